@@ -26,15 +26,15 @@ pub struct AccurateSettings {
     pub meshing: MeshingSettings,
     /// How to trace.
     pub tracing: TracingSettings,
-    /// How the accuracy was reached.
+    /// How the accuracy was reached; `None` where none was asked for.
     pub plan: Option<AccuracyPlan>,
 }
 
-/// The settings with tolerances and normals put in that keep a direction error of so many degrees. With a scene, its own rays are what
-/// the accuracy is about.
+/// Puts tolerances and normals into the settings that keep a direction error of so many degrees, for random rays, or with a scene for its
+/// own; `None` leaves the settings as they are. Traces on facets and spline to find them, and tells the monitor.
 ///
 /// # Errors
-/// When the settings say otherwise how fine the facets are, or that there are none.
+/// When the settings give a tolerance too, ask for the exact intersector, or do not fit the scene, or the scene does not fit the model.
 pub fn settings_for_accuracy(
     accuracy_deg: Option<f64>,
     (mut meshing, mut tracing): (MeshingSettings, TracingSettings),
@@ -80,10 +80,11 @@ pub fn settings_for_accuracy(
     Ok(AccurateSettings { meshing, tracing, plan: Some(found) })
 }
 
-/// The same for facets alone, whose readers interpolate the normals of their corners.
+/// Puts local tolerances into the settings that keep a direction error of so many degrees with bilinear normals, for facets whose readers
+/// interpolate those of their corners; `None` leaves the settings as they are, without a plan. Tells the monitor.
 ///
 /// # Errors
-/// When the settings say otherwise how fine the facets are.
+/// When the settings give a tolerance too.
 pub fn settings_for_accurate_facets(
     accuracy_deg: Option<f64>,
     meshing: MeshingSettings,
@@ -100,7 +101,10 @@ pub fn settings_for_accurate_facets(
     Ok((MeshingSettings { plan: Some(found.plan.clone()), ..meshing }, Some(found)))
 }
 
-/// What is asked for; `None` without an accuracy.
+/// Returns what is asked for; `None` without an accuracy.
+///
+/// # Errors
+/// When a tolerance is given too.
 fn target(accuracy_deg: Option<f64>, meshing: &MeshingSettings) -> Result<Option<AccuracyTarget>, Error> {
     let Some(degrees) = accuracy_deg else { return Ok(None) };
     if meshing.tolerance.is_some() {
@@ -110,7 +114,7 @@ fn target(accuracy_deg: Option<f64>, meshing: &MeshingSettings) -> Result<Option
     Ok(Some(AccuracyTarget::degrees(degrees)))
 }
 
-/// Rays of the scene's own run on the spline, from the sources and from where they were turned; about as many as asked.
+/// Returns rays of the scene's own run on the spline, from the sources and from where they were turned; about as many as it has rays.
 fn scene_rays(
     product: &ModelMeshSource<'_>,
     model: &Model,

@@ -55,17 +55,17 @@ pub struct CacheEntry {
 }
 
 impl Cache {
-    /// In a folder, which is made when something is kept.
+    /// Uses a folder, which is made when something is first kept.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into(), most_bytes: MOST_BYTES }
     }
 
-    /// With another limit, in bytes: beyond it, what was not used for longest is removed.
+    /// Returns the cache with another limit, in bytes: beyond it, what was not used for longest is removed.
     pub fn with_limit(self, most_bytes: u64) -> Self {
         Self { most_bytes, ..self }
     }
 
-    /// Where it is.
+    /// Returns the folder, which may not exist yet.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -75,7 +75,7 @@ impl Cache {
         self.most_bytes
     }
 
-    /// What it holds, what was not used for longest first; nothing where there is no folder.
+    /// Returns the whole entries, what was not used for longest first; none where there is no folder.
     ///
     /// # Errors
     /// When the folder cannot be read.
@@ -86,7 +86,7 @@ impl Cache {
         Ok(entries)
     }
 
-    /// Removes all entries, whole or not, and gives their number; other files in the folder stay.
+    /// Removes all entries, whole or not, and returns their number; other files in the folder stay.
     ///
     /// # Errors
     /// When one cannot be removed.
@@ -99,7 +99,10 @@ impl Cache {
         Ok(files.len())
     }
 
-    /// The files of the folder with a wanted name; none when there is no folder.
+    /// Returns the files of the folder with a wanted name; none when there is no folder.
+    ///
+    /// # Errors
+    /// When the folder cannot be read.
     fn files(&self, is_wanted: impl Fn(&str) -> bool) -> io::Result<Vec<CacheEntry>> {
         let folder = match fs::read_dir(&self.folder) {
             Ok(folder) => folder,
@@ -123,7 +126,7 @@ impl Cache {
         Ok(files)
     }
 
-    /// Reads an entry; `None` where there is none, or a damaged one, which is removed.
+    /// Reads an entry and marks it as just used; `None` where there is none, or a damaged one, which is removed and told to the monitor.
     fn fetch<T>(
         &self,
         name: &str,
@@ -148,7 +151,7 @@ impl Cache {
         }
     }
 
-    /// Keeps an entry; a run whose work cannot be kept goes on.
+    /// Writes an entry and removes what is too much; a failure is only told to the monitor.
     fn keep(&self, name: &str, monitor: &dyn Monitor, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
         // The standard library's seeded hasher is random: no further crate for a name.
         let random = RandomState::new().build_hasher().finish();
@@ -167,7 +170,7 @@ impl Cache {
         }
     }
 
-    /// Removes what was not used for longest beyond the limit, and what was never finished.
+    /// Removes entries, those first that were not used for longest, until the limit is kept, and what a process left unfinished a day ago.
     fn remove_excess(&self) -> io::Result<()> {
         for unfinished in self.files(is_unfinished)? {
             if unfinished.used.elapsed().is_ok_and(|age| age > STALE) {
@@ -197,18 +200,18 @@ pub(super) struct CachedFacets<'a> {
 }
 
 impl CachedFacets<'_> {
-    /// The facets of a model of so many faces.
+    /// Reads the facets of a model of so many placed faces; `None` where they are not kept.
     pub(super) fn mesh(&self, faces: usize) -> Option<FacetMesh> {
         let read = |from: &mut ArrayReader| FacetMesh::read_arrays(from, faces);
         self.cache.fetch(&self.name(KINDS[0]), self.monitor, read)
     }
 
-    /// Keeps the facets for a later run.
+    /// Keeps the facets for a later run; a failure is only told to the monitor.
     pub(super) fn keep_mesh(&self, mesh: &FacetMesh) {
         self.cache.keep(&self.name(KINDS[0]), self.monitor, |to| mesh.write_arrays(to));
     }
 
-    /// The octree of the facets; built and kept where there is none.
+    /// Returns the octree of the facets, as it was kept, or built and kept now.
     pub(super) fn octree<'m>(&self, mesh: &'m FacetMesh, settings: &octree::Settings) -> Octree<'m> {
         let name = self.name(KINDS[1]);
         let read = |from: &mut ArrayReader| Octree::read_arrays(mesh, settings, from);
@@ -219,12 +222,13 @@ impl CachedFacets<'_> {
         })
     }
 
+    /// Returns the name of the file of this kind of entry.
     fn name(&self, kind: &str) -> String {
         format!("{}{kind}", self.key.0)
     }
 }
 
-/// A hash of all that decides facets and octree; `None` where a file of the scene can no longer be read.
+/// Hashes all that decides facets and octree, the bytes of the models' files among it; `None` where a file can no longer be read.
 pub(super) fn facets_key(scene: &Scene, mesher: &tessellate::Settings) -> Option<Fingerprint> {
     // Entries are raw bytes of numbers: machines of the other order must not share them.
     let machine = if cfg!(target_endian = "big") { "big" } else { "little" };
@@ -240,7 +244,7 @@ pub(super) fn facets_key(scene: &Scene, mesher: &tessellate::Settings) -> Option
     Some(Fingerprint::new(&pieces))
 }
 
-/// The names of so many groups of a model: of a model in one piece its own.
+/// Returns the names of so many groups of a model; a model in one piece has its own.
 pub(super) fn group_keys(key: &Fingerprint, groups: usize) -> Vec<Fingerprint> {
     if groups == 1 {
         return vec![key.clone()];
@@ -248,18 +252,18 @@ pub(super) fn group_keys(key: &Fingerprint, groups: usize) -> Vec<Fingerprint> {
     (0..groups).map(|k| Fingerprint::new(&[key.0.as_bytes(), &k.to_le_bytes()])).collect()
 }
 
-/// Whether a name is a hash with this ending.
+/// Whether a file's name is a hash with this ending.
 fn is_entry(name: &str, kind: &str) -> bool {
     name.strip_suffix(kind).is_some_and(|hash| hash.len() == 32 && hash.bytes().all(|b| b.is_ascii_hexdigit()))
 }
 
-/// Whether a name is that of an entry that is being written.
+/// Whether a file's name is that of an entry that is being written.
 fn is_unfinished(name: &str) -> bool {
     let entry = name.strip_prefix('.').and_then(|n| n.strip_suffix(UNFINISHED)).and_then(|n| n.rsplit_once('.'));
     entry.is_some_and(|(entry, _)| KINDS.iter().any(|kind| is_entry(entry, kind)))
 }
 
-/// Removes a file that another process may have removed already.
+/// Removes a file that another process may have removed already, which is no error.
 fn remove(file: &Path) -> io::Result<()> {
     match fs::remove_file(file) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
@@ -267,7 +271,7 @@ fn remove(file: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes an entry between its magic and its checksum.
+/// Writes what `write` writes to a file, between magic and checksum; an error too where the disk is full.
 fn write_entry(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     let mut to =
         HashingWriter { to: BufWriter::with_capacity(WRITTEN_AT_ONCE, file), sum: crc32fast::Hasher::new() };
@@ -281,6 +285,9 @@ fn write_entry(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>)
 }
 
 /// Reads an entry of this version between its magic and its checksum; `bytes` is the size of the file.
+///
+/// # Errors
+/// When it is of another version, cut short or damaged, or `read` refuses it.
 fn read_entry<T>(
     file: &mut File,
     bytes: u64,

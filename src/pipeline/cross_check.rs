@@ -31,10 +31,11 @@ const FACETING_SEGMENTS: f64 = 100_000.0;
 const FACETING_REPLICATES: u32 = 64;
 
 impl PreparedScene {
-    /// Traces the scene, and asks some of its rays again of BVH and spline.
+    /// Traces the scene, asks some of its rays again of BVH and spline, and measures what facets change of its light. The request's shard
+    /// is not heeded; where it asks for kernels to be verified, nothing else of it is, nor the monitor.
     ///
     /// # Errors
-    /// What was traced, when the monitor ended the run early.
+    /// What was traced, when that is not the whole run: the monitor ended it early, or a range of rays was asked for.
     pub fn trace(&self, request: TraceRequest<'_>, monitor: &dyn Monitor) -> Result<SceneResults, Box<PartialRun>> {
         self.with_intersector(monitor, |intersector, build_seconds| {
             let settings = self.run_settings();
@@ -61,7 +62,8 @@ impl PreparedScene {
     }
 }
 
-/// Asks a sample of the run's rays again, and traces some of them on facets and on the spline.
+/// Asks a sample of the run's rays again, and traces some of them on facets and on the spline where no pilot has; `None` for both where no
+/// ray can be asked again, and for the error of a run on the spline.
 ///
 /// The rays depend on the run alone, not on how it was divided: a merged or resumed run has the figures of an undivided one.
 fn recheck(
@@ -72,7 +74,7 @@ fn recheck(
 ) -> (Option<CrossCheck>, Option<GeometricError>) {
     // What the pilot found need not be measured again.
     let pilot = prepared.chosen.as_ref().and_then(|chosen| chosen.geometric.clone());
-    let rays = sample(prepared, intersector);
+    let rays = sample_segments(prepared, intersector);
     if rays.is_empty() {
         return (None, pilot);
     }
@@ -83,8 +85,9 @@ fn recheck(
     (Some(check), pilot.or_else(|| facet_effects(prepared, results, [intersector, &*exact])))
 }
 
-/// Segments of some rays of the run, which are spread evenly over it and traced once more.
-fn sample(prepared: &PreparedScene, intersector: &dyn Intersector) -> Vec<Ray> {
+/// Traces some rays of the run once more, spread evenly over it, and returns up to [`RECHECKED`] of their segments, lifted off the surfaces
+/// that they leave.
+fn sample_segments(prepared: &PreparedScene, intersector: &dyn Intersector) -> Vec<Ray> {
     let settings = prepared.run_settings();
     // No more than the run has.
     let count = settings.rays.min(RECHECKED as u64);
@@ -96,7 +99,7 @@ fn sample(prepared: &PreparedScene, intersector: &dyn Intersector) -> Vec<Ray> {
     sampler.rays(RECHECKED, &prepared.job.loaded.model, |_, _| lift)
 }
 
-/// Octree against BVH against spline on these rays.
+/// Builds what the run has not of BVH and octree, and compares both and the spline on these rays.
 fn check_rays(
     prepared: &PreparedScene,
     intersector: &dyn Intersector,
@@ -139,7 +142,7 @@ fn check_rays(
     found
 }
 
-/// Some rays of the run once more, on facets and on the spline; `None` where the run was not on facets.
+/// Traces some rays of the run once more, on facets and on the spline, and compares every figure; `None` where the run was not on facets.
 fn facet_effects(
     prepared: &PreparedScene,
     results: &Results,

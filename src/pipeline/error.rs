@@ -38,31 +38,33 @@ pub struct Excerpt {
 }
 
 impl Error {
+    /// Makes an error without advice and excerpt.
     fn new(kind: ErrorKind, setting: Option<&'static str>, message: impl Into<String>) -> Self {
         Self { kind, setting, message: message.into(), help: None, excerpt: None }
     }
 
-    /// An error of the request itself.
+    /// Makes an error of the request itself.
     pub(crate) fn request(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Request, None, message)
     }
 
-    /// An error of a setting's value; the message goes on after its name.
+    /// Makes an error of a setting's value; the message goes on after its name.
     pub(crate) fn setting(setting: &'static str, message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Request, Some(setting), message)
     }
 
-    /// An error of a file that is read.
+    /// Makes an error of a file that is read.
     pub(crate) fn input(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Input, None, message)
     }
 
+    /// Returns the error with this advice, in place of any it had.
     pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// The error with a place in a file's text: file, text and range of bytes.
+    /// Returns the error with a place in a file's text: file, text and range of bytes; `label` says what is there.
     pub(crate) fn excerpt_of(
         mut self,
         (file, text, span): (&str, &str, Range<usize>),
@@ -72,35 +74,37 @@ impl Error {
         self
     }
 
-    /// What kind of mistake it is.
+    /// Returns what kind of mistake it is.
     pub fn kind(&self) -> ErrorKind {
         self.kind
     }
 
-    /// The setting that it is about, as `part`, `rays` or `until_error`.
+    /// Returns the setting that it is about, as `part`, `rays` or `until_error`; `None` where it is about none.
     pub fn setting_name(&self) -> Option<&'static str> {
         self.setting
     }
 
-    /// The message, without the setting before it and the advice behind it.
+    /// Returns the message, without the setting before it and the advice behind it.
     pub fn message(&self) -> &str {
         &self.message
     }
 
-    /// What to do about it.
+    /// Returns what to do about it; `None` where there is nothing to say.
     pub fn advice(&self) -> Option<&str> {
         self.help.as_deref()
     }
 
-    /// The place in a text file that is at fault.
+    /// Returns the place in a text file that is at fault; `None` where there is none.
     pub fn excerpt(&self) -> Option<&Excerpt> {
         self.excerpt.as_deref()
     }
 
+    /// Returns the setting, to stand before the message; empty without one.
     fn place(&self) -> String {
         self.setting.map_or_else(String::new, |setting| format!("{setting} "))
     }
 
+    /// Returns the advice behind a semicolon; empty without one.
     fn advice_clause(&self) -> String {
         self.help.as_ref().map_or_else(String::new, |help| format!("; {help}"))
     }

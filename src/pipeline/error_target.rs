@@ -54,10 +54,10 @@ pub struct TargetResult {
 }
 
 impl ErrorTarget {
-    /// From `P%@RECEIVER` or `P%@RECEIVER:cells`.
+    /// Parses `P%@RECEIVER` or `P%@RECEIVER:cells`.
     ///
     /// # Errors
-    /// When the text is neither, or the scene has no such receiver.
+    /// When the text is neither, P is not above 0 and below 100, or the scene has no such receiver.
     pub fn new(text: &str, scene: &Scene) -> Result<Self, Error> {
         let about = |message: String| Error::setting("until_error", format!("{text}: {message}"));
         let form = || about("write P%@RECEIVER, as in 0.5%@wall or 3%@wall:cells".into());
@@ -78,7 +78,7 @@ impl ErrorTarget {
         Ok(Self { percent, receiver: receiver.into(), cells })
     }
 
-    /// The relative error of a run, percent; `None` where nothing arrived.
+    /// Returns the relative error of a run, percent; `None` where nothing arrived.
     fn error(&self, results: &Results) -> Option<f64> {
         let r = results.receivers.iter().find(|r| r.name == self.receiver)?;
         // The cells weighted by their light: dark ones have large errors that nobody sees.
@@ -86,7 +86,8 @@ impl ErrorTarget {
         (power > 0.0).then(|| 100.0 * error / power)
     }
 
-    /// Traces until the error is small enough, the most rays are traced, or the monitor asks to stop: then not all is traced.
+    /// Traces runs of growing length, each from its first ray, until the error is small enough, the most rays are traced, or the monitor
+    /// asks to stop: then not all is traced. Sets `prepared.rays` to the number of the last.
     pub fn trace(&self, prepared: &mut PreparedScene, monitor: &dyn Monitor) -> (PartialRun, TargetResult) {
         let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
         let mut rays = FIRST_RAYS.min(most);
@@ -103,12 +104,12 @@ impl ErrorTarget {
         }
     }
 
-    /// What these results came to.
+    /// Returns what the run of these results has reached of this target.
     pub fn result(&self, results: &Results) -> TargetResult {
         self.result_of(self.error(results), results.rays)
     }
 
-    /// What the run has reached of this target, and how many rays are missing.
+    /// Returns what a run of so many rays has reached of this target, `found` percent, and how many rays are missing.
     fn result_of(&self, found: Option<f64>, rays: u64) -> TargetResult {
         let reached = found.is_some_and(|e| e <= self.percent);
         let wanted = (rays as f64 * self.growth(found)) as u64;
@@ -125,13 +126,14 @@ impl ErrorTarget {
         }
     }
 
-    /// How many times as many rays the error asks for: it falls at least as the root of the rays.
+    /// Returns how many times as many rays the error asks for, at most 64: it falls at least as the root of the rays. 16 where nothing
+    /// arrived.
     fn growth(&self, found: Option<f64>) -> f64 {
         // The error falls with the root of the rays, so that they go with the square of what is missing.
         found.map_or(GROWTH_FROM_NOTHING, |e| (GROWTH_MARGIN * (e / self.percent).powi(2)).min(GROWTH_RANGE[1]))
     }
 
-    /// Traces what the settings ask for; returns it with the error it reached.
+    /// Traces the rays that `prepared` asks for, and returns the sums with the error they reached, percent; `None` where nothing arrived.
     fn attempt(&self, prepared: &PreparedScene, monitor: &dyn Monitor) -> (PartialRun, Option<f64>) {
         let settings = prepared.run_settings();
         prepared.with_intersector(monitor, |intersector, _| {
@@ -142,7 +144,7 @@ impl ErrorTarget {
     }
 }
 
-/// Sums over the cells of the light, and of the error, each weighted by the light.
+/// Returns the sums over the cells of the light, and of the error, each weighted by the light.
 fn light_weighted_error(r: &ReceiverResult) -> (f64, f64) {
     let sum = |x: &mut dyn Iterator<Item = f64>| x.sum::<f64>();
     (sum(&mut r.cells.iter().map(|c| c * c)), sum(&mut r.cells.iter().zip(&r.errors).map(|(c, e)| c * e)))

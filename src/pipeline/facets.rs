@@ -10,10 +10,10 @@ use crate::tessellate::{self, FaceSelector, GroupedFacets, Tessellation, Toleran
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The mesher's settings from what is asked and the scene.
+/// Makes the mesher's settings of what is asked, else of the scene, else of the defaults.
 ///
 /// # Errors
-/// When a part, face or role is not there.
+/// When a part, face or role is not there, or a role is asked for without a scene.
 pub fn mesh_settings(
     meshing: &MeshingSettings,
     scene: Option<&Scene>,
@@ -47,7 +47,10 @@ pub fn mesh_settings(
     Ok(settings)
 }
 
-/// The faces of an optical role, which only a scene knows.
+/// Selects the faces of an optical role, which only a scene knows; binds the scene to the model.
+///
+/// # Errors
+/// When the role is not known, there is no scene, or the scene does not fit the model.
 fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<FaceSelector, Error> {
     if !BoundScene::ROLES.contains(&role) {
         let error = Error::setting("role", format!("{role}: there is no such optical role"));
@@ -61,7 +64,10 @@ fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<Fac
     Ok(FaceSelector::Placed(scene.bind(model)?.faces_in_role(role)))
 }
 
-/// The selector of a part by its name, or an error with the names that are like it.
+/// Selects a part by its name, letter for letter.
+///
+/// # Errors
+/// When there is none, with the names that are like it.
 fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     if model.parts.iter().any(|p| p.name == name) {
         return Ok(FaceSelector::Part(name.to_owned()));
@@ -75,7 +81,10 @@ fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     )))
 }
 
-/// A face by its name or, as `#ID`, by its entity; a face that is called `#17` wins over entity 17.
+/// Selects a face by its name or, as `#ID`, by its entity; a face that is called `#17` wins over entity 17.
+///
+/// # Errors
+/// When there is none, with the names that are like it.
 fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     // As STEP writes entities.
     let entity = name.strip_prefix('#').and_then(|id| id.parse().ok());
@@ -95,7 +104,7 @@ fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     }))
 }
 
-/// Facets with the seconds they took.
+/// Makes the facets of a model in one piece, tells the monitor, and returns them with the seconds they took.
 pub fn tessellate_model(
     model: &Model,
     settings: &tessellate::Settings,
@@ -106,7 +115,7 @@ pub fn tessellate_model(
     (tessellation, start.elapsed().as_secs_f64())
 }
 
-/// Facets of every group of a model, or of the model in one piece, with the seconds they took.
+/// Makes the facets of every group of a model, or without `instancing` of the model in one piece; returns them with the seconds they took.
 pub(super) fn tessellate_groups(
     model: &Model,
     instancing: Option<&Arc<Instancing>>,

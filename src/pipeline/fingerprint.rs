@@ -5,7 +5,8 @@ use super::prepared_scene::PreparedScene;
 use crate::formats::open_file;
 use crate::simulate::{Fingerprint, FingerprintHasher, RunSettings, grows};
 
-/// A hash of all that decides the bits of a run: program, scene, its files, facets, intersector, settings.
+/// Hashes all that decides the bits of a run: program, text of the scene, its files, facets, intersector, settings; of a run that grows not
+/// the number of rays.
 ///
 /// # Errors
 /// When a file of the scene cannot be read.

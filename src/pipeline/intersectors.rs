@@ -24,7 +24,7 @@ pub struct IntersectorChoice {
 }
 
 impl IntersectorChoice {
-    /// The settings, else the scene, else octree and bilinear.
+    /// Takes the settings, else the scene, else octree and bilinear.
     ///
     /// # Errors
     /// When the scene names an intersector or normals that are not known.
@@ -45,7 +45,7 @@ impl IntersectorChoice {
     }
 }
 
-/// Builds the chosen intersector and hands it to `work`, with what it took to build.
+/// Builds the chosen intersector of a model in one piece and calls `work` with it and what it took to build.
 pub fn with_intersector<T>(
     choice: IntersectorChoice,
     model: &Model,
@@ -66,7 +66,8 @@ pub(super) struct Builders<'a, 'm> {
     pub(super) splines: &'a dyn Fn() -> Vec<Arc<Exact>>,
 }
 
-/// The same with octrees and splines of the caller's making, for the meshes of all groups.
+/// Joins the octrees and splines of the caller's making to the chosen intersector over the meshes of all groups, and calls `work` with it
+/// and what it took to build; a BVH is built here. Without `instancing` there is one group.
 pub(super) fn with_built_intersector<'m, T>(
     choice: IntersectorChoice,
     Builders { octree, splines }: Builders<'_, 'm>,
@@ -110,7 +111,7 @@ pub(super) fn with_built_intersector<'m, T>(
     work(&*polished, polished.footprint())
 }
 
-/// The structures of all groups as one.
+/// Joins the structures of all groups to one that answers in the scene's coordinates; without `instancing` there must be one.
 pub(super) fn in_one_scene<'a>(
     instancing: Option<&'a Instancing>,
     mut groups: Vec<Box<dyn Intersector + 'a>>,
@@ -122,7 +123,7 @@ pub(super) fn in_one_scene<'a>(
     }
 }
 
-/// Where the farthest place of a group is, mm; 0 for what has the scene's coordinates.
+/// Returns how far, mm, the farthest place of a group is; 0 for what has the scene's coordinates.
 pub(super) fn farthest_start(instancing: Option<&Instancing>, group: usize) -> f64 {
     instancing.map_or(0.0, |i| i.reach(group))
 }

@@ -20,7 +20,7 @@ pub struct LoadedModel {
     pub seconds: f64,
 }
 
-/// Reads the models of a scene with `read`, which gets each entry of the scene.
+/// Reads the models of a scene with `read`, which is called with an entry of each file and unit, and puts them together.
 ///
 /// # Errors
 /// Those of `read`, and where the models cannot be put together.
@@ -62,7 +62,7 @@ pub fn read_scene_models(scene: &Scene, monitor: &dyn Monitor) -> Result<LoadedM
     })
 }
 
-/// How the file of a scene's model is read.
+/// Returns how the file of a scene's model is read: with its unit and limit, and without a box of the model.
 pub fn step_settings(entry: &ModelUse) -> step::Settings {
     let usual = step::Settings::default();
     step::Settings {

@@ -29,33 +29,33 @@ pub enum Stage<'a> {
 
 /// Hears how far a job is; nothing has to be heard.
 pub trait Monitor: Sync {
-    /// A stage begins.
+    /// Told when a stage begins.
     fn begin(&self, _stage: Stage<'_>) {}
 
-    /// So many rays of the stage are done, of so many; called from any thread. `false` ends tracing early.
+    /// Told that so many rays of the stage are done, of so many; called from any thread. `false` ends tracing early.
     fn advance(&self, _done: u64, _total: u64) -> bool {
         true
     }
 
-    /// A run whose verdicts leave so many rows unsure goes on with so many rays.
+    /// Told when verdicts leave so many rows unsure and the run goes on with so many rays.
     fn unsettled(&self, _rows: usize, _rays: u64) {}
 
-    /// How far a study has come.
+    /// Told how far a study has come.
     fn study_progress(&self, _progress: &study::Progress) {}
 
-    /// The stage is over.
+    /// Told when the stage is over.
     fn end(&self) {}
 
-    /// Something went wrong that changes no result.
+    /// Told when something went wrong that changes no result.
     fn warns(&self, _message: &str) {}
 
-    /// Tolerance, normals and intersector were chosen.
+    /// Told when tolerance, normals and intersector were chosen.
     fn chosen(&self, _chosen: &Chosen) {}
 
-    /// The facets keep the accuracy that was asked for as this sentence says.
+    /// Told when facets that keep an accuracy are found, with a sentence about them.
     fn aimed(&self, _answer: &str) {}
 
-    /// The error of a run was so many per cent, or unknown where nothing arrived, so that it goes on with so many rays.
+    /// Told that a run goes on with so many rays, as its error was so many per cent, or unknown where nothing arrived.
     fn grows(&self, _found_percent: Option<f64>, _rays: u64) {}
 }
 
@@ -65,7 +65,7 @@ pub struct Silent;
 
 impl Monitor for Silent {}
 
-/// Does a stage of work.
+/// Does a piece of work, with the monitor told when it begins and ends.
 pub(super) fn in_stage<T>(monitor: &dyn Monitor, stage: Stage<'_>, work: impl FnOnce() -> T) -> T {
     monitor.begin(stage);
     let made = work();

@@ -50,7 +50,7 @@ pub struct SceneJob {
 }
 
 impl SceneJob {
-    /// A scene as it stands, with all that it does not say left to choose.
+    /// Makes the job of a scene as it stands, with all that it does not say left to choose, and without a cache.
     pub fn new(scene: impl Into<Arc<Scene>>, loaded: impl Into<Arc<LoadedModel>>) -> Self {
         Self {
             scene: scene.into(),
@@ -63,7 +63,8 @@ impl SceneJob {
         }
     }
 
-    /// The facets of the model or of its groups with these settings, and the seconds that they took; those that are kept have no report.
+    /// Reads the facets of the model or of its groups from the cache, or makes and keeps them; returns them with the seconds that took.
+    /// Those from the cache have no report.
     fn facets(
         &self,
         instancing: Option<&Arc<Instancing>>,
@@ -87,7 +88,8 @@ impl SceneJob {
         (made, seconds)
     }
 
-    /// The cache, and the name that facets of these settings have in it.
+    /// Returns the cache, and the name that facets of these settings have in it; `None` without a cache, or where a file of the scene is
+    /// gone.
     fn cached(&self, settings: &tessellate::Settings) -> Option<(&Cache, Fingerprint)> {
         let cache = self.cache.as_ref()?;
         Some((cache, facets_key(&self.scene, settings)?))
@@ -122,11 +124,11 @@ pub struct PreparedScene {
 /// How to trace beside the settings.
 #[derive(Clone, Default)]
 pub struct TraceRequest<'a> {
-    /// With the full kernel too.
+    /// Whether to trace with the full kernel too and compare.
     pub verify_pruning: bool,
-    /// What is done already.
+    /// What is done already, of the same run; it is not traced again.
     pub from: Option<PartialRun>,
-    /// Which part of how many, from 0.
+    /// Which part of how many, from 0; all for `None`.
     pub shard: Option<[u32; 2]>,
     /// Told of all that is done, each thread after so long.
     pub finished: Option<&'a (dyn Fn(&PartialRun) + Sync)>,
@@ -137,12 +139,13 @@ pub struct TraceRequest<'a> {
 }
 
 impl PreparedScene {
-    /// Finest and loosest tolerance of the facets that the run is traced on, mm; `None` where it is traced on the spline.
+    /// Returns the finest and loosest tolerance of the facets that the run is traced on, mm; `None` where it is traced on the spline.
     pub fn tolerance_mm(&self) -> Option<[f64; 2]> {
         (self.choice.intersector != IntersectorKind::Exact).then_some(self.mesh_settings.tolerance)
     }
 
-    /// Binds the scene (so that its mistakes come before any work), makes the facets, and chooses how to trace where nobody asks.
+    /// Binds the scene (so that its mistakes come before any work), makes the facets, and chooses how to trace where nobody asks: by a
+    /// pilot that traces some of the run's rays.
     ///
     /// # Errors
     /// When the scene does not fit its model, or the settings do not fit the scene.
@@ -173,7 +176,8 @@ impl PreparedScene {
         Ok(prepared)
     }
 
-    /// Takes the facets or the spline that a pilot of the run's own rays finds sufficient.
+    /// Takes what another part of the run chose, if that was the spline, else the facets or the spline that a pilot finds sufficient. May
+    /// put finer facets in place of those that were made.
     fn choose_accuracy(&mut self, monitor: &dyn Monitor) {
         if let Some(chosen) = self.job.chosen.take_if(|chosen| chosen.intersector == "exact") {
             self.choice = IntersectorChoice { intersector: IntersectorKind::Exact, normals: chosen.normals };
@@ -199,21 +203,22 @@ impl PreparedScene {
         self.facets.instancing.as_ref().map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups)
     }
 
-    /// The exact spline of each group.
+    /// Returns the exact spline of each group, built when first asked for.
     fn splines(&self) -> Vec<Arc<Exact>> {
-        self.splines.get_or_init(|| self.built_splines(&exact::Settings::default())).clone()
+        self.splines.get_or_init(|| self.build_splines(&exact::Settings::default())).clone()
     }
 
-    /// The exact splines for some thousands of rays: those of pilot or run, else ones that are built sooner.
+    /// Returns exact splines for some thousands of rays: those of pilot or run, else ones that are built sooner and not kept.
     pub(super) fn splines_for_few_rays(&self) -> Vec<Arc<Exact>> {
-        self.splines.get().cloned().unwrap_or_else(|| self.built_splines(&exact::Settings::for_few_rays()))
+        self.splines.get().cloned().unwrap_or_else(|| self.build_splines(&exact::Settings::for_few_rays()))
     }
 
-    fn built_splines(&self, settings: &exact::Settings) -> Vec<Arc<Exact>> {
+    /// Builds the exact spline of each group.
+    fn build_splines(&self, settings: &exact::Settings) -> Vec<Arc<Exact>> {
         self.models().iter().map(|model| Arc::new(Exact::build(model, settings))).collect()
     }
 
-    /// The run's settings: the scene's, with what was asked over them.
+    /// Returns the run's settings: the scene's, with what was asked over them; the whole run, no shard.
     pub fn run_settings(&self) -> RunSettings {
         let mut settings = RunSettings::from(&self.job.scene.run);
         settings.rays = self.rays.or(self.job.tracing.rays()).unwrap_or(settings.rays);
@@ -229,12 +234,12 @@ impl PreparedScene {
         settings
     }
 
-    /// The replicates that are asked for: those of the rays from the first up to the last.
+    /// Returns the replicates that are asked for: those of the rays from the first up to the last.
     pub fn replicate_range(&self) -> Range<u32> {
         replicate_range(&self.bound, &self.run_settings())
     }
 
-    /// Unit of powers: `W` or `lm`.
+    /// Returns the unit of powers: `W` or `lm`.
     pub fn power_unit(&self) -> &'static str {
         match self.job.scene.run.unit {
             PowerUnit::Lumen => "lm",
@@ -242,13 +247,14 @@ impl PreparedScene {
         }
     }
 
-    /// Traces the replicates that are asked for and gives their sums.
+    /// Traces the replicates that are asked for, of the request's shard, and returns their sums with those it goes on from; fewer where the
+    /// monitor ends it early.
     pub fn trace_part(&self, request: TraceRequest<'_>, monitor: &dyn Monitor) -> PartialRun {
         let settings = RunSettings { shard: request.shard.unwrap_or([0, 1]), ..self.run_settings() };
         self.with_intersector(monitor, |intersector, _| self.run(intersector, &settings, request, monitor).partial)
     }
 
-    /// Builds the intersector of the run for `work`, which also gets the seconds that it took.
+    /// Builds the intersector of the run, or takes its octree from the cache, and calls `work` with it and the seconds that this took.
     pub fn with_intersector<T>(&self, monitor: &dyn Monitor, work: impl FnOnce(&dyn Intersector, f64) -> T) -> T {
         let meshes: Vec<&FacetMesh> = self.facets.meshes().collect();
         let kept = self.job.cached(&self.mesh_settings).map(|(cache, key)| (cache, group_keys(&key, meshes.len())));
@@ -265,7 +271,7 @@ impl PreparedScene {
         })
     }
 
-    /// Traces; ends early when the monitor asks for it.
+    /// Traces on an intersector; ends early when the monitor asks for it. Of the request, `shard` and `verify_pruning` are not looked at.
     pub(super) fn run(
         &self,
         intersector: &dyn Intersector,

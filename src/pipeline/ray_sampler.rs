@@ -16,7 +16,7 @@ pub struct RaySampler<'a> {
 }
 
 impl<'a> RaySampler<'a> {
-    /// Notes about `wanted` and a fifth more of `expected` rays.
+    /// Notes about `wanted` and a fifth more of `expected` rays; all where fewer come than are wanted.
     pub fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
         let share = (SPARE * wanted as f64 / expected.max(1) as f64).min(1.0);
         // Hashes are even over 64 bits: their share below the threshold is the share of the rays noted.
@@ -31,9 +31,9 @@ impl<'a> RaySampler<'a> {
         }
     }
 
-    /// At most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts above it, in free
-    /// space, so that all intersectors are asked the same question whatever they take for the surface: so many mm as `lift` says of the
-    /// ray and its cosine to the normal. One that left a ready mesh, which has no surface, is left out.
+    /// Returns at most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts above it,
+    /// in free space, so that all intersectors are asked the same question whatever they take for the surface: so many mm as `lift` says of
+    /// the ray and its cosine to the normal. One that left a ready mesh, which has no surface, is left out.
     pub fn rays(self, wanted: usize, model: &Model, lift: impl Fn(&Ray, f64) -> f64) -> Vec<Ray> {
         let faces: Vec<PlacedFace> = model.placed_faces().collect();
         let mut noted = self.sample.into_inner().unwrap_or_else(|e| e.into_inner());
@@ -43,7 +43,8 @@ impl<'a> RaySampler<'a> {
     }
 }
 
-/// The ray a little above the surface that it left; `None` where there is no surface.
+/// Moves the start of a ray a little above the surface that it left, to the side that it goes to; unchanged where it left none, `None`
+/// where that has no surface or no normal there.
 fn lift_off(ray: Ray, faces: &[PlacedFace], lift: &impl Fn(&Ray, f64) -> f64) -> Option<Ray> {
     let Some(departure) = ray.departure else { return Some(ray) };
     let placed = faces.get(departure.face.index())?;

@@ -13,7 +13,7 @@ use serde_json::Value;
 pub struct SceneResults {
     /// What was counted.
     pub results: Results,
-    /// Some of the rays asked again of BVH and spline.
+    /// Some of the rays asked again of BVH and spline; `None` where none could be.
     pub check: Option<CrossCheck>,
     /// What the facets change of the light, where the run was on facets.
     pub geometric: Option<GeometricError>,
@@ -24,7 +24,7 @@ pub struct SceneResults {
 }
 
 impl SceneResults {
-    /// The figures of every receiver with both their errors.
+    /// Returns the figures of every receiver with both their errors; the geometric one is absent where facets were not compared.
     pub fn figures(&self, prepared: &PreparedScene) -> Vec<ReceiverFigures> {
         let surface = match (prepared.choice.intersector, &self.geometric) {
             (IntersectorKind::Exact, _) => Surface::Spline,
@@ -34,7 +34,8 @@ impl SceneResults {
         figures::figures(&self.results, surface, prepared.power_unit())
     }
 
-    /// The errors of a receiver's cells from the facets, where they are known.
+    /// Returns the errors of a receiver's cells from the facets, in its unit; zeros on the spline, `None` where they are not known, empty
+    /// where there were too many cells to compare.
     pub fn geometric_cells(&self, prepared: &PreparedScene, receiver: usize) -> Option<Vec<f64>> {
         // On the true surfaces the error is known, and it is none.
         let none = vec![0.0; self.results.receivers[receiver].cells.len()];
@@ -46,7 +47,8 @@ impl SceneResults {
         }
     }
 
-    /// The same of each of its further channels.
+    /// Returns for each further channel of a receiver the errors of its cells from the facets, in its unit; zeros on the spline, `None`
+    /// where they are not known.
     pub fn geometric_channel_cells(&self, prepared: &PreparedScene, receiver: usize) -> Vec<Option<Vec<f64>>> {
         let none = Some(vec![0.0; self.results.receivers[receiver].cells.len()]);
         let of_channel = |c: usize| match (prepared.choice.intersector, &self.geometric) {
@@ -57,7 +59,7 @@ impl SceneResults {
         (0..self.results.receivers[receiver].channels.len()).map(of_channel).collect()
     }
 
-    /// The document of `results.json`, without what only its writer knows: files and where the numbers come from.
+    /// Makes the document of `results.json`, without what only its writer knows: files and where the numbers come from.
     ///
     /// # Errors
     /// When a piece cannot be written as JSON.

@@ -42,15 +42,15 @@ pub struct TracingSettings {
 }
 
 impl TracingSettings {
-    /// The number of rays that was asked for.
+    /// Returns the number of rays that was asked for, those before a range included; `None` where none was.
     pub fn rays(&self) -> Option<u64> {
         self.ray_range.map(|range| range.end)
     }
 
-    /// The number of threads to trace with.
+    /// Returns the number of threads to trace with: as many as the machine has where none are asked for, 4096 at most.
     ///
     /// # Errors
-    /// When none are asked for.
+    /// When 0 are asked for.
     pub fn thread_count(&self) -> Result<usize, Error> {
         match self.threads {
             // A machine that does not tell its threads has one at least.
@@ -66,7 +66,7 @@ impl TracingSettings {
 pub struct RayRange {
     /// The first, where a range was given.
     pub first: Option<u64>,
-    /// Past the last.
+    /// Past the last ray: their number where no first is given.
     pub end: u64,
 }
 
@@ -88,7 +88,7 @@ impl IntersectorKind {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Octree, Self::Bvh2, Self::Cwbvh, Self::Exact];
 
-    /// Its name on the command line and in scenes.
+    /// Returns its name on the command line and in scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Octree => "octree",
@@ -117,7 +117,10 @@ impl FromStr for IntersectorKind {
     }
 }
 
-/// The mode of this name, in any case.
+/// Finds the kind of normals of this name, in any case.
+///
+/// # Errors
+/// When there is none.
 pub(super) fn normal_mode(name: &str) -> Result<NormalMode, Error> {
     NormalMode::ALL.into_iter().find(|mode| mode.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
         Error::setting("normals", format!("{name}: they are not known"))

@@ -9,16 +9,18 @@ use super::verdicts::verdict;
 use crate::regulation::{RowVerdict, Verdict};
 use crate::simulate::{PartialRun, Results};
 
-/// Rays of the first run, and the most, where the settings do not say.
+/// Rays of the first run.
 const FIRST_RAYS: u64 = 200_000;
+/// The most rays, where the settings do not say.
 const MOST_RAYS: u64 = 10_000_000_000;
 
-/// More rays than a row asks for, for its error has an error; least and greatest growth of a run.
+/// More rays than a row asks for, for its error has an error.
 const GROWTH_MARGIN: f64 = 1.1;
+/// Least and greatest growth of a run.
 const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 
-/// Traces until no row of a verdict is unsure by the errors of the rays, the most rays are traced, or the monitor asks to stop: then not
-/// all is traced. Gives the sums and the number of rays.
+/// Traces runs of growing length, each from its first ray, until no row of a verdict is unsure by the errors of the rays, the most rays are
+/// traced, or the monitor asks to stop: then not all is traced. Sets `prepared.rays`; returns the sums and the number of rays.
 pub fn trace_until_settled(prepared: &mut PreparedScene, monitor: &dyn Monitor) -> (PartialRun, u64) {
     let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
     let mut rays = FIRST_RAYS.min(most);
@@ -40,8 +42,8 @@ pub fn trace_until_settled(prepared: &mut PreparedScene, monitor: &dyn Monitor) 
     }
 }
 
-/// The rays that would settle each unsure row. A row at its very limit asks for no number: then twice as
-/// many are tried.
+/// Returns for each unsure row the rays that would settle it; empty where all rows are sure. A row at its very limit asks for no number:
+/// then twice as many are tried.
 fn rays_wanted(prepared: &PreparedScene, results: &Results) -> Vec<u64> {
     let all = prepared.job.scene.regulations.iter();
     // One that cannot be judged asks for no rays; the last run tells why.

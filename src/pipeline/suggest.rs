@@ -1,6 +1,6 @@
 //! Names close to a mistyped one.
 
-/// A sentence with the closest known name first: `did you mean "cover"? its parts are cover, housing`.
+/// Writes a sentence with the closest known name first, and up to twenty of all: `did you mean "cover"? its parts are cover, housing`.
 pub(super) fn closest_name(intro: &str, given: &str, known: &[&str]) -> String {
     let mut unique: Vec<&str> = Vec::new();
     for name in known {
@@ -9,7 +9,7 @@ pub(super) fn closest_name(intro: &str, given: &str, known: &[&str]) -> String {
         }
     }
     let close =
-        unique.iter().map(|n| (distance(given, n), *n)).min().filter(|(d, n)| *d <= 2 + n.chars().count() / 3);
+        unique.iter().map(|n| (edit_distance(given, n), *n)).min().filter(|(d, n)| *d <= 2 + n.chars().count() / 3);
     // A screen of names; files may have thousands of parts.
     let shown = unique.iter().take(20).copied().collect::<Vec<_>>().join(", ");
     let rest = if unique.len() > 20 { format!(" and {} more", unique.len() - 20) } else { String::new() };
@@ -20,8 +20,8 @@ pub(super) fn closest_name(intro: &str, given: &str, known: &[&str]) -> String {
     }
 }
 
-/// Edit distance (Levenshtein 1966), case ignored, over at most 60 characters.
-fn distance(a: &str, b: &str) -> usize {
+/// Returns the edit distance (Levenshtein 1966), case ignored, over at most 60 characters.
+fn edit_distance(a: &str, b: &str) -> usize {
     let fold = |s: &str| s.to_lowercase().chars().take(60).collect::<Vec<char>>();
     let (a, b) = (fold(a), fold(b));
     let mut row: Vec<usize> = (0..=b.len()).collect();
@@ -43,7 +43,7 @@ mod tests {
 
     #[test]
     fn the_nearest_name_comes_first() {
-        assert_eq!(distance("kitten", "sitting"), 3);
+        assert_eq!(edit_distance("kitten", "sitting"), 3);
         assert_eq!(
             closest_name("parts:", "huosing", &["cover", "housing", "cover"]),
             "did you mean \"housing\"? parts: cover, housing"

@@ -15,7 +15,11 @@ pub struct ReceiverVerdict {
     pub assessment: Assessment,
 }
 
-/// The intensities of a far field over H and V, with both errors; geometric ones are zero where none are given.
+/// Makes the map of intensities, cd, of a far field over H and V, with both errors; geometric ones are zero for `None`. `ray_flux` is the
+/// power of a ray, lm.
+///
+/// # Errors
+/// When `geometric` has not an error for every cell.
 fn intensities(
     receiver: &ReceiverResult,
     geometric: Option<&[f64]>,
@@ -34,7 +38,10 @@ fn intensities(
     Ok(IntensityMap::new(edges(0), edges(1), cells)?.with_ray_flux(ray_flux))
 }
 
-/// The verdict of one regulation about a run's results.
+/// Judges a run's results by one regulation; `geometric` returns the errors of a receiver's cells from the facets.
+///
+/// # Errors
+/// When the far field cannot be judged; the message says why.
 pub(super) fn verdict(
     wanted: &RegulationUse,
     prepared: &PreparedScene,
@@ -58,7 +65,7 @@ pub(super) fn verdict(
 }
 
 impl SceneResults {
-    /// The verdicts of the scene's regulations, in its order.
+    /// Returns the verdicts of the scene's regulations, in its order.
     ///
     /// # Errors
     /// When a far field cannot be judged; the message says why.

@@ -124,7 +124,7 @@ pub enum SeriesStyle {
 pub(super) const PALETTE: [&str; 8] =
     ["#d97706", "#3b82f6", "#10a37f", "#e0529c", "#8b5cf6", "#0ea5b7", "#b45309", "#84a30d"];
 
-/// The colour of each series; a dashed one has that of the series before it, whose reference it is.
+/// Returns the colour of each series; a dashed one has that of the series before it, whose reference it is. Colours repeat after eight.
 pub(super) fn colours(series: &[Series]) -> Vec<&'static str> {
     let mut used = 0usize;
     let colour = |s: &Series| {
@@ -138,24 +138,25 @@ pub(super) fn colours(series: &[Series]) -> Vec<&'static str> {
 }
 
 impl AxisStyle {
-    /// A linear axis.
+    /// Makes a linear axis.
     pub fn linear(label: &str, unit: &str) -> Self {
         Self { label: label.into(), unit: unit.into(), log: false }
     }
 
-    /// A logarithmic axis.
+    /// Makes a logarithmic axis, on which only positive values have a place.
     pub fn log(label: &str, unit: &str) -> Self {
         Self { label: label.into(), unit: unit.into(), log: true }
     }
 
-    /// Label and unit as written at the axis.
+    /// Returns label and unit as written at the axis; the label alone for pure numbers.
     pub fn title(&self) -> String {
         if self.unit.is_empty() { self.label.clone() } else { format!("{} ({})", self.label, self.unit) }
     }
 }
 
 impl Chart {
-    /// A map of a grid with lines of equal value at round levels; the axes are the grid's.
+    /// Makes a map of a grid with lines of equal value at round levels, which the caption then names; the axes are the grid's. `name` is
+    /// the stem of its files.
     pub fn map(name: &str, title: &str, caption: &str, grid: Grid) -> Self {
         let axis = |k: usize| AxisStyle::linear(&grid.axes[k].label, &grid.axes[k].unit);
         // From zero up: a map of negative values alone has no lines.
@@ -202,12 +203,12 @@ impl Chart {
         self
     }
 
-    /// The chart with the same length for a unit of both axes.
+    /// Returns the chart with the same length for a unit of both axes.
     pub fn with_equal_scales(self) -> Self {
         Self { equal_scales: true, ..self }
     }
 
-    /// Points and lines.
+    /// Makes a chart of points and lines; `name` is the stem of its files.
     pub fn series(name: &str, title: &str, caption: &str, axes: [AxisStyle; 2], series: Vec<Series>) -> Self {
         let [x, y] = axes;
         let content = Content::Series(series);

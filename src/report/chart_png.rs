@@ -17,12 +17,12 @@ const ZOOM: f32 = 2.0;
 /// The colour of text and axes on white.
 const TEXT: [u8; 3] = [0x1d, 0x1b, 0x18];
 
-/// The chart as a picture; `None` when it has no size, which no chart causes.
+/// Renders the chart on white, at twice the size of its drawing; `None` when it has no size, which no chart causes.
 pub(super) fn picture(chart: &Chart) -> Option<Picture> {
     render(&static_chart::draw(chart))
 }
 
-/// The pixels of a drawing; `None` where it has no size.
+/// Renders a drawing; `None` where it has no size.
 fn render(drawing: &Drawing) -> Option<Picture> {
     let [width, height] = drawing.size.map(|s| (s as f32 * ZOOM).ceil() as u32);
     let mut pixels = Pixmap::new(width, height)?;
@@ -37,38 +37,38 @@ fn render(drawing: &Drawing) -> Option<Picture> {
     Some(Picture { width, height, rgb })
 }
 
-/// Paints one element; `None` where it leaves no ink.
+/// Paints one element over `pixels`; `None` where it leaves no ink.
 fn paint(pixels: &mut Pixmap, element: &Element, font: &FontRef) -> Option<()> {
     let zoom = Transform::from_scale(ZOOM, ZOOM);
     match element {
         Element::Line { points, ink, width, opacity, dashed } => {
             let mut path = PathBuilder::new();
-            for (k, [x, y]) in points.iter().map(single).enumerate() {
+            for (k, [x, y]) in points.iter().map(to_single).enumerate() {
                 if k == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
             }
             let dash = if *dashed { StrokeDash::new(vec![DASH as f32; 2], 0.0) } else { None };
             let stroke = Stroke { width: *width as f32, line_join: LineJoin::Round, dash, ..Stroke::default() };
-            pixels.stroke_path(&path.finish()?, &solid(*ink, *opacity), &stroke, zoom, None);
+            pixels.stroke_path(&path.finish()?, &ink_paint(*ink, *opacity), &stroke, zoom, None);
         }
         Element::Rectangle { corner, size, radius, ink } => {
-            let ([x, y], [width, height]) = (single(corner), single(size));
-            let path = rounded(Rect::from_xywh(x, y, width, height)?, *radius as f32)?;
-            pixels.fill_path(&path, &solid(*ink, 1.0), FillRule::Winding, zoom, None);
+            let ([x, y], [width, height]) = (to_single(corner), to_single(size));
+            let path = rounded_rectangle(Rect::from_xywh(x, y, width, height)?, *radius as f32)?;
+            pixels.fill_path(&path, &ink_paint(*ink, 1.0), FillRule::Winding, zoom, None);
         }
         Element::Disc { centre, radius, ink, opacity } => {
-            let [x, y] = single(centre);
+            let [x, y] = to_single(centre);
             let path = PathBuilder::from_circle(x, y, *radius as f32)?;
-            pixels.fill_path(&path, &solid(*ink, *opacity), FillRule::Winding, zoom, None);
+            pixels.fill_path(&path, &ink_paint(*ink, *opacity), FillRule::Winding, zoom, None);
         }
         Element::Text { text, place, anchor, opacity, turned, ink } => {
-            let [x, y] = single(place);
+            let [x, y] = to_single(place);
             let turn = if *turned { Transform::from_rotate(-90.0) } else { Transform::identity() };
             let place = turn.post_translate(x, y).post_concat(zoom);
             let path = outline(text, *anchor, font)?;
-            pixels.fill_path(&path, &solid(*ink, *opacity), FillRule::Winding, place, None);
+            pixels.fill_path(&path, &ink_paint(*ink, *opacity), FillRule::Winding, place, None);
         }
         Element::Pixels { corner, size, picture } => {
-            let ([x, y], [width, height]) = (single(corner), single(size));
+            let ([x, y], [width, height]) = (to_single(corner), to_single(size));
             let mut source = Pixmap::new(picture.width, picture.height)?;
             for (pixel, rgb) in source.data_mut().chunks_exact_mut(4).zip(picture.rgb.chunks_exact(3)) {
                 // Pictures are opaque.
@@ -85,19 +85,22 @@ fn paint(pixels: &mut Pixmap, element: &Element, font: &FontRef) -> Option<()> {
     Some(())
 }
 
-fn single(place: &Place) -> [f32; 2] {
+/// Returns a place in single precision.
+fn to_single(place: &Place) -> [f32; 2] {
     place.map(|v| v as f32)
 }
 
-fn solid(ink: Ink, opacity: f64) -> Paint<'static> {
+/// Returns the paint of an ink on white; `opacity` from 0 to 1.
+fn ink_paint(ink: Ink, opacity: f64) -> Paint<'static> {
     let [r, g, b] = if let Ink::Colour(rgb) = ink { rgb } else { TEXT };
     let mut paint = Paint { anti_alias: true, ..Paint::default() };
     paint.set_color_rgba8(r, g, b, (opacity * 255.0).round() as u8);
     paint
 }
 
-/// A rectangle whose corners are quarters of circles, drawn as parabolas: at 2 units the difference does not show.
-fn rounded(rect: Rect, radius: f32) -> Option<Path> {
+/// Returns a rectangle whose corners are quarters of circles, drawn as parabolas: at 2 units the difference does not show. `None` where it
+/// has no extent.
+fn rounded_rectangle(rect: Rect, radius: f32) -> Option<Path> {
     if radius == 0.0 {
         return Some(PathBuilder::from_rect(rect));
     }
@@ -116,7 +119,7 @@ fn rounded(rect: Rect, radius: f32) -> Option<Path> {
     path.finish()
 }
 
-/// The outlines of a line of text around its anchor on the baseline, in units of the drawing; `None` when nothing in it has one.
+/// Returns the outlines of a line of text around its anchor on the baseline, in units of the drawing; `None` when nothing in it has one.
 fn outline(text: &str, anchor: Anchor, font: &FontRef) -> Option<Path> {
     let scale = TYPE_SIZE as f32 / font.units_per_em()?;
     let mut path = PathBuilder::new();

@@ -18,7 +18,7 @@ const LEVELS: usize = 7;
 /// Lines of fewer points are specks of noise.
 const FEWEST_POINTS: usize = 6;
 
-/// The highest levels of the series 1, 2, 5 below a value, rising.
+/// Returns the seven highest levels of the series 1, 2, 5 below a value, rising; none unless it is positive and finite.
 pub(super) fn round_levels(most: f64) -> Vec<f64> {
     if !(most > 0.0 && most.is_finite()) {
         return Vec::new();
@@ -35,14 +35,15 @@ pub(super) fn round_levels(most: f64) -> Vec<f64> {
 /// An edge between the centres of two neighbouring cells: the lower cell, and whether it runs along the second axis.
 type Edge = (usize, usize, bool);
 
-/// The lines of these levels, through values averaged with their neighbours (1-2-1), so that noise does not tear them.
+/// Finds the lines of these levels, through values averaged with their neighbours (1-2-1), so that noise does not tear them. None for a
+/// grid of a single row or column; lines of fewer than [`FEWEST_POINTS`] are left out.
 pub(super) fn isolines(grid: &Grid, levels: &[f64]) -> Vec<Isoline> {
     let [a, b] = &grid.axes;
     // Marching squares need squares.
     if a.cells < 2 || b.cells < 2 || grid.values.len() != a.cells * b.cells {
         return Vec::new();
     }
-    let values = smoothed(&grid.values, a.cells, b.cells);
+    let values = averaged_with_neighbours(&grid.values, a.cells, b.cells);
     let value = |i: usize, j: usize| values[j * a.cells + i];
     let mut lines = Vec::new();
     for &level in levels {
@@ -62,8 +63,8 @@ pub(super) fn isolines(grid: &Grid, levels: &[f64]) -> Vec<Isoline> {
     lines
 }
 
-/// Each value averaged with its neighbours, weighed 1-2-1 along both axes.
-fn smoothed(values: &[f64], columns: usize, rows: usize) -> Vec<f64> {
+/// Returns each value averaged with its neighbours, weighed 1-2-1 along both axes; a neighbour beyond the border counts as the cell itself.
+fn averaged_with_neighbours(values: &[f64], columns: usize, rows: usize) -> Vec<f64> {
     let along = |values: &[f64], step: usize, place: &dyn Fn(usize) -> usize, count: usize| -> Vec<f64> {
         (0..values.len())
             .map(|k| {
@@ -78,7 +79,7 @@ fn smoothed(values: &[f64], columns: usize, rows: usize) -> Vec<f64> {
     along(&once, columns, &|k| k / columns, rows)
 }
 
-/// The pairs of edges that a line joins within the squares between four centres, as a list of neighbours of each edge.
+/// Finds the edges between cell centres that a line of this level crosses, and returns for each those that it goes on to.
 fn crossings(values: &[f64], [columns, rows]: [usize; 2], level: f64) -> FxHashMap<Edge, Vec<Edge>> {
     let mut links: FxHashMap<Edge, Vec<Edge>> = FxHashMap::default();
     let mut join = |p: Edge, q: Edge| {
@@ -117,7 +118,7 @@ fn crossings(values: &[f64], [columns, rows]: [usize; 2], level: f64) -> FxHashM
     links
 }
 
-/// Neighbouring edges as chains: those with an end first, then the closed ones.
+/// Joins neighbouring edges to chains: those with an end first, then the closed ones, whose first edge comes again as the last.
 fn chains(mut links: FxHashMap<Edge, Vec<Edge>>) -> Vec<Vec<Edge>> {
     // Starts are sorted: a table of hashes has no order, and pictures must not change from run to run.
     let mut starts: Vec<(bool, Edge)> = links.iter().map(|(edge, next)| (next.len() > 1, *edge)).collect();

@@ -24,8 +24,9 @@ pub struct CheckReport<'a> {
     pub provenance: Provenance,
 }
 
-/// Rays drawn of each cause, and rays listed.
+/// Most rays drawn of each cause.
 const DRAWN: usize = 200;
+/// Most rays listed.
 const LISTED: usize = 500;
 
 /// A cause with its count, colour and meaning.
@@ -36,7 +37,7 @@ struct Kind {
     meaning: &'static str,
 }
 
-/// The causes of differences with their counts, colours and what they mean.
+/// Lists the causes of differences with their counts, colours and what they mean.
 fn kinds(check: &CrossCheck) -> Vec<Kind> {
     let e = &check.facets_vs_exact.explained;
     let kind = |name, count, colour, meaning| Kind { name, count, colour, meaning };
@@ -89,7 +90,7 @@ fn kinds(check: &CrossCheck) -> Vec<Kind> {
     ]
 }
 
-/// The kind that a ray belongs to, as named in [`kinds`].
+/// Returns the kind that a ray belongs to, as named in [`kinds`].
 fn kind_of(d: &Disagreement) -> &'static str {
     match d.cause {
         // A difference between two trees over the same facets is graver than any between facets and spline.
@@ -100,7 +101,7 @@ fn kind_of(d: &Disagreement) -> &'static str {
     }
 }
 
-/// What was found, in a sentence.
+/// Writes in a sentence whether octree and BVH agree, and how many differences from the spline are unexplained.
 pub fn verdict(check: &CrossCheck) -> String {
     let f = &check.facets_vs_exact;
     let between = match check.octree_vs_bvh.disagree {
@@ -114,8 +115,8 @@ pub fn verdict(check: &CrossCheck) -> String {
     format!("Of {} rays asked again, {between}, and {beside}.", grouped(check.rays))
 }
 
-/// All counts in one table.
-pub(super) fn counts(check: &CrossCheck) -> Table {
+/// Makes a table of all counts of rays: asked, hit, answered differently, explained by which cause, proved.
+pub(super) fn count_table(check: &CrossCheck) -> Table {
     let (f, e) = (&check.facets_vs_exact, &check.facets_vs_exact.explained);
     let mut table = Table::new("cross-check", "The same rays, three intersectors", &[("", ""), ("rays", "")]);
     for (name, count) in [
@@ -140,8 +141,8 @@ pub(super) fn counts(check: &CrossCheck) -> Table {
     table
 }
 
-/// How far hits and normals are off, where both hit the same place.
-pub(super) fn errors(check: &CrossCheck, who: &str) -> Table {
+/// Makes a table of how far hits and normals of `who` are off, where both hit the same place.
+pub(super) fn error_table(check: &CrossCheck, who: &str) -> Table {
     let f = &check.facets_vs_exact;
     let columns = [("", ""), ("median", ""), ("99 %", ""), ("largest", ""), ("unit", "")];
     let title = format!("How far the {who} are from the spline, where both hit the same place");
@@ -153,7 +154,8 @@ pub(super) fn errors(check: &CrossCheck, who: &str) -> Table {
     table
 }
 
-/// Facets and rays that facets and spline answer differently, by cause; `None` where there are none.
+/// Draws facets and rays that facets and spline answer differently, at most [`DRAWN`] of each cause; `None` where there are none, or no
+/// facets.
 pub(super) fn odd_rays(check: &CrossCheck, facets: &Facets) -> Option<View> {
     let diagonal = facets.mesh.bounds().diagonal();
     if check.disagreements.is_empty() || !diagonal.is_finite() {
@@ -191,7 +193,7 @@ pub(super) fn odd_rays(check: &CrossCheck, facets: &Facets) -> Option<View> {
 }
 
 impl CheckReport<'_> {
-    /// The answer in a paragraph.
+    /// Writes the answer in a paragraph: the verdict, how many rays differ, and the p99 errors of hits (mm) and normals (degrees).
     pub fn answer(&self) -> String {
         let (c, f) = (self.check, &self.check.facets_vs_exact);
         let differ = f.hit_miss + f.other_face;
@@ -217,14 +219,14 @@ impl CheckReport<'_> {
         text
     }
 
-    /// The whole report.
+    /// Makes the whole report.
     pub fn report(&self) -> Report {
         let sections = vec![self.rays(), self.distance(), self.speed()];
         let title = format!("Check of {}", self.title);
         Report { title, answer: self.answer(), sections, provenance: self.provenance.clone() }
     }
 
-    /// The section on rays answered differently.
+    /// Makes the section on rays answered differently.
     fn rays(&self) -> Section {
         let mut table = Table::new(
             "causes",
@@ -246,7 +248,7 @@ impl CheckReport<'_> {
         if self.check.disagreements.is_empty() { section } else { section.with_block(self.list()) }
     }
 
-    /// The rays themselves, to be looked at one by one.
+    /// Makes a table of the rays themselves, at most [`LISTED`], evenly over all.
     fn list(&self) -> Table {
         let all = &self.check.disagreements;
         let mut columns = vec![("ray", ""), ("cause", ""), ("facets: face", ""), ("facets: t", "mm")];
@@ -274,16 +276,16 @@ impl CheckReport<'_> {
         table
     }
 
-    /// The section on errors of facets and of the normals on them.
+    /// Makes the section on errors of facets and of the normals on them.
     fn distance(&self) -> Section {
         let who = if self.normals == "exact" { "facets' hits, moved to the spline," } else { "facets" };
         let section = Section::new("Facets against the spline")
-            .with_block(errors(self.check, who))
-            .with_block(counts(self.check));
+            .with_block(error_table(self.check, who))
+            .with_block(count_table(self.check));
         self.tables.iter().cloned().fold(section, |s, t| s.with_block(t))
     }
 
-    /// The section on rates, building times and memory.
+    /// Makes the section on rates, building times and memory.
     fn speed(&self) -> Section {
         let c = self.check;
         let (m, b, s) = (&c.mrays_per_s, &c.build_seconds, &c.bytes_per_facet);

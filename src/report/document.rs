@@ -39,12 +39,12 @@ pub enum Block {
 }
 
 impl Section {
-    /// A section without content.
+    /// Makes a section without content.
     pub fn new(title: &str) -> Self {
         Self { title: title.into(), blocks: Vec::new() }
     }
 
-    /// The section with one more block.
+    /// Returns the section with one more block at its end.
     pub fn with_block(mut self, block: impl Into<Block>) -> Self {
         self.blocks.push(block.into());
         self

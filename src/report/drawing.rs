@@ -53,18 +53,19 @@ pub(super) const TYPE_SIZE: f64 = 13.0;
 /// Lengths of a dash and of the gap behind it.
 pub(super) const DASH: f64 = 5.0;
 
+/// Returns the text with the four characters that XML reserves written as entities.
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// A coordinate to a tenth of a unit, without a zero that says nothing.
-fn rounded(x: f64) -> String {
+/// Writes a coordinate to a tenth of a unit, without a zero that says nothing.
+fn in_tenths(x: f64) -> String {
     let text = format!("{x:.1}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
 impl Ink {
-    /// A colour written as `#rrggbb`.
+    /// Reads a colour written as `#rrggbb`; the colour of the text for anything else.
     pub(super) fn hex(text: &str) -> Self {
         let part = |k: usize| text.get(1 + 2 * k..3 + 2 * k).and_then(|h| u8::from_str_radix(h, 16).ok());
         match [part(0), part(1), part(2)] {
@@ -74,6 +75,7 @@ impl Ink {
         }
     }
 
+    /// Writes it as a CSS colour.
     fn svg(self) -> String {
         match self {
             Self::Text => "currentColor".into(),
@@ -82,13 +84,13 @@ impl Ink {
     }
 }
 
-/// ` name=".75"`, or nothing for a full one.
+/// Writes ` name=".75"`, or nothing for an opacity of 1.
 fn opacity_attribute(name: &str, opacity: f64) -> String {
     if opacity < 1.0 { format!(r#" {name}="{opacity}""#) } else { String::new() }
 }
 
 impl Drawing {
-    /// The drawing as an SVG document; text has the colour and the typeface of wherever it stands.
+    /// Writes the drawing as an SVG document; text has the colour and the typeface of wherever it stands.
     pub(super) fn svg(&self) -> String {
         let [width, height] = self.size;
         let mut svg = format!(
@@ -105,11 +107,12 @@ impl Drawing {
 }
 
 impl Element {
+    /// Appends the element as SVG; a picture without pixels is left out.
     fn write_svg(&self, svg: &mut String) -> std::fmt::Result {
         match self {
             Self::Line { points, ink, width, opacity, dashed } => {
                 let points: Vec<String> =
-                    points.iter().map(|[x, y]| format!("{} {}", rounded(*x), rounded(*y))).collect();
+                    points.iter().map(|[x, y]| format!("{} {}", in_tenths(*x), in_tenths(*y))).collect();
                 let dash = if *dashed { format!(r#" stroke-dasharray="{DASH} {DASH}""#) } else { String::new() };
                 write!(
                     svg,
@@ -121,13 +124,13 @@ impl Element {
             }
             Self::Rectangle { corner: [x, y], size: [width, height], radius, ink } => {
                 let round = if *radius > 0.0 { format!(r#" rx="{radius}""#) } else { String::new() };
-                let [x, y, width, height] = [x, y, width, height].map(|v| rounded(*v));
+                let [x, y, width, height] = [x, y, width, height].map(|v| in_tenths(*v));
                 let fill = ink.svg();
                 write!(svg, r#"<rect x="{x}" y="{y}" width="{width}" height="{height}"{round} fill="{fill}"/>"#)
             }
             Self::Disc { centre: [x, y], radius, ink, opacity } => {
                 let opacity = opacity_attribute("opacity", *opacity);
-                let [x, y, fill] = [rounded(*x), rounded(*y), ink.svg()];
+                let [x, y, fill] = [in_tenths(*x), in_tenths(*y), ink.svg()];
                 write!(svg, r#"<circle cx="{x}" cy="{y}" r="{radius}" fill="{fill}"{opacity}/>"#)
             }
             Self::Text { text, place: [x, y], anchor, opacity, turned, ink } => {
@@ -136,7 +139,7 @@ impl Element {
                     Anchor::Middle => r#" text-anchor="middle""#,
                     Anchor::End => r#" text-anchor="end""#,
                 };
-                let [x, y] = [rounded(*x), rounded(*y)];
+                let [x, y] = [in_tenths(*x), in_tenths(*y)];
                 let place = if *turned {
                     format!(r#"transform="translate({x} {y}) rotate(-90)""#)
                 } else {

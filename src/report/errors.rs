@@ -8,7 +8,7 @@ use crate::study::default_accuracy::Chosen;
 use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 
-/// A figure with its unit and one ± for both errors; where the facets weigh or are not known, they are named.
+/// Writes a figure with its unit and one ± for both errors; where the facets weigh or are not known, they are named.
 pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
     let Figure { value, unit, statistical, geometric, .. } = figure;
     // One ray is stated as the error where none arrived: three of them are the limit of 95 %.
@@ -35,7 +35,7 @@ pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
 /// Channels whose totals a sentence tells; of more the table tells.
 const SPOKEN_CHANNELS: usize = 6;
 
-/// The totals of a receiver's further channels, in parentheses; nothing where there are none.
+/// Writes the totals of a receiver's further channels, in parentheses, six at most; nothing where there are none.
 pub(super) fn channel_totals(all: &ReceiverFigures) -> String {
     if all.channels.is_empty() {
         return String::new();
@@ -48,8 +48,9 @@ pub(super) fn channel_totals(all: &ReceiverFigures) -> String {
     format!(" ({})", told.join(", "))
 }
 
-/// Where the facets, not the number of rays, decide the answer: the figures on facets and on the true surfaces.
-pub(super) fn limits(error: &GeometricError, all: &[ReceiverFigures]) -> String {
+/// Writes where the facets, not the number of rays, decide the answer: the figures on facets and on the true surfaces; empty where they do
+/// not.
+pub(super) fn facet_limits(error: &GeometricError, all: &[ReceiverFigures]) -> String {
     let said: Vec<String> =
         error.receivers.iter().zip(all).map(|(r, f)| sentence(r, f)).filter(|s| !s.is_empty()).collect();
     if said.is_empty() {
@@ -63,7 +64,7 @@ pub(super) fn limits(error: &GeometricError, all: &[ReceiverFigures]) -> String 
     )
 }
 
-/// What facets change of one receiver, as far as it is both beyond doubt and beyond the noise of the run.
+/// Writes what facets change of one receiver, as far as it is both beyond doubt and beyond the noise of the run; empty where nothing is.
 fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
     let is_limit = |paired: &Paired, figure: Option<&Figure>| {
         // Both: a difference that is real, and larger than what the rays leave open.
@@ -102,7 +103,8 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
     if parts.is_empty() { String::new() } else { format!("on {} {}", spoken(&r.name), parts.join(", ")) }
 }
 
-/// What would be needed to halve either error.
+/// Writes the seconds that halving the statistical error takes at most, and where `error` tells, a run at half the tolerance or on the
+/// spline.
 pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) -> String {
     let cost = halving(results, error);
     let mut text =
@@ -117,8 +119,8 @@ pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) ->
     text + ". "
 }
 
-/// Why the run was traced as it was.
-pub(super) fn choice(chosen: &Chosen) -> String {
+/// Writes what the run was traced on, the facets' tolerance in mm, and why it was chosen.
+pub(super) fn choice_sentence(chosen: &Chosen) -> String {
     let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));
     let how = match (chosen.intersector, chosen.normals) {
         ("exact", _) => "**on the true surfaces**".to_owned(),
@@ -130,7 +132,7 @@ pub(super) fn choice(chosen: &Chosen) -> String {
     format!("Traced {how}, because {}. ", chosen.because)
 }
 
-/// Every figure with both its errors.
+/// Makes a table of every figure with both its errors.
 pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures]) -> Table {
     let columns = [
         ("receiver", ""),
@@ -164,8 +166,8 @@ pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures]) -> Table 
     table
 }
 
-/// What was measured before the run was chosen to be traced so.
-pub(super) fn alternatives(chosen: &Chosen) -> Table {
+/// Makes a table of the ways that a pilot tried before the run was chosen to be traced so, each with the figure it gets most wrong.
+pub(super) fn alternative_table(chosen: &Chosen) -> Table {
     let columns = [
         ("intersector", ""),
         ("normals", ""),
@@ -197,8 +199,8 @@ pub(super) fn alternatives(chosen: &Chosen) -> Table {
     table
 }
 
-/// Every receiver on both.
-pub(super) fn changes(error: &GeometricError) -> Table {
+/// Makes a table of each receiver's power, brightest place and widths on facets and on the spline.
+pub(super) fn change_table(error: &GeometricError) -> Table {
     let columns = [
         ("receiver", ""),
         ("power, facets", ""),

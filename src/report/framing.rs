@@ -14,7 +14,7 @@ const WORTH: f64 = 0.75;
 /// Fewest cells along an axis: a narrow spot is shown with its surroundings.
 const FEWEST_CELLS: usize = 24;
 
-/// The part of a grid around all cells that are not dark; `None` where that is most of it, or nothing.
+/// Cuts a grid to the part around all cells that are not dark; `None` where that is most of it, or nothing.
 pub(super) fn lit_part(grid: &Grid) -> Option<Grid> {
     let [a, b] = [grid.axes[0].cells, grid.axes[1].cells];
     // A dark receiver has no part that is lit.

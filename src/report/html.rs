@@ -18,7 +18,7 @@ pub(super) type PngOf<'a> = &'a dyn Fn(&View) -> Result<Vec<u8>, String>;
 /// Stands for the scripts until the rest of the page is made; no text of a report can hold it, for its marks are escaped there.
 const SCRIPTS_GO_HERE: &str = "<!--scripts-->";
 
-/// What the browser is told: nothing may be loaded from anywhere, and no script may run but these, which it knows by their hash
+/// Writes what the browser is told: nothing may be loaded from anywhere, and no script may run but these, which it knows by their hash
 /// (Content Security Policy Level 3, 2.3.1); text never becomes code.
 fn policy(scripts: &[&str]) -> String {
     let hash = |script: &&str| format!("'sha256-{}'", base64(&Sha256::digest(script.as_bytes())));
@@ -30,7 +30,8 @@ fn policy(scripts: &[&str]) -> String {
     )
 }
 
-/// The page, complete: styles, scripts, data, static twins.
+/// Writes the page, complete: styles, scripts, data, static twins; `png` draws the views. The library of plots goes only into a page that
+/// has a picture.
 pub(super) fn page(report: &Report, png: PngOf) -> String {
     // The library weighs more than all the rest: a page of text and tables goes without.
     let interactive =
@@ -60,8 +61,8 @@ pub(super) fn page(report: &Report, png: PngOf) -> String {
                 main {
                     h1 { (report.title) }
                     p #answer.answer tabindex="-1" { (emphasised(&report.answer)) }
-                    @for section in &report.sections { (part(section, png)) }
-                    (origin(&report.provenance))
+                    @for section in &report.sections { (section_markup(section, png)) }
+                    (provenance_markup(&report.provenance))
                 }
                 (PreEscaped(SCRIPTS_GO_HERE))
             }
@@ -73,8 +74,8 @@ pub(super) fn page(report: &Report, png: PngOf) -> String {
     page.replacen(SCRIPTS_GO_HERE, &scripts, 1)
 }
 
-/// A section of the page.
-fn part(section: &Section, png: PngOf) -> Markup {
+/// Writes a section of the page; neighbouring pictures share a row, at most two.
+fn section_markup(section: &Section, png: PngOf) -> Markup {
     let mut rows: Vec<Vec<&Block>> = Vec::new();
     // Neighbouring pictures share a row, at most two.
     for block in &section.blocks {
@@ -88,34 +89,34 @@ fn part(section: &Section, png: PngOf) -> Markup {
         section id=(anchor(&section.title)) {
             h2 { (section.title) }
             @for row in rows {
-                @if row.len() == 2 { div.pair { @for block in row { (content(block, png)) } } }
-                @else { @for block in row { (content(block, png)) } }
+                @if row.len() == 2 { div.pair { @for block in row { (block_markup(block, png)) } } }
+                @else { @for block in row { (block_markup(block, png)) } }
             }
         }
     }
 }
 
-/// A block of the page; a picture stands as SVG or PNG until the script makes it interactive.
-fn content(block: &Block, png: PngOf) -> Markup {
+/// Writes a block of the page; a picture stands as SVG or PNG until the script makes it interactive.
+fn block_markup(block: &Block, png: PngOf) -> Markup {
     match block {
         Block::Text(text) => html! { p { (emphasised(text)) } },
         Block::Table(table) => table_markup(table),
         Block::Chart(chart) => {
             let drawing = PreEscaped(static_chart::draw(chart).svg());
-            figure(&chart.name, &chart.title, &chart.caption, drawing, &plotly::chart(chart), false)
+            figure_markup(&chart.name, &chart.title, &chart.caption, drawing, &plotly::chart(chart), false)
         }
         Block::View(view) => {
             let drawing = match png(view) {
                 Ok(png) => html! { img src={ "data:image/png;base64," (base64(&png)) } alt=(view.title); },
                 Err(e) => html! { p { "This view could not be drawn: " (e) } },
             };
-            figure(&view.name, &view.title, &view.caption, drawing, &plotly::view(view), true)
+            figure_markup(&view.name, &view.title, &view.caption, drawing, &plotly::view(view), true)
         }
     }
 }
 
-/// A picture with its data for the script and links to its files.
-fn figure(
+/// Writes a picture with its data for the script and links to its files; `solid` says that it is a 3-D view.
+fn figure_markup(
     name: &str,
     title: &str,
     caption: &str,
@@ -140,7 +141,7 @@ fn figure(
     }
 }
 
-/// A table that can be sorted, copied and fetched as CSV.
+/// Writes a table that can be sorted, copied and fetched as CSV.
 fn table_markup(table: &Table) -> Markup {
     html! {
         div.table id={ "table-" (table.name) } {
@@ -168,8 +169,8 @@ fn table_markup(table: &Table) -> Markup {
     }
 }
 
-/// The section that tells command, program, machine and seed.
-fn origin(p: &Provenance) -> Markup {
+/// Writes the section that tells command, program, machine and seed.
+fn provenance_markup(p: &Provenance) -> Markup {
     let seed = p.seed.map_or("none used".to_owned(), |s| s.to_string());
     html! {
         section #origin {
@@ -186,12 +187,12 @@ fn origin(p: &Provenance) -> Markup {
     }
 }
 
-/// `**words**` become strong, everything else is text.
+/// Writes text with `**words**` as strong; everything else in it is escaped.
 fn emphasised(text: &str) -> Markup {
     html! { @for (k, piece) in text.split("**").enumerate() { @if k % 2 == 1 { strong { (piece) } } @else { (piece) } } }
 }
 
-/// A title as a name for links.
+/// Makes a title a name for links: lower case, words joined by hyphens; alike titles have one name.
 fn anchor(title: &str) -> String {
     let lower = title.to_lowercase();
     lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect::<Vec<_>>().join("-")

@@ -9,8 +9,8 @@ use crate::simulate::{ReceiverResult, Results};
 /// Radii at which the encircled power is drawn.
 const RADII: usize = 200;
 
-/// Width over which values along a line through the peak stay above half of it, in the units of the axis; `None` where they are above
-/// half up to the end of the grid.
+/// Returns the width over which values along a line through the peak stay above half of it, in the units of `step`, the length of a cell;
+/// `None` where they are above half up to the end of the grid.
 fn width_at_half(values: &[f64], step: f64) -> Option<f64> {
     let peak = (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]))?;
     let half = 0.5 * values[peak];
@@ -23,7 +23,7 @@ fn width_at_half(values: &[f64], step: f64) -> Option<f64> {
     Some((right - left) * step)
 }
 
-/// Values along both axes through the brightest cell.
+/// Returns the values along both axes through the brightest cell; `None` for a grid without cells.
 fn lines_through_peak(grid: &Grid) -> Option<[Vec<f64>; 2]> {
     let cells = grid.axes[0].cells;
     let peak = (0..grid.values.len()).max_by(|a, b| grid.values[*a].total_cmp(&grid.values[*b]))?;
@@ -32,8 +32,8 @@ fn lines_through_peak(grid: &Grid) -> Option<[Vec<f64>; 2]> {
     Some([row, column])
 }
 
-/// A table of the figures of a far field in candela, with the points of a regulation where it was judged by one.
-pub(super) fn table(
+/// Makes a table of the figures of a far field in candela, with the points of a regulation where it was judged by one.
+pub(super) fn lamp_table(
     receiver: &ReceiverResult,
     grid: &Grid,
     results: &Results,
@@ -74,7 +74,8 @@ pub(super) fn table(
     table
 }
 
-/// The intensity straight ahead: of the cell there, or the mean of those that meet there.
+/// Returns the intensity straight ahead: of the cell there, or the mean of those that meet there; `None` where the grid does not reach
+/// there.
 fn value_ahead(grid: &Grid) -> Option<f64> {
     let cells = |axis: &crate::formats::Axis| -> Vec<usize> {
         // An even number of cells has none in the middle: two or four meet there, to rounding.
@@ -131,7 +132,8 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
     Some(Chart::series(&name, &title, &caption, axes, series))
 }
 
-/// The polar diagram of a luminaire: intensities over γ in the planes C 0–180 and C 90–270, nadir below.
+/// Draws the polar diagram of a luminaire: intensities over γ in the planes C 0–180 and C 90–270, nadir below; `None` for a grid that is
+/// not over C-planes all around.
 pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [c, gamma] = &grid.axes;
     // The diagram needs the whole turn.

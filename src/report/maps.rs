@@ -7,7 +7,7 @@ use crate::simulate::scene::FarFieldType;
 use crate::simulate::{ChannelResult, ReceiverResult};
 use crate::study::figures::{cell_errors, channel_cell_errors};
 
-/// The cells of a receiver with their axes; `None` for a receiver that has one number only.
+/// Returns the cells of a receiver with their axes, mm or degrees; `None` for a receiver that has one number only.
 pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
     // One cell is a number, not a map.
     if r.grid[0] * r.grid[1] < 2 || r.cells.len() != r.grid[0] * r.grid[1] {
@@ -65,7 +65,8 @@ fn layer(r: &ReceiverResult, channel: &ChannelResult) -> Layer {
     }
 }
 
-/// What the eye sees of a receiver in watts that counts lumens or CIE values too: the grid of its candela or lux.
+/// Returns what the eye sees of a receiver in watts that counts lumens or CIE values too: the grid of its candela or lux; `None` for
+/// others.
 pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
     let (grid, Layer { unit, values, error, .. }) = (receiver_grid(r)?, layer(r, r.photometric()?));
     let quantity = if unit == "lx" { "illuminance" } else { "luminous intensity" };
@@ -80,7 +81,7 @@ pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
     })
 }
 
-/// The values along both axes through the peak, with their errors; `None` for a grid without cells.
+/// Draws the values along both axes through the peak, with their errors; `None` for a grid without cells.
 pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [a, b] = &grid.axes;
     let (column, row) = grid.peak_cell()?;
@@ -108,7 +109,7 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     Some(Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), caption, axes, series))
 }
 
-/// What a map shows, in words: its peak, its noise and its cells.
+/// Writes what a map shows: its peak, its noise and its cells.
 pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
     let peak = grid.peak().map(|([x, y], value)| {
         format!(
@@ -141,7 +142,7 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
     [peak, error, Some(cells)].into_iter().flatten().collect()
 }
 
-/// A name as words.
+/// Returns a name as words: with spaces in place of underscores.
 pub(super) fn spoken(name: &str) -> String {
     name.replace('_', " ")
 }

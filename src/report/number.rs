@@ -9,7 +9,8 @@ const GIGA: f64 = 1e9;
 /// Sets thousands apart (ISO 80000-1, 7.3.1), without a line breaking there.
 pub(super) const NARROW_SPACE: char = '\u{202f}';
 
-/// A number with so many significant digits, without exponent where that stays short, thousands apart: `0.0123`, `1 234`, `3.2e-9`.
+/// Writes a number with so many significant digits, from 1 to 17, without exponent where that stays short, and from five digits on with
+/// thousands apart: `0.0123`, `1234`, `3.2e−9`. What is not a number is a dash.
 ///
 /// ```
 /// assert_eq!(lampyris::report::figures(0.0123456, 3), "0.0123");
@@ -37,22 +38,22 @@ pub fn figures(value: f64, digits: usize) -> String {
     };
     // Longer than that a number is read wrong.
     if !(-4..9).contains(&exponent) {
-        return format!("{}e{exponent}", trimmed(mantissa)).replace('-', "−");
+        return format!("{}e{exponent}", without_end_zeros(mantissa)).replace('-', "−");
     }
     let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
     let text = format!("{value:.decimals$}");
     let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
     let fraction = fraction.trim_end_matches('0');
     let dot = if fraction.is_empty() { "" } else { "." };
-    format!("{}{dot}{fraction}", apart(whole)).replace('-', "−")
+    format!("{}{dot}{fraction}", in_thousands(whole)).replace('-', "−")
 }
 
-/// A whole number with its thousands set apart by narrow spaces.
+/// Writes a whole number with its thousands set apart by narrow spaces, from five digits on.
 pub fn grouped(value: u64) -> String {
-    apart(&value.to_string())
+    in_thousands(&value.to_string())
 }
 
-/// A duration: `1.23 s`, `45 ms`, `2 min 5 s`.
+/// Writes a duration given in seconds: `1.23 s`, `45 ms`, `2 min 5 s`; a dash where it is not finite.
 pub fn seconds(value: f64) -> String {
     match value {
         v if !v.is_finite() => "–".into(),
@@ -63,7 +64,7 @@ pub fn seconds(value: f64) -> String {
     }
 }
 
-/// A size in memory: `12.3 MB`.
+/// Writes a size in memory, in powers of 1000: `12.3 MB`.
 pub fn bytes(value: u64) -> String {
     let value = value as f64;
     match value {
@@ -74,12 +75,13 @@ pub fn bytes(value: u64) -> String {
     }
 }
 
-fn trimmed(mantissa: &str) -> &str {
+/// Returns a mantissa without the zeros at its end.
+fn without_end_zeros(mantissa: &str) -> &str {
     if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa }
 }
 
-/// Digits in groups of three, apart by thin spaces.
-fn apart(whole: &str) -> String {
+/// Sets the digits of a whole number apart in groups of three, from five digits on.
+fn in_thousands(whole: &str) -> String {
     let (sign, digits) = whole.strip_prefix('-').map_or(("", whole), |d| ("-", d));
     // Four digits are read at a glance.
     if digits.len() < 5 {

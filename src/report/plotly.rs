@@ -11,7 +11,7 @@ use std::io::Read;
 /// plotly.js 3.0.1 as its authors publish it, compressed from 4.7 to 1.4 MB; its licence is in `plotly-licence.txt`.
 static SCRIPT: &[u8] = include_bytes!("plotly-3.0.1.min.js.gz");
 
-/// The script of plotly.js, which a page holds once.
+/// Unpacks the script of plotly.js, which a page holds once.
 ///
 /// # Panics
 /// When the script that the program holds is damaged, which a test rules out.
@@ -21,22 +21,25 @@ pub(super) fn script() -> String {
     script
 }
 
+/// Packs numbers as plotly's typed array of single precision.
 fn singles(values: impl Iterator<Item = f32>) -> Value {
     let bytes: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
     json!({"dtype": "f4", "bdata": base64(&bytes)})
 }
 
+/// Packs numbers as plotly's typed array of double precision.
 fn doubles(values: impl Iterator<Item = f64>) -> Value {
     let bytes: Vec<u8> = values.flat_map(f64::to_le_bytes).collect();
     json!({"dtype": "f8", "bdata": base64(&bytes)})
 }
 
+/// Packs whole numbers as plotly's typed array of 32 bits.
 fn indices(values: impl Iterator<Item = u32>) -> Value {
     let bytes: Vec<u8> = values.flat_map(u32::to_le_bytes).collect();
     json!({"dtype": "u4", "bdata": base64(&bytes)})
 }
 
-/// The map as plotly's list of stops.
+/// Returns the map as plotly's list of 17 stops.
 fn colour_scale(map: ColourMap) -> Value {
     let stop = |k: u32| {
         let [r, g, b] = map.colour(f64::from(k) / 16.0);
@@ -45,12 +48,14 @@ fn colour_scale(map: ColourMap) -> Value {
     (0..=16).map(stop).collect()
 }
 
+/// Writes red, green and blue, from 0 to 1, as a CSS colour.
 fn css([r, g, b]: [f64; 3]) -> String {
     let byte = |c: f64| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
     format!("rgb({},{},{})", byte(r), byte(g), byte(b))
 }
 
-/// An axis over these values. On a logarithmic one plotly names every digit of a decade, which overlap where there are more than two.
+/// Returns plotly's axis over these values. On a logarithmic one plotly names every digit of a decade, which overlap where there are more
+/// than two.
 fn axis(style: &AxisStyle, values: impl Iterator<Item = f64>) -> Value {
     let good = values.filter(|v| v.is_finite() && *v > 0.0);
     let (low, high) = good.fold((f64::INFINITY, 0f64), |(a, b), v| (a.min(v), b.max(v)));
@@ -65,7 +70,7 @@ fn axis(style: &AxisStyle, values: impl Iterator<Item = f64>) -> Value {
         "automargin": true, "separatethousands": true, "exponentformat": if style.log { "power" } else { "none" }})
 }
 
-/// Data and layout of a chart.
+/// Returns a chart as plotly's figure: an object with `data` and `layout`.
 pub(super) fn chart(chart: &Chart) -> Value {
     let (data, extra): (Vec<Value>, Value) = match &chart.content {
         Content::Series(series) => {
@@ -126,7 +131,7 @@ pub(super) fn chart(chart: &Chart) -> Value {
     json!({"data": data, "layout": layout})
 }
 
-/// Lines of equal value, borders of zones and named points as traces over a map; a NaN lifts the pen between two lines.
+/// Returns lines of equal value, borders of zones and named points as traces over a map; a NaN lifts the pen between two lines.
 fn mark_traces(marks: &Marks) -> Vec<Value> {
     let joined = |lines: &mut dyn Iterator<Item = &Vec<[f64; 2]>>| -> [Vec<f32>; 2] {
         let mut along = [Vec::new(), Vec::new()];
@@ -200,7 +205,7 @@ fn picture_trace([a, b]: &[Axis; 2], picture: &Picture) -> (Vec<Value>, Value) {
     (vec![image], layout)
 }
 
-/// A series as plotly's trace.
+/// Returns a series as plotly's trace.
 fn trace(colour: &str, s: &Series) -> Value {
     let mode = match s.style {
         SeriesStyle::LineAndPoints => "lines+markers",
@@ -224,7 +229,7 @@ fn trace(colour: &str, s: &Series) -> Value {
     trace
 }
 
-/// Data and layout of a 3-D view.
+/// Returns a 3-D view as plotly's figure: an object with `data` and `layout`.
 pub(super) fn view(view: &View) -> Value {
     let range = common_range(&view.shapes);
     let mut data: Vec<Value> = view.shapes.iter().map(|s| shape(s, range)).collect();
@@ -241,7 +246,7 @@ pub(super) fn view(view: &View) -> Value {
         "legend": {"orientation": "h", "y": -0.01, "yanchor": "top"}}})
 }
 
-/// A shape of a view as plotly's trace; `low` and `high` bound its colours.
+/// Returns a shape of a view as plotly's trace; `low` and `high` bound its colours.
 fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
     match shape {
         Shape::Surface { name, points, triangles, colour, opacity, values, labels } => {
@@ -290,7 +295,7 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
     }
 }
 
-/// Puts objects into one another, key by key; anything else is replaced.
+/// Puts the keys of one object into another, table by table; anything else is replaced.
 fn merge(into: &mut Value, from: Value) {
     match (into, from) {
         (Value::Object(into), Value::Object(from)) => {

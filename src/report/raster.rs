@@ -5,8 +5,9 @@ use crate::formats::Picture;
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 
-/// Size of the picture, pixels.
+/// Width of the picture, pixels.
 const WIDTH: usize = 1200;
+/// Height of the picture, pixels.
 const HEIGHT: usize = 800;
 /// Samples a pixel in each direction.
 const FINE: usize = 2;
@@ -20,6 +21,7 @@ struct Canvas {
 }
 
 impl Canvas {
+    /// Makes a canvas of background alone, with nothing in front of it.
     fn new() -> Self {
         let (width, height) = (WIDTH * FINE, HEIGHT * FINE);
         // A background that reads on a white and on a dark page.
@@ -31,8 +33,8 @@ impl Canvas {
         Self { width, height, rgb, depth: vec![f32::INFINITY; width * height] }
     }
 
-    /// Draws one pixel where nothing nearer stands.
-    fn put(&mut self, x: usize, y: usize, depth: f32, colour: [f32; 3], opacity: f32) {
+    /// Blends a colour into the sample at `x`, `y`, unless something nearer stands there. An opacity above 0.5 hides what is behind.
+    fn blend_sample(&mut self, x: usize, y: usize, depth: f32, colour: [f32; 3], opacity: f32) {
         let at = y * self.width + x;
         // At equal depth the later one wins, as lines along facets must show.
         if depth <= self.depth[at] {
@@ -46,7 +48,7 @@ impl Canvas {
         }
     }
 
-    /// Draws a triangle given in pixels, with its depth.
+    /// Draws a triangle whose corners are in samples, with their depth, where nothing nearer stands; nothing of one seen from its edge.
     fn triangle(&mut self, [a, b, c]: [Vec3; 3], colour: [f32; 3], opacity: f32) {
         let [p, q, r] = [a.truncate(), b.truncate(), c.truncate()];
         let area = (q - p).perp_dot(r - p);
@@ -68,12 +70,12 @@ impl Canvas {
                 span_of_positive([[u, u_step], [v, v_step], [1.0 - u - v, -u_step - v_step]], columns.len());
             for k in inside {
                 let (u, v) = (u + k as f32 * u_step, v + k as f32 * v_step);
-                self.put(columns.start + k, y, a.z + u * to_b + v * to_c, colour, opacity);
+                self.blend_sample(columns.start + k, y, a.z + u * to_b + v * to_c, colour, opacity);
             }
         }
     }
 
-    /// Draws a line given in pixels, as squares of its width.
+    /// Draws a line between points in samples, as squares of its width in pixels.
     fn line(&mut self, a: Vec3, b: Vec3, width: f32, colour: [f32; 3], opacity: f32) {
         // A step a pixel; what runs far out of the picture is not followed for ever.
         let steps = (b - a).truncate().abs().max_element().ceil().clamp(1.0, 8000.0) as usize;
@@ -85,13 +87,13 @@ impl Canvas {
             };
             for y in span(p.y, self.height) {
                 for x in span(p.x, self.width) {
-                    self.put(x, y, p.z, colour, opacity);
+                    self.blend_sample(x, y, p.z, colour, opacity);
                 }
             }
         }
     }
 
-    /// The picture, of which each pixel is the mean of its samples.
+    /// Returns the picture, of which each pixel is the mean of its samples.
     fn picture(&self) -> Picture {
         let mut rgb = Vec::with_capacity(3 * WIDTH * HEIGHT);
         for y in 0..HEIGHT {
@@ -108,7 +110,7 @@ impl Canvas {
     }
 }
 
-/// The indices below `n` at which all of some linear functions, each given by its value at 0 and its step, are positive or zero.
+/// Returns the indices below `n` at which all of some linear functions, each given by its value at 0 and its step, are positive or zero.
 fn span_of_positive<const N: usize>(functions: [[f32; 2]; N], n: usize) -> Range<usize> {
     let (mut first, mut last) = (0.0f32, n as f32 - 1.0);
     for [value, step] in functions {
@@ -131,7 +133,7 @@ pub(super) const EYE: [f64; 3] = [0.75, -1.25, 0.85];
 /// A view of a single point is drawn as if it reached so far, mm.
 const LEAST_REACH_MM: f32 = 1e-6;
 
-/// The view as a picture of 1200 × 800 pixels.
+/// Draws the view as a picture of 1200 × 800 pixels; the background alone where there is nothing to show.
 pub(super) fn render(view: &View) -> Picture {
     let mut canvas = Canvas::new();
     let Some([low, high]) = view.bounds().map(|b| b.map(Vec3::from)) else { return canvas.picture() };
@@ -201,7 +203,7 @@ pub(super) fn render(view: &View) -> Picture {
     canvas.picture()
 }
 
-/// Smallest and largest of all values that colour something: one scale for the whole view.
+/// Returns the smallest and largest of all finite values that colour something: one scale for the whole view; 0 to 1 without any.
 pub(super) fn common_range(shapes: &[Shape]) -> [f32; 2] {
     let of = |s: &Shape| match s {
         Shape::Surface { values, .. } => values.as_ref().map(|v| v.values.clone()),

@@ -2,15 +2,15 @@
 
 use super::colour_picture::colour_chart;
 use super::framing::lit_part;
-use super::lamp_figures::{encircled_power, polar, table};
+use super::lamp_figures::{encircled_power, lamp_table, polar};
 use super::maps::{reading, spoken};
 use super::{Block, Chart};
 use crate::formats::{Grid, file_stem};
 use crate::regulation::Assessment;
 use crate::simulate::{ReceiverResult, Results};
 
-/// The map of a receiver, framed around its light.
-pub(super) fn map(r: &ReceiverResult, grid: &Grid) -> Chart {
+/// Draws the map of a receiver, framed around its light; the caption says where that is a part of it.
+pub(super) fn framed_map(r: &ReceiverResult, grid: &Grid) -> Chart {
     let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
     let stem = file_stem(&r.name);
     // Candela and lux beside watts: the unit tells the files apart.

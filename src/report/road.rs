@@ -3,21 +3,26 @@
 use super::Chart;
 use crate::formats::{Axis, Grid};
 
-/// Height of the lamp and of the driver's eye above the road, m: those of a passenger car (UN R48 allows lamps from 0.5 to 1.2 m).
+/// Height of the lamp above the road, m: of a passenger car (UN R48 allows lamps from 0.5 to 1.2 m).
 const LAMP_HEIGHT_M: f64 = 0.65;
+/// Height of the driver's eye above the road, m.
 const EYE_HEIGHT_M: f64 = 1.2;
 
-/// What the picture from above shows: so far ahead and to both sides, m, in squares of so much.
+/// What the picture from above shows ahead of the lamp, from and to, m.
 const AHEAD_M: [f64; 2] = [5.0, 100.0];
+/// How far the picture from above goes to both sides, m.
 const ASIDE_M: f64 = 15.0;
+/// Side of a cell of the picture from above, m.
 const SQUARE_M: f64 = 0.5;
 
-/// What the driver's picture shows, degrees, and its cells.
+/// How far the driver's picture goes to both sides, degrees.
 const VIEW_H_DEG: f64 = 20.0;
+/// What the driver's picture shows below and above the horizon, degrees.
 const VIEW_V_DEG: [f64; 2] = [-8.0, 1.0];
+/// Side of a cell of the driver's picture, degrees.
 const VIEW_CELL_DEG: f64 = 0.1;
 
-/// Intensity of the cell in a direction, cd; `None` outside the far field.
+/// Returns the intensity of the cell in a direction, cd; `None` outside the far field.
 fn intensity(grid: &Grid, h_deg: f64, v_deg: f64) -> Option<f64> {
     let place = |axis: &Axis, at: f64| {
         let k = ((at - axis.range[0]) / axis.step()).floor();
@@ -27,7 +32,8 @@ fn intensity(grid: &Grid, h_deg: f64, v_deg: f64) -> Option<f64> {
     grid.values.get(j * grid.axes[0].cells + i).copied()
 }
 
-/// Illuminance of the road, lx, at a place to the right and ahead of the lamp, m: the light falls on a horizontal plane.
+/// Returns the illuminance of the road, lx, at a place to the right and ahead of the lamp, m: the light falls on a horizontal plane. `aim`
+/// is added to H and V, degrees; 0 where the far field does not reach.
 fn road_illuminance(grid: &Grid, aim: [f64; 2], aside: f64, ahead: f64) -> f64 {
     let distance = (aside * aside + ahead * ahead + LAMP_HEIGHT_M * LAMP_HEIGHT_M).sqrt();
     let h = aside.atan2(ahead).to_degrees();
@@ -39,11 +45,12 @@ fn road_illuminance(grid: &Grid, aim: [f64; 2], aside: f64, ahead: f64) -> f64 {
     candela * LAMP_HEIGHT_M / distance.powi(3)
 }
 
+/// Makes an axis of as many whole cells of this step as come nearest to its range.
 fn axis(label: &str, unit: &str, range: [f64; 2], step: f64) -> Axis {
     Axis { label: label.into(), unit: unit.into(), range, cells: ((range[1] - range[0]) / step).round() as usize }
 }
 
-/// A map of lux over the cells of two axes.
+/// Makes a map of lux over the cells of two axes: `value` is asked at the middle of each.
 fn chart(name: &str, title: &str, caption: &str, axes: [Axis; 2], value: impl Fn(f64, f64) -> f64) -> Chart {
     let values = (0..axes[1].cells)
         .flat_map(|j| (0..axes[0].cells).map(move |i| (i, j)))
@@ -62,7 +69,7 @@ fn chart(name: &str, title: &str, caption: &str, axes: [Axis; 2], value: impl Fn
     Chart::map(name, title, caption, grid)
 }
 
-/// The road from above, with isolux lines.
+/// Draws the road from above, lx, with isolux lines; `name` begins the names of its files, `aim` is added to H and V, degrees.
 pub(super) fn from_above(name: &str, grid: &Grid, aim: [f64; 2]) -> Chart {
     let axes = [axis("aside", "m", [-ASIDE_M, ASIDE_M], SQUARE_M), axis("ahead", "m", AHEAD_M, SQUARE_M)];
     let caption = format!(
@@ -73,7 +80,8 @@ pub(super) fn from_above(name: &str, grid: &Grid, aim: [f64; 2]) -> Chart {
     chart(&format!("{name}-road"), "The road from above: isolux lines", &caption, axes, value)
 }
 
-/// The road as the driver sees it, behind the lamp and above it.
+/// Draws the road as the driver sees it, lx, with the eye straight above the lamp; `name` begins the names of its files, `aim` is added to
+/// H and V, degrees.
 pub(super) fn from_driver(name: &str, grid: &Grid, aim: [f64; 2]) -> Chart {
     let axes =
         [axis("H", "deg", [-VIEW_H_DEG, VIEW_H_DEG], VIEW_CELL_DEG), axis("V", "deg", VIEW_V_DEG, VIEW_CELL_DEG)];

@@ -53,7 +53,7 @@ pub struct SimulationReport<'a> {
     pub provenance: Provenance,
 }
 
-/// Recorded paths as polylines with the power at their start and how they end; the ends are the second value.
+/// Makes recorded paths polylines with the power at their start and the number of their ray; the second value is how each of them ends.
 pub fn path_lines(paths: &[PathVertex]) -> (Polylines, Vec<Event>) {
     let mut lines = Polylines::default();
     let (mut power, mut rays, mut ends) = (Vec::new(), Vec::new(), Vec::new());
@@ -68,8 +68,8 @@ pub fn path_lines(paths: &[PathVertex]) -> (Polylines, Vec<Event>) {
     (lines, ends)
 }
 
-/// At most so many of the lines of the paths that end so, evenly over the run, for rays come source by source.
-fn ending(lines: &Polylines, ends: &[Event], wanted: impl Fn(Event) -> bool, most: usize) -> Polylines {
+/// Keeps at most `most` of the lines that end so, evenly over the run, for rays come source by source.
+fn lines_ending(lines: &Polylines, ends: &[Event], wanted: impl Fn(Event) -> bool, most: usize) -> Polylines {
     let mut kept = Polylines::default();
     let all: Vec<_> = lines.lines().zip(ends).filter(|(_, e)| wanted(**e)).collect();
     for (line, _) in all.iter().step_by(all.len().div_ceil(most).max(1)) {
@@ -79,16 +79,17 @@ fn ending(lines: &Polylines, ends: &[Event], wanted: impl Fn(Event) -> bool, mos
 }
 
 impl SimulationReport<'_> {
-    /// The report with these 3-D views.
+    /// Returns the report with these 3-D views in place of any it had.
     pub fn with_views(self, views: Vec<View>) -> Self {
         Self { views, ..self }
     }
 
+    /// Writes a power as per cent of what was emitted.
     fn share(&self, power: f64) -> String {
         format!("{} %", figures(100.0 * power / self.results.power.emitted, 4))
     }
 
-    /// The answer in a paragraph.
+    /// Writes the answer in a paragraph: power on each receiver with errors, speed, losses, verdicts, what limits it.
     pub fn answer(&self) -> String {
         let r = self.results;
         let mut text = format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit);
@@ -131,15 +132,15 @@ impl SimulationReport<'_> {
         );
         text += &self.verdicts.iter().map(|(_, a)| verdict_sentence(a)).collect::<String>();
         text += &self.cut_off();
-        text.extend(self.geometric.map(|g| errors::limits(g, self.figures)));
-        text.extend(self.chosen.map(errors::choice));
+        text.extend(self.geometric.map(|g| errors::facet_limits(g, self.figures)));
+        text.extend(self.chosen.map(errors::choice_sentence));
         if let Some(check) = self.check {
             text += &verdict(check);
         }
         text
     }
 
-    /// What limits took away, when it matters.
+    /// Writes what limits took away; empty below [`WORTH_A_SENTENCE`].
     fn cut_off(&self) -> String {
         let r = self.results;
         let share = r.power.cut_off / r.power.emitted;
@@ -168,7 +169,7 @@ impl SimulationReport<'_> {
         )
     }
 
-    /// The whole report.
+    /// Makes the whole report.
     pub fn report(&self) -> Report {
         let mut sections = vec![self.light()];
         sections.extend(self.sections.iter().cloned());
@@ -184,7 +185,7 @@ impl SimulationReport<'_> {
         Report { title: self.title.clone(), answer: self.answer(), sections, provenance: self.provenance.clone() }
     }
 
-    /// The section on light: notes, the map of each receiver, and facets with ray paths.
+    /// Makes the section on light: notes, the map of each receiver, and facets with ray paths.
     fn light(&self) -> Section {
         let notes = self.results.notes.iter().map(|note| format!("**Note:** {note}."));
         let mut section = notes.fold(Section::new("Light"), |s, note| s.with_block(note.as_str()));
@@ -195,9 +196,9 @@ impl SimulationReport<'_> {
         let around = self.facets.mesh.bounds();
         // Rays that leave go to infinity: they are cut a little outside of the model.
         let lines = lines.inside(&around.grown(0.35 * around.diagonal().max(1.0)));
-        let out = ending(&lines, &ends, |e| matches!(e, Event::Received | Event::Escaped), 250);
+        let out = lines_ending(&lines, &ends, |e| matches!(e, Event::Received | Event::Escaped), 250);
         // Far fewer that end inside: they would hide the others.
-        let stay = ending(&lines, &ends, |e| !matches!(e, Event::Received | Event::Escaped), 60);
+        let stay = lines_ending(&lines, &ends, |e| !matches!(e, Event::Received | Event::Escaped), 60);
         let mut view = Some(
             View::of_facets("facets", "Facets and ray paths", self.facets)
                 .lines("rays that leave", &out, [1.0, 0.72, 0.12])
@@ -206,7 +207,7 @@ impl SimulationReport<'_> {
         );
         for (k, grid) in maps {
             let r = &self.results.receivers[k];
-            section = section.with_block(receiver_blocks::map(r, &grid));
+            section = section.with_block(receiver_blocks::framed_map(r, &grid));
             // The map that matters most stands beside the facets and has its cuts drawn.
             if let Some(view) = view.take() {
                 section = section.with_block(view);
@@ -215,7 +216,7 @@ impl SimulationReport<'_> {
                 }
             }
             let judged = self.verdicts.iter().find(|(receiver, _)| *receiver == k).map(|(_, a)| a);
-            section.blocks.extend(receiver_blocks::more(r, &grid, self.results, judged));
+            section.blocks.extend(receiver_blocks::trade_figures(r, &grid, self.results, judged));
         }
         if let Some(view) = view {
             section = section.with_block(view);
@@ -226,7 +227,7 @@ impl SimulationReport<'_> {
         section
     }
 
-    /// Every receiver's grids, with the index of the receiver and the errors of the facets where they are known.
+    /// Returns every receiver's grids, with the receiver's index and the errors of the facets where these are known.
     fn maps(&self) -> Vec<(usize, Grid)> {
         let mut maps = Vec::new();
         for (k, r) in self.results.receivers.iter().enumerate() {
@@ -239,7 +240,7 @@ impl SimulationReport<'_> {
         maps
     }
 
-    /// The section on where the power went.
+    /// Makes the section on where the power went: emitted to lost, each receiver, and all figures with both errors.
     fn energy(&self) -> Section {
         let p = &self.results.power;
         let mut table = Table::new("power", "Where the power went", &[("", ""), ("power", self.unit), ("share", "%")])
@@ -291,8 +292,8 @@ impl SimulationReport<'_> {
         let section = Section::new("Energy").with_block(table).with_block(receivers);
         let section = section.with_block(errors::figure_table(self.results, self.figures));
         let section = section.with_block(errors::halving_cost(self.results, self.geometric).as_str());
-        let measured = self.geometric.filter(|g| g.rays > 0).map(errors::changes).into_iter();
-        let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(errors::alternatives);
+        let measured = self.geometric.filter(|g| g.rays > 0).map(errors::change_table).into_iter();
+        let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(errors::alternative_table);
         let section = measured.chain(tried).fold(section, |s, table| s.with_block(table));
         if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {
             section.with_block(self.channels())
@@ -301,7 +302,7 @@ impl SimulationReport<'_> {
         }
     }
 
-    /// Colours and bands of wavelengths, receiver by receiver.
+    /// Makes a table of colours and bands of wavelengths, receiver by receiver.
     fn channels(&self) -> Table {
         let columns = [
             ("receiver", ""),
@@ -340,22 +341,22 @@ impl SimulationReport<'_> {
         table
     }
 
-    /// The section on rays of this run that all intersectors were asked.
+    /// Makes the section on rays of this run that all intersectors were asked.
     fn cross_check(&self, check: &CrossCheck) -> Section {
         let text = "A sample of the very rays of this run, asked again of the octree, of obvhs' BVH over the same facets and of the \
             certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
             asked the same question.";
         let section = Section::new("Cross-check")
             .with_block(text)
-            .with_block(cross_check::counts(check))
-            .with_block(cross_check::errors(check, "facets"));
+            .with_block(cross_check::count_table(check))
+            .with_block(cross_check::error_table(check, "facets"));
         match cross_check::odd_rays(check, self.facets) {
             Some(view) => section.with_block(view),
             None => section,
         }
     }
 
-    /// The section on what was simulated and what not.
+    /// Makes the section on which effects were simulated, which not, and why.
     fn effects(&self) -> Section {
         let used = &self.results.effects;
         let mut table = Table::new("effects", "Effects", &[("effect", ""), ("simulated", ""), ("because", "")])
@@ -371,7 +372,7 @@ impl SimulationReport<'_> {
         Section::new("What was simulated, what not, and why").with_block(table)
     }
 
-    /// The section on the model, its facets and times.
+    /// Makes the section on the model, its facets and the seconds of each stage.
     fn cost(&self) -> Section {
         let s = &self.results.seconds;
         let mut table = Table::new("times", "Times", &[("step", ""), ("time", "s"), ("what", "")]);

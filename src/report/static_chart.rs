@@ -6,8 +6,9 @@ use super::level_labels::level_labels;
 use super::number::figures;
 use crate::formats::{Axis, ColourMap, Grid, Picture};
 
-/// Size of a chart in the drawing's units.
+/// Width of a chart in the drawing's units.
 const WIDTH: f64 = 760.0;
+/// Height of a chart in the drawing's units.
 const HEIGHT: f64 = 470.0;
 /// Plot area: left, top, right, bottom.
 const AREA: [f64; 4] = [78.0, 16.0, 740.0, 410.0];
@@ -22,7 +23,8 @@ struct Scale {
 }
 
 impl Scale {
-    /// The scale of an axis from `from` to `to` in the drawing, around these values and, where `zero` is asked, from zero.
+    /// Makes the scale of an axis from `from` to `to` in the drawing, around these values and, where `zero` is asked, from zero. Values
+    /// that have no place on it are left out; without any it goes from 0 to 1, or 1 to 10.
     fn new(values: impl Iterator<Item = f64>, axis: &AxisStyle, [from, to]: [f64; 2], zero: bool) -> Self {
         let usable = values.filter(|v| v.is_finite() && (!axis.log || *v > 0.0));
         let range =
@@ -42,7 +44,7 @@ impl Scale {
         Self { low, high, log: axis.log, from, to }
     }
 
-    /// Where a value stands in the picture.
+    /// Returns where a value stands in the drawing.
     fn position(&self, value: f64) -> f64 {
         let part = if self.log {
             (value.max(f64::MIN_POSITIVE).ln() - self.low.ln()) / (self.high.ln() - self.low.ln())
@@ -57,7 +59,7 @@ impl Scale {
         value.is_finite() && (!self.log || value > 0.0)
     }
 
-    /// Values to be marked: decades, or steps of 1, 2 or 5 times a power of ten.
+    /// Returns the values to be marked: decades, or steps of 1, 2 or 5 times a power of ten, at most twenty.
     fn ticks(&self) -> Vec<f64> {
         if self.log {
             let decades: Vec<f64> = (self.low.log10().ceil() as i32..=self.high.log10().floor() as i32)
@@ -80,11 +82,12 @@ impl Scale {
     }
 }
 
-/// How strongly the lines of the grid and the numbers beside it stand against the data.
+/// How strongly the lines of the grid stand against the data.
 const GRID_OPACITY: f64 = 0.13;
+/// How strongly the numbers beside the axes stand against the data.
 const NUMBER_OPACITY: f64 = 0.75;
 
-/// The chart as a drawing.
+/// Draws the chart: its axes, data, legend or map, as elements of a picture of 760 units by 470 or more.
 pub(super) fn draw(chart: &Chart) -> Drawing {
     let size = [WIDTH, HEIGHT + extra_height(chart)];
     let mut drawing = Drawing { title: chart.title.clone(), size, elements: Vec::new() };
@@ -103,15 +106,17 @@ pub(super) fn draw(chart: &Chart) -> Drawing {
     drawing
 }
 
+/// Returns a line of the grid.
 fn grid_line(from: Place, to: Place) -> Element {
     Element::Line { points: vec![from, to], ink: Ink::Text, width: 1.0, opacity: GRID_OPACITY, dashed: false }
 }
 
-/// A number at an axis or a name below a bar.
+/// Returns a number at an axis or a name below a bar.
 fn tick_label(text: String, place: Place, anchor: Anchor) -> Element {
     Element::Text { text, place, anchor, opacity: NUMBER_OPACITY, turned: false, ink: Ink::Text }
 }
 
+/// Returns a line of text in full strength.
 fn label(text: String, place: Place, anchor: Anchor) -> Element {
     Element::Text { text, place, anchor, opacity: 1.0, turned: false, ink: Ink::Text }
 }
@@ -141,7 +146,7 @@ fn axes(elements: &mut Vec<Element>, chart: &Chart, x: Option<&Scale>, y: &Scale
     });
 }
 
-/// Draws the names of series in their colours.
+/// Draws the names of series in their colours; nothing for a single one, which the title names.
 fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)]) {
     let [_, top, right, _] = AREA;
     // A single series is named by the title.
@@ -156,14 +161,14 @@ fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)]) {
     }
 }
 
-/// Draws lines and points with axes and legend.
+/// Draws lines and points with axes and legend; faint and nameless series are not in the legend.
 fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
     let [left, top, right, bottom] = AREA;
     let all = || series.iter().flat_map(|s| &s.points);
     let mut x = Scale::new(all().map(|p| p[0]), &chart.x, [left, right], false);
     let mut y = Scale::new(all().map(|p| p[1]), &chart.y, [bottom, top], false);
     if chart.equal_scales {
-        equalise(&mut x, &mut y);
+        equalise_units(&mut x, &mut y);
     }
     axes(elements, chart, Some(&x), &y, right);
     let mut names = Vec::new();
@@ -176,8 +181,8 @@ fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
     legend(elements, &names);
 }
 
-/// Widens the range of one linear scale, so that a unit is as long on both.
-fn equalise(x: &mut Scale, y: &mut Scale) {
+/// Widens the range of the finer of two linear scales, so that a unit is as long on both.
+fn equalise_units(x: &mut Scale, y: &mut Scale) {
     // The coarser unit of the two: the other scale is widened to it, and nothing is cut off.
     let unit = |s: &Scale| (s.high - s.low) / (s.to - s.from).abs();
     let most = unit(x).max(unit(y));
@@ -187,7 +192,7 @@ fn equalise(x: &mut Scale, y: &mut Scale) {
     }
 }
 
-/// The line of a series, then its error bars, then its points on top.
+/// Draws the line of a series, then its error bars, then its points on top; points without a place are left out.
 fn one_series(elements: &mut Vec<Element>, s: &Series, ink: Ink, [x, y]: [&Scale; 2]) {
     let place = |p: &[f64; 2]| (x.shows(p[0]) && y.shows(p[1])).then(|| [x.position(p[0]), y.position(p[1])]);
     let points: Vec<Place> = s.points.iter().filter_map(place).collect();
@@ -208,8 +213,8 @@ fn one_series(elements: &mut Vec<Element>, s: &Series, ink: Ink, [x, y]: [&Scale
 /// Distance of lines of text.
 const LINE: f64 = 15.0;
 
-/// A name in lines that fit under a bar, broken at spaces; a letter takes about half the size of the type.
-fn wrapped(name: &str, width: f64) -> Vec<String> {
+/// Breaks a name at spaces into lines that fit `width`; a letter takes about half the size of the type, and a long word a line of its own.
+fn wrapped_lines(name: &str, width: f64) -> Vec<String> {
     // Three letters at least: a bar of a pixel still needs lines that end.
     let most = ((width - 4.0) / 6.8).max(3.0) as usize;
     let mut lines: Vec<String> = Vec::new();
@@ -222,11 +227,11 @@ fn wrapped(name: &str, width: f64) -> Vec<String> {
     lines
 }
 
-/// What the drawing needs below for names of several lines.
+/// Returns what the drawing needs below for names of several lines; 0 but for bars.
 fn extra_height(chart: &Chart) -> f64 {
     let Content::Bars { categories, .. } = &chart.content else { return 0.0 };
     let slot = (AREA[2] - AREA[0]) / categories.len().max(1) as f64;
-    let lines = categories.iter().map(|c| wrapped(c, slot).len()).max().unwrap_or(1);
+    let lines = categories.iter().map(|c| wrapped_lines(c, slot).len()).max().unwrap_or(1);
     LINE * lines.saturating_sub(1) as f64
 }
 
@@ -273,7 +278,7 @@ fn bar_chart(
             });
             base += if stacked { value } else { 0.0 };
         }
-        for (k, line) in wrapped(category, slot).into_iter().enumerate() {
+        for (k, line) in wrapped_lines(category, slot).into_iter().enumerate() {
             let place = [left + slot * (c as f64 + 0.5), bottom + 19.0 + LINE * k as f64];
             elements.push(tick_label(line, place, Anchor::Middle));
         }
@@ -323,8 +328,9 @@ fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: Colou
     scales
 }
 
-/// The colour of lines and words on a map, and of the borders of zones: both stand against every colour of it.
+/// The colour of lines and words on a map: it stands against every colour of it.
 const MARK: Ink = Ink::Colour([255, 255, 255]);
+/// The colour of the borders of zones: it stands against every colour of a map.
 const ZONE: Ink = Ink::Colour([0x5e, 0xea, 0xd4]);
 
 /// Width of a digit, which most fonts have at about half of the height of the type, with room to either side.
@@ -333,7 +339,7 @@ const LETTER_WIDTH: f64 = 0.6 * TYPE_SIZE;
 /// How strongly the lines of equal value stand against the map.
 const LINE_OPACITY: f64 = 0.75;
 
-/// Lines of equal value with their levels, borders of zones, and named points.
+/// Draws lines of equal value with their levels, borders of zones, and named points.
 fn draw_marks(elements: &mut Vec<Element>, marks: &Marks, unit: &str, [x, y]: [Scale; 2]) {
     let place = |p: &[f64; 2]| [x.position(p[0]), y.position(p[1])];
     let word = |text: String, place: Place, ink: Ink, anchor: Anchor| Element::Text {

@@ -50,7 +50,7 @@ pub enum Cell {
 }
 
 impl Table {
-    /// A table without rows; columns are given as title and unit.
+    /// Makes a table without rows; columns are given as title and unit, `name` is the stem of its file.
     pub fn new(name: &str, title: &str, columns: &[(&str, &str)]) -> Self {
         let column = |&(title, unit): &(&str, &str)| Column { title: title.into(), unit: unit.into() };
         Self {
@@ -69,13 +69,13 @@ impl Table {
         self.rows.push(row);
     }
 
-    /// The table with a caption.
+    /// Returns the table with this caption, in place of any it had.
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self
     }
 
-    /// The table as CSV (RFC 4180), units in the header, numbers in full, text such that no spreadsheet takes it for a formula.
+    /// Writes the table as CSV (RFC 4180), units in the header, numbers in full, text such that no spreadsheet takes it for a formula.
     pub fn to_csv(&self) -> String {
         let header: Vec<String> = self.columns.iter().map(|c| csv_text(&c.heading())).collect();
         let mut text = header.join(",") + "\n";
@@ -88,14 +88,14 @@ impl Table {
 }
 
 impl Column {
-    /// Title and unit on one line.
+    /// Returns title and unit on one line.
     pub(super) fn heading(&self) -> String {
         if self.unit.is_empty() { self.title.clone() } else { format!("{} ({})", self.title, self.unit) }
     }
 }
 
 impl Cell {
-    /// For people.
+    /// Writes the cell for people; a dash for an empty one.
     pub fn shown(&self) -> String {
         match self {
             Self::Empty => "–".into(),
@@ -105,7 +105,7 @@ impl Cell {
         }
     }
 
-    /// For programs: every digit, nothing between them.
+    /// Writes the cell for programs: every digit, nothing between them; nothing for an empty one.
     pub fn plain(&self) -> String {
         match self {
             Self::Empty => String::new(),

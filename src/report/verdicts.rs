@@ -9,18 +9,18 @@ use crate::regulation::{Assessment, RowVerdict, Verdict};
 /// Significant digits of intensities: more than any photometer has.
 const DIGITS: usize = 5;
 
-/// How many rows have each verdict: pass, fail, unsure.
+/// Counts the rows of each verdict: pass, fail, unsure; rows that were not judged are in none.
 pub fn verdict_counts(a: &Assessment) -> [usize; 3] {
     [Verdict::Pass, Verdict::Fail, Verdict::Unsure].map(|v| a.rows.iter().filter(|r| r.verdict == Some(v)).count())
 }
 
-/// A sentence about the whole.
+/// Writes a sentence about the whole.
 pub fn verdict_sentence(a: &Assessment) -> String {
     let [pass, fail, unsure] = verdict_counts(a);
     format!("**{}: {}** ({pass} rows pass, {fail} fail, {unsure} unsure). ", a.regulation.id, a.verdict)
 }
 
-/// What is asked of a row.
+/// Writes what is asked of a row, cd; in words, or a dash, where it has no limit.
 pub fn requirement_text(row: &RowVerdict) -> String {
     let number = |x: f64| figures(x, DIGITS);
     match (row.row.min, row.row.max) {
@@ -34,7 +34,7 @@ pub fn requirement_text(row: &RowVerdict) -> String {
     }
 }
 
-/// A direction as the tables write it: `3.43L 0.57U`.
+/// Writes a direction, degrees, as the tables do: `3.43L 0.57U`.
 pub fn direction_text([h, v]: [f64; 2]) -> String {
     let side = |x: f64, positive: char, negative: char| match x {
         x if x > 0.0 => format!("{}{positive}", figures(x, 3)),
@@ -44,14 +44,14 @@ pub fn direction_text([h, v]: [f64; 2]) -> String {
     format!("{} {}", side(h, 'R', 'L'), side(v, 'U', 'D'))
 }
 
-/// What would settle an unsure row.
+/// Writes what would settle an unsure row; empty for any other.
 pub fn settling_text(row: &RowVerdict) -> String {
     let Some(settles) = row.settles else { return String::new() };
     let rays = format!("{:.1e} rays", settles.rays as f64);
     settles.tolerance_mm.map_or(rays.clone(), |t| format!("{rays}, {} mm", figures(t, 2)))
 }
 
-/// The section of one verdict; `grid` is the far field that was judged, as placed.
+/// Makes the section of one verdict: text, table, the test points on the map, and the road; `grid` is the far field judged, as placed.
 pub(super) fn section(a: &Assessment, grid: &Grid) -> Section {
     let aim = [a.aim.h_deg, a.aim.v_deg];
     let text = format!(
@@ -71,7 +71,7 @@ pub(super) fn section(a: &Assessment, grid: &Grid) -> Section {
         .with_block(road::from_driver(&name, grid, aim))
 }
 
-/// The rows of an assessment: what is asked and read, both errors, and the verdict.
+/// Makes a table of the rows of an assessment: what is asked and read, both errors, and the verdict. `name` begins the name of its file.
 fn table(a: &Assessment, name: &str) -> Table {
     let columns = [
         ("row", ""),
@@ -102,7 +102,7 @@ fn table(a: &Assessment, name: &str) -> Table {
     table
 }
 
-/// The test points where they were read, over the far field as placed.
+/// Draws the test points where they were read, over the far field as placed; those beyond the picture are left out.
 fn picture(a: &Assessment, grid: &Grid, name: &str) -> Chart {
     // As placed: the map is the one that the user knows; the points are moved to where they were read.
     let shown = lit_part(grid).unwrap_or_else(|| grid.clone());

@@ -75,19 +75,19 @@ pub struct Values {
 const SHOWN: usize = 60_000;
 
 impl View {
-    /// Facets in the colours of their parts, with the facet edges drawn while there are few enough to be seen.
+    /// Draws facets in the colours of their parts, simplified where there are more than 60,000 triangles, which the caption then says.
     pub fn of_facets(name: &str, title: &str, facets: &Facets) -> Self {
         let mut view = Self { name: name.into(), title: title.into(), caption: String::new(), shapes: Vec::new() };
         let mut merged = 0.0f64;
         let total: usize = facets.mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
-        for shown in shown(facets) {
+        for shown in shown_surfaces(facets) {
             let traced = triangles_of(facets, &shown.facets, !facets.labels.is_empty());
             // Each part by its share of the triangles, but enough to be recognised.
             let limit = (SHOWN * traced.triangles.len()).div_ceil(total.max(1)).max(2000);
             let (FaceTriangles { points, faces, triangles }, cell) = merge_corners(traced, limit);
             merged = merged.max(cell);
             let labels =
-                runs(&faces).filter_map(|(first, f)| Some((first, facets.labels.get(f as usize)?.clone())));
+                run_starts(&faces).filter_map(|(first, f)| Some((first, facets.labels.get(f as usize)?.clone())));
             view.shapes.push(Shape::Surface {
                 name: shown.name,
                 points,
@@ -107,7 +107,8 @@ impl View {
         view
     }
 
-    /// Facets coloured by a value each.
+    /// Draws facets coloured by a value each, by index; of more than 60,000 triangles every so many, which the caption then says. Facets
+    /// without a value have none to colour them.
     pub fn of_values(
         name: &str,
         title: &str,
@@ -124,7 +125,7 @@ impl View {
         };
         let mut view = Self { name: name.into(), title: title.into(), caption, shapes: Vec::new() };
         // Clear parts apart, so that one sees through them.
-        for shown in shown(facets) {
+        for shown in shown_surfaces(facets) {
             let FaceTriangles { mut points, mut triangles, .. } = triangles_of(facets, &shown.facets, false);
             let mut per_triangle: Vec<f32> = Vec::with_capacity(triangles.len());
             for &i in &shown.facets {
@@ -136,7 +137,7 @@ impl View {
             if step > 1 {
                 triangles = triangles.into_iter().step_by(step).collect();
                 per_triangle = per_triangle.into_iter().step_by(step).collect();
-                (points, triangles) = used(&points, &triangles);
+                (points, triangles) = used_points(&points, &triangles);
             }
             let values = Some(Values { label: label.into(), values: per_triangle, map });
             let opacity = if shown.group.opacity < 1.0 { 0.4 } else { 1.0 };
@@ -153,13 +154,13 @@ impl View {
         view
     }
 
-    /// The view with a sentence in front of its caption.
+    /// Returns the view with a sentence in front of its caption.
     pub fn caption(mut self, text: &str) -> Self {
         self.caption = format!("{text} {}", self.caption).trim().to_owned();
         self
     }
 
-    /// The view with polylines; those of a single point are left out.
+    /// Returns the view with polylines, mm; those of a single point are left out.
     pub fn lines(mut self, name: &str, lines: &Polylines, colour: [f64; 3]) -> Self {
         let lines: Vec<Vec<[f32; 3]>> = (lines.lines())
             .filter(|line| line.len() > 1)
@@ -171,7 +172,7 @@ impl View {
         self
     }
 
-    /// The view with points.
+    /// Returns the view with points, mm.
     pub fn points(mut self, name: &str, points: &[Point], colour: [f64; 3]) -> Self {
         if !points.is_empty() {
             let points = points.iter().map(|p| p.as_vec3().to_array()).collect();
@@ -180,7 +181,7 @@ impl View {
         self
     }
 
-    /// The view with surfaces that let what is behind them shine through.
+    /// Returns the view with surfaces of this opacity at most, so that what is behind them shines through.
     pub fn faded(mut self, most: f64) -> Self {
         for shape in &mut self.shapes {
             if let Shape::Surface { opacity, .. } = shape {
@@ -190,7 +191,7 @@ impl View {
         self
     }
 
-    /// Lowest and highest coordinates of everything shown.
+    /// Returns lowest and highest coordinates of everything shown, mm; `None` where that is nothing.
     pub fn bounds(&self) -> Option<[[f32; 3]; 2]> {
         let all = self.shapes.iter().flat_map(|s| -> Box<dyn Iterator<Item = &[f32; 3]>> {
             match s {
@@ -231,8 +232,8 @@ struct Shown<'a> {
     facets: Vec<usize>,
 }
 
-/// The facets of a view, by part or, where there are many, by look.
-fn shown<'a>(facets: &'a Facets) -> Vec<Shown<'a>> {
+/// Divides the facets of a view by part or, where there are more than [`NAMED`], by look.
+fn shown_surfaces<'a>(facets: &'a Facets) -> Vec<Shown<'a>> {
     let lists = facets.by_group().into_iter().zip(&facets.groups).filter(|(list, _)| !list.is_empty());
     let mut all: Vec<Shown> =
         lists.map(|(facets, group)| Shown { name: group.name.clone(), group, facets }).collect();
@@ -257,13 +258,13 @@ fn shown<'a>(facets: &'a Facets) -> Vec<Shown<'a>> {
     looks.into_iter().map(named).collect()
 }
 
-/// The first of each run of equal numbers, and the number.
-fn runs(numbers: &[u32]) -> impl Iterator<Item = (u32, u32)> {
+/// Returns the index of the first of each run of equal numbers, and the number.
+fn run_starts(numbers: &[u32]) -> impl Iterator<Item = (u32, u32)> {
     let starts = numbers.iter().enumerate().filter(|(k, n)| *k == 0 || numbers[k - 1] != **n);
     starts.map(|(k, n)| (k as u32, *n))
 }
 
-/// The traced triangles of some facets. Positions are shared; with `by_face` within each face alone, and face comes after face.
+/// Makes triangles of some facets. Points are shared by position; with `by_face` within each face alone, and face comes after face.
 fn triangles_of(facets: &Facets, wanted: &[usize], by_face: bool) -> FaceTriangles {
     let mesh = facets.mesh;
     let mut wanted = wanted.to_vec();
@@ -290,8 +291,8 @@ fn triangles_of(facets: &Facets, wanted: &[usize], by_face: bool) -> FaceTriangl
     FaceTriangles { points, faces, triangles }
 }
 
-/// The points that triangles use, and no others.
-fn used(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Triangles {
+/// Returns the points that triangles use, and no others, with the triangles by their new numbers.
+fn used_points(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Triangles {
     let mut index = FxHashMap::default();
     let mut kept = Vec::new();
     let mut of = |k: u32| {

@@ -8,13 +8,13 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 impl Report {
-    /// The page as one self-contained HTML text.
+    /// Writes the page as one self-contained HTML text; draws every view.
     pub fn to_html(&self) -> String {
-        html::page(self, &drawn)
+        html::page(self, &view_png)
     }
 
-    /// Writes `report.html`, `figures/*.svg` and `.png` and `tables/*.csv` into a folder, which is made when missing; gives the files
-    /// written, the page first.
+    /// Writes `report.html`, `figures/*.svg` and `.png` and `tables/*.csv` into a folder, which is made when missing; returns the files
+    /// written, the page first. Files of the same name are replaced.
     ///
     /// # Errors
     /// When the folder cannot be made or a file cannot be written.
@@ -24,12 +24,12 @@ impl Report {
         let page = folder.join("report.html");
         // The page and the folder have the same pictures: drawn once.
         let views = self.sections.iter().flat_map(|s| &s.blocks).filter_map(|block| match block {
-            Block::View(view) => Some((view.name.as_str(), drawn(view))),
+            Block::View(view) => Some((view.name.as_str(), view_png(view))),
             _ => None,
         });
         let pictures: HashMap<&str, Result<Vec<u8>, String>> = views.collect();
         let html =
-            html::page(self, &|view| pictures.get(view.name.as_str()).cloned().unwrap_or_else(|| drawn(view)));
+            html::page(self, &|view| pictures.get(view.name.as_str()).cloned().unwrap_or_else(|| view_png(view)));
         write_atomic(&page, |w| w.write_all(html.as_bytes()))?;
         let mut written = vec![page];
         for block in self.sections.iter().flat_map(|s| &s.blocks) {
@@ -71,7 +71,7 @@ impl Report {
     }
 }
 
-/// The picture of a view as the bytes of a PNG file, or why it could not be drawn.
-fn drawn(view: &View) -> Result<Vec<u8>, String> {
+/// Draws a view as the bytes of a PNG file, or returns why it could not be drawn.
+fn view_png(view: &View) -> Result<Vec<u8>, String> {
     raster::render(view).to_png().map_err(|e| e.to_string())
 }

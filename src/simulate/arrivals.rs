@@ -9,10 +9,10 @@ use crate::math::Ray;
 /// Share of its length by which a segment that ends on a receiver may fall short of it: 10^6 times the rounding of its vertices.
 const ROUNDING: f64 = 1e-9;
 
-/// The rays of the recorded paths that a plane or sphere counted: where they met it, where they go, and the power they stand for.
+/// Returns one ray for each time a recorded path crossed a plane or sphere that counts it: the point (mm, scene coordinates), the
+/// direction, and a power scaled so that the sum over all recorded paths is what the run emitted: an estimate of what the receiver counted.
 ///
-/// Recorded paths are a sample of all; each ray has the power of all rays that it stands for, so that the sum is an estimate of what
-/// the receiver counted.
+/// `wavelength_nm` is never set. Empty for a number without a receiver, a far field or faces, and for results without recorded paths.
 pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<LightRay> {
     let Some(receiver) = bound.receivers.get(receiver) else { return Vec::new() };
     let emitted: f64 = results.paths.iter().filter(|v| v.event == Event::Emitted).map(|v| v.power).sum();
@@ -48,8 +48,8 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
     rays
 }
 
-/// How far a segment may meet a receiver: to its end, one that leaves the scene for ever. One that ends on a receiver ends
-/// there but for rounding.
+/// Returns how far from `a`, mm, a recorded segment may meet a receiver: its length, infinite where it escapes at `b`, and lengthened by
+/// the rounding of its vertices where it ends on an absorbing receiver.
 fn segment_end(a: &PathVertex, b: &PathVertex, absorbs: bool) -> f64 {
     let length = (b.point - a.point).length();
     match b.event {

@@ -6,7 +6,8 @@ use crate::math::{Frame, Point, Vector};
 use crate::model::{Model, Part, PartId};
 
 impl Placement {
-    /// The placement as a frame.
+    /// Returns the frame that takes the model's coordinates, mm, to the scene's. `z` and `x` may have any length; without `x`, the x axis
+    /// is taken as near to the scene's as `z` allows.
     pub fn frame(&self) -> Frame {
         let z = Vector::from_array(self.z);
         let x = self.x.map(Vector::from_array).unwrap_or(Vector::X);

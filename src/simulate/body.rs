@@ -18,9 +18,9 @@ pub(crate) struct Body {
     absorption: f64,
     /// Absorption by wavelength, when the scene has several and they differ.
     coloured: Option<Absorption>,
-    /// Scattering inside.
+    /// Scattering inside; `None` for a clear body.
     pub(crate) scatter: Option<BulkScatter>,
-    /// Instance name.
+    /// Name of the instance.
     pub(crate) name: String,
     /// Name of the medium.
     pub(crate) medium: String,
@@ -33,7 +33,7 @@ pub(crate) struct Body {
 }
 
 impl Body {
-    /// A body of the medium `m`, with no faces yet.
+    /// Makes a body of the medium `m` without faces: its box is empty, and light in it is never taken to be trapped.
     pub(crate) fn new(m: optics::Medium, name: String, light: &SceneLight) -> Self {
         Self {
             // In light of one line an index is a number; the formula is kept only where rays have wavelengths of their own.
@@ -50,7 +50,7 @@ impl Body {
         }
     }
 
-    /// Refractive index; `wavelength` is absent where it does not matter.
+    /// Returns the refractive index at `wavelength`, nm; at the scene's for `None`, and where the medium does not depend on it.
     #[inline]
     pub(crate) fn index(&self, wavelength: Option<f64>) -> f64 {
         match (&self.dispersive, wavelength) {
@@ -59,7 +59,8 @@ impl Body {
         }
     }
 
-    /// Absorption coefficient, 1/mm.
+    /// Returns the absorption coefficient, 1/mm, at `wavelength`, nm; at the scene's for `None`, and where the medium does not depend on
+    /// it.
     #[inline]
     pub(crate) fn absorption(&self, wavelength: Option<f64>) -> f64 {
         match (&self.coloured, wavelength) {
@@ -68,12 +69,12 @@ impl Body {
         }
     }
 
-    /// Whether anything depends on the wavelength of a ray.
+    /// Whether index or absorption depends on the wavelength of a ray; never in a scene of one wavelength.
     pub(crate) fn is_dispersive(&self) -> bool {
         self.dispersive.is_some() || self.coloured.is_some()
     }
 
-    /// Whether light is absorbed inside.
+    /// Whether light may be absorbed inside at any wavelength.
     pub(crate) fn absorbs(&self) -> bool {
         self.absorption > 0.0 || self.coloured.is_some()
     }
@@ -85,7 +86,7 @@ impl Body {
         self.index == other.index && self.dispersive == other.dispersive
     }
 
-    /// Whether the index at the wavelength of the scene is a number that light can have.
+    /// Whether the index at the wavelength of the scene is positive and finite.
     pub(crate) fn has_valid_index(&self) -> bool {
         self.index > 0.0 && self.index.is_finite()
     }

@@ -9,7 +9,7 @@ pub(crate) struct Fnv(u128);
 impl Fnv {
     const START: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
 
-    /// The hash of these pieces; where one ends and the next begins counts.
+    /// Returns the hash of these pieces in order; where one ends and the next begins counts.
     pub(crate) fn hash(pieces: &[&[u8]]) -> u128 {
         let mut h = Self::new();
         pieces.iter().for_each(|piece| h.absorb_piece(piece));
@@ -43,8 +43,8 @@ impl Fnv {
         }
     }
 
-    /// Absorbs sums, with their number.
-    fn sums(&mut self, sums: &[Sum]) {
+    /// Hashes the number of sums and, with its index, each that is not zero.
+    fn absorb_sums(&mut self, sums: &[Sum]) {
         self.absorb(&(sums.len() as u64).to_le_bytes());
         // Empty cells are most, and are told by the indices of the others.
         for (i, s) in sums.iter().enumerate().filter(|(_, s)| **s != Sum::default()) {
@@ -55,22 +55,22 @@ impl Fnv {
     }
 }
 
-/// The hash of all sums, and of the counts of rays, segments, corrected normals, losses and cuts, as 32 hexadecimal digits. What instances
-/// absorbed is a sum of faces, and needs no place in it.
+/// Hashes all sums, and the counts of rays, segments, corrected normals, losses and cuts, to 32 hexadecimal digits. Lost rays, paths,
+/// sequences and other counts have no part in it; what instances absorbed is a sum of faces, and needs none.
 pub(crate) fn digest(t: &Tallies) -> String {
     let mut h = Fnv(Fnv::START);
-    t.cells.iter().for_each(|c| h.sums(c));
-    h.sums(&t.receivers);
-    h.sums(&t.faces);
-    h.sums(&t.bulk);
-    h.sums(&t.ends);
+    t.cells.iter().for_each(|c| h.absorb_sums(c));
+    h.absorb_sums(&t.receivers);
+    h.absorb_sums(&t.faces);
+    h.absorb_sums(&t.bulk);
+    h.absorb_sums(&t.ends);
     for m in &t.moments {
         m.first.iter().for_each(|x| h.absorb(&x.to_le_bytes()));
         m.second.iter().for_each(|x| h.absorb(&x.to_le_bytes()));
         h.absorb(&m.farthest.to_le_bytes());
     }
     t.spreads.iter().flat_map(|s| s.products.iter().flatten()).for_each(|x| h.absorb(&x.to_le_bytes()));
-    t.channels.iter().for_each(|c| h.sums(c));
+    t.channels.iter().for_each(|c| h.absorb_sums(c));
     let c = &t.counts;
     [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off].iter().for_each(|x| h.absorb(&x.to_le_bytes()));
     format!("{:032x}", h.0)

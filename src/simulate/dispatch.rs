@@ -7,12 +7,12 @@ use super::settings::{KernelChoice, RunSettings};
 use super::tallies::ReplicateTally;
 use crate::intersect::Cost;
 
-/// Name of the kernel that a run with these settings uses; runs of one kernel are the same code.
+/// Returns the name of the kernel that a run with these settings uses, from "mirror" to "full"; the same name is the same code.
 pub fn kernel_name(bound: &BoundScene, settings: &RunSettings) -> &'static str {
     kernel_kind(bound, settings).name()
 }
 
-/// The kernel that a run takes: what the scene needs, or more where the settings ask for more.
+/// Returns the kernel that a run takes: the smallest that the scene needs, or a larger one where the settings ask for it.
 pub(crate) fn kernel_kind(bound: &BoundScene, settings: &RunSettings) -> KernelKind {
     let required = Required::new(bound).kernel;
     match settings.kernel {
@@ -24,7 +24,7 @@ pub(crate) fn kernel_kind(bound: &BoundScene, settings: &RunSettings) -> KernelK
     }
 }
 
-/// Traces rays with a kernel and adds them to a tally. Returns the intersector's work.
+/// Traces the selected rays with a kernel, adds what becomes of them to `tally`, and returns the intersector's work.
 pub(super) fn trace(
     kind: KernelKind,
     context: &Context<'_>,

@@ -11,14 +11,14 @@ use serde::Serialize;
 pub struct Because {
     /// The effect.
     pub effect: Effect,
-    /// Why.
+    /// The reason why it is, or is not, simulated, in words.
     pub because: String,
 }
 
 /// What a scene calls for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Required {
-    /// The effects.
+    /// The effects that it calls for.
     pub effects: Effects,
     /// Those effects, each with the reason.
     pub simulated: Vec<Because>,
@@ -45,7 +45,7 @@ pub(crate) enum KernelKind {
 }
 
 impl KernelKind {
-    /// The smallest kernel that can do these effects where bodies stand apart.
+    /// Returns the smallest kernel that can do these effects where bodies neither touch nor nest; `Nested` is never the answer.
     pub(crate) fn for_effects(effects: Effects) -> Self {
         let media = [Effect::Refraction, Effect::Fresnel, Effect::BulkAbsorption, Effect::BulkScatter];
         let faces = [Effect::SurfaceScatter, Effect::Coating];
@@ -63,6 +63,7 @@ impl KernelKind {
         }
     }
 
+    /// Returns its name in results and messages, in lower case.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Mirror => "mirror",
@@ -76,20 +77,20 @@ impl KernelKind {
 }
 
 impl Effects {
-    /// The effects that a scene calls for, from its materials on faces in use, its sources and its receivers.
+    /// Returns the effects that a bound scene calls for, by its faces, media, sources and receivers.
     pub fn required_by(scene: &BoundScene) -> Self {
         Required::new(scene).effects
     }
 }
 
 impl Required {
-    /// What a scene calls for, with every reason, without running it.
+    /// Finds which effects a bound scene calls for, each with the reason, and the smallest kernel that has them; runs nothing.
     pub fn new(scene: &BoundScene) -> Self {
         required(scene)
     }
 }
 
-/// The effects that the scene needs, why, and the smallest kernel that has them all.
+/// Finds the effects that the scene needs, the reason for or against each, and the smallest kernel that has them all.
 fn required(bound: &BoundScene) -> Required {
     let used = |wanted: &dyn Fn(&Surface) -> bool| {
         bound.faces.iter().filter(|f| wanted(&bound.surfaces[f.surface as usize])).count()
@@ -163,7 +164,7 @@ fn required(bound: &BoundScene) -> Required {
     required
 }
 
-/// Whether the wavelength of a ray matters: for a medium, a coating or a receiver.
+/// Returns whether the wavelength of a ray matters, and the reason. `medium` is the name of one whose index or absorption depends on it.
 fn dispersion(bound: &BoundScene, medium: Option<&str>) -> (bool, String) {
     if !bound.light.coloured {
         return (false, format!("all light has {} nm", bound.light.wavelength));
@@ -182,7 +183,7 @@ fn dispersion(bound: &BoundScene, medium: Option<&str>) -> (bool, String) {
     }
 }
 
-/// A number of things, or that there are none.
+/// Returns the number with its noun, in the plural with an `s`; for 0 the words `none`.
 fn plural(n: usize, noun: &str, none: &str) -> String {
     match n {
         0 => none.into(),

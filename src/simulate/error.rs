@@ -34,16 +34,18 @@ pub struct Error {
 }
 
 impl Error {
+    /// Makes an error without a place in a file and without advice.
     pub(crate) fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
         Self { kind, message: message.into(), help: None, file: String::new(), text: None, span: None }
     }
 
+    /// Returns the error with this advice, in place of any it had.
     pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// The error with its place in the scene's file.
+    /// Returns the error with the file and text of the scene, and the bytes of the text that are meant, where these are known.
     pub(crate) fn located(mut self, file: &str, text: &Arc<str>, span: Option<Range<usize>>) -> Self {
         self.file = file.into();
         self.text = Some(text.clone());
@@ -51,37 +53,37 @@ impl Error {
         self
     }
 
-    /// What kind of mistake it is.
+    /// Returns what kind of mistake it is.
     pub fn kind(&self) -> ErrorKind {
         self.kind
     }
 
-    /// The message alone, without file, line and advice.
+    /// Returns the message alone, without file, line and advice.
     pub fn message(&self) -> &str {
         &self.message
     }
 
-    /// What to do about it.
+    /// Returns what to do about it; `None` where there is nothing to say.
     pub fn advice(&self) -> Option<&str> {
         self.help.as_deref()
     }
 
-    /// The scene file, empty for a scene that came from no file.
+    /// Returns the scene file, as it was named; empty for a scene that came from no file.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// The whole text of the scene file.
+    /// Returns the whole text of the scene file; `None` for an error that was not located.
     pub fn text(&self) -> Option<&str> {
         self.text.as_deref()
     }
 
-    /// The bytes of [`Error::text`] that are meant.
+    /// Returns the bytes of [`Error::text`] that are meant; `None` where no place is.
     pub fn span(&self) -> Option<Range<usize>> {
         self.span.clone()
     }
 
-    /// Line and column of the place that is meant, both from 1.
+    /// Returns line and column of the place that is meant, both from 1 and the column in characters; `None` where no place is.
     pub fn line(&self) -> Option<(usize, usize)> {
         let (text, span) = (self.text.as_deref()?, self.span.as_ref()?);
         let before = text.get(..span.start)?;
@@ -90,11 +92,12 @@ impl Error {
         Some((line, before.rsplit('\n').next().unwrap_or("").chars().count() + 1))
     }
 
+    /// Returns the advice behind a semicolon; empty without one.
     fn advice_clause(&self) -> String {
         self.help.as_ref().map_or_else(String::new, |h| format!("; {h}"))
     }
 
-    /// File, line and column as far as they are known, before the message.
+    /// Returns file, line and column as far as they are known, to stand before the message.
     fn place(&self) -> String {
         match (self.file.is_empty(), self.line()) {
             (true, None) => String::new(),

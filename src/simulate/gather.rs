@@ -14,7 +14,7 @@ use std::time::Instant;
 /// Cells of all receivers, faces and bodies up to which each thread has sums of its own: 32 MB.
 const MOST_THREAD_CELLS: usize = 1 << 20;
 
-/// What all threads have handed over.
+/// The total of what all threads have handed over, behind a lock, and the hooks that are told of it.
 pub(super) struct Gathering<'a> {
     total: Mutex<(PartialRun, Cost)>,
     hooks: &'a Hooks<'a>,
@@ -24,18 +24,20 @@ pub(super) struct Gathering<'a> {
 }
 
 impl<'a> Gathering<'a> {
+    /// Begins with what earlier runs have done; `start` is when this run began.
     pub(super) fn new(before: PartialRun, hooks: &'a Hooks<'a>, start: Instant) -> Self {
         let spent = before.seconds;
         Self { total: Mutex::new((before, Cost::default())), hooks, start, spent }
     }
 
+    /// Waits for the lock and takes it; sums that a panicked thread left are whole, and used.
     fn lock(&self) -> MutexGuard<'_, (PartialRun, Cost)> {
         // A thread that panicked while it held the lock has left whole sums or none: they are added under it in one
         // go.
         self.total.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Adds to what all have gathered, and tells.
+    /// Changes the total by `add` under the lock, brings its seconds up to date, and calls the hook `finished`, still under the lock.
     fn add(&self, add: impl FnOnce(&mut PartialRun), cost: Cost) {
         let mut sums = self.lock();
         add(&mut sums.0);
@@ -46,7 +48,7 @@ impl<'a> Gathering<'a> {
         }
     }
 
-    /// All of it.
+    /// Returns the total, its paths in order of their rays, and the intersector's work. Threads must have dropped their sums before.
     pub(super) fn into_partial_run(self) -> (PartialRun, Cost) {
         let (mut partial, cost) = self.total.into_inner().unwrap_or_else(|e| e.into_inner());
         // Only here: paths come from all threads as they end, and are kept in order of their rays.
@@ -62,7 +64,7 @@ pub(super) struct ThreadSums<'a, 'g> {
     bound: &'g BoundScene,
     /// None where one set of sums has to do.
     partial: Option<PartialRun>,
-    /// Those of the run.
+    /// Number of replicates of the whole run.
     replicates: u32,
     cost: Cost,
     /// When it last handed its sums over.
@@ -70,6 +72,7 @@ pub(super) struct ThreadSums<'a, 'g> {
 }
 
 impl<'a, 'g> ThreadSums<'a, 'g> {
+    /// Makes empty sums for a thread; none of its own where a set has more than [`MOST_THREAD_CELLS`] cells.
     pub(super) fn new(all: &'g Gathering<'a>, bound: &'g BoundScene, replicates: u32) -> Self {
         let receivers: usize = bound.receivers.iter().map(|r| r.sum_count()).sum();
         let fits = receivers + bound.faces.len() + bound.bodies.len() <= MOST_THREAD_CELLS;
@@ -77,7 +80,8 @@ impl<'a, 'g> ThreadSums<'a, 'g> {
         Self { all, bound, partial, replicates, cost: Cost::default(), handed: Instant::now() }
     }
 
-    /// Takes in what a whole replicate gathered, and empties it.
+    /// Adds a finished replicate and empties its `tally`. Hands the thread's sums over when `every` has passed and someone listens; without
+    /// sums of its own, adds to the total at once.
     pub(super) fn take(&mut self, replicate: u32, tally: &mut ReplicateTally, cost: Cost) {
         match &mut self.partial {
             Some(partial) => {
@@ -93,7 +97,7 @@ impl<'a, 'g> ThreadSums<'a, 'g> {
         }
     }
 
-    /// Adds what this thread has gathered to the total.
+    /// Adds what this thread has gathered to the total, and leaves the thread without sums; does nothing where no replicate is done.
     fn hand_over(&mut self) {
         if let Some(partial) = self.partial.take()
             && !partial.done.is_empty()

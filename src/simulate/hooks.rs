@@ -9,11 +9,11 @@ use std::time::Duration;
 /// How far a run has come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// Rays finished.
+    /// Rays finished, those of earlier runs that it goes on from included.
     pub rays: u64,
     /// Rays to trace in all.
     pub total: u64,
-    /// Seconds since the start.
+    /// Seconds since this run started.
     pub seconds: f64,
 }
 
@@ -36,7 +36,7 @@ pub struct Hooks<'a> {
 }
 
 impl<'a> Hooks<'a> {
-    /// Progress alone.
+    /// Makes hooks that tell progress alone.
     pub fn with_progress(progress: &'a (dyn Fn(Progress) -> bool + Sync)) -> Self {
         Self { progress, finished: None, every: Duration::ZERO, replicate: None, paths: None }
     }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum LostCause {
-    /// It left the scene while inside a medium: a crack, or an open shell with a medium.
+    /// It left the scene, or came to a receiver that ends light, while inside a medium: a crack, or an open shell with a medium.
     NoExit,
     /// It left a body that it was not inside of, or entered one while inside another that stands apart.
     ImpossibleMedium,
@@ -16,12 +16,12 @@ pub enum LostCause {
     InsideSolid,
     /// More bodies inside each other than a ray can carry.
     TooDeep,
-    /// A direction or distance that is not a number.
+    /// The intersector's answer is of no use: a distance or normal that is not a number, or a face that the scene does not have.
     NotANumber,
 }
 
 impl LostCause {
-    /// Its name in files and messages, the same as in JSON.
+    /// Returns its name in files and messages, the same as in JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::NoExit => "no_exit",
@@ -42,7 +42,7 @@ pub struct LostRay {
     pub branch: u32,
     /// Hits before it was lost.
     pub bounce: u32,
-    /// Why.
+    /// Why it was lost.
     pub cause: LostCause,
     /// Its power, in quanta.
     pub quanta: u64,
@@ -63,11 +63,11 @@ pub struct PathVertex {
     pub ray: u64,
     /// Which path of a ray that was split; a new branch starts where it split off.
     pub branch: u32,
-    /// Hits before this vertex.
+    /// Hits before this vertex; where light was scattered inside a body, that one included.
     pub bounce: u32,
-    /// Where, mm.
+    /// Where it is, mm, in scene coordinates.
     pub point: Point,
-    /// Power that arrives here, as a share of an average ray.
+    /// Power that arrives here, as a share of an average ray; at a coated or partly reflecting face what goes on this way.
     pub power: f64,
     /// What happens here.
     pub event: Event,
@@ -86,13 +86,13 @@ pub type PathSink<'a> = &'a (dyn Fn(&[PathVertex]) + Sync);
 pub enum Event {
     /// It starts at a source.
     Emitted,
-    /// It splits off another path.
+    /// It splits off another path here: the first vertex of that path.
     Split,
     /// Reflected at a face.
     Reflected,
-    /// Transmitted at a face.
+    /// Transmitted at a face. Where light goes straight on, as through a face without a medium, there is no vertex.
     Transmitted,
-    /// Scattered at a face.
+    /// Scattered inside a body. Light that a rough face scatters is reflected or transmitted.
     Scattered,
     /// It ends in a face or medium.
     Absorbed,
@@ -119,7 +119,7 @@ pub struct Counts {
     pub lost: u64,
     /// Paths that a limit cut off.
     pub cut_off: u64,
-    /// Those of them that went round by total reflection without end.
+    /// Paths cut off because they went round by total reflection without end; counted in `cut_off` too.
     pub caught: u64,
     /// Times that light left a body below the one it had come into later, of another index: two bodies that overlap.
     pub overlaps: u64,
@@ -128,6 +128,7 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// Adds the counts of other rays.
     pub(crate) fn add(&mut self, o: &Self) {
         self.rays += o.rays;
         self.segments += o.segments;
@@ -138,7 +139,7 @@ impl Counts {
         self.add_overlap(o.overlapping, o.overlaps);
     }
 
-    /// Notes that these bodies overlap, met so many times.
+    /// Adds `times` meetings of two overlapping bodies, and keeps the pair of the lowest numbers; `[0; 2]` is no pair.
     pub(crate) fn add_overlap(&mut self, pair: [u32; 2], times: u64) {
         self.overlaps += times;
         if self.overlapping == [0; 2] || (pair != [0; 2] && pair < self.overlapping) {

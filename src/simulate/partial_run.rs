@@ -21,9 +21,9 @@ pub struct PartialRun {
     pub replicates: u32,
     /// Whether further replicates may follow: parts of it may tell of different totals.
     pub grows: bool,
-    /// Those that are done, rising.
+    /// The replicates that are done, rising.
     pub done: Vec<u32>,
-    /// Their sums.
+    /// The sums of the replicates that are done.
     pub tallies: Tallies,
     /// Seconds that it took.
     pub seconds: f64,
@@ -33,11 +33,12 @@ pub struct PartialRun {
 const MAGIC: &[u8] = b"lampyris tally 7\n";
 
 impl PartialRun {
+    /// Makes a part with no replicate done, of a run that does not grow.
     pub(crate) fn empty(bound: &BoundScene, replicates: u32) -> Self {
         Self { replicates, tallies: Tallies::new(bound), ..Self::default() }
     }
 
-    /// Adds a whole replicate.
+    /// Adds a whole replicate that is not in it yet, and empties its `tally`.
     pub(crate) fn take(&mut self, replicate: u32, tally: &mut ReplicateTally, bound: &BoundScene) {
         // In order, so that looking for a replicate is a search by halves.
         let place = self.done.binary_search(&replicate).unwrap_or_else(|place| place);
@@ -50,10 +51,10 @@ impl PartialRun {
         self.done.len() == self.replicates as usize
     }
 
-    /// Adds another part of the same run.
+    /// Adds another part of the same run, with its seconds.
     ///
     /// # Errors
-    /// When both have a replicate in common, or are parts of different runs.
+    /// When both have a replicate in common, or are parts of different runs; nothing is added then.
     pub fn merge(&mut self, other: &Self) -> Result<(), String> {
         // Parts of a run that grows may come from different totals; what they must share is that it grows.
         let same_run = self.grows == other.grows && (self.grows || self.replicates == other.replicates);
@@ -69,29 +70,31 @@ impl PartialRun {
         Ok(())
     }
 
-    /// Adds other replicates of the same run.
+    /// Adds other replicates of the same run, unchecked; seconds stay as they are.
     pub(crate) fn add(&mut self, other: &Self) {
         self.done.extend(&other.done);
         self.done.sort_unstable();
         self.tallies.merge(&other.tallies);
     }
 
-    /// Writes the file, with a header of the caller's.
+    /// Writes the file, with a header of the caller's, as one block with a checksum.
     ///
     /// # Errors
     /// When `to` cannot be written.
     pub fn write(&self, header: &impl Serialize, to: &mut dyn Write) -> io::Result<()> {
         let mut out = Vec::from(MAGIC);
         let t = &self.tallies;
-        block(&mut out, &serde_json::to_vec(header)?);
+        append_block(&mut out, &serde_json::to_vec(header)?);
         out.extend(self.replicates.to_le_bytes());
         out.extend(u32::from(self.grows).to_le_bytes());
         out.extend((self.done.len() as u32).to_le_bytes());
         self.done.iter().for_each(|r| out.extend(r.to_le_bytes()));
         out.extend(self.seconds.to_le_bytes());
         out.extend((t.cells.len() as u32).to_le_bytes());
-        t.cells.iter().for_each(|c| sums(&mut out, c));
-        [&t.receivers[..], &t.faces, &t.instances, &t.bulk, &t.ends].into_iter().for_each(|s| sums(&mut out, s));
+        t.cells.iter().for_each(|c| append_sums(&mut out, c));
+        [&t.receivers[..], &t.faces, &t.instances, &t.bulk, &t.ends]
+            .into_iter()
+            .for_each(|s| append_sums(&mut out, s));
         for m in &t.moments {
             m.first.iter().for_each(|x| out.extend(x.to_le_bytes()));
             m.second.iter().for_each(|x| out.extend(x.to_le_bytes()));
@@ -108,13 +111,15 @@ impl PartialRun {
         // Numbers of f64 survive as bits: text would round the last one, and has no word for NaN.
         let zero = crate::math::Point::ZERO;
         let bare = |l: &LostRay| LostRay { origin: zero, direction: zero, ..l.clone() };
-        let ledger: Vec<_> = t.ledger.iter().map(|l| (bare(l), bits(&[l.origin, l.direction]))).collect();
-        block(&mut out, &serde_json::to_vec(&ledger)?);
+        let ledger: Vec<_> =
+            t.ledger.iter().map(|l| (bare(l), coordinate_bits(&[l.origin, l.direction]))).collect();
+        append_block(&mut out, &serde_json::to_vec(&ledger)?);
         let bare = |v: &PathVertex| PathVertex { point: zero, power: 0.0, ..v.clone() };
-        let paths: Vec<_> = t.paths.iter().map(|v| (bare(v), bits(&[v.point]), v.power.to_bits())).collect();
-        block(&mut out, &serde_json::to_vec(&paths)?);
+        let paths: Vec<_> =
+            t.paths.iter().map(|v| (bare(v), coordinate_bits(&[v.point]), v.power.to_bits())).collect();
+        append_block(&mut out, &serde_json::to_vec(&paths)?);
         let sequences: Vec<_> = t.sequences.iter().collect();
-        block(&mut out, &serde_json::to_vec(&sequences)?);
+        append_block(&mut out, &serde_json::to_vec(&sequences)?);
         to.write_all(&out)?;
         // The hash over all that stands before: a file that was cut or damaged on its way is refused, not added up.
         to.write_all(&Fnv::hash(&[&out]).to_le_bytes())
@@ -123,13 +128,13 @@ impl PartialRun {
     /// Reads the file for a scene, after `check` has found the header good.
     ///
     /// # Errors
-    /// When the bytes are no such file, are damaged, or belong to another scene.
+    /// When the bytes are no such file or are damaged, `check` refuses the header, or the sums are those of another scene.
     pub fn read<H: DeserializeOwned>(
         bytes: &[u8],
         check: impl FnOnce(&H) -> Result<(), String>,
         bound: &BoundScene,
     ) -> Result<Self, String> {
-        let (header, mut r) = open::<H>(bytes)?;
+        let (header, mut r) = open_tally_file::<H>(bytes)?;
         check(&header)?;
         let mut p = Self::empty(bound, r.u32()?);
         p.grows = r.u32()? != 0;
@@ -192,12 +197,12 @@ impl PartialRun {
         Ok(p)
     }
 
-    /// The header of a file alone.
+    /// Reads the header of a file alone; the checksum of the whole file is tested.
     ///
     /// # Errors
     /// When the bytes are no such file or are damaged.
     pub fn header<H: DeserializeOwned>(bytes: &[u8]) -> Result<H, String> {
-        open(bytes).map(|(header, _)| header)
+        open_tally_file(bytes).map(|(header, _)| header)
     }
 }
 
@@ -206,7 +211,7 @@ impl PartialRun {
 pub struct Fingerprint(pub String);
 
 impl Fingerprint {
-    /// Of these pieces, in this order.
+    /// Hashes these pieces in this order; where one ends and the next begins counts.
     pub fn new(pieces: &[&[u8]]) -> Self {
         Self(format!("{:032x}", Fnv::hash(pieces)))
     }
@@ -265,18 +270,19 @@ fn same_shape(a: &Tallies, b: &Tallies) -> bool {
         && a.bulk.len() == b.bulk.len()
 }
 
-fn bits(points: &[crate::math::Point]) -> Vec<[u64; 3]> {
+/// Returns the bits of each coordinate.
+fn coordinate_bits(points: &[crate::math::Point]) -> Vec<[u64; 3]> {
     points.iter().map(|p| p.to_array().map(f64::to_bits)).collect()
 }
 
-/// Bytes behind their number.
-fn block(out: &mut Vec<u8>, bytes: &[u8]) {
+/// Appends the number of bytes, as 64 bits, and the bytes.
+fn append_block(out: &mut Vec<u8>, bytes: &[u8]) {
     out.extend((bytes.len() as u64).to_le_bytes());
     out.extend(bytes);
 }
 
-/// Length, number of cells that are not empty, and these with their index.
-fn sums(out: &mut Vec<u8>, sums: &[Sum]) {
+/// Appends the number of sums, the number of those that are not empty, and these with their index.
+fn append_sums(out: &mut Vec<u8>, sums: &[Sum]) {
     out.extend((sums.len() as u64).to_le_bytes());
     let filled = sums.iter().enumerate().filter(|(_, s)| **s != Sum::default());
     out.extend((filled.clone().count() as u64).to_le_bytes());
@@ -288,7 +294,10 @@ fn sums(out: &mut Vec<u8>, sums: &[Sum]) {
 }
 
 /// Checks magic and checksum; returns the header and a reader of what follows.
-fn open<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), String> {
+///
+/// # Errors
+/// When the bytes are no such file or are damaged.
+fn open_tally_file<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("not a tally file of this version")?;
     let (rest, sum) = rest.split_last_chunk::<16>().ok_or("the file is cut short")?;
     if Fnv::hash(&[&bytes[..bytes.len() - 16]]) != u128::from_le_bytes(*sum) {
@@ -303,6 +312,7 @@ fn open<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>), String> {
 struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {
+    /// Takes the next `n` bytes off; an error when there are fewer.
     fn take(&mut self, n: u64) -> Result<&'a [u8], String> {
         let n = usize::try_from(n).ok().filter(|n| *n <= self.0.len()).ok_or("the file is cut short")?;
         let (taken, rest) = self.0.split_at(n);
@@ -322,12 +332,13 @@ impl<'a> Reader<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
+    /// Takes the next block off and parses it as JSON.
     fn json<T: DeserializeOwned>(&mut self) -> Result<T, String> {
         let n = self.u64()?;
         serde_json::from_slice(self.take(n)?).map_err(|e| format!("not a tally file of this version: {e}"))
     }
 
-    /// Reads the cells that are not empty into sums of the scene's size.
+    /// Takes sums off and writes those that are not empty into `into`, which must have the length that the file states.
     fn sums(&mut self, into: &mut [Sum]) -> Result<(), String> {
         if self.u64()? != into.len() as u64 {
             return Err("it has other receivers or faces than the scene".into());

@@ -35,14 +35,15 @@ pub(crate) struct SourceShare {
 /// How the rays of a run are divided among sources and replicates.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
-    /// Of each source.
+    /// The rays of each source, in the order of the scene.
     pub(crate) shares: Vec<SourceShare>,
-    /// Rays of each replicate of a run that can grow.
+    /// Rays of each replicate of a run that can grow; `None` for one that cannot.
     replicate_rays: Option<u64>,
     /// The first replicate that is asked for.
     pub(crate) first_replicate: u32,
-    /// Past the last one.
+    /// Past the last replicate that is asked for; their number where the first is 0.
     pub(crate) replicates: u32,
+    /// Rays of the whole run, of all sources.
     pub(crate) rays: u64,
     /// Power of a quantum, in the unit of the sources.
     pub(crate) quantum: f64,
@@ -57,7 +58,8 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Divides the rays of a run among sources and replicates.
+    /// Divides the rays of a run among sources, by power, and replicates. Each source has one ray at least, so that the rays of a run may
+    /// be more than the settings ask for.
     pub(crate) fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
         let emitted: f64 = bound.emitters.iter().map(|e| e.power).sum();
         let grows = can_grow(bound) && (settings.grows || grows_unasked(settings));
@@ -116,7 +118,7 @@ impl Plan {
         self.replicate_rays.is_some()
     }
 
-    /// The rays of a source in a replicate: the first, and past the last.
+    /// Returns the numbers in the run of a source's rays in a replicate: the first, and past the last; equal where it has none.
     pub(crate) fn range(&self, source: usize, replicate: u32) -> [u64; 2] {
         let share = &self.shares[source];
         match self.replicate_rays {
@@ -133,13 +135,13 @@ impl Plan {
         }
     }
 
-    /// Which of how many interleaved lattices of places in a ray list a replicate takes. How many replicates a run that grows will
-    /// have is not known: each has a lattice of its own there.
+    /// Returns `[k, n]`: a replicate takes the k-th of n interleaved lattices of places in a ray list. How many replicates a run that grows
+    /// will have is not known: each has a lattice of its own there, `[0, 1]`.
     pub(crate) fn lattice(&self, replicate: u32) -> [u32; 2] {
         if self.grows() { [0, 1] } else { [replicate, self.replicates] }
     }
 
-    /// The rays of a replicate, each with its source.
+    /// Goes through the rays of a replicate, each as its source and its number in the run.
     pub(super) fn rays_of_replicate(&self, replicate: u32) -> impl Iterator<Item = (usize, u64)> {
         (0..self.shares.len()).flat_map(move |source| {
             let [from, to] = self.range(source, replicate);
@@ -147,19 +149,19 @@ impl Plan {
         })
     }
 
-    /// Rays of a source in the whole run.
+    /// Returns the number of rays of a source in the whole run.
     pub(crate) fn rays_of_source(&self, source: usize) -> u64 {
         let rays = self.shares[source].rays;
         if self.grows() { rays * u64::from(self.replicates) } else { rays }
     }
 
-    /// Whether the path of a ray is kept.
+    /// Whether the path of a ray is recorded as it is traced.
     #[inline]
     pub(crate) fn records(&self, ray: u64) -> bool {
         self.record_mask.is_some_and(|m| ray & m == 0)
     }
 
-    /// Has every ray recorded.
+    /// Has every ray recorded; the sample that is kept stays the same.
     pub(super) fn record_all(&mut self) {
         self.record_mask = Some(0);
     }
@@ -169,8 +171,9 @@ impl Plan {
         self.record_mask.is_some()
     }
 
-    /// The plan of the same run that records what this one was to record, where that is few rays; this one then records none.
-    pub(super) fn recording(&mut self) -> Option<Self> {
+    /// Returns a plan of the same run that records what this one was to record, and has this one record none, where that is one ray in 64
+    /// or fewer; else returns `None` and changes nothing.
+    pub(super) fn take_recording_plan(&mut self) -> Option<Self> {
         let few = self.record_mask.is_some_and(|m| m >= FEW);
         few.then(|| {
             let recording = self.clone();
@@ -179,8 +182,8 @@ impl Plan {
         })
     }
 
-    /// The rays of a replicate that are recorded.
-    pub(super) fn recorded(&self, replicate: u32) -> impl Iterator<Item = u64> {
+    /// Goes through the rays of a replicate that are recorded, by their number in the run; none where nothing is recorded.
+    pub(super) fn recorded_rays(&self, replicate: u32) -> impl Iterator<Item = u64> {
         let recorded_of = move |source: usize, step: u64| {
             let [from, to] = self.range(source, replicate);
             (from.next_multiple_of(step)..to).step_by(step as usize)
@@ -190,12 +193,12 @@ impl Plan {
             .flat_map(move |step| (0..self.shares.len()).flat_map(move |source| recorded_of(source, step)))
     }
 
-    /// Whether the path of a ray belongs to the sample that is kept.
+    /// Whether the path of a ray belongs to the sample that is kept; the same as [`Self::records`] but where all are recorded.
     pub(crate) fn samples(&self, ray: u64) -> bool {
         self.sample_mask.is_some_and(|m| ray & m == 0)
     }
 
-    /// The source and the replicate of a ray; `None` when the run has no such ray.
+    /// Returns the source and the replicate of a ray, by its number; `None` when the run has no such ray.
     pub(crate) fn locate(&self, ray: u64) -> Option<(usize, u32)> {
         let holds = |source: usize, replicate: u32| {
             // Ranges of sources and replicates follow each other, so that a ray's number tells both.
@@ -226,7 +229,7 @@ fn grows_unasked(settings: &RunSettings) -> bool {
     usual && settings.rays >= FEWEST_GROWING * GROWING_REPLICATE && settings.rays.is_multiple_of(GROWING_REPLICATE)
 }
 
-/// So many rays shared out among the sources by their power; at least one to each.
+/// Shares out so many rays among the sources by their power, at least one to each; a source with a number of its own has that.
 fn rays_of_sources(bound: &BoundScene, rays: u64, emitted: f64) -> Vec<u64> {
     // Rounded sums, not rounded shares: three equal sources share a million rays without losing one.
     let mut share = 0.0;

@@ -6,7 +6,7 @@ use super::scene::{self, FarFieldType, ReceiverKind};
 use crate::math::{Aabb, Frame, Point, Ray, Vector};
 use std::f64::consts::TAU;
 
-/// A receiver.
+/// A receiver as the kernel asks it.
 #[derive(Clone, Debug)]
 pub(crate) struct Receiver {
     pub(crate) name: String,
@@ -50,17 +50,17 @@ pub(crate) enum Shape {
     },
 }
 
-/// Where light meets a receiver: the cell, and the coordinates in units of the half sides.
+/// Where light meets a receiver: the cell, and the coordinates in units of the half sides, each from −1 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Spot {
     pub(crate) cell: usize,
     pub(crate) at: [f64; 2],
-    /// Squared distance from the centre, in units of the square of the larger half side.
+    /// Squared distance from the centre in units of the larger half side; of angles, each in units of its own half range.
     pub(crate) radius2: f64,
 }
 
 impl Receiver {
-    /// The receiver of a checked scene; `faces` are those of an absorbing one.
+    /// Makes the receiver of a checked scene; `faces` are those of an absorbing one, which has a single cell.
     pub(crate) fn new(r: &scene::Receiver, faces: Vec<u32>) -> Self {
         let (at, n) = (Point::from_array(r.at), Vector::from_array(r.normal));
         let shape = match r.kind {
@@ -114,7 +114,7 @@ impl Receiver {
         self.cells[0] as usize * self.cells[1] as usize
     }
 
-    /// Sums to keep: the cells of power, then those of each channel.
+    /// Returns the number of sums to keep: the cells of power, then those of each channel.
     pub(crate) fn sum_count(&self) -> usize {
         self.cell_count() * (1 + self.channels.count())
     }
@@ -154,7 +154,7 @@ impl Receiver {
         }
     }
 
-    /// Distances at which a ray crosses the receiver, in `(after, before)`; the nearest.
+    /// Returns the nearest crossing of a plane or sphere in `(after, before)`, mm along a ray; none from behind a one-sided plane.
     #[inline(always)]
     pub(crate) fn crossing(&self, ray: &Ray, after: f64, before: f64) -> Option<f64> {
         match &self.shape {
@@ -194,7 +194,7 @@ impl Receiver {
                 // A point on the very border may be rounded over it.
                 let at = [(x / half[0]).clamp(-1.0, 1.0), (y / half[1]).clamp(-1.0, 1.0)];
                 let largest = half[0].max(half[1]);
-                Some(self.counted(at, (x * x + y * y) / (largest * largest)))
+                Some(self.spot_at(at, (x * x + y * y) / (largest * largest)))
             }
             Shape::Disc { frame, radius, cells, .. } => {
                 let local = p - frame.origin;
@@ -205,36 +205,36 @@ impl Receiver {
             }
             Shape::Sphere { frame, .. } => {
                 let d = frame.local_direction(p - frame.origin).normalize();
-                self.angular(d, FarFieldType::A, [-0.5 * TAU, -0.25 * TAU], [0.5 * TAU, 0.25 * TAU])
+                self.angular_spot(d, FarFieldType::A, [-0.5 * TAU, -0.25 * TAU], [0.5 * TAU, 0.25 * TAU])
             }
             Shape::FarField { .. } | Shape::Absorbed { .. } => None,
         }
     }
 
-    /// The cell and coordinates of a direction in a far field; `None` outside its ranges.
+    /// Returns the cell and coordinates of a unit direction in a far field; `None` outside its ranges, and for any other receiver.
     #[inline]
     pub(crate) fn direction(&self, d: Vector) -> Option<Spot> {
         match &self.shape {
             Shape::FarField { frame, angles, low, high } => {
-                self.angular(frame.local_direction(d), *angles, *low, *high)
+                self.angular_spot(frame.local_direction(d), *angles, *low, *high)
             }
             _ => None,
         }
     }
 
-    /// The spot of a direction; `None` outside of the field.
-    fn angular(&self, d: Vector, angles: FarFieldType, low: [f64; 2], high: [f64; 2]) -> Option<Spot> {
+    /// Returns the spot of a direction given as (right, up, forward) in a field from `low` to `high`, rad; `None` outside.
+    fn angular_spot(&self, d: Vector, angles: FarFieldType, low: [f64; 2], high: [f64; 2]) -> Option<Spot> {
         let [h, v] = to_angles(d, angles);
         if !(low[0] <= h && h <= high[0] && low[1] <= v && v <= high[1]) {
             return None;
         }
         let part = |a: f64, i: usize| (2.0 * (a - low[i]) / (high[i] - low[i]) - 1.0).clamp(-1.0, 1.0);
         let at = [part(h, 0), part(v, 1)];
-        Some(self.counted(at, at[0] * at[0] + at[1] * at[1]))
+        Some(self.spot_at(at, at[0] * at[0] + at[1] * at[1]))
     }
 
-    /// The spot at a place given in half sides, with its cell.
-    fn counted(&self, at: [f64; 2], radius2: f64) -> Spot {
+    /// Returns the spot at a place given in half sides, from −1 to 1, with its cell; the upper border belongs to the last cell.
+    fn spot_at(&self, at: [f64; 2], radius2: f64) -> Spot {
         // The upper border belongs to the last cell.
         let index = |x: f64, n: u32| ((0.5 * (x + 1.0) * f64::from(n)) as u32).min(n - 1) as usize;
         let cell = index(at[1], self.cells[1]) * self.cells[0] as usize + index(at[0], self.cells[0]);
@@ -287,7 +287,7 @@ pub(crate) fn far_axes(origin: Point, forward: Vector, up: Vector) -> Frame {
     Frame { x: side.y, y: side.x, ..side }
 }
 
-/// Angles of a direction given as (right, up, forward), radians.
+/// Returns both angles, rad, of a unit direction (right, up, forward): H and V, or for type C azimuth in `[0, 2π)` and angle from forward.
 pub(crate) fn to_angles(d: Vector, angles: FarFieldType) -> [f64; 2] {
     match angles {
         FarFieldType::A => [d.x.atan2(d.z), d.y.clamp(-1.0, 1.0).asin()],
@@ -296,7 +296,7 @@ pub(crate) fn to_angles(d: Vector, angles: FarFieldType) -> [f64; 2] {
     }
 }
 
-/// Solid angle of cell (i, j), sr; angles in radians.
+/// Returns the solid angle, sr, of cell (i, j) of a field whose angles, rad, go from `low` to `high`.
 fn solid_angle(angles: FarFieldType, low: [f64; 2], high: [f64; 2], cells: [u32; 2], [i, j]: [usize; 2]) -> f64 {
     let edge = |axis: usize, k: usize| low[axis] + (high[axis] - low[axis]) * k as f64 / f64::from(cells[axis]);
     let (h, v) = ([edge(0, i), edge(0, i + 1)], [edge(1, j), edge(1, j + 1)]);

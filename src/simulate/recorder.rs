@@ -17,14 +17,14 @@ pub(super) struct Recorder<'c, 'a> {
 }
 
 impl<'c, 'a> Recorder<'c, 'a> {
-    /// For a run whose plan says which rays are recorded.
+    /// Serves a run whose plan says which rays are recorded; `kind` must be a kernel that records.
     pub(super) fn new(context: &'c Context<'a>, kind: KernelKind) -> Self {
         Self { context, kind, tally: ReplicateTally::new(context.bound) }
     }
 
-    /// Adds the recorded paths of a replicate to its tally.
+    /// Traces the recorded rays of a replicate once more and appends their paths to its `tally`; nothing else is added.
     pub(super) fn record(&mut self, replicate: u32, tally: &mut ReplicateTally) {
-        for ray in self.context.plan.recorded(replicate) {
+        for ray in self.context.plan.recorded_rays(replicate) {
             dispatch::trace(self.kind, self.context, RaySelection::Ray(ray), &mut self.tally);
         }
         tally.paths.append(&mut self.tally.paths);

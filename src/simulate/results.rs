@@ -29,7 +29,7 @@ pub struct Results {
     pub rays: u64,
     /// Seconds of each stage; whoever read and built the scene fills in those but `trace`.
     pub seconds: Seconds,
-    /// Nearest-hit queries.
+    /// Nearest-hit queries of all rays.
     pub segments: u64,
     /// Million rays from the sources per second of `trace`.
     pub mrays_per_s: f64,
@@ -47,7 +47,7 @@ pub struct Results {
     pub lost_rays: u64,
     /// Paths that a limit cut off.
     pub cut_off_rays: u64,
-    /// Those of them that went round by total reflection without end.
+    /// Paths cut off because they went round by total reflection without end; counted in `cut_off_rays` too.
     pub caught_rays: u64,
     /// Hits that used the facet's normal because the interpolated one would have sent the ray through the wrong side.
     pub corrected_normals: u64,
@@ -55,7 +55,7 @@ pub struct Results {
     pub absorbed: Vec<Absorbed>,
     /// The receivers in the order of the scene.
     pub receivers: Vec<ReceiverResult>,
-    /// For each receiver the ways that light took to it, where that was asked for.
+    /// For each receiver the ways that light took to it; empty where the scene does not ask for them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sequences: Vec<ReceiverSequences>,
     /// What faces absorbed and let through, where that was asked for.
@@ -76,16 +76,16 @@ pub struct Results {
     /// Power of a quantum, in the unit of the sources.
     #[serde(skip)]
     pub quantum: f64,
-    /// Hash of all tallies: equal if and only if all of them are, bit by bit.
+    /// Hash of the sums and counts that make the figures; runs with the same sums have the same. Lost rays and paths have no part in it.
     pub digest: String,
 }
 
 /// What was simulated and what not, each with the reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EffectsUsed {
-    /// Simulated.
+    /// The effects that were simulated.
     pub simulated: Vec<Because>,
-    /// Not simulated.
+    /// The effects that were not simulated.
     pub not_simulated: Vec<Because>,
     /// The kernel that was picked.
     pub kernel: &'static str,
@@ -94,22 +94,22 @@ pub struct EffectsUsed {
 /// Where the power went. `emitted` is the sum of the others to the last quantum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Power {
-    /// By all sources.
+    /// Emitted by all sources.
     pub emitted: f64,
-    /// On receivers that end light.
+    /// Ended on receivers that end light, or in a far field.
     pub received: f64,
-    /// In faces and media.
+    /// Absorbed in faces and media.
     pub absorbed: f64,
-    /// Out of the scene, past every receiver.
+    /// Escaped out of the scene, past every receiver.
     pub escaped: f64,
-    /// On paths that a limit cut off.
+    /// Left on paths that a limit cut off.
     pub cut_off: f64,
-    /// On paths that were lost.
+    /// Left on paths that were lost.
     pub lost: f64,
 }
 
 impl Power {
-    /// What does not add up, as a share of what was emitted.
+    /// Returns what does not add up, as a share of what was emitted; not a number where nothing was.
     pub fn imbalance(&self) -> f64 {
         let sum = self.received + self.absorbed + self.escaped + self.cut_off + self.lost;
         (self.emitted - sum).abs() / self.emitted
@@ -130,7 +130,8 @@ pub struct Absorbed {
 }
 
 impl Results {
-    /// The results of a run, or of the part of it that was traced.
+    /// Makes the results of a run, or of the part of it that was traced: powers are scaled to what all sources emit. Stages other than
+    /// `trace` have 0 seconds.
     pub fn new(bound: &BoundScene, settings: &RunSettings, traced: Traced) -> Self {
         let plan = Plan::new(bound, settings);
         let required = Required::new(bound);
@@ -195,7 +196,7 @@ impl Results {
     }
 }
 
-/// The tables of sequences, one a receiver; none where they were not asked for.
+/// Returns a table of sequences for each receiver; none where the scene does not ask for them.
 fn sequences(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<ReceiverSequences> {
     let receivers = if bound.scene.run.sequences > 0 { bound.receivers.len() } else { 0 };
     (0..receivers as u32).map(|r| ReceiverSequences::new(bound, tallies, r, quantum)).collect()
@@ -204,7 +205,7 @@ fn sequences(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Receive
 /// Student's t for 95 % with 1 to 10 degrees of freedom.
 const STUDENT: [f64; 10] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23];
 
-/// What errors mean that few replicates tell of: of 200 runs with two, 151 lay within two of their errors.
+/// Returns a sentence on what errors from 2 to 11 replicates mean; `None` for others. Of 200 runs with two, 151 lay within two errors.
 fn few_replicates(replicates: u32) -> Option<String> {
     let t = STUDENT.get(replicates.checked_sub(2)? as usize)?;
     Some(format!(
@@ -212,7 +213,7 @@ fn few_replicates(replicates: u32) -> Option<String> {
     ))
 }
 
-/// Power that instances' faces and bodies' media have taken, where they took any.
+/// Returns the power that the faces of each instance and the medium of each body have taken; those that took none are left out.
 fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absorbed> {
     let result = |name: &str, r#in: &str, s: &Sum| Absorbed {
         name: name.into(),

@@ -32,7 +32,8 @@ pub fn simulate(
     Results::new(bound, settings, trace(bound, intersector, settings, None, &Hooks::with_progress(progress)))
 }
 
-/// Traces the replicates of a run (those of its shard) that are not done yet, and adds them to what is.
+/// Traces the replicates of a run (those of its shard) that are not done yet, and adds them to `from`, which must be a part of the same
+/// run; `None` begins anew. Ends early, with whole replicates, where the progress hook says so.
 pub fn trace(
     bound: &BoundScene,
     intersector: &dyn Intersector,
@@ -49,7 +50,7 @@ pub fn trace(
         context.plan.record_all();
         None
     } else {
-        context.plan.recording().map(|plan| context.with_plan(plan, &single))
+        context.plan.take_recording_plan().map(|plan| context.with_plan(plan, &single))
     };
     let mut all = context.plan.clone();
     all.record_all();
@@ -94,7 +95,7 @@ pub fn trace(
     Traced { partial, cost, threads }
 }
 
-/// The replicates of the `i`-th of `n` shards.
+/// Returns the replicates of the `shard`-th, from 0, of `shards`; empty for one too many.
 fn shard_replicates(all: Range<u32>, [shard, shards]: [u32; 2]) -> Range<u32> {
     let count = u64::from(all.end.saturating_sub(all.start));
     let first = |k: u32| all.start + (count * u64::from(k) / u64::from(shards.max(1))).min(count) as u32;
@@ -121,7 +122,7 @@ struct Work<'w, 'a> {
 }
 
 impl Work<'_, '_> {
-    /// What one thread does: takes replicates, traces them and adds them up, until none is left.
+    /// Takes replicates, traces them and adds them up, until none is left or the run is stopped: the work of one thread.
     fn run(&self, gathering: &Gathering<'_>) {
         let bound = self.context.bound;
         let mut tally = ReplicateTally::new(bound);
@@ -152,7 +153,7 @@ impl Work<'_, '_> {
     }
 }
 
-/// Tells the intersector which rays a run is going to ask.
+/// Tells the intersector how many rays a run is going to ask, and which of them share an origin or direction.
 fn announce(context: &Context<'_>, threads: usize) {
     // A shard traces its share alone, and what is worked out beforehand must pay for that.
     let of_shard = |rays: u64| rays / u64::from(context.settings.shard[1].max(1));
@@ -166,7 +167,7 @@ pub(crate) fn prepare(bound: &BoundScene, intersector: &dyn Intersector, setting
     announce(&Context::new(bound, intersector, settings), thread_count(settings));
 }
 
-/// Threads that are asked for, or as many as the machine has.
+/// Returns the threads that are asked for; for 0, as many as the machine has.
 fn thread_count(settings: &RunSettings) -> usize {
     match settings.threads {
         0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
@@ -174,8 +175,8 @@ fn thread_count(settings: &RunSettings) -> usize {
     }
 }
 
-/// Traces some rays of a run once more, by their number, and records their whole paths; `paths` and `ledger` of the results
-/// are theirs.
+/// Traces some rays of a run once more, by their number, and records their whole paths: `paths` and `ledger` of the results are theirs.
+/// Numbers that the run does not have are passed over; powers are scaled as if these rays were all.
 pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings, rays: &[u64]) -> Results {
     // A ray that is traced alone would leave the rest of a wave idle.
     let start = Instant::now();
@@ -197,12 +198,12 @@ pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunS
     Results::new(bound, settings, Traced { partial, cost, threads: 1 })
 }
 
-/// Number of replicates that a run is divided into.
+/// Returns the number of replicates that a run is divided into, those before its first ray included.
 pub fn replicates(bound: &BoundScene, settings: &RunSettings) -> u32 {
     Plan::new(bound, settings).replicates
 }
 
-/// The replicates of a run that its settings ask for: all of them, or those from its first ray on.
+/// Returns the replicates of a run that its settings ask for: all of them, or those from its first ray on; shards are not heeded.
 pub fn replicate_range(bound: &BoundScene, settings: &RunSettings) -> Range<u32> {
     let plan = Plan::new(bound, settings);
     plan.first_replicate..plan.replicates

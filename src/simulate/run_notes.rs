@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 const OVERLAP_SEGMENTS: u64 = 10_000;
 
 impl BoundScene {
-    /// One sentence about bodies of different media that a run found to overlap.
+    /// Returns one sentence about bodies of different media that a run found to overlap; `None` where that was rarer than once in
+    /// [`OVERLAP_SEGMENTS`] segments.
     pub(crate) fn overlap_note(&self, counts: &Counts) -> Option<String> {
         let [[a, medium_a], [b, medium_b]] = [self.body(counts.overlapping[0])?, self.body(counts.overlapping[1])?];
         let times = counts.overlaps;
@@ -24,7 +25,8 @@ impl BoundScene {
         })
     }
 
-    /// One sentence about lost light: where most of it was, and why.
+    /// Returns one sentence about lost light: where most of it was, and why; `None` where the ledger is empty. `lost` counts those beyond
+    /// it.
     pub(crate) fn lost_note(&self, lost: u64, ledger: &[LostRay]) -> Option<String> {
         let mut places: BTreeMap<(u32, Option<&str>, LostCause), usize> = BTreeMap::new();
         for l in ledger {

@@ -65,13 +65,15 @@ pub type SequenceSums = BTreeMap<Sequence, Sum>;
 struct RayPaths<'v>(FxHashMap<u32, Vec<&'v PathVertex>>);
 
 impl<'v> RayPaths<'v> {
+    /// Groups the vertices of one ray by branch.
     fn new(vertices: &'v [PathVertex]) -> Self {
         let mut by_branch: FxHashMap<u32, Vec<&PathVertex>> = FxHashMap::default();
         vertices.iter().for_each(|v| by_branch.entry(v.branch).or_default().push(v));
         Self(by_branch)
     }
 
-    /// What happened to the light of a branch before its hit of this number, from the source on.
+    /// Returns what happened to the light of a branch before its hit of this number, from the source on; empty for a branch without
+    /// vertices.
     fn steps(&self, branch: u32, bounce: u32) -> Vec<SequenceStep> {
         let Some(vertices) = self.0.get(&branch) else { return Vec::new() };
         let mut steps = match vertices.first() {
@@ -91,14 +93,15 @@ impl<'v> RayPaths<'v> {
         steps
     }
 
-    /// The steps of the path that a branch split off from, up to there. Branches are numbered by the splits before alone.
+    /// Returns the steps of the path that a branch split off from, up to there; empty where that path was not recorded. Branches are
+    /// numbered by the splits before alone.
     fn steps_before_split(&self, branch: u32, bounce: u32) -> Vec<SequenceStep> {
         let parent = self.0.keys().find(|&&p| p != branch && split_branch(p, bounce) == branch);
         parent.map_or_else(Vec::new, |&p| self.steps(p, bounce))
     }
 }
 
-/// Adds the light of one ray to its sequences.
+/// Adds the light of one ray, counted at `deposits`, to its sequences in `tally`. `vertices` are all of its paths.
 pub(crate) fn add_ray(
     bound: &BoundScene,
     source: u32,
@@ -144,7 +147,8 @@ pub struct RecordedWay {
     pub points: Vec<Point>,
 }
 
-/// The ways of recorded paths, whose vertices stand in the order of rays, branches and hits.
+/// Returns the way of each recorded path from its source, at most [`MOST_STEPS`] steps. Vertices must stand in the order of rays, branches
+/// and hits.
 pub fn recorded_ways(vertices: &[PathVertex]) -> Vec<RecordedWay> {
     let mut ways = Vec::new();
     for ray in vertices.chunk_by(|a, b| a.ray == b.ray) {

@@ -18,13 +18,13 @@ pub(super) struct SequenceRecorder<'c, 'a> {
 }
 
 impl<'c, 'a> SequenceRecorder<'c, 'a> {
-    /// For a context whose plan records every ray.
+    /// Serves a context whose plan records every ray; `kind` must be a kernel that records.
     pub(super) fn new(context: &'c Context<'a>, kind: KernelKind) -> Self {
         let tally = ReplicateTally { deposits: Some(Vec::new()), ..ReplicateTally::new(context.bound) };
         Self { context, kind, tally }
     }
 
-    /// Adds the sequences of a replicate to its tally.
+    /// Traces the rays of a replicate once more and adds their sequences to its `tally`; nothing else is added.
     pub(super) fn record(&mut self, replicate: u32, tally: &mut ReplicateTally) {
         for (source, ray) in self.context.plan.rays_of_replicate(replicate) {
             dispatch::trace(self.kind, self.context, RaySelection::Ray(ray), &mut self.tally);

@@ -28,14 +28,14 @@ pub struct SequenceResult {
 pub struct ReceiverSequences {
     /// How many there are.
     pub count: usize,
-    /// Those of most power, most first.
+    /// The sequences of most power, most first.
     pub first: Vec<SequenceResult>,
     /// Power of all others together.
     pub rest: f64,
 }
 
 impl ReceiverSequences {
-    /// The `most` sequences of the most power to one receiver.
+    /// Makes the table of one receiver: as many sequences of the most power as the scene asks for, and the rest as a sum.
     pub(crate) fn new(bound: &BoundScene, tallies: &Tallies, receiver: u32, quantum: f64) -> Self {
         let most = bound.scene.run.sequences as usize;
         let mut of_receiver: Vec<(&Sequence, &Sum)> =
@@ -56,7 +56,7 @@ impl ReceiverSequences {
     }
 }
 
-/// A source as tables name it.
+/// Returns a source as tables name it: by its name, or by its number from 1.
 fn source_name(bound: &BoundScene, source: u32) -> String {
     let name = bound.scene.sources.get(source as usize).map_or("", |s| s.name.as_str());
     if name.is_empty() { format!("source {}", source + 1) } else { name.to_owned() }

@@ -31,7 +31,7 @@ const WAVEFRONT: usize = 1024;
 pub struct RunSettings {
     /// Number of rays that leave the sources.
     pub rays: u64,
-    /// The first ray to trace of a run that grows, for a tally that joins those of the rays before it.
+    /// The first ray to trace of a run that grows, for a tally that joins those of the rays before it; rounded up to a whole replicate.
     pub first_ray: u64,
     /// Whether the run is divided into replicates of a fixed size, so that further rays may follow. Without, that is so where the rays
     /// are many and a round number.
@@ -56,7 +56,7 @@ pub struct RunSettings {
     pub threads: usize,
     /// Rays in one wavefront. Changes no bit of a result.
     pub batch: usize,
-    /// About how many paths to record.
+    /// About how many paths to record; 0 for none.
     pub path_samples: u64,
     /// Whether light is grouped by the faces it met; each ray is then traced twice. Changes no bit of a digest.
     pub sequences: bool,

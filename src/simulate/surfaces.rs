@@ -32,7 +32,7 @@ pub(crate) enum Surface {
 }
 
 impl Surface {
-    /// Whether no light passes it.
+    /// Whether no light passes it; `false` for a coating that may transmit at some angle or wavelength.
     pub(crate) fn is_opaque(&self) -> bool {
         match self {
             Self::Absorber | Self::Mirror(_) => true,

@@ -15,11 +15,11 @@ pub(crate) const LEDGER: usize = 1000;
 /// What one replicate gathered.
 #[derive(Debug)]
 pub struct ReplicateTally {
-    /// Of each receiver the cells, those of its channels behind them.
+    /// The cells of each receiver, with those of its channels behind them, in quanta.
     pub(crate) receivers: Vec<Grid>,
     pub(crate) receiver_totals: Vec<u64>,
     pub(crate) moments: Vec<Moments>,
-    /// By face, and by body.
+    /// Quanta absorbed by each face, and inside each body.
     pub(crate) absorbed: Grid,
     /// What passes each face, where that is asked for.
     pub(crate) crossings: Option<FaceCrossings>,
@@ -57,6 +57,7 @@ pub(crate) struct Ends {
 }
 
 impl ReplicateTally {
+    /// Makes an empty tally with the cells, faces and bodies of a scene; deposits are not asked for.
     pub(crate) fn new(bound: &BoundScene) -> Self {
         Self {
             receivers: bound.receivers.iter().map(|r| Grid::new(r.sum_count())).collect(),
@@ -94,7 +95,8 @@ impl ReplicateTally {
         self.sequences.clear();
     }
 
-    /// Brings it into the state in which it can be read: receivers of absorbed power are filled, and nothing waits to be added.
+    /// Fills the receivers of absorbed power from their faces and adds what waits, so that it can be read; once for each replicate, or that
+    /// power is counted twice.
     pub(crate) fn finish(&mut self, bound: &BoundScene) {
         for (i, receiver) in bound.receivers.iter().enumerate() {
             if let Shape::Absorbed { faces } = &receiver.shape {
@@ -106,29 +108,29 @@ impl ReplicateTally {
         }
     }
 
-    /// Hands the vertices gathered so far to whoever wants them all, and keeps the sample.
+    /// Hands the vertices gathered so far to `sink`, and keeps those of the sample.
     pub(crate) fn stream_paths(&mut self, sink: PathSink<'_>, plan: &Plan) {
         sink(&self.paths);
         self.sample.extend(self.paths.drain(..).filter(|v| plan.samples(v.ray)));
     }
 
-    /// Power of a receiver, in quanta.
+    /// Returns the power of a receiver, in quanta.
     pub fn power(&self, receiver: usize) -> u64 {
         self.receiver_totals[receiver]
     }
 
-    /// Where light fell on a receiver.
+    /// Returns the moments of where light fell on a receiver.
     pub fn moments(&self, receiver: usize) -> &Moments {
         &self.moments[receiver]
     }
 
-    /// The cells of a receiver that hold something, each once and in no particular order, with their quanta; those of its channels
-    /// follow those of its power.
+    /// Goes through the cells of a receiver that hold something, each once and in no particular order, with their quanta; those of its
+    /// channels follow those of its power.
     pub fn cells(&self, receiver: usize) -> impl Iterator<Item = (usize, u64)> {
         self.receivers[receiver].touched()
     }
 
-    /// Books power that a face takes.
+    /// Books power that a face takes, a whole number of quanta.
     #[inline]
     pub(crate) fn absorb(&mut self, face: FaceId, quanta: f64) {
         self.ends.absorbed += quanta_as_integer(quanta);
@@ -157,7 +159,7 @@ impl ReplicateTally {
     }
 }
 
-/// Keeps the lost rays of the lowest index.
+/// Sorts lost rays by index and keeps the first [`LEDGER`].
 fn trim_ledger(ledger: &mut Vec<LostRay>) {
     ledger.sort_by_key(|l| (l.ray, l.branch));
     ledger.truncate(LEDGER);
@@ -172,7 +174,7 @@ pub struct Tallies {
     pub cells: Vec<Vec<Sum>>,
     /// Power of each receiver.
     pub receivers: Vec<Sum>,
-    /// Where light fell on each receiver.
+    /// Moments of where light fell on each receiver.
     pub moments: Vec<Moments>,
     /// How that differs between replicates.
     pub spreads: Vec<MomentSpread>,
@@ -190,7 +192,7 @@ pub struct Tallies {
     pub bulk: Vec<Sum>,
     /// Emitted, received, absorbed, escaped, cut off, lost.
     pub ends: [Sum; 6],
-    /// Things counted.
+    /// Counts of rays, segments and what went wrong.
     pub counts: Counts,
     /// The lost rays of the lowest index.
     pub ledger: Vec<LostRay>,
@@ -202,6 +204,7 @@ pub struct Tallies {
 }
 
 impl Tallies {
+    /// Makes empty sums with the cells, faces and bodies of a scene, of no replicate.
     pub(crate) fn new(bound: &BoundScene) -> Self {
         let crossed = if bound.counts_faces() { bound.faces.len() } else { 0 };
         Self {
@@ -219,7 +222,7 @@ impl Tallies {
         }
     }
 
-    /// Takes in what a whole replicate gathered, once it is [finished](ReplicateTally::finish), and empties it.
+    /// Adds what a whole replicate gathered, once it is [finished](ReplicateTally::finish), and empties it; paths are left unsorted.
     pub(crate) fn take(&mut self, replicate: &mut ReplicateTally, bound: &BoundScene) {
         self.replicates += 1;
         // One replicate is one sample of each figure: squares are added once a replicate, or the errors would be
@@ -265,7 +268,8 @@ impl Tallies {
         self.paths.append(&mut replicate.paths);
     }
 
-    /// Adds the sums of other replicates of the same run.
+    /// Adds the sums of other replicates of the same run, and sorts the paths. Parts of runs with other receivers or faces are not refused:
+    /// what has no counterpart is left out.
     pub fn merge(&mut self, o: &Self) {
         self.replicates += o.replicates;
         self.cells.iter_mut().zip(&o.cells).for_each(|(a, b)| merge_sums(a, b));
@@ -289,7 +293,7 @@ impl Tallies {
         self.sort_paths();
     }
 
-    /// Brings what was gathered in any order into the one order.
+    /// Sorts the vertices of paths by ray, branch, bounce and event.
     pub(crate) fn sort_paths(&mut self) {
         self.paths.sort_by_key(|v| (v.ray, v.branch, v.bounce, v.event));
     }

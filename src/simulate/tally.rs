@@ -20,21 +20,21 @@ const CUT: u32 = 10;
 /// What added to a number below 2⁵¹ leaves the nearest whole number in the lowest bits.
 const SHIFT: f64 = 6_755_399_441_055_744.0;
 
-/// The nearest whole number. One addition below 2⁵¹: `f64::round` is a call for the baseline of x86-64, 3 ns each of the five on a
-/// path that is received.
+/// Returns the nearest whole number, of halves the even one below 2⁵¹. One addition there: `f64::round` is a call for the baseline of
+/// x86-64, 3 ns each of the five on a path that is received.
 #[inline(always)]
 pub(crate) fn round_quanta(x: f64) -> f64 {
     // Adding and taking away 1.5·2⁵² leaves the whole number, rounded to even.
     if x.abs() < 2_251_799_813_685_248.0 { (x + SHIFT) - SHIFT } else { x.round() }
 }
 
-/// A whole number of quanta as an integer; a cast to a signed integer is one instruction, to an unsigned one ten.
+/// Returns a whole number of quanta, from 0 to below 2⁶³, as an integer; a cast to a signed one is one instruction, to an unsigned one ten.
 #[inline(always)]
 pub(crate) fn quanta_as_integer(quanta: f64) -> u64 {
     quanta as i64 as u64
 }
 
-/// The whole number nearest to one below 2⁵¹, as an integer: a conversion with all its cases would be eight instructions more.
+/// Returns the whole number nearest to one below 2⁵¹, as an integer: a conversion with all its cases would be eight instructions more.
 #[inline(always)]
 fn nearest_integer(x: f64) -> i64 {
     (x + SHIFT).to_bits().wrapping_sub(SHIFT.to_bits()) as i64
@@ -51,7 +51,7 @@ fn nearest_integer(x: f64) -> i64 {
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sum {
-    /// Quanta.
+    /// Quanta of all rays.
     pub total: u128,
     /// Sum over replicates of the square of the replicate's quanta, in units of 2²⁰ quanta².
     pub squares: u128,
@@ -71,7 +71,7 @@ impl Sum {
         self.squares = self.squares.saturating_add(o.squares);
     }
 
-    /// Standard error of the total, in quanta, from the spread of `replicates` replicates.
+    /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates; fewer than two count as two.
     pub fn error(&self, replicates: u32) -> f64 {
         let k = f64::from(replicates.max(2));
         let squares = self.squares as f64 * f64::from(1u32 << (2 * CUT));
@@ -101,7 +101,8 @@ impl Grid {
         Self { cells: vec![0; cells], touched: vec![0; cells + 1], count: 0, waiting: (0, 0.0) }
     }
 
-    /// Without a branch on whether the cell is empty: half the cells of a picture are, and to wait for the answer was 7 % of a run.
+    /// Adds quanta to a cell. Without a branch on whether it is empty: half the cells of a picture are, and to wait for the answer was 7 %
+    /// of a run.
     #[inline]
     pub(crate) fn add(&mut self, cell: usize, quanta: f64) {
         let quanta = quanta_as_integer(quanta);
@@ -112,9 +113,9 @@ impl Grid {
         *c += quanta;
     }
 
-    /// The same for a grid larger than the nearest cache: asks for the memory of the cell, and adds when the next one comes. What
-    /// waits is part of what [`Self::flush`] moves, not of what the others tell before [`Self::add_pending`]. To add at once was 10 % of
-    /// the kernel's time.
+    /// Adds quanta to a cell when the next ones come, and asks for its memory now: for a grid larger than the nearest cache. What waits is
+    /// part of what [`Self::flush`] moves, not of what the others tell before [`Self::add_pending`]. To add at once was 10 % of the
+    /// kernel's time.
     #[inline(always)]
     pub(crate) fn add_deferred(&mut self, cell: usize, quanta: f64) {
         prefetch(&self.cells, cell);
@@ -122,7 +123,7 @@ impl Grid {
         self.add(earlier_cell, earlier_quanta);
     }
 
-    /// Every cell that was touched, with what it holds.
+    /// Goes through the cells that hold something, each once, with what they hold.
     pub(crate) fn touched(&self) -> impl Iterator<Item = (usize, u64)> {
         self.touched[..self.count].iter().map(|&c| (c as usize, self.cells[c as usize]))
     }
@@ -139,7 +140,7 @@ impl Grid {
         }
     }
 
-    /// Empties it.
+    /// Forgets what it holds and what waits, without adding it anywhere; costs what was touched, not what there is.
     pub(crate) fn clear(&mut self) {
         self.waiting = (0, 0.0);
         for &cell in &self.touched[..self.count] {
@@ -148,7 +149,7 @@ impl Grid {
         self.count = 0;
     }
 
-    /// Moves what the replicate gathered to the sums of the run.
+    /// Adds what the replicate gathered to the sums of the run, and empties the grid.
     pub(crate) fn flush(&mut self, sums: &mut [Sum]) {
         self.add_pending();
         let touched = &self.touched[..self.count];
@@ -198,7 +199,7 @@ impl Moments {
         self.farthest = self.farthest.max(quanta_as_integer(radius2 * (1u64 << 60) as f64));
     }
 
-    /// Adds the moments of other rays.
+    /// Adds the moments of other rays, of which the farthest counts where it is farther.
     pub fn merge(&mut self, o: &Self) {
         for axis in 0..2 {
             self.first[axis] += o.first[axis];
@@ -207,13 +208,13 @@ impl Moments {
         self.farthest = self.farthest.max(o.farthest);
     }
 
-    /// First and second moments of both coordinates in one list; no sum of a run reaches 2¹²⁷.
+    /// Returns first and second moments of both coordinates in one list; no sum of a run reaches 2¹²⁷.
     fn as_list(&self) -> [i128; 4] {
         let [x, y] = self.second.map(|s| i128::try_from(s).unwrap_or(i128::MAX));
         [self.first[0], self.first[1], x, y]
     }
 
-    /// Mean and mean square of both coordinates in units of the half sides, for `quanta` in all.
+    /// Returns mean and mean square of each coordinate in units of the half sides, for `quanta` in all; zeros where there are none.
     pub fn means(&self, quanta: u128) -> [[f64; 2]; 2] {
         let w = quanta.max(1) as f64;
         let first = self.first.map(|s| s as f64 / GRAIN / w);
@@ -221,7 +222,7 @@ impl Moments {
         [[first[0], second[0]], [first[1], second[1]]]
     }
 
-    /// Largest distance from the centre, in units of the half side it was counted in.
+    /// Returns the largest distance from the centre, in units of the half side it was counted in.
     pub fn farthest(&self) -> f64 {
         (self.farthest as f64 / (1u64 << 60) as f64).sqrt()
     }
@@ -239,7 +240,7 @@ pub struct MomentSpread {
 const CUT_MOMENT: u32 = 34;
 
 impl MomentSpread {
-    /// Adds what one whole replicate gathered.
+    /// Adds what one whole replicate gathered: its power in quanta and its moments.
     pub fn add_replicate(&mut self, quanta: u64, m: &Moments) {
         let power = i128::from(quanta >> CUT);
         for (sums, moment) in self.products.iter_mut().zip(m.as_list()) {
@@ -255,7 +256,7 @@ impl MomentSpread {
         pairs.for_each(|(a, b)| *a = a.saturating_add(*b));
     }
 
-    /// Standard errors of the two means and two mean squares of [`Moments::means`], as ratios of sums over replicates.
+    /// Returns the standard errors of the two means, then of the two mean squares of [`Moments::means`], as ratios of sums over replicates.
     pub fn errors(&self, power: &Sum, m: &Moments, replicates: u32) -> [f64; 4] {
         let k = f64::from(replicates.max(2));
         let total = power.total.max(1) as f64;

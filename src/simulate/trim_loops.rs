@@ -6,7 +6,7 @@ use crate::model::{EdgeUse, Face};
 /// Samples along each edge of a loop.
 const EDGE_SAMPLES: usize = 24;
 
-/// The trimming loops as polygons in the parameter plane.
+/// Returns the trimming loops of a face as polygons in its spline parameters, [`EDGE_SAMPLES`] points an edge; none for an untrimmed face.
 pub(crate) fn trim_polygons(face: &Face) -> Vec<Vec<Uv>> {
     let points = |u: &EdgeUse| {
         let [a, b] = u.uv.domain();
@@ -22,7 +22,7 @@ pub(crate) fn trim_polygons(face: &Face) -> Vec<Vec<Uv>> {
     face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
 }
 
-/// Whether a parameter point lies inside the loops: an odd number of crossings.
+/// Whether a parameter point lies inside the loops: an odd number of crossings. Without loops every point does.
 pub(crate) fn is_inside(loops: &[Vec<Uv>], p: Uv) -> bool {
     let crossings = loops
         .iter()

@@ -25,7 +25,8 @@ pub struct Verification {
     pub differing: Vec<String>,
 }
 
-/// Runs a scene with the pruned and with the full kernel and compares every tally.
+/// Runs a scene with the pruned and with the full kernel and compares every sum; returns the results of the pruned one. `progress` hears of
+/// both runs, and must end neither.
 pub fn verify_pruning(
     bound: &BoundScene,
     intersector: &dyn Intersector,
@@ -48,7 +49,7 @@ pub fn verify_pruning(
     (pruned, verification)
 }
 
-/// Where two runs differ, twenty places at most; nothing when all bits agree.
+/// Names where two runs differ, twenty places at most; empty when all of these agree.
 fn compare(bound: &BoundScene, a: &Results, b: &Results) -> Vec<String> {
     let (a, b) = (&a.tallies, &b.tallies);
     let mut found = Vec::new();

@@ -40,12 +40,12 @@ pub enum Verdict {
     Undecided,
 }
 
-/// By how much two distances may differ and still be the same hit, mm: single precision with room.
+/// Whether two distances, mm, may belong to the same hit: they differ by no more than single precision, with room.
 pub fn same_distance(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME_DISTANCE * (1.0 + a.abs())
 }
 
-/// Judges two answers to one ray.
+/// Judges two answers to one ray, on all facets of the mesh; `None` is a miss. Undecided where both are right, or both wrong.
 pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Option<&Hit>) -> Verdict {
     let mut met = Vec::new();
     // All of them: a tree here could share the fault of the trees that are judged.
@@ -57,7 +57,7 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
         met.extend(
             std::iter::once([a, b, c])
                 .chain(second)
-                .filter_map(|corners| meets(ray, corners))
+                .filter_map(|corners| triangle_crossing(ray, corners))
                 .filter(|hit| !own || hit.t > LEAST_OWN_DISTANCE),
         );
     }
@@ -87,7 +87,7 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
     }
 }
 
-/// Whether the line of a ray comes near a facet at all.
+/// Whether the whole line of a ray, both ways, comes near a facet at all.
 fn passes_near(ray: &Ray, corners: &[Point; 4]) -> bool {
     let from_corner = corners[0] - ray.origin;
     // The facet's first corner off the line, against the farthest that another corner is from it.
@@ -101,17 +101,18 @@ const BAND: f64 = 1e-13;
 
 /// A triangle that the ray meets as far as rounding can tell.
 struct Crossing {
+    /// Distance, mm.
     t: f64,
-    /// Beyond the band of rounding.
+    /// Whether it is met beyond the band of rounding.
     inside: bool,
-    /// To 2⁻⁹⁰.
+    /// Whether it is met to 2⁻⁹⁰ of the lengths involved.
     exact: bool,
-    /// Which side of the triangle is met.
+    /// Whether the ray runs against the normal of its corners' order.
     front: bool,
 }
 
-/// Where the ray meets a triangle within its range.
-fn meets(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
+/// Returns where the ray meets a triangle within its range; `None` where it misses by more than rounding, or runs within its plane.
+fn triangle_crossing(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
     let d = ray.direction.to_array().map(DoubleDouble::from);
     let from = ray.origin.to_array();
     let [a, b, c] = corners.map(|p| {
@@ -144,7 +145,7 @@ fn meets(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
     in_range.then(|| Crossing { t, inside, exact: one_sided(exact), front: det.high > 0.0 })
 }
 
-/// `u · (v × w)`.
+/// Returns `u · (v × w)`.
 fn volume(u: &[DoubleDouble; 3], v: &[DoubleDouble; 3], w: &[DoubleDouble; 3]) -> DoubleDouble {
     let cross = |p: usize, q: usize| v[p] * w[q] - v[q] * w[p];
     u[0] * cross(1, 2) + u[1] * cross(2, 0) + u[2] * cross(0, 1)
@@ -158,7 +159,7 @@ struct DoubleDouble {
 }
 
 impl DoubleDouble {
-    /// The exact sum of two numbers.
+    /// Returns the exact sum of two numbers.
     fn sum(a: f64, b: f64) -> Self {
         // Knuth's two-sum: what rounding took from the sum is recovered, whichever of the two is larger.
         let high = a + b;
@@ -166,6 +167,7 @@ impl DoubleDouble {
         Self { high, low: (a - (high - back)) + (b - back) }
     }
 
+    /// Returns the exact sum of two numbers of which the first is the larger.
     fn new(high: f64, low: f64) -> Self {
         // Dekker's quick two-sum: the first is the larger here.
         let sum = high + low;

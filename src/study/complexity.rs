@@ -28,18 +28,18 @@ pub struct Method<'a> {
     pub with: Box<dyn Fn(&Model, &mut Use<'_>) + 'a>,
 }
 
-/// How long.
+/// How many rays, and for how long.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Rays from the sources for the fast methods.
     pub rays: u64,
     /// Seconds that one run of the traditional method may take; it gets as many rays as that allows.
     pub traditional_seconds: f64,
-    /// Timed rounds.
+    /// Timed rounds, beside one that is not timed.
     pub rounds: usize,
     /// Threads; 0 for all.
     pub threads: usize,
-    /// Of the rays.
+    /// Seed of the rays.
     pub seed: u64,
 }
 
@@ -54,7 +54,7 @@ impl Default for Settings {
 pub struct Row {
     /// `simple`, `moderate`, `intricate`; the paper's rows are marked.
     pub model: String,
-    /// Bézier patches.
+    /// Bézier patches of the lamp.
     pub patches: Option<usize>,
     /// Facets, for facets.
     pub facets: Option<usize>,
@@ -64,11 +64,11 @@ pub struct Row {
     pub seconds_prepare: Option<f64>,
     /// The fastest of the rounds.
     pub seconds_prepare_min: Option<f64>,
-    /// For all rays of this row.
+    /// Seconds of the fastest round for all rays of this row.
     pub seconds_trace_min: Option<f64>,
-    /// For all rays of this row.
+    /// Seconds of the middle round for all rays of this row.
     pub seconds_trace_median: Option<f64>,
-    /// For all rays of this row.
+    /// Seconds that 90 % of the rounds stayed below, for all rays of this row.
     pub seconds_trace_p90: Option<f64>,
     /// Rays from the sources.
     pub rays: Option<u64>,
@@ -81,12 +81,12 @@ pub struct Row {
     pub receiver_difference: Option<f64>,
 }
 
-/// The study.
+/// The rows of the study, and its answer.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Complexity {
     /// Our rows, then the paper's.
     pub rows: Vec<Row>,
-    /// One sentence.
+    /// The answer in one sentence.
     pub answer: String,
 }
 
@@ -102,7 +102,8 @@ struct Ready<'r> {
     facets: Option<usize>,
 }
 
-/// Runs all methods on the three lamps.
+/// Times all methods on the three generated lamps, and checks that they light the wall alike; appends the paper's rows. Without a method
+/// called `traditional` no ratio is known.
 ///
 /// # Errors
 /// Those of binding the generated scenes.
@@ -124,7 +125,7 @@ pub fn complexity(
             rounds.add(method.name, || (method.with)(&lamp.model, &mut |_, _| ()));
         }
         let prepare: Vec<Timing> = rounds.run(settings.rounds).into_iter().map(|t| t.1).collect();
-        gather(methods, &lamp.model, &[], &mut |ready| {
+        prepare_all(methods, &lamp.model, &[], &mut |ready| {
             rows.extend(race(lamp, &bound, (ready, &prepare), settings));
         });
     }
@@ -140,19 +141,20 @@ pub fn complexity(
     Ok(Complexity { rows, answer })
 }
 
-/// Prepares all methods, one inside the other, so that all are alive at once and rounds can alternate.
-fn gather(methods: &[Method<'_>], model: &Model, ready: &[Ready<'_>], then: &mut dyn FnMut(&[Ready<'_>])) {
+/// Prepares all methods, one inside the other, then calls `then` with all of them, behind those that are `ready`: so all are alive at once
+/// and rounds can alternate.
+fn prepare_all(methods: &[Method<'_>], model: &Model, ready: &[Ready<'_>], then: &mut dyn FnMut(&[Ready<'_>])) {
     // An intersector lives within the call that it is handed to: to have all at once, each is prepared inside of the
     // one before.
     let Some((first, rest)) = methods.split_first() else { return then(ready) };
     (first.with)(model, &mut |who, facets| {
         let mut more = ready.to_vec();
         more.push(Ready { name: first.name, who, facets });
-        gather(rest, model, &more, then);
+        prepare_all(rest, model, &more, then);
     });
 }
 
-/// Times what is ready on one lamp; the traditional method has as many rays as its time allows.
+/// Times what is ready on one lamp, and returns a row for each; the traditional method has as many rays as its time allows, at least 1024.
 fn race(
     lamp: &Lamp,
     bound: &BoundScene,
@@ -211,7 +213,7 @@ fn race(
     ready.iter().zip(&timings).zip(prepare).map(row).collect()
 }
 
-/// The answer of the study in words.
+/// Writes the answer of the study; says so where the traditional method or the octree was not run.
 fn sentence(rows: &[Row]) -> String {
     let of = |method: &str| -> Vec<&Row> { rows.iter().filter(|r| r.method == method).collect() };
     let (octree, exact) = (of("octree"), of("exact"));

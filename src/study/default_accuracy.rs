@@ -42,9 +42,9 @@ const MARGIN: f64 = 1.5;
 /// Work of one nearest hit on facets with the rest of its path, ns on one thread of an x86-64 of 2021 (AMD EPYC); measured on the
 /// three scenes of the fixtures, as are the others.
 const FACET_HIT: f64 = 350.0;
-/// The same on the spline.
+/// Work of the same hit on the spline, ns.
 const SPLINE_HIT: f64 = 850.0;
-/// Work of making one facet and sorting it into the octree.
+/// Work of making one facet and sorting it into the octree, ns.
 const FACET: f64 = 15_000.0;
 
 /// Intersector and normals of a run on facets, and of one on the spline.
@@ -65,7 +65,7 @@ pub struct Chosen {
     /// `octree`, or `exact` for the spline.
     #[serde(deserialize_with = "intersector_named")]
     pub intersector: IntersectorName,
-    /// One sentence.
+    /// Why it was chosen, as the end of a sentence.
     pub because: String,
     /// Rays of the pilot; 0 where none was needed.
     pub pilot_rays: u64,
@@ -73,7 +73,7 @@ pub struct Chosen {
     pub pilot_seconds: f64,
     /// Everything that was measured, the chosen among it.
     pub alternatives: Vec<Alternative>,
-    /// What the facets that were taken change of the figures.
+    /// What the facets that were taken change of the figures; `None` on the spline.
     #[serde(skip)]
     pub geometric: Option<GeometricError>,
 }
@@ -105,12 +105,14 @@ fn by_name<S: serde::Serializer>(n: &NormalMode, s: S) -> Result<S::Ok, S::Error
     s.serialize_str(n.name())
 }
 
+/// Reads normals by their name; an error for a name that is none.
 fn normals_named<'d, D: Deserializer<'d>>(from: D) -> Result<NormalMode, D::Error> {
     let name = String::deserialize(from)?;
     let found = NormalMode::ALL.into_iter().find(|mode| mode.name() == name);
     found.ok_or_else(|| serde::de::Error::custom(format!("there are no {name} normals")))
 }
 
+/// Reads `octree` or `exact`; an error for any other name.
 fn intersector_named<'d, D: Deserializer<'d>>(from: D) -> Result<IntersectorName, D::Error> {
     let name = String::deserialize(from)?;
     let found = ["octree", "exact"].into_iter().find(|known| *known == name);
@@ -208,7 +210,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     (chosen(ON_SPLINE, tolerance, because, alternatives, None), None)
 }
 
-/// What was tried, with the worst that it changes of any figure.
+/// Makes the record of a way to trace the run: its tolerance in mm, its seconds, and the worst that it changes of any figure.
 fn alternative(
     tolerance_mm: [f64; 2],
     (intersector, normals): (&'static str, NormalMode),
@@ -227,7 +229,8 @@ fn alternative(
 }
 
 impl Undecided<'_> {
-    /// What can be said without a pilot.
+    /// Chooses facets or spline by what is known without tracing, as for flat faces, ready meshes and short runs; `None` where a pilot is
+    /// needed.
     fn without_pilot(&self) -> Option<Chosen> {
         // What is cheap to ask comes first.
         let ((intersector, normals), because) = if self.facets.is_empty() {
@@ -274,12 +277,12 @@ impl Undecided<'_> {
         self.faces().flatten().all(is_polygon)
     }
 
-    /// The number of rays whose statistical error facets must stay below.
+    /// Returns the number of rays whose statistical error facets must stay below.
     fn judged_rays(&self) -> u64 {
         if self.run.grows { GROWN_RAYS } else { self.run.rays }
     }
 
-    /// The run's settings with the pilot's few rays.
+    /// Returns the run's settings with the pilot's few rays, its own replicates and no shard.
     fn pilot_settings(&self) -> RunSettings {
         // No more rays than the run itself has.
         let rays = (self.judged_rays() / SHARE).clamp(PILOT_RAYS[0], PILOT_RAYS[1]).min(self.judged_rays());
@@ -300,7 +303,8 @@ impl Undecided<'_> {
         trace_replicates(self.bound, &*self.source.octree(facets), settings)
     }
 
-    /// How much finer facets would have to be, where counted work foretells that they are cheaper than the spline.
+    /// Returns how much finer facets would have to be; `None` where counted work foretells that they are no cheaper than the spline, or
+    /// they would be more than [`MOST_FINER`] times as fine.
     fn finer_factor(&self, worst: &Worst, error: &GeometricError) -> Option<f64> {
         let hits = error.segments_per_ray * self.judged_rays() as f64;
         let factor = MARGIN * worst.ratio;

@@ -22,11 +22,11 @@ pub struct Row {
     pub effects: Vec<&'static str>,
     /// Rays from the sources.
     pub rays: u64,
-    /// Fastest run.
+    /// Seconds of the fastest run.
     pub seconds_trace_min: f64,
-    /// Middle run.
+    /// Seconds of the middle run.
     pub seconds_trace_median: f64,
-    /// 90 % of the runs were faster.
+    /// Seconds that 90 % of the runs stayed below.
     pub seconds_trace_p90: f64,
     /// Million rays from the sources a second, of the middle run.
     pub mrays_per_s_median: f64,
@@ -36,7 +36,8 @@ pub struct Row {
     pub identical: bool,
 }
 
-/// Times every kernel that one of the choices needs, in alternating rounds, and compares their results bit by bit.
+/// Times every kernel that one of the choices needs, in alternating rounds, and compares their results bit by bit. The first row is the
+/// pruned kernel's, the last the full one's.
 pub fn effects(
     name: &str,
     bound: &BoundScene,
@@ -103,7 +104,7 @@ pub fn effects(
     choices.iter().filter_map(row).collect()
 }
 
-/// One sentence: what the effects that the scene does not call for would cost.
+/// Writes one sentence: what the effects that the scene does not call for would cost; empty for fewer than two rows.
 pub fn answer(rows: &[Row]) -> String {
     let [pruned, .., full] = rows else { return String::new() };
     format!(

@@ -33,6 +33,7 @@ pub struct Figure {
 }
 
 impl Figure {
+    /// Makes a figure, and says which of its errors is the larger; statistics where the geometric one is not known.
     fn new(value: f64, unit: &str, statistical: f64, geometric: Option<f64>) -> Self {
         let limited_by =
             // Without a measured geometric error the number of rays is all there is to blame.
@@ -40,7 +41,7 @@ impl Figure {
         Self { value, unit: unit.into(), statistical, geometric, limited_by }
     }
 
-    /// Both errors together; the statistical one alone where the facets were not judged.
+    /// Returns both errors together; the statistical one alone where the facets were not judged.
     pub fn combined(&self) -> f64 {
         self.geometric.map_or(self.statistical, |geometric| self.statistical.hypot(geometric))
     }
@@ -49,7 +50,7 @@ impl Figure {
 /// The figures of one receiver.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReceiverFigures {
-    /// Power.
+    /// Power counted.
     pub power: Figure,
     /// The largest cell; absent, as all that follow, where only power is counted.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -57,13 +58,13 @@ pub struct ReceiverFigures {
     /// Root mean square distance from the centre along the first axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_1: Option<Figure>,
-    /// And along the second.
+    /// Root mean square distance from the centre along the second axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_2: Option<Figure>,
     /// Mean position along the first axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centroid_1: Option<Figure>,
-    /// And along the second.
+    /// Mean position along the second axis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centroid_2: Option<Figure>,
     /// Sums of the further channels.
@@ -74,15 +75,15 @@ pub struct ReceiverFigures {
 /// The sum of a further channel.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChannelFigure {
-    /// Its name.
+    /// Name of the channel.
     pub name: String,
-    /// The sum.
+    /// Its sum over the receiver.
     #[serde(flatten)]
     pub figure: Figure,
 }
 
 impl ReceiverFigures {
-    /// All of them with their names, as in `results.json`.
+    /// Goes through all of them with their names, as in `results.json`; those that are absent are left out.
     pub fn named(&self) -> impl Iterator<Item = (&str, &Figure)> {
         let places = [
             ("max", &self.max),
@@ -108,7 +109,7 @@ pub enum Surface<'a> {
     Unmeasured,
 }
 
-/// The figures of every receiver of a run; `unit` is that of powers, `W` or `lm`.
+/// Returns the figures of every receiver of a run; `unit` is that of powers, `W` or `lm`.
 pub fn figures(results: &Results, surface: Surface<'_>, unit: &str) -> Vec<ReceiverFigures> {
     let receivers = results.receivers.iter().enumerate();
     receivers.map(|(k, r)| Errors::new(results, surface, k).figures(r, unit)).collect()
@@ -157,7 +158,8 @@ pub struct Halving {
 /// Tracing on facets takes about a tenth longer for each halving of the tolerance.
 const SLOWER_A_HALVING: f64 = 1.1;
 
-/// What the next halving of either error would cost, from the seconds of the run and of the rays that judged its facets.
+/// Estimates what the next halving of either error would cost, from the seconds of the run and of the rays that judged its facets; those
+/// for facets are absent where these were not judged.
 pub fn halving(results: &Results, geometric: Option<&GeometricError>) -> Halving {
     let s = &results.seconds;
     let judged = geometric.filter(|e| e.rays > 0);
@@ -180,6 +182,7 @@ struct Errors<'a> {
 }
 
 impl<'a> Errors<'a> {
+    /// Gathers what is known of the geometric errors of receiver `receiver`.
     fn new(results: &Results, surface: Surface<'a>, receiver: usize) -> Self {
         let measured = match surface {
             Surface::Facets(error) => error.receivers.get(receiver),
@@ -194,7 +197,7 @@ impl<'a> Errors<'a> {
         }
     }
 
-    /// The geometric error of a figure, `lost` of which may be missing.
+    /// Returns the geometric error of a figure, `lost` of which may be missing; `None` where the facets were not judged.
     fn geometric(&self, lost: f64, of_facets: impl Fn(&ReceiverError) -> f64) -> Option<f64> {
         match self.surface {
             Surface::Spline => Some(lost),
@@ -203,7 +206,7 @@ impl<'a> Errors<'a> {
         }
     }
 
-    /// The figures of a receiver, each with both its errors.
+    /// Makes the figures of a receiver, each with both its errors; for absorbed power only that and channels.
     fn figures(&self, r: &ReceiverResult, unit: &str) -> ReceiverFigures {
         let power = self.geometric(self.lost_power, |m| m.power.geometric());
         let is_dark = r.power <= 0.0;
@@ -248,7 +251,7 @@ impl<'a> Errors<'a> {
         }
     }
 
-    /// The figures of the channels of a receiver.
+    /// Makes the figures of a receiver's channels; `unit` is that of powers, which bins are told in.
     fn channels(&self, r: &ReceiverResult, unit: &str) -> Vec<ChannelFigure> {
         let of_channel = |(k, c): (usize, &ChannelResult)| {
             let measured = |m: &ReceiverError| m.channels.get(k).map_or(0.0, |c| c.total.geometric());
@@ -266,10 +269,11 @@ const STEPS: usize = 128;
 /// Standard errors beyond which a cell is taken as never to be the largest.
 const REACH: f64 = 6.0;
 
-/// Standard error of the largest of many cells: its own, and what the largest of noisy cells exceeds the largest true one by.
+/// Returns the standard error of the largest of many cells: its own, and what the largest of noisy cells exceeds the largest true one by. 0
+/// without cells.
 ///
-/// The excess is that of the largest cell after the noise is added once more (Efron, *Bootstrap Methods*, 1979), by the integral of
-/// the distribution of a maximum of independent normal values.
+/// The excess is that of the largest cell after the noise is added once more (Efron, *Bootstrap Methods*, 1979), by the integral of the
+/// distribution of a maximum of independent normal values.
 fn error_of_maximum(cells: &[f64], errors: &[f64]) -> f64 {
     let Some(largest) = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b])) else { return 0.0 };
     let Some(&own) = errors.get(largest) else { return 0.0 };
@@ -294,7 +298,7 @@ fn error_of_maximum(cells: &[f64], errors: &[f64]) -> f64 {
     own.hypot((expected - cells[largest]).max(0.0))
 }
 
-/// Distribution function of the standard normal distribution within 1e-5 (Abramowitz and Stegun, *Handbook*, 26.2.16).
+/// Returns the distribution function of the standard normal distribution, within 1e-5 (Abramowitz and Stegun, *Handbook*, 26.2.16).
 fn normal(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.33267 * x.abs());
     let density = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();

@@ -27,7 +27,8 @@ pub(super) struct HitErrors {
 }
 
 impl HitErrors {
-    /// Errors of hits against the exact ones of the same rays; hits on another face are counted alone.
+    /// Measures the errors of hits against the exact ones of the same rays; a ray that hits on one side alone, or another face, is only
+    /// counted.
     pub(super) fn between(rays: &[Ray], hits: &[Option<Hit>], exact: &[Option<Hit>]) -> Self {
         let mut e = Self::default();
         for ((ray, hit), truth) in rays.iter().zip(hits).zip(exact) {
@@ -54,7 +55,7 @@ impl HitErrors {
     }
 }
 
-/// Slope of log y over log x by least squares; `None` with fewer than two usable points.
+/// Returns the slope of log y over log x by least squares; `None` with fewer than two points above 0, or all at one x.
 pub(super) fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<(f64, f64)> =
         points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0).map(|(x, y)| (x.ln(), y.ln())).collect();

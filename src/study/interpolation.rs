@@ -24,7 +24,7 @@ pub struct Settings {
     pub rays: u64,
     /// Repetitions, averaged by minimum and median; the paper has 100.
     pub repetitions: usize,
-    /// Of the rays.
+    /// Seed of the rays.
     pub seed: u64,
 }
 
@@ -55,12 +55,12 @@ pub struct Row {
     pub seconds_median: f64,
 }
 
-/// The study.
+/// The rows of the study, and its answer.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Interpolation {
     /// Our rows, then the paper's.
     pub rows: Vec<Row>,
-    /// One sentence.
+    /// The answer in one sentence.
     pub answer: String,
 }
 
@@ -71,7 +71,7 @@ const PAPER: [(&str, f64, f64); 3] = [("nearest", 0.015, 5.2), ("bilinear", 0.00
 const ALGORITHMS: [NormalMode; 4] =
     [NormalMode::Nearest, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
 
-/// Compares the ways on each model, on one thread.
+/// Compares nearest, bilinear, cubic and exact normals on each named model, timing them on one thread; appends the paper's rows.
 pub fn interpolation(
     models: &[(&str, &dyn MeshSource)],
     settings: &Settings,
@@ -81,7 +81,7 @@ pub fn interpolation(
     let mut rows = Vec::new();
     for (i, (name, mesh_source)) in models.iter().enumerate() {
         clock.report(name, i as f64 / models.len() as f64);
-        rows.extend(one(name, *mesh_source, settings));
+        rows.extend(rows_of_model(name, *mesh_source, settings));
     }
     let answer = sentence(&rows);
     rows.extend(PAPER.map(|(algorithm, error, seconds)| Row {
@@ -96,7 +96,7 @@ pub fn interpolation(
     Interpolation { rows, answer }
 }
 
-/// A mesh of about the wanted number of facets: their number goes with 1/tolerance.
+/// Makes a mesh of about `facets` facets, within a quarter where six meshes suffice: their number goes with 1/tolerance.
 pub(super) fn mesh_of(mesh_source: &dyn MeshSource, facets: usize) -> MeasuredMesh {
     // Any start will do: each step corrects the tolerance by how far the number was off.
     let mut tolerance = 0.1;
@@ -114,10 +114,10 @@ pub(super) fn mesh_of(mesh_source: &dyn MeshSource, facets: usize) -> MeasuredMe
     meshed
 }
 
-/// Errors and times of all kinds of normals on one model.
-fn one(name: &str, mesh_source: &dyn MeshSource, settings: &Settings) -> Vec<Row> {
+/// Measures errors and times of all kinds of normals on one model, on facets of about the wanted number; a row for each.
+fn rows_of_model(name: &str, mesh_source: &dyn MeshSource, settings: &Settings) -> Vec<Row> {
     let meshed = mesh_of(mesh_source, settings.facets);
-    let (rays, truth) = hitting(mesh_source, &meshed, settings);
+    let (rays, truth) = rays_that_hit(mesh_source, &meshed, settings);
     let hits = ALGORITHMS.map(|_| Mutex::new(vec![None; rays.len()]));
     let timings = with_intersectors(mesh_source, &meshed.mesh, &[FacetTree::Octree], &ALGORITHMS, |trees| {
         let mut rounds = Rounds::default();
@@ -150,8 +150,8 @@ fn one(name: &str, mesh_source: &dyn MeshSource, settings: &Settings) -> Vec<Row
     ALGORITHMS.into_iter().zip(&hits).zip(timings).map(row).collect()
 }
 
-/// Rays that hit the spline, with their exact hits; fewer than wanted when the model is hard to hit.
-fn hitting(
+/// Returns `settings.rays` rays that hit the spline, with their exact hits; fewer where fewer than one in twenty hits.
+fn rays_that_hit(
     mesh_source: &dyn MeshSource,
     meshed: &MeasuredMesh,
     settings: &Settings,
@@ -183,7 +183,7 @@ pub struct Ratios {
     pub nearest_to_bilinear: f64,
     /// Error of bilinear normals over that of cubic ones.
     pub bilinear_to_cubic: f64,
-    /// The same of the 99th percentiles, where they are known.
+    /// Both ratios for the 99th percentiles of the errors, where they are known.
     pub at_p99: Option<[f64; 2]>,
     /// Time with cubic normals over that with bilinear ones.
     pub cubic_time: f64,
@@ -192,7 +192,7 @@ pub struct Ratios {
 }
 
 impl Ratios {
-    /// From the rows of one model; `None` when a kind is missing.
+    /// Works out the ratios from the rows of one model; `None` when a kind is missing.
     pub fn from_rows(rows: &[Row]) -> Option<Self> {
         let row = |name: &str| rows.iter().find(|r| r.algorithm == name);
         let (nearest, bilinear, cubic) = (row("nearest")?, row("bilinear")?, row("cubic")?);
@@ -226,7 +226,7 @@ impl Ratios {
     }
 }
 
-/// What a designer gains by each kind of normals, over all models.
+/// Writes by how much bilinear and cubic normals are nearer to the true ones, over all models, and what they cost; says so without any.
 fn sentence(rows: &[Row]) -> String {
     let models: Vec<(&str, Ratios)> = rows
         .chunk_by(|a, b| a.model == b.model)

@@ -24,12 +24,12 @@ const HALF: f64 = 30.0;
 /// Distance of neighbouring cavities, mm.
 const PITCH: f64 = 66.0;
 
-/// The three lamps, simple first.
+/// Generates the three lamps, simple first.
 pub fn lamps() -> Vec<Lamp> {
     vec![lamp("simple", 1, 8, 0.0), lamp("moderate", 3, 12, 0.02), lamp("intricate", 12, 20, 0.05)]
 }
 
-/// `spans`² bicubic patches a cavity, rippled by `ripple` mm to spread the light.
+/// Makes a lamp of reflectors of `spans`² bicubic patches each, rippled by `ripple` mm to spread the light, and its scene.
 fn lamp(name: &'static str, cavities: usize, spans: usize, ripple: f64) -> Lamp {
     let columns = cavities.min(4);
     let mut surfaces = Vec::new();
@@ -53,7 +53,8 @@ fn lamp(name: &'static str, cavities: usize, spans: usize, ripple: f64) -> Lamp 
     Lamp { name, model: sample_models::model(name, surfaces), patches: cavities * spans * spans, scene }
 }
 
-/// A rippled paraboloid over a square, as a bicubic spline: control points on the function at the Greville abscissae.
+/// Makes a rippled paraboloid over a square about a centre (mm), as a bicubic spline: control points on the function at the Greville
+/// abscissae. `focus` is its focal length, mm.
 fn cavity([x0, y0]: [f64; 2], focus: f64, spans: usize, ripple: f64) -> Surface {
     let inner = (0..=spans).map(|i| -HALF + 2.0 * HALF * i as f64 / spans as f64);
     let knots: Vec<f64> = std::iter::repeat_n(-HALF, 3).chain(inner).chain(std::iter::repeat_n(HALF, 3)).collect();

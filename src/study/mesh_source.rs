@@ -31,7 +31,7 @@ pub enum FacetTree {
 }
 
 impl FacetTree {
-    /// As on the command line.
+    /// Returns its name on the command line and in rows.
     pub fn name(self) -> &'static str {
         match self {
             Self::Octree => "octree",
@@ -42,21 +42,22 @@ impl FacetTree {
 
 /// Makes what a study compares. The product's is [`super::ModelMeshSource`]; tests bring their own to judge the studies.
 pub trait MeshSource: Sync {
-    /// Facets within a tolerance `[min, max]`, mm.
+    /// Makes facets within a tolerance `[min, max]`, mm.
     fn mesh(&self, tolerance: [f64; 2]) -> MeasuredMesh;
-    /// Facets within the local tolerances of a plan; without a mesher that can do so, within the least of them everywhere.
+    /// Makes facets within the local tolerances of a plan; without a mesher that can do so, within the least of them everywhere.
     fn mesh_plan(&self, plan: &TolerancePlan) -> MeasuredMesh {
         self.mesh([plan.tolerance_mm()[0]; 2])
     }
-    /// A structure over facets whose hits carry normals of that kind (`Exact` is [`MeshSource::polish`]'s).
+    /// Builds a structure over facets whose hits carry normals of that kind (`Exact` is [`MeshSource::polish`]'s).
     fn build<'m>(&'m self, mesh: &'m FacetMesh, tree: FacetTree, normals: NormalMode) -> Box<dyn Intersector + 'm>;
-    /// A structure over facets with its hits moved to the spline.
+    /// Builds a structure over facets with its hits moved to the spline.
     fn polish<'m>(&'m self, facets: &'m dyn Intersector, mesh: &'m FacetMesh) -> Box<dyn Intersector + 'm>;
-    /// The certified spline.
+    /// Returns the certified spline.
     fn exact(&self) -> &dyn Intersector;
 }
 
-/// Structures of one tree over a mesh, for each kind of normals in turn; those of exact normals stand on bilinear ones.
+/// Builds each tree over a mesh with each kind of normals in turn, and calls `then` with all of them; those of exact normals are polished
+/// hits on bilinear ones.
 pub(super) fn with_intersectors<R>(
     mesh_source: &dyn MeshSource,
     mesh: &FacetMesh,
@@ -82,7 +83,8 @@ pub(super) fn with_intersectors<R>(
 /// Rays of one task.
 const CHUNK: usize = 4096;
 
-/// All answers, on the current rayon pool or (for one thread) on this thread.
+/// Writes the answers to all rays into `hits`, of the same length, and returns the work. On the current rayon pool, or for one thread on
+/// this thread; any other number of threads means the pool.
 pub(super) fn answer(who: &dyn Intersector, rays: &[Ray], threads: usize, hits: &mut [Option<Hit>]) -> Cost {
     if threads == 1 {
         let mut cost = Cost::default();
@@ -103,13 +105,13 @@ pub(super) fn answer(who: &dyn Intersector, rays: &[Ray], threads: usize, hits: 
     rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).map(one).reduce(Cost::default, sum)
 }
 
-/// The mirrored direction.
+/// Returns the mirrored direction.
 pub(super) fn reflect(d: Vector, n: Vector) -> Vector {
     d - n * (2.0 * d.dot(n))
 }
 
-/// The direction behind a surface whose far side has the relative index `eta`; `None` for total reflection. The normal
-/// may point to either side.
+/// Returns the direction behind a surface whose far side has the relative index `eta`; `None` for total reflection. The normal may point to
+/// either side.
 pub(super) fn refract(d: Vector, n: Vector, eta: f64) -> Option<Vector> {
     // Snell's law wants the normal against the ray.
     let n = if d.dot(n) > 0.0 { -n } else { n };

@@ -26,18 +26,18 @@ impl<'a> ModelMeshSource<'a> {
         Self::with_spline(model, Arc::new(Exact::build(model, &exact::Settings::default())))
     }
 
-    /// With the exact spline of the model, which was built before.
+    /// Takes the exact spline of the model, which was built before.
     pub fn with_spline(model: &'a Model, exact: Arc<Exact>) -> Self {
         Self { model, exact, mesher: tessellate::Settings::default() }
     }
 
-    /// The same, with the sag of every mesh sampled, which takes about twice as long as meshing.
+    /// Builds the exact spline of the model; every mesh then has its sag sampled, which takes about twice as long as meshing.
     pub fn measuring(model: &'a Model) -> Self {
         let product = Self::new(model);
         Self { mesher: tessellate::Settings { measure: true, ..product.mesher }, ..product }
     }
 
-    /// The mesh with its sag: sampled where it was measured, else proved.
+    /// Makes the mesh with its sag, mm: sampled where it was measured, else the proved bound for mean and largest alike.
     fn tessellate_with(&self, settings: &tessellate::Settings) -> MeasuredMesh {
         let made = tessellate(self.model, settings);
         let sag = made.report.sag_mm;
@@ -50,12 +50,12 @@ impl<'a> ModelMeshSource<'a> {
         }
     }
 
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &'a Model {
         self.model
     }
 
-    /// The exact spline, as such.
+    /// Returns the exact spline as its own type.
     pub fn spline(&self) -> &Exact {
         &self.exact
     }

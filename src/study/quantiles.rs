@@ -48,7 +48,7 @@ impl Default for Quantiles {
 }
 
 impl Quantiles {
-    /// Counts one value; anything that is not a number counts as infinite.
+    /// Counts one value; anything that is not a number counts as infinite, a negative one as 0.
     pub fn add(&mut self, value: f64) {
         // An error that is no number is the worst there is; it must not vanish from the histogram.
         let value = if value.is_nan() { f64::INFINITY } else { value.max(0.0) };
@@ -68,7 +68,7 @@ impl Quantiles {
         self.bins[bin.min(BINS - 1)] += 1;
     }
 
-    /// Adds the counts of another.
+    /// Adds the values that another has counted.
     pub fn merge(&mut self, other: &Self) {
         if self.bins.is_empty() {
             self.bins.clone_from(&other.bins);
@@ -84,27 +84,27 @@ impl Quantiles {
         self.squares += other.squares;
     }
 
-    /// Number of values.
+    /// Returns the number of values.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Largest value, 0 without any.
+    /// Returns the largest value, 0 without any.
     pub fn max(&self) -> f64 {
         self.max
     }
 
-    /// Mean, 0 without any value.
+    /// Returns the mean, 0 without any value.
     pub fn mean(&self) -> f64 {
         if self.count == 0 { 0.0 } else { self.sum / self.count as f64 }
     }
 
-    /// Root of the mean square, 0 without any value.
+    /// Returns the root of the mean square, 0 without any value.
     pub fn rms(&self) -> f64 {
         if self.count == 0 { 0.0 } else { (self.squares / self.count as f64).sqrt() }
     }
 
-    /// The value below which a share of the values lies, within 0.6 %; 0 without any value.
+    /// Returns the value below which a share (0 to 1) of the values lies, within 0.6 % up to 2⁴⁰; 0 without any value.
     pub fn quantile(&self, share: f64) -> f64 {
         let wanted = (share.clamp(0.0, 1.0) * self.count as f64).ceil().max(1.0) as u64;
         let mut seen = self.zeros;
@@ -121,7 +121,7 @@ impl Quantiles {
         self.max
     }
 
-    /// Median, 99th percentile and maximum.
+    /// Returns median, 99th percentile and maximum; zeros without any value.
     pub fn summary(&self) -> Summary {
         Summary { p50: self.quantile(0.5), p99: self.quantile(0.99), max: self.max }
     }

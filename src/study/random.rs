@@ -21,6 +21,7 @@ pub struct Random {
 /// SplitMix64's step: 2⁶⁴ over the golden ratio, odd.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
+/// Scrambles 64 bits: SplitMix64's output function, a bijection.
 fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -28,30 +29,30 @@ fn mix(mut z: u64) -> u64 {
 }
 
 impl Random {
-    /// The stream of one index under a seed.
+    /// Begins the stream of one index under a seed.
     pub fn new(seed: u64, index: u64) -> Self {
         // The index is mixed by itself: neighbours would else run along one sequence, shifted by one.
         Self { state: mix(seed.wrapping_add(GOLDEN)) ^ mix(index.wrapping_mul(GOLDEN).wrapping_add(1)) }
     }
 
-    /// The next 64 bits.
+    /// Draws the next 64 bits.
     pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(GOLDEN);
         mix(self.state)
     }
 
-    /// Uniform in `[0, 1)`.
+    /// Draws a number uniform in `[0, 1)`.
     pub fn unit(&mut self) -> f64 {
         // The 53 upper bits: as many as a double holds below 1.
         (self.bits() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// Uniform in `[a, b)`.
+    /// Draws a number uniform in `[a, b)`.
     pub fn between(&mut self, a: f64, b: f64) -> f64 {
         a + (b - a) * self.unit()
     }
 
-    /// A direction uniform on the unit sphere.
+    /// Draws a direction uniform on the unit sphere.
     pub fn direction(&mut self) -> Vector {
         let z = self.between(-1.0, 1.0);
         let (sin, cos) = self.between(0.0, std::f64::consts::TAU).sin_cos();
@@ -59,7 +60,7 @@ impl Random {
         Vector::new(r * cos, r * sin, z).normalize()
     }
 
-    /// A direction uniform on the hemisphere about the unit vector `n`.
+    /// Draws a direction uniform on the hemisphere about the unit vector `n`.
     pub fn hemisphere(&mut self, n: Vector) -> Vector {
         let d = self.direction();
         if d.dot(n) < 0.0 { -d } else { d }

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 /// A numbered family of rays.
 pub trait RaySource: Sync {
-    /// How many rays there are.
+    /// Returns how many rays there are.
     fn len(&self) -> u64;
 
     /// Whether there are none.
@@ -15,7 +15,7 @@ pub trait RaySource: Sync {
         self.len() == 0
     }
 
-    /// The rays of a range of indices; always the same for the same index.
+    /// Makes the rays of a range of indices, which must lie below `len`; always the same for the same index.
     fn rays(&self, range: Range<u64>) -> Vec<Ray>;
 }
 
@@ -50,7 +50,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A square picture of about `count` pixels from an odd direction, so that no axis of the model is favoured.
+    /// Looks at a box (mm) from an odd direction, so that no axis of the model is favoured: the first `count` pixels of a square picture.
     pub fn new(bounds: &Aabb, count: u64) -> Self {
         // Some direction that is along no axis, diagonal or plane of symmetry.
         let view = Vector::new(0.48, -0.62, 0.39).normalize();
@@ -88,14 +88,14 @@ pub struct Uniform {
 }
 
 impl Uniform {
-    /// `count` rays through a box.
+    /// Makes `count` rays through a box, mm.
     pub fn new(bounds: &Aabb, seed: u64, count: u64) -> Self {
         // Grown, so that some rays pass by: what is missed must be missed by all.
         let margin = 0.025 * bounds.diagonal();
         Self { bounds: bounds.grown(margin), seed, count }
     }
 
-    /// The ray of a number: through a point of the box, evenly spread, from outside.
+    /// Makes the ray of a number: through a point of the grown box, evenly spread, from outside.
     fn ray(&self, index: u64) -> Ray {
         let mut random = Random::new(self.seed, index);
         let size = self.bounds.size();
@@ -130,13 +130,15 @@ pub struct Bounces<'a> {
 }
 
 impl<'a> Bounces<'a> {
-    /// `guide` finds the points the rays leave; `lift` is best a few times the sag of the facets, mm.
+    /// Makes `count` rays through a box, mm; `guide` finds the points they leave, and `lift`, mm, is best a few times the sag of the
+    /// facets.
     pub fn new(bounds: &Aabb, guide: &'a dyn Intersector, lift: f64, seed: u64, count: u64) -> Self {
         Self { first: Uniform::new(bounds, seed, count), guide, lift }
     }
 
-    /// The rays of one path, which bounce diffusely.
-    fn path(&self, path: u64) -> Vec<Ray> {
+    /// Makes all eight rays of a path: each leaves the hit of the one before in a random direction on the side it came from, or begins
+    /// anew.
+    fn path_rays(&self, path: u64) -> Vec<Ray> {
         // Another stream than that of the first rays, which are keyed by the same numbers.
         let mut random = Random::new(self.first.seed ^ 0x5851_f42d_4c95_7f2d, path);
         let mut cost = Cost::default();
@@ -168,7 +170,7 @@ impl RaySource for Bounces<'_> {
         while path * BOUNCES < range.end {
             let begin = path * BOUNCES;
             let wanted = |k: usize| range.contains(&(begin + k as u64));
-            rays.extend(self.path(path).into_iter().enumerate().filter(|(k, _)| wanted(*k)).map(|(_, r)| r));
+            rays.extend(self.path_rays(path).into_iter().enumerate().filter(|(k, _)| wanted(*k)).map(|(_, r)| r));
             path += 1;
         }
         rays

@@ -66,7 +66,8 @@ pub struct PowerComparison {
     pub power_error: f64,
 }
 
-/// Traces the same rays on facets and on the spline, replicate by replicate.
+/// Traces the same rays on facets and on the spline and compares the power of every receiver, with the error of the difference from
+/// replicate to replicate.
 pub fn compare_power(
     bound: &BoundScene,
     facets: &dyn Intersector,
@@ -103,15 +104,16 @@ pub fn compare_power(
 /// What to trace on, and the seconds that this will take.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Combination {
-    /// Of the facets, mm.
+    /// Tolerance of the facets, mm.
     pub(super) tolerance: f64,
-    /// At the hits.
+    /// Kind of normals at the hits.
     pub(super) normals: NormalMode,
     /// Meshing, building and tracing.
     pub(super) seconds: f64,
 }
 
-/// Traces a scene on the spline once and on facets for every combination. `begun` is when the whole study began.
+/// Traces a scene on the spline once and on facets for every combination, and returns a row for each receiver and combination. Combinations
+/// of one tolerance must stand together; `begun` is when the whole study began, for the forecast.
 pub(super) fn receivers(
     name: &str,
     bound: &BoundScene,
@@ -165,7 +167,8 @@ pub(super) fn receivers(
     rows
 }
 
-/// What facets change of a receiver beside what rays leave open, and which of the two limits it.
+/// Works out what facets change of a receiver beside what rays leave open, and which of the two limits it; names, rays and times stay
+/// empty.
 fn split_errors(found: &ReceiverResult, truth: &ReceiverResult) -> Row {
     let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|v| v * v).sum::<f64>().sqrt();
     let scale = norm(&mut truth.cells.iter().copied()).max(f64::MIN_POSITIVE);

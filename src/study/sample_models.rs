@@ -10,19 +10,19 @@ use rustc_hash::FxHashMap;
 /// Points this near, as a share of the model's diagonal, are one: far above rounding, far below any facet.
 const WELD: f64 = 1e-9;
 
-/// A face that is the whole domain of its surface.
+/// Makes a face that is the whole domain of its surface.
 pub fn face(surface: Surface) -> Face {
     Face::whole(surface)
 }
 
-/// A model of one shell with these untrimmed surfaces as its faces.
+/// Makes a model of one part with one open shell, whose faces are these untrimmed surfaces, mm.
 pub fn model(name: &str, surfaces: impl IntoIterator<Item = Surface>) -> Model {
     let faces = surfaces.into_iter().map(face).collect();
     let shell = Shell { faces, ..Shell::default() };
     Model::from_part(Part { name: name.into(), shells: vec![shell], ..Part::default() })
 }
 
-/// The same model under another placement of all its instances.
+/// Returns the model with all its instances moved by another placement, applied after their own.
 pub fn placed(mut model: Model, frame: &Frame) -> Model {
     for instance in &mut model.instances {
         instance.placement = frame.compose(&instance.placement);
@@ -30,10 +30,11 @@ pub fn placed(mut model: Model, frame: &Frame) -> Model {
     model
 }
 
-/// A uniform grid of facets over every knot rectangle of every untrimmed face, `divisions` a side.
+/// Makes a uniform grid of facets over every knot rectangle of every face, `divisions` a side (0 counts as 1); trims are not heeded, and
+/// ready meshes are left out.
 ///
-/// Points that agree within 1e-9 of the model's size become one position, so closed surfaces come out closed. The sag is
-/// the largest distance at equal parameters over 30 samples of each facet, plus 15 %: measured, not proved.
+/// Points that agree within 1e-9 of the model's size become one position, so closed surfaces come out closed. The sag is the largest
+/// distance at equal parameters over 30 samples of each facet, plus 15 %: measured, not proved.
 pub fn grid_mesh(model: &Model, divisions: usize) -> FacetMesh {
     let divisions = divisions.max(1);
     let bounds =
@@ -61,7 +62,7 @@ struct Weld {
 }
 
 impl Weld {
-    /// The number of a position: that of an earlier one where both agree.
+    /// Returns the number of a position: that of an earlier one where both agree, else of a new one, appended to `positions`.
     fn position(&mut self, p: Point, positions: &mut Vec<Point>) -> u32 {
         let scaled = (p - self.origin) / (16.0 * self.cell);
         // A point near a cell's side is looked for in both cells.
@@ -83,7 +84,7 @@ impl Weld {
     }
 }
 
-/// Knots along a direction, each span divided.
+/// Returns the knots along a direction, 0 or 1, within the domain, each span divided.
 fn breaks(surface: &Surface, direction: usize, divisions: usize) -> Vec<f64> {
     let [a, b] = surface.domain()[direction];
     // Knots stay grid lines: facets across a break would have the break's error.
@@ -95,7 +96,7 @@ fn breaks(surface: &Surface, direction: usize, divisions: usize) -> Vec<f64> {
     inner.chain([b]).collect()
 }
 
-/// Adds a face as a grid of facets, `divisions` a side of each knot rectangle.
+/// Adds a face to `mesh` as a grid of facets, `divisions` a side of each knot rectangle; facets without area are left out.
 fn grid_face(mesh: &mut FacetMesh, weld: &mut Weld, placed: &PlacedFace<'_>, face: &Face, divisions: usize) {
     let (us, vs) = (breaks(&face.surface, 0, divisions), breaks(&face.surface, 1, divisions));
     let mirrored = placed.placement.is_mirrored();
@@ -135,7 +136,7 @@ fn grid_face(mesh: &mut FacetMesh, weld: &mut Weld, placed: &PlacedFace<'_>, fac
     }
 }
 
-/// The largest distance of samples from the surface, with some room for what lies between them.
+/// Returns the largest distance of samples of a facet from the surface at equal parameters, mm, with some room for what lies between them.
 fn sampled_sag(mesh: &FacetMesh, facet: usize, placed: &PlacedFace<'_>, face: &Face) -> f64 {
     let corners = mesh.corners(facet);
     let uv = mesh.facets[facet].vertices.map(|v| mesh.vertices[v as usize].uv);

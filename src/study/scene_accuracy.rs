@@ -14,8 +14,9 @@ const LEAST_SECONDS: f64 = 1e-9;
 /// Kinds of normals that the receivers are asked about.
 const KINDS: [NormalMode; 4] = [NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
 
-/// Sweeps a model, then traces its light on facets of every uniform tolerance of the sweep and on the spline. `mesh_source` makes
-/// the sweep's meshes, with their sag measured; `plain` those of the light, which need none.
+/// Sweeps a model, then traces its light on facets of every uniform tolerance of the sweep and on the spline; without a uniform tolerance
+/// there are no rows of light. `mesh_source` makes the sweep's meshes, with their sag measured; `plain` those of the light, which need
+/// none.
 pub fn scene_accuracy(
     name: &str,
     [mesh_source, plain]: [&dyn MeshSource; 2],
@@ -59,16 +60,18 @@ pub fn scene_accuracy(
 
 /// Seconds of the whole run of light, from a part of its rays.
 struct Pilot {
+    /// The tolerance that it was timed at, mm.
     middle: f64,
+    /// Seconds of the run on the spline.
     spline: f64,
-    /// Of meshing and building at the middle tolerance.
+    /// Seconds of meshing and building at the middle tolerance.
     prepare: f64,
-    /// Of tracing there, for each of [`KINDS`].
+    /// Seconds of tracing there, for each of [`KINDS`].
     traced: [f64; 4],
 }
 
 impl Pilot {
-    /// Seconds that the run would take on the spline and, at the tolerance `middle`, on facets.
+    /// Times parts of the run on the spline and, at the tolerance `middle`, mm, on facets, and extrapolates them to the whole.
     fn time(mesh_source: &dyn MeshSource, bound: &BoundScene, run: &RunSettings, middle: f64) -> Self {
         let timed = |who: &dyn Intersector, rays: u64| {
             let few = RunSettings { rays, path_samples: 0, ..run.clone() };
@@ -95,8 +98,8 @@ impl Pilot {
         })
     }
 
-    /// Seconds for each of [`KINDS`] at a tolerance: tracing there, and an equal share of making facets, which goes with 1/tolerance;
-    /// `slower` tells how much slower tracing is there than at the middle one, where that is known.
+    /// Forecasts the seconds for each of [`KINDS`] at a tolerance, mm: tracing there, and an equal share of making facets, which goes with
+    /// 1/tolerance; `slower` tells how much slower tracing is there than at the middle one, where that is known.
     fn expected_seconds(&self, tolerance: f64, slower: impl Fn(NormalMode) -> Option<f64>) -> [f64; 4] {
         // Facets go with 1/tolerance, tracing grows by about a tenth per halving.
         let finer = self.middle / tolerance;

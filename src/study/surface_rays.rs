@@ -10,8 +10,8 @@ use std::ops::Range;
 /// Rays of one path: it ends earlier where it leaves the model, and the next one begins.
 pub const PATH: u64 = 4;
 
-/// Paths of up to four rays that leave facets to either side in cosine-distributed directions; the first starts anywhere on the facets,
-/// uniform by area.
+/// Paths of up to four rays that leave facets to either side in cosine-distributed directions; the first starts on the first triangle of a
+/// facet drawn by area.
 pub struct SurfacePaths<'a> {
     mesh: &'a FacetMesh,
     guide: &'a dyn Intersector,
@@ -23,7 +23,8 @@ pub struct SurfacePaths<'a> {
 }
 
 impl<'a> SurfacePaths<'a> {
-    /// `guide` finds the points that the rays after the first leave, on the facets of `mesh`.
+    /// Makes `count` rays, none where the facets have no area; `guide` finds the points that the rays after the first leave, on the facets
+    /// of `mesh`.
     pub fn new(mesh: &'a FacetMesh, guide: &'a dyn Intersector, seed: u64, count: u64) -> Self {
         let mut sum = 0.0;
         let areas: Vec<f64> = (0..mesh.facets.len())
@@ -37,11 +38,11 @@ impl<'a> SurfacePaths<'a> {
         Self { mesh, guide, areas, area: sum, seed, count }
     }
 
-    /// The rays of a path: at the end of a shorter one the others start anew, so that each has its index.
-    fn path(&self, path: u64) -> Vec<Ray> {
+    /// Makes the rays of a path: at the end of a shorter one the others start anew, so that each has its index.
+    fn path_rays(&self, path: u64) -> Vec<Ray> {
         let mut random = Random::new(self.seed ^ 0x2f6b_1c09_a3d5_e871, path);
         let mut rays = Vec::with_capacity(PATH as usize);
-        let mut ray = self.first(&mut random);
+        let mut ray = self.first_ray(&mut random);
         for _ in 0..PATH {
             rays.push(ray);
             ray = match self.guide.intersect(&ray, &mut Cost::default()) {
@@ -51,14 +52,14 @@ impl<'a> SurfacePaths<'a> {
                     let direction = cosine_direction(&mut random, hit.geometric_normal * side);
                     Ray::new(ray.point_at(hit.t), direction).with_departure(hit.departure())
                 }
-                None => self.first(&mut random),
+                None => self.first_ray(&mut random),
             };
         }
         rays
     }
 
-    /// A ray from anywhere on the first triangle of a facet.
-    fn first(&self, random: &mut Random) -> Ray {
+    /// Draws a ray from anywhere on the first triangle of a facet drawn by area; facets whose first triangle has none are drawn again.
+    fn first_ray(&self, random: &mut Random) -> Ray {
         loop {
             let wanted = random.unit() * self.area;
             let facet = self.areas.partition_point(|&area| area < wanted).min(self.areas.len() - 1);
@@ -82,7 +83,7 @@ impl<'a> SurfacePaths<'a> {
     }
 }
 
-/// A direction about a normal, cosine-distributed: the normal and a uniform direction added up.
+/// Draws a direction about a normal, cosine-distributed: the normal and a uniform direction added up.
 fn cosine_direction(random: &mut Random, normal: Vector) -> Vector {
     (normal + random.direction()).try_normalize().unwrap_or(normal)
 }
@@ -96,7 +97,7 @@ impl RaySource for SurfacePaths<'_> {
         let mut rays = Vec::new();
         let mut path = range.start / PATH;
         while path * PATH < range.end {
-            let indexed = (path * PATH..).zip(self.path(path));
+            let indexed = (path * PATH..).zip(self.path_rays(path));
             rays.extend(indexed.filter(|(index, _)| range.contains(index)).map(|(_, ray)| ray));
             path += 1;
         }

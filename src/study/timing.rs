@@ -33,7 +33,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// From the seconds of each run; all zero without any.
+    /// Works out minimum, median and 90th percentile of the seconds of each run; all zero without any.
     pub fn from_seconds(mut seconds: Vec<f64>) -> Self {
         if seconds.is_empty() {
             return Self::default();
@@ -97,7 +97,7 @@ impl<'a> Clock<'a> {
         Self { start: Instant::now(), report }
     }
 
-    /// `done` is the share of the expected work, not of the number of steps.
+    /// Tells how far the work is; `done` is the share of the expected work, not of the number of steps.
     pub(super) fn report(&self, stage: &str, done: f64) {
         let elapsed = self.start.elapsed().as_secs_f64();
         // Before a hundredth is done any forecast is a guess.
@@ -121,18 +121,18 @@ impl<'a> Countdown<'a> {
         Self::since(Instant::now(), report)
     }
 
-    /// Of work that began earlier.
+    /// Counts down for work that began at `start`.
     pub(super) fn since(start: Instant, report: &'a (dyn Fn(Progress) + Sync)) -> Self {
         Self { start, report, stage: String::new(), since: start, ahead: None }
     }
 
-    /// A stage begins, with the seconds of it and all after it; `None` for "not known yet".
+    /// Begins a stage, with the seconds of it and all after it; `None` for "not known yet". Reports it.
     pub(super) fn stage(&mut self, stage: &str, ahead: Option<f64>) {
         (self.stage, self.since, self.ahead) = (stage.into(), Instant::now(), ahead);
         self.tick();
     }
 
-    /// Some time has passed.
+    /// Reports the time that is left of the last forecast.
     pub(super) fn tick(&self) {
         let elapsed = self.start.elapsed().as_secs_f64();
         let left = self.ahead.map(|a| (a - self.since.elapsed().as_secs_f64()).max(0.0));

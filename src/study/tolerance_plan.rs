@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct TolerancePlan {
     /// Faces that enough rays met to be judged on their own.
     pub places: Vec<RelativeTolerance>,
-    /// For all others.
+    /// The tolerance of all other faces.
     pub other: RelativeTolerance,
     /// No tolerance is larger, mm.
     pub coarsest_mm: f64,
@@ -29,31 +29,32 @@ pub struct RelativeTolerance {
     pub radii_mm: [f64; 2],
 }
 
+/// Writes faces as their numbers.
 fn numbers<S: serde::Serializer>(faces: &[FaceId], s: S) -> Result<S::Ok, S::Error> {
     s.collect_seq(faces.iter().map(|f| f.0))
 }
 
 impl TolerancePlan {
-    /// The same tolerance everywhere.
+    /// Makes a plan of the same tolerance, mm, everywhere.
     pub fn uniform(tolerance_mm: f64) -> Self {
         // A power law between equal radii is a constant.
         let other = RelativeTolerance { faces: Vec::new(), of_radius: tolerance_mm, radii_mm: [1.0, 1.0] };
         Self { places: Vec::new(), other, coarsest_mm: tolerance_mm, finest_mm: tolerance_mm }
     }
 
-    /// The same, to be made coarser or finer within bounds.
+    /// Makes a plan of the same tolerance, mm, everywhere, to be made coarser or finer within bounds.
     pub(in crate::study) fn even(tolerance_mm: f64, [finest_mm, coarsest_mm]: [f64; 2]) -> Self {
         Self { coarsest_mm, finest_mm, ..Self::uniform(tolerance_mm) }
     }
 
-    /// All tolerances multiplied.
+    /// Multiplies all tolerances; the bounds stay.
     pub(in crate::study) fn scale(&mut self, factor: f64) {
         for share in self.places.iter_mut().chain([&mut self.other]) {
             share.of_radius *= factor;
         }
     }
 
-    /// Tolerances at the ends of the radii, mm, and the radii.
+    /// Returns the tolerances at the ends of the radii, within the bounds, and the radii at which they are reached; all in mm.
     pub(in crate::study) fn range(&self, share: &RelativeTolerance) -> ([f64; 2], [f64; 2]) {
         let clamp = |t: f64| t.clamp(self.finest_mm, self.coarsest_mm);
         let tolerance = share.radii_mm.map(|r| clamp(share.of_radius * r));
@@ -62,14 +63,14 @@ impl TolerancePlan {
         (tolerance, if tolerance[0] == tolerance[1] { share.radii_mm } else { radii })
     }
 
-    /// What the least tolerance would be without the bounds, mm.
+    /// Returns what the least tolerance would be without the lower bound, mm.
     pub(in crate::study) fn unbounded_mm(&self) -> f64 {
         // Where places have their own, the rest is only a default that no face may use.
         let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
         shares.map(|s| s.of_radius * s.radii_mm[0]).fold(self.coarsest_mm, f64::min).max(f64::MIN_POSITIVE)
     }
 
-    /// Least and largest tolerance, mm.
+    /// Returns the least and the largest tolerance, mm; those of places alone where there are any.
     pub fn tolerance_mm(&self) -> [f64; 2] {
         let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
         let ends = shares.map(|s| self.range(s).0);

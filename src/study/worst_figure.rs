@@ -17,12 +17,13 @@ const NEGLIGIBLE: f64 = 1e-6;
 pub(super) struct Worst {
     /// Geometric over allowed error.
     pub(super) ratio: f64,
-    /// Geometric error as a share of the figure, and its name.
+    /// Geometric error as a share of the figure, `None` where that is 0, and its name.
     pub(super) share: Option<f64>,
     pub(super) figure: String,
 }
 
-/// The figure whose geometric error is largest against the statistical one that a run of `scale` times the rays will have.
+/// Finds the figure whose geometric error is largest against the statistical one that a run of `scale` times the rays will have; a ratio of
+/// 0 and no name where facets change nothing.
 pub(super) fn worst_figure(error: &GeometricError, settings: &RunSettings, scale: f64) -> Worst {
     let order = if settings.sampling == Sampling::Sobol { NET_ORDER } else { RANDOM_ORDER };
     let mut worst = Worst::default();
@@ -40,7 +41,8 @@ pub(super) fn worst_figure(error: &GeometricError, settings: &RunSettings, scale
     worst
 }
 
-/// Hands every figure of a receiver to `weigh`: its name, its geometric error, the statistical one of the whole run, its value.
+/// Calls `weigh` with every figure of a receiver: its name, its geometric error, the statistical one of the whole run, its value. `sums`
+/// and `cells` are what the errors of both fall to.
 fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut(&str, f64, f64, f64)) {
     let s = &r.statistical;
     weigh("power", r.power.geometric(), s.power * sums, r.power.spline);
@@ -64,7 +66,7 @@ fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut
 }
 
 impl Worst {
-    /// What facets change at the worst, in words.
+    /// Writes which figure facets change most, by which share of it and of its standard error; "not at all" where they change none.
     pub(super) fn in_words(&self) -> String {
         if self.figure.is_empty() {
             return "not at all".into();

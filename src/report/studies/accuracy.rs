@@ -13,14 +13,16 @@ const WANTED_DEG: f64 = 0.05;
 /// A row as a point of cost against error, seconds and degrees.
 struct Point<'a> {
     row: &'a Value,
-    /// Of the whole job, and of it for the rays alone.
+    /// Seconds of the whole job.
     seconds: f64,
+    /// Seconds of it for the rays alone.
     trace_seconds: f64,
+    /// 99th percentile of the direction error, degrees.
     error: f64,
 }
 
 impl<'a> Point<'a> {
-    /// `None` for rows without a time or an error.
+    /// Reads a row; `None` without a time or an error.
     fn from_row(row: &'a Value) -> Option<Self> {
         // The spline has no facets to make.
         let prepare = number(row, "seconds_tessellate").unwrap_or(0.0) + number(row, "seconds_build")?;
@@ -29,7 +31,7 @@ impl<'a> Point<'a> {
         Some(Self { row, seconds, trace_seconds, error: number(row, "direction_error_deg_p99")? })
     }
 
-    /// The tolerance of its facets; nothing for the spline.
+    /// Returns the tolerance of its facets, mm; empty for the spline.
     fn tolerance(&self) -> Cell {
         match (text(self.row, "intersector"), self.row["adaptive"].as_bool()) {
             ("exact", _) => Cell::Empty,
@@ -38,7 +40,7 @@ impl<'a> Point<'a> {
         }
     }
 
-    /// What a point stands for, in words.
+    /// Writes what a point stands for.
     fn label(&self) -> String {
         let intersector = text(self.row, "intersector");
         if intersector == "exact" {
@@ -53,7 +55,7 @@ impl<'a> Point<'a> {
     }
 }
 
-/// Title, answer and sections of the accuracy study.
+/// Makes title, answer and sections of the accuracy study, from the rows of the most threads.
 pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let model = distinct(rows, "model").join(", ");
     // Facts at the largest number of threads: that is what a user waits for.
@@ -64,14 +66,14 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let points: Vec<Point> = chosen.iter().filter_map(|r| Point::from_row(r)).collect();
     let title = format!("What accuracy costs in time: {model}");
     let section = Section::new("Cost against accuracy")
-        .with_block(front(&points))
-        .with_block(slopes(&chosen))
-        .with_block(best(&points));
-    let time = Section::new("Where the time goes").with_block(stacked(&chosen));
+        .with_block(front_chart(&points))
+        .with_block(slope_chart(&chosen))
+        .with_block(front_table(&points));
+    let time = Section::new("Where the time goes").with_block(time_chart(&chosen));
     (title, answer(&points), vec![section, time])
 }
 
-/// The cheapest way to the wanted direction error, in words.
+/// Writes which facets reach a p99 direction error of [`WANTED_DEG`] in the least time, or that none does, and what the spline costs.
 fn answer(points: &[Point]) -> String {
     let best = (points.iter())
         .filter(|p| p.error <= WANTED_DEG && text(p.row, "intersector") != "exact")
@@ -102,8 +104,8 @@ fn is_dominated(p: &Point, points: &[Point]) -> bool {
     points.iter().any(|q| q.seconds <= p.seconds && q.error <= p.error && better(q))
 }
 
-/// The combinations that none beats, the cheapest first.
-fn best(points: &[Point]) -> Table {
+/// Makes a table of the combinations that no other beats in both time and p99 direction error, the cheapest first.
+fn front_table(points: &[Point]) -> Table {
     let columns = [
         ("tolerance", "mm"),
         ("normals", ""),
@@ -136,8 +138,8 @@ fn best(points: &[Point]) -> Table {
     table
 }
 
-/// Every combination as a point; those that another one beats in both time and error are faint.
-fn front(points: &[Point]) -> Chart {
+/// Draws every combination as time against p99 direction error; those that another one beats in both are faint.
+fn front_chart(points: &[Point]) -> Chart {
     // An error of exactly 0 has no place on a logarithmic axis; it is shown at a tenth of the smallest other.
     let smallest = points.iter().map(|p| p.error).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
     let shown = |p: &&Point| [p.seconds, if p.error > 0.0 { p.error } else { smallest / 10.0 }];
@@ -168,8 +170,9 @@ fn front(points: &[Point]) -> Chart {
     Chart::series("front", "Cost–accuracy front", caption, axes, series)
 }
 
-/// The chart of direction error over sag, with the slopes that theory expects.
-fn slopes(rows: &[&Value]) -> Chart {
+/// Draws direction error over sag of the octree's rows, by kind of normals, with the slopes that theory expects; rows without sag or error
+/// are left out.
+fn slope_chart(rows: &[&Value]) -> Chart {
     // The median: an rms follows the few most grazing rays, whose error goes with the tangent of incidence. Where more than half of
     // the hits are on planes their median is rounding, and the 99th percentile stands in for it.
     let octree = |r: &&&Value| text(r, "intersector") == "octree" && text(r, "normals") != "exact";
@@ -220,7 +223,7 @@ fn slopes(rows: &[&Value]) -> Chart {
     Chart::series("slopes", "Convergence", caption, axes, series)
 }
 
-/// Least-squares slope in log-log; `None` with fewer than three points.
+/// Returns the least-squares slope in log-log; `None` with fewer than three points, or all at one place.
 fn slope(points: &[[f64; 2]]) -> Option<f64> {
     let logs: Vec<[f64; 2]> = points.iter().map(|p| p.map(f64::ln)).collect();
     let n = logs.len() as f64;
@@ -231,8 +234,8 @@ fn slope(points: &[[f64; 2]]) -> Option<f64> {
     (logs.len() > 2 && sxx > 0.0).then(|| sxy / sxx)
 }
 
-/// The chart of the times that meshing, building and tracing take.
-fn stacked(rows: &[&Value]) -> Chart {
+/// Draws the times that meshing, building and tracing take, of at most 14 rows: the spline's and those of bilinear normals in the octree.
+fn time_chart(rows: &[&Value]) -> Chart {
     let shown: Vec<&&Value> = (rows.iter())
         .filter(|r| {
             text(r, "intersector") == "exact"

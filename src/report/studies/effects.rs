@@ -4,7 +4,7 @@ use super::rows::{number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, figures, seconds};
 use serde_json::Value;
 
-/// What a row measured, in a few words.
+/// Writes what the kernel of a row can do: the effect added, or all that it was asked for.
 fn label(row: &Value) -> String {
     let words = row["effects"].as_array().map(|a| a.iter().filter_map(Value::as_str).collect::<Vec<_>>());
     let effects = words.filter(|w| !w.is_empty()).map_or("none".into(), |w| w.join(" + ").replace('_', " "));
@@ -16,7 +16,7 @@ fn label(row: &Value) -> String {
     }
 }
 
-/// Title, answer and sections of the effects study.
+/// Makes title, answer and sections of the effects study; the first row must be the pruned kernel's, the last the full one's.
 pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let categories: Vec<String> = rows.iter().map(|r| label(r)).collect();
     let times: Vec<Option<f64>> = rows.iter().map(|r| number(r, "seconds_trace_median")).collect();

@@ -10,7 +10,7 @@ mod stability;
 use super::{Cell, Provenance, Report, Section, Table};
 use serde_json::Value;
 
-/// The report of a study document as `lampyris study … --json` prints it.
+/// Makes the report of a study document as `lampyris study … --json` prints it. What is missing in it, or of an unknown study, is left out.
 pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     // Whatever is missing in the document is an empty list: a kept file of an older program is drawn as far as it
     // goes.
@@ -37,7 +37,7 @@ pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     Report { title, answer, sections, provenance }
 }
 
-/// Title and unit of a key, by the suffixes that keys carry.
+/// Returns title and unit of a key, by the suffixes that keys carry; no unit for a key that has none.
 fn heading(key: &str) -> (String, &'static str) {
     let units = [
         ("_mm_p50", "mm", " median"),
@@ -64,8 +64,8 @@ fn heading(key: &str) -> (String, &'static str) {
     (title, unit)
 }
 
-/// A table of all rows with a column for each key, in the order in which keys first appear; missing values are empty. Titles and units
-/// follow from the keys. `kind` names the table and its file, `{kind}-rows.csv`.
+/// Makes a table of all rows with a column for each key, in the order in which keys first appear; missing values are empty. Titles and
+/// units follow from the keys. `kind` names the table and its file, `{kind}-rows.csv`.
 fn all_rows_table(kind: &str, rows: &[&Value]) -> Table {
     let mut keys: Vec<&str> = Vec::new();
     for key in rows.iter().filter_map(|r| r.as_object()).flat_map(|o| o.keys()) {

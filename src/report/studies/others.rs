@@ -9,8 +9,9 @@ use serde_json::Value;
 /// Title, answer and sections.
 type Parts = (String, String, Vec<Section>);
 
-/// Bars of one value: a category for every text of `by`, a layer for every text of `split`; the last row of a pair counts.
-fn bars(
+/// Draws bars of the number under `value`: a category for every text under `by`, a layer for every text under `split`; the last row of a
+/// pair counts, and a pair without a row has no bar.
+fn bar_chart(
     name: &str,
     title: &str,
     caption: &str,
@@ -35,7 +36,7 @@ fn bars(
     Chart { content, ..Chart::series(name, title, caption, axes, Vec::new()) }
 }
 
-/// The interpolation study: a table and a chart of normal errors.
+/// Makes title, answer and sections of the interpolation study: tables and charts of normal errors.
 pub(super) fn interpolation(rows: &[&Value]) -> Parts {
     let columns = [
         ("model", ""),
@@ -62,24 +63,25 @@ pub(super) fn interpolation(rows: &[&Value]) -> Parts {
     let keys = ["model", "algorithm", "normal_error_mean"];
     let caption = "Mean distance between the interpolated unit normal and the true one; 0.001 is about 0.06°. Shorter is better; the \
         axis is logarithmic.";
-    let mut chart = bars("error", "Mean error of the normal", caption, rows, keys, "");
+    let mut chart = bar_chart("error", "Mean error of the normal", caption, rows, keys, "");
     // Bilinear and cubic are tens to hundreds of times below nearest: nothing to see on a linear axis.
     chart.y.log = true;
     let keys = ["model", "algorithm", "seconds_median"];
     let own: Vec<&Value> = rows.iter().copied().filter(|r| text(r, "model") != "paper").collect();
     let caption = "Median time of all rays of a repetition on one thread; shorter is better. The paper's times are of its own machine.";
-    let times = bars("time", "Time", caption, &own, keys, "s");
+    let times = bar_chart("time", "Time", caption, &own, keys, "s");
     let title = "Normals between corners: nearest, bilinear, cubic, exact".into();
     let section = Section::new("Errors and times")
         .with_block(chart)
         .with_block(times)
-        .with_block(ratios(rows))
+        .with_block(ratio_table(rows))
         .with_block(table);
     (title, "Nothing was measured.".into(), vec![section])
 }
 
-/// How the errors stand to each other on every model, the paper's beside them.
-fn ratios(rows: &[&Value]) -> Table {
+/// Makes a table of the ratios of errors from nearest to bilinear to cubic normals, by model, the paper's beside them; a model without all
+/// three is left out.
+fn ratio_table(rows: &[&Value]) -> Table {
     let columns = [
         ("model", ""),
         ("facets", ""),
@@ -115,7 +117,7 @@ fn ratios(rows: &[&Value]) -> Table {
 /// The seed paper's table 1: share of time saved, percent.
 const PAPER_COMPLEXITY: [f64; 3] = [18.75, 25.45, 46.65];
 
-/// The complexity study, beside the figures of the paper.
+/// Makes title, answer and sections of the complexity study, beside the paper's; the answer is empty without a row of the octree.
 pub(super) fn complexity(rows: &[&Value]) -> Parts {
     let mut table = Table::new(
         "complexity",
@@ -167,14 +169,15 @@ pub(super) fn complexity(rows: &[&Value]) -> Parts {
     let keys = ["model", "method", "ratio_to_traditional"];
     let title = "How many times as fast as the traditional way";
     let caption = "Preparing and tracing together, against intersecting every spline surface with every ray (1 ×). Longer is better.";
-    let mut chart = bars("ratio", title, caption, rows, keys, "×");
+    let mut chart = bar_chart("ratio", title, caption, rows, keys, "×");
     chart.y.label = "times as fast".into();
-    let section = Section::new("Before and after").with_block(chart).with_block(growth(rows)).with_block(table);
+    let section =
+        Section::new("Before and after").with_block(chart).with_block(growth_chart(rows)).with_block(table);
     ("Three lamps, before and after".into(), answer, vec![section])
 }
 
-/// How the time of a million rays grows with the number of surfaces.
-fn growth(rows: &[&Value]) -> Chart {
+/// Draws the seconds of a million rays over the number of spline patches, a line for each method; rows without these are left out.
+fn growth_chart(rows: &[&Value]) -> Chart {
     let line = |method: &&str| {
         let own = rows.iter().filter(|r| text(r, "method") == *method);
         let point = |r: &&Value| {
@@ -191,7 +194,7 @@ fn growth(rows: &[&Value]) -> Chart {
     Chart::series("growth", "How the time grows with the lamp", caption, axes, series)
 }
 
-/// The benchmark against obvhs: rates by kind of rays and number of facets.
+/// Makes title, answer and sections of the benchmark against obvhs: rates by kind of rays and number of facets.
 pub(super) fn bvh(rows: &[&Value]) -> Parts {
     let rate = |name: &str, kind: &str| {
         let fits = |r: &&&Value| text(r, "intersector") == name && text(r, "rays_kind") == kind;
@@ -230,7 +233,7 @@ pub(super) fn bvh(rows: &[&Value]) -> Parts {
             })
             .collect();
         let sized: Vec<&Value> = sized.iter().collect();
-        let mut chart = bars(
+        let mut chart = bar_chart(
             &format!("rates-{kind}"),
             &format!("{kind} rays"),
             "Median of alternating rounds; longer is better.",
@@ -241,12 +244,12 @@ pub(super) fn bvh(rows: &[&Value]) -> Parts {
         chart.x = AxisStyle::linear("facets and call", "");
         section = section.with_block(chart);
     }
-    section = section.with_block(rates(rows));
+    section = section.with_block(rate_table(rows));
     ("Octree against bounding-volume hierarchies".into(), answer, vec![section])
 }
 
-/// Every rate beside the octree's on the same rays, facets, call and threads.
-fn rates(rows: &[&Value]) -> Table {
+/// Makes a table of every rate beside the octree's on the same rays, facets, call and threads; no ratio where the octree was not asked.
+fn rate_table(rows: &[&Value]) -> Table {
     let columns = [
         ("rays", ""),
         ("facets", ""),

@@ -4,7 +4,7 @@ use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Section, Series, Table, file_stem};
 use serde_json::Value;
 
-/// The section on receivers: a chart for each, and a table of all.
+/// Makes the section on receivers of a study's rows: a chart for each receiver, and a table of all.
 pub(super) fn section(rows: &[&Value]) -> Section {
     let intro = "The same rays on facets and on the spline: what the facets change (geometric) beside the noise of the run \
         (statistical). Where geometry is the larger, finer facets or better normals help; else more rays.";
@@ -13,7 +13,7 @@ pub(super) fn section(rows: &[&Value]) -> Section {
     section.with_block(table(rows))
 }
 
-/// The chart of what facets change of a receiver's map, by tolerance, beside the noise.
+/// Draws the change of a receiver's map over the tolerance, per cent, by kind of normals, beside the noise of the rays; zeros are left out.
 fn chart(rows: &[&Value], receiver: &str) -> Chart {
     let own: Vec<&Value> = rows.iter().copied().filter(|r| text(r, "receiver") == receiver).collect();
     let along = |normals: &str, key: &str| {
@@ -41,7 +41,7 @@ fn chart(rows: &[&Value], receiver: &str) -> Chart {
     Chart::series(&name, &format!("{}: what the facets change", receiver.replace('_', " ")), caption, axes, series)
 }
 
-/// The table of all receivers with both errors.
+/// Makes a table of all rows: each receiver's geometric and statistical errors, per cent, by tolerance and normals.
 fn table(rows: &[&Value]) -> Table {
     let columns = [
         ("receiver", ""),

@@ -2,18 +2,18 @@
 
 use serde_json::Value;
 
-/// A number of a row; `None` when absent or null.
+/// Returns a number of a row; `None` when absent, null or no number.
 pub(super) fn number(row: &Value, key: &str) -> Option<f64> {
     // JSON has no infinity; what was none is null, and absent.
     row[key].as_f64().filter(|x| x.is_finite())
 }
 
-/// A text of a row, empty when absent.
+/// Returns a text of a row, empty when absent or no text.
 pub(super) fn text<'a>(row: &'a Value, key: &str) -> &'a str {
     row[key].as_str().unwrap_or_default()
 }
 
-/// The different texts of a key, in order of appearance.
+/// Returns the different texts of a key, in order of appearance; empty ones are left out.
 pub(super) fn distinct<'a>(rows: &[&'a Value], key: &str) -> Vec<&'a str> {
     let mut seen = Vec::new();
     for value in rows.iter().map(|r| text(r, key)) {

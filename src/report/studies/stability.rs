@@ -4,7 +4,7 @@ use super::rows::{distinct, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, grouped};
 use serde_json::Value;
 
-/// Title, answer and sections of the stability study.
+/// Makes title, answer and sections of the stability study: the right, flagged and wrong answers of its rows, by intersector and by case.
 pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let sum = |name: &str, key: &str| -> u64 {
         rows.iter().filter(|r| text(r, "intersector") == name).filter_map(|r| r[key].as_u64()).sum()
@@ -33,12 +33,12 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     (
         "Numerical stability".into(),
         answer,
-        vec![Section::new("Verdicts").with_block(chart).with_block(table).with_block(cases(rows))],
+        vec![Section::new("Verdicts").with_block(chart).with_block(table).with_block(case_table(rows))],
     )
 }
 
-/// One row a case, variants added up: right / flagged / wrong of every intersector.
-fn cases(rows: &[&Value]) -> Table {
+/// Makes a table with one row a case, its variants added up: the numbers of right / flagged / wrong answers of every intersector.
+fn case_table(rows: &[&Value]) -> Table {
     let names = distinct(rows, "intersector");
     let columns: Vec<(&str, &str)> =
         [("case", ""), ("rays", "")].into_iter().chain(names.iter().map(|n| (*n, ""))).collect();

@@ -12,10 +12,11 @@ use crate::simulate::surfaces::SceneLight;
 use crate::simulate::{Error, ErrorKind};
 use std::collections::HashMap;
 
-/// The bodies (one for each instance and medium), the body of each face, and whether bodies may touch or nest.
+/// Makes the bodies, one for each instance and medium, with the surroundings as body 0. Returns them, the body of each placed face (0
+/// without a medium), and whether any two boxes come within the glue distance: bodies that do not can neither touch nor nest.
 ///
-/// An instance with two media, given by face, makes two bodies. Bodies whose boxes are farther apart than the glue distance
-/// can neither touch nor nest.
+/// # Errors
+/// When a medium is not known, or has no index at the wavelength of the scene.
 pub(super) fn find_bodies(
     scene: &Scene,
     model: &Model,
@@ -64,14 +65,14 @@ pub(super) fn find_bodies(
     Ok((bodies, of_face, nested))
 }
 
-/// Says of each body how long light may go in it by total reflection alone. Bodies of one index that may touch (by pairs) are one
-/// body to light, and as long as the box around them all.
+/// Sets for each body how far light may go in it by total reflection alone, mm: `caught_after` times the diagonal of its box; unchanged
+/// (infinite) where it absorbs or has no faces. Bodies of one index that touch, by `pairs`, count as one with the box around them all.
 pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[u32; 2]]) {
     // Union–find with halved paths (Tarjan & van Leeuwen 1984), since touching goes on from body to body; the lowest number
     // stands for its group.
     let mut united: Vec<u32> = (0..bodies.len() as u32).collect();
-    /// The number that stands for the group of a body; ways to it are halved as they are walked.
-    fn first(united: &mut [u32], mut body: u32) -> u32 {
+    /// Returns the number that stands for the group of a body, and shortens the way to it in `united`.
+    fn group_of(united: &mut [u32], mut body: u32) -> u32 {
         while united[body as usize] != body {
             united[body as usize] = united[united[body as usize] as usize];
             body = united[body as usize];
@@ -81,13 +82,13 @@ pub(super) fn set_trapped_lengths(scene: &Scene, bodies: &mut [Body], pairs: &[[
     for &[a, b] in pairs {
         let [one, other] = [a, b].map(|k| &bodies[k as usize]);
         if one.matches_index(other) {
-            let [a, b] = [a, b].map(|k| first(&mut united, k));
+            let [a, b] = [a, b].map(|k| group_of(&mut united, k));
             united[a.max(b) as usize] = a.min(b);
         }
     }
     // A path cannot tell where one body of its index ends and the next begins: what counts is the way through all of them.
     let mut whole = vec![(Aabb::EMPTY, false); bodies.len()];
-    let of_body: Vec<usize> = (0..bodies.len() as u32).map(|k| first(&mut united, k) as usize).collect();
+    let of_body: Vec<usize> = (0..bodies.len() as u32).map(|k| group_of(&mut united, k) as usize).collect();
     for (body, &k) in bodies.iter().zip(&of_body).skip(1) {
         whole[k] = (whole[k].0.union(body.bounds), whole[k].1 | body.absorbs());
     }

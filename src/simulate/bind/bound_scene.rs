@@ -8,7 +8,7 @@ use crate::simulate::scene::Scene;
 use crate::simulate::surfaces::{FaceOptics, SceneLight, Surface};
 use serde::Serialize;
 
-/// The faces that one rule decides; of several that select a face, the last one does.
+/// The faces that one rule decides: of all rules that select a face, the last that gives a surface and the last that gives a medium decide.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RuleFaces {
     /// Number of the `[[material]]`, from 1; `None` for the faces that no rule names.
@@ -25,11 +25,11 @@ pub struct RuleFaces {
 #[derive(Clone, Debug)]
 pub struct BoundScene {
     pub(crate) scene: Scene,
-    /// By placed face.
+    /// What each placed face is to light.
     pub(crate) faces: Vec<FaceOptics>,
-    /// Those that faces name by index.
+    /// The distinct surfaces, which faces name by index.
     pub(crate) surfaces: Vec<Surface>,
-    /// The surroundings first.
+    /// The bodies, of which the first is the surroundings.
     pub(crate) bodies: Vec<Body>,
     pub(crate) light: SceneLight,
     /// Whether bodies may touch or lie inside each other, so that paths need a stack of media.
@@ -50,7 +50,7 @@ pub struct BoundScene {
 }
 
 impl BoundScene {
-    /// The instance and the medium of a body, as lost rays name it.
+    /// Returns the names of the instance and the medium of a body, by its number in lost rays; `None` where there is no such body.
     pub fn body(&self, body: u32) -> Option<[&str; 2]> {
         self.bodies.get(body as usize).map(|b| [b.name.as_str(), b.medium.as_str()])
     }
@@ -67,34 +67,36 @@ impl BoundScene {
         lets_in.then_some(optics.body)
     }
 
-    /// The index of a body over that of the surroundings, at the wavelength of the scene; 1 for a number without a body.
+    /// Returns the index of a body over that of the surroundings, at the wavelength of the scene; 1 for a number without a body.
     pub fn relative_index(&self, body: u32) -> f64 {
         let ambient = self.bodies[AMBIENT as usize].index(None);
         self.bodies.get(body as usize).map_or(1.0, |b| b.index(None) / ambient)
     }
 
-    /// What someone who reads the results must know: bodies that are open, light beyond the wavelengths of a table.
+    /// Returns sentences that someone who reads the results must know: bodies that are open or too thin, light beyond the wavelengths of a
+    /// table.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// Which faces each rule of the scene decides; last, if there are any, those that no rule names.
+    /// Returns which faces each rule of the scene decides; last, if there are any, those that no rule names.
     pub fn rules(&self) -> &[RuleFaces] {
         &self.rules
     }
 
-    /// The instance of a face, by the face's index in the model.
+    /// Returns the name of the instance of a placed face, by the face's number in the model; `None` where there is no such face.
     pub fn instance(&self, face: u32) -> Option<&str> {
         let instance = *self.instance_of_face.get(face as usize)?;
         self.instances.get(instance as usize).map(String::as_str)
     }
 
-    /// The scene as it was read.
+    /// Returns the scene as it was read.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// Whether any face lets light into a medium.
+    /// Whether rays have to carry a medium: a face lets light into one, a source is stated to lie in one, or the surroundings absorb or
+    /// scatter.
     pub(crate) fn has_media(&self) -> bool {
         // Any of these needs a medium on the ray: faces that let light in, sources inside of bodies, surroundings
         // that do something to light.
@@ -106,7 +108,7 @@ impl BoundScene {
             || ambient.scatter.is_some()
     }
 
-    /// Name of the instance that a face belongs to.
+    /// Returns the name of the instance that a placed face belongs to; empty where there is no such face.
     pub fn instance_of(&self, face: FaceId) -> &str {
         self.instance_of_face.get(face.index()).map_or("", |&i| &self.instances[i as usize])
     }

@@ -7,16 +7,21 @@ use crate::simulate::Error;
 use crate::simulate::scene::{Key, Scene};
 use std::collections::HashMap;
 
-/// For each face the last rule that gives its surface, and the last that gives its medium.
+/// For each placed face the indices in `scene.materials` of the last rule that gives its surface or scatter, and of the last that gives its
+/// medium; `None` where no rule does.
 pub(super) type ChosenRules = Vec<(Option<usize>, Option<usize>)>;
 
-/// Which rule of the scene gives each face its surface, and which its medium.
+/// Finds for each placed face the rules that give its surface and its medium; later rules stand above earlier ones. A medium given to a
+/// part of a solid's faces goes to all of them.
+///
+/// # Errors
+/// When the selector of a rule means no face.
 pub(super) fn choose_rules(scene: &Scene, model: &Model) -> Result<ChosenRules, Error> {
     let mut chosen: ChosenRules = vec![(None, None); model.placed_face_count()];
     let mut nearest = Nearest::new(model);
     for (i, rule) in scene.materials.iter().enumerate() {
         let base = [Key::Name("material"), Key::Index(i)];
-        for face in select::faces(scene, &base, &rule.faces(), model, &mut nearest)? {
+        for face in select::select_faces(scene, &base, &rule.faces(), model, &mut nearest)? {
             // A later rule stands above an earlier one, for surfaces and media apart.
             if rule.surface.is_some() || rule.scatter.is_some() {
                 chosen[face].0 = Some(i);
@@ -30,7 +35,8 @@ pub(super) fn choose_rules(scene: &Scene, model: &Model) -> Result<ChosenRules, 
     Ok(chosen)
 }
 
-/// A medium that was given to some faces of a solid is that of the whole solid, unless others of its faces have another.
+/// Gives the faces without a medium the rule of the other faces of their solid, in `chosen`; not where those name two media, and not to
+/// faces of no shell.
 fn spread_media_over_solids(scene: &Scene, model: &Model, chosen: &mut ChosenRules) {
     let medium = |rule: Option<usize>| rule.and_then(|r| scene.materials[r].medium.as_deref());
     let mut solids: HashMap<(usize, usize), Option<usize>> = HashMap::new();

@@ -7,7 +7,8 @@ use crate::simulate::body::AMBIENT;
 use crate::simulate::scene::Scene;
 use crate::simulate::trim_loops::{is_inside, trim_polygons};
 
-/// Faces whose box comes within the glue distance of a face of another body: there, two solids may touch. And the pairs of bodies.
+/// Marks the faces whose box comes within the glue distance of the box of a face of another body, and returns those pairs of bodies too,
+/// some more than once. `of_face` is the body of each placed face; faces of the surroundings are never marked.
 pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u32]) -> (Vec<bool>, Vec<[u32; 2]>) {
     // Each box is grown by half of the glue, so that two within its whole meet.
     let boxed = |f: PlacedFace<'_>| (f.id.index(), face_bounds(&f).grown(0.5 * scene.run.glue_mm));
@@ -31,7 +32,8 @@ pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u32]) -> 
     (touching, pairs)
 }
 
-/// Faces whose box comes within the glue distance of a face of another shell of the same body: solids of one part that touch.
+/// Marks the faces whose box comes within the glue distance of the box of a face of another shell of the same body. Boxes alone are asked:
+/// whether the shells touch is found where light crosses there.
 pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u32]) -> Vec<bool> {
     let mut siblings = vec![false; of_face.len()];
     let mut faces: Vec<(usize, Option<usize>, PlacedFace<'_>)> = (model.placed_faces())
@@ -61,7 +63,9 @@ const MOST_DISTANCES: usize = 50_000;
 /// Samples across a face in each parameter.
 const SAMPLES: usize = 5;
 
-/// Faces of bodies and of opaque solids that touch each other: where a point inside one lies within the glue distance of the other.
+/// Marks faces of bodies, and opaque faces without a medium (`opaque`), that lie on each other: a sample point of one is within the glue
+/// distance of the other. After [`MOST_DISTANCES`] questions, faces whose boxes meet are marked unasked. All `false` where either is
+/// missing.
 pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opaque: &[bool]) -> Vec<bool> {
     let mut on_opaque = vec![false; of_face.len()];
     // Nothing to find: no bodies, or nothing opaque.
@@ -108,7 +112,7 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opa
     on_opaque
 }
 
-/// Points inside the loops of a face, mm.
+/// Returns those of 5 × 5 samples over the domain of a face that lie inside its loops, mm, in scene coordinates; none for a ready mesh.
 fn inner_points(f: &PlacedFace<'_>) -> Vec<Point> {
     let Some(face) = f.face else { return Vec::new() };
     let loops = trim_polygons(face);

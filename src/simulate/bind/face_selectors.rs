@@ -28,15 +28,15 @@ const COMBINATIONS: [&[Key]; 10] = [
     &[Key::Part, Key::Instance, Key::Solid, Key::Entity],
 ];
 
-/// A name that can stand in a selector: there is one, and no `*` makes it a pattern.
-fn usable(name: &str) -> Option<&str> {
+/// Returns the name if a selector can hold it: it is not empty, and no `*` makes it a pattern.
+fn usable_name(name: &str) -> Option<&str> {
     (!name.is_empty() && !name.contains('*')).then_some(name)
 }
 
-/// The selector of these keys; `None` where the face has not all of them.
-fn combined(keys: &[Key], face: &PlacedFace<'_>, model: &Model) -> Option<FaceSelector> {
+/// Returns the selector of a face made of these keys; `None` where the face, its part or its instance lacks one of them.
+fn selector_of_keys(keys: &[Key], face: &PlacedFace<'_>, model: &Model) -> Option<FaceSelector> {
     let mut selector = FaceSelector::default();
-    let name = |name: &str| Some(OneOrMany::One(usable(name)?.to_owned()));
+    let name = |name: &str| Some(OneOrMany::One(usable_name(name)?.to_owned()));
     for key in keys {
         match key {
             Key::Part => selector.part = Some(name(&model.part(face.part).name)?),
@@ -49,8 +49,8 @@ fn combined(keys: &[Key], face: &PlacedFace<'_>, model: &Model) -> Option<FaceSe
     Some(selector)
 }
 
-/// For each of these faces of a model the shortest selector that means it alone among them: by its name, its `#id`, with part, instance and
-/// solid where these are needed, and by a point on it where nothing else tells it apart.
+/// Returns for each of these faces the shortest selector that means it alone among them: its name or `#id`, with part, instance and solid
+/// where these are needed. Where no combination tells it apart, all that it has with a point on it; a face without geometry has no point.
 pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelector> {
     let mut chosen: Vec<Option<FaceSelector>> = vec![None; faces.len()];
     for keys in COMBINATIONS {
@@ -58,7 +58,7 @@ pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelect
             break;
         }
         // A selector tells a face apart when no other face of these has the same text.
-        let selectors: Vec<Option<FaceSelector>> = faces.iter().map(|f| combined(keys, f, model)).collect();
+        let selectors: Vec<Option<FaceSelector>> = faces.iter().map(|f| selector_of_keys(keys, f, model)).collect();
         let texts: Vec<Option<String>> = selectors.iter().map(|s| Some(s.as_ref()?.to_string())).collect();
         let mut uses: HashMap<&str, u32> = HashMap::new();
         for text in texts.iter().flatten() {
@@ -70,12 +70,17 @@ pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelect
             }
         }
     }
-    chosen.into_iter().zip(faces).map(|(chosen, face)| chosen.unwrap_or_else(|| by_point(face, model))).collect()
+    chosen
+        .into_iter()
+        .zip(faces)
+        .map(|(chosen, face)| chosen.unwrap_or_else(|| selector_by_point(face, model)))
+        .collect()
 }
 
-/// A selector by a point on the face, with all else that it has.
-fn by_point(face: &PlacedFace<'_>, model: &Model) -> FaceSelector {
-    let name = |name: &str| usable(name).map(|name| OneOrMany::One(name.to_owned()));
+/// Returns a selector of everything that a face has but its name, and a point on it, mm, in scene coordinates; without the point where the
+/// face has neither a surface nor facets.
+fn selector_by_point(face: &PlacedFace<'_>, model: &Model) -> FaceSelector {
+    let name = |name: &str| usable_name(name).map(|name| OneOrMany::One(name.to_owned()));
     // A point inside of the trims, which no other face is as near to.
     let on_surface = face.face.map(|f| f.surface.evaluate(f.inner_parameters()));
     let on_mesh = || {

@@ -8,7 +8,10 @@ use crate::simulate::scene::{Key, Material, Scene, SurfaceKind};
 use crate::simulate::surfaces::{Coated, Surface};
 use crate::simulate::{Error, ErrorKind};
 
-/// The surface that a rule gives.
+/// Returns the surface that a rule gives, an interface where it names none. A mirror or diffuse face that reflects nothing is an absorber.
+///
+/// # Errors
+/// When the rule's optical values do not go together or are out of range.
 pub(super) fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> {
     let (coating, scatter) = rule.optics().map_err(|(_, e)| scene.error(ErrorKind::Value, &[], e))?;
     let kind = rule.surface.unwrap_or(SurfaceKind::Interface);
@@ -28,7 +31,7 @@ pub(super) fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> 
     })
 }
 
-/// The index of a surface in the table, to which it is added where it is not in it.
+/// Returns the index of a surface in the table, appending it where it is not there yet.
 pub(super) fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> u16 {
     // Few surfaces are used by many faces: the table stays so short that a linear look is fastest.
     let found = surfaces.iter().position(|s| *s == surface).unwrap_or_else(|| {
@@ -38,7 +41,10 @@ pub(super) fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> u1
     found as u16
 }
 
-/// Faces that a rule calls interfaces need a medium behind them.
+/// Checks that every face which its rule calls an interface has a medium behind it (`bodies`, by placed face).
+///
+/// # Errors
+/// For the first face that has none.
 pub(super) fn check_interfaces(
     scene: &Scene,
     model: &Model,

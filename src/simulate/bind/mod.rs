@@ -47,7 +47,7 @@ impl Scene {
             self.sources.iter().enumerate().map(|(i, s)| emitter::load(self, i, s)).collect::<Result<_, _>>()?;
         let light = wavelengths::scene_light(self, &loaded);
         let ranges = wavelengths::source_ranges(self, &loaded);
-        let file_notes = notes::source_files(self, &loaded);
+        let file_notes = notes::source_file_notes(self, &loaded);
         // Bodies, from the rules that give media.
         let chosen = chosen::choose_rules(self, model)?;
         let (mut bodies, body_of_face, nested) = bodies::find_bodies(self, model, &chosen, &light)?;
@@ -89,11 +89,11 @@ impl Scene {
             instances: (0..model.instances.len()).map(|k| model.label(k)).collect(),
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
             rules: rule_table::rule_table(self, &chosen),
-            notes: notes::beyond_tables(self, &chosen, &ranges),
+            notes: notes::range_notes(self, &chosen, &ranges),
         };
         bound.notes.extend(file_notes);
-        bound.notes.extend(notes::openings(&bound, model));
-        bound.notes.extend(notes::films(&bound));
+        bound.notes.extend(notes::opening_note(&bound, model));
+        bound.notes.extend(notes::thin_body_note(&bound));
         Ok(bound)
     }
 }
@@ -106,7 +106,11 @@ struct Faces {
     touching_pairs: Vec<[u32; 2]>,
 }
 
-/// What each face does to light, and the distinct surfaces that faces name by their index.
+/// Makes the optics of each placed face, the table of distinct surfaces that these name by index, and the pairs of bodies that may touch:
+/// none where bodies are not `nested`. A face that no rule names is a bare interface where it has a medium, else `default_surface`.
+///
+/// # Errors
+/// When a rule gives a surface of values that do not go together.
 fn bind_faces(
     scene: &Scene,
     model: &Model,

@@ -4,10 +4,11 @@ use crate::math::{Aabb, Point, Uv};
 use crate::model::{Face, Model, PlacedFace};
 use crate::simulate::trim_loops::{is_inside, trim_polygons};
 
-/// Finds the face nearest to a point, on the spline itself: samples inside the trimming loops, then Gauss–Newton.
+/// Finds the placed face nearest to a point, on the spline itself: samples inside the trimming loops, then Gauss–Newton. Faces are named by
+/// their index in the model; points and distances are in scene coordinates, mm.
 ///
-/// Exact for points on a face; between faces, good to the spacing of the samples (1/24 of a face) where the foot of the
-/// perpendicular lies outside a trimming loop.
+/// Exact for points on a face; between faces, good to the spacing of the samples (1/24 of a face) where the foot of the perpendicular lies
+/// outside a trimming loop. The loops of a face are made into polygons when it is first asked, and kept.
 pub(super) struct Nearest<'a> {
     faces: Vec<PlacedFace<'a>>,
     bounds: Vec<Aabb>,
@@ -36,13 +37,13 @@ impl<'a> Nearest<'a> {
         Self { faces, bounds, loops }
     }
 
-    /// A box around these faces.
+    /// Returns a box around these faces; empty without any.
     pub(super) fn bounds(&self, faces: &[usize]) -> Aabb {
         faces.iter().fold(Aabb::EMPTY, |b, &f| b.union(self.bounds[f]))
     }
 
-    /// Index of the nearest of the candidate faces; the first of equals.
-    pub(super) fn face(&mut self, p: Point, candidates: &[usize]) -> Option<usize> {
+    /// Returns the nearest of the candidate faces, of equals the one with the lowest index; `None` where none has an extent.
+    pub(super) fn nearest_face(&mut self, p: Point, candidates: &[usize]) -> Option<usize> {
         // Distance to the box, 0 inside: no face is nearer than its box.
         let away = |b: &Aabb| (b.min - p).max(p - b.max).max(Point::ZERO).length();
         let mut order: Vec<(f64, usize)> = candidates.iter().map(|&c| (away(&self.bounds[c]), c)).collect();
@@ -61,7 +62,7 @@ impl<'a> Nearest<'a> {
         best.filter(|(d, _)| d.is_finite()).map(|(_, c)| c)
     }
 
-    /// Distance from a point to a placed face, mm; infinite for a face without extent.
+    /// Returns the distance from a point to a placed face, mm; infinite for a face that has neither a surface nor facets.
     pub(super) fn distance(&mut self, index: usize, p: Point) -> f64 {
         let placed = self.faces[index];
         let local = placed.placement.local_point(p);
@@ -82,7 +83,7 @@ impl<'a> Nearest<'a> {
     }
 }
 
-/// A box around a placed face.
+/// Returns a box around a placed face in scene coordinates, mm: of its whole surface, trims left out; empty for a face without geometry.
 pub(super) fn face_bounds(f: &PlacedFace<'_>) -> Aabb {
     let local = match (f.face, f.tessellated) {
         (Some(face), _) => face.surface.bounds(),
@@ -92,7 +93,8 @@ pub(super) fn face_bounds(f: &PlacedFace<'_>) -> Aabb {
     if local.is_empty() { local } else { Aabb::from_points(local.corners().map(|c| f.placement.point(c))) }
 }
 
-/// Distance of a point from the trimmed face, mm; `loops` are its trims as polygons in parameters.
+/// Returns the distance from `p` to a trimmed face, both in the coordinates of the part; `loops` are its trims as polygons in parameters.
+/// Infinite only where there is no sample inside them and no border.
 fn distance_to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
     let s = &face.surface;
     let [[u0, u1], [v0, v1]] = s.domain();
@@ -137,7 +139,8 @@ fn distance_to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
     best.min(border)
 }
 
-/// Distance from a point to a triangle: to the plane when the foot lies inside, else to the nearest edge.
+/// Returns the distance from a point to a triangle, in their unit: to the plane when the foot lies inside, else to the nearest edge; so of
+/// one without area too.
 fn distance_to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
     let n = (b - a).cross(c - a);
     let within = |a: Point, b: Point| (b - a).cross(p - a).dot(n) >= 0.0;
@@ -174,7 +177,7 @@ mod tests {
         let p = Point::new(100.0, 0.0, 0.0) + Vector::new(3.0, -4.0, 12.0).normalize() * 17.0;
         assert!((nearest.distance(0, p) - 7.0).abs() < 1e-9);
         assert!((nearest.distance(1, Point::new(100.5, 0.5, 41.0)) - 1.0).abs() < 1e-12);
-        assert_eq!(nearest.face(Point::new(100.0, 0.0, 35.0), &[0, 1]), Some(1));
-        assert_eq!(nearest.face(Point::new(100.0, 0.0, 24.0), &[0, 1]), Some(0));
+        assert_eq!(nearest.nearest_face(Point::new(100.0, 0.0, 35.0), &[0, 1]), Some(1));
+        assert_eq!(nearest.nearest_face(Point::new(100.0, 0.0, 24.0), &[0, 1]), Some(0));
     }
 }

@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 /// Share of a wavelength that the end of a table may be missed by: a unit that was converted to nm and back.
 const ROUNDING: f64 = 1e-9;
 
-/// Something that is known between two wavelengths alone.
+/// A property that is known between two wavelengths alone, nm, and what it is called in a sentence.
 struct KnownRange {
     what: String,
     range: [f64; 2],
@@ -21,13 +21,14 @@ struct KnownRange {
     beyond: &'static str,
 }
 
-/// What happens beyond a table.
+/// Words for what is taken beyond a table's wavelengths.
 const ENDS: &str = "its first and last values are used there";
-/// What happens beyond a formula's range.
+/// Words for what is taken beyond a formula's wavelengths.
 const FORMULA: &str = "the formula is used all the same there";
 
-/// One sentence for each table in use that some source's light lies outside of.
-pub(super) fn beyond_tables(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 2]]) -> Vec<String> {
+/// Returns one sentence for each table or formula in use that the light of a source goes beyond; `light` is first and last wavelength of
+/// each source, nm.
+pub(super) fn range_notes(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 2]]) -> Vec<String> {
     let media = chosen.iter().filter_map(|(_, rule)| scene.materials.get((*rule)?)?.medium.as_deref());
     let media: BTreeSet<&str> = media.chain(scene.ambient.as_deref()).collect();
     let surfaces: BTreeSet<usize> = chosen.iter().filter_map(|(rule, _)| *rule).collect();
@@ -40,11 +41,12 @@ pub(super) fn beyond_tables(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 
             beyond: ENDS,
         }));
     }
-    known.iter().filter_map(|k| sentence(scene, k, light)).collect()
+    known.iter().filter_map(|k| range_note(scene, k, light)).collect()
 }
 
-/// The sentence for a table that a source's light is beyond; `light` are the ends of each source's wavelengths.
-fn sentence(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<String> {
+/// Returns the sentence about a table that the light of a source goes beyond, naming the first such source; `None` where no source does.
+/// `light` is first and last wavelength of each source, nm.
+fn range_note(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<String> {
     let [from, to] = known.range;
     let outside = |[a, b]: &[f64; 2]| *a < from * (1.0 - ROUNDING) || *b > to * (1.0 + ROUNDING);
     // One sentence a table: the first source that is beyond it stands for all.
@@ -55,7 +57,7 @@ fn sentence(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<Str
     Some(format!("{} is known for {known_for}, but {whose} has light of {light}: {}", known.what, known.beyond))
 }
 
-/// A source as sentences name it.
+/// Returns a source as sentences name it: by its name, or by its number from 1 where it has none.
 fn source_label(scene: &Scene, source: usize) -> String {
     match scene.sources.get(source).map(|s| s.name.as_str()) {
         Some(name) if !name.is_empty() => format!("the source '{name}'"),
@@ -63,8 +65,8 @@ fn source_label(scene: &Scene, source: usize) -> String {
     }
 }
 
-/// What the readers of the sources' files changed or supposed.
-pub(super) fn source_files(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<String> {
+/// Returns what the readers of ray files changed or supposed, each sentence with its source in front.
+pub(super) fn source_file_notes(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<String> {
     let mut sentences = Vec::new();
     for (index, loaded) in loaded.iter().enumerate() {
         let Some(Loaded::Rays(list)) = loaded else { continue };
@@ -73,13 +75,14 @@ pub(super) fn source_files(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<Stri
     sentences
 }
 
-/// The least and the greatest.
-fn ends<'a>(mut nm: impl Iterator<Item = f64> + 'a) -> Option<[f64; 2]> {
+/// Returns the least and the greatest of these wavelengths; `None` without any.
+fn least_and_greatest<'a>(mut nm: impl Iterator<Item = f64> + 'a) -> Option<[f64; 2]> {
     let first = nm.next()?;
     Some(nm.fold([first, first], |[a, b], x| [a.min(x), b.max(x)]))
 }
 
-/// The wavelengths for which what a medium is made of is known, each with what happens beyond.
+/// Returns the wavelengths, nm, between which the catalogue formula and the tables of a medium are known; a table of one point is a
+/// constant and left out.
 fn medium_ranges(scene: &Scene, name: &str) -> Vec<KnownRange> {
     let mut known = Vec::new();
     let mut add = |what: String, range: Option<[f64; 2]>, beyond| {
@@ -92,7 +95,7 @@ fn medium_ranges(scene: &Scene, name: &str) -> Vec<KnownRange> {
     }
     if let Some(medium::Medium { index_table, absorption_per_mm, .. }) = own {
         // A single point is a constant.
-        let range = |t: &Vec<[f64; 2]>| if t.len() > 1 { ends(t.iter().map(|p| p[0])) } else { None };
+        let range = |t: &Vec<[f64; 2]>| if t.len() > 1 { least_and_greatest(t.iter().map(|p| p[0])) } else { None };
         add(format!("`index_table` of the medium '{name}'"), index_table.as_ref().and_then(range), ENDS);
         if let Some(ByWavelength::Table(t)) = absorption_per_mm {
             add(format!("`absorption_per_mm` of the medium '{name}'"), range(t), ENDS);
@@ -101,23 +104,24 @@ fn medium_ranges(scene: &Scene, name: &str) -> Vec<KnownRange> {
     known
 }
 
-/// Keys of a material's tables over wavelength, and from where to where they go.
+/// Returns the keys of a material's tables over wavelength, with first and last wavelength, nm.
 fn surface_ranges(m: &Material) -> impl Iterator<Item = (&'static str, [f64; 2])> {
-    let coating = m.coating.as_ref().and_then(|rows| ends(rows.iter().filter_map(|r| r.get(1).copied())));
+    let coating =
+        m.coating.as_ref().and_then(|rows| least_and_greatest(rows.iter().filter_map(|r| r.get(1).copied())));
     let reflectance = match &m.reflectance {
-        Some(Reflectance::ByAngleAndWavelength(rows)) => ends(rows.iter().map(|r| r[1])),
+        Some(Reflectance::ByAngleAndWavelength(rows)) => least_and_greatest(rows.iter().map(|r| r[1])),
         _ => None,
     };
     [("coating", coating), ("reflectance", reflectance)].into_iter().filter_map(|(key, range)| Some((key, range?)))
 }
 
-/// Whether a face is one of no closed shell. Of ready meshes nothing is known.
+/// Whether a face belongs to no closed shell; `false` for ready meshes, of which that is not known.
 pub(super) fn is_open(f: &PlacedFace<'_>, model: &Model) -> bool {
     f.face.is_some() && f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed)
 }
 
-/// One sentence about the bodies that have faces in no closed shell.
-pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
+/// Returns one sentence about the bodies that have faces in no closed shell, naming the first; `None` where all are closed.
+pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> {
     let open = |f: &PlacedFace<'_>| {
         is_open(f, model) && bound.faces.get(f.id.index()).is_some_and(|optics| optics.body != AMBIENT)
     };
@@ -138,8 +142,9 @@ pub(super) fn openings(bound: &BoundScene, model: &Model) -> Option<String> {
     ))
 }
 
-/// One sentence about the thinnest body that touches others and is hardly thicker than the glue, along an axis.
-pub(super) fn films(bound: &BoundScene) -> Option<String> {
+/// Returns one sentence about the thinnest body that touches others and whose box is thinner than twice the glue distance along an axis;
+/// `None` where there is none.
+pub(super) fn thin_body_note(bound: &BoundScene) -> Option<String> {
     let glue = bound.scene.run.glue_mm;
     let thickness = |k: u32| bound.bodies[k as usize].bounds.size().min_element();
     let touching: BTreeSet<u32> = bound.faces.iter().filter(|f| f.touches_body).map(|f| f.body).collect();

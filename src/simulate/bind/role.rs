@@ -8,7 +8,8 @@ impl BoundScene {
     /// What a face can be for light, as [`BoundScene::faces_in_role`] takes it.
     pub const ROLES: [&'static str; 4] = ["mirror", "interface", "coated", "absorber"];
 
-    /// The placed faces with a role: plain mirrors, bare interfaces of a medium, faces with a coating or scatter, absorbers.
+    /// Returns the placed faces with a role of [`BoundScene::ROLES`], in order: plain mirrors, bare interfaces, faces with a coating or
+    /// scatter, or absorbers. None for any other word. An interface is listed whether or not it has a medium.
     pub fn faces_in_role(&self, role: &str) -> Vec<FaceId> {
         let is = |surface: &Surface| match surface {
             Surface::Mirror(_) => role == "mirror",

@@ -4,7 +4,8 @@ use super::bound_scene::RuleFaces;
 use super::chosen::ChosenRules;
 use crate::simulate::scene::{Scene, SurfaceKind};
 
-/// One entry a rule, those without a face included, and a last one for the faces that no rule names, if there are any.
+/// Returns one entry for each rule, in the order of the scene and with faces or without, and a last one for the faces that no rule names,
+/// if there are any. A face whose surface and medium come from two rules stands in both entries.
 pub(super) fn rule_table(scene: &Scene, chosen: &ChosenRules) -> Vec<RuleFaces> {
     let mut table: Vec<RuleFaces> = (scene.materials.iter().enumerate())
         .map(|(k, material)| {
@@ -42,7 +43,7 @@ pub(super) fn rule_table(scene: &Scene, chosen: &ChosenRules) -> Vec<RuleFaces> 
     table
 }
 
-/// A surface in the scene file's word.
+/// Returns a surface in the scene file's word.
 fn surface_word(kind: SurfaceKind) -> &'static str {
     match kind {
         SurfaceKind::Absorber => "absorber",

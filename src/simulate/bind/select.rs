@@ -16,8 +16,8 @@ const RADIUS_ROUNDING: f64 = 1e-4;
 /// Messages give places in steps of a thousandth of a millimetre.
 const DECIMALS: f64 = 1e3;
 
-/// Whether a name fits a pattern in which `*` stands for anything.
-fn fits(pattern: &str, name: &str) -> bool {
+/// Whether a whole name fits a pattern in which each `*` stands for any characters, or none; upper and lower case differ.
+fn matches_pattern(pattern: &str, name: &str) -> bool {
     let mut pieces = pattern.split('*');
     let Some(mut rest) = name.strip_prefix(pieces.next().unwrap_or("")) else { return false };
     let mut last = None;
@@ -33,41 +33,42 @@ fn fits(pattern: &str, name: &str) -> bool {
     last.map_or(rest.is_empty(), |end: &str| rest.ends_with(end))
 }
 
-fn any_fits(patterns: &Option<OneOrMany<String>>, name: &str) -> bool {
-    patterns.as_ref().is_none_or(|p| p.as_slice().iter().any(|p| fits(p, name)))
+/// Whether a name fits any of the patterns; `true` where none is asked for.
+fn matches_any(patterns: &Option<OneOrMany<String>>, name: &str) -> bool {
+    patterns.as_ref().is_none_or(|p| p.as_slice().iter().any(|p| matches_pattern(p, name)))
 }
 
-/// Whether a solid is one of those that are meant.
-fn solid_fits(wanted: &Option<OneOrMany<SolidKey>>, face: &PlacedFace<'_>, model: &Model) -> bool {
+/// Whether a face's solid is one of the wanted, by number or by name; `true` where none is asked for.
+fn matches_solid(wanted: &Option<OneOrMany<SolidKey>>, face: &PlacedFace<'_>, model: &Model) -> bool {
     let Some(wanted) = wanted else { return true };
     let name = solid_name(face, model);
     wanted.as_slice().iter().any(|key| match key {
         SolidKey::Number(number) => *number == face.solid,
-        SolidKey::Name(pattern) => name.is_some_and(|name| fits(pattern, name)),
+        SolidKey::Name(pattern) => name.is_some_and(|name| matches_pattern(pattern, name)),
     })
 }
 
-/// The name of the solid of a face; the shell of a void is its solid's.
+/// Returns the name of the solid of a face; a void's shell has that of the shell it is in. `None` for a face of no shell.
 fn solid_name<'m>(face: &PlacedFace<'_>, model: &'m Model) -> Option<&'m str> {
     let shells = &model.part(face.part).shells[..=face.shell?];
     shells.iter().rfind(|s| !s.void).or(shells.first()).map(|s| s.name.as_str())
 }
 
-/// Whether a face has everything that a rule asks for, places left out.
-fn has_all(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -> bool {
+/// Whether a face has everything that a selector asks for; points (`at`) are not asked.
+fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -> bool {
     let same_radius = |wanted: &f64, have: f64| (wanted - have).abs() <= RADIUS_ROUNDING * have;
     let same_colour =
         |wanted: [f64; 3], have: [f64; 3]| have.iter().zip(wanted).all(|(a, b)| (a - b).abs() < COLOUR_STEP);
-    any_fits(&rule.part, &model.part(face.part).name)
-        && any_fits(&rule.instance, &model.instances[face.instance].name)
-        && any_fits(&rule.face, face.name())
-        && any_fits(&rule.kind, face.kind().word())
+    matches_any(&rule.part, &model.part(face.part).name)
+        && matches_any(&rule.instance, &model.instances[face.instance].name)
+        && matches_any(&rule.face, face.name())
+        && matches_any(&rule.kind, face.kind().word())
         && rule.entity.as_ref().is_none_or(|e| face.entity().is_some_and(|id| e.as_slice().contains(&id)))
-        && (rule.layer.is_none() || face.layer().is_some_and(|layer| any_fits(&rule.layer, layer)))
+        && (rule.layer.is_none() || face.layer().is_some_and(|layer| matches_any(&rule.layer, layer)))
         && rule.radius_mm.as_ref().is_none_or(|radii| {
             face.radius().is_some_and(|have| radii.as_slice().iter().any(|wanted| same_radius(wanted, have)))
         })
-        && solid_fits(&rule.solid, face, model)
+        && matches_solid(&rule.solid, face, model)
         && rule
             .colour
             .as_ref()
@@ -75,8 +76,12 @@ fn has_all(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -> bool {
             .is_none_or(|wanted| face.colour(model).is_some_and(|have| same_colour(wanted, have.0)))
 }
 
-/// Selects the placed faces that a rule means; an error when there is none, or when one of its points or names means none.
-pub(super) fn faces(
+/// Returns the indices of the placed faces that a selector means; with points, for each of them the nearest of these, which may repeat.
+/// `base` is where the selector stands in the scene, for messages.
+///
+/// # Errors
+/// When no face fits, a name in it fits nothing in the model, or a point lies farther from the faces than they are large.
+pub(super) fn select_faces(
     scene: &Scene,
     base: &[Key<'_>],
     rule: &FaceSelector,
@@ -85,7 +90,7 @@ pub(super) fn faces(
 ) -> Result<Vec<usize>, Error> {
     let path = |key| base.iter().copied().chain([Key::Name(key)]).collect::<Vec<_>>();
     let candidates: Vec<usize> =
-        model.placed_faces().filter(|f| has_all(rule, f, model)).map(|f| f.id.index()).collect();
+        model.placed_faces().filter(|f| matches_selector(rule, f, model)).map(|f| f.id.index()).collect();
     // Before the count: a name that nothing has is the better message than that nothing matches.
     each_name_means_something(scene, base, rule, model)?;
     if candidates.is_empty() {
@@ -95,7 +100,7 @@ pub(super) fn faces(
     let Some(points) = &rule.at else { return Ok(candidates) };
     let mut chosen = Vec::new();
     for p in points.as_slice() {
-        let Some(face) = nearest.face(Point::from_array(*p), &candidates) else {
+        let Some(face) = nearest.nearest_face(Point::from_array(*p), &candidates) else {
             let message = format!("no face is near to {p:?}");
             return Err(scene.error(ErrorKind::NoMatch, &path("at"), message).help("give a point on a face, mm"));
         };
@@ -114,7 +119,10 @@ pub(super) fn faces(
     Ok(chosen)
 }
 
-/// Refuses a selector of which a name stands for nothing in the model.
+/// Checks that every name in a selector fits something in the model.
+///
+/// # Errors
+/// For the first name that fits nothing, with the nearest name or a list of names.
 fn each_name_means_something(
     scene: &Scene,
     base: &[Key<'_>],
@@ -150,7 +158,7 @@ fn each_name_means_something(
     for (key, patterns, names) in lists {
         // A rule of several names must not lose one of them to a slip of the pen while the others match.
         for pattern in patterns.iter().flat_map(|p| p.as_slice()) {
-            if names.iter().any(|n| fits(pattern, n)) {
+            if names.iter().any(|n| matches_pattern(pattern, n)) {
                 continue;
             }
             let at: Vec<_> = base.iter().copied().chain([Key::Name(key)]).collect();
@@ -161,23 +169,30 @@ fn each_name_means_something(
     Ok(())
 }
 
-/// The faces that a source shines from.
+/// Returns the faces that a source shines from, ready for points to be drawn on them; `None` for a source that is not on faces.
+///
+/// # Errors
+/// When its selector means no face, or faces without area.
 pub(super) fn luminous_area(scene: &Scene, index: usize, model: &Model) -> Result<Option<Area>, Error> {
     let Some(on) = &scene.sources[index].on else { return Ok(None) };
     let base = [Key::Name("source"), Key::Index(index), Key::Name("on")];
-    let chosen = faces(scene, &base, on, model, &mut Nearest::new(model))?;
+    let chosen = select_faces(scene, &base, on, model, &mut Nearest::new(model))?;
     match Area::new(model, &chosen) {
         Some(area) => Ok(Some(area)),
         None => Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from")),
     }
 }
 
-/// The faces whose absorbed power a receiver counts.
+/// Returns the indices of the placed faces whose absorbed power a receiver counts: by its selector `on`, else by part and instance; all
+/// faces where it has none of these.
+///
+/// # Errors
+/// When these mean no face.
 pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Result<Vec<u32>, Error> {
     let receiver = &scene.receivers[index];
     if let Some(on) = &receiver.on {
         let base = [Key::Name("receiver"), Key::Index(index), Key::Name("on")];
-        let chosen = faces(scene, &base, on, model, &mut Nearest::new(model))?;
+        let chosen = select_faces(scene, &base, on, model, &mut Nearest::new(model))?;
         return Ok(chosen.into_iter().map(|f| f as u32).collect());
     }
     let rule = FaceSelector {
@@ -188,8 +203,8 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Res
     each_name_means_something(scene, &[Key::Name("receiver"), Key::Index(index)], &rule, model)?;
     let faces: Vec<u32> = model
         .placed_faces()
-        .filter(|f| any_fits(&rule.part, &model.part(f.part).name))
-        .filter(|f| any_fits(&rule.instance, &model.instances[f.instance].name))
+        .filter(|f| matches_any(&rule.part, &model.part(f.part).name))
+        .filter(|f| matches_any(&rule.instance, &model.instances[f.instance].name))
         .map(|f| f.id.0)
         .collect();
     if faces.is_empty() {
@@ -218,7 +233,7 @@ pub(super) fn advice(word: &str, mut names: Vec<&str>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::fits;
+    use super::matches_pattern;
 
     #[test]
     fn stars_stand_for_anything() {
@@ -230,10 +245,10 @@ mod tests {
             ("*", ""),
             ("a*", "a"),
         ] {
-            assert!(fits(pattern, name), "{pattern} {name}");
+            assert!(matches_pattern(pattern, name), "{pattern} {name}");
         }
         for (pattern, name) in [("led", "led_2"), ("led*", "xled"), ("a*b*c", "acb"), ("ab*b", "ab"), ("", "x")] {
-            assert!(!fits(pattern, name), "{pattern} {name}");
+            assert!(!matches_pattern(pattern, name), "{pattern} {name}");
         }
     }
 }

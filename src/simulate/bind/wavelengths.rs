@@ -15,7 +15,8 @@ const PROBES: u32 = 64;
 /// The last of them falls just short of the whole spectrum, whose end is drawn by no random number.
 const LAST_PROBE: f64 = 64.001;
 
-/// The wavelengths of all sources.
+/// Returns the wavelength of the scene, nm, and whether it has several. With several, that is the line of the first source, or the run's
+/// wavelength where the first source has a spectrum.
 pub(super) fn scene_light(scene: &Scene, loaded: &[Option<Loaded>]) -> SceneLight {
     let lines = scene.sources.iter().zip(loaded).flat_map(|(s, loaded)| match (&s.spectrum, loaded) {
         (Some(key), _) => vec![key.optics().ok().and_then(|s| s.single_line())],
@@ -29,7 +30,7 @@ pub(super) fn scene_light(scene: &Scene, loaded: &[Option<Loaded>]) -> SceneLigh
     SceneLight { wavelength: first.unwrap_or(scene.run.wavelength_nm), coloured }
 }
 
-/// The only wavelength of a list of rays; `None` where it has several.
+/// Returns the only wavelength of a list of rays, nm, the run's where the list gives none; `None` where it has several.
 fn single_wavelength(list: &RayList, scene: &Scene) -> Option<f64> {
     if let Some(spectrum) = &list.spectrum {
         let [first, last] = spectrum.range_nm();
@@ -42,7 +43,7 @@ fn single_wavelength(list: &RayList, scene: &Scene) -> Option<f64> {
     }
 }
 
-/// First and last wavelength of each source, nm.
+/// Returns first and last wavelength of each source, nm; the run's wavelength for a source that gives none.
 pub(super) fn source_ranges(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f64; 2]> {
     let run = [scene.run.wavelength_nm; 2];
     let range = |i: &f64| [*i, *i];
@@ -62,12 +63,16 @@ pub(super) fn source_ranges(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f6
         .collect()
 }
 
-/// Wavelengths over the whole of a spectrum.
+/// Returns wavelengths, nm, in even steps of power over a whole spectrum, both ends included.
 fn probes(spectrum: &Wavelengths) -> Vec<f64> {
     (0..=PROBES).map(|k| spectrum.sample(f64::from(k) / LAST_PROBE)).collect()
 }
 
-/// Every medium must have an index at every wavelength of the sources.
+/// Checks that every medium in use, the surroundings too, has an index from 0.1 to 10 at every wavelength of the sources; a continuous
+/// spectrum is asked at 65 places.
+///
+/// # Errors
+/// For the first wavelength and medium that fail, at the source.
 pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[Body]) -> Result<(), Error> {
     for (i, (source, loaded)) in scene.sources.iter().zip(loaded).enumerate() {
         let mut wavelengths: Vec<f64> = match (&source.spectrum, loaded) {

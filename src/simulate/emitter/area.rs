@@ -37,22 +37,23 @@ struct LuminousFace {
 }
 
 impl LuminousFace {
-    /// Lower corner and size of a cell of the domain.
+    /// Returns the lower corner and the size of cell `k` in spline parameters.
     fn cell(&self, k: usize) -> [Uv; 2] {
         let [[u0, u1], [v0, v1]] = self.face.surface.domain();
         let size = Uv::new(u1 - u0, v1 - v0) / CELLS as f64;
         [Uv::new(u0, v0) + size * Uv::new((k / CELLS) as f64, (k % CELLS) as f64), size]
     }
 
-    /// Area per unit of parameters, mm².
-    fn element(&self, uv: Uv) -> f64 {
+    /// Returns the area in the scene per unit of spline parameters, mm²; 0 at a pole.
+    fn area_element(&self, uv: Uv) -> f64 {
         let d = self.face.surface.derivatives(uv);
         d.du.cross(d.dv).length() * self.placement.scale.powi(2)
     }
 }
 
 impl Area {
-    /// Prepares faces; `None` when none of them has a surface with area.
+    /// Prepares the chosen faces (indices of placed faces); `None` when none of them has a spline surface with area. Ready meshes are
+    /// skipped.
     pub(crate) fn new(model: &Model, chosen: &[usize]) -> Option<Self> {
         let mut faces = Vec::new();
         let mut sums = Vec::new();
@@ -67,7 +68,7 @@ impl Area {
                 let samples = (0..9).map(|i| Uv::new((i / 3) as f64, (i % 3) as f64) * 0.5);
                 // Area per parameter, the rejection's bound: sampled on a grid of three by three, and raised by a margin for what lies
                 // between.
-                let largest = samples.map(|s| luminous.element(low + size * s)).fold(0.0, f64::max);
+                let largest = samples.map(|s| luminous.area_element(low + size * s)).fold(0.0, f64::max);
                 luminous.bounds.push(BOUND_MARGIN * largest);
                 sum += BOUND_MARGIN * largest * size.x * size.y;
                 sums.push(sum);
@@ -77,7 +78,8 @@ impl Area {
         (sum > 0.0 && sum.is_finite()).then_some(Self { faces, sums })
     }
 
-    /// A point, its outward normal and its face.
+    /// Draws a point (mm, scene coordinates), its unit outward normal and its face. Where no attempt of [`MOST_ATTEMPTS`] was accepted, the
+    /// last one is returned, which may lie outside the trims.
     pub(crate) fn point(&self, stream: &Stream, index: RayIndex) -> (Point, Vector, FaceId) {
         let whole = self.sums[self.sums.len() - 1];
         let mut last = None;
@@ -97,7 +99,7 @@ impl Area {
             let [keep, _] = stream.random(index, 2 * attempt + 11);
             let bound = luminous.bounds[cell % (CELLS * CELLS)];
             // Rejection makes uniform in parameters into uniform in area.
-            if is_inside(&luminous.loops, uv) && keep * bound <= luminous.element(uv) {
+            if is_inside(&luminous.loops, uv) && keep * bound <= luminous.area_element(uv) {
                 break;
             }
         }

@@ -24,7 +24,7 @@ struct TwoFold {
 }
 
 impl TwoFold {
-    /// The exact sum.
+    /// Returns the exact sum of two numbers.
     fn sum(a: f64, b: f64) -> Self {
         // Knuth's sum without a condition on which is larger; what is rounded off is exact.
         let high = a + b;
@@ -32,7 +32,7 @@ impl TwoFold {
         Self { high, low: (a - (high - b_share)) + (b - b_share) }
     }
 
-    /// The exact product.
+    /// Returns the exact product of two numbers, short of underflow.
     fn product(a: f64, b: f64) -> Self {
         let high = a * b;
         Self { high, low: a.mul_add(b, -high) }
@@ -59,7 +59,7 @@ impl TwoFold {
     }
 }
 
-/// The point of a line nearest to `centre`, for any length of `direction`; exact but for its last rounding.
+/// Returns the point of a line nearest to `centre`, mm; `direction` may have any length but 0. Exact but for its last rounding.
 fn foot_on_line(origin: Point, direction: Vector, centre: Point) -> Point {
     let zero = TwoFold { high: 0.0, low: 0.0 };
     let along = (0..3).fold(zero, |sum, k| sum.plus(TwoFold::sum(centre[k], -origin[k]).times(direction[k])));
@@ -79,7 +79,8 @@ pub(super) struct NearStart {
 }
 
 impl NearStart {
-    /// Moves the start of a ray that comes from far away to beside the scene.
+    /// Moves the origin of a ray that starts more than `far` from the centre along its direction to beside the scene; leaves one that
+    /// starts nearer, or goes away from the scene.
     #[inline(always)]
     pub(super) fn bring_near(&self, ray: &mut Ray) {
         let to_centre = self.centre - ray.origin;
@@ -95,11 +96,11 @@ impl NearStart {
 }
 
 impl Emitter {
-    /// Makes rays that come from far away start beside the scene, which lies in `scene_box`. `direction` is the axis of the source as it
-    /// was given, of any length.
+    /// Makes the rays of a source that is more than [`FAR_DIAGONALS`] diagonals away start beside `scene_box` (mm); leaves one that is
+    /// nearer, and any source where the box is empty. `direction` is the axis as the scene gives it, of any length.
     ///
     /// # Errors
-    /// When the source is so far away that its rays are not known within the scene; with what is wrong.
+    /// With what is wrong, when the source is so far away that its rays are not known within the scene.
     pub(crate) fn start_near(&mut self, scene_box: &Aabb, direction: Vector) -> Result<(), String> {
         if scene_box.is_empty() {
             return Ok(());
@@ -138,7 +139,7 @@ impl Emitter {
         Ok(())
     }
 
-    /// Distance from a point to the farthest start of its rays, mm.
+    /// Returns the distance from a point to the farthest start of its rays, mm; 0 for faces, which belong to the scene.
     fn farthest_start(&self, centre: Point) -> f64 {
         match &self.shape {
             Shape::Faces(_) => 0.0,

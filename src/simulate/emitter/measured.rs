@@ -9,12 +9,15 @@ use crate::simulate::{Error, ErrorKind};
 /// What the file of a source holds.
 #[derive(Clone, Debug)]
 pub(crate) enum Loaded {
-    /// A measured intensity, the type of its angles and its flux.
+    /// A measured intensity, the type of its angles, and its flux in the file's unit.
     Intensity(IntensitySampler, PhotometricType, f64),
     Rays(RayList),
 }
 
-/// Reads the file of a source, when it has one.
+/// Reads the file of source `index`; `None` when it names none, or its kind takes none.
+///
+/// # Errors
+/// When the file cannot be read, its light is no finite power, or its rays do not suit the unit of the run.
 pub(crate) fn load(scene: &Scene, index: usize, source: &Source) -> Result<Option<Loaded>, Error> {
     let Some(file) = &source.file else { return Ok(None) };
     let at = [Key::Name("source"), Key::Index(index), Key::Name("file")];

@@ -39,22 +39,22 @@ pub(crate) use stream::{RayIndex, Stream};
 /// A source ready to emit.
 #[derive(Clone, Debug)]
 pub(crate) struct Emitter {
-    /// In the unit of the run.
+    /// Its power, in the unit of the run.
     pub(crate) power: f64,
-    /// A number of its own, where the scene gives one.
+    /// Number of its rays, where the scene gives one.
     pub(crate) rays: Option<u64>,
-    /// Bodies around it, outermost first.
+    /// Bodies that the scene states around it, outermost first; empty where it states none.
     pub(crate) inside: SmallVec<[u32; 4]>,
-    /// Whether the scene says so; geometry tells otherwise.
+    /// Whether the scene states what it lies in; else geometry tells.
     pub(crate) media_stated: bool,
-    /// Its spectrum, when the scene has several wavelengths.
+    /// What wavelengths are drawn from; `None` where the scene has but one, or its rays have their own.
     wavelengths: Option<Wavelengths>,
-    /// Direction of the electric field of polarised light.
+    /// Direction of the electric field of polarised light, of any length; `None` for unpolarised light.
     pub(crate) polarised: Option<Vector>,
     frame: Frame,
     shape: Shape,
     lobe: Lobe,
-    /// Where the rays of a far source start.
+    /// Where the rays of a far source start; `None` for a source that is near, or was moved as a whole.
     near_start: Option<NearStart>,
 }
 
@@ -68,7 +68,10 @@ pub(crate) struct Emission {
 }
 
 impl Emitter {
-    /// The emitter of source `i`, with its file where it has `loaded` one and its faces where it glows from an `area`.
+    /// Makes the emitter of source `i`, from what its file held (`loaded`) and the faces that it glows from (`area`), if any.
+    ///
+    /// # Errors
+    /// When its power is not within `scene::POWERS`, or `inside` names no instance with a medium.
     pub(crate) fn new(
         scene: &Scene,
         i: usize,
@@ -166,7 +169,7 @@ impl Emitter {
         [self.shape.is_extended(), !(list || collimated), self.wavelengths.is_some()]
     }
 
-    /// What its rays have in common.
+    /// Returns the point or the direction that all its rays have, to the bit; `None` where they have neither.
     pub(crate) fn beam(&self) -> Option<Beam> {
         // A beam is promised only where all rays have the very point or direction: who is told relies on it to the bit.
         let (origin, direction) = (self.frame.origin, self.frame.z);
@@ -181,7 +184,7 @@ impl Emitter {
         }
     }
 
-    /// Distance from its middle to the farthest place it shines from, mm; faces and lists of rays left out.
+    /// Returns the distance from its middle to the farthest place it shines from, mm; 0 for faces and lists of rays.
     fn size(&self) -> f64 {
         match &self.shape {
             Shape::Disc(radius) => *radius,
@@ -190,7 +193,8 @@ impl Emitter {
         }
     }
 
-    /// A box around the places it shines from; faces, lists of rays and what is far away left out.
+    /// Returns a box around the places it shines from, mm; for faces and lists of rays around the source's `at` alone, empty for a source
+    /// that is far away.
     pub(crate) fn extent(&self) -> Aabb {
         if self.near_start.is_some() {
             return Aabb::EMPTY;
@@ -207,7 +211,7 @@ impl Emitter {
         }
     }
 
-    /// The ray's wavelength, nm, where rays have one.
+    /// Draws the ray's wavelength, nm; `None` where the emitter has no spectrum to draw from.
     #[inline(always)]
     fn wavelength(&self, stream: &Stream, index: RayIndex) -> Option<f64> {
         let wavelengths = self.wavelengths.as_ref()?;
@@ -290,7 +294,10 @@ impl Emitter {
     }
 }
 
-/// The bodies that a source is said to lie in, outermost first.
+/// Returns the bodies that a source is stated to lie in, outermost first; empty where the scene does not say.
+///
+/// # Errors
+/// When `inside` names no instance that has a medium.
 fn stated_media(scene: &Scene, source: usize, bodies: &[Body]) -> Result<SmallVec<[u32; 4]>, Error> {
     let mut media = SmallVec::new();
     for instance in scene.sources[source].inside.iter().flat_map(|n| n.as_slice()) {

@@ -21,7 +21,7 @@ impl RayPacket {
         Box::new(Self { origins: [[0.0; PACKET]; 3], directions: [[0.0; PACKET]; 3] })
     }
 
-    /// Origin and direction of the ray at one place.
+    /// Returns origin and direction of the ray that starts as the `k`-th, modulo the size of a packet.
     #[inline(always)]
     pub(super) fn ray(&self, k: usize) -> (Point, Vector) {
         let k = k % PACKET;
@@ -29,7 +29,7 @@ impl RayPacket {
         (Point::new(x[k], y[k], z[k]), Vector::new(a[k], b[k], c[k]))
     }
 
-    /// Makes the rays that start from the `started`-th on.
+    /// Makes the rays that start from the `started`-th on; `stream` must have been refilled for them.
     #[inline(always)]
     pub(super) fn fill(&mut self, emitter: &Emitter, stream: &Stream, started: u32) {
         emitter.fill_origins(stream.pairs_from(started, 0), &mut self.origins);
@@ -37,7 +37,7 @@ impl RayPacket {
     }
 }
 
-/// Sines and cosines of whole turns.
+/// Returns sine and cosine of each angle, given in whole turns.
 #[inline(always)]
 fn sines_and_cosines(turns: &PacketNumbers) -> [PacketNumbers; 2] {
     let [mut sin, mut cos] = [[0.0; PACKET]; 2];
@@ -47,7 +47,7 @@ fn sines_and_cosines(turns: &PacketNumbers) -> [PacketNumbers; 2] {
     [sin, cos]
 }
 
-/// Products of two numbers of each ray.
+/// Returns the products of two arrays, number by number.
 #[inline(always)]
 fn products(a: &PacketNumbers, b: &PacketNumbers) -> PacketNumbers {
     let mut products = [0.0; PACKET];
@@ -57,13 +57,13 @@ fn products(a: &PacketNumbers, b: &PacketNumbers) -> PacketNumbers {
     products
 }
 
-/// A number times one of each ray.
+/// Returns each number times `a`.
 #[inline(always)]
 fn scaled(a: f64, b: &PacketNumbers) -> PacketNumbers {
     products(&[a; PACKET], b)
 }
 
-/// Adds a number of each ray times a vector.
+/// Adds to the k-th vector in `sums`, whose x, y and z stand in arrays of their own, `vector` times the k-th number.
 #[inline(always)]
 fn add_multiples(sums: &mut [PacketNumbers; 3], vector: Vector, numbers: &PacketNumbers) {
     for axis in 0..3 {
@@ -75,7 +75,7 @@ fn add_multiples(sums: &mut [PacketNumbers; 3], vector: Vector, numbers: &Packet
 }
 
 impl Emitter {
-    /// Whether its rays can be made in packets.
+    /// Whether its rays can be made in packets: from a point, disc or rectangle, into a cone, Lambert's cosine or one direction.
     pub(super) fn fits_packets(&self) -> bool {
         // Powers, measured lobes and faces are left to rays one by one: their formulas branch or call.
         let simple_shape = matches!(self.shape, Shape::Point | Shape::Disc(_) | Shape::Rectangle(_));
@@ -87,7 +87,7 @@ impl Emitter {
             }
     }
 
-    /// Starts for the numbers u and v, by the formulas that serve single rays.
+    /// Writes the starts, mm in scene coordinates, for the uniform numbers u and v, by the formulas that serve single rays.
     #[inline(always)]
     fn fill_origins(&self, [u, v]: [PacketNumbers; 2], origins: &mut [PacketNumbers; 3]) {
         let f = self.frame;
@@ -115,7 +115,7 @@ impl Emitter {
         }
     }
 
-    /// Directions for the numbers u and v, by the formulas that serve single rays.
+    /// Writes the unit directions for the uniform numbers u and v, by the formulas that serve single rays.
     #[inline(always)]
     fn fill_directions(&self, [u, v]: [PacketNumbers; 2], directions: &mut [PacketNumbers; 3]) {
         let f = self.frame;

@@ -29,10 +29,13 @@ impl Fault {
 }
 
 impl RayList {
-    /// The rays of a file as the source of a run that counts in `unit`.
+    /// Makes the rays of a file the source of a run that counts in `unit`.
     ///
-    /// Watts become lumens where the file or the scene gives wavelengths. What cannot be converted is refused unless the scene gives the
-    /// source's power: the file's powers then are relative.
+    /// Watts become lumens where the file or the scene gives wavelengths; a note says so.
+    ///
+    /// # Errors
+    /// When the unit cannot be converted and the scene does not give the source's power (with it, the file's powers are relative), when the
+    /// eye sees nothing of the file's spectrum, or when the powers add up to 0 or to no finite number.
     pub(super) fn new(mut set: RaySet, source: &Source, unit: PowerUnit) -> Result<Self, Fault> {
         let mut notes = std::mem::take(&mut set.notes);
         let table = file_spectrum(&set)?;
@@ -74,14 +77,14 @@ impl RayList {
         self.sums[self.sums.len() - 1]
     }
 
-    /// The ray at a share of the summed power.
+    /// Returns the ray at which the running sum of powers passes `share`, from 0 to 1, of the whole.
     pub(crate) fn ray_at_share(&self, share: f64) -> &LightRay {
         // The running sum is searched: each ray is drawn in proportion to its power.
         let at = share * self.power();
         &self.rays[self.sums.partition_point(|s| *s <= at).min(self.rays.len() - 1)]
     }
 
-    /// The wavelengths of single rays, ascending, each once.
+    /// Returns the wavelengths, nm, that single rays have of their own, ascending and each once; empty where none has.
     pub(crate) fn own_wavelengths(&self) -> Vec<f64> {
         let mut all: Vec<f64> = self.rays.iter().filter_map(|r| r.wavelength_nm).collect();
         all.sort_by(f64::total_cmp);
@@ -90,7 +93,10 @@ impl RayList {
     }
 }
 
-/// The spectrum that a file gives for all its rays, by its watts.
+/// Returns the spectrum that a file gives for all its rays, by its watts; `None` where it gives none.
+///
+/// # Errors
+/// When its rows are no spectrum.
 fn file_spectrum(set: &RaySet) -> Result<Option<Wavelengths>, Fault> {
     let Some(pairs) = &set.spectrum else { return Ok(None) };
     let spectrum = match pairs[..] {
@@ -101,7 +107,11 @@ fn file_spectrum(set: &RaySet) -> Result<Option<Wavelengths>, Fault> {
     sampler.map(Some).map_err(|e| Fault::new(e.to_string(), "give the source a `spectrum` and mend the file's"))
 }
 
-/// Makes watts lumens: by the spectrum of the scene where it gives one, else by the file's wavelengths. Says what was done.
+/// Multiplies the powers in `set` by lm/W: of the scene's spectrum, else the file's, else each ray's own wavelength. Returns a note of what
+/// was done; `None`, and powers unchanged, where there are no wavelengths but the scene gives the source's power.
+///
+/// # Errors
+/// When there are neither wavelengths nor such a power.
 fn to_lumens(set: &mut RaySet, table: Option<&Wavelengths>, source: &Source) -> Result<Option<String>, Fault> {
     let of_scene = source.spectrum.as_ref().and_then(|key| key.optics().ok()?.sampler().ok());
     if let Some(spectrum) = of_scene.as_ref().or(table) {

@@ -17,7 +17,7 @@ pub(crate) struct RaySampler {
 }
 
 impl RaySampler {
-    /// For the numbers of a stream; the first of its rays has the number `first` in the run.
+    /// Makes a sampler that draws from `stream`, in packets where that pays; the first of its rays has the number `first` in the run.
     pub(crate) fn new(emitter: &Emitter, stream: Stream, first: u64) -> Self {
         let stream = stream.with_pairs(emitter.needed_pairs());
         // Packets need the net's numbers, a plain source, and enough rays to pay for one.
@@ -28,13 +28,13 @@ impl RaySampler {
         Self { stream, packet: packed.then(RayPacket::boxed), first }
     }
 
-    /// The memory of its numbers, for the next source.
+    /// Gives the stream back, whose memory the next source may use.
     pub(crate) fn into_stream(self) -> Stream {
         self.stream
     }
 
-    /// Puts the ray to start after `started` others into `ray`. By reference: a whole ray that is written in pieces and copied at
-    /// once was waited for, 15 % of the kernel's time.
+    /// Writes the ray that starts after `started` others to `ray`, and returns its numbers and emission. To be called with 0, 1, 2, … in
+    /// turn. By reference: a whole ray that is written in pieces and copied at once was waited for, 15 % of the kernel's time.
     #[inline(always)]
     pub(crate) fn next_ray(&mut self, emitter: &Emitter, started: u32, ray: &mut Ray) -> (RayIndex, Emission) {
         if self.stream.is_refill_due(started) {
@@ -52,7 +52,7 @@ impl RaySampler {
         (index, Emission { from: None, wavelength: emitter.wavelength(&self.stream, index) })
     }
 
-    /// Puts the ray of an index in this source and replicate, the one ray that is started, into `ray`.
+    /// Writes the ray with this index in its source and replicate to `ray`, without those before it; the same bits as [`Self::next_ray`].
     pub(crate) fn single_ray(&mut self, emitter: &Emitter, index: u32, ray: &mut Ray) -> (RayIndex, Emission) {
         self.stream.prepare_single(index);
         let index = self.index(index);

@@ -35,30 +35,31 @@ pub(super) enum Lobe {
 pub(super) const LAMBERTIAN: f64 = 0.5;
 
 impl Shape {
-    /// Whether a place is drawn for each ray.
+    /// Whether a place is drawn for each ray; a list of rays draws no place of its own.
     pub(super) fn is_extended(&self) -> bool {
         matches!(self, Self::Disc(_) | Self::Rectangle(_) | Self::Faces(_))
     }
 }
 
-/// Distance from the middle of a disc for a uniform number: equal areas are equally likely.
+/// Returns the distance from the middle of a disc for a uniform number `u`; equal areas are equally likely.
 #[inline(always)]
 pub(super) fn radius_on_disc(radius: f64, u: f64) -> f64 {
     radius * u.sqrt()
 }
 
-/// The coordinates of a point of a rectangle, from half its sides.
+/// Returns a point of a rectangle, from its middle, for uniform numbers `u` and `v`; `a` and `b` are half its sides.
 #[inline(always)]
 pub(super) fn point_on_rectangle([a, b]: [f64; 2], [u, v]: [f64; 2]) -> [f64; 2] {
     [a * (2.0 * u - 1.0), b * (2.0 * v - 1.0)]
 }
 
-/// `1 − cos` of a cone's half angle.
+/// Returns `1 − cos` of an angle, rad, without the loss of digits of a small one.
 pub(super) fn versine(angle: f64) -> f64 {
     2.0 * (0.5 * angle).sin().powi(2)
 }
 
-/// `1 − cos` of the angle to the axis of a cone whose rim has `rim`: equal solid angles are equally likely.
+/// Returns `1 − cos` of an angle to the axis for a uniform number `u`; `rim` is that of the half angle. Equal solid angles are equally
+/// likely.
 #[inline(always)]
 pub(super) fn versine_in_cone(rim: f64, u: f64) -> f64 {
     u * rim
@@ -74,7 +75,8 @@ pub(super) fn sine_from_cosine(cosine: f64) -> f64 {
     ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt()
 }
 
-/// The direction with this cosine and sine to the last of three axes, at azimuth `v` of a whole turn.
+/// Returns the direction at an angle to the last of three axes, given by its cosine and sine, and at azimuth `v`, in whole turns, from the
+/// first towards the second.
 pub(super) fn direction_about_axis(axes: [Vector; 3], [cos_theta, sin_theta]: [f64; 2], v: f64) -> Vector {
     let (sin, cos) = sin_cos_turns(v);
     axes[0] * (sin_theta * cos) + axes[1] * (sin_theta * sin) + axes[2] * cos_theta

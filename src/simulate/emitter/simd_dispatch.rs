@@ -26,7 +26,7 @@ impl Kernel for Refill<'_> {
     }
 }
 
-/// Makes ready the numbers and the packet of rays from the `started`-th ray on.
+/// Fills the stream's numbers and the packet, if there is one, from the `started`-th ray on, with the widest instructions that there are.
 #[inline(never)]
 pub(super) fn refill(emitter: &Emitter, stream: &mut Stream, packet: Option<&mut RayPacket>, started: u32) {
     simd::dispatch(Refill { emitter, stream, packet, started });

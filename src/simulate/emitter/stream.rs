@@ -17,7 +17,7 @@ const CHUNK: usize = 1 << (2 * CELL_BITS);
 /// Rays of a source in a replicate up to which each is made by itself: eight take as long as a packet of 64.
 const SHORT: u32 = 8;
 
-/// The lowest bits of a number with a gap after each.
+/// Spreads the lowest 8 bits of a number, with a zero bit after each.
 #[inline(always)]
 fn interleaved(x: u32) -> u32 {
     let x = (x | x << 4) & 0x0f0f;
@@ -25,7 +25,7 @@ fn interleaved(x: u32) -> u32 {
     (x | x << 1) & 0x5555
 }
 
-/// The cell of a pair of numbers along a Z-curve.
+/// Returns the cell of a pair of 32-bit numbers along a Z-curve through the square, of 64 × 64 cells.
 #[inline(always)]
 fn z_order_cell(x: u32, y: u32) -> u16 {
     (interleaved(x >> (32 - CELL_BITS)) | interleaved(y >> (32 - CELL_BITS)) << 1) as u16
@@ -34,7 +34,7 @@ fn z_order_cell(x: u32, y: u32) -> u16 {
 /// Width of the steps that a 32-bit number counts, 2⁻³².
 const STEP: f64 = 1.0 / 4_294_967_296.0;
 
-/// The middle of a step of the unit interval.
+/// Returns the middle of a step of the unit interval: never 0 and never 1.
 #[inline(always)]
 fn unit(number: u32) -> f64 {
     // The middle of a step, which is neither 0 nor 1: inversions have no end to fall off.
@@ -71,7 +71,8 @@ pub(crate) struct RayIndex {
 }
 
 impl Stream {
-    /// The numbers of one source in one replicate, which has this many of its rays.
+    /// Makes the numbers of one source in one replicate, which has `rays` of its rays (at most 2³² − 1 are counted), all pairs of them and
+    /// one lattice. Nothing is drawn before a refill.
     pub(crate) fn new(seed: u64, sampling: Sampling, replicate: u32, source: u32, rays: u64) -> Self {
         let key = Key { seed, ray: u64::from(replicate), branch: source, bounce: 0 };
         let (a, b) = (key.words(Purpose::Scramble), Key { bounce: 1, ..key }.words(Purpose::Scramble));
@@ -91,7 +92,7 @@ impl Stream {
         }
     }
 
-    /// The same stream in the memory of one that is no longer needed.
+    /// Returns this stream with the memory of `old`, which is no longer needed.
     pub(crate) fn in_place_of(self, old: Self) -> Self {
         Self { order: old.order, numbers: old.numbers, ..self }
     }
@@ -101,12 +102,12 @@ impl Stream {
         self.rays <= SHORT
     }
 
-    /// The same stream with these pairs of numbers alone: for the place, the direction and the wavelength.
+    /// Returns the same stream with these pairs of numbers alone: for the place, the direction and the wavelength.
     pub(super) fn with_pairs(self, pairs: [bool; 3]) -> Self {
         Self { pairs, ..self }
     }
 
-    /// The same stream that takes, of a ray list, one of so many interleaved lattices of places.
+    /// Returns the same stream that takes, of the places in a ray list, lattice `[k, n]`: the k-th of n that interleave.
     pub(crate) fn with_lattice(self, lattice: [u32; 2]) -> Self {
         Self { lattice, ..self }
     }
@@ -133,10 +134,11 @@ impl Stream {
         self.is_chunked() && (started as usize).is_multiple_of(PACKET)
     }
 
-    /// The ray to start after `started` others of this source and replicate.
+    /// Returns the index of the ray to start after `started` others of this source and replicate; `refill` must have been called for its
+    /// chunk.
     ///
-    /// Rays of a net start in chunks, each along a Z-curve through their directions, or places if all have one direction: rays that
-    /// follow each other meet the same nodes and facets.
+    /// Rays of a net start in chunks, each along a Z-curve through their directions, or places if all have one direction: rays that follow
+    /// each other meet the same nodes and facets.
     #[inline(always)]
     pub(super) fn index_to_start(&self, started: u32) -> u32 {
         if !self.is_chunked() {
@@ -146,7 +148,7 @@ impl Stream {
         started - k as u32 + self.order[k]
     }
 
-    /// Makes ready the numbers that are needed from the `started`-th ray on.
+    /// Makes the numbers of the chunk that begins with the `started`-th ray; does nothing within a chunk.
     #[inline(always)]
     pub(super) fn refill(&mut self, started: u32) {
         if (started as usize).is_multiple_of(CHUNK) {
@@ -154,7 +156,7 @@ impl Stream {
         }
     }
 
-    /// Makes ready the numbers of one ray alone.
+    /// Makes the numbers of the ray with this index alone, the same as in its chunk; those of its chunk are lost.
     pub(super) fn prepare_single(&mut self, index: u32) {
         // The same number as in a chunk, made for this index alone.
         if self.sampling == Sampling::Sobol {
@@ -165,8 +167,8 @@ impl Stream {
         self.first_number = index;
     }
 
-    /// Makes the numbers of a chunk and the order in which its rays start. Loops, not closures, which would be compiled without the
-    /// caller's instruction set.
+    /// Makes the numbers of the chunk from ray `first` on and the order in which its rays start. Loops, not closures, which would be
+    /// compiled without the caller's instruction set.
     #[inline(always)]
     fn fill_chunk(&mut self, first: u32) {
         // What a source with few rays does not ask for is not made.
@@ -209,7 +211,7 @@ impl Stream {
         }
     }
 
-    /// The same for a few rays.
+    /// Makes the numbers of the `n` rays from `first` on of a source that has [`SHORT`] at most, and the order in which they start.
     #[inline(always)]
     fn fill_short(&mut self, first: u32, n: usize) {
         for d in 0..random::DIMENSIONS {
@@ -226,15 +228,16 @@ impl Stream {
         self.order.sort_by_key(|&k| z_order_cell(x[k as usize], y[k as usize]));
     }
 
-    /// The first of the two dimensions along which rays are put in order: those of the direction, or of the place where all have one.
+    /// Returns the first of the two dimensions by which rays are put in order: of the direction, or of the place where no direction is
+    /// drawn.
     #[inline(always)]
     fn sorted_dimension(&self) -> usize {
         // The direction decides most of what a ray meets; where all have one, the place does.
         if self.pairs[1] { 2 } else { 0 }
     }
 
-    /// The numbers of a pair for the rays that start from the `started`-th on; of no meaning beyond the last of them, and for a pair
-    /// that the source does not ask for.
+    /// Returns the numbers of a pair for the packet of rays that start from the `started`-th on; of no meaning beyond the last ray, and 0
+    /// for a pair that the source does not ask for.
     #[inline(always)]
     pub(super) fn pairs_from(&self, started: u32, pair: usize) -> [PacketNumbers; 2] {
         let mut pairs = [[0.0; PACKET]; 2];
@@ -253,7 +256,8 @@ impl Stream {
         pairs
     }
 
-    /// Two numbers in `[0, 1)` of a prepared ray: pair 0 for the place, 1 for the direction, 2 for the wavelength.
+    /// Returns two uniform numbers of a ray that `refill` or `prepare_single` has made ready, neither of them 1: pair 0 for the place, 1
+    /// for the direction, 2 for the wavelength.
     #[inline]
     pub(crate) fn pair(&self, index: RayIndex, pair: u32) -> [f64; 2] {
         match self.sampling {
@@ -266,12 +270,14 @@ impl Stream {
         }
     }
 
-    /// Further pairs of independent numbers, from 3.
+    /// Returns two numbers independent of the net, keyed by the ray's number in the run; pairs 0 to 2 are [`Self::pair`]'s, further ones
+    /// free.
     pub(crate) fn random(&self, index: RayIndex, pair: u32) -> [f64; 2] {
         Key { seed: self.seed, ray: index.in_run, branch: 0, bounce: pair }.pair(Purpose::Source)
     }
 
-    /// A number in `[0, 1)` that runs evenly through all rays of the source, each replicate taking a lattice of its own.
+    /// Returns a number in `[0, 1)` that runs evenly through all rays of the source, with jitter; each replicate takes a lattice of its
+    /// own.
     pub(crate) fn systematic(&self, index: RayIndex) -> f64 {
         let jitter = self.random(index, 3)[0];
         let [lattice, lattices] = self.lattice.map(f64::from);

@@ -16,21 +16,22 @@ pub(super) struct FaceHit {
 }
 
 impl FaceHit {
-    /// The place as one that a ray leaves.
+    /// Returns the place as one that a ray leaves.
     pub(super) fn departure(&self) -> Departure {
         self.hit.departure()
     }
 }
 
-/// The body on the other side of a face that lies on a face of another body within the glue distance.
+/// Returns the body on the other side of a face that lies on a face of another body within the glue distance; `None` where there is none.
 ///
-/// Found by asking for the nearest face from just before the hit, this face left out: so a face at the very same place is found
-/// whether rounding puts it before or behind.
+/// Found by asking for the nearest face from just before the hit, this face left out: so a face at the very same place is found whether
+/// rounding puts it before or behind.
 pub(super) fn touching_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u32> {
     touching_face(context, ray, at).map(|other| other.face.body)
 }
 
-/// Whether another solid of the same body lies against the face, looking the other way: between them there is no interface.
+/// Whether another solid of the same body lies against the face within the glue distance, looking the other way: between them there is no
+/// interface.
 #[inline(never)]
 pub(super) fn touches_sibling(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> bool {
     faces_along(context, probe_at(context, ray, at)).any(|(found, other)| {
@@ -39,8 +40,8 @@ pub(super) fn touches_sibling(context: &Context<'_>, ray: &Ray, at: &FaceHit) ->
     })
 }
 
-/// Another body whose face lies at the same place and looks the same way: bodies that overlap and end at the same plane. Both are
-/// entered or left at once, wherever rounding puts the second face.
+/// Returns another body whose face lies at the same place and looks the same way: bodies that overlap and end at the same plane. Both are
+/// entered or left at once, wherever rounding puts the second face. `None` where there is none.
 #[inline(never)]
 pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u32> {
     // The direction of the ray against the outward normal tells whether it goes in or out, whichever of the two
@@ -55,7 +56,7 @@ pub(super) fn aligned_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Op
     Some(other.body)
 }
 
-/// The piece of a ray around its hit that lies within the glue distance of the face, that face left out.
+/// Returns the piece of a ray around its hit that lies within the glue distance of the face; that face is its departure, and left out.
 fn probe_at(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Ray {
     let reach = way_through_glue(context.glue_mm(), ray.direction.dot(at.hit.geometric_normal));
     Ray::new(at.point - ray.direction * reach, ray.direction)
@@ -66,11 +67,11 @@ fn probe_at(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Ray {
 /// Faces within the glue distance among which the partner is looked for.
 const MOST_FACES: usize = 6;
 
-/// The faces that a short ray meets, one after another.
+/// Goes through the faces that a short ray meets, in order, at most [`MOST_FACES`] of them; ends at a face that the scene does not know.
 ///
-/// An intersector may give a root once more, moved up to where it is asked from by rounding; it is asked from a little farther on
-/// then. Without that, light that was reflected beside an edge of a touching body was lost on the spline: the face that stands across
-/// came six times, and the partner behind it not at all.
+/// An intersector may give a root once more, moved up to where it is asked from by rounding; it is asked from a little farther on then.
+/// Without that, light that was reflected beside an edge of a touching body was lost on the spline: the face that stands across came six
+/// times, and the partner behind it not at all.
 fn faces_along<'a>(context: &'a Context<'a>, mut probe: Ray) -> impl Iterator<Item = (Hit, FaceOptics)> + 'a {
     let rounding = rounding_at(probe.origin);
     let mut last: Option<(FaceId, f64)> = None;
@@ -88,12 +89,12 @@ fn faces_along<'a>(context: &'a Context<'a>, mut probe: Ray) -> impl Iterator<It
         .take(MOST_FACES)
 }
 
-/// Where the segment of light starts that has met both of two faces at one place, mm: past all faces along them within `reach`,
-/// but not past a face that stands across, as beside an edge. Without that, 4 % of what is trapped in eight touching bricks got out
-/// between their faces in 200 times their length.
+/// Returns how far along `next` the segment starts, mm, of light that has met both of two faces at one place: past all faces along them
+/// within `reach`, but not past a face that stands across, as beside an edge. Without that, 4 % of what is trapped in eight touching bricks
+/// got out between their faces in 200 times their length.
 ///
-/// What has been passed is passed by its rounding, as the spline gives a root once more where it is asked from next to it: light that
-/// was reflected within the glue distance of an edge met the second face there, and 9 % of that in a square die was lost.
+/// What has been passed is passed by its rounding, as the spline gives a root once more where it is asked from next to it: light that was
+/// reflected within the glue distance of an edge met the second face there, and 9 % of that in a square die was lost.
 #[inline(never)]
 pub(super) fn end_of_contact(context: &Context<'_>, next: &Ray, normal: Vector, reach: f64) -> f64 {
     let rounding = rounding_at(next.origin);
@@ -111,7 +112,7 @@ pub(super) fn end_of_contact(context: &Context<'_>, next: &Ray, normal: Vector, 
     reach
 }
 
-/// The face of another body that lies against this one.
+/// Returns the face of another body that lies against this one within the glue distance; `None` where there is none.
 fn touching_face(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<FaceHit> {
     let along = ray.direction.dot(at.hit.geometric_normal);
     let probe = probe_at(context, ray, at);
@@ -134,8 +135,8 @@ pub(super) enum ContactSurface {
     Partner(FaceHit),
 }
 
-/// Which of two faces at one place says what happens there: the one that is not bare, of two such the one that the light is leaving;
-/// so it does not depend on which of them rounding puts first.
+/// Decides which of two faces at one place says what happens there: the one that is not bare, of two such the one that the light is
+/// leaving; so it does not depend on which of them rounding puts first.
 #[inline(never)]
 pub(super) fn contact_surface(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> ContactSurface {
     let Some(partner) = touching_face(context, ray, at) else { return ContactSurface::Bare };
@@ -151,8 +152,8 @@ pub(super) fn contact_surface(context: &Context<'_>, ray: &Ray, at: &FaceHit) ->
     }
 }
 
-/// The ray of a source on an opaque face that a body lies on, moved to behind the body's face: light shines into what is glued on a
-/// die, not against it. `None` where there is no such body.
+/// Finds the body that lies on the opaque face of a source: light shines into what is glued on a die, not against it. Moves the start
+/// (`t_min`) of `ray` to behind that body's face, and returns the ray that begins there; `None`, `ray` unchanged, where there is none.
 #[inline(never)]
 pub(super) fn emit_into_contact(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> Option<Ray> {
     // Only a source that lies on an opaque solid can have a body glued over it.
@@ -174,8 +175,8 @@ pub(super) fn emit_into_contact(context: &Context<'_>, face: FaceId, normal: Vec
 /// largest gap that facets of a usual sag leave between them.
 const DEEPEST_SLIP: f64 = 1.0;
 
-/// The face of an opaque solid in front of light that leaves a body there, within the glue distance; or in front of light that
-/// is in a solid where none can be.
+/// Returns the opaque face that light meets where it leaves a body, within the glue distance; for a hit on an opaque solid from inside, its
+/// front up to [`DEEPEST_SLIP`] before the ray's start. `None` where there is no such face.
 #[cold]
 pub(super) fn opaque_contact(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<FaceHit> {
     let probe = if at.face.opaque_solid {

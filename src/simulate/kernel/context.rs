@@ -49,7 +49,7 @@ pub(crate) struct Context<'a> {
 }
 
 impl<'a> Context<'a> {
-    /// A context that knows nothing yet about what its sources lie in.
+    /// Makes a context whose `starting_media` is still empty: which bodies its sources lie in is not yet known.
     pub(super) fn without_media(
         bound: &'a BoundScene,
         intersector: &'a dyn Intersector,
@@ -80,17 +80,18 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The same for another plan of the same rays.
+    /// Returns the same context for another plan of the same rays.
     pub(crate) fn with_plan(&self, plan: Plan, settings: &'a RunSettings) -> Self {
         Self { plan, settings, ..self.clone() }
     }
 
-    /// The same for vertices that stay in the tally.
+    /// Returns the same context without a sink for paths: their vertices stay in the tally.
     pub(crate) fn without_path_sink(self) -> Self {
         Self { paths: None, ..self }
     }
 
-    /// Whether nothing is asked about a ray on its way but where it ends.
+    /// Whether nothing is asked about a ray but where it ends: no path is recorded, no receiver lets light pass, counts some bounces only
+    /// or asks for the spectrum.
     pub(crate) fn asks_ends_only(&self) -> bool {
         let extra = |r: &Receiver| r.interactions.is_some() || r.channels.count() > 0;
         self.passing.is_empty()
@@ -99,19 +100,19 @@ impl<'a> Context<'a> {
             && !self.bound.receivers.iter().any(extra)
     }
 
-    /// Whether the polarisation of rays is followed.
+    /// Whether the scene asks for the polarisation of rays to be followed.
     #[inline]
     pub(super) fn polarised(&self) -> bool {
         self.bound.scene.run.polarisation
     }
 
-    /// Distance up to which faces of two solids are one, mm.
+    /// Returns the distance up to which faces of two solids are one, mm.
     #[inline(always)]
     pub(super) fn glue_mm(&self) -> f64 {
         self.bound.scene.run.glue_mm
     }
 
-    /// Refractive index of a body for the light of a ray.
+    /// Returns the refractive index of a body at the wavelength of a ray, or of the scene where the ray carries none.
     #[inline(always)]
     pub(super) fn index<C: RayPayload>(&self, body: u32, payload: &C) -> f64 {
         self.bound.bodies[body as usize].index(payload.wavelength())

@@ -12,13 +12,17 @@ use crate::simulate::outcome::LostCause;
 pub(super) struct Crossing<C> {
     /// Before the face: what it came with, unless it was found to be somewhere else.
     pub(super) here: C,
-    /// Behind it.
+    /// Behind the face.
     pub(super) across: C,
 }
 
-/// The payload of a ray on both sides of a face; `Err` with the cause when it cannot be on the other.
+/// Returns the payload of a ray on both sides of the face at `at`. Where two faces are crossed at once, sets `at.skip` to the glue
+/// distance.
+///
+/// # Errors
+/// The cause of loss, when a ray with these media, or those found anew from geometry, cannot be on the other side.
 #[inline(always)]
-pub(super) fn cross<C: RayPayload>(
+pub(super) fn cross_face<C: RayPayload>(
     context: &Context<'_>,
     payload: C,
     ray: &Ray,
@@ -55,7 +59,8 @@ pub(super) fn cross<C: RayPayload>(
     }
 }
 
-/// The same at a face that may lie on one of another body: both are crossed at once, whichever the ray met first.
+/// Crosses both faces at once where the face lies on one of another body, whichever the ray met first: sets `across` to the payload behind
+/// both, `here` where its media had to be found anew, and `at.skip`. Changes nothing where no other face lies there.
 #[inline(always)]
 fn cross_contact<C: RayPayload>(
     context: &Context<'_>,

@@ -24,7 +24,7 @@ pub(super) struct SourceQueue {
     next: u64,
     range: [u64; 2],
     sampler: Option<RaySampler>,
-    /// The last source to go through.
+    /// The source at which the queue ends: one past the last, or 0 for a single ray, which no other follows.
     last: usize,
     /// Whether one ray alone is asked for, by its number.
     single: bool,
@@ -33,7 +33,7 @@ pub(super) struct SourceQueue {
 }
 
 impl SourceQueue {
-    /// The queue of a replicate, or of a single ray that is traced again.
+    /// Makes the queue of a replicate, or of a single ray that is traced again; empty for a ray that the run does not have.
     pub(super) fn new(context: &Context<'_>, rays: RaySelection) -> Self {
         let last = context.plan.shares.len();
         let single = !matches!(rays, RaySelection::Replicate(_));
@@ -42,14 +42,14 @@ impl SourceQueue {
         match rays {
             RaySelection::Replicate(replicate) => {
                 queue.replicate = replicate;
-                queue.enter(context, 0);
+                queue.enter_source(context, 0);
             }
             RaySelection::Ray(ray) => {
                 // A replayed ray is alone: no source follows, and the range is cut to its one index.
                 queue.last = 0;
                 if let Some((source, replicate)) = context.plan.locate(ray) {
                     queue.replicate = replicate;
-                    queue.enter(context, source);
+                    queue.enter_source(context, source);
                     (queue.next, queue.range[1]) = (ray, ray + 1);
                 }
             }
@@ -66,8 +66,8 @@ impl SourceQueue {
         queue
     }
 
-    /// Turns to a source: its rays in this replicate, from the first on.
-    fn enter(&mut self, context: &Context<'_>, source: usize) {
+    /// Turns to the rays of a source in this replicate, from the first on, and makes its sampler; does nothing past the last source.
+    fn enter_source(&mut self, context: &Context<'_>, source: usize) {
         self.source = source;
         let Some(emitter) = context.bound.emitters.get(source) else { return };
         self.range = context.plan.range(source, self.replicate);
@@ -85,7 +85,8 @@ impl SourceQueue {
         self.sampler = Some(RaySampler::new(emitter, stream, self.range[0]));
     }
 
-    /// Starts the next ray that can start; `false` at the end of the replicate.
+    /// Writes the next ray that can start to `path` and `ray`; `false` at the end of the replicate. Rays that cannot start are booked as
+    /// lost and passed over.
     #[inline(always)]
     pub(super) fn start_next<C: RayPayload>(
         &mut self,
@@ -100,7 +101,7 @@ impl SourceQueue {
                 if self.source >= self.last {
                     return false;
                 }
-                self.enter(context, self.source + 1);
+                self.enter_source(context, self.source + 1);
             }
             let Some(sampler) = &mut self.sampler else { return false };
             let emitter = &context.bound.emitters[self.source];
@@ -115,7 +116,7 @@ impl SourceQueue {
                 sampler.next_ray(emitter, started, ray)
             };
             *path = Path::at_source(index.in_run, context.plan.shares[self.source].quanta, C::in_surroundings());
-            if tracer.start(self.source, &emission, path, ray) {
+            if tracer.start_path(self.source, &emission, path, ray) {
                 return true;
             }
         }
@@ -123,9 +124,10 @@ impl SourceQueue {
 }
 
 impl<C: RayPayload> Tracer<'_, '_, C> {
-    /// Puts a ray that leaves its source on its way; `false` when it cannot start.
+    /// Puts a ray that leaves its source on its way: finds its face and media, books it as emitted and clips its first segment. `false`
+    /// when it is in more bodies than it can carry; it is then booked as lost.
     #[inline(always)]
-    fn start(&mut self, source: usize, emission: &Emission, path: &mut Path<C>, ray: &mut Ray) -> bool {
+    fn start_path(&mut self, source: usize, emission: &Emission, path: &mut Path<C>, ray: &mut Ray) -> bool {
         let context = self.context;
         let mut into_contact = None;
         // Luminous faces emit from the spline; the ray starts from the intersector's own idea of that face.
@@ -155,7 +157,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         true
     }
 
-    /// The media that a ray starts in; `None` when it cannot carry so many.
+    /// Returns the payload of a ray with the media that it starts in; `None` when it cannot carry so many. Moves the start of a ray of a
+    /// source that lies on a face of a solid clear of it.
     #[inline(always)]
     fn payload_at_start(&self, source: usize, into_contact: Option<&Ray>, ray: &mut Ray) -> Option<C> {
         let context = self.context;

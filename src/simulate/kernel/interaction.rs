@@ -69,7 +69,8 @@ pub(super) struct Division<'s, C> {
 pub(super) const CONDUCTOR: Mueller = Mueller { a: 1.0, b: 0.0, c: -1.0, e: 0.0 };
 
 impl SurfaceInteraction<'_> {
-    /// The normal to shade with and the cosine of incidence. A normal that looks away from the ray is replaced by the facet's.
+    /// Returns the normal to shade with and the cosine of incidence, from 0 to 1. A normal that looks away from the ray is replaced by the
+    /// facet's, and counted.
     #[inline(always)]
     pub(super) fn shading_normal(&mut self, direction: Vector) -> (Vector, f64) {
         let shaded = direction.dot(self.hit.normal);
@@ -83,9 +84,10 @@ impl SurfaceInteraction<'_> {
         }
     }
 
-    /// The reflected direction, on the side of the facet the ray came from.
+    /// Returns the reflected direction, on the side of the facet that the ray came from; about the facet's normal, and counted, where
+    /// `normal` would send it through.
     #[inline(always)]
-    pub(super) fn mirrored(&mut self, direction: Vector, normal: Vector) -> Vector {
+    pub(super) fn reflected_direction(&mut self, direction: Vector, normal: Vector) -> Vector {
         let flat = self.hit.geometric_normal;
         let r = reflect(direction, normal);
         // A reflection that points into the facet would meet it again from inside.
@@ -96,19 +98,20 @@ impl SurfaceInteraction<'_> {
         reflect(direction, flat)
     }
 
-    /// The place as one that a ray leaves.
+    /// Returns the place as one that a ray leaves.
     #[inline(always)]
     pub(super) fn departure(&self) -> Departure {
         self.hit.departure()
     }
 
-    /// The hit with its face and point, as the search for other faces at the same place wants it.
+    /// Returns the hit with its face and point, as the search for other faces at the same place wants it.
     pub(super) fn face_hit(&self) -> FaceHit {
         FaceHit { hit: *self.hit, face: self.face, point: self.point }
     }
 }
 
-/// Passes the polarisation of a ray through an interface; its power stays 1.
+/// Passes the polarisation of a ray with direction `d` through an interface with normal `n`; its power stays 1. Where the scene does not
+/// follow polarisation the frame turns and the light stays unpolarised; a payload without polarisation is left alone.
 #[inline(always)]
 pub(super) fn turn_polarisation<C: RayPayload>(
     context: &Context<'_>,
@@ -128,7 +131,7 @@ pub(super) fn turn_polarisation<C: RayPayload>(
 }
 
 impl<C: RayPayload> Division<'_, C> {
-    /// Takes what is reflected: gives the path its payload, and returns its direction.
+    /// Gives `path` the payload of what is reflected, and returns its direction, after scatter where the surface is rough.
     #[inline(always)]
     pub(super) fn reflect(
         &self,
@@ -138,11 +141,12 @@ impl<C: RayPayload> Division<'_, C> {
         at: &mut SurfaceInteraction<'_>,
     ) -> Vector {
         self.take_payload::<0>(context, path, d);
-        let specular = at.mirrored(d, self.normal);
-        self.scattered(context, path, specular, at)
+        let specular = at.reflected_direction(d, self.normal);
+        self.scattered_direction(context, path, specular, at)
     }
 
-    /// Takes what is transmitted: gives the path its payload, and returns its direction.
+    /// Gives `path` the payload of what is transmitted, with the media behind the face, and returns its direction, after scatter where the
+    /// surface is rough.
     #[inline(always)]
     pub(super) fn transmit(
         &self,
@@ -153,10 +157,11 @@ impl<C: RayPayload> Division<'_, C> {
     ) -> Vector {
         self.take_payload::<1>(context, path, d);
         path.payload = path.payload.with_media_of(self.across);
-        self.scattered(context, path, self.transmitted, at)
+        self.scattered_direction(context, path, self.transmitted, at)
     }
 
-    /// Gives the path its payload as the interface left it on one of both ways, 0 reflected and 1 transmitted.
+    /// Gives `path` its payload as the interface left it on one of both ways: `WAY` 0 is reflected, 1 transmitted. Media stay those before
+    /// it.
     #[inline(always)]
     fn take_payload<const WAY: usize>(&self, context: &Context<'_>, path: &mut Path<C>, d: Vector) {
         path.payload = self.payload;
@@ -165,9 +170,9 @@ impl<C: RayPayload> Division<'_, C> {
         }
     }
 
-    /// The direction after scatter; `specular` where the surface is smooth.
+    /// Returns the direction after scatter; `specular` where the surface is smooth.
     #[inline(always)]
-    fn scattered(
+    fn scattered_direction(
         &self,
         context: &Context<'_>,
         path: &mut Path<C>,
@@ -181,7 +186,8 @@ impl<C: RayPayload> Division<'_, C> {
     }
 }
 
-/// The direction after scatter at a rough surface; `specular` when this light stays specular.
+/// Draws the direction after scatter at a rough surface; `specular` when this light stays specular. What is scattered is unpolarised after;
+/// one that dips below the facet is mirrored back and counted.
 #[inline(never)]
 fn scatter_at<C: RayPayload>(
     scatter: &Scatter,

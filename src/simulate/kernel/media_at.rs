@@ -18,9 +18,10 @@ const TILTS: [[f64; 2]; 2] = [[0.031, 0.017], [-0.013, 0.029]];
 /// Length into the segment, mm, at whose half the bodies are asked for: a place that is surely past the edge.
 const LONGEST_LOOK: f64 = 1.0;
 
-/// The bodies around the start of a ray.
+/// Returns the bodies around the start of a ray, outermost first, by following it straight out of the scene; empty in the surroundings.
 ///
-/// Where solids touch, a way out that comes near an edge of three of them may miss one; then two ways of three decide.
+/// Where solids touch, a way out that comes near an edge of three of them may miss one; then a second and a third way are followed, and two
+/// that agree decide, or the first where none do.
 pub(super) fn media_at(context: &Context<'_>, ray: &Ray) -> Bodies {
     // Away from edges of touching solids the first way out is beyond doubt, and it is nearly always enough.
     let (first, certain) = bodies_left(context, ray);
@@ -41,7 +42,8 @@ pub(super) fn media_at(context: &Context<'_>, ray: &Ray) -> Bodies {
     if third == second { second } else { first }
 }
 
-/// The bodies that a ray leaves on its straight way out without having entered them, and whether no two of them touched there.
+/// Returns the bodies that a ray leaves on its straight way out without having entered them, outermost first, and whether no two of them
+/// touched on it. Given up after [`MOST_FACES`] faces, with what was found so far.
 fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
     let mut crossings = Crossings::default();
     let mut certain = true;
@@ -56,7 +58,7 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
         let along = d.dot(hit.geometric_normal);
         // Against the outward normal the ray goes in, along it out.
-        crossings.cross(face.body, along < 0.0);
+        crossings.note_crossing(face.body, along < 0.0);
         if !(face.touches_body || face.medium_on_opaque || face.touches_sibling) {
             continue;
         }
@@ -77,7 +79,7 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
         let aligned = second.geometric_normal.dot(hit.geometric_normal) > ALIGNED;
         let other = context.bound.faces.get(second.face.index()).filter(may_touch);
         if let Some(other) = other.filter(|_| opposite || aligned) {
-            crossings.cross(other.body, entering);
+            crossings.note_crossing(other.body, entering);
             // Past both faces, or the second would be crossed once more on its own.
             segment.t_min = reach;
             certain = false;
@@ -86,9 +88,9 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
     (crossings.bodies_around(), certain)
 }
 
-/// The payload of a ray with the media that geometry finds on its way to `end`, for a ray that carries media that cannot be. `None`
-/// where these are the same, or where neither it nor the face it comes to (`touching`) is where bodies touch: there alone it may have
-/// passed an edge of three or more of them unseen, within the glue distance that the crossing of two passes over.
+/// Returns the payload of a ray with the media that geometry finds on its way to `end` (mm), for a ray that carries media that cannot be.
+/// `None` where the innermost body stays the same, more bodies are found than it can carry, or neither it nor the face it comes to
+/// (`touching`) is where bodies touch: there alone it may have passed an edge of three or more of them unseen.
 #[cold]
 pub(super) fn recover_media<C: RayPayload>(
     context: &Context<'_>,
@@ -127,8 +129,8 @@ struct Crossings {
 }
 
 impl Crossings {
-    /// Notes that the way crosses the border of a body.
-    fn cross(&mut self, body: u32, entering: bool) {
+    /// Notes that the way goes into, or out of, a body; the surroundings are left out.
+    fn note_crossing(&mut self, body: u32, entering: bool) {
         if body == AMBIENT {
             return;
         }
@@ -140,7 +142,7 @@ impl Crossings {
         }
     }
 
-    /// The bodies that the way left without having entered them, the outermost first.
+    /// Returns the bodies that the way left without having entered them, the outermost first.
     fn bodies_around(mut self) -> Bodies {
         // A solid that is turned inside out is left before it is entered.
         self.left.retain(|b| !self.entered.contains(b));
@@ -157,7 +159,7 @@ mod tests {
     fn what_is_left_and_was_not_entered_is_around() {
         let around = |crossings: &[(u32, bool)]| {
             let mut c = Crossings::default();
-            crossings.iter().for_each(|&(body, entering)| c.cross(body, entering));
+            crossings.iter().for_each(|&(body, entering)| c.note_crossing(body, entering));
             c.bodies_around().to_vec()
         };
         assert_eq!(around(&[(1, true), (1, false)]), Vec::<u32>::new());

@@ -43,7 +43,7 @@ pub(super) const NO_RECEIVER: u32 = u32::MAX;
 pub(super) const SCATTERS: u32 = u32::MAX - 1;
 
 impl<C: RayPayload> Path<C> {
-    /// A path that has not left its source.
+    /// Makes the path of a ray of the run, by its number, that has not left its source: branch 0, no hits, no receiver ahead.
     pub(super) fn at_source(ray: u64, quanta: f64, payload: C) -> Self {
         Self {
             ray,
@@ -58,13 +58,13 @@ impl<C: RayPayload> Path<C> {
         }
     }
 
-    /// The key of the random numbers of its present vertex.
+    /// Returns the key of the random numbers of its present vertex.
     #[inline(always)]
     pub(super) fn key(&self, context: &Context<'_>) -> Key {
         Key { seed: context.settings.seed, ray: self.ray, branch: self.branch, bounce: self.bounce }
     }
 
-    /// Notes that it has just met what is no total reflection.
+    /// Notes that it has just met what is no total reflection; does nothing without media.
     #[inline(always)]
     pub(super) fn release(&mut self) {
         // Only in a body can light go round by total reflection.
@@ -73,13 +73,13 @@ impl<C: RayPayload> Path<C> {
         }
     }
 
-    /// Whether it has gone in a body by total reflection alone for so long that it will go round there for ever.
+    /// Whether it has gone in a body by total reflection alone for longer than the body's `trapped_length`, and so will go round for ever.
     #[inline(always)]
     pub(super) fn is_trapped_in(&self, context: &Context<'_>, body: u32) -> bool {
         self.length - f64::from(self.released_at) > context.bound.bodies[body as usize].trapped_length
     }
 
-    /// The number of the path that splits off at its present vertex; it depends on the splits before alone, not on the order of
+    /// Returns the number of the path that splits off at its present vertex; it depends on the splits before alone, not on the order of
     /// tracing.
     pub(super) fn split_branch(&self) -> u32 {
         split_branch(self.branch, self.bounce)

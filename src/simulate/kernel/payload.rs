@@ -18,15 +18,17 @@ pub(crate) trait RayPayload: Copy + Send {
     const ENDS_ONLY: bool = false;
     /// Whether it carries a wavelength.
     const COLOURED: bool = false;
-    /// The payload of a ray that is in no body.
+    /// Makes the payload of a ray that is in no body, without a colour of its own.
     fn in_surroundings() -> Self;
-    /// A ray that starts inside these bodies, outermost first; `None` when it cannot carry so many.
+    /// Makes the payload of a ray that starts inside these bodies, outermost first; empty for the surroundings. `None` when it cannot carry
+    /// so many.
     fn inside(bodies: &[u32]) -> Option<Self>;
-    /// The innermost body.
+    /// Returns the innermost body; 0 in the surroundings.
     fn body(&self) -> u32;
-    /// The same ray on the other side of the boundary of a body; `None` for a crossing that cannot be.
+    /// Returns the same ray on the other side of the boundary of a body. `None` for a crossing that cannot be: out of a body that it is not
+    /// in, or into one when it can carry no more.
     fn cross(&self, body: u32, entering: bool) -> Option<Self>;
-    /// The same light inside these bodies.
+    /// Returns the same light inside these bodies, outermost first; `None` when it cannot carry so many.
     fn moved_inside(&self, bodies: &[u32]) -> Option<Self> {
         Self::inside(bodies)
     }
@@ -34,16 +36,16 @@ pub(crate) trait RayPayload: Copy + Send {
     fn is_full(&self) -> bool {
         false
     }
-    /// The light of this ray in the media of another: after an interface has changed the polarisation, what has crossed it still has
-    /// the old one.
+    /// Returns the light of this ray in the media of another: after an interface has changed the polarisation, what has crossed it still
+    /// has the old one.
     fn with_media_of(&self, other: Self) -> Self {
         other
     }
-    /// Its wavelength, nm, when it carries one.
+    /// Returns its wavelength, nm; `None` when it carries none, and has the scene's.
     fn wavelength(&self) -> Option<f64> {
         None
     }
-    /// Its polarisation, of power 1, when it carries one.
+    /// Returns its polarisation, of power 1; `None` when it carries none.
     fn stokes_mut(&mut self) -> Option<&mut Stokes> {
         None
     }

@@ -17,14 +17,14 @@ pub(super) type Candidates = SmallVec<[u32; 16]>;
 /// Receivers of one kind, to be asked by rays.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReceiverIndex {
-    /// In the order of the scene.
+    /// Their indices, in the order of the scene.
     receivers: Vec<u32>,
     /// Their boxes; none where the receivers are few.
     tree: Option<BoxTree>,
 }
 
 impl ReceiverIndex {
-    /// Of those that are wanted.
+    /// Makes an index of the receivers that are wanted; a tree of boxes where there are more than [`FEW`].
     pub(super) fn new(all: &[Receiver], is_wanted: impl Fn(&Receiver) -> bool) -> Self {
         let receivers: Vec<u32> = (0..all.len()).filter(|&i| is_wanted(&all[i])).map(|i| i as u32).collect();
         let boxes = || receivers.iter().map(|&i| all[i as usize].bounds().with_room()).collect::<Vec<Aabb>>();
@@ -37,16 +37,18 @@ impl ReceiverIndex {
         self.receivers.is_empty()
     }
 
-    /// The receivers that a ray may cross nearer than `end`, in the order of the scene; `room` is where they are put.
+    /// Returns the receivers that a ray may cross nearer than `end`, mm, in the order of the scene; all of them where they are few. `room`,
+    /// which must be empty, is where they are put.
     #[inline(always)]
     pub(super) fn candidates<'a>(&'a self, ray: &Ray, end: f64, room: &'a mut Candidates) -> &'a [u32] {
         let Some(tree) = &self.tree else { return &self.receivers };
-        self.collect(tree, ray, end, room);
+        self.collect_candidates(tree, ray, end, room);
         room
     }
 
+    /// Appends the receivers whose boxes the ray meets nearer than `end`, mm, to `found`, and sorts it.
     #[inline(never)]
-    fn collect(&self, tree: &BoxTree, ray: &Ray, end: f64, found: &mut Candidates) {
+    fn collect_candidates(&self, tree: &BoxTree, ray: &Ray, end: f64, found: &mut Candidates) {
         let mut walk = tree.walk(&ray.with_range(0.0, end));
         while let Some(k) = walk.next(end) {
             found.push(self.receivers[k as usize]);

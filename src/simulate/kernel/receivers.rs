@@ -13,14 +13,14 @@ use crate::simulate::receiver::{Receiver, Spot};
 use crate::simulate::sequence::DepositPlace;
 use crate::simulate::tally::{quanta_as_integer, round_quanta};
 
-/// How far in front of a face a receiver that lies in it is met, mm: more than both are off by rounding.
+/// Returns how far in front of a face a receiver that lies in it is met, mm, at distance `t` of a ray: more than both are off by rounding.
 #[inline(always)]
 fn in_front(ray: &Ray, t: f64) -> f64 {
     rounding(t + ray.origin.abs().max_element())
 }
 
-/// Ends the ray at its next scattering or at the nearest receiver that stops light and stands among the faces, unless a face comes
-/// first.
+/// Sets `ray.t_max` and `path.receiver` to the next scattering, or to the nearest receiver among the faces that stops light; leaves the ray
+/// unclipped where there is neither. A face may still come first.
 #[inline(always)]
 pub(super) fn clip_segment<C: RayPayload>(context: &Context<'_>, path: &mut Path<C>, ray: &mut Ray) {
     path.receiver = NO_RECEIVER;
@@ -42,10 +42,8 @@ pub(super) fn clip_segment<C: RayPayload>(context: &Context<'_>, path: &mut Path
     }
 }
 
-/// Ends the ray at the nearest receiver that stops light and stands outside the scene's box, unless a face comes first.
-///
-/// A segment inside the box cannot meet one, so that rays from face to face are not asked: 1 test in place of 3 for each ray of a
-/// lens.
+/// Sets `ray.t_max` and `path.receiver` to the nearest receiver outside the scene's box that stops light, if it comes before the hit, and
+/// returns `None` then; else returns `hit`.
 #[inline(always)]
 pub(super) fn clip_outside<'h, C: RayPayload>(
     context: &Context<'_>,
@@ -79,7 +77,7 @@ pub(super) fn clip_outside<'h, C: RayPayload>(
 }
 
 impl<C: RayPayload> Tracer<'_, '_, C> {
-    /// Counts the light on receivers that let it pass.
+    /// Counts the light on receivers that let it pass, on its way to `end`, mm; a sphere may count it twice.
     pub(super) fn count_passing(&mut self, path: &Path<C>, ray: &Ray, end: f64) {
         let context = self.context;
         // A receiver that lies in a face is crossed on the way to the face, not on the way from it.
@@ -96,7 +94,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Counts light that meets a plane or sphere at a point.
+    /// Counts light that meets receiver `r`, a plane or sphere, at a point; not after another number of bounces than the receiver asks for.
     #[inline(always)]
     pub(super) fn count_at(&mut self, path: &Path<C>, r: u32, point: Point) {
         let receiver = &self.context.bound.receivers[r as usize];
@@ -109,7 +107,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Counts light that leaves the scene in the far field; whether any receiver takes it.
+    /// Counts light that leaves the scene in every far field, and returns whether its direction is in the range of any: also of one that
+    /// counts other bounces only.
     #[inline(always)]
     pub(super) fn count_far(&mut self, path: &Path<C>, ray: &Ray) -> bool {
         let context = self.context;

@@ -26,7 +26,7 @@ impl<C: RayPayload> Kernel for Trace<'_, '_, C> {
     }
 }
 
-/// Traces these rays and adds them to a tally. Returns the intersector's work.
+/// Traces these rays with the widest instructions that there are, adds what becomes of them to `tally`, and returns the intersector's work.
 pub(crate) fn trace<C: RayPayload>(context: &Context<'_>, rays: RaySelection, tally: &mut ReplicateTally) -> Cost {
     simd::dispatch(Trace::<C> { context, rays, tally, payload: PhantomData })
 }

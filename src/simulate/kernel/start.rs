@@ -9,12 +9,11 @@ use crate::optics::reflect;
 /// ask for, nearer where another face is in between.
 const REACHES: [f64; 4] = [1.0, 0.1, 0.01, 1e-3];
 
-/// Moves the start of a ray from the spline of a face to where the intersector has that face, and marks it as leaving it.
+/// Moves the start of a ray from the spline of a face to where the intersector has that face, and marks it as leaving it. `normal` is the
+/// spline's, outward.
 ///
-/// Facets lie up to their sag off the spline: a ray that started there could hit its own facet. A ray whose face is not found starts
-/// on the spline.
-///
-/// A ray that would go below the facet is turned to above it; tells whether it was.
+/// Facets lie up to their sag off the spline: a ray that started there could hit its own facet. A ray whose face is not found within 1 mm
+/// starts on the spline. One that would go below the facet is turned to above it; returns whether it was.
 #[inline(never)]
 pub(super) fn start_on_face(context: &Context<'_>, face: FaceId, normal: Vector, ray: &mut Ray) -> bool {
     // From the longest: a mesh of coarse facets has its face that far from the spline.

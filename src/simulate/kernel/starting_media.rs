@@ -19,7 +19,7 @@ const PROBED_RAYS: u64 = 64;
 const MOST_FACES: usize = 6;
 
 impl<'a> Context<'a> {
-    /// What all replicates of a run share.
+    /// Makes what all replicates of a run share; probes the intersector for what the sources lie in.
     pub(crate) fn new(bound: &'a BoundScene, intersector: &'a dyn Intersector, settings: &'a RunSettings) -> Self {
         let mut context = Self::without_media(bound, intersector, settings);
         let sources = bound.emitters.iter().enumerate();
@@ -28,7 +28,8 @@ impl<'a> Context<'a> {
     }
 }
 
-/// What the rays of one source start in, from some of its rays.
+/// Decides what the rays of one source start in, from up to [`PROBED_RAYS`] of its rays, each of another replicate: the same bodies where
+/// all agree and none starts on a face.
 fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> StartingMedia {
     // Stated media are believed; only starts on faces are still looked for.
     let stated = emitter.media_stated || !context.bound.has_media();
@@ -71,16 +72,16 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> St
     StartingMedia::Same(first.unwrap_or_else(|| emitter.inside.clone()))
 }
 
-/// The same ray from one glue distance farther on.
+/// Returns the same ray from one glue distance farther on, leaving no face.
 pub(super) fn start_behind_glue(context: &Context<'_>, ray: &Ray) -> Ray {
     Ray::new(ray.origin + ray.direction * context.glue_mm(), ray.direction)
 }
 
-/// The ray of a source that lies exactly on faces of solids: it starts behind all of them, by the glue distance along its way; one
-/// that goes into an opaque solid starts before it. `None` where there is no such face.
+/// Returns the ray of a source that lies on faces of solids, started behind all of them, by the glue distance along its way; one that goes
+/// into an opaque solid starts before it. `None` where there is no such face within the glue distance.
 ///
-/// As it came, rounding put starts on either side: of a disc on a die 85 % were lost, on a clear cube 2 %.
-/// Known weakness: at a corner of an opaque solid the third face is not seen, and too much of a point's light is taken to go in.
+/// As it came, rounding put starts on either side: of a disc on a die 85 % were lost, on a clear cube 2 %. Known weakness: at a corner of
+/// an opaque solid the third face is not seen, and too much of a point's light is taken to go in.
 #[cold]
 pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<Ray> {
     let reach = context.glue_mm();

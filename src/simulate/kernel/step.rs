@@ -21,7 +21,8 @@ use crate::simulate::surfaces::FaceOptics;
 use crate::simulate::tally::{quanta_as_integer, round_quanta};
 
 impl<C: RayPayload> Tracer<'_, '_, C> {
-    /// Takes a path over its segment and through what it meets; false when the path ends.
+    /// Takes a path over its segment to `hit`, or to where a receiver or scattering ends it, and through what it meets; books what light
+    /// loses on the way, and sets `path` and `ray` for the next segment. `false` when the path ends; its light is booked then.
     #[inline(always)]
     pub(super) fn step(&mut self, path: &mut Path<C>, ray: &mut Ray, hit: Option<&Hit>) -> bool {
         let context = self.context;
@@ -67,10 +68,11 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             // Light that comes back from an opaque face does not meet the face of its own body on it once more.
             at.skip = context.glue_mm();
         }
-        self.apply(path, ray, &mut at)
+        self.apply_surface(path, ray, &mut at)
     }
 
-    /// What a segment does to light on its way to its end.
+    /// Counts the light of a segment up to `end`, mm, on receivers that let it pass, then takes from `path` what the body absorbs. An
+    /// endless segment is absorbed in the surroundings alone.
     #[inline(always)]
     fn cover_segment(&mut self, path: &mut Path<C>, ray: &Ray, end: f64) {
         if !C::ENDS_ONLY && !self.context.passing.is_empty() {
@@ -83,7 +85,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Finds which of several faces at one place says what happens, where that is not the one that was hit.
+    /// Returns the face that says what happens, of several at one place, where that is not the one that was hit; sets `at.entering` and
+    /// `at.skip` to match. `None` where the face that was hit does.
     #[inline(always)]
     fn resolve_contact(&self, ray: &Ray, at: &mut SurfaceInteraction<'_>) -> Option<FaceHit> {
         let context = self.context;
@@ -112,9 +115,9 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         None
     }
 
-    /// Books what a surface does to the light of a path, and starts what goes on; false when the path ends.
+    /// Books what the surface does to the light of a path, and sets `path` and `ray` for what goes on; `false` when the path ends.
     #[inline(always)]
-    fn apply(&mut self, path: &mut Path<C>, ray: &mut Ray, at: &mut SurfaceInteraction<'_>) -> bool {
+    fn apply_surface(&mut self, path: &mut Path<C>, ray: &mut Ray, at: &mut SurfaceInteraction<'_>) -> bool {
         // What the surface does was decided without touching a count; here alone it is booked, so that no power is booked twice or not at
         // all.
         let direction = match interact(self.context, path, ray, at) {
@@ -140,7 +143,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
                 path.payload = payload;
                 Some(direction)
             }
-            Interaction::Divide(division) => Some(self.divide(path, ray, at, &division)),
+            Interaction::Divide(division) => Some(self.divide_light(path, ray, at, &division)),
             Interaction::Trap => {
                 self.cut_off_trapped(path, at.point);
                 None
@@ -161,9 +164,10 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Goes one of both ways on from a partly reflecting face, or both; the direction to go on in.
+    /// Sends a path on from a partly reflecting face: one way drawn at random, or, where the run splits and it has power enough,
+    /// transmitted with its reflection split off. Books what the face absorbs, and returns the direction to go on in.
     #[inline(always)]
-    fn divide(
+    fn divide_light(
         &mut self,
         path: &mut Path<C>,
         ray: &Ray,
@@ -183,7 +187,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let splits =
             settings.interfaces == Interfaces::Split && path.quanta > settings.split_floor * path.first_quanta;
         let reflects = if splits {
-            !self.split(path, ray, at, division)
+            !self.split_reflection(path, ray, at, division)
         } else {
             path.key(context).unit(Purpose::Interface) < division.share
         };
@@ -199,9 +203,10 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Splits off what is reflected, if it is anything; whether something is left to be transmitted.
+    /// Splits off what is reflected, a whole number of quanta, as a path of its own that waits in `pending`. Returns whether the path
+    /// itself is to be transmitted: with less than a quantum to reflect it is, without being split; with all to reflect it is not.
     #[inline(never)]
-    fn split(
+    fn split_reflection(
         &mut self,
         path: &mut Path<C>,
         ray: &Ray,
@@ -226,7 +231,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         reflected != path.quanta
     }
 
-    /// Starts the next segment at a face; false when a limit cuts the path off.
+    /// Starts the next segment of a path at a face, behind both faces of a contact; `false` when a limit cuts the path off.
     #[inline(always)]
     fn leave_face(
         &mut self,
@@ -245,7 +250,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         self.start_segment(path, ray, next)
     }
 
-    /// Takes the next ray of a path, unless a limit cuts the path off.
+    /// Gives a path its next ray, clipped at the next receiver or scattering; `false`, and booked as cut off, when a limit of bounces,
+    /// length or power ends it.
     #[inline(always)]
     fn start_segment(&mut self, path: &mut Path<C>, ray: &mut Ray, next: Ray) -> bool {
         let s = self.context.settings;
@@ -263,7 +269,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         true
     }
 
-    /// Scattering inside a body.
+    /// Scatters a path inside its body, at the end of its segment, and starts the next; `false` when a limit cuts the path off.
     #[inline(never)]
     fn scatter_in_body(&mut self, path: &mut Path<C>, ray: &mut Ray) -> bool {
         let context = self.context;
@@ -283,7 +289,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         self.start_segment(path, ray, Ray::new(point, direction))
     }
 
-    /// Ends a path whose ray is known to meet no face; `false` where it is not to be followed straight on.
+    /// Ends a path whose ray is known to meet no face and books its light; `false`, and nothing done, where it scatters on its way.
     #[inline(always)]
     pub(super) fn finish_escaping(&mut self, path: &mut Path<C>, ray: &mut Ray) -> bool {
         // Light that scatters on its way is not at its end, however free the way is.
@@ -297,7 +303,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         true
     }
 
-    /// The end of a path that meets no face: on a receiver, in the far field, or lost inside a body.
+    /// Books the end of a path that meets no face: on a receiver, in the far field, escaped, or lost while inside a body.
     #[inline(always)]
     fn end_without_face(&mut self, path: &mut Path<C>, ray: &Ray) {
         let context = self.context;

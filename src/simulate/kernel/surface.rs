@@ -1,7 +1,7 @@
 //! The laws of light at a face, as what they make of one ray.
 
 use super::context::Context;
-use super::crossing::{Crossing, cross};
+use super::crossing::{Crossing, cross_face};
 use super::interaction::{CONDUCTOR, Division, Interaction, SurfaceInteraction, turn_polarisation};
 use super::path::Path;
 use super::payload::RayPayload;
@@ -12,7 +12,8 @@ use crate::simulate::body::AMBIENT;
 use crate::simulate::surfaces::{Coated, Surface};
 use crate::simulate::tally::round_quanta;
 
-/// What the surface of a face does to the light that meets it.
+/// Returns what the surface of a face does to the light that meets it; books nothing. Notes in `at` the normals that it corrected and
+/// whether two faces were crossed at once.
 #[inline(always)]
 pub(super) fn interact<'s, C: RayPayload>(
     context: &'s Context<'_>,
@@ -22,18 +23,19 @@ pub(super) fn interact<'s, C: RayPayload>(
 ) -> Interaction<'s, C> {
     match &context.bound.surfaces[at.face.surface as usize] {
         Surface::Absorber => Interaction::Absorb,
-        Surface::Mirror(share) => mirror(context, *share, path, ray.direction, at),
-        Surface::Interface if C::MEDIA && at.face.body != AMBIENT => interface(context, path, ray, at),
+        Surface::Mirror(share) => mirror_interaction(context, *share, path, ray.direction, at),
+        Surface::Interface if C::MEDIA && at.face.body != AMBIENT => interface_interaction(context, path, ray, at),
         // A bare face without a medium behind it is not there for light.
         Surface::Interface => Interaction::Pass { payload: path.payload },
-        Surface::Coated(c) if C::COATED => coating(context, c, path, ray, at),
+        Surface::Coated(c) if C::COATED => coating_interaction(context, c, path, ray, at),
         Surface::Coated(_) => unreachable!("scenes with such faces have a kernel for them"),
     }
 }
 
-/// Reflects a constant share and absorbs the rest.
+/// Reflects a constant share of the path's quanta, rounded to whole ones, and turns its polarisation as a conductor does; the face absorbs
+/// the rest.
 #[inline(always)]
-fn mirror<'s, C: RayPayload>(
+fn mirror_interaction<'s, C: RayPayload>(
     context: &Context<'_>,
     share: f64,
     path: &Path<C>,
@@ -45,19 +47,20 @@ fn mirror<'s, C: RayPayload>(
     turn_polarisation(context, &mut payload, &CONDUCTOR, direction, normal);
     // In whole quanta, so that what is kept and what is absorbed add up to the last one.
     let kept = round_quanta(path.quanta * share);
-    Interaction::Reflect { kept, direction: at.mirrored(direction, normal), payload }
+    Interaction::Reflect { kept, direction: at.reflected_direction(direction, normal), payload }
 }
 
-/// Reflection and refraction at the bare boundary of a body.
+/// Reflects and refracts light at the bare boundary of a body. Light passes unchanged where its innermost body stays the same; at total
+/// reflection it may be found to be trapped.
 #[inline(always)]
-fn interface<'s, C: RayPayload>(
+fn interface_interaction<'s, C: RayPayload>(
     context: &Context<'_>,
     path: &Path<C>,
     ray: &Ray,
     at: &mut SurfaceInteraction<'_>,
 ) -> Interaction<'s, C> {
     // Media first: between two parts of one body there is no surface, whatever its face is made of.
-    let Crossing { here: mut payload, across } = match cross(context, path.payload, ray, at) {
+    let Crossing { here: mut payload, across } = match cross_face(context, path.payload, ray, at) {
         Ok(crossing) => crossing,
         Err(cause) => return Interaction::Lose(cause),
     };
@@ -78,7 +81,7 @@ fn interface<'s, C: RayPayload>(
         if payload.stokes_mut().is_some() {
             turn_polarisation(context, &mut payload, &polarised::reflected(cos_i, eta), d, normal);
         }
-        return Interaction::ReflectTotally { direction: at.mirrored(d, normal), payload };
+        return Interaction::ReflectTotally { direction: at.reflected_direction(d, normal), payload };
     };
     // From both cosines, which refraction has already worked out: no further root.
     let mut share = fresnel::of_cosines(cos_i, cos_t, eta).unpolarised();
@@ -102,7 +105,8 @@ fn interface<'s, C: RayPayload>(
     })
 }
 
-/// Two bodies of different index that overlap: light leaves one of them below the one it has come into later.
+/// Returns two bodies of different index that overlap, the lower number first: light leaves one of them below the one it has come into
+/// later. `None` at a contact, and where they do not overlap here.
 #[inline(always)]
 fn overlapping_bodies<C: RayPayload>(
     context: &Context<'_>,
@@ -117,8 +121,9 @@ fn overlapping_bodies<C: RayPayload>(
         .then(|| [left.min(here), left.max(here)])
 }
 
-/// A surface with a coating, scatter or both.
-fn coating<'s, C: RayPayload>(
+/// Reflects, transmits and scatters light at a surface with a coating, scatter or both; what the coating takes is not kept. A face without
+/// a medium, or an opaque one, needs no body behind it.
+fn coating_interaction<'s, C: RayPayload>(
     context: &Context<'_>,
     coated: &'s Coated,
     path: &Path<C>,
@@ -129,7 +134,7 @@ fn coating<'s, C: RayPayload>(
     // What lets nothing through needs no medium behind it, so that mirrors may be open sheets.
     let transmits = C::MEDIA && at.face.body != AMBIENT && !coated.opaque;
     let crossing = if transmits {
-        cross(context, path.payload, ray, at)
+        cross_face(context, path.payload, ray, at)
     } else {
         Ok(Crossing { here: path.payload, across: path.payload })
     };
@@ -175,7 +180,7 @@ fn coating<'s, C: RayPayload>(
     })
 }
 
-/// What the share of power would be for the polarisation of a ray; the unpolarised share when it is not followed.
+/// Returns the share of power that matrix `m` leaves of a ray with this polarisation; `unpolarised` when polarisation is not followed.
 #[inline]
 fn polarised_share<C: RayPayload>(
     context: &Context<'_>,
@@ -191,8 +196,8 @@ fn polarised_share<C: RayPayload>(
     }
 }
 
-/// The normal, the cosine of incidence, and the refracted direction on the far side of the facet with its cosine; `None` for these
-/// at total reflection.
+/// Returns the normal, the cosine of incidence, and the refracted direction on the far side of the facet with its cosine; `None` for these
+/// at total reflection. `eta` is the index before the face over that behind it.
 #[inline(always)]
 fn refracted(d: Vector, eta: f64, at: &mut SurfaceInteraction<'_>) -> (Vector, f64, Option<(Vector, f64)>) {
     let flat = at.hit.geometric_normal;
@@ -207,7 +212,7 @@ fn refracted(d: Vector, eta: f64, at: &mut SurfaceInteraction<'_>) -> (Vector, f
     (flat, d.dot(flat).abs().min(1.0), refract_with_cosine(d, flat, eta))
 }
 
-/// The matrices of reflection and transmission; a table has no phases, and reflects like a conductor.
+/// Returns the matrices of reflection and transmission; a table has no phases, and reflects like a conductor.
 fn mueller(coating: &Coating, split: &Split, cos_i: f64, n1: f64, n2: f64) -> [Mueller; 2] {
     match coating {
         Coating::Bare => [polarised::reflected(cos_i, n1 / n2), polarised::transmitted(cos_i, n1 / n2)],

@@ -12,26 +12,26 @@ const ROUNDING_SHARE: f64 = 1e-12;
 /// Largest distance to the end of a segment that rounding is reckoned from, mm: a segment that leaves the scene has none.
 pub(super) const LONGEST_SEGMENT: f64 = 1e12;
 
-/// How far from its true place, mm, a point this far from the origin may be by rounding.
+/// Returns how far from its true place, mm, a point at this distance from the origin, mm, may be by rounding.
 #[inline(always)]
 pub(super) fn rounding(distance: f64) -> f64 {
     ROUNDING_MM + ROUNDING_SHARE * distance
 }
 
-/// How far from its true place, mm, a point may be by rounding.
+/// Returns how far from its true place, mm, a point may be by rounding.
 #[inline(always)]
 pub(super) fn rounding_at(point: Point) -> f64 {
     rounding(point.abs().max_element())
 }
 
-/// The way of a ray through a layer of the glue distance, mm, for the cosine between them. Below a cosine of 1e-3 (0.06° off the
-/// face) it grows no further: a ray that grazes a face more than that would reach a millimetre for the default of 1 µm.
+/// Returns the way of a ray through a layer of the glue distance, mm, for the cosine between ray and normal. Below a cosine of 1e-3 (0.06°
+/// off the face) it grows no further: a ray that grazes a face more than that would reach a millimetre for the default of 1 µm.
 #[inline(always)]
 pub(super) fn way_through_glue(glue_mm: f64, cosine: f64) -> f64 {
     glue_mm / cosine.abs().max(LEAST_COSINE)
 }
 
-/// See [`way_through_glue`].
+/// Cosine below which the way through a layer grows no further, see [`way_through_glue`].
 const LEAST_COSINE: f64 = 1e-3;
 
 /// Cosine above which two normals at one place look the same way, and below whose negative they look at each other: 60°, between

@@ -18,7 +18,7 @@ pub(super) struct Tracer<'t, 'a, C> {
 }
 
 impl<C: RayPayload> Tracer<'_, '_, C> {
-    /// Notes a vertex of a path that is recorded.
+    /// Adds a vertex to the tally if the path of this ray is recorded; `face` is `None` where it is at none.
     #[inline(always)]
     pub(super) fn record(&mut self, path: &Path<C>, point: Point, event: Event, face: Option<FaceId>) {
         // Only sampled paths are recorded, and asking costs next to nothing.
@@ -29,7 +29,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Books what a face takes of a path, which goes on with `kept` quanta.
+    /// Books what a face takes of a path, and leaves the path `kept` quanta.
     #[inline(always)]
     pub(super) fn absorb_in_face(&mut self, path: &mut Path<C>, face: FaceId, kept: f64) {
         self.tally.absorb(face, path.quanta - kept);
@@ -39,7 +39,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         path.quanta = kept;
     }
 
-    /// Notes where light was counted, for those who group it by sequence.
+    /// Notes where light was counted, for those who group it by sequence; nothing where none do, or for no quanta.
     #[inline(always)]
     pub(super) fn note_deposit(&mut self, path: &Path<C>, place: DepositPlace, quanta: u64) {
         if let Some(deposits) = &mut self.tally.deposits
@@ -49,7 +49,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Beer's law over the segment, for bodies that absorb.
+    /// Takes from a path, and books, what its body absorbs over `length`, mm (Beer's law), in whole quanta; nothing in a clear body.
     #[inline(always)]
     pub(super) fn absorb_in_body(&mut self, path: &mut Path<C>, length: f64) {
         let body = path.payload.body();
@@ -64,7 +64,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Ends a path at a limit.
+    /// Books the power that is left of a path as cut off by a limit, and ends its record at `point`; nothing for a path without power.
     #[cold]
     pub(super) fn cut_off(&mut self, path: &Path<C>, point: Point) {
         // A path without power has been booked to the last quantum already.
@@ -75,14 +75,14 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Ends a path that goes round in its body for ever.
+    /// Books the end of a path that goes round in its body for ever: as cut off, and as caught.
     #[cold]
     pub(super) fn cut_off_trapped(&mut self, path: &Path<C>, point: Point) {
         self.tally.counts.caught += u64::from(path.quanta > 0.0);
         self.cut_off(path, point);
     }
 
-    /// Ends a path that cannot go on.
+    /// Books a path that cannot go on as lost, with its ray and cause; `face` is `None` where it was at none.
     #[cold]
     pub(super) fn lose(&mut self, path: &Path<C>, ray: &Ray, cause: LostCause, face: Option<FaceId>) {
         self.tally.lose(LostRay {

@@ -12,7 +12,8 @@ use crate::simulate::tallies::ReplicateTally;
 /// Vertices that are gathered before they are streamed: 1.3 MB.
 const STREAMED: usize = 1 << 14;
 
-/// Traces these rays and adds them to a tally. Returns the intersector's work.
+/// Traces these rays to their ends, adds what becomes of them to `tally`, and returns the intersector's work. Recorded paths go to the
+/// context's sink, if it has one.
 #[inline(always)]
 pub(super) fn trace_rays<C: RayPayload>(
     context: &Context<'_>,
@@ -49,7 +50,7 @@ pub(super) fn trace_rays<C: RayPayload>(
     cost
 }
 
-/// Hands paths that have ended to who writes them.
+/// Hands the vertices in `tally` to the context's sink; does nothing without one.
 fn stream_paths(context: &Context<'_>, tally: &mut ReplicateTally) {
     if let Some(sink) = context.paths {
         tally.stream_paths(sink, &context.plan);
@@ -66,7 +67,7 @@ struct Wavefront<C> {
 }
 
 impl<C: RayPayload> Wavefront<C> {
-    /// Places for `batch` paths, all of them free.
+    /// Makes a wavefront with places for `batch` paths, all of them free.
     fn idle(batch: usize) -> Self {
         Self {
             paths: vec![Path::at_source(0, 0.0, C::in_surroundings()); batch],
@@ -76,7 +77,7 @@ impl<C: RayPayload> Wavefront<C> {
         }
     }
 
-    /// Puts paths that wait, then new ones, into the places of those that have ended; places without a taker go.
+    /// Puts paths that wait, then new ones, into the places of those that have ended; removes places without a taker.
     #[inline(always)]
     fn fill(&mut self, tracer: &mut Tracer<'_, '_, C>, sources: &mut SourceQueue) {
         let mut taken = 0;

@@ -48,21 +48,21 @@ pub struct Key {
 }
 
 impl Key {
-    /// Two uniform numbers in `[0, 1)`, 53 bits each.
+    /// Returns two uniform numbers in `[0, 1)`, 53 bits each; the same for the same key and purpose.
     #[inline]
     pub fn pair(&self, purpose: Purpose) -> [f64; 2] {
         let [a, b, c, d] = self.words(purpose);
         [unit(a, b), unit(c, d)]
     }
 
-    /// One uniform number in `[0, 1)`, 53 bits.
+    /// Returns one uniform number in `[0, 1)`, 53 bits: the first of [`Key::pair`].
     #[inline]
     pub fn unit(&self, purpose: Purpose) -> f64 {
         let [a, b, ..] = self.words(purpose);
         unit(a, b)
     }
 
-    /// 128 random bits.
+    /// Returns 128 random bits, a function of key and purpose alone.
     #[inline]
     pub fn words(&self, purpose: Purpose) -> [u32; 4] {
         // 48 bits of the ray and 16 of the purpose share two words of the counter.
@@ -71,13 +71,14 @@ impl Key {
     }
 }
 
+/// Returns a number in `[0, 1)` from the first 53 of these 64 bits.
 #[inline]
 fn unit(a: u32, b: u32) -> f64 {
     // 53 bits: all that an `f64` below 1 has.
     ((u64::from(a) << 32 | u64::from(b)) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 
-/// The number of the path that splits off another at its hit of this number.
+/// Returns the number, never 0, of the path that splits off path `branch` at its hit `bounce`: a hash, the same on every run.
 pub(crate) fn split_branch(branch: u32, bounce: u32) -> u32 {
     let mixed = (branch ^ bounce.wrapping_mul(0x9e37_79b9)).wrapping_add(0x7f4a_7c15).wrapping_mul(0x85eb_ca6b);
     (mixed ^ mixed >> 15).max(1)

@@ -1,9 +1,9 @@
 //! The Philox counter-based random number generator.
 
-/// Ten rounds of Philox 4×32: 128 random bits from a 128-bit counter and a 64-bit key.
+/// Makes 128 random bits from a 128-bit counter and a 64-bit key, by ten rounds of Philox 4×32.
 ///
-/// Salmon, Moraes, Dror, Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC 2011. Passes BigCrush; stateless, so any
-/// number of any ray can be had in any order on any thread.
+/// Salmon, Moraes, Dror, Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC 2011. Passes BigCrush; stateless, so any number of any ray
+/// can be had in any order on any thread.
 #[inline]
 pub fn philox4x32(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     const M: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];

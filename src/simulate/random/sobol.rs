@@ -15,9 +15,9 @@ const JOE_KUO: [(u32, u32, &[u32]); DIMENSIONS - 1] =
 type Table = [[u32; 256]; 4];
 
 /// Made when first asked for.
-static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| (0..DIMENSIONS).map(table).collect());
+static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| (0..DIMENSIONS).map(byte_table).collect());
 
-/// The direction numbers of a dimension, counted from 0, each as 32 binary places.
+/// Returns the direction numbers of a dimension below [`DIMENSIONS`], counted from 0, each as 32 binary places.
 fn directions(dimension: usize) -> [u32; 32] {
     let mut v = [0u32; 32];
     if dimension == 0 {
@@ -37,8 +37,8 @@ fn directions(dimension: usize) -> [u32; 32] {
     v
 }
 
-/// What each value of each byte of the index contributes, in reverse order of bits.
-fn table(dimension: usize) -> Table {
+/// Returns what each value of each byte of the index contributes, in reverse order of bits.
+fn byte_table(dimension: usize) -> Table {
     let v = directions(dimension);
     std::array::from_fn(|byte| {
         std::array::from_fn(|value| {
@@ -47,11 +47,14 @@ fn table(dimension: usize) -> Table {
     })
 }
 
-/// The Sobol number of an index, 32 bits after the point, Owen-scrambled by `seed`.
+/// Returns the Sobol number of an index in a dimension below [`DIMENSIONS`], 32 bits after the point, Owen-scrambled by `seed`.
 ///
-/// The scrambling is the hash of Laine and Karras as improved by N. Vegdahl, applied to reversed bits: Burley, *Practical
-/// hash-based Owen scrambling*, JCGT 9 (4), 2020. Each seed gives an independent randomisation of the same net, so the mean
-/// over seeds is unbiased and the spread over seeds is an honest error.
+/// The scrambling is the hash of Laine and Karras as improved by N. Vegdahl, applied to reversed bits: Burley, *Practical hash-based Owen
+/// scrambling*, JCGT 9 (4), 2020. Each seed gives an independent randomisation of the same net, so the mean over seeds is unbiased and the
+/// spread over seeds is an honest error.
+///
+/// # Panics
+/// For a dimension that does not exist.
 #[inline]
 pub fn scrambled(index: u32, dimension: usize, seed: u32) -> u32 {
     let t = &TABLES[dimension];
@@ -59,7 +62,7 @@ pub fn scrambled(index: u32, dimension: usize, seed: u32) -> u32 {
     scramble(t[0][b[0] as usize] ^ t[1][b[1] as usize] ^ t[2][b[2] as usize] ^ t[3][b[3] as usize], seed)
 }
 
-/// Owen's scrambling of a number whose bits are reversed, by the hash that [`scrambled`] names.
+/// Scrambles a number whose bits are reversed, by the hash that [`scrambled`] names, and puts its bits in order.
 #[inline(always)]
 fn scramble(reversed: u32, seed: u32) -> u32 {
     let mut n = reversed;
@@ -74,8 +77,8 @@ fn scramble(reversed: u32, seed: u32) -> u32 {
 /// Numbers made at a time.
 pub const BLOCK: usize = 64;
 
-/// The same for the indices from `first`, a multiple of [`BLOCK`], on. At most [`BLOCK`] indices differ in their lowest byte alone,
-/// so the loop runs in vectors.
+/// Fills `numbers`, at most [`BLOCK`] of them, with [`scrambled`] of the indices from `first`, a multiple of [`BLOCK`], on. These differ in
+/// their lowest byte alone, so the loop runs in vectors.
 #[inline(always)]
 pub fn scrambled_block(first: u32, dimension: usize, seed: u32, numbers: &mut [u32]) {
     let t = &TABLES[dimension];

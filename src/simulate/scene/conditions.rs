@@ -5,8 +5,8 @@ use super::lenient::LARGEST_COUNT;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
 
-/// Adds the conditions to the schema of a scene.
-pub(super) fn add(schema: &mut Value) {
+/// Adds the conditions to the JSON Schema of a scene, in place.
+pub(super) fn add_conditions(schema: &mut Value) {
     let needs = |keys: &[&str]| json!({"required": keys});
     // Asked to be there: a scene without `kind` has the default one, whose conditions stand under `never`.
     let of_kind = |kinds: &[&str], then: Value| json!({"if": {"properties": {"kind": {"enum": kinds}}, "required": ["kind"]}, "then": then});
@@ -68,7 +68,7 @@ pub(super) fn add(schema: &mut Value) {
     }
 }
 
-/// A pattern for any of these words in any case.
+/// Returns a regular expression for any of these words in any case.
 fn any_case_pattern(words: &[&str]) -> String {
     let letter =
         |c: char| if c.is_ascii_alphabetic() { format!("[{c}{}]", c.to_ascii_uppercase()) } else { c.to_string() };
@@ -76,7 +76,7 @@ fn any_case_pattern(words: &[&str]) -> String {
     format!("^({})$", words.join("|"))
 }
 
-/// Puts the keys of one object into another, table by table.
+/// Puts the keys of one object into another, table by table; where one of them is no object, `more` takes its place.
 fn merge(into: &mut Value, more: &Value) {
     match (into, more) {
         (Value::Object(into), Value::Object(more)) => {
@@ -87,12 +87,12 @@ fn merge(into: &mut Value, more: &Value) {
     }
 }
 
-/// What a schema says of a whole number that may be written as `1e6`.
+/// Returns what a schema says of a whole number that may be written as `1e6`.
 pub(super) fn count_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({"type": "number", "multipleOf": 1, "minimum": 0, "maximum": LARGEST_COUNT})
 }
 
-/// What a schema says of two numbers, or one for both.
+/// Returns what a schema says of two numbers, or one for both.
 pub(super) fn range_schema(generator: &mut SchemaGenerator) -> Schema {
     let two = <[f64; 2]>::json_schema(generator);
     json_schema!({"anyOf": [{"type": "number"}, two]})

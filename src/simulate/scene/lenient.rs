@@ -7,17 +7,17 @@ use std::fmt;
 /// Whole numbers up to this one are exact where they are written as `1e6`: just below 2⁵³.
 pub(super) const LARGEST_COUNT: f64 = 9e15;
 
-/// A whole number, which may be written as `1e6`.
+/// Reads a whole number from 0, which may be written as `1e6`; such a one must be below [`LARGEST_COUNT`].
 pub(super) fn count<'de, D: Deserializer<'de>>(d: D) -> Result<u64, D::Error> {
     d.deserialize_any(Count)
 }
 
-/// The same where the key may be missing.
+/// Reads a whole number, such as `1e6`, of a key that may be missing; a serde default stands for one that is.
 pub(super) fn optional_count<'de, D: Deserializer<'de>>(d: D) -> Result<Option<u64>, D::Error> {
     d.deserialize_any(Count).map(Some)
 }
 
-/// Two numbers, or one for both.
+/// Reads two numbers, or one for both; their order and sign are not looked at.
 pub(super) fn range<'de, D: Deserializer<'de>>(d: D) -> Result<Option<[f64; 2]>, D::Error> {
     d.deserialize_any(Range).map(Some)
 }

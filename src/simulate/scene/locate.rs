@@ -31,8 +31,8 @@ const REFUSED: [(&str, &str); 20] = [
     ("coheren", "interference of paths"),
 ];
 
-/// The effect that a word asks for and that is not simulated.
-fn refused(word: &str) -> Option<&'static str> {
+/// Returns the effect that a word asks for and that is not simulated; `None` for any other word.
+fn unsupported_effect(word: &str) -> Option<&'static str> {
     // Spelling with hyphens or capitals is forgiven: the word is refused either way, and should be with its reason.
     let word = word.to_lowercase().replace('-', "_");
     REFUSED.iter().find(|(start, _)| word.starts_with(start)).map(|(_, effect)| *effect)
@@ -55,7 +55,8 @@ const LISTS: [(&str, &str); 9] = [
     ("tolerance_mm", "write tolerance_mm = [0.05, 0.2]"),
 ];
 
-/// The bytes of the value at a path; of the deepest table on the way when the value itself is not there.
+/// Returns the bytes of the value at a path, or of the deepest table on the way when the value is not written; `None` where not even its
+/// first key is, or the text is no TOML.
 pub(super) fn span(text: &str, path: &[Key<'_>]) -> Option<Range<usize>> {
     // The values that were read do not know their places: the text is read once more for them.
     let root = DeTable::parse(text).ok()?;
@@ -88,8 +89,8 @@ const TABLES: [(&str, &str); 8] = [
     ("a sequence", "[[source]], with both brackets doubled, for an entry of a list"),
 ];
 
-/// A value of the wrong type, in words that do not speak of the program's own types.
-fn typed(message: &str, key: &str) -> Error {
+/// Makes an error of a value of the wrong type, in words that do not speak of the program's own types; `key` is empty where not known.
+fn type_error(message: &str, key: &str) -> Error {
     let message = message.trim();
     // The key is asked first: a list has its own form, which the type does not tell.
     if let Some((_, help)) = LISTS.iter().find(|(list, _)| *list == key) {
@@ -121,18 +122,18 @@ fn typed(message: &str, key: &str) -> Error {
     )
 }
 
-/// The key whose value stands at a byte of a line, or around it.
-fn key_of(text: &str, at: usize) -> &str {
+/// Returns the key whose value stands at byte `at` of the text, by its line; empty where there is none.
+fn key_before(text: &str, at: usize) -> &str {
     let before = text.get(..at).unwrap_or("");
     let line = before.rsplit('\n').next().unwrap_or("");
     let key = line.rsplit_once('=').map_or("", |(key, _)| key);
     key.rsplit(['{', ',', '.']).next().unwrap_or("").trim()
 }
 
-/// Every list of the file must be as long as what was understood of it, for the reader takes as many entries as it needs and passes
-/// over the rest.
-pub(super) fn lengths(text: &str, understood: &serde_json::Value) -> Option<(Range<usize>, String)> {
-    /// The first list of the file with more values than the scene has understood, and what to say of it.
+/// Returns the place of the first list of the file that is longer than what was understood of it, and what to say; `None` where all are
+/// alike. The reader takes as many entries as it needs and passes over the rest.
+pub(super) fn unread_entries(text: &str, understood: &serde_json::Value) -> Option<(Range<usize>, String)> {
+    /// Returns the first list within `value` with more entries than the scene has understood, and what to say of it.
     fn unread(value: &Spanned<DeValue<'_>>, known: &serde_json::Value) -> Option<(Range<usize>, String)> {
         match (value.get_ref(), known) {
             (DeValue::Table(table), serde_json::Value::Object(known)) => {
@@ -153,15 +154,15 @@ pub(super) fn lengths(text: &str, understood: &serde_json::Value) -> Option<(Ran
     root.get_ref().iter().find_map(|(key, v)| unread(v, known.get(&**key.get_ref())?))
 }
 
-/// An error of the TOML reader with its place, and the key that was probably meant.
-pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error {
+/// Makes the scene's error of one of the TOML reader, with its place, and the key that was probably meant.
+pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error {
     let message = e.message();
     let mut words = message.split('`').skip(1).step_by(2);
     // The reader's errors are texts: known keys stand in backquotes, the unknown one first.
     let error = if message.starts_with("unknown field") {
         let word = words.next().unwrap_or("");
         // A key of another program for an effect that is not simulated must not be taken for a slip.
-        if let Some(effect) = refused(word) {
+        if let Some(effect) = unsupported_effect(word) {
             let message = format!("`{word}`: {effect} is not simulated");
             Error::new(ErrorKind::Unsupported, message)
                 .help("remove the key; the result would be wrong if it were ignored")
@@ -176,7 +177,7 @@ pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error 
     } else if message.starts_with("unknown variant") {
         let word = words.next().unwrap_or("");
         let known: Vec<&str> = words.collect();
-        if let Some(effect) = refused(word) {
+        if let Some(effect) = unsupported_effect(word) {
             Error::new(ErrorKind::Unsupported, format!("`{word}`: {effect} is not simulated"))
         } else {
             let error = Error::new(ErrorKind::Syntax, format!("`{word}` is none of {}", known.join(", ")));
@@ -186,7 +187,7 @@ pub(super) fn syntax(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error 
             }
         }
     } else {
-        typed(message, e.span().map_or("", |span| key_of(text, span.start)))
+        type_error(message, e.span().map_or("", |span| key_before(text, span.start)))
     };
     error.located(file, text, e.span())
 }

@@ -25,7 +25,7 @@ pub struct ModelUse {
 const FARTHEST_PLACE: f64 = 1e11;
 
 impl ModelUse {
-    /// Refuses a model without file or at no place.
+    /// Refuses a model without a file, or with a placement or unit that is no number or out of range; `index` is its place in the scene.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fail = |keys: &[&str], message: &str| {
             let mut at = vec![Key::Name("model"), Key::Index(index)];
@@ -64,9 +64,9 @@ pub struct Placement {
     pub at: [f64; 3],
     /// Where the file's z axis points.
     pub z: [f64; 3],
-    /// Where the file's x axis points, as far as `z` lets it.
+    /// Where the file's x axis points, as far as `z` lets it; the scene's x axis unless given.
     pub x: Option<[f64; 3]>,
-    /// Enlargement.
+    /// Enlargement, above 0.
     pub scale: f64,
 }
 
@@ -156,12 +156,12 @@ pub enum LobeKind {
 }
 
 impl Material {
-    /// Whether the rule selects by keys of its own and by `on`.
+    /// Whether the rule selects faces both by keys of its own and by `on`.
     pub(super) fn selects_twice(&self) -> bool {
         self.on.is_some() && self.own_selectors() != FaceSelector::default()
     }
 
-    /// Its selectors.
+    /// Returns the selector of the rule: `on`, or the keys that stand in the rule itself; all faces where it has neither.
     pub(crate) fn faces(&self) -> FaceSelector {
         // `check` has refused a rule with both, so that none of its selectors is lost here.
         if let Some(on) = &self.on {
@@ -170,7 +170,7 @@ impl Material {
         self.own_selectors()
     }
 
-    /// Those that stand in the rule itself.
+    /// Returns the selectors that stand in the rule itself; all faces where there are none.
     fn own_selectors(&self) -> FaceSelector {
         let Self { part, instance, solid, face, layer, colour, kind, radius_mm, entity, at, .. } = self.clone();
         FaceSelector { part, instance, solid, face, layer, colour, kind, radius_mm, entity, at }

@@ -21,7 +21,7 @@ pub struct Medium {
     /// Glass catalogue in AGF form that `catalogue` is a name in, relative to the scene file. The glass absorbs by its internal
     /// transmittances there unless `absorption_per_mm` says otherwise.
     pub file: Option<String>,
-    /// What the file says of the glass.
+    /// What the file says of the glass; filled in when the scene is read, `None` without a file.
     #[serde(skip)]
     pub(crate) glass: Option<AgfGlass>,
     /// Pairs `[B, C]` of `n² = 1 + Σ B λ²/(λ² − C)`, λ in µm, C in µm².
@@ -54,7 +54,10 @@ pub enum ByWavelength {
 }
 
 impl Medium {
-    /// The medium in the form the laws of light read; otherwise what is wrong, and at which key.
+    /// Returns the medium in the form that the laws of light read.
+    ///
+    /// # Errors
+    /// With the key that is wrong and what is wrong with it, as when there is not exactly one index.
     pub(crate) fn optics(&self) -> Result<optics::Medium, (&'static str, String)> {
         let points = |t: &[[f64; 2]]| t.iter().map(|p| (p[0], p[1])).collect::<Vec<_>>();
         let mut ways = Vec::new();
@@ -102,7 +105,10 @@ impl Medium {
     }
 }
 
-/// The index of a glass by the formula of its catalogue (OpticStudio's numbers of them).
+/// Returns the index of a glass by the formula of its catalogue (OpticStudio's numbers of them).
+///
+/// # Errors
+/// For a formula other than Schott's and Sellmeier's.
 fn agf_index(glass: &AgfGlass) -> Result<Index, String> {
     /// Formulas of n² − 1 as a sum of `K λ²/(λ² − L)`: of three, four and five terms.
     const SELLMEIER: [(u32, usize); 3] = [(2, 3), (6, 4), (11, 5)];
@@ -123,7 +129,7 @@ fn agf_index(glass: &AgfGlass) -> Result<Index, String> {
     ))
 }
 
-/// The absorption of a glass from its transmittances; none where fewer than two are known.
+/// Returns the absorption of a glass from its transmittances; none where fewer than two are known.
 fn agf_absorption(glass: &AgfGlass) -> Result<Absorption, String> {
     let points = glass.absorption();
     if points.len() < 2 {
@@ -132,7 +138,10 @@ fn agf_absorption(glass: &AgfGlass) -> Result<Absorption, String> {
     Absorption::table(points.iter().map(|p| (p[0], p[1])).collect::<Vec<_>>()).map_err(|e| e.to_string())
 }
 
-/// Reads the glasses that media name in files.
+/// Reads the glass of each medium that names a catalogue file; `None` for the others.
+///
+/// # Errors
+/// When a file cannot be read, or has no glass of the name, which is compared in any case.
 pub(super) fn read_glasses(scene: &Scene) -> Result<Vec<Option<AgfGlass>>, Error> {
     let mut glasses = Vec::with_capacity(scene.media.len());
     for (i, medium) in scene.media.iter().enumerate() {
@@ -163,7 +172,10 @@ pub(super) fn read_glasses(scene: &Scene) -> Result<Vec<Option<AgfGlass>>, Error
     Ok(glasses)
 }
 
-/// A medium of the catalogue, or an error that names what there is.
+/// Returns a medium of the built-in catalogue.
+///
+/// # Errors
+/// With the nearest name, or all there are, when there is none of this name.
 fn catalogued(name: &str) -> Result<optics::Medium, String> {
     catalogue::medium(name).ok_or_else(|| {
         let names: Vec<&str> = catalogue::names().collect();
@@ -174,7 +186,10 @@ fn catalogued(name: &str) -> Result<optics::Medium, String> {
     })
 }
 
-/// Finds a medium by name: one of the scene, or one of the catalogue.
+/// Returns the medium of a name, of the scene before the catalogue; `at` is where the name stands, for messages.
+///
+/// # Errors
+/// When there is none of this name, or its index or absorption is wrong.
 pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::Medium, Error> {
     // Names of the scene come before those of the catalogue, so that a scene may have a glass of its own.
     if let Some(m) = scene.media.iter().find(|m| m.name == name) {
@@ -192,7 +207,7 @@ pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::
     })
 }
 
-/// Refuses media without a name of their own or with an index that no material has.
+/// Refuses media without a name of their own, or whose index at the run's wavelength is not from 0.1 to 10.
 pub(super) fn check(scene: &Scene) -> Result<(), Error> {
     for (i, m) in scene.media.iter().enumerate() {
         let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];

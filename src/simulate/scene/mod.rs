@@ -107,7 +107,10 @@ pub struct Origin {
 }
 
 impl Scene {
-    /// Reads a scene file; paths in it are relative to its folder.
+    /// Reads and checks a scene file, and the glass catalogues that it names; paths in it are relative to its folder.
+    ///
+    /// # Errors
+    /// When the file, or a catalogue, cannot be read, or [`Scene::parse`] refuses the text.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let name = path.display().to_string();
         // Through `formats`: a pipe in place of the file would never end.
@@ -119,15 +122,19 @@ impl Scene {
         Self::parse(&text, &name, folder)
     }
 
-    /// Parses the text of a scene file and checks every value that can be checked without a model.
+    /// Parses the text of a scene file and checks every value that can be checked without a model. `file_name` is for messages; `base_dir`
+    /// is where relative paths begin, as of glass catalogues, which are read here.
+    ///
+    /// # Errors
+    /// For the first key that is not known, or value that cannot be, with its place in the text.
     pub fn parse(text: &str, file_name: &str, base_dir: &Path) -> Result<Self, Error> {
         let shared: Arc<str> = text.into();
-        let mut scene: Self = toml::from_str(text).map_err(|e| locate::syntax(&e, file_name, &shared))?;
+        let mut scene: Self = toml::from_str(text).map_err(|e| locate::syntax_error(&e, file_name, &shared))?;
         scene.origin = Origin { file: file_name.into(), folder: base_dir.into(), text: Some(shared.clone()) };
         // Written out again, the scene shows what was understood: a list that lost entries on the way was too long.
         let understood = serde_json::to_value(&scene)
             .map_err(|e| Error::new(ErrorKind::Syntax, e.to_string()).located(file_name, &shared, None))?;
-        if let Some((span, message)) = locate::lengths(text, &understood) {
+        if let Some((span, message)) = locate::unread_entries(text, &understood) {
             return Err(Error::new(ErrorKind::Syntax, message).located(file_name, &shared, Some(span)));
         }
         let glasses = medium::read_glasses(&scene)?;
@@ -136,20 +143,20 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The JSON Schema of a scene file; with the feature `schema`.
+    /// Returns the JSON Schema of a scene file; with the feature `schema`.
     #[cfg(feature = "schema")]
     pub fn schema() -> serde_json::Value {
         let mut schema = schemars::schema_for!(Self).to_value();
-        conditions::add(&mut schema);
+        conditions::add_conditions(&mut schema);
         schema
     }
 
-    /// A path named in the scene, seen from where the program runs.
+    /// Returns a path named in the scene, seen from where the program runs; an absolute one stays as it is.
     pub fn resolve(&self, file: &str) -> PathBuf {
         self.origin.folder.join(file)
     }
 
-    /// An error about the value at `path`, a key or index at a time, with its place in the file.
+    /// Makes an error about the value at `path`, with its place in the file; without a place for a scene that was not parsed from text.
     pub(crate) fn error(&self, kind: ErrorKind, path: &[Key<'_>], message: impl Into<String>) -> Error {
         let error = Error::new(kind, message);
         match &self.origin.text {
@@ -158,16 +165,19 @@ impl Scene {
         }
     }
 
-    /// The scene file, its text, and where it names the file of a model.
+    /// Returns the scene file, its text, and the bytes that name the file of model `index`; `None` for a scene that was not parsed from
+    /// text.
     pub fn place_of_model(&self, index: usize) -> Option<(&str, &str, Range<usize>)> {
         let span = self.span(&[Key::Name("model"), Key::Index(index), Key::Name("file")])?;
         Some((&self.origin.file, self.origin.text.as_deref()?, span))
     }
 
+    /// Returns the bytes of the value at a path, as `locate::span`; `None` for a scene that was not parsed from text.
     fn span(&self, path: &[Key<'_>]) -> Option<Range<usize>> {
         locate::span(self.origin.text.as_deref()?, path)
     }
 
+    /// Checks all values, in the order of the file's keys, and that the receivers' cells fit into memory.
     fn check(&self) -> Result<(), Error> {
         // In the order of the file's keys, so that the first fault told is one that stands far up.
         self.run.check(self)?;
@@ -190,7 +200,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Every receiver has files of its own.
+    /// Refuses two receivers whose names make the same file name, and one that would write over lost_rays.csv.
     fn check_receiver_names(&self) -> Result<(), Error> {
         // By the name of the file, not of the receiver: `a b` and `a_b` would write over each other.
         let mut stems: HashMap<String, &str> = HashMap::new();

@@ -133,7 +133,7 @@ pub enum FarFieldType {
 }
 
 impl Receiver {
-    /// The ranges of both angles as given, or all directions for C-planes without a range.
+    /// Returns the ranges of both angles, degrees, as given; for C-planes all directions in place of a range that is the default.
     pub(crate) fn angles_deg(&self) -> ([f64; 2], [f64; 2]) {
         let unset = Self::default();
         match self.angles {
@@ -147,7 +147,7 @@ impl Receiver {
         }
     }
 
-    /// Sums that it keeps: a cell for power and one for every channel.
+    /// Returns how many sums it keeps: its cells for power and once more for each channel or bin.
     pub(super) fn sums(&self) -> u64 {
         let channels = match (self.channels, &self.bins_nm) {
             // A bin has a sum, and power one beside them: as many sums as edges.
@@ -160,7 +160,7 @@ impl Receiver {
         u64::from(self.cells[0]) * u64::from(self.cells[1]) * channels
     }
 
-    /// A key that is given and means nothing for this kind, and the kinds it belongs to.
+    /// Returns a key that is given and means nothing for this kind, and the kinds it belongs to; `None` where there is none.
     fn misplaced(&self) -> Option<(&'static str, &'static str)> {
         use ReceiverKind::{Absorbed, Disc, FarField, Plane, Sphere};
         let unset = Self::default();
@@ -189,7 +189,7 @@ impl Receiver {
         keys.into_iter().find(|(_, given, kinds, _)| *given && !kinds.contains(&self.kind)).map(|k| (k.0, k.3))
     }
 
-    /// Refuses a receiver whose values contradict each other, or leave it without a place or cells.
+    /// Refuses a receiver whose values contradict each other, or leave it without a place or cells; `index` is its place in the scene.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
             let at = [Key::Name("receiver"), Key::Index(index), Key::Name(key)];

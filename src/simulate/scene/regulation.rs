@@ -21,7 +21,8 @@ pub struct RegulationUse {
 }
 
 impl RegulationUse {
-    /// The far field that is judged, as an index into the scene's receivers.
+    /// Returns the far field that is judged, as an index into the scene's receivers; `None` where no receiver, or more than one, can be
+    /// meant.
     pub fn receiver_index(&self, scene: &Scene) -> Option<usize> {
         let fits = |r: &Receiver| match &self.receiver {
             Some(name) => r.name == *name,
@@ -34,6 +35,9 @@ impl RegulationUse {
     }
 
     /// Judges a far field without light: what the regulation wants of its cells is known before anything is traced.
+    ///
+    /// # Errors
+    /// When the cells cannot answer the regulation, or it is not known.
     fn try_assess(&self, receiver: &Receiver) -> Result<(), String> {
         let (h, v) = receiver.angles_deg();
         let edges = |[low, high]: [f64; 2], cells: u32| -> Vec<f64> {

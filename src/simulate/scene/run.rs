@@ -154,7 +154,7 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// Refuses names that are not known and tolerances that are none.
+    /// Refuses names that are not known, and tolerances and angles out of range.
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
             let at = [Key::Name("accuracy"), Key::Name(key)];
@@ -187,7 +187,7 @@ impl Accuracy {
 }
 
 impl Run {
-    /// Refuses numbers out of range.
+    /// Refuses the first number that is out of range.
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
             Err(scene.error(ErrorKind::Value, &[Key::Name("run"), Key::Name(key)], format!("`{key}` {message}")))

@@ -14,7 +14,7 @@ pub enum OneOrMany<T> {
 }
 
 impl<T> OneOrMany<T> {
-    /// All values.
+    /// Returns all values; a list may be empty.
     pub fn as_slice(&self) -> &[T] {
         match self {
             Self::One(x) => std::slice::from_ref(x),
@@ -63,7 +63,7 @@ pub struct FaceSelector {
 }
 
 impl FaceSelector {
-    /// As the key `on` of a rule, source or receiver: `on = { part = "led", entity = 12 }`.
+    /// Writes it as the key `on` of a rule, source or receiver: `on = { part = "led", entity = 12 }`.
     pub fn as_key(&self) -> String {
         format!("on = {{ {self} }}")
     }
@@ -81,7 +81,7 @@ pub enum ColourKey {
 }
 
 impl ColourKey {
-    /// As three numbers, when it is a colour.
+    /// Returns it as red, green, blue; `None` for a text that is no `#rrggbb`. Three numbers are taken as they are.
     pub fn rgb(&self) -> Option<[f64; 3]> {
         match self {
             Self::Rgb(c) => Some(*c),
@@ -123,7 +123,7 @@ impl std::fmt::Display for FaceSelector {
     }
 }
 
-/// A value as JSON, which strings, numbers and lists of them share with TOML.
+/// Writes a value as JSON, which strings, numbers and lists of them share with TOML; `None` for none.
 fn json_text<T: Serialize>(value: &Option<T>) -> Option<String> {
     serde_json::to_string(value.as_ref()?).ok()
 }

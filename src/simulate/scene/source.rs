@@ -111,7 +111,7 @@ pub enum SourceKind {
 }
 
 impl Source {
-    /// Refuses a source with the first of its faults.
+    /// Refuses a source with the first of its faults; `index` is its place in the scene.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fault = (self.power_fault())
             .or_else(|| self.file_fault())
@@ -132,6 +132,7 @@ impl Source {
         Ok(())
     }
 
+    /// Returns what is wrong with the power; `None` where none is given or it is within [`POWERS`].
     fn power_fault(&self) -> Fault {
         match self.power {
             Some(power) if POWERS.contains(&power) => None,
@@ -143,7 +144,7 @@ impl Source {
         }
     }
 
-    /// What is wrong with the file of a source, or with keys that a source with a file has not.
+    /// Returns what is wrong with the file of a source, or the first key that a source with a file has not; `None` where nothing is.
     fn file_fault(&self) -> Fault {
         let list = matches!(self.kind, SourceKind::Rays | SourceKind::Data1);
         let measured = list || matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);
@@ -176,7 +177,7 @@ impl Source {
         None
     }
 
-    /// What is wrong with the place, the directions or the extent.
+    /// Returns the first that is wrong with the place, the directions or the extent; `None` where nothing is.
     fn geometry_fault(&self) -> Fault {
         let is_finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
         let is_direction = |v: &[f64; 3]| is_finite(v) && v.iter().any(|x| *x != 0.0);
@@ -205,7 +206,7 @@ impl Source {
         None
     }
 
-    /// What is wrong with the number of rays, the spectrum or the polarisation.
+    /// Returns the first that is wrong with the number of rays, the spectrum or the polarisation; `None` where nothing is.
     fn light_fault(&self, scene: &Scene) -> Fault {
         if self.rays == Some(0) {
             return Some(("rays", "`rays` must be positive".into()));
@@ -219,7 +220,7 @@ impl Source {
         None
     }
 
-    /// What is wrong with the keys of the lobe.
+    /// Returns the first key of the lobe that is missing, out of range or of another kind of source; `None` where all are right.
     fn lobe_fault(&self) -> Fault {
         match (self.kind, self.half_angle_deg, self.exponent) {
             (SourceKind::Cone, Some(a), _) if a > 0.0 && a <= 180.0 => {}
@@ -238,7 +239,7 @@ impl Source {
     }
 }
 
-/// A key with what is wrong with it.
+/// A key with what is wrong with it; `None` where nothing is.
 type Fault = Option<(&'static str, String)>;
 
 /// Powers that a source may have, in the unit of the run: sums over rays neither overflow nor vanish.

@@ -43,7 +43,10 @@ pub enum SpectrumName {
 }
 
 impl SpectrumKey {
-    /// The spectrum in the form the laws of light read.
+    /// Returns the spectrum in the form that the laws of light read.
+    ///
+    /// # Errors
+    /// When a key is missing or belongs to another kind, or its values are no spectrum.
     pub(crate) fn optics(&self) -> Result<Spectrum, String> {
         let values = || self.values.clone().ok_or("this spectrum needs `values`, pairs of nm and power");
         let allowed: &[&str] = match self.kind {
@@ -89,7 +92,10 @@ impl SpectrumKey {
         Ok(spectrum)
     }
 
-    /// What wavelengths are drawn from: the watts of the spectrum, or its lumens where the run counts these.
+    /// Returns what wavelengths are drawn from: the watts of the spectrum, or its lumens where the run counts these.
+    ///
+    /// # Errors
+    /// When the spectrum is wrong, or has no lumens that a run could count.
     pub(crate) fn wavelengths(&self, unit: PowerUnit) -> Result<Wavelengths, String> {
         let watts = self.optics()?.sampler().map_err(|e| e.to_string())?;
         match unit {

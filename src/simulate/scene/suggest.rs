@@ -1,18 +1,18 @@
 //! The name that was probably meant.
 
-/// The candidate nearest to a word, if it is near enough to be a slip of the pen.
+/// Returns the candidate nearest to a word, in any case of letters; `None` where a third of the letters and more differ.
 pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = word.to_lowercase();
     candidates
         .into_iter()
-        .map(|c| (distance(&word, &c.to_lowercase()), c))
+        .map(|c| (edit_distance(&word, &c.to_lowercase()), c))
         // A third of the letters, and one more for short words: what differs more is another word.
         .filter(|(d, c)| *d <= 1 + c.len().max(word.len()) / 3)
         .min_by_key(|(d, _)| *d)
         .map(|(_, c)| c)
 }
 
-/// The nearest name, or all of them.
+/// Returns advice that names the nearest name, or the first twelve where none is near.
 pub(crate) fn nearest_or_all(word: &str, names: &[&str]) -> String {
     match nearest(word, names.iter().copied()) {
         Some(near) => format!("did you mean '{near}'?"),
@@ -21,8 +21,8 @@ pub(crate) fn nearest_or_all(word: &str, names: &[&str]) -> String {
     }
 }
 
-/// Levenshtein's distance. Quadratic; words are cut at 64 characters so that no input makes it long.
-fn distance(a: &str, b: &str) -> usize {
+/// Returns Levenshtein's distance. Quadratic; words are cut at 64 characters so that no input makes it long.
+fn edit_distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.iter().enumerate() {

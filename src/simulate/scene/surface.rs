@@ -9,7 +9,10 @@ use crate::simulate::{Error, ErrorKind};
 const LARGEST_INDEX: f64 = 1e3;
 
 impl Material {
-    /// The surface as a coating and a scatter, for all kinds but `absorber`; what is wrong with it otherwise, and at which key.
+    /// Returns the surface as a coating and a scatter; bare where only a medium is given, and without any share for an absorber.
+    ///
+    /// # Errors
+    /// With the key that is wrong, and what is wrong with it.
     pub(crate) fn optics(&self) -> Result<(Coating, Option<Scatter>), (&'static str, String)> {
         // A boundary that says only its medium is a bare one.
         let kind = self.surface.unwrap_or(SurfaceKind::Interface);
@@ -22,7 +25,7 @@ impl Material {
             },
             SurfaceKind::Mirror | SurfaceKind::Diffuse => reflector(self.reflectance.as_ref(), 1.0, 0.0),
             SurfaceKind::Coating => match &self.coating {
-                Some(rows) => table(rows).map_err(|e| ("coating", e)),
+                Some(rows) => coating_from_rows(rows).map_err(|e| ("coating", e)),
                 // A coating passes only what it says that it passes; the rest is absorbed.
                 None => reflector(self.reflectance.as_ref(), 0.0, self.transmittance.unwrap_or(0.0)),
             },
@@ -36,7 +39,10 @@ impl Material {
         Ok((coating, scatter))
     }
 
-    /// Every key must belong to this kind of surface.
+    /// Checks that every key given belongs to this kind of surface.
+    ///
+    /// # Errors
+    /// With the first that does not.
     fn check_keys(&self, kind: SurfaceKind) -> Result<(), (&'static str, String)> {
         let mirror = matches!(kind, SurfaceKind::Mirror | SurfaceKind::Diffuse);
         let coated = kind == SurfaceKind::Coating;
@@ -55,7 +61,10 @@ impl Material {
         }
     }
 
-    /// The scattering that is asked for, when its lobe has just the parameters that it needs.
+    /// Returns the scattering that is asked for; `None` where none is.
+    ///
+    /// # Errors
+    /// When the lobe has not just the parameters that it needs.
     fn scatter(&self) -> Result<Option<Scatter>, String> {
         let Some(s) = &self.scatter else { return Ok(None) };
         let lobe = match (s.lobe, s.sigma_deg, s.exponent, s.abg) {
@@ -75,7 +84,10 @@ impl Material {
     }
 }
 
-/// The coating of given reflectance, `unset` where the scene gives none; errors come with the key they belong to.
+/// Makes the coating of a reflectance, `unset` where the scene gives none, and a transmittance that is the same everywhere.
+///
+/// # Errors
+/// With the key they belong to.
 fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<Coating, (&'static str, String)> {
     let same = |r: f64| Split {
         reflected: Power { rs: r, rp: r },
@@ -94,13 +106,16 @@ fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<
                 .map_err(|e| ("reflectance", e.to_string()))
         }
         Some(Reflectance::ByAngleAndWavelength(t)) => {
-            grid(t.iter().map(|[a, nm, r]| ([*a, *nm], same(*r)))).map_err(|e| ("reflectance", e))
+            coating_from_grid(t.iter().map(|[a, nm, r]| ([*a, *nm], same(*r)))).map_err(|e| ("reflectance", e))
         }
     }
 }
 
-/// A coating from rows of angle, wavelength, R, T or of angle, wavelength, Rs, Rp, Ts, Tp.
-fn table(rows: &[Vec<f64>]) -> Result<Coating, String> {
+/// Makes a coating from rows of angle (degrees), wavelength (nm), R, T or of angle, wavelength, Rs, Rp, Ts, Tp.
+///
+/// # Errors
+/// When a row has another length, or they make no full grid.
+fn coating_from_rows(rows: &[Vec<f64>]) -> Result<Coating, String> {
     let cells = rows.iter().map(|row| match row[..] {
         [a, nm, r, t] => {
             Ok(([a, nm], Split { reflected: Power { rs: r, rp: r }, transmitted: Power { rs: t, rp: t } }))
@@ -110,11 +125,14 @@ fn table(rows: &[Vec<f64>]) -> Result<Coating, String> {
         }
         _ => Err(format!("a row has {} numbers, not 4 or 6", row.len())),
     });
-    grid(cells.collect::<Result<Vec<_>, _>>()?.into_iter())
+    coating_from_grid(cells.collect::<Result<Vec<_>, _>>()?.into_iter())
 }
 
-/// A coating table from rows of (angle, wavelength) that make a full grid, wavelengths fastest.
-fn grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Coating, String> {
+/// Makes a coating from rows of (angle in degrees, wavelength in nm) that make a full grid, wavelengths fastest.
+///
+/// # Errors
+/// When they do not, or their shares are out of range.
+fn coating_from_grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Coating, String> {
     let (keys, cells): (Vec<[f64; 2]>, Vec<Split>) = rows.unzip();
     let first = keys.first().ok_or("the table is empty")?[0];
     // The first angle's rows tell the wavelengths; the rest must repeat them.
@@ -129,7 +147,7 @@ fn grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Coating, String
     CoatingTable::new(angles, nm, cells).map(Coating::Table).map_err(|e| e.to_string())
 }
 
-/// Refuses materials that say nothing, select twice or name a medium that is not known.
+/// Refuses materials that say nothing, select twice, have values that do not go together or name a medium that is not known.
 pub(super) fn check(scene: &Scene) -> Result<(), Error> {
     if let Some(name) = &scene.ambient {
         medium::find(scene, name, &[Key::Name("ambient")])?;

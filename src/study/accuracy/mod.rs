@@ -26,11 +26,11 @@ pub struct Settings {
     pub trees: Vec<FacetTree>,
     /// Rays: both the timed and the judged ones.
     pub rays: u64,
-    /// Timed rounds.
+    /// Timed rounds, beside one that is not timed.
     pub rounds: usize,
     /// Numbers of threads; 1 or that of the current rayon pool.
     pub threads: Vec<usize>,
-    /// Of the rays.
+    /// Seed of the rays.
     pub seed: u64,
     /// Seconds of work that the caller does after the sweep, for the time left.
     pub seconds_after: f64,
@@ -59,7 +59,7 @@ impl Default for Settings {
 pub struct Row {
     /// Name of the model.
     pub model: String,
-    /// Uniform tolerance, or the lower end of the adaptive one; none for the spline.
+    /// Uniform tolerance, or the lower end of the adaptive one; `None` for the spline.
     pub tolerance_mm: Option<f64>,
     /// Whether the tolerance was a range.
     pub adaptive: bool,
@@ -73,49 +73,49 @@ pub struct Row {
     pub facets: usize,
     /// Bytes of mesh and structure.
     pub bytes: usize,
-    /// Sampled on the facets, mm.
+    /// Mean distance of the facets from the spline, sampled, mm; `None` for the spline.
     pub sag_mean_mm: Option<f64>,
-    /// Sampled on the facets, mm.
+    /// Largest distance of the facets from the spline, sampled, mm; `None` for the spline.
     pub sag_max_mm: Option<f64>,
-    /// Seconds.
+    /// Seconds of making the facets; `None` for the spline.
     pub seconds_tessellate: Option<f64>,
-    /// Seconds.
+    /// Seconds of building the structure.
     pub seconds_build: f64,
-    /// Seconds for all rays.
+    /// Seconds of the fastest round for all rays.
     pub seconds_trace_min: f64,
-    /// Seconds for all rays.
+    /// Seconds of the middle round for all rays.
     pub seconds_trace_median: f64,
-    /// Seconds for all rays.
+    /// Seconds that 90 % of the rounds stayed below, for all rays.
     pub seconds_trace_p90: f64,
     /// Rays traced.
     pub rays: u64,
-    /// Distance between hit and exact hit, mm.
+    /// Median distance between hit and exact hit, mm.
     pub hit_error_mm_p50: f64,
-    /// Distance between hit and exact hit, mm.
+    /// 99th percentile of the distance between hit and exact hit, mm.
     pub hit_error_mm_p99: f64,
-    /// Of the mirrored ray, degrees.
+    /// Median error of the mirrored ray's direction, degrees.
     pub direction_error_deg_p50: f64,
-    /// Of the mirrored ray, degrees; grazing rays dominate it.
+    /// Root mean square of that error, degrees; grazing rays dominate it.
     pub direction_error_deg_rms: f64,
-    /// Of the mirrored ray, degrees.
+    /// 99th percentile of that error, degrees.
     pub direction_error_deg_p99: f64,
-    /// Of the mirrored ray, degrees.
+    /// Largest such error, degrees.
     pub direction_error_deg_max: f64,
-    /// Of the ray refracted into n = 1.5, degrees.
+    /// Root mean square error of the direction of the ray refracted into n = 1.5, degrees.
     pub refracted_error_deg_rms: f64,
-    /// Of the ray refracted into n = 1.5, degrees.
+    /// 99th percentile of that error, degrees.
     pub refracted_error_deg_p99: f64,
     /// Rays that hit only one of the two, or another face.
     pub flips: u64,
 }
 
 impl Row {
-    /// Seconds from the model to the answer.
+    /// Returns the seconds from the model to the answers of this row's rays: meshing, building and the median trace.
     pub fn seconds(&self) -> f64 {
         self.seconds_prepare() + self.seconds_trace_median
     }
 
-    /// Before the first ray; the spline has no facets to make.
+    /// Returns the seconds before the first ray; the spline has no facets to make.
     fn seconds_prepare(&self) -> f64 {
         self.seconds_tessellate.unwrap_or(0.0) + self.seconds_build
     }
@@ -136,12 +136,12 @@ pub struct Slope {
     pub points: usize,
 }
 
-/// The study.
+/// The rows of the study, and what follows from them.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Accuracy {
     /// Every combination.
     pub rows: Vec<Row>,
-    /// For each kind of normals.
+    /// How the error falls, for each kind of normals.
     pub slopes: Vec<Slope>,
     /// Indices of rows that no other row beats in both error (p99) and time, by falling error.
     pub front: Vec<usize>,
@@ -149,9 +149,9 @@ pub struct Accuracy {
     pub answer: String,
 }
 
-/// Slopes over the uniform tolerances of the first tree, of the median error: the error goes with tan i, whose mean square
-/// over isotropic rays has no limit, so an rms follows the few most grazing rays instead of the facets. Where more than half of the
-/// hits are on planes, the 99th percentile stands in for the median.
+/// Fits, for each kind of normals, the median error against sag and facet length over the uniform tolerances of the first tree; kinds with
+/// fewer than two usable tolerances are left out. The error goes with tan i, whose mean square over isotropic rays has no limit, so an rms
+/// follows the few most grazing rays instead of the facets. Where more than half of the hits are on planes, the 99th percentile stands in.
 fn slopes(rows: &[Row]) -> Vec<Slope> {
     let mut names: Vec<&str> = Vec::new();
     for r in rows.iter().filter(|r| r.tolerance_mm.is_some()) {
@@ -188,7 +188,7 @@ fn slopes(rows: &[Row]) -> Vec<Slope> {
     names.into_iter().filter_map(of).collect()
 }
 
-/// Rows that are not dominated, among those with the most threads.
+/// Returns the indices of the rows with the most threads that no other of them beats in both time and p99 error, by falling error.
 fn front(rows: &[Row]) -> Vec<usize> {
     // Fewer threads are slower throughout: their rows would only hide behind the others.
     let threads = rows.iter().map(|r| r.threads).max().unwrap_or(1);
@@ -209,13 +209,14 @@ fn front(rows: &[Row]) -> Vec<usize> {
 const JOB: f64 = 1e6;
 
 impl Row {
-    /// Seconds from the model to the answers of a job of a million rays, tracing in proportion to the rays.
+    /// Returns the seconds from the model to the answers of a job of a million rays, tracing in proportion to the rays.
     pub fn seconds_of_job(&self) -> f64 {
         self.seconds_prepare() + self.seconds_trace_median * JOB / self.rays.max(1) as f64
     }
 }
 
-/// "For 0.05° take …": the cheapest combination whose p99 direction error is within `target` degrees.
+/// Writes "For 0.05° take …": the combination of facets that is cheapest for a million rays with a p99 direction error within `target`
+/// degrees, or that there is none; and what the spline costs.
 pub fn sentence(rows: &[Row], target: f64) -> String {
     let threads = rows.iter().map(|r| r.threads).max().unwrap_or(1);
     let timed =

@@ -11,7 +11,8 @@ use crate::study::{Progress, Rounds, Timing};
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Sweeps a model. Runs on the current rayon pool.
+/// Sweeps the tolerances, kinds of normals and trees of the settings over one model, against the exact hits of the same rays. Runs on the
+/// current rayon pool; calls `progress` with a forecast of the time left.
 pub fn accuracy(
     name: &str,
     mesh_source: &dyn MeshSource,
@@ -26,7 +27,7 @@ pub fn accuracy(
     let rays = source.rays(0..source.len());
     let mut study =
         Sweep { name, mesh_source, settings, rays: &rays, truth: Vec::new(), rows: Vec::new(), countdown };
-    study.exact();
+    study.time_spline();
     // Facets in either structure take about four fifths of the spline's time, all kinds of normals and meshing taken together.
     let combinations = (settings.trees.len() * settings.normals.len() * (settings.rounds + 1)) as f64;
     let guess = 0.8 * combinations * study.rows.iter().map(|r| r.seconds_trace_median).sum::<f64>();
@@ -47,7 +48,7 @@ pub fn accuracy(
         let left = ahead.seconds() + settings.seconds_after;
         study.countdown.stage(&format!("tolerance {range}"), Some(left));
         let start = Instant::now();
-        let prepare = study.tolerance([low, high]);
+        let prepare = study.time_tolerance([low, high]);
         ahead.known.push((k, [prepare, start.elapsed().as_secs_f64() - prepare]));
         blocks.push((k + 1, std::mem::take(&mut study.rows)));
     }
@@ -69,13 +70,13 @@ struct Forecast {
 }
 
 impl Forecast {
-    /// Logarithm of the middle of a range of tolerances.
+    /// Returns the logarithm of the geometric middle of the `k`-th range of tolerances.
     fn fineness(&self, k: usize) -> f64 {
         0.5 * (self.tolerances[k][0] * self.tolerances[k][1]).ln()
     }
 
-    /// Meshing and building go with the facets, that is with 1/tolerance; tracing grows evenly with its logarithm, by about a tenth
-    /// per halving where only one tolerance is known.
+    /// Forecasts the seconds of all tolerances to come. Meshing and building go with the facets, that is with 1/tolerance; tracing grows
+    /// evenly with its logarithm, by about a tenth per halving where only one tolerance is known.
     fn seconds(&self) -> f64 {
         let mut known: Vec<(f64, [f64; 2])> = self.known.iter().map(|&(k, s)| (self.fineness(k), s)).collect();
         known.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -124,7 +125,7 @@ struct Runner<'a> {
 }
 
 impl Sweep<'_> {
-    /// Times the runners in alternating rounds; each leaves its hits.
+    /// Times the runners on all rays in alternating rounds, in seconds and in their order; each is left with its hits.
     fn race(&self, runners: &[Runner<'_>], threads: usize) -> Vec<Timing> {
         let mut rounds = Rounds::default();
         for runner in runners {
@@ -142,8 +143,8 @@ impl Sweep<'_> {
         Runner { who, hits: Mutex::new(vec![None; self.rays.len()]) }
     }
 
-    /// Times the exact spline; its hits are the truth of all that follows.
-    fn exact(&mut self) {
+    /// Times the exact spline, adds its rows, and keeps its hits as the truth of all that follows.
+    fn time_spline(&mut self) {
         let who = self.mesh_source.exact();
         let runners = [self.runner(who)];
         for &threads in &self.settings.threads {
@@ -156,14 +157,15 @@ impl Sweep<'_> {
                 seconds_build: footprint.build_seconds,
                 ..row
             };
-            self.push(row, timing, threads);
+            self.push_row(row, timing, threads);
         }
         let [runner] = runners;
         self.truth = runner.hits.into_inner().unwrap_or_else(|e| e.into_inner());
     }
 
-    /// Gives the seconds of meshing and building.
-    fn tolerance(&mut self, tolerance: [f64; 2]) -> f64 {
+    /// Makes facets of a tolerance `[min, max]`, mm, times every tree and kind of normals on them, and adds their rows; returns the seconds
+    /// of meshing and building.
+    fn time_tolerance(&mut self, tolerance: [f64; 2]) -> f64 {
         let start = Instant::now();
         let meshed = self.mesh_source.mesh(tolerance);
         let settings = self.settings;
@@ -177,16 +179,16 @@ impl Sweep<'_> {
                 for ((combination, runner), timing) in combinations.iter().zip(&runners).zip(timings) {
                     // Hits are the same in every round; those of the last one are judged.
                     let hits = runner.hits.lock().unwrap_or_else(|e| e.into_inner()).clone();
-                    let row = self.row(tolerance, &meshed, *combination, &hits);
-                    self.push(row, timing, threads);
+                    let row = self.facet_row(tolerance, &meshed, *combination, &hits);
+                    self.push_row(row, timing, threads);
                 }
             }
             prepare
         })
     }
 
-    /// The row of a tree on a mesh, without what tracing took.
-    fn row(
+    /// Returns the row of a tree on a mesh, with the errors of its hits against the truth; what tracing took is left out.
+    fn facet_row(
         &self,
         tolerance: [f64; 2],
         meshed: &MeasuredMesh,
@@ -220,7 +222,7 @@ impl Sweep<'_> {
     }
 
     /// Adds a row with the times of its rounds.
-    fn push(&mut self, row: Row, timing: Timing, threads: usize) {
+    fn push_row(&mut self, row: Row, timing: Timing, threads: usize) {
         self.rows.push(Row {
             model: self.name.into(),
             threads,

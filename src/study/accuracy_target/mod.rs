@@ -30,12 +30,12 @@ pub struct AccuracyTarget {
     pub check_rays: u64,
     /// Kinds of normals that may be taken.
     pub kinds: Vec<NormalMode>,
-    /// Of all rays here.
+    /// Seed of all rays here.
     pub seed: u64,
 }
 
 impl AccuracyTarget {
-    /// The defaults for an angle: a job of a million rays, checked on 100,000.
+    /// Returns the defaults for an angle: a job of a million rays, checked on 100,000.
     pub fn degrees(degrees: f64) -> Self {
         let kinds = vec![NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
         Self { degrees, job_rays: 1e6, check_rays: 100_000, kinds, seed: 1 }
@@ -45,13 +45,13 @@ impl AccuracyTarget {
 /// What to do.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AccuracyPlan {
-    /// Asked, degrees.
+    /// Error that was asked for, degrees.
     pub asked_deg: f64,
     /// Reached on fresh rays (p99), degrees.
     pub reached_deg: f64,
     /// The largest error of these rays, degrees.
     pub largest_deg: f64,
-    /// Whether the 99th percentile is within what was asked.
+    /// Whether the 99th percentile is within what was asked; also where no ray of the check hit anything.
     pub kept: bool,
     /// Kind of normals to trace with.
     #[serde(serialize_with = "by_name")]
@@ -75,7 +75,7 @@ pub struct AccuracyPlan {
     pub flips: u64,
     /// Seconds spent on finding out.
     pub seconds: f64,
-    /// One sentence.
+    /// The answer in one sentence.
     pub answer: String,
 }
 
@@ -86,9 +86,9 @@ pub struct Trial {
     pub normals: String,
     /// Least and largest local tolerance, mm.
     pub tolerance_mm: [f64; 2],
-    /// Facets.
+    /// Facets made.
     pub facets: usize,
-    /// p99, degrees.
+    /// 99th percentile of the direction error, degrees.
     pub reached_deg: f64,
     /// Seconds for the whole job.
     pub seconds: f64,

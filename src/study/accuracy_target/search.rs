@@ -1,6 +1,6 @@
 //! The search for the cheapest tolerances and normals that meet an accuracy target.
 
-use super::survey::{Survey, factor, p99};
+use super::survey::{Survey, p99, tolerance_factor};
 use super::{AccuracyPlan, AccuracyTarget, Trial};
 use crate::intersect::{Hit, NormalMode};
 use crate::math::{Aabb, FaceId, Ray};
@@ -19,7 +19,7 @@ const PLAIN_NUMBERS: std::ops::Range<f64> = 1e-4..1e4;
 const COARSEST: f64 = 0.2;
 /// Of a small model the coarse tolerance is its diagonal over this.
 const SMALL_MODEL: f64 = 500.0;
-/// And never finer than this, mm: a model of a micrometre.
+/// The coarse tolerance is never finer than this, mm: a model of a micrometre.
 const FINEST_COARSE: f64 = 1e-6;
 /// Finest local tolerance of a plan over the coarse one: facets go with its inverse, and ten thousand times as many are given up.
 const FINEST: f64 = 1e-4;
@@ -30,7 +30,7 @@ const COARSEST_FACTOR: f64 = 4.0;
 const PILOTS: u64 = 65_536;
 /// What is asked is aimed at with this much to spare, since the 99th percentile of fresh rays differs by some percent.
 const MARGIN: f64 = 0.9;
-/// And accepted with this much, so that other rays than the judge's find it kept too.
+/// An error is accepted with this much to spare, so that other rays than the judge's find it kept too.
 const ACCEPTED: f64 = 0.96;
 /// Meshes made for one kind of normals.
 const ATTEMPTS: usize = 6;
@@ -42,7 +42,8 @@ const MOST_FACETS: f64 = 6e6;
 /// Rays of a seed, and how many: those that the job will meet.
 pub type RayGenerator<'r> = dyn Fn(u64, u64) -> Vec<Ray> + Sync + 'r;
 
-/// Finds the cheapest way to an accuracy for random rays through the model. Runs on the current rayon pool.
+/// Finds the cheapest tolerances and normals that reach an accuracy, for random rays through the model; the best found where none reaches
+/// it. Makes several meshes for each kind of normals, on the current rayon pool.
 pub fn meet_target(
     model: &Model,
     mesh_source: &dyn MeshSource,
@@ -59,7 +60,8 @@ pub fn meet_target(
     meet_target_for_rays(model, mesh_source, target, &uniform, progress)
 }
 
-/// The same for rays of one's own, such as those of a scene.
+/// Finds the cheapest tolerances and normals that reach an accuracy for rays of one's own, such as those of a scene: `rays` is asked for so
+/// many under several seeds. The best found where none reaches it; runs on the current rayon pool.
 pub fn meet_target_for_rays(
     model: &Model,
     mesh_source: &dyn MeshSource,
@@ -73,7 +75,8 @@ pub fn meet_target_for_rays(
     clock.report("pilot rays", 0.0);
     let pilots = ReferenceRays::new(mesh_source, rays(target.seed, PILOTS));
     let survey = Survey::new(model, &pilots.rays, &pilots.truth);
-    let search = Search { mesh_source, target, rays, pilots, survey, coarse: coarse(model), fresh: 0.into() };
+    let search =
+        Search { mesh_source, target, rays, pilots, survey, coarse: coarse_tolerance(model), fresh: 0.into() };
     let local = target.kinds.iter().map(|&normals| search.candidate(normals, true));
     // Where few rays meet the sharp places, they may err: one tolerance for all then costs less than holding every face to the angle.
     // On the two reflectors 0.3° cost twice the cheapest combination without it.
@@ -106,15 +109,18 @@ pub fn meet_target_for_rays(
     let found = best.unwrap_or_else(|| search.nothing_tried());
     let kept = found.is_kept(target);
     let [low, high] = found.plan.tolerance_mm();
-    let range =
-        if low == high { format!("{} mm", brief(low)) } else { format!("{} to {} mm", brief(low), brief(high)) };
+    let range = if low == high {
+        format!("{} mm", three_digits(low))
+    } else {
+        format!("{} to {} mm", three_digits(low), three_digits(high))
+    };
     let answer = format!(
         "Asked {}°, reached {}° (99th percentile of {} fresh rays against the spline, at most {}°{}) with {} normals on {} facets within \
          {range}{}.",
         target.degrees,
-        brief(found.reached),
+        three_digits(found.reached),
         found.checked,
-        brief(found.largest),
+        three_digits(found.largest),
         found.without_angle(),
         found.normals,
         found.facets,
@@ -139,8 +145,8 @@ pub fn meet_target_for_rays(
     }
 }
 
-/// Three digits.
-fn brief(x: f64) -> String {
+/// Writes a number with three digits, or with two and an exponent outside of 1e-4 to 1e4.
+fn three_digits(x: f64) -> String {
     if !PLAIN_NUMBERS.contains(&x) {
         return format!("{x:.1e}");
     }
@@ -148,8 +154,8 @@ fn brief(x: f64) -> String {
     format!("{x:.decimals$}")
 }
 
-/// 0.2 mm, the coarse end of what users ask for, or 1/500 of a small model.
-fn coarse(model: &Model) -> f64 {
+/// Returns the coarse end of what users ask for, mm: 0.2, or 1/500 of the diagonal of a small model.
+fn coarse_tolerance(model: &Model) -> f64 {
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
     let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
     (bounds.diagonal() / SMALL_MODEL).clamp(FINEST_COARSE, COARSEST)
@@ -197,24 +203,24 @@ struct Solution {
 }
 
 impl Solution {
-    /// Whether the target was reached.
+    /// Whether the 99th percentile is within what is asked.
     fn is_kept(&self, target: &AccuracyTarget) -> bool {
         self.reached <= target.degrees
     }
     fn seconds(&self) -> f64 {
         self.prepare + self.trace
     }
-    /// Rays that no angle stands for, in words, where they are more than the percentile leaves out.
+    /// Returns the share of rays that no angle stands for, in words; empty where the percentile leaves out as many.
     fn without_angle(&self) -> String {
         let share = self.flips as f64 / (self.flips + self.checked).max(1) as f64;
         if share <= BEYOND_PERCENTILE {
             return String::new();
         }
-        format!("; {} % more meet another face or none", brief(100.0 * share))
+        format!("; {} % more meet another face or none", three_digits(100.0 * share))
     }
 }
 
-/// Facets of a plan, asked some rays.
+/// What some rays showed on the facets of a plan.
 struct Measured {
     /// The face of each facet.
     made: Vec<FaceId>,
@@ -240,7 +246,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Meshes by a plan, traces the reference rays, and holds the mirrored directions against the spline's.
+    /// Meshes by a plan, times the reference rays on it, and compares the mirrored directions with the spline's; rays that hit on one of
+    /// both alone, or other faces, are counted as flips.
     fn measure(&self, plan: &TolerancePlan, normals: NormalMode, on: &ReferenceRays) -> Measured {
         let meshed = self.mesh_source.mesh_plan(plan);
         let mut hits = vec![None; on.rays.len()];
@@ -273,7 +280,8 @@ impl Search<'_> {
         measured
     }
 
-    /// The plan by the formulas, or one tolerance for all places, corrected once by what the pilots measure on coarse facets.
+    /// Makes the plan by the formulas, or one tolerance for all places where not `local`, corrects it once by what the pilots measure on
+    /// coarse facets, and forecasts its facets and seconds.
     fn candidate(&self, normals: NormalMode, local: bool) -> Candidate {
         let order = if normals == NormalMode::Flat || normals == NormalMode::Nearest { 0.5 } else { 1.0 };
         let epsilon = (MARGIN * self.target.degrees).to_radians();
@@ -299,7 +307,7 @@ impl Search<'_> {
             plan = pilot.clone();
             self.survey.adapt(&mut plan, &m.errors, expected, order);
             plan.scale(1.0 / coarser);
-            facets = self.survey.facets(&plan, &pilot, &m.made);
+            facets = self.survey.expected_facets(&plan, &pilot, &m.made);
         }
         let ratio = facets / m.made.len().max(1) as f64;
         // Facets, and with them meshing and building, go with 1/tolerance; tracing grows by about a tenth per halving.
@@ -307,7 +315,8 @@ impl Search<'_> {
         Candidate { normals, plan, order, facets, predicted: m.prepare * ratio + trace }
     }
 
-    /// Meshes, asks fresh rays, and mends the plan until what is asked is reached without waste.
+    /// Meshes, asks fresh rays, and mends the plan until what is asked is reached without waste, or [`ATTEMPTS`] are made; adds each to
+    /// `trials` and returns the best.
     fn reach(&self, candidate: &Candidate, trials: &mut Vec<Trial>) -> Solution {
         let (mut plan, normals) = (candidate.plan.clone(), candidate.normals);
         let mut best: Option<Solution> = None;
@@ -355,7 +364,7 @@ impl Search<'_> {
                 break;
             }
             // Along the law of the error in the sag.
-            let growth = factor(reached, MARGIN * self.target.degrees, candidate.order);
+            let growth = tolerance_factor(reached, MARGIN * self.target.degrees, candidate.order);
             if m.made.len() as f64 / growth > MOST_FACETS {
                 break;
             }
@@ -364,7 +373,7 @@ impl Search<'_> {
         best.unwrap_or_else(|| self.nothing_tried())
     }
 
-    /// What stands for a result when no candidate was measured: infinite error, no facets.
+    /// Returns what stands for a result when no candidate was measured: infinite error, no facets.
     fn nothing_tried(&self) -> Solution {
         Solution {
             normals: NormalMode::Exact,

@@ -17,7 +17,7 @@ const FLATTEST_MM: f64 = 1e12;
 /// Least and largest factor of one correction.
 const STEPS: [f64; 2] = [1e-3, 30.0];
 
-/// What is known of one pilot's hit.
+/// What is known of one pilot's hit; the radius of curvature in mm.
 #[derive(Clone, Copy, Debug)]
 struct PilotHit {
     /// Index of the face among the distinct ones.
@@ -31,7 +31,7 @@ struct PilotHit {
 pub(super) struct Survey {
     /// The placed faces of each distinct face.
     faces: Vec<Vec<FaceId>>,
-    /// Which distinct face a placed one is of.
+    /// Index of the distinct face of each placed one; `None` for ready meshes.
     of: Vec<Option<usize>>,
     pilots: Vec<PilotHit>,
 }
@@ -42,7 +42,7 @@ const ENOUGH: usize = 100;
 const MANY: usize = 400;
 
 impl Survey {
-    /// Numbers the distinct faces of a model, and notes radius and tilt where rays hit them.
+    /// Numbers the distinct faces of a model, and notes radius and tilt where rays hit them; `truth` are their exact hits.
     pub(super) fn new(model: &Model, rays: &[Ray], truth: &[Option<Hit>]) -> Self {
         let placed: Vec<_> = model.placed_faces().collect();
         let mut names: FxHashMap<*const Face, usize> = FxHashMap::default();
@@ -73,8 +73,8 @@ impl Survey {
         survey
     }
 
-    /// The plan by the formulas: sag ≤ ε·R/(2·tan i) for interpolated normals, 1 − cos(ε/2) of R for flat ones, each for 99 % of a
-    /// face's hits.
+    /// Makes the plan by the formulas, for an angle of `epsilon` rad: sag ≤ ε·R/(2·tan i) for interpolated normals, 1 − cos(ε/2) of R for
+    /// `flat` ones, each for 99 % of a face's hits. Faces with fewer than [`ENOUGH`] hits share one tolerance.
     pub(super) fn plan(&self, epsilon: f64, flat: bool, [finest_mm, coarsest_mm]: [f64; 2]) -> TolerancePlan {
         let of = |faces: Vec<FaceId>, pilots: &mut [PilotHit]| {
             pilots.sort_by(|a, b| a.tilt.total_cmp(&b.tilt));
@@ -101,7 +101,7 @@ impl Survey {
         TolerancePlan { other: of(Vec::new(), &mut self.pilots.clone()), places, coarsest_mm, finest_mm }
     }
 
-    /// Which of the plan's places each placed face belongs to.
+    /// Returns for each placed face the index of its place in the plan; `None` where it shares the common tolerance.
     fn place_of(&self, plan: &TolerancePlan) -> Vec<Option<usize>> {
         let mut all = vec![None; self.of.len()];
         for (k, place) in plan.places.iter().enumerate() {
@@ -112,8 +112,9 @@ impl Survey {
         all
     }
 
-    /// Facets that a plan makes, from those that another made: on each face they go with the inverse of the tolerance.
-    pub(super) fn facets(&self, plan: &TolerancePlan, other: &TolerancePlan, made: &[FaceId]) -> f64 {
+    /// Estimates the facets that a plan makes, from those that `other` made (`made`, the face of each): on each face they go with the
+    /// inverse of the tolerance.
+    pub(super) fn expected_facets(&self, plan: &TolerancePlan, other: &TolerancePlan, made: &[FaceId]) -> f64 {
         let places = self.place_of(plan);
         let mean = |plan: &TolerancePlan, k: Option<usize>| {
             let [a, b] = plan.range(k.and_then(|k| plan.places.get(k)).unwrap_or(&plan.other)).0;
@@ -129,7 +130,8 @@ impl Survey {
         made.iter().map(|f| of(f).max(0.5)).sum()
     }
 
-    /// Tightens or loosens every place by what was measured there: the error goes with the sag to the power `order`.
+    /// Tightens or loosens every place of `plan` with [`MANY`] measured errors, degrees, and the common tolerance, so that p99 comes to
+    /// `epsilon_deg`: the error goes with the sag to the power `order`.
     pub(super) fn adapt(&self, plan: &mut TolerancePlan, errors: &[(FaceId, f64)], epsilon_deg: f64, order: f64) {
         let places = self.place_of(plan);
         let mut own: Vec<Vec<f64>> = vec![Vec::new(); plan.places.len()];
@@ -139,19 +141,20 @@ impl Survey {
             }
         }
         for (place, errors) in plan.places.iter_mut().zip(&mut own).filter(|(_, e)| e.len() >= MANY) {
-            place.of_radius *= factor(p99(errors), epsilon_deg, order);
+            place.of_radius *= tolerance_factor(p99(errors), epsilon_deg, order);
         }
         let mut all: Vec<f64> = errors.iter().map(|e| e.1).collect();
-        plan.other.of_radius *= factor(p99(&mut all), epsilon_deg, order);
+        plan.other.of_radius *= tolerance_factor(p99(&mut all), epsilon_deg, order);
     }
 }
 
-/// What to multiply a tolerance with, in moderate steps: the power law holds near where it was measured.
-pub(super) fn factor(error: f64, wanted: f64, order: f64) -> f64 {
+/// Returns what to multiply a tolerance with so that `error` becomes `wanted`, within [`STEPS`]: the power law holds near where it was
+/// measured.
+pub(super) fn tolerance_factor(error: f64, wanted: f64, order: f64) -> f64 {
     (wanted / error.max(f64::MIN_POSITIVE)).powf(1.0 / order).clamp(STEPS[0], STEPS[1])
 }
 
-/// The 99th percentile; 0 of nothing.
+/// Returns the 99th percentile, 0 of nothing; puts `errors` into another order.
 pub(super) fn p99(errors: &mut [f64]) -> f64 {
     if errors.is_empty() {
         return 0.0;

@@ -22,7 +22,7 @@ pub(super) struct Border {
 }
 
 impl Border {
-    /// A border curve sampled so closely that it strays from no chord by more than a quarter of its length.
+    /// Samples a border curve of a surface so closely that it strays from no chord by more than a quarter of its length.
     pub(super) fn new(curve: UvCurve, surface: &Surface) -> Self {
         let breaks = curve.breakpoints();
         let mut samples = Vec::new();
@@ -36,19 +36,20 @@ impl Border {
         let end = curve.domain()[1];
         samples.push((end, surface.evaluate(curve.evaluate(end))));
         // A straight line of parameters may be a helix of many turns in space.
-        samples = straightened(samples, |t| surface.evaluate(curve.evaluate(t)));
+        samples = with_short_chords(samples, |t| surface.evaluate(curve.evaluate(t)));
         // The curve strays from its chords by no more than a quarter of their length, as it was straightened.
         let longest = samples.windows(2).map(|w| w[0].1.distance(w[1].1)).fold(0.0, f64::max);
         let bounds = Aabb::from_points(samples.iter().map(|s| s.1)).grown(0.25 * longest);
         Self { curve, samples, bounds }
     }
 
-    /// Whether `p` may lie within `enough` of the curve.
+    /// Whether `p` may lie within `enough`, mm, of the curve, by its box.
     pub(super) fn reaches(&self, p: Point, enough: f64) -> bool {
         self.bounds.grown(enough).contains(p)
     }
 
-    /// The distance of `p` from some place of the border within `enough`, where there is one; else a number above `enough`.
+    /// Returns the distance of `p` from some place of the border within `enough`, mm, where there is one, not always the nearest; else a
+    /// number above `enough`.
     pub(super) fn distance(&self, surface: &Surface, p: Point, enough: f64) -> f64 {
         // On parts smaller than the band every sample is near: one of them says all that is asked.
         if let Some(near) = self.samples.iter().map(|s| s.1.distance(p)).find(|&d| d <= enough) {
@@ -77,8 +78,9 @@ impl Border {
     }
 }
 
-/// Further samples, so that the curve between two of them stays within a quarter of their distance from their chord.
-fn straightened(samples: Vec<(f64, Point)>, at: impl Fn(f64) -> Point) -> Vec<(f64, Point)> {
+/// Inserts further samples, so that the curve between two of them stays within a quarter of their distance from their chord; each stretch
+/// is halved at most [`FINEST`] times.
+fn with_short_chords(samples: Vec<(f64, Point)>, at: impl Fn(f64) -> Point) -> Vec<(f64, Point)> {
     let mut out = Vec::with_capacity(samples.len());
     for pair in samples.windows(2) {
         let mut stack = vec![(pair[0], pair[1], 0)];
@@ -103,7 +105,8 @@ fn straightened(samples: Vec<(f64, Point)>, at: impl Fn(f64) -> Point) -> Vec<(f
     out
 }
 
-/// The uv curves that bound a face in space: no seams, no poles.
+/// Returns the uv curves that bound a face in space, seams and poles left out; for a face without loops the sides of its domain. `size`,
+/// mm, is that of the surface.
 pub(super) fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<UvCurve> {
     if !face.loops.is_empty() {
         let mut uses = FxHashMap::default();
@@ -153,7 +156,7 @@ mod tests {
         let ts: Vec<f64> = (0..).map(|i| f64::from(i) / 64.0).take_while(|&t| t < turns).collect();
         let at = |t: f64| surface.evaluate(wound(t));
         let coarse = (0..=16).map(|i| f64::from(i) * 0.5 * (1.0 - 1e-12)).map(|t| (t, at(t))).collect();
-        let fine = straightened(coarse, at);
+        let fine = with_short_chords(coarse, at);
         for t in ts {
             let p = at(t);
             let near = fine.windows(2).any(|w| {

@@ -32,7 +32,7 @@ pub(super) struct Classifier<'a> {
 }
 
 impl<'a> Classifier<'a> {
-    /// A classifier for a model and its mesh; `fallback`, mm, stands for the sag of facets that were not proved.
+    /// Makes a classifier for a model and its mesh; `fallback`, mm, stands for the sag of facets that were not proved.
     pub(super) fn new(model: &'a Model, mesh: &'a FacetMesh, fallback: f64) -> Self {
         // Surfaces are moved into place only for faces that differ: most never do.
         let placed: Vec<_> = model.placed_faces().collect();
@@ -50,23 +50,24 @@ impl<'a> Classifier<'a> {
         Self { mesh, placed, surfaces, facets, fallback, rounding: ROUNDING * size }
     }
 
-    /// A face's surface at its place, made when it is first asked for.
+    /// Returns a face's surface at its place, made when it is first asked for; `None` for a ready mesh or a face that does not exist.
     fn surface(&self, face: FaceId) -> Option<&PlacedSurface> {
         let placed = self.placed.get(face.index())?;
         self.surfaces[face.index()].get_or_init(|| PlacedSurface::new(placed)).as_ref()
     }
 
-    /// Sag of a facet, mm: proved, or what was asked of the mesher.
+    /// Returns the sag of a facet, mm: proved, or what was asked of the mesher.
     fn sag(&self, facet: u32) -> f64 {
-        self.proved(facet).unwrap_or(self.fallback)
+        self.proved_sag(facet).unwrap_or(self.fallback)
     }
 
-    fn proved(&self, facet: u32) -> Option<f64> {
+    /// Returns the proved sag of a facet, mm; `None` where it was not proved.
+    fn proved_sag(&self, facet: u32) -> Option<f64> {
         self.mesh.sag.get(facet as usize).copied().filter(|s| s.is_finite())
     }
 
-    /// Largest sag of those facets of a face that the ray passes within their own sag; of all when it passes none, as beside
-    /// a border or over a hole.
+    /// Returns the largest sag, mm, of those facets of a face that the ray's line passes within their own sag and `gap`; of all when it
+    /// passes none, as beside a border or over a hole.
     fn band(&self, face: FaceId, ray: &Ray, gap: f64) -> f64 {
         let near = |&i: &u32| {
             let sag = self.sag(i);
@@ -79,8 +80,8 @@ impl<'a> Classifier<'a> {
         passed.unwrap_or_else(|| all.iter().map(|&i| self.sag(i)).fold(0.0, f64::max))
     }
 
-    /// How far a facet that nobody proved strays from the spline: the farthest of 25 of its points.
-    fn measured(&self, hit: &Hit, surface: &PlacedSurface, ray: &Ray) -> f64 {
+    /// Measures how far, mm, the facet that was hit strays from the spline: the farthest of 25 of its points.
+    fn measured_sag(&self, hit: &Hit, surface: &PlacedSurface, ray: &Ray) -> f64 {
         // A grid over the facet's two triangles, which share the diagonal from a to c.
         let [a, b, c, d] = self.mesh.corners(hit.primitive as usize);
         let points = (0..25).map(|k| {
@@ -90,7 +91,7 @@ impl<'a> Classifier<'a> {
         points.map(|p| surface.foot(p, hit.uv, ray.direction).offset.abs()).fold(0.0, f64::max)
     }
 
-    /// `None` when the answers agree to rounding.
+    /// Returns why facets and spline answer a ray differently; `None` when the answers agree to rounding. `None` for a hit is a miss.
     pub(super) fn compare(&self, ray: &Ray, facet: Option<&Hit>, exact: Option<&Hit>) -> Option<Cause> {
         let (f, e) = match (facet, exact) {
             (None, None) => return None,
@@ -111,7 +112,7 @@ impl<'a> Classifier<'a> {
         (apart > self.rounding).then_some(Cause::WithinSag)
     }
 
-    /// The cause of a difference, from the earlier of the two hits: why did the other not see it?
+    /// Finds the cause of a difference, from the earlier of the two hits: why did the other not see it?
     fn explain(&self, ray: &Ray, facet: Option<&Hit>, exact: Option<&Hit>) -> Cause {
         // A touch is no crossing: rounding decides who sees it.
         if exact.is_some_and(|e| e.certainty == Certainty::Tangent) {
@@ -132,10 +133,10 @@ impl<'a> Classifier<'a> {
         let sag = self.band(first.face, ray, surface.gap);
         let cause = self.cause(ray, first, other, surface, sag);
         // A facet that the mesher itself does not vouch for, and that strays farther than was asked: so much is measured here.
-        if let (Cause::Unexplained(_), Some(f)) = (cause, facet.filter(|f| self.proved(f.primitive).is_none()))
+        if let (Cause::Unexplained(_), Some(f)) = (cause, facet.filter(|f| self.proved_sag(f.primitive).is_none()))
             && let Some(its) = self.surface(f.face)
         {
-            let measured = self.measured(f, its, ray);
+            let measured = self.measured_sag(f, its, ray);
             let again = if measured > sag { self.cause(ray, first, other, surface, measured) } else { cause };
             if !matches!(again, Cause::Unexplained(_)) {
                 return Cause::Unproved;
@@ -144,7 +145,7 @@ impl<'a> Classifier<'a> {
         cause
     }
 
-    /// The cause when facets may stray from the first hit's face by `sag`.
+    /// Finds the cause when facets may stray from the first hit's face by `sag`, mm, by following the ray through that band.
     fn cause(&self, ray: &Ray, first: &Hit, other: Option<&Hit>, surface: &PlacedSurface, sag: f64) -> Cause {
         let band = sag + surface.gap + self.rounding + FOOT_POINT * surface.size();
         let Some(stretch) = surface.stretch(ray, first.t, first.uv, band) else {
@@ -176,7 +177,10 @@ impl<'a> Classifier<'a> {
         Cause::Unexplained(Defect::MissedCrossing)
     }
 
-    /// Octree against BVH: `Ok(true)` for a tie between facets, `Err` for a defect.
+    /// Compares the answers of octree and BVH: `Ok(true)` for a tie between facets, `Ok(false)` for the same answer.
+    ///
+    /// # Errors
+    /// For a defect: one misses, or distances or normals differ by more than rounding.
     pub(super) fn same_facets(&self, ray: &Ray, a: Option<&Hit>, b: Option<&Hit>) -> Result<bool, ()> {
         let (a, b) = match (a, b) {
             (None, None) => return Ok(false),

@@ -22,7 +22,7 @@ struct Local<'c, 'a> {
 }
 
 impl<'a> Classifiers<'a> {
-    /// For the models of all groups with their meshes; one of a model in one piece.
+    /// Makes a classifier for each group's model and mesh; there is one group, and no `instancing`, for a model in one piece.
     pub(super) fn new(
         groups: &[(&'a Model, &'a FacetMesh)],
         instancing: Option<&'a Instancing>,
@@ -32,38 +32,39 @@ impl<'a> Classifiers<'a> {
         Self { groups: groups.iter().map(classifier).collect(), instancing }
     }
 
-    /// As [`Classifier::compare`].
+    /// Returns why facets and spline differ, as [`Classifier::compare`], for hits in scene coordinates. Of hits in two placements the
+    /// earlier is explained alone.
     pub(super) fn compare(&self, ray: &Ray, facet: Option<&Hit>, exact: Option<&Hit>) -> Option<Cause> {
         let (mut facet, mut exact) = (facet, exact);
         if let (Some(f), Some(e)) = (facet, exact)
-            && self.place(f) != self.place(e)
+            && self.placement_of(f) != self.placement_of(e)
         {
             // Why the other did not see the earlier one does not depend on what it saw elsewhere.
             if f.t < e.t { exact = None } else { facet = None }
         }
-        let Local { classifier, ray, hits: [facet, exact] } = self.local(ray, [facet, exact]);
+        let Local { classifier, ray, hits: [facet, exact] } = self.in_group(ray, [facet, exact]);
         classifier.compare(&ray, facet.as_ref(), exact.as_ref())
     }
 
-    /// As [`Classifier::same_facets`].
+    /// Compares octree and BVH as [`Classifier::same_facets`], for hits in scene coordinates; hits in two placements are a defect.
     pub(super) fn same_facets(&self, ray: &Ray, a: Option<&Hit>, b: Option<&Hit>) -> Result<bool, ()> {
         if let (Some(a), Some(b)) = (a, b)
-            && self.place(a) != self.place(b)
+            && self.placement_of(a) != self.placement_of(b)
         {
             return Err(());
         }
-        let Local { classifier, ray, hits: [a, b] } = self.local(ray, [a, b]);
+        let Local { classifier, ray, hits: [a, b] } = self.in_group(ray, [a, b]);
         classifier.same_facets(&ray, a.as_ref(), b.as_ref())
     }
 
-    /// The placement that was hit, if it is one.
-    fn place(&self, hit: &Hit) -> Option<usize> {
+    /// Returns the index of the placement that was hit; `None` for the first group and a model in one piece.
+    fn placement_of(&self, hit: &Hit) -> Option<usize> {
         self.instancing.and_then(|i| i.locate(hit.face).0)
     }
 
-    /// Hits of one place, and their ray, as their group sees them.
-    fn local(&self, ray: &Ray, hits: [Option<&Hit>; 2]) -> Local<'_, 'a> {
-        let place = hits.into_iter().flatten().next().and_then(|hit| self.place(hit));
+    /// Moves hits of one placement, and their ray, into the coordinates of its group; the first group's are the scene's.
+    fn in_group(&self, ray: &Ray, hits: [Option<&Hit>; 2]) -> Local<'_, 'a> {
+        let place = hits.into_iter().flatten().next().and_then(|hit| self.placement_of(hit));
         let numbered = |hit: &Hit| Hit { face: self.instancing.map_or(hit.face, |i| i.locate(hit.face).1), ..*hit };
         let hits = hits.map(|hit| hit.map(numbered));
         let Some(place) = place.and_then(|k| Some(&self.instancing?.placements[k])) else {

@@ -11,13 +11,13 @@ use std::hint::black_box;
 pub struct Competitor<'a> {
     /// As in [`PerIntersector`]: `octree`, `octree_single`, `bvh2`, `cwbvh`, `cwbvh_as_shipped`, `polish`, `exact`.
     pub name: &'a str,
-    /// Who answers.
+    /// The intersector that is timed.
     pub who: &'a dyn Intersector,
     /// Whether it gets the rays as one batch or one by one.
     pub batch: bool,
 }
 
-/// Times all competitors on the same rays, on this thread, in alternating rounds; seconds per pass over the rays.
+/// Times all competitors on the same rays, on this thread, in alternating rounds; returns seconds per pass over the rays, by name.
 pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> Vec<(String, Timing)> {
     let mut race = Rounds::default();
     for c in competitors {
@@ -40,7 +40,7 @@ pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> V
 }
 
 impl PerIntersector {
-    /// The figures with what people call the intersectors.
+    /// Returns the figures with what people call the intersectors, in a fixed order.
     pub fn named(&self) -> [(&'static str, Option<f64>); 7] {
         [
             ("octree, batch", self.octree),

@@ -82,7 +82,8 @@ impl Default for Settings {
 /// Rays checked by one task.
 const CHUNK: u64 = 8192;
 
-/// Asks octree, BVH and spline about every ray and classifies every difference. Runs on the current rayon pool.
+/// Asks octree, BVH and spline about every ray and classifies every difference. Runs on the current rayon pool; timings, build times and
+/// sizes are left empty.
 pub fn cross_check(
     intersectors: &Intersectors<'_>,
     rays: &(impl RaySource + ?Sized),
@@ -94,7 +95,8 @@ pub fn cross_check(
     cross_check_groups(&whole, rays, settings, progress)
 }
 
-/// The same for a model in groups.
+/// Asks octrees, BVHs and splines of a model in groups about every ray and classifies every difference; rays and hits are in scene
+/// coordinates. Runs on the current rayon pool; timings, build times and sizes are left empty.
 pub fn cross_check_groups(
     intersectors: &GroupedIntersectors<'_>,
     rays: &(impl RaySource + ?Sized),
@@ -132,7 +134,7 @@ pub fn cross_check_groups(
     check
 }
 
-/// Angle between unit vectors, degrees, accurate for small angles too.
+/// Returns the angle between unit vectors, degrees, accurate for small angles too.
 pub(super) fn angle_deg(a: crate::math::Vector, b: crate::math::Vector) -> f64 {
     // By the cross product too: the arc cosine loses half of the digits of small angles.
     a.cross(b).length().atan2(a.dot(b)).to_degrees()
@@ -148,7 +150,7 @@ struct Tally {
 }
 
 impl Tally {
-    /// The tally of some rays, of which `first` is the number of the first.
+    /// Asks all three about some rays, of which `first` is the number of the first, and tallies the answers.
     fn of_rays(
         intersectors: &GroupedIntersectors<'_>,
         classifier: &Classifiers<'_>,
@@ -189,7 +191,7 @@ impl Tally {
             }
         }
         let cause = classifier.compare(ray, octree.as_ref(), exact.as_ref());
-        self.count(cause, octree, exact);
+        self.count_cause(cause, octree, exact);
         // A hit that only one has is kept whatever its cause, for it changes where the light goes.
         let flipped = octree.is_some() != exact.is_some();
         if facets_differ || flipped || cause.is_some_and(|c| c != Cause::WithinSag) {
@@ -197,8 +199,8 @@ impl Tally {
         }
     }
 
-    /// Counts how facets and spline differ, and the cause.
-    fn count(&mut self, cause: Option<Cause>, octree: Option<Hit>, exact: Option<Hit>) {
+    /// Counts how facets and spline differ, and the cause; adds to the errors where both hit the same face within the sag.
+    fn count_cause(&mut self, cause: Option<Cause>, octree: Option<Hit>, exact: Option<Hit>) {
         let found = &mut self.check.facets_vs_exact;
         match (octree, exact) {
             (Some(f), Some(e)) if f.face == e.face => {
@@ -227,7 +229,7 @@ impl Tally {
         *counter += 1;
     }
 
-    /// Adds another tally; of kept rays there are `keep` at most.
+    /// Adds another tally; of its kept rays as many as leave `keep` at most in all.
     fn absorb(&mut self, other: Self, keep: usize) {
         let (a, b) = (&mut self.check, &other.check);
         a.hits += b.hits;

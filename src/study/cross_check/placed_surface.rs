@@ -42,7 +42,7 @@ pub(super) struct Foot {
     pub(super) normal: Vector,
     /// Distance, negative inside.
     pub(super) offset: f64,
-    /// Curvature of the surface along the ray's tangential direction, 1/mm.
+    /// Curvature of the surface along the ray's tangential direction, 1/mm; positive towards the normal.
     curvature: f64,
     /// Whether the foot is held back by the end of the domain.
     held: bool,
@@ -55,7 +55,7 @@ pub(super) struct BandInterval {
     pub(super) range: [f64; 2],
     /// The side on which the ray leaves the band, before and after; 0 where the ray itself ends inside.
     pub(super) sides: [i8; 2],
-    /// Whether it comes within the band of the face's border.
+    /// Whether it comes near the face's border: within the band and twice the gap.
     pub(super) border: bool,
     /// Whether both ends were found within the budget of steps.
     pub(super) complete: bool,
@@ -65,7 +65,7 @@ pub(super) struct BandInterval {
 const STEPS: usize = 1000;
 
 impl PlacedSurface {
-    /// `None` for a face without a surface.
+    /// Makes the surface of a placed face in scene coordinates (mm), with its border; `None` for a ready mesh.
     pub(super) fn new(placed: &PlacedFace<'_>) -> Option<Self> {
         let face = placed.face?;
         let surface = face.surface.transformed(|p| placed.placement.point(p));
@@ -83,12 +83,13 @@ impl PlacedSurface {
         Some(Self { surface, sign, size, gap: face.gap * placed.placement.scale, borders, seeds })
     }
 
-    /// Diagonal of the box about the control points, mm.
+    /// Returns the diagonal of the box about the control points, mm.
     pub(super) fn size(&self) -> f64 {
         self.size
     }
 
-    /// The foot of `p`, from a guess; where the guess ends at the end of the domain, also from everywhere else.
+    /// Returns the point of the surface nearest to `p`, searched from a guess in parameters; where that ends at the end of the domain, from
+    /// the four nearest samples too. Trims are not heeded. `direction` is that along which its curvature is told.
     pub(super) fn foot(&self, p: Point, guess: Uv, direction: Vector) -> Foot {
         let near = self.project(p, guess);
         let mut best = self.describe(p, near, direction);
@@ -111,7 +112,8 @@ impl PlacedSurface {
         best
     }
 
-    /// The surface at `uv` as seen from `p`, and how it bends along `direction`.
+    /// Returns the surface at parameters `uv` as a foot of `p`, and how it bends along `direction`; at a pole as a sphere of its size
+    /// would.
     fn describe(&self, p: Point, uv: Uv, direction: Vector) -> Foot {
         let d = self.surface.second_derivatives(uv);
         let normal = self.surface.normal(uv).map_or(Vector::ZERO, |n| n * self.sign);
@@ -132,7 +134,7 @@ impl PlacedSurface {
         Foot { uv, point: d.point, normal, offset, curvature, held }
     }
 
-    /// A local minimum of the distance inside the domain: Newton with an active set of the domain's sides.
+    /// Finds a local minimum of the distance from `p` inside the domain: Newton with an active set of the domain's sides.
     fn project(&self, p: Point, start: Uv) -> Uv {
         let [[u0, u1], [v0, v1]] = self.surface.domain();
         let mut uv = self.surface.clamp(start);
@@ -176,7 +178,8 @@ impl PlacedSurface {
         uv
     }
 
-    /// Distance from a point of the surface to its border; infinite for a closed face.
+    /// Returns a distance, mm, from a point of the surface to its border, the nearest only where that is beyond `enough`; infinite for a
+    /// closed face and where none comes near.
     fn border_distance(&self, p: Point, enough: f64) -> f64 {
         let mut best = f64::INFINITY;
         for border in self.borders.iter().filter(|b| b.reaches(p, enough)) {
@@ -185,7 +188,8 @@ impl PlacedSurface {
         best
     }
 
-    /// Walks from `t` in both directions for as long as the ray stays within `band` of the surface.
+    /// Walks along the ray from `t` in both directions for as long as it stays within `band`, mm, of the surface; `None` where it is not
+    /// within it at `t`. `guess` are parameters near there.
     pub(super) fn stretch(&self, ray: &Ray, t: f64, guess: Uv, band: f64) -> Option<BandInterval> {
         let start = self.foot(ray.point_at(t), guess, ray.direction);
         if start.offset.abs() > band {
@@ -216,7 +220,7 @@ impl PlacedSurface {
                 }
                 // Steps of two bands cannot jump over a border unseen; a ray that lies almost in the sheet gets longer ones.
                 let longest = band * if steps < STEPS / 2 { 2.0 } else { 2.0 + (steps - STEPS / 2) as f64 };
-                let mut step = self.step(&foot, ray, band).min(longest);
+                let mut step = self.step_length(&foot, ray, band).min(longest);
                 let (before, last) = (at, foot);
                 // On the hollow side of the surface the foot runs ahead of the ray; where it jumps no step is short enough.
                 for _ in 0..4 {
@@ -234,8 +238,8 @@ impl PlacedSurface {
         Some(found)
     }
 
-    /// A length over which the offset changes by at most about half the band.
-    fn step(&self, foot: &Foot, ray: &Ray, band: f64) -> f64 {
+    /// Returns a length along the ray, mm, over which the offset changes by at most about half the band.
+    fn step_length(&self, foot: &Foot, ray: &Ray, band: f64) -> f64 {
         let (g, k) = (foot.normal.dot(ray.direction).abs(), foot.curvature.abs());
         let by_offset =
             if k * band < STRAIGHT * g * g { 0.5 * band / g } else { ((g * g + k * band).sqrt() - g) / k };

@@ -46,7 +46,7 @@ pub enum Defect {
 }
 
 impl Cause {
-    /// The word used in tables.
+    /// Returns the word used in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::WithinSag => "within sag",

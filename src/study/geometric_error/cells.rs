@@ -26,7 +26,7 @@ pub struct MapError {
 
 /// The brightest place of a receiver.
 pub(super) struct Peak {
-    /// In the receiver's unit.
+    /// Its density, in the receiver's unit.
     pub(super) density: Paired,
     /// Cells a side that it was taken over.
     pub(super) cells: usize,
@@ -41,7 +41,7 @@ struct Cell {
     spline: f64,
     /// Sum over replicates of the squares of their differences, then the variance of the whole difference.
     difference_variance: f64,
-    /// The same of the spline alone.
+    /// Sum of the squares of the spline's replicates, then the variance of the spline's cell.
     spline_variance: f64,
 }
 
@@ -50,7 +50,7 @@ impl Cell {
         self.facets - self.spline
     }
 
-    /// The square of the difference less what noise adds to it on average.
+    /// Returns the square of the difference less what noise adds to it on average; may be negative.
     fn excess(&self) -> f64 {
         self.difference().powi(2) - self.difference_variance
     }
@@ -79,7 +79,7 @@ pub(super) struct CellPairs<'r> {
 }
 
 impl<'r> CellPairs<'r> {
-    /// Of power, for `layer` 0, or of a further channel; `None` where too many to be kept apart.
+    /// Pairs the cells of receiver `k`, of power for `layer` 0 or of a further channel; `None` where there are too many to be kept apart.
     pub(super) fn new(bound: &BoundScene, runs: [&'r ReplicatedRun; 2], k: usize, layer: usize) -> Option<Self> {
         let (receiver, result) = (&bound.receivers[k], &runs[1].results.receivers[k]);
         let replicates = runs.map(|run| run.replicates.iter().filter_map(|r| r.get(k)).collect::<Vec<_>>());
@@ -106,19 +106,19 @@ impl<'r> CellPairs<'r> {
         Some(Self { grid, cells, unit, measure, replicates, layer })
     }
 
-    /// Cells of a block, as far as the grid goes.
-    fn inside(&self, block: Block) -> impl Iterator<Item = usize> + '_ {
+    /// Goes through the indices of the cells of a block, as far as the grid goes.
+    fn cells_of(&self, block: Block) -> impl Iterator<Item = usize> + '_ {
         let [nx, ny] = self.grid;
         let rows = block.y..(block.y + block.side).min(ny);
         rows.flat_map(move |y| (block.x..(block.x + block.side).min(nx)).map(move |x| y * nx + x))
     }
 
-    /// The smallest power of two that covers the grid.
-    fn whole(&self) -> usize {
+    /// Returns the side of the smallest square of a power of two that covers the grid.
+    fn covering_side(&self) -> usize {
         self.grid[0].max(self.grid[1]).next_power_of_two()
     }
 
-    /// The square of this many cells a side that is brightest by `quanta`.
+    /// Returns the square of `side` cells that is brightest by `quanta`, of those side by side from the first corner, and its density.
     fn brightest(&self, side: usize, quanta: impl Fn(&Cell) -> f64) -> (Block, f64) {
         let corners =
             (0..self.grid[1]).step_by(side).flat_map(|y| (0..self.grid[0]).step_by(side).map(move |x| (x, y)));
@@ -129,20 +129,21 @@ impl<'r> CellPairs<'r> {
         blocks.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Block { x: 0, y: 0, side }, 0.0))
     }
 
-    /// Quanta over measure of a square, in the receiver's unit.
+    /// Returns the quanta of a square over its measure, in the receiver's unit; 0 for an empty one.
     fn density(&self, block: Block, quanta: impl Fn(&Cell) -> f64) -> f64 {
         let sum = |of: &dyn Fn(usize) -> f64| self.inside(block).map(of).sum::<f64>();
         let measure = sum(&|c| self.measure[c]);
         if measure > 0.0 { sum(&|c| quanta(&self.cells[c])) / measure } else { 0.0 }
     }
 
-    /// The brightest place, over the smallest squares of cells that hold rays enough.
+    /// Finds the brightest place of each run, over the smallest squares of cells that hold [`PEAK_RAYS`] on the spline, and compares them
+    /// wherever they are.
     pub(super) fn peak(&self) -> Peak {
         // Power is counted in quanta: as many make one ray of the mean power.
-        let rays = |block: Block| self.inside(block).map(|c| self.cells[c].spline).sum::<f64>() / QUANTA;
+        let rays = |block: Block| self.cells_of(block).map(|c| self.cells[c].spline).sum::<f64>() / QUANTA;
         let mut side = 1;
         let (mut block, mut spline) = self.brightest(side, |c| c.spline);
-        while rays(block) < PEAK_RAYS && side < self.whole() {
+        while rays(block) < PEAK_RAYS && side < self.covering_side() {
             side *= 2;
             (block, spline) = self.brightest(side, |c| c.spline);
         }
@@ -164,17 +165,17 @@ impl<'r> CellPairs<'r> {
         let noise = standard_error(by_replicate(0, on_facets).zip(by_replicate(1, block)).map(|(a, b)| a - b));
         // Facets may blur what is finer than the square: counted where it is beyond what noise makes of it.
         let unit = |c: usize| self.unit[c];
-        let count = self.inside(block).count().max(1) as f64;
-        let excess: f64 = self.inside(block).map(|c| self.cells[c].excess() * unit(c).powi(2)).sum();
+        let count = self.cells_of(block).count().max(1) as f64;
+        let excess: f64 = self.cells_of(block).map(|c| self.cells[c].excess() * unit(c).powi(2)).sum();
         let chance: f64 =
-            self.inside(block).map(|c| 2.0 * (self.cells[c].difference_variance * unit(c).powi(2)).powi(2)).sum();
+            self.cells_of(block).map(|c| 2.0 * (self.cells[c].difference_variance * unit(c).powi(2)).powi(2)).sum();
         let blurred = ((excess - 3.0 * chance.sqrt()).max(0.0) / count).sqrt();
-        let variance: f64 = self.inside(block).map(|c| self.cells[c].spline_variance * unit(c).powi(2)).sum();
+        let variance: f64 = self.cells_of(block).map(|c| self.cells[c].spline_variance * unit(c).powi(2)).sum();
         let density = Paired { facets, spline, error: if side > 1 { noise.hypot(blurred) } else { noise } };
         Peak { density, cells: side, statistical: (variance / count).sqrt() }
     }
 
-    /// All cells together.
+    /// Compares all cells together, as shares of the root of the sum of the spline's squares.
     pub(super) fn map(&self) -> MapError {
         let sum = |of: &dyn Fn(&Cell) -> f64| self.cells.iter().map(of).sum::<f64>();
         let norm = sum(&|c| c.spline * c.spline).sqrt().max(1.0);
@@ -187,14 +188,14 @@ impl<'r> CellPairs<'r> {
         }
     }
 
-    /// The estimated geometric error of each cell, row by row and in the unit of the receiver or channel, and the side of the largest
-    /// block of cells that share one, for rays were few. What noise is left after pooling is in it; blocks without rays have 0.
+    /// Returns the estimated geometric error of each cell, row by row and in the unit of the receiver or channel, and the side of the
+    /// largest block of cells that share one, for rays were few. What noise is left after pooling is in it; blocks without rays have 0.
     pub(super) fn cell_errors(&self) -> (Vec<f64>, usize) {
         let mut layer = vec![0.0; self.cells.len()];
         let mut pooled = 1;
-        let mut stack = vec![Block { x: 0, y: 0, side: self.whole() }];
+        let mut stack = vec![Block { x: 0, y: 0, side: self.covering_side() }];
         while let Some(block) = stack.pop() {
-            let quanta = |of: fn(&Cell) -> f64| self.inside(block).map(|c| of(&self.cells[c])).sum::<f64>();
+            let quanta = |of: fn(&Cell) -> f64| self.cells_of(block).map(|c| of(&self.cells[c])).sum::<f64>();
             let rays = quanta(|c| c.facets).max(quanta(|c| c.spline)) / QUANTA;
             if rays == 0.0 {
                 continue;
@@ -206,20 +207,20 @@ impl<'r> CellPairs<'r> {
                 stack.extend(quarters.map(|(dx, dy)| Block { x: block.x + dx, y: block.y + dy, side }));
                 continue;
             }
-            let count = self.inside(block).count().max(1) as f64;
+            let count = self.cells_of(block).count().max(1) as f64;
             pooled = pooled.max(block.side.min(self.grid[0].max(self.grid[1])));
             let excess = quanta(Cell::excess) / count;
             let mean = quanta(Cell::difference) / count;
             let noise = quanta(|c| c.difference_variance) / (count * count);
             // The mean of a square of cells may say more than their scatter, where all err the same way.
             let error = (excess.max(mean * mean) + noise).sqrt();
-            self.inside(block).for_each(|c| layer[c] = error * self.unit[c]);
+            self.cells_of(block).for_each(|c| layer[c] = error * self.unit[c]);
         }
         (layer, pooled)
     }
 }
 
-/// Adds what one replicate of both runs brought to the sums of the cells.
+/// Adds what one replicate of both runs brought, lists of cell and quanta that rise by cell, to the sums of the cells.
 fn add_replicate(cells: &mut [Cell], facets: &[(u32, u64)], spline: &[(u32, u64)]) {
     // Both lists rise: they are merged like two sorted files.
     let (mut a, mut b) = (facets.iter().peekable(), spline.iter().peekable());

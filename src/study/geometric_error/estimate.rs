@@ -20,26 +20,28 @@ struct Means {
     square: f64,
 }
 
-fn sums(run: &ReplicatedRun, receiver: usize) -> impl Iterator<Item = &ReplicateSums> {
+/// Goes through what each replicate brought to a receiver.
+fn replicate_sums(run: &ReplicatedRun, receiver: usize) -> impl Iterator<Item = &ReplicateSums> {
     run.replicates.iter().filter_map(move |r| r.get(receiver))
 }
 
 impl Means {
     fn new(run: &ReplicatedRun, receiver: usize, axis: usize) -> Self {
-        let power = sums(run, receiver).map(|s| s.power as f64).sum::<f64>().max(1.0);
-        let mean = sums(run, receiver).map(|s| s.first[axis]).sum::<f64>() / power;
-        let square = sums(run, receiver).map(|s| s.second[axis]).sum::<f64>() / power;
+        let power = replicate_sums(run, receiver).map(|s| s.power as f64).sum::<f64>().max(1.0);
+        let mean = replicate_sums(run, receiver).map(|s| s.first[axis]).sum::<f64>() / power;
+        let square = replicate_sums(run, receiver).map(|s| s.second[axis]).sum::<f64>() / power;
         Self { power, mean, square }
     }
 
-    /// Of the mean position, in half sides.
+    /// Returns the mean position, in half sides, and what each replicate adds to it.
     fn centroid(&self, run: &ReplicatedRun, receiver: usize, axis: usize) -> Influence {
         // The derivative of a quotient: what a replicate adds to the sum, less its share of the mean.
         let by_replicate = |s: &ReplicateSums| (s.first[axis] - self.mean * s.power as f64) / self.power;
-        Influence { value: self.mean, by_replicate: sums(run, receiver).map(by_replicate).collect() }
+        Influence { value: self.mean, by_replicate: replicate_sums(run, receiver).map(by_replicate).collect() }
     }
 
-    /// Of the root mean square distance from `about`, which is 0 for the receiver's centre, or the mean position.
+    /// Returns the root mean square distance, in half sides, from `about`: 0, the receiver's centre, or the mean position; and what each
+    /// replicate adds to it.
     fn spread(&self, run: &ReplicatedRun, receiver: usize, axis: usize, about: f64) -> Influence {
         let value = (self.square - about * about).max(0.0).sqrt();
         let by_replicate = |s: &ReplicateSums| {
@@ -48,46 +50,48 @@ impl Means {
             let change = (s.second[axis] - self.square * power) - 2.0 * about * (s.first[axis] - about * power);
             if value > 0.0 { 0.5 * change / (self.power * value) } else { 0.0 }
         };
-        Influence { value, by_replicate: sums(run, receiver).map(by_replicate).collect() }
+        Influence { value, by_replicate: replicate_sums(run, receiver).map(by_replicate).collect() }
     }
 }
 
-/// Both values with the error of their difference, from replicates of the same rays.
-fn paired(facets: &Influence, spline: &Influence, scale: f64) -> Paired {
+/// Returns both values with the error of their difference, from replicates of the same rays, all times `scale`.
+fn paired_figure(facets: &Influence, spline: &Influence, scale: f64) -> Paired {
     let difference = facets.by_replicate.iter().zip(&spline.by_replicate).map(|(a, b)| a - b);
     Paired { facets: scale * facets.value, spline: scale * spline.value, error: scale * standard_error(difference) }
 }
 
-/// Power of a receiver.
+/// Compares the power of a receiver in both runs, facets first.
 pub(super) fn power(runs: [&ReplicatedRun; 2], receiver: usize) -> Paired {
     let [facets, spline] = runs.map(|run| &run.results.receivers[receiver]);
-    let quanta = |run: &ReplicatedRun| -> Vec<f64> { sums(run, receiver).map(|s| s.power as f64).collect() };
+    let quanta =
+        |run: &ReplicatedRun| -> Vec<f64> { replicate_sums(run, receiver).map(|s| s.power as f64).collect() };
     let [a, b] = runs.map(quanta);
     let error = standard_error(a.iter().zip(&b).map(|(a, b)| a - b)) * runs[1].results.quantum;
     Paired { facets: facets.power, spline: spline.power, error }
 }
 
-/// Total of a further channel of a receiver.
+/// Compares the total of a further channel of a receiver; `worth` is what a quantum of it counts.
 pub(super) fn channel(runs: [&ReplicatedRun; 2], receiver: usize, channel: usize, worth: f64) -> Paired {
     let [facets, spline] = runs.map(|run| run.results.receivers[receiver].channels[channel].total);
-    let quanta =
-        |run: &ReplicatedRun| -> Vec<f64> { sums(run, receiver).map(|s| s.channels[channel] as f64).collect() };
+    let quanta = |run: &ReplicatedRun| -> Vec<f64> {
+        replicate_sums(run, receiver).map(|s| s.channels[channel] as f64).collect()
+    };
     let [a, b] = runs.map(quanta);
     let error = standard_error(a.iter().zip(&b).map(|(a, b)| a - b)) * runs[1].results.quantum * worth;
     Paired { facets, spline, error }
 }
 
-/// Mean position, root mean square about the receiver's centre, and about the mean position, along an axis.
+/// Compares mean position, root mean square about the receiver's centre, and about the mean position, along an axis, in mm or degrees.
 pub(super) fn moments(runs: [&ReplicatedRun; 2], receiver: usize, axis: usize) -> [Paired; 3] {
     let result = &runs[1].results.receivers[receiver];
     let (half, middle) = (result.half[axis], result.middle[axis]);
     let means = runs.map(|run| Means::new(run, receiver, axis));
     let [facets, spline] = [0, 1].map(|i| means[i].centroid(runs[i], receiver, axis));
-    let centroid = paired(&facets, &spline, half);
+    let centroid = paired_figure(&facets, &spline, half);
     let [facets, spline] = [0, 1].map(|i| means[i].spread(runs[i], receiver, axis, 0.0));
-    let rms = paired(&facets, &spline, half);
+    let rms = paired_figure(&facets, &spline, half);
     let [facets, spline] = [0, 1].map(|i| means[i].spread(runs[i], receiver, axis, means[i].mean));
-    let width = paired(&facets, &spline, half);
+    let width = paired_figure(&facets, &spline, half);
     let shifted = Paired { facets: middle + centroid.facets, spline: middle + centroid.spline, ..centroid };
     [shifted, rms, width]
 }

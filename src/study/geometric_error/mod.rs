@@ -24,16 +24,16 @@ use serde::{Serialize, Serializer};
 /// A figure on facets and on the spline.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Paired {
-    /// On facets.
+    /// The figure on facets.
     pub facets: f64,
-    /// On the spline.
+    /// The figure on the spline.
     pub spline: f64,
     /// Standard error of the difference.
     pub error: f64,
 }
 
 impl Paired {
-    /// What the facets change, with how well that is known: one standard error of the figure on facets.
+    /// Returns what the facets change, with how well that is known: one standard error of the figure on facets.
     pub fn geometric(&self) -> f64 {
         // An error that cannot be told from none is still no smaller than its own uncertainty.
         (self.facets - self.spline).hypot(self.error)
@@ -70,17 +70,17 @@ pub struct GeometricError {
 /// What facets change of one receiver's light.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ReceiverError {
-    /// Its name.
+    /// Name of the receiver.
     pub name: String,
     /// Unit of positions and widths: `mm`, or `deg` of far fields and spheres; empty where only power is counted.
     pub unit: &'static str,
-    /// Power.
+    /// Power counted.
     pub power: Paired,
     /// Mean position along both axes.
     pub centroid: [Paired; 2],
     /// Root mean square distance from the receiver's centre along both axes.
     pub rms: [Paired; 2],
-    /// The same from the mean position: the width of the light.
+    /// Root mean square distance from the mean position along both axes: the width of the light.
     pub width: [Paired; 2],
     /// The brightest place, in the receiver's unit, over [`Self::peak_cells`] × as many cells.
     pub peak: Paired,
@@ -92,7 +92,7 @@ pub struct ReceiverError {
     pub pooled_cells: usize,
     /// Standard errors on the spline, from these rays alone.
     pub statistical: Statistical,
-    /// Geometric error of each cell, in the receiver's unit.
+    /// Geometric error of each cell, in the receiver's unit; empty where cells were not compared.
     #[serde(skip)]
     pub cells: Vec<f64>,
     /// Its further channels, in the order of the results.
@@ -103,7 +103,7 @@ pub struct ReceiverError {
 /// What facets change of a further channel of a receiver.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ChannelError {
-    /// Its name.
+    /// Name of the channel.
     pub name: String,
     /// Sum over the receiver.
     pub total: Paired,
@@ -117,20 +117,20 @@ pub struct ChannelError {
 /// Standard errors of the figures of one receiver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Statistical {
-    /// Of power.
+    /// Standard error of power.
     pub power: f64,
-    /// Of the mean positions.
+    /// Standard errors of the mean positions.
     pub centroid: [f64; 2],
-    /// Of the root mean squares.
+    /// Standard errors of the root mean squares.
     pub rms: [f64; 2],
-    /// Of one cell at the brightest place.
+    /// Standard error of one cell at the brightest place.
     pub peak: f64,
-    /// Of all cells: root of the sum of squares, as [`MapError::geometric`].
+    /// Standard error of all cells: root of the sum of squares, as [`MapError::geometric`].
     pub map: f64,
 }
 
 impl GeometricError {
-    /// Of facets that are the surface itself.
+    /// Returns the error of facets that are the surface itself: none, from no rays.
     pub(in crate::study) fn of_exact_facets(bound: &BoundScene) -> Self {
         let unchanged =
             |name: &String| ReceiverError { name: name.clone(), peak_cells: 1, ..ReceiverError::default() };
@@ -138,7 +138,7 @@ impl GeometricError {
     }
 }
 
-/// Traces `settings.rays` rays on facets and on the spline.
+/// Traces the run of these settings on facets and on the spline and compares every figure.
 pub fn geometric_error(
     bound: &BoundScene,
     [facets, spline]: [&dyn Intersector; 2],
@@ -149,7 +149,7 @@ pub fn geometric_error(
     compare(bound, [&facets, &spline])
 }
 
-/// Compares two runs of the same rays.
+/// Compares every figure of two runs of the same rays, the first on facets, the second on the spline; receivers are those of the second.
 pub(in crate::study) fn compare(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -> GeometricError {
     let results = runs.map(|run| &run.results);
     GeometricError {
@@ -161,7 +161,7 @@ pub(in crate::study) fn compare(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -
     }
 }
 
-/// What facets change of receiver `k`, from paired runs on facets and on the spline.
+/// Finds what facets change of receiver `k`, from paired runs on facets and on the spline; of too many cells only power and places.
 fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> ReceiverError {
     let result = &runs[1].results.receivers[k];
     let power = estimate::power(runs, k);
@@ -197,7 +197,7 @@ fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> Re
     error
 }
 
-/// What facets change of one channel of receiver `k`.
+/// Finds what facets change of one channel of receiver `k`: its total and its cells, which are left out where they are too many.
 fn channel_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize, channel: usize) -> ChannelError {
     let result = &runs[1].results.receivers[k].channels[channel];
     let worth = bound.receivers[k].channels.worth();
@@ -210,7 +210,7 @@ fn channel_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize, channe
 }
 
 impl ReceiverError {
-    /// Takes in what was found of the cells.
+    /// Puts in the brightest place, the map and the cells' errors, from the cells of both runs.
     fn set_cells(&mut self, cells: &CellPairs<'_>) {
         let peak = cells.peak();
         self.peak = peak.density;
@@ -221,13 +221,13 @@ impl ReceiverError {
         (self.cells, self.pooled_cells) = cells.cell_errors();
     }
 
-    /// Whether the cells were compared; of grids of millions they are not.
+    /// Whether the cells were compared; those of absorbed power, and of grids of millions, are not.
     pub fn has_cells(&self) -> bool {
         self.peak_cells > 0
     }
 }
 
-/// Standard error of a sum over replicates.
+/// Returns the standard error of a sum over replicates, from what each adds to it; 0 for fewer than two equal parts.
 fn standard_error(parts: impl Iterator<Item = f64>) -> f64 {
     let parts: Vec<f64> = parts.collect();
     let n = parts.len().max(2) as f64;

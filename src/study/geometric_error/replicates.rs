@@ -38,13 +38,14 @@ struct Totals {
 /// Cells of a receiver that are kept apart.
 #[derive(Clone, Copy)]
 struct KeptCells {
-    /// Of one layer.
+    /// Cells of one layer.
     cells: usize,
     /// Power and further channels; none of grids that are too large, or power alone.
     layers: usize,
 }
 
 impl KeptCells {
+    /// Keeps power and channels apart, power alone where all together are more than [`MOST_CELLS`], or nothing where power alone is.
     fn new(cells: usize, channels: usize) -> Self {
         let fits = |layers: usize| cells * layers <= MOST_CELLS;
         // Power alone where all channels together are too many.
@@ -54,7 +55,8 @@ impl KeptCells {
 }
 
 impl Totals {
-    /// Takes over the sums of a portion and gives what the one replicate that is new brought to each receiver.
+    /// Takes over the sums of a portion and returns the number of the one replicate that is new in it, with what it brought to each
+    /// receiver; `None` where none is new.
     fn advance(&mut self, portion: &PartialRun, kept: &[KeptCells]) -> Option<(u32, Vec<ReplicateSums>)> {
         // Portions are handed over one replicate at a time; the one that is not yet known is new.
         let new = *portion.done.iter().find(|r| self.done.binary_search(r).is_err())?;
@@ -93,7 +95,7 @@ impl Totals {
     }
 }
 
-/// Traces a run and keeps what each replicate brought.
+/// Traces a run and keeps what each replicate brought, by asking for the sums after each; replicates that were not traced stay empty.
 pub(in crate::study) fn trace_replicates(
     bound: &BoundScene,
     intersector: &dyn Intersector,

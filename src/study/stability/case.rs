@@ -7,7 +7,7 @@ use crate::nurbs::Surface;
 use crate::study::sample_models;
 use serde::Serialize;
 
-/// One difficulty.
+/// One difficulty: surfaces, and questions about them whose answers are known.
 pub struct Case {
     /// Short name, as in the table.
     pub name: &'static str,
@@ -30,20 +30,22 @@ pub(super) struct Truth {
     pub(super) t: Option<f64>,
     /// |cos| of the angle of incidence.
     pub(super) cos: f64,
-    /// How far the surface must move for the answer to change: depth of a hit, clearance of a miss.
+    /// How far the surface must move for the answer to change, mm: depth of a hit, clearance of a miss.
     pub(super) margin: f64,
     /// Outward unit normal where it is unique.
     pub(super) normal: Option<Vector>,
 }
 
 impl Truth {
+    /// Makes a truth: a hit at distance `t`, mm, that stays one while the surface moves by less than `margin`, mm.
     pub(super) fn hit(t: f64, cos: f64, margin: f64) -> Self {
         Self { t: Some(t), cos: cos.abs(), margin, normal: None }
     }
+    /// Makes a truth: a miss that stays one while the surface moves by less than `margin`, mm.
     pub(super) fn miss(margin: f64) -> Self {
         Self { t: None, cos: 1.0, margin, normal: None }
     }
-    /// Distance along the ray, which rounding grows with; a miss is judged where the ray starts.
+    /// Returns the distance along the ray, mm, which rounding grows with; 0 for a miss, judged where the ray starts.
     pub(super) fn distance(&self) -> f64 {
         self.t.unwrap_or(0.0)
     }
@@ -92,7 +94,7 @@ impl Variant {
     /// Sizes at which absolute limits show: for facets, since a nanometre is a contact on the spline.
     pub const EXTREME: [Self; 2] = [Self::Tiny, Self::Huge];
 
-    /// The word used in tables.
+    /// Returns the word used in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Home => "home",
@@ -105,7 +107,7 @@ impl Variant {
         }
     }
 
-    /// Where a variant puts the case.
+    /// Returns the frame that takes the case's coordinates to the variant's.
     fn frame(self) -> Frame {
         match self {
             Self::Home => Frame::IDENTITY,
@@ -131,6 +133,7 @@ pub struct Scene<'a> {
     pub model: Model,
     /// A uniform mesh of them.
     pub mesh: FacetMesh,
+    /// From the case's coordinates to those of the model and mesh.
     pub(super) frame: Frame,
 }
 
@@ -144,7 +147,7 @@ pub enum Geometry {
 }
 
 impl Case {
-    /// The case in a variant.
+    /// Puts the case into the place of a variant, and meshes it uniformly; a trimmed case has an empty mesh.
     pub fn scene(&self, variant: Variant) -> Scene<'_> {
         let frame = variant.frame();
         // The control points themselves are moved: the truth of a moved case is that of the case, to their

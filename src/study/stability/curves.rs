@@ -7,22 +7,34 @@ use crate::nurbs::{ControlPoint, Curve, Surface, sweep};
 use crate::study::Random;
 use std::f64::consts::PI;
 
+/// Makes the cases on swept curves and graphs.
 pub(super) fn cases() -> Vec<Case> {
-    vec![crease(), cusp(), crossing_sheets(), ruling(), tangent(), collapsed(), apex(), huge_radius()]
+    vec![
+        crease_case(),
+        cusp_case(),
+        crossing_sheets_case(),
+        ruling_case(),
+        tangent_case(),
+        collapsed_case(),
+        apex_case(),
+        huge_radius_case(),
+    ]
 }
 
-/// A curve in the x–z plane swept from y = −50 to 50.
-pub(super) fn swept(points: &[(f64, f64, f64)], degree: usize, knots: Vec<f64>) -> Surface {
+/// Makes the surface of a curve in the x–z plane, with control points (x, z, weight), swept from y = −50 to 50 mm.
+pub(super) fn swept_curve(points: &[(f64, f64, f64)], degree: usize, knots: Vec<f64>) -> Surface {
     let points = points.iter().map(|&(x, z, w)| Homogeneous::weighted(Point::new(x, 0.0, z), w)).collect();
     sweep::extrusion(&Curve { degree, knots, points }, Vector::Y, [-50.0, 50.0])
 }
 
+/// Returns the knots of one Bézier span over `[0, 1]`.
 pub(super) fn bezier_knots(degree: usize) -> Vec<f64> {
     [vec![0.0; degree + 1], vec![1.0; degree + 1]].concat()
 }
 
-/// A ray in a plane of constant x, coming down from z = 100 onto `(x, y, z)`, inclined along y.
-pub(super) fn down(random: &mut Random, x: f64, z: f64) -> (Ray, f64, f64) {
+/// Makes a ray in a plane of constant x, from z = 100 down onto `(x, y, z)` for a random y, inclined along y; returns it with its distance
+/// to there, mm, and its cosine to the vertical.
+pub(super) fn ray_down(random: &mut Random, x: f64, z: f64) -> (Ray, f64, f64) {
     // Inclined along y, in which nothing changes: depth and cosine stay those of the profile.
     let slope = random.between(-0.6, 0.6);
     let d = Vector::new(0.0, slope, -1.0).normalize();
@@ -31,8 +43,8 @@ pub(super) fn down(random: &mut Random, x: f64, z: f64) -> (Ray, f64, f64) {
     (Ray::new(target - d * t, d), t, -d.z)
 }
 
-/// Rays on a crease that lies inside of a face.
-fn crease() -> Case {
+/// Makes the case of rays on a crease that lies inside of a face, half of them on the crease itself.
+fn crease_case() -> Case {
     // z = −0.8·|x| as one cubic with a triple knot, so that the crease lies inside the face.
     let side = |k: usize| 50.0 * k as f64 / 3.0;
     let points: Vec<_> = (0..7).map(|k| side(k) - 50.0).map(|x| (x, -0.8 * x.abs(), 1.0)).collect();
@@ -41,12 +53,12 @@ fn crease() -> Case {
         let mut random = Random::new(21, i);
         // Half of the rays meet the crease itself.
         let x = if i % 2 == 0 { 0.0 } else { random.between(-40.0, 40.0) };
-        let (ray, t, cos) = down(&mut random, x, -0.8 * x.abs());
+        let (ray, t, cos) = ray_down(&mut random, x, -0.8 * x.abs());
         Question::First { ray, truth: Truth::hit(t, cos / 0.64f64.hypot(1.0), 10.0) }
     };
     Case {
         name: "crease inside a face",
-        surfaces: vec![swept(&points, 3, knots)],
+        surfaces: vec![swept_curve(&points, 3, knots)],
         loops: Vec::new(),
         divisions: 8,
         slack: 0.0,
@@ -55,8 +67,8 @@ fn crease() -> Case {
     }
 }
 
-/// Rays at a cusp, where the surface turns back and its normal is lost.
-fn cusp() -> Case {
+/// Makes the case of rays at a cusp, where the surface turns back and its normal is lost.
+fn cusp_case() -> Case {
     // (x, z) = 40·(s³, s²) for s in [−1, 1]: Bernstein coefficients of s² and s³ with s = 2u − 1.
     let points: Vec<_> = [(-1.0, 1.0), (1.0, -1.0 / 3.0), (-1.0, -1.0 / 3.0), (1.0, 1.0)]
         .map(|(x, z)| (40.0 * x, 40.0 * z, 1.0))
@@ -69,7 +81,7 @@ fn cusp() -> Case {
             1 => random.between(-1e-3, 1e-3),
             _ => random.between(-39.0, 39.0),
         };
-        let (ray, t, cos) = down(&mut random, x, height(x));
+        let (ray, t, cos) = ray_down(&mut random, x, height(x));
         // dx/dz on the curve is 3/2·(|x|/40)^(1/3): the cosine of a vertical ray.
         let across = 1.5 * (x.abs() / 40.0).cbrt();
         // At the cusp a vertical ray runs along the surface; a cosine of zero would divide the tolerance.
@@ -81,7 +93,7 @@ fn cusp() -> Case {
     };
     Case {
         name: "cusp",
-        surfaces: vec![swept(&points, 3, bezier_knots(3))],
+        surfaces: vec![swept_curve(&points, 3, bezier_knots(3))],
         loops: Vec::new(),
         divisions: 16,
         slack: 0.0,
@@ -95,8 +107,8 @@ fn cusp() -> Case {
     }
 }
 
-/// Rays through a surface that crosses itself.
-fn crossing_sheets() -> Case {
+/// Makes the case of rays through all sheets of a surface that crosses itself.
+fn crossing_sheets_case() -> Case {
     // (x, z) = 20·(s³ − s, s²) for s in [−1.5, 1.5]: the curve crosses itself at s = ±1.
     let a: f64 = 1.5;
     // Bernstein coefficients of s, s² and s³ for s = a(2u − 1), degree 3.
@@ -122,7 +134,7 @@ fn crossing_sheets() -> Case {
             // The height and the slope dx/dz of the sheet with parameter s.
             roots(x).iter().map(|s| (20.0 * s * s, (3.0 * s * s - 1.0) / (2.0 * s))).collect();
         sheets.sort_by(|p, q| q.0.total_cmp(&p.0));
-        let (ray, t, cos) = down(&mut random, x, sheets[0].0);
+        let (ray, t, cos) = ray_down(&mut random, x, sheets[0].0);
         let truths = sheets.iter().map(|&(z, across)| {
             let t = t + (sheets[0].0 - z) / cos;
             Truth::hit(t, cos * across.abs() / across.hypot(1.0), f64::MAX)
@@ -131,7 +143,7 @@ fn crossing_sheets() -> Case {
     };
     Case {
         name: "sheets that cross",
-        surfaces: vec![swept(&points, 3, bezier_knots(3))],
+        surfaces: vec![swept_curve(&points, 3, bezier_knots(3))],
         loops: Vec::new(),
         divisions: 24,
         slack: 0.0,
@@ -146,8 +158,8 @@ fn crossing_sheets() -> Case {
     }
 }
 
-/// Rays that run along a straight line of the surface.
-fn ruling() -> Case {
+/// Makes the case of rays that run along a straight line of the surface: any answer within rounding is right.
+fn ruling_case() -> Case {
     // Rays in the surface itself, along its straight lines: whether they meet it is a matter of rounding.
     let questions = (0..100).map(|i| {
         let mut random = Random::new(24, i);
@@ -158,7 +170,7 @@ fn ruling() -> Case {
     });
     Case {
         name: "ray along a ruling",
-        surfaces: vec![swept(&[(-50.0, -25.0, 1.0), (50.0, 25.0, 1.0)], 1, bezier_knots(1))],
+        surfaces: vec![swept_curve(&[(-50.0, -25.0, 1.0), (50.0, 25.0, 1.0)], 1, bezier_knots(1))],
         loops: Vec::new(),
         divisions: 8,
         slack: 0.0,
@@ -167,7 +179,7 @@ fn ruling() -> Case {
     }
 }
 
-/// z = a·x² + b·y² over [−50, 50]² as one biquadratic patch.
+/// Makes z = a·x² + b·y² over [−50, 50]² mm as one biquadratic patch.
 pub(super) fn paraboloid(a: f64, b: f64) -> Surface {
     // Bernstein coefficients of s² for s = 50(2u − 1), degree 2: 50²·(1, −1, 1).
     let (s1, s2) = ([-50.0, 0.0, 50.0], [2500.0, -2500.0, 2500.0]);
@@ -176,8 +188,8 @@ pub(super) fn paraboloid(a: f64, b: f64) -> Surface {
     Surface { degree: [2, 2], knots: [bezier_knots(2), bezier_knots(2)], points }
 }
 
-/// Rays along a bowl, a micrometre down to a picometre above or below touching.
-fn tangent() -> Case {
+/// Makes the case of rays along a bowl, a micrometre down to a picometre above touching, which hit, or below, which miss.
+fn tangent_case() -> Case {
     let (a, b) = (0.01, 0.015);
     let mut questions = Vec::new();
     // A micrometre, a nanometre and a picometre above and below.
@@ -213,8 +225,8 @@ fn tangent() -> Case {
     }
 }
 
-/// Rays near a corner into which one side of a patch has collapsed.
-fn collapsed() -> Case {
+/// Makes the case of rays near a corner into which one side of a patch has collapsed, inside and outside of the patch.
+fn collapsed_case() -> Case {
     // A plane triangle as a bilinear patch whose side u = 1 is one point.
     let tip = Point::new(50.0, 0.0, 0.0);
     let corners = [Point::new(-50.0, -40.0, 0.0), Point::new(-50.0, 40.0, 0.0), tip, tip];
@@ -247,8 +259,8 @@ fn collapsed() -> Case {
     }
 }
 
-/// Rays at and beside the tip of a cone.
-fn apex() -> Case {
+/// Makes the case of rays at and beside the tip of a cone.
+fn apex_case() -> Case {
     // A cone with its tip at the origin, opening downwards: radius = −z.
     let cone = sweep::cone(&Frame::IDENTITY, 0.0, -PI / 4.0, [0.0, 2.0 * PI], [-50.0, 0.0]);
     let question = |i| {
@@ -272,8 +284,8 @@ fn apex() -> Case {
     }
 }
 
-/// Rays on a surface of which the centre is a thousand kilometres off.
-fn huge_radius() -> Case {
+/// Makes the case of rays on a cylinder whose axis is a thousand kilometres off.
+fn huge_radius_case() -> Case {
     // A cylinder of radius 1e9 with its crest along y through the origin, ±50 mm wide; heights by half angles, without
     // the cancellation of R·cos − R.
     let r: f64 = 1e9;
@@ -284,12 +296,12 @@ fn huge_radius() -> Case {
     let question = move |i| {
         let mut random = Random::new(28, i);
         let x = random.between(-45.0, 45.0);
-        let (ray, t, cos) = down(&mut random, x, height(x));
+        let (ray, t, cos) = ray_down(&mut random, x, height(x));
         Question::First { ray, truth: Truth::hit(t, cos, 10.0) }
     };
     Case {
         name: "radius 1e9",
-        surfaces: vec![swept(&points, 2, bezier_knots(2))],
+        surfaces: vec![swept_curve(&points, 2, bezier_knots(2))],
         loops: Vec::new(),
         divisions: 8,
         slack: 0.0,

@@ -50,7 +50,7 @@ pub struct Row {
 }
 
 impl Scene<'_> {
-    /// What an intersector makes of every question.
+    /// Asks an intersector every question and counts the grades; a trimmed case asks facets none.
     pub fn ask(&self, name: &str, who: &dyn Intersector, geometry: Geometry) -> Row {
         let mut row = Row {
             case: self.case.name.into(),
@@ -77,7 +77,7 @@ impl Scene<'_> {
 const STEPS: usize = 256;
 
 impl Scene<'_> {
-    /// One grade per question, in order.
+    /// Returns one grade per question, in order; none for facets of a trimmed case.
     pub fn grades(&self, who: &dyn Intersector, geometry: Geometry) -> Vec<Grade> {
         // A trimmed case has no mesh.
         if geometry == Geometry::Facets && self.mesh.facets.is_empty() {
@@ -87,7 +87,7 @@ impl Scene<'_> {
         self.case.questions.iter().map(|q| grader.grade(q)).collect()
     }
 
-    /// The ray of a question where the scene stands; for paths the first ray.
+    /// Returns the ray of each question where the scene stands; for paths the first ray.
     pub fn rays(&self) -> Vec<Ray> {
         let first = |q: &Question| match q {
             Question::First { ray, .. } | Question::All { ray, .. } | Question::Guide { ray, .. } => *ray,
@@ -96,19 +96,20 @@ impl Scene<'_> {
         self.case.questions.iter().map(|q| self.ray(&first(q))).collect()
     }
 
-    /// The ray in the place of the variant.
+    /// Moves a ray of the case into the place of the variant.
     fn ray(&self, local: &Ray) -> Ray {
         let range = |t: f64| t * self.frame.scale;
         Ray::new(self.frame.point(local.origin), self.frame.direction(local.direction).normalize())
             .with_range(range(local.t_min), range(local.t_max))
     }
 
-    /// Largest sag of the facets, in the case's own millimetres.
+    /// Returns the largest sag of the facets, in the case's own millimetres; 0 without facets.
     fn band(&self) -> f64 {
         self.mesh.sag.iter().copied().fold(0.0, f64::max) / self.frame.scale
     }
 
-    /// Rounding of coordinates of the size that the ray's numbers have here, in the case's own millimetres.
+    /// Returns the rounding of coordinates of the size that the ray's numbers have here at distance `t`, both in the case's own
+    /// millimetres.
     pub fn resolution(&self, ray: &Ray, t: f64) -> f64 {
         // In the place where the case stands: coordinates there set the rounding, not those at home.
         let reach = self.frame.point(ray.origin).length() + self.frame.scale * t.abs() + self.frame.origin.length();
@@ -124,11 +125,13 @@ struct Grader<'a> {
     band: f64,
 }
 
-fn flagged(hit: &Hit) -> bool {
+/// Whether a hit says that it is not sure.
+fn is_flagged(hit: &Hit) -> bool {
     matches!(hit.certainty, Certainty::Tangent | Certainty::Uncertified)
 }
 
 impl Grader<'_> {
+    /// Asks for the nearest hit of a ray in the scene's place.
     fn ask(&self, ray: &Ray) -> Option<Hit> {
         self.who.intersect(ray, &mut Cost::default())
     }
@@ -140,13 +143,12 @@ impl Grader<'_> {
         self.geometry == Geometry::Spline && self.who.intersect(ray, &mut cost).is_none() && cost.fallbacks > 0
     }
 
-    /// What a miss is worth where there should be a hit.
-    fn missed(&self, ray: &Ray) -> Grade {
+    /// Grades a miss where there should be a hit: wrong, or flagged where the spline is not sure of it.
+    fn grade_miss(&self, ray: &Ray) -> Grade {
         if self.unsure_miss(ray) { Grade::Flagged } else { Grade::Wrong }
     }
 
-    /// Whether the truth hangs on less than the intersector promises: the last bits of the input, and on the spline the band along
-    /// trims.
+    /// Whether the truth hangs on less than the intersector promises: the last bits of the input, and on the spline the band along trims.
     fn is_open(&self, truth: &Truth, resolution: f64) -> bool {
         let trimmed = self.geometry == Geometry::Spline && !self.scene.case.loops.is_empty();
         let band = if trimmed { TRIM_BAND / self.scene.frame.scale } else { 0.0 };
@@ -158,21 +160,22 @@ impl Grader<'_> {
         match question {
             Question::First { ray, truth } => {
                 let hit = self.ask(&self.scene.ray(ray));
-                self.first(ray, truth, hit.as_ref())
+                self.grade_first(ray, truth, hit.as_ref())
             }
-            Question::All { ray, truths } => self.all(ray, truths),
-            Question::Chord { toward, direction, radius } => self.chord(toward, *direction, *radius),
-            Question::Onward { toward, direction, size } => self.onward(toward, *direction, *size),
-            Question::Guide { ray, size, reflections } => self.guide(ray, *size, *reflections),
+            Question::All { ray, truths } => self.grade_all(ray, truths),
+            Question::Chord { toward, direction, radius } => self.grade_chord(toward, *direction, *radius),
+            Question::Onward { toward, direction, size } => self.grade_onward(toward, *direction, *size),
+            Question::Guide { ray, size, reflections } => self.grade_guide(ray, *size, *reflections),
         }
     }
 
+    /// Returns the distance of a hit in the case's own millimetres.
     fn local_t(&self, hit: &Hit) -> f64 {
         hit.t / self.scene.frame.scale
     }
 
-    /// The grade of a first hit, by what is promised on the spline or on facets.
-    fn first(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
+    /// Grades a first hit, by what is promised on the spline or on facets.
+    fn grade_first(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
         match self.geometry {
             Geometry::Spline => self.first_on_spline(ray, truth, hit),
             Geometry::Facets if self.right_within_sag(ray, truth, hit) => Grade::Right,
@@ -180,7 +183,7 @@ impl Grader<'_> {
         }
     }
 
-    /// The grade of a first hit where the spline is promised to the last digits.
+    /// Grades a first hit on the spline: right to the last digits, or flagged where it says that it is not proved.
     fn first_on_spline(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
         let resolution = self.scene.resolution(ray, truth.distance());
         let open = self.is_open(truth, resolution);
@@ -200,25 +203,26 @@ impl Grader<'_> {
         };
         match (right, hit) {
             // An answer that says it is unsure counts as such, right or not, unless the truth itself is open.
-            (_, Some(h)) if flagged(h) && !open => Grade::Flagged,
+            (_, Some(h)) if is_flagged(h) && !open => Grade::Flagged,
             (true, _) => Grade::Right,
-            (false, Some(h)) if flagged(h) => Grade::Flagged,
+            (false, Some(h)) if is_flagged(h) => Grade::Flagged,
             (false, None) if self.unsure_miss(&self.scene.ray(ray)) => Grade::Flagged,
             _ => Grade::Wrong,
         }
     }
 
+    /// Whether a hit lies on the true surface, to rounding.
     fn on_surface(&self, ray: &Ray, hit: &Hit, resolution: f64) -> bool {
         (self.scene.case.distance)(ray.point_at(self.local_t(hit))).abs() <= 64.0 * resolution + ON_SURFACE
     }
 
-    /// Whether a hit lies within the facets' sag of the surface.
+    /// Whether the point at distance `t`, in the case's own millimetres, lies within the facets' sag of the surface.
     fn in_band(&self, ray: &Ray, t: f64) -> bool {
         let slack = self.scene.case.slack + 64.0 * self.scene.resolution(ray, t);
         (self.scene.case.distance)(ray.point_at(t)).abs() <= self.band + slack
     }
 
-    /// Whether a first hit is right for facets: within their band, and not behind a surface that stands in the way.
+    /// Whether a first hit, or a miss, is right for facets: within their band, and not behind a surface that stands in the way.
     fn right_within_sag(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> bool {
         let slack = self.scene.case.slack + 64.0 * self.scene.resolution(ray, truth.distance());
         let Some(h) = hit else { return truth.t.is_none() || truth.margin <= self.band + slack };
@@ -236,8 +240,9 @@ impl Grader<'_> {
         t <= true_t || !(1..STEPS).any(through)
     }
 
-    /// Asks for all crossings of a ray, one after the other.
-    fn all(&self, ray: &Ray, truths: &[Truth]) -> Grade {
+    /// Asks for all crossings of a ray, each from the one before, and grades them together: right only if there are as many as in truth,
+    /// or, on facets, fewer by pairs that their sag may miss.
+    fn grade_all(&self, ray: &Ray, truths: &[Truth]) -> Grade {
         let mut next = self.scene.ray(ray);
         let origin = next.origin;
         let mut hits: Vec<Hit> = Vec::new();
@@ -272,17 +277,18 @@ impl Grader<'_> {
             }
         };
         match right {
-            _ if self.geometry == Geometry::Spline && (unsure || hits.iter().any(flagged)) => Grade::Flagged,
+            _ if self.geometry == Geometry::Spline && (unsure || hits.iter().any(is_flagged)) => Grade::Flagged,
             true => Grade::Right,
             false => Grade::Wrong,
         }
     }
 
-    /// Asks for a hit inside a sphere and from there for the other end of a chord.
-    fn chord(&self, toward: &Ray, direction: Vector, radius: f64) -> Grade {
+    /// Asks for a hit inside a sphere and from there for the other end of a chord, and grades that end; wrong, or flagged, where either is
+    /// missed.
+    fn grade_chord(&self, toward: &Ray, direction: Vector, radius: f64) -> Grade {
         let frame = &self.scene.frame;
         let first = self.scene.ray(toward);
-        let Some(h) = self.ask(&first) else { return self.missed(&first) };
+        let Some(h) = self.ask(&first) else { return self.grade_miss(&first) };
         let origin = frame.local_point(first.point_at(h.t));
         let local = Ray::new(origin, direction);
         let from = h.departure();
@@ -296,27 +302,28 @@ impl Grader<'_> {
             return if self.geometry == Geometry::Facets && truth.margin <= self.band {
                 Grade::Right
             } else {
-                self.missed(&second)
+                self.grade_miss(&second)
             };
         };
         match self.geometry {
             // From a hit that is not the one aimed at, a chord may run another way.
-            Geometry::Spline if flagged(&h) => Grade::Flagged,
+            Geometry::Spline if is_flagged(&h) => Grade::Flagged,
             Geometry::Spline => self.first_on_spline(&local, &truth, Some(&a)),
             Geometry::Facets => {
                 let t = self.local_t(&a);
                 // From inside, a chord is missed only if the ray got out of the band on the far side.
-                let right = self.in_band(&local, t) && t > AT_START * true_t && t <= true_t + self.reach(&truth);
+                let right =
+                    self.in_band(&local, t) && t > AT_START * true_t && t <= true_t + self.band_reach(&truth);
                 if right { Grade::Right } else { Grade::Wrong }
             }
         }
     }
 
-    /// Asks for a hit in a box and from there for the next wall.
-    fn onward(&self, toward: &Ray, direction: Vector, size: Vector) -> Grade {
+    /// Asks for a hit in a box and from there for the next wall, and grades that; wrong, or flagged, where the first is missed.
+    fn grade_onward(&self, toward: &Ray, direction: Vector, size: Vector) -> Grade {
         let frame = &self.scene.frame;
         let first = self.scene.ray(toward);
-        let Some(h) = self.ask(&first) else { return self.missed(&first) };
+        let Some(h) = self.ask(&first) else { return self.grade_miss(&first) };
         let start = first.point_at(h.t);
         let local = Ray::new(frame.local_point(start), direction);
         let next = Ray::new(start, frame.direction(direction).normalize()).with_departure(h.departure());
@@ -329,23 +336,24 @@ impl Grader<'_> {
         // Over the wall that it leaves the ray has risen by this when it meets the next.
         let margin = direction.abs().min_element() * ways[axis];
         let truth = Truth::hit(ways[axis], direction[axis], margin);
-        self.first(&local, &truth, self.ask(&next).as_ref())
+        self.grade_first(&local, &truth, self.ask(&next).as_ref())
     }
 
-    /// How far along the ray the sag band stretches behind a hit.
-    fn reach(&self, truth: &Truth) -> f64 {
+    /// Returns how far along the ray the sag band stretches behind a hit, mm.
+    fn band_reach(&self, truth: &Truth) -> f64 {
         4.0 * self.band / truth.cos.max(GRAZING)
     }
 
-    /// Follows reflections in a box, whose end is known by unfolding.
-    fn guide(&self, ray: &Ray, size: Vector, reflections: usize) -> Grade {
+    /// Follows reflections in a box and grades where they end, known by unfolding: wrong at once where one is missed, flagged where the end
+    /// is wrong and some hit was not sure.
+    fn grade_guide(&self, ray: &Ray, size: Vector, reflections: usize) -> Grade {
         let frame = &self.scene.frame;
         let mut ray_here = self.scene.ray(ray);
         let mut path = 0.0;
         let mut any_flag = false;
         for _ in 0..reflections {
             let Some(h) = self.ask(&ray_here) else { return Grade::Wrong };
-            any_flag |= flagged(&h);
+            any_flag |= is_flagged(&h);
             path += h.t / frame.scale;
             let d = ray_here.direction;
             let turned = (d - h.geometric_normal * (2.0 * d.dot(h.geometric_normal))).normalize();

@@ -20,7 +20,7 @@ mod spheres;
 pub use case::{Case, Geometry, Scene, Variant};
 pub use grade::{Grade, Row};
 
-/// One sentence: what is wrong in silence, by intersector.
+/// Writes one sentence: what is wrong in silence, by intersector.
 pub fn answer(rows: &[Row]) -> String {
     let mut names: Vec<&str> = Vec::new();
     for r in rows {
@@ -46,7 +46,8 @@ pub fn answer(rows: &[Row]) -> String {
     )
 }
 
-/// All cases; the first thirteen are the hard cases of spline intersection, the others belong to facets and trees, and to what users do.
+/// Makes all cases; the first thirteen are the hard cases of spline intersection, the others belong to facets and trees, and to what users
+/// do.
 pub fn cases() -> Vec<Case> {
     let mut all = spheres::cases();
     all.extend(curves::cases());

@@ -1,7 +1,7 @@
 //! Cases of what users do: trims, sheets that lie almost in an axis plane, weights that shape a curve, starts on edges of facets.
 
 use super::case::{Case, Question, Truth};
-use super::curves::{bezier_knots, down, paraboloid, swept};
+use super::curves::{bezier_knots, paraboloid, ray_down, swept_curve};
 use super::solids::{block, block_distance};
 use crate::math::{Point, Ray, Uv, Vector};
 use crate::model::{EdgeUse, TrimLoop};
@@ -9,18 +9,19 @@ use crate::nurbs::UvCurve;
 use crate::study::Random;
 use std::f64::consts::{SQRT_2, TAU};
 
+/// Makes the cases of what users do.
 pub(super) fn cases() -> Vec<Case> {
     vec![
-        trimmed(),
-        almost_flat(),
-        weighted("weight of 100", 100.0),
-        weighted("weight of 0.01", 0.01),
-        edge_starts(),
+        trimmed_case(),
+        almost_flat_case(),
+        weighted_arc_case("weight of 100", 100.0),
+        weighted_arc_case("weight of 0.01", 0.01),
+        edge_starts_case(),
     ]
 }
 
-/// Rays beside the trim of a curved face.
-fn trimmed() -> Case {
+/// Makes the case of rays beside the trim of a curved face, which has no mesh.
+fn trimmed_case() -> Case {
     // A bowl z = a·x² + b·y² of which |x| + |y| < 40 is left: the loop runs in straight lines over the parameters.
     let (a, b, half) = (0.01, 0.015, 40.0);
     let corners =
@@ -59,12 +60,15 @@ fn trimmed() -> Case {
     }
 }
 
-/// Rays along a sheet that stands a hair aslant of an axis plane.
-fn almost_flat() -> Case {
+/// Makes the case of rays along a sheet that stands a hair aslant of an axis plane, with a wall behind.
+fn almost_flat_case() -> Case {
     // A sheet of 100 mm that rises by 1e-12, and a wall behind: rays along the sheet meet it at x, or the wall where x is beyond its end.
     let (slope, pivot) = (1e-12, 20.0);
-    let sheet =
-        swept(&[(-50.0, slope * (-50.0 - pivot), 1.0), (50.0, slope * (50.0 - pivot), 1.0)], 1, bezier_knots(1));
+    let sheet = swept_curve(
+        &[(-50.0, slope * (-50.0 - pivot), 1.0), (50.0, slope * (50.0 - pivot), 1.0)],
+        1,
+        bezier_knots(1),
+    );
     let wall = block(Point::new(-61.0, -100.0, -100.0), Point::new(-60.0, 100.0, 100.0));
     let question = |i: u64| {
         let mut random = Random::new(62, i);
@@ -90,10 +94,10 @@ fn almost_flat() -> Case {
     }
 }
 
-/// A conic arc over x in [−40, 40] with its middle control point at z = 20 and this weight.
-fn weighted(name: &'static str, weight: f64) -> Case {
+/// Makes a case of rays on a conic arc over x in [−40, 40] mm, whose middle control point at z = 20 has this weight.
+fn weighted_arc_case(name: &'static str, weight: f64) -> Case {
     let (half, top) = (40.0, 20.0);
-    let surface = swept(&[(-half, 0.0, 1.0), (0.0, top, weight), (half, 0.0, 1.0)], 2, bezier_knots(2));
+    let surface = swept_curve(&[(-half, 0.0, 1.0), (0.0, top, weight), (half, 0.0, 1.0)], 2, bezier_knots(2));
     // With barycentric coordinates l of the control points the arc is l₁² = 4w²·l₀·l₂; for x = 40·p, l₁ = m solves
     // m²(1 − w²) + 2w²·m = w²(1 − p²).
     let w2 = weight * weight;
@@ -105,7 +109,7 @@ fn weighted(name: &'static str, weight: f64) -> Case {
     let question = move |i| {
         let mut random = Random::new(63, i);
         let x = if i % 3 == 0 { random.between(-0.1, 0.1) } else { random.between(-39.0, 39.0) };
-        let (ray, t, cos) = down(&mut random, x, top * share(x));
+        let (ray, t, cos) = ray_down(&mut random, x, top * share(x));
         let truth = Truth::hit(t, cos / slope(x).hypot(1.0), 1.0);
         Question::First { ray, truth }
     };
@@ -123,8 +127,8 @@ fn weighted(name: &'static str, weight: f64) -> Case {
     }
 }
 
-/// Rays that start on edges, diagonals and corners of facets.
-fn edge_starts() -> Case {
+/// Makes the case of rays that start on edges, diagonals and corners of a box's facets and go on to the next wall.
+fn edge_starts_case() -> Case {
     // In a box, from edges, diagonals and corners of its facets, at sines down to 1e-9.
     let size = 64.0;
     let question = |i: u64| {

@@ -5,11 +5,12 @@ use crate::math::{Frame, Point, Ray, Vector};
 use crate::nurbs::{Surface, sweep};
 use crate::study::Random;
 
+/// Makes the cases on boxes.
 pub(super) fn cases() -> Vec<Case> {
-    vec![cell_walls(), coincident(), slivers(), gap(), guide()]
+    vec![cell_walls_case(), coincident_case(), slivers_case(), gap_case(), guide_case()]
 }
 
-/// The six faces of a box, normals outward.
+/// Makes the six faces of a box, normals outward.
 pub(super) fn block(min: Point, max: Point) -> Vec<Surface> {
     let size = max - min;
     let mut faces = Vec::new();
@@ -32,7 +33,7 @@ pub(super) fn block(min: Point, max: Point) -> Vec<Surface> {
     faces
 }
 
-/// Signed distance from a box, negative inside.
+/// Returns the function of the signed distance from a box, mm, negative inside.
 pub(super) fn block_distance(min: Point, max: Point) -> impl Fn(Point) -> f64 + Send + Sync + Clone {
     move |p| {
         let d = (p - 0.5 * (min + max)).abs() - 0.5 * (max - min);
@@ -41,8 +42,8 @@ pub(super) fn block_distance(min: Point, max: Point) -> impl Fn(Point) -> f64 + 
     }
 }
 
-/// Rays in the walls and through the corners of a tree's cells.
-fn cell_walls() -> Case {
+/// Makes the case of rays in the walls and through the corners of a tree's cells.
+fn cell_walls_case() -> Case {
     let (min, max) = (Point::ZERO, Point::splat(64.0));
     let mut questions = Vec::new();
     for i in 0..480 {
@@ -85,8 +86,8 @@ fn cell_walls() -> Case {
     }
 }
 
-/// Rays that meet two faces in one place.
-fn coincident() -> Case {
+/// Makes the case of rays that meet two faces in one place.
+fn coincident_case() -> Case {
     // Two boxes that share the wall x = 10.
     let (a, b) = ((Point::ZERO, Point::splat(10.0)), (Point::new(10.0, 0.0, 0.0), Point::new(20.0, 10.0, 10.0)));
     let questions = (0..300).map(|i| {
@@ -110,8 +111,8 @@ fn coincident() -> Case {
     }
 }
 
-/// Rays on facets a million times as long as wide.
-fn slivers() -> Case {
+/// Makes the case of rays on facets a million times as long as wide.
+fn slivers_case() -> Case {
     // A bar of 1000 × 1e-3 × 1e-4 mm in facets as long as the bar.
     let (min, max) = (Point::ZERO, Point::new(1000.0, 1e-3, 1e-4));
     let questions = (0..300).map(|i| {
@@ -133,8 +134,8 @@ fn slivers() -> Case {
     }
 }
 
-/// Rays through a thin gap of air.
-fn gap() -> Case {
+/// Makes the case of rays through a gap of air of a micrometre, all crossings asked.
+fn gap_case() -> Case {
     // 1 µm of air between two plates.
     let (a, b) = ((Point::ZERO, Point::splat(10.0)), (Point::new(10.001, 0.0, 0.0), Point::new(20.0, 10.0, 10.0)));
     let questions = (0..300).map(|i| {
@@ -156,8 +157,8 @@ fn gap() -> Case {
     }
 }
 
-/// Rays that are reflected ten thousand times.
-fn guide() -> Case {
+/// Makes the case of rays that are reflected ten thousand times in a box.
+fn guide_case() -> Case {
     let size = Vector::new(10.0, 7.0, 500.0);
     let questions = (0..6).map(|i| {
         let mut random = Random::new(45, i);

@@ -11,27 +11,29 @@ const R: f64 = 50.0;
 /// All around.
 const FULL: [f64; 2] = [0.0, 2.0 * PI];
 
+/// Makes the cases on spheres and tori.
 pub(super) fn cases() -> Vec<Case> {
     vec![
-        graze(),
-        silhouette(),
-        pole(),
-        knots(),
-        thin_torus(),
-        weights(),
-        on_surface(),
-        far_origin(),
-        from_inside(),
-        facet_features(),
+        graze_case(),
+        silhouette_case(),
+        pole_case(),
+        knots_case(),
+        thin_torus_case(),
+        weights_case(),
+        on_surface_case(),
+        far_origin_case(),
+        from_inside_case(),
+        facet_features_case(),
     ]
 }
 
+/// Makes a sphere about the origin with its poles on the z axis; `radius` in mm.
 pub(super) fn sphere(radius: f64) -> Surface {
     sweep::sphere(&Frame::IDENTITY, radius, FULL, [-FRAC_PI_2, FRAC_PI_2])
 }
 
-/// A case about a sphere of radius `R`.
-fn ball(name: &'static str, questions: Vec<Question>) -> Case {
+/// Makes a case about a sphere of radius `R`.
+fn ball_case(name: &'static str, questions: Vec<Question>) -> Case {
     Case {
         name,
         surfaces: vec![sphere(R)],
@@ -43,8 +45,8 @@ fn ball(name: &'static str, questions: Vec<Question>) -> Case {
     }
 }
 
-/// A ray at impact parameter `b` about the origin, from 150 mm before its nearest point.
-fn past(random: &mut Random, b: f64) -> Ray {
+/// Makes a ray at impact parameter `b`, mm, about the origin, in a random direction, from 150 mm before its nearest point.
+fn ray_past_origin(random: &mut Random, b: f64) -> Ray {
     let d = random.direction();
     let (a, c) = orthonormal_pair(d);
     // Around the origin by chance, so that no plane of the tree is favoured.
@@ -52,15 +54,15 @@ fn past(random: &mut Random, b: f64) -> Ray {
     Ray::new((a * cos + c * sin) * b - d * 150.0, d)
 }
 
-/// Both crossings of the sphere for an impact parameter whose difference from the radius is known exactly.
-fn crossings(depth: f64) -> [Truth; 2] {
+/// Returns both crossings, by a ray of [`ray_past_origin`], of the sphere into which it dips `depth` mm deep: exact for the shortest chords too.
+fn ball_crossings(depth: f64) -> [Truth; 2] {
     // 2·√(R² − b²) by the difference R − b: squares would lose what is left of a grazing chord.
     let half = (depth * (2.0 * R - depth)).sqrt();
     [150.0 - half, 150.0 + half].map(|t| Truth::hit(t, half / R, depth))
 }
 
-/// Rays that touch a ball, or miss or cut it by ever less.
-fn graze() -> Case {
+/// Makes the case of rays that touch a ball, or miss or cut it by ever less.
+fn graze_case() -> Case {
     let mut questions = Vec::new();
     for k in 1..=12 {
         for sign in [-1.0, 1.0] {
@@ -68,29 +70,32 @@ fn graze() -> Case {
                 let mut random = Random::new(1, k * 1000 + i + if sign > 0.0 { 500 } else { 0 });
                 // From a tenth of a millimetre to 1e-12 mm on both sides of touching.
                 let delta = sign * 10f64.powi(-(k as i32));
-                let truth = if sign < 0.0 { crossings(-delta)[0] } else { Truth::miss(delta) };
-                questions.push(Question::First { ray: past(&mut random, R + delta), truth });
+                let truth = if sign < 0.0 { ball_crossings(-delta)[0] } else { Truth::miss(delta) };
+                questions.push(Question::First { ray: ray_past_origin(&mut random, R + delta), truth });
             }
         }
     }
-    let touch = |i| Question::First { ray: past(&mut Random::new(2, i), R), truth: Truth::hit(150.0, 1e-9, 0.0) };
+    let touch = |i| Question::First {
+        ray: ray_past_origin(&mut Random::new(2, i), R),
+        truth: Truth::hit(150.0, 1e-9, 0.0),
+    };
     questions.extend((0..40).map(touch));
-    ball("grazing sphere", questions)
+    ball_case("grazing sphere", questions)
 }
 
-/// Rays that cut a ball near its outline.
-fn silhouette() -> Case {
+/// Makes the case of rays that cut a ball near its outline, both crossings asked.
+fn silhouette_case() -> Case {
     let question = |i| {
         let mut random = Random::new(3, i);
         let half = random.between(2.0, 4.0);
         let depth = R - (R * R - half * half).sqrt();
-        Question::All { ray: past(&mut random, R - depth), truths: crossings(depth).to_vec() }
+        Question::All { ray: ray_past_origin(&mut random, R - depth), truths: ball_crossings(depth).to_vec() }
     };
-    ball("near-silhouette entry", (0..400).map(question).collect())
+    ball_case("near-silhouette entry", (0..400).map(question).collect())
 }
 
-/// Rays at and beside the poles of a ball.
-fn pole() -> Case {
+/// Makes the case of rays at and beside the poles of a ball.
+fn pole_case() -> Case {
     let mut questions = Vec::new();
     for (k, offset) in [0.0, 1e-12, 1e-9, 1e-6, 1e-3].into_iter().enumerate() {
         for i in 0..80 {
@@ -111,21 +116,22 @@ fn pole() -> Case {
             questions.push(Question::All { ray, truths: vec![first, second] });
         }
     }
-    ball("pole", questions)
+    ball_case("pole", questions)
 }
 
-/// A point of the torus about z at the two angles, and the outward normal there.
+/// Returns a point of the torus about z at the two angles, rad, and the outward normal there.
 fn torus_point(major: f64, minor: f64, u: f64, v: f64) -> (Point, Vector) {
     let n = Vector::new(v.cos() * u.cos(), v.cos() * u.sin(), v.sin());
     (Point::new(major * u.cos(), major * u.sin(), 0.0) + n * minor, n)
 }
 
+/// Returns the function of the signed distance from a torus about z, mm, negative inside.
 fn torus_distance(major: f64, minor: f64) -> Box<dyn Fn(Point) -> f64 + Send + Sync> {
     Box::new(move |p| (p.x.hypot(p.y) - major).hypot(p.z) - minor)
 }
 
-/// Rays at knots and seams of a torus.
-fn knots() -> Case {
+/// Makes the case of rays at knots and seams of a torus.
+fn knots_case() -> Case {
     let (major, minor) = (R, 15.0);
     let mut questions = Vec::new();
     for i in 0..400 {
@@ -153,8 +159,8 @@ fn knots() -> Case {
     }
 }
 
-/// Rays that cut short chords of a ring as thin as a hair.
-fn thin_torus() -> Case {
+/// Makes the case of rays that cut short chords of a ring as thin as a hair.
+fn thin_torus_case() -> Case {
     let (major, minor) = (R, 0.01);
     let question = |i: u64| {
         let mut random = Random::new(6, i);
@@ -182,7 +188,7 @@ fn thin_torus() -> Case {
     }
 }
 
-/// The patch with another parametrisation: weights times `lambda^i · mu^j` leave the set of points as it is.
+/// Returns the patch with another parametrisation: weights times `lambda^i · mu^j` leave the set of points as it is.
 fn reweighted(patch: &BezierPatch, lambda: f64, mu: f64) -> Surface {
     let [p, q] = patch.degree;
     let points = (0..=p).flat_map(|i| (0..=q).map(move |j| (i, j))).map(|(i, j)| {
@@ -193,20 +199,20 @@ fn reweighted(patch: &BezierPatch, lambda: f64, mu: f64) -> Surface {
     Surface { degree: [p, q], knots: [knots(p), knots(q)], points: points.collect() }
 }
 
-/// Rays on a ball whose patches have weights four powers of ten apart.
-fn weights() -> Case {
+/// Makes the case of rays on a ball whose patches have weights four powers of ten apart.
+fn weights_case() -> Case {
     // λ²μ² = 1e4 between opposite corners of a biquadratic patch.
     let surfaces = sphere(R).bezier_patches().iter().map(|p| reweighted(p, 10.0, 10.0)).collect();
     let question = |i| {
         let mut random = Random::new(7, i);
         let depth = random.between(0.1, R);
-        Question::First { ray: past(&mut random, R - depth), truth: crossings(depth)[0] }
+        Question::First { ray: ray_past_origin(&mut random, R - depth), truth: ball_crossings(depth)[0] }
     };
-    Case { surfaces, divisions: 24, ..ball("weights up to 1e4", (0..400).map(question).collect()) }
+    Case { surfaces, divisions: 24, ..ball_case("weights up to 1e4", (0..400).map(question).collect()) }
 }
 
-/// Chords of a ball from a hit on it, some of them flat and short.
-fn on_surface() -> Case {
+/// Makes the case of chords of a ball from a hit on it, some of them flat and short.
+fn on_surface_case() -> Case {
     let question = |i| {
         let mut random = Random::new(8, i);
         let toward = Ray::new(random.direction() * random.between(0.0, 20.0), random.direction());
@@ -223,24 +229,24 @@ fn on_surface() -> Case {
         let direction = ((a * cos + c * sin) * (1.0 - flat * flat).sqrt() - n * flat).normalize();
         Question::Chord { toward, direction, radius: R }
     };
-    ball("start on the surface", (0..400).map(question).collect())
+    ball_case("start on the surface", (0..400).map(question).collect())
 }
 
-/// Rays on a ball from a kilometre off.
-fn far_origin() -> Case {
+/// Makes the case of rays on a ball from a kilometre off.
+fn far_origin_case() -> Case {
     let question = |i| {
         let mut random = Random::new(9, i);
         let depth = random.between(1.0, R);
-        let near = past(&mut random, R - depth);
-        let truth = crossings(depth)[0];
+        let near = ray_past_origin(&mut random, R - depth);
+        let truth = ball_crossings(depth)[0];
         let ray = Ray::new(near.origin - near.direction * 1e6, near.direction);
         Question::First { ray, truth: Truth { t: truth.t.map(|t| t + 1e6), ..truth } }
     };
-    ball("origin 1e6 mm away", (0..400).map(question).collect())
+    ball_case("origin 1e6 mm away", (0..400).map(question).collect())
 }
 
-/// Rays from within a ball, a quarter of them along the axes.
-fn from_inside() -> Case {
+/// Makes the case of rays from within a ball, a quarter of them along the axes.
+fn from_inside_case() -> Case {
     let question = |i| {
         let mut random = Random::new(10, i);
         let o = random.direction() * (R * 0.98 * random.unit().cbrt());
@@ -255,13 +261,13 @@ fn from_inside() -> Case {
         let truth = Truth::hit(root - b, root / R, R - o.length());
         Question::All { ray: Ray::new(o, d), truths: vec![truth] }
     };
-    ball("from inside", (0..400).map(question).collect())
+    ball_case("from inside", (0..400).map(question).collect())
 }
 
-/// Rays at corners and edge middles of the facets, on the axes of the tree too.
-fn facet_features() -> Case {
+/// Makes the case of rays at corners and edge middles of the facets of a ball, on the axes of the tree too.
+fn facet_features_case() -> Case {
     let divisions = 12;
-    let case = ball("facet edge and vertex", Vec::new());
+    let case = ball_case("facet edge and vertex", Vec::new());
     let mesh =
         crate::study::sample_models::grid_mesh(&crate::study::sample_models::model("ball", [sphere(R)]), divisions);
     let mut questions = Vec::new();
