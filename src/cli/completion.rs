@@ -10,12 +10,12 @@ pub(crate) enum Completion {
 }
 
 impl Completion {
-    /// The worse of two.
+    /// Returns the worse of two.
     pub(crate) fn and(self, other: Self) -> Self {
         if self == Self::Complete { other } else { self }
     }
 
-    /// Incomplete where `short` holds.
+    /// Incomplete if `short`, else complete.
     pub(crate) fn incomplete_if(short: bool) -> Self {
         if short { Self::Incomplete } else { Self::Complete }
     }

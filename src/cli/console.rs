@@ -23,9 +23,9 @@ pub(crate) struct Console {
     pub(crate) json: bool,
     /// Nothing on stderr but errors.
     pub(crate) quiet: bool,
-    /// How much more to say.
+    /// How much more to say: how often -v was given.
     pub(crate) verbose: u8,
-    /// The command as typed.
+    /// The command as typed, quoted for a shell.
     pub(crate) command: String,
     /// When it began.
     pub(crate) started: Instant,
@@ -34,7 +34,7 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    /// From the options that every command has, and the command line as typed.
+    /// Makes a console from the options that every command has and the command line as typed; asks the environment for colours.
     pub(crate) fn new(json: bool, quiet: bool, verbose: u8, typed: &[OsString]) -> Self {
         // https://no-color.org: set and not empty, whatever its value.
         let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
@@ -51,7 +51,7 @@ impl Console {
         }
     }
 
-    /// A message for people, on stderr.
+    /// Writes a message for people to stderr, with what a terminal would obey written out; nothing if quiet.
     pub(crate) fn say(&self, message: impl std::fmt::Display) {
         if !self.quiet {
             // A closed stderr is no reason to stop working.
@@ -59,7 +59,7 @@ impl Console {
         }
     }
 
-    /// What a terminal may be given: names are data, so that all it would obey is written out, but for our own emphasis.
+    /// Returns the text as a terminal may be given it: names are data, so that all it would obey is written out, but for our own emphasis.
     pub(crate) fn shown(&self, text: &str) -> String {
         if !self.colour {
             return printable(text).into_owned();
@@ -75,22 +75,23 @@ impl Console {
         shown + &printable(rest)
     }
 
-    /// Emphasis, where the terminal has it.
+    /// Returns the text in bold, where messages may be coloured; else as it is.
     pub(crate) fn bold(&self, text: &str) -> String {
         if self.colour { format!("\x1b[1m{text}\x1b[0m") } else { text.to_owned() }
     }
 
-    /// Less than normal, where the terminal has it.
+    /// Returns the text dimmed, where messages may be coloured; else as it is.
     pub(crate) fn dim(&self, text: &str) -> String {
         if self.colour { format!("\x1b[2m{text}\x1b[0m") } else { text.to_owned() }
     }
 
-    /// Whether messages may be coloured.
+    /// Whether messages may be coloured: stderr is a terminal that can, and `NO_COLOR` is not set.
     pub(crate) fn has_colour(&self) -> bool {
         self.colour
     }
 
-    /// Columns for messages: as `COLUMNS` says, as the terminal has, or 120 where there is none.
+    /// Returns the columns for messages: as `COLUMNS` says, as the terminal has, or [`DEFAULT_WIDTH`] where there is none; kept within
+    /// [`READABLE_WIDTHS`].
     pub(crate) fn width(&self) -> usize {
         let requested = std::env::var("COLUMNS").ok().and_then(|c| c.parse::<usize>().ok());
         let of_terminal =
@@ -99,7 +100,7 @@ impl Console {
         width.clamp(*READABLE_WIDTHS.start(), *READABLE_WIDTHS.end())
     }
 
-    /// A progress bar with rate and remaining time; invisible where stderr is no terminal.
+    /// Returns a progress bar with rate and remaining time; invisible where stderr is no terminal.
     pub(crate) fn progress_bar(&self, label: &str, unit: &str, total: u64) -> ProgressBar {
         let bar = ProgressBar::new(total);
         // Hidden and not left out: the work reports to it all the same.
@@ -119,7 +120,8 @@ impl Console {
         bar
     }
 
-    /// A progress bar over shares of a work whose stages and remaining time it is told; of length [`STAGE_STEPS`].
+    /// Returns a progress bar of length [`STAGE_STEPS`] for a work that tells its stages and remaining time; hidden with `--quiet` and off
+    /// a terminal.
     pub(crate) fn stage_bar(&self, label: &str) -> ProgressBar {
         let bar = ProgressBar::new(STAGE_STEPS);
         if !self.terminal || self.quiet {
@@ -133,7 +135,7 @@ impl Console {
         bar
     }
 
-    /// A sign of life for work of unknown length.
+    /// Returns a sign of life for work of unknown length; invisible where stderr is no terminal. It turns until it is finished.
     pub(crate) fn spinner(&self, label: &str) -> ProgressBar {
         let spinner = ProgressBar::new_spinner();
         if !self.terminal || self.quiet {
@@ -148,7 +150,7 @@ impl Console {
         spinner
     }
 
-    /// Where the numbers of this command come from.
+    /// Returns where the numbers of this command come from: command, program and machine. `None` for a command without random numbers.
     pub(crate) fn provenance(&self, seed: Option<u64>, threads: usize) -> Provenance {
         Provenance {
             command: self.command.clone(),
@@ -161,8 +163,8 @@ impl Console {
     }
 }
 
-/// Data on stdout, with what a terminal would obey written out. A reader that has gone away (`| head`) is no failure: what
-/// was to be written to files is there all the same.
+/// Writes data to stdout, with what a terminal would obey written out. A reader that has gone away (`| head`) is no failure: what was to be
+/// written to files is there all the same.
 pub(crate) fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     let written = out.write_all(printable(text).as_bytes()).and_then(|()| out.flush());
@@ -172,7 +174,7 @@ pub(crate) fn print(text: &str) -> io::Result<()> {
     }
 }
 
-/// The command as a person would type it again.
+/// Returns the command line, whose first word is the program's name, as a person would type it again.
 fn command_line(line: &[OsString]) -> String {
     let quote = |word: &OsString| {
         let word = word.to_string_lossy();
@@ -187,7 +189,7 @@ fn command_line(line: &[OsString]) -> String {
     std::iter::once("lampyris".to_owned()).chain(line.iter().skip(1).map(quote)).collect::<Vec<_>>().join(" ")
 }
 
-/// The bar follows the study's own clock, remaining time included.
+/// Sets a stage bar to a study's progress: its stage, the remaining time if known, and its share, cut to 1.
 pub(crate) fn show_progress(bar: &ProgressBar, p: &crate::study::Progress) {
     let remaining = p.remaining_seconds.map_or(String::new(), |s| format!(", {} left", crate::report::seconds(s)));
     bar.set_message(printable_line(&format!("{}{remaining}", p.stage)).into_owned());

@@ -29,33 +29,34 @@ struct Excerpt {
 }
 
 impl Failure {
+    /// Makes a failure; what a terminal would obey in the message is written out.
     fn new(code: u8, message: impl Into<String>) -> Self {
         // What a message quotes may hold codes that a terminal obeys.
         Self { code, message: printable(&message.into()).into_owned(), help: None, excerpt: None }
     }
 
-    /// Exit code 1.
+    /// Makes a failure while running: exit code 1.
     pub(crate) fn running(message: impl Into<String>) -> Self {
         Self::new(1, message)
     }
 
-    /// Exit code 2.
+    /// Makes the failure of wrong arguments or a wrong scene: exit code 2.
     pub(crate) fn arguments(message: impl Into<String>) -> Self {
         Self::new(2, message)
     }
 
-    /// Exit code 3.
+    /// Makes the failure of an input that cannot be read: exit code 3.
     pub(crate) fn input(message: impl Into<String>) -> Self {
         Self::new(3, message)
     }
 
-    /// Adds what to do about it.
+    /// Adds advice on what to do about it, in place of any before.
     pub(crate) fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(printable(&help.into()).into_owned());
         self
     }
 
-    /// Shows this stretch of a text file.
+    /// Adds a stretch of a text file, bytes `span` of its `text`, to be shown with a label.
     pub(crate) fn with_excerpt(mut self, file: &str, text: &str, span: Range<usize>, label: &str) -> Self {
         // A span beyond the text, which only a message about another file could have, is cut to it.
         let span = span.start.min(text.len())..span.end.min(text.len());
@@ -66,12 +67,12 @@ impl Failure {
         self
     }
 
-    /// Prints the failure on stderr.
+    /// Prints the failure on stderr, even if quiet, and returns the exit code.
     pub(crate) fn print(&self, console: &Console) -> ExitCode {
         let renderer = if console.has_colour() { Renderer::styled() } else { Renderer::plain() };
         let renderer = renderer.decor_style(DecorStyle::Unicode).term_width(console.width());
-        let message = wrapped(&self.message, console.width());
-        let help = self.help.as_ref().map(|help| wrapped(help, console.width()));
+        let message = wrap_lines(&self.message, console.width());
+        let help = self.help.as_ref().map(|help| wrap_lines(help, console.width()));
         let snippet = self.excerpt.as_ref().map(|excerpt| {
             let label = AnnotationKind::Primary.span(excerpt.span.clone()).label(&excerpt.label);
             Snippet::source(&excerpt.text).path(&excerpt.file).annotation(label)
@@ -85,8 +86,8 @@ impl Failure {
     }
 }
 
-/// Lines of at most this many characters where spaces allow it, beside what stands before a message.
-fn wrapped(text: &str, width: usize) -> String {
+/// Breaks lines longer than the width, less the room for `error: `, at spaces where there are any. Lines of the text stay lines.
+fn wrap_lines(text: &str, width: usize) -> String {
     const LABEL: usize = "error: ".len();
     const NARROWEST: usize = 20;
     let width = width.saturating_sub(LABEL).max(NARROWEST);
@@ -170,8 +171,8 @@ mod tests {
 
     #[test]
     fn long_messages_are_broken_at_spaces_and_keep_their_lines() {
-        assert_eq!(wrapped("one two three four five six", 27), "one two three four\nfive six");
-        assert_eq!(wrapped("one\n  two", 80), "one\n  two");
-        assert_eq!(wrapped(&"x".repeat(50), 30), "x".repeat(50));
+        assert_eq!(wrap_lines("one two three four five six", 27), "one two three four\nfive six");
+        assert_eq!(wrap_lines("one\n  two", 80), "one\n  two");
+        assert_eq!(wrap_lines(&"x".repeat(50), 30), "x".repeat(50));
     }
 }

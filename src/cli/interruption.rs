@@ -30,7 +30,7 @@ pub(crate) fn is_requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
 }
 
-/// Listens to the signals from now on, where the system has them.
+/// Listens to SIGINT, SIGTERM and SIGHUP from now on, in a thread of its own; where the system refuses, they end the command as usual.
 #[cfg(unix)]
 pub(crate) fn watch() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};

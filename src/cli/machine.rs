@@ -6,31 +6,33 @@ use std::fs;
 /// As the system counts memory.
 const KILOBYTES_PER_GB: f64 = 1_000_000.0;
 
-/// Processor, number of cores and memory, as far as the system tells.
+/// Describes processor, number of cores, memory and system in words, as far as the system tells.
 pub(crate) fn hardware() -> String {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field(&text, "model name"));
+    let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field_value(&text, "model name"));
     // Not every kernel names its processor: then its architecture is said.
     let cpu = cpu.unwrap_or_else(|| std::env::consts::ARCH.to_owned());
-    let memory = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobytes(&text, "MemTotal"));
+    let memory = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobyte_field(&text, "MemTotal"));
     let mut parts = vec![cpu, format!("{cores} cores")];
     parts.extend(memory.map(|kb| format!("{:.0} GB", kb as f64 / KILOBYTES_PER_GB)));
     parts.push(std::env::consts::OS.to_owned());
     parts.join(", ")
 }
 
-/// Largest resident size of this process so far, bytes; `None` where the system does not tell.
+/// Returns the largest resident size of this process so far, bytes; `None` where the system does not tell.
 pub(crate) fn peak_bytes() -> Option<u64> {
-    kilobytes(&fs::read_to_string("/proc/self/status").ok()?, "VmHWM").map(|kb| 1024 * kb)
+    kilobyte_field(&fs::read_to_string("/proc/self/status").ok()?, "VmHWM").map(|kb| 1024 * kb)
 }
 
-fn field(text: &str, key: &str) -> Option<String> {
+/// Returns what follows the colon in the first line that begins with the key; `None` without one.
+fn field_value(text: &str, key: &str) -> Option<String> {
     let line = text.lines().find(|l| l.starts_with(key))?;
     Some(line.split_once(':')?.1.trim().to_owned())
 }
 
-fn kilobytes(text: &str, key: &str) -> Option<u64> {
-    field(text, key)?.split_whitespace().next()?.parse().ok()
+/// Returns the number in the line of that key, which counts kilobytes.
+fn kilobyte_field(text: &str, key: &str) -> Option<u64> {
+    field_value(text, key)?.split_whitespace().next()?.parse().ok()
 }
 
 /// The name that the machine has in its network.

@@ -62,8 +62,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// Panics of other people's code that cost one face, or one row of a comparison, are counted and named where they are caught: their
-/// messages and places in source are no news to a user.
+/// Sets a panic hook that says nothing of panics that are caught and cost one face, or one row of a comparison: they are counted and named
+/// where they are caught, and their messages and places in source are no news to a user.
 fn keep_caught_panics_quiet() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {

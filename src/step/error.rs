@@ -53,7 +53,7 @@ impl Error {
         Self(kind)
     }
 
-    /// What kind of error it is.
+    /// Returns what kind of error it is.
     pub fn kind(&self) -> &ErrorKind {
         &self.0
     }

@@ -52,7 +52,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     let file = parse(name, bytes)?;
     let parsed = start.elapsed().as_secs_f64();
     let mut report = ImportReport { file: name.to_string(), bytes: bytes.len() as u64, ..ImportReport::default() };
-    report.schema = schema(&file);
+    report.schema = schema_names(&file);
     for fault in &file.faults {
         let id = fault.id.map_or_else(String::new, |id| format!(" #{id}"));
         report.problems.push(format!("{name}: line {}:{id} {}", fault.line, fault.what));
@@ -60,7 +60,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     if file.fault_count > file.faults.len() {
         report.problems.push(format!("{} further statements were skipped", file.fault_count - file.faults.len()));
     }
-    let model = assemble(&file, name, settings, &mut report)?;
+    let model = convert_assembly(&file, name, settings, &mut report)?;
     let bounds = if settings.measure_box { model.bounds() } else { Aabb::EMPTY };
     if !bounds.is_empty() {
         report.bbox_mm = Some([bounds.min.to_array(), bounds.max.to_array()]);
@@ -71,14 +71,15 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     Ok(Import { model, report })
 }
 
-/// The schemas that the file names.
-fn schema(file: &File<'_>) -> Vec<String> {
+/// Returns the schemas that the file names, in its order; empty without a header.
+fn schema_names(file: &File<'_>) -> Vec<String> {
     let Some(args) = file.header("FILE_SCHEMA") else { return Vec::new() };
     let list = args.list(0);
     (0..list.len()).filter_map(|i| list.text(i)).collect()
 }
 
-/// Reads the units of all contexts: by context, and those of a representation without one.
+/// Reads the units of all contexts, and their names into `names`. Returns those by context, and those for a representation without one: the
+/// first that name a length, else mm. [`Settings::length_unit_mm`] replaces all lengths.
 fn read_units(file: &File<'_>, settings: &Settings, names: &mut UnitNames) -> (FxHashMap<u64, Units>, Units) {
     let mut units: FxHashMap<u64, Units> = FxHashMap::default();
     let mut fallback = None;
@@ -103,8 +104,14 @@ fn read_units(file: &File<'_>, settings: &Settings, names: &mut UnitNames) -> (F
     (units, fallback.unwrap_or(Units { length, ..Units::DEFAULT }))
 }
 
-/// Reads a parsed file's assembly and converts what it places.
-fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut ImportReport) -> Result<Model, Error> {
+/// Reads a parsed file's assembly and converts what it places, with all counts and notes in `report`. Fails only where more is placed than
+/// [`Settings::max_placed`].
+fn convert_assembly(
+    file: &File<'_>,
+    name: &str,
+    settings: &Settings,
+    report: &mut ImportReport,
+) -> Result<Model, Error> {
     let (units, fallback) = read_units(file, settings, &mut report.units);
     let assembly = Assembly::read(file, units, fallback);
     // Thirty kilobytes can place a part 2⁴⁰ times: what is counted first need not be expanded.
@@ -153,8 +160,8 @@ fn assemble(file: &File<'_>, name: &str, settings: &Settings, report: &mut Impor
     Ok(model)
 }
 
-/// Items of a representation that do not stand in its place already: linked representations often name the same shapes, each of which
-/// is meant once in a place.
+/// Returns the items of a representation that do not stand in its place already, and adds them to `items_placed`: linked representations
+/// often name the same shapes, each of which is meant once in a place. An orphan repeats none at all.
 fn items_not_placed(
     file: &File<'_>,
     assembly: &Assembly<'_, '_>,
@@ -175,7 +182,7 @@ fn items_not_placed(
     items
 }
 
-/// Fills in what the report says of the whole model.
+/// Fills in the report's counts of parts, instances, shells and placed faces, and the names, each once.
 fn count_model(model: &Model, report: &mut ImportReport) {
     report.parts = model.parts.iter().filter(|p| p.face_count() > 0).count();
     report.instances = model.instances.len();
@@ -189,7 +196,7 @@ fn count_model(model: &Model, report: &mut ImportReport) {
     }
 }
 
-/// A part of the model, and the faces that the file has in it.
+/// A part of the model, and the number of faces that the file has in it.
 #[derive(Clone, Copy)]
 struct PartFaces {
     part: PartId,
@@ -206,7 +213,7 @@ struct Reader<'f, 'a, 'r> {
 }
 
 impl Reader<'_, '_, '_> {
-    /// Converts a representation that holds shapes; `None` when it holds none.
+    /// Converts a representation that holds shapes, and adds the part to the model and its counts to the report; `None` when it holds none.
     fn convert_representation(
         &mut self,
         units: Units,
@@ -245,7 +252,7 @@ impl Reader<'_, '_, '_> {
         Some(PartFaces { part: PartId(self.model.parts.len() as u32 - 1), found })
     }
 
-    /// Places a part.
+    /// Places a part and counts its faces; one without a converted face gets no instance.
     fn add_instance(&mut self, PartFaces { part, found }: PartFaces, p: PlacedRepresentation) {
         self.report.faces_placed.found += found;
         // A part of which no face was converted has nothing to place.
@@ -258,7 +265,7 @@ impl Reader<'_, '_, '_> {
     }
 }
 
-/// Largest resident size of this process; 0 where the system does not tell.
+/// Returns the largest resident size of this process, bytes; 0 where the system does not tell.
 fn peak_bytes() -> u64 {
     let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return 0 };
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));

@@ -8,9 +8,9 @@ use serde::Serialize;
 pub struct ImportReport {
     /// Name of the file.
     pub file: String,
-    /// Its length.
+    /// Its length, bytes.
     pub bytes: u64,
-    /// FILE_SCHEMA.
+    /// The names in its FILE_SCHEMA; empty without one.
     pub schema: Vec<String>,
     /// Units of its contexts, by name.
     pub units: UnitNames,
@@ -36,7 +36,7 @@ pub struct ImportReport {
     pub names: Vec<String>,
     /// Faces that were repaired, and how.
     pub repairs: Vec<Note>,
-    /// Largest distance between an edge and a face it bounds, mm.
+    /// Largest distance between an edge and a face it bounds, mm of the part.
     pub gap_max_mm: f64,
     /// Statements and placements that could not be read, with their lines or instances.
     pub problems: Vec<String>,
@@ -96,7 +96,7 @@ pub struct SurfaceCounts {
 }
 
 impl SurfaceCounts {
-    /// Counts one more face of a kind.
+    /// Counts one more face of this kind of surface.
     pub(super) fn count(&mut self, kind: SurfaceKind) {
         let slot = match kind {
             SurfaceKind::Plane => &mut self.plane,

@@ -15,7 +15,7 @@ pub struct Settings {
     pub max_placed: u64,
     /// Whether the report gets [`super::ImportReport::bbox_mm`], which takes longer than reading where trims are long.
     pub measure_box: bool,
-    /// Millimetres per unit of length, for files whose own unit is wrong; every context of the file then has it.
+    /// Millimetres per unit of length, for files whose own unit is wrong; every context of the file then has it. `None` believes the file.
     pub length_unit_mm: Option<f64>,
 }
 

@@ -21,7 +21,9 @@ pub struct SteepFace {
     pub largest_deg: f64,
 }
 
-/// Names the faces; `None` when no angle was asked for.
+/// Lists the placed faces with facets that turn farther from the surface normals at their corners than [`Settings::angle_deg`], in the
+/// mesh's order; `None` when no angle was asked for. Quads count by the steeper triangle; triangles without area and faces that are meshes
+/// in the file are passed over.
 pub(super) fn steep_faces(mesh: &FacetMesh, model: &Model, settings: &Settings) -> Option<Vec<SteepFace>> {
     let most = settings.angle_deg?;
     let faces: Vec<_> = model.placed_faces().collect();

@@ -12,21 +12,21 @@ use super::placed_part::PlacedPart;
 use super::report::{FailureCause, Repair};
 use super::settings::Settings;
 use super::taken_chords::{NO_CHORDS, TakenChords, doubled_chords};
-use super::triangulator::guarded;
+use super::triangulator::catch_panic;
 use crate::math::Point;
 use crate::model::{EdgeId, Face, Model, Part, PartId};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// A part's faces, in the order of its shells.
+/// The facets of a part, its faces in the order of its shells, in the part's coordinates.
 pub(super) struct PartMesh {
-    /// Of each edge.
+    /// Where each edge is divided, by [`EdgeId`].
     pub(super) divisions: Vec<Division>,
     /// Places of vertices and of samples of edges, in the part's coordinates.
     pub(super) shared: Vec<Point>,
-    /// None for a face that could not be meshed.
+    /// `None` for a face that could not be meshed or has no usable surface.
     pub(super) faces: Vec<Option<FaceMesh>>,
-    /// Why faces that could have been meshed were not.
+    /// Why faces, by their place in the part, exceeded a limit: too many facets or too much work. Other failures are not in it.
     pub(super) causes: FxHashMap<usize, FailureCause>,
 }
 
@@ -40,7 +40,8 @@ const MAX_ROUNDS_OF_CROSSING: u32 = MAX_ROUNDS_OF_REPAIRED + 4;
 /// Samples of an edge up to which its chords may be why its face comes to nothing.
 const FEW_CHORDS: usize = 500;
 
-/// Meshes every part that is placed.
+/// Meshes every part once, for the largest scale at which it is placed. `None` for a part without an instance; faces that fail are `None`
+/// within their part.
 pub(super) fn mesh_parts(model: &Model, settings: &Settings) -> Vec<Option<PartMesh>> {
     let mut placed: Vec<PlacedPart<'_>> =
         model.parts.iter().map(|part| PlacedPart { part, firsts: Vec::new(), scale: 0.0 }).collect();
@@ -58,7 +59,8 @@ pub(super) fn mesh_parts(model: &Model, settings: &Settings) -> Vec<Option<PartM
     placed.par_iter().enumerate().map(mesh).collect()
 }
 
-/// One of a part's faces with its surface.
+/// Returns the `k`-th face of a part, counted through its shells, with its surface; `None` when there is no such face or its surface cannot
+/// be used.
 pub(super) fn face_with_surface<'m>(
     model: &'m Model,
     settings: &Settings,
@@ -70,8 +72,9 @@ pub(super) fn face_with_surface<'m>(
     Some((face, placed.surface(settings, k, face)?))
 }
 
-/// Meshes a part once: divides its edges, meshes its faces, and goes on with denser edges while repairs ask for them. `too_large` tells of
-/// faces that are left out the cells they would need.
+/// Meshes a part: divides its edges, meshes its faces, and starts again with denser edges while faces ask for them, at most
+/// [`MAX_ROUNDS_OF_REPAIRED`] times; then meshes anew the faces that share an inner chord. `too_large` gives, for a face to be left out,
+/// the cells that it would need.
 fn mesh_part(
     placed: &PlacedPart<'_>,
     settings: &Settings,
@@ -159,8 +162,8 @@ fn mesh_part(
     with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes })
 }
 
-/// Edges that should have shorter chords: those that faces ask for, and all of a face that came to nothing or to its border alone, where
-/// those of a few chords may lie on one line or cross others.
+/// Returns the edges, perhaps twice, that need shorter chords: those that faces ask for, and all edges of at most [`FEW_CHORDS`] samples of
+/// a face that has no mesh or only one of its border. `round` counts from 0; from [`MAX_ROUNDS`] on only faces whose borders cross may ask.
 fn coarse_edges(
     faces: &[(&Face, Option<FaceSurface<'_>>)],
     meshes: &[Option<FaceMesh>],
@@ -187,8 +190,8 @@ fn coarse_edges(
     coarse
 }
 
-/// Gives one number to vertices that a file has twice in one place where loops touch: the face whose loops they are has one corner there,
-/// the faces beyond must have the same.
+/// Gives vertices that a file has twice in one place, where loops of a face touch, the least of their numbers, in all faces of the part.
+/// Only corners change; the positions left over stay in `shared`.
 pub(super) fn with_coincident_vertices_joined(mut mesh: PartMesh) -> PartMesh {
     let pairs: Vec<[u32; 2]> = mesh.faces.iter().flatten().flat_map(|f| f.coincident.iter().copied()).collect();
     if pairs.is_empty() {
@@ -222,15 +225,16 @@ struct PreviousRound {
     meshes: Vec<Option<FaceMesh>>,
 }
 
-/// Where shared positions are now, and which edges have others.
+/// Maps shared positions from one division of a part's edges to another, and knows which edges differ between the two.
 pub(super) struct Renumbering {
-    /// By edge; and the new positions, by the old.
+    /// By edge.
     changed: Vec<bool>,
     to: Vec<u32>,
 }
 
 impl Renumbering {
-    /// From one division of a part's edges, with so many shared positions, to another.
+    /// Compares two divisions of a part's edges; `shared` is the number of positions that went with the first. Inner positions of changed
+    /// edges keep their old numbers, which mean nothing any more.
     pub(super) fn new(part: &Part, (before, shared): (&[Division], usize), now: &[Division]) -> Self {
         let mut to: Vec<u32> = (0..shared as u32).collect();
         let mut changed = Vec::with_capacity(part.edges.len());
@@ -244,11 +248,12 @@ impl Renumbering {
         Self { changed, to }
     }
 
+    /// Whether an edge is divided otherwise than before; false without an edge, true for one that the part does not have.
     pub(super) fn has_changed(&self, edge: Option<EdgeId>) -> bool {
         edge.is_some_and(|e| self.changed.get(e.0 as usize).is_none_or(|&c| c))
     }
 
-    /// The mesh with the numbers that its shared positions have now.
+    /// Returns the mesh with its shared positions renumbered. Only for a face none of whose edges has changed.
     pub(super) fn renumbered(&self, mut mesh: FaceMesh) -> FaceMesh {
         for corner in &mut mesh.corners {
             if let Position::Shared(p) = &mut corner.position {
@@ -260,7 +265,8 @@ impl Renumbering {
     }
 }
 
-/// A face by its cells and transition, or by its border alone; `None` where neither gives facets.
+/// Meshes a face by cells and transition, or else from its border alone, which is marked as repaired. `None` where neither gives facets,
+/// where the work is over its limit, and where an edge or vertex does not exist.
 pub(super) fn mesh_face(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
     let FaceInput { part, face, surface, divisions, shared, .. } = *input;
     let uses = || face.loops.iter().flat_map(|l| &l.uses);
@@ -281,6 +287,6 @@ pub(super) fn mesh_face(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
         Err(Unmeshed::TooManySteps) => return None,
     };
     // The same library may give up on the border too.
-    let border = guarded(|| fallback::border_alone(part, face, surface, divisions, shared)).ok().flatten();
+    let border = catch_panic(|| fallback::border_alone(part, face, surface, divisions, shared)).ok().flatten();
     border.map(|mesh| FaceMesh { repaired: Some(how), ..mesh })
 }

@@ -22,23 +22,24 @@ const SAME_AT_POLE: f64 = 1e-9;
 /// Share of the domain within which parameters of one place are on the same side of a seam.
 const SAME_SIDE: f64 = 0.1;
 
-/// The border of a face.
+/// The border of a face: its nodes, and the segments between them in parameters.
 pub(super) struct BorderNodes {
     pub(super) nodes: Nodes,
-    /// Pairs of nodes, loop by loop.
+    /// Pairs of nodes in the direction of the loops, loop by loop, without poles at first.
     pub(super) segments: Vec<[u32; 2]>,
+    /// How far the curve of each segment that follows an edge strays, by its two nodes.
     pub(super) chords: BorderChords,
     /// The piece of an edge that a segment follows.
     pub(super) followed: FxHashMap<[u32; 2], Followed>,
     /// Segments that are one point in space.
     poles: Vec<[u32; 2]>,
-    /// Positions of vertices that the file has twice, where loops touch.
+    /// Pairs of shared positions of vertices that the file has twice, where loops touch.
     pub(super) coincident: Vec<[u32; 2]>,
-    /// Segments of a border of another solid's face.
+    /// Segments of the border of another solid's face that this one carries.
     pub(super) imprinted: Vec<[u32; 2]>,
 }
 
-/// A segment that follows an edge, over these parameters.
+/// A segment that follows an edge over the parameters `t` of its curve.
 struct EdgeSegment<'l> {
     nodes: [u32; 2],
     edge_use: &'l EdgeUse,
@@ -47,7 +48,8 @@ struct EdgeSegment<'l> {
 }
 
 impl BorderNodes {
-    /// Nodes and segments of a face's border, from its polygons.
+    /// Makes nodes and segments from the polygons of a face and bounds, in parallel, how far edges stray from their segments. `shared` are
+    /// the part's positions, `loops` those that the polygons were built from. Nothing is imprinted yet.
     pub(super) fn new(
         part: &Part,
         loops: &[TrimLoop],
@@ -105,8 +107,9 @@ impl BorderNodes {
         out
     }
 
-    /// Makes the nodes of all polygons. Loops that touch in a vertex have one node there, or what follows its chords would be known of one
-    /// of them alone.
+    /// Makes the nodes of all polygons and returns their numbers, polygon by polygon. Corners at one vertex with the same parameters get
+    /// one node: loops that touch there would otherwise not know of each other's chords. Notes vertices that stand twice in the file in
+    /// `coincident`.
     fn add_nodes(&mut self, part: &Part, polygons: &BorderPolygons, shared: &[Point]) -> Vec<Vec<u32>> {
         let (lo, hi) = polygons.bounds();
         let near = SAME_PARAMETERS * (hi - lo);
@@ -139,7 +142,8 @@ impl BorderNodes {
         polygons.map(|p| p.iter().map(|v| node(v.uv, v.position)).collect()).collect()
     }
 
-    /// Adds the segments of an imprint, and tells which node stands for each of its vertices. Nodes that are there already are taken.
+    /// Adds the segments of an imprint, except those on the border, and the nodes that are missing. Returns pairs of node and imprinted
+    /// vertex, two for each segment, with repetitions.
     pub(super) fn add_imprint(&mut self, surface: &FaceSurface<'_>, imprint: &Imprint) -> Vec<(u32, usize)> {
         let mut vertex_nodes = Vec::new();
         // Lines that follow the border already bound the facets there as they are.
@@ -157,7 +161,8 @@ impl BorderNodes {
         vertex_nodes
     }
 
-    /// The node where an imprinted line ends: one that is there, or a new one.
+    /// Returns the node where an imprinted line ends: the nearest in parameters within `near` mm on the same side of a seam, or a new one.
+    /// A new node within `near` of another shares its position.
     fn node_at(&mut self, surface: &FaceSurface<'_>, end: &ImprintEnd, near: f64) -> u32 {
         let extent = surface.extent();
         let off = |n: &Node| ((n.uv - end.uv) / extent).abs().max_element();
@@ -178,7 +183,8 @@ impl BorderNodes {
         }
     }
 
-    /// Divides poles where the cells beside them are.
+    /// Turns the poles into segments, divided where corners of border cells or imprinted nodes lie on them; the new nodes share the pole's
+    /// position.
     pub(super) fn divide_poles(&mut self, cells: &Subdivision) {
         for [from, to] in std::mem::take(&mut self.poles) {
             let (a, b) = (self.nodes[from].uv, self.nodes[to].uv);

@@ -6,7 +6,7 @@ use super::nodes::{Nodes, ProvedFacet};
 use crate::math::{Uv, Vector};
 use rustc_hash::FxHashMap;
 
-/// Collects the facets of a face.
+/// Turns facets of nodes into facets of corners with outward normals.
 pub(super) struct Emission<'e, 's, 'a> {
     surface: &'s FaceSurface<'a>,
     nodes: &'e Nodes,
@@ -32,8 +32,9 @@ impl<'e, 's, 'a> Emission<'e, 's, 'a> {
         self.made
     }
 
-    /// Adds a facet; `pole` is a corner with parameters of its own.
-    pub(super) fn facet(&mut self, facet: &ProvedFacet<4>, pole: Option<(usize, Uv)>) {
+    /// Adds a facet, turned around on a flipped surface. `pole` is the index of a corner that gets its own, and the parameters for its
+    /// normal.
+    pub(super) fn add_facet(&mut self, facet: &ProvedFacet<4>, pole: Option<(usize, Uv)>) {
         let nodes = facet.nodes;
         let uv = nodes.map(|n| self.nodes[n].uv);
         let inside = 0.25 * (uv[0] + uv[1] + uv[2] + uv[3]);
@@ -56,7 +57,7 @@ impl<'e, 's, 'a> Emission<'e, 's, 'a> {
         self.made.facets.push(MeshedFacet { corners, bound: facet.bound, tolerance: facet.tolerance });
     }
 
-    /// The corner at a node for facets on one side of its creases.
+    /// Returns the corner at a node for facets on one side of its creases, made at first use. `inside` are parameters within the facet.
     fn shared_corner(&mut self, node: u32, inside: Uv) -> u32 {
         let uv = self.nodes[node].uv;
         let sides = crease_sides(self.surface, uv, inside);
@@ -68,14 +69,14 @@ impl<'e, 's, 'a> Emission<'e, 's, 'a> {
         corner
     }
 
-    /// Adds a corner with the surface's normal on the side of `inside`.
+    /// Adds a corner with the surface's normal on the side of `inside`, or [`NO_NORMAL`] where it has none; returns its number.
     fn new_corner(&mut self, node: u32, uv: Uv, inside: Uv) -> u32 {
         let normal = self.surface.normal_towards(uv, inside).unwrap_or(NO_NORMAL);
         self.made.corners.push(Corner { position: self.nodes[node].position, normal, uv });
         (self.made.corners.len() - 1) as u32
     }
 
-    /// Where the surface has no normal, a corner takes that of its first facet.
+    /// Gives corners without a normal that of the facet `corners`, +z for one without area.
     fn fill_normals(&mut self, corners: [u32; 4]) {
         if corners.iter().all(|&n| self.made.corners[n as usize].normal != NO_NORMAL) {
             return;
@@ -98,7 +99,7 @@ impl<'e, 's, 'a> Emission<'e, 's, 'a> {
 /// Stands for a normal that the surface does not have, until the corner's first facet gives one.
 const NO_NORMAL: Vector = Vector::ZERO;
 
-/// The side of each crease through `uv` on which `inside` lies.
+/// Tells for the creases of constant u and of constant v through `uv` on which side `inside` lies.
 fn crease_sides(surface: &FaceSurface<'_>, uv: Uv, inside: Uv) -> [CreaseSide; 2] {
     if !surface.is_creased() {
         return [CreaseSide::NoCrease; 2];

@@ -10,7 +10,8 @@ use crate::model::Model;
 /// Share of the tolerance, and mm, by which a sample may be above it: one on the very tolerance differs by rounding alone.
 const SAMPLE_ROUNDING: [f64; 2] = [1e-9, 1e-10];
 
-/// Fills in everything but the times.
+/// Fills in `made.report` from its mesh and quality, all but the times. `failed` are the placed faces without facets, whose causes are
+/// filled in later; samples are taken only if [`Settings::measure`] says so.
 pub(super) fn fill_report(
     made: &mut Tessellation,
     model: &Model,
@@ -40,15 +41,15 @@ pub(super) fn fill_report(
     report.repaired = repairs::repaired_faces(made, model, repairs);
     report.faces.meshed = model.placed_face_count() - failed.len();
     name_uncertified(&mut report, made, model);
-    let all_closed = shells(&mut report, made, model);
+    let all_closed = count_shells(&mut report, made, model);
     report.volume_mm3 = (all_closed && report.facets > 0).then(|| made.mesh.volume());
     if settings.measure {
-        measure(&mut report, made, model, &areas);
+        measure_samples(&mut report, made, model, &areas);
     }
     made.report = report;
 }
 
-/// The faces that were not meshed, with their entities.
+/// Returns the faces that were not meshed, with their entities and, as yet, the default cause; empty for none.
 fn failed_faces(model: &Model, failed: &[FaceId]) -> Vec<FailedFace> {
     // Looked up only where there is something to name: models may have thousands of faces.
     if failed.is_empty() {
@@ -60,7 +61,8 @@ fn failed_faces(model: &Model, failed: &[FaceId]) -> Vec<FailedFace> {
     failed.iter().map(named).collect()
 }
 
-/// Lists the faces with facets that are not certified, with their entity and the file's gap.
+/// Adds to the report the faces with facets that are not certified, in the mesh's order of faces, with their entity and the file's gap, mm
+/// of the scene.
 fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
     for (facet, _) in made.mesh.facets.iter().zip(&made.quality).filter(|(_, q)| !q.certified) {
         match report.not_certified.last_mut() {
@@ -80,8 +82,9 @@ fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
     }
 }
 
-/// Counts closed shells; whether every shell of the model is closed.
-fn shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
+/// Counts open and closed shells and the edges that are open, shared by more than two facets, or turned; returns whether every shell of the
+/// model is closed. Shells that the file calls open are not counted and not examined; a ready mesh counts as not closed.
+fn count_shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
     let facets = &made.mesh.facets;
     let mut all = true;
     for (i, instance) in model.instances.iter().enumerate() {
@@ -114,8 +117,9 @@ fn shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
     all
 }
 
-/// Fills in what samples show: sag, facets above their tolerance, and errors of normals.
-fn measure(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64]) {
+/// Fills in what samples show: sag and its excess over the tolerance, mm, and errors of normals, degrees. `areas` are those of the facets,
+/// mm².
+fn measure_samples(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64]) {
     let sampled = sample::sample_mesh(&made.mesh, model);
     let max = sampled.iter().map(|s| s.sag).fold(0.0, f64::max);
     let mean =

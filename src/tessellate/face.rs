@@ -19,7 +19,7 @@ use super::taken_chords::TakenChords;
 use super::transition::creases::crease_lines;
 use super::transition::delaunay::{self, Outline, Transition};
 use super::transition::pairing::{self, TransitionFacet};
-use super::triangulator::{GaveUp, guarded};
+use super::triangulator::{GaveUp, catch_panic};
 use crate::math::{Point, Uv};
 use crate::model::{EdgeId, Face, Part};
 use crate::nurbs::FundamentalForms;
@@ -39,7 +39,7 @@ const VOTES: usize = 8;
 /// Why a face has no facets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Unmeshed {
-    /// Nothing can be made of its parameter plane.
+    /// Its border encloses nothing in the parameter plane, or no facets came of it.
     Empty,
     /// The triangulation library gave up on it.
     GaveUp,
@@ -63,16 +63,21 @@ pub(super) struct FaceInput<'i, 'a> {
     /// The part's shared positions.
     pub(super) shared: &'i [Point],
     pub(super) settings: &'i Settings,
-    /// Chords that others have.
+    /// Chords between shared positions that other faces have inside, which no side of a facet here may be.
     pub(super) taken: &'i TakenChords,
 }
 
-/// Meshes a face.
+/// Meshes a face by cells and transition. Facets that are not proved are in the mesh, with their bound; errors are as in
+/// [`mesh_with_imprint`].
 pub(super) fn mesh(input: &FaceInput<'_, '_>) -> Result<FaceMesh, Unmeshed> {
     mesh_with_imprint(input, &Imprint::default()).map(|(mesh, _)| mesh)
 }
 
-/// Meshes a face on which borders of faces of other solids lie.
+/// Meshes a face with the lines of `imprint` as sides of facets, and returns its facets by node too; whether the lines were kept is
+/// [`CarrierFacets::holds_imprint`].
+///
+/// Facets that cover another area than the border bounds, or cross it, are kept as a repair, not an error. Fails where nothing is enclosed
+/// or made, the triangulation library gives up, or proofs have taken too many steps.
 pub(super) fn mesh_with_imprint(
     input: &FaceInput<'_, '_>,
     imprint: &Imprint,
@@ -114,7 +119,7 @@ pub(super) fn mesh_with_imprint(
     let creases = crease_lines(surface, &nodes, &segments);
     let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale, taken };
     let triangulate = || delaunay::triangulate(surface, settings.acceptance, outline, settings.budget);
-    let mut transition = guarded(triangulate)?.ok_or(Unmeshed::Empty)?;
+    let mut transition = catch_panic(triangulate)?.ok_or(Unmeshed::Empty)?;
     // Proofs that were not tried any more say nothing: the face is given up whole, whichever thread came how far.
     if surface.steps.are_too_many() {
         return Err(Unmeshed::TooManySteps);
@@ -139,7 +144,7 @@ pub(super) fn mesh_with_imprint(
     let mut emission = Emission::new(surface, &transition.nodes);
     let mut facets = Vec::new();
     for f in whole_cells.chain(paired) {
-        emission.facet(&f.facet, f.pole);
+        emission.add_facet(&f.facet, f.pole);
         facets.push(f.facet.nodes);
     }
     // Conflicts may have cost an imprinted line, so that the guests' facets would not be bounded by it.
@@ -153,7 +158,7 @@ pub(super) fn mesh_with_imprint(
     Ok((FaceMesh { own, coarse, facing, coincident, repaired, ..made }, carrier))
 }
 
-/// What was given up, the gravest first.
+/// Returns the gravest of what was given up: a border that crosses itself, then area, then a budget used up. `None` if nothing was.
 fn first_repair(transition: &Transition, is_covered: bool, exhausted: bool) -> Option<Repair> {
     if !transition.conflicts.is_empty() {
         Some(Repair::CrossingBorder)
@@ -164,7 +169,7 @@ fn first_repair(transition: &Transition, is_covered: bool, exhausted: bool) -> O
     }
 }
 
-/// What is left for the transition to fill, between the border and the outline of whole cells.
+/// Returns the segments in the border or the outline but not in both, which the transition has to fill between.
 fn unmet_segments(border: &[[u32; 2]], outline: &[[u32; 2]]) -> Vec<[u32; 2]> {
     let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
     let all = border.iter().chain(outline);
@@ -173,9 +178,8 @@ fn unmet_segments(border: &[[u32; 2]], outline: &[[u32; 2]]) -> Vec<[u32; 2]> {
     all.filter(|s| uses[&edge_key(s[0], s[1])] % 2 == 1).copied().collect()
 }
 
-/// Whether facets cover as much of the parameter plane as the border bounds, within [`COVERED`]: a gap and an overlap of one size are
-/// not told. They cover more where they lie over each other or beyond a border that
-/// crosses itself, less where something is left out.
+/// Whether facets cover as much of the parameter plane as the border bounds, within [`COVERED`]. More is covered where they overlap or the
+/// border crosses itself, less where something is left out; a gap and an overlap of one size are not told.
 fn covers_area_of_border(transition: &Transition, quads: &[ProvedFacet<4>], polygons: &BorderPolygons) -> bool {
     // Only ratios and signs are compared: halving each would change none.
     let doubled_area = |corners: &[Uv]| -> f64 {
@@ -213,8 +217,8 @@ fn covers_area_of_border(transition: &Transition, quads: &[ProvedFacet<4>], poly
     is_near((0..loops.len()).map(bounded).sum::<f64>())
 }
 
-/// Scale of the parameters in which triangles should look square: lengths in chords where the face bends, so that
-/// the triangles of the transition lie along the direction that does not bend.
+/// Returns the factors for u and v, the larger one 1, that turn parameter lengths into counts of chords, so that triangles of the
+/// transition lie along the direction that bends less. 1 and 1 where curvature tells nothing.
 fn parameter_scale(surface: &FaceSurface<'_>, polygons: &BorderPolygons, cells: &Subdivision) -> Uv {
     let (lo, hi) = polygons.bounds();
     let n = if surface.affine { 1 } else { SCALE_PLACES };

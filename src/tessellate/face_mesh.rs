@@ -9,7 +9,7 @@ use crate::model::EdgeId;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
     pub(super) position: Position,
-    /// Outward; zero where the surface has none, until a facet gives its own.
+    /// Outward, in the part's coordinates; zero where the surface has none, until a facet gives its own.
     pub(super) normal: Vector,
     pub(super) uv: Uv,
 }
@@ -19,16 +19,16 @@ pub(super) struct Corner {
 pub(super) struct MeshedFacet {
     /// A triangle repeats its last corner.
     pub(super) corners: [u32; 4],
-    /// As of [`super::nodes::ProvedFacet`].
+    /// As of [`super::nodes::ProvedFacet`], mm of the part; infinite where nothing is proved.
     pub(super) bound: f64,
     pub(super) tolerance: f64,
 }
 
-/// The facets of a face.
+/// The facets of a face in its part's coordinates.
 #[derive(Clone, Default)]
 pub(super) struct FaceMesh {
     pub(super) corners: Vec<Corner>,
-    /// Places of the face's own positions.
+    /// Places of the face's own positions, in the part's coordinates.
     pub(super) own: Vec<Point>,
     pub(super) facets: Vec<MeshedFacet>,
     /// Edges that should have shorter chords: they cross others in the parameter plane, or a facet beside them is not proved.
@@ -37,6 +37,6 @@ pub(super) struct FaceMesh {
     pub(super) facing: Vec<(EdgeId, f64)>,
     /// Shared positions that are one: vertices of the file in one place, where loops touch.
     pub(super) coincident: Vec<[u32; 2]>,
-    /// What was given up.
+    /// What was given up; `None` where nothing was.
     pub(super) repaired: Option<Repair>,
 }

@@ -44,28 +44,29 @@ pub(super) struct FaceSurface<'a> {
     patches: Vec<BezierPatch>,
     /// How much it bends, patch by patch.
     pub(super) curving: SecondDerivativeBounds,
-    /// Distinct knots in u and v.
+    /// Distinct knots in u and v, ascending, both ends of the domain included.
     pub(super) breaks: [Vec<f64>; 2],
     /// Parameters with a crease or corner of the surface, in u and v.
     pub(super) creases: [Vec<f64>; 2],
     /// Those at which nothing may lie across.
     pub(super) sharp: [Vec<f64>; 2],
-    /// Diagonal of the box around the surface, mm.
+    /// Diagonal of the box around the control points, mm of the part.
     pub(super) size: f64,
-    /// Whether the sides of the domain are points: at both ends of u, of v.
+    /// Whether sides of the domain are single points: those at both ends of u, and of v.
     poles: [[bool; 2]; 2],
     /// Whether both ends of u, of v are one curve in space.
     pub(super) closed: [bool; 2],
     /// How far the face's edges lie from the surface, mm, where the file was measured.
     pub(super) gap: Option<f64>,
-    /// Farthest that such a side strays from a point, mm.
+    /// Farthest that a pole's side strays from a point, mm; 0 without poles.
     pub(super) pole_size: f64,
     /// What the proofs on it have taken.
     pub(super) steps: ProofSteps,
 }
 
 impl<'a> FaceSurface<'a> {
-    /// A face's surface with what meshing asks of it; `flip` where the face looks against Su × Sv.
+    /// Lays out a face's surface; `flip` where the face looks against Su × Sv. The tolerance is lowered on small surfaces closed in both
+    /// directions, of which it would leave nothing. Gap unknown and steps unlimited, for the caller to set.
     pub(super) fn new(surface: &'a Surface, flip: bool, field: ToleranceField) -> Self {
         let breaks = [0, 1].map(|d| {
             let n = surface.counts()[d];
@@ -74,7 +75,7 @@ impl<'a> FaceSurface<'a> {
             b.dedup();
             b
         });
-        let sharper = |least: f64| [0, 1].map(|d| creases(surface, d, &breaks, least));
+        let sharper = |least: f64| [0, 1].map(|d| crease_knots(surface, d, &breaks, least));
         let creases = sharper(BENT);
         // Most surfaces have no creases at all, and need not be looked at twice.
         let sharp = if creases.iter().all(|c| c.is_empty()) { creases.clone() } else { sharper(SHARP) };
@@ -111,7 +112,7 @@ impl<'a> FaceSurface<'a> {
         }
     }
 
-    /// Where `uv` lies on a pole: the parameter that is constant along it.
+    /// Returns the parameter that is constant along the pole on which `uv` lies, 0 for u or 1 for v; `None` off the poles.
     pub(super) fn pole(&self, uv: Uv) -> Option<usize> {
         let domain = self.spline.domain();
         let near = |d: usize, end: usize| {
@@ -121,19 +122,21 @@ impl<'a> FaceSurface<'a> {
         (0..2).find(|&d| (0..2).any(|end| self.poles[d][end] && near(d, end)))
     }
 
-    /// Size of the parameter rectangle.
+    /// Returns the size of the surface's domain in u and v.
     pub(super) fn extent(&self) -> Uv {
         let [[u0, u1], [v0, v1]] = self.spline.domain();
         Uv::new(u1 - u0, v1 - v0)
     }
 
-    /// Index of the knot interval that holds `x`.
+    /// Returns the index of the knot interval that holds parameter `x` of u (0) or v (1); beyond the domain the first or last, on a knot
+    /// the one that begins there.
     pub(super) fn interval(&self, direction: usize, x: f64) -> usize {
         let b = &self.breaks[direction];
         b[1..b.len() - 1].partition_point(|&k| k <= x)
     }
 
-    /// First and last knot interval that `[x, y]` meets.
+    /// Returns the first and last knot interval of direction `d` that `[x, y]` meets; one in which only `y` itself would lie does not
+    /// count.
     pub(super) fn range(&self, d: usize, x: f64, y: f64) -> [usize; 2] {
         let (a, mut b) = (self.interval(d, x), self.interval(d, y));
         // An interval that is met in its first parameter alone belongs to the one before.
@@ -143,16 +146,18 @@ impl<'a> FaceSurface<'a> {
         [a, b]
     }
 
+    /// Returns the Bézier patch of the `a`-th knot interval in u and the `b`-th in v.
     pub(super) fn patch(&self, a: usize, b: usize) -> &BezierPatch {
         &self.patches[a * (self.breaks[1].len() - 1) + b]
     }
 
+    /// Returns the point of the surface, in the part's coordinates; `uv` must lie in the domain.
     pub(super) fn point(&self, uv: Uv) -> Point {
         let patch = self.patch(self.interval(0, uv.x), self.interval(1, uv.y));
-        patch.homogeneous_point(local(patch, uv)).project()
+        patch.homogeneous_point(patch_uv(patch, uv)).project()
     }
 
-    /// Points at three parameters of each direction; the same bits as [`FaceSurface::point`].
+    /// Returns the points at ascending `u` and `v`, the first index that of `u`; the same bits as [`FaceSurface::point`].
     pub(super) fn lattice(&self, u: [f64; 3], v: [f64; 3]) -> [[Point; 3]; 3] {
         let (a, b) = (self.interval(0, u[0]), self.interval(1, v[0]));
         // Corners of a cell mostly lie on one patch; where they do, nine evaluations share their basis functions.
@@ -161,21 +166,21 @@ impl<'a> FaceSurface<'a> {
             return u.map(|x| v.map(|y| self.point(Uv::new(x, y))));
         }
         let patch = self.patch(a, b);
-        let [x, y, z] = [0, 1, 2].map(|i| local(patch, Uv::new(u[i], v[i])));
+        let [x, y, z] = [0, 1, 2].map(|i| patch_uv(patch, Uv::new(u[i], v[i])));
         patch.homogeneous_lattice([x.x, y.x, z.x], [x.y, y.y, z.y]).map(|row| row.map(|c| c.project()))
     }
 
-    /// Position and derivatives at parameters inside the domain.
+    /// Returns the position and derivatives, up to the second, at parameters inside the domain.
     pub(super) fn second_derivatives(&self, uv: Uv) -> SecondDerivatives {
         let patch = self.patch(self.interval(0, uv.x), self.interval(1, uv.y));
-        patch.second_derivatives(local(patch, uv))
+        patch.second_derivatives(patch_uv(patch, uv))
     }
 
     fn forms(&self, uv: Uv) -> Option<FundamentalForms> {
         FundamentalForms::new(&self.second_derivatives(uv))
     }
 
-    /// Outward unit normal, where there is one.
+    /// Returns the outward unit normal, at a pole its limit; `None` where there is none.
     pub(super) fn normal(&self, uv: Uv) -> Option<Vector> {
         // Where the control points of a pole were rounded, be it by a centre far away, the two derivatives there span any plane.
         let normal = if self.pole(uv).is_some() { self.spline.limit_normal(uv) } else { self.spline.normal(uv) };
@@ -192,13 +197,13 @@ impl<'a> FaceSurface<'a> {
         self.sharp.iter().any(|c| !c.is_empty())
     }
 
-    /// For each direction the crease that a place lies on.
+    /// Returns the crease in u, and that in v, on which `uv` lies; `None` where it lies on none.
     pub(super) fn on_creases(&self, uv: Uv) -> [Option<f64>; 2] {
         let near = CREASE * self.extent();
         [0, 1].map(|d| self.creases[d].iter().copied().find(|c| (c - uv[d]).abs() <= near[d]))
     }
 
-    /// Outward unit normal, on a crease that of the side on which `inside` lies.
+    /// Returns the outward unit normal, on a crease that of the side on which `inside` lies; `None` where there is none.
     pub(super) fn normal_towards(&self, uv: Uv, inside: Uv) -> Option<Vector> {
         let on = self.on_creases(uv);
         if on == [None; 2] {
@@ -210,7 +215,7 @@ impl<'a> FaceSurface<'a> {
             None => self.interval(d, uv[d]),
         });
         let patch = self.patch(a, b);
-        let d = patch.second_derivatives(local(patch, uv).clamp(Uv::ZERO, Uv::ONE));
+        let d = patch.second_derivatives(patch_uv(patch, uv).clamp(Uv::ZERO, Uv::ONE));
         let (lu, lv) = (d.du.length(), d.dv.length());
         if lu.min(lv) <= NO_DERIVATIVE * lu.max(lv) {
             // At a pole rounding is all that is left of one derivative: the limit there, a little beside the crease.
@@ -222,12 +227,12 @@ impl<'a> FaceSurface<'a> {
         n.map(|n| if self.flip { -n } else { n }).or_else(|| self.normal(uv))
     }
 
-    /// Whether facets run clockwise in the parameter plane.
+    /// Whether facets that face outward run clockwise in the parameter plane.
     pub(super) fn is_flipped(&self) -> bool {
         self.flip
     }
 
-    /// The tolerance at a place.
+    /// Returns the tolerance at `uv`, mm of the part, by the curvature there; at a pole by that just beside it.
     pub(super) fn tolerance(&self, uv: Uv) -> f64 {
         // With one tolerance everywhere no curvature is asked for, which would cost second derivatives.
         if self.affine || self.field.tightest() == self.field.loosest() {
@@ -243,7 +248,8 @@ impl<'a> FaceSurface<'a> {
     }
 }
 
-/// How far the control points of a side of the domain stray from its first.
+/// Returns how far, in its own lengths, control points of the side at the start (`end` 0) or end (1) of direction `d` stray from the first
+/// of them.
 fn side_size(s: &Surface, d: usize, end: usize) -> f64 {
     let counts = s.counts();
     let fixed = if end == 0 { 0 } else { counts[d] - 1 };
@@ -254,7 +260,7 @@ fn side_size(s: &Surface, d: usize, end: usize) -> f64 {
     (1..counts[1 - d]).map(|k| (at(k) - at(0)).length()).fold(0.0, f64::max)
 }
 
-/// Whether both ends of a direction are one curve.
+/// Whether the control points at both ends of direction `d` lie within `least` of each other.
 fn is_closed(s: &Surface, d: usize, least: f64) -> bool {
     let counts = s.counts();
     let at = |i: usize, j: usize| s.points[i * counts[1] + j].project();
@@ -264,13 +270,13 @@ fn is_closed(s: &Surface, d: usize, least: f64) -> bool {
     (0..counts[1 - d]).map(pair).all(|[a, b]| (a - b).length() <= least)
 }
 
-/// Local parameters of `uv` on a patch.
-pub(super) fn local(patch: &BezierPatch, uv: Uv) -> Uv {
+/// Returns the parameters of a patch, 0 to 1 over its domain, for those of its surface.
+pub(super) fn patch_uv(patch: &BezierPatch, uv: Uv) -> Uv {
     let [[u0, u1], [v0, v1]] = patch.domain;
     Uv::new((uv.x - u0) / (u1 - u0), (uv.y - v0) / (v1 - v0))
 }
 
-/// Whether all control points lie on one affine image of their Greville points, with equal weights.
+/// Whether all control points lie on one affine image of their Greville abscissas, with equal weights; `size` is the surface's.
 fn is_affine(s: &Surface, size: f64) -> bool {
     let [nu, nv] = s.counts();
     // A spline whose control points lie on an affine map at their Greville abscissas is that map.
@@ -290,8 +296,9 @@ fn is_affine(s: &Surface, size: f64) -> bool {
     })
 }
 
-/// Interior knots at which the surface may be bent: multiplicity of at least the degree and a jump of the tangent.
-fn creases(s: &Surface, d: usize, breaks: &[Vec<f64>; 2], least: f64) -> Vec<f64> {
+/// Returns the inner knots of direction `d`, of a multiplicity no less than the degree, where the sine of the angle between the tangents on
+/// both sides exceeds `least` at one of a few places across.
+fn crease_knots(s: &Surface, d: usize, breaks: &[Vec<f64>; 2], least: f64) -> Vec<f64> {
     let b = &breaks[d];
     let knots = &s.knots[d];
     let inner = b[1..b.len() - 1].iter().enumerate();

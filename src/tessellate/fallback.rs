@@ -34,7 +34,8 @@ impl HasPosition for BorderCorner {
     }
 }
 
-/// Meshes a face by its border; `None` when that has no three points.
+/// Meshes a face from its border alone, without a proof: every bound is infinite. `None` when no loop has three different places, or none
+/// of the two ways below gives triangles.
 pub(super) fn border_alone(
     part: &Part,
     face: &Face,
@@ -51,7 +52,7 @@ pub(super) fn border_alone(
             Position::Own(p) => border.own[p as usize],
         };
         let corner = || {
-            let uv = sample::nearest(surface.spline, place);
+            let uv = sample::nearest_parameters(surface.spline, place);
             BorderCorner { position: v.position, place, uv, at: Point2::new(0.0, 0.0) }
         };
         place.is_finite().then(corner)
@@ -68,7 +69,7 @@ pub(super) fn border_alone(
     loops.retain(|r| r.len() > 2);
     // By the surface's own normals, for the mean normal of the loops alone does not tell outside from inside.
     let up = loops.iter().flatten().filter_map(|c| surface.normal(c.uv)).sum::<Vector>();
-    let triangles = match planar_triangulation(&mut loops, up).or_else(|| zigzag(&loops)) {
+    let triangles = match planar_triangulation(&mut loops, up).or_else(|| zigzag_triangles(&loops)) {
         Some(triangles) if !triangles.is_empty() => triangles,
         _ => return None,
     };
@@ -89,7 +90,8 @@ pub(super) fn border_alone(
     Some(out)
 }
 
-/// Constrained Delaunay in the plane across the loops' mean normal; `None` where they cross there. `up` tells its sides apart.
+/// Triangulates (constrained Delaunay) what `loops` hold in the plane across their mean normal, turned towards `up`. Sets where corners
+/// are seen; `None` where sides cross or corners coincide there, or there is no mean normal.
 fn planar_triangulation(loops: &mut [Vec<BorderCorner>], up: Vector) -> Option<Vec<[BorderCorner; 3]>> {
     let area = |r: &Vec<BorderCorner>| -> Vector {
         let o = r[0].place;
@@ -136,8 +138,8 @@ fn planar_triangulation(loops: &mut [Vec<BorderCorner>], up: Vector) -> Option<V
     Some(cdt.inner_faces().map(|f| f.vertices().map(|v| *v.data())).filter(inside).collect())
 }
 
-/// One loop that no plane shows: triangles from one of its sides to the other and back.
-fn zigzag(loops: &[Vec<BorderCorner>]) -> Option<Vec<[BorderCorner; 3]>> {
+/// Fills a single loop that no plane shows with triangles, from one of its sides to the other and back; `None` for several loops.
+fn zigzag_triangles(loops: &[Vec<BorderCorner>]) -> Option<Vec<[BorderCorner; 3]>> {
     let [ring] = loops else { return None };
     let (mut i, mut j) = (0, ring.len() - 1);
     let mut out = Vec::new();

@@ -27,46 +27,48 @@ impl From<Tessellation> for GroupedFacets {
 const SIDES: [[usize; 4]; 6] = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 
 impl GroupedFacets {
-    /// The meshes of the groups.
+    /// Returns the meshes of the groups.
     pub fn meshes(&self) -> impl Iterator<Item = &FacetMesh> {
         self.groups.iter().map(|g| &g.mesh)
     }
 
-    /// Whether nothing has facets.
+    /// Whether no group has facets.
     pub fn is_empty(&self) -> bool {
         self.meshes().all(|mesh| mesh.facets.is_empty())
     }
 
-    /// The meshes, each with how often it stands in the scene.
+    /// Returns the meshes, each with the number of places at which it stands in the scene.
     pub fn counted(&self) -> impl Iterator<Item = (&FacetMesh, usize)> {
         let counts = self.instancing.as_ref().map_or_else(|| vec![1], |i| i.counts());
         self.meshes().zip(counts)
     }
 
-    /// Number of facets, counted as often as they stand.
+    /// Returns the number of facets in the scene, each counted at all places of its group.
     pub fn facet_count(&self) -> usize {
         self.counted().map(|(mesh, count)| mesh.facets.len() * count).sum()
     }
 
-    /// Bytes held by the meshes and their places.
+    /// Returns how many bytes the meshes and the list of places hold.
     pub fn bytes(&self) -> usize {
         let places = self.instancing.as_ref().map_or(0, |i| size_of_val(&*i.placements));
         self.meshes().map(FacetMesh::bytes).sum::<usize>() + places
     }
 
-    /// A box around all facets.
+    /// Returns a box around all facets in the scene's coordinates; empty without any.
     pub fn bounds(&self) -> Aabb {
         let placed = self.instancing.iter().flat_map(|i| &i.placements).map(|p| p.bounds);
         placed.fold(self.groups.first().map_or(Aabb::EMPTY, |g| g.mesh.bounds()), Aabb::union)
     }
 
-    /// All facets where they stand, with the model's numbers of faces.
+    /// Returns all facets where they stand, in the scene's coordinates and with the model's numbers of faces; borrowed for a model in one
+    /// piece.
     pub fn whole(&self) -> Cow<'_, FacetMesh> {
         self.drawn(usize::MAX)
     }
 
-    /// Facets to be looked at, with the model's numbers of faces: all, where they are at most so many. Of more, what is placed often is
-    /// drawn as boxes, so many as there is room for and spread evenly, but for the first place of each part.
+    /// Returns the facets to be looked at, in the scene's coordinates and with the model's numbers of faces: all of them if they are at
+    /// most `most`, or the model is in one piece. Otherwise the first group and the first place of every other are whole, and further
+    /// places are boxes, spread evenly, of about `most` facets together.
     pub fn drawn(&self, most: usize) -> Cow<'_, FacetMesh> {
         let Some(instancing) = self.instancing.as_deref() else {
             return self.groups.first().map_or_else(Cow::default, |g| Cow::Borrowed(&g.mesh));
@@ -79,7 +81,7 @@ impl GroupedFacets {
         for (k, place) in instancing.placements.iter().enumerate() {
             let group = place.group as usize;
             if has_room || !std::mem::replace(&mut is_drawn[group], true) {
-                append(&mut mesh, &self.groups[group].mesh, place);
+                append_group(&mut mesh, &self.groups[group].mesh, place);
             } else if k % step == 0 {
                 append_box(&mut mesh, place);
             }
@@ -88,8 +90,8 @@ impl GroupedFacets {
     }
 }
 
-/// Adds a group's facets in one of its places.
-fn append(mesh: &mut FacetMesh, group: &FacetMesh, place: &Placement) {
+/// Appends a group's facets at one of its places, in the scene's coordinates, turned around where the place is mirrored.
+fn append_group(mesh: &mut FacetMesh, group: &FacetMesh, place: &Placement) {
     let frame = &place.frame;
     let (positions, vertices) = (mesh.positions.len() as u32, mesh.vertices.len() as u32);
     mesh.positions.extend(group.positions.iter().map(|&p| frame.point(p)));
@@ -99,13 +101,13 @@ fn append(mesh: &mut FacetMesh, group: &FacetMesh, place: &Placement) {
         ..*v
     }));
     mesh.facets.extend(group.facets.iter().map(|f| Facet {
-        vertices: super::placement::turned(f.vertices.map(|v| v + vertices), frame),
+        vertices: super::placement::oriented_corners(f.vertices.map(|v| v + vertices), frame),
         face: FaceId(place.first_face.0 + f.face.0),
     }));
     mesh.sag.extend(&group.sag);
 }
 
-/// Adds the box around one place of a group, as facets of its first face without a proof.
+/// Appends the box around a place of a group: six quads of its first face, with infinite sag.
 fn append_box(mesh: &mut FacetMesh, place: &Placement) {
     let corners: [Point; 8] = place.bounds.corners();
     let position = mesh.positions.len() as u32;
@@ -122,7 +124,8 @@ fn append_box(mesh: &mut FacetMesh, place: &Placement) {
 }
 
 impl Settings {
-    /// The settings for one group of a model, whose faces have other numbers there.
+    /// Returns these settings for the faces of one group, whose numbers in overrides become the group's own; overrides of other groups'
+    /// faces apply to nothing.
     pub fn of_group(&self, instancing: &Instancing, group: usize) -> Self {
         let mut settings = self.clone();
         for o in &mut settings.overrides {

@@ -10,7 +10,7 @@ pub(super) struct ImprintEnd {
     pub(super) uv: Uv,
     /// In the carrier's part's coordinates.
     pub(super) place: Point,
-    /// Which corner of the border it is.
+    /// Number of the corner among those of all guests' borders.
     pub(super) vertex: usize,
 }
 
@@ -24,12 +24,12 @@ pub(super) struct ImprintSegment {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Imprint {
     pub(super) segments: Vec<ImprintSegment>,
-    /// Distance within which places are one, mm.
+    /// Distance within which places are one, mm of the scene.
     pub(super) near: f64,
 }
 
 impl Imprint {
-    /// Places of all corners.
+    /// Returns the places of the ends of all segments, with repetitions, in the carrier's part's coordinates.
     pub(super) fn points(&self) -> Vec<Point> {
         self.segments.iter().flat_map(|s| s.ends).map(|end| end.place).collect()
     }
@@ -41,7 +41,7 @@ pub(super) struct CarrierFacets {
     pub(super) nodes: Vec<Node>,
     /// A triangle repeats its third corner.
     pub(super) facets: Vec<[u32; 4]>,
-    /// The node that stands for each corner of the imprint.
+    /// Nodes that stand for corners of the imprint: pairs of index in `nodes` and number of the corner, with repetitions.
     pub(super) vertex_nodes: Vec<(u32, usize)>,
     /// Whether no facet crosses the imprint.
     pub(super) holds_imprint: bool,

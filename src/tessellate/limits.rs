@@ -29,7 +29,8 @@ const TRIM_STEPS: u32 = 8;
 /// Faces of parts that are not begun, with the cells they would need: by part, and by the face's place in the part.
 pub(super) type TooLarge = FxHashMap<(usize, usize), f64>;
 
-/// The faces that are left out so that the rest stays within [`Settings::most_cells`].
+/// Returns the faces that are left out, the most expensive first, so that the cells expected of all others are at most
+/// [`Settings::most_cells`]. Faces small for their tolerance cost nothing here and are never left out.
 pub(super) fn faces_beyond(parts: &[PlacedPart<'_>], settings: &Settings) -> TooLarge {
     let faces = parts.iter().enumerate().filter(|(_, p)| p.is_placed()).flat_map(|(i, part)| {
         let faces = part.part.shells.iter().flat_map(|s| &s.faces).enumerate();
@@ -62,8 +63,8 @@ pub(super) fn faces_beyond(parts: &[PlacedPart<'_>], settings: &Settings) -> Too
     beyond
 }
 
-/// Cells that a face surely needs, from its curvature at a grid of places inside its border: where a surface bends by k over a length L, a
-/// chord sags by k·L²/8.
+/// Estimates from below how many cells a face needs, not whole: the mean over a grid of places inside its border, the sharpest tenth left
+/// out, of √(k / 8ξ)·L chords along u times those along v. 1 for a plane.
 pub(super) fn expected_cells(face: &Face, surface: &FaceSurface<'_>) -> f64 {
     if surface.affine {
         return 1.0;
@@ -101,7 +102,8 @@ pub(super) fn expected_cells(face: &Face, surface: &FaceSurface<'_>) -> f64 {
     cells[..kept].iter().sum::<f64>() / (PLACES * PLACES) as f64
 }
 
-/// Says of faces without facets why they have none.
+/// Sets the cause of the failed faces of a report. `cause` is asked with the part and the face's place in it; where it knows none, the
+/// default stays.
 pub(super) fn name_causes(
     report: &mut Report,
     model: &Model,

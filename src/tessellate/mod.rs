@@ -57,7 +57,8 @@ pub use settings::{Acceptance, FaceSelector, Settings, ToleranceLaw, ToleranceOv
 pub use tessellation::{FacetQuality, Tessellation};
 pub use triangulator::is_panic_guarded;
 
-/// Tessellates every placed face of a model. Faces of which nothing can be made are counted in the report.
+/// Tessellates every placed face of a model, in the scene's coordinates. Never fails: faces of which nothing can be made, or that exceed a
+/// limit, are left out and named in the report.
 ///
 /// ```
 /// use lampyris::math::Frame;
@@ -81,7 +82,7 @@ pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     let start = std::time::Instant::now();
     // Parts first, each once; then faces that touch, which need the placed model; then copies for all instances.
     let parts = assemble::mesh_parts(model, settings);
-    let joined = contact::join(model, settings, &parts);
+    let joined = contact::mesh_contacts(model, settings, &parts);
     let placement::Placed { mut made, failed, repairs } = placement::place_instances(model, &parts, &joined);
     made.report.seconds.tessellate = start.elapsed().as_secs_f64();
     evaluation::fill_report(&mut made, model, settings, &failed, &repairs);

@@ -3,7 +3,7 @@
 use crate::math::{Point, Uv};
 use std::ops::Index;
 
-/// A point that facets meet in.
+/// A point that facets meet in, by its index in one of two lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Position {
     /// One of the part's: a vertex, or a sample of an edge. Other faces may have corners there.
@@ -15,6 +15,7 @@ pub(super) enum Position {
 /// A corner: several lie at one position where the parameters differ, as on both sides of a seam or along a pole.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
+    /// Parameters of the surface.
     pub(super) uv: Uv,
     /// In the part's coordinates.
     pub(super) place: Point,
@@ -49,19 +50,19 @@ impl Nodes {
         self.all.iter()
     }
 
-    /// Adds a node at a position that is known.
+    /// Adds a node at a position that exists, and returns its number.
     pub(super) fn push(&mut self, node: Node) -> u32 {
         self.all.push(node);
         self.len() - 1
     }
 
-    /// Adds a node at a position of its own.
+    /// Adds a node at a new position of its own, and returns the node's number; `place` is in the part's coordinates.
     pub(super) fn push_own(&mut self, uv: Uv, place: Point) -> u32 {
         self.own.push(place);
         self.push(Node { uv, place, position: Position::Own(self.own.len() as u32 - 1) })
     }
 
-    /// The state to which `rewind` goes back.
+    /// Returns the state to which `rewind` goes back.
     pub(super) fn mark(&self) -> Mark {
         Mark { nodes: self.all.len(), own: self.own.len() }
     }
@@ -90,13 +91,14 @@ impl Index<u32> for Nodes {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ProvedFacet<const N: usize> {
     pub(super) nodes: [u32; N],
-    /// Distance between the facet and its piece of the surface, mm: proved where it is at most the tolerance.
+    /// Distance between the facet and its piece of the surface, mm of the part: proved where it is at most the tolerance, without meaning
+    /// above it.
     pub(super) bound: f64,
-    /// The tolerance at its place, mm.
+    /// The tolerance at its place, mm of the part.
     pub(super) tolerance: f64,
 }
 
-/// Name of the edge between two nodes, whichever way it runs.
+/// Returns the key of the edge between two nodes, whichever way it runs.
 pub(super) fn edge_key(a: u32, b: u32) -> [u32; 2] {
     [a.min(b), a.max(b)]
 }

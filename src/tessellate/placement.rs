@@ -13,13 +13,14 @@ use rustc_hash::FxHashMap;
 /// What placing gives.
 pub(super) struct Placed {
     pub(super) made: Tessellation,
-    /// Faces without facets.
+    /// Placed faces without facets.
     pub(super) failed: Vec<FaceId>,
     /// Faces of which something was given up.
     pub(super) repairs: Vec<(FaceId, Repair)>,
 }
 
-/// Puts every instance's facets where they belong; `joined` are instances with a mesh of their own.
+/// Copies the facets of all instances into the scene's coordinates. `parts` are by part; `joined` are, by instance, meshes that replace
+/// them. Instances of parts without a mesh add nothing.
 pub(super) fn place_instances(
     model: &Model,
     parts: &[Option<PartMesh>],
@@ -52,7 +53,8 @@ pub(super) fn place_instances(
     out
 }
 
-/// Adds the facets of a face whose part's shared positions start at `shared`.
+/// Appends the facets of face `id` with its own positions. `shared` is the index at which the instance's shared positions begin; bounds and
+/// tolerances are scaled to the scene.
 fn place_face(out: &mut Tessellation, instance: &Instance, shared: u32, face: &FaceMesh, id: FaceId) {
     let frame = &instance.placement;
     let own = out.mesh.positions.len() as u32;
@@ -67,7 +69,7 @@ fn place_face(out: &mut Tessellation, instance: &Instance, shared: u32, face: &F
         uv: corner.uv,
     }));
     for facet in &face.facets {
-        let vertices = turned(facet.corners.map(|c| c + first), frame);
+        let vertices = oriented_corners(facet.corners.map(|c| c + first), frame);
         out.mesh.facets.push(Facet { vertices, face: id });
         let (bound, tolerance) = (facet.bound * frame.scale, facet.tolerance * frame.scale);
         // Compared after scaling, as whoever reads both numbers compares them.
@@ -77,8 +79,9 @@ fn place_face(out: &mut Tessellation, instance: &Instance, shared: u32, face: &F
     }
 }
 
-/// A mirrored placement turns facets around, so that they stay counter-clockwise from outside.
-pub(super) fn turned([a, b, c, d]: [u32; 4], frame: &Frame) -> [u32; 4] {
+/// Returns the corners of a facet, turned around by a mirrored placement so that it stays counter-clockwise from outside; a triangle
+/// repeats its last.
+pub(super) fn oriented_corners([a, b, c, d]: [u32; 4], frame: &Frame) -> [u32; 4] {
     if !frame.is_mirrored() {
         [a, b, c, d]
     } else if c == d {
@@ -88,7 +91,7 @@ pub(super) fn turned([a, b, c, d]: [u32; 4], frame: &Frame) -> [u32; 4] {
     }
 }
 
-/// A face that is a mesh in the file is copied as it is: it is its own truth.
+/// Appends a face that is a mesh in the file, as it is. It is its own truth: sag and tolerance 0, certified.
 fn place_ready(out: &mut Tessellation, frame: &Frame, ready: &TessellatedFace, id: FaceId) {
     let (p, v) = (out.mesh.positions.len() as u32, out.mesh.vertices.len() as u32);
     out.mesh.positions.extend(ready.mesh.positions.iter().map(|&x| frame.point(x)));
@@ -98,14 +101,14 @@ fn place_ready(out: &mut Tessellation, frame: &Frame, ready: &TessellatedFace, i
         uv: x.uv,
     }));
     for f in &ready.mesh.facets {
-        out.mesh.facets.push(Facet { vertices: turned(f.vertices.map(|c| c + v), frame), face: id });
+        out.mesh.facets.push(Facet { vertices: oriented_corners(f.vertices.map(|c| c + v), frame), face: id });
         // The file has nothing else to be measured against.
         out.mesh.sag.push(0.0);
         out.quality.push(FacetQuality { tolerance: 0.0, bound: 0.0, certified: true });
     }
 }
 
-/// Removes positions that no facet uses: ends of edges without faces, hanging samples of failed faces.
+/// Removes positions that no facet uses, such as those of failed faces, and renumbers the rest.
 fn drop_unused(mesh: &mut FacetMesh) {
     let mut name = vec![u32::MAX; mesh.positions.len()];
     for v in mesh.facets.iter().flat_map(|f| f.vertices) {

@@ -15,7 +15,7 @@ impl ProofSteps {
         Self { taken: AtomicU64::new(0), most }
     }
 
-    /// Adds some.
+    /// Adds steps, from any thread.
     pub(super) fn add(&self, steps: u64) {
         // Order does not matter: a face that is over the limit is given up whenever that is seen, and all of it.
         self.taken.fetch_add(steps, Ordering::Relaxed);

@@ -6,7 +6,8 @@ use super::tessellation::Tessellation;
 use crate::math::FaceId;
 use crate::model::Model;
 
-/// Names the faces and measures what was reached.
+/// Names the repaired faces, in their order, and measures how far their facets are from the spline, mm: proved where certified, sampled
+/// elsewhere. Looks at nothing if there are none.
 pub(super) fn repaired_faces(
     made: &Tessellation,
     model: &Model,

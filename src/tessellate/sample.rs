@@ -49,13 +49,13 @@ const STILL: f64 = 1e-9;
 /// Determinant of the first fundamental form, in shares of the product of its diagonal, at which it cannot be solved for a step.
 const SINGULAR: f64 = 1e-14;
 
-/// Samples every facet; facets of ready meshes give zeros.
+/// Samples every facet, in parallel; facets of ready meshes give zeros. Vertices need their `uv`.
 pub(super) fn sample_mesh(mesh: &FacetMesh, model: &Model) -> Vec<Sampled> {
     let facets: Vec<usize> = (0..mesh.facets.len()).collect();
     sample_facets(mesh, model, &facets)
 }
 
-/// Samples some facets.
+/// Samples the facets of these indices, in their order; lengths are mm of the scene.
 pub(super) fn sample_facets(mesh: &FacetMesh, model: &Model, facets: &[usize]) -> Vec<Sampled> {
     let faces: Vec<_> = model.placed_faces().collect();
     facets
@@ -78,7 +78,8 @@ pub(super) fn sample_facets(mesh: &FacetMesh, model: &Model, facets: &[usize]) -
         .collect()
 }
 
-/// Sag and normal errors of facet `f` with corners `p` and their normals `n`, measured at samples.
+/// Returns the sag and normal errors of facet `f`, in the surface's lengths. `p` are its corners in the part's coordinates, `n` their
+/// normals on the side of Su × Sv.
 fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n: [Vector; 4]) -> Sampled {
     let uv = mesh.facets[f].vertices.map(|v| mesh.vertices[v as usize].uv);
     let triangles: &[[usize; 3]] =
@@ -118,7 +119,7 @@ fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n:
             if away > out.sag {
                 // A single start may end beside the nearest point: uneven weights bend the parameters.
                 let pieces: Vec<[Uv; 3]> = triangles.iter().map(|t| t.map(|k| uv[k])).collect();
-                let other = project(surface, x, search(surface, x, &pieces));
+                let other = project(surface, x, search_pieces(surface, x, &pieces));
                 let nearer = (surface.evaluate(other) - x).length();
                 if nearer < away {
                     (foot, away) = (other, nearer);
@@ -126,7 +127,7 @@ fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n:
             }
             out.sag = out.sag.max(away);
             sum += share * weight * away;
-            let bilinear = interpolated(triangles.len() == 1, t, b, n);
+            let bilinear = interpolated_normal(triangles.len() == 1, t, b, n);
             if let (Some(a), Some(e)) = (bilinear.try_normalize(), surface.normal(foot)) {
                 // The arctangent keeps its digits at small angles, where a cosine has none.
                 out.normal_errors.push(a.cross(e).length().atan2(a.dot(e)) as f32);
@@ -137,8 +138,9 @@ fn sample_facet(surface: &Surface, mesh: &FacetMesh, f: usize, p: [Point; 4], n:
     out
 }
 
-/// The normal at a point of triangle `t`: bilinear in the facet's own parameters, linear on a triangular facet.
-fn interpolated(single: bool, t: &[usize; 3], b: [f64; 3], n: [Vector; 4]) -> Vector {
+/// Returns the normal, not of unit length, at barycentric `b` of triangle `t` (corner numbers) of a facet: bilinear in the quad's own
+/// parameters, linear on a facet that is a single triangle.
+fn interpolated_normal(single: bool, t: &[usize; 3], b: [f64; 3], n: [Vector; 4]) -> Vector {
     if single {
         return n[0] * b[0] + n[1] * b[1] + n[2] * b[2];
     }
@@ -150,10 +152,10 @@ fn interpolated(single: bool, t: &[usize; 3], b: [f64; 3], n: [Vector; 4]) -> Ve
 const FOLLOWED: usize = 8;
 const LEVELS: usize = 40;
 
-/// Parameters of a point near `x` on a piece of the surface, which is given in triangles: at first the whole of a facet's. Of the parts
-/// that pieces are cut into those go on whose flat triangles lie nearest. So none is lost where weights crowd most of the parameters into
-/// one place and a step of any length leaps over the surface.
-fn search(surface: &Surface, x: Point, over: &[[Uv; 3]]) -> Uv {
+/// Returns the parameters of a near point on the part of the surface over the triangles `over`: quarters are followed whose flat triangles
+/// lie nearest to `x`. So none is lost where weights crowd most of the parameters into one place and a step of any length leaps over the
+/// surface.
+fn search_pieces(surface: &Surface, x: Point, over: &[[Uv; 3]]) -> Uv {
     let at = |u: Uv| (u, surface.evaluate(u));
     let off = |p: &[(Uv, Point); 3]| distance_to_triangle(x, p.map(|q| q.1));
     let mut best = (f64::INFINITY, over[0][0]);
@@ -185,17 +187,18 @@ fn search(surface: &Surface, x: Point, over: &[[Uv; 3]]) -> Uv {
     best.1
 }
 
-/// Parameters of a near point of the whole surface.
-pub(super) fn nearest(surface: &Surface, x: Point) -> Uv {
+/// Returns the parameters of a near, mostly the nearest, point of the whole surface.
+pub(super) fn nearest_parameters(surface: &Surface, x: Point) -> Uv {
     let [[u0, u1], [v0, v1]] = surface.domain();
     let [a, b, c, d] = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)].map(|(u, v)| Uv::new(u, v));
     // Both halves of the domain, since a path of nearest triangles may run into a dead end in one.
-    let found = [[a, b, c], [a, c, d]].map(|half| project(surface, x, search(surface, x, &[half])));
+    let found = [[a, b, c], [a, c, d]].map(|half| project(surface, x, search_pieces(surface, x, &[half])));
     let away = found.map(|u| (surface.evaluate(u) - x).length());
     if away[1] < away[0] { found[1] } else { found[0] }
 }
 
-/// Parameters of a near point of the surface, by damped Gauss–Newton from a start; never farther away than the start.
+/// Returns the parameters of a near point of the surface by damped Gauss–Newton from `start`, which is clamped to the domain first; never
+/// farther away than it.
 pub(super) fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
     let mut best = surface.clamp(start);
     let mut away = (surface.evaluate(best) - x).length();
@@ -226,9 +229,9 @@ pub(super) fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
     best
 }
 
-/// Distance of a point to a triangle, in the triangle's own plane: x along its longest side, y along its height. What is perpendicular
-/// to the longest side is small, so that no digits are lost on needles: by products of lengths, a point over a needle of 500 m that was
-/// 0.1 µm thick seemed to be 0.7 m away.
+/// Returns the distance of a point to a triangle, which may be degenerate, in the triangle's own plane: x along its longest side, y along
+/// its height. What is perpendicular to the longest side is small, so that no digits are lost on needles: by products of lengths, a point
+/// over a needle of 500 m that was 0.1 µm thick seemed to be 0.7 m away.
 fn distance_to_triangle(p: Point, mut t: [Point; 3]) -> f64 {
     let length = |k: usize| (t[(k + 1) % 3] - t[k]).length_squared();
     let longest = if length(0) >= length(1).max(length(2)) {

@@ -20,12 +20,14 @@ const ROUNDING_ROOM: f64 = 1.0 + 1e-12;
 pub(super) struct SecondDerivativeBounds {
     /// For uu, uv and vv in the surface's own parameters, patch by patch.
     per_patch: Vec<[f64; 3]>,
-    /// Whether the parametrisation is C1 across each distinct knot.
+    /// Whether the parametrisation is C1 across each distinct knot of u, of v.
     smooth: [Vec<bool>; 2],
+    /// Patches along v.
     columns: usize,
 }
 
 impl SecondDerivativeBounds {
+    /// Bounds the second derivatives of each patch, in parallel. `patches` and distinct knots `breaks` are those of `surface`.
     pub(super) fn new(surface: &Surface, patches: &[BezierPatch], breaks: &[Vec<f64>; 2]) -> Self {
         let smooth = [0, 1].map(|d| {
             let times = |k: &f64| surface.knots[d].iter().filter(|x| *x == k).count();
@@ -38,14 +40,14 @@ impl SecondDerivativeBounds {
         }
     }
 
-    /// Whether the surface and its weight are C1 through these knot intervals (first and last).
+    /// Whether the surface and its weight are C1 through knot intervals `a` of u and `b` of v (first and last).
     pub(super) fn is_smooth(&self, a: [usize; 2], b: [usize; 2]) -> bool {
         let through = |d: usize, r: [usize; 2]| (r[0] + 1..=r[1]).all(|k| self.smooth[d][k]);
         through(0, a) && through(1, b)
     }
 
-    /// Bound of the deviation from a linear interpolant over parameters within `[lo, hi]`, which meet the knot intervals `a` and
-    /// `b` (first and last); `None` where it does not hold or costs too much.
+    /// Returns a bound, mm, of the deviation from a linear interpolant over parameters of extent `size` that meet the knot intervals `a` of
+    /// u and `b` of v (first and last); `None` across knots that are not C1 and for more than [`MAX_PATCHES`].
     pub(super) fn linear_deviation(&self, a: [usize; 2], b: [usize; 2], size: Uv) -> Option<f64> {
         // Across a kink no Taylor's theorem holds, and many patches make a bound worse than hulls do.
         if (a[1] - a[0] + 1) * (b[1] - b[0] + 1) > MAX_PATCHES || !self.is_smooth(a, b) {
@@ -62,7 +64,7 @@ impl SecondDerivativeBounds {
     }
 }
 
-/// Bounds of |Suu|, |Suv| and |Svv| over a patch.
+/// Returns the bounds of |Suu|, |Suv| and |Svv| over a patch, in the surface's own parameters.
 fn patch_bounds(patch: &BezierPatch) -> [f64; 3] {
     let [p, q] = patch.degree;
     // About a point of its own: the terms with w below grow with the distance from the origin.

@@ -105,12 +105,12 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The same tolerance everywhere, mm.
+    /// Makes settings with the same tolerance everywhere, mm.
     pub fn uniform(tolerance: f64) -> Self {
         Self { tolerance: [tolerance; 2], ..Self::default() }
     }
 
-    /// The largest tolerance anywhere, mm.
+    /// Returns the largest tolerance anywhere, mm.
     pub fn loosest(&self) -> f64 {
         let all = self.overrides.iter().map(|o| o.tolerance).chain([self.tolerance]);
         // All places' own tolerances too: one may be looser than the model's.
@@ -130,7 +130,8 @@ pub(super) struct ToleranceField {
 }
 
 impl ToleranceField {
-    /// `scale` is that of the placement: tolerances hold for the placed part.
+    /// Cleans and orders tolerances and radii, mm of the scene, and divides them by `scale`, that of the placement. What is not finite and
+    /// positive becomes [`LEAST_LENGTH`].
     pub(super) fn new(tolerance: [f64; 2], radii: [f64; 2], law: ToleranceLaw, scale: f64) -> Self {
         // A length that is no number becomes the least there is, so that nothing is ever looser than was asked.
         let clean = |x: f64| if x.is_finite() && x > 0.0 { x / scale } else { LEAST_LENGTH };
@@ -139,7 +140,7 @@ impl ToleranceField {
         Self { range: [a.min(b), a.max(b)], radii: [r.min(s), r.max(s)], law, angle: None }
     }
 
-    /// Tolerance where the sharpest normal curvature is `k`.
+    /// Returns the tolerance where the sharpest normal curvature is `k`, 1/mm in the part's lengths; the loosest at 0, the tightest at NaN.
     pub(super) fn tolerance_at(&self, k: f64) -> f64 {
         let ([tight, loose], [sharp, flat]) = (self.range, self.radii);
         // Flatter than the flattest radius, and sharper than the sharpest: the ends hold as they are, and no
@@ -158,31 +159,34 @@ impl ToleranceField {
         }
     }
 
-    /// The tighter of two everywhere, as a share of it.
+    /// Returns the smaller tolerances of both, times `share`; radii and law are those of `self`.
     pub(super) fn tighter(self, other: &Self, share: f64) -> Self {
         let range = [0, 1].map(|k| share * self.range[k].min(other.range[k]));
         Self { range, ..self }
     }
 
-    /// The same with no tolerance above this.
+    /// Returns the same field with no tolerance above `most`.
     pub(super) fn at_most(self, most: f64) -> Self {
         Self { range: self.range.map(|x| x.min(most)), ..self }
     }
 
-    /// The same with the angle condition of [`Settings::angle_deg`].
+    /// Returns the same with the angle condition of [`Settings::angle_deg`].
     pub(super) fn with_angle(self, degrees: Option<f64>) -> Self {
         Self { angle: degrees.map(f64::to_radians), ..self }
     }
 
-    /// Sag at which a chord meets the angle condition where the curvature is `k`: the chord's ends turn by k·L/2 and it sags k·L²/8.
+    /// Returns the sag, mm, at which a chord meets the angle condition where the curvature is `k`, 1/mm: the chord's ends turn by k·L/2 and
+    /// it sags k·L²/8. Infinite without a condition.
     pub(super) fn turning(&self, k: f64) -> f64 {
         self.angle.map_or(f64::INFINITY, |a| a * a / (2.0 * k))
     }
 
+    /// Returns the tolerance at the sharpest places, mm.
     pub(super) fn tightest(&self) -> f64 {
         self.range[0]
     }
 
+    /// Returns the tolerance at the flattest places, mm.
     pub(super) fn loosest(&self) -> f64 {
         self.range[1]
     }

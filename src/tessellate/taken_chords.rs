@@ -22,8 +22,8 @@ impl TakenChords {
         self.0.is_empty()
     }
 
-    /// Whether the chord between two positions is taken.
-    pub(super) fn has(&self, ends: [Position; 2]) -> bool {
+    /// Whether the chord between two positions is taken; never if one of them is the face's own.
+    pub(super) fn contains(&self, ends: [Position; 2]) -> bool {
         match ends {
             [Position::Shared(a), Position::Shared(b)] => self.0.contains(&[a.min(b), a.max(b)]),
             _ => false,
@@ -35,8 +35,9 @@ impl TakenChords {
     }
 }
 
-/// For faces of a part that have a diagonal where others of their shell have a chord: the faces, by number, and those diagonals. The last
-/// of several diagonals stays where no other chord is; `taken` are those that each face was asked to give up before.
+/// Returns the faces of a part with diagonals that must go because the chord is the side of more than two facets of the shell, with these
+/// diagonals; the last of several diagonals stays where no other chord is. `taken` is what each face was asked to give up before, and is
+/// not asked for again.
 pub(super) fn doubled_chords(
     part: &Part,
     meshes: &[Option<FaceMesh>],
@@ -63,16 +64,17 @@ pub(super) fn doubled_chords(
     doubled
 }
 
-/// The chords between shared positions of some faces.
+/// The chords between shared positions of some faces, by both positions in ascending order.
 struct Chords {
-    /// How many sides of facets each is.
+    /// How many sides of facets each chord is.
     uses: FxHashMap<[u32; 2], u32>,
-    /// Those that a face has twice, in order of the faces.
+    /// Chords that are two sides within one face, with that face, in order of the faces.
     diagonals: Vec<(usize, [u32; 2])>,
 }
 
 impl Chords {
-    /// Counts the chords of these faces: those of two faces, and those that are one's own diagonal.
+    /// Counts how many sides of facets each chord of the faces in `range` is, and which chords one face has twice; unmeshed faces have
+    /// none.
     fn new(meshes: &[Option<FaceMesh>], range: Range<usize>) -> Self {
         let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
         let mut diagonals: Vec<(usize, [u32; 2])> = Vec::new();

@@ -19,7 +19,8 @@ pub struct Tessellation {
 pub struct FacetQuality {
     /// Tolerance at the facet's place, mm; 0 for faces that are meshes in the file.
     pub tolerance: f64,
-    /// Upper bound of the distance to its piece of the spline where certified; otherwise a value above the tolerance.
+    /// Upper bound of the distance to its piece of the spline, mm, where certified; otherwise a value above the tolerance, perhaps
+    /// infinite.
     pub bound: f64,
     /// Whether the bound is proved to be within the tolerance.
     pub certified: bool,

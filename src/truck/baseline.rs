@@ -35,7 +35,8 @@ pub struct Baseline {
     pub failed: Vec<(FaceId, String)>,
 }
 
-/// Meshes the surfaces of a model by `truck_meshalgo` with one chordal tolerance in mm. Faces that are meshes already are left out.
+/// Meshes the surfaces of a model by `truck_meshalgo` with one chordal tolerance in mm, at least 1e-6, in the scene's coordinates. Faces
+/// that are meshes already are left out.
 ///
 /// A face that makes truck panic is caught and listed in [`Baseline::failed`]; the panic's message goes to the panic hook, in a thread
 /// named [`THREAD`]. So is one on which truck takes too long; the thread that works on it cannot be stopped and goes on until the
@@ -65,10 +66,10 @@ pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
         let shell: TruckShell = faces.iter().map(|f| f.truck.clone()).collect();
         // What is left of the model's time, so that a hundred bad shells do not take a hundred times a shell's.
         let left = || MODEL.saturating_sub(begun.elapsed());
-        let meshes = triangulated(shell, tolerance, SHELL.min(left())).unwrap_or_else(|| {
+        let meshes = triangulate_faces(shell, tolerance, SHELL.min(left())).unwrap_or_else(|| {
             // Each face alone where all together fail: one bad face should not cost the rest.
             let alone = |f: &TruckFace| {
-                triangulated([f.truck.clone()].into_iter().collect(), tolerance, FACE.min(left()))?.pop()?
+                triangulate_faces([f.truck.clone()].into_iter().collect(), tolerance, FACE.min(left()))?.pop()?
             };
             faces.iter().map(alone).collect()
         });
@@ -77,7 +78,7 @@ pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
             let face = id(f.shell, f.face);
             match mesh {
                 Some(m) if !m.tri_faces().is_empty() || !m.quad_faces().is_empty() => {
-                    append(&mut out.mesh, &mut positions, &m, face);
+                    append_face(&mut out.mesh, &mut positions, &m, face);
                 }
                 _ => out.failed.push((face, "truck's mesher gives no triangles, or takes too long".into())),
             }
@@ -86,18 +87,22 @@ pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
     out
 }
 
-/// The mesh of each face with the face's orientation; `None` when truck panics or takes too long.
+/// Meshes faces together, in mm, within the time limit; a face truck gives up on is `None`, and so is the whole when truck panics or takes
+/// too long.
 ///
 /// Faces that truck's standard mesher gives up on (poles of rational B-splines, edges that lie a little off their surface) are
 /// tried with its robust one.
-fn triangulated(shell: TruckShell, tolerance: f64, limit: Duration) -> Option<Vec<Option<PolygonMesh>>> {
+fn triangulate_faces(shell: TruckShell, tolerance: f64, limit: Duration) -> Option<Vec<Option<PolygonMesh>>> {
     if limit.is_zero() {
         return None;
     }
     let tolerance = tolerance.max(SMALLEST);
     let work = move || {
-        let mut meshes: Vec<Option<PolygonMesh>> =
-            shell.triangulation(tolerance).face_iter().map(|f| oriented(f.surface(), f.orientation())).collect();
+        let mut meshes: Vec<Option<PolygonMesh>> = shell
+            .triangulation(tolerance)
+            .face_iter()
+            .map(|f| oriented_mesh(f.surface(), f.orientation()))
+            .collect();
         if meshes.iter().any(Option::is_none) {
             // Faces from `faces_to_truck` are rational B-splines, all of them.
             let Some(plain) = shell.try_mapped(
@@ -109,7 +114,7 @@ fn triangulated(shell: TruckShell, tolerance: f64, limit: Duration) -> Option<Ve
             };
             for (mesh, f) in meshes.iter_mut().zip(plain.robust_triangulation(tolerance).face_iter()) {
                 if mesh.is_none() {
-                    *mesh = oriented(f.surface(), f.orientation());
+                    *mesh = oriented_mesh(f.surface(), f.orientation());
                 }
             }
         }
@@ -128,8 +133,8 @@ fn triangulated(shell: TruckShell, tolerance: f64, limit: Duration) -> Option<Ve
     receive.recv_timeout(limit).ok()?
 }
 
-/// The mesh turned as its face is.
-fn oriented(mesh: Option<PolygonMesh>, orientation: bool) -> Option<PolygonMesh> {
+/// Returns the mesh as it is, or turned around where its face looks against its surface (`orientation` false).
+fn oriented_mesh(mesh: Option<PolygonMesh>, orientation: bool) -> Option<PolygonMesh> {
     mesh.map(|mut m| {
         if !orientation {
             m.invert();
@@ -138,11 +143,12 @@ fn oriented(mesh: Option<PolygonMesh>, orientation: bool) -> Option<PolygonMesh>
     })
 }
 
-/// Adds a face's triangles. Points with the same bits are one: truck gives those of a common edge with both faces.
-fn append(out: &mut FacetMesh, known: &mut FxHashMap<[u64; 3], u32>, m: &PolygonMesh, face: FaceId) {
+/// Appends a face's triangles, and quads as they are. Points with the same bits are one: truck gives those of a common edge with both
+/// faces.
+fn append_face(out: &mut FacetMesh, known: &mut FxHashMap<[u64; 3], u32>, m: &PolygonMesh, face: FaceId) {
     let mut corner = |v: &StandardVertex| {
         let p = point(m.positions()[v.pos]);
-        let position = *known.entry(key(p)).or_insert_with(|| {
+        let position = *known.entry(point_bits(p)).or_insert_with(|| {
             out.positions.push(p);
             out.positions.len() as u32 - 1
         });
@@ -164,7 +170,8 @@ fn append(out: &mut FacetMesh, known: &mut FxHashMap<[u64; 3], u32>, m: &Polygon
     out.facets.extend(facets.into_iter().map(|vertices| Facet { vertices, face }));
 }
 
-fn key(p: Point) -> [u64; 3] {
+/// Returns the bits of a point, the same for both zeros.
+fn point_bits(p: Point) -> [u64; 3] {
     // Adding zero makes one zero of both.
     p.to_array().map(|x| (x + 0.0).to_bits())
 }

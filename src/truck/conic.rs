@@ -12,8 +12,8 @@ pub struct ShapeError {
     pub(super) allowed: &'static str,
 }
 
-/// The value where it is finite and `good`, else an error that tells what is allowed.
-pub(super) fn checked(
+/// Returns the value where it is finite and `good`, else an error that tells what is allowed.
+pub(super) fn check_value(
     what: &'static str,
     value: f64,
     good: bool,
@@ -35,17 +35,17 @@ impl Conic {
     /// A plane.
     pub const FLAT: Self = Self { radius: f64::INFINITY, conic: 0.0 };
 
-    /// A sphere.
+    /// Returns a sphere of that radius, mm, whose sign is that of [`Self::radius`].
     pub fn sphere(radius: f64) -> Self {
         Self { radius, conic: 0.0 }
     }
 
-    /// A paraboloid of that focal length.
+    /// Returns a paraboloid of that focal length, mm, which opens towards +z if it is positive.
     pub fn paraboloid(focal_length: f64) -> Self {
         Self { radius: 2.0 * focal_length, conic: -1.0 }
     }
 
-    /// Height above the vertex at a distance from the axis; `None` beyond the shape's reach.
+    /// Returns the height above the vertex at a distance from the axis, mm; `None` beyond the shape's reach.
     pub fn sag(&self, h: f64) -> Option<f64> {
         if self.radius.is_infinite() {
             return Some(0.0);
@@ -56,7 +56,7 @@ impl Conic {
         (inside > 0.0).then(|| c * h * h / (1.0 + inside.sqrt()))
     }
 
-    /// Depth at an aperture.
+    /// Returns the height above the vertex, mm, at a half aperture.
     ///
     /// # Errors
     /// When the conic does not reach it.
@@ -68,7 +68,7 @@ impl Conic {
         })
     }
 
-    /// dz/dh.
+    /// Returns the slope dz/dh at a distance from the axis within the shape's reach.
     fn slope(&self, h: f64) -> f64 {
         if self.radius.is_infinite() {
             return 0.0;
@@ -77,12 +77,13 @@ impl Conic {
         c * h / (1.0 - (1.0 + self.conic) * c * c * h * h).sqrt()
     }
 
-    /// The profile from the vertex `(0, z0)` to `(reach, z0 + sag)` in the x–z plane, exact as one rational quadratic.
+    /// Returns the profile from the vertex `(0, z0)` to `(reach, z0 + sag)` in the x–z plane, mm, exact as one rational quadratic; a line
+    /// where it is flat. Fails for a radius of zero, a reach that is not positive, or one beyond the conic's.
     pub(super) fn profile(&self, z0: f64, reach: f64) -> Result<Curve, ShapeError> {
         // One over the radius: a plane's is zero, and a radius of no number or zero is told with it.
-        checked("a radius of curvature", 1.0 / self.radius, self.radius != 0.0, "anything but zero")?;
-        checked("a conic constant", self.conic, true, "a finite number")?;
-        checked("the half aperture", reach, reach > 0.0, "positive")?;
+        check_value("a radius of curvature", 1.0 / self.radius, self.radius != 0.0, "anything but zero")?;
+        check_value("a conic constant", self.conic, true, "a finite number")?;
+        check_value("the half aperture", reach, reach > 0.0, "positive")?;
         let sag = self.sag_within(reach)?;
         let start = Point3::new(0.0, 0.0, z0);
         let end = Point3::new(reach, 0.0, z0 + sag);

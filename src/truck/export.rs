@@ -18,7 +18,7 @@ pub struct TruckFace {
     pub truck: modeling::Face,
 }
 
-/// The faces of a part where it is placed, as truck faces that share their edges, and those truck cannot hold.
+/// Returns the faces of a part at its place, mm of the scene, as truck faces that share their edges, and those truck cannot hold.
 ///
 /// Truck has no closed edges, so each is cut in two; poles, which exist in the parameter plane alone, are left out of its wires. A
 /// face with a seam is cut open along it and has edges of its own, for truck's wires meet no point twice. A face without
@@ -52,7 +52,8 @@ impl<'a> Exporter<'a> {
         Self { part, placement, vertices, edges: vec![None; part.edges.len()] }
     }
 
-    /// A face of truck, with edges that its neighbours share where truck takes them.
+    /// Makes a face of truck at the part's place, with edges that its neighbours share where truck takes them; else the reason why it
+    /// cannot.
     fn face(&mut self, f: &Face) -> Result<modeling::Face, String> {
         let surface = surface_to_truck(&f.surface.transformed(|p| self.placement.point(p)))?;
         if f.loops.is_empty() {
@@ -70,7 +71,7 @@ impl<'a> Exporter<'a> {
         Ok(if f.reversed != self.placement.is_mirrored() { face.inverse() } else { face })
     }
 
-    /// A loop of shared edges.
+    /// Returns a wire of the shared edges of a loop; sides at poles are left out.
     fn wire(&mut self, l: &TrimLoop) -> Result<modeling::Wire, String> {
         let mut sides: Vec<modeling::Edge> = Vec::new();
         for u in &l.uses {
@@ -88,16 +89,16 @@ impl<'a> Exporter<'a> {
         Ok(sides.into())
     }
 
-    /// A loop of edges of its own, with a vertex of its own wherever two of them meet.
+    /// Returns a wire of edges of its own for a loop, with a vertex of its own wherever two of them meet; a loop of one edge is cut in two.
     fn cut_open(&self, f: &Face, l: &TrimLoop) -> Result<modeling::Wire, String> {
         let mut curves: Vec<Curve> = Vec::new();
         for u in &l.uses {
             let curve = match u.edge {
                 Some(id) => self.part.edges[id.0 as usize].curve.clone(),
-                None => seam(f, u)?,
+                None => seam_curve(f, u)?,
             };
             if curve.bounds().diagonal() > 1e-9 {
-                curves.push(self.placed(if u.reversed { curve.reversed() } else { curve }));
+                curves.push(self.placed_curve(if u.reversed { curve.reversed() } else { curve }));
             }
         }
         // Truck's edges need two ends: a closed one is cut in the middle.
@@ -112,7 +113,8 @@ impl<'a> Exporter<'a> {
         curves.iter().zip(joints.iter().zip(next)).map(|(c, (a, b))| truck_edge(a, b, c)).collect()
     }
 
-    /// An edge of the part as edges of truck, made once: two where it is closed.
+    /// Makes edges of truck for an edge of the part, once, and returns them in its direction: two where it is closed. Fails for a curve
+    /// that truck does not take.
     fn edge(&mut self, id: EdgeId) -> Result<Vec<modeling::Edge>, String> {
         let index = id.0 as usize;
         if let Some(made) = &self.edges[index] {
@@ -120,7 +122,7 @@ impl<'a> Exporter<'a> {
         }
         let edge = &self.part.edges[index];
         let [front, back] = edge.vertices.map(|v| self.vertices[v.0 as usize].clone());
-        let curve = self.placed(edge.curve.clone());
+        let curve = self.placed_curve(edge.curve.clone());
         // A closed edge, which truck does not know, is two.
         let made = if front == back {
             let [t0, t1] = curve.domain();
@@ -137,7 +139,8 @@ impl<'a> Exporter<'a> {
         Ok(made)
     }
 
-    fn placed(&self, mut curve: Curve) -> Curve {
+    /// Moves the curve from the part's coordinates to its place in the scene.
+    fn placed_curve(&self, mut curve: Curve) -> Curve {
         for p in &mut curve.points {
             *p = Homogeneous::weighted(self.placement.point(p.position()), p.w);
         }
@@ -145,12 +148,14 @@ impl<'a> Exporter<'a> {
     }
 }
 
+/// Returns an edge of truck from `a` to `b` along the curve.
 fn truck_edge(a: &modeling::Vertex, b: &modeling::Vertex, c: &Curve) -> Result<modeling::Edge, String> {
     modeling::Edge::try_new(a, b, TruckCurve::NurbsCurve(curve_to_truck(c)?)).map_err(|e| format!("an edge: {e}"))
 }
 
-/// The curve in space of a use without an edge: a line of constant u or v.
-fn seam(f: &Face, u: &EdgeUse) -> Result<Curve, String> {
+/// Returns the curve in space, in the part's coordinates and over the surface's parameters, of a use without an edge: a line of constant u
+/// or v, or one without length at a pole. Fails for any other use.
+fn seam_curve(f: &Face, u: &EdgeUse) -> Result<Curve, String> {
     let [t0, t1] = u.uv.domain();
     let (a, b) = (u.uv.evaluate(t0), u.uv.evaluate(t1));
     // Seams are lines of constant parameter; anything else has no curve that both sides share.

@@ -19,16 +19,19 @@ pub(super) struct WireEdge<'a> {
     pub(super) reversed: bool,
 }
 
-/// The face for a truck surface with its own (not the face's) orientation, and its wires.
-pub(super) fn convert<'a>(
+/// Makes a face of a truck surface, in mm, and its wires; `oriented` is whether the face looks as its surface does. Fails with the reason
+/// where edges lie off the surface or do not close, or it is of a kind that has no form here.
+pub(super) fn convert_face<'a>(
     surface: &TruckSurface,
     oriented: bool,
     wires: &[Vec<WireEdge<'a>>],
 ) -> Result<Face, String> {
     let (surface, analytic, flipped, loops, gap) = match surface {
-        TruckSurface::Plane(p) => plane(p, wires)?,
-        TruckSurface::BSplineSurface(s) => traced(bspline_surface(s)?, Analytic::Bspline, false, wires, None)?,
-        TruckSurface::NurbsSurface(s) => traced(nurbs_surface(s)?, Analytic::Rational, false, wires, None)?,
+        TruckSurface::Plane(p) => plane_parts(p, wires)?,
+        TruckSurface::BSplineSurface(s) => {
+            spline_parts(bspline_surface(s)?, Analytic::Bspline, false, wires, None)?
+        }
+        TruckSurface::NurbsSurface(s) => spline_parts(nurbs_surface(s)?, Analytic::Rational, false, wires, None)?,
         TruckSurface::RevolutedCurve(s) => {
             let revolved = Revolved::new(s)?;
             let flipped = revolved.flipped;
@@ -41,13 +44,13 @@ pub(super) fn convert<'a>(
                     if flipped { w.iter().rev().map(side).collect() } else { w.iter().map(side).collect() }
                 })
                 .collect();
-            let cut = revolved.cut(&sides)?;
+            let cut = revolved.cut_to_loops(&sides)?;
             let middles = cut
                 .middles
                 .into_iter()
                 .map(|m| if flipped { m.into_iter().rev().collect() } else { m })
                 .collect::<Vec<Vec<f64>>>();
-            traced(cut.surface, Analytic::Revolution, flipped, wires, Some(&middles))?
+            spline_parts(cut.surface, Analytic::Revolution, flipped, wires, Some(&middles))?
         }
     };
     // Our normal is Su × Sv, truck's may be its opposite; and a face may be turned against its surface.
@@ -55,11 +58,12 @@ pub(super) fn convert<'a>(
     Ok(Face { analytic, reversed, loops, gap, ..Face::whole(surface) })
 }
 
-/// A surface, what it is exactly, whether Su × Sv is against truck's normal, its trims, and how far edges lie from it, mm.
+/// A surface, what it was in truck, whether Su × Sv is against truck's normal, its trims, and how far edges lie from it, mm.
 type Parts = (Surface, Analytic, bool, Vec<TrimLoop>, f64);
 
-/// A plane's surface, sized by its wires, and its trims, which an affine map gives exactly.
-fn plane(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
+/// Returns a plane's surface, sized by its wires, and its trims, which an affine map gives exactly; fails for edges more than [`ACCEPTED`]
+/// off it.
+fn plane_parts(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
     let (x, normal) = (vector(p.u_axis()), vector(p.normal()));
     if !(x.is_finite() && normal.is_finite() && normal.length() > 0.5) {
         return Err("a plane without a normal".into());
@@ -96,12 +100,13 @@ fn plane(p: &Plane, wires: &[Vec<WireEdge>]) -> Result<Parts, String> {
     }
     // The plane goes no farther than its loops, for a domain must be finite.
     let surface = sweep::plane(&frame, [[low.x, high.x], [low.y, high.y]]);
-    let loops = finished(&surface, loops)?;
+    let loops = oriented_loops(&surface, loops)?;
     Ok((surface, Analytic::Plane { frame }, false, loops, gap))
 }
 
-/// A spline and its trims, which are traced on it; `middles` tell on which side of a seam each edge runs.
-fn traced(
+/// Returns a spline with its trims, which are traced on it; `middles` are u in the middle of each edge, which tell on which side of a seam
+/// it runs. Edges without length are left out: they are poles.
+fn spline_parts(
     surface: Surface,
     analytic: Analytic,
     flipped: bool,
@@ -128,13 +133,13 @@ fn traced(
         }
         loops.push(TrimLoop { uses });
     }
-    let loops = finished(&surface, loops)?;
+    let loops = oriented_loops(&surface, loops)?;
     Ok((surface, analytic, flipped, loops, gap))
 }
 
-/// Loops closed in the parameter plane, the outer one counter-clockwise and the others clockwise.
-fn finished(surface: &Surface, loops: Vec<TrimLoop>) -> Result<Vec<TrimLoop>, String> {
-    let mut closed = loops.into_iter().map(|l| close(surface, l)).collect::<Result<Vec<_>, _>>()?;
+/// Returns the loops closed in the parameter plane, the outer one, which comes first, counter-clockwise and the others clockwise.
+fn oriented_loops(surface: &Surface, loops: Vec<TrimLoop>) -> Result<Vec<TrimLoop>, String> {
+    let mut closed = loops.into_iter().map(|l| close_loop(surface, l)).collect::<Result<Vec<_>, _>>()?;
     let areas: Vec<f64> = closed.iter().map(signed_area).collect();
     // In the plane of parameters the largest loop holds the others.
     let outer = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
@@ -150,8 +155,8 @@ fn finished(surface: &Surface, loops: Vec<TrimLoop>) -> Result<Vec<TrimLoop>, St
     Ok(closed)
 }
 
-/// The loop with uses along poles put in and its ends joined to the bit.
-fn close(surface: &Surface, l: TrimLoop) -> Result<TrimLoop, String> {
+/// Returns the loop with uses along poles put in and its ends joined to the bit; fails for gaps that no pole explains.
+fn close_loop(surface: &Surface, l: TrimLoop) -> Result<TrimLoop, String> {
     let [[u0, u1], [v0, v1]] = surface.domain();
     let extent = Uv::new(u1 - u0, v1 - v0);
     let mut uses: Vec<EdgeUse> = Vec::new();
@@ -159,7 +164,7 @@ fn close(surface: &Surface, l: TrimLoop) -> Result<TrimLoop, String> {
     let first = l.uses.first().map(EdgeUse::start).ok_or("a wire without edges")?;
     for (i, next) in l.uses.into_iter().enumerate() {
         if i > 0 {
-            bridge(surface, extent, &mut uses, next.start())?;
+            bridge_pole(surface, extent, &mut uses, next.start())?;
         }
         let start = uses.last().map(EdgeUse::end);
         uses.push(next);
@@ -169,15 +174,15 @@ fn close(surface: &Surface, l: TrimLoop) -> Result<TrimLoop, String> {
         }
     }
     debug_assert!(uses.len() >= count);
-    bridge(surface, extent, &mut uses, first)?;
+    bridge_pole(surface, extent, &mut uses, first)?;
     if let Some(last) = uses.last_mut() {
         move_end(last, false, first);
     }
     Ok(TrimLoop { uses })
 }
 
-/// Adds the line of a pole where the chain does not reach `to`.
-fn bridge(surface: &Surface, extent: Uv, uses: &mut Vec<EdgeUse>, to: Uv) -> Result<(), String> {
+/// Adds the line of a pole where the chain does not reach `to`; nothing for a step of rounding. `extent` is the size of the domain.
+fn bridge_pole(surface: &Surface, extent: Uv, uses: &mut Vec<EdgeUse>, to: Uv) -> Result<(), String> {
     let Some(from) = uses.last().map(EdgeUse::end) else { return Ok(()) };
     if ((to - from) / extent).abs().max_element() <= SNAP {
         return Ok(());
@@ -198,14 +203,14 @@ fn move_end(u: &mut EdgeUse, start: bool, to: Uv) {
     *p = ControlPoint::weighted(to, p.weight());
 }
 
-/// Area in parameters, positive where the loop runs counterclockwise.
+/// Returns the area in parameters, positive where the loop runs counter-clockwise.
 fn signed_area(l: &TrimLoop) -> f64 {
-    let points: Vec<Uv> = l.uses.iter().flat_map(along).collect();
+    let points: Vec<Uv> = l.uses.iter().flat_map(points_of_use).collect();
     (0..points.len()).map(|i| points[i].perp_dot(points[(i + 1) % points.len()])).sum::<f64>() * 0.5
 }
 
-/// Points along a use in the loop's direction, its end left out.
-pub(super) fn along(u: &EdgeUse) -> impl Iterator<Item = Uv> + '_ {
+/// Returns sixteen points along a use in the loop's direction, its end left out.
+pub(super) fn points_of_use(u: &EdgeUse) -> impl Iterator<Item = Uv> + '_ {
     const STEPS: usize = 16;
     let [t0, t1] = u.uv.domain();
     (0..STEPS).map(move |k| {

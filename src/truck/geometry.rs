@@ -28,7 +28,8 @@ fn homogeneous(v: &Vector4) -> Homogeneous {
     Homogeneous::new(v.x, v.y, v.z, v.w)
 }
 
-/// A truck curve as a clamped spline over the same parameters.
+/// Returns a truck curve as a clamped spline over the same parameters; intersection curves are fitted within [`FIT`]. Fails for what our
+/// splines do not hold.
 pub(super) fn curve(c: &TruckCurve) -> Result<Curve, String> {
     let spline = match c {
         TruckCurve::Line(line) => Curve::line(point(line.0), point(line.1), [0.0, 1.0]),
@@ -42,13 +43,14 @@ pub(super) fn curve(c: &TruckCurve) -> Result<Curve, String> {
             knots: c.knot_vec().iter().copied().collect(),
             points: c.control_points().iter().map(homogeneous).collect(),
         },
-        TruckCurve::IntersectionCurve(c) => fitted(c)?,
+        TruckCurve::IntersectionCurve(c) => fit_curve(c)?,
     };
     checked_curve(spline)
 }
 
-/// A cubic Hermite spline through a curve that is not a spline, refined until its middles are right.
-fn fitted(c: &impl BoundedCurve<Point = Point3, Vector = Vector3>) -> Result<Curve, String> {
+/// Returns a cubic Hermite spline of a curve that is not a spline, halved until the middle of each piece lies within [`FIT`] of it; fails
+/// beyond [`MAX_PIECES`].
+fn fit_curve(c: &impl BoundedCurve<Point = Point3, Vector = Vector3>) -> Result<Curve, String> {
     let (t0, t1) = c.range_tuple();
     let mut pieces = 8;
     while pieces <= MAX_PIECES {
@@ -68,7 +70,8 @@ fn fitted(c: &impl BoundedCurve<Point = Point3, Vector = Vector3>) -> Result<Cur
     Err(format!("an intersection curve that {MAX_PIECES} cubic pieces do not follow within {FIT} mm"))
 }
 
-/// A curve as we need it, clamped to its domain; truck itself checks little of what it is given.
+/// Returns a curve clamped to its domain; fails for degrees, control points, weights and knots that are of no use. Truck itself checks
+/// little of what it is given.
 fn checked_curve(c: Curve) -> Result<Curve, String> {
     if c.degree == 0 || c.degree > MAX_DEGREE {
         return Err(format!("a curve of degree {}; 1 to {MAX_DEGREE} are supported", c.degree));
@@ -93,7 +96,7 @@ fn check_points(points: &[Homogeneous]) -> Result<(), String> {
     }
 }
 
-/// A surface from rows of control points, checked and clamped.
+/// Makes a surface from rows of control points, one for each u, checked as curves are and clamped to its domain.
 pub(super) fn surface(knots: (&KnotVec, &KnotVec), rows: Vec<Vec<Homogeneous>>) -> Result<Surface, String> {
     let knots = [knots.0.iter().copied().collect::<Vec<f64>>(), knots.1.iter().copied().collect()];
     let counts = [rows.len(), rows.first().map_or(0, Vec::len)];
@@ -125,7 +128,7 @@ fn vector4(p: &Homogeneous) -> Vector4 {
     Vector4::new(p.x, p.y, p.z, p.w)
 }
 
-/// Our curve as truck's.
+/// Returns our curve as truck's.
 ///
 /// # Errors
 /// What truck says of it: it takes an interval of parameters below 1e-6 for a single value.
@@ -134,7 +137,7 @@ pub fn curve_to_truck(c: &Curve) -> Result<NurbsCurve<Vector4>, String> {
     curve.map(NurbsCurve::new).map_err(|e| format!("truck refuses a curve: {e}"))
 }
 
-/// Our surface as truck's, with the same parameters.
+/// Returns our surface as truck's, with the same parameters.
 ///
 /// # Errors
 /// What truck says of it, as for [`curve_to_truck`].

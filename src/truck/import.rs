@@ -1,6 +1,6 @@
 //! Truck solids and shells → [`Model`].
 
-use super::face::{WireEdge, along, convert};
+use super::face::{WireEdge, convert_face, points_of_use};
 use super::geometry::{curve, point};
 use super::modeling;
 use crate::math::{Aabb, Uv, Vector};
@@ -27,8 +27,8 @@ pub struct Refusal {
     pub reason: String,
 }
 
-/// The model of a solid: its outer shell, then its voids. All face normals point out of the material, whichever way
-/// truck's faces were wound.
+/// Returns the model of a solid: its outer shell, then its voids. All face normals point out of the material, whichever way truck's faces
+/// were wound.
 ///
 /// ```
 /// use lampyris::truck::{self, modeling::{builder, Point3, Vector3}};
@@ -48,7 +48,7 @@ pub fn solid(name: &str, solid: &modeling::Solid) -> Conversion {
     made.finish(name)
 }
 
-/// The model of a shell; normals are those of truck's faces, turned outward when the shell is closed.
+/// Returns the model of a shell; normals are those of truck's faces, turned outward when the shell is closed.
 pub fn shell(name: &str, shell: &modeling::Shell) -> Conversion {
     let mut made = Maker::default();
     // Of an open shell nobody can say which side is out.
@@ -57,7 +57,7 @@ pub fn shell(name: &str, shell: &modeling::Shell) -> Conversion {
     made.finish(name)
 }
 
-/// The part under construction, with what is known by truck's ids.
+/// The part under construction, with what of it is known by truck's ids.
 #[derive(Default)]
 struct Maker {
     part: Part,
@@ -67,7 +67,7 @@ struct Maker {
 }
 
 impl Maker {
-    /// Adds a shell with the faces that can be converted.
+    /// Adds a shell with the faces that can be converted; the others are noted as refused.
     fn shell(&mut self, shell: &modeling::Shell, closed: bool) {
         let at = self.part.shells.len();
         let mut faces = Vec::new();
@@ -80,7 +80,7 @@ impl Maker {
         self.part.shells.push(Shell { faces, closed, ..Shell::default() });
     }
 
-    /// A face of the part; its edges are added to the part where they are new.
+    /// Converts a face; its edges are added to the part where they are new. Fails with the reason.
     fn face(&mut self, face: &modeling::Face) -> Result<Face, String> {
         let mut wires: Vec<Vec<(EdgeId, bool)>> = Vec::new();
         for wire in face.absolute_boundaries() {
@@ -96,10 +96,11 @@ impl Maker {
                     .collect()
             })
             .collect();
-        convert(&face.surface(), face.orientation(), &wires)
+        convert_face(&face.surface(), face.orientation(), &wires)
     }
 
-    /// The number of an edge in the part, to which it is added when it is met first.
+    /// Returns the number of an edge in the part, to which it is added when it is met first; fails, every time, for a curve that cannot be
+    /// had.
     fn edge(&mut self, e: &modeling::Edge) -> Result<EdgeId, String> {
         // By truck's id: neighbours hold the same edge, and must get the same curve.
         if let Some(known) = self.edges.get(&e.id()) {
@@ -114,6 +115,7 @@ impl Maker {
         made
     }
 
+    /// Returns the number of a vertex in the part, to which it is added when it is met first.
     fn vertex(&mut self, v: &modeling::Vertex) -> VertexId {
         *self.vertices.entry(v.id()).or_insert_with(|| {
             self.part.vertices.push(point(v.point()));
@@ -121,7 +123,7 @@ impl Maker {
         })
     }
 
-    /// Turns shells that look the wrong way and puts the outer one first.
+    /// Turns closed shells that look the wrong way, puts the outer one first, and numbers refusals accordingly.
     fn finish(mut self, name: &str) -> Conversion {
         self.part.name = name.into();
         let edges = &self.part.edges;
@@ -153,14 +155,15 @@ impl Maker {
     }
 }
 
+/// Returns the box around the surfaces and edges of a shell.
 fn shell_bounds(shell: &Shell, edges: &[Edge]) -> Aabb {
     let used = shell.faces.iter().flat_map(|f| &f.loops).flat_map(|l| &l.uses).filter_map(|u| u.edge);
     let curves = used.map(|id| edges[id.0 as usize].curve.bounds());
     curves.chain(shell.faces.iter().map(|f| f.surface.bounds())).fold(Aabb::from_points([]), Aabb::union)
 }
 
-/// Whether the normals of a closed shell point outward, by a vote: where it reaches farthest in a direction, an outward
-/// normal does not point back. `None` when the vote is tied.
+/// Whether the normals of a closed shell point outward, by a vote: where it reaches farthest in a direction, an outward normal does not
+/// point back. `None` when the vote is tied or no face has a normal.
 fn points_outward(shell: &Shell) -> Option<bool> {
     let samples: Vec<(Vector, Vector)> = shell.faces.iter().flat_map(face_samples).collect();
     let mut votes = 0i32;
@@ -178,22 +181,23 @@ fn points_outward(shell: &Shell) -> Option<bool> {
     (votes != 0).then_some(votes > 0)
 }
 
-/// Points inside a face with its normals.
+/// Returns the points inside a face, on a grid, with its normals; places without a normal are left out.
 fn face_samples(face: &Face) -> Vec<(Vector, Vector)> {
     const GRID: usize = 12;
-    let outline: Vec<Vec<Uv>> = face.loops.iter().map(|l| l.uses.iter().flat_map(along).collect()).collect();
+    let outline: Vec<Vec<Uv>> =
+        face.loops.iter().map(|l| l.uses.iter().flat_map(points_of_use).collect()).collect();
     let [[u0, u1], [v0, v1]] = face.surface.domain();
     let sign = if face.reversed { -1.0 } else { 1.0 };
     let at = |i: usize, a: f64, b: f64| a + (b - a) * (i as f64 + 0.5) / GRID as f64;
     (0..GRID * GRID)
         .map(|k| Uv::new(at(k / GRID, u0, u1), at(k % GRID, v0, v1)))
-        .filter(|&uv| inside(&outline, uv))
+        .filter(|&uv| is_inside(&outline, uv))
         .filter_map(|uv| Some((face.surface.evaluate(uv), face.surface.normal(uv)? * sign)))
         .collect()
 }
 
-/// Whether a point is inside loops, by crossings of a line to the right; without loops everything is.
-fn inside(outline: &[Vec<Uv>], p: Uv) -> bool {
+/// Whether parameters are inside loops, by crossings of a line to the right; without loops everything is.
+fn is_inside(outline: &[Vec<Uv>], p: Uv) -> bool {
     let crosses = |a: Uv, b: Uv| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y);
     let crossings = outline.iter().map(|l| (0..l.len()).filter(|&i| crosses(l[i], l[(i + 1) % l.len()])).count());
     outline.is_empty() || crossings.sum::<usize>() % 2 == 1

@@ -1,6 +1,6 @@
 //! Optical parts by a handful of numbers, modelled by truck and exact as rational B-splines: a lens, reflectors.
 
-use super::conic::{Conic, ShapeError, checked};
+use super::conic::{Conic, ShapeError, check_value};
 use super::import::{Conversion, shell, solid};
 use super::modeling::{Curve, Edge, Line, Point3, Rad, Shell, Solid, Vector3, Wire, builder};
 
@@ -35,7 +35,7 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// The lens as a truck solid.
+    /// Makes the lens as a truck solid, mm.
     ///
     /// # Errors
     /// When the surfaces meet inside the aperture or do not reach it.
@@ -46,8 +46,8 @@ impl Lens {
         // Both profiles reach the aperture, or they would have been refused.
         let rim = [self.front.sag(reach), self.back.sag(reach)].map(Option::unwrap_or_default);
         let edge = self.thickness + rim[1] - rim[0];
-        checked("the thickness", self.thickness, self.thickness > 0.0, "positive")?;
-        checked(
+        check_value("the thickness", self.thickness, self.thickness > 0.0, "positive")?;
+        check_value(
             "the thickness at the rim",
             edge,
             edge > THINNEST_RIM,
@@ -66,7 +66,7 @@ impl Lens {
         Ok(Solid::new(vec![builder::cone(&wire, Vector3::unit_z(), TURN)]))
     }
 
-    /// The lens as a model.
+    /// Makes the lens as a model, mm, in truck's three sectors.
     ///
     /// # Errors
     /// As [`Lens::solid`].
@@ -94,28 +94,28 @@ pub struct Reflector {
 }
 
 impl Reflector {
-    /// Part of an ellipsoid of semi-axes `a` (along z) and `b`, with the vertex at the origin and foci at `a ∓ √(a²−b²)`.
+    /// Returns part of an ellipsoid of semi-axes `a` (along z) and `b`, with the vertex at the origin and foci at `a ∓ √(a²−b²)`.
     ///
     /// # Errors
     /// When `b` is not below `a`.
     pub fn ellipsoid(a: f64, b: f64, half_aperture: f64) -> Result<Self, ShapeError> {
-        checked("the semi-axis b", b, b > 0.0 && b < a, "positive and below the semi-axis a")?;
+        check_value("the semi-axis b", b, b > 0.0 && b < a, "positive and below the semi-axis a")?;
         let shape = Conic { radius: b * b / a, conic: b * b / (a * a) - 1.0 };
         Ok(Self { shape, half_aperture, hole: 0.0 })
     }
 
-    /// Height of the focus nearest to the vertex, mm; `None` for conics without one (K above 0).
+    /// Returns the height of the focus nearest to the vertex, mm; `None` for conics without one (K above 0).
     pub fn focus(&self) -> Option<f64> {
         // R = a(1 − e²) and K = −e² put the near focus at R/(1 + e).
         (self.shape.conic <= 0.0).then(|| self.shape.radius / (1.0 + (-self.shape.conic).sqrt()))
     }
 
-    /// The reflector as a truck shell.
+    /// Makes the reflector as an open truck shell, mm.
     ///
     /// # Errors
     /// When the shape does not reach the aperture or the hole is as large.
     pub fn shell(&self) -> Result<Shell, ShapeError> {
-        checked(
+        check_value(
             "the hole",
             self.hole,
             (0.0..self.half_aperture).contains(&self.hole),
@@ -123,7 +123,7 @@ impl Reflector {
         )?;
         let mut profile = self.shape.profile(0.0, self.half_aperture)?;
         if self.hole > 0.0 {
-            profile = self.cut(profile)?;
+            profile = self.cut_hole(profile)?;
         }
         let at = |h: f64| Ok(builder::vertex(Point3::new(h, 0.0, self.shape.sag_within(h)?)));
         let (inner, outer) = (at(self.hole)?, at(self.half_aperture)?);
@@ -136,8 +136,8 @@ impl Reflector {
         })
     }
 
-    /// The profile from the hole outward.
-    fn cut(&self, mut profile: Curve) -> Result<Curve, ShapeError> {
+    /// Cuts the profile at the hole's radius and returns the part outside of it.
+    fn cut_hole(&self, mut profile: Curve) -> Result<Curve, ShapeError> {
         use super::modeling::{BoundedCurve, Cut, ParametricCurve};
         let (t0, t1) = profile.range_tuple();
         let off = |t: f64| profile.subs(t).x - self.hole;
@@ -146,7 +146,7 @@ impl Reflector {
         Ok(profile.cut(t))
     }
 
-    /// The reflector as a model; normals point towards the focus.
+    /// Makes the reflector as a model, mm; normals point towards the axis, where the light comes from.
     ///
     /// # Errors
     /// As [`Reflector::shell`].

@@ -26,10 +26,11 @@ pub(super) struct Revolved {
     axis: Frame,
     matrix: Matrix4,
     inverse: Matrix4,
-    /// Angle of the meridian about the axis, from which u counts.
+    /// Angle of the meridian about the axis, radians, from which u counts.
     azimuth: f64,
     /// Whether our normal points the other way than truck's.
     pub(super) flipped: bool,
+    /// Of the meridian's box, mm.
     size: f64,
 }
 
@@ -40,13 +41,14 @@ pub(super) struct Side<'a> {
     pub(super) reversed: bool,
 }
 
-/// A surface cut to a face, and for each loop the parameter u in the middle of each edge.
+/// A surface cut to a face, and for each loop the spline's parameter u in the middle of each edge.
 pub(super) struct Cut {
     pub(super) surface: Surface,
     pub(super) middles: Vec<Vec<f64>>,
 }
 
 impl Revolved {
+    /// Reads truck's surface; fails where its curve does not lie in a half-plane of the axis, or it is scaled to nothing.
     pub(super) fn new(s: &Processor<RevolutedCurve<TruckCurve>, Matrix4>) -> Result<Self, String> {
         use super::modeling::SquareMatrix;
         let entity = s.entity();
@@ -54,13 +56,13 @@ impl Revolved {
         let axis = Frame::from_axis(point(entity.origin()), vector(entity.axis()), None);
         let inverse = s.transform().invert().ok_or("a surface of revolution scaled to nothing")?;
         let size = meridian.bounds().diagonal();
-        let azimuth = azimuth(&meridian, &axis, size)?;
+        let azimuth = meridian_azimuth(&meridian, &axis, size)?;
         // Truck's u runs along the curve and v about the axis, ours the other way round.
         Ok(Self { meridian, axis, matrix: *s.transform(), inverse, azimuth, flipped: s.orientation(), size })
     }
 
-    /// The surface over the angles of a face.
-    pub(super) fn cut(&self, loops: &[Vec<Side>]) -> Result<Cut, String> {
+    /// Returns the surface over the angles of a face, given by its loops; fails where these close around the axis, or have no width.
+    pub(super) fn cut_to_loops(&self, loops: &[Vec<Side>]) -> Result<Cut, String> {
         let mut range: Option<[f64; 2]> = None;
         let mut middles = Vec::new();
         for sides in loops {
@@ -89,10 +91,11 @@ impl Revolved {
         for angle in middles.iter_mut().flatten() {
             *angle = conic::parameter_of_angle(range, angle.clamp(a, b));
         }
-        Ok(Cut { surface: local.transformed(|p| transform(&self.matrix, p)), middles })
+        Ok(Cut { surface: local.transformed(|p| transform_point(&self.matrix, p)), middles })
     }
 
-    /// Lowest and highest angle of a loop, unwrapped, and the angle in the middle of each edge.
+    /// Returns the lowest and highest angle of a loop, unwrapped, radians, and the angle in the middle of each edge, 0 on the axis. Fails
+    /// for a loop on the axis or around it.
     fn angles(&self, sides: &[Side]) -> Result<(f64, f64, Vec<f64>), String> {
         let ends_on_axis = |s: &Side| {
             let [t0, t1] = s.curve.domain();
@@ -120,8 +123,8 @@ impl Revolved {
                 let raw = self.angle(p);
                 let angle = match (last, jump.take()) {
                     // Past a pole: towards lower angles at the end of the meridian, higher ones at its start.
-                    (Some(before), Some(sign)) => before + sign * turned(sign * (raw - before)),
-                    (Some(before), None) => before + wrapped(raw - before),
+                    (Some(before), Some(sign)) => before + sign * positive_turn(sign * (raw - before)),
+                    (Some(before), None) => before + wrap_angle(raw - before),
                     (None, _) => raw,
                 };
                 start.get_or_insert(angle);
@@ -150,24 +153,27 @@ impl Revolved {
         Ok((low, high, middles))
     }
 
+    /// Returns the point before truck's transform.
     fn local(&self, p: Point) -> Point {
-        transform(&self.inverse, p)
+        transform_point(&self.inverse, p)
     }
 
+    /// Whether a point lies on the axis, within [`ON_AXIS`].
     fn on_axis(&self, p: Point) -> bool {
         let q = self.axis.local_point(self.local(p));
         q.x.hypot(q.y) < ON_AXIS * (1.0 + self.size)
     }
 
-    /// Angle of a point about the axis, from the meridian on.
+    /// Returns the angle of a point about the axis, radians, from the meridian on; not unwrapped.
     fn angle(&self, p: Point) -> f64 {
         let q = self.axis.local_point(self.local(p));
         q.y.atan2(q.x) - self.azimuth
     }
 }
 
-/// The one angle about the axis that all points of a meridian have.
-fn azimuth(meridian: &Curve, axis: &Frame, size: f64) -> Result<f64, String> {
+/// Returns the one angle about the axis, radians, that all points of a meridian have; fails where they have none or several. `size` is the
+/// meridian's, mm.
+fn meridian_azimuth(meridian: &Curve, axis: &Frame, size: f64) -> Result<f64, String> {
     let [t0, t1] = meridian.domain();
     let samples =
         (0..=SAMPLES).map(|k| axis.local_point(meridian.evaluate(t0 + (t1 - t0) * k as f64 / SAMPLES as f64)));
@@ -189,25 +195,25 @@ fn azimuth(meridian: &Curve, axis: &Frame, size: f64) -> Result<f64, String> {
     Ok(y.atan2(x))
 }
 
-/// Where a side ends as the loop runs.
+/// Returns where a side ends as the loop runs.
 fn side_end(side: &Side) -> Point {
     let [t0, t1] = side.curve.domain();
     side.curve.evaluate(if side.reversed { t0 } else { t1 })
 }
 
-/// The angle brought to `(−π, π]`.
-fn wrapped(angle: f64) -> f64 {
+/// Returns the angle, radians, moved by whole turns to within half a turn of 0.
+fn wrap_angle(angle: f64) -> f64 {
     angle - 2.0 * PI * (angle / (2.0 * PI)).round()
 }
 
-/// The angle brought to `(0, 2π]`.
-fn turned(angle: f64) -> f64 {
+/// Returns the angle, radians, moved by whole turns to `(0, 2π]`; next to nothing is a whole turn.
+fn positive_turn(angle: f64) -> f64 {
     let a = angle.rem_euclid(2.0 * PI);
     if a < SAME_ANGLE { 2.0 * PI } else { a }
 }
 
-/// An affine placement; truck allows no other.
-pub(super) fn transform(m: &Matrix4, p: Point) -> Point {
+/// Moves a point by a matrix that must be affine, as truck's are.
+pub(super) fn transform_point(m: &Matrix4, p: Point) -> Point {
     let h = Homogeneous::weighted(p, 1.0);
     Point::new(
         m.x.x * h.x + m.y.x * h.y + m.z.x * h.z + m.w.x,

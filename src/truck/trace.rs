@@ -32,14 +32,14 @@ pub(super) struct Tracer<'a> {
     size: f64,
 }
 
-/// A uv curve and the largest distance found between its image and the edge, mm.
+/// A uv curve and the largest distance found between its image and the edge, mm, by samples.
 pub(super) struct Traced {
     pub(super) uv: UvCurve,
     pub(super) gap: f64,
 }
 
 impl<'a> Tracer<'a> {
-    /// Samples over the domain, from which searches start.
+    /// Samples the surface over its domain, for searches to start from.
     pub(super) fn new(surface: &'a Surface) -> Self {
         let [[u0, u1], [v0, v1]] = surface.domain();
         // Some samples a span, within what is quick to search.
@@ -56,7 +56,8 @@ impl<'a> Tracer<'a> {
         Self { surface, seeds, extent: Uv::new(u1 - u0, v1 - v0), size }
     }
 
-    /// The uv curve of an edge, over the edge's own parameters; `near_u` tells two sides of a seam apart.
+    /// Returns the uv curve of an edge, over the edge's own parameters; `near_u` tells two sides of a seam apart, `None` where there is
+    /// none. Fails for edges more than [`ACCEPTED`] off the surface.
     pub(super) fn trace(&self, edge: &Curve, near_u: Option<f64>) -> Result<Traced, String> {
         let [t0, t1] = edge.domain();
         // The kinks of the edge's parametrisation are always nodes.
@@ -69,8 +70,8 @@ impl<'a> Tracer<'a> {
             }
             let last = ts.len() - 1;
             ts[last] = t1;
-            let uv = self.through(edge, &ts, near_u)?;
-            let gap = self.gap(edge, &uv, &ts);
+            let uv = self.fit_hermite(edge, &ts, near_u)?;
+            let gap = self.largest_gap(edge, &uv, &ts);
             // When halving no longer helps, the file's own gap is what is left.
             if gap <= WANTED || 2 * ts.len() > MAX_PIECES {
                 return if gap <= ACCEPTED {
@@ -83,8 +84,8 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// The largest distance of a trim from its edge, sampled between the points at `ts`.
-    fn gap(&self, edge: &Curve, uv: &UvCurve, ts: &[f64]) -> f64 {
+    /// Returns the largest distance of a trim from its edge, mm, sampled between the points at `ts`.
+    fn largest_gap(&self, edge: &Curve, uv: &UvCurve, ts: &[f64]) -> f64 {
         let off = |t: f64| (self.surface.evaluate(uv.evaluate(t)) - edge.evaluate(t)).length();
         ts.windows(2)
             // At the middles, where Hermite pieces are worst, and on both sides of them.
@@ -93,8 +94,9 @@ impl<'a> Tracer<'a> {
             .fold(off(ts[0]), f64::max)
     }
 
-    /// The trim through the points of an edge at `ts`, with slopes that follow the edge.
-    fn through(&self, edge: &Curve, ts: &[f64], near_u: Option<f64>) -> Result<UvCurve, String> {
+    /// Returns the uv curve through the feet of an edge's points at `ts`, with slopes that follow the edge; fails where its middle is not
+    /// on the surface.
+    fn fit_hermite(&self, edge: &Curve, ts: &[f64], near_u: Option<f64>) -> Result<UvCurve, String> {
         // Start in the middle, where no pole is, and walk to both ends.
         let middle = ts.len() / 2;
         let start = self.closest(edge.evaluate(ts[middle]), near_u)?;
@@ -108,7 +110,7 @@ impl<'a> Tracer<'a> {
         let mut slopes: Vec<Uv> =
             nodes.iter().zip(ts).map(|(&uv, &t)| self.slope(uv, edge.derivatives(t).first)).collect();
         for (end, inner) in [(0, 1), (ts.len() - 1, ts.len() - 2)] {
-            if let Some(k) = self.pole(nodes[end]) {
+            if let Some(k) = self.pole_parameter(nodes[end]) {
                 let (at, slope) = self.leaving_pole(edge, [ts[end], ts[inner]], nodes[inner], k);
                 nodes[end][k] = at.clamp(self.surface.domain()[k][0], self.surface.domain()[k][1]);
                 slopes[end][k] = slope;
@@ -117,15 +119,15 @@ impl<'a> Tracer<'a> {
         Ok(UvCurve::hermite(ts, &nodes, &slopes))
     }
 
-    /// Which parameter moves nothing at a point: 0 for u, 1 for v.
-    fn pole(&self, uv: Uv) -> Option<usize> {
+    /// Returns which parameter moves nothing at a point: 0 for u, 1 for v; `None` off the poles.
+    fn pole_parameter(&self, uv: Uv) -> Option<usize> {
         let d = self.surface.derivatives(uv);
         let lengths = [d.du.length() * self.extent.x, d.dv.length() * self.extent.y];
         (0..2).find(|&k| lengths[k] < POLE * self.size.max(lengths[1 - k]))
     }
 
-    /// Parameter `k` and its slope at a pole, where it means nothing: continued from two points further in towards `inner`, so
-    /// that the curve stays smooth.
+    /// Returns the parameter `k` and its slope at a pole, where it means nothing: continued from two points further in, `at` and `inwards`
+    /// being the edge's parameters at the pole and at `inner`, so that the curve stays smooth.
     fn leaving_pole(&self, edge: &Curve, [at, inwards]: [f64; 2], inner: Uv, k: usize) -> (f64, f64) {
         let h = 0.1 * (inwards - at);
         let near = |s: f64| self.refine(edge.evaluate(at + s * h), inner)[k];
@@ -133,7 +135,8 @@ impl<'a> Tracer<'a> {
         (2.0 * one - two, (two - one) / h)
     }
 
-    /// The parameters of the point of the surface that is closest to `p`.
+    /// Returns the parameters of the point of the surface that is closest to `p`, within 0.3 of the domain of `near_u` if that is given;
+    /// fails where it is more than [`ACCEPTED`] away.
     fn closest(&self, p: Point, near_u: Option<f64>) -> Result<Uv, String> {
         // A seam's two sides lie a whole domain apart: a third of it tells them.
         let allowed = |uv: Uv| near_u.is_none_or(|u| (uv.x - u).abs() <= 0.3 * self.extent.x);
@@ -156,13 +159,13 @@ impl<'a> Tracer<'a> {
             .ok_or_else(|| "an edge that does not lie on its surface".into())
     }
 
-    /// Gauss–Newton steps to the closest point, inside the domain.
+    /// Returns the parameters of a point at least as near to `p` as the start, which is clamped to the domain first, by Gauss–Newton steps.
     fn refine(&self, p: Point, start: Uv) -> Uv {
         let mut uv = self.surface.clamp(start);
         let mut off = (self.surface.evaluate(uv) - p).length();
         for _ in 0..50 {
             let d = self.surface.derivatives(uv);
-            let step = solve(d.du, d.dv, p - d.point);
+            let step = solve_least_squares(d.du, d.dv, p - d.point);
             let mut scale = 1.0;
             let (next, next_off) = loop {
                 let next = self.surface.clamp(uv + step * scale);
@@ -185,15 +188,15 @@ impl<'a> Tracer<'a> {
         uv
     }
 
-    /// duv/dt along a curve with that tangent.
+    /// Returns the change of parameters along a curve with that tangent, per unit of the curve's parameter.
     fn slope(&self, uv: Uv, tangent: Vector) -> Uv {
         let d = self.surface.derivatives(uv);
-        solve(d.du, d.dv, tangent)
+        solve_least_squares(d.du, d.dv, tangent)
     }
 }
 
-/// The least-squares solution of `du·x + dv·y = v`; a parameter that moves nothing stays.
-fn solve(du: Vector, dv: Vector, v: Vector) -> Uv {
+/// Returns x and y, the least-squares solution of `du·x + dv·y = v`; with parallel `du` and `dv` the shorter one's is 0.
+fn solve_least_squares(du: Vector, dv: Vector, v: Vector) -> Uv {
     let (a, b, c) = (du.length_squared(), du.dot(dv), dv.length_squared());
     let determinant = a * c - b * b;
     if determinant > PARALLEL_SQUARED * a * c {

@@ -1,7 +1,7 @@
 //! The commands and their own options.
 
 use super::help_text;
-use super::options::{AccuracyOption, CacheOption, MeshingOptions, TracingOptions, count};
+use super::options::{AccuracyOption, CacheOption, MeshingOptions, TracingOptions, parse_count};
 use crate::step;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -115,7 +115,7 @@ pub(crate) enum Command {
         #[arg(long, value_name = "SECONDS")]
         wait: Option<f64>,
         /// As many rays as the merged run is to have, where further ranges of a run that grows are still to come
-        #[arg(long, value_name = "N", value_parser = count)]
+        #[arg(long, value_name = "N", value_parser = parse_count)]
         rays: Option<u64>,
         /// Say how many rays are still missing until the statistical error (1σ) of a receiver's power, or of its :cells, is below P
         /// percent; the exit code is 4 as long as there are any
@@ -320,6 +320,7 @@ pub(crate) struct PageOption {
 }
 
 impl PageOption {
+    /// Whether report.html, figures and tables are to be written.
     pub(crate) fn is_wanted(self) -> bool {
         !self.no_report
     }
@@ -334,7 +335,7 @@ pub(crate) struct PlacedLimit {
 }
 
 impl PlacedLimit {
-    /// How a file is read within it.
+    /// Returns the settings with which a file is read within it, all others as by default.
     pub(crate) fn settings(self) -> step::Settings {
         step::Settings { max_placed: self.max_placed, ..step::Settings::default() }
     }
@@ -372,6 +373,7 @@ pub(crate) enum StudyKind {
 }
 
 impl StudyKind {
+    /// Returns the name of the study as it is typed.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Accuracy => "accuracy",

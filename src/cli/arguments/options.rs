@@ -16,7 +16,7 @@ pub(crate) struct AccuracyOption {
         help_heading = "Facets",
         value_name = "Xdeg",
         conflicts_with = "tolerance",
-        value_parser = accuracy,
+        value_parser = parse_accuracy,
         allow_hyphen_values = true
     )]
     pub(crate) accuracy: Option<f64>,
@@ -27,24 +27,24 @@ pub(crate) struct AccuracyOption {
 pub(crate) struct MeshingOptions {
     /// Distance from facets to the surface in mm: tight where curved, loose where flat; one number for uniform; 0.05..0.2
     /// by default; a traced scene that asks for no tolerance, accuracy, normals or intersector chooses facets or spline by a pilot
-    #[arg(long, help_heading = "Facets", value_name = "MIN..MAX", value_parser = tolerance, allow_hyphen_values = true)]
+    #[arg(long, help_heading = "Facets", value_name = "MIN..MAX", value_parser = parse_tolerance, allow_hyphen_values = true)]
     pub(crate) tolerance: Option<[f64; 2]>,
     /// Largest angle between facet and surface normal, degrees; off by default
-    #[arg(long, help_heading = "Facets", value_name = "DEG", value_parser = angle, allow_hyphen_values = true)]
+    #[arg(long, help_heading = "Facets", value_name = "DEG", value_parser = parse_angle, allow_hyphen_values = true)]
     pub(crate) angle: Option<f64>,
     /// Tolerance of one part, by name; may be given several times
-    #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = part)]
+    #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = parse_part)]
     pub(crate) part: Vec<(String, [f64; 2])>,
     /// Tolerance of one face, by its name or as #ID of its entity in the file; may be given several times, and wins over that of its part
-    #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = part)]
+    #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = parse_part)]
     pub(crate) face: Vec<(String, [f64; 2])>,
     /// Tolerance of all faces of one optical role in the scene: mirror, interface, coated or absorber; may be given several times
-    #[arg(long, help_heading = "Facets", value_name = "ROLE=MIN..MAX", value_parser = part)]
+    #[arg(long, help_heading = "Facets", value_name = "ROLE=MIN..MAX", value_parser = parse_part)]
     pub(crate) role: Vec<(String, [f64; 2])>,
 }
 
 impl MeshingOptions {
-    /// What they ask for.
+    /// Returns what the options ask for, unset ones left open; no plan of tolerances.
     pub(crate) fn settings(&self) -> MeshingSettings {
         MeshingSettings {
             tolerance: self.tolerance,
@@ -71,7 +71,7 @@ pub(crate) struct CacheOption {
 pub(crate) struct TracingOptions {
     /// Number of rays, such as 1000000 or 1e6; by default what the scene says, or what suits the command. For trace also A..B: the rays
     /// from A up to B, whose tally joins those of the rays before it
-    #[arg(long = "rays", help_heading = "Rays", value_name = "N", value_parser = ray_range, allow_hyphen_values = true)]
+    #[arg(long = "rays", help_heading = "Rays", value_name = "N", value_parser = parse_ray_range, allow_hyphen_values = true)]
     pub(crate) ray_range: Option<RayRange>,
     /// Seed of all random numbers
     #[arg(long, help_heading = "Rays", value_name = "S")]
@@ -88,7 +88,7 @@ pub(crate) struct TracingOptions {
 }
 
 impl TracingOptions {
-    /// What they ask for.
+    /// Returns what the options ask for, unset ones left open.
     pub(crate) fn settings(&self) -> TracingSettings {
         TracingSettings {
             ray_range: self.ray_range,
@@ -120,8 +120,8 @@ impl ValueEnum for NormalMode {
     }
 }
 
-/// A positive length in mm.
-fn length(text: &str) -> Result<f64, String> {
+/// Reads a positive length in mm, with or without the unit.
+fn parse_length(text: &str) -> Result<f64, String> {
     let value: f64 =
         // The unit may be written; it is always mm.
         text.trim().trim_end_matches("mm").trim().parse().map_err(|_| format!("'{text}' is no number of mm"))?;
@@ -132,10 +132,10 @@ fn length(text: &str) -> Result<f64, String> {
     }
 }
 
-/// `MIN..MAX` or one number.
-fn tolerance(text: &str) -> Result<[f64; 2], String> {
+/// Reads a tolerance in mm, `MIN..MAX` or one number for both.
+fn parse_tolerance(text: &str) -> Result<[f64; 2], String> {
     let (low, high) = text.split_once("..").unwrap_or((text, text));
-    let (low, high) = (length(low)?, length(high)?);
+    let (low, high) = (parse_length(low)?, parse_length(high)?);
     if low <= high {
         Ok([low, high])
     } else {
@@ -143,31 +143,32 @@ fn tolerance(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-fn angle(text: &str) -> Result<f64, String> {
+/// Reads an angle above 0 and below 90 degrees, with or without `deg`.
+fn parse_angle(text: &str) -> Result<f64, String> {
     let value = text.trim_end_matches("deg").trim().parse::<f64>().ok();
     value
         .filter(|v| *v > 0.0 && *v < 90.0)
         .ok_or_else(|| format!("an angle is a number of degrees above 0 and below 90, not '{text}'"))
 }
 
-/// The name of a part and its range of tolerances, as NAME=MIN..MAX.
-fn part(text: &str) -> Result<(String, [f64; 2]), String> {
+/// Reads the name of a part, face or role and its tolerances in mm, NAME=MIN..MAX.
+fn parse_part(text: &str) -> Result<(String, [f64; 2]), String> {
     // The last '=' parts the two, since names of parts may contain it.
     let (name, range) = text.rsplit_once('=').ok_or("write NAME=MIN..MAX, as in cover=0.01..0.05")?;
     if name.trim().is_empty() {
         return Err("the name of the part is missing; write NAME=MIN..MAX, as in cover=0.01..0.05".into());
     }
-    Ok((name.trim().to_owned(), tolerance(range)?))
+    Ok((name.trim().to_owned(), parse_tolerance(range)?))
 }
 
-/// `N`, or `A..B`.
-fn ray_range(text: &str) -> Result<RayRange, String> {
+/// Reads a number of rays, `N`, or the half-open range `A..B` from ray A up to B.
+fn parse_ray_range(text: &str) -> Result<RayRange, String> {
     let Some((first, end)) = text.split_once("..") else {
-        return Ok(RayRange { first: None, end: count(text)? });
+        return Ok(RayRange { first: None, end: parse_count(text)? });
     };
-    // `count` takes nothing below 1, but ranges begin at ray 0.
-    let first = if first.trim() == "0" { 0 } else { count(first.trim())? };
-    let end = count(end.trim())?;
+    // `parse_count` takes nothing below 1, but ranges begin at ray 0.
+    let first = if first.trim() == "0" { 0 } else { parse_count(first.trim())? };
+    let end = parse_count(end.trim())?;
     if first >= end {
         return Err(format!("the rays of A..B rise, not as in {text}"));
     }
@@ -177,8 +178,8 @@ fn ray_range(text: &str) -> Result<RayRange, String> {
 /// Largest number of rays: doubles, in which it may be written, count singly up to it.
 const MOST_RAYS: f64 = 9e15;
 
-/// A whole positive number; `1e6`, `1_000_000` and `10M` are understood.
-pub(crate) fn count(text: &str) -> Result<u64, String> {
+/// Reads a whole number from 1 to [`MOST_RAYS`]; `1e6`, `1_000_000` and `10M` are understood.
+pub(crate) fn parse_count(text: &str) -> Result<u64, String> {
     let plain = text.replace('_', "");
     let (digits, factor) = match plain.chars().last() {
         Some('k') => (&plain[..plain.len() - 1], 1000.0),
@@ -195,8 +196,8 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
     }
 }
 
-/// `0.05deg`: a direction error in degrees.
-fn accuracy(text: &str) -> Result<f64, String> {
+/// Reads a direction error above 0 and below 90 degrees, with or without `deg`.
+fn parse_accuracy(text: &str) -> Result<f64, String> {
     // A bare number is taken for degrees.
     let number = text.strip_suffix("deg").or_else(|| text.strip_suffix('°')).unwrap_or(text);
     let value = number.trim().parse::<f64>().ok().filter(|v| *v > 0.0 && *v < 90.0);
@@ -209,8 +210,8 @@ mod tests {
 
     #[test]
     fn tolerances() {
-        assert_eq!(tolerance("0.05..0.2"), Ok([0.05, 0.2]));
-        assert_eq!(tolerance("0.1mm"), Ok([0.1, 0.1]));
+        assert_eq!(parse_tolerance("0.05..0.2"), Ok([0.05, 0.2]));
+        assert_eq!(parse_tolerance("0.1mm"), Ok([0.1, 0.1]));
         for (wrong, says) in [
             ("-0.1", "positive"),
             ("0..0.2", "positive"),
@@ -218,21 +219,29 @@ mod tests {
             ("a", "number"),
             ("nan", "positive"),
         ] {
-            assert!(tolerance(wrong).unwrap_err().contains(says), "{wrong}");
+            assert!(parse_tolerance(wrong).unwrap_err().contains(says), "{wrong}");
         }
     }
 
     #[test]
     fn counts() {
-        assert_eq!((count("1e6"), count("10M"), count("1_000")), (Ok(1_000_000), Ok(10_000_000), Ok(1000)));
-        assert!(count("-5").is_err() && count("0").is_err() && count("1.5").is_err() && count("").is_err());
+        assert_eq!(
+            (parse_count("1e6"), parse_count("10M"), parse_count("1_000")),
+            (Ok(1_000_000), Ok(10_000_000), Ok(1000))
+        );
+        assert!(
+            parse_count("-5").is_err()
+                && parse_count("0").is_err()
+                && parse_count("1.5").is_err()
+                && parse_count("").is_err()
+        );
     }
 
     #[test]
     fn parts_and_angles() {
-        assert_eq!(part("a=b=0.1"), Ok(("a=b".into(), [0.1, 0.1])));
-        assert!(part("=0.1").is_err() && part("cover").is_err());
-        assert_eq!((angle("5deg"), accuracy("0.05deg")), (Ok(5.0), Ok(0.05)));
-        assert!(angle("90").is_err() && accuracy("-1deg").is_err());
+        assert_eq!(parse_part("a=b=0.1"), Ok(("a=b".into(), [0.1, 0.1])));
+        assert!(parse_part("=0.1").is_err() && parse_part("cover").is_err());
+        assert_eq!((parse_angle("5deg"), parse_accuracy("0.05deg")), (Ok(5.0), Ok(0.05)));
+        assert!(parse_angle("90").is_err() && parse_accuracy("-1deg").is_err());
     }
 }

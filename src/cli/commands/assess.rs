@@ -9,7 +9,7 @@ use crate::regulation::{Assumptions, IntensityMap, Regulation, Traffic, assess};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// What is asked.
+/// What `assess` was asked for; `None` for what was not given.
 pub(crate) struct AssessCommand<'a> {
     pub(crate) result: Option<&'a Path>,
     pub(crate) regulation: Option<&'a str>,
@@ -18,7 +18,7 @@ pub(crate) struct AssessCommand<'a> {
     pub(crate) as_placed: bool,
 }
 
-/// Prints what there are tables of.
+/// Prints the regulations that there are tables of, with `--json` as a list of objects.
 pub(crate) fn list(console: &Console) -> Result<Completion, Failure> {
     let all = Regulation::all();
     if console.json {
@@ -33,6 +33,8 @@ pub(crate) fn list(console: &Console) -> Result<Completion, Failure> {
     Ok(Completion::Complete)
 }
 
+/// Judges a far field by a regulation and prints the verdict, or with `--json` its document. It is complete whatever the verdict; it fails
+/// on unknown regulations, results that cannot be read, and far fields that the tables cannot be asked of.
 pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completion, Failure> {
     // The parser asks for both, but for --list.
     let name = command.regulation.ok_or_else(|| Failure::arguments("no --regulation is given"))?;
@@ -67,7 +69,7 @@ struct ResultsFile {
 }
 
 impl ResultsFile {
-    /// Reads results.json, or that of a folder.
+    /// Reads `results.json`, given by its path or its folder.
     fn read(given: &Path) -> Result<Self, Failure> {
         let path = if given.is_dir() { given.join("results.json") } else { given.to_owned() };
         let help = "give the folder that `lampyris trace` wrote, or its results.json";
@@ -79,7 +81,7 @@ impl ResultsFile {
         Ok(Self { folder, path, results })
     }
 
-    /// The far field over H and V, of this name where there are several.
+    /// Returns the one far field in candela over H and V, of that name if one is given. Fails where there is none, or several.
     fn far_field(&self, name: Option<&str>) -> Result<&Value, Failure> {
         let fits = |r: &&Value| r["kind"] == "far_field" && r["angles"] == "A" && r["unit"] == "cd";
         let named = |r: &&Value| name.is_none_or(|n| r["name"] == n);
@@ -99,13 +101,13 @@ impl ResultsFile {
         }
     }
 
-    /// How many rays were traced, on which the errors' prediction for more rays rests.
+    /// Returns how many rays were traced, on which the prediction of errors for more rays rests; fails where the results do not say.
     fn rays(&self) -> Result<u64, Failure> {
         let rays = self.results["rays"].as_u64();
         rays.ok_or_else(|| Failure::input(format!("{}: no number of rays", self.path.display())))
     }
 
-    /// The intensities of a far field, from the CSV file that the results name.
+    /// Returns the intensities of a far field, cd, from the CSV file that the results name for it.
     fn intensities(&self, receiver: &Value) -> Result<IntensityMap, Failure> {
         let files = receiver["files"].as_array().into_iter().flatten();
         let csv = files.filter_map(Value::as_str).find(|f| f.ends_with(".csv"));
@@ -121,7 +123,7 @@ impl ResultsFile {
         IntensityMap::from_csv(&text, ray_flux).map_err(failure)
     }
 
-    /// The upper end of the tolerance of the run's facets, where it traced any.
+    /// Returns the looser end of the tolerance of the run's facets, mm; `None` where it traced none.
     fn tolerance_mm(&self) -> Option<f64> {
         self.results["tolerance_mm"][1].as_f64()
     }

@@ -52,14 +52,16 @@ pub(crate) struct BvhCommand<'a> {
     pub(crate) file: Option<&'a Path>,
     /// Rays to ask in place of its own.
     pub(crate) rays_in: Option<&'a Path>,
-    /// The library of Embree to compare with.
+    /// The library of Embree to compare with; `None` leaves Embree out.
     pub(crate) embree: Option<&'a Path>,
-    /// Where the rays are written that were asked.
+    /// The folder of results, in whose `rays/` the rays are written that were asked.
     pub(crate) folder: &'a Path,
     pub(crate) meshing: &'a MeshingSettings,
     pub(crate) tracing: &'a TracingSettings,
 }
 
+/// Measures all intersectors on meshes of one tolerance after the other, the loose end of a tolerance that is asked for left out. Writes
+/// the rays of each kind; fails on files that cannot be read or written, and libraries that are no Embree.
 pub(crate) fn run(
     command: &BvhCommand,
     console: &Console,
@@ -70,7 +72,7 @@ pub(crate) fn run(
     let embree = command.embree.map(open_embree).transpose()?;
     let loaded = match command.file {
         None => demo::lamp()?.1,
-        Some(path) => match input_files::either(path, PlacedLimit::default(), console)? {
+        Some(path) => match input_files::scene_or_model(path, PlacedLimit::default(), console)? {
             input_files::Input::Step(loaded) | input_files::Input::Scene(_, loaded) => loaded,
         },
     };
@@ -93,17 +95,19 @@ pub(crate) fn run(
         }
         benchmark.measure_mesh((&name, &mesh), &octree, &kinds, embree.as_ref(), threads)?;
     }
-    benchmark.answer = sentence(&benchmark.rows);
+    benchmark.answer = answer_text(&benchmark.rows);
     Ok(benchmark)
 }
 
 /// A library of Embree and where it lies.
 type OpenEmbree<'p> = (&'p Path, Arc<EmbreeLibrary>);
 
+/// Opens a library of Embree by its path.
 fn open_embree(path: &Path) -> Result<OpenEmbree<'_>, Failure> {
     Ok((path, EmbreeLibrary::open(path).map_err(unusable_embree)?))
 }
 
+/// Says that Embree cannot be used, and what to give instead.
 fn unusable_embree(error: EmbreeError) -> Failure {
     Failure::arguments(error.to_string()).with_help(
         "name the library of Embree 4, such as libembree4.so.4, by its whole path, or leave --embree out",
@@ -116,7 +120,7 @@ const GIVEN: &str = "given";
 /// Rays by their kind.
 type Kinds = Vec<(&'static str, Vec<Ray>)>;
 
-/// The benchmark's own rays.
+/// Returns the benchmark's own rays by kind, as many of each as were asked for, else [`RAYS`]. `tolerance` is that of the mesh, mm.
 fn own_rays(mesh: &FacetMesh, octree: &Octree, tolerance: f64, tracing: &TracingSettings) -> Kinds {
     let count = tracing.rays().unwrap_or(RAYS);
     let seed = tracing.seed.unwrap_or(1);
@@ -131,7 +135,8 @@ fn own_rays(mesh: &FacetMesh, octree: &Octree, tolerance: f64, tracing: &Tracing
     ]
 }
 
-/// Writes rays as arrays that NumPy opens: where they start, mm, their directions, and the facet that each leaves, −1 for none.
+/// Writes rays as arrays that NumPy opens: where they start, mm, their directions, and the facet that each leaves, −1 for none. Makes the
+/// folder.
 fn write_rays(path: &Path, rays: &[Ray]) -> Result<(), Failure> {
     make_folder(&folder_of(path))?;
     let origin: Vec<f64> = rays.iter().flat_map(|ray| ray.origin.to_array()).collect();
@@ -164,7 +169,7 @@ struct Question<'a> {
 }
 
 impl BvhBenchmark {
-    /// All intersectors on one mesh.
+    /// Measures all intersectors on one mesh and appends their rows, and the octree's shape with its cost for each kind of rays.
     fn measure_mesh(
         &mut self,
         (model, mesh): (&str, &FacetMesh),
@@ -206,15 +211,16 @@ impl BvhBenchmark {
         Ok(())
     }
 
-    /// All intersectors on rays of one kind, on one thread and on all; what the first of them, the octree, did for them.
+    /// Measures all intersectors on rays of one kind, on one thread and on all, and appends their rows; returns what the octree, which must
+    /// be the first of `entrants`, did for them.
     fn measure_rays(&mut self, question: &Question, entrants: &[Entrant], threads: usize) -> Cost {
         let Question { mesh, kind, rays, .. } = *question;
         // The octree's answers are what others are compared with; who is right is asked of the arbiter.
-        let truth = answers(entrants[0].who, rays).0;
+        let truth = ask_rays(entrants[0].who, rays).0;
         let hits = truth.iter().flatten().count();
         let mut judged: Vec<(Comparison, Cost)> = (entrants.iter())
             .map(|entrant| {
-                let (hits, cost) = answers(entrant.who, rays);
+                let (hits, cost) = ask_rays(entrant.who, rays);
                 (Comparison::new(mesh, rays, &truth, &hits), cost)
             })
             .collect();
@@ -236,7 +242,7 @@ impl BvhBenchmark {
                 .collect();
             let timings = measure(&competitors, &crowd, ROUNDS);
             for ((entrant, (_, timing)), judgement) in entrants.iter().zip(timings).zip(&judged) {
-                let mut row = row(question, entrant, (call, threads), timing, judgement);
+                let mut row = timing_row(question, entrant, (call, threads), timing, judgement);
                 row["hits"] = hits.into();
                 self.rows.push(row);
             }
@@ -244,7 +250,7 @@ impl BvhBenchmark {
         judged[0].1
     }
 
-    /// Whether such a row is there already, of whichever intersector.
+    /// Whether there is a row for a mesh of as many facets, these rays, this call and this number of threads, of whichever intersector.
     fn has_row(&self, mesh: &FacetMesh, kind: &str, call: &str, threads: usize) -> bool {
         self.rows.iter().any(|r| {
             r["facets"] == mesh.facets.len()
@@ -255,8 +261,8 @@ impl BvhBenchmark {
     }
 }
 
-/// What one intersector did with one call on so many threads.
-fn row(
+/// Returns the row of what one intersector did with one call on so many threads; its `hits` are 0, for the caller to set.
+fn timing_row(
     question: &Question,
     entrant: &Entrant,
     (call, threads): (&str, usize),
@@ -300,7 +306,7 @@ impl Intersector for ParallelBatches<'_> {
     }
 }
 
-/// Random rays aimed at corners and at points of edges, where careless tests leak.
+/// Returns random rays aimed at corners and at middles of edges, where careless tests leak; without facets, random ones. At most `count`.
 fn edge_rays(mesh: &FacetMesh, bounds: &Aabb, seed: u64, count: u64) -> Vec<Ray> {
     let random = Uniform::new(bounds, seed ^ 0xad5e, count).rays(0..count);
     let facets = mesh.facets.len().max(1);
@@ -318,25 +324,28 @@ fn edge_rays(mesh: &FacetMesh, bounds: &Aabb, seed: u64, count: u64) -> Vec<Ray>
         .collect()
 }
 
-/// What a structure answers to the rays, and what that cost.
-fn answers(who: &dyn Intersector, rays: &[Ray]) -> (Vec<Option<Hit>>, Cost) {
+/// Asks a structure all rays as one batch; returns its answers in their order, and what that cost.
+fn ask_rays(who: &dyn Intersector, rays: &[Ray]) -> (Vec<Option<Hit>>, Cost) {
     let mut hits = vec![None; rays.len()];
     let mut cost = Cost::default();
     who.intersect_batch(rays, &mut hits, &mut cost);
     (hits, cost)
 }
 
-/// How the answers of one structure stand to those of the octree.
+/// How the answers of one structure stand to those of the octree, in rays.
 struct Comparison {
     /// Rays that hit only one of the two, or at distances that differ by more than single precision explains.
     differs: usize,
+    /// Of those, the ones where this structure is wrong by arithmetic of twice the digits.
     wrong: usize,
+    /// Of those, the ones where the octree is.
     octree_wrong: usize,
+    /// Of those, the ones that even that could not tell.
     undecided: usize,
 }
 
 impl Comparison {
-    /// Counts where hits differ from the octree's, and which of the two is wrong.
+    /// Counts where hits of one structure differ from the octree's, and asks the arbiter which of the two is wrong.
     fn new(mesh: &FacetMesh, rays: &[Ray], octree: &[Option<Hit>], hits: &[Option<Hit>]) -> Self {
         let same = |a: &Option<Hit>, b: &Option<Hit>| match (a, b) {
             (None, None) => true,
@@ -357,8 +366,8 @@ impl Comparison {
     }
 }
 
-/// The answer of the benchmark in words.
-fn sentence(rows: &[Value]) -> String {
+/// Returns the answer of the benchmark in words: rates of octree and CwBvh as shipped on the finest mesh, on one thread, and their ratio.
+fn answer_text(rows: &[Value]) -> String {
     let most = rows.iter().filter_map(|r| r["facets"].as_u64()).max().unwrap_or(0);
     let kind = if rows.iter().any(|r| r["rays_kind"] == GIVEN) { GIVEN } else { "incoherent" };
     let rate = |name: &str, build: &str, call: &str| {

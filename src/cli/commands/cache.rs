@@ -9,7 +9,7 @@ use crate::cli::work::cache_folder::{self, FOLDER_VARIABLE};
 use crate::report::{bytes, grouped};
 use serde_json::json;
 
-/// Says what the folder holds, or empties it.
+/// Prints what the folder of the cache holds, after emptying it if `clear`; fails where no cache is named.
 pub(crate) fn run(option: &CacheOption, clear: bool, console: &Console) -> Result<Completion, Failure> {
     let Some(cache) = cache_folder::cache(option)? else {
         let failure = Failure::arguments("there is no cache: nothing is kept from one run to the next");

@@ -39,6 +39,10 @@ const FEWEST_SCENE_RAYS: u64 = 64;
 /// Columns of the table of rates.
 const TABLE_WIDTH: usize = 100;
 
+/// Asks octree, BVH and spline the same rays, of the scene, a file or its own, and prints how their answers differ and how fast they are.
+///
+/// Writes the files that were asked for. Incomplete where there are no facets, answers differ on the same facets or without a cause, or too
+/// many faces were refused.
 pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completion, Failure> {
     // Before any work: a folder that cannot be made would cost it.
     for path in command.rays_out.iter().chain(&command.disagreements) {
@@ -46,7 +50,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     }
     let threads = threads::set_threads(command.tracing.threads)?;
     let given = command.rays_in.as_deref().map(read_rays).transpose()?;
-    let input = input_files::either(&command.file, command.placed, console)?;
+    let input = input_files::scene_or_model(&command.file, command.placed, console)?;
     let (scene, loaded) = match &input {
         Input::Step(loaded) => (None, loaded),
         Input::Scene(scene, loaded) => (Some(&**scene), loaded),
@@ -83,7 +87,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         found.facets_vs_exact.t_error_mm = distance;
         found.facets_vs_exact.normal_error_deg = angle;
     }
-    time_all(&mut found, &contenders.named(&polish), &rays, console);
+    time_all(&mut found, &contenders.competitors(&polish), &rays, console);
     write_rays(command, &found, octree, &rays, console)?;
     // What the facets change of the light, which only a scene has.
     let facets: &dyn Intersector = if normals == NormalMode::Exact { &polish } else { octree };
@@ -92,7 +96,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         Some((scene, bound)) => paired_receivers::trace_both(scene, bound, [facets, exact], &tracing, console),
         None => Vec::new(),
     };
-    let text = json_text(&document(&found, normals, scene.map(|_| &receivers[..]), reached.as_ref())?)?;
+    let text = json_text(&json_document(&found, normals, scene.map(|_| &receivers[..]), reached.as_ref())?)?;
     if let Some(folder) = &command.output {
         let report = CheckReport {
             title: file_name(&command.file),
@@ -112,7 +116,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     if console.json {
         print(&text)?;
     } else {
-        print(&(summary(&found, normals) + &paired_receivers::summary(&receivers)))?;
+        print(&(check_summary(&found, normals) + &paired_receivers::summary(&receivers)))?;
         say_files(command, &found, console);
     }
     // Last, for the answer counts although faces are missing.
@@ -120,7 +124,8 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     Ok(refused.and(report_defects(&found, console)))
 }
 
-/// Says what no check may find: no facets, answers that differ on the same facets, differences without a cause.
+/// Says what no check may find (no facets, answers that differ on the same facets, differences without a cause); incomplete if any was
+/// found.
 fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     let disagreements = found.octree_vs_bvh.disagree;
     let unexplained = found.facets_vs_exact.unexplained;
@@ -137,8 +142,8 @@ fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     completion
 }
 
-/// What `--json` prints; receivers are those of a scene.
-fn document(
+/// Returns what `--json` prints. `receivers` are those of a scene, `None` without one; `reached` is what came of `--accuracy`.
+fn json_document(
     found: &CrossCheck,
     normals: NormalMode,
     receivers: Option<&[PowerComparison]>,
@@ -155,7 +160,7 @@ fn document(
     Ok(document)
 }
 
-/// The files of rays that were asked for.
+/// Writes the files of rays that were asked for, in mm: all with the octree's answers, and those that were answered differently.
 fn write_rays(
     command: &CheckCommand,
     found: &CrossCheck,
@@ -179,7 +184,7 @@ fn write_rays(
     Ok(())
 }
 
-/// Which files were written, or how to get them.
+/// Says which files were written, or how to get them.
 fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
     match &command.output {
         Some(folder) => {
@@ -196,7 +201,8 @@ fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
     }
 }
 
-/// The rays of a scene's own run, or a camera's, random and bouncing ones for a bare model.
+/// Returns the rays of a scene's own run, or a camera's, random and bouncing ones for a bare model. `lift` is how far, mm, rays begin off
+/// the facet that they leave.
 fn own_rays(
     scene: Option<&Scene>,
     model: &Model,
@@ -228,7 +234,7 @@ fn own_rays(
     Ok(sampler.rays(count as usize, model, |_, _| lift))
 }
 
-/// How far hits moved to the spline are from it, along the ray in mm and in the normal in degrees. Beyond `near` mm it is another
+/// Returns how far hits moved to the spline are from it, along the ray in mm and in the normal in degrees. Beyond `near` mm it is another
 /// crossing, which the facets' own verdict counts.
 fn polished_errors(polish: &dyn Intersector, exact: &dyn Intersector, rays: &[Ray], near: f64) -> [Summary; 2] {
     let ask = |who: &dyn Intersector| {
@@ -248,12 +254,14 @@ fn polished_errors(polish: &dyn Intersector, exact: &dyn Intersector, rays: &[Ra
     [distance.summary(), angle.summary()]
 }
 
+/// Returns the quantiles of errors in words, each with the unit.
 fn spread_text(q: &Summary, unit: &str) -> String {
     let [p50, p99, max] = [q.p50, q.p99, q.max].map(|x| figures(x, 2));
     format!("off by {p50}{unit} (median), {p99}{unit} (99 %), {max}{unit} (largest)")
 }
 
-fn summary(c: &CrossCheck, normals: NormalMode) -> String {
+/// Returns what was found, for people: the verdict, differences by cause, errors, and a table of rates.
+fn check_summary(c: &CrossCheck, normals: NormalMode) -> String {
     let f = &c.facets_vs_exact;
     let e = &f.explained;
     let mut text = format!("  {}\n\n", verdict(c).replace("**", ""));

@@ -28,6 +28,7 @@ const SCENE: &str = include_str!("../../../fixtures/scenes/demo.toml");
 /// (Mitsuba 3.9, 2e7 rays).
 const REFERENCE: [f64; 2] = [0.75595, 3.694];
 
+/// Does the main job on the built-in lamp and writes everything into the folder, the lamp and its scene included.
 pub(crate) fn run(
     folder: &Path,
     meshing: MeshingSettings,
@@ -69,7 +70,7 @@ pub(crate) fn run(
         // What is left of the time of both.
         say_step("check", what, both - s.build - s.trace);
     }
-    let comparison = comparison(r);
+    let comparison = reference_comparison(r);
     let start = std::time::Instant::now();
     let (document, answer) = results_folder::write(&prepared, folder, &mut run, comparison, with_page, console)?;
     write_atomic(&folder.join("lamp.stp"), |w| w.write_all(LAMP))?;
@@ -84,7 +85,7 @@ pub(crate) fn run(
     Ok(Completion::Complete)
 }
 
-/// The built-in lamp with its scene.
+/// Reads the built-in lamp, as scene and model, from what is compiled in.
 pub(crate) fn lamp() -> Result<(Scene, LoadedModel), Failure> {
     let scene = Scene::parse(SCENE, "demo.toml", Path::new("."))?;
     let settings = step::Settings { measure_box: false, ..step::Settings::default() };
@@ -92,8 +93,8 @@ pub(crate) fn lamp() -> Result<(Scene, LoadedModel), Failure> {
     Ok((scene, loaded))
 }
 
-/// How the run compares with what other programs found.
-fn comparison(r: &crate::simulate::Results) -> Vec<String> {
+/// Returns how the run compares with what other programs found, as a sentence for the page; none without a plane receiver.
+fn reference_comparison(r: &crate::simulate::Results) -> Vec<String> {
     let Some(wall) = r.receivers.iter().find(|x| x.kind == "plane") else { return Vec::new() };
     let share = wall.power / r.power.emitted;
     let error = wall.power_error / r.power.emitted;

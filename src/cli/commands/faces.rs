@@ -14,7 +14,7 @@ const SHOWN_FACES: usize = 60;
 /// Coordinates below this are rounding of what the file has as 0, mm.
 const ROUNDING_MM: f64 = 1e-9;
 
-/// Prints the tree; with `--json` the document that holds the same.
+/// Prints the parts, solids and faces of a model as a tree; with `--json` the document that holds the same.
 pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failure> {
     let parts = model.account();
     let mut selectors = part_selectors(model).into_iter();
@@ -36,7 +36,8 @@ pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failur
     Ok(())
 }
 
-/// For each face in the order of the account the selector that means it, wherever its part stands; `None` for a part that stands nowhere.
+/// Returns, for each face in the order of the account, the selector that means it, wherever its part stands; `None` for a part that stands
+/// nowhere.
 fn part_selectors(model: &Model) -> Vec<Option<String>> {
     let mut first: Vec<Option<usize>> = vec![None; model.parts.len()];
     for (k, instance) in model.instances.iter().enumerate() {
@@ -58,20 +59,20 @@ fn part_selectors(model: &Model) -> Vec<Option<String>> {
     selectors
 }
 
-/// A part, how often it is placed, and its solids.
+/// Returns the lines of a part: its name, how often it is placed, and its solids. Takes a selector for each of its faces.
 fn part_text(part: &PartAccount, most: usize, selectors: &mut impl Iterator<Item = Option<String>>) -> String {
     let placed = if part.instances == 1 { String::new() } else { format!(", placed {} times", part.instances) };
-    let mut text = format!("part {}{placed}\n", named(&part.name));
+    let mut text = format!("part {}{placed}\n", quoted_name(&part.name));
     for solid in &part.solids {
         text += &solid_text(solid, most, selectors);
     }
     text
 }
 
-/// A solid and at most `most` of its faces, one a line.
+/// Returns the lines of a solid and at most `most` of its faces, one a line. Takes a selector for each of its faces, shown or not.
 fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<Item = Option<String>>) -> String {
     let closed = if solid.closed { "closed" } else { "open" };
-    let name = if solid.name.is_empty() { String::new() } else { format!(" {}", named(&solid.name)) };
+    let name = if solid.name.is_empty() { String::new() } else { format!(" {}", quoted_name(&solid.name)) };
     let area: f64 = solid.faces.iter().map(|f| f.area_mm2).sum();
     let count = grouped(solid.faces.len() as u64);
     let size = solid.size_mm().map(|x| figures(x, 4)).join(" × ");
@@ -91,15 +92,15 @@ fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<I
     text
 }
 
-/// A face on one line: entity, kind, area, a point on it, colour, layer, name and selector.
+/// Returns the line of a face: entity, kind, area, a point on it, colour, layer, name and selector, if it has one.
 fn face_text(face: &FaceAccount, selector: Option<&str>) -> String {
     let id = face.id.map_or_else(|| "–".to_owned(), |id| format!("#{id}"));
     let kind = face.kind.word();
     let radius = face.radius_mm.map_or(String::new(), |r| format!(" r {} mm", figures(r, 5)));
     let point = face.at.map(|x| figures(if x.abs() < ROUNDING_MM { 0.0 } else { x }, 6)).join(", ");
     let colour = face.colour.map_or(String::new(), |c| format!("  {c}"));
-    let name = if face.name.is_empty() { String::new() } else { format!("  {}", named(&face.name)) };
-    let layer = face.layer.as_ref().map_or(String::new(), |l| format!("  layer {}", named(l)));
+    let name = if face.name.is_empty() { String::new() } else { format!("  {}", quoted_name(&face.name)) };
+    let layer = face.layer.as_ref().map_or(String::new(), |l| format!("  layer {}", quoted_name(l)));
     let selector = selector.map_or(String::new(), |s| format!("  {s}"));
     format!(
         "    {id:>8}  {:<22} {:>12} mm²  at [{point}]{colour}{layer}{name}{selector}\n",
@@ -108,7 +109,7 @@ fn face_text(face: &FaceAccount, selector: Option<&str>) -> String {
     )
 }
 
-/// A name in quotes, or that there is none.
-fn named(name: &str) -> String {
+/// Returns a name in quotes, or that there is none.
+fn quoted_name(name: &str) -> String {
     if name.is_empty() { "without a name".into() } else { format!("\"{name}\"") }
 }

@@ -20,6 +20,8 @@ use serde::Serialize;
 /// Faces without facets that are named with their cause; `--json` has all of them.
 const NAMED_FAILURES: usize = 10;
 
+/// Meshes a STEP file, writes the facets into all files that were asked for, and prints the report. Incomplete where more faces were
+/// refused or got no facets than `--max-refused` allows.
 pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completion, Failure> {
     // A wrong extension is said before any work is done.
     if let Some(path) = command.output.iter().find(|p| !is_facet_file(p)) {
@@ -69,7 +71,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         let both = Both { report: &made.report, baseline, accuracy: reached };
         print(&json_text(&both)?)?;
     } else {
-        print(&summary(&made.report))?;
+        print(&meshing_summary(&made.report))?;
         if command.output.is_empty() {
             console.say(console.dim("  no facets were written: -o NAME.glb does (.obj .ply .stl .vtu .data2 too)"));
         }
@@ -103,6 +105,7 @@ struct Baseline {
 }
 
 impl Baseline {
+    /// Meshes the model by truck at one tolerance, mm, and samples how far its triangles lie from the splines.
     fn run(model: &Model, tolerance_mm: f64) -> Self {
         let made = baseline::mesh(model, tolerance_mm);
         let [sampled_max_mm, sampled_mean_mm] = sampled_sag(&made.mesh, model);
@@ -117,7 +120,7 @@ impl Baseline {
         }
     }
 
-    /// Both meshers, one below the other.
+    /// Returns a table, as text, with our mesher and the baseline one below the other; `r` is our report.
     fn comparison(&self, r: &Report) -> String {
         let shown = |x: Option<f64>, digits| x.map_or("–".to_owned(), |x| figures(x, digits));
         let sag = |max, mean| format!("{} ({})", shown(max, 4), shown(mean, 3));
@@ -149,7 +152,8 @@ impl Baseline {
     }
 }
 
-fn summary(r: &Report) -> String {
+/// Returns the report of a meshing as lines for people.
+fn meshing_summary(r: &Report) -> String {
     let mut text = String::new();
     let mut line = |name: &str, what: String| text += &format!("  {name:<10} {what}\n");
     let n = |x: usize| grouped(x as u64);
@@ -219,8 +223,8 @@ fn summary(r: &Report) -> String {
     text
 }
 
-/// For each facet the largest angle between interpolated and true normal at its middle and the middles of its sides, degrees, and
-/// the largest curvature there, 1/mm.
+/// Returns, for each facet, the largest angle between interpolated and true normal at its middle and the middles of its sides, degrees, and
+/// the largest curvature there, 1/mm; NaN for facets of ready meshes.
 pub(crate) fn normal_errors(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f64>) {
     use rayon::prelude::*;
     let faces: Vec<PlacedFace> = model.placed_faces().collect();
@@ -248,15 +252,16 @@ pub(crate) fn normal_errors(model: &Model, mesh: &FacetMesh) -> (Vec<f64>, Vec<f
                 let true_normal = placed.placement.normal(if face.reversed { -n } else { n });
                 let angle = mixed.cross(true_normal).length().atan2(mixed.dot(true_normal)).to_degrees();
                 worst = worst.max(angle);
-                curved = curved.max(curvature(&d, n) / placed.placement.scale);
+                curved = curved.max(largest_curvature(&d, n) / placed.placement.scale);
             }
             (worst, curved)
         })
         .unzip()
 }
 
-/// Largest absolute principal curvature from the two fundamental forms.
-fn curvature(d: &crate::nurbs::SecondDerivatives, n: crate::math::Vector) -> f64 {
+/// Returns the largest absolute principal curvature, in the surface's own lengths, at derivatives `d` with unit normal `n`; NaN where they
+/// span no plane.
+fn largest_curvature(d: &crate::nurbs::SecondDerivatives, n: crate::math::Vector) -> f64 {
     // From the first and second fundamental form: E, F, G and L, M, N.
     let (e, f, g) = (d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv));
     let (l, m, k) = (d.duu.dot(n), d.duv.dot(n), d.dvv.dot(n));

@@ -15,6 +15,8 @@ use std::path::Path;
 const SHOWN_NAMES: usize = 12;
 const SHOWN_NOTES: usize = 20;
 
+/// Reads a STEP file and prints what it holds and what was refused, or with `faces` all of its faces. Incomplete where more faces were
+/// refused than the limit allows.
 pub(crate) fn run(
     path: &Path,
     faces: bool,
@@ -29,14 +31,15 @@ pub(crate) fn run(
     } else if console.json {
         print(&json_text(&report)?)?;
     } else {
-        print(&summary(&report, console))?;
+        print(&import_summary(&report, console))?;
     }
     // Products, for zero of zero faces are no excess.
     let over = report.faces.refused as f64 > limits.max_refused * report.faces.found as f64;
     Ok(Completion::incomplete_if(over))
 }
 
-fn summary(r: &ImportReport, console: &Console) -> String {
+/// Returns the report of an import as lines for people; lists are cut off without -v.
+fn import_summary(r: &ImportReport, console: &Console) -> String {
     let list = |words: &[String]| if words.is_empty() { "none named".to_owned() } else { words.join(", ") };
     let mut text = format!("{}  {}, {}\n", r.file, bytes(r.bytes), list(&r.schema));
     let mut line = |name: &str, what: String| text += &format!("  {name:<10} {what}\n");
@@ -56,7 +59,7 @@ fn summary(r: &ImportReport, console: &Console) -> String {
             grouped(r.faces_placed.found as u64)
         ),
     );
-    line("surfaces", surfaces(r));
+    line("surfaces", surface_counts(r));
     match r.bbox_mm {
         Some([low, high]) => {
             let side = |k: usize| format!("{} … {}", figures(low[k], 5), figures(high[k], 5));
@@ -97,7 +100,8 @@ fn summary(r: &ImportReport, console: &Console) -> String {
     text
 }
 
-fn surfaces(r: &ImportReport) -> String {
+/// Lists in words how many faces there are of each kind of surface, "none" for none.
+fn surface_counts(r: &ImportReport) -> String {
     let s = &r.by_surface;
     let kinds = [
         ("plane", s.plane),

@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1e-9;
 /// The receiver is so many times as wide as the beam.
 const RECEIVER_WIDTHS: f64 = 4.0;
 
-/// Writes the scene; a file that is there is never written over.
+/// Writes a scene for a STEP file and says so; a file that is there is never written over, but refused.
 pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Result<Completion, Failure> {
     let loaded = input_files::model_file(file, PlacedLimit::default(), console)?;
     let scene_file = match output {
@@ -52,12 +52,12 @@ pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Resu
     Ok(Completion::Complete)
 }
 
-/// The name of a file without its folder; a path that ends in no name is left whole.
+/// Returns the name of a file without its folder; a path that ends in no name is left whole.
 fn last_component(file: &Path) -> &OsStr {
     file.file_name().unwrap_or(file.as_os_str())
 }
 
-/// The model as the scene names it: relative where both are in one folder.
+/// Returns the model's path as the scene names it: its bare name where both are in one folder, else absolute.
 fn model_reference(file: &Path, scene_file: &Path) -> String {
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let is_beside = folder_of(&absolute(file)) == folder_of(&absolute(scene_file));
@@ -66,7 +66,7 @@ fn model_reference(file: &Path, scene_file: &Path) -> String {
     path.to_string_lossy().into_owned()
 }
 
-/// The whole scene.
+/// Returns the whole scene as TOML. `file` is for its heading, `reference` the path of the model in it.
 fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     let model = &loaded.model;
     let name = file_name(file);
@@ -74,36 +74,36 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
         "# A scene for {}: lengths in mm, powers in W. `lampyris schema` says what else may stand here.\n\
          title = {}\n\n[run]\nrays = 1_000_000\n\n[[model]]\nfile = {}\n\n",
         printable_line(&name),
-        quoted(&name),
-        quoted(reference)
+        toml_string(&name),
+        toml_string(reference)
     );
     text += "# A face that no rule names absorbs all light that meets it. Rules select by part, instance, solid, face, entity (the #id\n\
         # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins. `lampyris info FILE --faces`\n\
         # shows what selects each face, `lampyris media` lists the media that have names.\n";
-    let rules: Vec<String> = model.account().iter().flat_map(rules).collect();
+    let rules: Vec<String> = model.account().iter().flat_map(rule_texts).collect();
     text.extend(rules.iter().take(MOST_RULES).map(String::as_str));
     let rest = rules.len().saturating_sub(MOST_RULES);
     if rest > 0 {
         text += &format!("# … and {rest} more solids: `lampyris info --faces` names them\n\n");
     }
-    text + &light(model)
+    text + &light_text(model)
 }
 
-/// A rule for a part, or one for each of its solids where it has several.
-fn rules(part: &PartAccount) -> Vec<String> {
-    let name = if part.name.is_empty() { "\"*\"".to_owned() } else { quoted(&part.name) };
+/// Returns the rules for a part: one, or one for each of its solids where it has several; none for solids without faces.
+fn rule_texts(part: &PartAccount) -> Vec<String> {
+    let name = if part.name.is_empty() { "\"*\"".to_owned() } else { toml_string(&part.name) };
     let solids = part.solids.iter().filter(|s| !s.faces.is_empty());
     let is_one = solids.clone().count() < 2;
     let selector = |solid: &SolidAccount| {
         if is_one { format!("part = {name}") } else { format!("part = {name}\nsolid = {}", solid.index) }
     };
-    solids.map(|solid| rule(&selector(solid), solid)).collect()
+    solids.map(|solid| rule_text(&selector(solid), solid)).collect()
 }
 
-/// A rule for one solid, with what may be said of it.
-fn rule(selector: &str, solid: &SolidAccount) -> String {
+/// Returns a rule for one solid, with what may be said of it in comments.
+fn rule_text(selector: &str, solid: &SolidAccount) -> String {
     let closed = if solid.closed { "closed" } else { "open: a medium would have a gap" };
-    let size = solid.size_mm().map(short).join(" × ");
+    let size = solid.size_mm().map(toml_number).join(" × ");
     let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
     format!(
         "[[material]]\n\
@@ -116,7 +116,8 @@ fn rule(selector: &str, solid: &SolidAccount) -> String {
 /// Sides of a box that differ by less than this share are equal: a round part fills its box to the rounding of its splines.
 const EQUAL_SIDES: f64 = 0.01;
 
-/// The axis about which the box is square, as that of a lens or a reflector is; z where none is alone in that.
+/// Returns the axis, 0 to 2, about which a box of these half sides is square, as that of a lens or a reflector is; z where no axis is alone
+/// in that.
 fn optical_axis(half: [f64; 3]) -> usize {
     let is_square = |k: &usize| {
         let [a, b] = [half[(k + 1) % 3], half[(k + 2) % 3]];
@@ -126,8 +127,9 @@ fn optical_axis(half: [f64; 3]) -> usize {
     if let [axis] = square[..] { axis } else { 2 }
 }
 
-/// A beam along the axis of the model that covers it, a plane behind it, and all directions.
-fn light(model: &Model) -> String {
+/// Returns the TOML of a beam along the axis of the model that covers it, a plane behind it, and a far field; for an empty model, about a
+/// box of 2 mm.
+fn light_text(model: &Model) -> String {
     let bounds = model.bounds();
     // A model without faces still gets a scene that can be read.
     let [low, high] =
@@ -142,13 +144,13 @@ fn light(model: &Model) -> String {
     // A model that is a rod along the axis still gets a beam.
     let radius = BEAM_MARGIN * across.max(DISTANCE * diagonal / 10.0);
     let at = |along: f64| {
-        let place: [String; 3] = std::array::from_fn(|k| short(if k == axis { along } else { middle[k] }));
+        let place: [String; 3] = std::array::from_fn(|k| toml_number(if k == axis { along } else { middle[k] }));
         format!("[{}]", place.join(", "))
     };
     let direction = ["[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"][axis];
     let up = ["[0, 0, 1]", "[0, 0, 1]", "[0, 1, 0]"][axis];
     let letter = ["x", "y", "z"][axis];
-    let width = short(RECEIVER_WIDTHS * radius);
+    let width = toml_number(RECEIVER_WIDTHS * radius);
     let parts = model.parts.len();
     format!(
         "# The model ({parts} part{}) lies within x {} … {}, y {} … {}, z {} … {} mm.\n\n\
@@ -160,27 +162,27 @@ fn light(model: &Model) -> String {
          # The light distribution: intensity by direction, of all that leaves the model, with its polar diagram and IES file.\n\
          [[receiver]]\nname = \"distribution\"\nkind = \"far_field\"\nnormal = {direction}\nup = {up}\nangles = \"C\"\ncells = [72, 90]\n",
         if parts == 1 { "" } else { "s" },
-        short(low[0]),
-        short(high[0]),
-        short(low[1]),
-        short(high[1]),
-        short(low[2]),
-        short(high[2]),
+        toml_number(low[0]),
+        toml_number(high[0]),
+        toml_number(low[1]),
+        toml_number(high[1]),
+        toml_number(low[2]),
+        toml_number(high[2]),
         at(low[axis] - DISTANCE * diagonal),
-        short(radius),
+        toml_number(radius),
         at(high[axis] + DISTANCE * diagonal),
     )
 }
 
-/// A number of five digits as TOML takes it.
-fn short(value: f64) -> String {
+/// Returns a number of five digits as TOML takes it; what has no such form keeps all digits.
+fn toml_number(value: f64) -> String {
     // As `figures` writes for people: TOML knows neither their minus nor their spaces.
     let digits = figures(value, 5).replace('−', "-").replace('\u{202f}', "");
     digits.parse::<f64>().map_or_else(|_| value.to_string(), |_| digits)
 }
 
-/// A text as a TOML string.
-fn quoted(text: &str) -> String {
+/// Returns a text as a TOML string.
+fn toml_string(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
@@ -196,9 +198,12 @@ mod tests {
 
     #[test]
     fn numbers_and_names_are_toml() {
-        assert_eq!([short(-1234567.0), short(1e-7), short(0.1 + 0.2)], ["-1234567", "1e-7", "0.3"]);
+        assert_eq!(
+            [toml_number(-1234567.0), toml_number(1e-7), toml_number(0.1 + 0.2)],
+            ["-1234567", "1e-7", "0.3"]
+        );
         let text = "a\"\\\u{1b}\nb";
-        let back: toml::Table = format!("x = {}", quoted(text)).parse().unwrap();
+        let back: toml::Table = format!("x = {}", toml_string(text)).parse().unwrap();
         assert_eq!(back["x"].as_str(), Some(text));
     }
 }

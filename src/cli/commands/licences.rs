@@ -17,6 +17,7 @@ const EMBEDDED: [(&str, &str, &str); 2] = [
 /// Libraries compiled in, `name version licence` a line, as `cargo tree -e normal` lists them.
 const LIBRARIES: &str = include_str!("../licences/libraries.txt");
 
+/// Prints the licences of the program, of what stands in it, and of the libraries compiled in.
 pub(crate) fn run() -> Result<Completion, Failure> {
     let mut text = format!(
         "lampyris {} is licensed under MIT or Apache-2.0, at your choice.\n\n\

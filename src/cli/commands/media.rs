@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 /// Wavelength at which an index is shown, nm: the yellow line of helium, for which glass is named.
 const SHOWN_WAVELENGTH_NM: f64 = line::D;
 
+/// Prints every medium that a scene may name, with its index at [`SHOWN_WAVELENGTH_NM`].
 pub(crate) fn run(console: &Console) -> Result<Completion, Failure> {
     let index = |name: &str| Some(catalogue::medium(name)?.index.value(SHOWN_WAVELENGTH_NM));
     if console.json {

@@ -22,7 +22,7 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// What `merge` was asked for.
+/// What `merge` was asked for; `None` for what was not given.
 pub(crate) struct MergeCommand<'a> {
     pub(crate) parts: &'a [PathBuf],
     pub(crate) folder: &'a Path,
@@ -39,12 +39,13 @@ pub(crate) struct MergeCommand<'a> {
 /// How long to wait before looking for parts again.
 const LOOK_AGAIN: Duration = Duration::from_millis(500);
 
-/// Puts the parts together and writes the results of the whole run.
+/// Puts the parts together, waiting for missing ones if asked to, and writes the results of the whole run, or the sum where the place is a
+/// `.tally`. Incomplete where light was lost or faces refused beyond the limits, or the error asked for was not reached.
 pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completion, Failure> {
     let patience = Patience::new(command.wait)?;
     let monitor = TerminalMonitor::new(console);
     let first = first_part(command, &patience, console)?;
-    let header: TallyHeader = PartialRun::header(&read(&first)?).map_err(|m| unreadable(&first, m))?;
+    let header: TallyHeader = PartialRun::header(&read_part(&first)?).map_err(|m| input_failure(&first, m))?;
     // The part knows where its scene was.
     let scene_path = command.scene.map_or_else(|| header.scene(), Path::to_path_buf);
     let (mut scene, loaded) = read_scene(&scene_path, &monitor).map_err(|error| match command.scene {
@@ -59,10 +60,10 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let target = command.until_error.map(|text| ErrorTarget::new(text, &scene)).transpose()?;
     let job = SceneJob { meshing, tracing, cache, chosen: header.chosen(), ..SceneJob::new(scene, loaded) };
     let mut prepared = PreparedScene::new(job, &monitor)?;
-    let (mut whole, mut usage) = sum(command, &header, &prepared)?;
+    let (mut whole, mut usage) = sum_parts(command, &header, &prepared)?;
     // Looked at again as a whole: parts may grow while they are waited for.
-    while !whole.is_whole() && patience.lasts(console, &missing_parts(&whole, &header)) {
-        (whole, usage) = sum(command, &header, &prepared)?;
+    while !whole.is_whole() && patience.wait_again(console, &missing_parts(&whole, &header)) {
+        (whole, usage) = sum_parts(command, &header, &prepared)?;
     }
     if is_tally(command.folder) {
         // A merge into a tally sums up what is there, whole or not.
@@ -111,7 +112,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
         .and(Completion::incomplete_if(result.is_some_and(|result| !result.reached))))
 }
 
-/// Writes the sum of the parts as a tally, for a merge of merges.
+/// Writes the sum of the parts, whole or not, as a tally for a merge of merges, and says so.
 fn write_sum(
     command: &MergeCommand,
     prepared: &PreparedScene,
@@ -138,6 +139,7 @@ struct Patience {
 }
 
 impl Patience {
+    /// Starts the clock; `None` does not wait. Fails for what is no number of seconds.
     fn new(seconds: Option<f64>) -> Result<Self, Failure> {
         let limit = match seconds {
             Some(s) => Duration::try_from_secs_f64(s)
@@ -147,8 +149,8 @@ impl Patience {
         Ok(Self { start: Instant::now(), limit })
     }
 
-    /// Waits a little, unless the time is over.
-    fn lasts(&self, console: &Console, missing: &str) -> bool {
+    /// Waits [`LOOK_AGAIN`] and returns true; false, at once, when the time is over. With -v says what is missing.
+    fn wait_again(&self, console: &Console, missing: &str) -> bool {
         if self.start.elapsed() >= self.limit {
             return false;
         }
@@ -160,14 +162,14 @@ impl Patience {
     }
 }
 
-/// The first part there is, waited for where that was asked.
+/// Returns the first part that is there, waited for where that was asked; fails when none came in time.
 fn first_part(command: &MergeCommand, patience: &Patience, console: &Console) -> Result<PathBuf, Failure> {
     loop {
         // Listed anew each time: parts appear in the folder.
         let files = part_files(command.parts)?;
         match files.into_iter().find(|file| file.exists()) {
             Some(file) => return Ok(file),
-            None if patience.lasts(console, "no part is there yet") => {}
+            None if patience.wait_again(console, "no part is there yet") => {}
             None => {
                 let missing = command.parts.first().map_or_else(String::new, |p| p.display().to_string());
                 return Err(Failure::input(format!("{missing}: no .tally file is there")));
@@ -176,7 +178,8 @@ fn first_part(command: &MergeCommand, patience: &Patience, console: &Console) ->
     }
 }
 
-/// The files among the arguments, and the parts in the folders among them in the order of their names.
+/// Returns the tally files that the arguments mean: files as they are given, there or not, and those in folders, sorted by name,
+/// checkpoints left out.
 fn part_files(arguments: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut files = Vec::new();
     for argument in arguments {
@@ -184,7 +187,7 @@ fn part_files(arguments: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
             files.push(argument.clone());
             continue;
         }
-        let entries = std::fs::read_dir(argument).map_err(|e| unreadable(argument, e))?;
+        let entries = std::fs::read_dir(argument).map_err(|e| input_failure(argument, e))?;
         let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
         // A checkpoint is of a run that is still traced.
         inside.retain(|path| path.extension().is_some_and(|e| e == "tally") && !path.ends_with(CHECKPOINT));
@@ -194,16 +197,19 @@ fn part_files(arguments: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(files)
 }
 
-fn unreadable(path: &Path, message: impl std::fmt::Display) -> Failure {
+/// Returns the failure of an input file.
+fn input_failure(path: &Path, message: impl std::fmt::Display) -> Failure {
     Failure::input(format!("{}: {message}", path.display()))
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    crate::formats::read_bytes(path).map_err(|e| unreadable(path, e))
+/// Returns the bytes of a part.
+fn read_part(path: &Path) -> Result<Vec<u8>, Failure> {
+    crate::formats::read_bytes(path).map_err(|e| input_failure(path, e))
 }
 
-/// The sum of all parts, each of which must be of the run that the first one's header names.
-fn sum(
+/// Sums up all parts that the arguments mean, each of which must be of the run that the first one's header names, and the usage of their
+/// processes. `--rays` sets how long a run that grows is to be.
+fn sum_parts(
     command: &MergeCommand,
     header: &TallyHeader,
     prepared: &PreparedScene,
@@ -228,9 +234,10 @@ fn sum(
     };
     let mut sum: Option<PartialRun> = None;
     for path in &part_files(command.parts)? {
-        let part = PartialRun::read(&read(path)?, check, &prepared.bound).map_err(|m| unreadable(path, m))?;
+        let part =
+            PartialRun::read(&read_part(path)?, check, &prepared.bound).map_err(|m| input_failure(path, m))?;
         match &mut sum {
-            Some(sum) => sum.merge(&part).map_err(|m| unreadable(path, m))?,
+            Some(sum) => sum.merge(&part).map_err(|m| input_failure(path, m))?,
             None => sum = Some(part),
         }
     }
@@ -249,7 +256,7 @@ fn sum(
     Ok((sum, usage.into_inner()))
 }
 
-/// Which shards are not there, or which rays of a run that grows.
+/// Returns a text of how many replicates are missing, and which shards or, of a run that grows, which rays they are.
 fn missing_parts(whole: &PartialRun, header: &TallyHeader) -> String {
     let absent = |r: &u32| whole.done.binary_search(r).is_err();
     let count = (0..whole.replicates).filter(absent).count();
@@ -267,7 +274,7 @@ fn missing_parts(whole: &PartialRun, header: &TallyHeader) -> String {
     text
 }
 
-/// The ranges of rays that are not there, of a run that grows.
+/// Returns the ranges of rays that are not there, of a run that grows, as `A..B`.
 fn missing_rays(whole: &PartialRun) -> Vec<String> {
     let mut ranges = Vec::new();
     let mut next = 0;

@@ -8,6 +8,7 @@ use crate::formats::write_atomic;
 use clap::CommandFactory;
 use std::path::Path;
 
+/// Prints a completion script for a shell on stdout.
 pub(crate) fn completions(shell: clap_complete::Shell) -> Result<Completion, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Arguments::command(), "lampyris", &mut script);
@@ -15,12 +16,14 @@ pub(crate) fn completions(shell: clap_complete::Shell) -> Result<Completion, Fai
     Ok(Completion::Complete)
 }
 
+/// Prints the schema of a scene as JSON, or as a page of Markdown.
 pub(crate) fn schema(as_text: bool) -> Result<Completion, Failure> {
     let schema = crate::simulate::Scene::schema();
     print(&if as_text { schema_page(&schema) } else { format!("{schema:#}\n") })?;
     Ok(Completion::Complete)
 }
 
+/// Prints the manual page, or writes one page for each command into the folder, which is made.
 pub(crate) fn man(folder: Option<&Path>, console: &Console) -> Result<Completion, Failure> {
     let mut command = Arguments::command();
     // Built, so that options of every command stand in every page.

@@ -22,7 +22,7 @@ use crate::cli::arguments::command::Command;
 use crate::cli::console::Console;
 use crate::cli::{completion::Completion, failure::Failure};
 
-/// Does what a command asks for.
+/// Runs the command that was asked for, and returns how it ended or why it failed.
 pub(super) fn execute(command: Command, console: &Console) -> Result<Completion, Failure> {
     match command {
         Command::Demo { output, page, meshing, tracing } => {

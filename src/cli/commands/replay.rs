@@ -16,7 +16,9 @@ use std::path::Path;
 /// What `--replay` asks for: rays by number, and the seed and number of rays of a ledger.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct ReplayRequest {
+    /// Ascending, each once, counted from 0.
     pub(crate) rays: Vec<u64>,
+    /// Seed and number of rays of the ledger's run; `None` where no ledger was given.
     run: Option<[u64; 2]>,
 }
 
@@ -26,7 +28,7 @@ impl ReplayRequest {
     }
 }
 
-/// Rays given by number, or all those of a ledger.
+/// Reads words that are numbers of rays or paths of ledgers; fails on ledgers of different runs. Empty words make an empty request.
 pub(crate) fn parse_request(words: &[String]) -> Result<ReplayRequest, Failure> {
     let mut request = ReplayRequest::default();
     for word in words {
@@ -46,7 +48,8 @@ pub(crate) fn parse_request(words: &[String]) -> Result<ReplayRequest, Failure> 
     Ok(request)
 }
 
-/// Adds the rays of a ledger of lost rays, and the seed and number of rays of its run.
+/// Adds the rays of a ledger of lost rays to the request, and the seed and number of rays of its run; a message if it is none or of another
+/// run.
 fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
     let mut lines = text.lines();
     if lines.next() != Some(COLUMNS) {
@@ -67,7 +70,8 @@ fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
     Ok(())
 }
 
-/// Traces the rays again and shows every vertex of their paths; they are written as `replay.vtp` too.
+/// Traces the rays again, prints every vertex of their paths, and writes these as `replay.vtp` into the folder, which is made. Fails for
+/// rays beyond the run's last.
 pub(crate) fn run(
     prepared: &PreparedScene,
     request: &ReplayRequest,
@@ -100,7 +104,7 @@ pub(crate) fn run(
     Ok(())
 }
 
-/// Every vertex of every path, and where a ray was lost.
+/// Prints every vertex of every path, in mm and scene coordinates, and where and why a ray was lost.
 fn print_paths(prepared: &PreparedScene, found: &Results) -> Result<(), Failure> {
     // Branches of a split ray follow each other.
     for path in found.paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
@@ -121,7 +125,7 @@ fn print_paths(prepared: &PreparedScene, found: &Results) -> Result<(), Failure>
     Ok(())
 }
 
-/// One path with what was lost of it.
+/// Makes the JSON object of one ray: its vertices, of all branches, and what was lost of it. `path` must not be empty.
 fn document_of(path: &[PathVertex], found: &Results) -> Value {
     let lost: Vec<Value> = (found.ledger.iter())
         .filter(|l| l.ray == path[0].ray)

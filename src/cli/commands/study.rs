@@ -39,9 +39,9 @@ pub(crate) struct StudyCommand<'a> {
     pub(crate) kind: StudyKind,
     pub(crate) file: Option<&'a Path>,
     pub(crate) output: Option<&'a PathBuf>,
-    /// Rays to ask in place of those of the study.
+    /// Rays to ask in place of those of the study; `None` for its own.
     pub(crate) rays_in: Option<&'a Path>,
-    /// The library of Embree to compare with.
+    /// The library of Embree to compare with; `None` leaves Embree out.
     pub(crate) embree: Option<&'a Path>,
     pub(crate) page: PageOption,
     pub(crate) meshing: MeshingSettings,
@@ -72,7 +72,7 @@ impl StudyResult {
     }
 }
 
-/// Options that a study would not look at are refused: whoever gives one believes that it changes the rows.
+/// Refuses options that a study would not look at: whoever gives one believes that it changes the rows.
 fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     use StudyKind::{Accuracy, Bvh, Complexity, Effects, Stability};
     let kind = command.kind;
@@ -112,6 +112,8 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     Err(failure.with_help("leave it out"))
 }
 
+/// Runs a study and writes `study.json`, and the page if wanted, into its folder; prints the document, or its small tables and the answer.
+/// Fails on options that the study would not look at.
 pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completion, Failure> {
     refuse_unused_options(command)?;
     let threads = threads::set_threads(command.tracing.threads)?;
@@ -185,14 +187,14 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
     Ok(Completion::Complete)
 }
 
-/// The model of the file, or the built-in lamp.
+/// Returns the model of the file or the built-in lamp, its scene if it has one, and a name for the rows.
 fn read_model(file: Option<&Path>, console: &Console) -> Result<(Option<Scene>, LoadedModel, String), Failure> {
     let Some(path) = file else {
         let (scene, loaded) = demo::lamp()?;
         return Ok((Some(scene), loaded, "three-cavity lamp".into()));
     };
     let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-    Ok(match input_files::either(path, PlacedLimit::default(), console)? {
+    Ok(match input_files::scene_or_model(path, PlacedLimit::default(), console)? {
         Input::Step(loaded) => (None, loaded, name),
         Input::Scene(scene, loaded) => (Some(*scene), loaded, name),
     })
@@ -201,6 +203,7 @@ fn read_model(file: Option<&Path>, console: &Console) -> Result<(Option<Scene>, 
 /// Where progress is told.
 type Report<'a> = &'a (dyn Fn(Progress) + Sync);
 
+/// Measures cost and accuracy over tolerances, normals and intersectors; for a scene, also what facets change of each receiver.
 fn study_accuracy(
     command: &StudyCommand,
     seed: u64,
@@ -229,7 +232,7 @@ fn study_accuracy(
     StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes)?.with_rows("receivers", &light)
 }
 
-/// Where on the surface the normals err, on facets of the tolerance asked for.
+/// Makes the section with a view of where on the surface the normals err, on facets of the tolerance asked for.
 fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Failure> {
     let (scene, loaded, _) = read_model(command.file, console)?;
     let settings = mesh_settings(&command.meshing, scene.as_ref(), &loaded.model)?;
@@ -247,6 +250,7 @@ fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Fail
     Ok(Section::new("Where the error sits").with_block(view.caption(&text)))
 }
 
+/// Measures the kinds of normals on the model of the file or, without one, on all built-in ones.
 fn study_interpolation(
     command: &StudyCommand,
     seed: u64,
@@ -268,6 +272,7 @@ fn study_interpolation(
     StudyResult::new(&study.rows, study.answer)
 }
 
+/// Compares the spline, traced the traditional way and ours, with facets on three built-in lamps.
 fn study_complexity(
     command: &StudyCommand,
     seed: u64,
@@ -312,6 +317,7 @@ fn study_complexity(
     StudyResult::new(&study.rows, study.answer)
 }
 
+/// Asks octree, BVH and spline the awkward rays of the built-in cases, each in all its variants.
 fn study_stability(progress: Report) -> Result<StudyResult, Failure> {
     use stability::{Geometry, Variant, cases};
     let all = cases();
@@ -343,6 +349,7 @@ fn study_stability(progress: Report) -> Result<StudyResult, Failure> {
     StudyResult::new(&rows, stability::answer(&rows))
 }
 
+/// Measures what each optical effect costs on a scene, with at most a million rays unless `--rays` says more; fails for a bare model.
 fn study_effects(command: &StudyCommand, threads: usize, console: &Console) -> Result<StudyResult, Failure> {
     let (scene, loaded, name) = read_model(command.file, console)?;
     let Some(scene) = scene else {

@@ -94,7 +94,8 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     Ok(done.and(refused))
 }
 
-/// Traces the whole run, or what is left of it, and writes its results.
+/// Traces the whole run, or what is left of it, and writes its results. Interrupted, it fails with what was done saved. Incomplete where an
+/// error or verdict asked for was missed, or too much light lost.
 fn trace_whole(
     prepared: &mut PreparedScene,
     command: &TraceCommand,
@@ -115,7 +116,7 @@ fn trace_whole(
     let (traced, result) = match found {
         Some((portion, result)) if !portion.is_whole() => {
             let rays = result.rays;
-            return Err(checkpoint.stopped(&portion, "interrupted").with_help(format!(
+            return Err(checkpoint.save_stopped(&portion, "interrupted").with_help(format!(
                 "--rays {rays} --resume in place of --until-error goes on with this many rays"
             )));
         }
@@ -125,7 +126,7 @@ fn trace_whole(
     let saved = if extra.resume { saved_run(&checkpoint, folder, console)? } else { None };
     // Called by any thread: it saves when it is time to.
     let save = |p: &PartialRun| checkpoint.save_when_due(p);
-    let take = paths.as_ref().map(|paths| |vertices: &[PathVertex]| paths.take(vertices));
+    let take = paths.as_ref().map(|paths| |vertices: &[PathVertex]| paths.append(vertices));
     let request = TraceRequest {
         verify_pruning: extra.verify_pruning,
         // What was traced to find the number of rays is saved no more.
@@ -140,7 +141,7 @@ fn trace_whole(
         Ok(run) => run,
         Err(portion) => {
             let because = paths.and_then(|p| p.finish().err()).map_or("interrupted".into(), |e| e.to_string());
-            return Err(checkpoint.stopped(&portion, &because));
+            return Err(checkpoint.save_stopped(&portion, &because));
         }
     };
     let path_failure = match (paths, &extra.paths) {
@@ -153,7 +154,7 @@ fn trace_whole(
     let written = results_folder::write(prepared, folder, &mut run, sentences.clone(), with_page, console);
     let (mut document, answer) = match written {
         Ok(written) => written,
-        Err(failure) => return Err(rescue(&mut run, &sentences, &checkpoint, with_page, failure)),
+        Err(failure) => return Err(rescue_results(&mut run, &sentences, &checkpoint, with_page, failure)),
     };
     // Rays that cannot be traced again for their paths alone are not lost with these.
     if let Some(failure) = path_failure {
@@ -178,7 +179,7 @@ fn trace_whole(
     Ok(lost.and(Completion::incomplete_if(missed)))
 }
 
-/// What is done of an interrupted run; `None` where there is none.
+/// Returns what is done of an interrupted run, and says so; `None` where there is none.
 fn saved_run(checkpoint: &Checkpoint, folder: &Path, console: &Console) -> Result<Option<PartialRun>, Failure> {
     let saved = checkpoint.read()?;
     console.say(match &saved {
@@ -188,7 +189,7 @@ fn saved_run(checkpoint: &Checkpoint, folder: &Path, console: &Console) -> Resul
     Ok(saved)
 }
 
-/// Says what came of --until-error, and gives the sentence for the page.
+/// Says what came of --until-error, and gives the sentence for the page; none where nothing was asked.
 fn say_target(result: Option<&TargetResult>, console: &Console) -> Vec<String> {
     let sentences: Vec<String> = result.map(closing::error_sentence).into_iter().collect();
     for sentence in &sentences {
@@ -197,7 +198,8 @@ fn say_target(result: Option<&TargetResult>, console: &Console) -> Vec<String> {
     sentences
 }
 
-/// Tries all that is to be written, and begins the file of paths where one is wanted.
+/// Tries all that is to be written, and begins the file of paths if one is wanted, else `None`. Fails, before anything is traced, where a
+/// place cannot be written or holds an interrupted run.
 fn try_outputs(
     prepared: &PreparedScene,
     command: &TraceCommand,
@@ -213,15 +215,16 @@ fn try_outputs(
     PathFile::create(file).map(Some)
 }
 
-/// Completes the file of paths.
+/// Completes the file of paths and says how many vertices it has.
 fn say_paths(paths: PathFile, file: &Path, console: &Console) -> Result<(), Failure> {
     let vertices = paths.finish()?;
     console.say(format_args!("wrote {} ({} vertices)", file.display(), grouped(vertices)));
     Ok(())
 }
 
-/// Results that could not be written where they should: they go where they can, or their sums do.
-fn rescue(
+/// Saves results that could not be written where they should: they go where they can, or their sums do. Returns `failure` with where they
+/// are.
+fn rescue_results(
     run: &mut SceneResults,
     sentences: &[String],
     checkpoint: &Checkpoint,
@@ -242,7 +245,7 @@ fn rescue(
     }
 }
 
-/// Says that both kernels agree.
+/// Says that both kernels agree, where both were run.
 ///
 /// # Errors
 /// When they do not.
@@ -264,7 +267,7 @@ fn say_verification(run: &SceneResults, console: &Console) -> Result<(), Failure
     Ok(())
 }
 
-/// Whether the run can grow, where a range of its rays was asked for.
+/// Checks that the run can grow, where a range of its rays was asked for.
 ///
 /// # Errors
 /// When it cannot, or the range does not begin and end with a replicate.
@@ -284,7 +287,8 @@ fn check_growing(prepared: &PreparedScene, console: &Console) -> Result<(), Fail
     Ok(())
 }
 
-/// Traces a shard, or goes on with it, into its file.
+/// Traces a shard (index from 0, count), or goes on with it, into its file; one that is done already is not traced again. Fails when
+/// interrupted, with what was done saved.
 fn trace_shard(
     prepared: &PreparedScene,
     command: &TraceCommand,
@@ -318,7 +322,7 @@ fn trace_shard(
     let portion = prepared.trace_part(request, &TerminalMonitor::of_saveable(console, None));
     // Fewer replicates than the shard has: it was stopped.
     if !shards::is_shard_done(&portion, replicates, shard) {
-        return Err(checkpoint.stopped(&portion, "interrupted"));
+        return Err(checkpoint.save_stopped(&portion, "interrupted"));
     }
     let file = checkpoint.save_anywhere(&portion)?;
     // It was rescued to another place.
@@ -332,7 +336,7 @@ fn trace_shard(
     Ok(Completion::Complete)
 }
 
-/// Says what a finished shard holds.
+/// Says, or with `--json` prints, what a finished shard (index from 0, count) holds.
 fn say_shard(
     file: &Path,
     portion: &PartialRun,
@@ -355,7 +359,7 @@ fn say_shard(
     Ok(())
 }
 
-/// Says what would be done.
+/// Prints what would be done, with `--json` as a document; traces and writes nothing.
 fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result<Completion, Failure> {
     let settings = prepared.run_settings();
     let facets = &prepared.facets;

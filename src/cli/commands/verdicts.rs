@@ -13,18 +13,18 @@ use serde_json::Value;
 pub(super) const UNSETTLED: &str = "**Not settled**: rows stay unsure, by the facets or at the most rays; the column 'settled by' says what \
     would do, and --intersector exact takes the errors of the facets away.";
 
-/// Prints every verdict of the run.
+/// Says every verdict of the run on stderr.
 ///
 /// # Errors
 /// When a far field cannot be judged.
-pub(super) fn say(run: &SceneResults, prepared: &PreparedScene, console: &Console) -> Result<(), Failure> {
+pub(super) fn say_verdicts(run: &SceneResults, prepared: &PreparedScene, console: &Console) -> Result<(), Failure> {
     for verdict in run.verdicts(prepared).map_err(Failure::running)? {
         console.say(summary(&verdict.assessment, console));
     }
     Ok(())
 }
 
-/// Whether a row of a verdict is unsure.
+/// Whether a row of any verdict in a document of results is unsure; false without regulations.
 pub(super) fn are_unsettled(document: &Value) -> bool {
     let verdicts = document["regulations"].as_array().into_iter().flatten();
     let mut rows = verdicts.flat_map(|v| v["rows"].as_array()).flatten();

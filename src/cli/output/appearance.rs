@@ -22,14 +22,16 @@ const PALETTE: [[f64; 3]; 8] = [
 const CLEAR: [f64; 3] = [0.62, 0.80, 0.95];
 const CLEAR_OPACITY: f64 = 0.2;
 
-/// What a group shows: of an instance either the faces of one colour, as the file writes it, or those that let light into a body.
+/// What a group shows: of an instance, by its index, either the faces of one colour, as the file writes it, or those that let light into a
+/// body.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Look {
     Coloured(usize, Option<String>),
     Clear(usize, u32),
 }
 
-/// The mesh with a group for every instance and look; faces that let light into a medium, whatever selected them, are clear.
+/// Returns the mesh with a group for every instance and look; faces that let light into a medium of `bound`, whatever selected them, are
+/// clear. Without a scene none is. Parts without a colour get one of the palette.
 pub(crate) fn grouped_facets<'a>(model: &Model, mesh: &'a FacetMesh, bound: Option<&BoundScene>) -> Facets<'a> {
     let mut places: HashMap<Look, u32> = HashMap::new();
     let mut looks: Vec<(Look, Option<Colour>)> = Vec::new();

@@ -16,7 +16,7 @@ const LINE_LENGTH: usize = 96;
 /// Name of the list of lost rays in a folder of results.
 pub(crate) const LEDGER: &str = "lost_rays.csv";
 
-/// Prints the results as JSON on stdout, or the closing lines.
+/// Prints the document of the results on stdout with `--json`, else says the closing lines.
 pub(crate) fn print_results(
     document: &Value,
     answer: &str,
@@ -32,7 +32,7 @@ pub(crate) fn print_results(
     Ok(())
 }
 
-/// The last lines of a traced scene: what was found, which file to open.
+/// Says the last lines of a traced scene: what was found, and which files to open.
 fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: bool, console: &Console) {
     console.say("");
     for line in wrapped_lines(&answer.replace("**", ""), console.width().min(LINE_LENGTH)) {
@@ -52,7 +52,7 @@ fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: 
     }
 }
 
-/// The files of a result folder that a person wants to know of.
+/// Returns the files of a result folder that a person wants to know of, with what they are; the page is always the first.
 fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
     let mut files = vec![
         (folder.join("report.html"), "open this in a browser: pictures, tables, cross-check".to_owned()),
@@ -71,7 +71,7 @@ fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
     files
 }
 
-/// What came of an error that was asked for.
+/// Says in a sentence, with marks of emphasis (`**`), whether an error that was asked for was reached, and how many rays are missing.
 pub(crate) fn error_sentence(result: &TargetResult) -> String {
     let found = result.found_percent.map_or("nothing arrived".into(), |e| format!("{} %", figures(e, 2)));
     let verdict = if result.reached { "reached" } else { "**not reached**" };
@@ -88,7 +88,7 @@ pub(crate) fn error_sentence(result: &TargetResult) -> String {
     )
 }
 
-/// Words in lines of at most `width` characters.
+/// Breaks a text into lines of at most `width` characters; a longer word has a line to itself. An empty text is one empty line.
 fn wrapped_lines(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];
     for word in text.split_whitespace() {

@@ -5,12 +5,12 @@ use crate::formats::printable_json;
 use serde::Serialize;
 use serde_json::Value;
 
-/// A piece of a document.
+/// Returns a piece of a document as JSON; fails where it has no such form.
 pub(crate) fn json_value(piece: &impl Serialize) -> Result<Value, Failure> {
     serde_json::to_value(piece).map_err(|e| Failure::running(e.to_string()))
 }
 
-/// A document as text, its last line ended.
+/// Returns a document as text, indented, its last line ended, control characters escaped.
 pub(crate) fn json_text(document: &impl Serialize) -> Result<String, Failure> {
     let text = serde_json::to_string_pretty(document).map_err(|e| Failure::running(e.to_string()))?;
     Ok(printable_json(text + "\n"))

@@ -15,7 +15,7 @@ const MOST_BOXES: usize = 50_000;
 /// Most boxes drawn in the page: 16 corners each are half a megabyte.
 const MOST_DRAWN: usize = 2_000;
 
-/// An octree after a benchmark.
+/// The shape of an octree, and what a benchmark's rays cost on it.
 pub(crate) struct OctreeShape {
     facets: usize,
     bytes: usize,
@@ -26,6 +26,7 @@ pub(crate) struct OctreeShape {
 }
 
 impl OctreeShape {
+    /// Takes statistics, size and boxes of an octree; costs are for the caller to add.
     pub(crate) fn new(octree: &Octree) -> Self {
         let footprint = octree.footprint();
         Self {
@@ -37,11 +38,12 @@ impl OctreeShape {
         }
     }
 
+    /// Returns how often a facet is listed, on average.
     fn listings_per_facet(&self) -> f64 {
         self.statistics.references as f64 / self.facets.max(1) as f64
     }
 
-    /// Everything in words and bars.
+    /// Describes the octree in several lines, with bars of its depths, and the cost of each kind of rays.
     fn summary(&self) -> String {
         let mut text = format!(
             "{} facets, each listed {} times, {} bytes a facet\n",
@@ -84,13 +86,13 @@ pub(crate) fn write_octree_files(folder: &Path, shapes: &[OctreeShape]) -> Resul
     Ok(())
 }
 
-/// From blue at the root to orange at the leaves.
+/// Returns a colour from blue at the root (0) to orange at the deepest level.
 fn depth_colour(depth: usize, deepest: usize) -> [f64; 3] {
     let s = depth as f64 / deepest.max(1) as f64;
     [0.20 + 0.70 * s, 0.45 + 0.10 * s, 0.85 - 0.65 * s]
 }
 
-/// Six quads a box, outward; the face of a quad is the depth of its box.
+/// Returns six quads a box (depth, box), outward; the face of a quad is the depth of its box. Bounds are as given, without uv.
 fn box_facets(boxes: &[(usize, Aabb)]) -> FacetMesh {
     let mut mesh = FacetMesh::default();
     for (depth, b) in boxes {
@@ -118,7 +120,8 @@ fn box_facets(boxes: &[(usize, Aabb)]) -> FacetMesh {
     mesh
 }
 
-/// Cells of an octree as lines in the colours of their depth: all of the upper levels, the last shown thinned out evenly.
+/// Draws cells of an octree as lines in the colours of their depth: all of the upper levels, the last shown thinned out evenly,
+/// [`MOST_DRAWN`] in all.
 pub(crate) fn octree_view(shape: &OctreeShape) -> View {
     let mut boxes = shape.boxes.clone();
     boxes.sort_by_key(|(depth, _)| *depth);
@@ -153,14 +156,14 @@ pub(crate) fn octree_view(shape: &OctreeShape) -> View {
     ))
 }
 
-/// The edges of a box in one stroke; three are passed twice.
+/// Returns the corners along the edges of a box in one stroke; three edges are passed twice.
 fn box_edges(b: &Aabb) -> [Point; 16] {
     let ends = [b.min, b.max];
     [0, 1, 3, 2, 0, 4, 5, 1, 5, 7, 3, 7, 6, 2, 6, 4]
         .map(|k: usize| Point::new(ends[k & 1].x, ends[k >> 1 & 1].y, ends[k >> 2].z))
 }
 
-/// The section of the report.
+/// Returns the section of the report: depths of all trees, the cells of the first, and a table of shape and cost.
 pub(crate) fn octree_section(shapes: &[OctreeShape]) -> Section {
     let deepest = shapes.iter().map(|s| s.statistics.depths.len()).fold(0, usize::max);
     let layer = |s: &OctreeShape| {

@@ -13,8 +13,8 @@ use std::path::Path;
 /// A far field whose ends are this near to those of all directions holds all of them, degrees.
 const WHOLE_RANGE_DEG: f64 = 1e-9;
 
-/// Writes all files of a receiver and gives their names; `geometric` are the errors of its cells from the facets, where they are known, and
-/// those of its further channels, `rays` those of the sample that it counted.
+/// Writes all files of a receiver into a folder and returns their names, none for a receiver without cells. `geometric` are the errors of
+/// its cells from the facets, where they are known, and those of its further channels; `rays` are the sample that it counted.
 pub(crate) fn write(
     folder: &Path,
     receiver: &ReceiverResult,
@@ -84,8 +84,8 @@ fn sampled_rays(receiver: &ReceiverResult, rays: &[LightRay]) -> Tm25 {
 const SOFTWARE: usize = 4;
 const ADDITIONAL: usize = 7;
 
-/// A far field in candela over all its directions, with the ends of both ranges that LM-63 wants: values there are those of the
-/// nearest cells, at a pole the mean of its ring.
+/// Returns a far field as LM-63 has it, in candela over all its directions, with the ends of both ranges: values there are those of the
+/// nearest cells, at a pole the mean of its ring. `None` for other receivers, and where its ranges are not those of a whole luminaire.
 ///
 /// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, mostly within a thousandth of
 /// 1, so that their flux is the receiver's.

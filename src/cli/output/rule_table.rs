@@ -12,7 +12,7 @@ const NAMED_FACES: usize = 3;
 /// Most faces of a model whose selectors stand in a page: a megabyte of them.
 const MOST_LABELLED: usize = 20_000;
 
-/// The selector of every placed face; of none where there are too many for a page.
+/// Returns the selector of every placed face, in their order; empty where there are more than [`MOST_LABELLED`], too many for a page.
 pub(crate) fn face_labels(model: &Model) -> Vec<String> {
     // None rather than some: a page whose faces answer here and there would puzzle.
     if model.placed_face_count() > MOST_LABELLED {
@@ -22,20 +22,20 @@ pub(crate) fn face_labels(model: &Model) -> Vec<String> {
     face_selectors(model, &faces).iter().map(FaceSelector::as_key).collect()
 }
 
-/// The selectors of the first faces of each rule.
-fn examples(bound: &BoundScene, model: &Model) -> Vec<Vec<String>> {
+/// Returns, for each rule, the selectors of its first [`NAMED_FACES`] faces; empty for large models.
+fn example_selectors(bound: &BoundScene, model: &Model) -> Vec<Vec<String>> {
     let labels = face_labels(model);
     let label = |face: &u32| labels.get(*face as usize).cloned();
     bound.rules().iter().map(|r| r.faces.iter().take(NAMED_FACES).filter_map(label).collect()).collect()
 }
 
-/// A row a rule, and one for the faces that none names.
+/// Returns the rules of a scene as a table: a row for each, in their order, and one for the faces that none names.
 pub(crate) fn rule_table(bound: &BoundScene, model: &Model) -> Table {
     let columns = [("[[material]]", ""), ("selects", ""), ("gives", ""), ("faces", ""), ("which", "")];
     let caption = "Of several rules that select a face the last one decides, for its medium and its surface apart. A row without faces is \
         a rule that later ones replace everywhere.";
     let mut table = Table::new("rules", "Rules and their faces", &columns).caption(caption);
-    for (rule, named) in bound.rules().iter().zip(examples(bound, model)) {
+    for (rule, named) in bound.rules().iter().zip(example_selectors(bound, model)) {
         let more = rule.faces.len() - named.len();
         let which = named.join(" | ");
         let which = if more > 0 && !which.is_empty() { format!("{which} and {more} more") } else { which };
@@ -51,9 +51,9 @@ pub(crate) fn rule_table(bound: &BoundScene, model: &Model) -> Table {
     table
 }
 
-/// The same as JSON.
+/// Returns the rules of a scene as JSON, with the same rows as [`rule_table`].
 pub(crate) fn rule_document(bound: &BoundScene, model: &Model) -> Value {
-    let rows = bound.rules().iter().zip(examples(bound, model)).map(|(rule, named)| {
+    let rows = bound.rules().iter().zip(example_selectors(bound, model)).map(|(rule, named)| {
         json!({"rule": rule.rule, "selects": rule.selects, "gives": rule.gives, "faces": rule.faces.len(), "first": named})
     });
     rows.collect()

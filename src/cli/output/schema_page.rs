@@ -8,7 +8,8 @@ const OPENING: &str = "# Scene files\n\n\
     writes one to begin with. Lengths are mm, angles degrees, powers those of `unit`. Paths are relative to the scene file. \
     `lampyris schema --text` prints this page, `lampyris schema` the JSON Schema for editors.\n";
 
-/// The definition that a property refers to, as itself, as one of several forms or as the items of a list.
+/// Returns the definition that a property refers to, as itself, as one of several forms or as the items of a list; `None` for a plain
+/// value.
 fn definition<'s>(schema: &'s Value, property: &Value) -> Option<&'s Value> {
     let forms = property["anyOf"].as_array().into_iter().flatten();
     let of = |p: &Value| p["$ref"].as_str().map(str::to_owned);
@@ -16,25 +17,27 @@ fn definition<'s>(schema: &'s Value, property: &Value) -> Option<&'s Value> {
     schema["$defs"].get(reference.rsplit('/').next()?)
 }
 
-/// The keys of a table, if the definition is one.
-fn keys(definition: &Value) -> Option<&Map<String, Value>> {
+/// Returns the keys of a definition that is a table; `None` for any other.
+fn table_keys(definition: &Value) -> Option<&Map<String, Value>> {
     definition["properties"].as_object().filter(|keys| !keys.is_empty())
 }
 
-/// The words that a definition allows, each with its meaning.
-fn words(definition: &Value) -> Vec<String> {
+/// Returns the words that a definition allows, each with its meaning; empty if it is no choice of words.
+fn allowed_words(definition: &Value) -> Vec<String> {
     let forms = definition["oneOf"].as_array().into_iter().flatten();
-    forms.filter_map(|w| Some(format!("`{}`: {}", w["const"].as_str()?, text(w).trim_end_matches('.')))).collect()
+    forms
+        .filter_map(|w| Some(format!("`{}`: {}", w["const"].as_str()?, description_text(w).trim_end_matches('.'))))
+        .collect()
 }
 
-/// What the schema says of something, on one line.
-fn text(value: &Value) -> String {
+/// Returns what the schema says of something, on one line; empty where it says nothing.
+fn description_text(value: &Value) -> String {
     value["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// A key with what it means, the words that it may be, and what it is unless given.
-fn row(schema: &Value, key: &str, property: &Value) -> String {
-    let allowed = definition(schema, property).map(words).unwrap_or_default();
+/// Returns the row of a key: what it means, the words that it may be, and what it is unless given.
+fn key_row(schema: &Value, key: &str, property: &Value) -> String {
+    let allowed = definition(schema, property).map(allowed_words).unwrap_or_default();
     let allowed = if allowed.is_empty() { String::new() } else { format!(" {}.", allowed.join("; ")) };
     let default = match &property["default"] {
         Value::Null => String::new(),
@@ -46,41 +49,41 @@ fn row(schema: &Value, key: &str, property: &Value) -> String {
             format!("`{other}`").replace(".0`", "`").replace(".0,", ",").replace(".0]", "]").replace(',', ", ")
         }
     };
-    format!("| `{key}` | {}{allowed} | {default} |\n", text(property)).replace("  ", " ")
+    format!("| `{key}` | {}{allowed} | {default} |\n", description_text(property)).replace("  ", " ")
 }
 
-/// The keys as a table of Markdown.
-fn table<'s>(schema: &'s Value, keys: impl Iterator<Item = (&'s String, &'s Value)>) -> String {
-    let rows: String = keys.map(|(key, property)| row(schema, key, property)).collect();
+/// Returns the keys as a table of Markdown.
+fn key_table<'s>(schema: &'s Value, keys: impl Iterator<Item = (&'s String, &'s Value)>) -> String {
+    let rows: String = keys.map(|(key, property)| key_row(schema, key, property)).collect();
     format!("\n| key | what it says | unless given |\n| --- | --- | --- |\n{rows}")
 }
 
-/// The page, as Markdown.
+/// Returns the page about a scene's schema, as Markdown.
 pub(crate) fn schema_page(schema: &Value) -> String {
-    let Some(top) = keys(schema) else { return OPENING.to_owned() };
-    let is_table = |property: &Value| definition(schema, property).and_then(keys).is_some();
+    let Some(top) = table_keys(schema) else { return OPENING.to_owned() };
+    let is_table = |property: &Value| definition(schema, property).and_then(table_keys).is_some();
     let mut page = OPENING.to_owned();
     page += "\n## At the top\n";
-    page += &table(schema, top.iter().filter(|(_, p)| !is_table(p)));
+    page += &key_table(schema, top.iter().filter(|(_, p)| !is_table(p)));
     let mut inner: Vec<(String, &Value)> = Vec::new();
     for (key, property) in top.iter().filter(|(_, p)| is_table(p)) {
         let heading = if property["type"] == "array" { format!("[[{key}]]") } else { format!("[{key}]") };
         let Some(table) = definition(schema, property) else { continue };
-        page += &section(schema, &heading, table);
-        for (key, property) in keys(table).into_iter().flatten() {
-            let found = definition(schema, property).filter(|d| keys(d).is_some());
+        page += &table_section(schema, &heading, table);
+        for (key, property) in table_keys(table).into_iter().flatten() {
+            let found = definition(schema, property).filter(|d| table_keys(d).is_some());
             // A table that several others hold is explained once.
             if let Some(found) = found.filter(|d| inner.iter().all(|(_, known)| known != d)) {
                 inner.push((format!("{key} = {{ … }}"), found));
             }
         }
     }
-    inner.iter().for_each(|(heading, table)| page += &section(schema, heading, table));
+    inner.iter().for_each(|(heading, table)| page += &table_section(schema, heading, table));
     page
 }
 
-/// A section about one table of the file.
-fn section(schema: &Value, heading: &str, definition: &Value) -> String {
-    let rows = table(schema, keys(definition).into_iter().flatten());
-    format!("\n## `{heading}`\n\n{}\n{rows}", text(definition))
+/// Returns a section about one table of the file.
+fn table_section(schema: &Value, heading: &str, definition: &Value) -> String {
+    let rows = key_table(schema, table_keys(definition).into_iter().flatten());
+    format!("\n## `{heading}`\n\n{}\n{rows}", description_text(definition))
 }

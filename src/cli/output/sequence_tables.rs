@@ -38,8 +38,8 @@ pub(super) fn face_names(model: &Model) -> Vec<String> {
     model.placed_faces().zip(face_labels(model)).map(name).collect()
 }
 
-/// A sequence in words.
-fn way(sequence: &SequenceResult, names: &[String]) -> String {
+/// Returns the way of a sequence in words, from its source on; `names` are those of the faces, by number.
+fn way_text(sequence: &SequenceResult, names: &[String]) -> String {
     let step = |face: Option<u32>, event: Event| {
         let verb = match event {
             Event::Reflected => "reflected by",
@@ -66,7 +66,7 @@ fn way(sequence: &SequenceResult, names: &[String]) -> String {
     words.join(" → ")
 }
 
-/// A table for each receiver that light was grouped for.
+/// Returns a table for each receiver that light was grouped for, its ways by power; none where it was not. `unit` is that of power.
 fn sequence_tables(results: &Results, model: &Model, unit: &str) -> Vec<Table> {
     let names = face_names(model);
     let columns = [("", ""), ("power", unit), ("± (1σ)", unit), ("share", "%"), ("way", "")];
@@ -83,14 +83,14 @@ fn sequence_tables(results: &Results, model: &Model, unit: &str) -> Vec<Table> {
         let mut table = Table::new(&name, &title, &columns).caption(caption);
         for (rank, s) in found.first.iter().enumerate() {
             let power = Cell::Number(s.power, 6);
-            table.row([(rank + 1).into(), power, s.power_error.into(), share(s.power), way(s, &names).into()]);
+            table.row([(rank + 1).into(), power, s.power_error.into(), share(s.power), way_text(s, &names).into()]);
         }
         table
     };
     results.sequences.iter().enumerate().filter(|(_, found)| found.count > 0).map(table).collect()
 }
 
-/// The section of a page; `None` where light was not grouped.
+/// Returns the section of a page with view and tables; `None` where light was not grouped.
 pub(crate) fn sequence_section(results: &Results, model: &Model, facets: &Facets, unit: &str) -> Option<Section> {
     let tables = sequence_tables(results, model, unit);
     if tables.is_empty() {
@@ -100,7 +100,7 @@ pub(crate) fn sequence_section(results: &Results, model: &Model, facets: &Facets
     Some(tables.into_iter().fold(section, Section::with_block))
 }
 
-/// Recorded paths of the first sequences of each receiver, a colour for each.
+/// Draws recorded paths of the first sequences of each receiver, a colour for each; cut a little outside of the model, mm.
 fn sequence_view(results: &Results, facets: &Facets) -> View {
     let ways = recorded_ways(&results.paths);
     let mut view = View::of_facets("sequences", "Paths of the first ways", facets).faded(0.35);
@@ -122,7 +122,7 @@ fn sequence_view(results: &Results, facets: &Facets) -> View {
     view.caption("Numbers are those of the tables; a way too rare to be among the recorded paths has no line.")
 }
 
-/// Puts each sequence in words into the document of the results.
+/// Adds each sequence in words to the document of the results, as `way`; nothing where light was not grouped.
 pub(crate) fn add_ways(document: &mut Value, results: &Results, model: &Model) {
     if results.sequences.is_empty() {
         return;
@@ -130,12 +130,12 @@ pub(crate) fn add_ways(document: &mut Value, results: &Results, model: &Model) {
     let names = face_names(model);
     for (r, found) in results.sequences.iter().enumerate() {
         for (k, s) in found.first.iter().enumerate() {
-            document["sequences"][r]["first"][k]["way"] = way(s, &names).into();
+            document["sequences"][r]["first"][k]["way"] = way_text(s, &names).into();
         }
     }
 }
 
-/// Prints the tables on the terminal.
+/// Prints the tables of sequences on stdout, but not with `--json`.
 pub(crate) fn print_sequences(results: &Results, model: &Model, unit: &str, console: &Console) -> io::Result<()> {
     if console.json {
         return Ok(());

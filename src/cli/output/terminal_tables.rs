@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, ContentArrangement, LineStyle, TableStyle};
 /// A line under the heading and nothing else, so that rows stay close together.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
-/// An empty table in the common style that wraps its cells at the width.
+/// Returns an empty table in the common style that wraps its cells at `width` columns.
 pub(crate) fn blank_table(width: usize) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
     // Terminals count columns in 16 bits.
@@ -15,7 +15,7 @@ pub(crate) fn blank_table(width: usize) -> comfy_table::Table {
     table
 }
 
-/// A report's table for the terminal, its title above it.
+/// Returns a report's table for the terminal, at most `width` columns wide, its title above it; columns of numbers to the right.
 pub(crate) fn table_text(table: &Table, width: usize) -> String {
     let mut grid = blank_table(width);
     let heading = |c: &crate::report::Column| {
@@ -33,7 +33,7 @@ pub(crate) fn table_text(table: &Table, width: usize) -> String {
     format!("  {}\n{grid}\n", table.title)
 }
 
-/// The tables of a study's page, its list of every measurement left to the page.
+/// Returns the tables of a study's page as text, empty ones and its list of every measurement left out.
 pub(crate) fn study_tables(report: &Report, width: usize) -> String {
     let blocks = report.sections.iter().flat_map(|s| &s.blocks);
     let tables = blocks.filter_map(|b| if let Block::Table(t) = b { Some(t) } else { None });

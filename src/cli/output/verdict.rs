@@ -9,7 +9,7 @@ use comfy_table::CellAlignment;
 /// Significant digits of intensities: more than any photometer has.
 const DIGITS: usize = 5;
 
-/// Aim, photometer, every row and the whole.
+/// Describes an assessment in lines and a table: aim, photometer, every row and the whole.
 pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     let mut text = format!("{}  {}\n", console.bold(&a.regulation.id), a.regulation.function.name);
     text += &format!("  aim     {}\n", a.aim.how);
@@ -18,7 +18,7 @@ pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     let mut table = blank_table(console.width());
     table.set_header(["", "direction", "asked [cd]", "read [cd]", "± stat.", "± geom.", "verdict", "settled by"]);
     for row in &a.rows {
-        table.add_row(cells(row));
+        table.add_row(row_cells(row));
     }
     for column in 2..=5 {
         if let Some(column) = table.column_mut(column) {
@@ -32,8 +32,8 @@ pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     text + &format!("; the whole: {}\n", console.bold(&a.verdict.to_string()))
 }
 
-/// The cells of a row of the table.
-fn cells(row: &RowVerdict) -> [String; 8] {
+/// Returns the eight cells of a row of the table; a dash where nothing was read.
+fn row_cells(row: &RowVerdict) -> [String; 8] {
     let read = |value: fn(crate::regulation::Reading) -> f64| {
         row.reading.map_or("–".to_owned(), |r| figures(value(r), DIGITS))
     };

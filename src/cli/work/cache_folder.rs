@@ -13,24 +13,26 @@ const LIMIT_VARIABLE: &str = "LAMPYRIS_CACHE_GB";
 /// Bytes in a gigabyte, as sizes of disks are told.
 const BYTES_IN_GB: f64 = 1e9;
 
-/// The cache that the option or the environment asks for.
+/// Returns the cache that the option or, without it, the environment asks for; `None` where neither names a folder.
 ///
 /// # Errors
 /// When its limit is no number.
 pub(crate) fn cache(option: &CacheOption) -> Result<Option<Cache>, Failure> {
     // The option stands above the environment.
-    let Some(folder) = option.cache.clone().or_else(|| variable(FOLDER_VARIABLE).map(PathBuf::from)) else {
+    let Some(folder) = option.cache.clone().or_else(|| environment_variable(FOLDER_VARIABLE).map(PathBuf::from))
+    else {
         return Ok(None);
     };
     let cache = Cache::new(folder);
-    let Some(limit) = variable(LIMIT_VARIABLE) else { return Ok(Some(cache)) };
+    let Some(limit) = environment_variable(LIMIT_VARIABLE) else { return Ok(Some(cache)) };
     match limit.to_str().and_then(|text| text.trim().parse::<f64>().ok()) {
         Some(gigabytes) if gigabytes >= 0.0 => Ok(Some(cache.with_limit((gigabytes * BYTES_IN_GB) as u64))),
         _ => Err(Failure::arguments(format!("{LIMIT_VARIABLE}={}: no number of gigabytes", limit.display()))),
     }
 }
 
-fn variable(name: &str) -> Option<OsString> {
+/// Returns the value of a variable of the environment; `None` if it is not set or empty.
+fn environment_variable(name: &str) -> Option<OsString> {
     // An empty variable is none, as shells unset it.
     std::env::var_os(name).filter(|value| !value.is_empty())
 }

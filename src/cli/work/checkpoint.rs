@@ -24,15 +24,18 @@ pub(crate) struct Checkpoint<'a> {
     pub(crate) prepared: &'a PreparedScene,
     header: TallyHeader,
     pub(crate) file: PathBuf,
+    /// Least time between two saves.
     every: Duration,
+    /// When it was saved last, or made.
     last: Mutex<Instant>,
-    /// What earlier processes took for it.
+    /// What earlier processes took for the run.
     earlier: Mutex<Usage>,
     pub(crate) console: &'a Console,
 }
 
 impl<'a> Checkpoint<'a> {
-    /// For a run that is about to be traced; nothing is written yet.
+    /// Makes the checkpoint of a run, or of a shard of it, that is about to be traced into `file`; saves at most every so many seconds.
+    /// Nothing is written yet.
     ///
     /// # Errors
     /// When a file of the scene can no longer be read.
@@ -59,13 +62,13 @@ impl<'a> Checkpoint<'a> {
         })
     }
 
-    /// How often to look whether it is time to save.
+    /// Returns how often to look whether it is time to save: at least every [`LOOK_EVERY`].
     pub(crate) fn interval(&self) -> Duration {
         // Looking is cheap; to look seldom would save late.
         self.every.min(LOOK_EVERY)
     }
 
-    /// What an earlier run of the same scene, files, options and program left behind; `None` when there is nothing.
+    /// Reads what an earlier run of the same scene, files, options and program left behind, and what it took; `None` when there is no file.
     ///
     /// # Errors
     /// When the file cannot be read, is damaged or is of another run.
@@ -91,7 +94,7 @@ impl<'a> Checkpoint<'a> {
         })
     }
 
-    /// Saves the run, when it is time to.
+    /// Saves the run if it is time to; a failure is said and the run goes on.
     pub(crate) fn save_when_due(&self, portion: &PartialRun) {
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
         if last.elapsed() < self.every {
@@ -105,14 +108,14 @@ impl<'a> Checkpoint<'a> {
         *last = Instant::now();
     }
 
-    /// Saves the run now.
+    /// Saves the run now, in place of what was saved before; makes the folder.
     pub(crate) fn save(&self, portion: &PartialRun) -> Result<(), Failure> {
         make_folder(&folder_of(&self.file))?;
         let header = self.header_now();
         Ok(write_atomic(&self.file, |w| portion.write(&header, w))?)
     }
 
-    /// The sum of other parts, with what these took.
+    /// Saves the sum of other parts, with what these took.
     pub(crate) fn save_sum(&self, sum: &PartialRun, usage: Usage) -> Result<(), Failure> {
         make_folder(&folder_of(&self.file))?;
         let header = self.header.with_usage(usage);
@@ -123,14 +126,14 @@ impl<'a> Checkpoint<'a> {
         self.earlier.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// The header with what it took so far.
+    /// Returns the header with what the run took so far, earlier processes included.
     fn header_now(&self) -> TallyHeader {
         let wall = self.console.started.elapsed().as_secs_f64();
         // A run that goes on counts what it took before.
-        self.header.with_usage(Usage::of_process(wall).continued(&self.earlier()))
+        self.header.with_usage(Usage::of_process(wall).continue_from(&self.earlier()))
     }
 
-    /// Saves the run in its own file or, where that cannot be written, wherever one can; gives the file.
+    /// Saves the run in its own file or, where that cannot be written, in a new one wherever one can be; returns the file.
     ///
     /// # Errors
     /// When none of the places can be written.
@@ -145,8 +148,8 @@ impl<'a> Checkpoint<'a> {
         places.find(|file| write_atomic(file, |w| portion.write(&header, w)).is_ok()).ok_or(reason)
     }
 
-    /// Why a run stopped before its end, and how to go on from what was saved of it.
-    pub(crate) fn stopped(&self, portion: &PartialRun, because: &str) -> Failure {
+    /// Saves a run that stopped before its end, and returns the failure that says why, and how to go on from there.
+    pub(crate) fn save_stopped(&self, portion: &PartialRun, because: &str) -> Failure {
         let share = format!("{} of {} replicates", portion.done.len(), portion.replicates);
         match self.save_anywhere(portion) {
             Ok(file) if file == self.file => {
@@ -171,7 +174,7 @@ impl<'a> Checkpoint<'a> {
     }
 }
 
-/// Refuses to write over what an interrupted run left.
+/// Refuses to write over what an interrupted run left in `file`.
 ///
 /// # Errors
 /// When the file is there.

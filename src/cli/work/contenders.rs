@@ -28,7 +28,7 @@ pub(crate) struct Contenders<'a> {
 }
 
 impl<'a> Contenders<'a> {
-    /// Builds them all; the spline's structure is cut for so many rays.
+    /// Builds them all over one mesh and its model; the spline's structure is cut for so many rays. Shows a sign of life.
     pub(crate) fn build(
         mesh: &'a FacetMesh,
         model: &Model,
@@ -49,8 +49,8 @@ impl<'a> Contenders<'a> {
         contenders
     }
 
-    /// Under the names of the document, with whether whole batches are asked.
-    pub(crate) fn named<'s>(&'s self, polish: &'s dyn Intersector) -> [Competitor<'s>; 7] {
+    /// Returns all intersectors, the polished octree included, under the names of the document; `octree_single` is asked ray by ray.
+    pub(crate) fn competitors<'s>(&'s self, polish: &'s dyn Intersector) -> [Competitor<'s>; 7] {
         let competitor = |name, who, batch| Competitor { name, who, batch };
         [
             competitor("octree", &self.octree as &dyn Intersector, true),
@@ -64,7 +64,7 @@ impl<'a> Contenders<'a> {
     }
 }
 
-/// Build time, size and rate of every intersector.
+/// Measures build time, size and rate of every intersector on a sample of the rays, and fills them into `found`.
 pub(crate) fn time_all(found: &mut CrossCheck, contenders: &[Competitor], rays: &[Ray], console: &Console) {
     let spinner = console.spinner("timing");
     for contender in contenders {

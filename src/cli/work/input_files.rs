@@ -18,7 +18,7 @@ pub(crate) enum Input {
     Scene(Box<Scene>, LoadedModel),
 }
 
-/// Reads one STEP file.
+/// Reads one STEP file, showing a spinner meanwhile.
 pub(crate) fn step_file(path: &Path, settings: &step::Settings, console: &Console) -> Result<Import, Failure> {
     let spinner = console.spinner(&format!("reading {}", path.display()));
     let import = step::read(path, settings);
@@ -26,7 +26,7 @@ pub(crate) fn step_file(path: &Path, settings: &step::Settings, console: &Consol
     Ok(import?)
 }
 
-/// A STEP file as a model.
+/// Reads a STEP file as a model, in mm; fails where it holds no face that can be traced.
 pub(crate) fn model_file(path: &Path, placed: PlacedLimit, console: &Console) -> Result<LoadedModel, Failure> {
     let start = Instant::now();
     let settings = step::Settings { measure_box: false, ..placed.settings() };
@@ -39,8 +39,8 @@ pub(crate) fn model_file(path: &Path, placed: PlacedLimit, console: &Console) ->
     Ok(LoadedModel { model, reports: vec![report], seconds: start.elapsed().as_secs_f64() })
 }
 
-/// A scene when the name ends in `.toml`, a STEP file within a limit otherwise.
-pub(crate) fn either(path: &Path, placed: PlacedLimit, console: &Console) -> Result<Input, Failure> {
+/// Reads a scene with its models when the name ends in `.toml`, and a STEP file otherwise; the limit holds for the latter alone.
+pub(crate) fn scene_or_model(path: &Path, placed: PlacedLimit, console: &Console) -> Result<Input, Failure> {
     // By the name: a STEP file has several, a scene one.
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         let (scene, loaded) = read_scene(path, &TerminalMonitor::new(console))?;
@@ -49,7 +49,7 @@ pub(crate) fn either(path: &Path, placed: PlacedLimit, console: &Console) -> Res
     Ok(Input::Step(model_file(path, placed, console)?))
 }
 
-/// Says what was refused and whether that is more than allowed.
+/// Says how many faces were refused, if any were; incomplete where that is a larger share of all than `max_refused`.
 pub(crate) fn report_refusals(reports: &[ImportReport], max_refused: f64, console: &Console) -> Completion {
     let (found, refused) = reports.iter().fold((0, 0), |(f, r), i| (f + i.faces.found, r + i.faces.refused));
     if refused == 0 {

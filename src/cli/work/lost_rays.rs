@@ -18,7 +18,7 @@ const NAMED_REASONS: usize = 3;
 pub(crate) const COLUMNS: &str =
     "ray,branch,bounce,cause,power,x_mm,y_mm,z_mm,dx,dy,dz,instance,medium,face,hit_instance,seed,rays";
 
-/// Writes the ledger, when a ray was lost. Text in quotes, as instance names may hold commas.
+/// Writes the ledger of lost rays into the folder, lengths in mm; returns whether there was one to write.
 pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) -> Result<bool, Failure> {
     if results.ledger.is_empty() {
         return Ok(false);
@@ -55,12 +55,12 @@ pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) 
     Ok(true)
 }
 
-/// Says what is open in the scene, or beyond its tables.
+/// Says what is open in the scene, or beyond its tables, a line each.
 pub(crate) fn warn(prepared: &PreparedScene, console: &Console) {
     prepared.bound.notes().iter().for_each(|note| console.say(note));
 }
 
-/// Says so where more light was lost than allowed.
+/// Says so, and is incomplete, where a larger share of the light was lost than `max_lost`, or the power is no finite number.
 pub(crate) fn report_lost_light(
     results: &Results,
     prepared: &PreparedScene,
@@ -80,21 +80,21 @@ pub(crate) fn report_lost_light(
     console.say(format_args!(
         "{} % of the energy was lost, more than --max-lost allows: {}; {} names every ray",
         figures(100.0 * share, 2),
-        reasons(results, prepared),
+        loss_reasons(results, prepared),
         folder.join(LEDGER).display()
     ));
     Completion::Incomplete
 }
 
-/// Why rays were lost and where, the most frequent first.
-fn reasons(results: &Results, prepared: &PreparedScene) -> String {
+/// Returns why rays of the ledger were lost and where, the [`NAMED_REASONS`] most frequent first, in words.
+fn loss_reasons(results: &Results, prepared: &PreparedScene) -> String {
     // Sorted by the words, so that equal counts come in one order.
     let mut count: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     for l in &results.ledger {
         let hit = l.face.and_then(|f| prepared.bound.instance(f));
         let inside = || prepared.bound.body(l.body).map(|[instance, _]| instance);
         // Where it was hit; a ray that left the scene is told by the body that it was in.
-        *count.entry((meaning(l.cause), hit.or_else(inside).unwrap_or(""))).or_default() += 1;
+        *count.entry((cause_text(l.cause), hit.or_else(inside).unwrap_or(""))).or_default() += 1;
     }
     let mut all: Vec<_> = count.into_iter().collect();
     all.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
@@ -105,8 +105,8 @@ fn reasons(results: &Results, prepared: &PreparedScene) -> String {
     format!("{counted}{}", reasons.join("; "))
 }
 
-/// What happened to rays that were lost so, to follow "rays".
-fn meaning(cause: LostCause) -> &'static str {
+/// Returns what happened to rays that were lost so, to follow "rays".
+fn cause_text(cause: LostCause) -> &'static str {
     match cause {
         LostCause::NoExit => "left the scene inside a medium, as by a gap or an open shell,",
         LostCause::ImpossibleMedium => "met a body from the wrong side, as through a gap or an open shell,",

@@ -24,7 +24,7 @@ pub(crate) struct OutputPlace {
 }
 
 impl OutputPlace {
-    /// A folder for results, made when missing, in which files can be made.
+    /// Claims a folder for results, made when missing, in which files can be made.
     ///
     /// # Errors
     /// When the folder cannot be made or written, or another process writes into it.
@@ -32,7 +32,7 @@ impl OutputPlace {
         Self::claim(folder, folder.join(FOLDER_LOCK))
     }
 
-    /// A single file, whose folder is made when missing.
+    /// Claims a single file, whose folder is made when missing; the file is not touched.
     ///
     /// # Errors
     /// As [`OutputPlace::folder`].
@@ -41,7 +41,8 @@ impl OutputPlace {
         Self::claim(&folder_of(path), path.with_file_name(format!(".{name}.lock")))
     }
 
-    /// Takes the lock file of a folder, or says who has it.
+    /// Takes the lock file of a folder, which is made when missing, or says who has it. Where the file system has no locks, it takes it
+    /// unasked.
     fn claim(folder: &Path, lock: PathBuf) -> Result<Self, Failure> {
         make_folder(folder)?;
         let unwritable = |e: std::io::Error| {
@@ -94,7 +95,7 @@ fn owned_by_another(folder: &Path, file: &mut File) -> Failure {
         .with_help("wait until it has ended, or give another folder with -o")
 }
 
-/// Whether the open file is still the one of that name.
+/// Whether the open file is still the one of that name, and not one removed or replaced meanwhile.
 #[cfg(unix)]
 fn is_file_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -111,7 +112,7 @@ fn is_file_at(_: &File, _: &Path) -> bool {
     true
 }
 
-/// Makes a folder and those above it.
+/// Makes a folder and those above it; one that is there is left as it is.
 ///
 /// # Errors
 /// When that fails.
@@ -119,14 +120,14 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))
 }
 
-/// The folder that a file is in.
+/// Returns the folder that a file is in; `.` for a bare name.
 pub(crate) fn folder_of(path: &Path) -> PathBuf {
     // A bare name is in the working folder.
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
     parent.unwrap_or(Path::new(".")).to_path_buf()
 }
 
-/// Refuses a place with less free space than the results need at least.
+/// Refuses a place with less free space than needed; one that does not tell is taken.
 ///
 /// # Errors
 /// When the file system says that it has less.
@@ -142,7 +143,7 @@ pub(crate) fn require_space(folder: &Path, needed_bytes: u64) -> Result<(), Fail
     }
 }
 
-/// Bytes that are left on the folder's file system, where it tells.
+/// Returns the bytes that are left on the folder's file system; `None` where it does not tell.
 #[cfg(unix)]
 fn free_bytes(folder: &Path) -> Option<u64> {
     let system = rustix::fs::statvfs(folder).ok()?;
@@ -155,7 +156,8 @@ fn free_bytes(_: &Path) -> Option<u64> {
     None
 }
 
-/// Places for what could not be written where it should: the working folder, that of temporary files, and the home.
+/// Returns the folders for what could not be written where it should, best first: the working folder, that of temporary files, and the
+/// home.
 pub(crate) fn rescue_folders() -> Vec<PathBuf> {
     let home = std::env::var_os("HOME").map(PathBuf::from);
     [std::env::current_dir().ok(), Some(std::env::temp_dir()), home].into_iter().flatten().collect()

@@ -10,7 +10,8 @@ use crate::study::receivers::{PowerComparison, compare_power};
 /// Rays at most: a second or two on the spline of a lamp.
 const MOST_RAYS: u64 = 100_000;
 
-/// Traces the scene on both.
+/// Traces the scene on facets and on the spline with the same rays, at most [`MOST_RAYS`]; returns what changes at each receiver. Shows a
+/// spinner.
 pub(crate) fn trace_both(
     scene: &Scene,
     bound: &BoundScene,
@@ -31,7 +32,7 @@ pub(crate) fn trace_both(
     found
 }
 
-/// What facets change of every receiver, for the report.
+/// Makes the report's table of what facets change of every receiver, in per cent of its power on the spline.
 pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
     let columns = [
         ("receiver", ""),
@@ -56,7 +57,7 @@ pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
     table
 }
 
-/// What facets change of every receiver, a line each.
+/// Returns what facets change of every receiver, a line each; dark receivers are left out.
 pub(crate) fn summary(pairs: &[PowerComparison]) -> String {
     let mut text = String::new();
     // A share of darkness is no share.

@@ -16,13 +16,13 @@ const COLUMNS: [Column; 6] = [
     Column { name: "power", numbers: "<f8", bytes: 8, width: 1 },
 ];
 
-/// The file in the making, and what went wrong with it.
+/// The file in the making, and the first failure to write it.
 pub(crate) struct PathFile {
     state: Mutex<(NpzStream, Option<Error>)>,
 }
 
 impl PathFile {
-    /// Begins the file, which must be an `.npz`.
+    /// Begins the file of ray paths; fails unless its name ends in `.npz`, or where it cannot be written.
     pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
             let message = format!("--paths {}: ray paths are written as .npz alone", path.display());
@@ -31,8 +31,8 @@ impl PathFile {
         Ok(Self { state: Mutex::new((NpzStream::create(path, &COLUMNS)?, None)) })
     }
 
-    /// Takes some vertices; after a failure no more.
-    pub(crate) fn take(&self, vertices: &[PathVertex]) {
+    /// Appends vertices, from any thread; after a failure no more.
+    pub(crate) fn append(&self, vertices: &[PathVertex]) {
         // Packed before the lock is taken: threads wait for the file alone.
         let mut columns: [Vec<u8>; 6] = Default::default();
         for v in vertices {
@@ -56,7 +56,8 @@ impl PathFile {
         self.state.lock().unwrap_or_else(|e| e.into_inner()).1.is_some()
     }
 
-    /// Completes the file and gives the number of vertices.
+    /// Completes the file and returns the number of vertices; fails with the first failure to write, and leaves an older file of that name
+    /// alone then.
     pub(crate) fn finish(self) -> Result<u64, Failure> {
         match self.state.into_inner().unwrap_or_else(|e| e.into_inner()) {
             (stream, None) => Ok(stream.finish()?),

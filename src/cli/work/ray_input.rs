@@ -10,7 +10,8 @@ use std::path::Path;
 /// Extensions of lists (CSV, NPZ) and measured ray sets (TM-25, Zemax, LightTools); all others are records.
 const RAY_SETS: [&str; 7] = ["csv", "txt", "npz", "tm25ray", "dat", "sdf", "ray"];
 
-/// The rays of a file, in the order they stand there.
+/// Reads the rays of a file, mm, in the order they stand there; by its extension a list or measured set, else records. Fails if there are
+/// none.
 pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
     // A name without an extension is one of the others.
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();

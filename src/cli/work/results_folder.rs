@@ -48,7 +48,8 @@ pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_page: boo
     Ok(())
 }
 
-/// Writes the results where they can be written, when they cannot where they should; gives the folder.
+/// Writes the results into a new folder wherever one can be, when they cannot be written where they should; returns the folder, `None` if
+/// nowhere.
 pub(crate) fn write_anywhere(
     prepared: &PreparedScene,
     run: &mut SceneResults,
@@ -71,8 +72,8 @@ pub(crate) fn write_anywhere(
 /// Paths are shown as far as this share of the model's diagonal around it.
 const PATH_MARGIN: f64 = 0.35;
 
-/// Writes everything into a folder; the page comes last, so that a folder with a page is complete. Gives the document of
-/// `results.json` and the answer in words.
+/// Writes everything into a folder, which is made; the page, if wanted, comes last, so that a folder with a page is complete. Notes in
+/// `run` which files each receiver got. Returns the document of `results.json` and the answer in words.
 pub(crate) fn write(
     prepared: &PreparedScene,
     folder: &Path,
@@ -122,17 +123,17 @@ pub(crate) fn write(
         facets.labels = rule_table::face_labels(&prepared.job.loaded.model);
     }
     let found = (all_figures.as_slice(), verdicts.as_slice());
-    let report = page(prepared, run, found, &facets, sentences, provenance);
+    let report = report_page(prepared, run, found, &facets, sentences, provenance);
     let answer = report.answer();
     if with_page {
-        report.with_views(views(prepared, &facets)).report().write(folder)?;
+        report.with_views(facet_views(prepared, &facets)).report().write(folder)?;
     }
     spinner.finish_and_clear();
     Ok((document, answer))
 }
 
-/// The page of a traced scene.
-fn page<'a>(
+/// Returns the page of a traced scene; `sentences` compare it with what was asked for or others found.
+fn report_page<'a>(
     prepared: &'a PreparedScene,
     run: &'a SceneResults,
     (all_figures, verdicts): (&'a [ReceiverFigures], &'a [(usize, Assessment)]),
@@ -181,8 +182,8 @@ fn page<'a>(
     }
 }
 
-/// How finely the facets follow the surface, and how the octree sorts them.
-fn views(prepared: &PreparedScene, facets: &Facets) -> Vec<View> {
+/// Returns the views of how finely the facets follow the surface and, for runs that use one, of how the octree sorts them.
+fn facet_views(prepared: &PreparedScene, facets: &Facets) -> Vec<View> {
     let mesh = facets.mesh;
     let title = "Distance of the facets from the surface";
     let sag = View::of_values("sag", title, facets, "proved distance (mm)", &mesh.sag, ColourMap::Viridis);
@@ -196,7 +197,7 @@ fn views(prepared: &PreparedScene, facets: &Facets) -> Vec<View> {
     std::iter::once(sag).chain(octree).collect()
 }
 
-/// What was read.
+/// Makes a table of the files that were read, a row each.
 fn model_table(prepared: &PreparedScene) -> Table {
     let columns =
         [("file", ""), ("parts", ""), ("instances", ""), ("faces", ""), ("repaired", ""), ("refused", "")];
@@ -214,7 +215,7 @@ fn model_table(prepared: &PreparedScene) -> Table {
     table
 }
 
-/// What the facets are.
+/// Returns a table of what the facets are, each counted in all places of its part.
 fn facet_table(prepared: &PreparedScene) -> Table {
     let facets = &prepared.facets;
     let sum =
@@ -238,7 +239,7 @@ fn facet_table(prepared: &PreparedScene) -> Table {
     table
 }
 
-/// What the view of the facets shows.
+/// Returns what the view of the facets shows, in words, by the numbers drawn and traced.
 fn drawn_note(drawn: usize, traced: usize) -> String {
     if drawn == traced {
         return "Facets as traced, parts in their colours, with some ray paths of the run.".into();

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// More shards than any cluster starts; a typing error beyond it is refused.
 const MOST_SHARDS: u32 = 1 << 16;
 
-/// `I/N` as it is typed, both counted from 1; from 0 inside.
+/// Reads `I/N` as it is typed, I from 1 to N; returns the index from 0 and the count.
 pub(crate) fn parse_shard(text: &str) -> Result<[u32; 2], Failure> {
     let parts = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
     match parts {
@@ -19,7 +19,8 @@ pub(crate) fn parse_shard(text: &str) -> Result<[u32; 2], Failure> {
     }
 }
 
-/// The part that is asked for: `I/N`, or `auto` for that of the launcher.
+/// Returns the part that is asked for, as index from 0 and count: `I/N`, or `auto` for that of the launcher, which is said. `count` is
+/// `--shards`.
 ///
 /// # Errors
 /// When it is neither, or no launcher says which part this is.
@@ -36,7 +37,7 @@ pub(crate) fn requested_shard(text: &str, count: Option<u32>, console: &Console)
     Ok(from_launcher.shard)
 }
 
-/// What a launcher said.
+/// The part that a launcher said, as index from 0 and count.
 #[derive(Debug, PartialEq)]
 struct LauncherShard {
     launcher: &'static str,
@@ -77,7 +78,8 @@ const LAUNCHERS: [Launcher; 6] = [
     Launcher { name: "SLURM_PROCID", index: "SLURM_PROCID", count: Some("SLURM_NTASKS"), first: None, step: None },
 ];
 
-/// The part that the environment names; `parts` is `--shards N`.
+/// Returns the part that the environment names; `parts` is `--shards N`, which wins over the launcher's own number. Fails where no launcher
+/// is known, or what it says is no part.
 fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>) -> Result<LauncherShard, Failure> {
     let number = |name: &str| -> Result<Option<u32>, Failure> {
         let Some(text) = variable(name).filter(|text| !text.trim().is_empty()) else { return Ok(None) };
@@ -113,7 +115,7 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
         .with_help(format!("it takes {}; else write --shard I/N", known.join(", "))))
 }
 
-/// The replicates of a shard of these.
+/// Returns the replicates of a shard (index from 0, count) of all; shards differ by one replicate at most, and may be empty.
 pub(crate) fn replicates_of_shard(all: Range<u32>, [index, count]: [u32; 2]) -> Range<u32> {
     let whole = u64::from(all.end.saturating_sub(all.start));
     // By multiplication first: shards differ by one replicate at most.
@@ -126,7 +128,8 @@ pub(crate) fn is_shard_done(portion: &PartialRun, all: Range<u32>, shard: [u32; 
     replicates_of_shard(all, shard).all(|r| portion.done.binary_search(&r).is_ok())
 }
 
-/// Where the tally of a shard goes: the file that was asked for, or one in the folder that was.
+/// Returns where the tally of a shard (index from 0, count) goes: the file that was asked for, or one in the folder that was, named after
+/// shard and rays.
 pub(crate) fn shard_file(output: &Path, [i, n]: [u32; 2], rays: Option<RayRange>) -> PathBuf {
     if is_tally(output) {
         return output.to_path_buf();
@@ -140,7 +143,7 @@ pub(crate) fn shard_file(output: &Path, [i, n]: [u32; 2], rays: Option<RayRange>
     output.join(name + ".tally")
 }
 
-/// Whether a path names a tally file.
+/// Whether a path names a tally file, told by its extension.
 pub(crate) fn is_tally(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tally"))
 }

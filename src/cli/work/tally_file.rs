@@ -60,7 +60,8 @@ pub(crate) struct TallyHeader {
 }
 
 impl TallyHeader {
-    /// Of a run that is about to be traced.
+    /// Returns the header of a run that is about to be traced from the scene file `scene`, or of a shard (index from 0, count) of it. No
+    /// usage yet.
     pub(crate) fn new(
         prepared: &PreparedScene,
         scene: &Path,
@@ -99,12 +100,12 @@ impl TallyHeader {
         })
     }
 
-    /// The same with what it took.
+    /// Returns the same header with what the run took.
     pub(crate) fn with_usage(&self, usage: Usage) -> Self {
         Self { usage, ..self.clone() }
     }
 
-    /// Where the scene was when the part was traced.
+    /// Returns where the scene was when the part was traced.
     pub(crate) fn scene(&self) -> PathBuf {
         #[cfg(unix)]
         if let Some(bytes) = &self.scene_bytes {
@@ -114,12 +115,12 @@ impl TallyHeader {
         PathBuf::from(&self.scene)
     }
 
-    /// What the part chose where nobody asked.
+    /// Returns what the part chose where nobody asked; `None` if somebody did, or it is of a form that is no longer known.
     pub(crate) fn chosen(&self) -> Option<Chosen> {
         serde_json::from_value(self.chosen.clone()?).ok()
     }
 
-    /// The options that decided the facets.
+    /// Returns the options that decided the facets, to the bit.
     pub(crate) fn meshing(&self) -> MeshingSettings {
         let back = |x: [u64; 2]| x.map(f64::from_bits);
         MeshingSettings {
@@ -132,7 +133,7 @@ impl TallyHeader {
         }
     }
 
-    /// The options that decided the rays.
+    /// Returns the options that decided the rays; threads are left open.
     pub(crate) fn tracing(&self) -> TracingSettings {
         TracingSettings {
             ray_range: self.rays.map(|end| RayRange { first: self.first_ray, end }),
@@ -162,6 +163,7 @@ struct StoredTolerance {
 }
 
 impl StoredPlan {
+    /// Keeps a plan to the bit.
     fn new(plan: &TolerancePlan) -> Self {
         Self {
             places: plan.places.iter().map(StoredTolerance::new).collect(),
@@ -171,6 +173,7 @@ impl StoredPlan {
         }
     }
 
+    /// Returns the plan that was kept, to the bit.
     fn restore(&self) -> TolerancePlan {
         TolerancePlan {
             places: self.places.iter().map(StoredTolerance::restore).collect(),
@@ -182,6 +185,7 @@ impl StoredPlan {
 }
 
 impl StoredTolerance {
+    /// Keeps a tolerance to the bit.
     fn new(tolerance: &RelativeTolerance) -> Self {
         Self {
             faces: tolerance.faces.iter().map(|f| f.0).collect(),
@@ -190,6 +194,7 @@ impl StoredTolerance {
         }
     }
 
+    /// Returns the tolerance that was kept, to the bit.
     fn restore(&self) -> RelativeTolerance {
         RelativeTolerance {
             faces: self.faces.iter().map(|f| FaceId(*f)).collect(),
@@ -199,7 +204,7 @@ impl StoredTolerance {
     }
 }
 
-/// The options that ask for the facets, normals and intersector of a run.
+/// Returns the options that ask for the facets, normals and intersector of a run, as they are typed.
 fn accuracy_options(prepared: &PreparedScene) -> String {
     let [low, high] = prepared.mesh_settings.tolerance;
     let IntersectorChoice { intersector, normals } = prepared.choice;

@@ -28,11 +28,12 @@ struct Shown {
 }
 
 impl<'a> TerminalMonitor<'a> {
+    /// Shows a job that cannot be saved.
     pub(crate) fn new(console: &'a Console) -> Self {
         Self { console, is_saveable: false, paths: None, shown: Mutex::default() }
     }
 
-    /// Of a run that is saved when a signal asks it to stop.
+    /// Shows a run that is saved when a signal asks it to stop, and stops it when its `paths` can no longer be written.
     pub(crate) fn of_saveable(console: &'a Console, paths: Option<&'a PathFile>) -> Self {
         Self { is_saveable: true, paths, ..Self::new(console) }
     }

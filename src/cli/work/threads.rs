@@ -3,7 +3,8 @@
 use crate::cli::failure::Failure;
 use crate::pipeline::TracingSettings;
 
-/// Sets the number of threads of everything that runs in parallel; all cores when nothing is asked. Gives the number.
+/// Sets the number of threads of everything that runs in parallel, all cores for `None`, and returns it. The first call in a process
+/// counts: later ones return their number, but change nothing.
 pub(crate) fn set_threads(requested: Option<usize>) -> Result<usize, Failure> {
     let threads = TracingSettings { threads: requested, ..TracingSettings::default() }.thread_count()?;
     // The pool can be set once in a process; a second command in the same process keeps the first.

@@ -21,13 +21,13 @@ struct MachineUsage {
 }
 
 impl Usage {
-    /// What this process took so far, as one part.
+    /// Returns what this process took so far, as one part on this machine.
     pub(crate) fn of_process(wall_seconds: f64) -> Self {
         let usage = MachineUsage { parts: 1, cpu_seconds: cpu_seconds(), slowest_seconds: wall_seconds };
         Self(BTreeMap::from([(machine::name(), usage)]))
     }
 
-    /// Adds what other parts took.
+    /// Adds what other parts took, machine by machine: times of threads add up, of the slowest part the longest counts.
     pub(crate) fn add(&mut self, other: &Self) {
         for (machine, theirs) in &other.0 {
             let Some(mine) = self.0.get_mut(machine) else {
@@ -41,8 +41,8 @@ impl Usage {
         }
     }
 
-    /// The same part after it was gone on with.
-    pub(crate) fn continued(mut self, other: &Self) -> Self {
+    /// Adds what an earlier process took for this same part: on one machine times add up, and the part counts where it ends.
+    pub(crate) fn continue_from(mut self, other: &Self) -> Self {
         for (machine, theirs) in &other.0 {
             match self.0.get_mut(machine) {
                 Some(mine) => {
@@ -57,7 +57,7 @@ impl Usage {
         self
     }
 
-    /// All of it in four numbers; `None` where nothing is known.
+    /// Returns the whole usage in four numbers; `None` where nothing is known, and no time of threads where one machine's is not.
     pub(crate) fn total(&self) -> Option<MergedSeconds> {
         let machines = u32::try_from(self.0.len()).ok().filter(|n| *n > 0)?;
         Some(MergedSeconds {
@@ -69,6 +69,7 @@ impl Usage {
     }
 }
 
+/// Returns the seconds that all threads of this process took so far; `None` where the system does not tell.
 #[cfg(unix)]
 fn cpu_seconds() -> Option<f64> {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
@@ -100,9 +101,9 @@ mod tests {
         }
         assert_eq!(sum.total(), Some(MergedSeconds { parts: 3, machines: 2, cpu: Some(8.0), slowest: 5.0 }));
         // One part that was stopped and gone on with, on the same machine and on another.
-        let resumed = part("a", 3.0, 2.0).continued(&part("a", 1.0, 4.0));
+        let resumed = part("a", 3.0, 2.0).continue_from(&part("a", 1.0, 4.0));
         assert_eq!(resumed.total(), Some(MergedSeconds { parts: 1, machines: 1, cpu: Some(4.0), slowest: 6.0 }));
-        let moved = part("a", 3.0, 2.0).continued(&part("b", 1.0, 4.0)).total();
+        let moved = part("a", 3.0, 2.0).continue_from(&part("b", 1.0, 4.0)).total();
         assert_eq!(moved.map(|m| (m.parts, m.machines)), Some((1, 2)));
     }
 }

@@ -4,18 +4,19 @@ use crate::math::{Frame, Point, Uv, Vector};
 use crate::nurbs::Derivatives;
 use std::f64::consts::FRAC_PI_2;
 
-/// The foot of a point on a plane.
+/// Returns the parameters, in units of the frame, of the foot of `p` on a plane.
 pub(super) fn locate_plane(frame: &Frame, p: Point) -> Uv {
     let q = frame.local_point(p);
     Uv::new(q.x, q.y)
 }
 
-/// Longitude of a local point; that of the opposite side where the signed radius is negative.
+/// Returns the longitude of a point in the frame's coordinates, radians in (−π, π]; that of the opposite side where `radius` is negative.
 fn longitude(q: Point, radius: f64) -> f64 {
     if radius < 0.0 { (-q.y).atan2(-q.x) } else { q.y.atan2(q.x) }
 }
 
-/// v is the height of the foot point along the axis.
+/// Returns the parameters of the nearest point of a cone: the longitude in radians, and the height of the foot along the axis in units of
+/// the frame.
 pub(super) fn locate_cone(frame: &Frame, radius: f64, half_angle: f64, p: Point) -> Uv {
     let q = frame.local_point(p);
     let slope = half_angle.tan();
@@ -27,8 +28,8 @@ pub(super) fn locate_cone(frame: &Frame, radius: f64, half_angle: f64, p: Point)
     Uv::new(longitude(q, signed), v)
 }
 
-/// Point and first derivatives of a cone of `radius` at v = 0: u is the longitude and `half_angle` its slope, both in radians, v the
-/// height along the axis in units of the frame. Beyond the apex the radius is negative.
+/// Returns the point and first derivatives of a cone of `radius` at v = 0: u is the longitude and `half_angle` its slope, both in radians,
+/// v the height along the axis in units of the frame. Beyond the apex the radius is negative.
 pub(super) fn cone(frame: &Frame, radius: f64, half_angle: f64, uv: Uv) -> Derivatives {
     let (s, c) = uv.x.sin_cos();
     let slope = half_angle.tan();
@@ -40,7 +41,7 @@ pub(super) fn cone(frame: &Frame, radius: f64, half_angle: f64, uv: Uv) -> Deriv
     }
 }
 
-/// Range of the minor angle between two poles; `None` for a torus with a hole.
+/// Returns the angles v between −π and π, radians, at which a torus meets its axis; `None` for a torus with a hole.
 ///
 /// A negative `major` stands for the inner (lemon) part of a self-touching torus.
 pub(super) fn minor_range(major: f64, minor: f64) -> Option<[f64; 2]> {
@@ -55,7 +56,8 @@ pub(super) fn minor_range(major: f64, minor: f64) -> Option<[f64; 2]> {
     Some([-v, v])
 }
 
-/// Parameters of the point of a torus that is nearest to `p`; `range` bounds v.
+/// Returns the longitude and angle about the tube, radians, of the point of a torus that is nearest to `p`; an infinite `range` does not
+/// bound v.
 pub(super) fn locate_torus(frame: &Frame, major: f64, range: [f64; 2], p: Point) -> Uv {
     let q = frame.local_point(p);
     let distance = q.x.hypot(q.y);
@@ -65,7 +67,8 @@ pub(super) fn locate_torus(frame: &Frame, major: f64, range: [f64; 2], p: Point)
     Uv::new(longitude(q, 1.0), v)
 }
 
-/// Point and derivatives of a torus: u is the longitude, v the angle about the tube.
+/// Returns the point and derivatives of a torus: u is the longitude, v the angle about the tube, both in radians. `major` is 0 for a
+/// sphere, negative for the inner part of one that touches itself.
 pub(super) fn torus(frame: &Frame, major: f64, minor: f64, uv: Uv) -> Derivatives {
     let (s, c) = uv.x.sin_cos();
     let (sv, cv) = uv.y.sin_cos();

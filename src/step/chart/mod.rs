@@ -3,7 +3,7 @@
 //! A chart answers three questions: where in the parameter plane a point lies (closed form for everything analytic,
 //! Newton with a Bézier-patch search behind it for splines), what the surface does there, and which spline covers a
 //! rectangle of it. Its parameters are those of ISO 10303-42: angles are angles. The spline's parameters differ from
-//! them only in angular directions ([`Chart::to_surface`]).
+//! them only in angular directions ([`Chart::spline_parameters`]).
 //!
 //! Of `pole`, `analytic`, `spline`, `swept`, `surface_chart` and `offset` each sees only those before it.
 

@@ -18,7 +18,8 @@ pub(crate) const TOLERANCE: f64 = 1e-6;
 /// Most cells in one direction.
 const MAX_CELLS: usize = 256;
 
-/// The chart of the surface at `distance` along the normals of `basis`; `None` where nothing is left.
+/// Returns the chart of the surface at `distance`, mm, along Su × Sv of `basis`. `None` where a radius does not stay positive, the basis
+/// has no ends, or no fit within [`WORST_FIT_MM`] is found; the error of a fit is in the chart.
 pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
     let mut chart = match &basis.kind {
         // Elementary surfaces stay what they are, and exact.
@@ -59,7 +60,7 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
         // The offset of a spline is no spline in general: it is fitted.
         _ => {
             let domain = basis_domain(basis)?;
-            let (surface, error) = fit(&basis.surface(domain), distance)?;
+            let (surface, error) = fit_bicubic(&basis.surface(domain), distance)?;
             Chart { error, ..Chart::new(Kind::Spline(SplineChart::new(surface)), Analytic::Offset) }
         }
     };
@@ -67,7 +68,8 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
     Some(chart)
 }
 
-/// The profile of an extrusion moved along the normals of its surface, and the error of the fit; `None` where it is torn at a corner.
+/// Returns the profile of an extrusion moved along the normals of its surface, and the error of the fit, mm. `None` where it is torn at a
+/// corner, has no normal, or the fit is worse than [`WORST_FIT_MM`].
 fn offset_profile(base: &Curve, direction: Vector, distance: f64) -> Option<(Curve, f64)> {
     let mut whole: Option<Curve> = None;
     let mut worst = 0f64;
@@ -105,7 +107,7 @@ fn offset_profile(base: &Curve, direction: Vector, distance: f64) -> Option<(Cur
     Some((whole?, worst))
 }
 
-/// The rectangle of parameters of a basis, one period where it has no ends; `None` where it is endless.
+/// Returns the rectangle of parameters of a basis, one period where it has no ends; `None` where it is endless.
 fn basis_domain(basis: &Chart) -> Option<[[f64; 2]; 2]> {
     let mut domain = basis.range;
     for d in 0..2 {
@@ -117,7 +119,7 @@ fn basis_domain(basis: &Chart) -> Option<[[f64; 2]; 2]> {
     domain.iter().flatten().all(|x| x.is_finite()).then_some(domain)
 }
 
-/// Position and derivatives of the offset at one point.
+/// Position, first and mixed derivatives of the offset at one place.
 #[derive(Clone, Copy)]
 struct Jet {
     point: Point,
@@ -126,7 +128,8 @@ struct Jet {
     duv: Vector,
 }
 
-/// First-order part of the jet, by the derivatives of the unit normal.
+/// Returns the position and first derivatives of the offset, by the derivatives of the unit normal; `None` at a pole and where the
+/// derivatives are parallel.
 fn first_order(basis: &Surface, distance: f64, uv: Uv) -> Option<(Point, Vector, Vector)> {
     let s = basis.second_derivatives(uv);
     let n = s.du.cross(s.dv);
@@ -147,7 +150,8 @@ fn first_order(basis: &Surface, distance: f64, uv: Uv) -> Option<(Point, Vector,
     Some((s.point + distance * unit, s.du + distance * nu, s.dv + distance * nv))
 }
 
-/// The jet at a grid point, as it is on one side of the grid lines (-1, 1) or, where there is no corner, on them (0).
+/// Returns the jet at a grid point, its derivatives as they are on one side of the grid lines (−1, 1) or, where there is no corner, on them
+/// (0). `None` where there is no normal.
 fn jet(basis: &Surface, distance: f64, uv: Uv, sides: [f64; 2]) -> Option<Jet> {
     let domain = basis.domain();
     let extent = Uv::new(domain[0][1] - domain[0][0], domain[1][1] - domain[1][0]);
@@ -165,7 +169,8 @@ fn jet(basis: &Surface, distance: f64, uv: Uv, sides: [f64; 2]) -> Option<Jet> {
     Some(Jet { point, du, dv, duv: (above - below) / (hi - lo) })
 }
 
-/// The jet at a collapsed row: the limit normal, and derivatives extrapolated linearly from two places inside.
+/// Returns the jet at a collapsed row: the limit normal, and derivatives extrapolated linearly from two places inside. `extent` is the size
+/// of the domain.
 fn jet_at_pole(basis: &Surface, distance: f64, uv: Uv, sides: [f64; 2], extent: Uv) -> Option<Jet> {
     let domain = basis.domain();
     let s = basis.derivatives(uv);
@@ -189,13 +194,14 @@ fn jet_at_pole(basis: &Surface, distance: f64, uv: Uv, sides: [f64; 2], extent: 
     })
 }
 
-/// Grid lines in one direction. At the knots of the basis, the offset of a C¹ spline has a corner in its derivatives.
+/// Grid lines in one direction, ascending, and which of them are knots of the basis, where the offset of a C¹ spline has a corner in its
+/// derivatives.
 struct GridLines {
     at: Vec<f64>,
     is_knot: Vec<bool>,
 }
 
-/// A row of control points beside or on a grid line: how far off, and on which side of a corner.
+/// A row of control points: on or beside which line, how far off in the parameter, and on which side of a corner (−1, 1; 0 without one).
 #[derive(Clone, Copy)]
 struct ControlRow {
     line: usize,
@@ -204,7 +210,7 @@ struct ControlRow {
 }
 
 impl GridLines {
-    /// The knots of the basis with `per_span - 1` lines between each two.
+    /// Makes grid lines at the knots `breaks` of the basis, with `per_span - 1` lines evenly between each two.
     fn new(breaks: &[f64], per_span: usize) -> Self {
         let mut lines = Self { at: Vec::new(), is_knot: Vec::new() };
         for w in breaks.windows(2) {
@@ -218,7 +224,7 @@ impl GridLines {
         lines
     }
 
-    /// A third of the neighbouring cells off each line, and on the lines that may be corners.
+    /// Returns the rows of control points: a third of the neighbouring cells off each line, and on the lines that may be corners.
     fn control_rows(&self) -> Vec<ControlRow> {
         let mut rows = Vec::with_capacity(3 * self.at.len());
         for (line, &x) in self.at.iter().enumerate() {
@@ -239,7 +245,7 @@ impl GridLines {
         rows
     }
 
-    /// Knots of a cubic whose pieces end at the lines, with a corner where the basis has a knot.
+    /// Returns the knots of a cubic whose pieces end at the lines, with a corner where the basis has a knot.
     fn knots(&self) -> Vec<f64> {
         let last = self.at.len() - 1;
         let mut knots = Vec::with_capacity(3 * self.at.len() + 2);
@@ -254,8 +260,9 @@ impl GridLines {
     }
 }
 
-/// The bicubic Hermite spline of the offset, and its error.
-fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
+/// Returns the bicubic Hermite spline of the offset, and its error in the middles of cells, mm. `None` where the basis has no normal or the
+/// finest grid leaves more than [`WORST_FIT_MM`].
+fn fit_bicubic(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
     // Knots of the basis stay grid lines, so that its breaks stay breaks.
     let breaks = |d: usize| {
         let mut b = basis.knots[d][basis.degree[d]..=basis.counts()[d]].to_vec();
@@ -266,7 +273,7 @@ fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
     let mut per_span = 2usize;
     loop {
         let lines = [0, 1].map(|d| GridLines::new(&base[d], per_span));
-        let surface = hermite(basis, distance, &lines)?;
+        let surface = hermite_surface(basis, distance, &lines)?;
         let mut error = 0f64;
         for u in lines[0].at.windows(2) {
             for v in lines[1].at.windows(2) {
@@ -286,8 +293,8 @@ fn fit(basis: &Surface, distance: f64) -> Option<(Surface, f64)> {
     }
 }
 
-/// The bicubic surface with the offset's values, slopes and twists where lines cross; `None` where it has none.
-fn hermite(basis: &Surface, distance: f64, lines: &[GridLines; 2]) -> Option<Surface> {
+/// Returns the bicubic surface with the offset's values, slopes and twists where lines cross; `None` where one of them does not exist.
+fn hermite_surface(basis: &Surface, distance: f64, lines: &[GridLines; 2]) -> Option<Surface> {
     let [rows, columns] = [lines[0].control_rows(), lines[1].control_rows()];
     let mut points = Vec::with_capacity(rows.len() * columns.len());
     for row in &rows {

@@ -25,12 +25,12 @@ pub(in crate::step) struct SplineChart {
     pub(in crate::step) surface: Surface,
     /// Diagonal of its box, mm.
     pub(super) size: f64,
-    /// By direction.
+    /// Whether both ends of u, of v, are one row of control points.
     closed: [bool; 2],
     /// Collapsed sides: `[direction][low, high]`.
     collapsed: [[bool; 2]; 2],
     patches: OnceLock<Vec<(BezierPatch, Aabb)>>,
-    /// Distance from the surface that edges of this face have shown; larger residuals start a search.
+    /// Distance from the surface, mm, that edges of this face have shown; larger residuals start a search.
     expected: Cell<f64>,
 }
 
@@ -42,7 +42,7 @@ impl Clone for SplineChart {
 }
 
 impl SplineChart {
-    /// A spline with its sides that coincide and those that are one point.
+    /// Makes a chart of a spline; finds out which sides coincide and which are one point, by control points.
     pub(in crate::step) fn new(surface: Surface) -> Self {
         let size = surface.bounds().diagonal();
         let near = CLOSED_CONTROLS_SHARE * size.min(CLOSED_CONTROLS_LARGEST_MM) + CLOSED_MM;
@@ -61,12 +61,13 @@ impl SplineChart {
         Self { surface, size, closed, collapsed, patches: OnceLock::new(), expected }
     }
 
+    /// Returns the lengths of the domain in closed directions; `None` where it is open or both ends are poles.
     pub(super) fn period(&self) -> [Option<f64>; 2] {
         let domain = self.surface.domain();
         [0, 1].map(|d| self.closed[d].then(|| domain[d][1] - domain[d][0]))
     }
 
-    /// The sides that are one point, as poles.
+    /// Returns a pole for each side of the domain that is one point.
     pub(super) fn poles(&self) -> Vec<Pole> {
         let domain = self.surface.domain();
         let mut poles = Vec::new();
@@ -82,7 +83,8 @@ impl SplineChart {
         poles
     }
 
-    /// Parameters of the nearest point, in the base period.
+    /// Returns the parameters of a nearest point of the surface, inside its domain: by Newton from `hint` where that ends as near as
+    /// expected, else by a search. Remembers how far from the surface points are.
     pub(super) fn locate(&self, p: Point, hint: Option<Uv>) -> Uv {
         let mut best: Option<(Uv, f64)> = None;
         if let Some(hint) = hint {
@@ -102,7 +104,7 @@ impl SplineChart {
         uv
     }
 
-    /// Parameters within the domain: around where it closes on itself, to the border elsewhere.
+    /// Moves parameters into the domain: by periods where it closes on itself, to the nearest border elsewhere.
     fn wrap(&self, uv: Uv) -> Uv {
         let domain = self.surface.domain();
         let one = |d: usize| {
@@ -118,9 +120,8 @@ impl SplineChart {
         Uv::new(one(0), one(1))
     }
 
-    /// Gauss–Newton (tangents alone, without the surface's curvature), halved while it does not descend, held
-    /// inside the domain.
-    /// Gauss–Newton with the curvature of the residual, halved while it does not descend, held inside the domain.
+    /// Descends from `start`, inside the domain, to a point that is locally nearest to `p`; returns its parameters and distance, mm.
+    /// Gauss–Newton (tangents alone, without the surface's curvature), each step halved while it does not descend.
     fn newton(&self, p: Point, start: Uv) -> (Uv, f64) {
         let domain = self.surface.domain();
         let extent = [domain[0][1] - domain[0][0], domain[1][1] - domain[1][0]];
@@ -182,7 +183,7 @@ impl SplineChart {
         (uv, at)
     }
 
-    /// A step in parameters, around where the surface closes and held at its border elsewhere.
+    /// Adds a step to parameters: around where the surface closes, held at its border elsewhere.
     fn wrap_step(&self, uv: Uv, step: Uv, domain: [[f64; 2]; 2]) -> Uv {
         let one = |d: usize| {
             let [a, b] = domain[d];
@@ -192,8 +193,8 @@ impl SplineChart {
         Uv::new(one(0), one(1))
     }
 
-    /// Patches in the order of the distance to their boxes, Newton from the best sample of each that may hold a nearer
-    /// point than is known.
+    /// Finds a nearest point without a start: by Newton from the best samples of patches, in the order of the distance to their boxes, of
+    /// at most about [`MAX_PATCHES_SEARCHED`]. Returns parameters and distance, mm; `known` where nothing nearer is found.
     fn search(&self, p: Point, known: Option<(Uv, f64)>) -> (Uv, f64) {
         let patches = self.patches.get_or_init(|| {
             self.surface
@@ -238,7 +239,7 @@ impl SplineChart {
         best
     }
 
-    /// The surface over a rectangle that may run over the seams of closed directions.
+    /// Returns the surface over a rectangle that may run over the seams of closed directions; in others, its own domain stays.
     pub(super) fn extend_periodically(&self, domain: [[f64; 2]; 2]) -> Surface {
         let base = self.surface.domain();
         let mut surface = self.surface.clone();
@@ -254,7 +255,8 @@ impl SplineChart {
     }
 }
 
-/// A curve over a range, repeated by its period as far as needed; without a period its own domain stays.
+/// Returns a curve over `[a, b]`, repeated by its period as far as needed, at most [`MAX_COPIES`] times; without a period, or within its
+/// domain, the whole curve as it is.
 pub(super) fn extend_periodically(curve: &Curve, [a, b]: [f64; 2], period: Option<f64>) -> Curve {
     let [t0, t1] = curve.domain();
     let Some(period) = period else { return curve.clone() };

@@ -13,7 +13,7 @@ pub(in crate::step) enum Kind {
     Plane {
         frame: Frame,
     },
-    /// `radius + v·slope` about z; a cylinder when the slope is 0.
+    /// Radius `radius + v·tan(half_angle)` about z at height v; a cylinder when the angle is 0. Angles in radians.
     Cone {
         frame: Frame,
         radius: f64,
@@ -25,7 +25,7 @@ pub(in crate::step) enum Kind {
         major: f64,
         minor: f64,
     },
-    /// `meridian(v)` turned about z by u; the plane of the meridian when it lies in one through the axis.
+    /// `meridian(v)`, in the model's coordinates, turned about z by u; `plane` when the meridian lies in one through the axis.
     Revolution {
         frame: Frame,
         meridian: Curve,
@@ -45,7 +45,7 @@ pub(in crate::step) struct Chart {
     pub(in crate::step) kind: Kind,
     /// What the face was in the file.
     pub(in crate::step) analytic: Analytic,
-    /// Differences of parameters after which the surface repeats.
+    /// Differences of u, of v, after which the surface repeats; `None` where it does not.
     pub(in crate::step) period: [Option<f64>; 2],
     /// Natural bounds; infinite where there is none, meaningless in periodic directions.
     pub(in crate::step) range: [[f64; 2]; 2],
@@ -59,18 +59,18 @@ pub(in crate::step) struct Chart {
 }
 
 impl Chart {
-    /// The surface of revolution of a meridian.
+    /// Returns the surface of revolution of a meridian, in the model's coordinates, about the frame's z axis.
     pub(in crate::step) fn revolution(frame: Frame, meridian: Curve) -> Self {
         let plane = swept::plane(&frame, &meridian);
         Self::new(Kind::Revolution { frame, meridian, plane }, Analytic::Revolution)
     }
 
-    /// A cylinder: a cone that does not widen.
+    /// Returns a cylinder: a cone that does not widen.
     pub(in crate::step) fn cylinder(frame: Frame, radius: f64) -> Self {
         Self::new(Kind::Cone { frame, radius, half_angle: 0.0 }, Analytic::Cylinder { frame, radius })
     }
 
-    /// A chart of this kind, with periods, ranges and poles that follow from it.
+    /// Makes a chart of this kind; periods, ranges, poles and size follow from it. Not flipped, without an error.
     pub(in crate::step) fn new(kind: Kind, analytic: Analytic) -> Self {
         const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
         let mut chart = Self {
@@ -87,7 +87,7 @@ impl Chart {
         chart
     }
 
-    /// Fills in periods, bounds, poles and size.
+    /// Fills in `period`, `range`, `poles` and `size` from the kind.
     fn characterise(&mut self) {
         const TURN: f64 = 2.0 * PI;
         match &self.kind {
@@ -151,12 +151,12 @@ impl Chart {
         }
     }
 
-    /// Distance below which ends of the surface are one, mm.
+    /// Returns the distance below which ends of the surface are one, mm.
     fn closure(&self) -> f64 {
         CLOSED_SHARE * self.size + CLOSED_MM
     }
 
-    /// Whether a parameter is an angle, whose spline parameter differs from it.
+    /// Whether u, and v, are angles, from which the spline's parameters differ.
     pub(in crate::step) fn angular_directions(&self) -> [bool; 2] {
         match self.kind {
             Kind::Cone { .. } | Kind::Revolution { .. } => [true, false],
@@ -165,7 +165,8 @@ impl Chart {
         }
     }
 
-    /// Parameters of the nearest point of the surface; of several by a period, the one nearest to `hint`.
+    /// Returns the parameters of a nearest point of the surface; shifted by periods, those nearest to `hint`. A hint also starts the search
+    /// on curves and splines, and the foot near it is taken.
     pub(in crate::step) fn locate(&self, p: Point, hint: Option<Uv>) -> Uv {
         let uv = match &self.kind {
             Kind::Plane { frame } => analytic::locate_plane(frame, p),
@@ -183,19 +184,19 @@ impl Chart {
         hint.map_or(uv, |h| self.nearest_representative(uv, h))
     }
 
-    /// The representative of `uv` that is nearest to `to`.
+    /// Returns `uv` shifted by whole periods to within half a period of `to`; directions without a period stay.
     pub(in crate::step) fn nearest_representative(&self, uv: Uv, to: Uv) -> Uv {
         let shift = |d: usize| self.period[d].map_or(0.0, |p| p * ((to[d] - uv[d]) / p).round());
         uv + Uv::new(shift(0), shift(1))
     }
 
-    /// The displacement by whole periods; directions without a period are not displaced.
+    /// Returns the displacement by `count` whole periods; 0 in directions without one.
     pub(in crate::step) fn whole_periods(&self, count: [i32; 2]) -> Uv {
         let one = |d: usize| self.period[d].map_or(0.0, |p| p * f64::from(count[d]));
         Uv::new(one(0), one(1))
     }
 
-    /// Position and first derivatives, anywhere in the plane.
+    /// Returns the position, mm, and first derivatives; parameters beyond the bounds are wrapped into them first, see [`Self::wrap`].
     pub(in crate::step) fn derivatives(&self, uv: Uv) -> Derivatives {
         match &self.kind {
             Kind::Plane { frame } => {
@@ -215,7 +216,8 @@ impl Chart {
         }
     }
 
-    /// Into the base period, and into the natural bounds.
+    /// Moves parameters into the base period, or without one to the nearest natural bound; a periodic parameter without a base period
+    /// stays.
     pub(in crate::step) fn wrap(&self, uv: Uv) -> Uv {
         let one = |d: usize| {
             let [a, b] = self.range[d];
@@ -231,7 +233,7 @@ impl Chart {
         Uv::new(one(0), one(1))
     }
 
-    /// The spline that covers a rectangle of the parameters. It may reach beyond: splines and profiles keep their own domain.
+    /// Returns the spline that covers a rectangle of the parameters. It may reach beyond: splines and profiles keep their own domain.
     pub(in crate::step) fn surface(&self, domain: [[f64; 2]; 2]) -> Surface {
         use crate::nurbs::sweep;
         match &self.kind {
@@ -266,7 +268,8 @@ impl Chart {
         Uv::new(one(0, u), one(1, v))
     }
 
-    /// Factors from the file's parameters to the chart's; `None` where they are not proportional.
+    /// Returns the factors from the file's parameters to the chart's, given mm and radians to the file's units; `None` where they are not
+    /// proportional.
     pub(in crate::step) fn parameter_scale(&self, length: f64, angle: f64) -> Option<[f64; 2]> {
         // Weights alike leave a curve's parameter proportional to the file's; a rational arc has its own.
         let direct = |c: &Curve| c.points.iter().all(|p| p.w == c.points[0].w);
@@ -280,7 +283,7 @@ impl Chart {
         }
     }
 
-    /// The same sphere with its poles along another axis.
+    /// Returns the same sphere with its poles along another axis; `None` for any other surface.
     pub(in crate::step) fn with_axis(&self, axis: Vector, x_hint: Vector) -> Option<Self> {
         let Kind::Torus { frame, major: 0.0, minor } = self.kind else { return None };
         let frame = Frame::from_axis(frame.origin, axis, Some(x_hint));

@@ -8,16 +8,17 @@ use crate::math::{Frame, Point, Uv, Vector};
 use crate::nurbs::{ControlPoint, Curve, Derivatives, project};
 use std::f64::consts::{PI, TAU};
 
-/// The plane of a meridian that lies in one with the axis.
+/// The half plane through the axis in which a meridian lies.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::step) struct Plane {
-    /// Its azimuth.
+    /// Its azimuth, radians.
     azimuth: f64,
     /// Whether the meridian is on both sides of the axis.
     crosses: bool,
 }
 
-/// u from the azimuth, v from the projection to the meridian in its plane, or in the half plane of radius and height.
+/// Returns the parameters of a nearest point of a surface of revolution, not moved to the hint's period: u from the azimuth, v from the
+/// projection to the meridian in its plane, or in the half plane of radius and height. `size` is the meridian's, mm.
 pub(super) fn locate_revolution(
     (frame, meridian, plane): (&Frame, &Curve, Option<Plane>),
     p: Point,
@@ -55,8 +56,8 @@ pub(super) fn locate_revolution(
     if back { Uv::new(u + PI, behind.0) } else { Uv::new(u, ahead.0) }
 }
 
-/// The parameter of the profile `(radius, height)` nearest to a target, for a meridian that leaves every plane through
-/// the axis: samples, then golden sections.
+/// Returns the parameter of the profile `(radius, height)` nearest to `target`, whose x and z these are, for a meridian that leaves every
+/// plane through the axis: samples, then golden sections.
 fn nearest_profile(frame: &Frame, meridian: &Curve, target: Vector) -> f64 {
     let distance = |v: f64| {
         let m = frame.local_point(meridian.evaluate(v));
@@ -77,13 +78,13 @@ fn nearest_profile(frame: &Frame, meridian: &Curve, target: Vector) -> f64 {
     0.5 * (lo + hi)
 }
 
-/// Distance of a target `(radius, height)` from a profile.
+/// Returns the distance of a target, radius in x and height in z, from the profile of a meridian, in units of the frame.
 pub(in crate::step) fn profile_distance(frame: &Frame, meridian: &Curve, target: Vector) -> f64 {
     let m = frame.local_point(meridian.evaluate(nearest_profile(frame, meridian, target)));
     (Vector::new(m.x.hypot(m.y), 0.0, m.z) - target).length()
 }
 
-/// The plane of a meridian, if it has one with the axis.
+/// Returns the plane through the axis that holds a meridian; `None` if there is none, or the meridian lies on the axis.
 pub(super) fn plane(frame: &Frame, meridian: &Curve) -> Option<Plane> {
     let local: Vec<Point> = meridian.points.iter().map(|p| frame.local_point(p.position())).collect();
     // The plane is told best by the point that is farthest from the axis.
@@ -95,8 +96,8 @@ pub(super) fn plane(frame: &Frame, meridian: &Curve) -> Option<Plane> {
     (flat && r > 0.0).then(|| Plane { azimuth: far.y.atan2(far.x), crosses })
 }
 
-/// Point (mm) and first derivatives of the surface that `meridian` makes, turned about the frame's z axis. The meridian is in the
-/// model's coordinates, not in the frame's; u is the angle in radians, v the meridian's parameter.
+/// Returns the point (mm) and first derivatives of the surface that `meridian` makes, turned about the frame's z axis. The meridian is in
+/// the model's coordinates, not in the frame's; u is the angle in radians, v the meridian's parameter.
 pub(super) fn revolution(frame: &Frame, meridian: &Curve, uv: Uv) -> Derivatives {
     let d = meridian.derivatives(uv.y);
     let (m, t) = (frame.local_point(d.point), frame.local_direction(d.first) / frame.scale);
@@ -106,7 +107,8 @@ pub(super) fn revolution(frame: &Frame, meridian: &Curve, uv: Uv) -> Derivatives
     Derivatives { point: frame.point(p), du: frame.vector(Vector::new(-p.y, p.x, 0.0)), dv: frame.vector(turn(t)) }
 }
 
-/// u from the projection along the direction, v from what remains.
+/// Returns the parameters of a nearest point of an extrusion: u by projecting `base` along the direction, from `hint` where given; v from
+/// what remains. `size` is the profile's, mm.
 pub(super) fn locate_extrusion(base: &Curve, direction: Vector, p: Point, hint: Option<f64>, size: f64) -> Uv {
     let square = direction.length_squared();
     // Along the direction nothing counts: what is left of the distance is the curve's own.

@@ -12,7 +12,8 @@ use std::f64::consts::PI;
 const MAX_SEGMENTS: usize = 100_000;
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// A curve with two ends (or closed), in its own direction.
+    /// Reads a bounded curve, mm, as a spline in its own direction; conics that are closed become one turn. Refuses unbounded curves, and
+    /// chains of more than [`MAX_DEPTH`] references, of which `depth` are behind.
     pub(crate) fn bounded_curve(&self, id: u64, depth: usize) -> Outcome<Curve> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
@@ -40,7 +41,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(if reversed { whole.reversed() } else { whole })
     }
 
-    /// The part of a basis curve between the two trimming values of a TRIMMED_CURVE.
+    /// Returns the part of a basis curve between the two trimming values of a TRIMMED_CURVE, whose attributes are `args`. On closed curves
+    /// equal values mean once around; elsewhere they are refused.
     fn trimmed_curve(&self, e: Entity<'f, 'a>, args: Args<'f, 'a>, depth: usize) -> Outcome<Curve> {
         let basis = self.resolve(e, args.id(0), "basis curve")?;
         let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;
@@ -75,7 +77,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(if sense == reversed { curve.reversed() } else { curve })
     }
 
-    /// The segments of a composite curve, in its direction.
+    /// Returns the segments of a composite curve, in its order, turned around where that joins them clearly better than the file's own
+    /// senses. Gaps stay.
     pub(crate) fn segments(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Vec<Curve>> {
         let own = ["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"]
             .into_iter()
@@ -122,7 +125,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(curves)
     }
 
-    /// A composite curve as one spline.
+    /// Reads a composite curve as one spline, of the highest degree of its segments; at gaps each begins where the one before ends.
     pub(crate) fn composite_curve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         if depth > MAX_DEPTH {
             return Err(Refusal::new(e, "curves refer to each other too deeply"));
@@ -135,7 +138,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// The same curve with a higher degree, piecewise Bézier.
+/// Returns the same curve with a higher degree, piecewise Bézier; `degree` is not below its own.
 fn elevate_degree(curve: &Curve, degree: usize) -> Curve {
     if curve.degree == degree {
         return curve.clone();
@@ -162,7 +165,7 @@ fn elevate_degree(curve: &Curve, degree: usize) -> Curve {
     Curve { degree, knots, points }
 }
 
-/// Whether two points are the same within the accuracy of files.
+/// Whether two points are at most `tolerance`, mm, apart.
 pub(crate) fn coincident(a: Point, b: Point, tolerance: f64) -> bool {
     (a - b).length() <= tolerance
 }

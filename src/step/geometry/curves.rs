@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 /// Deepest chain of curves that refer to curves.
 pub(crate) const MAX_DEPTH: usize = 16;
 
-/// A curve, not yet cut.
+/// A curve in space, mm, not yet cut; parameters of conics are radians or pure numbers, as in ISO 10303-42.
 #[derive(Clone, Debug)]
 pub(crate) enum CurveShape {
     /// `origin + t·direction`.
@@ -29,12 +29,12 @@ pub(crate) enum CurveShape {
 #[derive(Clone, Debug)]
 pub(crate) struct DirectedCurve {
     pub(crate) shape: CurveShape,
-    /// Against its parameter.
+    /// Whether it is run against its parameter.
     pub(crate) reversed: bool,
 }
 
 impl CurveShape {
-    /// A spline that knows whether its ends meet.
+    /// Wraps a spline, and finds out whether its ends meet.
     pub(crate) fn spline(curve: Curve) -> Self {
         let [a, b] = curve.domain();
         let size = curve.bounds().diagonal();
@@ -42,7 +42,7 @@ impl CurveShape {
         Self::Spline { curve, closed }
     }
 
-    /// Parameter difference after which the curve repeats.
+    /// Returns the parameter difference after which the curve repeats; `None` for an open one.
     pub(crate) fn period(&self) -> Option<f64> {
         match self {
             Self::Ellipse { .. } => Some(2.0 * PI),
@@ -54,7 +54,8 @@ impl CurveShape {
         }
     }
 
-    /// Parameter of the nearest point.
+    /// Returns the parameter of the nearest point, radians on an ellipse; on a hyperbola or parabola that of the point with the same local
+    /// y, which is the same for points of the curve.
     pub(crate) fn parameter(&self, p: Point) -> f64 {
         match self {
             Self::Line { origin, direction } => (p - *origin).dot(*direction) / direction.length_squared(),
@@ -69,7 +70,7 @@ impl CurveShape {
         }
     }
 
-    /// The piece over `[t0, t1]`, `t0 < t1`, as a spline; over a period at most, and inside the domain of an open spline.
+    /// Returns the piece over `[t0, t1]`, `t0 < t1`, as a spline; over a period at most, and inside the domain of an open spline.
     pub(crate) fn segment(&self, t0: f64, t1: f64) -> Curve {
         match self {
             Self::Line { origin, direction } => {
@@ -113,7 +114,7 @@ impl CurveShape {
     }
 }
 
-/// A closed spline over a range that runs past its end.
+/// Returns a closed spline over `[s0, s1]`, which may run past the end of its domain by one period.
 fn segment_over_seam(curve: &Curve, s0: f64, s1: f64) -> Curve {
     let [a, b] = curve.domain();
     let period = b - a;
@@ -130,13 +131,14 @@ fn segment_over_seam(curve: &Curve, s0: f64, s1: f64) -> Curve {
     head.joined_with(&tail)
 }
 
-/// A spline with its control points moved by an affine map.
+/// Returns a spline with its control points moved by `map`, which must be affine.
 pub(crate) fn map_points(curve: Curve, map: impl Fn(Point) -> Point) -> Curve {
     let points = curve.points.iter().map(|p| Homogeneous::weighted(map(p.position()), p.w)).collect();
     Curve { points, ..curve }
 }
 
-/// Angle of the nearest point of an ellipse, by Newton from the angle of the scaled point.
+/// Returns the angle, radians, of the point of an ellipse nearest to `q`, by Newton from the angle of the scaled point; may be a local
+/// minimum for far points.
 fn ellipse_angle(q: Point, a: f64, b: f64) -> f64 {
     let mut t = (q.y / b).atan2(q.x / a);
     for _ in 0..20 {
@@ -156,7 +158,7 @@ fn ellipse_angle(q: Point, a: f64, b: f64) -> f64 {
     t
 }
 
-/// The first curve in a parameter plane of a surface curve that has none in space.
+/// Returns the id of the first PCURVE of a surface curve, for one without a curve in space; `None` if it has none.
 pub(crate) fn first_pcurve(e: Entity<'_, '_>) -> Option<u64> {
     let list = e.attributes("SURFACE_CURVE", 1).map_or_else(|| e.args().list(2), |a| a.list(1));
     let mut curves = (0..list.len()).filter_map(|i| list.entity(i));
@@ -164,7 +166,8 @@ pub(crate) fn first_pcurve(e: Entity<'_, '_>) -> Option<u64> {
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// A curve in space with its direction; trimming is left to the caller's vertices.
+    /// Reads a curve in space with its direction. Trimming is left to the caller's vertices, except where only the cut curve has a meaning
+    /// (composite, offset, replica). Refuses kinds that are not supported, and chains of more than [`MAX_DEPTH`] references.
     pub(crate) fn curve(&self, id: u64, depth: usize) -> Outcome<DirectedCurve> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
@@ -202,7 +205,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         ahead(self.elementary_curve(e)?)
     }
 
-    /// An elementary curve or a spline.
+    /// Reads an elementary curve, polyline or B-spline; refuses any other kind, and sizes that are not positive.
     fn elementary_curve(&self, e: Entity<'f, 'a>) -> Outcome<CurveShape> {
         let mm = self.units.length;
         let positive = |x: Option<f64>, what: &str| {
@@ -258,7 +261,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Err(Refusal::new(e, "this kind of curve is not supported"))
     }
 
-    /// A B-spline curve in any of its forms.
+    /// Reads a B-spline curve in any of its forms, in mm; small faults of knots and weights are mended, others refused.
     fn spline_curve(&self, e: Entity<'f, 'a>) -> Outcome<Curve> {
         let base = e.attributes("B_SPLINE_CURVE", 1).unwrap_or_else(|| e.args());
         let shift = usize::from(!e.keyword().is_empty() && e.keyword() != "B_SPLINE_CURVE");
@@ -278,7 +281,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// A polyline by arc length; repeated points are dropped. `None` when nothing is left.
+/// Returns a polyline parametrised by arc length, mm; points nearer than [`MERGED_POINTS_MM`] are dropped. `None` when fewer than two are
+/// left.
 pub(crate) fn polyline(points: &[Point]) -> Option<Curve> {
     let mut kept: Vec<Point> = Vec::with_capacity(points.len());
     let mut lengths = Vec::with_capacity(points.len());
@@ -309,7 +313,8 @@ pub(crate) enum KnotForm {
     Bezier,
 }
 
-/// The form of a spline without knots.
+/// Returns the form of a spline of this kind (`CURVE` or `SURFACE`) without knots, by the names of its records; quasi-uniform if none
+/// tells.
 pub(crate) fn knot_form(e: Entity<'_, '_>, kind: &str) -> KnotForm {
     let is = |prefix: &str| e.keywords().any(|k| k.strip_prefix(prefix).is_some_and(|rest| rest == kind));
     if is("UNIFORM_") {
@@ -322,7 +327,7 @@ pub(crate) fn knot_form(e: Entity<'_, '_>, kind: &str) -> KnotForm {
 }
 
 impl KnotForm {
-    /// The knot vector for a degree and a number of control points.
+    /// Returns the knot vector for a degree and a number of control points; `None` where they do not fit the form.
     pub(crate) fn knots(self, degree: usize, points: usize) -> Option<Vec<f64>> {
         if degree == 0 || degree > crate::nurbs::MAX_DEGREE || points <= degree {
             return None;
@@ -349,7 +354,7 @@ impl KnotForm {
     }
 }
 
-/// Multiplicities and distinct knots as a knot vector.
+/// Returns the knot vector of multiplicities and distinct knots; `None` where they are no numbers or do not fit each other.
 pub(crate) fn explicit_knots(
     multiplicities: crate::step::part21::Args<'_, '_>,
     knots: crate::step::part21::Args<'_, '_>,

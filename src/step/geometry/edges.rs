@@ -14,7 +14,7 @@ const PASSED_BY: &str = "the line of an edge passes both its vertices by: it run
 /// Longest chain of edges that are parts of edges.
 const MAX_PARENTS: usize = 4;
 
-/// An edge before it is numbered.
+/// An edge's curve, cut to its vertices and running from the first to the second.
 #[derive(Clone, Debug)]
 pub(crate) struct TrimmedEdge {
     /// `None` for an edge without length.
@@ -26,7 +26,7 @@ pub(crate) struct TrimmedEdge {
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// An edge's curve between its vertices; that of a SUBEDGE is its parent's.
+    /// Reads an edge's curve between its vertices, mm; that of a SUBEDGE is cut from its parent's. Refuses other kinds of edges.
     pub(crate) fn edge(&self, id: u64) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
         let vertices = e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1));
@@ -44,7 +44,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         self.edge_between(e.id, [vertices.id(0), vertices.id(1)], curve, sense)
     }
 
-    /// An edge between two vertices, straight where the file gives no curve.
+    /// Reads an edge between two vertices, mm: straight where the file gives no curve, and without a curve where it has no length. `sense`
+    /// is whether it runs along the curve. Refuses missing vertices, and such as leave nothing of the curve.
     fn edge_between(
         &self,
         id: u64,
@@ -67,7 +68,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// The part of a curve between two points.
+/// Returns the part of a curve from `p` to `q`, the whole of it if `closed`; `sense` is whether the edge runs along the curve as the file
+/// names it. A wrong sense on an open curve is corrected. `None` where the vertices leave nothing of it but lie apart.
 pub(crate) fn trim_to_vertices(
     directed: &DirectedCurve,
     p: Point,
@@ -133,7 +135,7 @@ pub(crate) fn trim_to_vertices(
             if tb < ta {
                 // The sense flag is wrong, which real files show now and then: the vertices decide.
                 let curve = shape.segment(tb, ta);
-                return finish(curve, !forward, p, q);
+                return finish_edge(curve, !forward, p, q);
             }
             if !(tb - ta > 0.0) || (a - b).length() < EQUAL_POINTS_MM && matches!(shape, CurveShape::Line { .. }) {
                 return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge {
@@ -148,11 +150,11 @@ pub(crate) fn trim_to_vertices(
     if !(tb - ta > length_scale) {
         return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge { curve: None, gap: 0.0, repair: None });
     }
-    finish(shape.segment(ta, tb), forward, p, q)
+    finish_edge(shape.segment(ta, tb), forward, p, q)
 }
 
-/// The curve turned as the edge runs, with its gap to the vertices; `None` where nothing is left of it.
-fn finish(curve: Curve, forward: bool, p: Point, q: Point) -> Option<TrimmedEdge> {
+/// Returns the curve turned as the edge runs, with its gap to the vertices; `None` where it has no parameters left or is no number.
+fn finish_edge(curve: Curve, forward: bool, p: Point, q: Point) -> Option<TrimmedEdge> {
     let curve = if forward { curve } else { curve.reversed() };
     let [a, b] = curve.domain();
     if !(b > a) || curve.points.iter().any(|x| !x.is_finite()) {

@@ -10,17 +10,18 @@ use crate::step::chart::{Chart, Kind};
 use crate::step::part21::{Args, Entity};
 use std::f64::consts::PI;
 
-/// An elementary surface: where it stands, and the attributes behind its position.
+/// An elementary surface as read: where it stands, and the attributes with its sizes.
 struct Elementary<'f, 'a> {
     entity: Entity<'f, 'a>,
     frame: Frame,
     sizes: Args<'f, 'a>,
-    /// Number of the first size: a simple instance has its position before it.
+    /// Index of the first size in `sizes`: a simple instance has its position before it.
     first: usize,
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// An elementary surface; `None` for any other kind.
+    /// Returns the chart of an elementary surface, or why it is refused; `None` for any other kind. `extent` tells which part of a
+    /// self-touching torus is meant.
     pub(super) fn elementary_surface(&self, e: Entity<'f, 'a>, extent: FaceExtent<'_>) -> Option<Outcome<Chart>> {
         type Reader<'f, 'a> = fn(&Geometry<'f, 'a>, Elementary<'f, 'a>, FaceExtent<'_>) -> Outcome<Chart>;
         let readers: [(&str, Reader<'f, 'a>); 6] = [
@@ -43,11 +44,12 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Some(frame.and_then(|frame| reader(self, Elementary { entity: e, frame, sizes, first }, extent)))
     }
 
-    /// A size in mm, if it is a number.
+    /// Returns the `k`-th size in mm; `None` if it is no finite number.
     fn size(&self, s: &Elementary<'f, 'a>, k: usize) -> Option<f64> {
         s.sizes.real(s.first + k).map(|x| x * self.units.length).filter(|x| x.is_finite())
     }
 
+    /// The `k`-th size in mm; a refusal that calls it `what` unless it is positive.
     fn positive_size(&self, s: &Elementary<'f, 'a>, k: usize, what: &str) -> Outcome<f64> {
         let size = self.size(s, k).filter(|x| *x > 0.0);
         size.ok_or_else(|| Refusal::new(s.entity, format!("{what} is not positive")))
@@ -58,7 +60,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(Chart::cylinder(s.frame, radius))
     }
 
-    /// The chart of a CONICAL_SURFACE; one of next to no angle is a cylinder.
+    /// Makes the chart of a CONICAL_SURFACE; one of next to no angle is a cylinder. Refuses a negative radius and half angles of 90° or
+    /// more.
     fn cone(&self, s: &Elementary<'f, 'a>) -> Outcome<Chart> {
         let frame = s.frame;
         let radius = self.size(s, 0).filter(|r| *r >= 0.0);
@@ -73,7 +76,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(Chart::new(Kind::Cone { frame, radius, half_angle }, Analytic::Cone { frame, radius, half_angle }))
     }
 
-    /// The chart of a SPHERICAL_SURFACE: a torus whose circle is a point.
+    /// Makes the chart of a SPHERICAL_SURFACE, a torus of major radius 0; refuses a radius that is not positive.
     fn sphere(&self, s: &Elementary<'f, 'a>) -> Outcome<Chart> {
         let radius = self.positive_size(s, 0, "radius")?;
         Ok(Chart::new(
@@ -82,7 +85,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         ))
     }
 
-    /// A torus; `stated` is the part of a self-touching one that the file names.
+    /// Returns the chart of a torus; `stated` is the part of a self-touching one that the file names. Without it the points of the face
+    /// tell, and a face on both parts becomes a surface of revolution. Refuses radii that leave no surface.
     fn torus(&self, s: &Elementary<'f, 'a>, stated: Option<TorusRegion>, extent: FaceExtent<'_>) -> Outcome<Chart> {
         let frame = s.frame;
         let major = self.size(s, 0).unwrap_or(f64::NAN);
@@ -110,7 +114,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// The parts of a torus that touches itself.
+/// The parts of a torus that touches itself: the outer apple, the inner lemon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum TorusRegion {
     Apple,
@@ -119,7 +123,7 @@ enum TorusRegion {
     Both,
 }
 
-/// On which part of a self-touching torus points lie.
+/// Tells on which part of a self-touching torus (radii in mm) points lie; the apple where none tells.
 fn torus_region(frame: &Frame, major: f64, minor: f64, points: &[Point]) -> TorusRegion {
     let off = |center: f64, p: &Point| {
         let q = frame.local_point(*p);
@@ -135,7 +139,7 @@ fn torus_region(frame: &Frame, major: f64, minor: f64, points: &[Point]) -> Toru
     }
 }
 
-/// The circle that a torus turns about its axis.
+/// Returns the circle that a torus turns about its axis, in the model's coordinates.
 fn tube_circle(frame: &Frame, major: f64, minor: f64) -> Curve {
     let circle = Frame::from_axis(frame.point(Point::new(major, 0.0, 0.0)), -frame.y, Some(frame.x));
     conic::arc(&circle, minor, [0.0, 2.0 * PI])

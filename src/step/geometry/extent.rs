@@ -2,14 +2,14 @@
 
 use crate::math::{Aabb, Point};
 
-/// Where a face is, for surfaces whose curves have no ends or cross their axis.
+/// A ball around a face and some of its points, for surfaces whose curves have no ends or cross their axis.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceExtent<'r> {
-    /// Middle of its edges.
+    /// Middle of the box around its edges, mm.
     pub(crate) center: Point,
     /// Distance from there that holds them all, mm.
     pub(crate) radius: f64,
-    /// Some points of its edges.
+    /// Some points of its edges; empty where nothing is known.
     pub(crate) points: &'r [Point],
 }
 
@@ -17,7 +17,7 @@ impl<'r> FaceExtent<'r> {
     /// Nothing is known of the face.
     pub(crate) const UNKNOWN: Self = Self { center: Point::ZERO, radius: 0.0, points: &[] };
 
-    /// Around edges in a box.
+    /// Makes the ball around the box of a face's edges; [`Self::UNKNOWN`] for an empty box.
     pub(crate) fn from_bounds(bounds: Aabb, points: &'r [Point]) -> Self {
         if bounds.is_empty() {
             return Self::UNKNOWN;
@@ -25,6 +25,7 @@ impl<'r> FaceExtent<'r> {
         Self { center: bounds.center(), radius: 0.5 * bounds.diagonal(), points }
     }
 
+    /// Returns the same with a radius larger by `by`, mm.
     pub(crate) fn grown_by(self, by: f64) -> Self {
         Self { radius: self.radius + by, ..self }
     }

@@ -9,7 +9,8 @@ use crate::step::chart::profile_distance;
 /// Samples that look for crossings of the axis.
 const SAMPLES: i32 = 256;
 
-/// A meridian that crosses the axis is cut there: the part on which the points of the face lie stays.
+/// Cuts a meridian where it crosses the axis, and returns the part nearest to the points of the face; the whole one where that fits as well
+/// as any, or nothing crosses.
 pub(crate) fn keep_face_side_of_axis(frame: &Frame, curve: Curve, reach: FaceExtent<'_>) -> Curve {
     let mut parts = split_at_axis(frame, &curve);
     // A tube bent more tightly than its own radius passes through the axis.
@@ -32,8 +33,8 @@ pub(crate) fn keep_face_side_of_axis(frame: &Frame, curve: Curve, reach: FaceExt
     first.and_then(|i| parts.get(i).cloned()).unwrap_or(curve)
 }
 
-/// The parts between crossings of the axis, that of the curve's start first; none when there is no crossing. A closed
-/// curve has no ends of its own.
+/// Returns the parts between crossings of the axis, that of the curve's start first; none when there is no crossing. The first and last
+/// part of a closed curve are one.
 fn split_at_axis(frame: &Frame, curve: &Curve) -> Vec<Curve> {
     let [a, b] = curve.domain();
     let at = |t: f64| frame.local_point(curve.evaluate(t));

@@ -39,6 +39,7 @@ pub(crate) struct Refusal {
 pub(crate) type Outcome<T> = Result<T, Refusal>;
 
 impl Refusal {
+    /// Blames an entity.
     pub(crate) fn new(entity: Entity<'_, '_>, reason: impl Into<String>) -> Self {
         Self { id: entity.id, entity: entity.name(), reason: reason.into() }
     }
@@ -52,7 +53,7 @@ pub(crate) struct Geometry<'f, 'a> {
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// The instance with an id, or a refusal that says that it is missing.
+    /// Returns the instance with an id, or a refusal that says that the file has none.
     pub(crate) fn entity(&self, id: u64) -> Outcome<Entity<'f, 'a>> {
         self.file.entity(id).ok_or_else(|| Refusal {
             id,
@@ -61,7 +62,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         })
     }
 
-    /// The instance that a parameter refers to.
+    /// Returns the instance with the id `position` that `from` refers to; a refusal says that `what` is missing where there is no id, or
+    /// that the instance is.
     pub(crate) fn resolve(
         &self,
         from: Entity<'f, 'a>,
@@ -74,7 +76,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
     }
 
-    /// A CARTESIAN_POINT, mm.
+    /// Reads a CARTESIAN_POINT, mm; z is 0 for two coordinates. Refuses coordinates beyond [`FARTHEST_MM`] and other numbers of them.
     pub(crate) fn point(&self, id: u64) -> Outcome<Point> {
         let e = self.entity(id)?;
         let xs = e.attributes("CARTESIAN_POINT", 1).map(|a| a.list(0)).and_then(|l| l.reals());
@@ -92,7 +94,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(point)
     }
 
-    /// A VERTEX_POINT, mm.
+    /// Reads the place of a VERTEX_POINT, or of a CARTESIAN_POINT in its place, mm; refuses anything else.
     pub(crate) fn vertex(&self, id: u64) -> Outcome<Point> {
         let e = self.entity(id)?;
         match e.attributes("VERTEX_POINT", 1).and_then(|a| a.id(0)) {
@@ -102,7 +104,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
     }
 
-    /// A DIRECTION, not normalised; `None` when absent or zero.
+    /// Reads a DIRECTION of two or three components, not normalised; `None` when absent, broken or zero.
     pub(crate) fn direction(&self, id: Option<u64>) -> Option<Vector> {
         let e = self.file.entity(id?)?;
         let xs = e.attributes("DIRECTION", 1)?.list(0).reals()?;
@@ -114,7 +116,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         (d.is_finite() && d.length_squared() > 0.0).then_some(d)
     }
 
-    /// A VECTOR with its magnitude, mm.
+    /// Reads a VECTOR with its magnitude, mm; a magnitude of zero or none counts as one unit.
     pub(crate) fn vector(&self, id: u64) -> Outcome<Vector> {
         let e = self.entity(id)?;
         let args = e.attributes("VECTOR", 1);
@@ -127,7 +129,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
     }
 
-    /// An AXIS1_PLACEMENT, AXIS2_PLACEMENT_2D or AXIS2_PLACEMENT_3D as a right-handed frame, mm.
+    /// Reads an AXIS1_PLACEMENT, AXIS2_PLACEMENT_2D or AXIS2_PLACEMENT_3D as a right-handed frame, mm. Missing location and axes are those
+    /// of the space.
     pub(crate) fn placement(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
         let args = ["AXIS2_PLACEMENT_3D", "AXIS1_PLACEMENT", "AXIS2_PLACEMENT_2D"];
@@ -155,7 +158,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         })
     }
 
-    /// A placement or CARTESIAN_TRANSFORMATION_OPERATOR_3D: the target of a mapped item.
+    /// Reads a placement, or a CARTESIAN_TRANSFORMATION_OPERATOR_3D, which may scale and mirror, as a frame, mm: the target of a mapped
+    /// item.
     pub(crate) fn transformation(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
         let Some(args) = e.attributes("CARTESIAN_TRANSFORMATION_OPERATOR", 1).or_else(|| {

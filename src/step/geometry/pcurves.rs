@@ -11,7 +11,8 @@ use crate::step::chart::Chart;
 use crate::step::part21::{Args, Entity};
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// An OFFSET_CURVE_3D: the basis moved along the reference direction × its tangent.
+    /// Reads an OFFSET_CURVE_3D with attributes `own`: the basis moved along the reference direction × its tangent. Lines and circles stay
+    /// exact, splines are fitted within [`CURVE_ERROR_MM`]; refuses hyperbolas and parabolas.
     pub(crate) fn offset_curve(
         &self,
         e: Entity<'f, 'a>,
@@ -68,7 +69,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(DirectedCurve { shape, reversed })
     }
 
-    /// A PCURVE as a curve in space.
+    /// Reads a PCURVE as a curve in space, mm, fitted within [`CURVE_ERROR_MM`]; refuses surfaces whose parameters the chart does not keep.
     pub(crate) fn pcurve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         let own = e.attributes("PCURVE", 1).unwrap_or_else(|| e.args());
         let basis = self.resolve(e, own.id(0), "basis surface")?;
@@ -87,7 +88,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// A curve of the parameter plane, in space.
+/// Returns a curve of a chart's parameter plane as a curve in space, fitted; `scale` turns the curve's u and v into the chart's.
 fn lift_to_surface(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
     let at = |t: f64| {
         let c = curve.derivatives(t);

@@ -22,7 +22,8 @@ const SPLINES: [&str; 5] = [
 ];
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// A surface.
+    /// Reads a surface as a chart, mm and radians, of as much as a face of this extent needs; trims of the surface itself are passed over.
+    /// Refuses kinds that are not supported, and chains of more than [`MAX_DEPTH`] references.
     pub(crate) fn chart(&self, id: u64, extent: FaceExtent<'_>, depth: usize) -> Outcome<Chart> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
@@ -51,7 +52,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Err(Refusal::new(e, "this kind of surface is not supported"))
     }
 
-    /// An OFFSET_SURFACE.
+    /// Reads an OFFSET_SURFACE with attributes `a`; refused where the offset leaves nothing of its basis.
     fn offset_surface(
         &self,
         e: Entity<'f, 'a>,
@@ -68,7 +69,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         offset::offset(&basis, signed).ok_or_else(|| Refusal::new(e, "the offset leaves nothing of its basis"))
     }
 
-    /// A B-spline surface in any of its forms.
+    /// Reads a B-spline surface in any of its forms; small faults of knots and weights are mended, others refused.
     fn spline_surface(&self, e: Entity<'f, 'a>) -> Outcome<Chart> {
         let simple = !e.keyword().is_empty();
         let base = e.attributes("B_SPLINE_SURFACE", 1).unwrap_or_else(|| e.args());

@@ -13,7 +13,8 @@ use crate::step::part21::{Args, Entity};
 use std::f64::consts::PI;
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// The curve of a swept surface, cut to what can matter within reach.
+    /// Returns the curve that a surface sweeps, cut to what can matter within the face's extent, as a spline, mm; for a line, its origin
+    /// and direction too.
     fn swept_curve(
         &self,
         id: u64,
@@ -55,7 +56,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok((if directed.reversed { curve.reversed() } else { curve }, None))
     }
 
-    /// A SURFACE_OF_REVOLUTION.
+    /// Reads a SURFACE_OF_REVOLUTION with attributes `a`; a sphere, torus or cylinder in closed form where it is one and the face has
+    /// edges.
     pub(super) fn revolution(
         &self,
         e: Entity<'f, 'a>,
@@ -86,7 +88,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(Chart::revolution(frame, keep_face_side_of_axis(&frame, curve, reach)))
     }
 
-    /// A SURFACE_OF_LINEAR_EXTRUSION.
+    /// Reads a SURFACE_OF_LINEAR_EXTRUSION with attributes `a` as a chart whose u is the profile's parameter; an unbounded profile is cut
+    /// to `reach`.
     pub(super) fn extrusion(
         &self,
         e: Entity<'f, 'a>,
@@ -111,7 +114,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// A circle turned about an axis in its plane: a sphere, or a torus that does not touch itself.
+/// Returns the sphere, or torus that does not touch itself, that a circle of `radius`, mm, makes about an axis in its plane; `None` for any
+/// other circle.
 fn revolved_circle(frame: &Frame, circle: &Frame, radius: f64) -> Option<Chart> {
     let (o, n) = (frame.local_point(circle.origin), frame.local_direction(circle.z.try_normalize()?));
     let major = o.x.hypot(o.y);
@@ -146,7 +150,8 @@ fn revolved_circle(frame: &Frame, circle: &Frame, radius: f64) -> Option<Chart> 
     Some(chart)
 }
 
-/// A line turned about an axis that it is parallel to: a cylinder with the orientation of the revolution; `None` for any other line.
+/// Returns a line turned about an axis that it is parallel to: a cylinder with the orientation of the revolution; `None` for any other
+/// line.
 fn revolved_line(frame: &Frame, origin: Point, direction: Vector) -> Option<Chart> {
     let (o, d) = (frame.local_point(origin), frame.local_direction(direction.try_normalize()?));
     // Only lines that lie in a plane through the axis.

@@ -13,7 +13,7 @@ pub(crate) struct Units {
     pub(crate) length: f64,
     /// Radians per unit of plane angle.
     pub(crate) angle: f64,
-    /// The file's own distance accuracy in mm, when it states one.
+    /// The file's own distance accuracy in mm; `None` when it states none.
     pub(crate) accuracy: Option<f64>,
 }
 
@@ -22,7 +22,7 @@ impl Units {
     pub(crate) const DEFAULT: Self = Self { length: 1.0, angle: 1.0, accuracy: None };
 }
 
-/// Units that a context assigns, with their names for the report.
+/// Units that a context assigns, with their names for the report; `None` for a name that it does not assign.
 #[derive(Clone, Debug)]
 pub(crate) struct Assigned {
     pub(crate) units: Units,
@@ -30,7 +30,7 @@ pub(crate) struct Assigned {
     pub(crate) angle_name: Option<String>,
 }
 
-/// Reads the units of a representation context; what it does not assign is mm and radians.
+/// Reads the units of a representation context; what it does not assign is mm and radians. The accuracy is the smallest uncertainty of all.
 pub(crate) fn read_context(context: Entity<'_, '_>) -> Assigned {
     let mut assigned = Assigned { units: Units::DEFAULT, length_name: None, angle_name: None };
     if let Some(args) = context.attributes("GLOBAL_UNIT_ASSIGNED_CONTEXT", 2) {
@@ -67,7 +67,7 @@ enum Kind {
     Angle,
 }
 
-/// Kind, factor and name of a unit.
+/// Returns kind, factor to mm or rad, and name of a unit; `None` for other quantities and for definitions that do not fit their kind.
 fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)> {
     if depth > MAX_DEPTH {
         return None;
@@ -101,7 +101,7 @@ fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)
     (declared.is_none_or(|d| d == kind)).then_some((kind, factor, name))
 }
 
-/// An SI_UNIT of length or angle: its kind, its size in mm or rad, and its name.
+/// Returns kind, size in mm or rad, and name of an SI_UNIT with these attributes; `None` for anything but metres and radians.
 fn si_unit(args: Args<'_, '_>) -> Option<(Kind, f64, String)> {
     let prefix = args.word(0);
     let factor = prefix.map_or(Some(1.0), si_prefix)?;
@@ -114,7 +114,7 @@ fn si_unit(args: Args<'_, '_>) -> Option<(Kind, f64, String)> {
     }
 }
 
-/// Units whose definition is missing or broken, by their usual names.
+/// Returns kind and factor to mm or rad of a unit by its usual name, in any case or plural; `None` for others. For broken definitions.
 fn conventional_unit(name: &str) -> Option<(Kind, f64)> {
     Some(match name.to_ascii_uppercase().trim_end_matches('S') {
         "INCH" | "INCHE" => (Kind::Length, INCH),
@@ -128,7 +128,7 @@ fn conventional_unit(name: &str) -> Option<(Kind, f64)> {
     })
 }
 
-/// All contexts of a file that assign units.
+/// Returns all contexts of a file that assign units, by their ids.
 pub(crate) fn contexts<'f, 'a>(file: &'f File<'a>) -> impl Iterator<Item = (u64, Assigned)> + use<'f, 'a> {
     file.entities().filter(|e| e.is_a("GLOBAL_UNIT_ASSIGNED_CONTEXT")).map(|e| (e.id, read_context(e)))
 }

@@ -69,21 +69,21 @@ struct Instance {
     count: u32,
 }
 
-/// A statement that was not understood.
+/// A statement that was not understood and was skipped.
 #[derive(Clone, Debug)]
 pub(super) struct Fault {
     /// Line in the file, from 1.
     pub(super) line: usize,
-    /// Instance, when it had come that far.
+    /// The `#id` of its instance, when it had come that far.
     pub(super) id: Option<u64>,
     /// What was wrong.
     pub(super) what: &'static str,
 }
 
-/// Finds instances by id.
+/// Positions of instances by id.
 #[derive(Debug)]
 enum Index {
-    /// `table[id]` is the position plus one.
+    /// `table[id]` is the position plus one; 0 for none.
     Dense(Vec<u32>),
     Sparse(FxHashMap<u64, u32>),
 }
@@ -109,7 +109,7 @@ impl<'a> File<'a> {
         &self.source[span.range()]
     }
 
-    /// The instance with an id.
+    /// Returns the instance with an id; `None` when the file has none such.
     pub(super) fn entity(&self, id: u64) -> Option<Entity<'_, 'a>> {
         let position = match &self.index {
             Index::Dense(table) => table.get(usize::try_from(id).ok()?).copied()?.checked_sub(1)?,
@@ -118,23 +118,23 @@ impl<'a> File<'a> {
         Some(self.instance(position as usize))
     }
 
-    /// The instance at a place in the file's order.
+    /// Returns the instance at a place in the file's order.
     fn instance(&self, position: usize) -> Entity<'_, 'a> {
         let i = self.instances[position];
         Entity { file: self, id: i.id, records: &self.records[i.first as usize..(i.first + i.count) as usize] }
     }
 
-    /// The name of the instance with an id, empty when the file has none such.
+    /// Returns the name of the instance with an id, empty when the file has none such.
     pub(super) fn entity_name(&self, id: u64) -> String {
         self.entity(id).map_or_else(String::new, |e| e.name())
     }
 
-    /// All instances in the order of the file.
+    /// Returns all instances in the order of the file.
     pub(super) fn entities(&self) -> impl Iterator<Item = Entity<'_, 'a>> {
         (0..self.instances.len()).map(|i| self.instance(i))
     }
 
-    /// Parameters of a header record such as `FILE_SCHEMA`.
+    /// Returns the parameters of the first header record of this name, such as `FILE_SCHEMA`.
     pub(super) fn header(&self, name: &str) -> Option<Args<'_, 'a>> {
         let record = self.header.iter().find(|r| self.bytes(r.name) == name.as_bytes())?;
         Some(self.args(record.values))
@@ -145,7 +145,7 @@ impl<'a> File<'a> {
     }
 }
 
-/// An instance.
+/// An instance of a file.
 #[derive(Clone, Copy)]
 pub(super) struct Entity<'f, 'a> {
     file: &'f File<'a>,
@@ -155,13 +155,13 @@ pub(super) struct Entity<'f, 'a> {
 }
 
 impl<'f, 'a> Entity<'f, 'a> {
-    /// The name, or the names of a complex instance joined by `+`.
+    /// Returns the name; for a complex instance, the names of its records joined by `+`.
     pub(super) fn name(&self) -> String {
         let names = self.records.iter().map(|r| String::from_utf8_lossy(self.file.bytes(r.name)));
         names.collect::<Vec<_>>().join("+")
     }
 
-    /// The name of a simple instance; empty for a complex one.
+    /// Returns the name of a simple instance; empty for a complex one, which has several.
     pub(super) fn keyword(&self) -> &'a str {
         match self.records {
             [r] => std::str::from_utf8(self.file.bytes(r.name)).unwrap_or(""),
@@ -169,7 +169,7 @@ impl<'f, 'a> Entity<'f, 'a> {
         }
     }
 
-    /// Names of all records.
+    /// Returns the names of all records.
     pub(super) fn keywords(&self) -> impl Iterator<Item = &'a str> + use<'f, 'a> {
         let file = self.file;
         self.records.iter().map(move |r| std::str::from_utf8(file.bytes(r.name)).unwrap_or(""))
@@ -185,8 +185,8 @@ impl<'f, 'a> Entity<'f, 'a> {
         self.keywords().any(|k| names.contains(&k))
     }
 
-    /// The parameters that the record `name` adds: all of them in a complex instance, those after the `inherited`
-    /// first ones in a simple instance.
+    /// Returns the parameters that the record `name` adds: all of them in a complex instance, those after the `inherited` first ones in a
+    /// simple instance. `None` without such a record, empty where it has no more than are inherited.
     pub(super) fn attributes(&self, name: &str, inherited: usize) -> Option<Args<'f, 'a>> {
         let record = self.records.iter().find(|r| self.file.bytes(r.name) == name.as_bytes())?;
         let args = self.file.args(record.values);
@@ -196,7 +196,7 @@ impl<'f, 'a> Entity<'f, 'a> {
         Some(Args { values: args.values.get(skip..).unwrap_or(&[]), ..args })
     }
 
-    /// All parameters of a simple instance, or of the first record of a complex one.
+    /// Returns all parameters of a simple instance, or of the first record of a complex one.
     pub(super) fn args(&self) -> Args<'f, 'a> {
         match self.records.first() {
             Some(r) => self.file.args(r.values),
@@ -204,7 +204,7 @@ impl<'f, 'a> Entity<'f, 'a> {
         }
     }
 
-    /// Parameters of every record.
+    /// Returns the parameters of every record.
     pub(super) fn all_args(&self) -> impl Iterator<Item = Args<'f, 'a>> + use<'f, 'a> {
         let file = self.file;
         self.records.iter().map(move |r| file.args(r.values))
@@ -219,17 +219,17 @@ pub(super) struct Args<'f, 'a> {
 }
 
 impl<'f, 'a> Args<'f, 'a> {
-    /// Number of parameters.
+    /// Returns the number of parameters.
     pub(super) fn len(&self) -> usize {
         self.values.len()
     }
 
-    /// The parameter at a position.
+    /// Returns the parameter at a position; `None` beyond the last.
     pub(super) fn value(&self, i: usize) -> Option<Value> {
         self.values.get(i).copied()
     }
 
-    /// A number, whether written as an integer or a real, also inside a typed parameter.
+    /// Returns a number, whether written as an integer or a real, also inside a typed parameter; `None` for anything else.
     pub(super) fn real(&self, i: usize) -> Option<f64> {
         match self.value(i)? {
             Value::Real(x) => Some(x),
@@ -240,7 +240,7 @@ impl<'f, 'a> Args<'f, 'a> {
         }
     }
 
-    /// A non-negative integer, also when written as a real.
+    /// Returns a non-negative integer, also when written as a real; `None` for anything else.
     pub(super) fn count(&self, i: usize) -> Option<usize> {
         match self.value(i)? {
             Value::Integer(x) => usize::try_from(x).ok(),
@@ -250,7 +250,7 @@ impl<'f, 'a> Args<'f, 'a> {
         }
     }
 
-    /// The id that is referred to.
+    /// Returns the id of the instance that parameter `i` refers to; `None` for what is no reference.
     pub(super) fn id(&self, i: usize) -> Option<u64> {
         match self.value(i)? {
             Value::Ref(id) => Some(id),
@@ -258,12 +258,12 @@ impl<'f, 'a> Args<'f, 'a> {
         }
     }
 
-    /// The instance that is referred to.
+    /// Returns the instance that is referred to; `None` for what is no reference or leads nowhere.
     pub(super) fn entity(&self, i: usize) -> Option<Entity<'f, 'a>> {
         self.file.entity(self.id(i)?)
     }
 
-    /// A decoded text.
+    /// Returns a decoded text, also inside a typed parameter; `None` for anything else.
     pub(super) fn text(&self, i: usize) -> Option<String> {
         match self.value(i)? {
             Value::Text(span) => Some(text::decode(self.file.bytes(span))),
@@ -272,12 +272,12 @@ impl<'f, 'a> Args<'f, 'a> {
         }
     }
 
-    /// A name: a decoded text, empty where the file gives none, as the schemas allow.
+    /// Returns a decoded text, empty where the file gives none, as the schemas allow.
     pub(super) fn name(&self, i: usize) -> String {
         self.text(i).unwrap_or_default()
     }
 
-    /// An enumeration value without its dots.
+    /// Returns an enumeration value without its dots; `None` for anything else.
     pub(super) fn word(&self, i: usize) -> Option<&'a str> {
         match self.value(i)? {
             Value::Enum(span) => std::str::from_utf8(self.file.bytes(span)).ok(),
@@ -285,7 +285,7 @@ impl<'f, 'a> Args<'f, 'a> {
         }
     }
 
-    /// `.T.` or `.F.`.
+    /// Returns a truth value, `.T.` or `.F.`; `None` for anything else, `.U.` too.
     pub(super) fn flag(&self, i: usize) -> Option<bool> {
         match self.word(i)? {
             "T" | "TRUE" => Some(true),
@@ -294,7 +294,7 @@ impl<'f, 'a> Args<'f, 'a> {
         }
     }
 
-    /// A list; empty when the parameter is no list.
+    /// Returns the parameters of a list; empty when the parameter is no list.
     pub(super) fn list(&self, i: usize) -> Args<'f, 'a> {
         match self.value(i) {
             Some(Value::List(span)) => self.file.args(span),
@@ -302,7 +302,7 @@ impl<'f, 'a> Args<'f, 'a> {
         }
     }
 
-    /// A typed parameter: its name and what it holds.
+    /// Returns a typed parameter: its name and what it holds; `None` for anything else.
     pub(super) fn typed(&self, i: usize) -> Option<(&'a str, Args<'f, 'a>)> {
         match self.value(i)? {
             Value::Typed(t) => {
@@ -314,17 +314,17 @@ impl<'f, 'a> Args<'f, 'a> {
         }
     }
 
-    /// All numbers of the list; `None` when one is no number.
+    /// Returns all numbers of the list; `None` when one is no number.
     pub(super) fn reals(&self) -> Option<Vec<f64>> {
         (0..self.len()).map(|i| self.real(i)).collect()
     }
 
-    /// All ids of the list; what is no reference is left out.
+    /// Returns all ids of the list; what is no reference is left out.
     pub(super) fn ids(&self) -> Vec<u64> {
         (0..self.len()).filter_map(|i| self.id(i)).collect()
     }
 
-    /// Every id in the list and in lists inside it.
+    /// Appends every id in the list, in lists inside it and in typed parameters to `found`.
     pub(super) fn deep_ids(&self, found: &mut Vec<u64>) {
         for (i, value) in self.values.iter().enumerate() {
             match value {

@@ -80,16 +80,16 @@ pub(super) fn number(source: &[u8], at: usize) -> Option<(Value, usize)> {
         let power = POWERS[exponent.unsigned_abs() as usize];
         if exponent < 0 { mantissa as f64 / power } else { mantissa as f64 * power }
     } else {
-        slow(&source[at..i])?
+        parse_by_library(&source[at..i])?
     };
     let x = if negative { -magnitude } else { magnitude };
     // An overflow is refused: no length of a file is infinite.
     x.is_finite().then_some((Value::Real(x), i))
 }
 
-/// The absolute value by the standard library.
+/// Returns the absolute value of a number, `D` for `E` allowed, by the standard library; infinite where it overflows.
 #[cold]
-fn slow(text: &[u8]) -> Option<f64> {
+fn parse_by_library(text: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(text).ok()?;
     let text = text.trim_start_matches(['+', '-']);
     if text.contains(['D', 'd']) { text.replace(['D', 'd'], "E").parse().ok() } else { text.parse().ok() }

@@ -12,17 +12,15 @@ const END: u8 = 0;
 /// Faults that are kept with their lines; the rest is counted.
 const MAX_FAULTS: usize = 100;
 
-/// Parses a whole file. Fails only when the bytes are no Part 21 file at all.
+/// Parses a whole file, `name` being for messages. Fails only for 4 GiB and more, and for bytes that are no Part 21 file at all.
 pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a>, Error> {
-    // Places are kept as 32 bits, which halves the size of the tables.
     if u32::try_from(source.len()).is_err() {
         return Err(Error::new(ErrorKind::TooLarge { file: name.into() }));
     }
     let mut p = Parser {
         source,
         at: if source.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 },
-        // About what CAD systems write, a value in a dozen bytes and an instance in some sixty; a wrong guess costs
-        // a copy of the tables.
+        // What CAD systems write: a value in a dozen bytes, an instance in some sixty; a wrong guess costs a copy of the tables.
         values: Vec::with_capacity(source.len() / 12),
         typed: Vec::new(),
         records: Vec::with_capacity(source.len() / 64),
@@ -39,7 +37,7 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     if !marked && p.instances.is_empty() {
         return Err(Error::new(ErrorKind::NotStep { file: name.into() }));
     }
-    let (index, repeated) = index(&p.instances);
+    let (index, repeated) = index_instances(&p.instances);
     for position in repeated {
         let instance = p.instances[position];
         let start = p.records[instance.first as usize].name.start as usize;
@@ -58,12 +56,11 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     })
 }
 
-/// Finds instances by their numbers, the first where several have one; positions of the others.
-fn index(instances: &[Instance]) -> (Index, Vec<usize>) {
+/// Makes the index of instances by number, the first where several have one; returns the positions of the others too.
+fn index_instances(instances: &[Instance]) -> (Index, Vec<usize>) {
     let largest = instances.iter().map(|i| i.id).fold(0, u64::max);
     let mut repeated = Vec::new();
-    // Writers number nearly without gaps: a table is smaller and quicker than a map then. One number of 10¹⁸ must not make a table of
-    // that size.
+    // Writers number nearly without gaps: a table is smaller and quicker then. One number of 10¹⁸ must not make one of that size.
     if largest <= 4 * instances.len() as u64 + 1024 {
         let mut table = vec![0; largest as usize + 1];
         for (k, i) in instances.iter().enumerate() {
@@ -109,7 +106,7 @@ struct Parser<'a> {
 type Parsed<T> = Result<T, &'static str>;
 
 impl Parser<'_> {
-    /// Reads all statements; whether the file said that it is Part 21.
+    /// Reads all statements; returns whether the file said that it is Part 21.
     fn statements(&mut self) -> bool {
         let mut marked = false;
         loop {
@@ -157,7 +154,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Notes a fault of the statement that began at `start` and goes on behind it.
+    /// Notes a fault of the statement that began at `start`, and goes on behind that statement.
     #[cold]
     fn fault(&mut self, start: usize, id: Option<u64>, what: &'static str) {
         self.stack.clear();
@@ -181,7 +178,7 @@ impl Parser<'_> {
         self.at = if self.rewound > 8 * self.source.len() { self.source.len() } else { next };
     }
 
-    /// Lists a fault with its line.
+    /// Counts a fault, and lists it with its line while there are at most [`MAX_FAULTS`].
     fn note(&mut self, start: usize, id: Option<u64>, what: &'static str) {
         self.fault_count += 1;
         if self.faults.len() < MAX_FAULTS {
@@ -193,7 +190,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Whitespace, comments and print directives.
+    /// Skips whitespace, comments and print directives.
     fn skip(&mut self) {
         loop {
             while self.at < self.source.len() && self.source[self.at] <= b' ' {
@@ -213,7 +210,7 @@ impl Parser<'_> {
         }
     }
 
-    /// The next byte that means something, 0 at the end.
+    /// Skips blanks and returns the next byte, without taking it; [`END`] at the end.
     fn peek(&mut self) -> u8 {
         // Most bytes are no blanks: the test before the call is what reading costs.
         if let Some(&c) = self.source.get(self.at)
@@ -227,6 +224,7 @@ impl Parser<'_> {
         self.source.get(self.at).copied().unwrap_or(END)
     }
 
+    /// Takes the ';' at the end of a statement; fails without one.
     fn end(&mut self) -> Parsed<()> {
         if self.peek() != b';' {
             return Err("';' is missing at the end of the statement");
@@ -235,6 +233,7 @@ impl Parser<'_> {
         Ok(())
     }
 
+    /// Takes a name of letters, digits, '_', '-' and '!'; empty where none stands here.
     fn identifier(&mut self) -> Span {
         let start = self.at;
         while let Some(c) = self.source.get(self.at) {
@@ -246,17 +245,18 @@ impl Parser<'_> {
         Span { start: start as u32, len: (self.at - start) as u32 }
     }
 
+    /// Reads the digits of an id behind '#'; numbers beyond 64 bits are damage and all become `u64::MAX`. Fails where there is no digit.
     fn unsigned(&mut self) -> Parsed<u64> {
         let start = self.at;
         let mut x = 0u64;
         while let Some(c) = self.source.get(self.at).filter(|c| c.is_ascii_digit()) {
-            // Numbers beyond 64 bits are damage; all of them become one.
             x = x.saturating_mul(10).saturating_add(u64::from(c - b'0'));
             self.at += 1;
         }
         if self.at == start { Err("digits are missing behind '#'") } else { Ok(x) }
     }
 
+    /// Reads an instance, simple or complex, from its '#' on; sets `id_out` once its number is known. A missing ';' before '#' is forgiven.
     fn instance(&mut self, id_out: &mut Option<u64>) -> Parsed<()> {
         self.at += 1;
         let id = self.unsigned()?;
@@ -291,6 +291,7 @@ impl Parser<'_> {
         ended
     }
 
+    /// Reads a record, NAME( … ), and appends it to the table.
     fn record(&mut self) -> Parsed<()> {
         let c = self.peek();
         if !(c.is_ascii_alphabetic() || c == b'!' || c == b'_') {
@@ -305,7 +306,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// A list from its '(' to behind its ')'.
+    /// Reads a list from its '(' to behind its ')'; empty places between commas are left out.
     fn list(&mut self, depth: usize) -> Parsed<Span> {
         if depth > MAX_DEPTH {
             return Err("lists are nested too deeply");
@@ -327,11 +328,11 @@ impl Parser<'_> {
         self.at += 1;
         let span = Span { start: self.values.len() as u32, len: (self.stack.len() - base) as u32 };
         self.values.extend_from_slice(&self.stack[base..]);
-        // The stack keeps its memory for the next list.
         self.stack.truncate(base);
         Ok(span)
     }
 
+    /// Reads the value that begins with byte `c`, in a list of this depth; a binary is stepped over, as nothing asks for what it holds.
     fn value(&mut self, c: u8, depth: usize) -> Parsed<Value> {
         Ok(match c {
             b'#' => {
@@ -359,7 +360,6 @@ impl Parser<'_> {
                 Value::Enum(name)
             }
             b'"' => {
-                // Nothing asks for what a binary holds.
                 let rest = &self.source[self.at + 1..];
                 self.at += 2 + rest.iter().position(|&b| b == b'"').ok_or("'\"' is missing behind a binary")?;
                 Value::Binary
@@ -382,6 +382,7 @@ impl Parser<'_> {
         })
     }
 
+    /// Takes a text in apostrophes, two of which are one inside of it; returns the span between them, not decoded.
     fn text(&mut self) -> Parsed<Span> {
         self.at += 1;
         let start = self.at;
@@ -389,7 +390,6 @@ impl Parser<'_> {
             let rest = self.source.get(self.at..).unwrap_or(&[]);
             let end = rest.iter().position(|&b| b == b'\'').ok_or("an apostrophe is missing behind a text")?;
             self.at += end + 1;
-            // Two apostrophes are one inside of the text.
             if self.source.get(self.at) != Some(&b'\'') {
                 break;
             }

@@ -1,6 +1,6 @@
 //! Texts: `''`, `\S\`, `\P?\`, `\X\`, `\X2\…\X0\`, `\X4\…\X0\`, and raw bytes, which real files hold as UTF-8 or Latin-1.
 
-/// Decodes what stands between the apostrophes; unknown escapes stay as they are.
+/// Decodes what stands between the apostrophes of a text. Line breaks are dropped; escapes that are unknown or broken stay as they are.
 pub(super) fn decode(raw: &[u8]) -> String {
     let mut out = String::with_capacity(raw.len());
     let mut i = 0;
@@ -23,7 +23,7 @@ pub(super) fn decode(raw: &[u8]) -> String {
         } else if rest.starts_with(b"\\\\") {
             plain.push(b'\\');
             i += 2;
-        } else if let Some((text, used)) = escape(rest) {
+        } else if let Some((text, used)) = decode_escape(rest) {
             flush(&mut plain, &mut out);
             out.push_str(&text);
             i += used;
@@ -39,8 +39,9 @@ pub(super) fn decode(raw: &[u8]) -> String {
     out
 }
 
-/// A control directive at the start of `rest`: what it stands for, and its length.
-fn escape(rest: &[u8]) -> Option<(String, usize)> {
+/// Reads a control directive at the start of `rest`: what it stands for, maybe nothing, and its length in bytes. `None` where there is
+/// none.
+fn decode_escape(rest: &[u8]) -> Option<(String, usize)> {
     if rest.starts_with(b"\\S\\") {
         return rest.get(3).map(|&b| (char::from(b | 0x80).to_string(), 4));
     }
@@ -52,7 +53,7 @@ fn escape(rest: &[u8]) -> Option<(String, usize)> {
         return Some((String::new(), 3));
     }
     if rest.starts_with(b"\\X\\") {
-        return Some((char::from(hex(rest.get(3..5)?)? as u8).to_string(), 5));
+        return Some((char::from(parse_hex(rest.get(3..5)?)? as u8).to_string(), 5));
     }
     let wide = rest.starts_with(b"\\X4\\");
     if !wide && !rest.starts_with(b"\\X2\\") {
@@ -68,16 +69,16 @@ fn escape(rest: &[u8]) -> Option<(String, usize)> {
     let codes = &rest[4..end];
     let text = if wide {
         // What is no character is shown as one that says so.
-        codes.chunks(8).map(|c| hex(c).and_then(char::from_u32).unwrap_or('\u{fffd}')).collect()
+        codes.chunks(8).map(|c| parse_hex(c).and_then(char::from_u32).unwrap_or('\u{fffd}')).collect()
     } else {
         // Edition 2 calls these codes UCS-2; writers put UTF-16 with its surrogates there.
-        let units: Vec<u16> = codes.chunks(4).map(|c| hex(c).unwrap_or(0xfffd) as u16).collect();
+        let units: Vec<u16> = codes.chunks(4).map(|c| parse_hex(c).unwrap_or(0xfffd) as u16).collect();
         String::from_utf16_lossy(&units)
     };
     Some((text, end + 4))
 }
 
-fn hex(digits: &[u8]) -> Option<u32> {
+fn parse_hex(digits: &[u8]) -> Option<u32> {
     u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()
 }
 

@@ -1,8 +1,7 @@
 //! Products, occurrences and representations: which representation stands where.
 //!
-//! Walks from the products that no other product uses, along NEXT_ASSEMBLY_USAGE_OCCURRENCEs and their
-//! CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs, and inside representations along relationships and MAPPED_ITEMs.
-//! What holds shapes and is reached by no product is placed where it is.
+//! Walks from the products that no other uses along NEXT_ASSEMBLY_USAGE_OCCURRENCEs and CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs,
+//! and inside representations along relationships and MAPPED_ITEMs. Shapes that no product reaches are placed where they are.
 
 use super::purpose::{holds_mesh, purpose_besides_shape};
 use crate::math::Frame;
@@ -28,7 +27,7 @@ pub(crate) struct PlacedRepresentation {
     pub(crate) orphan: bool,
 }
 
-/// A directed relationship: what it leads to, and how that is placed.
+/// A directed relationship: the representation it leads to, and how that is placed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Link {
     pub(super) to: u64,
@@ -41,7 +40,7 @@ pub(super) struct Usage {
     id: u64,
 }
 
-/// Structure of the file.
+/// The structure of a file, and the state of the walk through it.
 pub(crate) struct Assembly<'f, 'a> {
     pub(super) file: &'f File<'a>,
     /// Units by context.
@@ -74,7 +73,7 @@ pub(crate) struct Assembly<'f, 'a> {
 }
 
 impl<'f, 'a> Assembly<'f, 'a> {
-    /// Reads the structure.
+    /// Reads products, usages and relationships; places nothing yet. `fallback` are the units of representations without a context.
     pub(crate) fn read(file: &'f File<'a>, units: FxHashMap<u64, Units>, fallback: Units) -> Self {
         let mut a = Self {
             file,
@@ -125,7 +124,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         a
     }
 
-    /// Units of a representation.
+    /// Returns the units of a representation's context; `fallback` where it names none or one that assigns none.
     pub(crate) fn units_of(&self, representation: u64) -> Units {
         let context = self
             .file
@@ -138,18 +137,18 @@ impl<'f, 'a> Assembly<'f, 'a> {
         Geometry { file: self.file, units: self.units_of(representation) }
     }
 
-    /// ShapeItems of a representation.
+    /// Returns the ids of the items of a representation; empty when the file does not have it.
     pub(crate) fn items(&self, representation: u64) -> Vec<u64> {
         let Some(e) = self.file.entity(representation) else { return Vec::new() };
         let args = e.attributes("REPRESENTATION", 0).unwrap_or_else(|| e.args());
         args.list(1).ids()
     }
 
-    /// Notes which product a representation shows, or which aspect of one.
+    /// Notes which product a representation shows, or which aspect of one; nothing where either is missing.
     fn read_shape_definition(&mut self, definition: Option<Entity<'f, 'a>>, representation: Option<u64>) {
         let (Some(definition), Some(representation)) = (definition, representation) else { return };
         // PRODUCT_DEFINITION_SHAPE of a product definition; those of usages and shape aspects place nothing.
-        let target = described(definition).entity(2);
+        let target = property_attributes(definition).entity(2);
         let Some(target) = target else { return };
         if !target.keywords().any(|k| k.starts_with("PRODUCT_DEFINITION")) {
             // Shapes of usages are placed by them; the geometry of an aspect is a part of its product's, named once more.
@@ -165,7 +164,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         self.owned.insert(representation);
     }
 
-    /// The two representations of a relationship and the placement of the first in the second, if it has one.
+    /// Returns the two representations of a relationship, and the first's placement in the second; that is `None` if none can be read.
     fn related_representations(&self, e: Entity<'f, 'a>) -> Option<(u64, u64, Option<Frame>)> {
         let base = e.attributes("REPRESENTATION_RELATIONSHIP", 0).unwrap_or_else(|| e.args());
         let (first, second) = (base.id(2)?, base.id(3)?);
@@ -189,12 +188,12 @@ impl<'f, 'a> Assembly<'f, 'a> {
         Some((first, second, placement))
     }
 
-    /// Reads a CONTEXT_DEPENDENT_SHAPE_REPRESENTATION: where the child of its usage stands in the parent.
+    /// Reads where the child of a usage stands in the parent, by a CONTEXT_DEPENDENT_SHAPE_REPRESENTATION; its relation goes into `used`.
     fn read_contextual(&mut self, e: Entity<'f, 'a>, used: &mut FxHashSet<u64>) {
         let args = e.args();
         let (Some(relation), Some(shape)) = (args.entity(0), args.entity(1)) else { return };
         used.insert(relation.id);
-        let Some(usage) = described(shape).id(2) else { return };
+        let Some(usage) = property_attributes(shape).id(2) else { return };
         let Some((first, second, placement)) = self.related_representations(relation) else { return };
         let Some(mut placement) = placement else { return };
         // The first representation is the child's; some writers swap them.
@@ -208,6 +207,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         self.placements.entry(usage).or_insert(placement);
     }
 
+    /// Links the two representations of a relationship: one way by its placement, or both ways, unmoved, if none can be read.
     fn read_relationship(&mut self, e: Entity<'f, 'a>) {
         let Some((first, second, placement)) = self.related_representations(e) else { return };
         match placement {
@@ -220,7 +220,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
     }
 
-    /// Every placed representation, in the order of the file; what was visited when that became more than `limit`.
+    /// Places everything, in an order that the file decides; fails, with the number of visits, when these become more than `limit`.
     pub(crate) fn walk(mut self, limit: u64) -> Result<(Vec<PlacedRepresentation>, Self), u64> {
         self.limit = limit;
         let children: FxHashSet<u64> = self.usages.values().flatten().map(|u| u.child).collect();
@@ -243,7 +243,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         if self.visited > limit { Err(self.visited) } else { Ok((std::mem::take(&mut self.placed), self)) }
     }
 
-    /// Representations with shapes that no product reaches.
+    /// Places representations that no product reaches, except those of aspects, which are listed in `left_out`.
     fn place_orphans(&mut self) {
         self.in_orphans = true;
         // From here on what products reach is closed: an orphan that leads to it would show it twice.
@@ -273,7 +273,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
     }
 
-    /// Empty for a definition whose product cannot be found: what uses it names it then.
+    /// Returns the product's name, or else its id; empty where it cannot be found: what uses it names it then.
     fn product_name(&self, definition: u64) -> String {
         let product = || {
             let formation = self.file.entity(definition)?.attributes("PRODUCT_DEFINITION", 0)?.entity(2)?;
@@ -394,7 +394,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
     }
 }
 
-/// Attributes of a property definition, the third of which is what it describes; subtypes add none.
-fn described<'f, 'a>(definition: Entity<'f, 'a>) -> Args<'f, 'a> {
+/// Returns the attributes of a property definition, the third of which is what it describes; subtypes add none.
+fn property_attributes<'f, 'a>(definition: Entity<'f, 'a>) -> Args<'f, 'a> {
     definition.attributes("PROPERTY_DEFINITION", 0).unwrap_or_else(|| definition.args())
 }

@@ -40,7 +40,7 @@ const EMPTY_EDGE_MM: f64 = 1e-9;
 /// Edges of a face whose points are asked for where a surface is sized by them.
 const ASKED_EDGES: usize = 64;
 
-/// Converts the items of a representation.
+/// Converts the shapes of a representation into a part, in mm; never fails: faces that cannot be had are refused, one by one.
 pub(crate) fn convert(
     file: &File<'_>,
     units: Units,
@@ -78,7 +78,7 @@ pub(crate) fn convert(
         match outcome {
             Ok(built) => {
                 if !built.repairs.is_empty() {
-                    out.repaired.push(remark(file, id, built.repairs.join("; ")));
+                    out.repaired.push(repair_note(file, id, built.repairs.join("; ")));
                 }
                 let name = plans[&id].as_ref().map_or_else(|_| String::new(), |p| p.name.clone());
                 faces.insert(id, add_face(built, id, name, &mut part, &numbers, styles));
@@ -93,13 +93,13 @@ pub(crate) fn convert(
     out
 }
 
-/// A remark about an instance of the file.
-fn remark(file: &File<'_>, id: u64, reason: String) -> Refusal {
+/// Names an instance of the file with a reason, for a repair.
+fn repair_note(file: &File<'_>, id: u64, reason: String) -> Refusal {
     Refusal { id, entity: file.entity_name(id), reason }
 }
 
-/// Moves edges, and the vertices that they share, into the part; the number of each key's edge there, none for edges that failed or have
-/// no length. Of the latter the two vertices become one.
+/// Moves edges, and the vertices that they share, into the part. Returns the number of each key's edge there, `None` for edges that failed
+/// or have no length. Of the latter the two vertices become one.
 fn add_edges(
     geometry: &Geometry<'_, '_>,
     keys: &[EdgeKey],
@@ -115,7 +115,7 @@ fn add_edges(
             continue;
         };
         let [a, b] = curve.domain();
-        let ends = vertex_ids(geometry.file, *key).map(|id| id.map(|id| first_of(&joined, id)));
+        let ends = vertex_ids(geometry.file, *key).map(|id| id.map(|id| joined_vertex(&joined, id)));
         let vertices = [(ends[0], a), (ends[1], b)].map(|(id, t)| {
             *vertices.entry(id).or_insert_with(|| {
                 // The file's own vertex, where it has one: edges that meet there end at the same bits.
@@ -131,8 +131,8 @@ fn add_edges(
     numbers
 }
 
-/// For the second vertex of each edge without length the first: such an edge is left out, and the faces on both of its sides would
-/// meet in two places, with a slit between them.
+/// Maps the second vertex of each edge without length to the first: such an edge is left out, and the faces on both of its sides would meet
+/// in two places, with a slit between them.
 fn vertices_of_empty_edges(
     file: &File<'_>,
     keys: &[EdgeKey],
@@ -142,7 +142,7 @@ fn vertices_of_empty_edges(
     let mut joined: FxHashMap<u64, u64> = FxHashMap::default();
     for (key, edge) in keys.iter().zip(edges) {
         if let (Ok(TrimmedEdge { curve: None, .. }), [Some(a), Some(b)]) = (edge, vertex_ids(file, *key)) {
-            let (a, b) = (first_of(&joined, a), first_of(&joined, b));
+            let (a, b) = (joined_vertex(&joined, a), joined_vertex(&joined, b));
             if a != b {
                 joined.insert(b, a);
             }
@@ -151,8 +151,8 @@ fn vertices_of_empty_edges(
     joined
 }
 
-/// The vertex that stands for all that empty edges join with one.
-fn first_of(joined: &FxHashMap<u64, u64>, mut vertex: u64) -> u64 {
+/// Returns the vertex that stands for all that empty edges join with `vertex`.
+fn joined_vertex(joined: &FxHashMap<u64, u64>, mut vertex: u64) -> u64 {
     while let Some(&before) = joined.get(&vertex) {
         vertex = before;
     }
@@ -160,7 +160,8 @@ fn first_of(joined: &FxHashMap<u64, u64>, mut vertex: u64) -> u64 {
     vertex
 }
 
-/// Puts the faces into their shells; the shell of a solid that is inside out is turned.
+/// Puts the faces into shells of the part; faces that contradict their neighbours, and the outer shell of a solid that is inside out, are
+/// turned and listed as repaired. Shells without a face are left out.
 fn add_shells(
     file: &File<'_>,
     items: &ShapeItems,
@@ -190,14 +191,14 @@ fn add_shells(
             own[k].reversed ^= true;
             let reason =
                 "its sense contradicts its edges, which run against those of its neighbours: the edges decide";
-            out.repaired.extend(own[k].entity.map(|id| remark(file, id, reason.into())));
+            out.repaired.extend(own[k].entity.map(|id| repair_note(file, id, reason.into())));
         }
         // Only a whole shell tells by its volume which way it faces.
         if plan.outer && own.len() == plan.faces.len() && is_inside_out(&own) {
             own.iter_mut().for_each(|face| face.reversed ^= true);
             // Rays would enter where they should leave: one such file lost 857 of 50,000.
             let reason = "the shell of a solid was inside out";
-            out.repaired.extend(plan.owners.first().map(|owner| remark(file, *owner, reason.into())));
+            out.repaired.extend(plan.owners.first().map(|owner| repair_note(file, *owner, reason.into())));
         }
         enclosed = if plan.void { enclosed } else { !own.is_empty() };
         if !own.is_empty() {
@@ -212,7 +213,7 @@ fn add_shells(
     }
 }
 
-/// Vertex entities of an edge.
+/// Returns the ids of an edge's vertices, as the file orders them; `None` for each that it does not name.
 fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
     match key {
         EdgeKey::Straight(a, b) => [Some(a), Some(b)],
@@ -224,7 +225,7 @@ fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
     }
 }
 
-/// The curve of an edge, or the line between two points of a loop.
+/// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length.
 fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<TrimmedEdge> {
     match key {
         EdgeKey::Entity(id) => geometry.edge(id),
@@ -242,17 +243,18 @@ fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<TrimmedEdge>
 
 /// The edges of a face, in the order of its loops.
 struct FaceEdges<'e> {
-    /// By number.
+    /// By place among the edges that were asked for.
     curves: FxHashMap<usize, &'e Curve>,
-    /// Number of the edge, and whether the loop runs against it.
+    /// For each loop the edges, and whether it runs against them; loops without length are left out.
     loops: Vec<Vec<(usize, bool)>>,
+    /// Around the edges, mm.
     bounds: Aabb,
     /// Largest distance of an edge's ends from its vertices, mm.
     gap: f64,
     repairs: Vec<&'static str>,
 }
 
-/// Collects the edges of a face and puts each loop in order.
+/// Collects the edges of a face that have a length, and puts each loop in order; fails with the first edge that cannot be had.
 fn face_edges<'e>(
     plan: &FacePlan,
     edges: &'e [Outcome<TrimmedEdge>],
@@ -300,7 +302,7 @@ fn is_sized_by_edges(file: &File<'_>, surface: u64) -> bool {
     file.entity(surface).is_some_and(|e| !e.keywords().any(known))
 }
 
-/// The refusal of a face whose surface reaches farther than numbers tell places apart.
+/// Refuses a face whose surface reaches farther than numbers tell places apart.
 fn beyond_rounding(geometry: &Geometry<'_, '_>, id: u64, plan: &FacePlan) -> Refusal {
     let surface = geometry.file.entity_name(plan.surface);
     let reason =
@@ -308,7 +310,8 @@ fn beyond_rounding(geometry: &Geometry<'_, '_>, id: u64, plan: &FacePlan) -> Ref
     Refusal { id, entity: geometry.file.entity_name(id), reason }
 }
 
-/// One face of a plan: its edges joined to loops, its chart, and the trims on it.
+/// Converts one face of a plan: its edges joined to loops, its chart, and the trims on it. `edges` are all of the part, found by `index`; a
+/// refusal names the face and, in its reason, what below it is to blame.
 fn convert_face(
     geometry: &Geometry<'_, '_>,
     id: u64,

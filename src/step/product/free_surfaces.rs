@@ -23,10 +23,11 @@ const LOOSE_BOUNDARY_MM: f64 = 1e-3;
 /// A rectangle short of a whole period by less than this share of it is whole.
 const PERIOD_SLACK: f64 = 1e-9;
 
-/// A built face with its boundary curves.
+/// A built face with its boundary curves, loop by loop.
 type Bounded = (BuiltFace, Vec<Vec<Curve>>);
 
-/// Converts what is not a face of a shell: each surface becomes a shell of one face.
+/// Converts what is not a face of a shell: each surface becomes a shell of one face in the part, and each mesh a tessellated face. Counts
+/// and refusals go to `out`.
 pub(crate) fn convert_free_surfaces(
     geometry: &Geometry<'_, '_>,
     items: &ShapeItems,
@@ -64,7 +65,7 @@ pub(crate) fn convert_free_surfaces(
     }));
 }
 
-/// Adds boundary curves as edges; ends that follow on each other share a vertex.
+/// Adds boundary curves to the part as edges; ends that follow on each other in a boundary share a vertex. Returns their numbers, in order.
 fn number_boundaries(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option<EdgeId>> {
     let mut numbers = Vec::new();
     for boundary in boundaries {
@@ -81,7 +82,7 @@ fn number_boundaries(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option
     numbers
 }
 
-/// One surface with its boundaries, if it has any.
+/// Builds the face of one surface with its boundaries; without any, of the whole surface or of its rectangle of parameters.
 fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) -> Outcome<Bounded> {
     let e = geometry.entity(id)?;
     let (mut boundaries, mut implicit) = (Vec::new(), false);
@@ -119,7 +120,8 @@ fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) ->
     Ok((built, boundaries))
 }
 
-/// The task of trimming a surface by boundaries that belong to it alone.
+/// Makes the task of trimming a surface by boundaries that belong to it alone: each curve is an edge of its own, numbered through all
+/// boundaries.
 fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings) -> FaceTask<'e> {
     // Boundaries of free surfaces share no edges: each use has one of its own, and runs along it.
     let mut edges = FxHashMap::default();
@@ -145,7 +147,8 @@ fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings
     }
 }
 
-/// The parameter rectangle of a RECTANGULAR_TRIMMED_SURFACE in the chart's parameters.
+/// Returns the parameter rectangle of a RECTANGULAR_TRIMMED_SURFACE in the chart's parameters, ascending; over a seam its end lies beyond
+/// the period.
 fn trim_rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart) -> Outcome<[[f64; 2]; 2]> {
     let Some(a) = e.attributes("RECTANGULAR_TRIMMED_SURFACE", 1) else {
         return Err(Refusal::new(e, "is not trimmed"));

@@ -19,14 +19,14 @@ impl<T> DirectedUse<T> {
     }
 }
 
-/// Largest step from one use to the next, mm.
+/// Returns the largest step from one use to the next, all around, mm; 0 without uses.
 fn largest_gap<T>(uses: &[DirectedUse<T>]) -> f64 {
     let n = uses.len();
     (0..n).map(|i| (uses[(i + 1) % n].from - uses[i].to).length()).fold(0.0, f64::max)
 }
 
-/// Makes each use begin where the one before ends, within `tolerance` mm; says what was changed. A loop that cannot be
-/// closed this way stays as it was.
+/// Makes each use of a loop begin where the one before ends, within `tolerance` mm, and says what was changed. `None` where nothing had to
+/// be, and where the loop cannot be closed this way and stays as it was.
 pub(crate) fn put_in_order<T: Copy>(uses: &mut Vec<DirectedUse<T>>, tolerance: f64) -> Option<&'static str> {
     if largest_gap(uses) <= tolerance {
         return None;
@@ -45,7 +45,7 @@ pub(crate) fn put_in_order<T: Copy>(uses: &mut Vec<DirectedUse<T>>, tolerance: f
     None
 }
 
-/// Single uses turned around between neighbours that both fit the other way.
+/// Turns single uses around between neighbours that fit the other way; `None` when that does not close the loop.
 fn turn_misfits<T: Copy>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<Vec<DirectedUse<T>>> {
     let n = uses.len();
     let mut out = uses.to_vec();
@@ -63,7 +63,7 @@ fn turn_misfits<T: Copy>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<Vec<
     (largest_gap(&out) <= tolerance).then_some(out)
 }
 
-/// The uses chained anew from the first, turned where only their far end fits.
+/// Chains the uses anew from the first, turned where only their far end fits; `None` when that does not close the loop, or it is too long.
 fn chain_from_first<T: Copy>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<Vec<DirectedUse<T>>> {
     // Quadratic in the length: longer loops than this are left alone.
     if uses.len() > 2000 {

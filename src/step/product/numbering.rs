@@ -17,14 +17,16 @@ const LARGEST_GAP_MM: f64 = 0.1;
 #[derive(Debug, Default)]
 pub(crate) struct ConvertedPart {
     pub(crate) part: Part,
-    /// Faces the file has, distinct.
+    /// Faces that the file has, distinct, the refused ones included.
     pub(crate) found: usize,
+    /// Why faces could not be had.
     pub(crate) refused: Vec<Refusal>,
     /// Faces that were repaired, and how.
     pub(crate) repaired: Vec<Refusal>,
 }
 
-/// Numbers a built face's seams and vertices into the part.
+/// Makes a face of a built one: adds its seams as edges, and vertices for their ends where none of the face is near, to the part. `numbers`
+/// are the part's edges by those of the built face, `None` for one without length.
 pub(crate) fn add_face(
     built: BuiltFace,
     id: u64,

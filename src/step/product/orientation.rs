@@ -16,8 +16,8 @@ const GRIDS: [usize; 3] = [4, 16, 23];
 /// Points on each edge of a loop.
 const EDGE: usize = 6;
 
-/// Faces that look inwards where their neighbours look outwards: of two groups that contradict each other along all edges between them,
-/// the smaller one. None where edges give no two groups (a Möbius band) or groups of one size.
+/// Returns the indices of faces, ascending, that look inwards where their neighbours look outwards: of two groups that contradict each
+/// other along all edges between them, the smaller one. Empty where edges give no two groups (a Möbius band) or groups of one size.
 pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
     // For each edge the faces that use it and whether they run along it.
     let mut uses: FxHashMap<EdgeId, Vec<(usize, bool)>> = FxHashMap::default();
@@ -74,11 +74,11 @@ pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
     out
 }
 
-/// Whether the faces of the outer shell of a solid, all of them, are certainly turned inwards.
+/// Whether the faces of the outer shell of a solid, all of them, are certainly turned inwards; false where that is not certain.
 pub(crate) fn is_inside_out(faces: &[Face]) -> bool {
-    let loops: Vec<Vec<Vec<Uv>>> = faces.par_iter().map(polygons).collect();
+    let loops: Vec<Vec<Vec<Uv>>> = faces.par_iter().map(loop_polygons).collect();
     // About the middle of the solid the terms are least, and what cancels between faces with them.
-    let around = Aabb::from_points(faces.iter().map(|f| f.surface.evaluate(middle(f))));
+    let around = Aabb::from_points(faces.iter().map(|f| f.surface.evaluate(domain_center(f))));
     if around.is_empty() {
         return false;
     }
@@ -97,13 +97,13 @@ pub(crate) fn is_inside_out(faces: &[Face]) -> bool {
     fine < 0.0 && -fine > 4.0 * (fine - coarse).abs() && -fine > 0.02 * whole
 }
 
-fn middle(face: &Face) -> Uv {
+fn domain_center(face: &Face) -> Uv {
     let [[u0, u1], [v0, v1]] = face.surface.domain();
     Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1))
 }
 
-/// The loops as polygons of a few points an edge.
-fn polygons(face: &Face) -> Vec<Vec<Uv>> {
+/// Returns a face's loops as polygons, in parameters: [`EDGE`] points on each edge, in the direction of the loop.
+fn loop_polygons(face: &Face) -> Vec<Vec<Uv>> {
     let points = |u: &crate::model::EdgeUse| {
         let ([a, b], reversed) = (u.uv.domain(), u.reversed);
         (0..EDGE)
@@ -114,15 +114,16 @@ fn polygons(face: &Face) -> Vec<Vec<Uv>> {
     face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
 }
 
-/// Whether a point lies inside of the polygons, by even and odd crossings.
-fn inside(loops: &[Vec<Uv>], p: Uv) -> bool {
+/// Whether a point lies inside of the polygons, by even and odd crossings; always, if there are none.
+fn is_inside(loops: &[Vec<Uv>], p: Uv) -> bool {
     let sides = loops.iter().flat_map(|l| (0..l.len()).map(move |i| (l[i], l[(i + 1) % l.len()])));
     let crossed =
         |(a, b): &(Uv, Uv)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
     loops.is_empty() || sides.filter(crossed).count() % 2 == 1
 }
 
-/// A third of the flow of `p - center` out of a face, and what it would be with all signs alike.
+/// Returns a third of the flow of `p - center` out of a face, mm³, and what it would be with all signs alike, by the middles of a grid of
+/// `grid` cells each way over what `loops` enclose (none: all); zeros if that has no area.
 fn flux(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> [f64; 2] {
     let [[u0, u1], [v0, v1]] = face.surface.domain();
     let (mut low, mut high) = (Uv::new(u0, v0), Uv::new(u1, v1));
@@ -139,7 +140,7 @@ fn flux(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> [f64; 2] 
     let (mut sum, mut whole) = (0.0, 0.0);
     for k in 0..grid * grid {
         let uv = low + step * Uv::new((k % grid) as f64 + 0.5, (k / grid) as f64 + 0.5);
-        if !inside(loops, uv) {
+        if !is_inside(loops, uv) {
             continue;
         }
         let d = face.surface.derivatives(uv);

@@ -10,7 +10,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 const MAX_DEPTH: usize = 64;
 
 impl Assembly<'_, '_> {
-    /// How many products and representations a walk would place, without walking: what is used twice counts twice.
+    /// Returns how many products and representations a walk would place, without walking: what is used twice counts twice. At least 1;
+    /// beyond 64 bits the largest number.
     pub(crate) fn count(&self) -> u64 {
         let children: FxHashSet<u64> = self.usages.values().flatten().map(|u| u.child).collect();
         let mut counter = Counter { assembly: self, products: FxHashMap::default(), shapes: FxHashMap::default() };
@@ -31,13 +32,14 @@ impl Assembly<'_, '_> {
 /// Counts what a walk would place; each product and representation is looked at once.
 struct Counter<'c, 'f, 'a> {
     assembly: &'c Assembly<'f, 'a>,
-    /// Numbers that are known; 0 while they are being found, so that cycles end.
+    /// Numbers of products that are known; 0 while they are being found, so that cycles end.
     products: FxHashMap<u64, u64>,
+    /// The same of representations.
     shapes: FxHashMap<u64, u64>,
 }
 
 impl Counter<'_, '_, '_> {
-    /// How many a walk would place for a product: itself, its representations and what its children place.
+    /// Returns how many a walk would place for a product: itself, its representations and what its children place.
     fn product(&mut self, id: u64, depth: usize) -> u64 {
         if let Some(known) = self.products.get(&id) {
             return *known;
@@ -58,7 +60,7 @@ impl Counter<'_, '_, '_> {
         count
     }
 
-    /// How many a walk would place for a representation: itself, what it maps and what it is related to.
+    /// Returns how many a walk would place for a representation: itself, what it maps and what it is related to.
     fn representation(&mut self, id: u64, depth: usize) -> u64 {
         if let Some(known) = self.shapes.get(&id) {
             return *known;

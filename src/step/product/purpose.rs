@@ -2,7 +2,7 @@
 
 use crate::step::part21::File;
 
-/// What a representation is for, when that is not the shape of a product.
+/// Returns what a representation is for, for messages, when that is not the shape of a product; else `None`. Told by its names in the file.
 pub(super) fn purpose_besides_shape(file: &File<'_>, id: u64) -> Option<&'static str> {
     let e = file.entity(id)?;
     let has = |word: &str| e.keywords().any(|k| k.contains(word));
@@ -16,7 +16,7 @@ pub(super) fn purpose_besides_shape(file: &File<'_>, id: u64) -> Option<&'static
     e.keywords().any(shows).then_some("says how something is shown")
 }
 
-/// Whether one of these items is a ready mesh.
+/// Whether one of these items is a ready mesh, told by its name.
 pub(super) fn holds_mesh(file: &File<'_>, items: &[u64]) -> bool {
     let mesh = |k: &str| k.contains("TRIANGULATED") || k.starts_with("TESSELLATED");
     items.iter().any(|i| file.entity(*i).is_some_and(|e| e.keywords().any(mesh)))

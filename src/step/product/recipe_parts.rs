@@ -16,7 +16,7 @@ use crate::step::trim::task::FaceTask;
 /// Ends of edges of one recipe this near are one vertex, mm: the curves of a profile meet as loosely as its file says.
 const SAME_VERTEX_MM: f64 = 1e-3;
 
-/// Converts the recipes of a representation: each becomes a closed shell.
+/// Converts the recipes of a representation: each becomes a closed shell of the part. Counts and refusals go to `out`.
 pub(super) fn convert_recipes(
     geometry: &Geometry<'_, '_>,
     items: &ShapeItems,
@@ -27,7 +27,7 @@ pub(super) fn convert_recipes(
 ) {
     for &id in &items.recipes {
         let solid = geometry.entity(id).and_then(|e| geometry.solid_recipe(e));
-        match solid.and_then(|solid| build(geometry, id, solid, settings)) {
+        match solid.and_then(|solid| trim_faces(geometry, id, solid, settings)) {
             // A recipe counts by its faces once they are known; one that fails counts as one.
             Ok((edges, built)) => {
                 out.found += built.len();
@@ -54,8 +54,8 @@ pub(super) fn convert_recipes(
     }
 }
 
-/// Trims every face of a solid; one that cannot be had costs the solid.
-fn build(
+/// Trims every face of the solid `id`, and returns its edges and faces; one face that cannot be had refuses the solid.
+fn trim_faces(
     geometry: &Geometry<'_, '_>,
     id: u64,
     solid: SolidRecipe,
@@ -85,7 +85,8 @@ fn build(
     Ok((edges, built))
 }
 
-/// Adds edges with their vertices, which they share where they meet.
+/// Adds edges, curves in the part's coordinates, to the part, and their vertices, which are one where two lie within [`SAME_VERTEX_MM`];
+/// earlier vertices of the part are not shared. Returns the edges' ids, each `Some`.
 fn add_edges(edges: Vec<Curve>, part: &mut Part) -> Vec<Option<EdgeId>> {
     let first = part.vertices.len();
     let mut numbers = Vec::with_capacity(edges.len());

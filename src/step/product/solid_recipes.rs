@@ -33,18 +33,18 @@ pub(super) struct SolidRecipe {
 pub(super) struct RecipeFace {
     pub(super) chart: Chart,
     pub(super) same_sense: bool,
-    /// Edge and whether it is run backwards.
+    /// For each loop the edges, by index, and whether they are run backwards; no loop means the whole closed surface.
     pub(super) loops: Vec<Vec<(usize, bool)>>,
 }
 
-/// Closed loops of curves in a plane.
+/// Closed loops of curves in a plane, mm, and its normal, of unit length.
 struct Profile {
     normal: Vector,
     loops: Vec<Vec<Curve>>,
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// The solid of a recipe; booleans and other recipes are refused by name.
+    /// Reads the solid of a recipe, mm; booleans, other recipes and sizes that are not positive are refused.
     pub(super) fn solid_recipe(&self, e: Entity<'f, 'a>) -> Outcome<SolidRecipe> {
         if let Some(a) = e.attributes("CSG_SOLID", 1) {
             let root = self.resolve(e, a.id(0), "tree root")?;
@@ -74,12 +74,12 @@ impl<'f, 'a> Geometry<'f, 'a> {
         self.primitive(e)
     }
 
-    /// An attribute as a length, mm.
+    /// Returns the `k`-th attribute as a length, mm; `None` if it is no finite number.
     fn length(&self, a: Args<'f, 'a>, k: usize) -> Option<f64> {
         a.real(k).map(|x| x * self.units.length).filter(|x| x.is_finite())
     }
 
-    /// The primitives of CSG.
+    /// Reads a primitive of CSG, mm; refuses anything else.
     fn primitive(&self, e: Entity<'f, 'a>) -> Outcome<SolidRecipe> {
         let size = |a: Args<'f, 'a>, k: usize| {
             let size = self.length(a, k).filter(|x| *x > 0.0);
@@ -156,7 +156,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Err(unsupported(e))
     }
 
-    /// The loops of a CURVE_BOUNDED_SURFACE or a face in a plane.
+    /// Reads the loops of a CURVE_BOUNDED_SURFACE or a face as a profile, which must be plane and have a border.
     fn profile(&self, e: Entity<'f, 'a>, id: Option<u64>) -> Outcome<Profile> {
         let area = self.resolve(e, id, "swept area")?;
         let (surface, loops) = if let Some(a) = area.attributes("CURVE_BOUNDED_SURFACE", 1) {
@@ -185,14 +185,15 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
+/// Refuses a recipe of a kind that is not converted.
 fn unsupported(e: Entity<'_, '_>) -> Refusal {
     Refusal::new(e, "this kind of recipe is not converted; export the solid as a boundary representation")
 }
 
 impl Profile {
-    /// The same profile seen from where a sweep goes: the outer loop counter-clockwise, holes clockwise; `None` when it is swept within
-    /// its plane.
-    fn facing(mut self, sweep: Vector) -> Option<Self> {
+    /// Returns the same profile seen from where a sweep goes: the outer loop counter-clockwise, holes clockwise; `None` when it is swept
+    /// within its plane.
+    fn turn_to_sweep(mut self, sweep: Vector) -> Option<Self> {
         let cosine = self.normal.dot(sweep) / sweep.length();
         if !(cosine.abs() > FLAT_SWEEP) {
             // Written so that it refuses a normal or a sweep that is no number.
@@ -214,7 +215,7 @@ impl Profile {
     }
 }
 
-/// Area of a loop about a normal, by a polygon: only its sign and its order of size matter.
+/// Returns the area of a loop about a normal, mm², by a polygon: only its sign and its order of size matter.
 fn signed_area(curves: &[Curve], normal: Vector) -> f64 {
     let mut points: Vec<Point> = Vec::new();
     for curve in curves {
@@ -228,35 +229,36 @@ fn signed_area(curves: &[Curve], normal: Vector) -> f64 {
     0.5 * sum.dot(normal)
 }
 
-/// Loops of edges run the other way.
-fn reversed(loops: &[Vec<(usize, bool)>]) -> Vec<Vec<(usize, bool)>> {
+/// Returns the same loops of edges, run the other way.
+fn reversed_loops(loops: &[Vec<(usize, bool)>]) -> Vec<Vec<(usize, bool)>> {
     loops.iter().map(|l| l.iter().rev().map(|&(edge, back)| (edge, !back)).collect()).collect()
 }
 
 impl SolidRecipe {
+    /// Adds an edge and returns its index.
     fn add_edge(&mut self, curve: Curve) -> usize {
         self.edges.push(curve);
         self.edges.len() - 1
     }
 
-    /// A plane cap; `forward` when its outward normal is the profile's.
+    /// Adds a plane cap in the x-y plane of `frame`; `forward` when its outward normal is the profile's.
     fn add_cap(&mut self, frame: Frame, loops: &[Vec<(usize, bool)>], forward: bool) {
         let chart = Chart::new(Kind::Plane { frame }, Analytic::Plane { frame });
-        let loops = if forward { loops.to_vec() } else { reversed(loops) };
+        let loops = if forward { loops.to_vec() } else { reversed_loops(loops) };
         self.faces.push(RecipeFace { chart, same_sense: forward, loops });
     }
 }
 
-/// A profile moved along a direction.
+/// Returns the solid of a profile moved by `by`, mm; `None` when that lies in its plane.
 fn extrude(profile: Profile, by: Vector) -> Option<SolidRecipe> {
-    let profile = profile.facing(by)?;
+    let profile = profile.turn_to_sweep(by)?;
     let mut solid = SolidRecipe::default();
     let mut bottoms = Vec::new();
     let mut tops = Vec::new();
     for curves in &profile.loops {
         let n = curves.len();
         let bottom: Vec<usize> = curves.iter().map(|c| solid.add_edge(c.clone())).collect();
-        let top: Vec<usize> = curves.iter().map(|c| solid.add_edge(moved(c, |p| p + by))).collect();
+        let top: Vec<usize> = curves.iter().map(|c| solid.add_edge(map_control_points(c, |p| p + by))).collect();
         let start = |c: &Curve| c.evaluate(c.domain()[0]);
         // The edges from the corners of the profile up: each is shared by two sides.
         let posts: Vec<usize> =
@@ -286,13 +288,14 @@ fn extrude(profile: Profile, by: Vector) -> Option<SolidRecipe> {
     Some(solid)
 }
 
-/// A profile turned about the z axis of a frame.
+/// Returns the solid of a profile turned about the z axis of a frame by an angle, radians; from nearly 2π on a whole turn without caps.
+/// `None` when the profile is turned within its own plane.
 fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
     // Which way the profile sets out is told by the middle of the curve that is farthest from the axis.
     let points: Vec<Point> =
         profile.loops.iter().flatten().map(|c| c.evaluate(0.5 * (c.domain()[0] + c.domain()[1]))).collect();
-    let far = points.into_iter().max_by(|a, b| distance(axis, *a).total_cmp(&distance(axis, *b)))?;
-    let profile = profile.facing(axis.z.cross(far - axis.origin))?;
+    let far = points.into_iter().max_by(|a, b| axis_distance(axis, *a).total_cmp(&axis_distance(axis, *b)))?;
+    let profile = profile.turn_to_sweep(axis.z.cross(far - axis.origin))?;
     let whole = angle >= TAU - WHOLE_TURN_SLACK;
     let angle = if whole { TAU } else { angle };
     let (sin, cos) = angle.sin_cos();
@@ -306,12 +309,12 @@ fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
     for curves in &profile.loops {
         let n = curves.len();
         // An edge on the axis stays where it is and bounds no side.
-        let on_axis = |c: &Curve| c.points.iter().all(|p| distance(axis, p.project()) <= ON_AXIS_MM);
+        let on_axis = |c: &Curve| c.points.iter().all(|p| axis_distance(axis, p.project()) <= ON_AXIS_MM);
         let first: Vec<usize> = curves.iter().map(|c| solid.add_edge(c.clone())).collect();
         let last: Vec<usize> = curves
             .iter()
             .zip(&first)
-            .map(|(c, &edge)| if whole || on_axis(c) { edge } else { solid.add_edge(moved(c, turn)) })
+            .map(|(c, &edge)| if whole || on_axis(c) { edge } else { solid.add_edge(map_control_points(c, turn)) })
             .collect();
         let mut arcs: Vec<Option<usize>> = Vec::with_capacity(n);
         // Each corner runs along an arc; two sides share it. A corner on the axis stays a point.
@@ -347,14 +350,14 @@ fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
     Some(solid)
 }
 
-/// Distance from an axis, mm.
-fn distance(axis: &Frame, p: Point) -> f64 {
+/// Returns the distance of a point from the z axis of a frame, in the frame's units.
+fn axis_distance(axis: &Frame, p: Point) -> f64 {
     let q = axis.local_point(p);
     q.x.hypot(q.y)
 }
 
-/// The curve with its control points moved.
-fn moved(curve: &Curve, place: impl Fn(Point) -> Point) -> Curve {
+/// Returns the curve with its control points moved by `place`, which must be affine.
+fn map_control_points(curve: &Curve, place: impl Fn(Point) -> Point) -> Curve {
     let points = curve.points.iter().map(|p| Homogeneous::weighted(place(p.project()), p.w)).collect();
     Curve { points, ..curve.clone() }
 }

@@ -16,7 +16,7 @@ pub(crate) struct Styles {
 }
 
 impl Styles {
-    /// Collects all styles of a file.
+    /// Collects the surface colours and layers that a file gives to items; overriding styles win over plain ones.
     pub(crate) fn read(file: &File<'_>) -> Self {
         let mut plain = FxHashMap::default();
         let mut over = FxHashMap::default();
@@ -46,18 +46,19 @@ impl Styles {
         Self { colours: plain, layers }
     }
 
-    /// The colour given to an item itself.
+    /// Returns the colour given to an item itself; `None` where it has none of its own.
     pub(crate) fn colour(&self, item: u64) -> Option<Colour> {
         self.colours.get(&item).copied()
     }
 
-    /// The layer on which an item is put itself.
+    /// Returns the layer on which an item is put itself; `None` for none.
     pub(crate) fn layer(&self, item: u64) -> Option<Arc<str>> {
         self.layers.get(&item).cloned()
     }
 }
 
-/// The first surface colour that a style leads to.
+/// Returns the first surface colour that a style leads to within [`MAX_STEPS`] entities; `None` without one, or where a reference leads
+/// nowhere before.
 fn colour(file: &File<'_>, style: u64) -> Option<Colour> {
     let mut queue = vec![style];
     let mut at = 0;
@@ -83,7 +84,7 @@ fn colour(file: &File<'_>, style: u64) -> Option<Colour> {
     None
 }
 
-/// The colour that an entity states by numbers or by name.
+/// Returns the colour that an entity states by numbers or by name; `None` for any other entity and name.
 fn rgb(e: Entity<'_, '_>) -> Option<Colour> {
     if let Some(a) = e.attributes("COLOUR_RGB", 1) {
         return Some(Colour([a.real(0)?, a.real(1)?, a.real(2)?]));

@@ -18,14 +18,14 @@ pub(crate) struct TessellatedItems {
 
 /// Where a kind of leaf keeps its indices, and how triangles are listed.
 struct Layout {
-    /// Place of the attribute of this name.
+    /// Position, among the attributes, of the one of this name.
     pnindex: usize,
     /// Whether triangles are listed as strips and fans.
     strips: bool,
 }
 
-/// The layout of a leaf by its keyword; `None` for what is no leaf.
-fn layout(keyword: &str) -> Option<Layout> {
+/// Returns the layout of a leaf by its keyword; `None` for what is no leaf.
+fn leaf_layout(keyword: &str) -> Option<Layout> {
     // A face has its link to an exact face before the indices, a set has none (ISO 10303-42).
     Some(match keyword {
         "TRIANGULATED_FACE" => Layout { pnindex: 5, strips: false },
@@ -37,11 +37,11 @@ fn layout(keyword: &str) -> Option<Layout> {
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// Collects the triangulated faces of a tessellated item. A solid or shell that is linked to an exact shape is only
-    /// its picture and gives nothing.
+    /// Collects the triangulated faces of a tessellated item, and refusals of those that are broken, in `into`. A solid or shell that is
+    /// linked to an exact shape is only its picture and gives nothing; nor does an item of another kind.
     pub(crate) fn tessellated(&self, id: u64, depth: usize, into: &mut TessellatedItems) {
         let Ok(e) = self.entity(id) else { return };
-        if let Some(layout) = layout(e.keyword()) {
+        if let Some(layout) = leaf_layout(e.keyword()) {
             match self.triangles(e, &layout) {
                 Ok(mesh) => {
                     let name = e.args().name(0);
@@ -61,7 +61,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
     }
 
-    /// The triangles of a leaf as a mesh, with the file's normals where it gives them.
+    /// Returns the triangles of a leaf as a mesh, mm, with the file's normals where it gives them, else flat ones; triangles without area
+    /// are left out, and a leaf without others is refused.
     fn triangles(&self, e: Entity<'f, 'a>, layout: &Layout) -> Outcome<FacetMesh> {
         let args = e.args();
         let list = self.resolve(e, args.id(1), "list of coordinates")?;
@@ -116,7 +117,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// Local point numbers of all triangles: listed, or unrolled from strips and fans.
+/// Returns the local point numbers, from 1, of all triangles: listed, or unrolled from strips and fans. Rows that are not three numbers are
+/// left out.
 fn corner_numbers(args: Args<'_, '_>, layout: &Layout) -> Vec<[usize; 3]> {
     let numbers = |list: Args<'_, '_>| -> Vec<usize> { (0..list.len()).filter_map(|i| list.count(i)).collect() };
     let mut triangles = Vec::new();

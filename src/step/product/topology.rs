@@ -27,7 +27,7 @@ const RECIPES: [&str; 16] = [
 /// Longest chain of faces that are parts of faces.
 const MAX_PARENTS: usize = 4;
 
-/// A shell to be converted.
+/// A shell to be converted, with the styles and names around it.
 #[derive(Clone, Debug)]
 pub(crate) struct ShellPlan {
     pub(crate) name: String,
@@ -42,7 +42,7 @@ pub(crate) struct ShellPlan {
     pub(crate) owners: Vec<u64>,
 }
 
-/// An edge as loops name it.
+/// An edge as loops name it, the same from both faces beside it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum EdgeKey {
     /// An EDGE_CURVE.
@@ -51,12 +51,14 @@ pub(crate) enum EdgeKey {
     Straight(u64, u64),
 }
 
-/// A face's topology.
+/// A face's topology: ids of its surface and edges, without geometry.
 #[derive(Clone, Debug)]
 pub(crate) struct FacePlan {
     pub(crate) name: String,
     pub(crate) surface: u64,
+    /// Whether the face looks along the surface's normal.
     pub(crate) same_sense: bool,
+    /// For each bound the edges in its order, and whether it runs against them; bounds without edges are left out.
     pub(crate) loops: Vec<Vec<(EdgeKey, bool)>>,
 }
 
@@ -83,7 +85,7 @@ impl ShapeItems {
             && self.refused.is_empty()
     }
 
-    /// Sorts one item in; what is no shape is left out.
+    /// Sorts an item of a representation in; what is no shape, or not in the file, is left out.
     pub(crate) fn add(&mut self, file: &File<'_>, id: u64) {
         let Some(e) = file.entity(id) else { return };
         let name = e.attributes("REPRESENTATION_ITEM", 0).unwrap_or_else(|| e.args()).name(0);
@@ -134,14 +136,14 @@ impl ShapeItems {
         }
     }
 
-    /// Notes a surface that stands in a set without a face, once.
+    /// Adds a surface that stands in a set without a face, once; elements of other kinds are left out.
     fn add_set_element(&mut self, file: &File<'_>, id: u64) {
         if !self.surfaces.contains(&id) && file.entity(id).is_some_and(is_surface) {
             self.surfaces.push(id);
         }
     }
 
-    /// Adds the shells around the hollows of a solid.
+    /// Adds a shell for each void of the solid `e`.
     fn add_voids(&mut self, file: &File<'_>, e: Entity<'_, '_>, shells: Vec<u64>, name: &str) {
         for shell in shells {
             let before = self.shells.len();
@@ -154,7 +156,8 @@ impl ShapeItems {
         }
     }
 
-    /// Adds the plan of a shell: its faces, and for each whether the oriented shells and faces around it turn it.
+    /// Adds the plan of a shell: its faces, and for each whether the oriented shells and faces around it turn it. A missing shell is
+    /// refused in `owner`'s name.
     fn add_shell(
         &mut self,
         file: &File<'_>,
@@ -206,6 +209,7 @@ impl ShapeItems {
     }
 }
 
+/// Whether a keyword is that of a tessellated solid, shell, face or set.
 fn is_tessellated(keyword: &str) -> bool {
     matches!(
         keyword,
@@ -219,7 +223,7 @@ fn is_tessellated(keyword: &str) -> bool {
     )
 }
 
-/// Whether an entity is a surface.
+/// Whether an entity is a surface, told by its name.
 pub(crate) fn is_surface(e: Entity<'_, '_>) -> bool {
     e.keywords().any(|k| {
         k.ends_with("_SURFACE")
@@ -229,7 +233,7 @@ pub(crate) fn is_surface(e: Entity<'_, '_>) -> bool {
     })
 }
 
-/// Reads the bounds of a face.
+/// Reads the surface, sense and bounds of a face, without geometry. Bounds that are missing are passed over; missing edges refuse the face.
 pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     let Some(e) = file.entity(id) else {
         return Err(Refusal {
@@ -280,7 +284,8 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     Ok(FacePlan { name, surface, same_sense: sense != Some(false), loops })
 }
 
-/// Edges of a loop in its order; none for a VERTEX_LOOP.
+/// Returns the edges of a loop in its order, and whether it runs against them; none for a VERTEX_LOOP. Refuses missing edges and other
+/// kinds of loops.
 fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
     if e.is_a("VERTEX_LOOP") {
         return Ok(Vec::new());
@@ -314,7 +319,7 @@ fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
     Ok(edges)
 }
 
-/// Edges in the order of first use.
+/// Numbers the edges of faces in the order of first use, each once; returns them in that order, and the number of each.
 pub(crate) fn number_edges<'p>(
     faces: impl Iterator<Item = &'p FacePlan>,
 ) -> (Vec<EdgeKey>, FxHashMap<EdgeKey, usize>) {

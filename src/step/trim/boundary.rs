@@ -8,7 +8,7 @@ use crate::math::Uv;
 use crate::nurbs::UvCurve;
 use crate::step::chart::Chart;
 
-/// What the arrangement gives.
+/// The boundary of a face in the plane of its chart.
 pub(crate) struct Boundary {
     /// Closed loops, material on the left.
     pub(crate) loops: Vec<Chain>,
@@ -18,7 +18,8 @@ pub(crate) struct Boundary {
     pub(crate) repairs: Vec<&'static str>,
 }
 
-/// Arranges the chains of a face, given with the material on their left.
+/// Arranges the chains of a face, given with the material on their left, to closed loops; without chains the face is the whole surface.
+/// Fails where chains wind in a way that bounds nothing. `implicit_outer`: the surface's own border is the outer loop.
 pub(crate) fn bound_region(
     mut chains: Vec<Chain>,
     chart: &Chart,
@@ -74,7 +75,8 @@ pub(crate) fn bound_region(
 /// 16-sided polygon of that circle.
 const FINE_DENSITY: usize = 16;
 
-/// Moves a hole by periods into the border and turns it clockwise.
+/// Moves a hole by periods into the border, and turns it clockwise; one that lies in no place inside is a loop of its own and turned the
+/// other way. Notes what was turned.
 fn place_hole(mut hole: Chain, outer: &Chain, chart: &Chart, repairs: &mut Vec<&'static str>) -> Chain {
     let polygon = hole.polygon();
     let options = |d: usize| if chart.period[d].is_some() { vec![0, -1, 1, -2, 2] } else { vec![0] };
@@ -107,15 +109,15 @@ fn place_hole(mut hole: Chain, outer: &Chain, chart: &Chart, repairs: &mut Vec<&
     hole
 }
 
-/// Adds an outer loop with the holes that it holds.
+/// Adds to `out` an outer loop and its holes, moved into it.
 fn add_with_holes(outer: Chain, holes: impl IntoIterator<Item = Chain>, chart: &Chart, out: &mut Boundary) {
     let holes: Vec<Chain> = holes.into_iter().map(|h| place_hole(h, &outer, chart, &mut out.repairs)).collect();
     out.loops.push(outer);
     out.loops.extend(holes);
 }
 
-/// Loops that wind around nothing: the largest is the outer one, except on a closed surface, where loops that all run
-/// clockwise leave the rest of the surface as the face.
+/// Adds loops that wind around nothing to `out`: the largest is the outer one, except on a closed surface, where loops that all run
+/// clockwise leave the rest of the surface as the face. Empties `plain`.
 fn bound_without_winding(
     plain: &mut Vec<Chain>,
     chart: &Chart,
@@ -141,7 +143,7 @@ fn bound_without_winding(
     Ok(())
 }
 
-/// Whether the surface has no border at all.
+/// Whether the surface has no border at all: each direction is periodic or ends in poles.
 fn is_closed(chart: &Chart) -> bool {
     (0..2).all(|d| {
         chart.period[d].is_some()
@@ -149,7 +151,8 @@ fn is_closed(chart: &Chart) -> bool {
     })
 }
 
-/// The whole surface: its natural borders, seams and poles, cut where no hole is.
+/// Returns the border of the whole surface: seams, poles and natural borders, cut where no hole is. Adds the seams to `seams`; fails on an
+/// unbounded surface and where holes leave no place.
 fn natural_boundary(chart: &Chart, holes: &[Vec<Uv>], seams: &mut Vec<[Uv; 2]>) -> Result<Chain, &'static str> {
     let mut range = [[0.0; 2]; 2];
     for d in 0..2 {
@@ -194,7 +197,8 @@ fn natural_boundary(chart: &Chart, holes: &[Vec<Uv>], seams: &mut Vec<[Uv; 2]>) 
     ]))
 }
 
-/// A start of the period that no hole spans: the middle of the widest gap between them.
+/// Returns where a period of direction `d` may start so that no hole spans it: in the middle of the widest gap between them, `base` without
+/// holes. `None` where there is no gap.
 fn free_start(d: usize, base: f64, period: f64, holes: &[Vec<Uv>]) -> Option<f64> {
     if holes.is_empty() {
         return Some(base);
@@ -219,7 +223,8 @@ fn free_start(d: usize, base: f64, period: f64, holes: &[Vec<Uv>]) -> Option<f64
     (best.1 > 0.0).then_some(base + best.0)
 }
 
-/// One loop that winds around: to the pole or natural border on its left.
+/// Closes one loop that winds around: to the pole or natural border on its left, by a seam run both ways. A loop that has nothing there is
+/// turned around if it may be; else fails.
 fn extend_to_border(
     chain: Chain,
     chart: &Chart,
@@ -291,14 +296,14 @@ fn extend_to_border(
     Ok(Chain { bridged: chain.bridged, ..Chain::closed(pieces) })
 }
 
-/// The chain starting with another piece.
+/// Returns the winding chain starting with piece `first`; the pieces before it come last, one displacement on.
 fn started_at(mut chain: Chain, first: usize, displacement: Uv) -> Chain {
     let head: Vec<Piece> = chain.pieces.drain(..first).map(|p| p.shifted(displacement)).collect();
     chain.pieces.extend(head);
     chain
 }
 
-/// Two loops that wind in opposite senses, joined by a seam run twice.
+/// Joins two loops that wind in opposite senses by a seam run both ways, past the holes; fails where no way is found.
 fn join_winding_pair(
     a: Chain,
     b: Chain,
@@ -365,7 +370,7 @@ fn join_winding_pair(
     Ok(Chain { bridged: a.bridged.max(b.bridged), ..Chain::closed(pieces) })
 }
 
-/// The straight pieces of a seam, each entered in the list of seams.
+/// Makes a straight piece of seam between each two of `points`, in parameters, and appends each to the list of seams.
 fn seam_pieces(points: &[Uv], seams: &mut Vec<[Uv; 2]>) -> Vec<Piece> {
     let mut pieces = Vec::with_capacity(points.len() - 1);
     for side in points.windows(2) {
@@ -376,7 +381,7 @@ fn seam_pieces(points: &[Uv], seams: &mut Vec<[Uv; 2]>) -> Vec<Piece> {
     pieces
 }
 
-/// The pieces of a seam run the other way.
+/// Returns the pieces of a seam in opposite order and direction.
 fn run_back(pieces: Vec<Piece>) -> impl Iterator<Item = Piece> {
     pieces.into_iter().rev().map(|p| Piece { reversed: true, ..p })
 }

@@ -18,20 +18,20 @@ const MAX_TURNS: f64 = 4.0;
 /// Most periods that a face without a pole may span: the flank of a thread has as many turns as the thread.
 const MAX_THREAD_TURNS: f64 = 256.0;
 
-/// A built face; seams are numbered from 0, edges as in the task.
+/// A built face, mm; seams are numbered from 0, edges as in the task.
 pub(crate) struct BuiltFace {
     pub(crate) surface: Surface,
     pub(crate) analytic: Analytic,
     pub(crate) reversed: bool,
     pub(crate) loops: Vec<Vec<FaceUse>>,
     pub(crate) seams: Vec<Seam>,
-    /// Largest distance between edges and surface, mm.
+    /// Largest distance between edges and surface, mm, the moves of ends in the parameter plane included.
     pub(crate) gap: f64,
     /// What was done to it, in words.
     pub(crate) repairs: Vec<String>,
 }
 
-/// An edge use whose edge is not numbered yet.
+/// A use of an edge or seam that has no number in the part yet.
 pub(crate) struct FaceUse {
     pub(crate) source: Source,
     pub(crate) reversed: bool,
@@ -44,7 +44,8 @@ impl From<Overrun> for &'static str {
     }
 }
 
-/// Builds a face, or says why not.
+/// Builds a face: locates its edges, arranges its loops, and makes the spline that they bound. Fails with a reason in words where edges are
+/// off the surface, loops bound nothing, or the budget is used up.
 pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static str> {
     // Edges in the parameters of the chart.
     task.turn_sphere();
@@ -62,7 +63,7 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
     }
 
     // Loops in the unwrapped plane, then the boundary of a region without periods.
-    let chains = chains(&task, &fits, same_sense, task.accuracy.max(2.0 * gap).max(SMALLEST_ACCURACY));
+    let chains = chain_loops(&task, &fits, same_sense, task.accuracy.max(2.0 * gap).max(SMALLEST_ACCURACY));
     let bridged = chains.iter().fold(0f64, |b, c| b.max(c.bridged));
     if bridged > 0.0 {
         repairs.push(format!("edges of a loop are {bridged:.3e} mm apart"));
@@ -94,7 +95,7 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
             };
             uses.push(FaceUse { source, reversed, uv });
         }
-        gap = gap.max(snap(&mut uses, &region.surface));
+        gap = gap.max(join_ends(&mut uses, &region.surface));
         built.push(uses);
     }
     let seams = seams.finish();
@@ -109,8 +110,9 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
     })
 }
 
-/// The loops with the material on their left, each closed up to whole periods.
-fn chains(task: &FaceTask<'_>, fits: &FxHashMap<usize, Fit>, same_sense: bool, tolerance: f64) -> Vec<Chain> {
+/// Returns the loops with the material on their left in the chart's plane, each closed up to whole periods. `tolerance` is the distance,
+/// mm, within which ends are one.
+fn chain_loops(task: &FaceTask<'_>, fits: &FxHashMap<usize, Fit>, same_sense: bool, tolerance: f64) -> Vec<Chain> {
     let piece = |&(edge, reversed): &(usize, bool)| Piece {
         source: Source::Edge(edge),
         reversed,
@@ -129,7 +131,8 @@ fn chains(task: &FaceTask<'_>, fits: &FxHashMap<usize, Fit>, same_sense: bool, t
     chains
 }
 
-/// The rectangle of all loops, and the shift by whole periods that moves it into the base period.
+/// Returns the rectangle of all loops, moved into the base period, and the shift by whole periods that takes the loops there. `None` where
+/// it is empty, infinite or winds too often.
 fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
     let points = loops.iter().flat_map(|l| &l.pieces).flat_map(|p| p.curve.points.iter().map(|q| q.position()));
     let (lo, hi) = points.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
@@ -176,8 +179,8 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
     Some((domain, shift))
 }
 
-/// Lets each use begin exactly where the one before ends; the largest move of an end, mm.
-fn snap(uses: &mut [FaceUse], surface: &Surface) -> f64 {
+/// Moves ends of uv curves so that each use begins exactly where the one before ends; returns the largest move, mm.
+fn join_ends(uses: &mut [FaceUse], surface: &Surface) -> f64 {
     let mut moved = 0f64;
     let n = uses.len();
     let end_index = |u: &FaceUse, end: bool| if end != u.reversed { u.uv.points.len() - 1 } else { 0 };
@@ -204,7 +207,7 @@ fn snap(uses: &mut [FaceUse], surface: &Surface) -> f64 {
     moved
 }
 
-/// Loops of uses whose edges have their numbers.
+/// Returns the loops as the model has them; `id` gives the edge of a source, `None` for sides without one.
 pub(crate) fn trim_loops(loops: Vec<Vec<FaceUse>>, id: impl Fn(Source) -> Option<EdgeId>) -> Vec<TrimLoop> {
     let numbered = |u: FaceUse| EdgeUse { edge: id(u.source), reversed: u.reversed, uv: u.uv };
     loops.into_iter().map(|l| TrimLoop { uses: l.into_iter().map(numbered).collect() }).collect()

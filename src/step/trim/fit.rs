@@ -16,7 +16,7 @@ use std::cell::Cell;
 /// Deepest halving of a Bézier span of the edge.
 const MAX_DEPTH: u32 = 12;
 
-/// Counts work, so that no face takes for ever.
+/// Evaluations that a face has left, so that none takes for ever.
 #[derive(Debug)]
 pub(crate) struct Budget(Cell<u64>);
 
@@ -37,9 +37,9 @@ impl Budget {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Overrun;
 
-/// The surface as the fit sees it.
+/// The surface as the fit sees it, in the chart's or the spline's parameters.
 pub(crate) struct Target<'t> {
-    /// Parameters of a point, given the edge's parameter and what is expected.
+    /// Parameters of the point nearest to a place, given the edge's parameter and, if known, what is expected.
     pub(crate) locate: &'t dyn Fn(f64, Point, Option<Uv>) -> Uv,
     /// Position and first derivatives.
     pub(crate) derivatives: &'t dyn Fn(Uv) -> Derivatives,
@@ -63,7 +63,7 @@ pub(crate) struct Fit {
     pub(crate) gap: f64,
 }
 
-/// An end of a fitted piece.
+/// An end of a fitted cubic piece.
 #[derive(Clone, Copy)]
 struct Node {
     t: f64,
@@ -75,7 +75,8 @@ struct Node {
 }
 
 impl Target<'_> {
-    /// Foot point and slope at `t` of a Bézier piece; `inward` leads from an end into the piece.
+    /// Returns the foot point and slope at `t` of a Bézier piece; `inward`, 1 or −1, leads from an end into the piece. At a pole both are
+    /// extrapolated from inside.
     fn node(&self, piece: &Curve, t: f64, inward: f64, hint: Option<Uv>) -> Result<Node, Overrun> {
         self.budget.spend()?;
         let [a, b] = piece.domain();
@@ -120,10 +121,10 @@ impl Target<'_> {
         Ok(Node { t, uv, slope: (beside - uv) / step, miss })
     }
 
-    /// Where the middle between two nodes is expected. Close to a pole azimuths change so fast that the cubic swings by whole periods;
-    /// then the chord says which period is meant.
+    /// Returns where the middle between two nodes is expected. Close to a pole azimuths change so fast that the cubic swings by whole
+    /// periods; then the chord says which period is meant.
     fn middle_guess(&self, a: Node, b: Node) -> Uv {
-        let mut guess = hermite(a, b, 0.5);
+        let mut guess = evaluate_hermite(a, b, 0.5);
         let chord = 0.5 * (a.uv + b.uv);
         for d in 0..2 {
             let far = |p: f64| (guess[d] - chord[d]).abs() > LARGEST_SWING * p;
@@ -134,7 +135,7 @@ impl Target<'_> {
         guess
     }
 
-    /// How far a point lies beyond the border, as a fraction of the range.
+    /// Returns how far `uv` lies beyond the range, as a share of it; negative inside, 0 where it has no end.
     fn overshoot(&self, uv: Uv) -> f64 {
         let over = |d: usize| {
             let [lo, hi] = self.range[d];
@@ -143,7 +144,8 @@ impl Target<'_> {
         over(0).max(over(1))
     }
 
-    /// The slope of a node on the border without what leads out of it: ahead (1), behind (-1) or to both sides (0).
+    /// Returns the node without the part of its slope that leads out of the border that it lies on: ahead (1), behind (−1) or to both sides
+    /// (0).
     fn slope_inside(&self, mut node: Node, ahead: f64) -> Node {
         for d in 0..2 {
             let [lo, hi] = self.range[d];
@@ -158,7 +160,7 @@ impl Target<'_> {
         node
     }
 
-    /// The same ends with control points inside the border.
+    /// Returns both nodes with slopes shortened so that the cubic's control points lie inside the border.
     fn controls_inside(&self, mut a: Node, mut b: Node) -> (Node, Node) {
         let third = (b.t - a.t) / 3.0;
         if !(third > 0.0) {
@@ -172,17 +174,18 @@ impl Target<'_> {
         (a, b)
     }
 
-    /// Whether the cubic between two nodes is good enough; and the gap seen.
+    /// Whether the cubic between two nodes keeps to the border and, at four places, to the tolerance or a share of the file's own gap.
+    /// Raises `gap` to the largest miss seen, mm.
     fn accepts(&self, piece: &Curve, a: Node, b: Node, gap: &mut f64) -> Result<bool, Overrun> {
         // Where an edge runs along the border beside the surface, its foot points follow the border with corners.
-        if (1..10).any(|k| self.overshoot(hermite(a, b, 0.1 * f64::from(k))) > MAX_OVERSHOOT) {
+        if (1..10).any(|k| self.overshoot(evaluate_hermite(a, b, 0.1 * f64::from(k))) > MAX_OVERSHOOT) {
             return Ok(false);
         }
         // Not in symmetric places alone: a cubic's error may vanish in the middle.
         for s in [0.5, 0.13, 0.87, 0.32] {
             self.budget.spend()?;
             let t = a.t + s * (b.t - a.t);
-            let guess = hermite(a, b, s);
+            let guess = evaluate_hermite(a, b, s);
             let p = piece.evaluate(t);
             let at = (self.derivatives)(guess);
             let miss = at.point - p;
@@ -205,7 +208,8 @@ impl Target<'_> {
         Ok(true)
     }
 
-    /// Fits an edge.
+    /// Fits a uv curve to an edge, over the edge's own parameter; fails only when the budget is used up. Beyond [`MAX_DEPTH`] halvings
+    /// pieces are taken as they are.
     pub(crate) fn fit(&self, curve: &Curve) -> Result<Fit, Overrun> {
         let breaks = curve.breakpoints();
         let spans = breaks.len() - 1;
@@ -223,17 +227,17 @@ impl Target<'_> {
                 let t =
                     if k == pieces { pair[1] } else { pair[0] + (pair[1] - pair[0]) * k as f64 / pieces as f64 };
                 let b = self.node(&piece, t, -1.0, Some(a.uv))?;
-                self.halve(&piece, a, b, 0, &mut nodes, &mut gap)?;
+                self.fit_by_halving(&piece, a, b, 0, &mut nodes, &mut gap)?;
                 a = b;
             }
             // The end of one span is where the next one is expected to begin.
             hint = Some(a.uv);
         }
-        Ok(Fit { curve: assemble(&nodes), gap })
+        Ok(Fit { curve: join_pieces(&nodes), gap })
     }
 
-    /// Adds the cubic from `a` to `b` where it is accepted, else those of its halves; `gap` grows to the largest miss.
-    fn halve(
+    /// Appends the cubic from `a` to `b` to `nodes` where it is accepted, else those of its halves; raises `gap` to the largest miss, mm.
+    fn fit_by_halving(
         &self,
         piece: &Curve,
         a: Node,
@@ -253,28 +257,30 @@ impl Target<'_> {
         let t = 0.5 * (a.t + b.t);
         let middle = self.node(piece, t, 1.0, Some(self.middle_guess(a, b)))?;
         let middle = self.slope_inside(middle, 0.0);
-        self.halve(piece, a, middle, depth + 1, nodes, gap)?;
-        self.halve(piece, middle, b, depth + 1, nodes, gap)
+        self.fit_by_halving(piece, a, middle, depth + 1, nodes, gap)?;
+        self.fit_by_halving(piece, middle, b, depth + 1, nodes, gap)
     }
 }
 
-/// The cubic between two nodes at the fraction `s`.
-fn hermite(a: Node, b: Node, s: f64) -> Uv {
+/// Returns the place, in parameters, of the cubic between two nodes at the share `s` of its interval.
+fn evaluate_hermite(a: Node, b: Node, s: f64) -> Uv {
     let h = b.t - a.t;
     let r = 1.0 - s;
     a.uv * (r * r * (1.0 + 2.0 * s)) + b.uv * (s * s * (3.0 - 2.0 * s)) + a.slope * (h * s * r * r)
         - b.slope * (h * s * s * r)
 }
 
-/// One spline of all pieces: C¹ where slopes agree, a corner where they do not, a straight line where all is straight.
-fn assemble(pieces: &[(Node, Node)]) -> UvCurve {
+/// Makes one spline of all pieces, of which there is at least one: C¹ where slopes agree, a corner where they do not, a single line where
+/// all is straight.
+fn join_pieces(pieces: &[(Node, Node)]) -> UvCurve {
     let (first, last) = (pieces[0].0, pieces[pieces.len() - 1].1);
     let line = UvCurve::line(first.uv, last.uv, [first.t, last.t]);
     let size = (last.uv - first.uv).abs().max_element();
     let straight = pieces.iter().all(|(a, b)| {
         [0.0, 0.3, 0.7, 1.0].iter().all(|&s| {
             let t = a.t + s * (b.t - a.t);
-            (hermite(*a, *b, s) - line.evaluate(t)).abs().max_element() <= STRAIGHT_SHARE * size.max(STRAIGHT_SIZE)
+            (evaluate_hermite(*a, *b, s) - line.evaluate(t)).abs().max_element()
+                <= STRAIGHT_SHARE * size.max(STRAIGHT_SIZE)
         })
     });
     if straight {
@@ -307,8 +313,8 @@ fn assemble(pieces: &[(Node, Node)]) -> UvCurve {
     UvCurve { degree: 3, knots, points }
 }
 
-/// An edge on a plane, exactly: its control points in the plane's coordinates.
-pub(crate) fn project(curve: &Curve, flat: impl Fn(Point) -> (Uv, f64)) -> Fit {
+/// Returns an edge on a plane, exactly: its control points by `flat`, which gives a point's parameters and height over the plane, mm.
+pub(crate) fn project_to_plane(curve: &Curve, flat: impl Fn(Point) -> (Uv, f64)) -> Fit {
     let mut gap = 0f64;
     let points = curve
         .points

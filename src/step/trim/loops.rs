@@ -8,25 +8,26 @@ use crate::step::chart::{Chart, Pole};
 /// Where a piece of a loop comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Source {
-    /// An edge of the part.
+    /// An edge of the part, by its number in the task.
     Edge(usize),
-    /// A seam that was added to this face.
+    /// A seam that was added to this face, by its number.
     Seam(usize),
     /// A pole, or a small step between edges that do not meet.
     Nothing,
 }
 
-/// A part of a loop.
+/// A part of a loop, in the chart's parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Piece {
     pub(crate) source: Source,
+    /// Whether the loop runs against the curve.
     pub(crate) reversed: bool,
-    /// Over the parameter of its edge.
+    /// Over the parameter of its edge or seam; from 0 to 1 for a step.
     pub(crate) curve: UvCurve,
 }
 
 impl Piece {
-    /// The end of the curve, whichever way the loop runs it.
+    /// Returns the last (true) or first point of the curve, whichever way the loop runs it.
     fn end_point(&self, end: bool) -> Uv {
         let n = self.curve.points.len() - 1;
         self.curve.points[if end { n } else { 0 }].position()
@@ -45,7 +46,7 @@ impl Piece {
         self.curve.evaluate(0.5 * (a + b))
     }
 
-    /// The piece moved in the parameter plane.
+    /// Returns the piece moved by `by` in the parameter plane.
     pub(crate) fn shifted(mut self, by: Uv) -> Self {
         if by != Uv::ZERO {
             for p in &mut self.curve.points {
@@ -56,12 +57,12 @@ impl Piece {
         self
     }
 
-    /// A straight step.
+    /// Returns a straight step that belongs to no edge.
     pub(crate) fn straight(from: Uv, to: Uv) -> Self {
         Self { source: Source::Nothing, reversed: false, curve: UvCurve::line(from, to, [0.0, 1.0]) }
     }
 
-    /// Points along the piece in the direction of the loop, without the last; `density` times as many as a first test needs.
+    /// Appends points along the piece in the direction of the loop, without the last; `density` times as many as a first test needs.
     fn sample(&self, density: usize, into: &mut Vec<Uv>) {
         let start = into.len();
         let breaks = self.curve.breakpoints();
@@ -79,7 +80,7 @@ impl Piece {
     }
 }
 
-/// A chain of pieces that closes up to whole periods.
+/// A chain of pieces, each beginning where the one before ends, that closes up to whole periods.
 #[derive(Clone, Debug)]
 pub(crate) struct Chain {
     pub(crate) pieces: Vec<Piece>,
@@ -90,15 +91,17 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
+    /// Pieces that close without winding.
     pub(crate) fn closed(pieces: Vec<Piece>) -> Self {
         Self { pieces, winding: [0, 0], bridged: 0.0 }
     }
 
+    /// Returns a polygon of points along the chain, without the end.
     pub(crate) fn polygon(&self) -> Vec<Uv> {
         self.polygon_of_density(1)
     }
 
-    /// The polygon with so many times the points.
+    /// Returns the polygon with about so many times the points on curved pieces.
     pub(crate) fn polygon_of_density(&self, density: usize) -> Vec<Uv> {
         let mut points = Vec::new();
         for piece in &self.pieces {
@@ -111,7 +114,7 @@ impl Chain {
         self.winding != [0, 0]
     }
 
-    /// Whether the chain runs along an edge twice, as along a seam.
+    /// Whether the chain runs along an edge of the file twice, as along a seam.
     pub(crate) fn is_cut_open(&self) -> bool {
         let twice = |i: usize, p: &Piece| {
             matches!(p.source, Source::Edge(_)) && self.pieces[..i].iter().any(|q| q.source == p.source)
@@ -119,11 +122,12 @@ impl Chain {
         self.pieces.iter().enumerate().any(|(i, p)| twice(i, p))
     }
 
+    /// Moves all pieces in the parameter plane.
     pub(crate) fn shift(&mut self, by: Uv) {
         self.pieces = std::mem::take(&mut self.pieces).into_iter().map(|p| p.shifted(by)).collect();
     }
 
-    /// The same loop run the other way.
+    /// Turns the chain around: order and direction of its pieces, and its winding.
     pub(crate) fn reverse(&mut self) {
         self.pieces.reverse();
         for piece in &mut self.pieces {
@@ -132,13 +136,13 @@ impl Chain {
         self.winding = self.winding.map(|w| -w);
     }
 
-    /// The displacement that the winding stands for.
+    /// Returns the displacement from start to end that the winding stands for.
     pub(crate) fn displacement(&self, chart: &Chart) -> Uv {
         chart.whole_periods(self.winding)
     }
 }
 
-/// The signed area of a polygon, positive counter-clockwise.
+/// Returns the signed area of a polygon, positive counter-clockwise; 0 if it is empty.
 pub(crate) fn signed_area(polygon: &[Uv]) -> f64 {
     let n = polygon.len();
     let Some(&o) = polygon.first() else { return 0.0 };
@@ -146,7 +150,7 @@ pub(crate) fn signed_area(polygon: &[Uv]) -> f64 {
     0.5 * (0..n).map(|i| (polygon[i] - o).perp_dot(polygon[(i + 1) % n] - o)).sum::<f64>()
 }
 
-/// Whether a point is inside a polygon, by crossings.
+/// Whether a point is inside a polygon, by crossings; on its border either answer may come.
 pub(crate) fn contains(polygon: &[Uv], p: Uv) -> bool {
     let n = polygon.len();
     let mut inside = false;
@@ -159,7 +163,8 @@ pub(crate) fn contains(polygon: &[Uv], p: Uv) -> bool {
     inside
 }
 
-/// Chains edge uses; each is shifted by whole periods to begin where the one before ends.
+/// Chains edge uses, in their order, to a loop; each is shifted by whole periods to begin where the one before ends, within `tolerance` mm,
+/// or after a straight step.
 ///
 /// Loops whose sides at a pole do not fit the sense in which they wind are tried with the sides run the other way: such
 /// loops run against their face's orientation.
@@ -179,9 +184,10 @@ pub(crate) fn close_loop(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Cha
     second
 }
 
-/// Puts uses one behind the other by whole periods, and counts how often the loop winds around.
+/// Puts uses one behind the other by whole periods, and counts how often the loop winds around; `turned` runs sides at a pole the other
+/// way.
 fn chain_uses(uses: Vec<Piece>, chart: &Chart, tolerance: f64, turned: bool) -> Chain {
-    let connection = Connection { chart, tolerance, turned, extent: extent(&uses) };
+    let connection = Connection { chart, tolerance, turned, extent: control_extent(&uses) };
     let mut chain = Chain::closed(Vec::with_capacity(uses.len() + 2));
     for (i, next) in uses.into_iter().enumerate() {
         if i == 0 {
@@ -200,8 +206,8 @@ fn chain_uses(uses: Vec<Piece>, chart: &Chart, tolerance: f64, turned: bool) -> 
     chain
 }
 
-/// Size of the box around pieces, each in the period in which it was found.
-fn extent(pieces: &[Piece]) -> Uv {
+/// Returns the size of the box around the control points of pieces, each in the period in which it was found.
+fn control_extent(pieces: &[Piece]) -> Uv {
     let points = pieces.iter().flat_map(|p| p.curve.points.iter().map(|q| q.position()));
     let (lo, hi) = points.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
     hi - lo
@@ -219,7 +225,7 @@ struct Connection<'c> {
 }
 
 impl Connection<'_> {
-    /// Steps from the end of the chain to the start of `next`, adding pole sides; the shift that `next` needs.
+    /// Appends steps from the end of the chain to the start of `next`, sides along a pole included; returns the shift that `next` needs.
     fn connect(&self, chain: &mut Chain, next: &Piece) -> Uv {
         let Self { chart, tolerance, turned, .. } = *self;
         let Some(last) = chain.pieces.last().cloned() else { return Uv::ZERO };
@@ -262,14 +268,15 @@ impl Connection<'_> {
         shift
     }
 
-    /// Whether a step is so large a part of the loop that ends which meet half way would leave nothing of it: of a ring between two half circles
-    /// on the same two vertices that was all its width.
+    /// Whether a step is so large a part of the loop, in u or v, that ends which meet half way would leave nothing of it: of a ring between
+    /// two half circles on the same two vertices that was all its width.
     fn is_wide(&self, step: Uv) -> bool {
         step.abs().cmpgt(WIDE_STEP * self.extent).any()
     }
 }
 
-/// How far the loop runs along a pole, with the material on its left.
+/// Returns how far the loop runs along a pole, in the parameter that changes there, with the material on its left. `low` is whether it
+/// comes from larger values of the fixed one; `difference` is from where it leaves the chain to the next start.
 fn run_along_pole(pole: &Pole, chart: &Chart, low: bool, difference: f64, same_edge: bool) -> f64 {
     let free = 1 - pole.fixed;
     let Some(period) = chart.period[free] else { return difference };

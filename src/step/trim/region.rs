@@ -19,12 +19,12 @@ impl<'t, 'e> Region<'t, 'e> {
         Self { task, domain, surface: task.chart.surface(domain) }
     }
 
-    /// The spline's parameters of a place in the chart.
+    /// Returns the spline's parameters of a place in the chart; places beyond the domain are not clamped.
     pub(super) fn parameters(&self, uv: Uv) -> Uv {
         self.task.chart.spline_parameters(self.domain, uv)
     }
 
-    /// An edge in the spline's parameters, following the piece in the chart's.
+    /// Fits an edge in the spline's parameters, following `piece`, the same edge in the chart's; fails when the budget is used up.
     pub(super) fn refit(&self, piece: &Piece, curve: &Curve) -> Result<Fit, Overrun> {
         let chart = &self.task.chart;
         let pole_here = |pole: &Pole| {
@@ -47,7 +47,7 @@ impl<'t, 'e> Region<'t, 'e> {
         target.fit(curve)
     }
 
-    /// A straight piece in the spline's parameters.
+    /// Returns the straight line between the ends of a piece, in the spline's parameters and over the piece's own.
     pub(super) fn line(&self, piece: &Piece) -> UvCurve {
         let last = piece.curve.points.len() - 1;
         let [a, b] = [0, last].map(|i| self.parameters(piece.curve.points[i].position()));

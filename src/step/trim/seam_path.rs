@@ -16,7 +16,7 @@ const MAX_CORNERS: usize = 4000;
 /// Places along each side of the strip between two loops that are in each other's way.
 const LATTICE: f64 = 24.0;
 
-/// A seam from a start to a goal, by their numbers, and its corners with both.
+/// A seam's way: the numbers of its start and goal, and its places in parameters, both ends included.
 pub(super) struct SeamPath {
     pub(super) start: usize,
     pub(super) goal: usize,
@@ -27,11 +27,11 @@ pub(super) struct SeamPath {
 pub(super) enum Goals<'g> {
     /// At one of these, each with its number.
     Points(&'g [(usize, Uv)]),
-    /// On a line, at the foot of any point.
+    /// On a line, at the foot that a place has there; its number is 0.
     Line(&'g dyn Fn(Uv) -> Uv),
 }
 
-/// What a seam must not cross, with all copies by the displacement.
+/// What a seam must not cross, with its copies by multiples of the displacement: closed holes and open borders, in parameters.
 pub(super) struct Obstacles<'o> {
     pub(super) holes: &'o [Vec<Uv>],
     pub(super) borders: &'o [Vec<Uv>],
@@ -49,13 +49,14 @@ struct Node {
 }
 
 impl Obstacles<'_> {
-    /// Whether a straight seam crosses nothing.
+    /// Whether the straight line between two places crosses no hole, no border and no copy of these.
     pub(super) fn leave_free(&self, from: Uv, to: Uv) -> bool {
         !self.holes.iter().any(|h| segment_crosses(h, true, from, to, self.displacement))
             && !self.borders.iter().any(|b| segment_crosses(b, false, from, to, self.displacement))
     }
 
-    /// The shortest way from one of the starts to a goal, by lengths on the surface near the first start.
+    /// Returns the shortest way found from one of the starts to a goal, by lengths on the surface near the first start; `None` where holes
+    /// and borders leave none.
     pub(super) fn way_around(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives) -> Option<SeamPath> {
         let mut around_holes = MARGINS.iter().map(|margin| self.corners(*margin));
         let found = around_holes.find_map(|corners| self.way_by(starts, goals, metric, corners));
@@ -66,7 +67,8 @@ impl Obstacles<'_> {
         })
     }
 
-    /// The shortest way from a start to a goal by way of these corners that no loop bars.
+    /// Returns the shortest way from a start to a goal by way of these corners that nothing bars; `None` without one, and where it would
+    /// cross its own copies.
     fn way_by(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives, corners: Vec<Uv>) -> Option<SeamPath> {
         let length = |a: Uv, b: Uv| (metric.du * (b.x - a.x) + metric.dv * (b.y - a.y)).length();
         let node = |place: Uv, length: f64| Node { place, length, before: None, settled: false };
@@ -117,7 +119,8 @@ impl Obstacles<'_> {
         self.is_simple(&points).then_some(SeamPath { start: at, goal, points })
     }
 
-    /// Corners of boxes around the holes and their next copies.
+    /// Returns the corners of boxes around the holes, larger by a share of their size, and around their next copies; [`MAX_CORNERS`] at
+    /// most.
     fn corners(&self, margin: f64) -> Vec<Uv> {
         let mut corners = Vec::new();
         for hole in self.holes {
@@ -134,7 +137,7 @@ impl Obstacles<'_> {
         corners
     }
 
-    /// Places all over the strip that the borders span, and over its next copies.
+    /// Returns the places, in parameters, of a square lattice over the box of the borders, [`LATTICE`] steps each way.
     fn lattice(&self) -> Vec<Uv> {
         let points = || self.borders.iter().flatten();
         let lo = points().fold(Uv::INFINITY, |m, p| m.min(*p));
@@ -149,7 +152,7 @@ impl Obstacles<'_> {
         places
     }
 
-    /// Whether a way misses its own copies: the cut surface then lies in one sheet.
+    /// Whether a way misses its copies on both sides: the cut surface then lies in one sheet.
     fn is_simple(&self, points: &[Uv]) -> bool {
         let crosses_copy = |side: &[Uv]| {
             [-1.0, 1.0].iter().any(|&copy| {
@@ -161,14 +164,15 @@ impl Obstacles<'_> {
     }
 }
 
-/// The polygon with its end point, for a chain that winds.
+/// Returns the polygon of a chain that winds, with its end point, which is one displacement from its start.
 pub(super) fn unrolled_polygon(polygon: &[Uv], displacement: Uv) -> Vec<Uv> {
     let mut open = polygon.to_vec();
     open.push(polygon[0] + displacement);
     open
 }
 
-/// Whether a segment properly meets a polygon, or one of its copies by `period`.
+/// Whether a segment crosses a polygon or one of its two nearest copies by `period` on either side; touching does not count, a corner
+/// between both sides does.
 fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bool {
     let n = polygon.len();
     let sides = if closed { n } else { n - 1 };

@@ -21,7 +21,7 @@ pub(super) struct Seams<'r, 't, 'e> {
     curves: Vec<SeamCurve>,
 }
 
-/// A seam in space.
+/// A seam in space and how it goes with its line.
 struct SeamCurve {
     curve: Curve,
     /// The parameter that varies, when the seam is an isoline.
@@ -35,12 +35,12 @@ impl<'r, 't, 'e> Seams<'r, 't, 'e> {
         Self { region, curves: lines.into_iter().map(|line| seam_curve(region, line)).collect() }
     }
 
-    /// Whether the curve of a source runs against the line it was made of.
+    /// Whether the curve of a source runs against the line it was made of; false for edges.
     pub(super) fn is_turned(&self, source: Source) -> bool {
         matches!(source, Source::Seam(k) if self.curves[k].turned)
     }
 
-    /// The uv curve of a use of a seam, over the seam's own parameter.
+    /// Returns the uv curve of a use of seam `k`, over the seam's own parameter; fails when the budget is used up.
     pub(super) fn uv(&mut self, k: usize, piece: &Piece) -> Result<UvCurve, Overrun> {
         let seam = &self.curves[k];
         let ends = [0, piece.curve.points.len() - 1].map(|i| piece.curve.points[i].truncate());
@@ -57,7 +57,7 @@ impl<'r, 't, 'e> Seams<'r, 't, 'e> {
         self.region.refit(piece, &seam.curve).map(|fit| fit.curve)
     }
 
-    /// The seams that were made, with their ends.
+    /// Hands over the seams in space, in the order of their numbers, with their ends.
     pub(super) fn finish(self) -> Vec<Seam> {
         self.curves
             .into_iter()
@@ -69,7 +69,8 @@ impl<'r, 't, 'e> Seams<'r, 't, 'e> {
     }
 }
 
-/// The curve of a seam in space: an isoline where it can be one.
+/// Returns the curve of a seam in space: an isoline of the spline where it can be one, else a fitted cubic. `a` and `b` are in the chart's
+/// parameters.
 fn seam_curve(region: &Region<'_, '_>, [a, b]: [Uv; 2]) -> SeamCurve {
     let Region { task, domain, surface } = region;
     let p = region.parameters(a);

@@ -1,6 +1,6 @@
 //! A face to be built, and its edges in the parameters of its chart.
 
-use super::fit::{Budget, Fit, Overrun, Target, project};
+use super::fit::{Budget, Fit, Overrun, Target, project_to_plane};
 use super::tolerances::{BORDER_SLACK, POLE_CLEARANCE, SCORE_NOISE, SMALLEST_EXTENT};
 use crate::math::{Uv, Vector};
 use crate::nurbs::Curve;
@@ -15,7 +15,7 @@ pub(crate) struct FaceTask<'e> {
     pub(crate) same_sense: bool,
     /// Loops as the file runs them: edge and whether it is run against its parameter.
     pub(crate) loops: Vec<Vec<(usize, bool)>>,
-    /// The edges in space, by the numbers of the loops.
+    /// The edges in space, mm, by the numbers of the loops.
     pub(crate) edges: FxHashMap<usize, &'e Curve>,
     /// Allowed error of uv curves, mm.
     pub(crate) tolerance: f64,
@@ -23,19 +23,19 @@ pub(crate) struct FaceTask<'e> {
     pub(crate) accuracy: f64,
     /// Work that the face may take.
     pub(crate) budget: Budget,
-    /// Whether the natural border of the surface is the outer loop.
+    /// Whether the natural border of the surface is the outer loop, which the loops leave out.
     pub(crate) implicit_outer: bool,
 }
 
 impl FaceTask<'_> {
-    /// Size of the face by its edges, or of its surface, mm.
+    /// Returns the diagonal of the box around its edges, or without any the size of its surface, mm; never below [`SMALLEST_EXTENT`].
     pub(super) fn extent(&self) -> f64 {
         let edges = self.edges.values().map(|curve| curve.bounds());
         let all = edges.reduce(|a, b| a.union(b));
         all.map_or(self.chart.size, |b| b.diagonal()).max(SMALLEST_EXTENT)
     }
 
-    /// Every edge of the loops in the chart's own parameters.
+    /// Fits every edge of the loops, once, in the chart's own parameters; by number. Fails when the budget is used up.
     pub(super) fn fit_edges(&self) -> Result<FxHashMap<usize, Fit>, Overrun> {
         let mut fits: FxHashMap<usize, Fit> = FxHashMap::default();
         for &(edge, _) in self.loops.iter().flatten() {
@@ -47,11 +47,12 @@ impl FaceTask<'_> {
         Ok(fits)
     }
 
-    /// The edge in the chart's own parameters.
+    /// Fits an edge in the chart's own parameters: exact on a plane, else within the tolerance, and put on the border where it swings just
+    /// over it.
     fn fit_edge(&self, curve: &Curve) -> Result<Fit, Overrun> {
         let chart = &self.chart;
         if let Kind::Plane { frame } = &chart.kind {
-            return Ok(project(curve, |p| {
+            return Ok(project_to_plane(curve, |p| {
                 let q = frame.local_point(p);
                 (Uv::new(q.x, q.y), q.z)
             }));
@@ -85,7 +86,8 @@ impl FaceTask<'_> {
         Ok(fit)
     }
 
-    /// Turns the poles of a sphere away from the edges, unless the file cut it open itself.
+    /// Turns the axis of a sphere so that its poles are away from the edges, unless they are, or the file cut it open itself. Does nothing
+    /// on other surfaces.
     pub(super) fn turn_sphere(&mut self) {
         // A sphere is a torus without a large radius.
         let Kind::Torus { frame, major: 0.0, .. } = self.chart.kind else { return };

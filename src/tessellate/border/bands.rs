@@ -6,8 +6,8 @@ use crate::math::Uv;
 /// Most bands: a segment that runs along all of them stands in each.
 const MOST_BANDS: usize = 256;
 
-/// Segments in bands across v, so that a place is compared only with those at its height: a damaged face with 5,000 of them spent nine tenths
-/// of its time comparing.
+/// Segments in bands across v, so that a place is compared only with those at its height: a damaged face with 5,000 of them spent nine
+/// tenths of its time comparing.
 pub(in crate::tessellate) struct BorderBands {
     lowest: f64,
     /// Bands to a unit of v.
@@ -16,6 +16,7 @@ pub(in crate::tessellate) struct BorderBands {
 }
 
 impl BorderBands {
+    /// Sorts segments of a border, in parameters, into bands; without segments nothing is enclosed.
     pub(in crate::tessellate) fn new(segments: &[[Uv; 2]]) -> Self {
         let heights = || segments.iter().flatten().map(|p| p.y);
         let (lowest, highest) =
@@ -30,13 +31,15 @@ impl BorderBands {
         out
     }
 
-    /// The band at a height: it never falls as heights rise, so that a segment stands in the band of each height that it crosses.
+    /// Returns the index of the band at height `v`, the first or last beyond the ends. Never falls as `v` rises, so that a segment is in
+    /// every band it crosses.
     fn band(&self, v: f64) -> usize {
         // Beyond either end the first or last band, which crosses nothing there.
         (((v - self.lowest) * self.density) as usize).min(self.bands.len() - 1)
     }
 
-    /// Whether a place lies inside, by parity of crossings along u.
+    /// Whether `p` lies inside the closed loops of the border, by the parity of their crossings with the ray along +u. On the border either
+    /// answer may come.
     pub(in crate::tessellate) fn encloses(&self, p: Uv) -> bool {
         self.bands[self.band(p.y)].iter().filter(|&&s| crosses_ray_from(p, s)).count() % 2 == 1
     }

@@ -32,7 +32,8 @@ const PROBES: [f64; 5] = [0.2, 0.35, 0.5, 0.65, 0.8];
 const KINK: f64 = 0.05;
 const KINK_STEP: f64 = 1e-6;
 
-/// The ends of a curve and the kinks between them.
+/// Returns the parameters of a curve's ends and of the kinks between them, ascending. A kink is a knot of full multiplicity at which the
+/// tangent turns by more than [`KINK`].
 pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
     let b = curve.breakpoints();
     let n = b.len();
@@ -54,9 +55,12 @@ pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
     (0..n).filter(|&i| i == 0 || i + 1 == n || is_kink(i)).map(|i| b[i]).collect()
 }
 
-/// Parameters so that chords stay within the tolerance (of a parameter and the direction there), spread evenly in
-/// `√(curvature / tolerance)` between `breaks`.
-pub(in crate::tessellate) fn parameters(
+/// Divides a curve into chords within `tolerance`, mm, a function of the parameter and the chord's direction there: spread evenly in
+/// `√(curvature / tolerance)` between `breaks`, then halved where that is not enough. Returns the parameters ascending, all `breaks`
+/// included.
+///
+/// `breaks` are at least two, ascending. Limits on chords and halvings can leave chords that exceed the tolerance.
+pub(in crate::tessellate) fn chord_parameters(
     breaks: &[f64],
     at: impl Fn(f64) -> Point,
     tolerance: impl Fn(f64, Vector) -> f64,
@@ -70,7 +74,7 @@ pub(in crate::tessellate) fn parameters(
         }
         t.push(pair[1]);
     }
-    shorten(&mut t, at, tolerance);
+    halve_long_chords(&mut t, at, tolerance);
     t
 }
 
@@ -80,12 +84,13 @@ struct Piece {
     samples: Vec<f64>,
     /// Tolerances at one in [`TOLERANCE_EVERY`] samples.
     tolerances: Vec<f64>,
-    /// Number of chords from the start up to each sample.
+    /// Number of chords, not whole, that the tolerance asks for from the start up to each sample.
     chords: Vec<f64>,
 }
 
 impl Piece {
-    /// `None` where the piece is straight.
+    /// Samples the curve `at` in `steps` steps over `[a, b]`, with tolerances (mm, by parameter and direction) at some; `None` where the
+    /// piece is straight, which needs no inner parameters.
     fn new(
         [a, b]: [f64; 2],
         steps: usize,
@@ -107,7 +112,7 @@ impl Piece {
         let density = |i: usize| {
             let (k, f) = (i / TOLERANCE_EVERY, (i % TOLERANCE_EVERY) as f64 / TOLERANCE_EVERY as f64);
             let xi = tolerances[k] + (tolerances[(k + 1).min(last)] - tolerances[k]) * f;
-            (curvature(&p, i) / (8.0 * xi)).sqrt()
+            (sample_curvature(&p, i) / (8.0 * xi)).sqrt()
         };
         let d: Vec<f64> = (0..=steps).map(density).collect();
         let mut chords = vec![0.0];
@@ -118,13 +123,14 @@ impl Piece {
         Some(Self { ends: [a, b], samples, tolerances, chords })
     }
 
-    /// Inner parameters of as few chords as hold, spread evenly.
+    /// Returns the parameters strictly between the ends, ascending, of about as few chords as keep their middles within the tolerance;
+    /// empty for one chord. Some may still exceed it after [`MAX_SPREADS`] spreads.
     fn spread_within_tolerance(&self, at: &impl Fn(f64) -> Point) -> Vec<f64> {
         let total = self.chords[self.chords.len() - 1];
         // Samples without length make the sum no number; one chord, and halving, is what is left then.
         let mut n =
             if total.is_finite() { (total - CHORD_ROUNDING).ceil().clamp(1.0, MAX_CHORDS as f64) } else { 1.0 };
-        let mut inner = self.spread(n);
+        let mut inner = self.even_parameters(n);
         // The samples' own chords miss a little of the curve: ask for more while the worst chord is too long.
         for _ in 0..MAX_SPREADS {
             let worst = self.worst_excess(&inner, at);
@@ -133,13 +139,13 @@ impl Piece {
             }
             // The sag goes as the square of a chord's length: their number as the root of the excess.
             n = (n * worst.sqrt()).ceil().max(n + 1.0);
-            inner = self.spread(n);
+            inner = self.even_parameters(n);
         }
         inner
     }
 
-    /// Inner parameters of `n` chords.
-    fn spread(&self, n: f64) -> Vec<f64> {
+    /// Returns the parameters between the `n` chords, a whole number of at least one, that share `chords` evenly; empty for one.
+    fn even_parameters(&self, n: f64) -> Vec<f64> {
         let (ts, sum) = (&self.samples, &self.chords);
         let steps = ts.len() - 1;
         let parameter = |k: usize| {
@@ -150,7 +156,8 @@ impl Piece {
         (1..n as usize).map(parameter).collect()
     }
 
-    /// The largest sag of a chord in its middle, in tolerances.
+    /// Returns the largest distance of a chord's middle from the curve, over the tolerance there. `inner` are the parameters between the
+    /// ends.
     fn worst_excess(&self, inner: &[f64], at: &impl Fn(f64) -> Point) -> f64 {
         let [a, b] = self.ends;
         let last = self.tolerances.len() - 1;
@@ -164,8 +171,9 @@ impl Piece {
     }
 }
 
-/// Curvature at a sample from the circle through three points; ends take their neighbour's.
-fn curvature(p: &[Point], i: usize) -> f64 {
+/// Returns the curvature at sample `i` of at least three, 1/mm, from the circle through it and its neighbours; at either end that of the
+/// next sample, 0 where samples coincide.
+fn sample_curvature(p: &[Point], i: usize) -> f64 {
     // Ends have a neighbour on one side only.
     let i = i.clamp(1, p.len() - 2);
     let (x, y) = (p[i] - p[i - 1], p[i + 1] - p[i]);
@@ -173,9 +181,14 @@ fn curvature(p: &[Point], i: usize) -> f64 {
     if scale > 0.0 { 2.0 * x.cross(y).length() / scale } else { 0.0 }
 }
 
-/// Halves chords that stray too far from the curve.
-pub(super) fn shorten(t: &mut Vec<f64>, at: impl Fn(f64) -> Point, tolerance: impl Fn(f64, Vector) -> f64) {
-    bisect(t, |a, b| {
+/// Halves chords between the parameters `t`, within the limits of [`bisect_coarse`], while any of [`PROBES`] lies farther from its
+/// chord than [`HALVED_FROM`] times the tolerance, mm, at the chord's middle and in its direction.
+pub(super) fn halve_long_chords(
+    t: &mut Vec<f64>,
+    at: impl Fn(f64) -> Point,
+    tolerance: impl Fn(f64, Vector) -> f64,
+) {
+    bisect_coarse(t, |a, b| {
         let chord = [at(a), at(b)];
         let along = chord[1] - chord[0];
         let xi = tolerance(0.5 * (a + b), along) * HALVED_FROM;
@@ -183,8 +196,9 @@ pub(super) fn shorten(t: &mut Vec<f64>, at: impl Fn(f64) -> Point, tolerance: im
     });
 }
 
-/// Halves intervals until `coarse` holds for none.
-pub(super) fn bisect(t: &mut Vec<f64>, coarse: impl Fn(f64, f64) -> bool) {
+/// Halves the intervals between the ascending `t` while `coarse` holds, at most [`MAX_HALVINGS`] times each and up to [`MAX_CHORDS`] in
+/// all.
+pub(super) fn bisect_coarse(t: &mut Vec<f64>, coarse: impl Fn(f64, f64) -> bool) {
     let mut out = Vec::with_capacity(t.len());
     for pair in t.windows(2) {
         let mut stack = vec![(pair[0], pair[1], 0)];
@@ -204,7 +218,7 @@ pub(super) fn bisect(t: &mut Vec<f64>, coarse: impl Fn(f64, f64) -> bool) {
     *t = out;
 }
 
-/// Halves all intervals.
+/// Halves every interval between the ascending `t` once, in place.
 pub(super) fn bisect_all(t: &mut Vec<f64>) {
     let mut out = Vec::with_capacity(2 * t.len());
     for pair in t.windows(2) {

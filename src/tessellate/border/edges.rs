@@ -15,7 +15,7 @@ const SAME_CURVE: f64 = 1e-3;
 /// Sides of a loop up to which all of them may be one chord.
 const MAX_LENS_SIDES: usize = 4;
 
-/// Where an edge is divided: parameters ascending, ends included.
+/// Where an edge is divided: its parameters, ascending, both ends included.
 #[derive(Clone, Debug, Default)]
 pub(in crate::tessellate) struct Division {
     pub(in crate::tessellate) t: Vec<f64>,
@@ -30,8 +30,11 @@ pub(in crate::tessellate) struct OwnDivision {
     t: Vec<f64>,
 }
 
-/// Divides all edges of a part, and returns the shared positions: vertices, then inner points edge by edge. `own` keeps what each
-/// edge has by itself from round to round.
+/// Divides all edges of a part. Returns the divisions by edge, and the shared positions in the part's coordinates: its vertices, then inner
+/// points edge by edge.
+///
+/// `sides` and `denser` are by edge; an edge without sides is one chord. `own` is read and rewritten: what edges have by themselves, kept
+/// from round to round, empty before the first.
 pub(in crate::tessellate) fn divide(
     part: &Part,
     faces: &[(&Face, &FaceSurface<'_>)],
@@ -66,7 +69,8 @@ fn with_further(times: impl Iterator<Item = Vec<f64>>, further: &[Vec<f64>]) -> 
     times.zip(further).map(merge).collect()
 }
 
-/// The divisions with further parameters, those of each edge in any order, and the shared positions.
+/// Adds `further` parameters of each edge, in any order, to its division, and returns the new divisions and shared positions as [`divide`]
+/// does.
 pub(in crate::tessellate) fn divide_more(
     part: &Part,
     divisions: &[Division],
@@ -75,8 +79,9 @@ pub(in crate::tessellate) fn divide_more(
     positions(part, with_further(divisions.iter().map(|d| d.t.clone()), further))
 }
 
-/// Divisions at these parameters, and the shared positions.
-fn positions(part: &Part, times: Vec<Vec<f64>>) -> (Vec<Division>, Vec<Point>) {
+/// Returns the divisions at `times`, two or more ascending parameters of each edge, and the shared positions: vertices, then inner points
+/// edge by edge.
+fn sample_positions(part: &Part, times: Vec<Vec<f64>>) -> (Vec<Division>, Vec<Point>) {
     let inner = |(edge, t): (&Edge, &Vec<f64>)| -> Vec<Point> {
         t[1..t.len() - 1].iter().map(|&t| edge.curve.evaluate(t)).collect()
     };
@@ -91,8 +96,8 @@ fn positions(part: &Part, times: Vec<Vec<f64>>) -> (Vec<Division>, Vec<Point>) {
     (divisions, positions)
 }
 
-/// Edges around a face that all are one chord between the same two places leave nothing of it, be they two or the seam of a sphere that
-/// runs from pole to pole: the one that bends most gets a corner.
+/// Halves the most bent edge of every loop whose edges, two to [`MAX_LENS_SIDES`] of them, are all one chord between the same two vertices,
+/// which would leave nothing of the face. The seam of a sphere from pole to pole counts as two. Where all are straight nothing changes.
 fn open_lenses(part: &Part, faces: &[(&Face, &FaceSurface<'_>)], times: &mut [Vec<f64>]) {
     for trim in faces.iter().flat_map(|(face, _)| &face.loops).filter(|l| l.uses.len() <= MAX_LENS_SIDES) {
         let edges: SmallVec<[usize; 4]> = trim.uses.iter().filter_map(|u| Some(u.edge?.0 as usize)).collect();
@@ -119,8 +124,8 @@ fn open_lenses(part: &Part, faces: &[(&Face, &FaceSurface<'_>)], times: &mut [Ve
     }
 }
 
-/// Several edges between the same two vertices that all are one chord would be one edge of the mesh with more than two facets: all but
-/// the straightest get a corner.
+/// Halves all but the straightest of edges that are one chord between the same two vertices, which as one edge of the mesh would have more
+/// than two facets. Edges that coincide with the straightest, one edge that stands twice in the file, stay as they are.
 fn separate_twins(part: &Part, sides: &[Vec<EdgeSide<'_, '_>>], times: &mut [Vec<f64>]) {
     let chord = |e: usize| {
         let [a, b] = part.edges[e].vertices;

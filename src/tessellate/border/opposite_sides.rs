@@ -26,11 +26,11 @@ const INVERSION_HALVINGS: usize = 60;
 /// Steps in which a side's shape is looked at.
 const STEPS: u32 = 8;
 
-/// A use that runs along a parameter line.
+/// A use of an edge that runs along a parameter line of the face.
 struct ParameterRun<'f> {
     edge: usize,
     edge_use: &'f EdgeUse,
-    /// The parameter that changes.
+    /// The parameter that changes: 0 for u, 1 for v.
     direction: usize,
     /// From where to where, ascending, in shares of the domain.
     range: [f64; 2],
@@ -38,10 +38,11 @@ struct ParameterRun<'f> {
     level: f64,
 }
 
-/// Two uses that face each other.
+/// Two uses that face each other, each with the index of its edge.
 type Pair<'f> = [(usize, &'f EdgeUse); 2];
 
-/// Makes samples of opposite edges equal. `times` are the parameters at which each edge is divided.
+/// Makes the samples of opposite edges equal, in `times`: the ascending parameters at which each edge of the part is divided. Edges beyond
+/// its length, and planes, are passed over. `denser` and `sides` are by edge, as for `edges::divide`.
 pub(in crate::tessellate) fn equalise<'f>(
     part: &Part,
     faces: &[(&'f Face, &FaceSurface<'_>)],
@@ -74,6 +75,7 @@ struct Equaliser<'w, 'f, 's, 'a> {
     part: &'w Part,
     sides: &'w [Vec<EdgeSide<'s, 'a>>],
     denser: &'w [u32],
+    /// With the direction in which both run: 0 for u, 1 for v.
     pairs: &'w [(Pair<'f>, usize)],
     /// The pairs of each edge that has one.
     of_edge: &'w FxHashMap<usize, Vec<usize>>,
@@ -81,7 +83,7 @@ struct Equaliser<'w, 'f, 's, 'a> {
 }
 
 impl Equaliser<'_, '_, '_, '_> {
-    /// Edges that pairs lead to from each other.
+    /// Returns the groups of edges that pairs connect, each edge in one group; edges without a pair are in none.
     fn groups(&self) -> Vec<Vec<usize>> {
         let mut seen = vec![false; self.times.len()];
         let mut groups = Vec::new();
@@ -107,7 +109,7 @@ impl Equaliser<'_, '_, '_, '_> {
         groups
     }
 
-    /// What the edges of one group take over.
+    /// Returns the edges of a group that take over samples, each once, with all of their new parameters; empty where none does.
     fn equalise_group(&self, group: &[usize]) -> Vec<(usize, Vec<f64>)> {
         // From the densest, so that samples are only ever handed to sides that would have had fewer.
         let mut order = group.to_vec();
@@ -159,12 +161,13 @@ impl Equaliser<'_, '_, '_, '_> {
     }
 }
 
-/// Whether samples are the same but for rounding.
+/// Whether samples are as many and the same within [`SAME_SAMPLE`] of the edge's domain.
 fn are_same(a: &[f64], b: &[f64], [t0, t1]: [f64; 2]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(x, y)| (x - y).abs() <= SAME_SAMPLE * (t1 - t0))
 }
 
-/// Opposite uses of a face whose edges are among the first `edges`, and the direction in which they run.
+/// Returns the pairs of opposite uses of a face whose edges are among the first `edges` of the part, with the direction in which both run
+/// (0 for u, 1 for v). None for a face of more than [`MAX_USES`] uses.
 fn pairs_of<'f>(face: &'f Face, surface: &FaceSurface<'_>, edges: usize) -> Vec<(Pair<'f>, usize)> {
     let mut pairs = Vec::new();
     let uses: Vec<&EdgeUse> = face.loops.iter().flat_map(|l| &l.uses).collect();
@@ -186,7 +189,7 @@ fn pairs_of<'f>(face: &'f Face, surface: &FaceSurface<'_>, edges: usize) -> Vec<
     pairs
 }
 
-/// A use as a run along a parameter line, if it is one.
+/// Describes a use that runs along a parameter line without turning back; `None` for any other, and for one without an edge.
 fn parameter_run<'f>(edge_use: &'f EdgeUse, surface: &FaceSurface<'_>) -> Option<ParameterRun<'f>> {
     let edge = edge_use.edge?.0 as usize;
     let [t0, t1] = edge_use.uv.domain();
@@ -216,7 +219,8 @@ fn parameter_run<'f>(edge_use: &'f EdgeUse, surface: &FaceSurface<'_>) -> Option
     })
 }
 
-/// The samples of one use where the other has the same parameter; `None` when they do not ascend there.
+/// Returns the parameters of `to`, ascending over `[t0, t1]`, where it has the same surface parameter `d` (0 for u, 1 for v) as `from` at
+/// `times`; `None` when two of them coincide.
 fn transfer_samples(times: &[f64], from: &EdgeUse, to: &EdgeUse, d: usize, [t0, t1]: [f64; 2]) -> Option<Vec<f64>> {
     let x = |t: f64| to.uv.evaluate(t)[d];
     let up = x(t1) > x(t0);

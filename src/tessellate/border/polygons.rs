@@ -34,22 +34,23 @@ pub(in crate::tessellate) struct PolygonVertex {
 pub(in crate::tessellate) enum BorderSide {
     /// The part's edge of this use (counted through all loops) over a parameter interval.
     Edge { edge_use: u32, t: [f64; 2] },
-    /// A straight line of the parameter plane whose two sides are one in space, or a free border.
+    /// A straight line of the parameter plane without an edge of the part: one side of a seam, or a free border.
     Seam,
     /// A line of the parameter plane that is one point in space.
     Pole,
 }
 
-/// All polygons of a face.
+/// The border polygons of a face, one for each loop.
 #[derive(Default)]
 pub(in crate::tessellate) struct BorderPolygons {
+    /// In order of the loops; the last corner is joined to the first.
     pub(in crate::tessellate) polygons: Vec<Vec<PolygonVertex>>,
-    /// Places of the positions that are not shared with other faces.
+    /// Places of the positions that are not shared with other faces, in the part's coordinates.
     pub(in crate::tessellate) own: Vec<Point>,
 }
 
 impl BorderPolygons {
-    /// The box around all polygons.
+    /// Returns the box, in parameters, around all polygons: lowest and highest corner. Infinite and inverted without any.
     pub(in crate::tessellate) fn bounds(&self) -> (Uv, Uv) {
         let all = self.polygons.iter().flatten();
         all.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), v| (l.min(v.uv), h.max(v.uv)))
@@ -61,8 +62,8 @@ const MANY_CORNERS: usize = 8;
 /// Share of a loop's area that the polygon of its chords keeps.
 const KEPT_AREA: f64 = 0.1;
 
-/// Edges of loops of which chords leave next to nothing, or turn inside out: an arc and a flat hyperbola over one chord, whose polygon
-/// is a line of the parameter plane but for rounding.
+/// Returns the edges of loops whose chords enclose less than [`KEPT_AREA`] of the loop's area in parameters, or turn inside out: an arc and
+/// a flat hyperbola over one chord, say. Polygons of more than [`MANY_CORNERS`] corners are not asked.
 pub(in crate::tessellate) fn edges_of_collapsed_loops(
     loops: &[TrimLoop],
     polygons: &BorderPolygons,
@@ -90,7 +91,8 @@ pub(in crate::tessellate) fn edges_of_collapsed_loops(
     found
 }
 
-/// The loops of a face; of an untrimmed one, the rim of its domain.
+/// Returns the loops of a face; for a face without any, one loop counter-clockwise around the domain of its surface, of four uses without
+/// edges.
 pub(in crate::tessellate) fn loops(face: &Face) -> Vec<TrimLoop> {
     if !face.loops.is_empty() {
         return face.loops.clone();
@@ -109,7 +111,8 @@ pub(in crate::tessellate) fn loops(face: &Face) -> Vec<TrimLoop> {
     vec![TrimLoop { uses }]
 }
 
-/// Builds the polygons on the part's shared points; sides without an edge get corners at those of `imprinted` that lie on them.
+/// Builds a polygon for each loop, its corners at the part's shared positions. Sides without an edge get samples of their own, the same on
+/// both sides of a seam, and corners at those of `imprinted` that lie on them. Parameters are clamped to the surface's domain.
 pub(in crate::tessellate) fn build(
     part: &Part,
     loops: &[TrimLoop],
@@ -130,8 +133,8 @@ pub(in crate::tessellate) fn build(
         let starts: Vec<Position> = (0..n)
             .map(|k| {
                 let (before, here) = (&trim.uses[(k + n - 1) % n], &trim.uses[k]);
-                vertex(part, here, 0)
-                    .or(vertex(part, before, 1))
+                vertex_position(part, here, 0)
+                    .or(vertex_position(part, before, 1))
                     .unwrap_or_else(|| own.find_or_add(surface.point(surface.spline.clamp(here.start()))))
             })
             .collect();
@@ -163,13 +166,15 @@ pub(in crate::tessellate) fn build(
     out
 }
 
-/// The vertex at the start (0) or end (1) of a use of an edge.
-fn vertex(part: &Part, u: &EdgeUse, end: usize) -> Option<Position> {
+/// Returns the shared position of the vertex where a use starts (`end` 0) or ends (1), in the direction of the loop; `None` without an
+/// edge.
+fn vertex_position(part: &Part, u: &EdgeUse, end: usize) -> Option<Position> {
     let vertices = part.edges[u.edge?.0 as usize].vertices;
     Some(Position::Shared(vertices[if u.reversed { 1 - end } else { end }].0))
 }
 
-/// A side along an edge: the edge's own samples, from the use's start on.
+/// Returns the vertices of a side along an edge, in the direction of the loop, without its end. `from` is the position of its start;
+/// `edge_use` the number of the use through all loops.
 fn edge_side<'d>(
     u: &'d EdgeUse,
     division: &'d Division,
@@ -185,14 +190,16 @@ fn edge_side<'d>(
     })
 }
 
-/// One side of a seam that has been sampled, to be met again from the other side.
+/// The first side of a seam, kept so that the second one takes its samples.
 struct SeamSide {
+    /// Places at even steps along it.
     shape: Vec<Point>,
-    /// Its inner samples: shares of the way along it, and positions.
+    /// Its inner samples: shares of the way along it, in [0, 1], and positions.
     samples: Vec<(f64, Position)>,
 }
 
-/// A side without an edge: a pole, or one side of a seam; the second side of a seam takes the samples of the first.
+/// Returns the vertices of a side without an edge, without its end: one vertex for a pole; otherwise samples of its own, which go to `own`
+/// and `seams`, or those of the side in `seams` that runs back through the same places. `from` and `to` are the positions of its ends.
 fn free_side(
     u: &EdgeUse,
     surface: &FaceSurface<'_>,
@@ -229,7 +236,7 @@ fn free_side(
             );
             breaks.push(1.0);
             breaks.sort_by(f64::total_cmp);
-            let mut fs = curve_chords::parameters(&breaks, at, |f, _| SEAM_SHARE * surface.tolerance(uv(f)));
+            let mut fs = curve_chords::chord_parameters(&breaks, at, |f, _| SEAM_SHARE * surface.tolerance(uv(f)));
             imprinted.add_samples(&mut fs, at);
             let samples: Vec<(f64, Position)> = fs[1..fs.len() - 1].iter().map(|&f| (f, own.add(at(f)))).collect();
             seams.push(SeamSide { shape, samples: samples.clone() });
@@ -240,7 +247,7 @@ fn free_side(
     all.map(|(f, position)| PolygonVertex { uv: uv(f), position, side: BorderSide::Seam }).collect()
 }
 
-/// Points that a face makes itself, found again by place.
+/// Positions that a face makes for itself, looked up by place.
 struct OwnPoints {
     points: Vec<Point>,
     /// Distance within which they are one, mm.
@@ -248,12 +255,13 @@ struct OwnPoints {
 }
 
 impl OwnPoints {
+    /// Adds a place, even where one is near already.
     fn add(&mut self, p: Point) -> Position {
         self.points.push(p);
         Position::Own(self.points.len() as u32 - 1)
     }
 
-    /// The position of a point: an own one that is near, or a new one.
+    /// Returns the first position of its own within `near` of `p`, or a new one at `p`.
     fn find_or_add(&mut self, p: Point) -> Position {
         // By place, not by parameters: both ends of a seam are one corner.
         match self.points.iter().position(|q| (*q - p).length() <= self.near) {
@@ -263,12 +271,12 @@ impl OwnPoints {
     }
 }
 
-/// Whether the ray from `p` along u crosses a segment: an odd number of them means inside.
+/// Whether the ray from `p` along +u crosses the segment from `a` to `b`; over closed loops an odd number of crossings means inside.
 pub(in crate::tessellate) fn crosses_ray_from(p: Uv, [a, b]: [Uv; 2]) -> bool {
     (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
 }
 
-/// Points of a face of another solid that lies on this one.
+/// Corners of a face of another solid that lies on this one, in this part's coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::tessellate) struct ImprintedPoints<'p> {
     pub(in crate::tessellate) points: &'p [Point],
@@ -277,9 +285,11 @@ pub(in crate::tessellate) struct ImprintedPoints<'p> {
 }
 
 impl ImprintedPoints<'_> {
+    /// Of a face that no other lies on.
     pub(in crate::tessellate) const NONE: Self = ImprintedPoints { points: &[], near: 0.0 };
 
-    /// Adds the parameters of those points that lie on a curve whose samples these are, unless a sample is there already.
+    /// Adds to `samples`, ascending parameters of the curve `at`, the nearest one to each point that lies within `near` of the curve and is
+    /// not within `near` of a sample.
     fn add_samples(&self, samples: &mut Vec<f64>, at: impl Fn(f64) -> Point) {
         for &p in self.points {
             let off = |t: f64| (at(t) - p).length();

@@ -21,7 +21,8 @@ const QUARTERS: [f64; 2] = [0.25, 0.75];
 /// Corners of a facet: parameters and places, the traced diagonal from the first to the third.
 pub(in crate::tessellate) type Corners = [(Uv, Point); 4];
 
-/// Bound of a quad's two triangles, edges and diagonal included; its corners lie on the surface.
+/// Returns a bound, mm, of the distance between the surface and the triangles (0, 1, 2) and (0, 2, 3), sides and diagonal included, where
+/// it is at most `limit`; a larger value only says that none was proved. The corners lie on the surface.
 pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners, limit: f64) -> f64 {
     let mut worst = 0f64;
     let mut open: SmallVec<[[usize; 3]; 2]> = SmallVec::new();
@@ -52,15 +53,16 @@ pub(in crate::tessellate) fn quad_bound(prover: &mut Prover<'_, '_>, c: &Corners
     worst
 }
 
-/// A cell seen at nine points.
+/// A cell seen at nine points of the surface: its corners, the middles of its sides, and its middle.
 pub(in crate::tessellate) struct CandidateFacet {
-    /// Places at the corners, sides and middle: three by three.
+    /// Places, by step along u and then along v.
     p: [[Point; 3]; 3],
-    /// Largest distance of a middle from its chord, for lines along u and along v.
+    /// The largest distance, mm, of a middle point from the chord between its ends, among the three lines along u and the three along v.
     pub(in crate::tessellate) sag: [f64; 2],
 }
 
 impl CandidateFacet {
+    /// Evaluates the surface at the corners, side middles and middle of the cell, and measures sags; proves nothing.
     pub(in crate::tessellate) fn new(surface: &FaceSurface<'_>, cell: Cell) -> Self {
         let middle = cell.center();
         let p = surface.lattice([cell.lo.x, middle.x, cell.hi.x], [cell.lo.y, middle.y, cell.hi.y]);
@@ -108,12 +110,12 @@ impl CandidateFacet {
         [self.p[0][0], self.p[2][0], self.p[2][2], self.p[0][2]]
     }
 
-    /// The corner at which the better diagonal starts, the one that lies nearer to the surface: 0 or 1.
+    /// Returns the corner at which the better diagonal starts, the one that lies nearer to the surface: 0 or 1.
     pub(in crate::tessellate) fn first_corner(&self) -> usize {
         self.diagonal().0
     }
 
-    /// The corner at which the better diagonal starts, and how far the middle is from it.
+    /// Returns the corner at which the diagonal nearer to the middle starts, 0 or 1, and the distance of the middle from it, mm.
     fn diagonal(&self) -> (usize, f64) {
         let (p, m) = (self.places(), self.p[1][1]);
         let (a, b) = (distance_to_chord(m, &[p[0], p[2]]), distance_to_chord(m, &[p[1], p[3]]));
@@ -121,7 +123,8 @@ impl CandidateFacet {
         if b < a * (1.0 - NEARER) { (1, b) } else { (0, a) }
     }
 
-    /// Bound of the cell as a facet, cut along the better diagonal.
+    /// Returns a bound, mm, of the cell as a facet cut along the better diagonal, proved where it is at most `limit`; above, it says only
+    /// that none was.
     pub(in crate::tessellate) fn bound(&self, prover: &mut Prover<'_, '_>, cell: Cell, limit: f64) -> f64 {
         let (r, off) = self.diagonal();
         // Cells with hanging vertices are cut along this diagonal after all, and must not be far from it.

@@ -10,6 +10,7 @@ pub(in crate::tessellate) struct Cell {
 }
 
 impl Cell {
+    /// Returns the corners counter-clockwise from `lo`.
     pub(in crate::tessellate) fn corners(&self) -> [Uv; 4] {
         [self.lo, Uv::new(self.hi.x, self.lo.y), self.hi, Uv::new(self.lo.x, self.hi.y)]
     }
@@ -19,18 +20,19 @@ impl Cell {
     }
 }
 
-/// A cell that is proved.
+/// A cell that is proved as a facet.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::tessellate) struct ProvedCell {
     pub(in crate::tessellate) cell: Cell,
+    /// Proved distance between facet and surface, mm, at most `slack` times the tolerance.
     pub(in crate::tessellate) bound: f64,
-    /// The tolerance at its place.
+    /// The tightest tolerance at its corners and middle, mm.
     pub(in crate::tessellate) tolerance: f64,
-    /// How many times that it was held to: 1, more once the budget has ended.
+    /// The multiple of the tolerance that it was held to: 1, more once the budget has ended.
     pub(in crate::tessellate) slack: f64,
     /// The corner at which the traced diagonal starts: 0 or 1.
     pub(in crate::tessellate) first: usize,
-    /// Where its corners lie.
+    /// The surface at [`Cell::corners`], in the part's coordinates.
     pub(in crate::tessellate) places: [Point; 4],
 }
 
@@ -48,12 +50,12 @@ pub(in crate::tessellate) struct Subdivision {
 }
 
 impl Subdivision {
-    /// How many cells there are.
+    /// Returns how many cells there are.
     pub(super) fn len(&self) -> usize {
         self.inside.len() + self.border.len()
     }
 
-    /// Adds what another branch has left.
+    /// Adds the cells of another branch to these; either branch's flags count for both.
     pub(super) fn append(&mut self, other: Self) {
         self.inside.extend(other.inside);
         self.border.extend(other.border);
@@ -65,7 +67,7 @@ impl Subdivision {
 /// Share of a face's extent within which parameters are one: trims that were fitted to the surface meet its parameter lines no better.
 const SAME_PARAMETER: f64 = 1e-7;
 
-/// Parameters nearer than this are one, in a face that spans the box.
+/// Returns how near parameters are one, in u and v, for a face that spans the box from `lo` to `hi`.
 pub(in crate::tessellate) fn parameter_resolution(lo: Uv, hi: Uv) -> Uv {
     SAME_PARAMETER * (hi - lo)
 }

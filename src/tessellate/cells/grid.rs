@@ -30,9 +30,9 @@ const MOVED_PARAMETERS: f64 = 1e-10;
 pub(in crate::tessellate) struct Grid {
     /// Corners in order of the traced diagonal.
     pub(in crate::tessellate) quads: Vec<ProvedFacet<4>>,
-    /// Pieces of cells with hanging vertices, to be joined in pairs.
+    /// Pieces of cells with hanging vertices; the transition's pairing may join them to quads.
     pub(in crate::tessellate) triangles: Vec<ProvedFacet<3>>,
-    /// Segments between the cells and the rest of the face.
+    /// Sides of the facets that belong to one of them alone, which the transition must meet.
     pub(in crate::tessellate) outline: Vec<[u32; 2]>,
 }
 
@@ -40,7 +40,7 @@ pub(in crate::tessellate) struct Grid {
 pub(in crate::tessellate) struct GridInput<'g> {
     /// Those of the border at first; corners of cells are added.
     pub(in crate::tessellate) nodes: &'g mut Nodes,
-    /// What border segments follow.
+    /// How far edges stray from the segments of the border.
     pub(in crate::tessellate) chords: &'g BorderChords,
     /// Parameters nearer than this are one.
     pub(in crate::tessellate) resolution: Uv,
@@ -48,7 +48,8 @@ pub(in crate::tessellate) struct GridInput<'g> {
     pub(in crate::tessellate) taken: &'g TakenChords,
 }
 
-/// Makes facets of the cells inside; those that cannot be resolved within their tolerance are left to the transition.
+/// Makes facets of the cells inside; a cell with nodes on its sides becomes several. Cells of which none holds its tolerance stay open, for
+/// the transition to fill. Adds nodes to those of the border.
 pub(in crate::tessellate) fn build(prover: &mut Prover<'_, '_>, cells: &Subdivision, input: GridInput<'_>) -> Grid {
     let border = input.nodes.len();
     // Nodes of the border and corners of cells come onto the lines first, bridges then: what hangs on a side is
@@ -96,7 +97,8 @@ pub(in crate::tessellate) fn build(prover: &mut Prover<'_, '_>, cells: &Subdivis
     grid
 }
 
-/// The nodes at the corners of each cell inside: those of the border where it has one there, else new ones. All are put on the lines.
+/// Returns the nodes at the corners of each cell inside, in the order of [`Cell::corners`]: a node of the border where one stands there,
+/// else a new one. Puts them, and all border nodes that lie on a line, on `lines`, unsorted.
 fn corners_of_cells(cells: &Subdivision, lines: &mut GridLines, nodes: &mut Nodes) -> Vec<[u32; 4]> {
     let mut at_crossing: FxHashMap<[usize; 2], u32> = FxHashMap::default();
     for (id, n) in (0..).zip(nodes.iter()) {
@@ -137,7 +139,8 @@ fn corners_of_cells(cells: &Subdivision, lines: &mut GridLines, nodes: &mut Node
         .collect()
 }
 
-/// Adds nodes that lead one hanging vertex to another.
+/// Adds the nodes of [`GridLines::bridges`] to `nodes` and to the sorted `lines`, so that hanging vertices on opposite sides of cells face
+/// each other.
 fn add_bridges(
     prover: &Prover<'_, '_>,
     cells: &Subdivision,
@@ -169,11 +172,13 @@ struct CellFacets<'b, 'g, 's, 'a> {
 }
 
 impl CellFacets<'_, '_, '_, '_> {
+    /// Bounds the triangle of nodes `t`, held to `slack` times its tolerance; whether it holds is for the caller to ask.
     fn prove(&mut self, t: [u32; 3], slack: f64) -> ProvedFacet<3> {
         prove_triangle(self.prover, self.input.nodes, t, self.input.chords, slack)
     }
 
-    /// Facets of a cell with hanging nodes.
+    /// Adds to `grid` the facets of a cell with hanging nodes: a grid of quads, or else triangles. `None`, and nothing added, where neither
+    /// holds. `polygon` are all nodes around the cell, counter-clockwise from its first corner.
     fn with_hanging_nodes(
         &mut self,
         proved: &ProvedCell,
@@ -189,20 +194,22 @@ impl CellFacets<'_, '_, '_, '_> {
         Some(())
     }
 
-    /// The facet of a cell with corners on the border.
+    /// Returns the facet of a cell with corners on the border and no hanging nodes; `None` where it does not hold or a side is a chord of
+    /// another face.
     fn at_border(&mut self, proved: &ProvedCell, corners: &[u32; 4]) -> Option<ProvedFacet<4>> {
         let at = corners.map(|c| self.input.nodes[c].position);
         // Another face has this chord already: with a side on it the edge would have more than two facets.
-        if (0..4).any(|k| self.input.taken.has([at[k], at[(k + 1) % 4]])) {
+        if (0..4).any(|k| self.input.taken.contains([at[k], at[(k + 1) % 4]])) {
             return None;
         }
-        self.with_proof_of_cell(proved, corners).or_else(|| self.quad(proved.slack, *corners))
+        self.with_proof_of_cell(proved, corners).or_else(|| self.prove_quad(proved.slack, *corners))
     }
 
-    /// A facet with corners on the border: it must hold with the border's own points, and follow its curve.
-    fn quad(&mut self, slack: f64, corners: [u32; 4]) -> Option<ProvedFacet<4>> {
+    /// Returns the first of two quads, by diagonal, that holds `slack` times its tolerance on the nodes' own places, edges along its sides
+    /// included; `None` if neither does, if a side is taken, or if two corners share a position.
+    fn prove_quad(&mut self, slack: f64, corners: [u32; 4]) -> Option<ProvedFacet<4>> {
         let n = corners.map(|c| self.input.nodes[c]);
-        let is_taken = |k: usize| self.input.taken.has([n[k].position, n[(k + 1) % 4].position]);
+        let is_taken = |k: usize| self.input.taken.contains([n[k].position, n[(k + 1) % 4].position]);
         if (0..4).any(|i| is_taken(i) || (0..i).any(|j| n[i].position == n[j].position)) {
             return None;
         }
@@ -219,8 +226,8 @@ impl CellFacets<'_, '_, '_, '_> {
         })
     }
 
-    /// The facet of a cell whose corners are the border's points already: what is proved of the cell holds for it but for the curves
-    /// that its border sides follow. `None` when the border's points lie elsewhere.
+    /// Returns the facet of a cell whose corners are border nodes, by the cell's own proof and the curves that its border sides follow.
+    /// `None` when a node lies elsewhere than the corner, two share a position, or the sum exceeds the limit.
     fn with_proof_of_cell(&mut self, proved: &ProvedCell, corners: &[u32; 4]) -> Option<ProvedFacet<4>> {
         let nodes = &*self.input.nodes;
         let n = corners.map(|c| nodes[c]);
@@ -253,7 +260,8 @@ impl CellFacets<'_, '_, '_, '_> {
         (worst <= limit).then_some(ProvedFacet { nodes: q, bound: worst, tolerance })
     }
 
-    /// Cuts a cell whose hanging vertices face each other from side to side; `None` when they do not.
+    /// Cuts a cell into a grid of quads between hanging nodes that face each other on opposite sides. `None` when they do not, for more
+    /// than [`MAX_PIECES`], or when a piece does not hold; the nodes made for it are taken back then.
     fn cut_across(
         &mut self,
         slack: f64,
@@ -299,7 +307,7 @@ impl CellFacets<'_, '_, '_, '_> {
         }
         let pieces = (0..nx * ny).map(|k| {
             let (i, j) = (k / ny, k % ny);
-            self.quad(slack, [at[i][j], at[i + 1][j], at[i + 1][j + 1], at[i][j + 1]])
+            self.prove_quad(slack, [at[i][j], at[i + 1][j], at[i + 1][j + 1], at[i][j + 1]])
         });
         let made: Option<Vec<_>> = pieces.collect();
         if made.is_none() {
@@ -308,7 +316,8 @@ impl CellFacets<'_, '_, '_, '_> {
         made
     }
 
-    /// Cuts a cell with hanging vertices into the triangles whose diagonals lie nearest to the surface; `None` when one does not hold.
+    /// Cuts the polygon around a cell into the triangles whose diagonals lie nearest to the surface, and proves each; `None` when one
+    /// exceeds `slack` tolerances or has a taken side.
     fn triangulate(&mut self, slack: f64, polygon: &[u32]) -> Option<Vec<ProvedFacet<3>>> {
         // Among triangulations the one whose diagonals lie nearest to the surface is most likely to hold; only that
         // one is tried.
@@ -317,7 +326,7 @@ impl CellFacets<'_, '_, '_, '_> {
         for t in triangles {
             let t = t.map(|i| polygon[i]);
             let p = t.map(|n| self.input.nodes[n].position);
-            if (0..3).any(|k| p[k] == p[(k + 1) % 3] || self.input.taken.has([p[k], p[(k + 1) % 3]])) {
+            if (0..3).any(|k| p[k] == p[(k + 1) % 3] || self.input.taken.contains([p[k], p[(k + 1) % 3]])) {
                 return None;
             }
             let proved = self.prove(t, slack);
@@ -329,8 +338,8 @@ impl CellFacets<'_, '_, '_, '_> {
         Some(made)
     }
 
-    /// The triangulation of a polygon with the least sum of squared distances of its diagonals from the surface, in places of the
-    /// polygon; by dynamic programming over its parts.
+    /// Returns the triangulation, as indices into `polygon`, with the least sum of squared distances of its diagonals from the surface.
+    /// `None` for more than [`MAX_CORNERS`] corners and where every one has a triangle without area.
     fn best_triangulation(&self, polygon: &[u32]) -> Option<Vec<[usize; 3]>> {
         // Triangulation of least weight by dynamic programming (Klincsek 1980): O(n³) for n corners, hence the limit.
         let n = polygon.len();

@@ -10,7 +10,7 @@ const MAX_BRIDGE: usize = 3;
 /// Share of a cell's size within which hanging vertices face each other.
 pub(super) const FACING: f64 = 0.15;
 
-/// A place for a further node on the side of a cell.
+/// A place for a further node on side `side`, 0 to 3 as in [`Cell::corners`], of cell `cell` of the list that was asked about.
 pub(super) struct Bridge {
     pub(super) cell: usize,
     pub(super) side: usize,
@@ -20,15 +20,16 @@ pub(super) struct Bridge {
 
 /// The nodes on the lines that sides of cells lie on.
 pub(in crate::tessellate) struct GridLines {
-    /// Parameters of the lines across u and v, ascending.
+    /// Parameters of the lines of constant u and of constant v, ascending.
     parameters: [Vec<f64>; 2],
-    /// On each of them, the nodes in order of the other parameter.
+    /// On each of those lines, pairs of the other parameter and a node, in order of that parameter once sorted.
     pub(in crate::tessellate) nodes: [Vec<Vec<(f64, u32)>>; 2],
     /// Parameters nearer than this are one.
     resolution: Uv,
 }
 
 impl GridLines {
+    /// Returns the lines that sides of cells inside lie on, without nodes. `resolution` is how near parameters are one.
     pub(in crate::tessellate) fn new(cells: &Subdivision, resolution: Uv) -> Self {
         let parameters = [0, 1].map(|d| {
             let mut x: Vec<f64> = cells.inside.iter().flat_map(|l| [l.cell.lo[d], l.cell.hi[d]]).collect();
@@ -48,14 +49,14 @@ impl GridLines {
         }
     }
 
-    /// The line that a side of a cell inside lies on.
+    /// Returns the index of the line of constant parameter `d` (0 for u, 1 for v) at exactly `x`, which must be the side of a cell inside.
     pub(super) fn side_line(&self, d: usize, x: f64) -> usize {
         let line = self.parameters[d].partition_point(|&y| y < x);
         debug_assert_eq!(self.parameters[d].get(line), Some(&x), "the lines are those of all cells");
         line
     }
 
-    /// The line at a parameter.
+    /// Returns the index of the line of constant parameter `d` nearest to `x` within the resolution; `None` where there is none.
     pub(in crate::tessellate) fn find(&self, d: usize, x: f64) -> Option<usize> {
         let l = &self.parameters[d];
         let i = l.partition_point(|&y| y < x);
@@ -66,7 +67,8 @@ impl GridLines {
         })
     }
 
-    /// Nodes on the line at `level` of direction `d` strictly between two parameters, in that order.
+    /// Returns the nodes on the line where parameter `d` is `level`, with the other parameter strictly between `a` and `b`, from `a` to
+    /// `b`; empty without such a line. The lines must be sorted.
     fn nodes_between(&self, d: usize, level: f64, a: f64, b: f64) -> Vec<u32> {
         let Some(line) = self.find(d, level).map(|i| &self.nodes[d][i]) else { return Vec::new() };
         // Without the ends, which are the cell's own corners, or as good as these.
@@ -79,7 +81,7 @@ impl GridLines {
         inner
     }
 
-    /// Nodes inside the four sides of a cell, in counter-clockwise order.
+    /// Returns the nodes strictly within the four sides of a cell, side by side and counter-clockwise from `lo`; the lines must be sorted.
     pub(in crate::tessellate) fn hanging_nodes(&self, cell: &Cell) -> [Vec<u32>; 4] {
         let (lo, hi) = (cell.lo, cell.hi);
         [
@@ -90,8 +92,8 @@ impl GridLines {
         ]
     }
 
-    /// Places for further nodes: where one hanging vertex faces another across a
-    /// few cells, the sides between get one too, so that all of them fall into quads.
+    /// Returns places for further nodes: where one hanging vertex faces another in a row of at most [`MAX_BRIDGE`] cells, the sides between
+    /// get one too, so that all of these cells fall into quads. `cells` are with the nodes of their corners; the lines must be sorted.
     pub(in crate::tessellate) fn bridges(&self, cells: &[(Cell, [u32; 4])], nodes: &Nodes) -> Vec<Bridge> {
         let mut sides_at: FxHashMap<[u32; 2], Vec<(usize, usize)>> = FxHashMap::default();
         let name = |i: usize, s: usize| edge_key(cells[i].1[s], cells[i].1[(s + 1) % 4]);

@@ -24,7 +24,8 @@ const SPARE: f64 = 1.03;
 /// Share of the tolerance that bending the other way may take from chords along this one.
 const MAX_SHARE_ACROSS: f64 = 0.5;
 
-/// Preferred cuts in direction `d`.
+/// Returns the parameters strictly inside `root`, ascending, at which cells should be cut in direction `d` (0 for u, 1 for v): border
+/// samples along parameter lines where these cover half of the range, else lines spread evenly in curvature. May be empty.
 pub(in crate::tessellate) fn preferred_cuts(
     surface: &FaceSurface<'_>,
     border: &BorderPolygons,
@@ -53,7 +54,8 @@ pub(in crate::tessellate) fn preferred_cuts(
     cuts
 }
 
-/// Runs of border samples along parameter lines on which parameter `d` changes: its values, ascending.
+/// Lists runs of at least three border samples along lines on which parameter `d` alone changes: the values of `d`, ascending, one list a
+/// run. Poles are left out.
 fn sample_runs(border: &BorderPolygons, root: Cell, d: usize) -> Vec<Vec<f64>> {
     let other = 1 - d;
     let flat = LEVEL * (root.hi[other] - root.lo[other]);
@@ -88,14 +90,15 @@ fn sample_runs(border: &BorderPolygons, root: Cell, d: usize) -> Vec<Vec<f64>> {
     runs
 }
 
-/// Lines spread evenly in `√(curvature / tolerance)`, as many as the sharpest of a few lines needs.
+/// Returns the values of parameter `d` that divide `root` evenly in `√(curvature / tolerance)`, as many as its sharpest line needs; empty
+/// where one chord will do.
 fn even_cuts(surface: &FaceSurface<'_>, root: Cell, d: usize) -> Vec<f64> {
     if surface.spline.degree[d] == 1 && surface.breaks[d].len() == 2 {
         // Straight lines bend nowhere.
         return Vec::new();
     }
     let [n, _] = PLACES;
-    let density = density(surface, root, d);
+    let density = chord_density(surface, root, d);
     let step = (root.hi[d] - root.lo[d]) / n as f64;
     let mut sum = vec![0.0];
     for i in 0..n {
@@ -119,8 +122,9 @@ fn even_cuts(surface: &FaceSurface<'_>, root: Cell, d: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Chords a parameter that the curvature asks for, at places along `d`: the most of a few places across.
-fn density(surface: &FaceSurface<'_>, root: Cell, d: usize) -> Vec<f64> {
+/// Returns how many chords to a unit of parameter `d` that curvature asks for, at even places along `root`: the most of a few places
+/// across, 0 where nothing bends.
+fn chord_density(surface: &FaceSurface<'_>, root: Cell, d: usize) -> Vec<f64> {
     let [n, m] = PLACES;
     let other = 1 - d;
     let mut density = vec![0f64; n + 1];

@@ -41,21 +41,21 @@ struct Tree<'s, 'a> {
     border: usize,
     /// Those, by their place along v.
     bands: BorderBands,
-    /// Segments that are one point in space.
+    /// Of each border segment, whether it is one point in space.
     poles: Vec<bool>,
     /// Parameters nearer than this are one.
     resolution: Uv,
     /// Parameters at which cells are cut rather than elsewhere, in u and v.
     preferred: [Vec<f64>; 2],
-    /// Between a facet and its normals, radians.
+    /// Largest angle between a facet and its normals, radians; `None` where none was asked for.
     max_angle: Option<f64>,
 }
 
-/// What one branch of the tree works with.
+/// The state of one branch of the tree.
 struct Branch<'s, 'a> {
     prover: Prover<'s, 'a>,
     cells: Subdivision,
-    /// Cells that it may have.
+    /// Cells that it may have; grows with `slack`.
     budget: usize,
     /// What cells are held to, in tolerances.
     slack: f64,
@@ -67,7 +67,8 @@ impl<'s, 'a> Branch<'s, 'a> {
         Self { prover, cells: Subdivision::default(), budget, slack: 1.0 }
     }
 
-    /// Whether splitting may go on: once the share of the budget is used up, with coarser cells.
+    /// Whether a cell at `depth` may be split further. Where the budget is used up, doubles the slack and enlarges the budget a little
+    /// until [`COARSEST`]; notes in `cells` that splitting ended early.
     fn may_split(&mut self, depth: u32) -> bool {
         if self.prover.gives_up() {
             self.cells.exhausted = true;
@@ -97,7 +98,9 @@ struct Visit<'n> {
     depth: u32,
 }
 
-/// Splits the box around the border until every cell fits.
+/// Splits the box around the border until every cell fits its tolerance or the budget of cells is used up, which the result says; it may
+/// hold up to twice the budget. Empty on a plane and for a border without extent. `max_angle` is in radians; no cell crosses an `imprinted`
+/// line.
 pub(in crate::tessellate) fn split(
     surface: &FaceSurface<'_>,
     acceptance: Acceptance,
@@ -144,7 +147,8 @@ pub(in crate::tessellate) fn split(
 }
 
 impl Tree<'_, '_> {
-    /// Keeps a whole cell that holds its tolerance, leaves one on the border to the transition, and halves any other.
+    /// Sorts a cell into the branch: inside if it fits whole, to the border if it fits but is cut or splitting ends, dropped if it lies
+    /// outside; else halves it and visits both halves, near the root in parallel.
     fn visit(&self, branch: &mut Branch<'_, '_>, visit: Visit<'_>) {
         let Visit { cell, depth, .. } = visit;
         let Some((near, inside)) = self.border_near(&visit) else { return };
@@ -153,10 +157,10 @@ impl Tree<'_, '_> {
             return;
         }
         let candidate = CandidateFacet::new(self.surface, cell);
-        let crease = self.crease(cell);
+        let crease = self.crease_to_cut(cell);
         // A crease is cut along before anything is proved: no facet may lie across it.
         if crease.is_none()
-            && let Some((bound, tolerance)) = self.fit(branch, cell, &candidate)
+            && let Some((bound, tolerance)) = self.prove_fit(branch, cell, &candidate)
         {
             // At the border the samples' aligned sides let a cell be whole; else the transition takes it, and this
             // one only told the size.
@@ -200,7 +204,8 @@ impl Tree<'_, '_> {
         branch.cells.append(second);
     }
 
-    /// The segments that come near a cell and whether it lies inside; `None` where it lies outside.
+    /// Returns the indices of the segments within [`CLEARANCE`] of a cell, and whether the cell is known to lie inside; `None` where it
+    /// lies wholly outside.
     fn border_near(&self, visit: &Visit<'_>) -> Option<(Vec<u32>, bool)> {
         if visit.inside {
             return Some((Vec::new(), true));
@@ -208,15 +213,15 @@ impl Tree<'_, '_> {
         let cell = visit.cell;
         let grow = CLEARANCE * (cell.hi - cell.lo);
         let (lo, hi) = (cell.lo - grow, cell.hi + grow);
-        let touching = |s: &u32| touches(self.segments[*s as usize], lo, hi);
+        let touching = |s: &u32| segment_touches_rectangle(self.segments[*s as usize], lo, hi);
         let near: Vec<u32> = visit.near.iter().copied().filter(touching).collect();
         // Free of the border all of it is inside or outside, as its middle is.
         let clear = near.is_empty();
         (!clear || self.contains(cell.center())).then_some((near, clear))
     }
 
-    /// Bound and tolerance of a cell that fits.
-    fn fit(&self, branch: &mut Branch<'_, '_>, cell: Cell, candidate: &CandidateFacet) -> Option<(f64, f64)> {
+    /// Returns a bound and tolerance, mm, of a cell that is proved within the branch's slack; `None` where it is not.
+    fn prove_fit(&self, branch: &mut Branch<'_, '_>, cell: Cell, candidate: &CandidateFacet) -> Option<(f64, f64)> {
         // Nine samples first: they turn most cells away before any bound is made.
         let tolerance = self.sampled_fit(cell, candidate, branch.slack)?;
         let limit = tolerance * branch.slack;
@@ -226,8 +231,8 @@ impl Tree<'_, '_> {
         (bound <= limit).then_some((bound, tolerance))
     }
 
-    /// Whether the segments near a cell leave it whole: they run along its sides, or beyond and along them, and no
-    /// corner stands between two samples.
+    /// Whether the border segments `near` leave a cell whole: each runs along a side, or beyond it and parallel, with no corner of the cell
+    /// strictly between its ends. False where an imprinted line is near.
     fn is_aligned(&self, cell: Cell, near: &[u32]) -> bool {
         // What the border's segments do not cross, and no sample of theirs divides, meets neighbours corner to corner.
         near.iter().all(|&s| {
@@ -251,8 +256,9 @@ impl Tree<'_, '_> {
         })
     }
 
-    /// A crease of the surface across the cell, not but for the rounding of its trims: what would be cut off there is a facet folded flat.
-    fn crease(&self, cell: Cell) -> Option<(usize, f64)> {
+    /// Returns the middle one of the creases across a cell, with the parameter it is constant in (0 for u, 1 for v); `None` without one.
+    /// Creases within the resolution of a side do not count.
+    fn crease_to_cut(&self, cell: Cell) -> Option<(usize, f64)> {
         (0..2).find_map(|d| {
             let c = &self.surface.creases[d];
             let (lo, hi) = (cell.lo[d] + self.resolution[d], cell.hi[d] - self.resolution[d]);
@@ -262,7 +268,7 @@ impl Tree<'_, '_> {
         })
     }
 
-    /// The middle one of the preferred cuts inside the cell, or the cell's middle.
+    /// Returns where a cell is cut in direction `d`: at the middle one of the preferred cuts that keep off its sides, else half-way.
     fn cut_parameter(&self, cell: Cell, d: usize) -> f64 {
         let (lo, hi) = (cell.lo[d], cell.hi[d]);
         let l = &self.preferred[d];
@@ -272,7 +278,8 @@ impl Tree<'_, '_> {
         if i < j { l[(i + j) / 2] } else { 0.5 * (lo + hi) }
     }
 
-    /// The tolerance of a cell that seems to be within `slack` times as much.
+    /// Returns the tightest tolerance, mm, at the cell's corners and middle if the nine samples are within `slack` times as much and, at
+    /// slack 1, the normals at the corners within the angle; else `None`. Proves nothing.
     fn sampled_fit(&self, cell: Cell, candidate: &CandidateFacet, slack: f64) -> Option<f64> {
         let xi = cell
             .corners()
@@ -293,13 +300,14 @@ impl Tree<'_, '_> {
         Some(xi)
     }
 
-    /// Whether a point lies inside the border.
+    /// Whether `p` lies inside the border's loops, imprinted lines not counted.
     fn contains(&self, p: Uv) -> bool {
         self.bands.encloses(p)
     }
 }
 
-/// Bound of a cell with a side on a pole, which becomes a triangle.
+/// Returns a bound, mm, of a cell with a side on a pole as the triangle that it becomes; `None` for a cell without one, and where none is
+/// found.
 fn pole_bound(prover: &mut Prover<'_, '_>, cell: Cell, limit: f64) -> Option<f64> {
     let c = cell.corners();
     let polar = c.map(|x| prover.surface.pole(x).is_some());
@@ -310,8 +318,8 @@ fn pole_bound(prover: &mut Prover<'_, '_>, cell: Cell, limit: f64) -> Option<f64
     pole::sector_bound(prover, uv, xyz, [None; 3], limit)
 }
 
-/// Whether a segment meets a rectangle.
-fn touches([a, b]: [Uv; 2], lo: Uv, hi: Uv) -> bool {
+/// Whether a segment meets the rectangle from `lo` to `hi`, its sides included.
+fn segment_touches_rectangle([a, b]: [Uv; 2], lo: Uv, hi: Uv) -> bool {
     if a.max(b).cmplt(lo).any() || a.min(b).cmpgt(hi).any() {
         return false;
     }

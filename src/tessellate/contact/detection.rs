@@ -31,15 +31,18 @@ pub(super) struct Contact {
     pub(super) extent: Extent,
 }
 
-/// A curved face with its box in the model.
+/// A curved face with its box in the model's coordinates, grown by half of the glue distance.
 struct BoxedFace {
     key: FaceKey,
     shell: usize,
     bounds: Aabb,
 }
 
-/// All contacts, each face either carrier or guest, and a guest of one carrier; and the faces concerned. Plane faces need none: their
-/// facets coincide as they are.
+/// Finds the faces of one solid that lie wholly on a face of another within [`Settings::glue_mm`]. Returns the contacts in order, and the
+/// faces in them, carriers with a tightened tolerance.
+///
+/// A face is either carrier or guest, and a guest has one carrier: the rest of a chain is left out. Planes are, for their facets coincide
+/// as they are.
 pub(super) fn contacts<'m>(
     model: &'m Model,
     settings: &Settings,

@@ -19,7 +19,7 @@ use crate::tessellate::proof::prover::Prover;
 use crate::tessellate::settings::Settings;
 use rustc_hash::FxHashMap;
 
-/// A guest with its border as it is divided now.
+/// A guest with its border on the divisions of now, seams included.
 pub(super) struct Guest<'f, 'm> {
     pub(super) face: &'f TrimmedFace<'m>,
     pub(super) polygons: BorderPolygons,
@@ -28,6 +28,7 @@ pub(super) struct Guest<'f, 'm> {
 }
 
 impl<'f, 'm> Guest<'f, 'm> {
+    /// Makes a guest of a face and its border; looks up the places of the border's corners among the positions of `mesh`, the guest's part.
     pub(super) fn new(face: &'f TrimmedFace<'m>, polygons: BorderPolygons, mesh: &PartMesh) -> Self {
         let place = |v: &PolygonVertex| match v.position {
             Position::Shared(p) => mesh.shared[p as usize],
@@ -37,12 +38,12 @@ impl<'f, 'm> Guest<'f, 'm> {
         Self { face, polygons, places }
     }
 
-    /// How many corners the border has.
+    /// Returns how many corners the border has.
     pub(super) fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// The border's sides: the places of both corners among all, and what runs between them.
+    /// Goes through the border's sides: the numbers of both ends, counted through all polygons, and both ends themselves.
     fn sides(&self) -> impl Iterator<Item = (usize, usize, &PolygonVertex, &PolygonVertex)> {
         let mut first = 0;
         self.polygons.polygons.iter().flat_map(move |p| {
@@ -55,8 +56,9 @@ impl<'f, 'm> Guest<'f, 'm> {
         })
     }
 
-    /// The place half-way along a side, in the part's coordinates.
-    fn middle(&self, part: &Part, uses: &[&EdgeUse], a: &PolygonVertex, b: &PolygonVertex) -> Point {
+    /// Returns the place half-way (in parameter) along the side from `a` to `b`, in the part's coordinates: on the edge's curve, or on the
+    /// surface for sides without an edge. `uses` are those of all loops.
+    fn side_middle(&self, part: &Part, uses: &[&EdgeUse], a: &PolygonVertex, b: &PolygonVertex) -> Point {
         match a.side {
             BorderSide::Edge { edge_use, t } => match uses[edge_use as usize].edge {
                 // Without an edge, or on a seam, the side follows the surface.
@@ -87,7 +89,7 @@ impl<'f, 'm> Guest<'f, 'm> {
             let (middle, _) = carrier.projector.project(local(middle));
             let end = |vertex: usize, place: Point| {
                 let (uv, _) = carrier.projector.project(place);
-                ImprintEnd { uv: beside(carrier, uv, middle), place, vertex: first + vertex }
+                ImprintEnd { uv: choose_seam_side(carrier, uv, middle), place, vertex: first + vertex }
             };
             out.segments.push(ImprintSegment { ends: [end(i, places[0]), end(j, places[1])] });
         }
@@ -102,8 +104,9 @@ impl<'f, 'm> Guest<'f, 'm> {
 /// Share of the domain within which a place lies on a seam.
 const ON_SEAM: f64 = 1e-6;
 
-/// Of all parameters that a place has on a closed surface, those on the side of `middle`.
-fn beside(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
+/// Moves a place on a seam or pole of a closed surface to those of its parameters that lie on the side of `middle`; others stay as they
+/// are.
+fn choose_seam_side(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
     let surface = &face.surface;
     if let Some(across) = surface.pole(uv) {
         // The nearest end, for a projected place is only near the pole; all along the pole is one place.
@@ -156,14 +159,15 @@ pub(super) fn taken_facets(
     let position = |n: u32| border.nodes[n].position;
     let sides = SideCounts::new(border.segments.iter().map(|s| s.map(position)));
     let mut emission = Emission::new(surface, &border.nodes);
-    made.iter().for_each(|(f, pole)| emission.facet(f, *pole));
+    made.iter().for_each(|(f, pole)| emission.add_facet(f, *pole));
     let out = emission.finish();
     let coincident = border.coincident;
     let (_, own) = border.nodes.into_parts();
     (FaceMesh { own, coincident, ..out }, sides)
 }
 
-/// Bound and tolerance of a facet; a triangle repeats its third corner.
+/// Bounds a facet by its two triangles one by one, or else as a whole cell; returns bound and tolerance, mm, of which either may be the
+/// larger. A triangle repeats its third corner.
 fn prove_facet(prover: &mut Prover<'_, '_>, border: &BorderNodes, q: [u32; 4]) -> ProvedFacet<4> {
     let mut prove = |t: [u32; 3]| prove_triangle(prover, &border.nodes, t, &border.chords, 1.0);
     let first = prove([q[0], q[1], q[2]]);
@@ -178,7 +182,8 @@ fn prove_facet(prover: &mut Prover<'_, '_>, border: &BorderNodes, q: [u32; 4]) -
     ProvedFacet { nodes: q, bound, tolerance }
 }
 
-/// Bound of a facet over a rectangle of parameters as a whole cell, the border's curves included; infinite where there is none.
+/// Returns a bound, mm, of a facet that covers a rectangle of parameters, proved as a whole cell with the border's curves; infinite where
+/// it covers none or none is found.
 fn prove_cell(prover: &mut Prover<'_, '_>, border: &BorderNodes, q: [u32; 4], limit: f64) -> f64 {
     let surface = prover.surface;
     let nodes = q.map(|n| border.nodes[n]);
@@ -209,7 +214,7 @@ fn prove_cell(prover: &mut Prover<'_, '_>, border: &BorderNodes, q: [u32; 4], li
 /// Share of the domain within which a facet's corners are those of a cell.
 const SAME_PARAMETERS: f64 = 1e-9;
 
-/// Finds the guest's nodes of the carrier's.
+/// Finds or makes the guest's nodes for the carrier's.
 struct Builder<'b, 'f, 'm, 'c> {
     guest: &'b Guest<'f, 'm>,
     carrier: &'b TrimmedFace<'c>,
@@ -221,19 +226,20 @@ struct Builder<'b, 'f, 'm, 'c> {
     vertices: FxHashMap<Position, usize>,
     /// Nodes of the guest by position and parameters.
     known: FxHashMap<(Position, [u64; 2]), u32>,
-    /// The guest's own position, parameters and place at a position of the carrier.
+    /// The guest's node, made for it, at a position of the carrier that is no corner of the guest's border.
     inner: FxHashMap<Position, u32>,
     /// Parameters of the border's corners at each position of the guest.
     parameters: FxHashMap<Position, Vec<Uv>>,
 }
 
-/// A node's name: two nodes may share a position, as on a seam.
-fn name(position: Position, uv: Uv) -> (Position, [u64; 2]) {
+/// Returns a node's key; two nodes may share a position, as on a seam, but not the parameters too.
+fn node_key(position: Position, uv: Uv) -> (Position, [u64; 2]) {
     // Adding zero turns −0.0 into 0.0: as bits the two would be different names.
     (position, [(uv.x + 0.0).to_bits(), (uv.y + 0.0).to_bits()])
 }
 
 impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
+    /// Indexes the guest's corners by the carrier's nodes. `first` is the number of its first corner in the imprint, `glue` in mm.
     fn new(
         guest: &'b Guest<'f, 'm>,
         carrier: &'b TrimmedFace<'c>,
@@ -247,7 +253,7 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
             Some((facets.nodes[node as usize].position, vertex))
         });
         let vertices = own.collect();
-        let known = (0..).zip(border.nodes.iter()).map(|(id, n)| (name(n.position, n.uv), id)).collect();
+        let known = (0..).zip(border.nodes.iter()).map(|(id, n)| (node_key(n.position, n.uv), id)).collect();
         let mut parameters: FxHashMap<Position, Vec<Uv>> = FxHashMap::default();
         for v in guest.polygons.polygons.iter().flatten() {
             parameters.entry(v.position).or_default().push(v.uv);
@@ -255,12 +261,13 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
         Self { guest, carrier, facets, border, glue, vertices, known, inner: FxHashMap::default(), parameters }
     }
 
-    /// From the carrier's part's coordinates to the guest's.
+    /// Takes a point from the coordinates of the carrier's part to those of the guest's.
     fn local(&self, p: Point) -> Point {
         self.guest.face.frame.local_point(self.carrier.frame.point(p))
     }
 
-    /// The guest's nodes of a facet that lies in it, counter-clockwise in its parameters.
+    /// Returns the guest's nodes of a carrier's facet, counter-clockwise in the guest's parameters, and new ones where there were none;
+    /// `None` where the facet's middle lies outside the guest.
     fn facet_inside(&mut self, corners: [u32; 4]) -> Option<[u32; 4]> {
         let triangle = corners[2] == corners[3];
         let places = corners.map(|n| self.local(self.facets.nodes[n as usize].place));
@@ -275,8 +282,8 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
             return None;
         }
         let middle = uv;
-        let [a, b, c] = [0, 1, 2].map(|k| self.node(corners[k], places[k], middle));
-        let d = if triangle { c } else { self.node(corners[3], places[3], middle) };
+        let [a, b, c] = [0, 1, 2].map(|k| self.guest_node(corners[k], places[k], middle));
+        let d = if triangle { c } else { self.guest_node(corners[3], places[3], middle) };
         let normal = (places[1] - places[0]).cross(places[2] - places[0]);
         // Two faces that touch look at each other: the carrier's facets are turned around for the guest.
         let turned = self.guest.face.surface.spline.normal(middle).is_some_and(|n| n.dot(normal) < 0.0);
@@ -287,8 +294,9 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
         })
     }
 
-    /// The guest's node for a node of the carrier's facets: the guest's own vertex, a known one, or a new one inside.
-    fn node(&mut self, carrier_node: u32, place: Point, middle: Uv) -> u32 {
+    /// Returns the guest's node for a node of the carrier's facets: a corner of its border, one that was made before, or a new one. `place`
+    /// is in the guest's part's coordinates, `middle` the facet's middle in its parameters.
+    fn guest_node(&mut self, carrier_node: u32, place: Point, middle: Uv) -> u32 {
         let face = self.guest.face;
         let position = self.facets.nodes[carrier_node as usize].position;
         if let Some(&vertex) = self.vertices.get(&position) {
@@ -300,11 +308,11 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
                 let all = &self.parameters[&v.position];
                 let uv = all.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(v.uv);
                 let position = v.position;
-                if let Some(&known) = self.known.get(&name(position, uv)) {
+                if let Some(&known) = self.known.get(&node_key(position, uv)) {
                     return known;
                 }
                 let node = self.border.nodes.push(Node { uv, place: self.guest.places[vertex], position });
-                self.known.insert(name(position, uv), node);
+                self.known.insert(node_key(position, uv), node);
                 return node;
             }
         }
@@ -312,7 +320,7 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
             return known;
         }
         let (uv, _) = face.projector.project(place);
-        let node = self.border.nodes.push_own(beside(face, uv, middle), place);
+        let node = self.border.nodes.push_own(choose_seam_side(face, uv, middle), place);
         self.inner.insert(position, node);
         node
     }

@@ -37,8 +37,13 @@ use rustc_hash::FxHashMap;
 use samples::{EdgeSamples, FurtherSamples};
 use trimmed::{FaceKey, TrimmedFace};
 
-/// The meshes of all instances with faces in contact.
-pub(super) fn join(model: &Model, settings: &Settings, parts: &[Option<PartMesh>]) -> FxHashMap<usize, PartMesh> {
+/// Meshes anew, by index, the instances with faces in contact; all others have the mesh of their part. Empty at a glue distance of 0 or
+/// less.
+pub(super) fn mesh_contacts(
+    model: &Model,
+    settings: &Settings,
+    parts: &[Option<PartMesh>],
+) -> FxHashMap<usize, PartMesh> {
     if settings.glue_mm <= 0.0 {
         return FxHashMap::default();
     }
@@ -71,15 +76,18 @@ struct Member<'f, 'm> {
 }
 
 impl<'j, 'm> Joiner<'j, 'm> {
+    /// Returns the mesh of an instance's part before contacts; `None` if it was not meshed.
     fn mesh_of(&self, instance: usize) -> Option<&'j PartMesh> {
         self.parts[self.model.instances[instance].part.0 as usize].as_ref()
     }
 
+    /// Returns the edges of a face with the divisions before contacts; `None` for a face that is in no contact.
     fn edge_samples(&self, key: FaceKey) -> Option<EdgeSamples<'j, 'm>> {
         Some(EdgeSamples { face: self.faces.get(&key)?, divisions: &self.mesh_of(key.instance)?.divisions })
     }
 
-    /// What edges must have more: where borders cross seams, and the samples of edges that run together.
+    /// Returns the parameters that edges must have besides their own: where borders cross seams of carriers, and the samples of edges that
+    /// run together.
     fn further_samples(&self) -> FurtherSamples {
         let glue = self.settings.glue_mm;
         let mut further = FurtherSamples::default();
@@ -102,7 +110,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         further
     }
 
-    /// Meshes of all instances concerned with their edges divided further; faces beside changed edges are meshed anew.
+    /// Meshes of all instances in contact with their edges divided further. Faces beside changed edges are meshed anew; those in contact
+    /// keep the old mesh, renumbered, until their turn.
     fn divided_more(&self, further: &FurtherSamples) -> FxHashMap<usize, PartMesh> {
         let mut instances: Vec<usize> =
             self.contacts.iter().flat_map(|c| [c.carrier.instance, c.guest.instance]).collect();
@@ -143,7 +152,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
         instances.par_iter().filter_map(divide).collect()
     }
 
-    /// What meshing a face needs, with the divisions of its part.
+    /// Makes the input for meshing a face on the edge divisions of `mesh`, its part; no chords are taken.
     fn input<'i>(&'i self, face: &'i TrimmedFace<'m>, mesh: &'i PartMesh) -> FaceInput<'i, 'm> {
         FaceInput {
             part: face.part,
@@ -156,7 +165,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
         }
     }
 
-    /// Meshes anew, group by group, the faces that touch others.
+    /// Replaces, in `meshes`, the faces in contact: each carrier with its guests is one group, and groups run in parallel.
     fn mesh_carriers_and_guests(&self, meshes: &mut FxHashMap<usize, PartMesh>) {
         let groups: Vec<&[Contact]> = self.contacts.chunk_by(|a, b| a.carrier == b.carrier).collect();
         let now = &*meshes;
@@ -169,7 +178,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         }
     }
 
-    /// A carrier and all faces that lie on it.
+    /// Meshes a carrier, with its guests' borders imprinted, and then its guests, all with a mesh by themselves where that fails; `None`
+    /// where that fails too. The contacts of `group` have one carrier.
     fn mesh_group(
         &self,
         group: &[Contact],
@@ -249,7 +259,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
                 let place = |f: f64| face.surface.point(a.lerp(b, f));
                 let on_carrier = |f: f64| carrier.project(face.frame.point(place(f))).0;
                 for d in (0..2).filter(|&d| carrier.surface.closed[d]) {
-                    points.extend(samples::crossing(carrier, d, [0.0, 1.0], on_carrier).map(place));
+                    points.extend(samples::seam_crossing(carrier, d, [0.0, 1.0], on_carrier).map(place));
                 }
             }
         }

@@ -12,10 +12,10 @@ const TRIED: usize = 3;
 /// Area of the parameters' unit square, in shares of that of the surface's own size, below which a place is a pole.
 const SINGULAR: f64 = 1e-9;
 
-/// A surface with places to start from.
+/// A surface with a grid of places from which the nearest point is looked for.
 pub(super) struct Projector<'s> {
     spline: &'s Surface,
-    /// Places to start from: none at poles, where no step leads anywhere.
+    /// Places to start from, in parameters and in space; none at poles, where no step leads anywhere.
     seeds: Vec<(Uv, Point)>,
     /// Places at poles.
     poles: Vec<(Uv, Point)>,
@@ -24,7 +24,7 @@ pub(super) struct Projector<'s> {
 }
 
 impl<'s> Projector<'s> {
-    /// Seeds over the domain, those at poles apart.
+    /// Evaluates the surface on a grid over its domain, [`SEEDS`] to a knot interval, and sorts the places into seeds and poles.
     pub(super) fn new(spline: &'s Surface) -> Self {
         let [[u0, u1], [v0, v1]] = spline.domain();
         let steps = |d: usize| {
@@ -58,7 +58,8 @@ impl<'s> Projector<'s> {
         self.seeds.iter().chain(&self.poles).all(|(_, q)| (*q - p).length_squared() > reach * reach)
     }
 
-    /// Parameters of the point nearest to `p`, and how far that is.
+    /// Returns the parameters of the point nearest to `p`, and its distance in the surface's own lengths: from the [`TRIED`] nearest seeds,
+    /// so that a far minimum may be missed.
     pub(super) fn project(&self, p: Point) -> (Uv, f64) {
         let mut best: [(f64, Uv); TRIED] = [(f64::INFINITY, Uv::ZERO); TRIED];
         for &(uv, q) in &self.seeds {

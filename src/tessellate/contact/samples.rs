@@ -24,14 +24,14 @@ const CROSSING_STEPS: usize = 60;
 /// Further parameters of edges, by instance.
 pub(super) type FurtherSamples = FxHashMap<usize, Vec<Vec<f64>>>;
 
-/// One face's edges with what is asked of them so far.
+/// One face's edges with the divisions they have so far.
 pub(super) struct EdgeSamples<'f, 'm> {
     pub(super) face: &'f TrimmedFace<'m>,
     pub(super) divisions: &'f [Division],
 }
 
 impl EdgeSamples<'_, '_> {
-    /// All parameters of an edge so far, ascending.
+    /// Returns the parameters of an edge, its own and further ones, ascending.
     fn parameters(&self, edge: EdgeId, further: &FurtherSamples) -> Vec<f64> {
         let mut t = self.divisions[edge.0 as usize].t.clone();
         t.extend(further.get(&self.face.key.instance).map_or(&[][..], |f| &f[edge.0 as usize]));
@@ -39,12 +39,13 @@ impl EdgeSamples<'_, '_> {
         t
     }
 
+    /// Returns the point of an edge at `t`, in the model's coordinates.
     fn place(&self, edge: EdgeId, t: f64) -> Point {
         self.face.frame.point(self.face.part.edges[edge.0 as usize].curve.evaluate(t))
     }
 
-    /// Asks for a parameter unless a sample is within `glue` of it.
-    fn ask(&self, edge: EdgeId, t: f64, glue: f64, further: &mut FurtherSamples) {
+    /// Adds `t` to `further` unless a sample of the edge lies within `glue` mm.
+    fn request_sample(&self, edge: EdgeId, t: f64, glue: f64, further: &mut FurtherSamples) {
         let p = self.place(edge, t);
         let known = self.parameters(edge, further);
         if known.iter().all(|&s| (self.place(edge, s) - p).length() > glue) {
@@ -55,7 +56,7 @@ impl EdgeSamples<'_, '_> {
         }
     }
 
-    /// Asks for the samples of another face's edges that lie on this one's.
+    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges.
     pub(super) fn take_over(&self, other: &EdgeSamples<'_, '_>, glue: f64, further: &mut FurtherSamples) {
         for theirs in other.face.edges() {
             let places: Vec<Point> =
@@ -65,7 +66,7 @@ impl EdgeSamples<'_, '_> {
                 for &p in &places {
                     let (t, away) = self.face.nearest_on_edge(ours, p);
                     if away <= glue {
-                        self.ask(ours, t, glue, further);
+                        self.request_sample(ours, t, glue, further);
                     }
                 }
             }
@@ -159,8 +160,8 @@ impl EdgeSamples<'_, '_> {
             for pair in t.windows(2) {
                 for d in (0..2).filter(|&d| carrier.surface.closed[d]) {
                     let at = |t: f64| carrier.project(self.place(edge, t)).0;
-                    if let Some(crossing) = crossing(carrier, d, [pair[0], pair[1]], at) {
-                        self.ask(edge, crossing, glue, further);
+                    if let Some(crossing) = seam_crossing(carrier, d, [pair[0], pair[1]], at) {
+                        self.request_sample(edge, crossing, glue, further);
                     }
                 }
             }
@@ -168,8 +169,9 @@ impl EdgeSamples<'_, '_> {
     }
 }
 
-/// Where between two parameters a curve on the carrier crosses its seam in direction `d`; `at` gives the carrier's parameters.
-pub(super) fn crossing(
+/// Returns the parameter at which a curve on a closed carrier crosses its seam in direction `d` (0 for u, 1 for v); `at` gives the
+/// carrier's parameters. `None` where it does not, or where an end lies on the seam already.
+pub(super) fn seam_crossing(
     carrier: &TrimmedFace<'_>,
     d: usize,
     [mut lo, mut hi]: [f64; 2],

@@ -20,12 +20,13 @@ pub(super) struct FaceKey {
     pub(super) face: usize,
 }
 
-/// A face that may be in contact with others.
+/// A placed face that may be in contact with others.
 pub(super) struct TrimmedFace<'m> {
     pub(super) key: FaceKey,
     pub(super) part: &'m Part,
     pub(super) face: &'m Face,
     pub(super) frame: &'m Frame,
+    /// With its tolerance, which contacts may tighten.
     pub(super) surface: FaceSurface<'m>,
     /// The tolerance that was asked of it.
     pub(super) asked: ToleranceField,
@@ -39,7 +40,7 @@ pub(super) struct TrimmedFace<'m> {
 }
 
 impl<'m> TrimmedFace<'m> {
-    /// `None` where the face has no facets of its own.
+    /// Builds the face's border on the divisions of `mesh` and samples it; `None` where it is no face or its surface cannot be used.
     pub(super) fn new(model: &'m Model, settings: &Settings, mesh: &PartMesh, key: FaceKey) -> Option<Self> {
         let instance: &'m Instance = &model.instances[key.instance];
         let part = model.part(instance.part);
@@ -72,12 +73,12 @@ impl<'m> TrimmedFace<'m> {
         Some(out)
     }
 
-    /// All corners of the border.
+    /// Returns all corners of the border.
     pub(super) fn vertices(&self) -> impl Iterator<Item = &PolygonVertex> {
         self.polygons.polygons.iter().flatten()
     }
 
-    /// Where a corner of the border lies, in the part's coordinates.
+    /// Returns the place of a border corner in the part's coordinates; `mesh` is the part's.
     pub(super) fn place_of(&self, v: &PolygonVertex, mesh: &PartMesh) -> Point {
         match v.position {
             Position::Shared(p) => mesh.shared[p as usize],
@@ -85,14 +86,14 @@ impl<'m> TrimmedFace<'m> {
         }
     }
 
-    /// Whether parameters lie inside the border.
+    /// Whether `uv` lies inside the border.
     pub(super) fn contains(&self, uv: Uv) -> bool {
         let sides =
             self.polygons.polygons.iter().flat_map(|p| (0..p.len()).map(|i| [p[i].uv, p[(i + 1) % p.len()].uv]));
         sides.filter(|&s| crosses_ray_from(uv, s)).count() % 2 == 1
     }
 
-    /// The edges of the border, each once.
+    /// Returns the edges of the face's loops, each once; none for a face without loops.
     pub(super) fn edges(&self) -> Vec<EdgeId> {
         let mut edges: Vec<EdgeId> = self.face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| u.edge).collect();
         edges.sort_unstable();
@@ -114,13 +115,13 @@ impl<'m> TrimmedFace<'m> {
         (t, away * self.frame.scale.abs())
     }
 
-    /// Parameters of the point of the surface that is nearest to a place of the model, and how far it is, mm.
+    /// Returns the parameters of the point of the surface that is nearest to a place of the model, and how far it is, mm.
     pub(super) fn project(&self, p: Point) -> (Uv, f64) {
         let (uv, away) = self.projector.project(self.frame.local_point(p));
         (uv, away * self.frame.scale.abs())
     }
 
-    /// Whether all of another face lies on this one, within `glue` mm.
+    /// Whether all samples of another face lie on this one within `glue` mm; false if it has none.
     pub(super) fn carries(&self, other: &Self, glue: f64) -> bool {
         let edges = self.edges();
         !other.samples.is_empty() && other.samples.iter().all(|&p| self.holds(&edges, p, glue))

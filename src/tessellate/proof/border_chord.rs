@@ -27,22 +27,23 @@ const PARTS: [i32; 2] = [2, 8];
 /// The chords of a face's border by the edge between their nodes.
 pub(in crate::tessellate) type BorderChords = FxHashMap<[u32; 2], BorderChord>;
 
-/// One chord of a border edge.
+/// How far the border strays from the chord between two of an edge's samples.
 #[derive(Clone, Debug, Default)]
 pub(in crate::tessellate) struct BorderChord {
     /// Bound of the distance between the edge's curve and the line of the chord, mm, with the offset of the chord's ends
     /// from the surface.
     pub(in crate::tessellate) deviation: f64,
-    /// The file's own gap between edge and face here, mm, which no shorter chord closes.
+    /// The file's own gap between edge and face here, mm, which no shorter chord closes; included in `deviation`.
     pub(in crate::tessellate) gap: f64,
-    /// A convex polygon around what lies between the chord and the curve in the parameter plane.
+    /// A convex polygon, counter-clockwise, around what lies between chord and curve in the parameter plane; empty where that is nothing.
     pub(in crate::tessellate) between: Vec<Uv>,
-    /// Bound of the distance from the surface there to the chord, mm, once it is known.
+    /// Bound of the distance from the surface there to the chord, mm; `None` while none is known.
     sliver: Option<f64>,
 }
 
 impl BorderChord {
-    /// The chord of an edge between parameters `t`, of which one face has the ends at `uv`.
+    /// Bounds how far an edge strays from its chord between parameters `t` (in either order); `uv` and `xyz` are the chord's ends on one
+    /// face, in the order of the loop. The gap to the surface is sampled, not proved.
     pub(in crate::tessellate) fn new(
         surface: &FaceSurface<'_>,
         curve: &Curve,
@@ -79,7 +80,8 @@ impl BorderChord {
         chord
     }
 
-    /// Bounds how far the surface between chord and curve lies from the chord, once for all facets that have the chord.
+    /// Fills in the bound between surface and chord, once for all facets that have the chord; leaves it open where none is found within the
+    /// tolerance.
     pub(in crate::tessellate) fn bound_sliver(
         &mut self,
         surface: &FaceSurface<'_>,
@@ -97,10 +99,11 @@ impl BorderChord {
         // In the middle of the chord: facets on either side have tolerances of their own, and what does not fit
         // theirs is bounded anew.
         let limit = surface.tolerance(0.5 * (uv[0] + uv[1]));
-        self.sliver = deviation.sliver(surface, &self.between, uv, at, limit - off).map(|x| x + off);
+        self.sliver = deviation.sliver_bound(surface, &self.between, uv, at, limit - off).map(|x| x + off);
     }
 
-    /// The part of the bound that the border adds to a triangle of facets.
+    /// Returns what the border adds to the bound of a triangle that has the chord as a side, mm. `xyz` are the triangle's corners; above
+    /// `limit` the value only says that no bound is known.
     pub(in crate::tessellate) fn bound(&self, prover: &mut Prover<'_, '_>, xyz: [Point; 3], limit: f64) -> f64 {
         let mut worst = self.deviation;
         if let Some(sliver) = self.sliver.filter(|&x| x <= limit) {
@@ -113,8 +116,8 @@ impl BorderChord {
     }
 }
 
-/// Bound of the distance between a piece of a curve and a chord, by the hulls of its two halves, and of eighths where that is not
-/// clearly small.
+/// Returns a bound, mm, of the distance from the curve over `[a, b]` to a chord, by hulls of its control points: of its halves, and of
+/// finer parts where those exceed `small`.
 fn curve_deviation(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f64) -> f64 {
     let mut piece = curve.restricted_points(a, b);
     // Distance to a segment is a convex function: over the hull it is largest at a control point.
@@ -162,7 +165,8 @@ fn curve_deviation(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f
     worst
 }
 
-/// The convex hull of the curve's control points in the parameter plane.
+/// Returns the convex hull, counter-clockwise, of the chord and the curve over `[a, b]` in the parameter plane; empty where the curve is
+/// the chord itself.
 fn parameter_hull(surface: &FaceSurface<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -> Vec<Uv> {
     let [[u0, u1], [v0, v1]] = surface.spline.domain();
     let extent = Uv::new(u1 - u0, v1 - v0);
@@ -199,7 +203,7 @@ fn parameter_hull(surface: &FaceSurface<'_>, side: &EdgeUse, [a, b]: [f64; 2], c
     convex_hull(points)
 }
 
-/// Convex hull, counter-clockwise (Andrew's monotone chain).
+/// Returns the convex hull, counter-clockwise, without points on its sides (Andrew's monotone chain).
 fn convex_hull(mut p: Vec<Uv>) -> Vec<Uv> {
     p.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     p.dedup();

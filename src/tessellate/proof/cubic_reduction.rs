@@ -10,12 +10,12 @@ use crate::nurbs::BezierPatch;
 /// Degree of what stands for the patch.
 const REDUCED_DEGREE: usize = 3;
 
-/// Whether there is anything to gain.
+/// Whether either degree is above [`REDUCED_DEGREE`], so that reducing gains something.
 pub(in crate::tessellate) fn is_high(patch: &BezierPatch) -> bool {
     patch.degree[0].max(patch.degree[1]) > REDUCED_DEGREE
 }
 
-/// Makes and holds the cubics.
+/// Reduces patches to cubics, and holds the last one.
 pub(in crate::tessellate) struct CubicReduction {
     /// The last one, over the parameters from 0 to 1.
     pub(in crate::tessellate) patch: BezierPatch,
@@ -32,8 +32,8 @@ impl Default for CubicReduction {
 }
 
 impl CubicReduction {
-    /// Fills in `patch` from the net of a patch of this degree, seen from `origin`; a bound of the distance between the two, point by
-    /// point, infinite where there is none.
+    /// Sets `patch` to the cubic of `net`, whose positions are relative to `origin`; the patch itself is not. Returns a bound of the
+    /// distance between the two, point by point, in mm; infinite where weights leave none.
     pub(in crate::tessellate) fn reduce(&mut self, net: &[Homogeneous], degree: [usize; 2], origin: Point) -> f64 {
         let [p, q] = degree;
         // Along u first, line by line; then along v. The differences of both add up.
@@ -64,7 +64,8 @@ impl CubicReduction {
     }
 }
 
-/// Appends the line's Hermite cubic, or the line itself where its degree is no higher; adds the difference of positions and weights.
+/// Appends the line's Hermite cubic to `out`, or the line itself where its degree is no higher. Raises `off` to the largest differences of
+/// homogeneous positions and of weights.
 fn reduce_line(line: &[Homogeneous], out: &mut Vec<Homogeneous>, off: &mut [f64; 2]) {
     let n = line.len() - 1;
     // Already a cubic or less: it is exact as it is.

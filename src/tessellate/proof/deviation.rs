@@ -11,7 +11,7 @@ use super::linear_map::LinearMap;
 use super::refine::halve_net;
 use crate::math::{Homogeneous, Point, Uv};
 use crate::nurbs::BezierPatch;
-use crate::tessellate::face_surface::{FaceSurface, local};
+use crate::tessellate::face_surface::{FaceSurface, patch_uv};
 use smallvec::{SmallVec, smallvec};
 
 /// Triangles that reach into a patch by less than this share are left to others.
@@ -36,9 +36,9 @@ pub(in crate::tessellate) struct DeviationBounds {
 }
 
 impl DeviationBounds {
-    /// Bound of |S − L| over the triangle with these corners in the surface's parameters, which lie at `at` in space. The patches
-    /// cover it, and where there are several, S and its weight are C1 from one to the next: Taylor's theorem needs no more.
-    pub(in crate::tessellate) fn taylor<'p>(
+    /// Returns a bound of |S − L|, mm, over the triangle `corners` of the surface's parameters, which lies at `at` in space. The patches
+    /// cover it and are C1 from one to the next. `None` for a thin triangle, or one that touches a patch in a sliver.
+    pub(in crate::tessellate) fn taylor_bound<'p>(
         &mut self,
         patches: impl Iterator<Item = &'p BezierPatch>,
         corners: [Uv; 3],
@@ -53,7 +53,7 @@ impl DeviationBounds {
             if share.min_element() < NARROWEST || share.is_nan() {
                 return None;
             }
-            self.restrict(patch, local(patch, a), local(patch, b), at[0]);
+            self.restrict(patch, patch_uv(patch, a), patch_uv(patch, b), at[0]);
             let [w_min, w_max] = self.weight_range();
             // The lightest weight anywhere bounds the division for all patches.
             lightest = lightest.min(w_min);
@@ -80,10 +80,10 @@ impl DeviationBounds {
         Some((most[0] + 2.0 * most[1] + most[2]) / (8.0 * lightest))
     }
 
-    /// Bound of |S − L| where it is within the limit, by the control points of S − L over rectangles that are halved while that is not
-    /// so; the patches need not be smooth from one to the next. One facet of a spline through hundreds of points is proved in
-    /// microseconds where the hulls of its pieces took a millisecond.
-    pub(in crate::tessellate) fn hull<'p>(
+    /// Returns a bound of |S − L|, mm, where it is within `limit`, by control points of S − L over rectangles halved as needed; patches
+    /// need not be smooth from one to the next. `None` for a thin triangle and after [`MAX_HALVINGS`]. One facet of a spline through
+    /// hundreds of points is proved in microseconds where the hulls of its pieces took a millisecond.
+    pub(in crate::tessellate) fn hull_bound<'p>(
         &mut self,
         patches: impl Iterator<Item = &'p BezierPatch>,
         corners: [Uv; 3],
@@ -93,9 +93,9 @@ impl DeviationBounds {
         self.max_over_patches(patches, &LinearMap::new(corners, at)?, at[0], limit)
     }
 
-    /// Bound of the distance from the surface over a convex polygon to a chord that the polygon holds, where it is within the limit;
-    /// the chord's parameters lie at `at` in space.
-    pub(in crate::tessellate) fn sliver(
+    /// Returns a bound of the distance, mm, from the surface over a convex polygon to a chord that the polygon holds, where it is within
+    /// `limit`; else `None`. The chord's parameters lie at `at` in space.
+    pub(in crate::tessellate) fn sliver_bound(
         &mut self,
         surface: &FaceSurface<'_>,
         polygon: &[Uv],
@@ -109,7 +109,7 @@ impl DeviationBounds {
         self.max_over_patches(patches, &linear, at[0], limit)
     }
 
-    /// What `linear` measures, where it is within the limit over all patches, seen from `origin`.
+    /// Returns a bound, mm, of what `linear` measures over all patches, seen from `origin`; `None` where none within `limit` is found.
     fn max_over_patches<'p>(
         &mut self,
         patches: impl Iterator<Item = &'p BezierPatch>,
@@ -125,7 +125,7 @@ impl DeviationBounds {
             if !linear.meets_region(from, share) {
                 continue;
             }
-            self.restrict(patch, local(patch, a), local(patch, b), origin);
+            self.restrict(patch, patch_uv(patch, a), patch_uv(patch, b), origin);
             let weights = self.weight_range();
             let mut degree = patch.degree;
             // Equal weights leave A − W·L of the patch's own degree, a smaller net.
@@ -146,7 +146,7 @@ impl DeviationBounds {
         Some(worst)
     }
 
-    /// The bound over the parts of a rectangle that meet the region, halved until all are within the limit.
+    /// Bound over the parts of a rectangle that meet the region, halved until all are within the limit; `None` without `halvings` left.
     fn bound_by_halving(
         &mut self,
         linear: &LinearMap,
@@ -191,7 +191,7 @@ impl DeviationBounds {
         self.net.iter().fold([f64::INFINITY, 0.0], |[a, b], c| [a.min(c.w), b.max(c.w)])
     }
 
-    /// The patch's net over a rectangle of its local parameters, seen from `origin`. It is kept: both triangles of a cell have the same.
+    /// The patch's net over a rectangle of its local parameters, relative to `origin`. It is kept: both triangles of a cell have the same.
     ///
     /// The patches handed in must live as long as this does.
     pub(in crate::tessellate) fn restrict(
@@ -225,7 +225,7 @@ impl DeviationBounds {
         &self.net
     }
 
-    /// Bernstein coefficients of A − W·L of the same degree, where all weights are the same.
+    /// Sets `deviation` to the Bernstein coefficients of A − W·L of the same degree, where all weights are the same; `l` as below.
     fn subtract_keeping_degree(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
         let (s, t) = ((l[1] - l[0]) / p as f64, (l[2] - l[0]) / q as f64);
         self.deviation.clear();
@@ -236,7 +236,7 @@ impl DeviationBounds {
         }));
     }
 
-    /// Bernstein coefficients of A − W·L, one degree higher; `l` are L's values at the rectangle's corners (0,0), (1,0), (0,1), (1,1).
+    /// Sets `deviation` to those of A − W·L, one degree higher; `l` are L's values at the rectangle's corners (0,0), (1,0), (0,1), (1,1).
     fn subtract_raising_degree(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
         self.deviation.clear();
         self.deviation.resize((p + 2) * (q + 2), Point::ZERO);
@@ -258,12 +258,12 @@ impl DeviationBounds {
     }
 }
 
-/// Whether weights are all the same.
+/// Whether the least and largest weight are the same but for rounding.
 fn are_equal([least, most]: [f64; 2]) -> bool {
     most - least <= EQUAL_WEIGHTS * most
 }
 
-/// Control points over `[lo, hi]` in place of those over `[0, 1]`.
+/// Replaces control points over `[0, 1]` by those over `[lo, hi]`, 0 ≤ lo < hi ≤ 1.
 fn restrict_line(line: &mut [Homogeneous], lo: f64, hi: f64) {
     let n = line.len() - 1;
     if hi < 1.0 {
@@ -285,7 +285,7 @@ fn restrict_line(line: &mut [Homogeneous], lo: f64, hi: f64) {
     }
 }
 
-/// Bounds of the second derivatives (uu, uv, vv) over the unit square of a net of these degrees.
+/// Returns the bounds of the second derivatives (uu, uv, vv) over the unit square of a net of these degrees.
 fn second_derivative_bounds(net: &[Point], [p, q]: [usize; 2]) -> [f64; 3] {
     let n = q + 1;
     let mut most = [0f64; 3];
@@ -338,7 +338,7 @@ mod tests {
             let [[u0, u1], [v0, v1]] = p.domain;
             u0 < hi.x && lo.x < u1 && v0 < hi.y && lo.y < v1
         };
-        let bound = DeviationBounds::default().taylor(patches.iter().filter(meets), corners, at).unwrap();
+        let bound = DeviationBounds::default().taylor_bound(patches.iter().filter(meets), corners, at).unwrap();
         (bound, sampled(s, corners, 20))
     }
 
@@ -392,8 +392,8 @@ mod tests {
         ] {
             let at = corners.map(|x| s.evaluate(x));
             let worst = sampled(&s, corners, 60);
-            assert!(DeviationBounds::default().hull(patches.iter(), corners, at, 0.99 * worst).is_none());
-            let bound = DeviationBounds::default().hull(patches.iter(), corners, at, 2.0 * worst).unwrap();
+            assert!(DeviationBounds::default().hull_bound(patches.iter(), corners, at, 0.99 * worst).is_none());
+            let bound = DeviationBounds::default().hull_bound(patches.iter(), corners, at, 2.0 * worst).unwrap();
             assert!(worst <= bound && bound <= 2.0 * worst, "{worst} {bound}");
         }
     }

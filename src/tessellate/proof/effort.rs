@@ -3,7 +3,7 @@
 use super::prover::Prover;
 
 impl Drop for Prover<'_, '_> {
-    /// The sum of all steps does not depend on how many provers there were.
+    /// Hands in the steps not yet counted; their sum does not depend on how many provers there were.
     fn drop(&mut self) {
         self.gives_up();
     }

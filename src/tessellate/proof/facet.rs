@@ -8,7 +8,8 @@ use super::pole;
 use super::prover::Prover;
 use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};
 
-/// Bound and tolerance of one triangle; a bound above `slack` tolerances may be no bound, but says that there is none.
+/// Bounds one triangle of nodes, in mm, and takes the tightest tolerance of its corners and middle. A bound above `slack` tolerances is
+/// none: it only says that none was found.
 pub(in crate::tessellate) fn prove_triangle(
     prover: &mut Prover<'_, '_>,
     nodes: &Nodes,

@@ -18,7 +18,7 @@
 use super::flat_triangle::distance_to_chord;
 use super::prover::Prover;
 use crate::math::{Point, Uv, Vector};
-use crate::tessellate::face_surface::local;
+use crate::tessellate::face_surface::patch_uv;
 use crate::tessellate::settings::Acceptance;
 
 /// Knot rectangles up to which a cell is looked at as one quad.
@@ -30,20 +30,21 @@ const FLATTEST: f64 = 0.9;
 /// Least sine between sides that meet: a corner that is nearly straight or folded has no normal to speak of.
 const SHARPEST: f64 = 1e-6;
 
-/// A convex flat quad that measures distances, and what its corners have lost.
+/// A convex flat quad that measures distances, and what its corners have lost against the true ones.
 struct FlatQuad {
     corners: [Point; 4],
     normal: Vector,
     /// Across each side into the quad.
     inward: [Vector; 4],
-    /// How far the true corners stand from it.
+    /// How far the true corners stand above or below it, mm.
     height: f64,
     /// Least cosine between it and the triangles on the true corners.
     cosine: f64,
 }
 
 impl FlatQuad {
-    /// The quad under corners in their order, with the traced diagonal from corner `first`; `None` unless it is convex and nearly flat.
+    /// Returns the flat quad nearest to the corners `c`, given in order around it; the traced diagonal starts at corner `first`. `None`
+    /// unless it is convex and its triangles nearly flat.
     fn new(c: &[Point; 4], first: usize) -> Option<Self> {
         let normal = (c[2] - c[0]).cross(c[3] - c[1]).try_normalize()?;
         // A plane across both diagonals has the corners equally far above and below it, in turn.
@@ -66,7 +67,7 @@ impl FlatQuad {
         (convex && cosine >= FLATTEST).then_some(Self { corners, normal, inward, height: height.abs(), cosine })
     }
 
-    /// Distance of a point.
+    /// Returns the distance of a point to the nearest point of the quad, its inside included.
     fn distance(&self, p: Point) -> f64 {
         let c = &self.corners;
         // Over the inside the distance is that of the plane; beside it, that of the nearest side.
@@ -78,8 +79,10 @@ impl FlatQuad {
 }
 
 impl Prover<'_, '_> {
-    /// Bound of the distance between the surface over a cell and its two triangles, both ways, where it is within the limit. The corners
-    /// lie on the surface, counter-clockwise from the lowest; the traced diagonal starts at corner `first`.
+    /// Returns a bound, mm, of the distance between the surface over the cell from `lo` to `hi` and its two triangles, both ways, where it
+    /// is within `limit`; `None` where none is found, and always on planes, for [`Acceptance::Sampled`] and beyond [`MAX_PATCHES`].
+    ///
+    /// The corners lie on the surface, counter-clockwise from `lo`; the traced diagonal starts at corner `first`.
     pub(in crate::tessellate) fn quad_bound(
         &mut self,
         [lo, hi]: [Uv; 2],
@@ -116,8 +119,8 @@ impl Prover<'_, '_> {
                 let patch = surface.patch(i, j);
                 let [p, q] = patch.degree;
                 let [[u0, u1], [v0, v1]] = patch.domain;
-                let from = local(patch, lo.max(Uv::new(u0, v0)));
-                let to = local(patch, hi.min(Uv::new(u1, v1)));
+                let from = patch_uv(patch, lo.max(Uv::new(u0, v0)));
+                let to = patch_uv(patch, hi.min(Uv::new(u1, v1)));
                 let net = self.deviation.restrict(patch, from, to, origin);
                 let distances = net.iter().map(|c| (quad.distance(c.project()), c.w));
                 away = away.max(self.patch_scalar.bound(distances, [p, q], flat, &mut left)?);

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 /// A triangle cut by a rectangle has seven corners at most.
 type Polygon = SmallVec<[Uv; 8]>;
 
-/// The part of a segment or convex polygon inside a rectangle.
+/// Returns the part of a segment (two points) or convex polygon inside a rectangle `[[u0, u1], [v0, v1]]`; empty where they do not meet.
 pub(in crate::tessellate) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygon {
     let mut now: Polygon = uv.into();
     // Sutherland & Hodgman 1974: one side of the rectangle after the other.
@@ -39,13 +39,13 @@ pub(in crate::tessellate) fn clip(uv: &[Uv], rectangle: [[f64; 2]; 2]) -> Polygo
     now
 }
 
-/// Whether a clipped triangle is the whole rectangle.
+/// Whether a clipped polygon is the whole rectangle: its four corners.
 pub(in crate::tessellate) fn is_rectangle(polygon: &[Uv], [[u0, u1], [v0, v1]]: [[f64; 2]; 2]) -> bool {
     polygon.len() == 4 && polygon.iter().all(|p| (p.x == u0 || p.x == u1) && (p.y == v0 || p.y == v1))
 }
 
-/// Distance of a point to the chord between two points. Not to their line: the ends of a closed curve may differ by a
-/// last bit, and the line through them can lie anywhere.
+/// Returns the distance of `p` to the segment from `a` to `b`, not to their line: the ends of a closed curve may differ by a last bit, and
+/// the line through them can lie anywhere. Of ends in one place, the distance to that place.
 pub(in crate::tessellate) fn distance_to_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
     let (d, x) = (b - a, p - a);
     // Ends in one place: the distance to that place.
@@ -62,6 +62,7 @@ pub(in crate::tessellate) struct FlatTriangle {
 }
 
 impl FlatTriangle {
+    /// Prepares a triangle; its corners may lie in a line or in one place.
     pub(in crate::tessellate) fn new(corners: &[Point; 3]) -> Self {
         let [a, b, c] = *corners;
         let n = (b - a).cross(c - a);
@@ -71,7 +72,7 @@ impl FlatTriangle {
         Self { corners: *corners, frame }
     }
 
-    /// Distance of a point.
+    /// Returns the distance of a point to the nearest point of the triangle, its inside included; without area, to its sides.
     pub(in crate::tessellate) fn distance(&self, p: Point) -> f64 {
         let [a, b, c] = self.corners;
         if let Some((n, [x, y, z])) = self.frame

@@ -37,7 +37,7 @@ pub(in crate::tessellate) struct LinearMap {
 }
 
 impl LinearMap {
-    /// The map of a parameter triangle onto one in space, seen from its first corner.
+    /// Returns the map of a parameter triangle onto one in space, positions relative to its first corner; `None` where it is thin.
     pub(in crate::tessellate) fn new(corners: [Uv; 3], at: [Point; 3]) -> Option<Self> {
         let lo = corners[0].min(corners[1]).min(corners[2]);
         let hi = corners[0].max(corners[1]).max(corners[2]);
@@ -57,8 +57,9 @@ impl LinearMap {
         Some(Self { lo, hi, region, values: [l00, ls, lt], sign: det.signum(), measure: Measure::Whole })
     }
 
-    /// The map that takes a chord of parameters onto its chord in space, seen from there, and goes with the surface across it;
-    /// over a polygon, counter-clockwise, that holds the chord.
+    /// Returns the map that takes the parameters of a chord onto its ends `at`, positions relative to the first, and goes with the surface
+    /// across it. The region is a convex `polygon`, counter-clockwise, that holds the chord. `None` where the chord or the surface gives no
+    /// direction.
     pub(in crate::tessellate) fn along_chord(
         surface: &FaceSurface<'_>,
         polygon: &[Uv],
@@ -86,19 +87,20 @@ impl LinearMap {
         reach.is_finite().then_some(Self { lo, hi, region, values: [l00, ls, lt], sign: 1.0, measure })
     }
 
-    /// The part of the rectangle that a patch covers.
+    /// Returns the lower and upper corner of the part of the rectangle that a patch covers.
     pub(in crate::tessellate) fn overlap(&self, patch: &BezierPatch) -> [Uv; 2] {
         let [[u0, u1], [v0, v1]] = patch.domain;
         [self.lo.max(Uv::new(u0, v0)), self.hi.min(Uv::new(u1, v1))]
     }
 
-    /// Where a part of the rectangle starts and how large it is, as shares.
+    /// Returns where a part of the rectangle, given by its corners in parameters, starts and how large it is, as shares of the rectangle.
     pub(in crate::tessellate) fn as_shares(&self, [a, b]: [Uv; 2]) -> [Uv; 2] {
         let size = self.hi - self.lo;
         [(a - self.lo) / size, (b - a) / size]
     }
 
-    /// L at the corners (0,0), (1,0), (0,1), (1,1) of a part, which begins at `from` and is `share` of the rectangle.
+    /// Returns L, relative to the map's origin, at the corners (0,0), (1,0), (0,1), (1,1) of a part, which begins at `from` and is `share`
+    /// of the rectangle.
     pub(in crate::tessellate) fn corner_values(&self, from: Uv, share: Uv) -> [Point; 4] {
         let [l00, ls, lt] = self.values;
         let l = l00 + ls * from.x + lt * from.y;
@@ -106,7 +108,7 @@ impl LinearMap {
         [l, l + s, l + t, l + s + t]
     }
 
-    /// Whether a part meets the region.
+    /// Whether a part of the rectangle, given in shares, meets the region; by rounding it may say so of one that just does not.
     pub(in crate::tessellate) fn meets_region(&self, from: Uv, share: Uv) -> bool {
         let n = self.region.len();
         (0..n).all(|k| {
@@ -118,7 +120,8 @@ impl LinearMap {
         })
     }
 
-    /// Bound of what is measured where the control points of W·(S − L) are these and no weight is smaller.
+    /// Returns a bound, mm, of the deviation that the map measures, where `net` are the control points of W·(S − L) and no weight is below
+    /// `lightest`.
     pub(in crate::tessellate) fn bound(&self, net: &[Point], lightest: f64) -> f64 {
         match self.measure {
             Measure::Whole => net.iter().map(|x| x.length_squared()).fold(0.0, f64::max).sqrt() / lightest,
@@ -164,7 +167,7 @@ mod tests {
                     worst = worst.max(distance_to_chord(s.evaluate(x), &at));
                 }
             }
-            let bound = |limit: f64| DeviationBounds::default().sliver(&surface, &polygon, chord, at, limit);
+            let bound = |limit: f64| DeviationBounds::default().sliver_bound(&surface, &polygon, chord, at, limit);
             assert!(bound(0.999 * worst).is_none());
             let bound = bound(1.2 * worst).unwrap();
             assert!(worst <= bound && bound <= 1.2 * worst, "{worst} {bound}");

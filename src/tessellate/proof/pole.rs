@@ -25,14 +25,16 @@ use crate::tessellate::face_surface::FaceSurface;
 /// Share of the domain by which a border that runs into a pole may leave its parameter line.
 const ASLANT: f64 = 1e-9;
 
-/// Where the parameter line of `x` meets the pole at `pole`, whose parameter `across` it keeps.
+/// Returns the point of the pole `pole` on the parameter line through `x`; `across` is the parameter that is constant along the pole, 0 for
+/// u or 1 for v.
 fn foot(x: Uv, pole: Uv, across: usize) -> Uv {
     let mut f = x;
     f[across] = pole[across];
     f
 }
 
-/// The corner at a pole, and the parameter that is constant along the pole; `None` unless it is the only one.
+/// Returns the index of the corner at a pole, and the parameter that is constant along that pole; `None` unless exactly one corner is at a
+/// pole.
 fn pole_corner(surface: &FaceSurface<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
     let mut found = None;
     for (k, &x) in uv.iter().enumerate() {
@@ -46,13 +48,14 @@ fn pole_corner(surface: &FaceSurface<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)
     found
 }
 
-/// Whether two corners at poles, at which this parameter is constant, are not at the same one.
+/// Whether two corners, both at poles along which parameter `across` is constant, are at opposite ones.
 fn at_opposite_poles(surface: &FaceSurface<'_>, a: Uv, b: Uv, across: usize) -> bool {
     // Poles lie at the ends of the domain: half of it apart is the other one.
     (a[across] - b[across]).abs() > 0.5 * surface.extent()[across]
 }
 
-/// The corner off the poles of a triangle from pole to pole, and the parameter that is constant along these.
+/// Returns the index of the corner off the poles, of a triangle whose other two are at opposite poles, and the parameter constant along
+/// these; `None` for others.
 fn spindle_corner(surface: &FaceSurface<'_>, uv: &[Uv; 3]) -> Option<(usize, usize)> {
     let at = uv.map(|x| surface.pole(x));
     let k = (0..3).find(|&k| at[k].is_none())?;
@@ -61,7 +64,8 @@ fn spindle_corner(surface: &FaceSurface<'_>, uv: &[Uv; 3]) -> Option<(usize, usi
     (at[b] == Some(across) && at_opposite_poles(surface, uv[a], uv[b], across)).then_some((k, across))
 }
 
-/// Middles of the sides of a triangle, those into a pole along parameter lines.
+/// Returns the parameters in the middle of each side, the one from corner 0 to 1 first; on sides into a pole, along the parameter line of
+/// the other corner.
 pub(in crate::tessellate) fn side_middles(surface: &FaceSurface<'_>, uv: [Uv; 3]) -> [Uv; 3] {
     let mut at = [0, 1, 2].map(|i| 0.5 * (uv[i] + uv[(i + 1) % 3]));
     if let Some((k, across)) = pole_corner(surface, &uv) {
@@ -77,8 +81,8 @@ pub(in crate::tessellate) fn side_middles(surface: &FaceSurface<'_>, uv: [Uv; 3]
     at
 }
 
-/// The corner of a facet at a pole, with parameters there that keep each of its triangles within its sector: opposite the
-/// diagonal those of the diagonal's other end, else those between its neighbours.
+/// Returns the index of the first corner of a triangle or quad at a pole, with parameters there that keep each of its triangles within its
+/// sector: opposite the diagonal those of the diagonal's other end, else those between its neighbours. `None` without a pole.
 pub(in crate::tessellate) fn facet_parameters(surface: &FaceSurface<'_>, uv: &[Uv]) -> Option<(usize, Uv)> {
     let n = uv.len();
     let (k, across) = uv.iter().enumerate().find_map(|(k, &x)| Some((k, surface.pole(x)?)))?;
@@ -86,17 +90,18 @@ pub(in crate::tessellate) fn facet_parameters(surface: &FaceSurface<'_>, uv: &[U
     Some((k, foot(from, uv[k], across)))
 }
 
-/// Whether a triangle is proved with all that lies beside it up to parameter lines into a pole.
+/// Whether the proof of a triangle includes all that lies beside it up to parameter lines into a pole, or from pole to pole.
 pub(in crate::tessellate) fn covers_to_meridians(surface: &FaceSurface<'_>, uv: [Uv; 3]) -> bool {
     is_sector(surface, uv) || spindle_corner(surface, &uv).is_some()
 }
 
-/// Whether a triangle is proved by its sector.
+/// Whether a triangle is proved as a sector: exactly one corner is at a pole.
 pub(in crate::tessellate) fn is_sector(surface: &FaceSurface<'_>, uv: [Uv; 3]) -> bool {
     pole_corner(surface, &uv).is_some()
 }
 
-/// Bound for a triangle at a pole; `None` for others. `sides` are what its sides follow, the one from corner 0 to 1 first.
+/// Returns a bound, mm, for a triangle with one corner at a pole or with two at opposite ones; `None` for others. `sides` are what its
+/// sides follow, the one from corner 0 to 1 first, `None` where no edge; above `limit` the value proves nothing.
 pub(in crate::tessellate) fn sector_bound(
     prover: &mut Prover<'_, '_>,
     uv: [Uv; 3],
@@ -105,7 +110,7 @@ pub(in crate::tessellate) fn sector_bound(
     limit: f64,
 ) -> Option<f64> {
     if let Some((k, across)) = spindle_corner(prover.surface, &uv) {
-        return Some(spindle(prover, uv, xyz, sides, limit, (k, across)));
+        return Some(spindle_bound(prover, uv, xyz, sides, limit, (k, across)));
     }
     let (k, across) = pole_corner(prover.surface, &uv)?;
     let [p, a, b] = [0, 1, 2].map(|i| uv[(k + i) % 3]);
@@ -121,11 +126,12 @@ pub(in crate::tessellate) fn sector_bound(
         (None, [foot_a, foot_b], [xp, xp]),
     ];
     // Where the corners run back around the pole the piece is folded; the argument of `prover.rs` does not ask for more.
-    Some(quadrilateral(prover, lines, [a, b, foot_b, foot_a], xyz, limit))
+    Some(quadrilateral_bound(prover, lines, [a, b, foot_b, foot_a], xyz, limit))
 }
 
-/// Bound for a triangle from pole to pole whose corner `k` is off them.
-fn spindle(
+/// Returns a bound, mm, for a triangle between opposite poles, constant in parameter `across`, whose corner `k` is off them. Other
+/// arguments as for [`sector_bound`].
+fn spindle_bound(
     prover: &mut Prover<'_, '_>,
     uv: [Uv; 3],
     xyz: [Point; 3],
@@ -145,7 +151,7 @@ fn spindle(
         (None, [foot_a, a], [xa, xa]),
         (None, [foot_b, b], [xb, xb]),
     ];
-    let whole = quadrilateral(prover, lines, [a, b, foot_b, foot_a], xyz, limit);
+    let whole = quadrilateral_bound(prover, lines, [a, b, foot_b, foot_a], xyz, limit);
     if of_a.is_none() && of_b.is_none() {
         return whole;
     }
@@ -153,8 +159,9 @@ fn spindle(
     whole.max(prover.triangle_bound([x, foot_a, foot_b], xyz, limit))
 }
 
-/// Bound for a triangle whose piece is a quadrilateral of parameters, each boundary curve measured from its own edge or trim.
-fn quadrilateral<const N: usize>(
+/// Returns a bound, mm, for a triangle `xyz` whose piece is a convex quadrilateral of parameters; each boundary line is measured from its
+/// chord, or by the edge that stands in its place. Above `limit` it proves nothing.
+fn quadrilateral_bound<const N: usize>(
     prover: &mut Prover<'_, '_>,
     lines: [(Option<&BorderChord>, [Uv; 2], [Point; 2]); N],
     [a, b, c, d]: [Uv; 4],
@@ -181,8 +188,8 @@ fn quadrilateral<const N: usize>(
     worst
 }
 
-/// Bound for a triangle with two corners on one pole: nothing, but where a border runs aslant into it. `sides` as for
-/// [`sector_bound`].
+/// Returns a bound, mm, for a triangle with two corners on one pole, which stands for no piece: the size of the pole. `None` for others,
+/// and where an edge runs aslant into the pole. `sides` as for [`sector_bound`].
 pub(in crate::tessellate) fn collapsed_bound(
     surface: &FaceSurface<'_>,
     uv: [Uv; 3],

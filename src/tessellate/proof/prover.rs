@@ -27,7 +27,7 @@ use super::scalar_patch::ScalarPatch;
 use super::simplex_net::{MAX_HALVED, SimplexNets, right_angle};
 use crate::math::{Point, Uv};
 use crate::nurbs::BezierPatch;
-use crate::tessellate::face_surface::{FaceSurface, local};
+use crate::tessellate::face_surface::{FaceSurface, patch_uv};
 use crate::tessellate::settings::Acceptance;
 
 /// Share of the surface's size that covers rounding: some thousand roundings of a coordinate.
@@ -43,7 +43,7 @@ const REDUCTION_SHARE: f64 = 0.02;
 /// Where a triangle is looked at before it is proved.
 const PROBES: [[f64; 3]; 4] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [1.0 / 3.0; 3]];
 
-/// Bounds facets of one face.
+/// Bounds facets of one face, all in mm of its part.
 pub(in crate::tessellate) struct Prover<'s, 'a> {
     pub(in crate::tessellate) surface: &'s FaceSurface<'a>,
     pub(super) acceptance: Acceptance,
@@ -57,6 +57,7 @@ pub(in crate::tessellate) struct Prover<'s, 'a> {
 }
 
 impl<'s, 'a> Prover<'s, 'a> {
+    /// Makes a prover with buffers of its own; its steps count towards the surface's when it is dropped.
     pub(in crate::tessellate) fn new(surface: &'s FaceSurface<'a>, acceptance: Acceptance) -> Self {
         Self {
             surface,
@@ -70,7 +71,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         }
     }
 
-    /// Bound of the distance from the surface over a parameter triangle to a triangle in space.
+    /// Returns a bound of the distance from the surface over a parameter triangle to a triangle in space.
     ///
     /// Stops refining as soon as the answer is at most `limit`, or clearly is not: above `limit` the value says only that nothing nearer
     /// was shown, and may be a sample. With [`Acceptance::Sampled`] it is an estimate where the surface is not affine.
@@ -93,12 +94,12 @@ impl<'s, 'a> Prover<'s, 'a> {
             return sampled;
         }
         if self.acceptance == Acceptance::Sampled {
-            return self.sample(uv, &flat).max(sampled);
+            return self.sampled_distance(uv, &flat).max(sampled);
         }
         self.hull_bound(uv, &flat, limit)
     }
 
-    /// Largest distance of the surface at a few places of a parameter triangle to a triangle in space; the first one above the limit.
+    /// Returns the largest distance of the surface to `flat` at `places`, shares of the corners `uv`; stops at the first above the limit.
     fn probe(&self, uv: &[Uv; 3], flat: &FlatTriangle, limit: f64, places: &[[f64; 3]]) -> f64 {
         let mut most = 0f64;
         for [a, b, c] in places {
@@ -110,7 +111,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         most
     }
 
-    /// Bound of the distance from the surface over a parameter triangle to a triangle in space, by hulls.
+    /// Returns a bound as of [`Self::triangle_bound`], by hulls of control points.
     fn hull_bound(&mut self, uv: [Uv; 3], flat: &FlatTriangle, limit: f64) -> f64 {
         self.max_over_patches(&uv, |this, a, b, polygon| {
             let patch = this.surface.patch(a, b);
@@ -124,7 +125,7 @@ impl<'s, 'a> Prover<'s, 'a> {
                 }
             }
             for k in 1..polygon.len() - 1 {
-                let tri = [polygon[0], polygon[k], polygon[k + 1]].map(|x| local(patch, x));
+                let tri = [polygon[0], polygon[k], polygon[k + 1]].map(|x| patch_uv(patch, x));
                 worst = worst.max(this.convex_bound(patch, tri, limit, LEVELS, &|p| flat.distance(p)));
                 if worst > limit {
                     break;
@@ -134,7 +135,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         }) + self.margin
     }
 
-    /// Bound of the distance from the surface over a convex parameter polygon to a triangle in space.
+    /// Returns a bound as of [`Self::triangle_bound`] of the distance from the surface over a convex parameter polygon to a triangle.
     pub(in crate::tessellate) fn polygon_bound(&mut self, uv: &[Uv], xyz: [Point; 3], limit: f64) -> f64 {
         // As for a triangle: one look at the whole polygon before it is cut into triangles.
         let flat = FlatTriangle::new(&xyz);
@@ -159,8 +160,8 @@ impl<'s, 'a> Prover<'s, 'a> {
         worst
     }
 
-    /// Bound of the distance from the surface over a parameter triangle to a triangle in space and from its sides to theirs, by one
-    /// quick look; `None` when that does not show it to be within the limit. Above the limit it is a sample of the surface, which no
+    /// Returns a bound of the distance from the surface over a parameter triangle to a triangle in space and from its sides to theirs, by
+    /// one quick look; `None` when that does not show it to be within the limit. Above the limit it is a sample of the surface, which no
     /// bound can be below. `exact`: the corners are known to lie on the surface.
     pub(in crate::tessellate) fn facet_bound(
         &mut self,
@@ -172,16 +173,14 @@ impl<'s, 'a> Prover<'s, 'a> {
         if self.surface.affine || self.acceptance == Acceptance::Sampled {
             return None;
         }
-        // Where corners are the border's points they may be off the surface, and the difference is added in the
-        // end.
+        // Corners that are the border's points may be off the surface: the difference is added in the end.
         let at = if exact { xyz } else { uv.map(|x| self.surface.point(x)) };
         let off = (0..3).map(|i| (at[i] - xyz[i]).length()).fold(0.0, f64::max) + self.margin;
         let (lo, hi) = (uv[0].min(uv[1]).min(uv[2]), uv[0].max(uv[1]).max(uv[2]));
         let (a, b) = (self.surface.range(0, lo.x, hi.x), self.surface.range(1, lo.y, hi.y));
         let fits = |x: &f64| x + off <= limit;
         let quick = self.surface.curving.linear_deviation(a, b, hi - lo).filter(fits);
-        // From cheap to dear: second derivatives of whole regions, of the patches under the facet, samples, and
-        // nets at last.
+        // From cheap to dear: second derivatives of whole regions, of the patches under the facet, samples, and nets at last.
         if let Some(bound) = quick {
             return Some(bound + off);
         }
@@ -190,7 +189,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         let patches = || (a[0]..=a[1]).flat_map(|i| (b[0]..=b[1]).map(move |j| surface.patch(i, j)));
         // Taylor's theorem needs continuous first derivatives from patch to patch; on one patch there is no seam.
         if count == 1 || count <= MAX_PATCHES_TAYLOR && surface.curving.is_smooth(a, b) {
-            let taylor = self.deviation.taylor(patches(), uv, at).filter(fits);
+            let taylor = self.deviation.taylor_bound(patches(), uv, at).filter(fits);
             if let Some(bound) = taylor {
                 return Some(bound + off);
             }
@@ -203,17 +202,20 @@ impl<'s, 'a> Prover<'s, 'a> {
         }
         // Of several patches the deviation's hull is taken, which needs no smoothness between them.
         if count > 1 {
-            let hull =
-                if count <= MAX_PATCHES_HULL { self.deviation.hull(patches(), uv, at, limit - off) } else { None };
+            let hull = if count <= MAX_PATCHES_HULL {
+                self.deviation.hull_bound(patches(), uv, at, limit - off)
+            } else {
+                None
+            };
             return hull.map(|x| x + off);
         }
         let patch = surface.patch(a[0], b[0]);
-        self.net_bound(patch, uv.map(|x| local(patch, x)), xyz, limit).map(|x| x + self.margin)
+        self.net_bound(patch, uv.map(|x| patch_uv(patch, x)), xyz, limit).map(|x| x + self.margin)
     }
 
-    /// Bound of a triangle and its sides by the hull of one net, whose outer rows are the nets of the sides.
+    /// Returns a bound of a triangle and its sides by the hull of one net, whose outer rows are those of the sides; `None` above the limit.
     fn net_bound(&mut self, patch: &BezierPatch, at: [Uv; 3], xyz: [Point; 3], limit: f64) -> Option<f64> {
-        let small = self.reduced(patch, &at, limit);
+        let small = self.reduce(patch, &at, limit);
         let (patch, at, off) = match &small {
             Some((x, off)) => (&self.reduction.patch, [x[0], x[1], x[2]], *off),
             None => (patch, at, 0.0),
@@ -254,9 +256,9 @@ impl<'s, 'a> Prover<'s, 'a> {
         Some(worst + off)
     }
 
-    /// A cubic for a patch of higher degree over the box around some local parameters: these in the cubic's, and the bound of its
-    /// difference.
-    fn reduced<const N: usize>(&mut self, patch: &BezierPatch, at: &[Uv; N], limit: f64) -> Option<([Uv; N], f64)> {
+    /// Makes `self.reduction` the cubic for a patch of higher degree over the box around `at`. Returns `at` in the cubic's parameters and a
+    /// bound of the difference; `None` where the degree is low already or the difference too large.
+    fn reduce<const N: usize>(&mut self, patch: &BezierPatch, at: &[Uv; N], limit: f64) -> Option<([Uv; N], f64)> {
         if !cubic_reduction::is_high(patch) {
             return None;
         }
@@ -267,7 +269,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         (off <= REDUCTION_SHARE * limit).then(|| (at.map(share), off))
     }
 
-    /// Bound of the distance from the curve over a parameter segment to the line of a chord.
+    /// Returns a bound, mm, of the distance from the curve over a parameter segment to the chord `xyz`; above `limit` none is known.
     pub(in crate::tessellate) fn side_bound(&mut self, uv: [Uv; 2], xyz: [Point; 2], limit: f64) -> f64 {
         if self.surface.affine {
             return self.margin;
@@ -285,12 +287,12 @@ impl<'s, 'a> Prover<'s, 'a> {
             if polygon.len() < 2 {
                 return 0.0;
             }
-            let ends = [local(patch, polygon[0]), local(patch, polygon[1])];
+            let ends = [patch_uv(patch, polygon[0]), patch_uv(patch, polygon[1])];
             this.convex_bound(patch, ends, limit, 2 * LEVELS, &|p| distance_to_chord(p, &xyz))
         }) + self.margin
     }
 
-    /// Largest value of a convex distance over a simplex of a patch's local parameters; see [`refine`].
+    /// Returns a bound of a convex distance `f` over a simplex of a patch's local parameters, cut up to `levels` times; see [`refine`].
     fn convex_bound<const N: usize>(
         &mut self,
         patch: &BezierPatch,
@@ -300,7 +302,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         f: &impl Fn(Point) -> f64,
     ) -> f64 {
         // A patch of high degree first as a cubic: the net of degree p + q costs its fourth power.
-        if let Some((x, off)) = self.reduced(patch, &at, limit) {
+        if let Some((x, off)) = self.reduce(patch, &at, limit) {
             let bound =
                 off + refine((&mut self.nets, &mut self.scalar), &self.reduction.patch, x, limit - off, levels, f);
             // What the difference may have spoilt is tried on the patch itself.
@@ -311,8 +313,8 @@ impl<'s, 'a> Prover<'s, 'a> {
         refine((&mut self.nets, &mut self.scalar), patch, at, limit, levels, f)
     }
 
-    /// Bound of a convex distance over a convex piece of surface: the largest at its corners, which holds for all that is flat between
-    /// them, and the deviation from that by second derivatives; `None` above the limit.
+    /// Returns a bound of a convex distance over a convex piece of surface: the largest at its corners, which holds for all that is flat
+    /// between them, and the deviation from that by second derivatives; `None` above the limit.
     fn taylor_bound(&self, uv: &[Uv], limit: f64, away: impl Fn(Point) -> f64) -> Option<f64> {
         let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
         let (a, b) = (self.surface.range(0, lo.x, hi.x), self.surface.range(1, lo.y, hi.y));
@@ -322,7 +324,8 @@ impl<'s, 'a> Prover<'s, 'a> {
         Some(bound + off + self.margin).filter(|&x| x <= limit)
     }
 
-    /// Largest result over the knot rectangles that a segment or triangle meets.
+    /// Returns the largest result over the knot rectangles that a segment or polygon meets, clipped to each; infinite for more than
+    /// [`MAX_PIECES`]: a face of noise, of which nothing is proved.
     fn max_over_patches(&mut self, uv: &[Uv], mut each: impl FnMut(&mut Self, usize, usize, &[Uv]) -> f64) -> f64 {
         let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
         let range = |d: usize, x: f64, y: f64| {
@@ -330,8 +333,6 @@ impl<'s, 'a> Prover<'s, 'a> {
             a..=b
         };
         let (ra, rb) = (range(0, lo.x, hi.x), range(1, lo.y, hi.y));
-        // More rectangles than this are a face of noise; nothing is shown of it, and it counts as not proved.
-        // More patches than are worth a look: not proved.
         if ra.clone().count() * rb.clone().count() > MAX_PIECES {
             return f64::INFINITY;
         }
@@ -352,8 +353,8 @@ impl<'s, 'a> Prover<'s, 'a> {
         worst
     }
 
-    /// The largest sampled distance of a triangle's surface to it: what no bound can be below.
-    fn sample(&self, uv: [Uv; 3], flat: &FlatTriangle) -> f64 {
+    /// Returns the largest distance to `flat` among 55 samples of the surface over a parameter triangle: what no bound can be below.
+    fn sampled_distance(&self, uv: [Uv; 3], flat: &FlatTriangle) -> f64 {
         let n = 9;
         let mut worst = 0f64;
         for i in 0..=n {
@@ -367,7 +368,7 @@ impl<'s, 'a> Prover<'s, 'a> {
     }
 }
 
-/// Where in `[lo, hi]` a parameter lies, as a share.
+/// Returns where in `[lo, hi]` a parameter lies, as a share clamped to 0 to 1; 0 for an interval without length.
 fn share_of_interval(x: f64, lo: f64, hi: f64) -> f64 {
     if hi > lo { ((x - lo) / (hi - lo)).clamp(0.0, 1.0) } else { 0.0 }
 }

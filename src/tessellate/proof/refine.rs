@@ -10,8 +10,8 @@ pub(super) const LEVELS: u32 = 3;
 /// Limits beyond which a bound is not tried further below the first level: half of what two levels can gain.
 const HOPELESS: f64 = 8.0;
 
-/// Halves a net of degrees `[p, q]` along one direction by de Casteljau's steps: `high` holds it and keeps its upper half, `low` takes
-/// the lower one.
+/// Halves a net of degrees `[p, q]` along u (0) or v (1) by de Casteljau's steps: `high` holds it and keeps its upper half, `low` takes the
+/// lower one.
 #[inline]
 pub(super) fn halve_net<T>(low: &mut [T], high: &mut [T], [p, q]: [usize; 2], along: usize)
 where
@@ -30,7 +30,8 @@ where
     }
 }
 
-/// Largest value of a convex function on a Bézier simplex, refined until it is at most `limit` or levels run out.
+/// Returns a bound of a convex function `f` over the piece of a patch above the simplex `at` (2 or 3 corners, local parameters), cut into
+/// two or four up to `levels` times while that may bring it to `limit`. A value above `limit` is not proved.
 pub(super) fn refine<const N: usize>(
     (nets, scalar): (&mut SimplexNets, &mut ScalarBezier),
     patch: &BezierPatch,

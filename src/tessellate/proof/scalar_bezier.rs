@@ -22,7 +22,7 @@ pub(in crate::tessellate) struct ScalarBezier {
 }
 
 impl ScalarBezier {
-    /// Takes in distances and weights of the control points of a segment or triangle; the largest distance.
+    /// Takes in distances and weights of the control points of a segment or triangle; returns the largest distance.
     pub(in crate::tessellate) fn load(&mut self, points: impl Iterator<Item = (f64, f64)>, degree: usize) -> f64 {
         self.degree = degree;
         self.control.clear();
@@ -30,7 +30,8 @@ impl ScalarBezier {
         self.control.iter().map(|x| x.0).fold(0.0, f64::max)
     }
 
-    /// The bound of these distances if it is within the limit.
+    /// Returns a bound of these distances over the segment (`N` = 2) or triangle (3), by control points or by halving; `None` unless within
+    /// the limit.
     pub(in crate::tessellate) fn bound<const N: usize>(
         &mut self,
         points: impl Iterator<Item = (f64, f64)>,
@@ -41,14 +42,14 @@ impl ScalarBezier {
         if most <= limit { Some(most) } else { self.bound_within::<N>(limit) }
     }
 
-    /// Largest distance of the corners.
+    /// Returns the largest distance at the corners of the loaded piece, a segment (`N` = 2) or a triangle (3).
     pub(in crate::tessellate) fn largest_corner<const N: usize>(&self) -> f64 {
         let n = self.degree;
         let second = if N == 2 { n } else { n * (n + 1) / 2 };
         self.control[0].0.max(self.control[second].0).max(self.control[self.control.len() - 1].0)
     }
 
-    /// A bound that is within the limit, if halving finds one.
+    /// Halves the loaded piece until a bound within the limit is found; `None` where a corner exceeds it or halvings run out.
     pub(in crate::tessellate) fn bound_within<const N: usize>(&mut self, limit: f64) -> Option<f64> {
         let n = self.degree;
         let heaviest = self.control.iter().fold(0.0, |a: f64, x| a.max(x.1));
@@ -92,7 +93,7 @@ impl ScalarBezier {
         Some(limit + most / heaviest)
     }
 
-    /// The largest corner of the last net: its value is taken, not only approached.
+    /// Returns the largest corner of the net from `start` on: its value is taken, not only approached.
     fn largest_value_taken<const N: usize>(&self, start: usize) -> f64 {
         let n = self.degree;
         let net = &self.stack[start..];
@@ -100,7 +101,7 @@ impl ScalarBezier {
         if N == 2 { net[0].max(last) } else { net[0].max(net[n]).max(last) }
     }
 
-    /// Halves the polynomial of degree `n` on top of the stack: both halves stand there afterwards.
+    /// Halves the polynomial of degree `n` that the stack holds from `start` to its top: the lower half takes its place, the upper follows.
     fn halve_segment(&mut self, start: usize, n: usize) {
         self.stack.extend_from_within(start..);
         let (low, high) = self.stack[start..].split_at_mut(n + 1);
@@ -113,7 +114,8 @@ impl ScalarBezier {
         }
     }
 
-    /// Halves the side along each line; the halves' lines run across the next side, opposite to the new corner.
+    /// Replaces the triangle's net on top of the stack by its two halves, cut at the middle of the side along its lines; the halves' lines
+    /// run across the next side, opposite to the new corner.
     fn halve_triangle(&mut self, start: usize, n: usize) {
         let size = (n + 1) * (n + 2) / 2;
         self.stack.resize(start + 3 * size, 0.0);

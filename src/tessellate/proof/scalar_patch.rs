@@ -10,7 +10,8 @@ pub(in crate::tessellate) struct ScalarPatch {
 }
 
 impl ScalarPatch {
-    /// Bound of Σ dᵢwᵢBᵢ / Σ wᵢBᵢ over the unit square for distances and weights of a net of these degrees, where it is within the limit.
+    /// Returns a bound of Σ dᵢwᵢBᵢ / Σ wᵢBᵢ over the unit square for pairs (dᵢ, wᵢ) of a net of these degrees; `None` unless within the
+    /// limit. Counts down the halvings `left`, and gives up when they are used up.
     pub(super) fn bound(
         &mut self,
         net: impl Iterator<Item = (f64, f64)>,

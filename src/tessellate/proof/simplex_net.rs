@@ -50,7 +50,8 @@ pub(in crate::tessellate) struct RightAngle {
     pub(in crate::tessellate) upper: [bool; 2],
 }
 
-/// Whether a triangle is half of the rectangle around it: the corner before its right angle, and which half it is.
+/// Returns the index of the corner before the right angle of a triangle that is half of the rectangle around it, and which half; `None` for
+/// any other.
 pub(super) fn right_angle(at: &[Uv; 3]) -> Option<(usize, RightAngle)> {
     (0..3).find_map(|r| {
         let [a, b, c] = [0, 1, 2].map(|k| at[(k + r) % 3]);
@@ -65,7 +66,7 @@ pub(super) fn right_angle(at: &[Uv; 3]) -> Option<(usize, RightAngle)> {
     })
 }
 
-/// Coefficients of degree `d` over a simplex with `corners` corners.
+/// Returns the number of coefficients of degree `d` over a simplex of 2 or 3 corners.
 const fn size(corners: usize, d: usize) -> usize {
     if corners == 2 { d + 1 } else { (d + 1) * (d + 2) / 2 }
 }
@@ -87,7 +88,8 @@ impl<const N: usize> Kernel for Expansion<'_, N> {
 }
 
 impl SimplexNets {
-    /// Control points over the simplex with 2 or 3 corners, given in local parameters.
+    /// Returns the control points of the patch over the simplex with 2 or 3 corners, given in local parameters: of degree p + q, row by row
+    /// as in [`blend`]. Counts `steps`.
     pub(in crate::tessellate) fn expand<const N: usize>(
         &mut self,
         patch: &BezierPatch,
@@ -97,15 +99,16 @@ impl SimplexNets {
         // Multinomials are the same for all pieces of a degree, and faces have few degrees.
         if self.shares_for != (N, degree) {
             self.shares_for = (N, degree);
-            multinomials::<N>(degree, &mut self.shares);
+            inverse_multinomials::<N>(degree, &mut self.shares);
         }
         self.steps += steps_of_expansion(N, patch.degree);
         simd::dispatch(Expansion { nets: self, patch, corners });
         &self.out
     }
 
-    /// Control points over half of the rectangle that a net of these degrees, 1 to [`MAX_HALVED`], stands for. Of cells cut along a
-    /// diagonal it takes a seventh of the time: each coefficient is a mean of few control points, with weights that are the same for all.
+    /// Returns the control points over half of the rectangle that `net`, of degrees 1 to [`MAX_HALVED`], stands for; positions relative to
+    /// what its are. Of cells cut along a diagonal it takes a seventh of the time of [`Self::expand`]: each coefficient is a mean of few
+    /// control points with fixed weights.
     pub(in crate::tessellate) fn half_of_rectangle(
         &mut self,
         net: &[Homogeneous],
@@ -134,6 +137,7 @@ impl SimplexNets {
         &self.out
     }
 
+    /// Fills `out` with the control points over the simplex; `shares` must be those of its degree.
     #[inline(always)]
     fn expand_plain<const N: usize>(&mut self, patch: &BezierPatch, corners: [Uv; N]) {
         let [p, q] = patch.degree;
@@ -176,7 +180,7 @@ fn steps_of_expansion(corners: usize, [p, q]: [usize; 2]) -> u64 {
     ((q + 1) * first + second) as u64
 }
 
-/// All de Casteljau steps of one direction over `steps + 1` nets of a degree, which stand `stride` apart in `work[0]`; the result
+/// Takes all de Casteljau steps of one direction over `steps + 1` nets of a degree, which stand `stride` apart in `work[0]`; the result
 /// is first in the returned one of the two.
 #[inline(always)]
 fn de_casteljau<const N: usize>(
@@ -200,7 +204,7 @@ fn de_casteljau<const N: usize>(
     steps % 2
 }
 
-/// `(1 − ℓ)·a + ℓ·b` for the linear form ℓ with values `at` at the corners; degree `d` becomes `d + 1`.
+/// Writes `(1 − ℓ)·a + ℓ·b` to `out`, for the linear form ℓ with values `at` at the corners; degree `d` becomes `d + 1`.
 ///
 /// The coefficient with exponents (i, j, k) stands at `(j + k)(j + k + 1)/2 + k`, whatever i is.
 #[inline(always)]
@@ -234,12 +238,12 @@ fn blend<const N: usize>(a: &[Homogeneous], b: &[Homogeneous], d: usize, at: [f6
 }
 
 impl Half {
-    /// With s = λ_B + λ_C along the first side and t = λ_C along the second, (λ_B + λ_C)^i λ_A^(p−i) λ_C^j (λ_A + λ_B)^(q−j) is
-    /// multiplied out.
+    /// Makes the table for one pair of degrees: with s = λ_B + λ_C along the first side and t = λ_C along the second, (λ_B + λ_C)^i
+    /// λ_A^(p−i) λ_C^j (λ_A + λ_B)^(q−j) is multiplied out.
     fn new([p, q]: [usize; 2]) -> Self {
         // Divided by the multinomials here once, and not for each net.
         let mut shares = Vec::new();
-        multinomials::<3>(p + q, &mut shares);
+        inverse_multinomials::<3>(p + q, &mut shares);
         let mut of: Vec<Vec<([isize; 2], f64)>> = vec![Vec::new(); shares.len()];
         for i in 0..=p {
             for j in 0..=q {
@@ -262,13 +266,13 @@ impl Half {
     }
 }
 
-/// A binomial coefficient.
+/// Returns the binomial coefficient of `n` over `k`, rounded where it is large.
 fn binomial(n: usize, k: usize) -> f64 {
     (0..k).fold(1.0, |c, i| c * (n - i) as f64 / (i + 1) as f64)
 }
 
-/// Fills in one over the multinomials of a degree.
-fn multinomials<const N: usize>(degree: usize, out: &mut Vec<f64>) {
+/// Fills `out` with one over each multinomial of a degree, in the order of the coefficients over `N` corners.
+fn inverse_multinomials<const N: usize>(degree: usize, out: &mut Vec<f64>) {
     out.clear();
     for m in 0..=degree {
         if N == 2 {
@@ -307,7 +311,7 @@ mod tests {
         let at = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];
         assert!((sum.project() - patch.homogeneous(at)[0].project()).length() < 1e-13);
         let mut plain = SimplexNets::default();
-        multinomials::<3>(n, &mut plain.shares);
+        inverse_multinomials::<3>(n, &mut plain.shares);
         plain.expand_plain(patch, corners);
         assert_eq!(plain.out, net);
         let segment = nets.expand(patch, [corners[0], corners[1]]).to_vec();

@@ -7,7 +7,8 @@ use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::{Nodes, edge_key};
 use rustc_hash::FxHashSet;
 
-/// Lines between neighbouring nodes on each crease, where they run inside what `segments` bound.
+/// Returns the lines between neighbouring nodes on each sharp crease, as pairs of nodes, where their middle lies inside what `segments`
+/// bound and they are no segments themselves.
 pub(in crate::tessellate) fn crease_lines(
     surface: &FaceSurface<'_>,
     nodes: &Nodes,
@@ -40,7 +41,7 @@ pub(in crate::tessellate) fn crease_lines(
     out
 }
 
-/// Whether the line between two places runs along a sharp crease.
+/// Whether the line between two places runs along a sharp crease: both lie on the same one.
 pub(in crate::tessellate) fn runs_along_crease(surface: &FaceSurface<'_>, a: Uv, b: Uv) -> bool {
     if !surface.is_sharp() {
         return false;

@@ -26,7 +26,7 @@ pub(in crate::tessellate) struct Outline<'t> {
     pub(in crate::tessellate) creases: Vec<[u32; 2]>,
     /// Lines inside that no triangle crosses and nothing divides.
     pub(in crate::tessellate) imprinted: Vec<[u32; 2]>,
-    /// What border segments follow.
+    /// How far edges stray from the segments of the border.
     pub(in crate::tessellate) chords: &'t BorderChords,
     /// Multiplies parameters before triangulating.
     pub(in crate::tessellate) scale: Uv,
@@ -38,7 +38,7 @@ pub(in crate::tessellate) struct Outline<'t> {
 pub(in crate::tessellate) struct Transition {
     pub(in crate::tessellate) nodes: Nodes,
     pub(in crate::tessellate) triangles: Vec<ProvedFacet<3>>,
-    /// Segments that could not be kept because they cross others.
+    /// Segments that could not be kept because they cross others, or an end of which was not inserted.
     pub(in crate::tessellate) conflicts: Vec<[u32; 2]>,
     /// Those that are kept and crossed by them.
     pub(in crate::tessellate) crossed: Vec<[u32; 2]>,
@@ -47,8 +47,8 @@ pub(in crate::tessellate) struct Transition {
 }
 
 impl Transition {
-    /// Chords of the border beside triangles that are not proved, where shorter ones may help: not on edges that the file has farther
-    /// from the face than the tolerance somewhere.
+    /// Returns the chords of the border beside triangles that are not proved, where shorter ones may help: not on edges whose gap in the
+    /// file, anywhere along them, takes [`WIDEST_GAP`] of the tolerance. Some come twice. `followed` are the edges by chord.
     pub(in crate::tessellate) fn unproved_chords(
         &self,
         chords: &BorderChords,
@@ -119,19 +119,21 @@ struct Limits {
 }
 
 impl Limits {
+    /// `corners` are those at the start; the budget is never below them.
     fn new(corners: usize, budget: usize) -> Self {
         let budget = budget.max(corners);
         // Six times the corners and some for small faces: that is what transitions which end well take.
         Self { usual: (corners * 6 + 4000).min(budget), budget }
     }
 
-    /// Corners that there may be, by whether those facets that do not hold become fewer.
+    /// Returns how many corners there may be; more if those facets that do not hold become fewer (`falls`).
     fn most(&self, falls: bool) -> usize {
         if falls { self.budget } else { self.usual + self.usual / 4 }
     }
 }
 
-/// Triangulates; `None` when not even a triangulation of the points exists.
+/// Triangulates what the outline bounds and refines until all triangles hold, or work or the `budget` of corners is used up; those that do
+/// not hold then are in the result. Segments that cross others are left out and named. `None` when nodes have no usable parameters.
 pub(in crate::tessellate) fn triangulate(
     surface: &FaceSurface<'_>,
     acceptance: Acceptance,
@@ -168,14 +170,15 @@ pub(in crate::tessellate) fn triangulate(
     loop {
         // Prove what is new; what was there before stands as it did.
         let triangles = mesh.inner_triangles(by_centre.as_ref());
-        let new: Vec<[u32; 3]> = triangles.iter().copied().filter(|&t| !known.contains_key(&sorted(t))).collect();
+        let new: Vec<[u32; 3]> =
+            triangles.iter().copied().filter(|&t| !known.contains_key(&sorted_nodes(t))).collect();
         let prove =
             |prover: &mut Prover<'_, '_>, &t: &[u32; 3]| prove_triangle(prover, &mesh.nodes, t, chords, 1.0);
         let proved: Vec<ProvedFacet<3>> =
             new.par_iter().with_min_len(16).map_init(|| Prover::new(surface, acceptance), prove).collect();
-        known.extend(new.iter().map(|&t| sorted(t)).zip(proved));
+        known.extend(new.iter().map(|&t| sorted_nodes(t)).zip(proved));
         let triangles: Vec<ProvedFacet<3>> =
-            triangles.iter().map(|&nodes| ProvedFacet { nodes, ..known[&sorted(nodes)] }).collect();
+            triangles.iter().map(|&nodes| ProvedFacet { nodes, ..known[&sorted_nodes(nodes)] }).collect();
         let fails = |f: &&ProvedFacet<3>| f.bound > f.tolerance || mesh.side_to_divide(f.nodes).is_some();
         let mut failing: Vec<ProvedFacet<3>> = triangles.iter().filter(fails).copied().collect();
         // Beyond the usual measure only what is about to hold goes on: the flank of a thread of 20 m has no whole cells, and is done after
@@ -202,7 +205,8 @@ pub(in crate::tessellate) fn triangulate(
     }
 }
 
-fn sorted(mut t: [u32; 3]) -> [u32; 3] {
+/// Returns the three nodes in ascending order.
+fn sorted_nodes(mut t: [u32; 3]) -> [u32; 3] {
     t.sort_unstable();
     t
 }
@@ -224,7 +228,7 @@ pub(super) struct Refinement<'s, 'a> {
 }
 
 impl Refinement<'_, '_> {
-    /// Inserts the nodes of the transition; `None` where one has no usable parameters.
+    /// Inserts the nodes of segments and lines, and fills in `handles`; `None` where one has no usable parameters.
     fn insert_nodes(&mut self, segments: &[[u32; 2]], imprinted: &[[u32; 2]]) -> Option<()> {
         // Nodes inside of whole cells have no part in the transition, but each long constraint clears all that it
         // crosses.
@@ -253,7 +257,8 @@ impl Refinement<'_, '_> {
         Some(handle)
     }
 
-    /// Parameters as the triangulation has them; `None` where they are out of its range.
+    /// Turns parameters into coordinates of the triangulation, those below 1e-30 into zero; `None` where they are not finite or 1e30 and
+    /// more.
     fn scaled(&self, uv: Uv) -> Option<Point2<f64>> {
         // Spade refuses numbers so small that its exact predicates underflow.
         let clean = |x: f64| if x.abs() < COORDINATES[0] { 0.0 } else { x };
@@ -279,7 +284,7 @@ impl Refinement<'_, '_> {
         })
     }
 
-    /// Makes all segments edges of the triangulation; those that could not be, and those that they cross.
+    /// Makes segments edges of the triangulation. Returns those that could not be, and those that kept them out.
     fn constrain_all(&mut self, segments: &[[u32; 2]]) -> [Vec<[u32; 2]>; 2] {
         let mut conflicts = Vec::new();
         let mut crossed = Vec::new();
@@ -292,7 +297,7 @@ impl Refinement<'_, '_> {
         [conflicts, crossed]
     }
 
-    /// Makes a segment a constraint; false where it would cross another or an end was not inserted.
+    /// Makes a segment a constraint and counts it in `border`; false where it would cross another or an end was not inserted.
     fn constrain(&mut self, a: u32, b: u32) -> bool {
         let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else { return false };
         // Both nodes stand in one place; a constraint of no length holds as it is.
@@ -308,7 +313,7 @@ impl Refinement<'_, '_> {
         !made.is_empty()
     }
 
-    /// Keeps triangles from crossing a line that bounds nothing, where the border leaves it.
+    /// Makes the line between two nodes a constraint that does not bound anything; leaves it out where it would cross another.
     fn keep_crease(&mut self, a: u32, b: u32) {
         if let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize])
             && from != to
@@ -317,7 +322,7 @@ impl Refinement<'_, '_> {
         }
     }
 
-    /// The constraints that keep a segment out.
+    /// Returns the constraints, as pairs of nodes, that keep the segment from `a` to `b` out; none where an end was not inserted.
     fn crossed_by(&self, a: u32, b: u32) -> Vec<[u32; 2]> {
         let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else {
             return Vec::new();
@@ -326,7 +331,8 @@ impl Refinement<'_, '_> {
         edges.map(|e| [e.from().data().node, e.to().data().node]).collect()
     }
 
-    /// Triangles inside: by crossing constraints from outside; by their centres when constraints are missing.
+    /// Returns the nodes of the triangles inside: by crossings of the border from outside, or by their centres within `by_centre` where
+    /// constraints are missing.
     fn inner_triangles(&self, by_centre: Option<&BorderBands>) -> Vec<[u32; 3]> {
         type Face<'c> = FaceHandle<'c, InnerTag, Vertex, (), spade::CdtEdge<()>, ()>;
         let nodes = |f: Face<'_>| f.vertices().map(|v| v.data().node);
@@ -339,7 +345,7 @@ impl Refinement<'_, '_> {
         self.cdt.inner_faces().filter(|f| inside[f.index()] == Some(true)).map(nodes).collect()
     }
 
-    /// For each face of the triangulation whether it lies inside.
+    /// Tells for each face of the triangulation, by index, whether it lies inside what the border bounds; `None` where it was not reached.
     fn sides_of_border(&self) -> Vec<Option<bool>> {
         // From outside inward; each crossing of the border turns the state.
         let mut state: Vec<Option<bool>> = vec![None; self.cdt.num_all_faces()];

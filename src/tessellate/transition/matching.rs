@@ -20,7 +20,7 @@ pub(super) struct Candidate {
 pub(super) struct CandidatesOf(Vec<[Option<u32>; 3]>);
 
 impl CandidatesOf {
-    /// Lists candidates by triangle, those that pass `filter`.
+    /// Lists, by triangle, of which there are `triangles`, the candidates that pass `filter`; more than three of a triangle are dropped.
     pub(super) fn new(candidates: &[Candidate], triangles: usize, filter: impl Fn(&Candidate) -> bool) -> Self {
         let mut of = vec![[None; 3]; triangles];
         for (c, candidate) in candidates.iter().enumerate().filter(|(_, c)| filter(c)) {
@@ -33,7 +33,7 @@ impl CandidatesOf {
         Self(of)
     }
 
-    /// The candidates of a triangle.
+    /// Returns the indices of the candidates of a triangle.
     pub(super) fn of(&self, triangle: usize) -> impl Iterator<Item = usize> + '_ {
         self.0[triangle].iter().flatten().map(|&c| c as usize)
     }
@@ -42,7 +42,7 @@ impl CandidatesOf {
 /// Longest path that is looked for, in pairs.
 const MAX_PATH: u32 = 200;
 
-/// A matching that is augmented.
+/// A matching of triangles under augmentation.
 struct Matching<'c> {
     candidates: &'c [Candidate],
     /// The candidates of each triangle.
@@ -57,7 +57,7 @@ struct Matching<'c> {
     via: Vec<(usize, usize)>,
 }
 
-/// The pairs after all such exchanges; pairs that take in a triangle without area stay.
+/// Returns the indices of pairs, ascending, after all exchanges that `chosen` allows; pairs that take in a triangle without area stay.
 pub(super) fn augment(candidates: &[Candidate], triangles: usize, chosen: &[usize]) -> Vec<usize> {
     // Triangles that swallow one without area cannot give it up for another.
     let mut matching = Matching {
@@ -89,13 +89,14 @@ pub(super) fn augment(candidates: &[Candidate], triangles: usize, chosen: &[usiz
 }
 
 impl Matching<'_> {
-    /// The other triangle of a candidate.
+    /// Returns the triangle of candidate `c` that is not `t`.
     fn other(&self, c: usize, t: usize) -> usize {
         let [i, j] = self.candidates[c].triangles;
         if i == t { j } else { i }
     }
 
-    /// Searches a path to another triangle without a mate; the last triangle but one, and the candidate that leads from it to the end.
+    /// Searches, from a triangle without a mate, a path to another one. Returns the last triangle but one, and the candidate that leads
+    /// from it to the end; `None` where there is none. Leaves the way in `via`.
     fn path_from(&mut self, start: usize) -> Option<(usize, usize)> {
         let mut queue = VecDeque::from([(start, 0)]);
         // A mark that no other search leaves, for each start searches once.
@@ -128,7 +129,7 @@ impl Matching<'_> {
         None
     }
 
-    /// Makes the other pairs along a path.
+    /// Exchanges pairs along the path that `path_from(start)` has found, back from its last but one triangle `t` and candidate `c`.
     fn exchange(&mut self, start: usize, mut t: usize, mut c: usize) {
         loop {
             for end in self.candidates[c].triangles {

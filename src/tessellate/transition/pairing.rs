@@ -32,7 +32,8 @@ impl Candidate {
     }
 }
 
-/// Pairs greedily, squarest first. `fixed` edges are not crossed; triangles without area go into their neighbours.
+/// Joins triangles in pairs to quads, squarest first; the rest stay triangles. No quad lies across a `fixed` edge or a sharp crease;
+/// triangles without area go into a neighbour or, without one, are dropped.
 pub(in crate::tessellate) fn pair_triangles(
     transition: &Transition,
     fixed: &FxHashSet<[u32; 2]>,
@@ -73,7 +74,8 @@ pub(in crate::tessellate) fn pair_triangles(
     join_sectors(nodes, fixed, prover, facets)
 }
 
-/// All pairs that may be made, best first.
+/// Lists all pairs of triangles that may be joined, triangles without area first, then the squarest quads. `collapsed` tells by triangle
+/// whether it has no area.
 fn candidates(
     transition: &Transition,
     fixed: &FxHashSet<[u32; 2]>,
@@ -130,8 +132,8 @@ struct Join {
     bound: f64,
 }
 
-/// Joins triangles that meet at a pole, two and two: what is left of a sector there is a triangle, but two of them are a
-/// convex quad with the meridian between them as its diagonal.
+/// Joins triangles that meet at a pole, two and two, along a side that is not `fixed`: what is left of a sector there is a triangle, but
+/// two of them are a convex quad with the meridian between them as its diagonal.
 fn join_sectors(
     nodes: &Nodes,
     fixed: &FxHashSet<[u32; 2]>,
@@ -139,13 +141,13 @@ fn join_sectors(
     facets: Vec<TransitionFacet>,
 ) -> Vec<TransitionFacet> {
     // At a pole several nodes are one place.
-    let fixed: FxHashSet<[Position; 2]> = fixed.iter().map(|&[a, b]| places(nodes, a, b)).collect();
+    let fixed: FxHashSet<[Position; 2]> = fixed.iter().map(|&[a, b]| side_key(nodes, a, b)).collect();
     // A sector is (a, b, pole): the next one around starts at b.
     let sectors = facets.iter().enumerate().filter(|(_, f)| is_sector(f));
     let starts: FxHashMap<u32, usize> = sectors.map(|(i, f)| (f.facet.nodes[0], i)).collect();
     let next = |f: &TransitionFacet| {
         let [_, b, pole, _] = f.facet.nodes;
-        let j = *starts.get(&b).filter(|_| !fixed.contains(&places(nodes, b, pole)))?;
+        let j = *starts.get(&b).filter(|_| !fixed.contains(&side_key(nodes, b, pole)))?;
         (nodes[facets[j].facet.nodes[2]].position == nodes[f.facet.nodes[2]].position).then_some(j)
     };
     let follows: Vec<Option<usize>> = facets.iter().map(|f| if is_sector(f) { next(f) } else { None }).collect();
@@ -180,7 +182,7 @@ fn join_sectors(
         Some(Join { second, pole, bound }) => {
             let (f, g) = (&f.facet, &facets[second].facet);
             let facet = ProvedFacet {
-                nodes: kite(f, g),
+                nodes: sector_quad(f, g),
                 bound: f.bound.max(g.bound).max(bound),
                 tolerance: f.tolerance.min(g.tolerance),
             };
@@ -190,18 +192,19 @@ fn join_sectors(
     .collect()
 }
 
-/// Name of a side by the positions of its ends.
-fn places(nodes: &Nodes, a: u32, b: u32) -> [Position; 2] {
+/// Returns the key of a side by the positions of its ends, whichever way it runs.
+fn side_key(nodes: &Nodes, a: u32, b: u32) -> [Position; 2] {
     let (a, b) = (nodes[a].position, nodes[b].position);
     [a.min(b), a.max(b)]
 }
 
-/// The quad of two sectors, with the pole as its third corner.
-fn kite(f: &ProvedFacet<4>, g: &ProvedFacet<4>) -> [u32; 4] {
+/// Returns the nodes of the quad of two neighbouring sectors, `f` before `g` around the pole, which is the third.
+fn sector_quad(f: &ProvedFacet<4>, g: &ProvedFacet<4>) -> [u32; 4] {
     [f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]]
 }
 
-/// The pole's parameters in the quad of two sectors, and the bound that these add; `None` where they do not become one.
+/// Returns the pole's parameters in the quad of two sectors, and the bound, mm, that these need, 0 for none beyond their own; `None` where
+/// they do not become a quad that holds.
 fn join_two(
     nodes: &Nodes,
     prover: &mut Prover<'_, '_>,
@@ -210,7 +213,7 @@ fn join_two(
 ) -> Option<(Uv, f64)> {
     let tolerance = f.facet.tolerance.min(g.facet.tolerance);
     let ((_, x), (_, y)) = f.pole.zip(g.pole).filter(|_| f.facet.bound.max(g.facet.bound) <= tolerance)?;
-    let corners = kite(&f.facet, &g.facet).map(|n| nodes[n]);
+    let corners = sector_quad(&f.facet, &g.facet).map(|n| nodes[n]);
     sharpest_corner(corners)?;
     // Both sectors hold the line between them; other poles have to be looked at anew.
     if let Some((2, pole)) = pole::facet_parameters(prover.surface, &corners.map(|n| n.uv)) {
@@ -222,7 +225,8 @@ fn join_two(
     Some((pole, first?.max(second?)))
 }
 
-/// Pairs to make: good quads in order of squareness, then those of triangles that have but one mate left, then the rest.
+/// Returns the indices of pairs to make: good quads in order of squareness, then those of triangles that have but one mate left, then the
+/// rest. Marks their triangles as `taken`.
 fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
     let mut chosen = Vec::new();
     let of = CandidatesOf::new(candidates, taken.len(), |_| true);
@@ -264,13 +268,13 @@ fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
     }
 }
 
-/// Whether a triangle has two corners in one place.
+/// Whether two corners of a triangle share a position.
 fn is_collapsed(n: [Node; 3]) -> bool {
     n[0].position == n[1].position || n[1].position == n[2].position || n[2].position == n[0].position
 }
 
-/// The triangle at a pole, turned so that the pole is its third corner and seen in its middle, where that is proved too. `quad` has the
-/// pole's other node.
+/// Returns the triangle `full` that has taken in one without area, turned so that the pole is its third corner and seen in its middle,
+/// where that is proved too; otherwise as it is. `quad` has the pole's other node.
 fn pole_triangle(
     nodes: &Nodes,
     prover: &mut Prover<'_, '_>,
@@ -298,7 +302,7 @@ fn pole_triangle(
     }
 }
 
-/// A triangle by itself, a pole as its third corner.
+/// Makes a facet of a triangle alone; if it is a sector, it is turned so that the pole is its third corner.
 fn single_triangle(nodes: &Nodes, surface: &FaceSurface<'_>, full: ProvedFacet<3>) -> TransitionFacet {
     let t = full.nodes;
     let uv = t.map(|n| nodes[n].uv);
@@ -309,8 +313,8 @@ fn single_triangle(nodes: &Nodes, surface: &FaceSurface<'_>, full: ProvedFacet<3
     TransitionFacet { facet, pole: pole.map(|(_, uv)| (2, uv)) }
 }
 
-/// Bound of a triangle at a pole with other parameters of its third corner, where it holds: they are those of the facet that is
-/// handed on, whose piece of the surface may lie outside the one that was proved.
+/// Returns a bound, mm, of the triangle a, b, c with other parameters `pole` of its third corner, those of the facet that is handed on,
+/// whose piece of the surface may lie outside the one that was proved; `None` where it exceeds the tolerance.
 fn bound_with_pole(
     nodes: &Nodes,
     prover: &mut Prover<'_, '_>,
@@ -327,12 +331,13 @@ fn bound_with_pole(
     (worst <= tolerance).then_some(worst)
 }
 
-/// Whether two triangles that hold their own tolerances hold that of both together, which is the tighter of the two.
+/// Whether two triangles may share the tighter of their tolerances: both bounds are within it, or one of them does not hold anyway.
 fn both_hold(a: &ProvedFacet<3>, b: &ProvedFacet<3>) -> bool {
     a.bound.max(b.bound) <= a.tolerance.min(b.tolerance) || a.bound > a.tolerance || b.bound > b.tolerance
 }
 
-/// Largest cosine of a corner of a quad; `None` when it is not convex or folds along its diagonal.
+/// Returns the largest absolute cosine of a corner of a quad; `None` when it is not convex, folds along its diagonal, or has a corner
+/// beyond [`SHARPEST`].
 fn sharpest_corner(n: [Node; 4]) -> Option<f64> {
     let p = n.map(|x| x.place);
     let (n1, n2) = ((p[1] - p[0]).cross(p[2] - p[0]), (p[2] - p[0]).cross(p[3] - p[0]));

@@ -21,23 +21,25 @@ struct Wish {
 }
 
 impl Refinement<'_, '_> {
-    /// The side for which a triangle is divided even where it is near enough to the surface.
+    /// Returns the index of the side (from corner k to k + 1) for which a triangle is divided even where it is near enough to the surface;
+    /// `None` without one.
     pub(super) fn side_to_divide(&self, t: [u32; 3]) -> Option<usize> {
         self.steep_side(t).or_else(|| self.taken_side(t))
     }
 
-    /// The free side of a triangle that is a chord of others.
+    /// Returns the first side of a triangle, not on the outline, that is a taken chord; `None` without one.
     fn taken_side(&self, t: [u32; 3]) -> Option<usize> {
         if self.taken.is_empty() {
             return None;
         }
         let is_taken = |a: u32, b: u32| {
-            self.is_inner(a, b) && self.taken.has([self.nodes[a].position, self.nodes[b].position])
+            self.is_inner(a, b) && self.taken.contains([self.nodes[a].position, self.nodes[b].position])
         };
         (0..3).find(|&k| is_taken(t[k], t[(k + 1) % 3]))
     }
 
-    /// The free side of a triangle whose ends' normals differ most, where one of its normals breaks the angle condition.
+    /// Returns the side, not on the outline, whose ends' normals differ most, if a normal breaks the angle condition and that side turns by
+    /// more than it; `None` otherwise and without a condition.
     fn steep_side(&self, t: [u32; 3]) -> Option<usize> {
         let most = self.surface.field.angle?;
         let n = t.map(|i| self.nodes[i]);
@@ -54,12 +56,13 @@ impl Refinement<'_, '_> {
         (steep && turn(side) > most).then_some(side)
     }
 
-    /// Whether an edge is none of the border.
+    /// Whether an edge is not on the outline.
     fn is_inner(&self, a: u32, b: u32) -> bool {
         !self.border.contains_key(&edge_key(a, b))
     }
 
-    /// Puts a point on the worst free edge of each failing triangle; `false` when nothing can be done.
+    /// Inserts a point for each failing triangle that can gain: on its worst side inside the outline, or at its centre. Returns whether any
+    /// was inserted.
     pub(super) fn refine(&mut self, failing: &[ProvedFacet<3>], chords: &BorderChords) -> bool {
         // Sides are shared by two triangles, which both may ask: one point a side and round is enough.
         let mut divided: FxHashSet<[u32; 2]> = FxHashSet::default();
@@ -91,7 +94,8 @@ impl Refinement<'_, '_> {
         done
     }
 
-    /// Whether more points can make a triangle hold.
+    /// Whether more points can make a triangle hold: neither an edge strays by more than its tolerance, nor a corner lies that far off the
+    /// surface.
     fn can_gain(&self, f: &ProvedFacet<3>, chords: &BorderChords) -> bool {
         let t = f.nodes;
         // A chord stays as it is: no triangle on it can hold whose tolerance it strays beyond. Shorter chords are asked for instead, which
@@ -105,7 +109,8 @@ impl Refinement<'_, '_> {
         !(0..3).any(strays) && !t.iter().any(|n| off(n) > f.tolerance)
     }
 
-    /// The point that a triangle asks for; `None` where one is asked for on that side already.
+    /// Returns the point that a triangle asks for: in the middle of its worst side, or its centre where no side sags much. `None` where
+    /// `divided`, to which the side is added, has it already.
     fn wish(&self, f: &ProvedFacet<3>, divided: &mut FxHashSet<[u32; 2]>) -> Option<Wish> {
         let t = f.nodes;
         let end = |k: usize| t[(k + 1) % 3];
