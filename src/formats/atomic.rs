@@ -21,7 +21,7 @@ static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 /// # Errors
 /// When the folder cannot be written or `write` fails; the unfinished file is removed and an older file of that name stays.
 pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
-    let beside = part_path(path);
+    let beside = unfinished(path);
     // Before its own file is made: a run that was killed must not leave a part for ever.
     remove_stale(path);
     let attempt = || -> io::Result<()> {

@@ -53,7 +53,7 @@ impl StartTriangle {
     }
 
     /// The start, moved towards the middle of the triangle.
-    pub(super) fn moved(&self, start: Point, reach: f64) -> Point {
+    pub(super) fn nudge(&self, start: Point, reach: f64) -> Point {
         start + ((self.middle - start) * NUDGE).clamp_length_max(LONGEST_NUDGE * reach)
     }
 }

@@ -26,9 +26,14 @@ pub(super) fn framed_map(r: &ReceiverResult, grid: &Grid) -> Chart {
 }
 
 /// The colours of a receiver that counts them, the polar diagram of a luminaire, the encircled power of a spot, the figures of a lamp: those that apply.
-pub(super) fn more(r: &ReceiverResult, grid: &Grid, results: &Results, judged: Option<&Assessment>) -> Vec<Block> {
+pub(super) fn trade_figures(
+    r: &ReceiverResult,
+    grid: &Grid,
+    results: &Results,
+    judged: Option<&Assessment>,
+) -> Vec<Block> {
     let in_candela = r.kind == "far_field" && grid.unit == "cd";
     let charts =
         [colour_chart(grid), polar(r, grid), encircled_power(r, grid)].into_iter().flatten().map(Block::from);
-    charts.chain(in_candela.then(|| Block::Table(table(r, grid, results, judged)))).collect()
+    charts.chain(in_candela.then(|| Block::Table(lamp_table(r, grid, results, judged)))).collect()
 }

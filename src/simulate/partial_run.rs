@@ -101,8 +101,8 @@ impl PartialRun {
             out.extend(m.farthest.to_le_bytes());
         }
         t.spreads.iter().flat_map(|s| s.products.iter().flatten()).for_each(|x| out.extend(x.to_le_bytes()));
-        t.channels.iter().for_each(|c| sums(&mut out, c));
-        [&t.entered, &t.left].into_iter().for_each(|s| sums(&mut out, s));
+        t.channels.iter().for_each(|c| append_sums(&mut out, c));
+        [&t.entered, &t.left].into_iter().for_each(|s| append_sums(&mut out, s));
         let c = &t.counts;
         let [one, other] = c.overlapping.map(u64::from);
         [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off, c.caught, c.overlaps, one, other]

@@ -199,7 +199,7 @@ impl Receiver {
             Shape::Disc { frame, radius, cells, .. } => {
                 let local = p - frame.origin;
                 let at = [local.dot(frame.x) / radius, local.dot(frame.y) / radius];
-                let spot = self.counted(at.map(|x| x.clamp(-1.0, 1.0)), at[0] * at[0] + at[1] * at[1]);
+                let spot = self.spot_at(at.map(|x| x.clamp(-1.0, 1.0)), at[0] * at[0] + at[1] * at[1]);
                 // A cell whose middle lies beyond the rim leaves its light to the next one inwards.
                 Some(Spot { cell: cells.home(spot.cell), ..spot })
             }

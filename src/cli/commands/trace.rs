@@ -169,7 +169,7 @@ fn trace_whole(
     let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { sentences };
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     end_file::write(prepared, extra.ends.as_deref(), console)?;
-    verdicts::say(&run, prepared, console)?;
+    verdicts::say_verdicts(&run, prepared, console)?;
     face_tables::print_faces(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
     sequence_tables::print_sequences(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;

@@ -131,7 +131,7 @@ impl<'r> CellPairs<'r> {
 
     /// Returns the quanta of a square over its measure, in the receiver's unit; 0 for an empty one.
     fn density(&self, block: Block, quanta: impl Fn(&Cell) -> f64) -> f64 {
-        let sum = |of: &dyn Fn(usize) -> f64| self.inside(block).map(of).sum::<f64>();
+        let sum = |of: &dyn Fn(usize) -> f64| self.cells_of(block).map(of).sum::<f64>();
         let measure = sum(&|c| self.measure[c]);
         if measure > 0.0 { sum(&|c| quanta(&self.cells[c])) / measure } else { 0.0 }
     }
@@ -149,7 +149,7 @@ impl<'r> CellPairs<'r> {
         }
         // Facets may have their brightest place elsewhere: places are compared by how bright they are.
         let (on_facets, facets) = self.brightest(side, |c| c.facets);
-        let inverse = |block: Block| self.inside(block).map(|c| self.measure[c]).sum::<f64>();
+        let inverse = |block: Block| self.cells_of(block).map(|c| self.measure[c]).sum::<f64>();
         let measures = [inverse(on_facets), inverse(block)];
         let by_replicate = |run: usize, block: Block| {
             let (nx, layer) = (self.grid[0], self.layer);

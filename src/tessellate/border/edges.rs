@@ -55,7 +55,7 @@ pub(in crate::tessellate) fn divide(
     opposite_sides::equalise(part, faces, sides, denser, &mut times);
     open_lenses(part, faces, &mut times);
     separate_twins(part, sides, &mut times);
-    positions(part, with_further(times.into_iter(), further))
+    sample_positions(part, with_further(times.into_iter(), further))
 }
 
 /// Each edge's samples and further ones, which may come in any order.
@@ -76,7 +76,7 @@ pub(in crate::tessellate) fn divide_more(
     divisions: &[Division],
     further: &[Vec<f64>],
 ) -> (Vec<Division>, Vec<Point>) {
-    positions(part, with_further(divisions.iter().map(|d| d.t.clone()), further))
+    sample_positions(part, with_further(divisions.iter().map(|d| d.t.clone()), further))
 }
 
 /// Returns the divisions at `times`, two or more ascending parameters of each edge, and the shared positions: vertices, then inner points

@@ -80,7 +80,7 @@ impl<'f, 'm> Guest<'f, 'm> {
             if a.side == BorderSide::Pole || places[0] == places[1] {
                 continue;
             }
-            let middle = self.middle(self.face.part, &uses, a, b);
+            let middle = self.side_middle(self.face.part, &uses, a, b);
             let is_on_carrier = |p: &Point| carrier.holds(&edges, self.face.frame.point(*p), out.near);
             if extent == Extent::Part && ![middle, self.places[i], self.places[j]].iter().all(is_on_carrier) {
                 continue;

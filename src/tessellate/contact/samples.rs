@@ -89,8 +89,9 @@ impl EdgeSamples<'_, '_> {
                 let limit = CHORD_SHARE * other.surface.tolerance(uv) * other.frame.scale.abs();
                 // The sag falls with the square of the number of parts.
                 let parts = (sag / limit).sqrt().ceil();
-                (1..parts as usize)
-                    .for_each(|k| self.ask(edge, pair[0] + k as f64 / parts * (pair[1] - pair[0]), glue, further));
+                (1..parts as usize).for_each(|k| {
+                    self.request_sample(edge, pair[0] + k as f64 / parts * (pair[1] - pair[0]), glue, further)
+                });
             }
         }
     }
@@ -148,8 +149,8 @@ impl EdgeSamples<'_, '_> {
             s = other.face.nearest_on_edge(crossed, self.place(edge, t)).0;
         }
         if (self.place(edge, t) - other.place(crossed, s)).length() <= glue {
-            self.ask(edge, t, glue, further);
-            other.ask(crossed, s, glue, further);
+            self.request_sample(edge, t, glue, further);
+            other.request_sample(crossed, s, glue, further);
         }
     }
 

@@ -35,7 +35,8 @@ mod tests {
             let surface = line(w);
             let corners = [Uv::ZERO, Uv::X, Uv::ONE];
             let at = corners.map(|x| surface.evaluate(x));
-            let bound = DeviationBounds::default().taylor(surface.bezier_patches().iter(), corners, at).unwrap();
+            let bound =
+                DeviationBounds::default().taylor_bound(surface.bezier_patches().iter(), corners, at).unwrap();
             // 100 mm run unevenly stray from the even run by 100·(√w − 1)/(√w + 1) mm at most.
             let most = 100.0 * (w.sqrt() - 1.0) / (w.sqrt() + 1.0);
             assert!(bound >= most, "weight {w}: {bound} {most}");
