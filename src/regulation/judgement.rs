@@ -76,6 +76,10 @@ impl Decisive {
         const MOST_RAYS: f64 = 1e15;
         // At most so large may the whole error be.
         let wanted = self.margin.abs() / self.sigmas;
+        // On its very limit a reading stays unsure with any error.
+        if wanted == 0.0 {
+            return None;
+        }
         let Reading { statistical, geometric, .. } = self.reading;
         // Where the facets leave no room, both errors get half of the square.
         let finer = geometric > 0.5f64.sqrt() * wanted;
@@ -84,7 +88,6 @@ impl Decisive {
         // Statistical errors fall with the root of the rays; fewer rays than traced are no advice.
         let rays = (traced as f64 * (statistical / room).powi(2)).max(traced as f64).ceil();
         let tolerance_mm = tolerance_mm.filter(|_| finer).map(|t| t * room / geometric);
-        // An error of zero times no room is no number.
         (rays.is_finite() && rays < MOST_RAYS).then_some(Settles { rays: rays as u64, tolerance_mm })
     }
 }
@@ -135,4 +138,21 @@ fn read_margin(photometer: &Photometer, comparison: &Comparison) -> (Reading, f6
     let margin =
         if comparison.at_least { reading.value - comparison.limit } else { comparison.limit - reading.value };
     (reading, margin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_settles_a_reading_on_its_very_limit() {
+        let on_limit = |statistical: f64, geometric: f64| {
+            let reading = Reading { value: 1.0, statistical, geometric };
+            Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0 }.settles(1000, Some(0.1))
+        };
+        // Without a statistical error, zero by zero must not become the rays already traced and facets of 0 mm.
+        for (statistical, geometric) in [(0.0, 0.1), (0.1, 0.0), (0.1, 0.1)] {
+            assert_eq!(on_limit(statistical, geometric), None);
+        }
+    }
 }

@@ -17,7 +17,7 @@ impl IntensityMap {
     /// `ray_flux` is the flux of one ray in lm, where it is known: a cell that no ray met may hold as much, so that no error is smaller.
     ///
     /// # Errors
-    /// When a column is missing or the cells make no regular grid; the message names the line.
+    /// When a column is missing, a cell stands twice or the cells make no regular grid; the message names the line where one is at fault.
     pub fn from_csv(text: &str, ray_flux: Option<f64>) -> Result<Self, String> {
         // Comments are allowed, as in other CSV files that the program reads.
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
@@ -49,9 +49,13 @@ impl IntensityMap {
             columns.insert(key(centre_h), centre_h);
             rows.insert(key(centre_v), centre_v);
             let geometric = geometric.map_or(Ok(0.0), value)?;
-            cells.insert((key(centre_v), key(centre_h)), [value(intensity)?, value(statistical)?, geometric]);
+            let cell = [value(intensity)?, value(statistical)?, geometric];
+            // Which of two values holds, the file does not say.
+            if cells.insert((key(centre_v), key(centre_h)), cell).is_some() {
+                return Err(format!("line {}: the cell at H {centre_h}, V {centre_v} stands twice", number + 1));
+            }
         }
-        // A cell twice, or one that is missing: either makes the count wrong.
+        // A cell that is missing makes the count wrong.
         if cells.len() != columns.len() * rows.len() {
             return Err(format!("{} cells are no grid of {} × {}", cells.len(), columns.len(), rows.len()));
         }
@@ -102,6 +106,7 @@ mod tests {
             ("x_mm,y_mm,illuminance_lx,standard_error\n1,2,3,4\n", "H_deg"),
             ("H_deg,V_deg,luminous_intensity_cd,standard_error\n0,0,1,x\n", "line 2"),
             ("H_deg,V_deg,luminous_intensity_cd,standard_error\n0,0,1,1\n1,0,1,1\n0,1,1,1\n", "no grid"),
+            ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,1,1\n0,1,1,1\n1,1,1,1\n1,0,2,1\n", "line 6"),
             (
                 "H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,1,1\n3,0,1,1\n0,1,1,1\n1,1,1,1\n3,1,1,1\n",
                 "equal width",

@@ -130,6 +130,17 @@ pub(super) struct CutOff {
     pub(super) line_v_deg: f64,
     /// The line that the elbow is brought to.
     pub(super) elbow_h_deg: f64,
+    /// How far the lamp may be turned from there where a row fails.
+    pub(super) realignment: Realignment,
+}
+
+/// How far a lamp may be turned where a row fails.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub(super) struct Realignment {
+    pub(super) left_deg: f64,
+    pub(super) right_deg: f64,
+    /// Up and down.
+    pub(super) vertical_deg: f64,
 }
 
 /// Half the smallest opening that R148 allows, 10 minutes of arc, degrees.
@@ -193,6 +204,17 @@ struct File {
     functions: Vec<Function>,
 }
 
+/// The limits of realigning in a table that has a scan for the cut-off.
+///
+/// # Panics
+/// When the table states none.
+fn realignment(prefix: &str, aim: &Value) -> Realignment {
+    // UN R149 widened the turn to the left with its 01 series; both files state both.
+    let series = if prefix == "UN R149-01" { "r149_01" } else { "r112_and_r149_00" };
+    Realignment::deserialize(&aim["realign_if_failed"][series])
+        .unwrap_or_else(|e| panic!("table of {prefix}: realign_if_failed, {series}: {e}"))
+}
+
 /// Reads the regulations of a table of the program, one a lamp function, each called by `prefix` and the function's name.
 ///
 /// # Panics
@@ -217,6 +239,7 @@ fn read_table(prefix: &str, text: &str) -> Vec<Regulation> {
                 // What UN R112 and R149 have in common for those files that do not repeat it.
                 line_v_deg: number(&file.aim, "/vertical/line_b_deg").unwrap_or(-0.57),
                 elbow_h_deg: number(&file.aim, "/horizontal_visual/line_a_deg").unwrap_or(0.5),
+                realignment: realignment(prefix, &file.aim),
             });
             let id = match function.id.split_once('-') {
                 // People say `C passing`, the tables `passing-C`.

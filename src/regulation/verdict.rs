@@ -4,7 +4,7 @@ use super::aim::Aim;
 use super::judgement::{Judgement, Settles, Verdict};
 use super::map::{IntensityMap, Reading, Sensor};
 use super::requirement::{Photometer, requirements};
-use super::table::{Regulation, Row, Traffic};
+use super::table::{Realignment, Regulation, Row, Traffic};
 
 /// A row with what was measured.
 #[derive(Clone, Debug)]
@@ -49,9 +49,7 @@ pub struct Assumptions {
     pub tolerance_mm: Option<f64>,
 }
 
-/// Degrees left, right and up or down that a passing beam may be realigned by when a row fails (UN R149 00, Annex 5, §1.2.3), and the
-/// step in which it is tried.
-const REALIGN_DEG: [f64; 3] = [0.5, 0.75, 0.25];
+/// Step in which turns of a lamp are tried, degrees.
 const REALIGN_STEP_DEG: f64 = 0.125;
 
 /// The rounding of edges that were written and read again, as a share of a cell.
@@ -96,13 +94,14 @@ pub fn assess(
     };
     let first = assess_aimed(map, regulation, assumptions, sensor, aim);
     // Realigning is for beams with a cut-off, and for those that fail by more than doubt.
-    if first.verdict != Verdict::Fail || rules.cut_off.is_none() || assumptions.as_placed {
-        return Ok(first);
+    let limits = rules.cut_off.map(|rule| rule.realignment);
+    match limits.filter(|_| first.verdict == Verdict::Fail && !assumptions.as_placed) {
+        Some(limits) => Ok(realign(map, regulation, assumptions, sensor, &first, limits).unwrap_or(first)),
+        None => Ok(first),
     }
-    Ok(realign(map, regulation, assumptions, sensor, &first).unwrap_or(first))
 }
 
-/// The assessment with another aim, the nearest to that of `first` within what the regulation allows, with which no row fails; `None`
+/// The assessment with another aim, the nearest to that of `first` within the `limits` of the regulation, with which no row fails; `None`
 /// where there is none.
 fn realign(
     map: &IntensityMap,
@@ -110,10 +109,13 @@ fn realign(
     assumptions: &Assumptions,
     sensor: Sensor,
     first: &Assessment,
+    limits: Realignment,
 ) -> Option<Assessment> {
     let steps = |degrees: f64| (degrees / REALIGN_STEP_DEG).round() as i32;
-    let [left, right, vertical] = REALIGN_DEG.map(steps);
-    let mut turns: Vec<(i32, i32)> = (-left..=right)
+    let Realignment { left_deg, right_deg, vertical_deg } = limits;
+    let vertical = steps(vertical_deg);
+    // To read the map farther right is to turn the lamp to the left.
+    let mut turns: Vec<(i32, i32)> = (-steps(right_deg)..=steps(left_deg))
         .flat_map(|h| (-vertical..=vertical).map(move |v| (h, v)))
         .filter(|t| *t != (0, 0))
         .collect();
@@ -123,7 +125,6 @@ fn realign(
     let failed: Vec<&Row> =
         first.rows.iter().filter(|r| r.verdict == Some(Verdict::Fail)).map(|r| &r.row).collect();
     turns.into_iter().find_map(|(h, v)| {
-        // Turning the lamp to the left reads the map farther to the right.
         let aim = first.aim.realigned(REALIGN_STEP_DEG * f64::from(h), REALIGN_STEP_DEG * f64::from(v));
         let photometer = Photometer { map, aim: &aim, sensor, tolerance_deg: regulation.rules.tolerance_deg };
         let mended =
@@ -270,6 +271,27 @@ mod tests {
                 assert!((a.value - b.value).abs() <= 1e-9 * a.value.abs().max(1.0));
             }
         }
+    }
+
+    #[test]
+    fn a_lamp_is_realigned_to_either_side_as_far_as_its_regulation_allows() {
+        // Too bright in H = 0 unless the lamp turns by 0.75° to a side: its edge of light lies 0.6° from there.
+        let realigned_h_deg = |id: &str, to_the_right: bool| {
+            let mut regulation = Regulation::find(id).unwrap();
+            regulation.function.rows.retain(|r| r.kind == "point");
+            regulation.function.rows.truncate(1);
+            let point = &mut regulation.function.rows[0];
+            (point.h, point.v, point.min, point.max, point.when) = (Some(0.0), Some(0.0), None, Some(100.0), None);
+            let side = if to_the_right { 1.0 } else { -1.0 };
+            let lamp = map(|h, _| if side * h > -0.6 { 1000.0 } else { 1.0 }, 1e-3, 0.0);
+            let assessment = assess(&lamp, &regulation, &Assumptions::default()).unwrap();
+            (assessment.verdict == Verdict::Pass).then_some(assessment.aim.h_deg)
+        };
+        // A lamp turned right is read farther left. UN R112 and R149 00: 0.5° left, 0.75° right; R149 01: 0.75° both.
+        assert_eq!(realigned_h_deg("UN R112 B passing", true), Some(-0.75));
+        assert_eq!(realigned_h_deg("UN R112 B passing", false), None);
+        assert_eq!(realigned_h_deg("UN R149-01 C passing", true), Some(-0.75));
+        assert_eq!(realigned_h_deg("UN R149-01 C passing", false), Some(0.75));
     }
 
     #[test]
