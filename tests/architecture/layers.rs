@@ -329,6 +329,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "topology",
             "styles",
             "purpose",
+            "relations",
             "assembly",
             "placed_count",
             "tessellated",

@@ -1,6 +1,6 @@
 //! What an import says of its file: faces one by one, and what is no shape of a product.
 
-use crate::faces::{import, square};
+use crate::faces::{import, read, square};
 use lampyris::model::SurfaceKind;
 
 const FORWARD: [&str; 4] = [".T."; 4];
@@ -49,4 +49,35 @@ fn parts_of_edges_and_faces_have_the_geometry_of_their_parents() {
     let account = import.model.account();
     let face = &account[0].solids[0].faces[0];
     assert!((face.area_mm2 - 0.5).abs() < 1e-12, "{} {:?}", face.area_mm2, import.report.refusals);
+}
+
+#[test]
+fn what_a_broken_transformation_places_is_named_and_left_out() {
+    // The square as a child in an assembly; the second placement of the transformation is #100, or none at all.
+    let assembly = |to: &str| {
+        format!(
+            "#100=AXIS2_PLACEMENT_3D('',#12,$,$);\n#101=PRODUCT_DEFINITION('','',$,$);\n#102=PRODUCT_DEFINITION('','',$,$);\n\
+             #103=SHAPE_REPRESENTATION('',(#100),#1);\n#104=PRODUCT_DEFINITION_SHAPE('','',#101);\n\
+             #105=PRODUCT_DEFINITION_SHAPE('','',#102);\n#106=SHAPE_DEFINITION_REPRESENTATION(#104,#103);\n\
+             #108=ITEM_DEFINED_TRANSFORMATION('','',#20,{to});\n\
+             #109=(REPRESENTATION_RELATIONSHIP('','',#6,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#108)\
+             SHAPE_REPRESENTATION_RELATIONSHIP());\n"
+        )
+    };
+    let usage = "#107=SHAPE_DEFINITION_REPRESENTATION(#105,#6);\n#110=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#101,#102,$);\n\
+                 #111=PRODUCT_DEFINITION_SHAPE('','',#110);\n#112=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#109,#111);\n";
+    // By the usage of a product, and by the relationship alone.
+    for usage in [usage, ""] {
+        let whole = import(&(square(FORWARD, IN_ORDER) + &assembly("#100") + usage));
+        assert_eq!(whole.report.bbox_mm, Some([[1.0, 1.0, 0.0], [2.0, 2.0, 0.0]]));
+        for to in ["#999", "$"] {
+            let broken = read(&(square(FORWARD, IN_ORDER) + &assembly(to) + usage));
+            let problems = &broken.report.problems;
+            assert!(
+                problems.iter().any(|p| p.starts_with("#109: its transformation cannot be read")),
+                "{problems:?}"
+            );
+            assert_eq!(broken.model.placed_face_count(), 0);
+        }
+    }
 }

@@ -4,10 +4,11 @@
 //! and inside representations along relationships and MAPPED_ITEMs. Shapes that no product reaches are placed where they are.
 
 use super::purpose::{holds_mesh, purpose_besides_shape};
+use super::relations::{WITH_TRANSFORMATION, property_attributes, related_representations};
 use crate::math::Frame;
 use crate::step::geometry::units::Units;
 use crate::step::geometry::{FARTHEST_MM, Geometry};
-use crate::step::part21::{Args, Entity, File};
+use crate::step::part21::{Entity, File};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Deepest nesting of assemblies.
@@ -27,11 +28,11 @@ pub(crate) struct PlacedRepresentation {
     pub(crate) orphan: bool,
 }
 
-/// A directed relationship: the representation it leads to, and how that is placed.
+/// A directed relationship: the representation it leads to, and how that is placed; `None` where that cannot be read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Link {
     pub(super) to: u64,
-    placement: Frame,
+    placement: Option<Frame>,
 }
 
 pub(super) struct Usage {
@@ -51,8 +52,8 @@ pub(crate) struct Assembly<'f, 'a> {
     /// Representations that stand for a product.
     owned: FxHashSet<u64>,
     pub(super) usages: FxHashMap<u64, Vec<Usage>>,
-    /// Usage → placement of the child in the parent.
-    placements: FxHashMap<u64, Frame>,
+    /// Usage → placement of the child in the parent; `None` where that cannot be read.
+    placements: FxHashMap<u64, Option<Frame>>,
     pub(super) links: FxHashMap<u64, Vec<Link>>,
     /// Representations that are not the shape of a product, and what they are.
     pub(crate) left_out: Vec<(u64, String)>,
@@ -164,15 +165,11 @@ impl<'f, 'a> Assembly<'f, 'a> {
         self.owned.insert(representation);
     }
 
-    /// Returns the two representations of a relationship, and the first's placement in the second; that is `None` if none can be read.
-    fn related_representations(&self, e: Entity<'f, 'a>) -> Option<(u64, u64, Option<Frame>)> {
-        let base = e.attributes("REPRESENTATION_RELATIONSHIP", 0).unwrap_or_else(|| e.args());
-        let (first, second) = (base.id(2)?, base.id(3)?);
-        let simple = e.keyword() == "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
-        let operator = e.attributes("REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION", 4);
-        let operator =
-            operator.and_then(|a| a.entity(0)).or_else(|| if simple { e.args().entity(4) } else { None });
-        let placement = operator.and_then(|t| {
+    /// Returns how the first of two representations stands in the second by the transformation of their relationship; `None`, which is
+    /// reported, where that cannot be read.
+    fn transformation(&mut self, e: Entity<'f, 'a>, [first, second]: [u64; 2]) -> Option<Frame> {
+        let stated = e.attributes(WITH_TRANSFORMATION, 4).and_then(|a| a.entity(0));
+        let placement = stated.and_then(|t| {
             let args = t.attributes("ITEM_DEFINED_TRANSFORMATION", 0)?;
             let (from, to) = (args.id(2)?, args.id(3)?);
             // Each placement is in the units of the representation that holds it.
@@ -185,7 +182,10 @@ impl<'f, 'a> Assembly<'f, 'a> {
             let whole = to.compose(&from.inverse());
             Some(if holder_from == first { whole } else { whole.inverse() })
         });
-        Some((first, second, placement))
+        if placement.is_none() {
+            self.problems.push(format!("#{}: its transformation cannot be read; what it places is left out", e.id));
+        }
+        placement
     }
 
     /// Reads where the child of a usage stands in the parent, by a CONTEXT_DEPENDENT_SHAPE_REPRESENTATION; its relation goes into `used`.
@@ -194,29 +194,30 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let (Some(relation), Some(shape)) = (args.entity(0), args.entity(1)) else { return };
         used.insert(relation.id);
         let Some(usage) = property_attributes(shape).id(2) else { return };
-        let Some((first, second, placement)) = self.related_representations(relation) else { return };
-        let Some(mut placement) = placement else { return };
+        let Some([first, second]) = related_representations(relation) else { return };
+        if !relation.is_a(WITH_TRANSFORMATION) {
+            return;
+        }
+        let mut placement = self.transformation(relation, [first, second]);
         // The first representation is the child's; some writers swap them.
         let ends = self.file.entity(usage).and_then(|u| u.attributes("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0));
         if let Some((parent, child)) = ends.and_then(|a| Some((a.id(3)?, a.id(4)?))) {
             let has = |product: u64, r: u64| self.shapes.get(&product).is_some_and(|s| s.contains(&r));
             if has(parent, first) && has(child, second) && !has(child, first) {
-                placement = placement.inverse();
+                placement = placement.map(|p| p.inverse());
             }
         }
         self.placements.entry(usage).or_insert(placement);
     }
 
-    /// Links the two representations of a relationship: one way by its placement, or both ways, unmoved, if none can be read.
+    /// Links the two representations of a relationship: one way by its transformation, or both ways, unmoved, if it has none.
     fn read_relationship(&mut self, e: Entity<'f, 'a>) {
-        let Some((first, second, placement)) = self.related_representations(e) else { return };
-        match placement {
-            Some(placement) => self.links.entry(second).or_default().push(Link { to: first, placement }),
-            None => {
-                let same = Frame::IDENTITY;
-                self.links.entry(first).or_default().push(Link { to: second, placement: same });
-                self.links.entry(second).or_default().push(Link { to: first, placement: same });
-            }
+        let Some([first, second]) = related_representations(e) else { return };
+        let moved = e.is_a(WITH_TRANSFORMATION);
+        let placement = if moved { self.transformation(e, [first, second]) } else { Some(Frame::IDENTITY) };
+        self.links.entry(second).or_default().push(Link { to: first, placement });
+        if !moved {
+            self.links.entry(first).or_default().push(Link { to: second, placement });
         }
     }
 
@@ -311,9 +312,12 @@ impl<'f, 'a> Assembly<'f, 'a> {
         // Taken out while its children are placed; nothing asks for it meanwhile, for `path` stops a product inside itself.
         if let Some(usages) = self.usages.remove(&definition) {
             for usage in &usages {
-                let local = self.placements.get(&usage.id).copied().unwrap_or(Frame::IDENTITY);
-                let at = placement.compose(&local);
+                // Without a placement of its own the child stands where the parent does.
+                let local = self.placements.get(&usage.id).copied().unwrap_or(Some(Frame::IDENTITY));
+                let (kept, at) = (self.placed.len(), placement.compose(&local.unwrap_or(Frame::IDENTITY)));
                 self.place_product(usage.child, at, usage.name.clone(), path, &[owners, &[usage.id]].concat());
+                // Walked all the same, then left out: else it would come back as a shape that no product reaches.
+                self.placed.truncate(if local.is_some() { self.placed.len() } else { kept });
             }
             self.usages.insert(definition, usages);
         }
@@ -379,22 +383,14 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
         for link in self.links.get(&id).cloned().into_iter().flatten() {
             // A representation of another product is placed by its own usage.
-            let elsewhere = self.owned.contains(&link.to) && link.placement.is_identity();
+            let elsewhere = self.owned.contains(&link.to) && link.placement.is_none_or(|p| p.is_identity());
             if !path.contains(&link.to) && !elsewhere {
-                self.place_representation(
-                    link.to,
-                    placement.compose(&link.placement),
-                    (name, product),
-                    path,
-                    owners,
-                );
+                let (kept, at) = (self.placed.len(), placement.compose(&link.placement.unwrap_or(Frame::IDENTITY)));
+                self.place_representation(link.to, at, (name, product), path, owners);
+                // As for usages.
+                self.placed.truncate(if link.placement.is_some() { self.placed.len() } else { kept });
             }
         }
         path.pop();
     }
-}
-
-/// Returns the attributes of a property definition, the third of which is what it describes; subtypes add none.
-fn property_attributes<'f, 'a>(definition: Entity<'f, 'a>) -> Args<'f, 'a> {
-    definition.attributes("PROPERTY_DEFINITION", 0).unwrap_or_else(|| definition.args())
 }
