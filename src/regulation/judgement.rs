@@ -70,8 +70,11 @@ pub(super) struct Decisive {
 }
 
 impl Decisive {
-    /// Rays and tolerance with which the same margin would be enough, from the rays that were `traced`; `None` where that is beyond reason.
-    pub(super) fn settles(&self, traced: u64, tolerance_mm: Option<f64>) -> Option<Settles> {
+    /// Returns with how many rays in all, never fewer than `traced`, and on facets of which tolerance this margin would be enough.
+    ///
+    /// `tolerance_mm` is the run's own, `None` where it traced no facets; the answer's is `None` where facets need not be finer. `None` where
+    /// 10¹⁵ rays or more would be needed.
+    pub(super) fn what_settles(&self, traced: u64, tolerance_mm: Option<f64>) -> Option<Settles> {
         /// Runs beyond this are no advice.
         const MOST_RAYS: f64 = 1e15;
         // At most so large may the whole error be.
@@ -148,7 +151,7 @@ mod tests {
     fn nothing_settles_a_reading_on_its_very_limit() {
         let on_limit = |statistical: f64, geometric: f64| {
             let reading = Reading { value: 1.0, statistical, geometric };
-            Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0 }.settles(1000, Some(0.1))
+            Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0 }.what_settles(1000, Some(0.1))
         };
         // Without a statistical error, zero by zero must not become the rays already traced and facets of 0 mm.
         for (statistical, geometric) in [(0.0, 0.1), (0.1, 0.0), (0.1, 0.1)] {

@@ -200,7 +200,7 @@ fn judge_row(photometer: &Photometer, regulation: &Regulation, assumptions: &Ass
         verdict.direction = Some(decisive.direction);
         // Outside the field no number of rays helps.
         if worst.verdict == Verdict::Unsure && worst.unseen == 0 {
-            verdict.settles = decisive.settles(assumptions.rays, assumptions.tolerance_mm);
+            verdict.settles = decisive.what_settles(assumptions.rays, assumptions.tolerance_mm);
         }
     }
     verdict

@@ -131,7 +131,7 @@ fn required(bound: &BoundScene) -> Required {
             Effect::BulkScatter => medium(in_medium(&|b| b.scatter.is_some()), "scatters", "no medium scatters"),
             Effect::Polarisation if bound.scene.run.polarisation => (true, "the scene asks for it".into()),
             Effect::Polarisation => (false, "the scene does not ask for it".into()),
-            Effect::Dispersion => dispersion(bound, in_medium(&Body::is_dispersive)),
+            Effect::Dispersion => needs_wavelength(bound, in_medium(&Body::is_dispersive)),
             Effect::SurfaceScatter => {
                 let n = coated(&|c| c.scatter.is_some());
                 (n > 0, plural(n, "rough or diffuse face", "no face scatters"))
@@ -164,8 +164,9 @@ fn required(bound: &BoundScene) -> Required {
     required
 }
 
-/// Returns whether the wavelength of a ray matters, and the reason. `medium` is the name of one whose index or absorption depends on it.
-fn dispersion(bound: &BoundScene, medium: Option<&str>) -> (bool, String) {
+/// Returns whether rays must carry a wavelength, and the reason in words. Never where all light has one; else where a receiver asks for the
+/// spectrum, or where a coating or `medium` depends on it, the name of one whose index or absorption does.
+fn needs_wavelength(bound: &BoundScene, medium: Option<&str>) -> (bool, String) {
     if !bound.light.coloured {
         return (false, format!("all light has {} nm", bound.light.wavelength));
     }

@@ -110,14 +110,14 @@ pub(super) fn reflect(d: Vector, n: Vector) -> Vector {
     d - n * (2.0 * d.dot(n))
 }
 
-/// Returns the direction behind a surface whose far side has the relative index `eta`; `None` for total reflection. The normal may point to
-/// either side.
-pub(super) fn refract(d: Vector, n: Vector, eta: f64) -> Option<Vector> {
+/// Returns the direction behind a surface; `None` for total reflection. `index_ratio` is the index behind it over that before it, the inverse
+/// of what [`crate::optics::refract`] takes. Both vectors have unit length; the normal may point to either side.
+pub(super) fn refract(d: Vector, n: Vector, index_ratio: f64) -> Option<Vector> {
     // Snell's law wants the normal against the ray.
     let n = if d.dot(n) > 0.0 { -n } else { n };
     let cos_i = -d.dot(n);
-    let sin2_t = (1.0 - cos_i * cos_i) / (eta * eta);
-    (sin2_t < 1.0).then(|| d / eta + n * (cos_i / eta - (1.0 - sin2_t).sqrt()))
+    let sin2_t = (1.0 - cos_i * cos_i) / (index_ratio * index_ratio);
+    (sin2_t < 1.0).then(|| d / index_ratio + n * (cos_i / index_ratio - (1.0 - sin2_t).sqrt()))
 }
 
 #[cfg(test)]

@@ -232,7 +232,7 @@ impl<'a> Polished<'a> {
     /// The nearest root of a ray that leaves no face. Where it would first come out of a closed solid the spline is asked, and then up to
     /// [`MOST_OUTSIDE`] facets are passed; `None` for a miss or after these.
     fn search_from_outside(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
-        let mut answer = self.search(ray, None, cost);
+        let mut answer = self.search_by_facets(ray, None, cost);
         if !self.comes_out(ray, answer.as_ref()) {
             return answer;
         }
@@ -243,7 +243,7 @@ impl<'a> Polished<'a> {
         for _ in 0..MOST_OUTSIDE {
             // Just past the facet, or it would be found again.
             let behind = ray.with_range(answer?.t.next_up(), ray.t_max);
-            answer = self.search(&behind, None, cost);
+            answer = self.search_by_facets(&behind, None, cost);
             if !self.comes_out(ray, answer.as_ref()) {
                 return answer;
             }
@@ -266,9 +266,12 @@ impl<'a> Polished<'a> {
         Some(Hit { primitive: NO_FACET, certainty: Certainty::Polished, ..hit })
     }
 
-    /// The nearest root that the facets lead to, or a facet hit where none is found, counted in [`Cost::fallbacks`]; `None` where at most
-    /// [`MOST_FACETS`] facets lead to nothing. `left` is what the ray leaves and the spline's normal there. Counts one ray.
-    fn search(&self, ray: &Ray, left: Option<(&Departure, Vector)>, cost: &mut Cost) -> Option<Hit> {
+    /// Returns the nearest root that facets along the ray lead to; where a facet leads to none, its own hit, counted in [`Cost::fallbacks`]
+    /// unless its face has no spline. `None` for a miss, and after [`MOST_FACETS`] facets without an answer.
+    ///
+    /// `left` is what the ray leaves and the spline's normal there: a flat start is answered by the exact model first, with
+    /// [`NO_FACET`] as its primitive. Whether the answer fits the inside of solids is not asked. Counts one ray.
+    fn search_by_facets(&self, ray: &Ray, left: Option<(&Departure, Vector)>, cost: &mut Cost) -> Option<Hit> {
         let mut ray = *ray;
         // The spline may lie ahead of an origin whose facet lies behind it; a facet short of `hidden_range` may lead to a root behind it.
         // Seen flat, facets lie farther from it along the ray: of a short look for a face along the one left, all of them count.
@@ -342,7 +345,7 @@ impl Polished<'_> {
         let Some(left) = ray.departure.as_ref().and_then(|f| Some((f, normal(f)?))) else {
             return self.search_from_outside(ray, cost);
         };
-        let mut answer = self.search(ray, Some(left), cost);
+        let mut answer = self.search_by_facets(ray, Some(left), cost);
         let asked = (ray.t_max - ray.t_min <= SHORT_OF_SAGS * self.sag).then(|| self.ask_spline(ray));
         answer = answer.into_iter().chain(asked.flatten()).min_by(|a, b| a.t.total_cmp(&b.t));
         if !self.is_doubtful(ray, left, answer.as_ref()) {

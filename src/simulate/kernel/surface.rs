@@ -50,8 +50,10 @@ fn mirror_interaction<'s, C: RayPayload>(
     Interaction::Reflect { kept, direction: at.reflected_direction(direction, normal), payload }
 }
 
-/// Reflects and refracts light at the bare boundary of a body. Light passes unchanged where its innermost body stays the same; at total
-/// reflection it may be found to be trapped.
+/// Returns what the bare boundary of a body does to light: both ways on with their shares; nothing is drawn or booked.
+///
+/// Light passes unchanged where its innermost body stays the same. After too long by total reflection alone it is trapped, and it is lost
+/// where its media cannot be on the other side even when found anew. Writes `skip`, `overlap` and `corrected_normals` of `at`.
 #[inline(always)]
 fn interface_interaction<'s, C: RayPayload>(
     context: &Context<'_>,

@@ -71,8 +71,14 @@ impl CandidateFacet {
         Self { p, sag: [u, v] }
     }
 
-    /// The parameter across which the cell is cut when it does not fit within `limit`.
-    pub(in crate::tessellate) fn cut_direction(&self, surface: &FaceSurface<'_>, cell: Cell, limit: f64) -> usize {
+    /// Returns which parameter's range to halve where the cell does not fit within `limit`, mm: 0 for u, 1 for v. May evaluate the surface
+    /// at four points more.
+    pub(in crate::tessellate) fn parameter_to_halve(
+        &self,
+        surface: &FaceSurface<'_>,
+        cell: Cell,
+        limit: f64,
+    ) -> usize {
         let [mut u, mut v] = self.sag;
         // A profile like an S passes through the middle of its chord: by the middle alone a trumpet was cut into 100,000 columns, and
         // never across. Where middles do not tell why a cell fails, quarters are looked at.
@@ -163,6 +169,6 @@ mod tests {
         let candidate = CandidateFacet::new(&surface, cell);
         // The curve's farthest from its chord: by symmetry on either side of the middle, and none in it.
         assert!(candidate.sag[0] > 0.009 && candidate.sag[1] < 1e-12, "{:?}", candidate.sag);
-        assert_eq!(candidate.cut_direction(&surface, cell, 0.1), 1);
+        assert_eq!(candidate.parameter_to_halve(&surface, cell, 0.1), 1);
     }
 }

@@ -174,8 +174,11 @@ impl Tree<'_, '_> {
             return;
         }
         let (direction, at) = crease.unwrap_or_else(|| {
-            let d =
-                candidate.cut_direction(self.surface, cell, self.surface.tolerance(cell.center()) * branch.slack);
+            let d = candidate.parameter_to_halve(
+                self.surface,
+                cell,
+                self.surface.tolerance(cell.center()) * branch.slack,
+            );
             (d, self.cut_parameter(cell, d))
         });
         // Parameters have no more digits between the two.

@@ -49,7 +49,7 @@ pub(super) fn contacts<'m>(
     parts: &[Option<PartMesh>],
 ) -> (Vec<Contact>, FxHashMap<FaceKey, TrimmedFace<'m>>) {
     let glue = settings.glue_mm;
-    let faces = curved_faces(model, parts, glue);
+    let faces = curved_face_boxes(model, parts, glue);
     let mut pairs: Vec<[FaceKey; 2]> = Vec::new();
     // Sorted along x: from the first box that begins behind this one on, none meets it.
     for (i, a) in faces.iter().enumerate() {
@@ -125,8 +125,9 @@ fn with_one_role_each(all: Vec<Contact>) -> Vec<Contact> {
     out
 }
 
-/// Curved faces with facets of their own, in order of their boxes along x.
-fn curved_faces(model: &Model, parts: &[Option<PartMesh>], glue: f64) -> Vec<BoxedFace> {
+/// Returns the boxes of the curved faces of all instances that may share facets, meshed and not repaired ones: in the model's coordinates,
+/// grown by half of `glue`, mm, and sorted by their lower x.
+fn curved_face_boxes(model: &Model, parts: &[Option<PartMesh>], glue: f64) -> Vec<BoxedFace> {
     let mut out = Vec::new();
     for (i, instance) in model.instances.iter().enumerate() {
         let Some(mesh) = &parts[instance.part.0 as usize] else { continue };

@@ -238,7 +238,8 @@ fn blend<const N: usize>(a: &[Homogeneous], b: &[Homogeneous], d: usize, at: [f6
 }
 
 impl Half {
-    /// Makes the table for one pair of degrees: with s = λ_B + λ_C along the first side and t = λ_C along the second, (λ_B + λ_C)^i
+    /// Makes the table that turns the net of a rectangle of degrees p and q into the net of the Bézier triangle over its half: each
+    /// coefficient as a sum of control points with weights, which hold binomials and multinomials already. With s = λ_B + λ_C along the first side and t = λ_C along the second, (λ_B + λ_C)^i
     /// λ_A^(p−i) λ_C^j (λ_A + λ_B)^(q−j) is multiplied out.
     fn new([p, q]: [usize; 2]) -> Self {
         // Divided by the multinomials here once, and not for each net.

@@ -64,7 +64,7 @@ pub(in crate::tessellate) fn pair_triangles(
         let (uv, xyz) = (empty.map(|n| node(n).uv), full.map(|n| node(n).place));
         let whole = pole::covers_to_meridians(prover.surface, full.map(|n| node(n).uv));
         let bound = if whole { bound } else { bound.max(prover.triangle_bound(uv, xyz, tolerance)) };
-        facets.push(pole_triangle(nodes, prover, ProvedFacet { nodes: full, bound, tolerance }, corners));
+        facets.push(facet_at_pole(nodes, prover, ProvedFacet { nodes: full, bound, tolerance }, corners));
     }
     for (i, tri) in t.iter().enumerate() {
         if !taken[i] && !collapsed[i] {
@@ -128,7 +128,7 @@ struct Join {
     /// The other facet, and the parameters of the pole between both.
     second: usize,
     pole: Uv,
-    /// What the other parameters of the pole add to the bound.
+    /// Bound with the other parameters of the pole, mm; that of the quad is at least this.
     bound: f64,
 }
 
@@ -169,7 +169,7 @@ fn join_sectors(
             }
             at = follows[i];
             let Some(j) = follows[i].filter(|&j| j != i && !joined[j] && joins[j].is_none()) else { continue };
-            if let Some((pole, bound)) = join_two(nodes, prover, &facets[i], &facets[j]) {
+            if let Some((pole, bound)) = prove_sector_quad(nodes, prover, &facets[i], &facets[j]) {
                 joins[i] = Some(Join { second: j, pole, bound });
                 joined[j] = true;
                 at = follows[j];
@@ -203,9 +203,10 @@ fn sector_quad(f: &ProvedFacet<4>, g: &ProvedFacet<4>) -> [u32; 4] {
     [f.nodes[1], g.nodes[1], f.nodes[2], f.nodes[0]]
 }
 
-/// Returns the pole's parameters in the quad of two sectors, and the bound, mm, that these need, 0 for none beyond their own; `None` where
-/// they do not become a quad that holds.
-fn join_two(
+/// Proves the quad of two sectors at one pole, `g` behind `f` around it. Returns the pole's parameters in it and a bound, mm: that of the
+/// quad is the largest of this and their own, 0 where theirs are enough. `None` where the quad is not convex, folds, has too sharp a
+/// corner or is not proved, or where their own bounds are beyond the tighter of their tolerances. Changes the prover's state alone.
+fn prove_sector_quad(
     nodes: &Nodes,
     prover: &mut Prover<'_, '_>,
     f: &TransitionFacet,
@@ -273,9 +274,10 @@ fn is_collapsed(n: [Node; 3]) -> bool {
     n[0].position == n[1].position || n[1].position == n[2].position || n[2].position == n[0].position
 }
 
-/// Returns the triangle `full` that has taken in one without area, turned so that the pole is its third corner and seen in its middle,
-/// where that is proved too; otherwise as it is. `quad` has the pole's other node.
-fn pole_triangle(
+/// Makes a facet of the triangle `full`, which has taken in a neighbour without area. Where `quad` has a second node at one of its corners,
+/// the pole, that comes third and gets parameters midway between both, if that is proved within tolerance: the bound, mm, may rise.
+/// Otherwise, and for a sector, what [`single_triangle`] makes of it.
+fn facet_at_pole(
     nodes: &Nodes,
     prover: &mut Prover<'_, '_>,
     full: ProvedFacet<3>,
