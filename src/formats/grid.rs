@@ -1,7 +1,7 @@
 //! Values over a regular grid, and how they are written as CSV and NPZ.
 
 use super::npz::{NpyArray, write_npz};
-use super::{Error, write_atomic};
+use super::{Error, ErrorKind, write_atomic};
 use std::path::Path;
 
 /// Values over a regular grid of cells: what a receiver recorded.
@@ -117,6 +117,29 @@ impl Grid {
         of_values.chain(layers)
     }
 
+    /// Checks that every list of values has one for each cell; `path` is of the file to be written, for the message.
+    pub(super) fn check_filled(&self, path: &Path) -> Result<(), Error> {
+        let [a, b] = self.axes.each_ref().map(|axis| axis.cells);
+        let own = [Some(&self.values), self.error.as_ref(), self.geometric.as_ref()];
+        let layers = self.layers.iter().flat_map(|l| [Some(&l.values), Some(&l.error), l.geometric.as_ref()]);
+        let mut lists = own.into_iter().chain(layers).flatten();
+        match lists.find(|list| a.checked_mul(b) != Some(list.len())) {
+            Some(list) => {
+                let message = format!("{} values do not fill the grid of {a} × {b} cells", list.len());
+                Err(Error::new(path, ErrorKind::Malformed(message)))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The range of values that colours stand for: from 0, or the smallest value when negative, to the largest; never empty.
+    pub(crate) fn colour_range(&self) -> [f64; 2] {
+        // From zero, so that darkness is dark; a grid of negative values needs its own floor.
+        let [low, high] = self.extremes().map_or([0.0, 1.0], |[lo, hi]| [lo.min(0.0), hi]);
+        // A grid of equal values has no span to divide by.
+        [low, if high > low { high } else { low + low.abs().max(1.0) }]
+    }
+
     /// Smallest and largest finite value; `None` without any.
     pub fn extremes(&self) -> Option<[f64; 2]> {
         let finite = self.values.iter().copied().filter(|v| v.is_finite());
@@ -143,8 +166,9 @@ impl Grid {
 /// layer, then both errors of the value as `statistical` and `geometric`, and the geometric ones of the layers, where they are known.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// When values do not fill the grid, and when the file cannot be written.
 pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
+    grid.check_filled(path)?;
     let [a, b] = &grid.axes;
     write_atomic(path, |w| {
         write!(w, "{},{},{}", a.column(), b.column(), grid.column())?;

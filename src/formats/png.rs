@@ -42,20 +42,18 @@ pub struct Picture {
 
 impl Picture {
     /// Draws a grid as a picture, one cell `zoom` pixels wide and high, the second axis upward, colours from 0 (or the smallest value when
-    /// negative) to the largest, NaN in grey; `exponent` below 1 lifts the dark parts. `values` must fill the grid.
+    /// negative) to the largest, NaN and cells that have no value in grey; `exponent` below 1 lifts the dark parts.
     pub fn of_grid(grid: &Grid, map: ColourMap, zoom: u32, exponent: f64) -> Self {
         let (nx, ny) = (grid.axes[0].cells, grid.axes[1].cells);
-        // From zero, so that darkness is dark; a grid of negative values needs its own floor.
-        let [low, high] = grid.extremes().map_or([0.0, 1.0], |[lo, hi]| [lo.min(0.0), hi]);
-        // A grid of equal values has no span to divide by.
-        let span = if high > low { high - low } else { 1.0 };
+        let [low, high] = grid.colour_range();
         let zoom = zoom.max(1) as usize;
         let mut rgb = Vec::with_capacity(3 * nx * ny * zoom * zoom);
         // Pictures start at the top, the second axis at the bottom.
         for j in (0..ny).rev() {
             let row: Vec<u8> = (0..nx)
                 .flat_map(|i| {
-                    let colour = map.colour(((grid.values[j * nx + i] - low) / span).powf(exponent));
+                    let value = grid.values.get(j * nx + i).copied().unwrap_or(f64::NAN);
+                    let colour = map.colour(((value - low) / (high - low)).powf(exponent));
                     std::iter::repeat_n(colour, zoom).flatten()
                 })
                 .collect();
@@ -97,8 +95,9 @@ pub fn write_png(path: &Path, picture: &Picture) -> Result<(), Error> {
 /// Writes a grid as a coloured PNG of at least 800 pixels on its longer side.
 ///
 /// # Errors
-/// When the grid is empty and when the file cannot be written.
+/// When the grid is empty, when values do not fill it and when the file cannot be written.
 pub fn write_grid_png(path: &Path, grid: &Grid) -> Result<(), Error> {
+    grid.check_filled(path)?;
     let longer = grid.axes[0].cells.max(grid.axes[1].cells).max(1) as u32;
     write_png(path, &Picture::of_grid(grid, ColourMap::Inferno, 800u32.div_ceil(longer), 1.0))
 }

@@ -126,8 +126,9 @@ pub fn write_vtp(path: &Path, lines: &Polylines) -> Result<(), Error> {
 /// readers).
 ///
 /// # Errors
-/// When the file cannot be written.
+/// When values do not fill the grid, and when the file cannot be written.
 pub fn write_vti(path: &Path, grid: &Grid) -> Result<(), Error> {
+    grid.check_filled(path)?;
     let [a, b] = &grid.axes;
     write_atomic(path, |w| {
         write_head(w, "ImageData")?;

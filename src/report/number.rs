@@ -60,7 +60,11 @@ pub fn seconds(value: f64) -> String {
         v if v < MILLI => format!("{} µs", figures(v * MEGA, 3)),
         v if v < 1.0 => format!("{} ms", figures(v * KILO, 3)),
         v if v < 120.0 => format!("{} s", figures(v, 3)),
-        v => format!("{} min {} s", (v / 60.0).floor(), (v % 60.0).round()),
+        v => {
+            // Rounded before it is divided: 59.6 s are a minute more, not 60 s.
+            let whole = v.round();
+            format!("{} min {} s", (whole / 60.0).floor(), whole % 60.0)
+        }
     }
 }
 
@@ -120,6 +124,7 @@ mod tests {
             (seconds(0.0451), seconds(75.0), seconds(125.0)),
             ("45.1 ms".into(), "75 s".into(), "2 min 5 s".into())
         );
+        assert_eq!((seconds(179.6), seconds(179.4)), ("3 min 0 s".into(), "2 min 59 s".into()));
         assert_eq!(bytes(12_345_678), "12.3 MB");
     }
 }

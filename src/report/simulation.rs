@@ -173,10 +173,8 @@ impl SimulationReport<'_> {
     pub fn report(&self) -> Report {
         let mut sections = vec![self.light()];
         sections.extend(self.sections.iter().cloned());
-        for (receiver, assessment) in self.verdicts {
-            let grid = self.results.receivers.get(*receiver).and_then(receiver_grid);
-            sections.extend(grid.map(|grid| verdicts::section(assessment, &grid)));
-        }
+        let grid_of = |receiver: usize| self.results.receivers.get(receiver).and_then(receiver_grid);
+        sections.extend(verdicts::sections(self.verdicts, grid_of));
         sections.push(self.energy());
         if let Some(check) = self.check {
             sections.push(self.cross_check(check));

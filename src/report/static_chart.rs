@@ -311,7 +311,6 @@ fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: Colou
     let [_, top, right, bottom] = AREA;
     let scales = pixels(elements, chart, &grid.axes, Picture::of_grid(grid, map, 1, 1.0));
     let right = right - BAR_ROOM;
-    let [low, high] = grid.extremes().map_or([0.0, 1.0], |[lo, hi]| [lo.min(0.0), hi]);
     let steps = 64;
     for k in 0..steps {
         let ink = Ink::Colour(map.colour((f64::from(k) + 0.5) / f64::from(steps)));
@@ -320,7 +319,7 @@ fn map_chart(elements: &mut Vec<Element>, chart: &Chart, grid: &Grid, map: Colou
         // A little taller than its step: no seam shows between two.
         elements.push(Element::Rectangle { corner, size: [14.0, h + 0.3], radius: 0.0, ink });
     }
-    let bar = linear_scale([low, high], [bottom, top]);
+    let bar = linear_scale(grid.colour_range(), [bottom, top]);
     for t in bar.ticks() {
         elements.push(tick_label(figures(t, 3), [right + 30.0, bar.position(t) + 4.0], Anchor::Start));
     }
@@ -371,5 +370,29 @@ fn draw_marks(elements: &mut Vec<Element>, marks: &Marks, unit: &str, [x, y]: [S
         let corner = [AREA[0] + 8.0, AREA[3] - 8.0];
         let text = format!("lines: {unit}, from {}", figures(line.level, 3));
         elements.push(word(text, corner, MARK, Anchor::Start));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_of_equal_values_has_a_scale() {
+        let axis = |label: &str| Axis { label: label.into(), unit: "mm".into(), range: [0.0, 2.0], cells: 2 };
+        for value in [0.0, -3.0, 7.0] {
+            let grid = Grid {
+                name: "wall".into(),
+                quantity: "illuminance".into(),
+                unit: "lx".into(),
+                axes: [axis("x"), axis("y")],
+                values: vec![value; 4],
+                error: None,
+                geometric: None,
+                layers: Vec::new(),
+            };
+            let svg = draw(&Chart::map("wall", "", "", grid)).svg();
+            assert!(!svg.contains("NaN"), "{value}");
+        }
     }
 }

@@ -51,8 +51,20 @@ pub fn settling_text(row: &RowVerdict) -> String {
     settles.tolerance_mm.map_or(rays.clone(), |t| format!("{rays}, {} mm", figures(t, 2)))
 }
 
-/// Makes the section of one verdict: text, table, the test points on the map, and the road; `grid` is the far field judged, as placed.
-pub(super) fn section(a: &Assessment, grid: &Grid) -> Section {
+/// Makes the sections of all verdicts, each with the index of its receiver; what has no far field, of those that `grid_of` returns, is left
+/// out. No two sections, tables or charts have one name.
+pub(super) fn sections(verdicts: &[(usize, Assessment)], grid_of: impl Fn(usize) -> Option<Grid>) -> Vec<Section> {
+    let mut sections = Vec::new();
+    for (k, (receiver, assessment)) in verdicts.iter().enumerate() {
+        let before = verdicts[..k].iter().filter(|(other, _)| other == receiver).count();
+        sections.extend(grid_of(*receiver).map(|grid| section(assessment, &grid, before + 1)));
+    }
+    sections
+}
+
+/// Makes the section of one verdict: text, table, the test points on the map, and the road; `grid` is the far field judged, as placed,
+/// and `number` counts the verdicts on it from 1.
+fn section(a: &Assessment, grid: &Grid, number: usize) -> Section {
     let aim = [a.aim.h_deg, a.aim.v_deg];
     let text = format!(
         "{}Aim: {}. Photometer: {} from side to side. {}. An engineer's answer about a simulated lamp, not a statement of conformity.",
@@ -61,8 +73,13 @@ pub(super) fn section(a: &Assessment, grid: &Grid) -> Section {
         format_args!("{:.3}°", a.sensor_deg),
         a.regulation.checked()
     );
-    let title = format!("Verdict by {}", a.regulation.id);
-    let name = file_stem(&grid.name);
+    let stem = file_stem(&grid.name);
+    // One far field may be judged by several regulations, or by one in several ways, and several by one.
+    let (verdict, name) = match number {
+        1 => ("Verdict".to_owned(), stem),
+        n => (format!("Verdict {n}"), format!("{stem}-verdict-{n}")),
+    };
+    let title = format!("{verdict} by {}: {}", a.regulation.id, grid.name);
     Section::new(&title)
         .with_block(text.as_str())
         .with_block(table(a, &name))
@@ -122,4 +139,49 @@ fn picture(a: &Assessment, grid: &Grid, name: &str) -> Chart {
     let title = format!("{}: test points over isocandela lines", a.regulation.id);
     let caption = "Points and zones lie where the aimed photometer read them.";
     Chart::map(&format!("{name}-points"), &title, caption, shown).with_marks(points, outlines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::Axis;
+    use crate::regulation::{Aim, Regulation};
+    use crate::report::Block;
+
+    #[test]
+    fn verdicts_on_one_far_field_have_names_of_their_own() {
+        let aim = Aim { h_deg: 0.0, v_deg: 0.0, gradient: None, how: "as placed".into() };
+        let by = |id: &str| {
+            let regulation = Regulation::find(id).unwrap();
+            Assessment { regulation, aim: aim.clone(), sensor_deg: 0.1, rows: Vec::new(), verdict: Verdict::Pass }
+        };
+        let (low, high) = ("UN R112 B passing", "UN R112 B driving");
+        let axis = |label: &str| Axis { label: label.into(), unit: "deg".into(), range: [-1.0, 1.0], cells: 2 };
+        let grid_of = |receiver: usize| {
+            Some(Grid {
+                name: format!("road {receiver}"),
+                quantity: "luminous intensity".into(),
+                unit: "cd".into(),
+                axes: [axis("H"), axis("V")],
+                values: vec![1.0; 4],
+                error: None,
+                geometric: None,
+                layers: Vec::new(),
+            })
+        };
+        let all = sections(&[(0, by(low)), (0, by(high)), (0, by(low)), (1, by(low))], grid_of);
+        let mut names: Vec<&str> = all.iter().map(|s| s.title.as_str()).collect();
+        for block in all.iter().flat_map(|s| &s.blocks) {
+            match block {
+                Block::Chart(chart) => names.push(&chart.name),
+                Block::Table(table) => names.push(&table.name),
+                _ => {}
+            }
+        }
+        // A title, a table and three pictures each.
+        assert_eq!(names.len(), 4 * 5);
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), 4 * 5, "{names:?}");
+    }
 }

@@ -1,8 +1,8 @@
 //! Grids and polylines open in readers that others wrote, with the numbers that went in.
 
 use lampyris::formats::{
-    Axis, ColourMap, Grid, NpyArray, Picture, Polylines, write_grid_csv, write_grid_npz, write_grid_png, write_npz,
-    write_vti, write_vtp,
+    Axis, ColourMap, Grid, Layer, NpyArray, Picture, Polylines, write_grid_csv, write_grid_npz, write_grid_png,
+    write_npz, write_vti, write_vtp,
 };
 use lampyris::math::Point;
 use npyz::NpyFile;
@@ -62,6 +62,27 @@ fn npz_refuses_a_shape_that_does_not_hold_its_data() {
     let array = NpyArray { name: "a", shape: vec![2, 2], data: &[1.0] };
     assert!(write_npz(&path, &[array]).unwrap_err().to_string().contains("[2, 2]"));
     assert!(!path.exists());
+}
+
+#[test]
+fn values_that_do_not_fill_the_grid_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("g");
+    let layer =
+        Layer { quantity: "X".into(), unit: "cd".into(), values: vec![1.0], error: vec![0.1; 6], geometric: None };
+    for wrong in [
+        Grid { values: vec![1.0; 5], ..grid() },
+        Grid { error: Some(vec![0.5; 2]), ..grid() },
+        Grid { geometric: Some(Vec::new()), ..grid() },
+        Grid { layers: vec![layer], ..grid() },
+    ] {
+        for write in [write_grid_csv, write_grid_png, write_vti] {
+            assert!(write(&path, &wrong).unwrap_err().to_string().contains("do not fill"));
+            assert!(!path.exists());
+        }
+        // A picture by itself has no way to refuse: what is not there is grey.
+        assert_eq!(Picture::of_grid(&wrong, ColourMap::Inferno, 1, 1.0).rgb.len(), 18);
+    }
 }
 
 #[test]
