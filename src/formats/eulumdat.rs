@@ -86,16 +86,19 @@ pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
     })
 }
 
-/// Writes an EULUMDAT file: all C-planes, without symmetry, or the one plane of a rotational distribution. There must be a plane.
+/// Writes an EULUMDAT file: all C-planes, without symmetry, or the one plane of a rotational distribution.
 ///
 /// Numbers have six decimals. Absolute photometry is written with the flux of the distribution itself and −1 lamps.
 ///
 /// # Errors
-/// When the photometry is not of type C, does not cover whole turns, or the file cannot be written.
+/// When the photometry is not of type C, has no planes, does not cover whole turns, or the file cannot be written.
 pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     let malformed = |m: &str| Error::new(path, ErrorKind::Malformed(m.into()));
     if p.kind != PhotometricType::C {
         return Err(malformed("EULUMDAT holds type C photometry alone; write types A and B as .ies"));
+    }
+    if p.horizontal_deg.is_empty() {
+        return Err(malformed("there are no planes to write"));
     }
     // One plane is rotational already; to expand it would write the same plane twice.
     let all = if p.horizontal_deg.len() == 1 { p.clone() } else { p.expanded() };
@@ -166,6 +169,18 @@ mod tests {
         let path = folder.path().join("a.ldt");
         write_eulumdat(&path, p).unwrap();
         read_eulumdat(&path).unwrap()
+    }
+
+    #[test]
+    fn photometry_without_planes_is_refused() {
+        let none = Photometry {
+            horizontal_deg: vec![],
+            candela: vec![],
+            ..photometry_of(PhotometricType::C, &[0.0], &[0.0, 90.0], |_, _| 1.0)
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let error = write_eulumdat(&folder.path().join("a.ldt"), &none).unwrap_err();
+        assert!(error.to_string().contains("no planes"), "{error}");
     }
 
     #[test]

@@ -8,6 +8,8 @@ use std::path::Path;
 const FOOT: f64 = 304.8;
 /// Longest line the format allows, its end not counted.
 const LONGEST_LINE: usize = 130;
+/// Longest number without an exponent, characters: with one none is longer.
+const LONGEST_NUMBER: usize = 24;
 
 /// Reads an IES LM-63 file.
 ///
@@ -206,14 +208,21 @@ fn ies_text(p: &Photometry) -> Result<String, String> {
         PhotometricType::A => 3,
     };
     // −1 lumens stand for absolute photometry.
-    let lumens = p.lamp_lumens.map_or("-1".to_owned(), |l| l.to_string());
-    let [width, length, height] = p.opening_mm.map(|x| x / 1000.0);
+    let lumens = p.lamp_lumens.map_or("-1".to_owned(), number_word);
+    let [width, length, height] = p.opening_mm.map(|x| number_word(x / 1000.0));
     out.line(&format!("1 {lumens} 1 {rows} {planes} {kind} 2 {width} {length} {height}"));
-    out.line(&format!("1 1 {}", p.watts));
+    out.line(&format!("1 1 {}", number_word(p.watts)));
     out.numbers(&p.vertical_deg);
     out.numbers(&p.horizontal_deg);
     p.candela.chunks(rows).for_each(|plane| out.numbers(plane));
     Ok(out.0)
+}
+
+/// A number in the shortest decimals that read back the same bits, at most 24 characters.
+fn number_word(number: f64) -> String {
+    let plain = number.to_string();
+    // Hundreds of digits are longer than a line: such numbers get an exponent, which Fortran's free format reads too.
+    if plain.len() > LONGEST_NUMBER { format!("{number:e}") } else { plain }
 }
 
 /// Text with CR LF ends, as the format asks, and lines that are not too long.
@@ -228,12 +237,11 @@ impl Lines {
         self.0.push_str("\r\n");
     }
 
-    /// Adds numbers on lines of their own that are not too long; a number longer than a line is cut off.
+    /// Adds numbers on lines of their own that are not too long.
     fn numbers(&mut self, numbers: &[f64]) {
         let mut line = String::new();
         for number in numbers {
-            // The shortest decimals that read back the same bits.
-            let word = number.to_string();
+            let word = number_word(*number);
             if !line.is_empty() && line.len() + 1 + word.len() > LONGEST_LINE {
                 self.line(&line);
                 line.clear();
@@ -286,6 +294,18 @@ mod tests {
             let text = std::fs::read_to_string(&path).unwrap();
             assert!(text.lines().all(|l| l.len() < 132) && text.ends_with("\r\n"));
         }
+    }
+
+    #[test]
+    fn numbers_of_hundreds_of_digits_are_not_cut() {
+        let extremes = [1e200, f64::MAX, 5e-324, -0.0, f64::MIN_POSITIVE.next_up(), 0.1];
+        let mut p = photometry_of(PhotometricType::C, &[0.0], &steps(0.0, 90.0, 5), |_, _| 1.0);
+        p.candela = extremes.to_vec();
+        (p.lamp_lumens, p.watts) = (Some(1.234_567_890_123_456_7e-200), 2e250);
+        let text = ies_text(&p).unwrap();
+        assert!(text.lines().all(|l| l.len() <= LONGEST_LINE));
+        let back = parse(&text).unwrap();
+        assert_eq!((back.candela, back.lamp_lumens, back.watts), (p.candela, p.lamp_lumens, p.watts));
     }
 
     #[test]
