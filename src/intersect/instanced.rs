@@ -245,9 +245,10 @@ impl Intersector for Instanced<'_> {
     }
 
     fn prepare_for(&self, expected: &ExpectedRays<'_>) {
-        self.groups[0].prepare_for(expected);
+        let Some((single, placed)) = self.groups.split_first() else { return };
+        single.prepare_for(expected);
         // What is placed is not seen from the source as its part would be, but what leaves its facets is free of it in every place.
-        self.groups[1..].iter().for_each(|group| group.prepare_for(&ExpectedRays { beams: &[], ..*expected }));
+        placed.iter().for_each(|group| group.prepare_for(&ExpectedRays { beams: &[], ..*expected }));
     }
 
     /// Of rays that leave the box of their placement where they leave the box around all.
@@ -273,5 +274,20 @@ impl Intersector for Instanced<'_> {
             primitives: sum.primitives + f.primitives,
             build_seconds: sum.build_seconds + f.build_seconds,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Point, Vector};
+
+    #[test]
+    fn nothing_is_met_where_there_are_no_groups() {
+        let nothing = Instancing::default();
+        let empty = Instanced::new(&nothing, Vec::new());
+        empty.prepare_for(&ExpectedRays { rays: 1, threads: 1, beams: &[] });
+        let ray = Ray::new(Point::ZERO, Vector::X);
+        assert!(empty.intersect(&ray, &mut Cost::default()).is_none() && !empty.escapes(&ray));
     }
 }

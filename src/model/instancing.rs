@@ -175,10 +175,12 @@ impl Instancing {
         placed.map(|p| p.bounds.min.abs().max(p.bounds.max.abs()).max_element()).fold(0.0, f64::max)
     }
 
-    /// How often each group stands; the first one once, even if it has no faces. There must be a first.
+    /// How often each group stands; the first one once, even if it has no faces.
     pub fn counts(&self) -> Vec<usize> {
         let mut counts = vec![0; self.groups.len()];
-        counts[0] = 1;
+        if let Some(first) = counts.first_mut() {
+            *first = 1;
+        }
         self.placements.iter().for_each(|p| counts[p.group as usize] += 1);
         counts
     }
@@ -247,6 +249,11 @@ mod tests {
             }
         }
         assert!((instancing.reach(1) - 496.0).abs() < 0.2);
+    }
+
+    #[test]
+    fn nothing_has_no_groups() {
+        assert!(Instancing::default().counts().is_empty());
     }
 
     #[test]
