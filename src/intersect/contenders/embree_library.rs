@@ -2,6 +2,7 @@
 
 use libloading::{Library, Symbol};
 use std::ffi::{c_char, c_int, c_uint, c_void};
+use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::ptr::null_mut;
 use std::sync::Arc;
@@ -83,8 +84,8 @@ pub struct EmbreeLibrary {
     pub(super) intersect: Intersect1,
     /// Bytes that Embree holds; the box stays where Embree was told it is.
     held: Box<AtomicIsize>,
-    /// Closed last, for all above lies in it.
-    library: Library,
+    /// Never closed: Embree's worker threads run in it until the process ends.
+    library: ManuallyDrop<Library>,
 }
 
 // SAFETY: Embree's devices and committed scenes may be used by any thread (its manual, "Thread safety"); the functions are plain
@@ -131,7 +132,7 @@ impl EmbreeLibrary {
             }
             let held = Box::new(AtomicIsize::new(0));
             monitor(device, count_bytes, std::ptr::from_ref(&*held).cast_mut().cast());
-            Ok(Arc::new(Self { device, release_device, intersect, held, library }))
+            Ok(Arc::new(Self { device, release_device, intersect, held, library: ManuallyDrop::new(library) }))
         }
     }
 
@@ -197,7 +198,7 @@ const FLOAT3: c_int = 0x9003;
 
 impl Drop for EmbreeLibrary {
     fn drop(&mut self) {
-        // SAFETY: the device is this value's own, and the library still open.
+        // SAFETY: the device is this value's own, and the library stays open.
         #[allow(unsafe_code)]
         unsafe {
             (self.release_device)(self.device);
@@ -231,7 +232,7 @@ impl Scene {
 
 impl Drop for Scene {
     fn drop(&mut self) {
-        // SAFETY: the scene is this value's own, and its library still open.
+        // SAFETY: the scene is this value's own, and its library stays open.
         #[allow(unsafe_code)]
         unsafe {
             (self.release)(self.handle);
