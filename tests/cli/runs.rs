@@ -271,11 +271,22 @@ fn merged_parts_end_as_the_single_run_does() {
     let elsewhere = ["merge", "parts", "-o", "out", "--scene", "moved/scene.toml"];
     assert_eq!(lampyris_in(path, &[&elsewhere[..], &["--max-refused", "1", "--max-lost", "1"]].concat()).0, 0);
     // A part too few is waited for as long as was asked.
-    std::fs::remove_file(path.join("parts/shard-2-of-2.tally")).unwrap();
+    std::fs::rename(path.join("parts/shard-2-of-2.tally"), path.join("late")).unwrap();
     let start = std::time::Instant::now();
     let (code, _, err) = lampyris_in(path, &[&elsewhere[..], &["--wait", "1"]].concat());
     assert!(code == 3 && err.contains("shard 2/2"), "{code} {err}");
     assert!(start.elapsed() >= std::time::Duration::from_secs(1));
+    // So is one that is named, and comes while it is waited for.
+    let named = ["merge", "parts/shard-1-of-2.tally", "parts/shard-2-of-2.tally", "-o", "out", "--wait", "60"];
+    let rest = ["--scene", "moved/scene.toml", "--max-refused", "1", "--max-lost", "1"];
+    let (code, err) = std::thread::scope(|scope| {
+        let merge = scope.spawn(|| lampyris_in(path, &[&named[..], &rest].concat()));
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        std::fs::rename(path.join("late"), path.join("parts/shard-2-of-2.tally")).unwrap();
+        let (code, _, err) = merge.join().unwrap();
+        (code, err)
+    });
+    assert_eq!(code, 0, "{err}");
 }
 
 /// What a part cannot do is refused, and not dropped; a launcher says which part a process is.

@@ -60,6 +60,10 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let target = command.until_error.map(|text| ErrorTarget::new(text, &scene)).transpose()?;
     let job = SceneJob { meshing, tracing, cache, chosen: header.chosen(), ..SceneJob::new(scene, loaded) };
     let mut prepared = PreparedScene::new(job, &monitor)?;
+    // A part that is named is waited for as those of a folder are.
+    while let Some(absent) = part_files(command.parts)?.into_iter().find(|file| !file.exists())
+        && patience.wait_again(console, &format!("{} is not there yet", absent.display()))
+    {}
     let (mut whole, mut usage) = sum_parts(command, &header, &prepared)?;
     // Looked at again as a whole: parts may grow while they are waited for.
     while !whole.is_whole() && patience.wait_again(console, &missing_parts(&whole, &header)) {
