@@ -175,6 +175,10 @@ fn check_counts_no_defect_on_a_lens_and_its_rays_can_be_used_again() {
     let second: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(first["facets_vs_exact"], second["facets_vs_exact"]);
     std::fs::write(folder.path().join("torn.bin"), [0u8; 57]).unwrap();
+    for option in ["--rays", "--seed"] {
+        let (code, _, err) = lampyris_in(folder.path(), &["check", &lens, "--rays-in", "rays.bin", option, "5"]);
+        assert!(code == 2 && err.contains(&format!("does not take {option}")), "{code} {err}");
+    }
     let (code, _, err) = lampyris_in(folder.path(), &["check", &lens, "--rays-in", "torn.bin"]);
     assert!(code == 3 && err.contains("record 1"), "{err}");
 }

@@ -1,6 +1,7 @@
 //! `lampyris check`: octree against BVH against exact spline, ray by ray, and how fast each is.
 
 use crate::cli::arguments::command::CheckCommand;
+use crate::cli::arguments::options::TracingOptions;
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
@@ -55,6 +56,9 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         Input::Step(loaded) => (None, loaded),
         Input::Scene(scene, loaded) => (Some(&**scene), loaded),
     };
+    if given.is_some() && scene.is_none() {
+        refuse_unused_options(&command.tracing)?;
+    }
     let model = &loaded.model;
     let monitor = TerminalMonitor::new(console);
     let requested = (command.meshing.settings(), command.tracing.settings());
@@ -122,6 +126,16 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     // Last, for the answer counts although faces are missing.
     let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
     Ok(refused.and(report_defects(&found, console)))
+}
+
+/// Refuses options of rays where a file has all of them; a scene is traced with rays of its own besides.
+fn refuse_unused_options(tracing: &TracingOptions) -> Result<(), Failure> {
+    let given = [("--rays", tracing.ray_range.is_some()), ("--seed", tracing.seed.is_some())];
+    let Some((option, _)) = given.iter().find(|(_, is_given)| *is_given) else { return Ok(()) };
+    let failure = Failure::arguments(format!(
+        "check --rays-in does not take {option}: the file of --rays-in has all of them"
+    ));
+    Err(failure.with_help("leave it out"))
 }
 
 /// Says what no check may find (no facets, answers that differ on the same facets, differences without a cause); incomplete if any was

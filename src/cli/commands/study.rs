@@ -87,13 +87,19 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     let m = &command.meshing;
     let t = &command.tracing;
     let traces_scene = kind == Effects;
-    let faceted = matches!(kind, Effects | Bvh | Accuracy);
+    // The race of hierarchies takes a tolerance, but the same on all faces.
+    let faceted = matches!(kind, Effects | Accuracy);
     let given = [
         ("--intersector", t.intersector.is_some(), traces_scene, "it compares those that it is about"),
         ("--normals", t.normals.is_some(), traces_scene, "it compares those that it is about"),
         ("--rays", t.ray_range.is_some(), kind != Stability, "its questions are fixed"),
         ("--seed", t.seed.is_some(), kind != Stability, "its questions are fixed"),
-        ("--tolerance", m.tolerance.is_some(), faceted || kind == Complexity, "it goes through several of its own"),
+        (
+            "--tolerance",
+            m.tolerance.is_some(),
+            faceted || matches!(kind, Bvh | Complexity),
+            "it goes through several of its own",
+        ),
         ("--angle", m.angle_deg.is_some(), faceted, "it goes through facets of its own"),
         ("--embree", command.embree.is_some(), kind == Bvh, "it compares those that it is about"),
         ("--rays-in", command.rays_in.is_some(), kind == Bvh, "it asks rays of its own"),
@@ -104,6 +110,8 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
             "the file of --rays-in has all of them",
         ),
         ("--part", !m.part.is_empty(), faceted, "it goes through facets of its own"),
+        ("--face", !m.face.is_empty(), faceted, "it goes through facets of its own"),
+        ("--role", !m.role.is_empty(), faceted, "it goes through facets of its own"),
     ];
     // The first one is told; the others would be in vain too.
     let idle = given.iter().find(|(_, given, used, _)| *given && !used);
