@@ -63,7 +63,7 @@ pub struct PathVertex {
     pub ray: u64,
     /// Which path of a ray that was split; a new branch starts where it split off.
     pub branch: u32,
-    /// Hits before this vertex; where light was scattered inside a body, that one included.
+    /// Hits before this vertex, scattering inside bodies among them.
     pub bounce: u32,
     /// Where it is, mm, in scene coordinates.
     pub point: Point,

@@ -2,7 +2,9 @@
 
 use crate::support::World;
 use lampyris::math::Point;
-use lampyris::simulate::{Event, Hooks, PartialRun, Results, RunSettings, Scene, SequenceResult, trace};
+use lampyris::simulate::{
+    Event, Hooks, MOST_STEPS, PartialRun, Results, RunSettings, Scene, SequenceResult, recorded_ways, trace,
+};
 use std::path::Path;
 
 const GLASS: &str = "[[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart = 'glass'\nmedium = 'glass'\n";
@@ -110,4 +112,26 @@ fn parts_of_a_run_have_the_sequences_of_the_whole() {
         Results::new(&bound, &RunSettings::from(&scene.run), traced).sequences
     };
     assert_eq!(results(whole), results(sum));
+}
+
+/// Scattering inside a body is a step as a hit of a face is: in the order of the path, and told of light that is counted right after it.
+#[test]
+fn scattering_in_a_body_is_a_step_in_its_place() {
+    let mut world = World::default();
+    world.sphere("fog", Point::ZERO, 10.0);
+    let text = "[run]\nrays = 500\n[[medium]]\nname = 'fog'\nindex = 1.5\nscatter_per_mm = 0.1\n\
+                [[material]]\npart = 'fog'\nmedium = 'fog'\n[[source]]\nkind = 'point'\nat = [0, 0, 0]\n\
+                [[receiver]]\nname = 'all'\nkind = 'sphere'\nat = [0, 0, 0]\nradius = 40\n";
+    let paths = world.run(text, |s| s.path_samples = s.rays).paths;
+    assert!(paths.iter().filter(|v| v.event == Event::Scattered).count() > 200);
+    let ways = recorded_ways(&paths);
+    for (path, way) in paths.chunk_by(|a, b| a.ray == b.ray).zip(&ways) {
+        let [first, hits @ .., last] = path else { panic!("{path:?}") };
+        // The source, then the hits by their number, then the receiver: outside the ball, so that the last hit is of its face.
+        assert_eq!((first.bounce, last.bounce as usize, last.event), (0, hits.len(), Event::Received));
+        assert!(hits.iter().enumerate().all(|(k, hit)| hit.bounce as usize == k), "{hits:?}");
+        assert_eq!(hits.last().unwrap().event, Event::Transmitted);
+        let told: Vec<_> = hits.iter().map(|hit| (hit.face, hit.event)).take(MOST_STEPS).collect();
+        assert_eq!(way.steps.iter().map(|s| (s.face, s.event)).collect::<Vec<_>>(), told);
+    }
 }

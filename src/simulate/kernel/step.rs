@@ -280,8 +280,9 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         path.length += ray.t_max;
         // Light that was held by total reflection has another direction now, and may get out.
         path.release();
-        path.bounce += 1;
+        // Before it is counted among the hits, as at a face: vertices of a path stand in the order of their hits.
         self.record(path, point, Event::Scattered, None);
+        path.bounce += 1;
         let direction = scatter.sample(ray.direction, numbers);
         if let Some(stokes) = path.payload.stokes_mut() {
             *stokes = Stokes::unpolarised(1.0, direction);
