@@ -55,7 +55,7 @@ pub(crate) enum Shape {
 pub(crate) struct Spot {
     pub(crate) cell: usize,
     pub(crate) at: [f64; 2],
-    /// Squared distance from the centre in units of the larger half side; of angles, each in units of its own half range.
+    /// Squared distance from the centre in units of the larger half side, or of the larger half range of angles.
     pub(crate) radius2: f64,
 }
 
@@ -230,7 +230,11 @@ impl Receiver {
         }
         let part = |a: f64, i: usize| (2.0 * (a - low[i]) / (high[i] - low[i]) - 1.0).clamp(-1.0, 1.0);
         let at = [part(h, 0), part(v, 1)];
-        Some(self.spot_at(at, at[0] * at[0] + at[1] * at[1]))
+        // In units of the longer half range, in which distances are told: a degree is as long along both.
+        let range = [high[0] - low[0], high[1] - low[1]];
+        let longest = range[0].max(range[1]);
+        let [x, y] = [at[0] * (range[0] / longest), at[1] * (range[1] / longest)];
+        Some(self.spot_at(at, x * x + y * y))
     }
 
     /// Returns the spot at a place given in half sides, from −1 to 1, with its cell; the upper border belongs to the last cell.
@@ -339,6 +343,17 @@ mod tests {
             let r = far(angles, [-90.0, 90.0], [-90.0, 90.0], [2, 2]);
             assert_eq!(r.direction(Vector::new(-0.1, 0.1, 1.0).normalize()).unwrap().cell, 3);
             assert_eq!(r.direction(Vector::new(0.1, -0.1, 1.0).normalize()).unwrap().cell, 0);
+        }
+    }
+
+    #[test]
+    fn distances_in_a_far_field_are_in_units_of_its_longer_half_range() {
+        let r = far(FarFieldType::A, [-90.0, 90.0], [-20.0, 20.0], [9, 2]);
+        for [h, v] in [[0.0, 18.0], [-45.0, 0.0], [30.0, -10.0f64]] {
+            let (h_rad, v_rad) = (h.to_radians(), v.to_radians());
+            let to = Vector::new(-h_rad.sin() * v_rad.cos(), v_rad.sin(), h_rad.cos() * v_rad.cos());
+            let distance = 90.0 * r.direction(to).unwrap().radius2.sqrt();
+            assert!((distance - h.hypot(v)).abs() < 1e-9, "{h} {v}: {distance}");
         }
     }
 
