@@ -257,3 +257,22 @@ fn few_replicates_are_named() {
     };
     assert!(notes(2)[0].contains("12.71") && notes(8)[0].contains("2.36") && notes(32).is_empty());
 }
+
+/// A beam of radius 5 of which what lies beyond 3 from its axis, (arccos 0.6 − 0.48)/π = 0.1424 of it, starts half-way up a plate of 3 mm
+/// that absorbs 1/mm: 1 − e^(−1.5) on the way out, and 1 − e^(−3) of what is left and reflected, 4 %.
+#[test]
+fn a_source_that_straddles_a_boundary_is_seen_with_two_replicates() {
+    let mut world = World::default();
+    world.cuboid("glass", Point::new(3.0, -50.0, 0.0), Point::new(50.0, 50.0, 3.0));
+    let within = (0.6f64.acos() - 0.48) / std::f64::consts::PI;
+    let expected = within * (1.0 - (-1.5f64).exp() + 0.04 * (-1.5f64).exp() * (1.0 - (-3.0f64).exp()));
+    for seed in 1..5 {
+        let text = format!(
+            "[run]\nrays = 20000\nreplicates = 2\nseed = {seed}\n[[medium]]\nname = 'glass'\nindex = 1.5\n\
+             absorption_per_mm = 1\n[[material]]\npart = 'glass'\nmedium = 'glass'\n\
+             [[source]]\nkind = 'collimated'\nat = [0, 0, 1.5]\ndirection = [0, 0, 1]\nradius = 5\n"
+        );
+        let absorbed = world.run(&text, |_| ()).power.absorbed;
+        assert!((absorbed / expected - 1.0).abs() < 0.03, "seed {seed}: {absorbed} {expected}");
+    }
+}

@@ -28,17 +28,17 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Decides what the rays of one source start in, from up to [`PROBED_RAYS`] of its rays, each of another replicate: the same bodies where
-/// all agree and none starts on a face.
+/// Decides what the rays of one source start in, from [`PROBED_RAYS`] of its rays, of as many replicates as there are: the same bodies
+/// where all agree and none starts on a face.
 fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> StartingMedia {
     // Stated media are believed; only starts on faces are still looked for.
     let stated = emitter.media_stated || !context.bound.has_media();
     let replicates = context.plan.replicates;
-    let probed = PROBED_RAYS.min(u64::from(replicates));
     let mut first: Option<Bodies> = None;
-    for k in 0..probed {
-        // One ray of each of so many replicates: they are spread over the whole of a ray list.
-        let replicate = (k * u64::from(replicates) / probed) as u32;
+    for k in 0..PROBED_RAYS {
+        // Over all replicates and the whole of each: they are spread over the whole of a ray list. As many where replicates are few, of
+        // which each has several then: two rays would tell nothing of a source that straddles a boundary.
+        let replicate = (k * u64::from(replicates) / PROBED_RAYS) as u32;
         let [from, to] = context.plan.range(source, replicate);
         if from == to {
             continue;
