@@ -75,8 +75,7 @@ pub fn trace(
         hooks,
         start,
         // Of a shard, its share of the rays: progress is told of what this run traces.
-        total: context.plan.rays * u64::from(shard.end.saturating_sub(shard.start))
-            / u64::from(context.plan.replicates),
+        total: rays_of_replicates(context.plan.rays, &shard, context.plan.replicates),
         next: AtomicUsize::new(0),
         stop: AtomicBool::new(false),
         rays_done: AtomicU64::new(before.tallies.counts.rays),
@@ -100,6 +99,13 @@ fn shard_replicates(all: Range<u32>, [shard, shards]: [u32; 2]) -> Range<u32> {
     let count = u64::from(all.end.saturating_sub(all.start));
     let first = |k: u32| all.start + (count * u64::from(k) / u64::from(shards.max(1))).min(count) as u32;
     first(shard)..first(shard.saturating_add(1))
+}
+
+/// Returns the number of rays in some of the `replicates` replicates of a run of so many rays, to within one.
+fn rays_of_replicates(rays: u64, some: &Range<u32>, replicates: u32) -> u64 {
+    // Of a run of 3·10¹¹ rays that grows the product does not fit into 64 bits.
+    let product = u128::from(rays) * u128::from(some.end.saturating_sub(some.start));
+    (product / u128::from(replicates)) as u64
 }
 
 /// What the threads of a run share.
@@ -212,4 +218,17 @@ pub fn replicate_range(bound: &BoundScene, settings: &RunSettings) -> Range<u32>
 /// Whether a run is divided into replicates of [`GROWING_REPLICATE`](super::GROWING_REPLICATE) rays, so that further ones may follow.
 pub fn grows(bound: &BoundScene, settings: &RunSettings) -> bool {
     Plan::new(bound, settings).grows()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rays_of_replicates;
+
+    #[test]
+    fn rays_of_a_huge_run_are_counted() {
+        // 80 million replicates of 5000 rays, and the second half of them.
+        let (rays, replicates) = (400_000_000_000, 80_000_000);
+        assert_eq!(rays_of_replicates(rays, &(0..replicates), replicates), rays);
+        assert_eq!(rays_of_replicates(rays, &(40_000_000..replicates), replicates), rays / 2);
+    }
 }

@@ -26,6 +26,7 @@ fn values_out_of_range_are_refused_by_name() {
         ("[[model]]\nfile = \"x.stp\"\nunit_mm = 0", "unit_mm"),
         ("[[model]]\nfile = \"x.stp\"\nplacement = { scale = -1 }", "scale"),
         ("[run]\nrays = 0", "rays"),
+        ("[run]\nrays = 3e13", "2e13"),
         ("[run]\nray = 10", "ray"),
     ] {
         let said = refusal(head);

@@ -25,6 +25,9 @@ const GLUES_MM: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 /// Wavelengths that may be asked for, nm: from X-rays to a millimetre.
 const WAVELENGTHS_NM: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
+/// Most rays of a run: of one that grows, the 32 bits that number its replicates of 5000 rays hold no more.
+const MOST_RAYS: u64 = 20_000_000_000_000;
+
 /// Settings of the run.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -193,7 +196,7 @@ impl Run {
             Err(scene.error(ErrorKind::Value, &[Key::Name("run"), Key::Name(key)], format!("`{key}` {message}")))
         };
         match self {
-            r if r.rays == 0 || r.rays >= 1 << 47 => fail("rays", "must be from 1 to 1e14"),
+            r if r.rays == 0 || r.rays > MOST_RAYS => fail("rays", "must be from 1 to 2e13"),
             r if r.replicates < 2 || r.replicates > 1 << 16 => fail("replicates", "must be from 2 to 65536"),
             r if !(0.0..1.0).contains(&r.power_floor) => fail("power_floor", "must be in [0, 1)"),
             r if !(0.0..=1.0).contains(&r.split_floor) => fail("split_floor", "must be in [0, 1]"),
