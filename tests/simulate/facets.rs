@@ -163,3 +163,22 @@ fn errors_of_maps_are_what_whole_runs_differ_by() {
         assert_eq!(r.cells.len(), f.cells.len());
     }
 }
+
+/// Of light of one wavelength lumens are power times a number, and so are the errors of their cells: pooled by the rays that came,
+/// not by how much each counts.
+#[test]
+fn errors_of_lumens_are_pooled_as_those_of_power() {
+    let lumens = "[[receiver]]\nname = 'lumens'\nat = [0, 0, 990]\nsize = [2000, 2000]\ncells = [32, 32]\n\
+                  absorbs = false\nchannels = 'photometric'\n";
+    let case = case("s3_reflector.toml", lumens, 1 << 15);
+    let made = tessellate(&case.model, &tessellate::Settings { tolerance: [0.2; 2], ..Default::default() });
+    let octree = Octree::build(&made.mesh, &octree::Settings::default());
+    let found = geometric_error(&case.bound, [&octree, &case.exact], &case.settings);
+    let receiver = found.receivers.iter().find(|r| r.name == "lumens").unwrap();
+    let channel = &receiver.channels[0];
+    let efficacy = channel.total.spline / receiver.power.spline;
+    for (of_power, of_lumens) in receiver.cells.iter().zip(&channel.cells) {
+        assert!((of_power * efficacy - of_lumens).abs() <= 1e-4 * of_lumens, "{of_power} {efficacy} {of_lumens}");
+    }
+    assert!(receiver.pooled_cells < 32 && efficacy > 0.0, "{} {efficacy}", receiver.pooled_cells);
+}

@@ -68,6 +68,8 @@ struct Block {
 pub(super) struct CellPairs<'r> {
     grid: [usize; 2],
     cells: Vec<Cell>,
+    /// The cells of power, whose quanta tell how many rays came; `None` where the layer's own do, as it is not weighted.
+    power: Option<Vec<Cell>>,
     /// From quanta to the receiver's unit, cell by cell; 0 for cells off a disc, where no light is counted.
     unit: Vec<f64>,
     /// The inverse of that, and 0 too off a disc.
@@ -84,10 +86,16 @@ impl<'r> CellPairs<'r> {
         let (receiver, result) = (&bound.receivers[k], &runs[1].results.receivers[k]);
         let replicates = runs.map(|run| run.replicates.iter().filter_map(|r| r.get(k)).collect::<Vec<_>>());
         let grid = result.grid;
-        let mut cells = vec![Cell::default(); grid[0] * grid[1]];
-        for (facets, spline) in replicates[0].iter().zip(&replicates[1]) {
-            add_replicate(&mut cells, facets.layers.get(layer)?, spline.layers.get(layer)?);
-        }
+        let cells_of_layer = |layer: usize| {
+            let mut cells = vec![Cell::default(); grid[0] * grid[1]];
+            for (facets, spline) in replicates[0].iter().zip(&replicates[1]) {
+                add_replicate(&mut cells, facets.layers.get(layer)?, spline.layers.get(layer)?);
+            }
+            Some(cells)
+        };
+        let worth = if layer == 0 { 1.0 } else { receiver.channels.worth() };
+        let power = if worth == 1.0 { None } else { Some(cells_of_layer(0)?) };
+        let mut cells = cells_of_layer(layer)?;
         // At least two, for a variance divides by one less.
         let n = replicates[1].len().max(2) as f64;
         for c in &mut cells {
@@ -97,13 +105,12 @@ impl<'r> CellPairs<'r> {
         }
         // Lux and W/m² of cells in mm².
         let scale = if result.kind == "far_field" { 1.0 } else { 1e6 };
-        let worth = if layer == 0 { 1.0 } else { receiver.channels.worth() };
         let quantum = runs[1].results.quantum * worth;
         let per_measure = |m: f64| if m > 0.0 { quantum * scale / m } else { 0.0 };
         let unit: Vec<f64> =
             (0..cells.len()).map(|c| per_measure(receiver.measure(c % grid[0], c / grid[0]))).collect();
         let measure = unit.iter().map(|u| if *u > 0.0 { 1.0 / u } else { 0.0 }).collect();
-        Some(Self { grid, cells, unit, measure, replicates, layer })
+        Some(Self { grid, cells, power, unit, measure, replicates, layer })
     }
 
     /// Goes through the indices of the cells of a block, as far as the grid goes.
@@ -196,7 +203,10 @@ impl<'r> CellPairs<'r> {
         let mut stack = vec![Block { x: 0, y: 0, side: self.covering_side() }];
         while let Some(block) = stack.pop() {
             let quanta = |of: fn(&Cell) -> f64| self.cells_of(block).map(|c| of(&self.cells[c])).sum::<f64>();
-            let rays = quanta(|c| c.facets).max(quanta(|c| c.spline)) / QUANTA;
+            let counted = self.power.as_ref().unwrap_or(&self.cells);
+            let power = |of: fn(&Cell) -> f64| self.cells_of(block).map(|c| of(&counted[c])).sum::<f64>();
+            // A quantum of a weighted channel is a small part of one of power: its own would be taken for far fewer rays.
+            let rays = power(|c| c.facets).max(power(|c| c.spline)) / QUANTA;
             if rays == 0.0 {
                 continue;
             }
