@@ -31,16 +31,13 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
             {
                 continue;
             }
+            // A receiver that lets light pass counts it before the medium and the next face take their part.
+            let power = if receiver.absorbs { b.power } else { a.power } * share;
             let (ray, end) = (Ray::new(a.point, direction), segment_end(a, b, receiver.absorbs));
             let mut after = 0.0;
             // A sphere may be crossed twice by one segment.
             while let Some(t) = receiver.crossing(&ray, after, end) {
-                rays.push(LightRay {
-                    origin: ray.point_at(t),
-                    direction,
-                    power: b.power * share,
-                    wavelength_nm: None,
-                });
+                rays.push(LightRay { origin: ray.point_at(t), direction, power, wavelength_nm: None });
                 after = t;
             }
         }

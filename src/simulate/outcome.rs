@@ -67,7 +67,7 @@ pub struct PathVertex {
     pub bounce: u32,
     /// Where it is, mm, in scene coordinates.
     pub point: Point,
-    /// Power that arrives here, as a share of an average ray; at a coated or partly reflecting face what goes on this way.
+    /// Power that goes on from here, as a share of an average ray; where the path ends, what arrives.
     pub power: f64,
     /// What happens here.
     pub event: Event,

@@ -3,7 +3,8 @@
 use crate::support::World;
 use lampyris::math::Point;
 use lampyris::simulate::{
-    Event, Hooks, MOST_STEPS, PartialRun, Results, RunSettings, Scene, SequenceResult, recorded_ways, trace,
+    Event, Hooks, MOST_STEPS, PartialRun, Results, RunSettings, Scene, SequenceResult, arrivals, recorded_ways,
+    trace,
 };
 use std::path::Path;
 
@@ -133,5 +134,32 @@ fn scattering_in_a_body_is_a_step_in_its_place() {
         assert_eq!(hits.last().unwrap().event, Event::Transmitted);
         let told: Vec<_> = hits.iter().map(|hit| (hit.face, hit.event)).take(MOST_STEPS).collect();
         assert_eq!(way.steps.iter().map(|s| (s.face, s.event)).collect::<Vec<_>>(), told);
+    }
+}
+
+/// What recorded paths brought to a receiver that lets light pass is what it counted, whatever the medium and the faces after it take.
+#[test]
+fn arrivals_at_a_passing_receiver_have_the_power_that_it_counted() {
+    let mut world = World::default();
+    world.sphere("glass", Point::ZERO, 5.0).cuboid("plate", Point::new(-9.0, -9.0, 8.0), Point::new(9.0, 9.0, 9.0));
+    let text = [
+        "[run]\nrays = 1000\n[[medium]]\nname = 'glass'\nindex = 1.5\nabsorption_per_mm = 0.1\n",
+        "[[material]]\npart = 'glass'\nmedium = 'glass'\n",
+        "[[material]]\npart = 'plate'\nsurface = 'mirror'\nreflectance = 0.8\n",
+        "[[source]]\nkind = 'collimated'\nat = [0, 0, -20]\ndirection = [0, 0, 1]\nradius = 4\n",
+        "[[receiver]]\nname = 'before'\nat = [0, 0, -7]\nsize = [50, 50]\nabsorbs = false\n",
+        "[[receiver]]\nname = 'within'\nat = [0, 0, 0]\nsize = [8, 8]\nabsorbs = false\n",
+        "[[receiver]]\nname = 'mirror'\nat = [0, 0, 7]\nsize = [50, 50]\nabsorbs = false\n",
+        "[[receiver]]\nname = 'end'\nkind = 'sphere'\nat = [0, 0, 0]\nradius = 40\n",
+    ];
+    for interfaces in ["roulette", "split"] {
+        let text = text.concat().replace("[run]", &format!("[run]\ninterfaces = '{interfaces}'"));
+        let results = world.run(&text, |s| s.path_samples = s.rays);
+        let scene = Scene::parse(&text, "test.toml", Path::new(".")).unwrap();
+        let bound = scene.bind(&world.model).unwrap();
+        for (k, receiver) in results.receivers.iter().enumerate() {
+            let arrived: f64 = arrivals(&bound, k, &results).iter().map(|ray| ray.power).sum();
+            assert!((arrived / receiver.power - 1.0).abs() < 1e-9, "{} {interfaces}: {arrived}", receiver.name);
+        }
     }
 }

@@ -132,8 +132,9 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             }
             Interaction::Reflect { kept, direction, payload } => {
                 path.release();
-                self.record(path, at.point, Event::Reflected, Some(at.hit.face));
+                // Recorded with what goes on, as where light is divided.
                 self.absorb_in_face(path, at.hit.face, kept);
+                self.record(path, at.point, Event::Reflected, Some(at.hit.face));
                 path.payload = payload;
                 Some(direction)
             }
