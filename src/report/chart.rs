@@ -121,10 +121,10 @@ pub enum SeriesStyle {
 }
 
 /// Colours of series, apart in print and with colour blindness, readable on white and on black.
-pub(super) const PALETTE: [&str; 8] =
-    ["#d97706", "#3b82f6", "#10a37f", "#e0529c", "#8b5cf6", "#0ea5b7", "#b45309", "#84a30d"];
+pub(super) const PALETTE: [&str; 10] =
+    ["#d97706", "#3b82f6", "#10a37f", "#e0529c", "#8b5cf6", "#0ea5b7", "#b45309", "#84a30d", "#64748b", "#dc2626"];
 
-/// Returns the colour of each series; a dashed one has that of the series before it, whose reference it is. Colours repeat after eight.
+/// Returns the colour of each series; a dashed one has that of the series before it, whose reference it is. Colours repeat after ten.
 pub(super) fn colours(series: &[Series]) -> Vec<&'static str> {
     let mut used = 0usize;
     let colour = |s: &Series| {

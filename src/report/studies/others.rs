@@ -225,8 +225,14 @@ pub(super) fn bvh(rows: &[&Value]) -> Parts {
                     let threads = r["threads"].as_u64().unwrap_or(1);
                     let call = if threads > 1 { format!("{threads} threads") } else { text(r, "call").to_owned() };
                     row["size"] = Value::from(format!("{} facets, {call}", facets(r)));
-                    if text(r, "build") == "very slow" {
-                        row["intersector"] = Value::from(format!("{}, slow build", text(r, "intersector")));
+                    // Of one name twice in the race each bar says which it is.
+                    let twin = match text(r, "build") {
+                        "very slow" => Some("slow build"),
+                        build @ ("triangles" | "quads") => Some(build),
+                        _ => None,
+                    };
+                    if let Some(build) = twin {
+                        row["intersector"] = Value::from(format!("{}, {build}", text(r, "intersector")));
                     }
                 }
                 row
