@@ -57,14 +57,14 @@ impl Styles {
     }
 }
 
-/// Returns the first surface colour that a style leads to within [`MAX_STEPS`] entities; `None` without one, or where a reference leads
-/// nowhere before.
+/// Returns the first surface colour that a style leads to within [`MAX_STEPS`] entities; `None` without one.
 fn colour(file: &File<'_>, style: u64) -> Option<Colour> {
     let mut queue = vec![style];
     let mut at = 0;
     while at < queue.len() && at < MAX_STEPS {
-        let e = file.entity(queue[at])?;
         at += 1;
+        // A reference that leads nowhere ends its own branch only.
+        let Some(e) = file.entity(queue[at - 1]) else { continue };
         // Six entities may stand between an item and its colour, and writers differ in which: all that a style
         // leads to is looked at.
         if let Some(found) = rgb(e) {
