@@ -80,8 +80,11 @@ impl Conic {
     /// Returns the profile from the vertex `(0, z0)` to `(reach, z0 + sag)` in the x–z plane, mm, exact as one rational quadratic; a line
     /// where it is flat. Fails for a radius of zero, a reach that is not positive, or one beyond the conic's.
     pub(super) fn profile(&self, z0: f64, reach: f64) -> Result<Curve, ShapeError> {
-        // One over the radius: a plane's is zero, and a radius of no number or zero is told with it.
-        check_value("a radius of curvature", 1.0 / self.radius, self.radius != 0.0, "anything but zero")?;
+        // The curvature must be a number, which a plane's is too: the radius itself need not be finite.
+        if !(1.0 / self.radius).is_finite() {
+            let (what, allowed) = ("a radius of curvature", "anything but zero");
+            return Err(ShapeError { what, value: self.radius, allowed });
+        }
         check_value("a conic constant", self.conic, true, "a finite number")?;
         check_value("the half aperture", reach, reach > 0.0, "positive")?;
         let sag = self.sag_within(reach)?;
@@ -140,6 +143,7 @@ mod tests {
     fn an_aperture_beyond_the_sphere_is_refused() {
         let e = Conic::sphere(10.0).profile(0.0, 11.0).unwrap_err();
         assert!(e.to_string().contains("half aperture is 11"), "{e}");
-        assert!(Conic::sphere(0.0).profile(0.0, 1.0).is_err());
+        let e = Conic::sphere(0.0).profile(0.0, 1.0).unwrap_err();
+        assert_eq!(e.to_string(), "a radius of curvature is 0, but must be anything but zero");
     }
 }
