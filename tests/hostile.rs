@@ -56,6 +56,7 @@ fn a_bad_record_costs_that_record() {
         "#900=A(1e999,.X,\"12);\n",
         "/* open comment",
         "#900=();\n#901=A()B();\n",
+        "#900=DIRECTION('',,(0.,0.,1.));\n",
     ] {
         let import = import(&square(bad));
         assert_eq!(import.report.faces.converted, 1, "{bad}");

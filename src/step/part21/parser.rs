@@ -137,9 +137,8 @@ impl Parser<'_> {
                     } else {
                         Ok(())
                     };
-                    match outcome.and_then(|()| self.end()) {
-                        Ok(()) => {}
-                        Err(what) => self.fault(start, None, what),
+                    if let Err(what) = outcome.and_then(|()| self.end()) {
+                        self.fault(start, None, what);
                     }
                 }
                 b';' => self.at += 1,
@@ -198,10 +197,8 @@ impl Parser<'_> {
             }
             let rest = &self.source[self.at..];
             if rest.starts_with(b"/*") {
-                match rest[2..].windows(2).position(|w| w == b"*/") {
-                    Some(p) => self.at += p + 4,
-                    None => self.at = self.source.len(),
-                }
+                let end = rest[2..].windows(2).position(|w| w == b"*/");
+                self.at = end.map_or(self.source.len(), |p| self.at + p + 4);
             } else if rest.starts_with(b"\\N\\") || rest.starts_with(b"\\F\\") {
                 self.at += 3;
             } else {
@@ -306,7 +303,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// Reads a list from its '(' to behind its ')'; empty places between commas are left out.
+    /// Reads a list from its '(' to behind its ')'; a missing comma, or one behind the last value, is forgiven.
     fn list(&mut self, depth: usize) -> Parsed<Span> {
         if depth > MAX_DEPTH {
             return Err("lists are nested too deeply");
@@ -317,11 +314,13 @@ impl Parser<'_> {
         loop {
             match self.peek() {
                 b')' => break,
-                b',' => self.at += 1,
+                // Left out in silence, it would shift all values behind it.
+                b',' => return Err("a value is missing before a comma"),
                 END => return Err("the file ends inside a list"),
                 c => {
                     let value = self.value(c, depth)?;
                     self.stack.push(value);
+                    self.at += usize::from(self.peek() == b',');
                 }
             }
         }
