@@ -52,12 +52,24 @@ pub(crate) fn read_context(context: Entity<'_, '_>) -> Assigned {
     }
     if let Some(args) = context.attributes("GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT", 2) {
         let list = args.list(0);
-        let values = (0..list.len()).filter_map(|i| list.entity(i));
+        let measures = (0..list.len()).filter_map(|i| list.entity(i));
         // The smallest of several is the one that all shapes keep.
-        let lengths = values.filter_map(|m| m.all_args().find_map(|a| a.real(0))).filter(|&x| x > 0.0);
-        assigned.units.accuracy = lengths.reduce(f64::min).map(|x| x * assigned.units.length);
+        let lengths = measures.filter_map(|m| uncertain_length(m, assigned.units.length)).filter(|&x| x > 0.0);
+        assigned.units.accuracy = lengths.reduce(f64::min);
     }
     assigned
+}
+
+/// Returns the length of an uncertainty, mm, in its own unit or, where it has none, in the context's of `unit` mm; `None` for angles and
+/// other quantities.
+fn uncertain_length(uncertainty: Entity<'_, '_>, unit: f64) -> Option<f64> {
+    let args = uncertainty.all_args().find(|a| a.real(0).is_some())?;
+    let factor = match args.entity(1).and_then(|u| unit_factor(u, 0)) {
+        Some((kind, factor, _)) => (kind == Kind::Length).then_some(factor)?,
+        // The name of the value tells what it measures where the unit does not.
+        None => args.typed(0).is_none_or(|(name, _)| name.ends_with("LENGTH_MEASURE")).then_some(unit)?,
+    };
+    Some(args.real(0)? * factor)
 }
 
 /// What a unit measures.
@@ -131,4 +143,28 @@ fn conventional_unit(name: &str) -> Option<(Kind, f64)> {
 /// Returns all contexts of a file that assign units, by their ids.
 pub(crate) fn contexts<'f, 'a>(file: &'f File<'a>) -> impl Iterator<Item = (u64, Assigned)> + use<'f, 'a> {
     file.entities().filter(|e| e.is_a("GLOBAL_UNIT_ASSIGNED_CONTEXT")).map(|e| (e.id, read_context(e)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::step::part21;
+
+    #[test]
+    fn an_uncertainty_is_a_length_in_its_own_unit() {
+        // A context in metres with an accuracy of 0.02 mm, one of an angle that is smaller, and one without a unit.
+        for (list, expected) in [("#5,#6", Some(0.02)), ("#6", None), ("#7", Some(3.0))] {
+            let text = format!(
+                "ISO-10303-21;\nDATA;\n#1=(GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({list}))\
+                 GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+                 #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+                 #4=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n\
+                 #5=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.02),#4,'','');\n\
+                 #6=UNCERTAINTY_MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE(1E-9),#3,'','');\n\
+                 #7=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.003),$,'','');\nENDSEC;\n"
+            );
+            let file = part21::parse("units.stp", text.as_bytes()).unwrap();
+            assert_eq!(read_context(file.entity(1).unwrap()).units.accuracy, expected, "{list}");
+        }
+    }
 }
