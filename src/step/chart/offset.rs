@@ -18,7 +18,7 @@ pub(crate) const TOLERANCE: f64 = 1e-6;
 /// Most cells in one direction.
 const MAX_CELLS: usize = 256;
 
-/// Returns the chart of the surface at `distance`, mm, along Su × Sv of `basis`. `None` where a radius does not stay positive, the basis
+/// Returns the chart of the surface at `distance`, mm, along Su × Sv of `basis`. `None` where nothing is left of a radius, the basis
 /// has no ends, or no fit within [`WORST_FIT_MM`] is found; the error of a fit is in the chart.
 pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
     let mut chart = match &basis.kind {
@@ -29,11 +29,16 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
             Chart::new(Kind::Plane { frame }, Analytic::Plane { frame })
         }
         Kind::Cone { frame, radius, half_angle } => {
-            let (frame, half_angle) = (*frame, *half_angle);
+            let (mut frame, half_angle) = (*frame, *half_angle);
             // Seen across the axis a step along the tilted normal is longer by 1/cos: the moved slant line cuts the radius there.
-            let radius = radius + distance / half_angle.cos();
+            let mut radius = radius + distance / half_angle.cos();
             if !(radius > 0.0) {
-                return None;
+                if half_angle == 0.0 || radius.is_nan() {
+                    return None;
+                }
+                // The apex has passed the origin: what is left of the cone is counted from there.
+                frame.origin -= radius / half_angle.tan() * frame.z;
+                radius = 0.0;
             }
             let analytic = match half_angle {
                 0.0 => Analytic::Cylinder { frame, radius },
