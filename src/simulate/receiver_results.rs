@@ -3,6 +3,7 @@
 use super::receiver::{Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
 use super::tallies::Tallies;
+use super::tally::Sum;
 use serde::{Serialize, Serializer};
 
 /// Square millimetres to a square metre.
@@ -95,6 +96,28 @@ fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S:
     a.serialize(s)
 }
 
+impl ChannelResult {
+    /// The figures of channel `c` from the sums of its total and its cells; `quantum` and `per` make power and density of a count, the
+    /// latter by the cell.
+    fn new(
+        r: &Receiver,
+        (c, total, sums): (usize, &Sum, &[Sum]),
+        tallies: &Tallies,
+        (quantum, per): (f64, &impl Fn(usize) -> f64),
+        unit: &'static str,
+    ) -> Self {
+        let worth = r.channels.worth();
+        Self {
+            name: r.channels.name(c),
+            unit,
+            total: total.total as f64 * quantum * worth,
+            error: total.error(tallies.replicates) * quantum * worth,
+            cells: sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k) * worth).collect(),
+            errors: sums.iter().enumerate().map(|(k, s)| s.error(tallies.replicates) * per(k) * worth).collect(),
+        }
+    }
+}
+
 impl ReceiverResult {
     /// The figures of receiver `i`: sums of quanta turned into densities and their errors; `ray` is the most quanta of a ray.
     pub(super) fn new(
@@ -125,32 +148,13 @@ impl ReceiverResult {
         let off: Vec<usize> = (0..r.cell_count()).filter(|&k| measure(k) == 0.0).collect();
         // No light is counted off a disc: nothing over nothing stays nothing.
         let per = |k: usize| if measure(k) > 0.0 { quantum * scale / measure(k) } else { 0.0 };
-        let n = r.cell_count();
-        let (sums, further) = tallies.cells[i].split_at(n);
-        let channels = further.chunks(n).enumerate();
-        let channels = channels.map(|(c, sums)| {
-            let worth = r.channels.worth();
-            let total = &tallies.channels[i][c];
-            ChannelResult {
-                name: r.channels.name(c),
-                unit: if r.channels.worth() == 1.0 {
-                    unit
-                } else if scale == 1.0 {
-                    "cd"
-                } else {
-                    "lx"
-                },
-                total: total.total as f64 * quantum * worth,
-                error: total.error(tallies.replicates) * quantum * worth,
-                cells: sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k) * worth).collect(),
-                errors: sums
-                    .iter()
-                    .enumerate()
-                    .map(|(k, s)| s.error(tallies.replicates) * per(k) * worth)
-                    .collect(),
-            }
-        });
-        let channels = channels.collect();
+        let (sums, further) = tallies.cells[i].split_at(r.cell_count());
+        let photometric = if scale == 1.0 { "cd" } else { "lx" };
+        let channel_unit = if r.channels.worth() == 1.0 { unit } else { photometric };
+        let channel = |(c, sums)| {
+            ChannelResult::new(r, (c, &tallies.channels[i][c], sums), tallies, (quantum, &per), channel_unit)
+        };
+        let channels = further.chunks(r.cell_count()).enumerate().map(channel).collect();
         let cells: Vec<f64> = sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k)).collect();
         let errors = sums.iter().enumerate().map(|(k, s)| s.error(tallies.replicates) * per(k)).collect();
         let total = &tallies.receivers[i];

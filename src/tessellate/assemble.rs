@@ -88,15 +88,7 @@ fn mesh_part(
         faces.into_par_iter().enumerate().map(with_surface).collect();
     let known: Vec<(&Face, &FaceSurface<'_>)> =
         faces.iter().filter_map(|(face, surface)| Some((*face, surface.as_ref()?))).collect();
-    // Only sides on faces with a usable surface have a say in how an edge is divided.
-    let mut sides: Vec<Vec<EdgeSide<'_, '_>>> = (0..part.edges.len()).map(|_| Vec::new()).collect();
-    for &(face, surface) in &known {
-        for edge_use in face.loops.iter().flat_map(|l| &l.uses) {
-            if let Some(list) = edge_use.edge.and_then(|e| sides.get_mut(e.0 as usize)) {
-                list.push(EdgeSide { surface, edge_use });
-            }
-        }
-    }
+    let sides = edge_sides(part, &known);
     let mut denser = vec![0u32; part.edges.len()];
     let mut further: Vec<Vec<f64>> = vec![Vec::new(); part.edges.len()];
     // What edges and faces come to by themselves is kept from round to round: few edges change.
@@ -160,6 +152,19 @@ fn mesh_part(
     };
     let causes = faces.iter().enumerate().filter_map(cause).collect();
     with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes })
+}
+
+/// Returns for each edge its sides on faces with a usable surface: only these have a say in how it is divided.
+fn edge_sides<'f, 's>(part: &Part, known: &[(&'f Face, &'f FaceSurface<'s>)]) -> Vec<Vec<EdgeSide<'f, 's>>> {
+    let mut sides: Vec<Vec<EdgeSide<'_, '_>>> = (0..part.edges.len()).map(|_| Vec::new()).collect();
+    for &(face, surface) in known {
+        for edge_use in face.loops.iter().flat_map(|l| &l.uses) {
+            if let Some(list) = edge_use.edge.and_then(|e| sides.get_mut(e.0 as usize)) {
+                list.push(EdgeSide { surface, edge_use });
+            }
+        }
+    }
+    sides
 }
 
 /// Returns the edges, perhaps twice, that need shorter chords: those that faces ask for, and all edges of at most [`FEW_CHORDS`] samples of

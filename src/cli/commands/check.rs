@@ -32,6 +32,7 @@ use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::receivers::PowerComparison;
 use crate::study::{Quantiles, Summary, records};
 use serde_json::Value;
+use std::path::Path;
 
 /// Rays when nothing else is asked: a second or two on a lamp.
 const RAYS: u64 = 100_000;
@@ -111,11 +112,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
             also: reached.iter().map(|a| a.answer.clone()).collect(),
             provenance: console.provenance(Some(tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1)), threads),
         };
-        let _owned = OutputPlace::folder(folder)?;
-        if command.page.is_wanted() {
-            report.report().write(folder)?;
-        }
-        write_atomic(&folder.join("check.json"), |w| w.write_all(text.as_bytes()))?;
+        write_folder(folder, &report, command.page.is_wanted(), &text)?;
     }
     if console.json {
         print(&text)?;
@@ -126,6 +123,15 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     // Last, for the answer counts although faces are missing.
     let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
     Ok(refused.and(report_defects(&found, console)))
+}
+
+/// Writes `check.json`, which is `text`, and the page if it is wanted, into a folder of this run's own.
+fn write_folder(folder: &Path, report: &CheckReport, with_page: bool, text: &str) -> Result<(), Failure> {
+    let _owned = OutputPlace::folder(folder)?;
+    if with_page {
+        report.report().write(folder)?;
+    }
+    Ok(write_atomic(&folder.join("check.json"), |w| w.write_all(text.as_bytes()))?)
 }
 
 /// Refuses options of rays where a file has all of them; a scene is traced with rays of its own besides.

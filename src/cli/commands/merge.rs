@@ -5,8 +5,8 @@ use crate::cli::arguments::options::CacheOption;
 use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
+use crate::cli::output::closing;
 use crate::cli::output::json::json_value;
-use crate::cli::output::{closing, face_tables, sequence_tables};
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::cli::work::output_place::OutputPlace;
@@ -107,8 +107,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     if let Some(result) = &result {
         document["until_error"] = json_value(result)?;
     }
-    face_tables::print_faces(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
-    sequence_tables::print_sequences(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
+    closing::print_listings(&run.results, &prepared, console)?;
     closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
     let refused = input_files::report_refusals(&prepared.job.loaded.reports, command.limits.max_refused, console);
     Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)

@@ -5,10 +5,10 @@ use crate::cli::arguments::command::TraceOptions;
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
+use crate::cli::output::closing;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::rule_table::{rule_document, rule_table};
 use crate::cli::output::terminal_tables::table_text;
-use crate::cli::output::{closing, face_tables, sequence_tables};
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, require_space};
@@ -170,8 +170,7 @@ fn trace_whole(
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     end_file::write(prepared, extra.ends.as_deref(), console)?;
     verdicts::say_verdicts(&run, prepared, console)?;
-    face_tables::print_faces(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
-    sequence_tables::print_sequences(&run.results, &prepared.job.loaded.model, prepared.power_unit(), console)?;
+    closing::print_listings(&run.results, prepared, console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     // Only after everything was written: until then it is all that would be left.
     checkpoint.remove();

@@ -1,10 +1,12 @@
 //! The last lines of a traced scene, or its document on stdout.
 
+use super::face_tables::print_faces;
 use super::json::json_text;
+use super::sequence_tables::print_sequences;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::formats::printable_line;
-use crate::pipeline::TargetResult;
+use crate::pipeline::{PreparedScene, TargetResult};
 use crate::report::{figures, file_stem, grouped};
 use crate::simulate::Results;
 use serde_json::Value;
@@ -15,6 +17,17 @@ const LINE_LENGTH: usize = 96;
 
 /// Name of the list of lost rays in a folder of results.
 pub(crate) const LEDGER: &str = "lost_rays.csv";
+
+/// Prints what was asked for beside the figures: power by face and light by sequence. Nothing where neither was.
+pub(crate) fn print_listings(
+    results: &Results,
+    prepared: &PreparedScene,
+    console: &Console,
+) -> Result<(), Failure> {
+    let (model, unit) = (&prepared.job.loaded.model, prepared.power_unit());
+    print_faces(results, model, unit, console)?;
+    Ok(print_sequences(results, model, unit, console)?)
+}
 
 /// Prints the document of the results on stdout with `--json`, else says the closing lines.
 pub(crate) fn print_results(

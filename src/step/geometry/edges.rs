@@ -83,14 +83,10 @@ pub(crate) fn trim_to_vertices(
     let (a, b) = if forward { (p, q) } else { (q, p) };
     let (mut ta, mut tb) = (shape.parameter(a), shape.parameter(b));
     let accuracy = VERTEX_MM + VERTEX_SHARE * p.abs().max_element();
-    if let CurveShape::Line { origin, direction } = shape {
-        let miss = |t: f64, vertex: Point| (*origin + *direction * t - vertex).length();
-        let (miss_a, miss_b) = (miss(ta, a), miss(tb, b));
-        // A line that passes both vertices by is another edge's: of what this one is its vertices tell all.
-        if miss_a.min(miss_b) > LOOSE_VERTEX_MM && (p - q).length() > LOOSE_VERTEX_MM {
-            let curve = Curve::line(p, q, [0.0, (q - p).length()]);
-            return Some(TrimmedEdge { curve: Some(curve), gap: 0.0, repair: Some(PASSED_BY) });
-        }
+    // A line that passes both vertices by is another edge's: of what this one is its vertices tell all.
+    if passes_by(shape, [(ta, a), (tb, b)]) && (p - q).length() > LOOSE_VERTEX_MM {
+        let curve = Curve::line(p, q, [0.0, (q - p).length()]);
+        return Some(TrimmedEdge { curve: Some(curve), gap: 0.0, repair: Some(PASSED_BY) });
     }
     match shape.period() {
         Some(period) => {
@@ -151,6 +147,12 @@ pub(crate) fn trim_to_vertices(
         return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge { curve: None, gap: 0.0, repair: None });
     }
     finish_edge(shape.segment(ta, tb), forward, p, q)
+}
+
+/// Whether a line misses both vertices, each at its parameter, by more than [`LOOSE_VERTEX_MM`]; false of any other curve.
+fn passes_by(shape: &CurveShape, ends: [(f64, Point); 2]) -> bool {
+    let CurveShape::Line { origin, direction } = shape else { return false };
+    ends.iter().all(|&(t, vertex)| (*origin + *direction * t - vertex).length() > LOOSE_VERTEX_MM)
 }
 
 /// Returns the curve turned as the edge runs, with its gap to the vertices; `None` where it has no parameters left or is no number.

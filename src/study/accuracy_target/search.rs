@@ -109,23 +109,7 @@ pub fn meet_target_for_rays(
     let found = best.unwrap_or_else(|| search.nothing_tried());
     let kept = found.is_kept(target);
     let [low, high] = found.plan.tolerance_mm();
-    let range = if low == high {
-        format!("{} mm", three_digits(low))
-    } else {
-        format!("{} to {} mm", three_digits(low), three_digits(high))
-    };
-    let answer = format!(
-        "Asked {}°, reached {}° (99th percentile of {} fresh rays against the spline, at most {}°{}) with {} normals on {} facets within \
-         {range}{}.",
-        target.degrees,
-        three_digits(found.reached),
-        found.checked,
-        three_digits(found.largest),
-        found.without_angle(),
-        found.normals,
-        found.facets,
-        if kept { "" } else { ": not reached" }
-    );
+    let answer = answer_sentence(&found, target, kept);
     AccuracyPlan {
         asked_deg: target.degrees,
         reached_deg: found.reached,
@@ -143,6 +127,28 @@ pub fn meet_target_for_rays(
         seconds: start.elapsed().as_secs_f64(),
         answer,
     }
+}
+
+/// Returns what was asked, what was reached and by which facets and normals, as one sentence.
+fn answer_sentence(found: &Solution, target: &AccuracyTarget, kept: bool) -> String {
+    let [low, high] = found.plan.tolerance_mm();
+    let range = if low == high {
+        format!("{} mm", three_digits(low))
+    } else {
+        format!("{} to {} mm", three_digits(low), three_digits(high))
+    };
+    format!(
+        "Asked {}°, reached {}° (99th percentile of {} fresh rays against the spline, at most {}°{}) with {} normals on {} facets within \
+         {range}{}.",
+        target.degrees,
+        three_digits(found.reached),
+        found.checked,
+        three_digits(found.largest),
+        found.without_angle(),
+        found.normals,
+        found.facets,
+        if kept { "" } else { ": not reached" }
+    )
 }
 
 /// Writes a number with three digits, or with two and an exponent outside of 1e-4 to 1e4.
