@@ -3,6 +3,15 @@
 use crate::faces::{area, close, import, points};
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
+/// A face #900 on #34 between the arcs #35 and #36, with corners #12 to #15, and straight edges between them.
+const QUARTER: &str = "\
+          #40=VERTEX_POINT('',#12);\n#41=VERTEX_POINT('',#13);\n#42=VERTEX_POINT('',#14);\n#43=VERTEX_POINT('',#15);\n\
+          #50=EDGE_CURVE('',#40,#41,#35,.T.);\n#51=EDGE_CURVE('',#41,#42,$,.T.);\n\
+          #52=EDGE_CURVE('',#43,#42,#36,.T.);\n#53=EDGE_CURVE('',#43,#40,$,.T.);\n\
+          #60=ORIENTED_EDGE('',*,*,#50,.T.);\n#61=ORIENTED_EDGE('',*,*,#51,.T.);\n\
+          #62=ORIENTED_EDGE('',*,*,#52,.F.);\n#63=ORIENTED_EDGE('',*,*,#53,.T.);\n\
+          #70=EDGE_LOOP('',(#60,#61,#62,#63));\n#80=FACE_OUTER_BOUND('',#70,.T.);\n#900=ADVANCED_FACE('',(#80),#34,.T.);\n";
+
 #[test]
 fn an_offset_of_an_extrusion_without_end_is_an_extrusion() {
     // A circle of radius 5 extruded along z, 2 mm farther out: a quarter of a cylinder of radius 7 and height 4.
@@ -16,13 +25,8 @@ fn an_offset_of_an_extrusion_without_end_is_an_extrusion() {
     ]) + "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n#22=VECTOR('',#20,1.);\n\
           #30=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n#31=AXIS2_PLACEMENT_3D('',#11,#20,#21);\n\
           #32=CIRCLE('',#30,5.);\n#33=SURFACE_OF_LINEAR_EXTRUSION('',#32,#22);\n#34=OFFSET_SURFACE('',#33,2.,.F.);\n\
-          #35=CIRCLE('',#30,7.);\n#36=CIRCLE('',#31,7.);\n\
-          #40=VERTEX_POINT('',#12);\n#41=VERTEX_POINT('',#13);\n#42=VERTEX_POINT('',#14);\n#43=VERTEX_POINT('',#15);\n\
-          #50=EDGE_CURVE('',#40,#41,#35,.T.);\n#51=EDGE_CURVE('',#41,#42,$,.T.);\n\
-          #52=EDGE_CURVE('',#43,#42,#36,.T.);\n#53=EDGE_CURVE('',#43,#40,$,.T.);\n\
-          #60=ORIENTED_EDGE('',*,*,#50,.T.);\n#61=ORIENTED_EDGE('',*,*,#51,.T.);\n\
-          #62=ORIENTED_EDGE('',*,*,#52,.F.);\n#63=ORIENTED_EDGE('',*,*,#53,.T.);\n\
-          #70=EDGE_LOOP('',(#60,#61,#62,#63));\n#80=FACE_OUTER_BOUND('',#70,.T.);\n#900=ADVANCED_FACE('',(#80),#34,.T.);\n";
+          #35=CIRCLE('',#30,7.);\n#36=CIRCLE('',#31,7.);\n"
+        + QUARTER;
     close(area(&import(&d)), 7.0 * 0.5 * PI * 4.0, 1e-6);
 }
 
@@ -40,13 +44,8 @@ fn an_offset_of_a_cone_may_have_its_apex_beyond_the_origin() {
     ]) + "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n#29=AXIS2_PLACEMENT_3D('',#9,#20,#21);\n\
           #30=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n#31=AXIS2_PLACEMENT_3D('',#11,#20,#21);\n\
           #33=CONICAL_SURFACE('',#29,1.,0.7853981633974483);\n#34=OFFSET_SURFACE('',#33,-2.8284271247461903,.F.);\n\
-          #35=CIRCLE('',#30,1.);\n#36=CIRCLE('',#31,3.);\n\
-          #40=VERTEX_POINT('',#12);\n#41=VERTEX_POINT('',#13);\n#42=VERTEX_POINT('',#14);\n#43=VERTEX_POINT('',#15);\n\
-          #50=EDGE_CURVE('',#40,#41,#35,.T.);\n#51=EDGE_CURVE('',#41,#42,$,.T.);\n\
-          #52=EDGE_CURVE('',#43,#42,#36,.T.);\n#53=EDGE_CURVE('',#43,#40,$,.T.);\n\
-          #60=ORIENTED_EDGE('',*,*,#50,.T.);\n#61=ORIENTED_EDGE('',*,*,#51,.T.);\n\
-          #62=ORIENTED_EDGE('',*,*,#52,.F.);\n#63=ORIENTED_EDGE('',*,*,#53,.T.);\n\
-          #70=EDGE_LOOP('',(#60,#61,#62,#63));\n#80=FACE_OUTER_BOUND('',#70,.T.);\n#900=ADVANCED_FACE('',(#80),#34,.T.);\n";
+          #35=CIRCLE('',#30,1.);\n#36=CIRCLE('',#31,3.);\n"
+        + QUARTER;
     close(area(&import(&d)), 0.25 * PI * (1.0 + 3.0) * 2.0 * SQRT_2, 1e-6);
 }
 

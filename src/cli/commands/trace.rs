@@ -144,10 +144,10 @@ fn trace_whole(
             return Err(checkpoint.save_stopped(&portion, &because));
         }
     };
-    let path_failure = match (paths, &extra.paths) {
-        (Some(paths), Some(file)) => say_paths(paths, file, console).err(),
-        // The run counts whether its paths could be written or not.
-        _ => None,
+    // The run counts whether its paths could be written or not.
+    let paths_written = match (paths, &extra.paths) {
+        (Some(paths), Some(file)) => say_paths(paths, file, console),
+        _ => Ok(()),
     };
     say_verification(&run, console)?;
     let sentences = say_target(result.as_ref(), console);
@@ -157,9 +157,7 @@ fn trace_whole(
         Err(failure) => return Err(rescue_results(&mut run, &sentences, &checkpoint, with_page, failure)),
     };
     // Rays that cannot be traced again for their paths alone are not lost with these.
-    if let Some(failure) = path_failure {
-        return Err(failure);
-    }
+    paths_written?;
     if let Some(result) = &result {
         document["until_error"] = json_value(result)?;
     }
