@@ -8,6 +8,7 @@ use super::monitor::Monitor;
 use super::prepared_scene::{PreparedScene, TraceRequest};
 use super::suggest;
 use crate::simulate::{GROWING_REPLICATE, PartialRun, ReceiverResult, Results, Scene};
+use crate::study::figures::cell_errors;
 use serde::Serialize;
 
 /// Rays of the first run.
@@ -147,7 +148,7 @@ impl ErrorTarget {
 /// Returns the sums over the cells of the light, and of the error, each weighted by the light.
 fn light_weighted_error(r: &ReceiverResult) -> (f64, f64) {
     let sum = |x: &mut dyn Iterator<Item = f64>| x.sum::<f64>();
-    (sum(&mut r.cells.iter().map(|c| c * c)), sum(&mut r.cells.iter().zip(&r.errors).map(|(c, e)| c * e)))
+    (sum(&mut r.cells.iter().map(|c| c * c)), sum(&mut r.cells.iter().zip(cell_errors(r)).map(|(c, e)| c * e)))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::scene_results::SceneResults;
 use crate::regulation::{Assessment, Assumptions, IntensityMap, Regulation, Traffic, assess};
 use crate::simulate::scene::RegulationUse;
 use crate::simulate::{ReceiverResult, Results};
+use crate::study::figures::cell_errors;
 
 /// A regulation's answer about a receiver.
 #[derive(Clone, Debug)]
@@ -15,8 +16,8 @@ pub struct ReceiverVerdict {
     pub assessment: Assessment,
 }
 
-/// Makes the map of intensities, cd, of a far field over H and V, with both errors; geometric ones are zero for `None`. `ray_flux` is the
-/// power of a ray, lm.
+/// Makes the map of intensities, cd, of a far field over H and V, with both errors as they are printed; geometric ones are zero for `None`.
+/// `ray_flux` is the mean power of a ray, lm.
 ///
 /// # Errors
 /// When `geometric` has not an error for every cell.
@@ -30,11 +31,12 @@ fn intensities(
         (0..=receiver.grid[k]).map(|i| receiver.middle[k] - receiver.half[k] + step * i as f64).collect()
     };
     let error = |k: usize| geometric.map_or(Some(0.0), |g| g.get(k).copied());
-    let cells: Option<Vec<[f64; 3]>> = (receiver.cells.iter().zip(&receiver.errors).enumerate())
-        .map(|(k, (value, statistical))| Some([*value, *statistical, error(k)?]))
+    let cells: Option<Vec<[f64; 3]>> = (receiver.cells.iter().zip(cell_errors(receiver)).enumerate())
+        .map(|(k, (value, statistical))| Some([*value, statistical, error(k)?]))
         .collect();
     // A map that was not compared cell by cell cannot be judged with both errors.
     let cells = cells.ok_or("its cells have no errors from the facets")?;
+    // Where faint rays alone arrived their spread tells nothing of those that carry all.
     Ok(IntensityMap::new(edges(0), edges(1), cells)?.with_ray_flux(ray_flux))
 }
 
@@ -51,7 +53,6 @@ pub(super) fn verdict(
     let regulation = Regulation::find(&wanted.id)?;
     let receiver = wanted.receiver_index(&prepared.job.scene).ok_or("the scene has no such far field")?;
     let errors = geometric(receiver);
-    // What a cell that no ray met may hold.
     let ray_flux = results.power.emitted / results.rays.max(1) as f64;
     let map = intensities(&results.receivers[receiver], errors.as_deref(), ray_flux)?;
     let assumptions = Assumptions {

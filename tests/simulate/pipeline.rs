@@ -1,9 +1,12 @@
 //! The main job from the library: what it is told to stop is gone on with, and it does not matter who listens.
 
+use lampyris::model::Model;
 use lampyris::pipeline::{
-    ErrorTarget, IntersectorKind, Monitor, PreparedScene, RayRange, SceneJob, Silent, Stage, TraceRequest,
-    TracingSettings, read_scene,
+    ErrorTarget, IntersectorKind, LoadedModel, Monitor, PreparedScene, RayRange, SceneJob, Silent, Stage,
+    TraceRequest, TracingSettings, read_scene,
 };
+use lampyris::regulation::Verdict;
+use lampyris::simulate::Scene;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -80,4 +83,25 @@ fn requests_that_cannot_be_met_say_what_to_do() {
     let step = scene.resolve(&scene.models[0].file);
     assert!(text(read_scene(&step, &Silent).unwrap_err()).contains("a STEP file, where a scene (.toml) is needed"));
     assert!(text("quadtree".parse::<IntersectorKind>().unwrap_err()).contains("octree, bvh2, cwbvh, exact"));
+}
+
+/// One ray of the bright source in a test point would break its limit: that none arrived among a thousand does not tell.
+#[test]
+fn a_dark_test_point_is_judged_by_what_one_ray_adds() {
+    let text = "[run]\nunit = 'lm'\n\
+        [[source]]\nkind = 'cone'\ndirection = [0, 0, -1]\nhalf_angle_deg = 5\npower = 1\nrays = 100_000\n\
+        [[source]]\nkind = 'cone'\ndirection = [0, 0, -1]\nhalf_angle_deg = 5\npower = 10\nrays = 1000\n\
+        [[receiver]]\nname = 'road'\nkind = 'far_field'\nnormal = [0, 0, 1]\nh_deg = [-12, 12]\nv_deg = [-6, 6]\n\
+        cells = [240, 120]\n[[regulation]]\nid = 'UN R112 B passing'\nas_placed = true\n";
+    let scene = Scene::parse(text, "dark.toml", Path::new(".")).unwrap();
+    let loaded = LoadedModel { model: Model::default(), reports: Vec::new(), seconds: 0.0 };
+    let prepared = PreparedScene::new(SceneJob::new(scene, loaded), &Silent).unwrap();
+    let run = prepared.trace(TraceRequest::default(), &Silent).unwrap();
+    let verdicts = run.verdicts(&prepared).unwrap();
+    let row = verdicts[0].assessment.rows.iter().find(|row| row.row.id == "B50L").unwrap();
+    let reading = row.reading.unwrap();
+    // 0.01 lm over a photometer of 0.149° are about 1,500 cd, where at most 350 are allowed.
+    assert_eq!(reading.value, 0.0);
+    assert!(reading.statistical > 1000.0, "{reading:?}");
+    assert_eq!(row.verdict, Some(Verdict::Unsure));
 }
