@@ -15,6 +15,7 @@ pub mod octree;
 pub mod polish;
 mod prefetch;
 mod slopes;
+pub mod spline_with_meshes;
 mod start_triangle;
 
 use crate::math::{Departure, FaceId, Point, Ray, Triangle, Uv, Vector};

@@ -112,6 +112,33 @@ impl FacetMesh {
             .sum()
     }
 
+    /// Returns the facets of the faces that are kept, in their order, with only the corners and positions that they use.
+    pub fn of_faces(&self, is_kept: impl Fn(FaceId) -> bool) -> Self {
+        let mut kept = Self::default();
+        // Where each corner and position went.
+        let mut vertices = vec![u32::MAX; self.vertices.len()];
+        let mut positions = vec![u32::MAX; self.positions.len()];
+        for (k, facet) in self.facets.iter().enumerate().filter(|(_, facet)| is_kept(facet.face)) {
+            for v in facet.vertices {
+                if vertices[v as usize] != u32::MAX {
+                    continue;
+                }
+                let vertex = self.vertices[v as usize];
+                let position = &mut positions[vertex.position as usize];
+                if *position == u32::MAX {
+                    *position = kept.positions.len() as u32;
+                    kept.positions.push(self.positions[vertex.position as usize]);
+                }
+                vertices[v as usize] = kept.vertices.len() as u32;
+                kept.vertices.push(MeshVertex { position: *position, ..vertex });
+            }
+            kept.facets.push(Facet { vertices: facet.vertices.map(|v| vertices[v as usize]), face: facet.face });
+            // Meshes that come from no spline have none.
+            kept.sag.extend(self.sag.get(k));
+        }
+        kept
+    }
+
     /// Number of facets that are no triangles.
     pub fn quad_count(&self) -> usize {
         self.facets.iter().filter(|f| !f.is_triangle()).count()

@@ -1,7 +1,7 @@
 //! What is found out about a run beside its results: a sample of its rays asked again of BVH and spline, and what the facets
 //! change of its light.
 
-use super::intersectors::{farthest_start, in_one_scene};
+use super::intersectors::{farthest_start, in_one_scene, true_intersector};
 use super::monitor::{Monitor, Stage, in_stage};
 use super::prepared_scene::{PreparedScene, TraceRequest};
 use super::ray_sampler::RaySampler;
@@ -78,9 +78,8 @@ fn recheck(
     if rays.is_empty() {
         return (None, pilot);
     }
-    let splines = in_stage(monitor, Stage::BuildingCheck("the spline"), || prepared.splines_for_few_rays());
-    let groups = splines.iter().map(|s| Box::new(&**s) as Box<dyn Intersector>).collect();
-    let exact = in_one_scene(prepared.facets.instancing.as_deref(), groups);
+    let surfaces = in_stage(monitor, Stage::BuildingCheck("the spline"), || prepared.surfaces_for_few_rays());
+    let exact = true_intersector(prepared.facets.instancing.as_deref(), &surfaces);
     let check = check_rays(prepared, intersector, &*exact, &rays, monitor);
     (Some(check), pilot.or_else(|| facet_effects(prepared, results, [intersector, &*exact])))
 }

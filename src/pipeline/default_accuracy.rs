@@ -1,11 +1,10 @@
 //! A run that asks for no tolerance, normals or intersector is given them: what a pilot of its own rays finds sufficient.
 
 use super::facets::tessellate_groups;
-use super::intersectors::{IntersectorChoice, farthest_start, in_one_scene};
+use super::intersectors::{IntersectorChoice, TrueSurface, farthest_start, in_one_scene, true_intersector};
 use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
 use crate::intersect::Intersector;
-use crate::intersect::exact::Exact;
 use crate::intersect::octree::{self, Octree};
 use crate::model::Model;
 use crate::simulate::{BoundScene, RunSettings, Scene};
@@ -69,7 +68,7 @@ impl PilotSource for Source<'_> {
 
 /// Chooses for a run whose facets of the default tolerance are made.
 pub(super) fn choose(
-    (model, splines): (&Model, &[Arc<Exact>]),
+    (model, surfaces): (&Model, &[Arc<TrueSurface>]),
     bound: &BoundScene,
     run: &RunSettings,
     (facets, mesher): (&GroupedFacets, &tessellate::Settings),
@@ -77,8 +76,7 @@ pub(super) fn choose(
 ) -> AccuracyChoice {
     let instancing = facets.instancing.as_deref();
     let models = instancing.map_or(slice::from_ref(model), |i| &i.groups);
-    let splines = splines.iter().map(|spline| Box::new(&**spline) as Box<dyn Intersector>).collect();
-    let source = Source { model, made: facets, mesher, exact: in_one_scene(instancing, splines) };
+    let source = Source { model, made: facets, mesher, exact: true_intersector(instancing, surfaces) };
     let (chosen, finer) = in_stage(monitor, Stage::Choosing, || {
         let tolerance = mesher.tolerance;
         default_accuracy::choose(&Undecided { models, bound, run, source: &source, facets, tolerance })

@@ -8,6 +8,7 @@ use crate::intersect::exact::{self, Exact};
 use crate::intersect::instanced::Instanced;
 use crate::intersect::octree::{self, Octree};
 use crate::intersect::polish::Polished;
+use crate::intersect::spline_with_meshes::SplineWithMeshes;
 use crate::intersect::{Footprint, Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::{Instancing, Model};
@@ -45,6 +46,43 @@ impl IntersectorChoice {
     }
 }
 
+/// What stands for a group itself: the spline, and the facets of faces that have none, as ready meshes have none.
+#[derive(Debug)]
+pub(super) struct TrueSurface {
+    exact: Exact,
+    meshes: FacetMesh,
+}
+
+impl TrueSurface {
+    /// Builds the spline of a group; `mesh` has its facets, of any tolerance.
+    pub(super) fn new(model: &Model, mesh: &FacetMesh, settings: &exact::Settings) -> Self {
+        let exact = Exact::build(model, settings);
+        let meshes = match exact.skipped() {
+            [] => FacetMesh::default(),
+            skipped => mesh.of_faces(|face| skipped.binary_search(&face).is_ok()),
+        };
+        Self { exact, meshes }
+    }
+
+    /// Returns what answers rays on it; `farthest_start` is how far, mm, its farthest place is.
+    fn intersector(&self, farthest_start: f64) -> Box<dyn Intersector + '_> {
+        if self.meshes.facets.is_empty() {
+            return Box::new(&self.exact);
+        }
+        let settings = octree::Settings { farthest_start, ..Default::default() };
+        Box::new(SplineWithMeshes::new(&self.exact, &self.meshes, &settings))
+    }
+}
+
+/// Joins the true surfaces of all groups to one intersector in the scene's coordinates; without `instancing` there must be one.
+pub(super) fn true_intersector<'a>(
+    instancing: Option<&'a Instancing>,
+    surfaces: &'a [Arc<TrueSurface>],
+) -> Box<dyn Intersector + 'a> {
+    let group = |(k, surface): (usize, &'a Arc<TrueSurface>)| surface.intersector(farthest_start(instancing, k));
+    in_one_scene(instancing, surfaces.iter().enumerate().map(group).collect())
+}
+
 /// Builds the chosen intersector of a model in one piece and calls `work` with it and what it took to build.
 pub fn with_intersector<T>(
     choice: IntersectorChoice,
@@ -55,32 +93,31 @@ pub fn with_intersector<T>(
 ) -> T {
     let builders = Builders {
         octree: &|_, settings| Octree::build(mesh, settings),
-        splines: &|| vec![Arc::new(Exact::build(model, &exact::Settings::default()))],
+        surfaces: &|| vec![Arc::new(TrueSurface::new(model, mesh, &exact::Settings::default()))],
     };
     with_built_intersector(choice, builders, (&[mesh], None), monitor, work)
 }
 
-/// How the caller makes the octree of each group, and the splines of all: anew, or from what was built before.
+/// How the caller makes the octree of each group, and the true surfaces of all: anew, or from what was built before.
 pub(super) struct Builders<'a, 'm> {
     pub(super) octree: &'a dyn Fn(usize, &octree::Settings) -> Octree<'m>,
-    pub(super) splines: &'a dyn Fn() -> Vec<Arc<Exact>>,
+    pub(super) surfaces: &'a dyn Fn() -> Vec<Arc<TrueSurface>>,
 }
 
-/// Joins the octrees and splines of the caller's making to the chosen intersector over the meshes of all groups, and calls `work` with it
+/// Joins the octrees and true surfaces of the caller's making to the chosen intersector over the meshes of all groups, and calls `work` with it
 /// and what it took to build; a BVH is built here. Without `instancing` there is one group.
 pub(super) fn with_built_intersector<'m, T>(
     choice: IntersectorChoice,
-    Builders { octree, splines }: Builders<'_, 'm>,
+    Builders { octree, surfaces }: Builders<'_, 'm>,
     (meshes, instancing): (&[&'m FacetMesh], Option<&Instancing>),
     monitor: &dyn Monitor,
     work: impl FnOnce(&dyn Intersector, Footprint) -> T,
 ) -> T {
     monitor.begin(Stage::Building(choice.intersector));
-    // On the spline facets are not needed at all.
+    // On the spline no facets are needed but those of ready meshes.
     if choice.intersector == IntersectorKind::Exact {
-        let splines = splines();
-        let groups = splines.iter().map(|s| Box::new(&**s) as Box<dyn Intersector>).collect();
-        let exact = in_one_scene(instancing, groups);
+        let surfaces = surfaces();
+        let exact = true_intersector(instancing, &surfaces);
         monitor.end();
         return work(&*exact, exact.footprint());
     }
@@ -103,9 +140,10 @@ pub(super) fn with_built_intersector<'m, T>(
         monitor.end();
         return work(&*facets, facets.footprint());
     }
-    let splines = splines();
-    let polished = (facets.iter().zip(meshes).zip(&splines))
-        .map(|((facets, mesh), exact)| Box::new(Polished::new(&**facets, mesh, exact)) as Box<dyn Intersector>);
+    let surfaces = surfaces();
+    let polished = (facets.iter().zip(meshes).zip(&surfaces)).map(|((facets, mesh), surface)| {
+        Box::new(Polished::new(&**facets, mesh, &surface.exact)) as Box<dyn Intersector>
+    });
     let polished = in_one_scene(instancing, polished.collect());
     monitor.end();
     work(&*polished, polished.footprint())

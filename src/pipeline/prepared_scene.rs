@@ -4,12 +4,12 @@ use super::cache::{Cache, CachedFacets, facets_key, group_keys};
 use super::default_accuracy;
 use super::error::Error;
 use super::facets::{mesh_settings, tessellate_groups};
-use super::intersectors::{self, IntersectorChoice};
+use super::intersectors::{self, IntersectorChoice, TrueSurface};
 use super::loading::LoadedModel;
 use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
 use crate::intersect::Intersector;
-use crate::intersect::exact::{self, Exact};
+use crate::intersect::exact;
 use crate::intersect::octree::{self, Octree};
 use crate::mesh::FacetMesh;
 use crate::model::{Instancing, Model};
@@ -118,7 +118,7 @@ pub struct PreparedScene {
     /// Why it is traced as it is, where nobody asked for it.
     pub chosen: Option<Chosen>,
     /// Built once for pilot, run and check.
-    splines: OnceLock<Vec<Arc<Exact>>>,
+    surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
 }
 
 /// How to trace beside the settings.
@@ -167,7 +167,7 @@ impl PreparedScene {
             threads,
             rays: None,
             chosen: None,
-            splines: OnceLock::new(),
+            surfaces: OnceLock::new(),
         };
         // Whoever asks for anything of how it is traced gets just that.
         if !default_accuracy::is_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene) {
@@ -185,7 +185,7 @@ impl PreparedScene {
             return;
         }
         let run = RunSettings { sequences: false, ..self.run_settings() };
-        let model = (&self.job.loaded.model, &*self.splines());
+        let model = (&self.job.loaded.model, &*self.true_surfaces());
         let facets = (&self.facets, &self.mesh_settings);
         let choice = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
         if let Some(finer) = choice.finer {
@@ -203,19 +203,20 @@ impl PreparedScene {
         self.facets.instancing.as_ref().map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups)
     }
 
-    /// Returns the exact spline of each group, built when first asked for.
-    fn splines(&self) -> Vec<Arc<Exact>> {
-        self.splines.get_or_init(|| self.build_splines(&exact::Settings::default())).clone()
+    /// Returns the true surface of each group, built when first asked for.
+    fn true_surfaces(&self) -> Vec<Arc<TrueSurface>> {
+        self.surfaces.get_or_init(|| self.build_surfaces(&exact::Settings::default())).clone()
     }
 
-    /// Returns exact splines for some thousands of rays: those of pilot or run, else ones that are built sooner and not kept.
-    pub(super) fn splines_for_few_rays(&self) -> Vec<Arc<Exact>> {
-        self.splines.get().cloned().unwrap_or_else(|| self.build_splines(&exact::Settings::for_few_rays()))
+    /// Returns true surfaces for some thousands of rays: those of pilot or run, else ones that are built sooner and not kept.
+    pub(super) fn surfaces_for_few_rays(&self) -> Vec<Arc<TrueSurface>> {
+        self.surfaces.get().cloned().unwrap_or_else(|| self.build_surfaces(&exact::Settings::for_few_rays()))
     }
 
-    /// Builds the exact spline of each group.
-    fn build_splines(&self, settings: &exact::Settings) -> Vec<Arc<Exact>> {
-        self.models().iter().map(|model| Arc::new(Exact::build(model, settings))).collect()
+    /// Builds the true surface of each group.
+    fn build_surfaces(&self, settings: &exact::Settings) -> Vec<Arc<TrueSurface>> {
+        let groups = self.models().iter().zip(self.facets.meshes());
+        groups.map(|(model, mesh)| Arc::new(TrueSurface::new(model, mesh, settings))).collect()
     }
 
     /// Returns the run's settings: the scene's, with what was asked over them; the whole run, no shard.
@@ -264,7 +265,7 @@ impl PreparedScene {
             }
             None => Octree::build(meshes[group], settings),
         };
-        let builders = intersectors::Builders { octree: &octree, splines: &|| self.splines() };
+        let builders = intersectors::Builders { octree: &octree, surfaces: &|| self.true_surfaces() };
         let facets = (meshes.as_slice(), self.facets.instancing.as_deref());
         intersectors::with_built_intersector(self.choice, builders, facets, monitor, |intersector, footprint| {
             work(intersector, footprint.build_seconds)

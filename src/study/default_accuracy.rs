@@ -47,6 +47,11 @@ const SPLINE_HIT: f64 = 850.0;
 /// Work of making one facet and sorting it into the octree, ns.
 const FACET: f64 = 15_000.0;
 
+/// Why facets are the surface itself: with ready meshes among the faces, and without.
+const READY_OR_FLAT: &str = "all faces are ready meshes or flat, so that facets are the surface that was given; how far a ready mesh is \
+    from its own original is not known";
+const FLAT: &str = "all faces are flat, so that facets are the surface itself";
+
 /// Intersector and normals of a run on facets, and of one on the spline.
 const ON_FACETS: (&str, NormalMode) = ("octree", NormalMode::Bilinear);
 const ON_SPLINE: (&str, NormalMode) = ("exact", NormalMode::Exact);
@@ -134,7 +139,7 @@ pub trait PilotSource {
     fn facets(&self, tolerance: [f64; 2]) -> TimedFacets;
     /// The octree over facets, with bilinear normals.
     fn octree<'f>(&'f self, facets: &'f GroupedFacets) -> Box<dyn Intersector + 'f>;
-    /// The certified spline.
+    /// The certified spline, with the facets of ready meshes, which have none.
     fn exact(&self) -> &dyn Intersector;
 }
 
@@ -229,16 +234,15 @@ fn alternative(
 }
 
 impl Undecided<'_> {
-    /// Chooses facets or spline by what is known without tracing, as for flat faces, ready meshes and short runs; `None` where a pilot is
+    /// Chooses facets or spline by what is known without tracing, as for flat faces, ready meshes alone and short runs; `None` where a pilot is
     /// needed.
     fn without_pilot(&self) -> Option<Chosen> {
         // What is cheap to ask comes first.
         let ((intersector, normals), because) = if self.facets.is_empty() {
             (ON_FACETS, "there is no surface to meet")
-        } else if self.faces().any(|face| face.is_none()) {
-            (ON_FACETS, "the model holds ready meshes, which have no true surface")
         } else if self.is_flat() {
-            (ON_FACETS, "all faces are flat, so that facets are the surface itself")
+            let has_mesh = self.faces().any(|face| face.is_none());
+            (ON_FACETS, if has_mesh { READY_OR_FLAT } else { FLAT })
         } else if self.judged_rays() <= SHORT_RUN {
             (ON_SPLINE, "the run is so short that the spline costs less than to find out whether facets do")
         } else if self.bound.emitters.iter().any(|e| e.rays.is_some_and(|n| n > self.judged_rays() / SHARE)) {
@@ -272,7 +276,7 @@ impl Undecided<'_> {
         self.models.iter().flat_map(|model| model.placed_faces()).map(|placed| placed.face)
     }
 
-    /// Whether every face is a polygon in a plane.
+    /// Whether every face is a polygon in a plane or a ready mesh.
     fn is_flat(&self) -> bool {
         self.faces().flatten().all(is_polygon)
     }

@@ -237,6 +237,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "bvh",
             "contenders",
             "octree",
+            "spline_with_meshes",
             "instanced",
         ],
     ),

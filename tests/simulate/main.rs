@@ -22,6 +22,7 @@ mod laws;
 mod listed_rays;
 mod pipeline;
 mod polished;
+mod ready_meshes;
 mod refusals;
 mod scenes;
 mod selectors;

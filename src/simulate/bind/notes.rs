@@ -142,6 +142,26 @@ pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> 
     ))
 }
 
+/// Returns one sentence about the faces that the file gives as ready meshes, naming the first; `None` where there is none.
+pub(super) fn ready_mesh_note(model: &Model) -> Option<String> {
+    let ready = || model.parts.iter().flat_map(|part| &part.tessellated);
+    let first = ready().next()?;
+    let name = match (first.name.as_str(), first.entity) {
+        ("", None) => "a face".to_owned(),
+        ("", Some(entity)) => format!("face #{entity}"),
+        (name, None) => format!("face '{name}'"),
+        (name, Some(entity)) => format!("face '{name}' (#{entity})"),
+    };
+    let (others, verb) = match ready().count() {
+        1 => (String::new(), "is a ready mesh"),
+        n => (format!(" (and {} more)", n - 1), "are ready meshes"),
+    };
+    Some(format!(
+        "{name}{others} {verb} in the file and traced as given: how far that is from the surface it was made of is not known, and in no \
+         error that is printed"
+    ))
+}
+
 /// Returns one sentence about the thinnest body that touches others and whose box is thinner than twice the glue distance along an axis;
 /// `None` where there is none.
 pub(super) fn thin_body_note(bound: &BoundScene) -> Option<String> {

@@ -187,6 +187,8 @@ impl Tally {
             match e.certainty {
                 Certainty::Certified => self.check.exact.certified += 1,
                 Certainty::Tangent => self.check.exact.tangent += 1,
+                // Of a ready mesh, about which the spline says nothing.
+                Certainty::Facet => {}
                 _ => self.check.exact.uncertified += 1,
             }
         }
