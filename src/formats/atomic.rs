@@ -68,7 +68,7 @@ pub fn remove_unfinished_files() {
 }
 
 /// A name in the same folder (renaming across devices is a copy) that no other machine, process or thread uses.
-fn unfinished(path: &Path) -> PathBuf {
+pub(super) fn unfinished(path: &Path) -> PathBuf {
     let name = file_name(path);
     // Threads of one process may write the same name: each takes a number of its own.
     let serial = SERIAL.fetch_add(1, Ordering::Relaxed);

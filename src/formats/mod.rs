@@ -30,8 +30,11 @@ mod ply;
 mod png;
 mod polylines;
 mod printable;
+mod ray_csv;
 mod ray_files;
+mod ray_npz;
 mod rays;
+mod scratch;
 mod stl;
 mod stream;
 mod vtk;
@@ -59,8 +62,9 @@ pub use printable::{
     csv_quoted_text, csv_text, is_unprintable, printable, printable_in_place, printable_json, printable_line,
 };
 pub use ray_files::{
-    Flux, RaySet, SpectralData, Tm25, Tm25Columns, Tm25Header, Tm25Reader, read_ray_set, read_tm25, write_tm25,
+    Flux, RayBlock, RayFile, RaySet, SpectralData, Tm25, Tm25Columns, Tm25Header, Tm25Reader, read_ray_set,
+    read_rays, read_tm25, write_tm25,
 };
-pub use rays::{LightRay, read_rays, write_rays};
+pub use rays::{LightRay, write_rays};
 pub use stream::{Column, NpzStream};
 pub use vtk::{write_vti, write_vtp};

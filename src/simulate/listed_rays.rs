@@ -5,6 +5,7 @@
 
 use super::bind::BoundScene;
 use super::dispatch::{self, kernel_kind};
+use super::emitter::ListCursor;
 use super::kernel::{Context, RaySelection};
 use super::outcome::{Event, PathVertex};
 use super::settings::RunSettings;
@@ -43,7 +44,7 @@ pub struct ListedEnd {
 /// The sources that are lists of rays, by their place in the scene, and how many rays each has.
 pub fn ray_lists(bound: &BoundScene) -> Vec<(u32, u64)> {
     let lists = bound.emitters.iter().enumerate();
-    lists.filter_map(|(k, e)| Some((k as u32, e.list()?.rays.len() as u64))).collect()
+    lists.filter_map(|(k, e)| Some((k as u32, e.list()?.len()))).collect()
 }
 
 /// Traces every ray of every list; rows in the order of sources, rays and branches.
@@ -88,13 +89,14 @@ struct ListTracer<'c, 'a> {
     tally: ReplicateTally,
     /// Power of the source over that of its list.
     scale: f64,
+    cursor: ListCursor,
 }
 
 impl<'c, 'a> ListTracer<'c, 'a> {
     fn new(context: &'c Context<'a>, source: u32) -> Self {
         let emitter = &context.bound.emitters[source as usize];
         let scale = emitter.list().map_or(1.0, |list| emitter.power / list.power());
-        Self { context, source, tally: ReplicateTally::new(context.bound), scale }
+        Self { context, source, tally: ReplicateTally::new(context.bound), scale, cursor: ListCursor::default() }
     }
 
     /// Where a ray ended, path by path.
@@ -108,7 +110,8 @@ impl<'c, 'a> ListTracer<'c, 'a> {
         // Vertices of a path are noted in its order; those of several paths are mixed.
         vertices.sort_by_key(|v| v.branch);
         let emitter = &self.context.bound.emitters[self.source as usize];
-        let Some(measured) = emitter.list().and_then(|list| list.rays.get(ray as usize)) else { return Vec::new() };
+        let cursor = &mut self.cursor;
+        let Some(measured) = emitter.list().and_then(|list| list.ray(ray, cursor)) else { return Vec::new() };
         let power = measured.power * self.scale;
         let Some(emitted) = vertices.first().map(|v| v.power) else {
             // It could not start: nothing is known but where it should have.

@@ -46,7 +46,9 @@ impl BoundScene {
                 "it came to a closed opaque solid from inside, as from a source that lies in it"
             }
             LostCause::TooDeep => "more bodies lie in each other than a ray can carry",
-            LostCause::NotANumber => "its place or direction is no number",
+            LostCause::NotANumber => {
+                "its place or direction is no number, or its ray file was changed while it was read"
+            }
         };
         let place = match (self.body(body).filter(|_| body != AMBIENT), at) {
             (Some([name, medium]), _) => format!("in '{name}' ({medium})"),

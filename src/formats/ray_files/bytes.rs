@@ -2,15 +2,13 @@
 
 use super::super::input::open_file;
 use super::super::{Error, ErrorKind, LightRay};
+use super::ray_collector::RayCollector;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Bytes of one read from the disk.
 const BUFFER: usize = 1 << 18;
-
-/// Rays for which memory is set aside before they are read: a header that promises more than there is must not take it.
-const RESERVED_RAYS: u64 = 1 << 20;
 
 /// A binary file, read from its start.
 pub(super) struct ByteReader {
@@ -27,6 +25,11 @@ impl ByteReader {
         let file = open_file(path).map_err(unreadable)?;
         let length = file.metadata().map_err(unreadable)?.len();
         Ok(Self { path: path.to_owned(), file: BufReader::with_capacity(BUFFER, file), position: 0, length })
+    }
+
+    /// Where it is.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Bytes read so far.
@@ -104,39 +107,24 @@ impl ByteReader {
         Ok(())
     }
 
-    /// Reads `count` rows of f32, each made a ray by `ray`, which gets its index from 0 and may refuse it; the error then names the ray,
-    /// counted from 1.
+    /// Reads `count` rows of f32, each made a ray by `ray`, which may refuse it; the error then names the ray, counted from 1.
     pub(super) fn read_rays(
         &mut self,
         count: u64,
         columns: usize,
-        mut ray: impl FnMut(u64, &[f32]) -> Result<LightRay, String>,
-    ) -> Result<Vec<LightRay>, Error> {
-        let mut rays = Vec::with_capacity(count.min(RESERVED_RAYS) as usize);
+        rays: &mut RayCollector,
+        mut ray: impl FnMut(&[f32]) -> Result<LightRay, String>,
+    ) -> Result<(), Error> {
         let mut row = vec![0.0; columns];
         for index in 0..count {
             self.read_row(&mut row, "the rays")?;
-            rays.push(ray(index, &row).map_err(|m| self.malformed(format!("ray {}: {m}", index + 1)))?);
+            rays.add(ray(&row).map_err(|m| self.malformed(format!("ray {}: {m}", index + 1)))?)?;
         }
-        Ok(rays)
+        Ok(())
     }
-}
 
-/// Makes a ray of the seven first numbers of a row (position, direction, flux), its position in units of `scale` mm; an error as
-/// [`LightRay::from_numbers`].
-pub(super) fn light_ray(row: &[f32], scale: f64, wavelength_nm: Option<f64>) -> Result<LightRay, String> {
-    let mut numbers = [0.0; 8];
-    for (number, value) in numbers.iter_mut().zip(&row[..7]) {
-        *number = f64::from(*value);
-    }
-    for coordinate in &mut numbers[..3] {
-        *coordinate *= scale;
-    }
-    match wavelength_nm {
-        Some(wavelength) => {
-            numbers[7] = wavelength;
-            LightRay::from_numbers(&numbers)
-        }
-        None => LightRay::from_numbers(&numbers[..7]),
+    /// The open file, for reading from any place of it.
+    pub(super) fn file_handle(&self) -> Result<File, Error> {
+        self.file.get_ref().try_clone().map_err(|e| Error::new(&self.path, ErrorKind::Read(e)))
     }
 }

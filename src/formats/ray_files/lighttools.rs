@@ -1,7 +1,8 @@
 //! LightTools binary ray data files (`.ray`, `LTRF`), versions 2 and 3.
 
-use super::bytes::{ByteReader, light_ray};
-use super::{Flux, RaySet};
+use super::bytes::ByteReader;
+use super::ray_collector::RayCollector;
+use super::ray_file::{Flux, RayFile, RowLayout, RowWavelength};
 use crate::formats::Error;
 use std::path::Path;
 
@@ -16,7 +17,7 @@ const POLARISED_VERSION: u32 = 3;
 const END: &[u8; 7] = b"LTRFEND";
 
 /// Reads the rays of a binary ray data file; an error for far-field, tristimulus and polarised data.
-pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
+pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
     let mut file = ByteReader::open(path)?;
     file.read_array::<4>("the signature")?;
     let major = file.read_u32("the major version")?;
@@ -66,13 +67,16 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
         let message = format!("{bytes} bytes of rays are no whole number of rows of {row} bytes; it was cut short");
         return Err(file.malformed(message));
     }
-    let rays =
-        file.read_rays(bytes / row, columns, |_, row| light_ray(row, scale, row.get(7).map(|w| f64::from(*w))))?;
+    let wavelength = if columns == 8 { RowWavelength::Column(7, 1.0) } else { RowWavelength::Common(None) };
+    let layout = RowLayout { columns, scale, power: 6, wavelength };
+    let mut rays = RayCollector::new(path, most_in_memory).with_rows(file.file_handle()?, file.position(), layout);
+    file.read_rays(bytes / row, columns, &mut rays, |row| layout.ray(row))?;
     // A file cut between two rows would else pass.
     if file.read_array::<7>("the end mark")? != *END {
         return Err(file.malformed("LTRFEND is missing behind the rays; it was cut short"));
     }
-    let mut set = RaySet { rays, flux: Some(flux), spectrum: None, notes };
+    let mut set = rays.finish(Some(flux))?;
+    set.notes = notes;
     // The rays' numbers average to the total: each says how much its ray weighs beside the mean one.
     set.scale_to(Some(f64::from(stated)));
     Ok(set)

@@ -10,88 +10,84 @@
 
 mod bytes;
 mod lighttools;
+mod ray_collector;
+mod ray_file;
 mod tm25;
 mod tm25_header;
 mod zemax;
 
+pub use ray_file::{Flux, RayBlock, RayFile, RaySet};
 pub use tm25::{Tm25, Tm25Reader, read_tm25, write_tm25};
 pub use tm25_header::{SpectralData, Tm25Columns, Tm25Header};
 
 use super::input::open_file;
+use super::ray_csv::read_csv;
+use super::ray_npz::read_npz;
 use super::{Error, ErrorKind, LightRay};
+use ray_collector::RayCollector;
+use ray_file::MOST_IN_MEMORY;
 use std::io::Read;
 use std::path::Path;
 
-/// The quantity that the power of a ray stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flux {
-    /// Radiant flux, watts.
-    Radiant,
-    /// Luminous flux, lumens.
-    Luminous,
-}
+impl RayFile {
+    /// Opens a file of rays in any format there is: TM-25, Zemax binary and LightTools binary by their first bytes, else a list as
+    /// [`read_rays`] knows it, and looks at each ray once. `preferred` chooses the flux where the file holds both.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is not what its first bytes promise, the message names the byte or the ray; when a long list of text
+    /// or packed arrays finds no place in the folder for temporary files.
+    pub fn open(path: &Path, preferred: Flux) -> Result<Self, Error> {
+        Self::open_within(path, preferred, MOST_IN_MEMORY)
+    }
 
-impl std::fmt::Display for Flux {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(if *self == Self::Radiant { "watts" } else { "lumens" })
+    /// The same, with so many rays at most in memory.
+    fn open_within(path: &Path, preferred: Flux, most_in_memory: u64) -> Result<Self, Error> {
+        let mut start = [0; 4];
+        let mut file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+        // A file of fewer than four bytes is none of the binary formats; the reader of lists says what it lacks.
+        let binary = file.read_exact(&mut start).is_ok();
+        match &start {
+            b"TM25" if binary => Tm25Reader::open(path)?.into_ray_file(preferred, most_in_memory),
+            b"LTRF" if binary => lighttools::read(path, most_in_memory),
+            // The identifier of the other binary format is a number, not letters.
+            start if binary && i32::from_le_bytes(*start) == zemax::IDENTIFIER => zemax::read(path, most_in_memory),
+            _ => {
+                let mut rays = RayCollector::new(path, most_in_memory);
+                read_list(path, |ray| rays.add(ray))?;
+                rays.finish(None)
+            }
+        }
     }
 }
 
-/// The rays of a measured source.
-#[derive(Clone, Debug)]
-pub struct RaySet {
-    /// Origin in mm, unit direction, power in the unit of `flux`, wavelength where the file gives one for the ray.
-    pub rays: Vec<LightRay>,
-    /// What the powers stand for; `None` where the file does not say (CSV and NPZ).
-    pub flux: Option<Flux>,
-    /// Pairs of nm and relative radiant power per nm that hold for all rays, where the file gives such a table.
-    pub spectrum: Option<Vec<[f64; 2]>>,
-    /// What the reader changed or supposed, for people.
-    pub notes: Vec<String>,
-}
-
-/// Disagreement of header and rays that single precision explains, relative: rays of f32 added up by their writer in f32.
-const TOTAL_ROUNDING: f64 = 1e-4;
-
-impl RaySet {
-    /// Scales the rays to the total flux that a header states, and adds a note, where they differ by more than rounding; does nothing where
-    /// it states none, no positive one, or the rays are dark.
-    fn scale_to(&mut self, stated: Option<f64>) {
-        let sum: f64 = self.rays.iter().map(|r| r.power).sum();
-        let Some(stated) = stated.filter(|s| *s > 0.0) else { return };
-        // Dark sets cannot be scaled, and differences of rounding should not be.
-        if sum <= 0.0 || (sum / stated - 1.0).abs() <= TOTAL_ROUNDING {
-            return;
-        }
-        for ray in &mut self.rays {
-            ray.power *= stated / sum;
-        }
-        let unit = self.flux.unwrap_or(Flux::Radiant);
-        self.notes.push(format!(
-            "the header states {stated} {unit} but the rays add up to {sum}: they were scaled to the header"
-        ));
-    }
-}
-
-/// Reads the rays of a file in any format there is: TM-25, Zemax binary and LightTools binary by their first bytes, else a list as
-/// [`read_rays`](super::read_rays) knows it. `preferred` chooses the flux where the file holds both.
+/// Reads the rays of a file into memory, in any format that [`RayFile::open`] knows.
 ///
 /// # Errors
-/// When the file cannot be read or is not what its first bytes promise; the message names the byte or the ray.
+/// As [`RayFile::open`].
 pub fn read_ray_set(path: &Path, preferred: Flux) -> Result<RaySet, Error> {
-    let mut start = [0; 4];
-    let mut file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
-    // A file of fewer than four bytes is none of the binary formats; the reader of lists says what it lacks.
-    let binary = file.read_exact(&mut start).is_ok();
-    match &start {
-        b"TM25" if binary => Tm25Reader::open(path)?.into_rays(preferred),
-        b"LTRF" if binary => lighttools::read(path),
-        // The identifier of the other binary format is a number, not letters.
-        start if binary && i32::from_le_bytes(*start) == zemax::IDENTIFIER => zemax::read(path),
-        _ => {
-            let rays = super::read_rays(path)?;
-            Ok(RaySet { rays, flux: None, spectrum: None, notes: Vec::new() })
-        }
+    RayFile::open_within(path, preferred, u64::MAX)?.into_set()
+}
+
+/// Reads a list of rays; `.npz` by arrays `origin` (n × 3), `direction` (n × 3), `power` (n) and, if wanted,
+/// `wavelength_nm` (n), of f64 or f32; anything else as CSV with columns `x, y, z, dx, dy, dz, power` and, if wanted,
+/// `wavelength_nm`. Positions are mm. A CSV header may name the columns in any order; lines that start with `#` are comments.
+///
+/// # Errors
+/// When the file cannot be read or its content makes no rays; the message names the line.
+pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
+    let mut rays = Vec::new();
+    read_list(path, |ray| {
+        rays.push(ray);
+        Ok(())
+    })?;
+    Ok(rays)
+}
+
+/// Reads a list of rays in NPZ or CSV and hands each to `add`.
+fn read_list(path: &Path, add: impl FnMut(LightRay) -> Result<(), Error>) -> Result<(), Error> {
+    match path.extension() {
+        Some(extension) if extension.eq_ignore_ascii_case("npz") => read_npz(path, add),
+        _ => read_csv(path, add),
     }
 }
 
@@ -103,19 +99,56 @@ mod tests {
     #[test]
     fn rays_with_relative_weights_take_the_flux_of_the_header() {
         let ray = |power| LightRay { origin: Point::ZERO, direction: Vector::Z, power, wavelength_nm: None };
-        let mut set = RaySet {
-            rays: vec![ray(1.0), ray(3.0)],
-            flux: Some(Flux::Luminous),
-            spectrum: None,
-            notes: Vec::new(),
+        let scaled = |stated| {
+            let mut file = RayFile::from_rays(Path::new("a"), vec![ray(1.0), ray(3.0)]);
+            file.flux = Some(Flux::Luminous);
+            file.scale_to(stated);
+            let set = file.into_set().unwrap();
+            ([set.rays[0].power, set.rays[1].power], set.notes)
         };
-        set.scale_to(Some(2.0));
-        assert_eq!([set.rays[0].power, set.rays[1].power], [0.5, 1.5]);
-        assert!(set.notes[0].contains("2 lumens") && set.notes[0].contains('4'), "{}", set.notes[0]);
-        set.scale_to(None);
-        set.scale_to(Some(2.0 * (1.0 + 1e-6)));
-        assert_eq!(set.rays[1].power, 1.5);
-        assert_eq!(set.notes.len(), 1);
+        let (powers, notes) = scaled(Some(2.0));
+        assert_eq!(powers, [0.5, 1.5]);
+        assert!(notes[0].contains("2 lumens") && notes[0].contains('4'), "{}", notes[0]);
+        for stated in [None, Some(4.0 * (1.0 + 1e-6))] {
+            assert_eq!(scaled(stated), ([1.0, 3.0], Vec::new()));
+        }
+    }
+
+    /// Wherever the rays of a file are kept, each is the same to the bit, its power too, and the file says the same of itself.
+    #[test]
+    fn rays_on_the_disk_are_those_in_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let rays = crate::formats::rays::tests::some_rays(1000, true);
+        let at = |name: &str| folder.path().join(name);
+        crate::formats::write_rays(&at("a.csv"), &rays).unwrap();
+        crate::formats::write_rays(&at("a.npz"), &rays).unwrap();
+        let mut tm25 = Tm25::from_rays(&rays, Flux::Radiant);
+        tm25.header.radiant_flux *= 3.0;
+        write_tm25(&at("scaled.tm25ray"), &tm25).unwrap();
+        // A table per ray, whose wavelengths depend on the rays before: the power is followed by the table's number.
+        let mut tables = tm25.clone();
+        tables.header.columns = Tm25Columns { radiant: true, spectrum_index: true, ..Tm25Columns::default() };
+        tables.header.spectral = SpectralData::TablePerRay;
+        tables.header.spectra = vec![vec![[450.0, 1.0], [500.0, 2.0]]];
+        tables.rows.chunks_exact_mut(8).for_each(|row| row[7] = 1.0);
+        write_tm25(&at("tables.tm25ray"), &tables).unwrap();
+        for name in ["a.csv", "a.npz", "scaled.tm25ray", "tables.tm25ray"] {
+            let expected = read_ray_set(&at(name), Flux::Radiant).unwrap();
+            let file = RayFile::open_within(&at(name), Flux::Radiant, 10).unwrap();
+            assert!(file.is_on_disk() && file.len() == 1000 && file.spectral_rays() == 1000, "{name}");
+            let mut block = RayBlock::default();
+            for first in [990, 0, 500, 1003] {
+                file.read_block(first, 64, &mut block).unwrap();
+                assert_eq!(block.len() as u64, 1000u64.saturating_sub(first).min(64), "{name}");
+                for k in 0..block.len() {
+                    let expected = expected.rays[first as usize + k];
+                    assert_eq!(file.ray(&block, k).unwrap(), expected, "{name}");
+                    assert_eq!(file.power(&block, k), expected.power, "{name}");
+                }
+            }
+            let set = file.into_set().unwrap();
+            assert_eq!((set.rays, set.notes), (expected.rays, expected.notes), "{name}");
+        }
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! IES TM-25 ray files: rows of f32 behind a header, streamed or whole.
 
-use super::bytes::{ByteReader, light_ray};
+use super::bytes::ByteReader;
+use super::ray_collector::RayCollector;
+use super::ray_file::{Flux, RayFile, RaySet, RowLayout, RowWavelength};
 use super::tm25_header::{ColumnPlaces, SpectralData, Tm25Columns, Tm25Header};
-use super::{Flux, RaySet};
 use crate::formats::{Error, LightRay, write_atomic};
 use std::path::Path;
 
@@ -103,54 +104,85 @@ impl Tm25Reader {
     ///
     /// # Errors
     /// When the file ends early or a row makes no ray; the message names the ray.
-    pub fn into_rays(mut self, preferred: Flux) -> Result<RaySet, Error> {
+    pub fn into_rays(self, preferred: Flux) -> Result<RaySet, Error> {
+        self.into_ray_file(preferred, u64::MAX)?.into_set()
+    }
+
+    /// The same, with so many rays at most in memory.
+    pub(super) fn into_ray_file(mut self, preferred: Flux, most_in_memory: u64) -> Result<RayFile, Error> {
         let flux = match (self.places.radiant, self.places.luminous) {
             (Some(_), Some(_)) => preferred,
             (Some(_), None) => Flux::Radiant,
             (None, _) => Flux::Luminous,
         };
-        let place = if flux == Flux::Radiant { self.places.radiant } else { self.places.luminous };
-        let place = place.ok_or_else(|| self.file.malformed("no column of the flux"))?;
+        let power = if flux == Flux::Radiant { self.places.radiant } else { self.places.luminous };
+        let power = power.ok_or_else(|| self.file.malformed("no column of the flux"))?;
         // Zero or no number stands for unknown.
         let single = Some(f64::from(self.header.wavelengths[0])).filter(|w| *w > 0.0);
-        let tables: Vec<Option<Spectrum>> = self.header.spectra.iter().map(|t| Spectrum::new(t)).collect();
-        let mut drawn = vec![0u64; tables.len()];
 
-        let places = self.places;
-        let spectral = self.header.spectral;
-        let rays = self.file.read_rays(self.header.rays, places.count, |_, row| {
-            let wavelength = match spectral {
-                SpectralData::None | SpectralData::Table => None,
-                SpectralData::Single => single,
-                SpectralData::PerRay => places.wavelength.map(|p| f64::from(row[p])),
-                SpectralData::TablePerRay => {
-                    // Numbered from 1; what lies outside is damage, and must not become another table's spectrum.
-                    let number = places.spectrum_index.map_or(0.0, |p| row[p]);
-                    let table = (number as usize).checked_sub(1).filter(|t| *t < tables.len());
-                    let table = table.ok_or_else(|| format!("spectral table {number}, of {}", tables.len()))?;
-                    let spectrum = tables[table].as_ref();
-                    let spectrum = spectrum.ok_or_else(|| format!("spectral table {number}, which is empty"))?;
-                    // Multiples of the golden ratio are spread evenly over [0, 1), however many of them there will be.
-                    drawn[table] += 1;
-                    Some(spectrum.wavelength((drawn[table] as f64 * GOLDEN).fract()))
-                }
-            };
-            let numbers: [f32; 7] = std::array::from_fn(|k| if k < 6 { row[k] } else { row[place] });
-            light_ray(&numbers, 1.0, wavelength)
-        })?;
+        let columns = self.places.count;
+        let wavelength = match (self.header.spectral, self.places.wavelength) {
+            (SpectralData::Single, _) => RowWavelength::Common(single),
+            (SpectralData::PerRay, Some(place)) => RowWavelength::Column(place, 1.0),
+            _ => RowWavelength::Common(None),
+        };
+        let layout = RowLayout { columns, scale: 1.0, power, wavelength };
+        let mut rays = RayCollector::new(self.file.path(), most_in_memory);
+        if self.header.spectral == SpectralData::TablePerRay {
+            // Not read from the file again: the wavelength depends on how many rays of a table came before.
+            let mut drawn = TableWavelengths::new(&self.header, self.places.spectrum_index);
+            self.file.read_rays(self.header.rays, columns, &mut rays, |row| {
+                let nm = Some(drawn.next(row)?);
+                RowLayout { wavelength: RowWavelength::Common(nm), ..layout }.ray(row)
+            })?;
+        } else {
+            rays = rays.with_rows(self.file.file_handle()?, self.file.position(), layout);
+            self.file.read_rays(self.header.rays, columns, &mut rays, |row| layout.ray(row))?;
+        }
 
-        let spectrum = (spectral == SpectralData::Table)
+        let mut set = rays.finish(Some(flux))?;
+        set.spectrum = (self.header.spectral == SpectralData::Table)
             .then(|| self.header.spectra[0].iter().map(|pair| pair.map(f64::from)).collect());
-        if spectral == SpectralData::TablePerRay {
-            self.notes.push("each ray was given one wavelength of its spectral table".to_owned());
+        set.notes = self.notes;
+        if self.header.spectral == SpectralData::TablePerRay {
+            set.notes.push("each ray was given one wavelength of its spectral table".to_owned());
         }
         if self.header.columns.stokes {
-            self.notes.push("Stokes vectors are not traced: its light is taken as unpolarised".to_owned());
+            set.notes.push("Stokes vectors are not traced: its light is taken as unpolarised".to_owned());
         }
         let stated = if flux == Flux::Radiant { self.header.radiant_flux } else { self.header.luminous_flux };
-        let mut set = RaySet { rays, flux: Some(flux), spectrum, notes: self.notes };
         set.scale_to(Some(f64::from(stated)));
         Ok(set)
+    }
+}
+
+/// Wavelengths drawn from the spectral tables of a file, ray by ray.
+struct TableWavelengths {
+    /// `None` for an empty one.
+    tables: Vec<Option<Spectrum>>,
+    /// Rays of each table so far.
+    drawn: Vec<u64>,
+    /// Column of the number of a ray's table.
+    place: Option<usize>,
+}
+
+impl TableWavelengths {
+    fn new(header: &Tm25Header, place: Option<usize>) -> Self {
+        let tables: Vec<Option<Spectrum>> = header.spectra.iter().map(|t| Spectrum::new(t)).collect();
+        Self { drawn: vec![0; tables.len()], tables, place }
+    }
+
+    /// Returns the wavelength of the next row's ray, nm; an error, for people, where it names no table or an empty one.
+    fn next(&mut self, row: &[f32]) -> Result<f64, String> {
+        // Numbered from 1; what lies outside is damage, and must not become another table's spectrum.
+        let number = self.place.map_or(0.0, |p| row[p]);
+        let table = (number as usize).checked_sub(1).filter(|t| *t < self.tables.len());
+        let table = table.ok_or_else(|| format!("spectral table {number}, of {}", self.tables.len()))?;
+        let spectrum = self.tables[table].as_ref();
+        let spectrum = spectrum.ok_or_else(|| format!("spectral table {number}, which is empty"))?;
+        // Multiples of the golden ratio are spread evenly over [0, 1), however many of them there will be.
+        self.drawn[table] += 1;
+        Ok(spectrum.wavelength((self.drawn[table] as f64 * GOLDEN).fract()))
     }
 }
 

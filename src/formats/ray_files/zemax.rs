@@ -1,7 +1,8 @@
 //! Zemax OpticStudio binary source files (`.dat`, `.sdf`), layout as the program's help gives it under "Binary Source File format".
 
-use super::bytes::{ByteReader, light_ray};
-use super::{Flux, RaySet};
+use super::bytes::ByteReader;
+use super::ray_collector::RayCollector;
+use super::ray_file::{Flux, RayFile, RowLayout, RowWavelength};
 use crate::formats::Error;
 use std::path::Path;
 
@@ -16,7 +17,7 @@ const MICROMETRE: f64 = 1000.0;
 
 /// Reads the rays of a binary source file. Location, rotation and scale of the header are not applied: OpticStudio itself uses only
 /// the number of rays, the unit, the ray format and the flux type.
-pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
+pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
     let mut file = ByteReader::open(path)?;
     file.read_i32("the identifier")?;
     let count = file.read_u32("the number of rays")?;
@@ -52,12 +53,13 @@ pub(super) fn read(path: &Path) -> Result<RaySet, Error> {
     };
     // Without a wavelength per ray, the header may give one for all; 0 stands for a composite.
     let common = (composite > 0.0).then(|| f64::from(composite) * MICROMETRE);
-    let rays = file.read_rays(u64::from(count), columns, |_, row| {
-        // Each ray's own wavelength goes before that of the header.
-        let own = row.get(7).map(|w| f64::from(*w) * MICROMETRE);
-        light_ray(row, scale, own.or(common))
-    })?;
-    let mut set = RaySet { rays, flux: Some(flux), spectrum: None, notes: Vec::new() };
+    // Each ray's own wavelength goes before that of the header.
+    let wavelength =
+        if columns == 8 { RowWavelength::Column(7, MICROMETRE) } else { RowWavelength::Common(common) };
+    let layout = RowLayout { columns, scale, power: 6, wavelength };
+    let mut rays = RayCollector::new(path, most_in_memory).with_rows(file.file_handle()?, file.position(), layout);
+    file.read_rays(u64::from(count), columns, &mut rays, |row| layout.ray(row))?;
+    let mut set = rays.finish(Some(flux))?;
     set.scale_to(Some(f64::from(stated)));
     Ok(set)
 }

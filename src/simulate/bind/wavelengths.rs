@@ -36,7 +36,7 @@ fn single_wavelength(list: &RayList, scene: &Scene) -> Option<f64> {
         let [first, last] = spectrum.range_nm();
         return (first == last).then_some(first);
     }
-    match list.own_wavelengths()[..] {
+    match list.own_wavelengths.ascending()[..] {
         [] => Some(scene.run.wavelength_nm),
         [one] => Some(one),
         _ => None,
@@ -46,18 +46,11 @@ fn single_wavelength(list: &RayList, scene: &Scene) -> Option<f64> {
 /// Returns first and last wavelength of each source, nm; the run's wavelength for a source that gives none.
 pub(super) fn source_ranges(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f64; 2]> {
     let run = [scene.run.wavelength_nm; 2];
-    let range = |i: &f64| [*i, *i];
     (scene.sources.iter().zip(loaded))
         .map(|(source, loaded)| match (&source.spectrum, loaded) {
             (Some(key), _) => key.wavelengths(scene.run.unit).map_or(run, |s| s.range_nm()),
             (None, Some(Loaded::Rays(RayList { spectrum: Some(spectrum), .. }))) => spectrum.range_nm(),
-            (None, Some(Loaded::Rays(list))) => {
-                let all = list.rays.iter().map(|r| r.wavelength_nm.unwrap_or(run[0]));
-                all.fold(None, |r: Option<[f64; 2]>, nm| {
-                    r.map_or(Some(range(&nm)), |[a, b]| Some([a.min(nm), b.max(nm)]))
-                })
-                .unwrap_or(run)
-            }
+            (None, Some(Loaded::Rays(list))) => list.range_nm(run[0]),
             _ => run,
         })
         .collect()
@@ -80,7 +73,7 @@ pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[
                 key.wavelengths(scene.run.unit).map_or_else(|_| Vec::new(), |spectrum| probes(&spectrum))
             }
             (None, Some(Loaded::Rays(RayList { spectrum: Some(spectrum), .. }))) => probes(spectrum),
-            (None, Some(Loaded::Rays(list))) => list.own_wavelengths(),
+            (None, Some(Loaded::Rays(list))) => list.own_wavelengths.ascending(),
             _ => vec![scene.run.wavelength_nm],
         };
         wavelengths.sort_by(f64::total_cmp);

@@ -141,13 +141,14 @@ impl Emitter {
         Ok(())
     }
 
-    /// Returns the distance from a point to the farthest start of its rays, mm; 0 for faces, which belong to the scene.
+    /// Returns the distance from a point to the farthest start of its rays, mm, of a list a bound of it; 0 for faces, which belong to the scene.
     fn farthest_start(&self, centre: Point) -> f64 {
         match &self.shape {
             Shape::Faces(_) => 0.0,
+            // The corners of the box around them lie no nearer than the starts.
             Shape::List(list) => {
-                let starts = list.rays.iter().map(|r| self.frame.point(r.origin));
-                starts.map(|p| (p - centre).length()).fold(0.0, f64::max)
+                let starts = list.origins.corners().map(|corner| self.frame.point(corner));
+                starts.iter().map(|p| (*p - centre).length()).fold(0.0, f64::max)
             }
             Shape::Point | Shape::Disc(_) | Shape::Rectangle(_) => {
                 (self.frame.origin - centre).length() + self.size()

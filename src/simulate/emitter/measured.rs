@@ -1,7 +1,7 @@
 //! Sources that were measured: luminous intensities and lists of rays, read from files.
 
 use super::ray_list::RayList;
-use crate::formats::{Flux, PhotometricType, RaySet, read_data1, read_eulumdat, read_ies, read_ray_set};
+use crate::formats::{Flux, PhotometricType, RayFile, read_data1, read_eulumdat, read_ies};
 use crate::optics::IntensitySampler;
 use crate::simulate::scene::{Key, PowerUnit, Scene, Source, SourceKind};
 use crate::simulate::{Error, ErrorKind};
@@ -35,7 +35,7 @@ pub(crate) fn load(scene: &Scene, index: usize, source: &Source) -> Result<Optio
         }
         Ok(Some(Loaded::Intensity(sampler, p.kind, flux)))
     };
-    let list = |set: RaySet| match RayList::new(set, source, scene.run.unit) {
+    let list = |file: RayFile| match RayList::new(file, source, scene.run.unit) {
         Ok(list) => Ok(Some(Loaded::Rays(list))),
         Err(fault) => Err(scene.error(ErrorKind::Value, &at, fault.message).help(fault.help)),
     };
@@ -46,10 +46,10 @@ pub(crate) fn load(scene: &Scene, index: usize, source: &Source) -> Result<Optio
     match source.kind {
         SourceKind::Ies => intensity(read_ies(&path).map_err(unreadable)?),
         SourceKind::Eulumdat => intensity(read_eulumdat(&path).map_err(unreadable)?),
-        SourceKind::Rays => list(read_ray_set(&path, flux).map_err(unreadable)?),
+        SourceKind::Rays => list(RayFile::open(&path, flux).map_err(unreadable)?),
         SourceKind::Data1 => {
             let rays = read_data1(&path).map_err(unreadable)?;
-            list(RaySet { rays, flux: None, spectrum: None, notes: Vec::new() })
+            list(RayFile::from_rays(&path, rays))
         }
         _ => Ok(None),
     }

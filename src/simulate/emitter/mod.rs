@@ -1,11 +1,12 @@
 //! Sources in the form that makes rays.
 //!
-//! Inner modules, each of which sees only those before it: `ray_list`, `measured`, `stream`, `area`, `shape`, this file with `far`,
+//! Inner modules, each of which sees only those before it: `own_wavelengths`, `ray_list`, `measured`, `stream`, `area`, `shape`, this file with `far`,
 //! `packet`, `simd_dispatch`, `sampler`.
 
 mod area;
 mod far;
 mod measured;
+mod own_wavelengths;
 mod packet;
 mod ray_list;
 mod sampler;
@@ -26,7 +27,7 @@ use crate::optics::{Spectrum, Wavelengths};
 pub(crate) use area::Area;
 use far::NearStart;
 pub(crate) use measured::{Loaded, load};
-pub(crate) use ray_list::RayList;
+pub(crate) use ray_list::{ListCursor, RayList};
 pub(crate) use sampler::RaySampler;
 use shape::{
     LAMBERTIAN, Lobe, Shape, direction_about_axis, point_on_rectangle, radius_on_disc, sine_from_cosine,
@@ -65,6 +66,8 @@ pub(crate) struct Emission {
     pub(crate) from: Option<(FaceId, Vector)>,
     /// Wavelength, nm; absent when the scene has but one.
     pub(crate) wavelength: Option<f64>,
+    /// Whether there is no such ray: the file that lists it was changed or went while it was in use.
+    pub(crate) failed: bool,
 }
 
 impl Emitter {
@@ -116,7 +119,7 @@ impl Emitter {
             }
             Some(Loaded::Rays(list)) => {
                 own_power = list.power();
-                coloured_list = list.rays.iter().any(|r| r.wavelength_nm.is_some());
+                coloured_list = list.is_coloured();
                 list_spectrum = list.spectrum.clone();
                 shape = Shape::List(list);
             }
@@ -227,26 +230,33 @@ impl Emitter {
     }
 
     /// A ray of the list of this source, by its place there; one that there is not is left as it was.
-    fn emit_listed(&self, stream: &Stream, index: RayIndex, listed: u64, ray: &mut Ray) -> Emission {
-        let wavelength = self.wavelength(stream, index);
-        match self.list().and_then(|list| list.rays.get(listed as usize)) {
-            Some(measured) => self.emit_measured(measured, wavelength, ray),
-            None => Emission { from: None, wavelength },
-        }
+    fn emit_listed(
+        &self,
+        stream: &Stream,
+        index: RayIndex,
+        listed: u64,
+        cursor: &mut ListCursor,
+        ray: &mut Ray,
+    ) -> Emission {
+        let measured = self.list().and_then(|list| list.ray(listed, cursor));
+        self.emit_measured(measured, self.wavelength(stream, index), ray)
     }
 
-    /// A measured ray, which has its own wavelength where the source draws none.
-    #[inline(always)]
-    fn emit_measured(&self, measured: &LightRay, drawn: Option<f64>, ray: &mut Ray) -> Emission {
+    /// A measured ray, which has its own wavelength where the source draws none; one that could not be read fails where the source is.
+    fn emit_measured(&self, measured: Option<LightRay>, drawn: Option<f64>, ray: &mut Ray) -> Emission {
+        let Some(measured) = measured else {
+            *ray = Ray::new(self.frame.origin, self.frame.z);
+            return Emission { from: None, wavelength: drawn, failed: true };
+        };
         *ray = Ray::new(self.frame.point(measured.origin), self.frame.direction(measured.direction));
-        Emission { from: None, wavelength: drawn.or(measured.wavelength_nm) }
+        Emission { from: None, wavelength: drawn.or(measured.wavelength_nm), failed: false }
     }
 
-    /// A ray of this source.
+    /// A ray of this source; `cursor` is for those that have a list.
     #[inline(never)]
-    fn emit(&self, stream: &Stream, index: RayIndex, ray: &mut Ray) -> Emission {
+    fn emit(&self, stream: &Stream, index: RayIndex, cursor: &mut ListCursor, ray: &mut Ray) -> Emission {
         let f = &self.frame;
-        let mut emission = Emission { from: None, wavelength: self.wavelength(stream, index) };
+        let mut emission = Emission { from: None, wavelength: self.wavelength(stream, index), failed: false };
         *ray = Ray::new(f.origin, f.z);
         let mut axes = [f.x, f.y, f.z];
         match &self.shape {
@@ -271,7 +281,8 @@ impl Emitter {
             // A measured ray has a place and a direction of its own, and perhaps a wavelength. Systematic sampling: shares evenly
             // spaced over the list take from every part what it has.
             Shape::List(list) => {
-                return self.emit_measured(list.ray_at_share(stream.systematic(index)), emission.wavelength, ray);
+                let measured = list.ray_at_share(stream.systematic(index), cursor);
+                return self.emit_measured(measured, emission.wavelength, ray);
             }
         }
         ray.direction = match &self.lobe {

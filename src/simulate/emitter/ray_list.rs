@@ -1,18 +1,49 @@
 //! Measured rays as a source draws them, in the unit that the run counts.
 
-use crate::formats::{Flux, LightRay, RaySet};
+use super::own_wavelengths::OwnWavelengths;
+use crate::formats::{self, Flux, LightRay, RayBlock, RayFile};
+use crate::math::Aabb;
 use crate::optics::{Spectrum, Table, Wavelengths, xyz_of_watt};
 use crate::simulate::scene::{PowerUnit, Source};
+use std::sync::Arc;
+
+/// Rays whose powers are summed together: what a list holds in memory is one sum for each so many, and who draws a ray reads so many.
+/// With 64 the sums of 10⁸ rays would take 12 MB and a draw from a list of far more rays than are drawn half as long.
+const BLOCK: usize = 256;
 
 /// Measured rays, to be drawn in proportion to their power; at least one, and one with power.
 #[derive(Clone, Debug)]
 pub(crate) struct RayList {
-    pub(crate) rays: Vec<LightRay>,
+    file: Arc<RayFile>,
+    /// Lumens to a watt of the file, where it gives watts and the run counts lumens.
+    efficacy: Efficacy,
     /// Spectrum that the file gives for all its rays, in the unit of the run; no ray has a wavelength of its own then.
     pub(crate) spectrum: Option<Wavelengths>,
     /// What the reader changed or supposed, for people.
     pub(crate) notes: Vec<String>,
-    /// Power up to and including each ray.
+    /// Power up to the end of each block of rays.
+    sums: Arc<[f64]>,
+    /// Box around the origins, mm, in the source's frame.
+    pub(crate) origins: Aabb,
+    /// Wavelengths, nm, that single rays have of their own.
+    pub(crate) own_wavelengths: Arc<OwnWavelengths>,
+}
+
+/// What the powers of a list are multiplied by.
+#[derive(Clone, Copy, Debug)]
+enum Efficacy {
+    Constant(f64),
+    /// That of the eye at each ray's own wavelength, lm/W.
+    OfEachRay,
+}
+
+/// The block of a [`RayList`] that was read last, for one who draws rays.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ListCursor {
+    /// Its number; `None` before the first and after a failure.
+    number: Option<usize>,
+    block: RayBlock,
+    /// Power of the list up to and including each ray of the block.
     sums: Vec<f64>,
 }
 
@@ -36,11 +67,17 @@ impl RayList {
     /// # Errors
     /// When the unit cannot be converted and the scene does not give the source's power (with it, the file's powers are relative), when the
     /// eye sees nothing of the file's spectrum, or when the powers add up to 0 or to no finite number.
-    pub(super) fn new(mut set: RaySet, source: &Source, unit: PowerUnit) -> Result<Self, Fault> {
-        let mut notes = std::mem::take(&mut set.notes);
-        let table = file_spectrum(&set)?;
-        match (set.flux, unit) {
-            (Some(Flux::Radiant), PowerUnit::Lumen) => notes.extend(to_lumens(&mut set, table.as_ref(), source)?),
+    pub(super) fn new(mut file: RayFile, source: &Source, unit: PowerUnit) -> Result<Self, Fault> {
+        let mut notes = std::mem::take(&mut file.notes);
+        let table = file_spectrum(&file)?;
+        let mut efficacy = Efficacy::Constant(1.0);
+        match (file.flux, unit) {
+            (Some(Flux::Radiant), PowerUnit::Lumen) => {
+                if let Some((lumens, note)) = to_lumens(&file, table.as_ref(), source)? {
+                    efficacy = lumens;
+                    notes.push(note);
+                }
+            }
             // Relative powers will do where the scene says how much the source emits.
             (Some(Flux::Luminous), PowerUnit::Watt) if source.power.is_none() => {
                 return Err(Fault::new(
@@ -57,12 +94,17 @@ impl RayList {
                 Fault::new(message, "set `unit = \"W\"` in [run]")
             })?,
         };
-        let mut sum = 0.0;
-        let add = |r: &LightRay| {
-            sum += r.power;
-            sum
+        let mut list = Self {
+            file: Arc::new(file),
+            efficacy,
+            spectrum,
+            notes,
+            sums: Arc::new([]),
+            origins: Aabb::EMPTY,
+            own_wavelengths: Arc::default(),
         };
-        let sums: Vec<f64> = set.rays.iter().map(add).collect();
+        list.survey()?;
+        let sum = list.power();
         if !sum.is_finite() {
             let message = "the powers of this list add up to no finite number";
             return Err(Fault::new(message, "give powers in the unit of the run"));
@@ -70,26 +112,110 @@ impl RayList {
         if sum <= 0.0 {
             return Err(Fault::new("the rays of this list carry no power", "give another file"));
         }
-        Ok(Self { rays: set.rays, spectrum, notes, sums })
+        Ok(list)
+    }
+
+    /// Adds up the powers and notes where the rays start and which wavelengths they have.
+    fn survey(&mut self) -> Result<(), Fault> {
+        let changed = |e: formats::Error| Fault::new(e.to_string(), "leave the file as it is while it is in use");
+        let mut sums = Vec::new();
+        let mut wavelengths = OwnWavelengths::default();
+        let mut block = RayBlock::default();
+        let mut sum = 0.0;
+        for first in (0..self.file.len()).step_by(BLOCK) {
+            self.file.read_block(first, BLOCK, &mut block).map_err(changed)?;
+            for k in 0..block.len() {
+                let ray = self.file.ray(&block, k).map_err(changed)?;
+                sum += self.power_of(&block, k);
+                self.origins = self.origins.union(Aabb::from_points([ray.origin]));
+                ray.wavelength_nm.into_iter().for_each(|nm| wavelengths.add(nm));
+            }
+            sums.push(sum);
+        }
+        self.sums = sums.into();
+        self.own_wavelengths = Arc::new(wavelengths);
+        Ok(())
+    }
+
+    /// Number of rays.
+    pub(crate) fn len(&self) -> u64 {
+        self.file.len()
     }
 
     pub(crate) fn power(&self) -> f64 {
-        self.sums[self.sums.len() - 1]
+        self.sums.last().copied().unwrap_or(0.0)
     }
 
-    /// Returns the ray at which the running sum of powers passes `share`, from 0 to 1, of the whole.
-    pub(crate) fn ray_at_share(&self, share: f64) -> &LightRay {
+    /// Whether rays have wavelengths of their own.
+    pub(crate) fn is_coloured(&self) -> bool {
+        self.file.spectral_rays() > 0
+    }
+
+    /// Returns the first and the last of the rays' wavelengths, nm, where one without takes `other`.
+    pub(crate) fn range_nm(&self, other: f64) -> [f64; 2] {
+        let own = self.own_wavelengths.range();
+        match own {
+            Some([a, b]) if self.file.spectral_rays() < self.len() => [a.min(other), b.max(other)],
+            Some(range) => range,
+            None => [other; 2],
+        }
+    }
+
+    /// The power of a ray of a block in the unit of the run.
+    fn power_of(&self, block: &RayBlock, k: usize) -> f64 {
+        let power = self.file.power(block, k);
+        match self.efficacy {
+            Efficacy::Constant(efficacy) => power * efficacy,
+            Efficacy::OfEachRay => {
+                let nm = self.file.ray(block, k).ok().and_then(|ray| ray.wavelength_nm);
+                power * nm.map_or(0.0, |nm| xyz_of_watt(nm)[1])
+            }
+        }
+    }
+
+    /// Reads a block, and its sums, if it is not the cursor's already; `false` when the file cannot be read any more.
+    fn go_to(&self, number: usize, cursor: &mut ListCursor) -> bool {
+        if cursor.number == Some(number) {
+            return true;
+        }
+        cursor.number = None;
+        if self.file.read_block((number * BLOCK) as u64, BLOCK, &mut cursor.block).is_err() {
+            return false;
+        }
+        // Added in the same order as when the list was opened: the sums are those to the bit.
+        let mut sum = if number == 0 { 0.0 } else { self.sums[number - 1] };
+        cursor.sums.clear();
+        for k in 0..cursor.block.len() {
+            sum += self.power_of(&cursor.block, k);
+            cursor.sums.push(sum);
+        }
+        cursor.number = Some(number);
+        true
+    }
+
+    /// Returns a ray of the cursor's block, its power in the unit of the run; `None` when the file was changed.
+    fn ray_of_block(&self, k: usize, cursor: &ListCursor) -> Option<LightRay> {
+        let power = self.power_of(&cursor.block, k);
+        Some(LightRay { power, ..self.file.ray(&cursor.block, k).ok()? })
+    }
+
+    /// Returns the ray at which the running sum of powers passes `share`, from 0 to 1, of the whole; `None` when the file cannot be read any
+    /// more or was changed.
+    pub(crate) fn ray_at_share(&self, share: f64, cursor: &mut ListCursor) -> Option<LightRay> {
         // The running sum is searched: each ray is drawn in proportion to its power.
         let at = share * self.power();
-        &self.rays[self.sums.partition_point(|s| *s <= at).min(self.rays.len() - 1)]
+        let number = self.sums.partition_point(|s| *s <= at).min(self.sums.len() - 1);
+        if !self.go_to(number, cursor) {
+            return None;
+        }
+        let last = cursor.block.len().checked_sub(1)?;
+        self.ray_of_block(cursor.sums.partition_point(|s| *s <= at).min(last), cursor)
     }
 
-    /// Returns the wavelengths, nm, that single rays have of their own, ascending and each once; empty where none has.
-    pub(crate) fn own_wavelengths(&self) -> Vec<f64> {
-        let mut all: Vec<f64> = self.rays.iter().filter_map(|r| r.wavelength_nm).collect();
-        all.sort_by(f64::total_cmp);
-        all.dedup();
-        all
+    /// Returns the ray at this place of the list; `None` behind its end and when the file cannot be read any more.
+    pub(crate) fn ray(&self, place: u64, cursor: &mut ListCursor) -> Option<LightRay> {
+        let found = place < self.len() && self.go_to((place / BLOCK as u64) as usize, cursor);
+        if found { self.ray_of_block((place % BLOCK as u64) as usize, cursor) } else { None }
     }
 }
 
@@ -97,8 +223,8 @@ impl RayList {
 ///
 /// # Errors
 /// When its rows are no spectrum.
-fn file_spectrum(set: &RaySet) -> Result<Option<Wavelengths>, Fault> {
-    let Some(pairs) = &set.spectrum else { return Ok(None) };
+fn file_spectrum(file: &RayFile) -> Result<Option<Wavelengths>, Fault> {
+    let Some(pairs) = &file.spectrum else { return Ok(None) };
     let spectrum = match pairs[..] {
         [[nm, _]] => Ok(Spectrum::line(nm)),
         _ => Table::new("the spectrum of this file", pairs.iter().map(|p| (p[0], p[1]))).map(Spectrum::Table),
@@ -107,24 +233,26 @@ fn file_spectrum(set: &RaySet) -> Result<Option<Wavelengths>, Fault> {
     sampler.map(Some).map_err(|e| Fault::new(e.to_string(), "give the source a `spectrum` and mend the file's"))
 }
 
-/// Multiplies the powers in `set` by lm/W: of the scene's spectrum, else the file's, else each ray's own wavelength. Returns a note of what
-/// was done; `None`, and powers unchanged, where there are no wavelengths but the scene gives the source's power.
+/// Returns what makes lumens of a file's watts: lm/W of the scene's spectrum, else the file's, else of each ray's own wavelength, and a note
+/// that says so; `None` where there are no wavelengths but the scene gives the source's power.
 ///
 /// # Errors
 /// When there are neither wavelengths nor such a power.
-fn to_lumens(set: &mut RaySet, table: Option<&Wavelengths>, source: &Source) -> Result<Option<String>, Fault> {
+fn to_lumens(
+    file: &RayFile,
+    table: Option<&Wavelengths>,
+    source: &Source,
+) -> Result<Option<(Efficacy, String)>, Fault> {
     let of_scene = source.spectrum.as_ref().and_then(|key| key.optics().ok()?.sampler().ok());
     if let Some(spectrum) = of_scene.as_ref().or(table) {
         let efficacy = spectrum.xyz()[1];
-        set.rays.iter_mut().for_each(|r| r.power *= efficacy);
         let whose = if of_scene.is_some() { "the scene's" } else { "the file's" };
-        return Ok(Some(format!("its watts were made lumens by {whose} spectrum, {efficacy:.4} lm/W")));
+        let note = format!("its watts were made lumens by {whose} spectrum, {efficacy:.4} lm/W");
+        return Ok(Some((Efficacy::Constant(efficacy), note)));
     }
-    if set.rays.iter().all(|r| r.wavelength_nm.is_some()) {
-        for ray in &mut set.rays {
-            ray.power *= ray.wavelength_nm.map_or(0.0, |nm| xyz_of_watt(nm)[1]);
-        }
-        return Ok(Some("its watts were made lumens, each ray by its wavelength".into()));
+    if file.spectral_rays() == file.len() {
+        let note = "its watts were made lumens, each ray by its wavelength".to_owned();
+        return Ok(Some((Efficacy::OfEachRay, note)));
     }
     // Nothing tells how bright the light of a watt is; the scene's own power makes that a matter of proportion.
     if source.power.is_some() {
@@ -134,4 +262,50 @@ fn to_lumens(set: &mut RaySet, table: Option<&Wavelengths>, source: &Source) -> 
         "this file gives watts and no wavelengths, but the run counts lumens",
         "set `unit = \"W\"` in [run], or give the source's `spectrum`, or its `power` in lumens",
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::write_rays;
+    use crate::math::{Point, Vector};
+
+    /// The ray at a share is the first whose running sum of powers, added from the first ray on, passes it, in whichever order shares are
+    /// asked for and wherever the list is kept: 70,000 rays are more than memory takes.
+    #[test]
+    fn a_share_finds_the_ray_that_the_sums_of_all_find() {
+        let folder = tempfile::tempdir().unwrap();
+        let source = Source::default();
+        for n in [1, 256, 257, 70_000] {
+            let ray = |k: usize| LightRay {
+                origin: Point::new(k as f64, 0.0, 0.0),
+                direction: Vector::Z,
+                power: if k.is_multiple_of(3) { 0.0 } else { 0.1 + (k % 7) as f64 / 3.0 },
+                wavelength_nm: None,
+            };
+            let mut rays: Vec<LightRay> = (0..n).map(ray).collect();
+            rays[0].power = 0.7;
+            let path = folder.path().join("rays.csv");
+            write_rays(&path, &rays).unwrap();
+            let file = RayFile::open(&path, Flux::Radiant).unwrap();
+            let list =
+                RayList::new(file, &source, PowerUnit::Watt).unwrap_or_else(|fault| panic!("{}", fault.message));
+            let mut sums = Vec::new();
+            let mut sum = 0.0;
+            for ray in &rays {
+                sum += ray.power;
+                sums.push(sum);
+            }
+            assert_eq!((list.power(), list.len()), (sum, n as u64));
+            let mut cursor = ListCursor::default();
+            for k in [0, 999, 500, 501, 1, 250, 750] {
+                let share = f64::from(k) / 1000.0;
+                let expected = sums.iter().position(|s| *s > share * sum).unwrap();
+                assert_eq!(list.ray_at_share(share, &mut cursor), Some(rays[expected]), "{share} of {n}");
+            }
+            assert_eq!(list.ray_at_share(1.0, &mut cursor), Some(rays[n - 1]));
+            assert_eq!(list.ray(n as u64 - 1, &mut cursor), Some(rays[n - 1]));
+            assert_eq!(list.ray(n as u64, &mut cursor), None);
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::packet::RayPacket;
 use super::stream::{RayIndex, Stream};
-use super::{Emission, Emitter, simd_dispatch};
+use super::{Emission, Emitter, ListCursor, simd_dispatch};
 use crate::math::Ray;
 use crate::simulate::scene::Sampling;
 
@@ -14,6 +14,8 @@ pub(crate) struct RaySampler {
     packet: Option<Box<RayPacket>>,
     /// Number in the run of the first ray.
     first: u64,
+    /// Where a list of rays was read last.
+    cursor: ListCursor,
 }
 
 impl RaySampler {
@@ -25,7 +27,7 @@ impl RaySampler {
             && stream.needs_numbers()
             && emitter.fits_packets()
             && !stream.is_short();
-        Self { stream, packet: packed.then(RayPacket::boxed), first }
+        Self { stream, packet: packed.then(RayPacket::boxed), first, cursor: ListCursor::default() }
     }
 
     /// Gives the stream back, whose memory the next source may use.
@@ -42,21 +44,21 @@ impl RaySampler {
         }
         let index = self.index(self.stream.index_to_start(started));
         let Some(packet) = &self.packet else {
-            let emission = emitter.emit(&self.stream, index, ray);
+            let emission = emitter.emit(&self.stream, index, &mut self.cursor, ray);
             emitter.bring_near(ray);
             return (index, emission);
         };
         let (origin, direction) = packet.ray(started as usize);
         *ray = Ray::new(origin, direction);
         emitter.bring_near(ray);
-        (index, Emission { from: None, wavelength: emitter.wavelength(&self.stream, index) })
+        (index, Emission { from: None, wavelength: emitter.wavelength(&self.stream, index), failed: false })
     }
 
     /// Writes the ray with this index in its source and replicate to `ray`, without those before it; the same bits as [`Self::next_ray`].
     pub(crate) fn single_ray(&mut self, emitter: &Emitter, index: u32, ray: &mut Ray) -> (RayIndex, Emission) {
         self.stream.prepare_single(index);
         let index = self.index(index);
-        let emission = emitter.emit(&self.stream, index, ray);
+        let emission = emitter.emit(&self.stream, index, &mut self.cursor, ray);
         emitter.bring_near(ray);
         (index, emission)
     }
@@ -65,7 +67,7 @@ impl RaySampler {
     pub(crate) fn listed_ray(&mut self, emitter: &Emitter, listed: u64, ray: &mut Ray) -> (RayIndex, Emission) {
         self.stream.prepare_single(0);
         let index = RayIndex { in_run: listed, in_stream: 0 };
-        let emission = emitter.emit_listed(&self.stream, index, listed, ray);
+        let emission = emitter.emit_listed(&self.stream, index, listed, &mut self.cursor, ray);
         emitter.bring_near(ray);
         (index, emission)
     }

@@ -125,7 +125,7 @@ impl SourceQueue {
 
 impl<C: RayPayload> Tracer<'_, '_, C> {
     /// Puts a ray that leaves its source on its way: finds its face and media, books it as emitted and clips its first segment. `false`
-    /// when it is in more bodies than it can carry; it is then booked as lost.
+    /// when it is in more bodies than it can carry, or could not be read; it is then booked as lost.
     #[inline(always)]
     fn start_path(&mut self, source: usize, emission: &Emission, path: &mut Path<C>, ray: &mut Ray) -> bool {
         let context = self.context;
@@ -140,6 +140,10 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         // Booked before anything can go wrong, so that a ray which cannot start is in both sums, emitted and lost.
         self.tally.counts.rays += 1;
         self.tally.ends.emitted += quanta_as_integer(path.quanta);
+        if emission.failed {
+            self.lose(path, ray, LostCause::NotANumber, None);
+            return false;
+        }
         let Some(mut payload) = self.payload_at_start(source, into_contact.as_ref(), ray) else {
             self.lose(path, ray, LostCause::TooDeep, None);
             return false;

@@ -23,6 +23,7 @@ pub struct Source {
     /// Its main axis points along `direction`, for type C with the plane C 0 along `x` and C 90 to its left as seen by one who looks
     /// along `direction` (counterclockwise in the plan of a luminaire that shines down), for types A and B with upward along `x`
     /// (+y unless said otherwise) and positive H to the right. Ray lists stand with their origin in `at`.
+    /// Long ones stay on the disk; of CSV and NPZ 64 bytes a ray are unpacked into the folder for temporary files (`TMPDIR`).
     pub file: Option<String>,
     /// The faces that shine, outward, instead of `at`, `direction`, `radius` and `size`.
     pub on: Option<FaceSelector>,

@@ -1,0 +1,165 @@
+//! Lists of rays in NPZ, whose arrays are unpacked side by side in memory that does not grow with the list.
+
+use super::input::open_file;
+use super::{Error, ErrorKind, LightRay};
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+use zip::read::{ZipArchive, ZipFile};
+
+/// Arrays of an NPZ file may unpack to this many times its size: directions, half of the numbers of a ray, hardly shrink.
+const MOST_INFLATION: u64 = 50;
+/// And to this much whatever its size, bytes: small files of equal rays shrink far.
+const LEAST_BUDGET: u64 = 1 << 26;
+
+/// Bytes of an array that are unpacked at a time.
+const BUFFER: usize = 1 << 16;
+
+/// Arrays of a list of rays and the numbers that a ray has in each; the last may be missing.
+const ARRAYS: [(&str, usize); 4] = [("origin", 3), ("direction", 3), ("power", 1), ("wavelength_nm", 1)];
+
+/// The array of [`ARRAYS`] that may be missing.
+const OPTIONAL: &str = "wavelength_nm";
+
+/// Reads the arrays `origin`, `direction`, `power` and, where there is one, `wavelength_nm`, and hands each ray to `add`, in their order.
+///
+/// # Errors
+/// When the file cannot be read, the arrays are not those of a list, or numbers make no ray; those of `add`.
+pub(super) fn read_npz(path: &Path, mut add: impl FnMut(LightRay) -> Result<(), Error>) -> Result<(), Error> {
+    let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
+    let unreadable = |e| Error::new(path, ErrorKind::Read(e));
+    let size = open_file(path).and_then(|f| f.metadata()).map_err(unreadable)?.len();
+    // A few kilobytes may unpack to gigabytes: what all arrays take together is bounded by the size of the file.
+    let mut budget = LEAST_BUDGET.max(MOST_INFLATION.saturating_mul(size));
+    // An archive unpacks one array at a time: each has its own.
+    let mut archives = Vec::new();
+    for _ in ARRAYS {
+        let file = open_file(path).map_err(unreadable)?;
+        let archive = ZipArchive::new(BufReader::new(file));
+        archives.push(archive.map_err(|e| malformed(format!("not an NPZ file: {e}")))?);
+    }
+    let mut arrays = Vec::new();
+    for (archive, (name, width)) in archives.iter_mut().zip(ARRAYS) {
+        let entry = match archive.by_name(&format!("{name}.npy")) {
+            Ok(entry) => entry,
+            Err(zip::result::ZipError::FileNotFound) if name == OPTIONAL => continue,
+            Err(zip::result::ZipError::FileNotFound) => {
+                return Err(malformed(format!("no array '{name}'; a ray list has origin, direction, power")));
+            }
+            Err(e) => return Err(malformed(format!("array '{name}': {e}"))),
+        };
+        let array = ArrayReader::open(entry, width, &mut budget);
+        arrays.push((name, array.map_err(|m| malformed(format!("array '{name}': {m}")))?));
+    }
+    let rows = arrays[0].1.rows;
+    if arrays.iter().any(|(_, array)| array.rows != rows) {
+        return Err(malformed("the arrays origin, direction, power and wavelength_nm differ in length".into()));
+    }
+    for ray in 0..rows {
+        let mut numbers = [0.0; 8];
+        let mut place = 0;
+        for (name, array) in &mut arrays {
+            let row = &mut numbers[place..place + array.width];
+            array.read_row(row).map_err(|m| malformed(format!("array '{name}': {m}")))?;
+            place += array.width;
+        }
+        add(LightRay::from_numbers(&numbers[..place]).map_err(|m| malformed(format!("ray {ray}: {m}")))?)?;
+    }
+    for (name, array) in &mut arrays {
+        // The sum of an entry's bytes is compared where it ends.
+        array.entry.read(&mut [0]).map_err(|e| malformed(format!("array '{name}': {e}")))?;
+    }
+    Ok(())
+}
+
+/// An NPY array of f64 or f32, read row by row.
+struct ArrayReader<'a> {
+    entry: BufReader<ZipFile<'a, BufReader<File>>>,
+    /// Bytes of a number.
+    bytes: u64,
+    width: usize,
+    rows: u64,
+    /// Rows that were read.
+    done: u64,
+}
+
+impl<'a> ArrayReader<'a> {
+    /// Reads the head of an array of shape `(n, width)`, or `(n,)` for a width of 1; its bytes are taken off `budget`, and more than that is
+    /// an error.
+    fn open(entry: ZipFile<'a, BufReader<File>>, width: usize, budget: &mut u64) -> Result<Self, String> {
+        let mut entry = BufReader::with_capacity(BUFFER, entry);
+        let cut = |e: std::io::Error| e.to_string();
+        let mut start = [0u8; 10];
+        entry.read_exact(&mut start).map_err(cut)?;
+        if &start[..6] != b"\x93NUMPY" {
+            return Err("not an NPY array".into());
+        }
+        // Versions 2 and 3 have a header length of four bytes. A header of this kind never needs the upper two, which are zero.
+        if start[6] > 1 {
+            entry.read_exact(&mut [0u8; 2]).map_err(cut)?;
+        }
+        let mut header = vec![0u8; usize::from(u16::from_le_bytes([start[8], start[9]]))];
+        entry.read_exact(&mut header).map_err(cut)?;
+        // Python writes the dictionary with blanks and quotes of either kind.
+        let header = String::from_utf8_lossy(&header).replace([' ', '"'], "");
+        let bytes = if header.contains("'descr':'<f8'") {
+            8
+        } else if header.contains("'descr':'<f4'") {
+            4
+        } else {
+            return Err("its numbers are not little-endian f64 or f32".into());
+        };
+        let Some((shape, _)) = header.split_once("'shape':(").and_then(|(_, s)| s.split_once(')')) else {
+            return Err("its header tells no shape".into());
+        };
+        let dims: Vec<u64> = shape.split(',').filter(|d| !d.is_empty()).map_while(|d| d.parse().ok()).collect();
+        let fits = match width {
+            1 => dims.len() == 1,
+            _ => dims.len() == 2 && dims[1] == width as u64,
+        };
+        if !fits || !header.contains("'fortran_order':False") {
+            return Err(format!("shape ({shape}), where (n, {width}) in C order is needed"));
+        }
+        // Saturating: a shape of 2⁶⁰ rows must be refused, not wrapped.
+        let wanted = dims[0].saturating_mul(width as u64).saturating_mul(bytes);
+        *budget = budget.checked_sub(wanted).ok_or_else(|| {
+            format!("shape ({shape}) takes {wanted} bytes, more than a file of this size can hold of rays")
+        })?;
+        Ok(Self { entry, bytes, width, rows: dims[0], done: 0 })
+    }
+
+    /// Reads the numbers of the next row, as many as `row` has.
+    fn read_row(&mut self, row: &mut [f64]) -> Result<(), String> {
+        for number in row {
+            let mut raw = [0; 8];
+            // What is read grows with what is there, whatever the head says.
+            self.entry.read_exact(&mut raw[..self.bytes as usize]).map_err(|e| {
+                format!(
+                    "it ends or is damaged within row {} of the {} that its head tells: {e}",
+                    self.done, self.rows
+                )
+            })?;
+            *number = match self.bytes {
+                8 => f64::from_le_bytes(raw),
+                _ => f64::from(f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])),
+            };
+        }
+        self.done += 1;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{NpyArray, read_rays, write_npz};
+
+    #[test]
+    fn what_is_no_list_of_rays_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        std::fs::write(&path, b"PK no zip").unwrap();
+        assert!(read_rays(&path).unwrap_err().to_string().contains("not an NPZ file"));
+        write_npz(&path, &[NpyArray { name: "origin", shape: vec![6], data: &[0.0; 6] }]).unwrap();
+        assert!(read_rays(&path).unwrap_err().to_string().contains("shape (6,)"));
+    }
+}
