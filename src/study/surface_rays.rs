@@ -15,7 +15,7 @@ pub const PATH: u64 = 4;
 pub struct SurfacePaths<'a> {
     mesh: &'a FacetMesh,
     guide: &'a dyn Intersector,
-    /// Area of the facets up to each, mm².
+    /// Area of the facets up to each, mm²; one whose first triangle has none adds nothing, for no ray can start there.
     areas: Vec<f64>,
     area: f64,
     seed: u64,
@@ -23,13 +23,15 @@ pub struct SurfacePaths<'a> {
 }
 
 impl<'a> SurfacePaths<'a> {
-    /// Makes `count` rays, none where the facets have no area; `guide` finds the points that the rays after the first leave, on the facets
+    /// Makes `count` rays, none where no facet's first triangle has an area; `guide` finds the points that the rays after the first leave, on the facets
     /// of `mesh`.
     pub fn new(mesh: &'a FacetMesh, guide: &'a dyn Intersector, seed: u64, count: u64) -> Self {
         let mut sum = 0.0;
         let areas: Vec<f64> = (0..mesh.facets.len())
             .map(|facet| {
-                sum += mesh.facet_area(facet);
+                if first_normal(mesh, facet).is_some() {
+                    sum += mesh.facet_area(facet);
+                }
                 sum
             })
             .collect();
@@ -72,8 +74,8 @@ impl<'a> SurfacePaths<'a> {
             }
             // Either side: facets that bound nothing have two outsides.
             let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
-            // The first triangle of a facet may be a line where the second has all its area.
-            if let Some(normal) = (b - a).cross(c - a).try_normalize() {
+            // A number exactly between two facets may fall on one that is left out.
+            if let Some(normal) = first_normal(self.mesh, facet) {
                 let (face, triangle) = (self.mesh.facets[facet].face, Some(Triangle::First));
                 let departure = Departure { face, primitive: facet as u32, uv: Uv::ZERO, triangle };
                 let direction = cosine_direction(random, normal * side);
@@ -81,6 +83,13 @@ impl<'a> SurfacePaths<'a> {
             }
         }
     }
+}
+
+/// Returns the unit normal of the first triangle of a facet; `None` where it is a line or a point, as it may be where the second has all the
+/// area.
+fn first_normal(mesh: &FacetMesh, facet: usize) -> Option<Vector> {
+    let [a, b, c, _] = mesh.corners(facet);
+    (b - a).cross(c - a).try_normalize()
 }
 
 /// Draws a direction about a normal, cosine-distributed: the normal and a uniform direction added up.
@@ -102,5 +111,28 @@ impl RaySource for SurfacePaths<'_> {
             path += 1;
         }
         rays
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::octree::Octree;
+    use crate::math::{FaceId, Point};
+    use crate::mesh::{Facet, MeshVertex};
+
+    #[test]
+    fn facets_whose_first_triangle_is_a_line_start_no_ray() {
+        // Along x, then aside: the first three corners lie on a line, the second triangle has all the area.
+        let places = [Point::ZERO, Point::X, 2.0 * Point::X, Point::Y];
+        let vertex = |k: u32| MeshVertex { position: k, normal: Vector::Z, uv: Uv::ZERO };
+        let mesh = FacetMesh {
+            positions: places.to_vec(),
+            vertices: (0..4).map(vertex).collect(),
+            facets: vec![Facet { vertices: [0, 1, 2, 3], face: FaceId(0) }],
+            sag: vec![0.0],
+        };
+        let octree = Octree::build(&mesh, &Default::default());
+        assert_eq!(SurfacePaths::new(&mesh, &octree, 1, 8).len(), 0);
     }
 }

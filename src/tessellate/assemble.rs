@@ -28,6 +28,8 @@ pub(super) struct PartMesh {
     pub(super) faces: Vec<Option<FaceMesh>>,
     /// Why faces, by their place in the part, exceeded a limit: too many facets or too much work. Other failures are not in it.
     pub(super) causes: FxHashMap<usize, FailureCause>,
+    /// What each face has given up for the sake of others.
+    pub(super) taken: Vec<TakenChords>,
 }
 
 /// Times that borders are sampled more densely where facets beside them are not proved, and that doubled chords are looked for.
@@ -151,7 +153,7 @@ fn mesh_part(
         Some((k, cells.or(over_steps.then_some(FailureCause::TooManySteps))?))
     };
     let causes = faces.iter().enumerate().filter_map(cause).collect();
-    with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes })
+    with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken })
 }
 
 /// Returns for each edge its sides on faces with a usable surface: only these have a say in how it is divided.
@@ -235,6 +237,8 @@ pub(super) struct Renumbering {
     /// By edge.
     changed: Vec<bool>,
     to: Vec<u32>,
+    /// Whether a position of the first division is one of the second.
+    is_kept: Vec<bool>,
 }
 
 impl Renumbering {
@@ -242,15 +246,20 @@ impl Renumbering {
     /// edges keep their old numbers, which mean nothing any more.
     pub(super) fn new(part: &Part, (before, shared): (&[Division], usize), now: &[Division]) -> Self {
         let mut to: Vec<u32> = (0..shared as u32).collect();
+        let mut is_kept = vec![true; shared];
         let mut changed = Vec::with_capacity(part.edges.len());
         for (old, new) in before.iter().zip(now) {
             changed.push(old.t != new.t);
             // Inner samples alone move: vertices come first in any division.
-            if old.t == new.t {
-                (0..old.t.len() as u32 - 2).for_each(|k| to[(old.first + k) as usize] = new.first + k);
+            for k in 0..old.t.len() as u32 - 2 {
+                let position = (old.first + k) as usize;
+                is_kept[position] = old.t == new.t;
+                if old.t == new.t {
+                    to[position] = new.first + k;
+                }
             }
         }
-        Self { changed, to }
+        Self { changed, to, is_kept }
     }
 
     /// Whether an edge is divided otherwise than before; false without an edge, true for one that the part does not have.
@@ -267,6 +276,17 @@ impl Renumbering {
         }
         mesh.coincident.iter_mut().flatten().for_each(|p| *p = self.to[*p as usize]);
         mesh
+    }
+
+    /// Returns the chords with their ends renumbered, without those that end inside a changed edge, where no position is what it was.
+    pub(super) fn renumbered_chords(&self, taken: &TakenChords) -> TakenChords {
+        let renumbered = |p: u32| self.is_kept[p as usize].then(|| self.to[p as usize]);
+        let mut out = TakenChords::default();
+        out.extend(taken.iter().filter_map(|[a, b]| {
+            let (a, b) = (renumbered(a)?, renumbered(b)?);
+            Some([a.min(b), a.max(b)])
+        }));
+        out
     }
 }
 

@@ -30,6 +30,11 @@ impl TakenChords {
         }
     }
 
+    /// Goes through the chords, by both positions in ascending order, in no order of their own.
+    pub(super) fn iter(&self) -> impl Iterator<Item = [u32; 2]> {
+        self.0.iter().copied()
+    }
+
     pub(super) fn extend(&mut self, more: impl IntoIterator<Item = [u32; 2]>) {
         self.0.extend(more);
     }

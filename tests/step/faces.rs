@@ -285,6 +285,18 @@ fn edges_given_only_in_a_parameter_plane_or_as_an_offset_are_converted() {
     }
 }
 
+/// Aside of a corner the two sides of a curve part: what would bridge them is not in the file.
+#[test]
+fn the_offset_of_a_curve_with_a_corner_is_refused() {
+    let curve = "#80=OFFSET_CURVE_3D('',#81,1.,.F.,#82);\n#82=DIRECTION('',(0.,0.,1.));\n\
+        #81=B_SPLINE_CURVE_WITH_KNOTS('',1,(#83,#84,#85),.UNSPECIFIED.,.F.,.F.,(2,1,2),(0.,0.5,1.),.UNSPECIFIED.);\n\
+        #83=CARTESIAN_POINT('',(0.,-1.,0.));\n#84=CARTESIAN_POINT('',(0.5,-1.2,0.));\n#85=CARTESIAN_POINT('',(1.,-1.,0.));\n";
+    let import = import(&square_along(curve));
+    assert_eq!(import.report.faces.refused, 1);
+    let reason = &import.report.refusals[0].reason;
+    assert!(reason.contains("#80 OFFSET_CURVE_3D") && reason.contains("no curve follows it"), "{reason}");
+}
+
 #[test]
 fn every_context_has_its_own_units() {
     let own = |k: u32, unit: &str| {
@@ -367,6 +379,35 @@ fn rectangles_of_parameters_are_in_the_units_of_their_context() {
     let side = 20.0 * 30f64.to_radians().cos();
     for (got, expected) in lo.into_iter().chain(hi).zip([0.0, 0.0, 10.0, side, side, 20.0]) {
         assert!((got - expected).abs() < 1e-6, "{lo:?} {hi:?}");
+    }
+}
+
+/// ISO 10303-42: each flag says whether a parameter runs with that of the basis surface; the normal is ∂u × ∂v of the parameters as they
+/// run. One that runs against it starts where it otherwise ends.
+#[test]
+fn a_rectangle_that_runs_against_one_parameter_has_the_other_normal() {
+    for [with_u, with_v] in [[true, true], [false, true], [true, false], [false, false]] {
+        let range = |with: bool, [a, b]: [&str; 2]| if with { format!("{a},{b}") } else { format!("{b},{a}") };
+        let flag = |with: bool| if with { ".T." } else { ".F." };
+        let data = format!(
+            "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+            #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n\
+            #3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+            #10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=AXIS2_PLACEMENT_3D('',#10,$,$);\n#12=SPHERICAL_SURFACE('',#11,20.);\n\
+            #13=RECTANGULAR_TRIMMED_SURFACE('',#12,{},{},{},{});\n#14=GEOMETRIC_SET('',(#13));\n\
+            #15=GEOMETRICALLY_BOUNDED_SURFACE_SHAPE_REPRESENTATION('',(#14),#1);\n",
+            range(with_u, ["0.", "1.5"]),
+            range(with_v, ["0.5", "1."]),
+            flag(with_u),
+            flag(with_v),
+        );
+        let text = format!("ISO-10303-21;HEADER;FILE_SCHEMA(('X'));ENDSEC;DATA;{data}ENDSEC;END-ISO-10303-21;");
+        let import = read_bytes("zone.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
+        close(area(&import), 1.5 * 20.0 * 20.0 * (1f64.sin() - 0.5f64.sin()), 1e-4);
+        let mesh = lampyris::tessellate::tessellate(&import.model, &Default::default()).mesh;
+        let outward = mesh.vertices.iter().map(|v| v.normal.dot(mesh.positions[v.position as usize]).signum());
+        let expected = if with_u == with_v { 1.0 } else { -1.0 };
+        assert!(outward.clone().count() > 0 && outward.clone().all(|side| side == expected), "{with_u} {with_v}");
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::support::trimmed::{chain, face};
 use lampyris::math::{Frame, Point, Uv};
-use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
+use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Instance, Model, Part, PartId, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Curve, Surface, UvCurve, sweep};
 use lampyris::tessellate::{Settings, tessellate};
 use std::f64::consts::PI;
@@ -53,6 +53,24 @@ fn no_diagonal_is_in_two_faces() {
         // Twice the area of the polygon, by the formula of the ellipse's inscribed polygon.
         let area = 6.0 * 4.0 * f64::from(n) * (2.0 * PI / f64::from(n)).sin();
         assert!((r.area_mm2 / area - 1.0).abs() < 1e-12, "{n} corners: {}", r.area_mm2);
+    }
+}
+
+/// What one face has given up for the other it does not take back when something is glued to it.
+#[test]
+fn no_diagonal_is_in_two_faces_where_another_solid_lies_on_one() {
+    for n in [5, 6, 8, 13] {
+        let angle = |k: i32| 2.0 * PI * f64::from(k) / f64::from(n);
+        let corners: Vec<[f64; 2]> = (0..n).map(|k| [6.0 * angle(k).cos(), 4.0 * angle(k).sin()]).collect();
+        let mut model = both_sides_of(&corners);
+        let mut sheet = model.parts[0].clone();
+        sheet.shells[0].faces.pop();
+        sheet.shells[0].closed = false;
+        model.parts.push(sheet);
+        model.instances.push(Instance { part: PartId(1), ..model.instances[0].clone() });
+        let made = tessellate(&model, &Settings { glue_mm: 1e-3, ..Settings::uniform(0.1) });
+        let r = &made.report;
+        assert_eq!((r.open_edges, r.nonmanifold_edges, r.shells.closed), (0, 0, 1), "{n} corners");
     }
 }
 

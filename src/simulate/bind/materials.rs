@@ -31,14 +31,14 @@ pub(super) fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> 
     })
 }
 
-/// Returns the index of a surface in the table, appending it where it is not there yet.
-pub(super) fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> u16 {
+/// Returns the index of a surface in the table, appending it where it is not there yet; `None` where there are as many as an index can name.
+pub(super) fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> Option<u16> {
     // Few surfaces are used by many faces: the table stays so short that a linear look is fastest.
     let found = surfaces.iter().position(|s| *s == surface).unwrap_or_else(|| {
         surfaces.push(surface);
         surfaces.len() - 1
     });
-    found as u16
+    u16::try_from(found).ok()
 }
 
 /// Checks that every face which its rule calls an interface has a medium behind it (`bodies`, by placed face).
@@ -64,4 +64,17 @@ pub(super) fn check_interfaces(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_surface_beyond_the_last_index_has_none() {
+        let mut surfaces = vec![Surface::Interface; usize::from(u16::MAX)];
+        assert_eq!(surface_index(&mut surfaces, Surface::Mirror(0.5)), Some(u16::MAX));
+        assert_eq!(surface_index(&mut surfaces, Surface::Mirror(0.25)), None);
+        assert_eq!(surface_index(&mut surfaces, Surface::Mirror(0.5)), Some(u16::MAX));
+    }
 }

@@ -111,7 +111,7 @@ struct Faces {
 /// none where bodies are not `nested`. A face that no rule names is a bare interface where it has a medium, else `default_surface`.
 ///
 /// # Errors
-/// When a rule gives a surface of values that do not go together.
+/// When a rule gives a surface of values that do not go together, or the rules together more surfaces than can be told apart.
 fn bind_faces(
     scene: &Scene,
     model: &Model,
@@ -142,8 +142,13 @@ fn bind_faces(
         // Opaque from outside: what a body with a medium does behind its face is the medium's affair.
         let opaque = body == AMBIENT && surface.is_opaque();
         opaque_outside.push(opaque);
+        let surface = materials::surface_index(&mut surfaces, surface).ok_or_else(|| {
+            let at = [Key::Name("material")];
+            let error = scene.error(ErrorKind::Value, &at, "more than 65,536 different surfaces".to_string());
+            error.help("give faces that are to behave alike the same values")
+        })?;
         faces.push(FaceOptics {
-            surface: materials::surface_index(&mut surfaces, surface),
+            surface,
             body,
             opaque_solid: closed && opaque,
             touches_body: touching[f.id.index()],

@@ -96,7 +96,9 @@ fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<
     match r {
         None => Coating::ideal(unset, transmittance).map_err(|e| ("transmittance", e.to_string())),
         Some(Reflectance::Constant(r)) => {
-            Coating::ideal(*r, transmittance).map_err(|e| ("reflectance", e.to_string()))
+            // A reflectance that would do by itself is not what is wrong.
+            let wrong = if Coating::ideal(*r, 0.0).is_ok() { "transmittance" } else { "reflectance" };
+            Coating::ideal(*r, transmittance).map_err(|e| (wrong, e.to_string()))
         }
         Some(Reflectance::ByAngle(t)) => {
             let (angles, cells) = t.iter().map(|[a, r]| (*a, same(*r))).unzip();

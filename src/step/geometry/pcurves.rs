@@ -2,10 +2,10 @@
 
 use super::curves::{CurveShape, DirectedCurve};
 use super::extent::FaceExtent;
-use super::tolerances::{CURVE_ERROR_MM, DIFFERENCE_STEP, PARALLEL_AXIS};
+use super::tolerances::{CURVE_ERROR_MM, DIFFERENCE_STEP, PARALLEL_AXIS, WORST_CURVE_ERROR_MM};
 use super::units::Units;
 use super::{Geometry, Outcome, Refusal};
-use crate::math::{Uv, Vector};
+use crate::math::{Point, Uv, Vector};
 use crate::nurbs::{Curve, fit_cubic};
 use crate::step::chart::Chart;
 use crate::step::part21::{Args, Entity};
@@ -49,21 +49,21 @@ impl<'f, 'a> Geometry<'f, 'a> {
                     CurveShape::Spline { curve, .. } => curve,
                     other => other.segment(0.0, 2.0 * std::f64::consts::PI),
                 };
-                let moved = |t: f64| {
-                    let d = curve.derivatives(t);
+                let moved = |piece: &Curve, t: f64| {
+                    let d = piece.derivatives(t);
                     // Where the curve stands still, nothing says which way is aside: it stays where it is.
                     let aside = across.cross(d.first).try_normalize().unwrap_or(Vector::ZERO);
                     d.point + sign * aside
                 };
-                let [a, b] = curve.domain();
                 // The offset's own derivative would need the curve's second one; a quotient is close enough for a
                 // fit.
-                let at = |t: f64| {
+                let at = |piece: &Curve, t: f64| {
+                    let [a, b] = piece.domain();
                     let h = DIFFERENCE_STEP * (b - a);
                     let (lo, hi) = ((t - h).max(a), (t + h).min(b));
-                    (moved(t), (moved(hi) - moved(lo)) / (hi - lo))
+                    (moved(piece, t), (moved(piece, hi) - moved(piece, lo)) / (hi - lo))
                 };
-                CurveShape::spline(fit_cubic([a, b], at, CURVE_ERROR_MM).0)
+                CurveShape::spline(fit_pieces(e, &curve, at)?)
             }
         };
         Ok(DirectedCurve { shape, reversed })
@@ -84,31 +84,37 @@ impl<'f, 'a> Geometry<'f, 'a> {
         // Parameters are pure numbers; only angles of conics keep their unit.
         let plane = Geometry { file: self.file, units: Units { length: 1.0, ..self.units } };
         let curve = plane.bounded_curve(item.id, depth + 1)?;
-        Ok(lift_to_surface(&chart, &curve, scale))
+        lift_to_surface(e, &chart, &curve, scale)
     }
 }
 
 /// Returns a curve of a chart's parameter plane as a curve in space, fitted; `scale` turns the curve's u and v into the chart's.
-fn lift_to_surface(chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Curve {
-    let at = |t: f64| {
-        let c = curve.derivatives(t);
+fn lift_to_surface(e: Entity<'_, '_>, chart: &Chart, curve: &Curve, scale: [f64; 2]) -> Outcome<Curve> {
+    fit_pieces(e, curve, |piece, t| {
+        let c = piece.derivatives(t);
         let d = chart.derivatives(Uv::new(c.point.x * scale[0], c.point.y * scale[1]));
         (d.point, d.du * (c.first.x * scale[0]) + d.dv * (c.first.y * scale[1]))
-    };
-    // Corners stay corners: one cubic between each pair of knots of full multiplicity would do, all knots are simpler.
+    })
+}
+
+/// Fits cubics to what becomes of `curve`: `at` gives position, mm, and derivative on a piece of it, which ends where a corner may be, at
+/// knots of full multiplicity. Refuses what is not met within [`WORST_CURVE_ERROR_MM`], and pieces that part at a corner.
+fn fit_pieces(e: Entity<'_, '_>, curve: &Curve, at: impl Fn(&Curve, f64) -> (Point, Vector)) -> Outcome<Curve> {
     let breaks = curve.breakpoints();
-    if curve.degree > 1 || breaks.len() == 2 {
-        return fit_cubic(curve.domain(), at, CURVE_ERROR_MM).0;
+    let is_corner = |t: f64| curve.knots.iter().filter(|&&k| k == t).count() >= curve.degree;
+    let [start, end] = curve.domain();
+    let corners: Vec<f64> = breaks.into_iter().filter(|&t| t == start || t == end || is_corner(t)).collect();
+    let mut whole: Option<Curve> = None;
+    for span in corners.windows(2) {
+        let piece = curve.restricted(span[0], span[1]);
+        let (fitted, error) = fit_cubic([span[0], span[1]], |t| at(&piece, t), CURVE_ERROR_MM);
+        // Of an offset both sides of a corner part, and no one curve joins them.
+        let parted = whole.as_ref().map_or(0.0, |w| (w.points[w.points.len() - 1] - fitted.points[0]).length());
+        if !(error.max(parted) <= WORST_CURVE_ERROR_MM) || error.is_nan() {
+            let off = if error.is_nan() { error } else { error.max(parted) };
+            return Err(Refusal::new(e, format!("no curve follows it to more than {off:.1e} mm")));
+        }
+        whole = Some(whole.map_or_else(|| fitted.clone(), |head| head.joined_with(&fitted)));
     }
-    let parts = breaks.windows(2).map(|w| {
-        let middle = 0.5 * (w[0] + w[1]);
-        let slope = curve.derivatives(middle).first;
-        let line = |t: f64| {
-            let p = curve.evaluate(t);
-            let d = chart.derivatives(Uv::new(p.x * scale[0], p.y * scale[1]));
-            (d.point, d.du * (slope.x * scale[0]) + d.dv * (slope.y * scale[1]))
-        };
-        fit_cubic([w[0], w[1]], line, CURVE_ERROR_MM).0
-    });
-    parts.reduce(|a, b| a.joined_with(&b)).unwrap_or_else(|| curve.clone())
+    whole.ok_or_else(|| Refusal::new(e, "it has no length"))
 }

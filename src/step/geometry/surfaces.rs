@@ -38,10 +38,16 @@ impl<'f, 'a> Geometry<'f, 'a> {
         if let Some(a) = e.attributes("SURFACE_OF_LINEAR_EXTRUSION", 1) {
             return self.extrusion(e, a, extent, depth);
         }
-        let trimmed = e.attributes("RECTANGULAR_TRIMMED_SURFACE", 1);
-        if let Some(a) = trimmed.or_else(|| e.attributes("CURVE_BOUNDED_SURFACE", 1)) {
+        if let Some(a) = e.attributes("CURVE_BOUNDED_SURFACE", 1) {
             let basis = self.resolve(e, a.id(0), "basis surface")?;
             return self.chart(basis.id, extent, depth + 1);
+        }
+        if let Some(a) = e.attributes("RECTANGULAR_TRIMMED_SURFACE", 1) {
+            let basis = self.resolve(e, a.id(0), "basis surface")?;
+            let mut chart = self.chart(basis.id, extent, depth + 1)?;
+            // One parameter turned around turns the normal, which is ∂u × ∂v; both leave it (ISO 10303-42, usense and vsense).
+            chart.flipped ^= a.flag(5).is_some_and(|u| a.flag(6) == Some(!u));
+            return Ok(chart);
         }
         if let Some(a) = e.attributes("OFFSET_SURFACE", 1) {
             return self.offset_surface(e, a, extent, depth);

@@ -17,6 +17,8 @@ pub(super) const EQUAL_WEIGHTS: f64 = 1e-12;
 
 /// How closely a cubic follows an offset curve or a curve of the parameter plane: the default tolerance of uv curves.
 pub(super) const CURVE_ERROR_MM: f64 = 1e-6;
+/// How far from it a fitted curve may be and still be taken: what edges of real files miss their surfaces by.
+pub(super) const WORST_CURVE_ERROR_MM: f64 = 1e-3;
 /// Step of a difference quotient, as a share of the domain: near the cube root of the unit in the last place.
 pub(super) const DIFFERENCE_STEP: f64 = 1e-5;
 

@@ -98,7 +98,7 @@ fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) ->
         face_task(geometry.chart(basis.id, reach, 0)?, &boundaries, settings)
     } else {
         let mut chart = geometry.chart(id, FaceExtent::UNKNOWN, 0)?;
-        if let Some(a) = e.attributes("RECTANGULAR_TRIMMED_SURFACE", 1) {
+        if e.attributes("RECTANGULAR_TRIMMED_SURFACE", 1).is_some() {
             let range = trim_rectangle(geometry, e, &chart)?;
             for d in 0..2 {
                 let [a, b] = range[d];
@@ -108,9 +108,6 @@ fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) ->
                     chart.poles.retain(|pole| pole.fixed != d || pole.at == a || pole.at == b);
                     chart.range[d] = range[d];
                 }
-            }
-            if a.flag(5) == Some(false) && a.flag(6) == Some(false) {
-                return Err(Refusal::new(e, "a rectangle trimmed against both parameters is not supported"));
             }
         }
         face_task(chart, &boundaries, settings)

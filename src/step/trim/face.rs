@@ -84,7 +84,11 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
             let (source, reversed) = (piece.source, piece.reversed != seams.is_turned(piece.source));
             let uv = match source {
                 Source::Nothing => region.line(&piece),
-                Source::Seam(k) => seams.uv(k, &piece)?,
+                Source::Seam(k) => {
+                    let fit = seams.uv(k, &piece)?;
+                    gap = gap.max(fit.gap);
+                    fit.curve
+                }
                 // The spline has the chart's parameters.
                 Source::Edge(_) if chart.angular_directions() == [false, false] => piece.curve,
                 Source::Edge(edge) => {

@@ -1,6 +1,6 @@
 //! Seams that were added to a face: curves in space for straight lines in its parameter plane.
 
-use super::fit::Overrun;
+use super::fit::{Fit, Overrun};
 use super::loops::{Piece, Source};
 use super::region::Region;
 use super::tolerances::{ISOLINE_SLACK, SEAM_ERROR_MM};
@@ -28,6 +28,8 @@ struct SeamCurve {
     varies: Option<usize>,
     /// Whether the curve runs against the line it was made of.
     turned: bool,
+    /// Largest distance of the curve from the surface over its line, mm, where it was fitted.
+    error: f64,
 }
 
 impl<'r, 't, 'e> Seams<'r, 't, 'e> {
@@ -40,21 +42,22 @@ impl<'r, 't, 'e> Seams<'r, 't, 'e> {
         matches!(source, Source::Seam(k) if self.curves[k].turned)
     }
 
-    /// Returns the uv curve of a use of seam `k`, over the seam's own parameter; fails when the budget is used up.
-    pub(super) fn uv(&mut self, k: usize, piece: &Piece) -> Result<UvCurve, Overrun> {
+    /// Returns the uv curve of a use of seam `k`, over the seam's own parameter, and how far the seam is from the surface there; fails when
+    /// the budget is used up.
+    pub(super) fn uv(&mut self, k: usize, piece: &Piece) -> Result<Fit, Overrun> {
         let seam = &self.curves[k];
         let ends = [0, piece.curve.points.len() - 1].map(|i| piece.curve.points[i].truncate());
         let [a, b] = ends.map(|p| self.region.parameters(p));
         // An isoline has the spline's own parameter.
         if seam.varies.is_some() {
             let [a, b] = if seam.turned { [b, a] } else { [a, b] };
-            return Ok(UvCurve::line(a, b, seam.curve.domain()));
+            return Ok(Fit { curve: UvCurve::line(a, b, seam.curve.domain()), gap: 0.0 });
         }
         // An oblique line stays a line only where the spline has the chart's parameters.
         if self.region.task.chart.angular_directions() == [false, false] {
-            return Ok(UvCurve::line(a, b, [0.0, 1.0]));
+            return Ok(Fit { curve: UvCurve::line(a, b, [0.0, 1.0]), gap: seam.error });
         }
-        self.region.refit(piece, &seam.curve).map(|fit| fit.curve)
+        self.region.refit(piece, &seam.curve)
     }
 
     /// Hands over the seams in space, in the order of their numbers, with their ends.
@@ -91,6 +94,7 @@ fn seam_curve(region: &Region<'_, '_>, [a, b]: [Uv; 2]) -> SeamCurve {
                 curve: line.restricted(lo, hi),
                 varies: Some(varies),
                 turned: p[varies] > q[varies],
+                error: 0.0,
             };
         }
     }
@@ -100,5 +104,6 @@ fn seam_curve(region: &Region<'_, '_>, [a, b]: [Uv; 2]) -> SeamCurve {
         let d = task.chart.derivatives(a + step * t);
         (d.point, d.du * step.x + d.dv * step.y)
     };
-    SeamCurve { curve: fit_cubic([0.0, 1.0], at, SEAM_ERROR_MM).0, varies: None, turned: false }
+    let (curve, error) = fit_cubic([0.0, 1.0], at, SEAM_ERROR_MM);
+    SeamCurve { curve, varies: None, turned: false, error }
 }

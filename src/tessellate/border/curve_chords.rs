@@ -164,7 +164,7 @@ impl Piece {
         let end = |k: usize| if k == 0 { a } else { inner.get(k - 1).copied().unwrap_or(b) };
         let excess = |k: usize| {
             let (x, y) = (end(k), end(k + 1));
-            let i = (4.0 * ((0.5 * (x + y) - a) / (b - a) * last as f64)) as usize / 4;
+            let i = ((0.5 * (x + y) - a) / (b - a) * last as f64) as usize;
             distance_to_chord(at(0.5 * (x + y)), &[at(x), at(y)]) / self.tolerances[i.min(last)]
         };
         (0..=inner.len()).map(excess).fold(0.0, f64::max)

@@ -26,7 +26,7 @@ use super::face::{FaceInput, mesh_with_imprint};
 use super::face_mesh::FaceMesh;
 use super::imprint::{CarrierFacets, Imprint};
 use super::settings::Settings;
-use super::taken_chords::NO_CHORDS;
+use super::taken_chords::TakenChords;
 use crate::math::Point;
 use crate::model::{Face, Model};
 use closure::SideCounts;
@@ -125,6 +125,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             let (divisions, shared) = edges::divide_more(part, &before.divisions, further.get(&i).unwrap_or(&none));
             let renumbering = Renumbering::new(part, (&before.divisions, before.shared.len()), &divisions);
             let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
+            let taken: Vec<TakenChords> = before.taken.iter().map(|t| renumbering.renumbered_chords(t)).collect();
             let renew = |(k, old): (usize, &Option<FaceMesh>)| {
                 let key = FaceKey { instance: i, face: k };
                 let changed = faces[k].loops.iter().flat_map(|l| &l.uses).any(|u| renumbering.has_changed(u.edge));
@@ -141,18 +142,18 @@ impl<'j, 'm> Joiner<'j, 'm> {
                     divisions: &divisions,
                     shared: &shared,
                     settings: self.settings,
-                    taken: &NO_CHORDS,
+                    taken: &taken[k],
                 })
             };
             let meshes = before.faces.par_iter().enumerate().map(renew).collect();
             let causes = before.causes.clone();
-            Some((i, PartMesh { divisions, shared, faces: meshes, causes }))
+            Some((i, PartMesh { divisions, shared, faces: meshes, causes, taken }))
         };
         // Instances, not parts: another instance of the same part may touch nothing.
         instances.par_iter().filter_map(divide).collect()
     }
 
-    /// Makes the input for meshing a face on the edge divisions of `mesh`, its part; no chords are taken.
+    /// Makes the input for meshing a face on the edge divisions of `mesh`, its part, without the chords that it has given up to others there.
     fn input<'i>(&'i self, face: &'i TrimmedFace<'m>, mesh: &'i PartMesh) -> FaceInput<'i, 'm> {
         FaceInput {
             part: face.part,
@@ -161,7 +162,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             divisions: &mesh.divisions,
             shared: &mesh.shared,
             settings: self.settings,
-            taken: &NO_CHORDS,
+            taken: &mesh.taken[face.key.face],
         }
     }
 

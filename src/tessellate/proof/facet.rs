@@ -67,3 +67,67 @@ pub(in crate::tessellate) fn prove_triangle(
     }
     proved(worst.max(prover.triangle_bound(uv, xyz, limit)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Frame, Uv, Vector};
+    use crate::nurbs::sweep;
+    use crate::tessellate::face_surface::FaceSurface;
+    use crate::tessellate::nodes::{Node, Position};
+    use crate::tessellate::settings::{Acceptance, ToleranceField};
+
+    #[test]
+    fn a_strip_of_a_cylinder_has_its_closed_form_sag() {
+        let s = sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, 3.0], [0.0, 40.0]);
+        let surface =
+            FaceSurface::new(&s, false, ToleranceField::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0));
+        let [a, b] = [0.4, 0.9].map(|phi| crate::nurbs::conic::parameter_of_angle([0.0, 3.0], phi));
+        let uv = [Uv::new(a, 0.0), Uv::new(b, 0.0), Uv::new(b, 40.0)];
+        let xyz = uv.map(|x| s.evaluate(x));
+        let sag = 10.0 * (1.0 - 0.25f64.cos());
+        let mut prover = Prover::new(&surface, Acceptance::Proved);
+        let bound = prover.triangle_bound(uv, xyz, 1e-3 * sag);
+        assert!(bound >= sag * 0.999 && bound < 1.02 * 8.0 * sag, "{bound} {sag}");
+        let bound = prover.triangle_bound(uv, xyz, 1.03 * sag);
+        assert!(bound >= sag && bound <= 1.03 * sag, "{bound} {sag}");
+        let side = prover.side_bound([uv[0], uv[1]], [xyz[0], xyz[1]], 1.03 * sag);
+        assert!(side >= sag && side <= 1.03 * sag, "{side} {sag}");
+    }
+
+    #[test]
+    fn a_corner_moved_off_its_surface_is_in_the_bound_whatever_its_direction() {
+        let field = ToleranceField::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0);
+        let plane = sweep::plane(&Frame::IDENTITY, [[0.0, 10.0]; 2]);
+        let tube = sweep::cylinder(&Frame::IDENTITY, 1000.0, [0.0, 3.0], [0.0, 10.0]);
+        for spline in [plane, tube] {
+            let surface = FaceSurface::new(&spline, false, field);
+            let uv = [Uv::new(0.5, 5.0), Uv::new(0.51, 5.0), Uv::new(0.5, 5.01)];
+            let places = uv.map(|x| spline.evaluate(x));
+            let d = spline.derivatives(uv[0]);
+            // Across the surface, where a small facet stands on edge; along it, away from the facet, and along one of its sides.
+            let along = (places[0] - places[1]).normalize();
+            for direction in [d.du.cross(d.dv).normalize(), along, (places[0] - places[2]).normalize(), -along] {
+                for gap in [0.05, 0.5] {
+                    let mut nodes = Nodes::default();
+                    for k in 0..3 {
+                        let place = places[k] + if k == 0 { gap * direction } else { Vector::ZERO };
+                        nodes.push(Node { uv: uv[k], place, position: Position::Own(k as u32) });
+                    }
+                    let mut prover = Prover::new(&surface, Acceptance::Proved);
+                    let facet = prove_triangle(&mut prover, &nodes, [0, 1, 2], &BorderChords::default(), 1.0);
+                    // The moved corner's distance to the piece, by samples.
+                    let away = |i: i32, j: i32| -> f64 {
+                        let at = uv[0]
+                            + (uv[1] - uv[0]) * (f64::from(i) / 40.0)
+                            + (uv[2] - uv[0]) * (f64::from(j) / 40.0);
+                        (spline.evaluate(at) - nodes[0].place).length()
+                    };
+                    let near = (0..=40).flat_map(|i| (0..=40 - i).map(move |j| (i, j))).map(|(i, j)| away(i, j));
+                    let near: f64 = near.fold(f64::INFINITY, f64::min);
+                    assert!(facet.bound >= near - 1e-3 || facet.bound > facet.tolerance, "{} {near}", facet.bound);
+                }
+            }
+        }
+    }
+}
