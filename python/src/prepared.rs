@@ -8,7 +8,7 @@ use crate::names::{normal_mode, require_tolerance};
 use crate::results::Results;
 use lampyris::pipeline::{
     self, AccurateSettings, ErrorTarget, LoadedModel, MeshingSettings, PreparedScene, RayRange, SceneJob,
-    TraceRequest, TracingSettings, fingerprint, read_models, settings_for_accuracy,
+    TraceRequest, TracingSettings, read_models, settings_for_accuracy,
 };
 use lampyris::simulate::{PartialRun, Scene};
 use lampyris::step::{self, Import};
@@ -141,7 +141,7 @@ impl Prepared {
                 settings_for_accuracy(accuracy_deg, requested, Some(&scene), &loaded.model, monitor)?;
             let job = SceneJob { meshing, tracing, accuracy: plan, ..SceneJob::new(scene, loaded) };
             let prepared = PreparedScene::new(job, monitor)?;
-            let hash = fingerprint(&prepared)?.0;
+            let hash = prepared.fingerprint()?.0;
             Ok((prepared, hash))
         };
         let outcome = interruptible(py, progress.as_ref(), threads, move |shared| prepare(shared))?;
@@ -279,7 +279,7 @@ impl Prepared {
 }
 
 fn hash_of(scene: &PreparedScene) -> PyResult<String> {
-    Ok(fingerprint(scene).map_err(of_pipeline)?.0)
+    Ok(scene.fingerprint().map_err(of_pipeline)?.0)
 }
 
 #[pymethods]

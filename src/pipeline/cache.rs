@@ -1,4 +1,4 @@
-//! What is built once: facets and octrees in a folder that runs, processes and machines may share.
+//! What is built or found out once: facets, octrees and choices in a folder that runs, processes and machines may share.
 //!
 //! An entry is named by a hash of all that decides it: program, kind of machine, models, settings of the mesher. It is written under
 //! another name and renamed when it is whole; so a hundred processes that start at once need no lock: each finds an entry, or builds its
@@ -12,8 +12,9 @@
 use super::monitor::Monitor;
 use crate::intersect::octree::{self, Octree};
 use crate::mesh::FacetMesh;
-use crate::mesh::arrays::ArrayReader;
+use crate::mesh::arrays::{ArrayReader, invalid, write_array};
 use crate::simulate::{Fingerprint, Scene};
+use crate::study::default_accuracy::Chosen;
 use crate::tessellate;
 use std::fs::{self, File};
 use std::hash::{BuildHasher, Hasher, RandomState};
@@ -32,7 +33,7 @@ const STALE: Duration = Duration::from_secs(86_400);
 /// Bytes that are gathered before they are written.
 const WRITTEN_AT_ONCE: usize = 1 << 20;
 /// What follows the hash in the names of entries.
-const KINDS: [&str; 2] = [".facets", ".octree"];
+const KINDS: [&str; 3] = [".facets", ".octree", ".choice"];
 /// What follows in the names of those that are not whole yet.
 const UNFINISHED: &str = ".part";
 
@@ -63,6 +64,18 @@ impl Cache {
     /// Returns the cache with another limit, in bytes: beyond it, what was not used for longest is removed.
     pub fn with_limit(self, most_bytes: u64) -> Self {
         Self { most_bytes, ..self }
+    }
+
+    /// Returns what was chosen for the run of this name, before it was decided; `None` where that is not kept.
+    pub(super) fn choice(&self, undecided: &Fingerprint, monitor: &dyn Monitor) -> Option<Chosen> {
+        let read = |from: &mut ArrayReader| Chosen::from_words(&from.array()?).ok_or_else(|| invalid("no choice"));
+        self.fetch(&format!("{}{}", undecided.0, KINDS[2]), monitor, read)
+    }
+
+    /// Keeps what was chosen for a later run, another shard or range among them; a failure is only told to the monitor.
+    pub(super) fn keep_choice(&self, undecided: &Fingerprint, chosen: &Chosen, monitor: &dyn Monitor) {
+        let name = format!("{}{}", undecided.0, KINDS[2]);
+        self.keep(&name, monitor, |to| write_array(to, &chosen.to_words()));
     }
 
     /// Returns the folder, which may not exist yet.

@@ -13,14 +13,6 @@ use crate::tessellate::{self, GroupedFacets};
 use std::slice;
 use std::sync::Arc;
 
-/// What was chosen, as far as it changes the run.
-pub(super) struct AccuracyChoice {
-    pub(super) chosen: Chosen,
-    pub(super) intersector: IntersectorChoice,
-    /// Facets finer than the default ones, where these are taken.
-    pub(super) finer: Option<TimedFacets>,
-}
-
 /// Whether settings or scene say how fine the facets are, what normals they carry or what finds the hits.
 pub(super) fn is_asked(meshing: &MeshingSettings, tracing: &TracingSettings, scene: &Scene) -> bool {
     let accuracy = &scene.accuracy;
@@ -66,25 +58,28 @@ impl PilotSource for Source<'_> {
     }
 }
 
-/// Chooses for a run whose facets of the default tolerance are made.
+/// Chooses for a run whose facets of the default tolerance are made; with facets finer than these, where such are taken.
 pub(super) fn choose(
     (model, surfaces): (&Model, &[Arc<TrueSurface>]),
     bound: &BoundScene,
     run: &RunSettings,
     (facets, mesher): (&GroupedFacets, &tessellate::Settings),
     monitor: &dyn Monitor,
-) -> AccuracyChoice {
+) -> (Chosen, Option<TimedFacets>) {
     let instancing = facets.instancing.as_deref();
     let models = instancing.map_or(slice::from_ref(model), |i| &i.groups);
     let source = Source { model, made: facets, mesher, exact: true_intersector(instancing, surfaces) };
-    let (chosen, finer) = in_stage(monitor, Stage::Choosing, || {
+    in_stage(monitor, Stage::Choosing, || {
         let tolerance = mesher.tolerance;
         default_accuracy::choose(&Undecided { models, bound, run, source: &source, facets, tolerance })
-    });
-    monitor.chosen(&chosen);
+    })
+}
+
+/// Returns what finds the hits of a run that was chosen so, and its normals.
+pub(super) fn intersector_choice(chosen: &Chosen) -> IntersectorChoice {
     let intersector = match chosen.intersector {
         "exact" => IntersectorKind::Exact,
         _ => IntersectorKind::Octree,
     };
-    AccuracyChoice { intersector: IntersectorChoice { intersector, normals: chosen.normals }, chosen, finer }
+    IntersectorChoice { intersector, normals: chosen.normals }
 }

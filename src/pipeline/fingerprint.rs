@@ -1,21 +1,24 @@
 //! What decides the bits of a run, as one hash: parts with the same one belong together.
 
 use super::error::Error;
-use super::prepared_scene::PreparedScene;
+use super::intersectors::IntersectorChoice;
 use crate::formats::open_file;
-use crate::simulate::{Fingerprint, FingerprintHasher, RunSettings, grows};
+use crate::simulate::{BoundScene, Fingerprint, FingerprintHasher, RunSettings, Scene, grows};
+use crate::tessellate;
 
-/// Hashes all that decides the bits of a run: program, text of the scene, its files, facets, intersector, settings; of a run that grows not
-/// the number of rays.
+/// Hashes all that decides the bits of a run of these settings: program, text of the scene, its files, facets, intersector, settings; of a
+/// run that grows not the number of rays.
 ///
 /// # Errors
 /// When a file of the scene cannot be read.
-pub fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Error> {
-    let scene = &prepared.job.scene;
+pub(super) fn run_fingerprint(
+    (scene, bound): (&Scene, &BoundScene),
+    asked: &RunSettings,
+    (mesher, choice): (&tessellate::Settings, &IntersectorChoice),
+) -> Result<Fingerprint, Error> {
     let defaults = RunSettings::default();
-    let asked = prepared.run_settings();
     // How far a run has grown decides the bits of no ray.
-    let grows = grows(&prepared.bound, &asked);
+    let grows = grows(bound, asked);
     let settings = RunSettings {
         rays: if grows { 0 } else { asked.rays },
         first_ray: 0,
@@ -26,15 +29,10 @@ pub fn fingerprint(prepared: &PreparedScene) -> Result<Fingerprint, Error> {
         kernel: defaults.kernel,
         shard: [0, 1],
         path_samples: 0,
-        ..asked
+        ..asked.clone()
     };
-    let words = format!(
-        "{} {} {:?} {:?} {settings:?}",
-        env!("CARGO_PKG_VERSION"),
-        env!("LAMPYRIS_COMMIT"),
-        prepared.mesh_settings,
-        prepared.choice
-    );
+    let program = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
+    let words = format!("{program} {mesher:?} {choice:?} {settings:?}");
     let mut hasher = FingerprintHasher::default();
     hasher.add(words.as_bytes());
     hasher.add(scene.origin.text.as_deref().unwrap_or("").as_bytes());

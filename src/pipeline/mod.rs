@@ -17,8 +17,8 @@
 //! Guarantee: the same scene, files and settings give the same bits, whoever asks and whatever listens.
 //!
 //! Inner modules, each of which sees only those before it: `error`, `suggest`, `settings`, `monitor`, `loading`, `cache`, `facets`
-//! and `intersectors` (the ingredients), `ray_sampler`, `accuracy_target`, `default_accuracy` and `prepared_scene` with `scene_results` and
-//! `cross_check` (the run), `fingerprint`, `error_target`, `verdicts` and `settled_target` (what is made of it).
+//! `intersectors` and `fingerprint` (the ingredients), `ray_sampler`, `accuracy_target`, `default_accuracy` and `prepared_scene` with `scene_results` and
+//! `cross_check` (the run), `error_target`, `verdicts` and `settled_target` (what is made of it).
 
 mod accuracy_target;
 mod cache;
@@ -45,11 +45,10 @@ pub use cross_check::LIFT_IN_TOLERANCES;
 pub use error::{Error, ErrorKind, Excerpt};
 pub use error_target::{ErrorTarget, TargetResult};
 pub use facets::{mesh_settings, tessellate_model};
-pub use fingerprint::fingerprint;
 pub use intersectors::{IntersectorChoice, with_intersector};
 pub use loading::{LoadedModel, read_models, read_scene, read_scene_models, step_settings};
 pub use monitor::{Monitor, Silent, Stage};
-pub use prepared_scene::{PreparedScene, SceneJob, TraceRequest};
+pub use prepared_scene::{PartChoice, PreparedScene, SceneJob, TraceRequest};
 pub use ray_sampler::RaySampler;
 pub use scene_results::SceneResults;
 pub use settings::{IntersectorKind, MeshingSettings, RayRange, TracingSettings};

@@ -4,6 +4,7 @@ use super::cache::{Cache, CachedFacets, facets_key, group_keys};
 use super::default_accuracy;
 use super::error::Error;
 use super::facets::{mesh_settings, tessellate_groups};
+use super::fingerprint::run_fingerprint;
 use super::intersectors::{self, IntersectorChoice, TrueSurface};
 use super::loading::LoadedModel;
 use super::monitor::{Monitor, Stage, in_stage};
@@ -42,11 +43,19 @@ pub struct SceneJob {
     pub tracing: TracingSettings,
     /// How an accuracy that was asked for was reached.
     pub accuracy: Option<AccuracyPlan>,
-    /// What another part of the same run chose. The spline is taken from it; facets come with an error that only a pilot of this
-    /// process measures.
-    pub chosen: Option<Chosen>,
+    /// What another part chose, which is taken in place of a pilot where that part is of the same run.
+    pub chosen: Option<PartChoice>,
     /// Where facets and octree are kept for other runs; built anew where there is none.
     pub cache: Option<Cache>,
+}
+
+/// What a part of a run chose.
+#[derive(Clone, Debug)]
+pub struct PartChoice {
+    /// The choice, with what its pilot found.
+    pub chosen: Chosen,
+    /// The fingerprint of that run.
+    pub fingerprint: Fingerprint,
 }
 
 impl SceneJob {
@@ -156,13 +165,12 @@ impl PreparedScene {
         let bound = job.scene.bind(&job.loaded.model)?;
         let mesh_settings = mesh_settings(&job.meshing, Some(&job.scene), &job.loaded.model)?;
         let instancing = Instancing::new(&job.loaded.model, mesh_settings.glue_mm).map(Arc::new);
-        let (facets, tessellation_seconds) = job.facets(instancing.as_ref(), &mesh_settings, monitor);
         let mut prepared = Self {
             job,
             bound,
-            facets,
+            facets: GroupedFacets::default(),
             mesh_settings,
-            tessellation_seconds,
+            tessellation_seconds: 0.0,
             choice,
             threads,
             rays: None,
@@ -170,32 +178,83 @@ impl PreparedScene {
             surfaces: OnceLock::new(),
         };
         // Whoever asks for anything of how it is traced gets just that.
-        if !default_accuracy::is_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene) {
-            prepared.choose_accuracy(monitor);
+        let is_open =
+            !default_accuracy::is_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene);
+        let known = if is_open { prepared.known_choice(monitor) } else { None };
+        if let Some(chosen) = known {
+            // Before any facets are made: it says how fine they are.
+            prepared.take_choice(chosen, monitor);
+            prepared.make_facets(instancing.as_ref(), monitor);
+        } else {
+            prepared.make_facets(instancing.as_ref(), monitor);
+            if is_open {
+                prepared.choose_accuracy(monitor);
+            }
         }
         Ok(prepared)
     }
 
-    /// Takes what another part of the run chose, if that was the spline, else the facets or the spline that a pilot finds sufficient. May
-    /// put finer facets in place of those that were made.
-    fn choose_accuracy(&mut self, monitor: &dyn Monitor) {
-        if let Some(chosen) = self.job.chosen.take_if(|chosen| chosen.intersector == "exact") {
-            self.choice = IntersectorChoice { intersector: IntersectorKind::Exact, normals: chosen.normals };
-            self.chosen = Some(chosen);
-            return;
+    /// Makes the facets of the settings.
+    fn make_facets(&mut self, instancing: Option<&Arc<Instancing>>, monitor: &dyn Monitor) {
+        (self.facets, self.tessellation_seconds) = self.job.facets(instancing, &self.mesh_settings, monitor);
+    }
+
+    /// Returns what a part of the same run chose, or what the cache keeps of the same choice; `None` where there is neither.
+    fn known_choice(&mut self, monitor: &dyn Monitor) -> Option<Chosen> {
+        if let Some(part) = self.job.chosen.take() {
+            // Program, scene, files and settings are the same: so would be what a pilot of this process finds.
+            let run = self.run_settings();
+            let (mesher, choice) = self.settings_of(&part.chosen);
+            let own = run_fingerprint((&self.job.scene, &self.bound), &run, (&mesher, &choice));
+            if own.is_ok_and(|own| own == part.fingerprint) {
+                return Some(part.chosen);
+            }
         }
+        let cache = self.job.cache.as_ref()?;
+        cache.choice(&self.fingerprint().ok()?, monitor)
+    }
+
+    /// Returns settings and intersector of a choice.
+    fn settings_of(&self, chosen: &Chosen) -> (tessellate::Settings, IntersectorChoice) {
+        let mesher = tessellate::Settings { tolerance: chosen.tolerance_mm, ..self.mesh_settings.clone() };
+        (mesher, default_accuracy::intersector_choice(chosen))
+    }
+
+    /// Sets what a choice says; the facets must be made, or be made anew, by it.
+    fn take_choice(&mut self, chosen: Chosen, monitor: &dyn Monitor) {
+        monitor.chosen(&chosen);
+        (self.mesh_settings, self.choice) = self.settings_of(&chosen);
+        self.chosen = Some(chosen);
+    }
+
+    /// Hashes all that decides the bits of a run: program, text of the scene, its files, facets, intersector, settings; of a run that grows
+    /// not the number of rays.
+    ///
+    /// # Errors
+    /// When a file of the scene cannot be read.
+    pub fn fingerprint(&self) -> Result<Fingerprint, Error> {
+        let scene = (&*self.job.scene, &self.bound);
+        run_fingerprint(scene, &self.run_settings(), (&self.mesh_settings, &self.choice))
+    }
+
+    /// Chooses the facets or the spline that a pilot finds sufficient, and keeps the choice in the cache. May put finer facets in place of
+    /// those that were made.
+    fn choose_accuracy(&mut self, monitor: &dyn Monitor) {
         let run = RunSettings { sequences: false, ..self.run_settings() };
         let model = (&self.job.loaded.model, &*self.true_surfaces());
         let facets = (&self.facets, &self.mesh_settings);
-        let choice = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
-        if let Some(finer) = choice.finer {
+        let (chosen, finer) = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
+        // Named by the run before it is decided: that is what others know when they ask.
+        if let (Some(cache), Ok(undecided)) = (&self.job.cache, self.fingerprint())
+            && chosen.pilot_rays > 0
+        {
+            cache.keep_choice(&undecided, &chosen, monitor);
+        }
+        if let Some(finer) = finer {
             self.facets = finer.facets;
             self.tessellation_seconds += finer.seconds;
-            // The settings tell what the facets are: those of the finer ones.
-            self.mesh_settings.tolerance = choice.chosen.tolerance_mm;
         }
-        self.choice = choice.intersector;
-        self.chosen = Some(choice.chosen);
+        self.take_choice(chosen, monitor);
     }
 
     /// The models of the groups; of a scene in one piece the whole one.
@@ -210,6 +269,10 @@ impl PreparedScene {
 
     /// Returns true surfaces for some thousands of rays: those of pilot or run, else ones that are built sooner and not kept.
     pub(super) fn surfaces_for_few_rays(&self) -> Vec<Arc<TrueSurface>> {
+        // Those of the pilot too where another process had it: the last digits of the check are then the same.
+        if self.chosen.is_some() {
+            return self.true_surfaces();
+        }
         self.surfaces.get().cloned().unwrap_or_else(|| self.build_surfaces(&exact::Settings::for_few_rays()))
     }
 

@@ -17,7 +17,7 @@ use crate::math::Uv;
 use crate::model::{Face, Model};
 use crate::simulate::{BoundScene, RunSettings};
 use crate::tessellate::GroupedFacets;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::Serialize;
 use std::time::Instant;
 
 /// The pilot traces one ray in so many.
@@ -56,20 +56,16 @@ const FLAT: &str = "all faces are flat, so that facets are the surface itself";
 const ON_FACETS: (&str, NormalMode) = ("octree", NormalMode::Bilinear);
 const ON_SPLINE: (&str, NormalMode) = ("exact", NormalMode::Exact);
 
-/// `octree` or `exact`. An alias, as serde takes a reference in a struct for one into the text that it reads.
-pub type IntersectorName = &'static str;
-
 /// What a run is traced with, and why.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Chosen {
     /// Smallest and largest tolerance of the facets, mm; of those that are drawn, where the run is on the spline.
     pub tolerance_mm: [f64; 2],
     /// Normals at the hits.
-    #[serde(serialize_with = "by_name", deserialize_with = "normals_named")]
+    #[serde(serialize_with = "by_name")]
     pub normals: NormalMode,
     /// `octree`, or `exact` for the spline.
-    #[serde(deserialize_with = "intersector_named")]
-    pub intersector: IntersectorName,
+    pub intersector: &'static str,
     /// Why it was chosen, as the end of a sentence.
     pub because: String,
     /// Rays of the pilot; 0 where none was needed.
@@ -84,16 +80,15 @@ pub struct Chosen {
 }
 
 /// One way to trace the run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Alternative {
     /// Smallest and largest tolerance of the facets, mm.
     pub tolerance_mm: [f64; 2],
     /// Normals at the hits.
-    #[serde(serialize_with = "by_name", deserialize_with = "normals_named")]
+    #[serde(serialize_with = "by_name")]
     pub normals: NormalMode,
     /// `octree` or `exact`.
-    #[serde(deserialize_with = "intersector_named")]
-    pub intersector: IntersectorName,
+    pub intersector: &'static str,
     /// Seconds of tracing the whole run so, from those of the pilot.
     pub seconds: f64,
     /// What it gets wrong of the figure that it gets most wrong, as a share of that figure;
@@ -108,20 +103,6 @@ pub struct Alternative {
 /// Writes normals by their name.
 fn by_name<S: serde::Serializer>(n: &NormalMode, s: S) -> Result<S::Ok, S::Error> {
     s.serialize_str(n.name())
-}
-
-/// Reads normals by their name; an error for a name that is none.
-fn normals_named<'d, D: Deserializer<'d>>(from: D) -> Result<NormalMode, D::Error> {
-    let name = String::deserialize(from)?;
-    let found = NormalMode::ALL.into_iter().find(|mode| mode.name() == name);
-    found.ok_or_else(|| serde::de::Error::custom(format!("there are no {name} normals")))
-}
-
-/// Reads `octree` or `exact`; an error for any other name.
-fn intersector_named<'d, D: Deserializer<'d>>(from: D) -> Result<IntersectorName, D::Error> {
-    let name = String::deserialize(from)?;
-    let found = ["octree", "exact"].into_iter().find(|known| *known == name);
-    found.ok_or_else(|| serde::de::Error::custom(format!("no run chooses {name}")))
 }
 
 /// Facets with the seconds that they took.

@@ -31,6 +31,7 @@ pub mod records;
 pub mod sample_models;
 mod scene_accuracy;
 pub mod stability;
+mod stored_choice;
 pub mod surface_rays;
 mod timing;
 mod tolerance_plan;

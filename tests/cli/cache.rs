@@ -1,6 +1,7 @@
 //! Facets and octrees that are kept from one run to the next, with the real binary.
 
-use crate::growing::lens;
+use crate::growing::{lens, lens_before_a_wall};
+use crate::runs::without_times;
 use crate::support::lampyris_in;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -51,6 +52,26 @@ fn runs_are_the_same_with_a_cold_a_warm_a_damaged_and_no_cache() {
     std::fs::write(path.join("model.stp"), model + "\n").unwrap();
     assert_eq!(traced(path, &["--cache", "kept"]).0["digest"], digest);
     assert_eq!(entries(&path.join("kept")).len(), 6);
+}
+
+/// A second run takes what the pilot of the first one found, its seconds among it.
+#[test]
+fn a_choice_is_kept_too() {
+    let folder = lens_before_a_wall();
+    let path = folder.path();
+    let run = |options: &[&str]| -> Value {
+        let arguments = ["trace", "scene.toml", "-o", "out", "--no-report", "--json"];
+        let (code, out, err) = lampyris_in(path, &[&arguments, options].concat());
+        assert_eq!(code, 0, "{err}");
+        serde_json::from_str(&out).unwrap()
+    };
+    let [without, cold, warm] = [&[][..], &["--cache", "kept"], &["--cache", "kept"]].map(run);
+    assert_eq!((&cold["digest"], &warm["digest"]), (&without["digest"], &without["digest"]));
+    assert!(cold["chosen"]["pilot_rays"].as_u64().unwrap() > 0);
+    for key in ["chosen", "faceting"] {
+        assert_eq!(cold[key], warm[key], "{key}");
+    }
+    assert_eq!(without_times(cold), without_times(without));
 }
 
 #[test]

@@ -92,6 +92,46 @@ fn merge_takes_the_choice_of_its_parts() {
     assert!(once["pilot_seconds"].as_f64().unwrap() > 0.0);
 }
 
+/// A lens in whose light a wall of four cells stands, so that a pilot finds facets good enough.
+pub(crate) fn lens_before_a_wall() -> tempfile::TempDir {
+    let folder = lens("40_000");
+    let scene = std::fs::read_to_string(folder.path().join("scene.toml")).unwrap();
+    let wall = "[[receiver]]\nname = 'focus'\nat = [0, 0, 20]\nsize = [60, 60]\ncells = [2, 2]\n";
+    let (light, _) = scene.split_once("[[receiver]]").unwrap();
+    std::fs::write(folder.path().join("scene.toml"), format!("{light}{wall}")).unwrap();
+    folder
+}
+
+/// The results that a run left in a folder.
+fn results(folder: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(folder.join("results.json")).unwrap()).unwrap()
+}
+
+/// What the pilot found goes with the parts: merged, they answer with both errors as the whole run does, and no pilot is traced again.
+#[test]
+fn parts_hand_on_what_their_pilot_found() {
+    let folder = lens_before_a_wall();
+    let path = folder.path();
+    let traced = |options: &[&str]| {
+        let (code, _, err) = lampyris_in(path, &[&["trace", "scene.toml", "--no-report"], options].concat());
+        assert_eq!(code, 0, "{options:?}: {err}");
+    };
+    traced(&["-o", "whole"]);
+    traced(&["--shard", "1/2", "-o", "parts"]);
+    traced(&["--shard", "2/2", "-o", "parts"]);
+    let [first, second] = [1, 2].map(|k| format!("parts/shard-{k}-of-2.tally"));
+    merge(path, &[&first, &second], "merged");
+    assert_same(path, "whole", "merged");
+    merge(path, &[&second, &first], "again");
+    let [merged, again] = ["merged", "again"].map(|name| results(&path.join(name)));
+    assert_eq!(merged["chosen"]["intersector"], "octree");
+    assert!(merged["faceting"]["rays"].as_u64().unwrap() > 0);
+    // Seconds too: there was one pilot, that of the first part.
+    for key in ["chosen", "faceting"] {
+        assert_eq!(merged[key], again[key], "{key}");
+    }
+}
+
 /// What merge says is missing, traced and merged again, reaches the error; until then the exit code is 4.
 #[test]
 fn merged_ranges_grow_until_the_error_is_reached() {

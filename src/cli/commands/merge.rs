@@ -16,7 +16,7 @@ use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::usage::Usage;
 use crate::cli::work::{input_files, lost_rays, results_folder};
-use crate::pipeline::{ErrorTarget, PreparedScene, SceneJob, TraceRequest, fingerprint, read_scene};
+use crate::pipeline::{ErrorTarget, PreparedScene, SceneJob, TraceRequest, read_scene};
 use crate::simulate::{GROWING_REPLICATE, PartialRun};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -58,7 +58,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let (meshing, tracing) = (header.meshing(), header.tracing());
     let cache = cache_folder::cache(command.cache)?;
     let target = command.until_error.map(|text| ErrorTarget::new(text, &scene)).transpose()?;
-    let job = SceneJob { meshing, tracing, cache, chosen: header.chosen(), ..SceneJob::new(scene, loaded) };
+    let job = SceneJob { meshing, tracing, cache, chosen: header.choice(), ..SceneJob::new(scene, loaded) };
     let mut prepared = PreparedScene::new(job, &monitor)?;
     // A part that is named is waited for as those of a folder are.
     while let Some(absent) = part_files(command.parts)?.into_iter().find(|file| !file.exists())
@@ -217,7 +217,7 @@ fn sum_parts(
     header: &TallyHeader,
     prepared: &PreparedScene,
 ) -> Result<(PartialRun, Usage), Failure> {
-    let expected = fingerprint(prepared)?.0;
+    let expected = prepared.fingerprint()?.0;
     let usage = RefCell::new(Usage::default());
     let check = |h: &TallyHeader| {
         if h.fingerprint == expected {

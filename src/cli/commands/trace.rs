@@ -15,7 +15,7 @@ use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, requir
 use crate::cli::work::path_file::PathFile;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
-use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards};
+use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards, tally_file};
 use crate::pipeline::{
     AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, RayRange, SceneJob, SceneResults, TargetResult,
     TraceRequest, TracingSettings, read_scene, settings_for_accuracy,
@@ -62,10 +62,13 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let requested = (command.meshing.clone(), command.tracing.clone());
     let AccurateSettings { meshing, tracing, plan } =
         settings_for_accuracy(accuracy, requested, Some(&scene), &loaded.model, &monitor)?;
+    // What is traced in parts is chosen once: by the part that came first.
+    let is_part = shard.is_some() || extra.resume || tracing.ray_range.is_some_and(|range| range.first.is_some());
     let job = SceneJob {
         meshing,
         tracing,
         accuracy: plan,
+        chosen: if is_part { tally_file::choice_of_parts(folder) } else { None },
         cache: cache_folder::cache(&extra.cache)?,
         ..SceneJob::new(scene, loaded)
     };

@@ -7,7 +7,7 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::machine;
 use crate::formats::{read_bytes, write_atomic};
-use crate::pipeline::{PreparedScene, fingerprint};
+use crate::pipeline::PreparedScene;
 use crate::simulate::PartialRun;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
@@ -79,7 +79,7 @@ impl<'a> Checkpoint<'a> {
             Err(e) => return Err(Failure::input(format!("{}: {e}", self.file.display()))),
         };
         // Of the scene as it is now: what changed since cannot be gone on with.
-        let expected = fingerprint(self.prepared)?.0;
+        let expected = self.prepared.fingerprint()?.0;
         let same = |h: &TallyHeader| {
             if h.fingerprint == expected {
                 *self.earlier() = h.usage.clone();

@@ -1,14 +1,17 @@
 //! What stands at the head of a tally file: enough to know the run that it is a part of, and to write its results.
 
+use super::output_place::folder_of;
+use super::shards::is_tally;
 use super::usage::Usage;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
-use crate::cli::output::json::json_value;
+use crate::formats::read_bytes;
 use crate::intersect::NormalMode;
 use crate::math::FaceId;
 use crate::pipeline::{
-    IntersectorChoice, IntersectorKind, MeshingSettings, PreparedScene, RayRange, TracingSettings, fingerprint,
+    IntersectorChoice, IntersectorKind, MeshingSettings, PartChoice, PreparedScene, RayRange, TracingSettings,
 };
+use crate::simulate::{Fingerprint, PartialRun};
 use crate::study::accuracy_target::{RelativeTolerance, TolerancePlan};
 use crate::study::default_accuracy::Chosen;
 use clap::ValueEnum;
@@ -40,9 +43,9 @@ pub(crate) struct TallyHeader {
     /// The options that ask for what was chosen, where the command line did not.
     #[serde(default)]
     pub(crate) accuracy: String,
-    /// What was chosen and why, where nobody asked; as JSON, so that a choice of another form costs a pilot and not the file.
+    /// What was chosen and why, where nobody asked, with all that the pilot found; a choice of another form costs a pilot and not the file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    chosen: Option<serde_json::Value>,
+    choice: Option<Vec<u64>>,
     seed: Option<u64>,
     intersector: Option<String>,
     normals: Option<String>,
@@ -75,7 +78,7 @@ impl TallyHeader {
         // As bits: text would have to be read back exactly.
         let bits = |x: [f64; 2]| x.map(f64::to_bits);
         Ok(Self {
-            fingerprint: fingerprint(prepared)?.0,
+            fingerprint: prepared.fingerprint()?.0,
             scene_bytes: scene.to_str().is_none().then(|| scene.as_os_str().as_encoded_bytes().to_vec()),
             scene: scene.to_string_lossy().into_owned(),
             tolerance: m.tolerance.map(bits),
@@ -88,7 +91,7 @@ impl TallyHeader {
             rays: prepared.rays.or(t.rays()),
             first_ray: t.ray_range.and_then(|range| range.first),
             accuracy: accuracy_options(prepared),
-            chosen: prepared.chosen.as_ref().map(json_value).transpose()?,
+            choice: prepared.chosen.as_ref().map(Chosen::to_words),
             seed: t.seed,
             intersector: t.intersector.map(|i| i.to_string()),
             normals: t.normals.map(|n| n.to_string()),
@@ -116,8 +119,9 @@ impl TallyHeader {
     }
 
     /// Returns what the part chose where nobody asked; `None` if somebody did, or it is of a form that is no longer known.
-    pub(crate) fn chosen(&self) -> Option<Chosen> {
-        serde_json::from_value(self.chosen.clone()?).ok()
+    pub(crate) fn choice(&self) -> Option<PartChoice> {
+        let chosen = Chosen::from_words(self.choice.as_ref()?)?;
+        Some(PartChoice { chosen, fingerprint: Fingerprint(self.fingerprint.clone()) })
     }
 
     /// Returns the options that decided the facets, to the bit.
@@ -143,6 +147,22 @@ impl TallyHeader {
             normals: self.normals.as_ref().and_then(|n| NormalMode::from_str(n, true).ok()),
         }
     }
+}
+
+/// Returns what the parts that lie where `output` is to go chose by a pilot, from the smallest file that says; `None` where none does.
+pub(crate) fn choice_of_parts(output: &Path) -> Option<PartChoice> {
+    let folder = if is_tally(output) { folder_of(output) } else { output.to_path_buf() };
+    let files = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
+    let tallies = files.filter(|path| path.extension().is_some_and(|e| e == "tally"));
+    let mut tallies: Vec<(u64, PathBuf)> =
+        tallies.filter_map(|path| Some((std::fs::metadata(&path).ok()?.len(), path))).collect();
+    // Any of them will do, and all of a file is read to know that it is whole.
+    tallies.sort();
+    let choice = |(_, path): &(u64, PathBuf)| {
+        let header: TallyHeader = PartialRun::header(&read_bytes(path).ok()?).ok()?;
+        header.choice().filter(|choice| choice.chosen.pilot_rays > 0)
+    };
+    tallies.iter().find_map(choice)
 }
 
 /// A [`TolerancePlan`] in a file.
