@@ -77,8 +77,10 @@ pub fn parse_ies(path: &Path, text: &str) -> Result<Photometry, Error> {
     let opening = numbers.read_list(3, "width, length and height")?;
     let ballast = numbers.read_number("ballast factor")?;
     let lamp_factor = numbers.read_number("ballast-lamp photometric factor")?;
+    // Some editors put a byte order mark before the first line.
+    let header = text.trim_start_matches('\u{feff}').trim_start();
     // LM-63-2019 keeps a code for how the file was made in the field that held the ballast-lamp factor.
-    let factor = if text.trim_start().starts_with("IES:LM-63-2019") { ballast } else { ballast * lamp_factor };
+    let factor = if header.starts_with("IES:LM-63-2019") { ballast } else { ballast * lamp_factor };
     let watts = numbers.read_number("input watts")?;
     let vertical_deg = numbers.read_ascending(rows, "vertical angles")?;
     let horizontal_deg = numbers.read_ascending(planes, "horizontal angles")?;
@@ -334,6 +336,16 @@ mod tests {
             format!("\u{feff}{TEXT}\u{1a}"),
         ] {
             assert_eq!(parse(&odd).unwrap().candela, whole.candela, "{odd}");
+        }
+    }
+
+    #[test]
+    fn the_code_of_a_file_of_2019_weighs_nothing() {
+        let coded = TEXT.replacen("IESNA:LM-63-1995", "IES:LM-63-2019", 1).replacen("0.9 1.0 60", "0.9 1.1 60", 1);
+        let whole = parse(TEXT).unwrap().candela;
+        // Some editors put a byte order mark before the first line, which is not yet the end of it.
+        for text in [coded.clone(), format!("\u{feff}{coded}")] {
+            assert_eq!(parse(&text).unwrap().candela, whole);
         }
     }
 

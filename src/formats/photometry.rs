@@ -88,8 +88,8 @@ impl Photometry {
     /// Returns the same intensities over all planes that symmetry implies.
     ///
     /// Type C: one plane, or planes that end at 90°, 180°, or run from 90° to 270°, become planes from 0° to 360°.
-    /// Types A and B: horizontal angles that start at 0° are mirrored to negative ones. Anything else stays as it is,
-    /// also intensities that do not fill their planes.
+    /// Other planes from 0° to less than 360° are closed by the first one at 360°. Types A and B: horizontal angles that start at 0° are
+    /// mirrored to negative ones. Anything else stays as it is, also intensities that do not fill their planes.
     pub fn expanded(&self) -> Self {
         // Planes that are not filled cannot be mirrored: their rows would run out.
         if self.candela.len() != self.horizontal_deg.len() * self.vertical_deg.len() {

@@ -10,7 +10,7 @@ pub enum ColourMap {
     /// Black through red to pale yellow: light on a screen.
     #[default]
     Inferno,
-    /// Blue to yellow: errors and other signed-free quantities.
+    /// Blue to yellow: errors and other quantities without a sign.
     Viridis,
 }
 
@@ -92,7 +92,8 @@ pub fn write_png(path: &Path, picture: &Picture) -> Result<(), Error> {
     write_atomic(path, |w| w.write_all(&bytes))
 }
 
-/// Writes a grid as a coloured PNG of at least 800 pixels on its longer side.
+/// Writes a grid as a PNG of at least 800 pixels on its longer side, the second axis upward, in [`ColourMap::Inferno`], linear from 0
+/// (or the smallest value when negative) to the largest.
 ///
 /// # Errors
 /// When the grid is empty, when values do not fill it and when the file cannot be written.

@@ -220,7 +220,17 @@ impl<P: ControlPoint> Spline<P> {
     /// The same curve run backwards over the same domain, with `t` mapped to `t0 + t1 − t`.
     pub fn reversed(&self) -> Self {
         let [t0, t1] = self.domain();
-        let knots = self.knots.iter().rev().map(|k| t0 + (t1 - k)).collect();
+        let mirrored = |k: f64| {
+            // The ends are set, not computed: the domain stays to the bit.
+            if k == t0 {
+                t1
+            } else if k == t1 {
+                t0
+            } else {
+                t0 + (t1 - k)
+            }
+        };
+        let knots = self.knots.iter().rev().map(|&k| mirrored(k)).collect();
         Self { degree: self.degree, knots, points: self.points.iter().rev().copied().collect() }
     }
 
@@ -295,6 +305,15 @@ mod tests {
             assert!((k.evaluate(t) - c.evaluate(t)).length() < 1e-13);
         }
         assert!((k.points[0].position() - c.evaluate(a)).length() < 1e-13);
+    }
+
+    #[test]
+    fn a_reversed_curve_has_the_same_domain_to_the_bit() {
+        // 12.42 + (−6.19 − −6.19) is no trouble, but −6.19 + (12.42 − −6.19) is an ulp below 12.42.
+        let c = wavy().reparametrised([-6.19, 12.42]);
+        let r = c.reversed();
+        assert_eq!(r.domain(), c.domain());
+        assert!((r.evaluate(1.0) - c.evaluate(-6.19 + 12.42 - 1.0)).length() < 1e-13);
     }
 
     #[test]

@@ -6,6 +6,8 @@ use crate::math::{Vector, safe_newton};
 
 /// What an angle may lie beyond its range, radians or as a share of a cell, as the rounding of degrees in files puts it.
 const ROUNDING: f64 = 1e-9;
+/// What a whole turn may be above 360°, radians: files written from f32 have seven digits.
+const TURN_ROUNDING: f64 = 1e-7;
 
 /// How near an angle from the pole is found, radians: fifty ulps of 1.
 const QUANTILE_TOLERANCE: f64 = 1e-14;
@@ -68,7 +70,7 @@ impl IntensitySampler {
         require(
             "the range of the angle about the pole",
             turn.to_degrees(),
-            turn <= 6.2831854,
+            turn <= std::f64::consts::TAU + TURN_ROUNDING,
             "at most 360 degrees",
         )?;
         // Flux up to each cell, by which cells are chosen.
@@ -153,9 +155,10 @@ impl IntensitySampler {
     fn ring(&self, i: usize, low: f64, high: f64, x: f64) -> f64 {
         let (a, b) = (self.polar[i], self.polar[i + 1]);
         let slope = (high - low) / (b - a);
-        // cos a − cos x without cancellation.
-        let fall = 2.0 * (0.5 * (x + a)).sin() * (0.5 * (x - a)).sin();
-        low * fall + slope * (x.sin() - a.sin() - (x - a) * x.cos())
+        // cos a − cos x and sin x − sin a − (x − a) cos x, both by half the sum and half the difference, without cancellation.
+        let (mean, half) = (0.5 * (x + a), 0.5 * (x - a));
+        let fall = 2.0 * mean.sin() * half.sin();
+        low * fall + slope * 2.0 * (mean.cos() * sine_less_chord(half) + mean.sin() * half * half.sin())
     }
 
     /// The unit direction at an angle from the pole and one about it, radians, by the type's own axes.
@@ -167,6 +170,16 @@ impl IntensitySampler {
         };
         self.kind.direction(h, v).normalize()
     }
+}
+
+/// Returns sin h − h cos h, which begins with h³/3.
+fn sine_less_chord(h: f64) -> f64 {
+    if h.abs() > 0.1 {
+        return h.sin() - h * h.cos();
+    }
+    // The terms of the series left out are below 1e-14 of the first.
+    let square = h * h;
+    h * square * (1.0 / 3.0 - square * (1.0 / 30.0 - square * (1.0 / 840.0 - square / 45_360.0)))
 }
 
 /// The interval of ascending nodes, at least two, that holds `x` and the fraction in it; `None` outside by more than rounding.
@@ -205,6 +218,21 @@ mod tests {
 
     fn nodes(a: f64, b: f64, n: usize) -> Vec<f64> {
         (0..=n).map(|i| a + (b - a) * i as f64 / n as f64).collect()
+    }
+
+    #[test]
+    fn flux_between_angles_a_hair_apart_is_that_of_the_series() {
+        // At 30° and 1e-9 rad more the integral of (x − a) sin x is sin a · d²/2, next d³/3 · cos a.
+        let (a, d) = (PI / 6.0, 1e-9f64);
+        let angles = [0.0, 30.0, 30.0 + d.to_degrees(), 180.0];
+        let s = IntensitySampler::new(&photometry(PhotometricType::C, &[0.0, 360.0], &angles, |_, _| 1.0)).unwrap();
+        let width = s.polar[2] - s.polar[1];
+        let exact = 0.5 * a.sin() * width * width;
+        assert!((s.ring(1, 0.0, 1.0, s.polar[2]) * width / exact - 1.0).abs() < 1e-6);
+        // Wider ones against the plain form, on both sides of where the series ends.
+        for h in [0.05, 0.0999, 0.1001, 0.7] {
+            assert!((sine_less_chord(h) - (f64::sin(h) - h * h.cos())).abs() < 1e-16, "{h}");
+        }
     }
 
     #[test]

@@ -161,7 +161,7 @@ pub(super) fn in_one_scene<'a>(
     }
 }
 
-/// Returns how far, mm, the farthest place of a group is; 0 for what has the scene's coordinates.
+/// Returns the largest coordinate, in size, of what is placed from a group, mm; 0 for what has the scene's coordinates.
 pub(super) fn farthest_start(instancing: Option<&Instancing>, group: usize) -> f64 {
     instancing.map_or(0.0, |i| i.reach(group))
 }

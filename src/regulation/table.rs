@@ -204,7 +204,8 @@ struct File {
     functions: Vec<Function>,
 }
 
-/// The limits of realigning in a table that has a scan for the cut-off.
+/// Returns how far a lamp may be turned, degrees, by a table's `aim`: after the 01 series for the prefix `UN R149-01`, else after R112
+/// and the 00 series of R149.
 ///
 /// # Panics
 /// When the table states none.

@@ -155,14 +155,16 @@ impl AxisStyle {
 }
 
 impl Chart {
-    /// Makes a map of a grid with lines of equal value at round levels, which the caption then names; the axes are the grid's. `name` is
-    /// the stem of its files.
+    /// Makes a map of a grid in inferno colours, with lines through its smoothed values at up to seven round levels above 0, which the
+    /// caption names. The axes are the grid's; `name` is the stem of its files.
     pub fn map(name: &str, title: &str, caption: &str, grid: Grid) -> Self {
         let axis = |k: usize| AxisStyle::linear(&grid.axes[k].label, &grid.axes[k].unit);
         // From zero up: a map of negative values alone has no lines.
         let levels = round_levels(grid.values.iter().copied().fold(0.0, f64::max));
         let lines = isolines(&grid, &levels);
-        let named: Vec<String> = levels.iter().map(|l| figures(*l, 3)).collect();
+        // A level that the smoothed values do not reach has no line.
+        let drawn = levels.iter().filter(|level| lines.iter().any(|line| line.level == **level));
+        let named: Vec<String> = drawn.map(|level| figures(*level, 3)).collect();
         let word = match grid.unit.as_str() {
             "cd" => "Isocandela lines",
             "lx" => "Isolux lines",
@@ -214,5 +216,32 @@ impl Chart {
         let content = Content::Series(series);
         let equal_scales = false;
         Self { name: name.into(), title: title.into(), caption: caption.into(), x, y, equal_scales, content }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::Axis;
+
+    #[test]
+    fn a_map_names_the_levels_that_it_draws() {
+        // A square of 1000 on a plain of 100: nothing is below 100, so that the levels from 5 to 50 have no line.
+        let axis = || Axis { label: "x".into(), unit: "mm".into(), range: [-1.0, 1.0], cells: 100 };
+        let is_inside = |k: usize| (40..60).contains(&(k % 100)) && (40..60).contains(&(k / 100));
+        let values = (0..10_000).map(|k| if is_inside(k) { 1000.0 } else { 100.0 }).collect();
+        let (name, quantity, unit) = (String::new(), String::new(), "lx".to_owned());
+        let grid = Grid {
+            name,
+            quantity,
+            unit,
+            axes: [axis(), axis()],
+            values,
+            error: None,
+            geometric: None,
+            layers: Vec::new(),
+        };
+        let caption = Chart::map("map", "", "", grid).caption;
+        assert!(caption.contains("Isolux lines at 200, 500 lx,"), "{caption}");
     }
 }

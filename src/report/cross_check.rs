@@ -108,8 +108,16 @@ pub fn verdict(check: &CrossCheck) -> String {
         0 => "octree and BVH agree on every one".to_owned(),
         n => format!("octree and BVH **disagree on {}**", grouped(n)),
     };
+    let beyond = f.explained.unproved + f.explained.unmeshed + f.explained.no_surface;
     let beside = match f.unexplained {
-        0 => "every difference from the exact spline is explained by the facets' small distance from it".to_owned(),
+        0 if beyond == 0 => {
+            "every difference from the exact spline is explained by the facets' small distance from it".to_owned()
+        }
+        0 => format!(
+            "every difference from the exact spline is explained: but for {} at facets without a proof, or faces without facets or \
+             surface, by the facets' small distance from it",
+            grouped(beyond)
+        ),
         n => format!("**{} differences from the exact spline are unexplained**", grouped(n)),
     };
     format!("Of {} rays asked again, {between}, and {beside}.", grouped(check.rays))
@@ -158,7 +166,7 @@ pub(super) fn error_table(check: &CrossCheck, who: &str) -> Table {
 /// facets.
 pub(super) fn odd_rays(check: &CrossCheck, facets: &Facets) -> Option<View> {
     let diagonal = facets.mesh.bounds().diagonal();
-    if check.disagreements.is_empty() || !diagonal.is_finite() {
+    if check.disagreements.is_empty() || facets.mesh.facets.is_empty() {
         return None;
     }
     let mut view = View::of_facets("disagreeing", "Rays that are answered differently", facets).faded(0.35);
@@ -193,7 +201,7 @@ pub(super) fn odd_rays(check: &CrossCheck, facets: &Facets) -> Option<View> {
 }
 
 impl CheckReport<'_> {
-    /// Writes the answer in a paragraph: the verdict, how many rays differ, and the p99 errors of hits (mm) and normals (degrees).
+    /// Writes the answer in a paragraph: the verdict, how many rays differ, the p99 errors of hits (mm) and normals (degrees), and `also`.
     pub fn answer(&self) -> String {
         let (c, f) = (self.check, &self.check.facets_vs_exact);
         let differ = f.hit_miss + f.other_face;
@@ -267,7 +275,7 @@ impl CheckReport<'_> {
                 h.map_or(Cell::Text("missed".into()), |h| u64::from(h.face.0).into())
             };
             let far = |h: Option<crate::intersect::Hit>| h.map_or(Cell::Empty, |h| Cell::Number(h.t, 6));
-            let mut row: Vec<Cell> = vec![d.index.into(), d.cause.map_or(kind_of(d), Cause::name).into()];
+            let mut row: Vec<Cell> = vec![d.index.into(), kind_of(d).into()];
             row.extend([face(d.octree), far(d.octree), face(d.exact), far(d.exact)]);
             let origin: Point = d.ray.origin;
             row.extend(place(origin).into_iter().chain(place(d.ray.direction)));

@@ -8,7 +8,8 @@ use crate::study::default_accuracy::Chosen;
 use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 
-/// Writes a figure with its unit and one ± for both errors; where the facets weigh or are not known, they are named.
+/// Writes a figure of `digits` significant digits with its unit and one ± (1σ) for both errors. Both are named where the facets' exceeds
+/// a tenth of the rays', the rays' alone where the facets were not judged. A 0 that no ray reached gets its limit of 95 % instead.
 pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
     let Figure { value, unit, statistical, geometric, .. } = figure;
     // One ray is stated as the error where none arrived: three of them are the limit of 95 %.

@@ -26,7 +26,8 @@ pub struct Figure {
     pub unit: String,
     /// Standard error from the number of rays.
     pub statistical: f64,
-    /// Error from the facets, one standard error; 0 on the spline, absent where it was not measured.
+    /// Error from the facets and from light that was lost, one standard error; of lost light alone on the spline, absent where not
+    /// measured.
     pub geometric: Option<f64>,
     /// Which of the two is larger.
     pub limited_by: Limit,
@@ -115,7 +116,7 @@ pub fn figures(results: &Results, surface: Surface<'_>, unit: &str) -> Vec<Recei
     receivers.map(|(k, r)| Errors::new(results, surface, k).figures(r, unit)).collect()
 }
 
-/// Statistical error of each cell of a receiver: what one ray adds where none arrived.
+/// Returns the standard error of each cell, in `r.unit`; where no light arrived, what one ray would add to the cell. Empty without cells.
 pub fn cell_errors(r: &ReceiverResult) -> Vec<f64> {
     let stated = |k: usize| if r.cells[k] > 0.0 { r.errors[k] } else { r.ray_cells[k] };
     (0..r.cells.len()).map(stated).collect()

@@ -79,7 +79,7 @@ impl RaySource for Camera {
     }
 }
 
-/// Random rays: direction uniform, through a uniform point of the box grown by 5 %, from outside the bounding sphere.
+/// Random rays: direction uniform, through a uniform point of the box grown by a fortieth of its diagonal, from outside the bounding sphere.
 #[derive(Clone, Copy, Debug)]
 pub struct Uniform {
     bounds: Aabb,
@@ -116,7 +116,7 @@ impl RaySource for Uniform {
 }
 
 /// Rays of one path: the first comes from outside, the others from where the one before it hit.
-pub const BOUNCES: u64 = 8;
+pub const RAYS_PER_PATH: u64 = 8;
 
 /// Incoherent rays: paths of up to eight rays that leave each hit in a random direction on the side they came from.
 ///
@@ -142,9 +142,9 @@ impl<'a> Bounces<'a> {
         // Another stream than that of the first rays, which are keyed by the same numbers.
         let mut random = Random::new(self.first.seed ^ 0x5851_f42d_4c95_7f2d, path);
         let mut cost = Cost::default();
-        let mut rays = Vec::with_capacity(BOUNCES as usize);
-        let mut ray = self.first.ray(path * BOUNCES);
-        for k in 1..=BOUNCES {
+        let mut rays = Vec::with_capacity(RAYS_PER_PATH as usize);
+        let mut ray = self.first.ray(path * RAYS_PER_PATH);
+        for k in 1..=RAYS_PER_PATH {
             rays.push(ray);
             ray = match self.guide.intersect(&ray, &mut cost) {
                 Some(hit) => {
@@ -152,7 +152,7 @@ impl<'a> Bounces<'a> {
                     let n = hit.geometric_normal * side;
                     Ray::new(ray.point_at(hit.t) + n * self.lift, random.hemisphere(n))
                 }
-                None => self.first.ray(path * BOUNCES + k),
+                None => self.first.ray(path * RAYS_PER_PATH + k),
             };
         }
         rays
@@ -166,9 +166,9 @@ impl RaySource for Bounces<'_> {
     fn rays(&self, range: Range<u64>) -> Vec<Ray> {
         // Whole paths are made, for a ray follows from those before it; what was not asked for is dropped.
         let mut rays = Vec::with_capacity((range.end - range.start) as usize);
-        let mut path = range.start / BOUNCES;
-        while path * BOUNCES < range.end {
-            let begin = path * BOUNCES;
+        let mut path = range.start / RAYS_PER_PATH;
+        while path * RAYS_PER_PATH < range.end {
+            let begin = path * RAYS_PER_PATH;
             let wanted = |k: usize| range.contains(&(begin + k as u64));
             rays.extend(self.path_rays(path).into_iter().enumerate().filter(|(k, _)| wanted(*k)).map(|(_, r)| r));
             path += 1;

@@ -124,8 +124,8 @@ fn append_box(mesh: &mut FacetMesh, place: &Placement) {
 }
 
 impl Settings {
-    /// Returns these settings for the faces of one group, whose numbers in overrides become the group's own; overrides of other groups'
-    /// faces apply to nothing.
+    /// Returns these settings for the faces of one group: [`FaceSelector::Placed`] holds the group's own numbers, each once for all its
+    /// places, and drops other groups' faces; other selectors stay.
     pub fn of_group(&self, instancing: &Instancing, group: usize) -> Self {
         let mut settings = self.clone();
         for o in &mut settings.overrides {

@@ -49,6 +49,14 @@ fn parts_of_edges_and_faces_have_the_geometry_of_their_parents() {
     let account = import.model.account();
     let face = &account[0].solids[0].faces[0];
     assert!((face.area_mm2 - 0.5).abs() < 1e-12, "{} {:?}", face.area_mm2, import.report.refusals);
+    // Its four edges meet in the four corners, each in the one that it names.
+    let part = &import.model.parts[0];
+    let mut ends: Vec<_> =
+        part.edges.iter().flat_map(|e| e.vertices).map(|v| part.vertices[v.0 as usize]).collect();
+    ends.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).unwrap());
+    let corner = |x: f64, y: f64| lampyris::math::Point::new(x, y, 0.0);
+    let corners = [corner(0.0, 0.0), corner(0.0, 0.5), corner(1.0, 0.0), corner(1.0, 0.5)];
+    assert_eq!(ends, corners.map(|c| [c, c]).concat());
 }
 
 #[test]

@@ -38,7 +38,11 @@ pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Resu
         return Err(failure.with_help("give another name with -o"));
     }
     make_folder(&folder_of(&scene_file))?;
-    let text = scene_text(file, &model_reference(file, &scene_file), &loaded);
+    let Some(reference) = model_reference(file, &scene_file) else {
+        let failure = Failure::arguments(format!("{}: no scene can name this file", file.display()));
+        return Err(failure.with_help("its path is no UTF-8 text, as TOML is; give the file another name"));
+    };
+    let text = scene_text(file, &reference, &loaded);
     write_atomic(&scene_file, |w| w.write_all(text.as_bytes()))?;
     if console.json {
         print(&json_text(&json!({"scene": scene_file.display().to_string()}))?)?;
@@ -57,13 +61,13 @@ fn last_component(file: &Path) -> &OsStr {
     file.file_name().unwrap_or(file.as_os_str())
 }
 
-/// Returns the model's path as the scene names it: its bare name where both are in one folder, else absolute.
-fn model_reference(file: &Path, scene_file: &Path) -> String {
+/// Returns the model's path as the scene names it: its bare name where both are in one folder, else absolute. `None` where it is no UTF-8.
+fn model_reference(file: &Path, scene_file: &Path) -> Option<String> {
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let is_beside = folder_of(&absolute(file)) == folder_of(&absolute(scene_file));
     // A path beside the scene moves with it; any other must be absolute, for the scene may be read from elsewhere.
     let path = if is_beside { PathBuf::from(last_component(file)) } else { absolute(file) };
-    path.to_string_lossy().into_owned()
+    path.into_os_string().into_string().ok()
 }
 
 /// Returns the whole scene as TOML. `file` is for its heading, `reference` the path of the model in it.

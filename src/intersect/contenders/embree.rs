@@ -54,8 +54,7 @@ impl<'m> Embree<'m> {
         }
         let indices: Vec<u32> = codes.iter().flat_map(|&code| corner_indices(mesh, code, primitives)).collect();
         let size = if primitives == Primitives::Quads { 4 } else { 3 };
-        let scene = (library.new_scene(&positions, &indices, size))
-            .map_err(|source| EmbreeError::Library { path: path.into(), source })?;
+        let scene = library.new_scene(path, &positions, &indices, size)?;
         let bounds = mesh.bounds();
         let extent = if bounds.is_empty() { 0.0 } else { bounds.size().max_element() };
         Ok(Self {

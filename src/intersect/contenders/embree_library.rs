@@ -19,6 +19,12 @@ pub enum EmbreeError {
         /// What the system says.
         source: libloading::Error,
     },
+    /// Embree gave no memory for a mesh.
+    #[error("Embree has no memory for a mesh of {primitives} facets")]
+    Memory {
+        /// Triangles or quads of the mesh.
+        primitives: usize,
+    },
     /// Embree 3 and others take other arguments.
     #[error("{path} is Embree {major}; version 4 is needed")]
     Version {
@@ -144,41 +150,52 @@ impl EmbreeLibrary {
     /// A committed scene of one mesh: `size` indices a primitive, 3 or 4.
     pub(super) fn new_scene(
         self: &Arc<Self>,
+        path: &Path,
         positions: &[[f32; 3]],
         indices: &[u32],
         size: usize,
-    ) -> Result<Scene, libloading::Error> {
+    ) -> Result<Scene, EmbreeError> {
+        let unusable = |source| EmbreeError::Library { path: path.into(), source };
         let (kind, format) = if size == 3 { (TRIANGLES, UINT3) } else { (QUADS, UINT4) };
         // SAFETY: arguments as in `rtcore_scene.h` and `rtcore_geometry.h` of version 4. Both buffers are Embree's own, of the length
         // asked for, and filled before the commit; all indices are below the number of positions.
         #[allow(unsafe_code)]
         unsafe {
-            let new_scene: Symbol<NewObject> = self.library.get(b"rtcNewScene\0")?;
-            let scene_flags: Symbol<SetNumber> = self.library.get(b"rtcSetSceneFlags\0")?;
-            let scene_quality: Symbol<SetNumber> = self.library.get(b"rtcSetSceneBuildQuality\0")?;
-            let new_geometry: Symbol<NewGeometry> = self.library.get(b"rtcNewGeometry\0")?;
-            let new_buffer: Symbol<NewBuffer> = self.library.get(b"rtcSetNewGeometryBuffer\0")?;
-            let commit_geometry: Symbol<Act> = self.library.get(b"rtcCommitGeometry\0")?;
-            let attach: Symbol<Attach> = self.library.get(b"rtcAttachGeometry\0")?;
-            let release_geometry: Symbol<Act> = self.library.get(b"rtcReleaseGeometry\0")?;
-            let commit_scene: Symbol<Act> = self.library.get(b"rtcCommitScene\0")?;
-            let release: Act = *self.library.get(b"rtcReleaseScene\0")?;
+            let new_scene: Symbol<NewObject> = self.library.get(b"rtcNewScene\0").map_err(unusable)?;
+            let scene_flags: Symbol<SetNumber> = self.library.get(b"rtcSetSceneFlags\0").map_err(unusable)?;
+            let scene_quality: Symbol<SetNumber> =
+                self.library.get(b"rtcSetSceneBuildQuality\0").map_err(unusable)?;
+            let new_geometry: Symbol<NewGeometry> = self.library.get(b"rtcNewGeometry\0").map_err(unusable)?;
+            let new_buffer: Symbol<NewBuffer> = self.library.get(b"rtcSetNewGeometryBuffer\0").map_err(unusable)?;
+            let commit_geometry: Symbol<Act> = self.library.get(b"rtcCommitGeometry\0").map_err(unusable)?;
+            let attach: Symbol<Attach> = self.library.get(b"rtcAttachGeometry\0").map_err(unusable)?;
+            let release_geometry: Symbol<Act> = self.library.get(b"rtcReleaseGeometry\0").map_err(unusable)?;
+            let commit_scene: Symbol<Act> = self.library.get(b"rtcCommitScene\0").map_err(unusable)?;
+            let release: Act = *self.library.get(b"rtcReleaseScene\0").map_err(unusable)?;
             let handle = new_scene(self.device);
+            let primitives = indices.len() / size;
+            if handle.is_null() {
+                return Err(EmbreeError::Memory { primitives });
+            }
             // From here on a failure gives the scene back.
             let scene = Scene { handle, release, library: self.clone() };
             scene_flags(handle, ROBUST);
             scene_quality(handle, HIGH_QUALITY);
             let geometry = new_geometry(self.device, kind);
             let vertices = new_buffer(geometry, VERTEX_BUFFER, 0, FLOAT3, 12, positions.len()).cast::<[f32; 3]>();
-            let primitives =
-                new_buffer(geometry, INDEX_BUFFER, 0, format, 4 * size, indices.len() / size).cast::<u32>();
-            if !vertices.is_null() && !primitives.is_null() {
+            let corners = new_buffer(geometry, INDEX_BUFFER, 0, format, 4 * size, primitives).cast::<u32>();
+            let has_memory = !vertices.is_null() && !corners.is_null();
+            if has_memory {
                 vertices.copy_from_nonoverlapping(positions.as_ptr(), positions.len());
-                primitives.copy_from_nonoverlapping(indices.as_ptr(), indices.len());
+                corners.copy_from_nonoverlapping(indices.as_ptr(), indices.len());
                 commit_geometry(geometry);
                 attach(scene.handle, geometry);
             }
             release_geometry(geometry);
+            // Without its facets the scene would answer every ray with a miss, and at a splendid rate.
+            if primitives > 0 && !has_memory {
+                return Err(EmbreeError::Memory { primitives });
+            }
             commit_scene(scene.handle);
             Ok(scene)
         }

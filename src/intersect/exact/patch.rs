@@ -49,7 +49,7 @@ impl PatchGrid {
             b
         });
         let domain = s.domain();
-        // As near as a file's nine digits put points of one place, or a micrometre on a metre where it says nothing.
+        // As near as a file's nine digits put points of one place: a nanometre on a metre.
         let tolerance = SAME_POINT * (1.0 + s.bounds().diagonal());
         // Five points along the side at the low or high end of a parameter.
         let side = |d: usize, end: usize| -> [Point; 5] {
@@ -147,7 +147,7 @@ pub(super) const TRUSTED: f64 = 1e6;
 /// Square of the least sine between two derivatives that give a normal: seven digits of it are right.
 pub(super) const LEAST_SINE_SQUARED: f64 = 1e-18;
 /// Ulps of a parameter that are a larger share of a patch's rectangle than this leave too few digits of places in it: of 10 mm a
-/// micrometre's thousandth.
+/// picometre.
 const LARGEST_ULP: f64 = 1e-10;
 /// Weights of one patch that differ by more than this make it run at speeds so different that places in its slow part lose as many
 /// digits.

@@ -155,12 +155,11 @@ fn load_planes(row: &[f32; WIDTH]) -> std::arch::x86_64::__m256 {
     unsafe { std::arch::x86_64::_mm256_loadu_ps(row.as_ptr()) }
 }
 
-#[cfg(test)]
+#[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
     use super::*;
     use crate::math::{Point, Vector};
 
-    #[cfg(target_arch = "x86_64")]
     #[test]
     fn both_tests_give_the_same_bits() {
         if !is_x86_feature_detected!("avx2") {

@@ -8,6 +8,10 @@
 //! `unsafe` is needed to call a function compiled for instructions that the build as a whole does not assume. It is sound because
 //! the processor is asked first; the standard library caches its answer.
 #![allow(unsafe_code)]
+#![cfg_attr(
+    not(target_arch = "x86_64"),
+    expect(dead_code, reason = "elsewhere every loop is compiled for the target alone")
+)]
 
 pub(crate) mod f64x8;
 

@@ -2,6 +2,7 @@
 
 use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table, figures, seconds};
+use crate::study::slope;
 use serde_json::Value;
 
 /// Direction errors below it are rounding of unit vectors in double precision, degrees.
@@ -104,7 +105,7 @@ fn is_dominated(p: &Point, points: &[Point]) -> bool {
     points.iter().any(|q| q.seconds <= p.seconds && q.error <= p.error && better(q))
 }
 
-/// Makes a table of the combinations that no other beats in both time and p99 direction error, the cheapest first.
+/// Makes a table of the combinations that no other dominates in time and p99 direction error, the cheapest first.
 fn front_table(points: &[Point]) -> Table {
     let columns = [
         ("tolerance", "mm"),
@@ -138,10 +139,11 @@ fn front_table(points: &[Point]) -> Table {
     table
 }
 
-/// Draws every combination as time against p99 direction error; those that another one beats in both are faint.
+/// Draws every combination as time against p99 direction error; dominated ones are faint.
 fn front_chart(points: &[Point]) -> Chart {
     // An error of exactly 0 has no place on a logarithmic axis; it is shown at a tenth of the smallest other.
-    let smallest = points.iter().map(|p| p.error).filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
+    let smallest =
+        points.iter().map(|p| p.error).filter(|e| *e > 0.0).min_by(f64::total_cmp).unwrap_or(ROUNDING_DEG);
     let shown = |p: &&Point| [p.seconds, if p.error > 0.0 { p.error } else { smallest / 10.0 }];
     let of = |name: String, style, wanted: &dyn Fn(&Point) -> bool| {
         let mut list: Vec<&Point> = points.iter().filter(|p| wanted(p)).collect();
@@ -164,7 +166,7 @@ fn front_chart(points: &[Point]) -> Chart {
     series.push(of("dominated".into(), SeriesStyle::Faint, &|p| is_dominated(p, points)));
     series.retain(|s| !s.points.is_empty());
     let caption = "Each point is one combination of tolerance, normals and intersector; lower left is better. Faint: another \
-        combination is both faster and more accurate. Time is tessellation, build and the median of the traces; an error of 0 is drawn at a \
+        combination is no worse in either and better in one. Time is tessellation, build and the median of the traces; an error of 0 is drawn at a \
         tenth of the smallest other.";
     let axes = [AxisStyle::log("time", "s"), AxisStyle::log("direction error, p99", "°")];
     Chart::series("front", "Cost–accuracy front", caption, axes, series)
@@ -210,7 +212,9 @@ fn slope_chart(rows: &[&Value]) -> Chart {
             style: SeriesStyle::Dashed,
             ..Series::default()
         });
-        let name = match slope(&points) {
+        // Through two points any slope is exact.
+        let slope = if points.len() > 2 { slope(&points) } else { None };
+        let name = match slope {
             Some(s) => format!("{normals}, slope {}", figures(s, 3)),
             None => normals.to_owned(),
         };
@@ -221,17 +225,6 @@ fn slope_chart(rows: &[&Value]) -> Chart {
         (½ for flat and nearest normals, 1 for bilinear ones; none is drawn for cubic), through the coarsest measurement.";
     let axes = [AxisStyle::log("mean sag", "mm"), AxisStyle::log(&format!("direction error, {word}"), "°")];
     Chart::series("slopes", "Convergence", caption, axes, series)
-}
-
-/// Returns the least-squares slope in log-log; `None` with fewer than three points, or all at one place.
-fn slope(points: &[[f64; 2]]) -> Option<f64> {
-    let logs: Vec<[f64; 2]> = points.iter().map(|p| p.map(f64::ln)).collect();
-    let n = logs.len() as f64;
-    let mean = |k: usize| logs.iter().map(|p| p[k]).sum::<f64>() / n;
-    let (mx, my) = (mean(0), mean(1));
-    let sxx: f64 = logs.iter().map(|p| (p[0] - mx).powi(2)).sum();
-    let sxy: f64 = logs.iter().map(|p| (p[0] - mx) * (p[1] - my)).sum();
-    (logs.len() > 2 && sxx > 0.0).then(|| sxy / sxx)
 }
 
 /// Draws the times that meshing, building and tracing take, of at most 14 rows: the spline's and those of bilinear normals in the octree.

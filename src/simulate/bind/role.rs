@@ -9,7 +9,7 @@ impl BoundScene {
     pub const ROLES: [&'static str; 4] = ["mirror", "interface", "coated", "absorber"];
 
     /// Returns the placed faces with a role of [`BoundScene::ROLES`], in order: plain mirrors, bare interfaces, faces with a coating or
-    /// scatter, or absorbers. None for any other word. An interface is listed whether or not it has a medium.
+    /// scatter, or absorbers. Empty for any other word. An interface is listed whether or not it has a medium.
     pub fn faces_in_role(&self, role: &str) -> Vec<FaceId> {
         let is = |surface: &Surface| match surface {
             Surface::Mirror(_) => role == "mirror",

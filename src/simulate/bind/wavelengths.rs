@@ -73,7 +73,11 @@ pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[
                 key.wavelengths(scene.run.unit).map_or_else(|_| Vec::new(), |spectrum| probes(&spectrum))
             }
             (None, Some(Loaded::Rays(RayList { spectrum: Some(spectrum), .. }))) => probes(spectrum),
-            (None, Some(Loaded::Rays(list))) => list.own_wavelengths.ascending(),
+            // Rays that have none of their own have the run's.
+            (None, Some(Loaded::Rays(list))) => {
+                let run = (!list.is_all_coloured()).then_some(scene.run.wavelength_nm);
+                list.own_wavelengths.ascending().into_iter().chain(run).collect()
+            }
             _ => vec![scene.run.wavelength_nm],
         };
         wavelengths.sort_by(f64::total_cmp);

@@ -110,7 +110,7 @@ impl Emitter {
         let centre = scene_box.center();
         let diagonal = scene_box.diagonal();
         let far = FAR_DIAGONALS * diagonal.max(f64::MIN_POSITIVE);
-        let size = self.size();
+        let size = self.bounding_radius();
         let distance = self.farthest_start(centre);
         if !distance.is_finite() {
             return Err("it lies farther away than numbers reach".into());
@@ -151,7 +151,7 @@ impl Emitter {
                 starts.iter().map(|p| (*p - centre).length()).fold(0.0, f64::max)
             }
             Shape::Point | Shape::Disc(_) | Shape::Rectangle(_) => {
-                (self.frame.origin - centre).length() + self.size()
+                (self.frame.origin - centre).length() + self.bounding_radius()
             }
         }
     }

@@ -188,7 +188,7 @@ impl Emitter {
     }
 
     /// Returns the distance from its middle to the farthest place it shines from, mm; 0 for faces and lists of rays.
-    fn size(&self) -> f64 {
+    fn bounding_radius(&self) -> f64 {
         match &self.shape {
             Shape::Disc(radius) => *radius,
             Shape::Rectangle([a, b]) => a.hypot(*b),
@@ -202,7 +202,7 @@ impl Emitter {
         if self.near_start.is_some() {
             return Aabb::EMPTY;
         }
-        let size = Vector::splat(self.size());
+        let size = Vector::splat(self.bounding_radius());
         Aabb::from_points([self.frame.origin - size, self.frame.origin + size])
     }
 

@@ -151,11 +151,16 @@ impl RayList {
         self.file.spectral_rays() > 0
     }
 
+    /// Whether every ray has a wavelength of its own.
+    pub(crate) fn is_all_coloured(&self) -> bool {
+        self.file.spectral_rays() >= self.len()
+    }
+
     /// Returns the first and the last of the rays' wavelengths, nm, where one without takes `other`.
     pub(crate) fn range_nm(&self, other: f64) -> [f64; 2] {
         let own = self.own_wavelengths.range();
         match own {
-            Some([a, b]) if self.file.spectral_rays() < self.len() => [a.min(other), b.max(other)],
+            Some([a, b]) if !self.is_all_coloured() => [a.min(other), b.max(other)],
             Some(range) => range,
             None => [other; 2],
         }

@@ -77,8 +77,8 @@ pub(super) fn span(text: &str, path: &[Key<'_>]) -> Option<Range<usize>> {
     span
 }
 
-/// What stands where a table belongs.
-const TABLES: [(&str, &str); 8] = [
+/// What the reader expected, and how to write it.
+const TABLES: [(&str, &str); 14] = [
     ("struct SpectrumKey", "spectrum = { kind = \"d65\" }"),
     ("struct Placement", "placement = { at = [0, 0, 10] }"),
     ("struct ScatterKey", "scatter = { lobe = \"gaussian\", sigma_deg = 2 }"),
@@ -86,10 +86,27 @@ const TABLES: [(&str, &str); 8] = [
     ("struct Run", "[run]"),
     ("struct Accuracy", "[accuracy]"),
     ("struct Scene", "[[source]]"),
+    ("struct Source", "[[source]]"),
+    ("struct Receiver", "[[receiver]]"),
+    ("struct Material", "[[material]]"),
+    ("struct Medium", "[[medium]]"),
+    ("struct ModelUse", "[[model]]"),
+    ("struct RegulationUse", "[[regulation]]"),
     ("a sequence", "[[source]], with both brackets doubled, for an entry of a list"),
 ];
 
-/// Makes an error of a value of the wrong type, in words that do not speak of the program's own types; `key` is empty where not known.
+/// What the reader calls numbers, and what people do.
+const PLAIN_TYPES: [(&str, &str); 6] = [
+    ("expected f64", "expected a number"),
+    ("expected u64", "expected a whole number, 0 or more"),
+    ("expected u32", "expected a whole number, 0 or more"),
+    ("expected u16", "expected a whole number, 0 or more"),
+    ("expected u8", "expected a whole number, 0 or more"),
+    ("expected usize", "expected a whole number, 0 or more"),
+];
+
+/// Makes the error for a message of the TOML reader that names no unknown key or variant, in words that do not speak of the program's
+/// own types, with an example where a list or table belongs; other messages stay. `key` is that of the value, empty where not known.
 fn type_error(message: &str, key: &str) -> Error {
     let message = message.trim();
     // The key is asked first: a list has its own form, which the type does not tell.
@@ -116,10 +133,8 @@ fn type_error(message: &str, key: &str) -> Error {
             return Error::new(ErrorKind::Syntax, format!("this is {plain}"));
         }
     }
-    Error::new(
-        ErrorKind::Syntax,
-        message.replace("expected f64", "expected a number").replace("expected u64", "expected a whole number"),
-    )
+    let plain = PLAIN_TYPES.iter().fold(message.to_owned(), |m, (form, plain)| m.replace(form, plain));
+    Error::new(ErrorKind::Syntax, plain)
 }
 
 /// Returns the key whose value stands at byte `at` of the text, by its line; empty where there is none.

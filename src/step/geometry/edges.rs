@@ -44,8 +44,9 @@ impl<'f, 'a> Geometry<'f, 'a> {
         self.edge_between(e.id, [vertices.id(0), vertices.id(1)], curve, sense)
     }
 
-    /// Reads an edge between two vertices, mm: straight where the file gives no curve, and without a curve where it has no length. `sense`
-    /// is whether it runs along the curve. Refuses missing vertices, and such as leave nothing of the curve.
+    /// Reads edge #`id` from its first to its second vertex, mm: that part of `curve`, or all of a closed one where both vertices are one
+    /// place; the straight line where the file gives no curve, none where it has no length. `sense` is whether it runs along `curve`; a
+    /// wrong one is corrected. Refuses missing vertices, and vertices that leave nothing of the curve but lie apart.
     fn edge_between(
         &self,
         id: u64,
@@ -59,7 +60,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let closed = v0 == v1 || p == q;
         let Some(curve) = curve else {
             // No geometry: straight.
-            let curve = (!closed).then(|| Curve::line(p, q, [0.0, (q - p).length()]));
+            let length = (q - p).length();
+            let curve = (!closed && length >= EMPTY_EDGE_MM).then(|| Curve::line(p, q, [0.0, length]));
             return Ok(TrimmedEdge { curve, gap: 0.0, repair: None });
         };
         let directed = self.curve(curve, 0)?;

@@ -62,15 +62,10 @@ impl<'f, 'a> Geometry<'f, 'a> {
         })
     }
 
-    /// Returns the instance with the id `position` that `from` refers to; a refusal says that `what` is missing where there is no id, or
-    /// that the instance is.
-    pub(crate) fn resolve(
-        &self,
-        from: Entity<'f, 'a>,
-        position: Option<u64>,
-        what: &str,
-    ) -> Outcome<Entity<'f, 'a>> {
-        match position {
+    /// Returns the instance #`id`, which `from` refers to. Where there is no id, refuses in `from`'s name that `what` is missing; where the
+    /// file has no such instance, in the id's.
+    pub(crate) fn resolve(&self, from: Entity<'f, 'a>, id: Option<u64>, what: &str) -> Outcome<Entity<'f, 'a>> {
+        match id {
             Some(id) => self.entity(id),
             None => Err(Refusal::new(from, format!("{what} is missing"))),
         }
@@ -83,7 +78,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let point = match xs.as_deref() {
             Some([x, y, z]) => self.units.length * Point::new(*x, *y, *z),
             Some([x, y]) => self.units.length * Point::new(*x, *y, 0.0),
-            _ => return Err(Refusal::new(e, "is no point with three coordinates")),
+            _ => return Err(Refusal::new(e, "is no point of two or three coordinates")),
         };
         if !(point.abs().max_element() <= FARTHEST_MM) {
             return Err(Refusal::new(

@@ -107,7 +107,7 @@ fn add_edges(
     part: &mut Part,
 ) -> Vec<Option<EdgeId>> {
     let joined = vertices_of_empty_edges(geometry.file, keys, &edges);
-    let mut vertices: FxHashMap<Option<u64>, VertexId> = FxHashMap::default();
+    let mut vertices: FxHashMap<u64, VertexId> = FxHashMap::default();
     let mut numbers: Vec<Option<EdgeId>> = Vec::with_capacity(keys.len());
     for (key, edge) in keys.iter().zip(edges) {
         let Ok(TrimmedEdge { curve: Some(curve), .. }) = edge else {
@@ -117,12 +117,17 @@ fn add_edges(
         let [a, b] = curve.domain();
         let ends = vertex_ids(geometry.file, *key).map(|id| id.map(|id| joined_vertex(&joined, id)));
         let vertices = [(ends[0], a), (ends[1], b)].map(|(id, t)| {
-            *vertices.entry(id).or_insert_with(|| {
+            let mut add = || {
                 // The file's own vertex, where it has one: edges that meet there end at the same bits.
                 let given = id.and_then(|id| geometry.vertex(id).ok());
                 part.vertices.push(given.unwrap_or_else(|| curve.evaluate(t)));
                 VertexId(part.vertices.len() as u32 - 1)
-            })
+            };
+            // An end without a name meets no other.
+            match id {
+                Some(id) => *vertices.entry(id).or_insert_with(add),
+                None => add(),
+            }
         });
         let entity = if let EdgeKey::Entity(id) = key { Some(*id) } else { None };
         numbers.push(Some(EdgeId(part.edges.len() as u32)));
@@ -218,8 +223,8 @@ fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
     match key {
         EdgeKey::Straight(a, b) => [Some(a), Some(b)],
         EdgeKey::Entity(id) => {
-            let args =
-                file.entity(id).and_then(|e| e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1)));
+            let kinds = ["EDGE", "EDGE_CURVE", "SUBEDGE"];
+            let args = file.entity(id).and_then(|e| kinds.iter().find_map(|kind| e.attributes(kind, 1)));
             [0, 1].map(|i| args.and_then(|a| a.id(i)))
         }
     }

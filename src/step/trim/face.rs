@@ -44,8 +44,9 @@ impl From<Overrun> for &'static str {
     }
 }
 
-/// Builds a face: locates its edges, arranges its loops, and makes the spline that they bound. Fails with a reason in words where edges are
-/// off the surface, loops bound nothing, or the budget is used up.
+/// Builds a face, mm: fits its edges in the chart's parameters, closes its loops to a bounded region, with seams where they wind, and
+/// cuts the spline over it. A sphere may be turned first. Fails with a reason in words where edges lie off the surface, loops bound no
+/// region (nothing, too many turns, holes that leave no seam), or the work budget is used up.
 pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static str> {
     // Edges in the parameters of the chart.
     task.turn_sphere();
@@ -70,7 +71,7 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
     }
     let Boundary { mut loops, mut seams, repairs: turned } = bound_region(chains, chart, task.implicit_outer)?;
     repairs.extend(turned.into_iter().map(String::from));
-    let (domain, shift) = domain_of(&loops, chart).ok_or("its loops enclose nothing")?;
+    let (domain, shift) = domain_of(&loops, chart)?;
     loops.iter_mut().for_each(|l| l.shift(shift));
     seams.iter_mut().flatten().for_each(|p| *p += shift);
 
@@ -135,13 +136,13 @@ fn chain_loops(task: &FaceTask<'_>, fits: &FxHashMap<usize, Fit>, same_sense: bo
     chains
 }
 
-/// Returns the rectangle of all loops, moved into the base period, and the shift by whole periods that takes the loops there. `None` where
-/// it is empty, infinite or winds too often.
-fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
+/// Returns the rectangle of all loops, moved into the base period, and the shift by whole periods that takes the loops there. Fails with a
+/// reason in words where it is empty, infinite or winds too often.
+fn domain_of(loops: &[Chain], chart: &Chart) -> Result<([[f64; 2]; 2], Uv), &'static str> {
     let points = loops.iter().flat_map(|l| &l.pieces).flat_map(|p| p.curve.points.iter().map(|q| q.position()));
     let (lo, hi) = points.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
     if !(lo.is_finite() && hi.is_finite()) {
-        return None;
+        return Err("its loops have no places in the parameters of its surface");
     }
     let mut domain = [[0.0; 2]; 2];
     let mut shift = Uv::ZERO;
@@ -153,7 +154,7 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
             Some(period) => {
                 let turns = if chart.poles.is_empty() { MAX_THREAD_TURNS } else { MAX_TURNS };
                 if !(b - a <= turns * period) {
-                    return None;
+                    return Err("its loops wind too often around its surface");
                 }
                 let base = if natural[0].is_finite() { natural[0] } else { 0.0 };
                 // By whole periods, so that the region begins in the base period.
@@ -176,11 +177,11 @@ fn domain_of(loops: &[Chain], chart: &Chart) -> Option<([[f64; 2]; 2], Uv)> {
             }
         }
         if !(b - a > EMPTY_RANGE * (1.0 + a.abs().max(b.abs()))) {
-            return None;
+            return Err("its loops enclose nothing");
         }
         domain[d] = [a, b];
     }
-    Some((domain, shift))
+    Ok((domain, shift))
 }
 
 /// Moves ends of uv curves so that each use begins exactly where the one before ends; returns the largest move, mm.

@@ -170,8 +170,8 @@ fn slopes(rows: &[Row]) -> Vec<Slope> {
         let planes = all.iter().any(|r| r.direction_error_deg_p50 <= ROUNDING_DEG);
         let error = |r: &Row| if planes { r.direction_error_deg_p99 } else { r.direction_error_deg_p50 };
         let used: Vec<&Row> = all.into_iter().filter(|r| error(r) > ROUNDING_DEG).collect();
-        let sag: Vec<_> = used.iter().filter_map(|r| Some((r.sag_mean_mm?, error(r)))).collect();
-        let length: Vec<_> = used.iter().map(|r| (1.0 / (r.facets as f64).sqrt(), error(r))).collect();
+        let sag: Vec<_> = used.iter().filter_map(|r| Some([r.sag_mean_mm?, error(r)])).collect();
+        let length: Vec<_> = used.iter().map(|r| [1.0 / (r.facets as f64).sqrt(), error(r)]).collect();
         let theory_in_sag = match name {
             "flat" | "nearest" => Some(0.5),
             "bilinear" => Some(1.0),

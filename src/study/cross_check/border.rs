@@ -61,7 +61,7 @@ impl Border {
             let chord = b - a;
             let s = if chord == Vector::ZERO { 0.0 } else { (p - a).dot(chord) / chord.length_squared() };
             let coarse = p.distance(a + chord * s.clamp(0.0, 1.0));
-            // The curve stays within half a chord's length of its chord, as it was sampled.
+            // Samples keep the curve within a quarter of a chord's length of it at three places; half is room for what lies between.
             if coarse > enough + 0.5 * chord.length() || coarse > best + 0.5 * chord.length() {
                 continue;
             }
@@ -78,8 +78,8 @@ impl Border {
     }
 }
 
-/// Inserts further samples, so that the curve between two of them stays within a quarter of their distance from their chord; each stretch
-/// is halved at most [`FINEST`] times.
+/// Inserts further samples until the curve, judged at three parameters of each stretch, stays within a quarter of the chord's length from
+/// the chord; each stretch is halved at most [`FINEST`] times, and may stray farther then.
 fn with_short_chords(samples: Vec<(f64, Point)>, at: impl Fn(f64) -> Point) -> Vec<(f64, Point)> {
     let mut out = Vec::with_capacity(samples.len());
     for pair in samples.windows(2) {

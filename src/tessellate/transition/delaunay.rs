@@ -107,7 +107,7 @@ const MAX_WORK: usize = 8_000_000;
 const LONG_OUTLINE: usize = 4000;
 /// Coordinates below the first, which spade refuses, are zero; those above the second lose the exactness of its predicates.
 const COORDINATES: [f64; 2] = [1e-30, 1e30];
-/// Share of a coordinate within which two places are one: some fifty roundings.
+/// Share of the domain, or of a coordinate that is larger, within which two places are one: some fifty roundings.
 const SAME_COORDINATE: f64 = 1e-14;
 
 /// How many corners refinement may make.
@@ -219,7 +219,7 @@ pub(super) struct Refinement<'s, 'a> {
     scale: Uv,
     pub(super) taken: &'s TakenChords,
     cdt: Cdt,
-    /// How often each edge of the triangulation that lies on the outline turns outside into inside.
+    /// How often each edge of the triangulation that lies on the outline turns outside into inside; imprinted lines count twice.
     pub(super) border: FxHashMap<[u32; 2], u32>,
     /// Of those nodes that are in the triangulation.
     pub(super) handles: Vec<Option<FixedVertexHandle>>,
@@ -228,7 +228,8 @@ pub(super) struct Refinement<'s, 'a> {
 }
 
 impl Refinement<'_, '_> {
-    /// Inserts the nodes of segments and lines, and fills in `handles`; `None` where one has no usable parameters.
+    /// Inserts the nodes of segments and imprinted lines, or all nodes beside more than [`LONG_OUTLINE`] segments; adds to `handles` an
+    /// entry for every node, `None` for those left out. Returns `None` where a node has no usable parameters.
     fn insert_nodes(&mut self, segments: &[[u32; 2]], imprinted: &[[u32; 2]]) -> Option<()> {
         // Nodes inside of whole cells have no part in the transition, but each long constraint clears all that it
         // crosses.
@@ -266,12 +267,15 @@ impl Refinement<'_, '_> {
         (p.is_finite() && p.abs().max_element() < COORDINATES[1]).then(|| Point2::new(clean(p.x), clean(p.y)))
     }
 
-    /// Whether a point can be added without splitting a constraint or meeting a vertex, be it but for rounding: between corners one
-    /// rounding apart on a crease stood facets without width.
-    pub(super) fn is_free(&self, uv: Uv) -> bool {
+    /// Whether a point may be inserted: inside the hull, apart from the vertices around it by more than rounding, and on no border or
+    /// imprinted line; creases may be split. False too for parameters that [`Self::scaled`] refuses.
+    pub(super) fn can_insert(&self, uv: Uv) -> bool {
         use spade::PositionInTriangulation as At;
+        // Between corners one rounding apart stood facets without width. Near zero a coordinate's own size says nothing of its rounding.
+        let size = self.surface.extent() * self.scale;
         let apart = |p: Point2<f64>, v: Point2<f64>| {
-            (p.x - v.x).abs() > SAME_COORDINATE * p.x.abs() || (p.y - v.y).abs() > SAME_COORDINATE * p.y.abs()
+            (p.x - v.x).abs() > SAME_COORDINATE * p.x.abs().max(size.x)
+                || (p.y - v.y).abs() > SAME_COORDINATE * p.y.abs().max(size.y)
         };
         self.scaled(uv).is_some_and(|p| match self.cdt.locate(p) {
             At::OnFace(f) => self.cdt.face(f).vertices().iter().all(|v| apart(p, v.position())),

@@ -74,7 +74,7 @@ impl Refinement<'_, '_> {
         let mut done = false;
         for Wish { triangle, places } in wishes {
             // The middle of a parameter line into a pole may be a corner already.
-            let Some(uv) = places.into_iter().find(|&uv| self.is_free(uv)) else { continue };
+            let Some(uv) = places.into_iter().find(|&uv| self.can_insert(uv)) else { continue };
             let place = self.surface.point(uv);
             // What does not hold down to such a size does not for its size.
             let near = SAME_PLACE * triangle.tolerance;
