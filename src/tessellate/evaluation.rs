@@ -1,8 +1,10 @@
 //! Counts and measures what came out.
 
 use super::report::{FailedFace, FailureCause, NotCertified, Percentiles, Repair, Report, ToleranceRange};
+use super::sample::{self, Sampled};
+use super::sample_budget::sample_within_budget;
 use super::tessellation::{FacetQuality, Tessellation};
-use super::{angles, repairs, sample, settings::Settings};
+use super::{angles, repairs, settings::Settings};
 use crate::math::FaceId;
 use crate::mesh::{FacetMesh, Topology};
 use crate::model::Model;
@@ -120,20 +122,19 @@ fn count_shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool
 /// Fills in what samples show: sag and its excess over the tolerance, mm, and errors of normals, degrees. `areas` are those of the facets,
 /// mm².
 fn measure_samples(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64]) {
-    let sampled = sample::sample_mesh(&made.mesh, model);
-    let max = sampled.iter().map(|s| s.sag).fold(0.0, f64::max);
-    let mean =
-        // By area: many small facets would else outweigh a few large ones.
-        sampled.iter().zip(areas).map(|(s, a)| s.mean * a).sum::<f64>() / report.area_mm2.max(f64::MIN_POSITIVE);
-    report.sag_mm.sampled_max = Some(max);
+    let sampled = sample_within_budget(&made.mesh, model, &made.quality);
+    report.unsampled = sampled.iter().filter(|s| s.is_none()).count();
+    let known = || sampled.iter().enumerate().filter_map(|(i, s)| Some((i, s.as_ref()?)));
+    report.sag_mm.sampled_max = Some(known().map(|(_, s)| s.sag).fold(0.0, f64::max));
+    // By area: many small facets would else outweigh a few large ones.
+    let area: f64 = known().map(|(i, _)| areas[i]).sum();
+    let mean = known().map(|(i, s)| s.mean * areas[i]).sum::<f64>() / area.max(f64::MIN_POSITIVE);
     report.sag_mm.sampled_mean = Some(mean);
-    let over = |(s, q): (&sample::Sampled, &FacetQuality)| {
-        s.sag > q.tolerance * (1.0 + SAMPLE_ROUNDING[0]) + SAMPLE_ROUNDING[1]
-    };
-    let found = sampled.iter().zip(&made.quality).enumerate().filter(|&(_, x)| over(x));
-    report.over = found.map(|(i, (s, _))| (i as u32, s.sag)).collect();
+    let over =
+        |s: &Sampled, q: &FacetQuality| s.sag > q.tolerance * (1.0 + SAMPLE_ROUNDING[0]) + SAMPLE_ROUNDING[1];
+    report.over = known().filter(|(i, s)| over(s, &made.quality[*i])).map(|(i, s)| (i as u32, s.sag)).collect();
     report.over_tolerance = Some(report.over.len());
-    let mut errors: Vec<f32> = sampled.into_iter().flat_map(|s| s.normal_errors).collect();
+    let mut errors: Vec<f32> = sampled.into_iter().flatten().flat_map(|s| s.normal_errors).collect();
     errors.sort_by(f32::total_cmp);
     let at = |share: f64| {
         let i = ((errors.len().saturating_sub(1)) as f64 * share) as usize;

@@ -38,6 +38,7 @@ mod proof_steps;
 mod repairs;
 mod report;
 mod sample;
+mod sample_budget;
 mod second_derivatives;
 mod settings;
 mod taken_chords;

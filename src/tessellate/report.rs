@@ -20,7 +20,10 @@ pub struct Report {
     pub sag_mm: Sag,
     /// Facets whose sampled sag exceeds their local tolerance; `None` when not measured.
     pub over_tolerance: Option<usize>,
-    /// Their indices and sampled sags, mm; not part of the JSON.
+    /// Facets that were not sampled, of models with so many that it would take too long: facets without proof are sampled first.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub unsampled: usize,
+    /// Indices and sampled sags of those over their tolerance, mm; not part of the JSON.
     #[serde(skip)]
     pub over: Vec<(u32, f64)>,
     /// Bilinear normal against the spline's; `None` when not measured.
@@ -54,6 +57,11 @@ pub struct Report {
     pub seconds: Seconds,
     /// Filled in by whoever knows the process; bytes.
     pub peak_bytes: Option<u64>,
+}
+
+/// Whether there is nothing to report.
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Least and largest tolerance asked for.

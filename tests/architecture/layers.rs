@@ -418,6 +418,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "emission",
             "fallback",
             "tessellation",
+            "sample_budget",
             "repairs",
             "evaluation",
             "transition",

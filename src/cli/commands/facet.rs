@@ -175,6 +175,9 @@ fn meshing_summary(r: &Report) -> String {
     if let Some(over) = r.over_tolerance {
         sag += &format!("; {over} facets over their tolerance");
     }
+    if r.unsampled > 0 {
+        sag += &format!("; sampled on {} of {} facets", n(r.facets - r.unsampled), n(r.facets));
+    }
     line("distance", sag);
     if let Some(e) = r.normal_error_deg {
         line(
