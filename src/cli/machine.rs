@@ -19,11 +19,6 @@ pub(crate) fn hardware() -> String {
     parts.join(", ")
 }
 
-/// Returns the largest resident size of this process so far, bytes; `None` where the system does not tell.
-pub(crate) fn peak_bytes() -> Option<u64> {
-    kilobyte_field(&fs::read_to_string("/proc/self/status").ok()?, "VmHWM").map(|kb| 1024 * kb)
-}
-
 /// Returns what follows the colon in the first line that begins with the key; `None` without one.
 fn field_value(text: &str, key: &str) -> Option<String> {
     let line = text.lines().find(|l| l.starts_with(key))?;

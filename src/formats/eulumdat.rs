@@ -110,6 +110,13 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     if all.candela.len() != rows * all.horizontal_deg.len() || rows < 2 {
         return Err(malformed("the intensities do not fill the planes"));
     }
+    // A reader would take `NaN` or `inf` for text.
+    let numbers = all.vertical_deg.iter().chain(&all.horizontal_deg).chain(&all.candela);
+    if numbers.chain(p.opening_mm.iter()).chain([&p.watts]).chain(&p.lamp_lumens).any(|x| !x.is_finite()) {
+        return Err(malformed(
+            "an intensity, angle, lumen, watt or length is no finite number; EULUMDAT holds none such",
+        ));
+    }
     // The last plane, at 360°, is the first one again.
     let planes = if rotational { 1 } else { all.horizontal_deg.len() - 1 };
     let lumens = p.lamp_lumens.unwrap_or_else(|| p.flux());
@@ -181,6 +188,27 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let error = write_eulumdat(&folder.path().join("a.ldt"), &none).unwrap_err();
         assert!(error.to_string().contains("no planes"), "{error}");
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let good = photometry_of(PhotometricType::C, &[0.0], &[0.0, 90.0], |_, _| 1.0);
+        for bad in [f64::NAN, f64::INFINITY] {
+            for wrong in [
+                Photometry { candela: vec![1.0, bad], ..good.clone() },
+                Photometry { watts: bad, ..good.clone() },
+                Photometry { lamp_lumens: Some(bad), ..good.clone() },
+                Photometry { opening_mm: [0.0, bad, 0.0], ..good.clone() },
+            ] {
+                for name in ["a.ldt", "a.ies"] {
+                    let path = folder.path().join(name);
+                    let write = if name == "a.ldt" { write_eulumdat } else { crate::formats::write_ies };
+                    let error = write(&path, &wrong).unwrap_err().to_string();
+                    assert!(error.contains("finite") && !path.exists(), "{name}: {error}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -194,6 +194,14 @@ fn ies_text(p: &Photometry) -> Result<String, String> {
     if planes == 0 || rows == 0 || p.candela.len() != planes * rows {
         return Err(format!("{} intensities do not fill {planes} planes of {rows} angles", p.candela.len()));
     }
+    // A reader would take `NaN` or `inf` for the end of the numbers.
+    let numbers = p.vertical_deg.iter().chain(&p.horizontal_deg).chain(&p.candela);
+    let head = p.opening_mm.iter().chain([&p.watts]).chain(&p.lamp_lumens);
+    if let Some(bad) = numbers.chain(head).find(|x| !x.is_finite()) {
+        return Err(format!(
+            "{bad} among the intensities, angles, lumens, watts or lengths; LM-63 holds finite numbers alone"
+        ));
+    }
     let mut out = Lines::default();
     out.line("IESNA:LM-63-2002");
     for (name, value) in &p.keywords {

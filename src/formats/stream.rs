@@ -3,10 +3,8 @@
 //! The number of rows stands at the head of every array, so each column waits in a file beside the final one until all rows
 //! are known, and is then packed; the disk holds the rows twice for that while.
 
-use super::atomic::{Unfinished, remove_stale};
-use super::file_names::file_name;
+use super::atomic::{Unfinished, remove_stale, unfinished};
 use super::npz::header;
-use super::writer::Writer;
 use super::{Error, ErrorKind, write_atomic};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -37,18 +35,15 @@ pub struct NpzStream {
 }
 
 impl NpzStream {
-    /// Begins a file with these columns, each in a part of its own beside `path`. One process may have one stream of a path at a time, and
-    /// names of columns must differ.
+    /// Begins a file with these columns, each in a part of its own beside `path`.
     ///
     /// # Errors
     /// When the folder cannot be written.
     pub fn create(path: &Path, columns: &[Column]) -> Result<Self, Error> {
         let mut stream = Self { path: path.to_path_buf(), columns: Vec::new(), rows: 0, unfinished: Vec::new() };
-        let name = file_name(path);
         remove_stale(path);
         for column in columns {
-            // The columns' names keep the files apart; the writer's keeps runs apart.
-            let beside = path.with_file_name(format!(".{name}.{}.{}.part", Writer::this(), column.name));
+            let beside = unfinished(path);
             stream.unfinished.push(Unfinished::register(&beside));
             let file = File::create(&beside).map_err(|e| Error::new(path, ErrorKind::Write(e)))?;
             stream.columns.push((*column, beside, BufWriter::with_capacity(1 << 16, file)));
@@ -69,10 +64,11 @@ impl NpzStream {
             let message = format!("columns that do not hold {rows} rows");
             return Err(Error::new(&self.path, ErrorKind::Malformed(message)));
         }
-        self.rows += rows;
         for ((_, _, out), bytes) in self.columns.iter_mut().zip(bytes) {
             out.write_all(bytes).map_err(|e| Error::new(&self.path, ErrorKind::Write(e)))?;
         }
+        // Rows that were refused are none of the file.
+        self.rows += rows;
         Ok(())
     }
 
@@ -151,6 +147,13 @@ mod tests {
         let (shape, points) = read::<f64>(&mut file, "point");
         assert_eq!((shape, points[3 * 77], points[3 * 77 + 2]), (vec![1000, 3], 77.0, -1.0 / 3.0));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        // Two at a time write no part of the other's.
+        let [mut one, mut other] = [(); 2].map(|()| NpzStream::create(&path, &columns).unwrap());
+        one.write(1, &[&[1; 8], &[0; 24]]).unwrap();
+        other.write(1, &[&[2; 8], &[0; 24]]).unwrap();
+        drop(other);
+        assert_eq!(one.finish().unwrap(), 1);
+        assert_eq!(read::<u64>(&mut File::open(&path).unwrap(), "ray").1, [u64::from_le_bytes([1; 8])]);
         drop(NpzStream::create(&path, &columns).unwrap());
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }

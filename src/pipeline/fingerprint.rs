@@ -3,16 +3,19 @@
 use super::error::Error;
 use super::intersectors::IntersectorChoice;
 use crate::formats::open_file;
+use crate::model::Model;
+use crate::simulate::scene::Origin;
 use crate::simulate::{BoundScene, Fingerprint, FingerprintHasher, RunSettings, Scene, grows};
 use crate::tessellate;
+use std::fmt::{self, Write};
 
-/// Hashes all that decides the bits of a run of these settings: program, text of the scene, its files, facets, intersector, settings; of a
-/// run that grows not the number of rays.
+/// Hashes all that decides the bits of a run of these settings: program, scene, its files, facets, intersector, settings; of a run that grows
+/// not the number of rays. `in_memory` is a model that no file of the scene holds.
 ///
 /// # Errors
 /// When a file of the scene cannot be read.
 pub(super) fn run_fingerprint(
-    (scene, bound): (&Scene, &BoundScene),
+    (scene, bound, in_memory): (&Scene, &BoundScene, Option<&Model>),
     asked: &RunSettings,
     (mesher, choice): (&tessellate::Settings, &IntersectorChoice),
 ) -> Result<Fingerprint, Error> {
@@ -35,7 +38,12 @@ pub(super) fn run_fingerprint(
     let words = format!("{program} {mesher:?} {choice:?} {settings:?}");
     let mut hasher = FingerprintHasher::default();
     hasher.add(words.as_bytes());
-    hasher.add(scene.origin.text.as_deref().unwrap_or("").as_bytes());
+    // Every value, not the text: a scene that was made or changed by a program has none, or that of another.
+    hasher.add(format!("{:?}", Scene { origin: Origin::default(), ..Scene::clone(scene) }).as_bytes());
+    if let Some(model) = in_memory {
+        // Piece by piece: the whole would be many times the model.
+        write!(Pieces(&mut hasher), "{model:?}").map_err(|e| Error::input(e.to_string()))?;
+    }
     // By their bytes: a file that changed changes the run.
     let files = scene.models.iter().map(|m| &m.file).chain(scene.sources.iter().filter_map(|s| s.file.as_ref()));
     let files = files.chain(scene.media.iter().filter_map(|m| m.file.as_ref()));
@@ -48,4 +56,14 @@ pub(super) fn run_fingerprint(
         read().map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
     }
     Ok(hasher.finish())
+}
+
+/// Hashes what is written to it, each piece by itself.
+struct Pieces<'a>(&'a mut FingerprintHasher);
+
+impl Write for Pieces<'_> {
+    fn write_str(&mut self, piece: &str) -> fmt::Result {
+        self.0.add(piece.as_bytes());
+        Ok(())
+    }
 }

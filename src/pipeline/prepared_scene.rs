@@ -97,10 +97,16 @@ impl SceneJob {
         (made, seconds)
     }
 
-    /// Returns the cache, and the name that facets of these settings have in it; `None` without a cache, or where a file of the scene is
-    /// gone.
+    /// Whether the model is what the files of the scene hold, so that they stand for it; one without parts needs none.
+    pub(super) fn is_model_from_files(&self) -> bool {
+        let files = self.scene.models.len();
+        self.loaded.model.instances.is_empty() || (files > 0 && self.loaded.reports.len() == files)
+    }
+
+    /// Returns the cache, and the name that facets of these settings have in it; `None` without a cache, or where the model is from no file
+    /// or a file of the scene is gone.
     fn cached(&self, settings: &tessellate::Settings) -> Option<(&Cache, Fingerprint)> {
-        let cache = self.cache.as_ref()?;
+        let cache = self.cache.as_ref().filter(|_| self.is_model_from_files())?;
         Some((cache, facets_key(&self.scene, settings)?))
     }
 }
@@ -205,13 +211,19 @@ impl PreparedScene {
             // Program, scene, files and settings are the same: so would be what a pilot of this process finds.
             let run = self.run_settings();
             let (mesher, choice) = self.settings_of(&part.chosen);
-            let own = run_fingerprint((&self.job.scene, &self.bound), &run, (&mesher, &choice));
+            let own = run_fingerprint(self.scene_and_model(), &run, (&mesher, &choice));
             if own.is_ok_and(|own| own == part.fingerprint) {
                 return Some(part.chosen);
             }
         }
         let cache = self.job.cache.as_ref()?;
         cache.choice(&self.fingerprint().ok()?, monitor)
+    }
+
+    /// The scene, bound, and its model where no file of the scene holds it.
+    fn scene_and_model(&self) -> (&Scene, &BoundScene, Option<&Model>) {
+        let in_memory = (!self.job.is_model_from_files()).then_some(&self.job.loaded.model);
+        (&self.job.scene, &self.bound, in_memory)
     }
 
     /// Returns settings and intersector of a choice.
@@ -233,8 +245,7 @@ impl PreparedScene {
     /// # Errors
     /// When a file of the scene cannot be read.
     pub fn fingerprint(&self) -> Result<Fingerprint, Error> {
-        let scene = (&*self.job.scene, &self.bound);
-        run_fingerprint(scene, &self.run_settings(), (&self.mesh_settings, &self.choice))
+        run_fingerprint(self.scene_and_model(), &self.run_settings(), (&self.mesh_settings, &self.choice))
     }
 
     /// Chooses the facets or the spline that a pilot finds sufficient, and keeps the choice in the cache. May put finer facets in place of

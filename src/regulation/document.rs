@@ -1,11 +1,11 @@
 //! An assessment as the document that `assess --json` prints and `results.json` holds.
 
-use super::verdict::Assessment;
+use super::assessment::Assessment;
 use serde_json::{Value, json};
 
 impl Assessment {
     /// The assessment as JSON: regulation, aim, photometer, and every row with both errors and its verdict; angles in degrees, intensities
-    /// in cd, null for what is `None`.
+    /// in cd, null for what is `None`. For left-hand traffic directions and aim are those of the mirrored lamp, as in the tables.
     pub fn document(&self) -> Value {
         let rows = self.rows.iter().map(|r| {
             let settles = r.settles.map(|s| json!({"rays": s.rays, "tolerance_mm": s.tolerance_mm}));
@@ -23,7 +23,7 @@ impl Assessment {
         });
         json!({
             "regulation": self.regulation.id, "title": self.regulation.title, "checked": self.regulation.checked(),
-            "aim": {"h_deg": self.aim.h_deg, "v_deg": self.aim.v_deg, "gradient": self.aim.gradient, "how": self.aim.how},
+            "traffic": self.traffic.word(), "aim": {"h_deg": self.aim.h_deg, "v_deg": self.aim.v_deg, "gradient": self.aim.gradient, "how": self.aim.how},
             "sensor_deg": self.sensor_deg, "rows": rows.collect::<Vec<_>>(), "verdict": self.verdict.to_string(),
         })
     }

@@ -10,9 +10,10 @@
 //! that: it is an engineer's answer about a simulated lamp, not a statement of conformity.
 //!
 //! Layers: `map` (intensities with errors, from files by `read`) and `table` (what is asked) ← `aim` ← `requirement` ← `judgement` ←
-//! `verdict` ← `document`.
+//! `assessment` ← `verdict` ← `document`.
 
 mod aim;
+mod assessment;
 mod document;
 mod judgement;
 mod map;
@@ -22,7 +23,8 @@ mod table;
 mod verdict;
 
 pub use aim::Aim;
+pub use assessment::{Assessment, Assumptions, RowVerdict};
 pub use judgement::{Settles, Verdict};
 pub use map::{IntensityMap, Reading};
 pub use table::{Function, Regulation, Row, Traffic};
-pub use verdict::{Assessment, Assumptions, RowVerdict, assess};
+pub use verdict::assess;

@@ -23,6 +23,16 @@ pub enum Traffic {
     Left,
 }
 
+impl Traffic {
+    /// `right` or `left`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Left => "left",
+        }
+    }
+}
+
 /// A lamp function of a regulation: its rows and how they are measured.
 ///
 /// ```

@@ -1,53 +1,11 @@
 //! A lamp measured by a regulation: aimed, read row by row, realigned where the regulation allows it.
 
 use super::aim::Aim;
-use super::judgement::{Judgement, Settles, Verdict};
-use super::map::{IntensityMap, Reading, Sensor};
+use super::assessment::{Assessment, Assumptions, RowVerdict};
+use super::judgement::{Judgement, Verdict};
+use super::map::{IntensityMap, Sensor};
 use super::requirement::{Photometer, requirements};
 use super::table::{Realignment, Regulation, Row, Traffic};
-
-/// A row with what was measured.
-#[derive(Clone, Debug)]
-pub struct RowVerdict {
-    /// The row of the table.
-    pub row: Row,
-    /// The reading that decides; for a relative row, its difference from the multiple of the other. `None` outside the far field.
-    pub reading: Option<Reading>,
-    /// Where it was read, degrees of the table.
-    pub direction: Option<[f64; 2]>,
-    /// `None` where the row asks nothing that is measured here: notes, and rows under a condition.
-    pub verdict: Option<Verdict>,
-    /// What would settle it, if it is unsure.
-    pub settles: Option<Settles>,
-}
-
-/// A lamp measured by a regulation.
-#[derive(Clone, Debug)]
-pub struct Assessment {
-    /// The regulation.
-    pub regulation: Regulation,
-    /// How the lamp was aimed.
-    pub aim: Aim,
-    /// The photometer's opening, from side to side, degrees.
-    pub sensor_deg: f64,
-    /// Row by row.
-    pub rows: Vec<RowVerdict>,
-    /// Of all rows together; pass where no row has a verdict.
-    pub verdict: Verdict,
-}
-
-/// What is known of the run and the lamp besides the map.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Assumptions {
-    /// The side of the road.
-    pub traffic: Traffic,
-    /// Measure the lamp as it was placed, whatever the regulation says of aiming.
-    pub as_placed: bool,
-    /// Rays of the run.
-    pub rays: u64,
-    /// Tolerance of the run's facets, mm, where it had any.
-    pub tolerance_mm: Option<f64>,
-}
 
 /// Step in which turns of a lamp are tried, degrees.
 const REALIGN_STEP_DEG: f64 = 0.125;
@@ -167,7 +125,14 @@ fn assess_aimed(
     // A group of points counts through its points.
     let counted = rows.iter().filter(|r| !(leaning && r.row.kind == "group_sum"));
     let verdict = Verdict::all(counted.filter_map(|r| r.verdict));
-    Assessment { regulation: regulation.clone(), sensor_deg: 2.0 * sensor.half_deg, aim, rows, verdict }
+    Assessment {
+        regulation: regulation.clone(),
+        traffic: assumptions.traffic,
+        sensor_deg: 2.0 * sensor.half_deg,
+        aim,
+        rows,
+        verdict,
+    }
 }
 
 /// Judges a row by itself, by its worst requirement; rows with conditions on use, and those that ask nothing measured, stay without a
@@ -271,6 +236,17 @@ mod tests {
                 assert!((a.value - b.value).abs() <= 1e-9 * a.value.abs().max(1.0));
             }
         }
+        // Where a point is said to lie in the far field as placed, its value is.
+        let sensor = Sensor { half_deg: 0.5 * left.sensor_deg, round: regulation.rules.sensor_round };
+        let points = left.rows.iter().filter(|r| r.row.kind == "point");
+        let read: Vec<_> = points.filter_map(|r| Some((r.reading?, r.direction?))).collect();
+        assert!(read.len() > 3 && left.aim.h_deg.abs() > 0.1);
+        for (reading, direction) in read {
+            let [h, v] = left.placed_direction(direction);
+            let there = mirrored.read(&mirrored.measure(sensor, h, v).unwrap()).value;
+            assert!((there / reading.value - 1.0).abs() < 1e-6, "{there} at {h} {v}, {reading:?}");
+        }
+        assert_eq!(left.placed_aim(), [-left.aim.h_deg, left.aim.v_deg]);
     }
 
     #[test]

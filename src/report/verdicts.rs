@@ -4,7 +4,7 @@ use super::chart::MapPoint;
 use super::framing::lit_part;
 use super::{Cell, Chart, Section, Table, figures, road};
 use crate::formats::{Grid, file_stem};
-use crate::regulation::{Assessment, RowVerdict, Verdict};
+use crate::regulation::{Assessment, RowVerdict, Traffic, Verdict};
 
 /// Significant digits of intensities: more than any photometer has.
 const DIGITS: usize = 5;
@@ -18,6 +18,16 @@ pub fn verdict_counts(a: &Assessment) -> [usize; 3] {
 pub fn verdict_sentence(a: &Assessment) -> String {
     let [pass, fail, unsure] = verdict_counts(a);
     format!("**{}: {}** ({pass} rows pass, {fail} fail, {unsure} unsure). ", a.regulation.id, a.verdict)
+}
+
+/// Writes which way the directions count, for left-hand traffic; empty for the other, for which the tables are written.
+pub fn traffic_sentence(a: &Assessment) -> &'static str {
+    match a.traffic {
+        Traffic::Right => "",
+        Traffic::Left => {
+            "Left-hand traffic: the lamp is mirrored, and L and R, in the aim too, are those of the tables, written for right-hand traffic. "
+        }
+    }
 }
 
 /// Writes what is asked of a row, cd; in words, or a dash, where it has no limit.
@@ -65,10 +75,11 @@ pub(super) fn sections(verdicts: &[(usize, Assessment)], grid_of: impl Fn(usize)
 /// Makes the section of one verdict: text, table, the test points on the map, and the road; `grid` is the far field judged, as placed,
 /// and `number` counts the verdicts on it from 1.
 fn section(a: &Assessment, grid: &Grid, number: usize) -> Section {
-    let aim = [a.aim.h_deg, a.aim.v_deg];
+    let aim = a.placed_aim();
     let text = format!(
-        "{}Aim: {}. Photometer: {} from side to side. {}. An engineer's answer about a simulated lamp, not a statement of conformity.",
+        "{}{}Aim: {}. Photometer: {} from side to side. {}. An engineer's answer about a simulated lamp, not a statement of conformity.",
         verdict_sentence(a),
+        traffic_sentence(a),
         a.aim.how,
         format_args!("{:.3}°", a.sensor_deg),
         a.regulation.checked()
@@ -123,7 +134,7 @@ fn table(a: &Assessment, name: &str) -> Table {
 fn picture(a: &Assessment, grid: &Grid, name: &str) -> Chart {
     // As placed: the map is the one that the user knows; the points are moved to where they were read.
     let shown = lit_part(grid).unwrap_or_else(|| grid.clone());
-    let placed = |[h, v]: [f64; 2]| [h + a.aim.h_deg, v + a.aim.v_deg];
+    let placed = |direction| a.placed_direction(direction);
     let within =
         |p: &[f64; 2]| shown.axes.iter().zip(p).all(|(axis, x)| (axis.range[0]..=axis.range[1]).contains(x));
     let mut points = Vec::new();
@@ -146,14 +157,47 @@ mod tests {
     use super::*;
     use crate::formats::Axis;
     use crate::regulation::{Aim, Regulation};
-    use crate::report::Block;
+    use crate::report::{Block, Content};
+
+    /// Of a lamp for left-hand traffic, which is judged in a mirror, a point lies on the other side of the far field as placed, and so
+    /// does the aim.
+    #[test]
+    fn points_of_left_hand_traffic_stand_where_they_were_read() {
+        let mut regulation = Regulation::find("UN R112 B passing").unwrap();
+        let row = regulation.function.rows.drain(..).next().unwrap();
+        let direction = Some([3.5, 0.5]);
+        let rows = vec![RowVerdict { row, reading: None, direction, verdict: None, settles: None }];
+        let aim = Aim { h_deg: 0.5, v_deg: 0.25, gradient: None, how: String::new() };
+        let (traffic, verdict) = (Traffic::Left, Verdict::Pass);
+        let a = Assessment { regulation, traffic, aim, sensor_deg: 0.1, rows, verdict };
+        let axis = |half: f64| Axis { label: "H".into(), unit: "deg".into(), range: [-half, half], cells: 40 };
+        let grid = Grid {
+            name: "road".into(),
+            quantity: "luminous intensity".into(),
+            unit: "cd".into(),
+            axes: [axis(10.0), axis(10.0)],
+            values: vec![1.0; 1600],
+            error: None,
+            geometric: None,
+            layers: Vec::new(),
+        };
+        let Content::Map { marks, .. } = picture(&a, &grid, "road").content else { panic!() };
+        assert_eq!(marks.points[0].at, [-4.0, 0.75]);
+        assert!(
+            section(&a, &grid, 1)
+                .blocks
+                .iter()
+                .any(|b| matches!(b, Block::Text(t) if t.contains("Left-hand traffic")))
+        );
+    }
 
     #[test]
     fn verdicts_on_one_far_field_have_names_of_their_own() {
         let aim = Aim { h_deg: 0.0, v_deg: 0.0, gradient: None, how: "as placed".into() };
         let by = |id: &str| {
             let regulation = Regulation::find(id).unwrap();
-            Assessment { regulation, aim: aim.clone(), sensor_deg: 0.1, rows: Vec::new(), verdict: Verdict::Pass }
+            let (traffic, verdict) = (Traffic::Right, Verdict::Pass);
+            Assessment { regulation, traffic, aim: aim.clone(), sensor_deg: 0.1, rows: Vec::new(), verdict }
         };
         let (low, high) = ("UN R112 B passing", "UN R112 B driving");
         let axis = |label: &str| Axis { label: label.into(), unit: "deg".into(), range: [-1.0, 1.0], cells: 2 };

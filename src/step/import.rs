@@ -67,7 +67,8 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     }
     report.seconds.parse = parsed;
     report.seconds.convert = start.elapsed().as_secs_f64() - parsed;
-    report.peak_bytes = peak_bytes();
+    // 0 stands for a system that does not tell.
+    report.peak_bytes = peak_bytes().unwrap_or(0);
     Ok(Import { model, report })
 }
 
@@ -265,9 +266,9 @@ impl Reader<'_, '_, '_> {
     }
 }
 
-/// Returns the largest resident size of this process, bytes; 0 where the system does not tell.
-fn peak_bytes() -> u64 {
-    let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return 0 };
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<u64>().ok()).map_or(0, |kb| kb * 1024)
+/// Returns the largest resident size of this process so far, bytes; `None` where the system does not tell.
+pub(crate) fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    line.trim().trim_end_matches("kB").trim().parse::<u64>().ok().map(|kb| kb * 1024)
 }

@@ -56,7 +56,10 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "mod",
         ],
     ),
-    ("regulation", &["table", "map", "read", "aim", "requirement", "judgement", "verdict", "document", "mod"]),
+    (
+        "regulation",
+        &["table", "map", "read", "aim", "requirement", "judgement", "assessment", "verdict", "document", "mod"],
+    ),
     (
         "cli/commands",
         &[

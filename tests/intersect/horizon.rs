@@ -51,7 +51,10 @@ fn share_found_of(name: &str, mesh: &FacetMesh, ray: fn(&FacetMesh, &mut Random)
     let mut dice = Random(7);
     let rays: Vec<Ray> = (0..60_000).map(|_| ray(mesh, &mut dice)).collect();
     assert!(!rays.iter().any(|r| tree.escapes(r)), "{name}: nothing is known before it was worth it");
+    let bytes = tree.footprint().bytes;
     tree.prepare_for(&many());
+    // Cones and records are held from now on.
+    assert!(tree.footprint().bytes > bytes + mesh.facets.len() * 16, "{name}");
     let mut found = 0.0;
     // Horizons are found from the rays that left a facet before.
     for _ in 0..8 {

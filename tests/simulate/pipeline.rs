@@ -2,8 +2,8 @@
 
 use lampyris::model::Model;
 use lampyris::pipeline::{
-    ErrorTarget, IntersectorKind, LoadedModel, Monitor, PreparedScene, RayRange, SceneJob, Silent, Stage,
-    TraceRequest, TracingSettings, read_scene,
+    ErrorTarget, IntersectorKind, LoadedModel, MeshingSettings, Monitor, PreparedScene, RayRange, SceneJob, Silent,
+    Stage, TraceRequest, TracingSettings, read_scene,
 };
 use lampyris::regulation::Verdict;
 use lampyris::simulate::Scene;
@@ -104,4 +104,35 @@ fn a_dark_test_point_is_judged_by_what_one_ray_adds() {
     assert_eq!(reading.value, 0.0);
     assert!(reading.statistical > 1000.0, "{reading:?}");
     assert_eq!(row.verdict, Some(Verdict::Unsure));
+}
+
+/// A scene that a program made or changed has no text of its own, and a model that it made no file: parts of one run are known by what was
+/// traced.
+#[test]
+fn parts_of_other_scenes_and_models_are_told_apart_without_text() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes/s1_lens.toml");
+    let (scene, loaded) = read_scene(&path, &Silent).unwrap();
+    let of = |change: &dyn Fn(&mut Scene), loaded: &LoadedModel| {
+        let mut scene = scene.clone();
+        change(&mut scene);
+        let meshing = MeshingSettings { tolerance: Some([0.5, 0.5]), ..MeshingSettings::default() };
+        let job = SceneJob { meshing, ..SceneJob::new(scene, loaded.clone()) };
+        PreparedScene::new(job, &Silent).unwrap().fingerprint().unwrap()
+    };
+    let as_read = of(&|_| {}, &loaded);
+    assert_eq!(as_read, of(&|scene| scene.origin.file = "elsewhere/lens.toml".into(), &loaded));
+    assert_ne!(as_read, of(&|scene| scene.sources[0].power = Some(2.5), &loaded), "with the text of another");
+    let without_text = |scene: &mut Scene| scene.origin.text = None;
+    let brighter = |scene: &mut Scene| {
+        without_text(scene);
+        scene.sources[0].power = Some(2.5);
+    };
+    assert_ne!(of(&without_text, &loaded), of(&brighter, &loaded));
+
+    let in_memory = LoadedModel { reports: Vec::new(), ..loaded.clone() };
+    let mut moved = in_memory.clone();
+    moved.model.instances[0].placement.origin.z += 0.125;
+    let [first, second] = [&in_memory, &moved].map(|model| of(&without_text, model));
+    assert_ne!(first, second);
+    assert_eq!(first, of(&without_text, &in_memory));
 }

@@ -7,12 +7,13 @@ use crate::cli::output::json::json_text;
 use crate::cli::work::output_place::{folder_of, make_folder};
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{input_files, threads};
-use crate::cli::{completion::Completion, failure::Failure, machine};
+use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, lower_extension, write_facets};
 use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
 use crate::pipeline::{mesh_settings, settings_for_accurate_facets, tessellate_model};
 use crate::report::{bytes, figures, grouped, seconds};
+use crate::step::peak_bytes;
 use crate::tessellate::{Report, sampled_sag};
 use crate::truck::baseline;
 use serde::Serialize;
@@ -45,7 +46,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     settings.measure = true;
     let (mut made, _) = tessellate_model(&loaded.model, &settings, &monitor);
     made.report.seconds.read = loaded.seconds;
-    made.report.peak_bytes = machine::peak_bytes();
+    made.report.peak_bytes = peak_bytes();
     let mut facets = appearance::grouped_facets(&loaded.model, &made.mesh, None);
     // Only VTU has a place for them, and they cost a look at every facet.
     if command.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtu"))) {

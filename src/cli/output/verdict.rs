@@ -3,7 +3,7 @@
 use super::terminal_tables::blank_table;
 use crate::cli::console::Console;
 use crate::regulation::{Assessment, RowVerdict};
-use crate::report::{direction_text, figures, requirement_text, settling_text, verdict_counts};
+use crate::report::{direction_text, figures, requirement_text, settling_text, traffic_sentence, verdict_counts};
 use comfy_table::CellAlignment;
 
 /// Significant digits of intensities: more than any photometer has.
@@ -13,6 +13,9 @@ const DIGITS: usize = 5;
 pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     let mut text = format!("{}  {}\n", console.bold(&a.regulation.id), a.regulation.function.name);
     text += &format!("  aim     {}\n", a.aim.how);
+    if !traffic_sentence(a).is_empty() {
+        text += &format!("  traffic {}\n", traffic_sentence(a).trim_end());
+    }
     text += &format!("  sensor  {:.3}° from side to side\n", a.sensor_deg);
     text += &format!("  tables  {}\n", a.regulation.checked());
     let mut table = blank_table(console.width());

@@ -191,6 +191,12 @@ impl<'m> Octree<'m> {
         }
     }
 
+    /// Bytes of what was worked out about expected rays.
+    fn preparation_bytes(&self) -> usize {
+        let buffers = self.light_buffers.read().unwrap_or_else(PoisonError::into_inner);
+        self.horizons.get().map_or(0, Horizons::bytes) + buffers.iter().map(LightBuffer::bytes).sum::<usize>()
+    }
+
     /// Finds the nearest hit of each ray with the instructions that were chosen, and overwrites `hits`; `light_buffers`, which may be
     /// empty, answer some of them.
     fn walk(&self, light_buffers: &[LightBuffer], rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
@@ -240,7 +246,7 @@ impl Intersector for Octree<'_> {
 
     fn footprint(&self) -> Footprint {
         Footprint {
-            bytes: self.tree.bytes(),
+            bytes: self.tree.bytes() + self.preparation_bytes(),
             primitives: self.tree.surroundings.mesh.facets.len(),
             build_seconds: self.build_seconds,
         }

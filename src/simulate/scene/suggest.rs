@@ -21,8 +21,8 @@ pub(crate) fn nearest_or_all(word: &str, names: &[&str]) -> String {
     }
 }
 
-/// Returns Levenshtein's distance. Quadratic; words are cut at 64 characters so that no input makes it long.
-fn edit_distance(a: &str, b: &str) -> usize {
+/// Returns the edit distance (Levenshtein 1966), which tells letters by their case. Quadratic; words are cut at 64 characters so that no input makes it long.
+pub(crate) fn edit_distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.iter().enumerate() {
@@ -47,5 +47,6 @@ mod tests {
         assert_eq!(nearest("reflectence", keys), Some("reflectance"));
         assert_eq!(nearest("Medum", keys), Some("medium"));
         assert_eq!(nearest("wavelength", keys), None);
+        assert_eq!(edit_distance("kitten", "sitting"), 3);
     }
 }

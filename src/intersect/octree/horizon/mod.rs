@@ -196,6 +196,12 @@ impl RayRecord {
 }
 
 impl Horizons {
+    /// Bytes of cones, records and the horizons that were found so far.
+    pub(super) fn bytes(&self) -> usize {
+        let found = self.facets.iter().filter(|record| record.horizon.get().is_some()).count();
+        size_of_val(&*self.cones) + size_of_val(&*self.facets) + found * size_of::<Horizon>()
+    }
+
     /// Starts without cones and horizons, for a run of `rays` rays; `None` when they are too few for the facets of the tree.
     pub(super) fn if_worth(rays: u64, tree: &Tree) -> Option<Self> {
         let mesh = tree.surroundings.mesh;

@@ -83,6 +83,13 @@ pub(super) struct LightBuffer {
     facets: Vec<BufferFacet>,
 }
 
+impl LightBuffer {
+    /// Bytes of its arrays.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.squares) + size_of_val(&*self.entries) + size_of_val(&*self.facets)
+    }
+}
+
 /// Where a ray looks.
 #[derive(Clone, Copy)]
 struct Lookup {
