@@ -34,7 +34,7 @@ pub struct AccurateSettings {
 /// own; `None` leaves the settings as they are. Traces on facets and spline to find them, and tells the monitor.
 ///
 /// # Errors
-/// When the settings give a tolerance too, ask for the exact intersector, or do not fit the scene, or the scene does not fit the model.
+/// When the angle is not above 0 and below 90 degrees, the settings give a tolerance too, ask for the exact intersector, or do not fit the scene, or the scene does not fit the model.
 pub fn settings_for_accuracy(
     accuracy_deg: Option<f64>,
     (mut meshing, mut tracing): (MeshingSettings, TracingSettings),
@@ -74,6 +74,7 @@ pub fn settings_for_accuracy(
         }
     };
     monitor.end();
+    let found = found.map_err(refused_angle)?;
     monitor.aimed(&found.answer);
     meshing.plan = Some(found.plan.clone());
     tracing.normals = Some(found.normals);
@@ -84,7 +85,7 @@ pub fn settings_for_accuracy(
 /// interpolate those of their corners; `None` leaves the settings as they are, without a plan. Tells the monitor.
 ///
 /// # Errors
-/// When the settings give a tolerance too.
+/// When the angle is not above 0 and below 90 degrees, or the settings give a tolerance too.
 pub fn settings_for_accurate_facets(
     accuracy_deg: Option<f64>,
     meshing: MeshingSettings,
@@ -97,21 +98,30 @@ pub fn settings_for_accurate_facets(
     monitor.begin(Stage::Aiming);
     let found = meet_target(model, &ModelMeshSource::new(model), &ask, &|p| monitor.study_progress(&p));
     monitor.end();
+    let found = found.map_err(refused_angle)?;
     monitor.aimed(&found.answer);
     Ok((MeshingSettings { plan: Some(found.plan.clone()), ..meshing }, Some(found)))
+}
+
+/// Returns the error of an angle that nothing can be aimed at.
+fn refused_angle(message: String) -> Error {
+    Error::setting("accuracy", message)
 }
 
 /// Returns what is asked for; `None` without an accuracy.
 ///
 /// # Errors
-/// When a tolerance is given too.
+/// When the angle is not above 0 and below 90 degrees, or a tolerance is given too.
 fn target(accuracy_deg: Option<f64>, meshing: &MeshingSettings) -> Result<Option<AccuracyTarget>, Error> {
     let Some(degrees) = accuracy_deg else { return Ok(None) };
     if meshing.tolerance.is_some() {
         let error = Error::setting("accuracy", "and the tolerance both say how fine the facets are to be");
         return Err(error.help("leave one of them out; tolerances of single parts may stand beside an accuracy"));
     }
-    Ok(Some(AccuracyTarget::degrees(degrees)))
+    let target = AccuracyTarget::degrees(degrees);
+    // Before the spline is built and rays are traced.
+    target.check_angle().map_err(refused_angle)?;
+    Ok(Some(target))
 }
 
 /// Returns rays of the scene's own run on the spline, from the sources and from where they were turned; about as many as it has rays.

@@ -10,6 +10,7 @@
 //! more.
 
 mod search;
+mod solution;
 mod survey;
 
 pub use super::tolerance_plan::{RelativeTolerance, TolerancePlan};
@@ -17,6 +18,9 @@ pub use search::{RayGenerator, meet_target, meet_target_for_rays};
 
 use crate::intersect::NormalMode;
 use serde::Serialize;
+
+/// Facets that a mesh of a search may have, by default: each takes 15 µs on one core of a server.
+const MOST_FACETS: f64 = 6e6;
 
 /// What is asked.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,15 +34,29 @@ pub struct AccuracyTarget {
     pub check_rays: u64,
     /// Kinds of normals that may be taken.
     pub kinds: Vec<NormalMode>,
+    /// Facets that a mesh may have; all meshes of a search together may have three times as many. What is found until then is the answer.
+    pub most_facets: f64,
     /// Seed of all rays here.
     pub seed: u64,
 }
 
 impl AccuracyTarget {
-    /// Returns the defaults for an angle: a job of a million rays, checked on 100,000.
+    /// Refuses an angle that nothing can be aimed at.
+    ///
+    /// # Errors
+    /// When it is not above 0 and below 90 degrees; the message says so.
+    pub fn check_angle(&self) -> Result<(), String> {
+        if self.degrees > 0.0 && self.degrees < 90.0 {
+            return Ok(());
+        }
+        Err(format!("{}: an angle above 0 and below 90 degrees is needed, as 0.05", self.degrees))
+    }
+
+    /// Returns the defaults for an angle: a job of a million rays, checked on 100,000, and meshes that take a minute and a half of one
+    /// core.
     pub fn degrees(degrees: f64) -> Self {
         let kinds = vec![NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
-        Self { degrees, job_rays: 1e6, check_rays: 100_000, kinds, seed: 1 }
+        Self { degrees, job_rays: 1e6, check_rays: 100_000, kinds, most_facets: MOST_FACETS, seed: 1 }
     }
 }
 
@@ -47,10 +65,10 @@ impl AccuracyTarget {
 pub struct AccuracyPlan {
     /// Error that was asked for, degrees.
     pub asked_deg: f64,
-    /// Reached on fresh rays (p99), degrees.
-    pub reached_deg: f64,
-    /// The largest error of these rays, degrees.
-    pub largest_deg: f64,
+    /// Reached on fresh rays (p99), degrees; `None` where none met the same face on facets and spline.
+    pub reached_deg: Option<f64>,
+    /// The largest error of these rays, degrees; `None` as above.
+    pub largest_deg: Option<f64>,
     /// Whether the 99th percentile is within what was asked; also where no ray of the check hit anything.
     pub kept: bool,
     /// Kind of normals to trace with.
@@ -88,8 +106,8 @@ pub struct Trial {
     pub tolerance_mm: [f64; 2],
     /// Facets made.
     pub facets: usize,
-    /// 99th percentile of the direction error, degrees.
-    pub reached_deg: f64,
+    /// 99th percentile of the direction error, degrees; `None` where no ray met the same face on facets and spline.
+    pub reached_deg: Option<f64>,
     /// Seconds for the whole job.
     pub seconds: f64,
 }

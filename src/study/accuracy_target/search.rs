@@ -1,5 +1,6 @@
 //! The search for the cheapest tolerances and normals that meet an accuracy target.
 
+use super::solution::Solution;
 use super::survey::{Survey, p99, tolerance_factor};
 use super::{AccuracyPlan, AccuracyTarget, Trial};
 use crate::intersect::{Hit, NormalMode};
@@ -13,8 +14,6 @@ use crate::study::timing::Clock;
 use crate::study::tolerance_plan::TolerancePlan;
 use std::time::Instant;
 
-/// Numbers written without an exponent.
-const PLAIN_NUMBERS: std::ops::Range<f64> = 1e-4..1e4;
 /// The coarse end of what users ask for, mm.
 const COARSEST: f64 = 0.2;
 /// Of a small model the coarse tolerance is its diagonal over this.
@@ -30,26 +29,25 @@ const COARSEST_FACTOR: f64 = 4.0;
 const PILOTS: u64 = 65_536;
 /// What is asked is aimed at with this much to spare, since the 99th percentile of fresh rays differs by some percent.
 const MARGIN: f64 = 0.9;
-/// An error is accepted with this much to spare, so that other rays than the judge's find it kept too.
-const ACCEPTED: f64 = 0.96;
 /// Meshes made for one kind of normals.
 const ATTEMPTS: usize = 6;
-/// Share of the rays that the 99th percentile leaves out.
-const BEYOND_PERCENTILE: f64 = 0.01;
-/// A kind of normals that would need more facets than this is given up.
-const MOST_FACETS: f64 = 6e6;
+/// All meshes of a search together may have so many times the facets that one may: a few attempts at the finest.
+const LARGEST_MESHES: f64 = 3.0;
 
 /// Rays of a seed, and how many: those that the job will meet.
 pub type RayGenerator<'r> = dyn Fn(u64, u64) -> Vec<Ray> + Sync + 'r;
 
 /// Finds the cheapest tolerances and normals that reach an accuracy, for random rays through the model; the best found where none reaches
-/// it. Makes several meshes for each kind of normals, on the current rayon pool.
+/// it. Makes several meshes for each kind of normals, on the current rayon pool, and ends after a counted amount of work.
+///
+/// # Errors
+/// When the angle is not above 0 and below 90 degrees.
 pub fn meet_target(
     model: &Model,
     mesh_source: &dyn MeshSource,
     target: &AccuracyTarget,
     progress: &(dyn Fn(Progress) + Sync),
-) -> AccuracyPlan {
+) -> Result<AccuracyPlan, String> {
     // Of the surfaces, not of facets: there are none yet.
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
     let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
@@ -61,22 +59,36 @@ pub fn meet_target(
 }
 
 /// Finds the cheapest tolerances and normals that reach an accuracy for rays of one's own, such as those of a scene: `rays` is asked for so
-/// many under several seeds. The best found where none reaches it; runs on the current rayon pool.
+/// many under several seeds. The best found where none reaches it; runs on the current rayon pool, and ends after a counted amount of work.
+///
+/// # Errors
+/// When the angle is not above 0 and below 90 degrees.
 pub fn meet_target_for_rays(
     model: &Model,
     mesh_source: &dyn MeshSource,
     target: &AccuracyTarget,
     rays: &RayGenerator<'_>,
     progress: &(dyn Fn(Progress) + Sync),
-) -> AccuracyPlan {
+) -> Result<AccuracyPlan, String> {
+    target.check_angle()?;
     let start = Instant::now();
     let clock = Clock::new(progress);
     // The spline's hits are the truth, and tell which faces matter and how sharply they bend.
     clock.report("pilot rays", 0.0);
     let pilots = ReferenceRays::new(mesh_source, rays(target.seed, PILOTS));
     let survey = Survey::new(model, &pilots.rays, &pilots.truth);
-    let search =
-        Search { mesh_source, target, rays, pilots, survey, coarse: coarse_tolerance(model), fresh: 0.into() };
+    let coarse = coarse_tolerance(model);
+    let search = Search {
+        mesh_source,
+        target,
+        rays,
+        pilots,
+        survey,
+        coarse,
+        fresh: 0.into(),
+        made: 0.0.into(),
+        gave_up: false.into(),
+    };
     let local = target.kinds.iter().map(|&normals| search.candidate(normals, true));
     // Where few rays meet the sharp places, they may err: one tolerance for all then costs less than holding every face to the angle.
     // On the two reflectors 0.3° cost twice the cheapest combination without it.
@@ -90,16 +102,17 @@ pub fn meet_target_for_rays(
     for (k, candidate) in kinds.iter().enumerate() {
         // A kind that is dearer by its own forecast than what another was measured to cost is not worth the wait.
         let beaten = best.as_ref().is_some_and(|b| b.is_kept(target) && candidate.predicted > 0.8 * b.seconds());
-        // What nobody could mesh in reasonable time is tried only while nothing else is there.
-        if beaten || (candidate.facets > MOST_FACETS && best.is_some()) {
+        if beaten {
             continue;
         }
         let stage = format!("{} normals", candidate.normals);
         clock.report(&stage, 0.2 + 0.8 * k as f64 / kinds.len() as f64);
-        let found = search.reach(candidate, &mut trials);
+        // What nobody could mesh in reasonable time is tried, coarser, only while nothing else keeps what is asked.
+        let is_open = best.as_ref().is_none_or(|b| !b.is_kept(target));
+        let Some(found) = search.reach(candidate, is_open, &mut trials) else { continue };
         let better = |b: &Solution| match (found.is_kept(target), b.is_kept(target)) {
             (true, true) => found.seconds() < b.seconds(),
-            (a, b_kept) => a && !b_kept || a == b_kept && found.reached < b.reached,
+            (a, b_kept) => a && !b_kept || a == b_kept && found.errs_less(b),
         };
         if best.as_ref().is_none_or(better) {
             best = Some(found);
@@ -109,8 +122,8 @@ pub fn meet_target_for_rays(
     let found = best.unwrap_or_else(|| search.nothing_tried());
     let kept = found.is_kept(target);
     let [low, high] = found.plan.tolerance_mm();
-    let answer = answer_sentence(&found, target, kept);
-    AccuracyPlan {
+    let answer = found.answer_sentence(target, search.gave_up.get());
+    Ok(AccuracyPlan {
         asked_deg: target.degrees,
         reached_deg: found.reached,
         largest_deg: found.largest,
@@ -126,38 +139,7 @@ pub fn meet_target_for_rays(
         flips: found.flips,
         seconds: start.elapsed().as_secs_f64(),
         answer,
-    }
-}
-
-/// Returns what was asked, what was reached and by which facets and normals, as one sentence.
-fn answer_sentence(found: &Solution, target: &AccuracyTarget, kept: bool) -> String {
-    let [low, high] = found.plan.tolerance_mm();
-    let range = if low == high {
-        format!("{} mm", three_digits(low))
-    } else {
-        format!("{} to {} mm", three_digits(low), three_digits(high))
-    };
-    format!(
-        "Asked {}°, reached {}° (99th percentile of {} fresh rays against the spline, at most {}°{}) with {} normals on {} facets within \
-         {range}{}.",
-        target.degrees,
-        three_digits(found.reached),
-        found.checked,
-        three_digits(found.largest),
-        found.without_angle(),
-        found.normals,
-        found.facets,
-        if kept { "" } else { ": not reached" }
-    )
-}
-
-/// Writes a number with three digits, or with two and an exponent outside of 1e-4 to 1e4.
-fn three_digits(x: f64) -> String {
-    if !PLAIN_NUMBERS.contains(&x) {
-        return format!("{x:.1e}");
-    }
-    let decimals = (2 - x.log10().floor() as i32).max(0) as usize;
-    format!("{x:.decimals$}")
+    })
 }
 
 /// Returns the coarse end of what users ask for, mm: 0.2, or 1/500 of the diagonal of a small model.
@@ -192,40 +174,6 @@ struct Candidate {
     predicted: f64,
 }
 
-/// What a kind of normals came to.
-struct Solution {
-    normals: NormalMode,
-    plan: TolerancePlan,
-    facets: usize,
-    /// Seconds of meshing and building, and of the job's rays.
-    prepare: f64,
-    trace: f64,
-    /// The 99th percentile and the largest error, degrees.
-    reached: f64,
-    largest: f64,
-    /// Rays that have an angle, and those that have none as they met another face.
-    checked: u64,
-    flips: u64,
-}
-
-impl Solution {
-    /// Whether the 99th percentile is within what is asked.
-    fn is_kept(&self, target: &AccuracyTarget) -> bool {
-        self.reached <= target.degrees
-    }
-    fn seconds(&self) -> f64 {
-        self.prepare + self.trace
-    }
-    /// Returns the share of rays that no angle stands for, in words; empty where the percentile leaves out as many.
-    fn without_angle(&self) -> String {
-        let share = self.flips as f64 / (self.flips + self.checked).max(1) as f64;
-        if share <= BEYOND_PERCENTILE {
-            return String::new();
-        }
-        format!("; {} % more meet another face or none", three_digits(100.0 * share))
-    }
-}
-
 /// What some rays showed on the facets of a plan.
 struct Measured {
     /// The face of each facet.
@@ -249,6 +197,10 @@ struct Search<'a> {
     coarse: f64,
     /// Sets of fresh rays used so far: none is used twice for the same candidate.
     fresh: std::cell::Cell<u64>,
+    /// Facets made so far, but those that pilots looked at: these are coarse.
+    made: std::cell::Cell<f64>,
+    /// Whether facets were too many to be tried.
+    gave_up: std::cell::Cell<bool>,
 }
 
 impl Search<'_> {
@@ -299,10 +251,9 @@ impl Search<'_> {
             _ => TolerancePlan::even(0.25 * self.coarse, range),
         };
         // The pilot's facets: the plan itself where it is coarse, else as much coarser as keeps the pilot quick.
-        // Flat normals ask for far less than the plan's least tolerance, which must not hide how much coarser that is: facets of
-        // 0.001° took a minute.
-        let finest = if order == 0.5 { plan.unbounded_mm() } else { plan.tolerance_mm()[0] };
-        let coarser = (0.25 * self.coarse / finest).max(1.0);
+        // The plan's least tolerance must not hide how much coarser that is: flat facets of 0.001° took a minute, bilinear ones of 1e-6°
+        // had 580,000 facets on a ball.
+        let coarser = (0.25 * self.coarse / plan.unbounded_mm()).max(1.0);
         let mut pilot = plan.clone();
         pilot.scale(coarser);
         let m = self.measure(&pilot, normals, &self.pilots);
@@ -321,10 +272,27 @@ impl Search<'_> {
         Candidate { normals, plan, order, facets, predicted: m.prepare * ratio + trace }
     }
 
-    /// Meshes, asks fresh rays, and mends the plan until what is asked is reached without waste, or [`ATTEMPTS`] are made; adds each to
-    /// `trials` and returns the best.
-    fn reach(&self, candidate: &Candidate, trials: &mut Vec<Trial>) -> Solution {
+    /// Returns the most facets that the next mesh may have.
+    fn affordable(&self) -> f64 {
+        let most = self.target.most_facets;
+        most.min(LARGEST_MESHES * most - self.made.get())
+    }
+
+    /// Meshes, asks fresh rays, and mends the plan until what is asked is reached without waste, [`ATTEMPTS`] are made, or the next would
+    /// have too many facets; adds each to `trials` and returns the best. A plan of too many from the start is made coarser where `is_open`
+    /// says that nothing better is there, else `None`; also where the search has used up its facets.
+    fn reach(&self, candidate: &Candidate, is_open: bool, trials: &mut Vec<Trial>) -> Option<Solution> {
         let (mut plan, normals) = (candidate.plan.clone(), candidate.normals);
+        let affordable = self.affordable();
+        let excess = candidate.facets / affordable.max(1.0);
+        if excess > 1.0 {
+            self.gave_up.set(true);
+            if !is_open || affordable < 1.0 {
+                return None;
+            }
+            // Facets go with the inverse of the tolerance, and none is below the finest.
+            plan.scale(excess * (plan.finest_mm / plan.unbounded_mm()).max(1.0));
+        }
         let mut best: Option<Solution> = None;
         for attempt in 0..ATTEMPTS {
             self.fresh.set(self.fresh.get() + 1);
@@ -332,9 +300,10 @@ impl Search<'_> {
             let seed = self.target.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let fresh = ReferenceRays::new(self.mesh_source, (self.rays)(seed, self.target.check_rays));
             let m = self.measure(&plan, normals, &fresh);
+            self.made.set(self.made.get() + m.made.len() as f64);
             let mut errors: Vec<f64> = m.errors.iter().map(|e| e.1).collect();
             let reached = p99(&mut errors);
-            let largest = errors.iter().copied().fold(0.0, f64::max);
+            let largest = errors.iter().copied().max_by(f64::total_cmp);
             let found = Solution {
                 normals,
                 plan: plan.clone(),
@@ -353,15 +322,15 @@ impl Search<'_> {
                 reached_deg: reached,
                 seconds: found.seconds(),
             });
-            let good = reached <= ACCEPTED * self.target.degrees;
+            let good = found.is_accepted(self.target);
             // Reached far too well at a cost that counts: coarser facets are worth another try, twice.
-            let wasteful =
-                reached < 0.6 * self.target.degrees && attempt < 2 && found.prepare > 0.2 * found.seconds();
-            let better = |b: &Solution| match (good, b.reached <= ACCEPTED * self.target.degrees) {
+            let far_within = reached.is_some_and(|reached| reached < 0.6 * self.target.degrees);
+            let wasteful = far_within && attempt < 2 && found.prepare > 0.2 * found.seconds();
+            let was_good = best.as_ref().is_some_and(|b| b.is_accepted(self.target));
+            let better = |b: &Solution| match (good, was_good) {
                 (true, true) => found.seconds() < b.seconds(),
-                (a, b_good) => a && !b_good || a == b_good && found.reached < b.reached,
+                (a, b_good) => a && !b_good || a == b_good && found.errs_less(b),
             };
-            let was_good = best.as_ref().is_some_and(|b| b.reached <= ACCEPTED * self.target.degrees);
             if best.as_ref().is_none_or(better) {
                 best = Some(found);
             }
@@ -369,17 +338,20 @@ impl Search<'_> {
             if normals == NormalMode::Exact || good && !wasteful || !good && was_good {
                 break;
             }
+            // Without an angle there is nothing to go by.
+            let Some(reached) = reached else { break };
             // Along the law of the error in the sag.
             let growth = tolerance_factor(reached, MARGIN * self.target.degrees, candidate.order);
-            if m.made.len() as f64 / growth > MOST_FACETS {
+            if m.made.len() as f64 / growth > self.affordable() {
+                self.gave_up.set(true);
                 break;
             }
             plan.scale(growth);
         }
-        best.unwrap_or_else(|| self.nothing_tried())
+        best
     }
 
-    /// Returns what stands for a result when no candidate was measured: infinite error, no facets.
+    /// Returns what stands for a result when no candidate was measured: nothing known, no facets.
     fn nothing_tried(&self) -> Solution {
         Solution {
             normals: NormalMode::Exact,
@@ -387,8 +359,8 @@ impl Search<'_> {
             facets: 0,
             prepare: 0.0,
             trace: 0.0,
-            reached: f64::INFINITY,
-            largest: f64::INFINITY,
+            reached: None,
+            largest: None,
             checked: 0,
             flips: 0,
         }

@@ -81,7 +81,8 @@ impl Survey {
             let count = pilots.len();
             let at = |share: f64| ((count as f64 * share) as usize).min(count.saturating_sub(1));
             let tilt = pilots.get(at(0.99)).map_or(1.0, |p| p.tilt.max(LEAST_TILT));
-            let of_radius = if flat { 1.0 - (0.5 * epsilon).cos() } else { epsilon / tilt };
+            // 1 − cos(ε/2), which the cosine itself would round to none below 1e-6°.
+            let of_radius = if flat { 2.0 * (0.25 * epsilon).sin().powi(2) } else { epsilon / tilt };
             // The radii without their outermost 2 %: a few rays at a sharp end should not set the scale.
             pilots.sort_by(|a, b| a.radius.total_cmp(&b.radius));
             let end = |k: usize| pilots.get(k).map_or(1.0, |p| p.radius);
@@ -141,10 +142,10 @@ impl Survey {
             }
         }
         for (place, errors) in plan.places.iter_mut().zip(&mut own).filter(|(_, e)| e.len() >= MANY) {
-            place.of_radius *= tolerance_factor(p99(errors), epsilon_deg, order);
+            place.of_radius *= p99(errors).map_or(1.0, |error| tolerance_factor(error, epsilon_deg, order));
         }
         let mut all: Vec<f64> = errors.iter().map(|e| e.1).collect();
-        plan.other.of_radius *= tolerance_factor(p99(&mut all), epsilon_deg, order);
+        plan.other.of_radius *= p99(&mut all).map_or(1.0, |error| tolerance_factor(error, epsilon_deg, order));
     }
 }
 
@@ -154,11 +155,11 @@ pub(super) fn tolerance_factor(error: f64, wanted: f64, order: f64) -> f64 {
     (wanted / error.max(f64::MIN_POSITIVE)).powf(1.0 / order).clamp(STEPS[0], STEPS[1])
 }
 
-/// Returns the 99th percentile, 0 of nothing; puts `errors` into another order.
-pub(super) fn p99(errors: &mut [f64]) -> f64 {
+/// Returns the 99th percentile, `None` of nothing; puts `errors` into another order.
+pub(super) fn p99(errors: &mut [f64]) -> Option<f64> {
     if errors.is_empty() {
-        return 0.0;
+        return None;
     }
     let k = ((errors.len() as f64 * 0.99).ceil() as usize).clamp(1, errors.len()) - 1;
-    *errors.select_nth_unstable_by(k, f64::total_cmp).1
+    Some(*errors.select_nth_unstable_by(k, f64::total_cmp).1)
 }

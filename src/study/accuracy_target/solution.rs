@@ -1,0 +1,104 @@
+//! What a kind of normals came to on fresh rays, and the sentence that says it.
+
+use super::AccuracyTarget;
+use crate::intersect::NormalMode;
+use crate::study::tolerance_plan::TolerancePlan;
+
+/// Numbers written without an exponent.
+const PLAIN_NUMBERS: std::ops::Range<f64> = 1e-4..1e4;
+/// An error is accepted with this much to spare, so that other rays than the judge's find it kept too.
+const ACCEPTED: f64 = 0.96;
+/// Share of the rays that the 99th percentile leaves out.
+const BEYOND_PERCENTILE: f64 = 0.01;
+
+/// What a kind of normals came to.
+pub(super) struct Solution {
+    pub(super) normals: NormalMode,
+    pub(super) plan: TolerancePlan,
+    pub(super) facets: usize,
+    /// Seconds of meshing and building, and of the job's rays.
+    pub(super) prepare: f64,
+    pub(super) trace: f64,
+    /// The 99th percentile and the largest error, degrees; `None` where no ray met the same face on facets and spline.
+    pub(super) reached: Option<f64>,
+    pub(super) largest: Option<f64>,
+    /// Rays that have an angle, and those that have none as they met another face.
+    pub(super) checked: u64,
+    pub(super) flips: u64,
+}
+
+impl Solution {
+    /// Whether the 99th percentile is within `limit_deg`; also where no ray met anything, so that none can err.
+    fn is_within(&self, limit_deg: f64) -> bool {
+        self.reached.map_or(self.flips == 0, |reached| reached <= limit_deg)
+    }
+
+    /// Whether the 99th percentile is within what is asked.
+    pub(super) fn is_kept(&self, target: &AccuracyTarget) -> bool {
+        self.is_within(target.degrees)
+    }
+
+    /// Whether it is with enough to spare for other rays than these.
+    pub(super) fn is_accepted(&self, target: &AccuracyTarget) -> bool {
+        self.is_within(ACCEPTED * target.degrees)
+    }
+
+    /// Whether it errs less than another; what is not known is the worst.
+    pub(super) fn errs_less(&self, other: &Self) -> bool {
+        let known = |s: &Self| s.reached.unwrap_or(f64::INFINITY);
+        known(self) < known(other)
+    }
+
+    /// Returns the seconds of the whole job.
+    pub(super) fn seconds(&self) -> f64 {
+        self.prepare + self.trace
+    }
+
+    /// Returns the share of rays that no angle stands for, in words; empty where the percentile leaves out as many.
+    fn without_angle(&self) -> String {
+        let share = self.flips as f64 / (self.flips + self.checked).max(1) as f64;
+        if share <= BEYOND_PERCENTILE {
+            return String::new();
+        }
+        format!("; {} % more meet another face or none", three_digits(100.0 * share))
+    }
+
+    /// Returns what was asked, what was reached and by which facets and normals, as one sentence; `gave_up` where finer facets were too many
+    /// to be tried.
+    pub(super) fn answer_sentence(&self, target: &AccuracyTarget, gave_up: bool) -> String {
+        let [low, high] = self.plan.tolerance_mm();
+        let range = if low == high {
+            format!("{} mm", three_digits(low))
+        } else {
+            format!("{} to {} mm", three_digits(low), three_digits(high))
+        };
+        let reached = match self.reached.zip(self.largest) {
+            Some((reached, largest)) => format!(
+                "reached {}° (99th percentile of {} fresh rays against the spline, at most {}°{})",
+                three_digits(reached),
+                self.checked,
+                three_digits(largest),
+                self.without_angle()
+            ),
+            None => "what is reached is not known (no fresh ray met the same face on facets and spline)".to_owned(),
+        };
+        let shortfall = match (self.is_kept(target), gave_up) {
+            (true, _) => "",
+            (false, true) => ": not reached, and finer facets are more than a search may make",
+            (false, false) => ": not reached",
+        };
+        format!(
+            "Asked {}°, {reached} with {} normals on {} facets within {range}{shortfall}.",
+            target.degrees, self.normals, self.facets
+        )
+    }
+}
+
+/// Writes a number with three digits, or with two and an exponent outside of 1e-4 to 1e4.
+fn three_digits(x: f64) -> String {
+    if !PLAIN_NUMBERS.contains(&x) {
+        return format!("{x:.1e}");
+    }
+    let decimals = (2 - x.log10().floor() as i32).max(0) as usize;
+    format!("{x:.decimals$}")
+}
