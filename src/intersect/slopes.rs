@@ -3,6 +3,7 @@
 //! One in three exact tests of a ray that refracts or reflects asked the facet that it had just left.
 
 use crate::math::{Point, Vector};
+use bytemuck::{AnyBitPattern, NoUninit};
 
 /// The least sine of the angle between a ray and the planes of both triangles of its own facet over which nothing of the facet is
 /// ahead of it, whichever triangle it leaves and whether they fold to it or away.
@@ -13,7 +14,8 @@ const ROOM_OF_F32: f64 = 1e-3;
 const LEAST_COSINE: f64 = 0.5;
 
 /// The slope above which a ray that leaves a facet is known not to meet it again, on either side.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, NoUninit, AnyBitPattern)]
+#[repr(C)]
 pub(crate) struct Slopes {
     /// Mean unit normal of both triangles, and the sine over the plane across it that is enough: infinite where none is.
     axis: [f32; 3],

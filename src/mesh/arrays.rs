@@ -11,6 +11,25 @@ pub(crate) fn write_array<T: NoUninit>(to: &mut dyn Write, array: &[T]) -> io::R
     to.write_all(bytemuck::cast_slice(array))
 }
 
+/// Records that are made or taken apart at a time: they stay in the cache of a core.
+const RECORDS: usize = 1 << 12;
+
+/// Writes elements as [`write_array`] does, each as the record that `record` makes of it.
+pub(crate) fn write_records<T, R: NoUninit>(
+    to: &mut dyn Write,
+    elements: &[T],
+    record: impl Fn(&T) -> R,
+) -> io::Result<()> {
+    to.write_all(&(elements.len() as u64).to_le_bytes())?;
+    let mut records = Vec::new();
+    for chunk in elements.chunks(RECORDS) {
+        records.clear();
+        records.extend(chunk.iter().map(&record));
+        to.write_all(bytemuck::cast_slice(&records))?;
+    }
+    Ok(())
+}
+
 /// Reads arrays from what holds so many bytes: a length beyond them asks for no memory.
 pub(crate) struct ArrayReader<'a> {
     from: &'a mut dyn Read,
@@ -32,16 +51,42 @@ impl<'a> ArrayReader<'a> {
         &mut self,
         make: impl FnOnce(usize) -> Vec<T>,
     ) -> io::Result<Vec<T>> {
+        let length = self.length(size_of::<T>())?;
+        let mut array = make(length);
+        array.resize(length, T::zeroed());
+        self.from.read_exact(bytemuck::cast_slice_mut(&mut array))?;
+        Ok(array)
+    }
+
+    /// Reads the number of elements of an array, each of so many bytes.
+    fn length(&mut self, size: usize) -> io::Result<usize> {
         let mut length = [0; 8];
         self.from.read_exact(&mut length)?;
         let length = u64::from_le_bytes(length);
-        let bytes = length.checked_mul(size_of::<T>() as u64).filter(|n| *n <= self.left.saturating_sub(8));
+        let bytes = length.checked_mul(size as u64).filter(|n| *n <= self.left.saturating_sub(8));
         let bytes = bytes.ok_or(io::ErrorKind::UnexpectedEof)?;
         self.left -= 8 + bytes;
-        let mut array = make(length as usize);
-        array.resize(length as usize, T::zeroed());
-        self.from.read_exact(bytemuck::cast_slice_mut(&mut array))?;
-        Ok(array)
+        Ok(length as usize)
+    }
+
+    /// Reads what [`write_records`] wrote and makes an element of each record.
+    ///
+    /// # Errors
+    /// As [`ArrayReader::array_in`].
+    pub(crate) fn records<R: NoUninit + AnyBitPattern, T>(
+        &mut self,
+        element: impl Fn(&R) -> T,
+    ) -> io::Result<Vec<T>> {
+        let length = self.length(size_of::<R>())?;
+        let mut elements = Vec::with_capacity(length);
+        // Never all records beside all elements: half of the time was spent on clean pages for both.
+        let mut records = vec![R::zeroed(); length.min(RECORDS)];
+        while elements.len() < length {
+            let some = &mut records[..(length - elements.len()).min(RECORDS)];
+            self.from.read_exact(bytemuck::cast_slice_mut(some))?;
+            elements.extend(some.iter().map(&element));
+        }
+        Ok(elements)
     }
 
     /// Reads an array.

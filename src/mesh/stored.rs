@@ -1,6 +1,6 @@
 //! A mesh as bytes and back, to be kept from one run to the next.
 
-use super::arrays::{ArrayReader, invalid, write_array};
+use super::arrays::{ArrayReader, invalid, write_array, write_records};
 use super::{Facet, FacetMesh, MeshVertex};
 use crate::math::{FaceId, Point, Uv, Vector};
 use std::io::{self, Write};
@@ -12,12 +12,11 @@ impl FacetMesh {
     /// When `to` cannot be written.
     pub(crate) fn write_arrays(&self, to: &mut dyn Write) -> io::Result<()> {
         write_array(to, &self.positions)?;
-        write_array(to, &self.vertices.iter().map(|v| v.position).collect::<Vec<u32>>())?;
-        write_array(to, &self.vertices.iter().map(|v| v.normal).collect::<Vec<Vector>>())?;
-        write_array(to, &self.vertices.iter().map(|v| v.uv).collect::<Vec<Uv>>())?;
-        let facets: Vec<[u32; 5]> =
-            (self.facets.iter()).map(|&Facet { vertices: [a, b, c, d], face }| [a, b, c, d, face.0]).collect();
-        write_array(to, &facets)?;
+        write_records(to, &self.vertices, |v| {
+            let ([x, y, z], [s, t]) = (v.normal.to_array(), v.uv.to_array());
+            [x.to_bits(), y.to_bits(), z.to_bits(), s.to_bits(), t.to_bits(), u64::from(v.position)]
+        })?;
+        write_records(to, &self.facets, |&Facet { vertices: [a, b, c, d], face }| [a, b, c, d, face.0])?;
         write_array(to, &self.sag)
     }
 
@@ -28,25 +27,22 @@ impl FacetMesh {
     /// When it cannot be read, or an index lies outside its array.
     pub(crate) fn read_arrays(from: &mut ArrayReader, faces: usize) -> io::Result<Self> {
         let positions: Vec<Point> = from.array()?;
-        let (indices, normals, uvs) = (from.array::<u32>()?, from.array::<Vector>()?, from.array::<Uv>()?);
-        let facets: Vec<[u32; 5]> = from.array()?;
+        let vertices: Vec<MeshVertex> = from.records(|&[x, y, z, s, t, position]: &[u64; 6]| {
+            let [x, y, z, s, t] = [x, y, z, s, t].map(f64::from_bits);
+            MeshVertex { position: position as u32, normal: Vector::new(x, y, z), uv: Uv::new(s, t) }
+        })?;
+        let facets: Vec<Facet> =
+            from.records(|&[a, b, c, d, face]: &[u32; 5]| Facet { vertices: [a, b, c, d], face: FaceId(face) })?;
         let sag: Vec<f64> = from.array()?;
         // Told here once for all who index by these numbers later.
-        let is_whole = normals.len() == indices.len()
-            && uvs.len() == indices.len()
-            && (sag.is_empty() || sag.len() == facets.len())
-            && indices.iter().all(|&i| (i as usize) < positions.len())
-            && facets.iter().all(|[corners @ .., face]| {
-                corners.iter().all(|&v| (v as usize) < indices.len()) && (*face as usize) < faces
+        let is_whole = (sag.is_empty() || sag.len() == facets.len())
+            && vertices.iter().all(|v| (v.position as usize) < positions.len())
+            && facets.iter().all(|facet| {
+                facet.vertices.iter().all(|&v| (v as usize) < vertices.len()) && facet.face.index() < faces
             });
         if !is_whole {
             return Err(invalid("no mesh of this model"));
         }
-        let vertices = (indices.iter().zip(normals).zip(uvs))
-            .map(|((&position, normal), uv)| MeshVertex { position, normal, uv })
-            .collect();
-        let facets =
-            facets.iter().map(|&[a, b, c, d, face]| Facet { vertices: [a, b, c, d], face: FaceId(face) }).collect();
         Ok(Self { positions, vertices, facets, sag })
     }
 }

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 /// First bytes of an entry.
-const MAGIC: &[u8] = b"lampyris cache 1\n";
+const MAGIC: &[u8] = b"lampyris cache 2\n";
 /// Bytes of the checksum at the end of an entry.
 const CHECKSUM_BYTES: u64 = 4;
 /// Most bytes of a folder, unless another limit is given: some fifty scenes of a million facets.

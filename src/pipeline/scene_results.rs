@@ -59,6 +59,22 @@ impl SceneResults {
         (0..self.results.receivers[receiver].channels.len()).map(of_channel).collect()
     }
 
+    /// Returns for each face that the results list the errors from the facets of what it absorbed, let in and let out, in the unit of the
+    /// sources; `None` where they are not known: facets were not compared, or no ray of the comparison met the face.
+    pub fn geometric_face_errors(&self, prepared: &PreparedScene) -> Vec<Option<[f64; 3]>> {
+        let lost = self.results.power.lost;
+        let error = |face: u32| match (prepared.choice.intersector, &self.geometric) {
+            (IntersectorKind::Exact, _) => Some([lost; 3]),
+            (_, Some(error)) if error.rays == 0 => Some([lost; 3]),
+            (_, Some(error)) => {
+                let k = error.faces.binary_search_by_key(&face, |e| e.face).ok()?;
+                Some(error.faces[k].geometric(lost))
+            }
+            (_, None) => None,
+        };
+        self.results.faces.iter().flat_map(|found| &found.first).map(|f| error(f.face)).collect()
+    }
+
     /// Makes the document of `results.json`, without what only its writer knows: files and where the numbers come from.
     ///
     /// # Errors
@@ -73,6 +89,11 @@ impl SceneResults {
         }
         for (k, figures) in self.figures(prepared).iter().enumerate() {
             document["receivers"][k]["figures"] = serde_json::to_value(figures)?;
+        }
+        for (k, errors) in self.geometric_face_errors(prepared).into_iter().enumerate() {
+            for (key, place) in [("absorbed_geometric", 0), ("entered_geometric", 1), ("left_geometric", 2)] {
+                document["faces"]["first"][k][key] = serde_json::to_value(errors.map(|e| e[place]))?;
+            }
         }
         document["halving"] = serde_json::to_value(figures::halving(&self.results, self.geometric.as_ref()))?;
         document["tolerance_mm"] = serde_json::to_value(prepared.tolerance_mm())?;

@@ -4,11 +4,13 @@
 //! One function goes through all that is kept, for writing and for reading alike, so that neither can leave out what the other has.
 
 use super::default_accuracy::{Alternative, Chosen};
-use super::geometric_error::{ChannelError, GeometricError, MapError, Paired, ReceiverError, Statistical};
+use super::geometric_error::{
+    ChannelError, FaceError, GeometricError, MapError, Paired, ReceiverError, Statistical,
+};
 use crate::intersect::NormalMode;
 
 /// The first word; what begins with another is of another version.
-const FORM: u64 = 1;
+const FORM: u64 = 2;
 /// What a choice can name, by its number.
 const INTERSECTORS: [&str; 2] = ["octree", "exact"];
 /// What positions on a receiver are counted in, by its number.
@@ -124,12 +126,22 @@ fn exchange_alternative(words: &mut dyn Words, alternative: &mut Alternative) ->
 
 /// Goes through what facets change of a run.
 fn exchange_error(words: &mut dyn Words, error: &mut GeometricError) -> Option<()> {
-    let GeometricError { rays, lost, segments_per_ray, seconds, receivers } = error;
+    let GeometricError { rays, lost, segments_per_ray, seconds, receivers, faces } = error;
     words.word(rays)?;
     exchange_numbers(words, lost)?;
     exchange_number(words, segments_per_ray)?;
     exchange_numbers(words, seconds)?;
-    exchange_list(words, receivers, &ReceiverError::default(), exchange_receiver)
+    exchange_list(words, receivers, &ReceiverError::default(), exchange_receiver)?;
+    exchange_list(words, faces, &FaceError::default(), exchange_face)
+}
+
+/// Goes through what they change of a face.
+fn exchange_face(words: &mut dyn Words, error: &mut FaceError) -> Option<()> {
+    let FaceError { face, absorbed, entered, left } = error;
+    let mut word = u64::from(*face);
+    words.word(&mut word)?;
+    *face = u32::try_from(word).ok()?;
+    [absorbed, entered, left].into_iter().try_for_each(|paired| exchange_paired(words, paired))
 }
 
 /// Goes through what they change of a receiver.
@@ -298,6 +310,7 @@ mod tests {
             segments_per_ray: 4.5,
             seconds: [0.25, 0.5],
             receivers: vec![receiver, ReceiverError::default()],
+            faces: vec![FaceError { face: 12, absorbed: paired(10.0), entered: paired(11.0), left: paired(12.0) }],
         };
         Chosen {
             tolerance_mm: [0.1 + 0.2, 0.7],
@@ -332,7 +345,7 @@ mod tests {
             Chosen::from_words(&words)
         };
         assert_eq!(cut, 0);
-        assert!(changed(0, 2).is_none() && changed(3, 99).is_none() && changed(5, u64::MAX).is_none());
+        assert!(changed(0, 1).is_none() && changed(3, 99).is_none() && changed(5, u64::MAX).is_none());
         assert!(Chosen::from_words(&[&words[..], &[0]].concat()).is_none());
     }
 }

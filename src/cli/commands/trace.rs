@@ -171,7 +171,7 @@ fn trace_whole(
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     end_file::write(prepared, extra.ends.as_deref(), console)?;
     verdicts::say_verdicts(&run, prepared, console)?;
-    closing::print_listings(&run.results, prepared, console)?;
+    closing::print_listings(&run, prepared, console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     // Only after everything was written: until then it is all that would be left.
     checkpoint.remove();

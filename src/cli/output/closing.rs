@@ -6,7 +6,7 @@ use super::sequence_tables::print_sequences;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::formats::printable_line;
-use crate::pipeline::{PreparedScene, TargetResult};
+use crate::pipeline::{PreparedScene, SceneResults, TargetResult};
 use crate::report::{figures, file_stem, grouped};
 use crate::simulate::Results;
 use serde_json::Value;
@@ -20,13 +20,13 @@ pub(crate) const LEDGER: &str = "lost_rays.csv";
 
 /// Prints what was asked for beside the figures: power by face and light by sequence. Nothing where neither was.
 pub(crate) fn print_listings(
-    results: &Results,
+    run: &SceneResults,
     prepared: &PreparedScene,
     console: &Console,
 ) -> Result<(), Failure> {
     let (model, unit) = (&prepared.job.loaded.model, prepared.power_unit());
-    print_faces(results, model, unit, console)?;
-    Ok(print_sequences(results, model, unit, console)?)
+    print_faces(run, prepared, console)?;
+    Ok(print_sequences(&run.results, model, unit, console)?)
 }
 
 /// Prints the document of the results on stdout with `--json`, else says the closing lines.

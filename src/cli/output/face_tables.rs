@@ -4,6 +4,7 @@ use super::sequence_tables::face_names;
 use crate::cli::console::{Console, print};
 use crate::cli::output::terminal_tables::table_text;
 use crate::model::Model;
+use crate::pipeline::{PreparedScene, SceneResults};
 use crate::report::{Cell, Section, Table, figures, grouped};
 use crate::simulate::{FaceResult, Results};
 use serde_json::Value;
@@ -21,44 +22,52 @@ fn name(names: &[String], face: &FaceResult) -> String {
 }
 
 /// The table; `None` where it was not asked for.
-fn face_table(results: &Results, model: &Model, unit: &str) -> Option<Table> {
-    let found = results.faces.as_ref()?;
+fn face_table(run: &SceneResults, prepared: &PreparedScene) -> Option<Table> {
+    let (model, unit) = (&prepared.job.loaded.model, prepared.power_unit());
+    let found = run.results.faces.as_ref()?;
     let names = face_names(model);
     let columns = [
         ("face", ""),
         ("absorbed", unit),
-        ("± (1σ)", unit),
+        ("± rays", unit),
+        ("± facets", unit),
         ("entered through it", unit),
-        ("± (1σ)", unit),
+        ("± rays", unit),
+        ("± facets", unit),
         ("left through it", unit),
-        ("± (1σ)", unit),
+        ("± rays", unit),
+        ("± facets", unit),
     ];
     let caption = format!(
         "{} faces were met by light; those that are not listed absorbed {} {unit} and let {} {unit} out. Light that passes a face several \
-         times counts each time. Errors are those of the rays.",
+         times counts each time. Errors (1σ) are those of the rays and, where facets were compared with the spline on the face, of the facets.",
         grouped(found.count as u64),
         figures(found.rest_absorbed, SAID_DIGITS),
         figures(found.rest_left, SAID_DIGITS)
     );
     let mut table = Table::new("faces", "Power by face", &columns).caption(caption);
-    for face in &found.first {
+    for (face, geometric) in found.first.iter().zip(run.geometric_face_errors(prepared)) {
         let power = |value: f64| Cell::Number(value, DIGITS);
+        let of_facets = |k: usize| geometric.map_or(Cell::Empty, |errors| errors[k].into());
         table.row([
             name(&names, face).into(),
             power(face.absorbed),
             face.absorbed_error.into(),
+            of_facets(0),
             power(face.entered),
             face.entered_error.into(),
+            of_facets(1),
             power(face.left),
             face.left_error.into(),
+            of_facets(2),
         ]);
     }
     Some(table)
 }
 
 /// The section of a page; `None` where the table was not asked for.
-pub(crate) fn face_section(results: &Results, model: &Model, unit: &str) -> Option<Section> {
-    Some(Section::new("Light by face").with_block(face_table(results, model, unit)?))
+pub(crate) fn face_section(run: &SceneResults, prepared: &PreparedScene) -> Option<Section> {
+    Some(Section::new("Light by face").with_block(face_table(run, prepared)?))
 }
 
 /// Puts what selects each face into the document of the results.
@@ -71,8 +80,8 @@ pub(crate) fn add_selectors(document: &mut Value, results: &Results, model: &Mod
 }
 
 /// Prints the table on the terminal.
-pub(crate) fn print_faces(results: &Results, model: &Model, unit: &str, console: &Console) -> io::Result<()> {
-    match face_table(results, model, unit) {
+pub(crate) fn print_faces(run: &SceneResults, prepared: &PreparedScene, console: &Console) -> io::Result<()> {
+    match face_table(run, prepared) {
         Some(table) if !console.json => print(&table_text(&table, console.width())),
         _ => Ok(()),
     }

@@ -165,7 +165,7 @@ fn report_page<'a>(
             prepared.power_unit(),
         )
         .into_iter()
-        .chain(face_tables::face_section(&run.results, &prepared.job.loaded.model, prepared.power_unit()))
+        .chain(face_tables::face_section(run, prepared))
         .collect(),
         views: Vec::new(),
         tables: [

@@ -4,6 +4,7 @@
 use super::node::{Block, Link, Node, Target};
 use super::statistics::Statistics;
 use super::{huge_pages, tree::Tree};
+use crate::intersect::slopes::Slopes;
 use crate::mesh::FacetMesh;
 use crate::mesh::arrays::{ArrayReader, invalid, write_array};
 use std::io::{self, Write};
@@ -21,7 +22,8 @@ impl<'m> Tree<'m> {
         write_array(to, &depths.iter().map(|n| *n as u64).collect::<Vec<u64>>())?;
         write_array(to, &self.root.iter().map(|link| link.0).collect::<Vec<u32>>())?;
         write_array(to, &self.nodes)?;
-        write_array(to, &self.blocks)
+        write_array(to, &self.blocks)?;
+        write_array(to, &self.slopes)
     }
 
     /// Reads a tree of `mesh`, and its statistics.
@@ -34,10 +36,11 @@ impl<'m> Tree<'m> {
         let mut nodes: Vec<Node> = from.array_in(huge_pages::with_capacity)?;
         nodes.iter_mut().for_each(forget_unused);
         let blocks: Vec<Block> = from.array_in(huge_pages::with_capacity)?;
-        if !is_tree(mesh, root, &nodes, &blocks) {
+        let slopes: Vec<Slopes> = from.array_in(huge_pages::with_capacity)?;
+        if slopes.len() != mesh.facets.len() || !is_tree(mesh, root, &nodes, &blocks) {
             return Err(invalid("no octree of this mesh"));
         }
-        Ok((Self::new(mesh, nodes, blocks, root), statistics))
+        Ok((Self::new(mesh, nodes, blocks, root, slopes), statistics))
     }
 }
 

@@ -38,17 +38,24 @@ impl<'m> Tree<'m> {
             Some(flat) => (flat.nodes, flat.blocks, Some(flat.root)),
             None => (Vec::new(), Vec::new(), None),
         };
-        Self::new(mesh, nodes, blocks, root)
+        let mut slopes = huge_pages::with_capacity(mesh.facets.len());
+        (0..mesh.facets.len()).into_par_iter().map(|f| Slopes::new(mesh.corners(f))).collect_into_vec(&mut slopes);
+        Self::new(mesh, nodes, blocks, root, slopes)
     }
 
-    /// Joins nodes and blocks, given relative to the middle of the mesh, with what walks need of `mesh`; checks nothing.
-    pub(super) fn new(mesh: &'m FacetMesh, nodes: Vec<Node>, blocks: Vec<Block>, root: Option<Link>) -> Self {
+    /// Joins nodes and blocks, given relative to the middle of the mesh, and the slopes of all facets with what walks need of `mesh`; checks
+    /// nothing.
+    pub(super) fn new(
+        mesh: &'m FacetMesh,
+        nodes: Vec<Node>,
+        blocks: Vec<Block>,
+        root: Option<Link>,
+        slopes: Vec<Slopes>,
+    ) -> Self {
         let surroundings = Surroundings::new(mesh);
         let (finite, center) = (surroundings.bounds, middle(&surroundings));
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * BOUNDS_ROOM) };
         let frame = Frame::new(center, &bounds);
-        let mut slopes = huge_pages::with_capacity(mesh.facets.len());
-        (0..mesh.facets.len()).into_par_iter().map(|f| Slopes::new(mesh.corners(f))).collect_into_vec(&mut slopes);
         Self { surroundings, center, frame, nodes, blocks, root, slopes }
     }
 

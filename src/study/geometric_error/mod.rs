@@ -10,9 +10,11 @@
 
 mod cells;
 mod estimate;
+mod faces;
 mod replicates;
 
 pub use cells::MapError;
+pub use faces::FaceError;
 
 use cells::CellPairs;
 pub(in crate::study) use replicates::{MOST_CELLS, ReplicatedRun, trace_replicates};
@@ -65,6 +67,9 @@ pub struct GeometricError {
     pub seconds: [f64; 2],
     /// Every receiver of the scene.
     pub receivers: Vec<ReceiverError>,
+    /// The faces that these rays met, by their number; empty unless the scene asks for the power by face.
+    #[serde(skip)]
+    pub faces: Vec<FaceError>,
 }
 
 /// What facets change of one receiver's light.
@@ -158,6 +163,7 @@ pub(in crate::study) fn compare(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -
         segments_per_ray: results[1].segments as f64 / results[1].rays.max(1) as f64,
         seconds: results.map(|r| r.seconds.trace),
         receivers: (0..results[1].receivers.len()).map(|k| receiver_error(bound, runs, k)).collect(),
+        faces: faces::face_errors(runs),
     }
 }
 

@@ -1,5 +1,6 @@
 //! A run taken apart into its replicates: what each of them brought to every receiver and every cell.
 
+use super::faces::{FaceSums, FaceTotals};
 use crate::intersect::Intersector;
 use crate::simulate::{BoundScene, Hooks, Moments, PartialRun, Results, RunSettings, Sum, replicates, trace};
 use std::sync::Mutex;
@@ -23,6 +24,8 @@ pub(in crate::study) struct ReplicateSums {
 pub(in crate::study) struct ReplicatedRun {
     pub(in crate::study) results: Results,
     pub(in crate::study) replicates: Vec<Vec<ReplicateSums>>,
+    /// What each replicate brought to the faces that it reached, where the scene asks for that.
+    pub(super) faces: Vec<FaceSums>,
 }
 
 /// The sums of a run after some of its replicates.
@@ -33,6 +36,7 @@ struct Totals {
     moments: Vec<Moments>,
     cells: Vec<Vec<u128>>,
     channels: Vec<Vec<u128>>,
+    faces: FaceTotals,
 }
 
 /// Cells of a receiver that are kept apart.
@@ -56,8 +60,8 @@ impl KeptCells {
 
 impl Totals {
     /// Takes over the sums of a portion and returns the number of the one replicate that is new in it, with what it brought to each
-    /// receiver; `None` where none is new.
-    fn advance(&mut self, portion: &PartialRun, kept: &[KeptCells]) -> Option<(u32, Vec<ReplicateSums>)> {
+    /// receiver and to the faces; `None` where none is new.
+    fn advance(&mut self, portion: &PartialRun, kept: &[KeptCells]) -> Option<(u32, Vec<ReplicateSums>, FaceSums)> {
         // Portions are handed over one replicate at a time; the one that is not yet known is new.
         let new = *portion.done.iter().find(|r| self.done.binary_search(r).is_err())?;
         let tallies = &portion.tallies;
@@ -91,7 +95,7 @@ impl Totals {
         });
         let sums = sums.collect();
         self.done.clone_from(&portion.done);
-        Some((new, sums))
+        Some((new, sums, self.faces.advance(portion)))
     }
 }
 
@@ -104,17 +108,18 @@ pub(in crate::study) fn trace_replicates(
     let count = replicates(bound, settings) as usize;
     let kept = bound.receivers.iter().map(|r| KeptCells::new(r.cell_count(), r.channels.count()));
     let kept: Vec<KeptCells> = kept.collect();
-    let state = Mutex::new((Totals::default(), vec![Vec::new(); count]));
+    let state = Mutex::new((Totals::default(), vec![Vec::new(); count], vec![Vec::new(); count]));
     let finished = |portion: &PartialRun| {
         // A panic elsewhere ends the run anyway; the sums so far are whole.
         let mut state = state.lock().unwrap_or_else(|e| e.into_inner());
-        let (totals, by_replicate) = &mut *state;
-        if let Some((new, sums)) = totals.advance(portion, &kept) {
+        let (totals, by_replicate, faces_by_replicate) = &mut *state;
+        if let Some((new, sums, faces)) = totals.advance(portion, &kept) {
             by_replicate[new as usize] = sums;
+            faces_by_replicate[new as usize] = faces;
         }
     };
     let hooks = Hooks { finished: Some(&finished), ..Hooks::with_progress(&|_| true) };
     let results = Results::new(bound, settings, trace(bound, intersector, settings, None, &hooks));
-    let (_, replicates) = state.into_inner().unwrap_or_else(|e| e.into_inner());
-    ReplicatedRun { results, replicates }
+    let (_, replicates, faces) = state.into_inner().unwrap_or_else(|e| e.into_inner());
+    ReplicatedRun { results, replicates, faces }
 }

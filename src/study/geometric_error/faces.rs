@@ -1,0 +1,123 @@
+//! What facets change of the power that each face absorbs and lets through, from replicates of the same rays.
+
+use super::Paired;
+use super::replicates::ReplicatedRun;
+use crate::simulate::PartialRun;
+use rustc_hash::FxHashMap;
+
+/// Quanta that a replicate left in a face, took into its body through it, and out.
+type FaceQuanta = [u64; 3];
+
+/// What a replicate brought to the faces that it reached, by rising face.
+pub(super) type FaceSums = Vec<(u32, FaceQuanta)>;
+
+/// What facets change of the power at one face, in the unit of the sources.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FaceError {
+    /// The placed face.
+    pub face: u32,
+    /// Power that it absorbed.
+    pub absorbed: Paired,
+    /// Power that entered its body through it.
+    pub entered: Paired,
+    /// Power that left its body through it.
+    pub left: Paired,
+}
+
+impl FaceError {
+    /// Returns the geometric errors of what is absorbed, enters and leaves; `lost` is power that might have come to any face.
+    pub fn geometric(&self, lost: f64) -> [f64; 3] {
+        [self.absorbed, self.entered, self.left].map(|paired| paired.geometric().hypot(lost))
+    }
+}
+
+/// The sums of all faces after some of a run's replicates.
+#[derive(Default)]
+pub(super) struct FaceTotals(Vec<[u128; 3]>);
+
+impl FaceTotals {
+    /// Takes over the sums of a portion with one more replicate and returns what that one brought to each face that it reached, by rising
+    /// face; nothing where the run does not count crossings.
+    pub(super) fn advance(&mut self, portion: &PartialRun) -> FaceSums {
+        let tallies = &portion.tallies;
+        self.0.resize(tallies.entered.len(), [0; 3]);
+        let mut reached = Vec::new();
+        for (face, before) in self.0.iter_mut().enumerate() {
+            let now = [&tallies.faces[face], &tallies.entered[face], &tallies.left[face]].map(|sum| sum.total);
+            if *before != now {
+                reached.push((face as u32, [0, 1, 2].map(|k| (now[k] - before[k]) as u64)));
+                *before = now;
+            }
+        }
+        reached
+    }
+}
+
+/// Sums over replicates of one kind of power at one face, quanta.
+#[derive(Clone, Copy, Debug, Default)]
+struct PairedSums {
+    /// On facets and on the spline.
+    totals: [f64; 2],
+    /// Of the squares of the replicates' differences.
+    squares: f64,
+}
+
+impl PairedSums {
+    fn add(&mut self, facets: u64, spline: u64) {
+        let [facets, spline] = [facets as f64, spline as f64];
+        self.totals[0] += facets;
+        self.totals[1] += spline;
+        self.squares += (facets - spline).powi(2);
+    }
+
+    /// Both values, and the standard error of their difference over so many replicates.
+    fn paired(&self, replicates: usize, quantum: f64) -> Paired {
+        let n = replicates.max(2) as f64;
+        let difference = self.totals[0] - self.totals[1];
+        // Of the squared deviations from the mean; replicates that did not reach the face count too.
+        let deviations = (self.squares - difference * difference / n).max(0.0);
+        let [facets, spline] = self.totals.map(|total| total * quantum);
+        Paired { facets, spline, error: (deviations * n / (n - 1.0)).sqrt() * quantum }
+    }
+}
+
+/// Compares the power at each face that rays of either run met, the first on facets, by rising face.
+pub(super) fn face_errors(runs: [&ReplicatedRun; 2]) -> Vec<FaceError> {
+    // Sums, not what every replicate brought: of 10⁵ faces that would be gigabytes.
+    let mut sums: FxHashMap<u32, [PairedSums; 3]> = FxHashMap::default();
+    for (facets, spline) in runs[0].faces.iter().zip(&runs[1].faces) {
+        let mut both: FxHashMap<u32, [FaceQuanta; 2]> = FxHashMap::default();
+        facets.iter().for_each(|(face, quanta)| both.entry(*face).or_default()[0] = *quanta);
+        spline.iter().for_each(|(face, quanta)| both.entry(*face).or_default()[1] = *quanta);
+        for (face, [facets, spline]) in both {
+            let sums = sums.entry(face).or_default();
+            sums.iter_mut().zip(facets.iter().zip(spline)).for_each(|(sums, (a, b))| sums.add(*a, b));
+        }
+    }
+    let (replicates, quantum) = (runs[1].faces.len(), runs[1].results.quantum);
+    let error = |(face, sums): (u32, [PairedSums; 3])| {
+        let [absorbed, entered, left] = sums.map(|s| s.paired(replicates, quantum));
+        FaceError { face, absorbed, entered, left }
+    };
+    let mut errors: Vec<FaceError> = sums.into_iter().map(error).collect();
+    errors.sort_by_key(|e| e.face);
+    errors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::geometric_error::standard_error;
+
+    /// The error from sums is that of the replicates' differences.
+    #[test]
+    fn the_error_of_a_difference_is_that_of_its_replicates() {
+        let brought = [[5, 3], [0, 4], [7, 7], [0, 0], [12, 1]];
+        let mut sums = PairedSums::default();
+        brought.iter().for_each(|[a, b]| sums.add(*a, *b));
+        let found = sums.paired(brought.len(), 0.5);
+        let expected = 0.5 * standard_error(brought.iter().map(|[a, b]| *a as f64 - *b as f64));
+        assert_eq!((found.facets, found.spline), (12.0, 7.5));
+        assert!((found.error / expected - 1.0).abs() < 1e-12, "{} {expected}", found.error);
+    }
+}
