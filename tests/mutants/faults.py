@@ -22,7 +22,7 @@ FAULTS = [
     ("Krawczyk reach a third", EXACT + "leaf_test.rs", "let reach_v = «f64::from(leaf.half[1]) * (1.0 + row_v + INVERSE_ROUNDING) + margin»;",
      "(f64::from(leaf.half[1]) * (1.0 + row_v + INVERSE_ROUNDING) + margin) / 3.0", SPLINE),
     ("large margins not clipped", EXACT + "leaf_test.rs", "margin < «LARGEST_MARGIN»", "f64::INFINITY", SPLINE),
-    ("singular nets preconditioned", EXACT + "clip_hull.rs", "let blur = if «regular» {", "true", SPLINE),
+    ("singular nets preconditioned", EXACT + "clip_hull.rs", "let blur = if «regular» {", "true", "lib:clip_hull " + SPLINE),
     ("one root of a tangency forgotten", EXACT + "tangency.rs", "for side in «[-1.0, 1.0]» {", "[1.0, 1.0]", SPLINE),
     ("a tangency is none", EXACT + "tangency.rs", "if «height + slope * way + 0.5 * least * way * way > rounding» {", "true", SPLINE),
     ("roots counted far beside the leaf", EXACT + "leaf_test.rs", "let e = «margin + 2.0 * NEWTON_STEP»;", "margin + 0.05", SPLINE),

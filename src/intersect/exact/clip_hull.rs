@@ -186,3 +186,35 @@ pub(super) fn newton(net: &[V4], degree: [u8; 2], [mut u, mut v]: [f64; 2]) -> O
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_deviation_of_a_singular_net_holds_what_its_rounding_makes_of_its_jacobian() {
+        // Linear nets: no derivative varies, and all that a Jacobian may deviate by is what control points are off. Moved by the margin
+        // each, they move a derivative of degree p by 2p margins.
+        for (skew, degree) in [(1e-9, [1, 1]), (1e-10, [2, 3]), (3e-11, [3, 3])] {
+            let v = [1.0, 1.0 + skew, 0.0, 0.0];
+            let u = [1.0, 1.0, 0.0, 0.0];
+            let slopes = Slopes { u, v, ru: [0.0; 4], rv: [0.0; 4] };
+            let margin = [1e-15, 2e-15];
+            let made = precondition(&slopes, degree, margin).expect("a determinant");
+            let p = degree.map(f64::from);
+            let mut worst = 0f64;
+            // The largest row sum of Y · (J' − J) over all signs of the four errors; more than what is always counted.
+            for row in made.inverse {
+                for signs in 0..16u8 {
+                    let sign = |k: u8| if signs >> k & 1 == 0 { 1.0 } else { -1.0 };
+                    let along_u =
+                        row[0] * sign(0) * 2.0 * p[0] * margin[0] + row[1] * sign(1) * 2.0 * p[0] * margin[1];
+                    let along_v =
+                        row[0] * sign(2) * 2.0 * p[1] * margin[0] + row[1] * sign(3) * 2.0 * p[1] * margin[1];
+                    worst = worst.max(along_u.abs() + along_v.abs());
+                }
+            }
+            assert!(worst > INVERSE_ROUNDING && made.deviation >= worst, "{skew}: {} {worst}", made.deviation);
+        }
+    }
+}
