@@ -68,6 +68,30 @@ fn a_colour_is_found_beside_a_reference_that_leads_nowhere() {
     assert_eq!(face.colour.map(|c| c.0), Some([0.25, 0.5, 0.75]));
 }
 
+/// Scaled 2.5 times, mirrored in y and moved to (1, 1, 0), with the name and description of a transformation and without.
+#[test]
+fn an_operator_places_what_a_relationship_names() {
+    for names in ["''", "'',''", "'','',$"] {
+        let operator = format!(
+            "#120=DIRECTION('',(1.,0.,0.));\n#121=DIRECTION('',(0.,-1.,0.));\n#122=DIRECTION('',(0.,0.,1.));\n\
+             #108=CARTESIAN_TRANSFORMATION_OPERATOR_3D({names},#120,#121,#12,2.5,#122);\n\
+             #100=AXIS2_PLACEMENT_3D('',#12,$,$);\n#101=PRODUCT_DEFINITION('','',$,$);\n#102=PRODUCT_DEFINITION('','',$,$);\n\
+             #103=SHAPE_REPRESENTATION('',(#100),#1);\n#104=PRODUCT_DEFINITION_SHAPE('','',#101);\n\
+             #105=PRODUCT_DEFINITION_SHAPE('','',#102);\n#106=SHAPE_DEFINITION_REPRESENTATION(#104,#103);\n\
+             #107=SHAPE_DEFINITION_REPRESENTATION(#105,#6);\n#110=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#101,#102,$);\n\
+             #109=(REPRESENTATION_RELATIONSHIP('','',#6,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#108)\
+             SHAPE_REPRESENTATION_RELATIONSHIP());\n\
+             #111=PRODUCT_DEFINITION_SHAPE('','',#110);\n#112=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#109,#111);\n"
+        );
+        let placed = import(&(square(FORWARD, IN_ORDER) + &operator));
+        assert_eq!(placed.report.problems, Vec::<String>::new());
+        let [lo, hi] = placed.report.bbox_mm.expect("a face");
+        for (got, expected) in lo.into_iter().chain(hi).zip([1.0, -1.5, 0.0, 3.5, 1.0, 0.0]) {
+            assert!((got - expected).abs() < 1e-12, "{names}: {lo:?} {hi:?}");
+        }
+    }
+}
+
 #[test]
 fn what_a_broken_transformation_places_is_named_and_left_out() {
     // The square as a child in an assembly; the second placement of the transformation is #100, or none at all.

@@ -154,12 +154,12 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// Reads a placement, or a CARTESIAN_TRANSFORMATION_OPERATOR_3D, which may scale and mirror, as a frame, mm: the target of a mapped
-    /// item.
+    /// item, or what takes one representation into another.
     pub(crate) fn transformation(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
         let Some(args) = e.attributes("CARTESIAN_TRANSFORMATION_OPERATOR", 1).or_else(|| {
-            // The simple form has all attributes behind the name of the representation item (and its own).
-            let skip = if e.args().len() >= 7 { 2 } else { 1 };
+            // The simple form has its five attributes behind the name of the representation item, and its own name and description.
+            let skip = e.args().len().saturating_sub(5).max(1);
             e.attributes("CARTESIAN_TRANSFORMATION_OPERATOR_3D", skip)
         }) else {
             return self.placement(id);

@@ -170,6 +170,10 @@ impl<'f, 'a> Assembly<'f, 'a> {
     fn transformation(&mut self, e: Entity<'f, 'a>, [first, second]: [u64; 2]) -> Option<Frame> {
         let stated = e.attributes(WITH_TRANSFORMATION, 4).and_then(|a| a.entity(0));
         let placement = stated.and_then(|t| {
+            // An operator takes the first representation into the second by itself (ISO 10303-43, functionally_defined_transformation).
+            if t.keywords().any(|k| k.starts_with("CARTESIAN_TRANSFORMATION_OPERATOR")) {
+                return self.geometry(second).transformation(t.id).ok();
+            }
             let args = t.attributes("ITEM_DEFINED_TRANSFORMATION", 0)?;
             let (from, to) = (args.id(2)?, args.id(3)?);
             // Each placement is in the units of the representation that holds it.
