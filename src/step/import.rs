@@ -17,6 +17,9 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use std::path::Path;
 use std::time::Instant;
 
+/// Entities that are listed of a file without shapes.
+const LISTED_ENTITIES: usize = 5;
+
 /// A model and the account of how it was read.
 #[derive(Clone, Debug)]
 pub struct Import {
@@ -158,7 +161,23 @@ fn convert_assembly(
     }
     let Reader { model, report, .. } = reader;
     count_model(&model, report);
+    if report.faces.found == 0 {
+        report.problems.push(format!("{name}: {}", absent_shapes(file)));
+    }
     Ok(model)
+}
+
+/// Tells of a file without a face what it holds instead: the entities that it has most of.
+fn absent_shapes(file: &File<'_>) -> String {
+    let mut counts: FxHashMap<&str, usize> = FxHashMap::default();
+    file.entities().flat_map(|e| e.keywords()).for_each(|k| *counts.entry(k).or_default() += 1);
+    let mut most: Vec<(&str, usize)> = counts.into_iter().collect();
+    // By name where counts are equal, for tables of hashes have no order.
+    most.sort_unstable_by_key(|&(name, count)| (std::cmp::Reverse(count), name));
+    let listed: Vec<String> = most.iter().take(LISTED_ENTITIES).map(|(name, n)| format!("{name} ({n})")).collect();
+    let commonest =
+        if listed.is_empty() { "it has no entity".into() } else { format!("commonest are {}", listed.join(", ")) };
+    format!("no face, surface or mesh was found; {commonest}; export solids or surfaces")
 }
 
 /// Returns the items of a representation that do not stand in its place already, and adds them to `items_placed`: linked representations

@@ -145,3 +145,19 @@ fn the_page_of_scenes_is_that_of_the_program() {
         assert!(out.contains(words), "{words}");
     }
 }
+
+/// A file of which nothing can be traced says what it holds instead, and is not a success.
+#[test]
+fn info_on_a_file_without_shapes_names_what_there_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "ISO-10303-21;HEADER;ENDSEC;DATA;#1=CARTESIAN_POINT('',(0.,0.,0.));#2=MY_SHAPE(#1);#3=MY_SHAPE(#1);ENDSEC;END-ISO-10303-21;";
+    let path = written(folder.path(), "points.stp", text.as_bytes());
+    let (code, out, _) = lampyris(&["info", path.to_str().unwrap()]);
+    assert_eq!(code, 4, "{out}");
+    assert!(
+        out.contains(
+            "points.stp: no face, surface or mesh was found; commonest are MY_SHAPE (2), CARTESIAN_POINT (1)"
+        ),
+        "{out}"
+    );
+}

@@ -16,7 +16,7 @@ const SHOWN_NAMES: usize = 12;
 const SHOWN_NOTES: usize = 20;
 
 /// Reads a STEP file and prints what it holds and what was refused, or with `faces` all of its faces. Incomplete where more faces were
-/// refused than the limit allows.
+/// refused than the limit allows, and where there are none.
 pub(crate) fn run(
     path: &Path,
     faces: bool,
@@ -35,7 +35,7 @@ pub(crate) fn run(
     }
     // Products, for zero of zero faces are no excess.
     let over = report.faces.refused as f64 > limits.max_refused * report.faces.found as f64;
-    Ok(Completion::incomplete_if(over))
+    Ok(Completion::incomplete_if(over || report.faces.found == 0))
 }
 
 /// Returns the report of an import as lines for people; lists are cut off without -v.

@@ -7,11 +7,13 @@
 
 mod number;
 mod parser;
+mod short_names;
 mod text;
 
 pub(super) use parser::parse;
 
 use rustc_hash::FxHashMap;
+use short_names::Keyword;
 
 /// Reals below this that stand for a count are exact: 2⁵³ is 9e15.
 const EXACT_COUNT: f64 = 1e15;
@@ -57,7 +59,7 @@ pub(super) enum Value {
 /// A name with its parameters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Record {
-    name: Span,
+    name: Keyword,
     values: Span,
 }
 
@@ -109,6 +111,11 @@ impl<'a> File<'a> {
         &self.source[span.range()]
     }
 
+    /// Returns the long name of a record.
+    fn name(&self, record: &Record) -> &'a [u8] {
+        record.name.bytes(self.source)
+    }
+
     /// Returns the instance with an id; `None` when the file has none such.
     pub(super) fn entity(&self, id: u64) -> Option<Entity<'_, 'a>> {
         let position = match &self.index {
@@ -136,7 +143,7 @@ impl<'a> File<'a> {
 
     /// Returns the parameters of the first header record of this name, such as `FILE_SCHEMA`.
     pub(super) fn header(&self, name: &str) -> Option<Args<'_, 'a>> {
-        let record = self.header.iter().find(|r| self.bytes(r.name) == name.as_bytes())?;
+        let record = self.header.iter().find(|r| self.name(r) == name.as_bytes())?;
         Some(self.args(record.values))
     }
 
@@ -157,14 +164,14 @@ pub(super) struct Entity<'f, 'a> {
 impl<'f, 'a> Entity<'f, 'a> {
     /// Returns the name; for a complex instance, the names of its records joined by `+`.
     pub(super) fn name(&self) -> String {
-        let names = self.records.iter().map(|r| String::from_utf8_lossy(self.file.bytes(r.name)));
+        let names = self.records.iter().map(|r| String::from_utf8_lossy(self.file.name(r)));
         names.collect::<Vec<_>>().join("+")
     }
 
     /// Returns the name of a simple instance; empty for a complex one, which has several.
     pub(super) fn keyword(&self) -> &'a str {
         match self.records {
-            [r] => std::str::from_utf8(self.file.bytes(r.name)).unwrap_or(""),
+            [r] => std::str::from_utf8(self.file.name(r)).unwrap_or(""),
             _ => "",
         }
     }
@@ -172,12 +179,12 @@ impl<'f, 'a> Entity<'f, 'a> {
     /// Returns the names of all records.
     pub(super) fn keywords(&self) -> impl Iterator<Item = &'a str> + use<'f, 'a> {
         let file = self.file;
-        self.records.iter().map(move |r| std::str::from_utf8(file.bytes(r.name)).unwrap_or(""))
+        self.records.iter().map(move |r| std::str::from_utf8(file.name(r)).unwrap_or(""))
     }
 
     /// Whether one of the records has this name.
     pub(super) fn is_a(&self, name: &str) -> bool {
-        self.records.iter().any(|r| self.file.bytes(r.name) == name.as_bytes())
+        self.records.iter().any(|r| self.file.name(r) == name.as_bytes())
     }
 
     /// Whether one of the records has one of these names.
@@ -188,7 +195,7 @@ impl<'f, 'a> Entity<'f, 'a> {
     /// Returns the parameters that the record `name` adds: all of them in a complex instance, those after the `inherited` first ones in a
     /// simple instance. `None` without such a record, empty where it has no more than are inherited.
     pub(super) fn attributes(&self, name: &str, inherited: usize) -> Option<Args<'f, 'a>> {
-        let record = self.records.iter().find(|r| self.file.bytes(r.name) == name.as_bytes())?;
+        let record = self.records.iter().find(|r| self.file.name(r) == name.as_bytes())?;
         let args = self.file.args(record.values);
         // A complex instance has each type's attributes in its own record; a simple one writes those of its
         // supertypes first.
@@ -308,7 +315,7 @@ impl<'f, 'a> Args<'f, 'a> {
             Value::Typed(t) => {
                 // A typed value is a record without an id: a name and what stands in its brackets.
                 let record = self.file.typed[t as usize];
-                Some((std::str::from_utf8(self.file.bytes(record.name)).ok()?, self.file.args(record.values)))
+                Some((std::str::from_utf8(self.file.name(&record)).ok()?, self.file.args(record.values)))
             }
             _ => None,
         }

@@ -1,6 +1,6 @@
 //! The one pass over the text: statements into the arena of values, faults noted and stepped over.
 
-use super::{Fault, File, Index, Instance, Record, Span, Value, number::number};
+use super::{Fault, File, Index, Instance, Keyword, Record, Span, Value, number::number};
 use crate::step::{Error, ErrorKind};
 use rustc_hash::FxHashMap;
 use std::collections::hash_map::Entry;
@@ -126,14 +126,14 @@ impl Parser<'_> {
                     }
                 }
                 c if c.is_ascii_alphabetic() => {
-                    let keyword = self.identifier();
-                    marked |= &self.source[keyword.range()] == b"ISO-10303-21";
+                    let name = Keyword::new(self.source, self.identifier());
+                    marked |= name.bytes(self.source) == b"ISO-10303-21";
                     // A long word at the very beginning is some other kind of file.
                     if !marked && self.instances.is_empty() && self.at - start > 64 {
                         return false;
                     }
                     let outcome = if self.peek() == b'(' {
-                        self.list(0).map(|values| self.header.push(Record { name: keyword, values }))
+                        self.list(0).map(|values| self.header.push(Record { name, values }))
                     } else {
                         Ok(())
                     };
@@ -294,7 +294,7 @@ impl Parser<'_> {
         if !(c.is_ascii_alphabetic() || c == b'!' || c == b'_') {
             return Err("a record's name is missing");
         }
-        let name = self.identifier();
+        let name = Keyword::new(self.source, self.identifier());
         if self.peek() != b'(' {
             return Err("'(' is missing behind a record's name");
         }
@@ -369,7 +369,7 @@ impl Parser<'_> {
                 value
             }
             c if c.is_ascii_alphabetic() || c == b'!' => {
-                let name = self.identifier();
+                let name = Keyword::new(self.source, self.identifier());
                 if self.peek() != b'(' {
                     return Err("'(' is missing behind the name of a typed value");
                 }
