@@ -10,9 +10,18 @@ const SIDE: f64 = 10.0;
 /// How far apart two vertices stand that the file joins by an edge of nothing, mm.
 const APART: f64 = 2e-5;
 
+/// Reads what [`solid_text`] writes.
+fn solid(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: Option<[usize; 2]>) -> Import {
+    read(&solid_text(corners, faces, senses, tiny))
+}
+
+fn read(text: &str) -> Import {
+    read_bytes("solid.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
+}
+
 /// A solid with plane faces, given by the corners of each, counter-clockwise from outside. `senses` are the faces' flags; `tiny` is a pair of
 /// corners whose edge has a curve that leaves both at one parameter.
-fn solid(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: Option<[usize; 2]>) -> Import {
+fn solid_text(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: Option<[usize; 2]>) -> String {
     let mut data = String::new();
     let triple = |p: [f64; 3]| format!("({:?},{:?},{:?})", p[0], p[1], p[2]);
     let minus = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|i| a[i] - b[i]);
@@ -85,11 +94,10 @@ fn solid(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: Option
     let frame = "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
                  #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
                  #5=MANIFOLD_SOLID_BREP('',#4);\n#6=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#5),#1);\n";
-    let text = format!(
+    format!(
         "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n{frame}#4=CLOSED_SHELL('',({}));\n{data}ENDSEC;\nEND-ISO-10303-21;\n",
         shell.join(",")
-    );
-    read_bytes("solid.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
+    )
 }
 
 /// Corners of a cube; the last one stands a little before the one at (0, 10, 10) on the edge from (0, 0, 10).
@@ -141,4 +149,65 @@ fn a_face_whose_flag_contradicts_its_edges_looks_outwards() {
     assert_closes(&import);
     let said = import.report.repairs.iter().filter(|r| r.reason.contains("its sense contradicts")).count();
     assert_eq!(said, 1, "{:?}", import.report.repairs);
+}
+
+/// A cubic void inside of a cube, once as the schema asks for it and once with faces that look into it already below a shell that turns them.
+#[test]
+fn a_void_that_is_turned_once_too_often_encloses_a_hole() {
+    let side = 4.0;
+    let inner = cube_corners().into_iter().take(8).map(|p| p.map(|x| 3.0 + x * side / SIDE));
+    let corners: Vec<[f64; 3]> = cube_corners().into_iter().take(8).chain(inner).collect();
+    for turned_once_more in [false, true] {
+        let voids = CUBE.map(|face| {
+            let mut face: Vec<usize> = face.iter().map(|k| k + 8).collect();
+            if turned_once_more {
+                face.reverse();
+            }
+            face
+        });
+        let faces: Vec<&[usize]> = CUBE.into_iter().chain(voids.iter().map(|f| f.as_slice())).collect();
+        let ids = |range: std::ops::Range<usize>| {
+            range.map(|f| format!("#{}", 100_006 + 10 * f)).collect::<Vec<_>>().join(",")
+        };
+        let shells = format!(
+            "#5=BREP_WITH_VOIDS('',#7,(#8));#7=CLOSED_SHELL('',({}));#8=ORIENTED_CLOSED_SHELL('',*,#9,.F.);#9=CLOSED_SHELL('',({}));",
+            ids(0..6),
+            ids(6..12)
+        );
+        let text = solid_text(&corners, &faces, &[".T."; 12], None);
+        let import = read(&text.replace("#5=MANIFOLD_SOLID_BREP('',#4);", &shells));
+        let report = tessellate(&import.model, &tessellate::Settings::uniform(0.1)).report;
+        let volume = report.volume_mm3.expect("closed");
+        assert!((volume - (SIDE.powi(3) - side.powi(3))).abs() < 1e-6, "{turned_once_more}: {volume}");
+        let said = import.report.repairs.iter().filter(|r| r.reason.contains("void was inside out")).count();
+        assert_eq!(said, usize::from(turned_once_more));
+    }
+}
+
+/// A file with short names in place of the long ones is the same solid.
+#[test]
+fn short_names_are_read_as_the_long_ones() {
+    let mut text = solid_text(&cube_corners(), &CUBE, &[".T."; 6], None);
+    for (long, short) in [
+        ("CARTESIAN_POINT", "CRTPNT"),
+        ("VERTEX_POINT", "VRTPNT"),
+        ("DIRECTION", "DRCTN"),
+        ("EDGE_CURVE", "EDGCRV"),
+        ("ORIENTED_EDGE", "ORNEDG"),
+        ("AXIS2_PLACEMENT_3D", "A2PL3D"),
+        ("EDGE_LOOP", "EDGLP"),
+        ("FACE_OUTER_BOUND", "FCOTBN"),
+        ("ADVANCED_FACE", "ADVFC"),
+        ("CLOSED_SHELL", "CLSSHL"),
+        ("MANIFOLD_SOLID_BREP", "MNSLBR"),
+        ("ADVANCED_BREP_SHAPE_REPRESENTATION", "ABSR"),
+        ("GLOBAL_UNIT_ASSIGNED_CONTEXT", "GUAC"),
+        ("LENGTH_UNIT", "LNGUNT"),
+        ("PLANE_ANGLE_UNIT", "PLANUN"),
+        ("SI_UNIT", "SUNT"),
+    ] {
+        assert!(text.contains(long));
+        text = text.replace(long, short);
+    }
+    assert_closes(&read(&text));
 }

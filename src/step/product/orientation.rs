@@ -74,8 +74,9 @@ pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
     out
 }
 
-/// Whether the faces of the outer shell of a solid, all of them, are certainly turned inwards; false where that is not certain.
-pub(crate) fn is_inside_out(faces: &[Face]) -> bool {
+/// Whether the faces of a shell of a solid, all of them, certainly look the wrong way: inwards, or away from what a `void` encloses; false
+/// where that is not certain.
+pub(crate) fn is_inside_out(faces: &[Face], void: bool) -> bool {
     let loops: Vec<Vec<Vec<Uv>>> = faces.par_iter().map(loop_polygons).collect();
     // About the middle of the solid the terms are least, and what cancels between faces with them.
     let around = Aabb::from_points(faces.iter().map(|f| f.surface.evaluate(domain_center(f))));
@@ -85,7 +86,9 @@ pub(crate) fn is_inside_out(faces: &[Face]) -> bool {
     let flux = |grid: usize| {
         let of = |(face, loops): (&Face, &Vec<Vec<Uv>>)| flux(face, loops, around.center(), grid);
         let parts: Vec<[f64; 2]> = faces.par_iter().zip(&loops).map(of).collect();
-        parts.into_iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d])
+        let [volume, whole] = parts.into_iter().fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        // The faces of a void look into it, away from the solid: a right one has a negative volume.
+        [if void { -volume } else { volume }, whole]
     };
     // Most shells are right: a coarse look is enough to leave them.
     let [volume, _] = flux(GRIDS[0]);
@@ -172,11 +175,13 @@ mod tests {
 
     #[test]
     fn a_block_is_turned_but_nothing_without_sense() {
-        assert!(!is_inside_out(&block([1.0, 2.0, 3.0], false)));
-        assert!(is_inside_out(&block([1.0, 2.0, 3.0], true)));
-        assert!(!is_inside_out(&[]));
+        for void in [false, true] {
+            assert!(!is_inside_out(&block([1.0, 2.0, 3.0], void), void));
+            assert!(is_inside_out(&block([1.0, 2.0, 3.0], !void), void));
+            assert!(!is_inside_out(&[], void));
+        }
         let mut odd = block([1.0, 1.0, 1.0], true);
         odd.iter_mut().take(3).for_each(|f| f.reversed = false);
-        assert!(!is_inside_out(&odd), "no sense in it");
+        assert!(!is_inside_out(&odd, false), "no sense in it");
     }
 }
