@@ -337,6 +337,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "styles",
             "purpose",
             "relations",
+            "usage_names",
             "assembly",
             "placed_count",
             "tessellated",

@@ -122,3 +122,38 @@ fn what_a_broken_transformation_places_is_named_and_left_out() {
         }
     }
 }
+
+/// Two places of a lens and one of a ring, under names that tell nothing (blank, a translator's default, one for all) and under good ones.
+#[test]
+fn places_without_a_name_of_their_own_are_named_by_their_products() {
+    let products = "#101=PRODUCT_DEFINITION('','',$,$);\n#102=PRODUCT_DEFINITION('','',#122,$);\n#103=PRODUCT_DEFINITION('','',#123,$);\n\
+                    #122=PRODUCT_DEFINITION_FORMATION('','',#132);\n#132=PRODUCT('7','lens ','',());\n\
+                    #123=PRODUCT_DEFINITION_FORMATION('','',#133);\n#133=PRODUCT('ring',' ','',());\n\
+                    #104=PRODUCT_DEFINITION_SHAPE('','',#102);\n#105=SHAPE_DEFINITION_REPRESENTATION(#104,#6);\n\
+                    #106=PRODUCT_DEFINITION_SHAPE('','',#103);\n#107=SHAPE_DEFINITION_REPRESENTATION(#106,#206);\n\
+                    #206=SHAPE_REPRESENTATION('',(#901),#1);\n";
+    let text = square(FORWARD, IN_ORDER);
+    let face = text.lines().find_map(|l| l.strip_prefix("#900=")).expect("the face");
+    let by_product = ["lens:1", "lens:2", "ring"];
+    for (names, expected) in [
+        ([" ", "", " "], by_product),
+        (["Next assembly relationship"; 3], by_product),
+        (["part"; 3], by_product),
+        (["front", "back", "rim "], ["front", "back", "rim"]),
+        (["Next assembly relationship", "back", "rim"], ["lens", "back", "rim"]),
+    ] {
+        let usages: String = [102, 102, 103]
+            .iter()
+            .zip(names)
+            .enumerate()
+            .map(|(k, (child, name))| {
+                format!("#{}=NEXT_ASSEMBLY_USAGE_OCCURRENCE('{k}','{name}','',#101,#{child},$);\n", 300 + k)
+            })
+            .collect();
+        let import = import(&format!("{text}#901={face}\n{products}{usages}"));
+        let found: Vec<&str> = import.model.instances.iter().map(|i| i.name.as_str()).collect();
+        assert_eq!(found, expected, "{names:?}");
+        let parts: Vec<&str> = import.model.parts.iter().map(|p| p.name.as_str()).collect();
+        assert_eq!(parts, ["lens", "ring"]);
+    }
+}

@@ -5,6 +5,7 @@
 
 use super::purpose::{holds_mesh, purpose_besides_shape};
 use super::relations::{WITH_TRANSFORMATION, property_attributes, related_representations};
+use super::usage_names::{Usage, name_usages, product_name};
 use crate::math::Frame;
 use crate::step::geometry::units::Units;
 use crate::step::geometry::{FARTHEST_MM, Geometry};
@@ -33,12 +34,6 @@ pub(crate) struct PlacedRepresentation {
 pub(super) struct Link {
     pub(super) to: u64,
     placement: Option<Frame>,
-}
-
-pub(super) struct Usage {
-    pub(super) child: u64,
-    name: String,
-    id: u64,
 }
 
 /// The structure of a file, and the state of the walk through it.
@@ -104,8 +99,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 a.read_shape_definition(args.entity(0), args.id(1));
             } else if let Some(args) = e.attributes("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0) {
                 if let (Some(parent), Some(child)) = (args.id(3), args.id(4)) {
-                    let name = args.text(1).filter(|n| !n.is_empty()).unwrap_or_else(|| args.name(0));
-                    a.usages.entry(parent).or_default().push(Usage { child, name, id: e.id });
+                    a.usages.entry(parent).or_default().push(Usage { child, name: String::new(), id: e.id });
                 }
             } else if e.is_a("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION") {
                 contextual.push(e);
@@ -113,6 +107,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 relations.push(e);
             }
         }
+        a.usages.values_mut().for_each(|usages| name_usages(file, usages));
         let mut used = FxHashSet::default();
         for e in contextual {
             a.read_contextual(e, &mut used);
@@ -278,17 +273,6 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
     }
 
-    /// Returns the product's name, or else its id; empty where it cannot be found: what uses it names it then.
-    fn product_name(&self, definition: u64) -> String {
-        let product = || {
-            let formation = self.file.entity(definition)?.attributes("PRODUCT_DEFINITION", 0)?.entity(2)?;
-            let product = formation.args().entity(2)?;
-            let args = product.attributes("PRODUCT", 0)?;
-            args.text(1).filter(|n| !n.trim().is_empty()).or_else(|| args.text(0))
-        };
-        product().unwrap_or_default()
-    }
-
     /// Places a product with its representations and its children; `path` holds the products around it.
     fn place_product(
         &mut self,
@@ -309,7 +293,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             return;
         }
         path.push(definition);
-        let product = self.product_name(definition);
+        let product = product_name(self.file, definition);
         for representation in self.shapes.get(&definition).cloned().into_iter().flatten() {
             self.place_representation(representation, placement, (&name, &product), &mut Vec::new(), owners);
         }
