@@ -4,8 +4,9 @@ use super::prepared_scene::PreparedScene;
 use super::settings::IntersectorKind;
 use crate::simulate::{PartialRun, Results, Verification};
 use crate::study::cross_check::CrossCheck;
-use crate::study::figures::{self, ReceiverFigures, Surface};
+use crate::study::figures::{self, Figure, ReceiverFigures, Surface};
 use crate::study::geometric_error::GeometricError;
+use crate::study::model_figures;
 use serde_json::Value;
 
 /// The results of a run with what else was found out about it.
@@ -26,12 +27,21 @@ pub struct SceneResults {
 impl SceneResults {
     /// Returns the figures of every receiver with both their errors; the geometric one is absent where facets were not compared.
     pub fn figures(&self, prepared: &PreparedScene) -> Vec<ReceiverFigures> {
-        let surface = match (prepared.choice.intersector, &self.geometric) {
+        figures::figures(&self.results, self.surface(prepared), prepared.power_unit())
+    }
+
+    /// Returns the powers that bodies and media took, with both their errors, as [`Results::absorbed`] lists them.
+    pub fn absorbed_figures(&self, prepared: &PreparedScene) -> Vec<Figure> {
+        model_figures::absorbed_figures(&self.results, self.surface(prepared), prepared.power_unit())
+    }
+
+    /// Where hits were found, with what is known of facets.
+    fn surface(&self, prepared: &PreparedScene) -> Surface<'_> {
+        match (prepared.choice.intersector, &self.geometric) {
             (IntersectorKind::Exact, _) => Surface::Spline,
             (_, Some(error)) => Surface::Facets(error),
             (_, None) => Surface::Unmeasured,
-        };
-        figures::figures(&self.results, surface, prepared.power_unit())
+        }
     }
 
     /// Returns the errors of a receiver's cells from the facets, in its unit; zeros on the spline, `None` where they are not known, empty
@@ -89,6 +99,9 @@ impl SceneResults {
         }
         for (k, figures) in self.figures(prepared).iter().enumerate() {
             document["receivers"][k]["figures"] = serde_json::to_value(figures)?;
+        }
+        for (k, figure) in self.absorbed_figures(prepared).iter().enumerate() {
+            document["absorbed"][k]["figure"] = serde_json::to_value(figure)?;
         }
         for (k, errors) in self.geometric_face_errors(prepared).into_iter().enumerate() {
             for (key, place) in [("absorbed_geometric", 0), ("entered_geometric", 1), ("left_geometric", 2)] {

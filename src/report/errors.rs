@@ -3,7 +3,7 @@
 use super::maps::spoken;
 use super::{Cell, Table, figures, grouped, seconds};
 use crate::intersect::NormalMode;
-use crate::simulate::Results;
+use crate::simulate::{Absorbed, Results};
 use crate::study::default_accuracy::Chosen;
 use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
@@ -51,9 +51,15 @@ pub(super) fn channel_totals(all: &ReceiverFigures) -> String {
 
 /// Writes where the facets, not the number of rays, decide the answer: the figures on facets and on the true surfaces; empty where they do
 /// not.
-pub(super) fn facet_limits(error: &GeometricError, all: &[ReceiverFigures]) -> String {
-    let said: Vec<String> =
-        error.receivers.iter().zip(all).map(|(r, f)| sentence(r, f)).filter(|s| !s.is_empty()).collect();
+pub(super) fn facet_limits(
+    error: &GeometricError,
+    results: &Results,
+    all: &[ReceiverFigures],
+    absorbed: &[Figure],
+) -> String {
+    let of_receivers = error.receivers.iter().zip(all).map(|(r, f)| sentence(r, f));
+    let of_bodies = results.absorbed.iter().zip(absorbed).map(|(a, figure)| absorbed_sentence(error, a, figure));
+    let said: Vec<String> = of_receivers.chain(of_bodies).filter(|s| !s.is_empty()).collect();
     if said.is_empty() {
         return String::new();
     }
@@ -104,6 +110,25 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
     if parts.is_empty() { String::new() } else { format!("on {} {}", spoken(&r.name), parts.join(", ")) }
 }
 
+/// Writes what facets change of the power that a body or medium took, as far as it is beyond doubt and limits that figure; else nothing.
+fn absorbed_sentence(error: &GeometricError, absorbed: &Absorbed, figure: &Figure) -> String {
+    let measured = error.absorbed.iter().find(|e| e.index == absorbed.index);
+    match measured.filter(|e| e.power.is_significant() && figure.limited_by == Limit::Geometry) {
+        Some(e) => format!(
+            "{} absorbs {} % other power in {}",
+            spoken(&e.name),
+            figures(100.0 * (e.power.facets / e.power.spline - 1.0), 2),
+            e.r#in
+        ),
+        None => String::new(),
+    }
+}
+
+/// Makes the cells of both errors of a figure, that of facets a dash where it is not known.
+pub(super) fn error_cells(figure: &Figure) -> [Cell; 2] {
+    [Cell::Number(figure.statistical, 2), figure.geometric.map_or_else(|| "–".into(), |g| Cell::Number(g, 2))]
+}
+
 /// Writes the seconds that halving the statistical error takes at most, and where `error` tells, a run at half the tolerance or on the
 /// spline.
 pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) -> String {
@@ -133,6 +158,28 @@ pub(super) fn choice_sentence(chosen: &Chosen) -> String {
     format!("Traced {how}, because {}. ", chosen.because)
 }
 
+/// Makes a table of where the power went, what bodies and media took with both its errors.
+pub(super) fn power_table(results: &Results, absorbed: &[Figure], unit: &str) -> Table {
+    let columns = [("", ""), ("power", unit), ("share", "%"), ("± rays (1σ)", unit), ("± facets (1σ)", unit)];
+    let p = &results.power;
+    let mut table = Table::new("power", "Where the power went", &columns).caption(format!(
+        "Emitted is the sum of the others to {} of it. Received counts receivers that end light; one that lets it pass counts it again.",
+        figures(p.imbalance(), 1)
+    ));
+    let cells = |name: &str, power: f64| {
+        [name.into(), Cell::Number(power, 6), Cell::Number(100.0 * power / p.emitted, 5)].into_iter()
+    };
+    table.row(cells("emitted", p.emitted));
+    table.row(cells("received", p.received));
+    for (a, figure) in results.absorbed.iter().zip(absorbed) {
+        table.row(cells(&format!("absorbed in {} ({})", a.name, a.r#in), a.power).chain(error_cells(figure)));
+    }
+    table.row(cells("escaped", p.escaped));
+    table.row(cells("cut off by limits", p.cut_off));
+    table.row(cells("lost", p.lost));
+    table
+}
+
 /// Makes a table of every figure with both its errors.
 pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures]) -> Table {
     let columns = [
@@ -153,13 +200,14 @@ pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures]) -> Table 
                 Limit::Statistics => "rays",
                 Limit::Geometry => "facets",
             };
+            let [statistical, geometric] = error_cells(figure);
             table.row([
                 r.name.as_str().into(),
                 name.into(),
                 Cell::Number(figure.value, 6),
                 figure.unit.as_str().into(),
-                Cell::Number(figure.statistical, 2),
-                figure.geometric.map_or_else(|| "–".into(), |g| Cell::Number(g, 2)),
+                statistical,
+                geometric,
                 limit.into(),
             ]);
         }

@@ -8,8 +8,8 @@ use super::{errors, figures, grouped, receiver_blocks, seconds};
 use crate::formats::{Facets, Grid, Polylines};
 use crate::regulation::Assessment;
 use crate::simulate::{Event, PathVertex, Results};
-use crate::study::{cross_check::CrossCheck, default_accuracy::Chosen};
-use crate::study::{figures::ReceiverFigures, geometric_error::GeometricError};
+use crate::study::figures::{Figure, ReceiverFigures};
+use crate::study::{cross_check::CrossCheck, default_accuracy::Chosen, geometric_error::GeometricError};
 
 /// Share of the power from which on light that limits cut off is spoken of: below it no figure of four digits changes.
 const WORTH_A_SENTENCE: f64 = 1e-4;
@@ -37,6 +37,8 @@ pub struct SimulationReport<'a> {
     pub figures: &'a [ReceiverFigures],
     /// Some of the rays on facets and on the spline, where the run was on facets.
     pub geometric: Option<&'a GeometricError>,
+    /// The powers that bodies and media took, with both errors.
+    pub absorbed: &'a [Figure],
     /// Why the run was traced as it was, where it was not asked for.
     pub chosen: Option<&'a Chosen>,
     /// What regulations say of receivers, by their index.
@@ -132,7 +134,7 @@ impl SimulationReport<'_> {
         );
         text += &self.verdicts.iter().map(|(_, a)| verdict_sentence(a)).collect::<String>();
         text += &self.cut_off();
-        text.extend(self.geometric.map(|g| errors::facet_limits(g, self.figures)));
+        text.extend(self.geometric.map(|g| errors::facet_limits(g, self.results, self.figures, self.absorbed)));
         text.extend(self.chosen.map(errors::choice_sentence));
         if let Some(check) = self.check {
             text += &verdict(check);
@@ -240,24 +242,6 @@ impl SimulationReport<'_> {
 
     /// Makes the section on where the power went: emitted to lost, each receiver, and all figures with both errors.
     fn energy(&self) -> Section {
-        let p = &self.results.power;
-        let mut table = Table::new("power", "Where the power went", &[("", ""), ("power", self.unit), ("share", "%")])
-            .caption(format!(
-                "Emitted is the sum of the others to {} of it. Received counts receivers that end light; one that lets it pass \
-                 counts it again.",
-                figures(p.imbalance(), 1)
-            ));
-        let mut row = |name: &str, power: f64| {
-            table.row([name.into(), Cell::Number(power, 6), Cell::Number(100.0 * power / p.emitted, 5)]);
-        };
-        row("emitted", p.emitted);
-        row("received", p.received);
-        for a in &self.results.absorbed {
-            row(&format!("absorbed in {} ({})", a.name, a.r#in), a.power);
-        }
-        row("escaped", p.escaped);
-        row("cut off by limits", p.cut_off);
-        row("lost", p.lost);
         let columns = [
             ("receiver", ""),
             ("power", self.unit),
@@ -271,6 +255,7 @@ impl SimulationReport<'_> {
             ("rms 2", "mm or °"),
             ("± (1σ)", "mm or °"),
         ];
+        let power = errors::power_table(self.results, self.absorbed, self.unit);
         let mut receivers = Table::new("receivers", "Receivers", &columns);
         for r in &self.results.receivers {
             receivers.row([
@@ -287,7 +272,7 @@ impl SimulationReport<'_> {
                 Cell::Number(r.rms_error[1], 2),
             ]);
         }
-        let section = Section::new("Energy").with_block(table).with_block(receivers);
+        let section = Section::new("Energy").with_block(power).with_block(receivers);
         let section = section.with_block(errors::figure_table(self.results, self.figures));
         let section = section.with_block(errors::halving_cost(self.results, self.geometric).as_str());
         let measured = self.geometric.filter(|g| g.rays > 0).map(errors::change_table).into_iter();

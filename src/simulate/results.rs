@@ -127,6 +127,9 @@ pub struct Absorbed {
     pub power: f64,
     /// Its standard error.
     pub error: f64,
+    /// Its place in [`Tallies::of_model`].
+    #[serde(skip)]
+    pub index: usize,
 }
 
 impl Results {
@@ -215,15 +218,17 @@ fn few_replicates(replicates: u32) -> Option<String> {
 
 /// Returns the power that the faces of each instance and the medium of each body have taken; those that took none are left out.
 fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absorbed> {
-    let result = |name: &str, r#in: &str, s: &Sum| Absorbed {
+    let faces = bound.instances.iter().map(|name| (name.as_str(), "faces"));
+    // Media and faces apart: whoever tunes an absorption asks about the one, whoever chooses a paint about the
+    // other.
+    let bulk = bound.bodies.iter().map(|b| (b.name.as_str(), b.medium.as_str()));
+    let result = |(index, ((name, r#in), s)): (usize, ((&str, &str), &Sum))| Absorbed {
         name: name.into(),
         r#in: r#in.into(),
         power: s.total as f64 * quantum,
         error: s.error(tallies.replicates) * quantum,
+        index,
     };
-    let faces = bound.instances.iter().zip(&tallies.instances).map(|(name, s)| result(name, "faces", s));
-    // Media and faces apart: whoever tunes an absorption asks about the one, whoever chooses a paint about the
-    // other.
-    let bulk = bound.bodies.iter().zip(&tallies.bulk).map(|(b, s)| result(&b.name, &b.medium, s));
-    faces.chain(bulk).filter(|a| a.power > 0.0).collect()
+    let places = faces.chain(bulk).zip(tallies.of_model()).enumerate();
+    places.filter(|(_, (_, s))| s.total > 0).map(result).collect()
 }

@@ -293,6 +293,11 @@ impl Tallies {
         self.sort_paths();
     }
 
+    /// Goes through what the model took: the faces of each instance, then the inside of each body.
+    pub fn of_model(&self) -> impl Iterator<Item = &Sum> {
+        self.instances.iter().chain(&self.bulk)
+    }
+
     /// Sorts the vertices of paths by ray, branch, bounce and event.
     pub(crate) fn sort_paths(&mut self) {
         self.paths.sort_by_key(|v| (v.ray, v.branch, v.bounce, v.event));

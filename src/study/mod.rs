@@ -22,6 +22,7 @@ mod hit_errors;
 pub mod interpolation;
 pub mod lamp;
 mod mesh_source;
+pub mod model_figures;
 mod model_mesh_source;
 mod quantiles;
 mod random;

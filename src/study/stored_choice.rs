@@ -5,12 +5,12 @@
 
 use super::default_accuracy::{Alternative, Chosen};
 use super::geometric_error::{
-    ChannelError, FaceError, GeometricError, MapError, Paired, ReceiverError, Statistical,
+    AbsorbedError, ChannelError, FaceError, GeometricError, MapError, Paired, ReceiverError, Statistical,
 };
 use crate::intersect::NormalMode;
 
 /// The first word; what begins with another is of another version.
-const FORM: u64 = 2;
+const FORM: u64 = 3;
 /// What a choice can name, by its number.
 const INTERSECTORS: [&str; 2] = ["octree", "exact"];
 /// What positions on a receiver are counted in, by its number.
@@ -126,13 +126,24 @@ fn exchange_alternative(words: &mut dyn Words, alternative: &mut Alternative) ->
 
 /// Goes through what facets change of a run.
 fn exchange_error(words: &mut dyn Words, error: &mut GeometricError) -> Option<()> {
-    let GeometricError { rays, lost, segments_per_ray, seconds, receivers, faces } = error;
+    let GeometricError { rays, lost, segments_per_ray, seconds, receivers, absorbed, faces } = error;
     words.word(rays)?;
     exchange_numbers(words, lost)?;
     exchange_number(words, segments_per_ray)?;
     exchange_numbers(words, seconds)?;
     exchange_list(words, receivers, &ReceiverError::default(), exchange_receiver)?;
+    exchange_list(words, absorbed, &AbsorbedError::default(), exchange_absorbed)?;
     exchange_list(words, faces, &FaceError::default(), exchange_face)
+}
+
+/// Goes through what they change of the power that a body or medium took.
+fn exchange_absorbed(words: &mut dyn Words, absorbed: &mut AbsorbedError) -> Option<()> {
+    let AbsorbedError { name, r#in, power, statistical, index } = absorbed;
+    exchange_text(words, name)?;
+    exchange_text(words, r#in)?;
+    exchange_paired(words, power)?;
+    exchange_number(words, statistical)?;
+    exchange_count(words, index)
 }
 
 /// Goes through what they change of a face.
@@ -310,6 +321,13 @@ mod tests {
             segments_per_ray: 4.5,
             seconds: [0.25, 0.5],
             receivers: vec![receiver, ReceiverError::default()],
+            absorbed: vec![AbsorbedError {
+                name: "Körper".into(),
+                r#in: "faces".into(),
+                power: paired(13.0),
+                statistical: 0.01,
+                index: 5,
+            }],
             faces: vec![FaceError { face: 12, absorbed: paired(10.0), entered: paired(11.0), left: paired(12.0) }],
         };
         Chosen {

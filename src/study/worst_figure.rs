@@ -26,17 +26,16 @@ pub(super) struct Worst {
 /// 0 and no name where facets change nothing.
 pub(super) fn worst_figure(error: &GeometricError, settings: &RunSettings, scale: f64) -> Worst {
     let order = if settings.sampling == Sampling::Sobol { NET_ORDER } else { RANDOM_ORDER };
+    let [sums, cells] = [scale.powf(-order), scale.powf(-RANDOM_ORDER)];
     let mut worst = Worst::default();
     for r in &error.receivers {
-        let mut weigh = |figure: &str, geometric: f64, allowed: f64, value: f64| {
-            // No figure is asked for beyond a millionth of itself.
-            let ratio = geometric / allowed.max(NEGLIGIBLE * value.abs()).max(f64::MIN_POSITIVE);
-            if ratio > worst.ratio {
-                let share = (value != 0.0).then(|| geometric / value.abs());
-                worst = Worst { ratio, share, figure: format!("{}: {figure}", r.name) };
-            }
-        };
-        each_figure(r, [scale.powf(-order), scale.powf(-RANDOM_ORDER)], &mut weigh);
+        each_figure(r, [sums, cells], &mut |figure, geometric, allowed, value| {
+            worst.weigh([&r.name, figure], geometric, allowed, value);
+        });
+    }
+    for a in &error.absorbed {
+        let figure = format!("absorbed in {}", a.r#in);
+        worst.weigh([&a.name, &figure], a.power.geometric(), a.statistical * sums, a.power.spline);
     }
     worst
 }
@@ -66,6 +65,16 @@ fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut
 }
 
 impl Worst {
+    /// Takes the figure `name`, of what and which, in place of the worst so far if it is worse.
+    fn weigh(&mut self, [of, figure]: [&str; 2], geometric: f64, allowed: f64, value: f64) {
+        // No figure is asked for beyond a millionth of itself.
+        let ratio = geometric / allowed.max(NEGLIGIBLE * value.abs()).max(f64::MIN_POSITIVE);
+        if ratio > self.ratio {
+            let share = (value != 0.0).then(|| geometric / value.abs());
+            *self = Self { ratio, share, figure: format!("{of}: {figure}") };
+        }
+    }
+
     /// Writes which figure facets change most, by which share of it and of its standard error; "not at all" where they change none.
     pub(super) fn in_words(&self) -> String {
         if self.figure.is_empty() {

@@ -388,6 +388,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "effects",
             "geometric_error",
             "figures",
+            "model_figures",
             "worst_figure",
             "default_accuracy",
             "stored_choice",

@@ -10,6 +10,7 @@ use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
 use lampyris::study::default_accuracy::{Chosen, PilotSource, TimedFacets, Undecided, choose};
 use lampyris::study::figures::{Figure, Limit, ReceiverFigures, Surface, figures};
 use lampyris::study::geometric_error::geometric_error;
+use lampyris::study::model_figures::absorbed_figures;
 use lampyris::study::{FacetTree, MeshSource, ModelMeshSource, Random};
 use lampyris::tessellate::{self, GroupedFacets, Tessellation, tessellate};
 use lampyris::truck::{Conic, Lens};
@@ -139,6 +140,57 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
     let max = named(&answer.figures[0], "max");
     assert!((max.value - truth).abs() < 3.0 * max.combined(), "{max:?}, truly {truth}");
     assert!(max.geometric.is_some_and(|g| g <= max.statistical), "{max:?}");
+}
+
+/// A black ball in the middle of a beam of twice its radius takes a quarter of the light; facets within the sphere take less, and neither
+/// the choice nor the figures keep silent on it, though no receiver sees it.
+#[test]
+fn what_a_black_ball_takes_is_judged_without_a_receiver() {
+    let ball = known_scenes::ball(1.0, 1.5);
+    let text = "[[source]]\nkind = 'collimated'\nat = [0, 0, -5]\nradius = 2\n";
+    let known = KnownScene { text: text.into(), figures: Vec::new(), ..ball };
+    let (bound, settings) = bind(&known);
+    let run = RunSettings { rays: 200_000, ..settings };
+    let answer = default_answer_of(&known, &run);
+    assert_eq!(answer.chosen.intersector, "exact", "{}", answer.chosen.because);
+    let tried = &answer.chosen.alternatives[0];
+    assert!(tried.figure.starts_with("ball") && tried.figure.ends_with("absorbed in faces"), "{tried:?}");
+    let [on_spline] = &absorbed_figures(&answer.results, Surface::Spline, "W")[..] else { panic!("one body") };
+    assert!((on_spline.value - 0.25).abs() < 3.0 * on_spline.combined(), "{on_spline:?}");
+
+    // On facets that were asked for.
+    let source = ModelMeshSource::new(&known.model);
+    let mesh = tessellate(&known.model, &tessellate::Settings::default()).mesh;
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let results = simulate(&bound, &octree, &run, &|_| true);
+    let few = RunSettings { rays: 16_384, replicates: 64, ..run };
+    let error = geometric_error(&bound, [&octree, source.exact()], &few);
+    let surface = Surface::Facets(&error);
+    let [body] = &absorbed_figures(&results, surface, "W")[..] else { panic!("one body") };
+    let off = (body.value - 0.25).abs();
+    assert!(off > 10.0 * body.statistical, "the facets of this test are too good: {body:?}");
+    assert!(off < 3.0 * body.combined() && body.limited_by == Limit::Geometry, "{body:?}");
+    // Facets that nobody compared tell nothing of their error.
+    assert!(absorbed_figures(&results, Surface::Unmeasured, "W")[0].geometric.is_none());
+}
+
+/// What a medium takes is judged apart from its faces: of Beer's law over the chords of a ball of radius 1 in parallel light of its own
+/// refractive index, 1 − 2(1 − (1 + 2k)e⁻²ᵏ)/(2k)² is absorbed.
+#[test]
+fn what_a_glass_takes_is_judged_without_a_receiver() {
+    let ball = known_scenes::ball(1.0, 1.5);
+    let k = 0.5;
+    let text =
+        "[[medium]]\nname = 'glass'\nindex = 1\nabsorption_per_mm = 0.5\n[[material]]\npart = '*'\nmedium = 'glass'
+        [[source]]\nkind = 'collimated'\nat = [0, 0, -5]\nradius = 2\n";
+    let known = KnownScene { text: text.into(), figures: Vec::new(), ..ball };
+    let answer = default_answer(&known, 200_000, 2);
+    let chord = 2.0 * k;
+    let truth = 0.25 * (1.0 - 2.0 * (1.0 - (1.0 + chord) * f64::exp(-chord)) / (chord * chord));
+    assert!(answer.chosen.alternatives[0].figure.ends_with("absorbed in glass"), "{:?}", answer.chosen);
+    let surface = answer.chosen.geometric.as_ref().map_or(Surface::Spline, Surface::Facets);
+    let [glass] = &absorbed_figures(&answer.results, surface, "W")[..] else { panic!("one medium") };
+    assert!((glass.value - truth).abs() < 3.0 * glass.combined(), "{glass:?}, truly {truth}");
 }
 
 /// Light of one wavelength is in one of two bins: what facets change of that bin is what they change of the power, cell by cell.

@@ -16,7 +16,7 @@ use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults};
 use crate::regulation::Assessment;
 use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, grouped, path_lines};
 use crate::simulate::arrivals;
-use crate::study::figures::ReceiverFigures;
+use crate::study::figures::{Figure, ReceiverFigures};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -91,6 +91,7 @@ pub(crate) fn write(
         run.results.receivers[k].files = receiver_files::write(folder, receiver, geometric, rays)?;
     }
     let all_figures = run.figures(prepared);
+    let absorbed = run.absorbed_figures(prepared);
     let (paths, _) = path_lines(&run.results.paths);
     write_vtp(&folder.join("paths.vtp"), &paths)?;
     let mesh = &*prepared.facets.drawn(MOST_DRAWN);
@@ -122,7 +123,7 @@ pub(crate) fn write(
     if with_page {
         facets.labels = rule_table::face_labels(&prepared.job.loaded.model);
     }
-    let found = (all_figures.as_slice(), verdicts.as_slice());
+    let found = (all_figures.as_slice(), absorbed.as_slice(), verdicts.as_slice());
     let report = report_page(prepared, run, found, &facets, sentences, provenance);
     let answer = report.answer();
     if with_page {
@@ -136,7 +137,7 @@ pub(crate) fn write(
 fn report_page<'a>(
     prepared: &'a PreparedScene,
     run: &'a SceneResults,
-    (all_figures, verdicts): (&'a [ReceiverFigures], &'a [(usize, Assessment)]),
+    (all_figures, absorbed, verdicts): (&'a [ReceiverFigures], &'a [Figure], &'a [(usize, Assessment)]),
     facets: &'a Facets,
     sentences: Vec<String>,
     provenance: Provenance,
@@ -156,6 +157,7 @@ fn report_page<'a>(
         check: run.check.as_ref(),
         figures: all_figures,
         geometric: run.geometric.as_ref(),
+        absorbed,
         chosen: prepared.chosen.as_ref(),
         verdicts,
         sections: sequence_tables::sequence_section(

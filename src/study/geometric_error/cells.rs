@@ -3,8 +3,8 @@
 //! The square of a measured difference exceeds that of the true one by its variance, so sums of `d² − s²` over many cells tell a
 //! geometric error that no single cell could.
 
+use super::paired::{Paired, standard_error};
 use super::replicates::{ReplicateSums, ReplicatedRun};
-use super::{Paired, standard_error};
 use crate::simulate::{BoundScene, QUANTA};
 use serde::Serialize;
 
@@ -36,13 +36,13 @@ pub(super) struct Peak {
 
 /// One cell on facets and on the spline, in quanta.
 #[derive(Clone, Copy, Debug, Default)]
-struct Cell {
-    facets: f64,
-    spline: f64,
+pub(super) struct Cell {
+    pub(super) facets: f64,
+    pub(super) spline: f64,
     /// Sum over replicates of the squares of their differences, then the variance of the whole difference.
-    difference_variance: f64,
+    pub(super) difference_variance: f64,
     /// Sum of the squares of the spline's replicates, then the variance of the spline's cell.
-    spline_variance: f64,
+    pub(super) spline_variance: f64,
 }
 
 impl Cell {
@@ -87,22 +87,13 @@ impl<'r> CellPairs<'r> {
         let replicates = runs.map(|run| run.replicates.iter().filter_map(|r| r.get(k)).collect::<Vec<_>>());
         let grid = result.grid;
         let cells_of_layer = |layer: usize| {
-            let mut cells = vec![Cell::default(); grid[0] * grid[1]];
-            for (facets, spline) in replicates[0].iter().zip(&replicates[1]) {
-                add_replicate(&mut cells, facets.layers.get(layer)?, spline.layers.get(layer)?);
-            }
-            Some(cells)
+            let sums = |r: &'r ReplicateSums| r.layers.get(layer).map(Vec::as_slice);
+            let pairs = replicates[0].iter().zip(&replicates[1]).map(|(a, b)| Some([sums(a)?, sums(b)?]));
+            Some(paired_cells(grid[0] * grid[1], &pairs.collect::<Option<Vec<_>>>()?))
         };
         let worth = if layer == 0 { 1.0 } else { receiver.channels.worth() };
         let power = if worth == 1.0 { None } else { Some(cells_of_layer(0)?) };
-        let mut cells = cells_of_layer(layer)?;
-        // At least two, for a variance divides by one less.
-        let n = replicates[1].len().max(2) as f64;
-        for c in &mut cells {
-            let variance = |squares: f64, sum: f64| (squares - sum * sum / n).max(0.0) * n / (n - 1.0);
-            c.difference_variance = variance(c.difference_variance, c.difference());
-            c.spline_variance = variance(c.spline_variance, c.spline);
-        }
+        let cells = cells_of_layer(layer)?;
         // Lux and W/m² of cells in mm².
         let scale = if result.kind == "far_field" { 1.0 } else { 1e6 };
         let quantum = runs[1].results.quantum * worth;
@@ -228,6 +219,22 @@ impl<'r> CellPairs<'r> {
         }
         (layer, pooled)
     }
+}
+
+/// Sums up `count` cells from the pairs of what each replicate brought on facets and on the spline: lists of cell and quanta that rise by cell.
+pub(super) fn paired_cells(count: usize, replicates: &[[&[(u32, u64)]; 2]]) -> Vec<Cell> {
+    let mut cells = vec![Cell::default(); count];
+    for [facets, spline] in replicates {
+        add_replicate(&mut cells, facets, spline);
+    }
+    // At least two, for a variance divides by one less.
+    let n = replicates.len().max(2) as f64;
+    for c in &mut cells {
+        let variance = |squares: f64, sum: f64| (squares - sum * sum / n).max(0.0) * n / (n - 1.0);
+        c.difference_variance = variance(c.difference_variance, c.difference());
+        c.spline_variance = variance(c.spline_variance, c.spline);
+    }
+    cells
 }
 
 /// Adds what one replicate of both runs brought, lists of cell and quanta that rise by cell, to the sums of the cells.

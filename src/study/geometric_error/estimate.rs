@@ -2,8 +2,8 @@
 //!
 //! Ratios of sums are taken to first order: the standard error of a mean position is that of what each replicate adds to it.
 
+use super::paired::{Paired, standard_error};
 use super::replicates::{ReplicateSums, ReplicatedRun};
-use super::{Paired, standard_error};
 
 /// A figure of one run, and what each replicate adds to it to first order.
 struct Influence {

@@ -1,6 +1,6 @@
 //! What facets change of the power that each face absorbs and lets through, from replicates of the same rays.
 
-use super::Paired;
+use super::paired::Paired;
 use super::replicates::ReplicatedRun;
 use crate::simulate::PartialRun;
 use rustc_hash::FxHashMap;
@@ -107,7 +107,7 @@ pub(super) fn face_errors(runs: [&ReplicatedRun; 2]) -> Vec<FaceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::geometric_error::standard_error;
+    use crate::study::geometric_error::paired::standard_error;
 
     /// The error from sums is that of the replicates' differences.
     #[test]

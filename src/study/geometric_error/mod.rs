@@ -11,48 +11,21 @@
 mod cells;
 mod estimate;
 mod faces;
+mod model_powers;
+mod paired;
 mod replicates;
 
 pub use cells::MapError;
 pub use faces::FaceError;
+pub use model_powers::AbsorbedError;
+pub use paired::Paired;
 
 use cells::CellPairs;
 pub(in crate::study) use replicates::{MOST_CELLS, ReplicatedRun, trace_replicates};
 
 use crate::intersect::Intersector;
 use crate::simulate::{BoundScene, RunSettings};
-use serde::{Serialize, Serializer};
-
-/// A figure on facets and on the spline.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Paired {
-    /// The figure on facets.
-    pub facets: f64,
-    /// The figure on the spline.
-    pub spline: f64,
-    /// Standard error of the difference.
-    pub error: f64,
-}
-
-impl Paired {
-    /// Returns what the facets change, with how well that is known: one standard error of the figure on facets.
-    pub fn geometric(&self) -> f64 {
-        // An error that cannot be told from none is still no smaller than its own uncertainty.
-        (self.facets - self.spline).hypot(self.error)
-    }
-
-    /// Whether rays can tell the difference from none: it is beyond three of its standard errors.
-    pub fn is_significant(&self) -> bool {
-        (self.facets - self.spline).abs() > 3.0 * self.error
-    }
-}
-
-impl Serialize for Paired {
-    /// As `[facets, spline, error of the difference]`.
-    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        [self.facets, self.spline, self.error].serialize(s)
-    }
-}
+use serde::Serialize;
 
 /// What facets change of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -67,6 +40,9 @@ pub struct GeometricError {
     pub seconds: [f64; 2],
     /// Every receiver of the scene.
     pub receivers: Vec<ReceiverError>,
+    /// Bodies and media that took light.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub absorbed: Vec<AbsorbedError>,
     /// The faces that these rays met, by their number; empty unless the scene asks for the power by face.
     #[serde(skip)]
     pub faces: Vec<FaceError>,
@@ -163,6 +139,7 @@ pub(in crate::study) fn compare(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -
         segments_per_ray: results[1].segments as f64 / results[1].rays.max(1) as f64,
         seconds: results.map(|r| r.seconds.trace),
         receivers: (0..results[1].receivers.len()).map(|k| receiver_error(bound, runs, k)).collect(),
+        absorbed: model_powers::absorbed_errors(bound, runs),
         faces: faces::face_errors(runs),
     }
 }
@@ -231,12 +208,4 @@ impl ReceiverError {
     pub fn has_cells(&self) -> bool {
         self.peak_cells > 0
     }
-}
-
-/// Returns the standard error of a sum over replicates, from what each adds to it; 0 for fewer than two equal parts.
-fn standard_error(parts: impl Iterator<Item = f64>) -> f64 {
-    let parts: Vec<f64> = parts.collect();
-    let n = parts.len().max(2) as f64;
-    let mean = parts.iter().sum::<f64>() / n;
-    (parts.iter().map(|d| (d - mean).powi(2)).sum::<f64>() * n / (n - 1.0)).sqrt()
 }

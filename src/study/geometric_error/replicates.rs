@@ -26,6 +26,17 @@ pub(in crate::study) struct ReplicatedRun {
     pub(in crate::study) replicates: Vec<Vec<ReplicateSums>>,
     /// What each replicate brought to the faces that it reached, where the scene asks for that.
     pub(super) faces: Vec<FaceSums>,
+    /// What each replicate brought to bodies and media, as places of [`Tallies::of_model`](crate::simulate::Tallies::of_model), rising, with
+    /// quanta.
+    pub(super) of_model: Vec<Vec<(u32, u64)>>,
+}
+
+/// What one replicate brought to the receivers, to the faces, and to bodies and media.
+#[derive(Clone, Debug, Default)]
+struct Brought {
+    receivers: Vec<ReplicateSums>,
+    faces: FaceSums,
+    of_model: Vec<(u32, u64)>,
 }
 
 /// The sums of a run after some of its replicates.
@@ -37,6 +48,7 @@ struct Totals {
     cells: Vec<Vec<u128>>,
     channels: Vec<Vec<u128>>,
     faces: FaceTotals,
+    model: Vec<u128>,
 }
 
 /// Cells of a receiver that are kept apart.
@@ -59,9 +71,9 @@ impl KeptCells {
 }
 
 impl Totals {
-    /// Takes over the sums of a portion and returns the number of the one replicate that is new in it, with what it brought to each
-    /// receiver and to the faces; `None` where none is new.
-    fn advance(&mut self, portion: &PartialRun, kept: &[KeptCells]) -> Option<(u32, Vec<ReplicateSums>, FaceSums)> {
+    /// Takes over the sums of a portion and returns the number of the one replicate that is new in it, with what it brought; `None` where
+    /// none is new.
+    fn advance(&mut self, portion: &PartialRun, kept: &[KeptCells]) -> Option<(u32, Brought)> {
         // Portions are handed over one replicate at a time; the one that is not yet known is new.
         let new = *portion.done.iter().find(|r| self.done.binary_search(r).is_err())?;
         let tallies = &portion.tallies;
@@ -93,9 +105,17 @@ impl Totals {
             self.moments[k] = moments;
             brought
         });
-        let sums = sums.collect();
+        let receivers = sums.collect();
+        let mut of_model = Vec::new();
+        self.model.resize(tallies.of_model().count(), 0);
+        for (i, (before, now)) in self.model.iter_mut().zip(tallies.of_model()).enumerate() {
+            if *before != now.total {
+                of_model.push((i as u32, (now.total - *before) as u64));
+                *before = now.total;
+            }
+        }
         self.done.clone_from(&portion.done);
-        Some((new, sums, self.faces.advance(portion)))
+        Some((new, Brought { receivers, faces: self.faces.advance(portion), of_model }))
     }
 }
 
@@ -108,18 +128,23 @@ pub(in crate::study) fn trace_replicates(
     let count = replicates(bound, settings) as usize;
     let kept = bound.receivers.iter().map(|r| KeptCells::new(r.cell_count(), r.channels.count()));
     let kept: Vec<KeptCells> = kept.collect();
-    let state = Mutex::new((Totals::default(), vec![Vec::new(); count], vec![Vec::new(); count]));
+    let state = Mutex::new((Totals::default(), vec![Brought::default(); count]));
     let finished = |portion: &PartialRun| {
         // A panic elsewhere ends the run anyway; the sums so far are whole.
         let mut state = state.lock().unwrap_or_else(|e| e.into_inner());
-        let (totals, by_replicate, faces_by_replicate) = &mut *state;
-        if let Some((new, sums, faces)) = totals.advance(portion, &kept) {
-            by_replicate[new as usize] = sums;
-            faces_by_replicate[new as usize] = faces;
+        let (totals, by_replicate) = &mut *state;
+        if let Some((new, brought)) = totals.advance(portion, &kept) {
+            by_replicate[new as usize] = brought;
         }
     };
     let hooks = Hooks { finished: Some(&finished), ..Hooks::with_progress(&|_| true) };
     let results = Results::new(bound, settings, trace(bound, intersector, settings, None, &hooks));
-    let (_, replicates, faces) = state.into_inner().unwrap_or_else(|e| e.into_inner());
-    ReplicatedRun { results, replicates, faces }
+    let (_, by_replicate) = state.into_inner().unwrap_or_else(|e| e.into_inner());
+    let mut run = ReplicatedRun { results, replicates: Vec::new(), faces: Vec::new(), of_model: Vec::new() };
+    for brought in by_replicate {
+        run.replicates.push(brought.receivers);
+        run.faces.push(brought.faces);
+        run.of_model.push(brought.of_model);
+    }
+    run
 }
