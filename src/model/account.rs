@@ -2,6 +2,7 @@
 
 use super::outline::Outline;
 use super::{Colour, Face, Instance, Model, Part, Shell, SurfaceKind, TessellatedFace};
+use crate::math::quadrature::GAUSS;
 use crate::math::{Aabb, Frame, Uv};
 use crate::nurbs::UvCurve;
 use serde::{Serialize, Serializer};
@@ -86,17 +87,11 @@ fn hex_colour<S: Serializer>(colour: &Option<Colour>, serializer: S) -> Result<S
     colour.map(|c| c.to_string()).serialize(serializer)
 }
 
-/// Gauss–Legendre nodes and weights on `[0, 1]`, exact for polynomials of degree 9.
-const GAUSS: [(f64, f64); 5] = [
-    (0.046_910_077_030_668, 0.118_463_442_528_094_5),
-    (0.230_765_344_947_158_5, 0.239_314_335_249_683_2),
-    (0.5, 0.284_444_444_444_444_4),
-    (0.769_234_655_052_841_5, 0.239_314_335_249_683_2),
-    (0.953_089_922_969_332, 0.118_463_442_528_094_5),
-];
 /// Pieces into which a span of an edge, and of the surface across it, is divided: of a circular hole in a cylinder half as wide as its
 /// radius, 1e-6 of the area is then missed.
 const PIECES: usize = 2;
+/// Knots in u for each in v from which on rows run along v: of fewer, arcs mostly, the kinks at knots cost accuracy where rows cross them.
+const MANY_KNOTS: usize = 8;
 
 impl Model {
     /// Tells of every part its solids and faces, in order; parts without faces are left out, those without an instance are not.
@@ -187,38 +182,43 @@ impl Face {
         // Between knots the density of area is smooth, which is what Gauss' rule needs.
         let mut breaks = self.surface.knots.clone();
         breaks.iter_mut().for_each(Vec::dedup);
-        let sweep = Sweep { face: self, breaks };
+        // An extruded spline has hundreds of knots one way, which would all be met on every row along them.
+        let swept = usize::from(breaks[0].len() > MANY_KNOTS * breaks[1].len());
+        let sweep = Sweep { face: self, breaks, swept };
         if self.loops.is_empty() {
             let sides = (0..4).map(|k| UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]));
             // The sign tells which way the loops run; an area has none.
-            return sides.map(|side| sweep.area_left_of(&side)).sum::<f64>().abs();
+            return sides.map(|side| sweep.area_beside(&side)).sum::<f64>().abs();
         }
         let uses = self.loops.iter().flat_map(|l| &l.uses);
-        uses.map(|u| if u.reversed { -sweep.area_left_of(&u.uv) } else { sweep.area_left_of(&u.uv) })
+        uses.map(|u| if u.reversed { -sweep.area_beside(&u.uv) } else { sweep.area_beside(&u.uv) })
             .sum::<f64>()
             .abs()
     }
 }
 
-/// The area between a curve of the parameter plane and the lower end of u.
+/// The area between a curve of the parameter plane and the lower end of one parameter.
 struct Sweep<'f> {
     face: &'f Face,
     /// Distinct knots in u and v, between which the density of area is smooth.
     breaks: [Vec<f64>; 2],
+    /// The parameter from whose lower end the area reaches to the curve: 0 for u, 1 for v.
+    swept: usize,
 }
 
 impl Sweep<'_> {
-    /// Signed area, mm², between a curve and the lower end of u, positive where v rises: the integral of the row areas over dv.
-    fn area_left_of(&self, curve: &UvCurve) -> f64 {
-        let mut sum = 0.0;
+    /// Signed area, mm², between a curve and the lower end of the swept parameter, positive where the other one rises: the integral of the
+    /// row areas over the latter.
+    fn area_beside(&self, curve: &UvCurve) -> f64 {
+        let (mut sum, across) = (0.0, 1 - self.swept);
         for span in curve.breakpoints().windows(2) {
             for piece in self.smooth_pieces(curve, [span[0], span[1]]).windows(2) {
                 let width = piece[1] - piece[0];
                 for (x, weight) in GAUSS {
                     let d = curve.derivatives(piece[0] + x * width);
-                    // A piece along a row adds nothing to an integral over dv, and its row need not be computed.
-                    if d.first.y != 0.0 {
-                        sum += weight * width * d.first.y * self.row_area(d.point);
+                    // A piece along a row adds nothing to an integral across it, and its row need not be computed.
+                    if d.first[across] != 0.0 {
+                        sum += weight * width * d.first[across] * self.row_area(d.point);
                     }
                 }
             }
@@ -229,10 +229,11 @@ impl Sweep<'_> {
     /// Parameters at which a span of a curve is divided, both ends included: at the rows of knots that a straight one crosses, at as many
     /// even steps of a bent one, and in [`PIECES`] between.
     fn smooth_pieces(&self, curve: &UvCurve, [t0, t1]: [f64; 2]) -> Vec<f64> {
-        let v0 = curve.evaluate(t0).y;
-        let v1 = curve.evaluate(t1).y;
+        let across = 1 - self.swept;
+        let v0 = curve.evaluate(t0)[across];
+        let v1 = curve.evaluate(t1)[across];
         let between = |k: &&f64| **k > v0.min(v1) && **k < v0.max(v1);
-        let crossed: Vec<f64> = self.breaks[1].iter().filter(between).copied().collect();
+        let crossed: Vec<f64> = self.breaks[across].iter().filter(between).copied().collect();
         let mut cuts = vec![t0, t1];
         // A straight line's crossings are known in closed form; those of a bent one would need a search each.
         if curve.degree == 1 {
@@ -250,15 +251,16 @@ impl Sweep<'_> {
         pieces
     }
 
-    /// Integral over u of the surface's density of area, at the height v of a point, from the lower end of u up to it.
+    /// Integral over the swept parameter of the surface's density of area, from its lower end up to a point, at the point's other one.
     fn row_area(&self, end: Uv) -> f64 {
         let mut sum = 0.0;
-        for span in self.breaks[0].windows(2).filter(|s| s[0] < end.x) {
-            let width = (span[1].min(end.x) - span[0]) / PIECES as f64;
+        for span in self.breaks[self.swept].windows(2).filter(|s| s[0] < end[self.swept]) {
+            let width = (span[1].min(end[self.swept]) - span[0]) / PIECES as f64;
             for piece in 0..PIECES {
                 for (x, weight) in GAUSS {
-                    let u = span[0] + (piece as f64 + x) * width;
-                    let d = self.face.surface.derivatives(Uv::new(u, end.y));
+                    let mut at = end;
+                    at[self.swept] = span[0] + (piece as f64 + x) * width;
+                    let d = self.face.surface.derivatives(at);
                     // The area of a patch of surface is |Su × Sv| du dv.
                     sum += weight * width * d.du.cross(d.dv).length();
                 }

@@ -164,3 +164,33 @@ fn edges_whose_ends_lie_apart_by_the_width_of_their_face_keep_it() {
         assert_eq!(import.report.faces.repaired, 1, "{:?}", import.report.repairs);
     }
 }
+
+/// A ring of which the outer circle is two arcs and the inner one four, so that as polygons the inner one would be the larger.
+#[test]
+fn a_ring_narrower_than_the_sag_of_coarse_polygons_keeps_its_hole() {
+    let (outer, inner) = (5.0, 4.99);
+    let text = points(&[
+        (10, [0., 0., 0.]),
+        (11, [outer, 0., 0.]),
+        (12, [-outer, 0., 0.]),
+        (13, [inner, 0., 0.]),
+        (14, [0., inner, 0.]),
+        (15, [-inner, 0., 0.]),
+        (16, [0., -inner, 0.]),
+    ]) + "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n\
+          #30=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n#31=PLANE('',#30);\n#32=CIRCLE('',#30,5.);\n#33=CIRCLE('',#30,4.99);\n\
+          #41=VERTEX_POINT('',#11);\n#42=VERTEX_POINT('',#12);\n#43=VERTEX_POINT('',#13);\n\
+          #44=VERTEX_POINT('',#14);\n#45=VERTEX_POINT('',#15);\n#46=VERTEX_POINT('',#16);\n\
+          #51=EDGE_CURVE('',#41,#42,#32,.T.);\n#52=EDGE_CURVE('',#42,#41,#32,.T.);\n\
+          #53=EDGE_CURVE('',#43,#44,#33,.T.);\n#54=EDGE_CURVE('',#44,#45,#33,.T.);\n\
+          #55=EDGE_CURVE('',#45,#46,#33,.T.);\n#56=EDGE_CURVE('',#46,#43,#33,.T.);\n\
+          #61=ORIENTED_EDGE('',*,*,#51,.T.);\n#62=ORIENTED_EDGE('',*,*,#52,.T.);\n\
+          #63=ORIENTED_EDGE('',*,*,#53,.T.);\n#64=ORIENTED_EDGE('',*,*,#54,.T.);\n\
+          #65=ORIENTED_EDGE('',*,*,#55,.T.);\n#66=ORIENTED_EDGE('',*,*,#56,.T.);\n\
+          #71=EDGE_LOOP('',(#61,#62));\n#72=EDGE_LOOP('',(#63,#64,#65,#66));\n\
+          #81=FACE_OUTER_BOUND('',#71,.T.);\n#82=FACE_BOUND('',#72,.F.);\n#900=ADVANCED_FACE('',(#81,#82),#31,.T.);\n";
+    let import = import(&text);
+    // The measure is of polygons of 400 corners an edge, whose sag is a share of so narrow a ring.
+    close(area(&import), PI * (outer * outer - inner * inner), 5e-3);
+    assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
+}

@@ -124,7 +124,7 @@ fn bound_without_winding(
     out: &mut Boundary,
     implicit_outer: bool,
 ) -> Result<(), &'static str> {
-    let areas: Vec<f64> = plain.iter().map(|c| signed_area(&c.polygon())).collect();
+    let areas: Vec<f64> = plain.iter().map(Chain::area).collect();
     // A loop that runs along an edge twice was cut open by the file: it goes around the face, not around a hole.
     let all_holes = areas.iter().all(|&a| a < 0.0) && !plain.iter().any(Chain::is_cut_open);
     if implicit_outer || all_holes && is_closed(chart) {

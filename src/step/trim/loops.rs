@@ -2,6 +2,7 @@
 
 use super::tolerances::{EMPTY_STEP, POLE_RESOLUTION_MM, POLE_TURN_SLACK, WIDE_STEP};
 use crate::math::Uv;
+use crate::math::quadrature::GAUSS;
 use crate::nurbs::{ControlPoint, UvCurve};
 use crate::step::chart::{Chart, Pole};
 
@@ -108,6 +109,25 @@ impl Chain {
             piece.sample(density, &mut points);
         }
         points
+    }
+
+    /// Returns the signed area inside a closed chain, by Green's theorem along its curves: polygons of two circles with different arcs hide
+    /// a ring narrower than their sag, and took the inner one for the larger.
+    pub(crate) fn area(&self) -> f64 {
+        // About the first corner: far from the origin the products would cancel.
+        let Some(corner) = self.pieces.first().map(Piece::start) else { return 0.0 };
+        let mut area = 0.0;
+        for piece in &self.pieces {
+            let sign = if piece.reversed { -0.5 } else { 0.5 };
+            for span in piece.curve.breakpoints().windows(2) {
+                let width = span[1] - span[0];
+                for (x, weight) in GAUSS {
+                    let d = piece.curve.derivatives(span[0] + x * width);
+                    area += sign * weight * width * (d.point - corner).perp_dot(d.first);
+                }
+            }
+        }
+        area
     }
 
     pub(crate) fn is_winding(&self) -> bool {
