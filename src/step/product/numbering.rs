@@ -36,12 +36,15 @@ pub(crate) fn add_face(
     styles: &Styles,
 ) -> Face {
     // Vertices that the face knows; ends of seams are looked up among them.
-    let sources =
-        built.loops.iter().flatten().filter_map(|u| if let Source::Edge(e) = u.source { numbers[e] } else { None });
-    let mut known: Vec<VertexId> = sources.flat_map(|e| part.edges[e.0 as usize].vertices).collect();
+    let sources = || {
+        built.loops.iter().flatten().filter_map(|u| if let Source::Edge(e) = u.source { numbers[e] } else { None })
+    };
+    let mut known: Vec<VertexId> = sources().flat_map(|e| part.edges[e.0 as usize].vertices).collect();
     known.sort();
     known.dedup();
-    let near = SEAM_END_MM + GAPS * built.gap.min(LARGEST_GAP_MM);
+    // A seam ends on edges, and these may miss their vertices themselves.
+    let missed = sources().map(|e| distance_to_vertices(part, e)).fold(0.0, f64::max);
+    let near = SEAM_END_MM + GAPS * built.gap.max(missed).min(LARGEST_GAP_MM);
     // A seam ends at vertices of the face, or shells would have a crack there.
     let seams: Vec<EdgeId> = built
         .seams
@@ -81,4 +84,12 @@ pub(crate) fn add_face(
         loops,
         gap: built.gap,
     }
+}
+
+/// Returns how far the ends of an edge's curve are from its vertices at most, mm.
+fn distance_to_vertices(part: &Part, edge: EdgeId) -> f64 {
+    let Edge { curve, vertices, .. } = &part.edges[edge.0 as usize];
+    let [a, b] = curve.domain();
+    let distance = |t: f64, v: VertexId| (curve.evaluate(t) - part.vertices[v.0 as usize]).length();
+    distance(a, vertices[0]).max(distance(b, vertices[1]))
 }
