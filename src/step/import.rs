@@ -134,6 +134,7 @@ fn convert_assembly(
             report.left_out.push(Note { id: *id, entity: file.entity_name(*id), reason: reason.clone() });
         }
     }
+    report.left_out.extend(external_files(file, name));
     report.problems.extend(assembly.problems.iter().cloned());
     let mut reader = Reader {
         file,
@@ -165,6 +166,24 @@ fn convert_assembly(
         report.problems.push(format!("{name}: {}", absent_shapes(file)));
     }
     Ok(model)
+}
+
+/// Names the other STEP files that a file's products have their shapes in.
+fn external_files(file: &File<'_>, own: &str) -> Vec<Note> {
+    let mut notes = Vec::new();
+    for e in file.entities() {
+        let Some(other) = e.attributes("DOCUMENT_FILE", 0).and_then(|a| a.text(0)) else { continue };
+        // Drawings and files of a CAD system, or the file itself, may be named as well.
+        let extension = Path::new(&other).extension();
+        let is_step = extension.is_some_and(|x| ["stp", "step"].iter().any(|known| x.eq_ignore_ascii_case(known)));
+        if is_step && !other.eq_ignore_ascii_case(own) {
+            let reason = format!(
+                "shapes are in {other}, which is not read with this file: export the assembly as one file, or use that file too"
+            );
+            notes.push(Note { id: e.id, entity: e.name(), reason });
+        }
+    }
+    notes
 }
 
 /// Tells of a file without a face what it holds instead: the entities that it has most of.

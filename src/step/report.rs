@@ -30,7 +30,8 @@ pub struct ImportReport {
     pub bbox_mm: Option<[[f64; 3]; 2]>,
     /// Faces and shapes that were refused.
     pub refusals: Vec<Note>,
-    /// Representations with shapes that are no product's shape (of aspects, datums, construction, drawings), which are not in the model.
+    /// Representations with shapes that are no product's shape (of aspects, datums, construction, drawings), and other files
+    /// that hold shapes of this one: they are not in the model.
     pub left_out: Vec<Note>,
     /// Names of parts and instances.
     pub names: Vec<String>,

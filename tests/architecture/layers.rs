@@ -226,7 +226,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "model",
         &["part face", "placed", "outline", "bounds", "account", "tight_box", "near_parts", "instancing", "mod"],
     ),
-    ("math", &["mod", "simd", "ray", "aabb", "box_tree", "frame", "roots", "units"]),
+    ("math", &["mod", "simd", "ray", "aabb", "box_tree", "frame", "roots", "quadrature", "units"]),
     (
         "intersect",
         &[
@@ -345,6 +345,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "solid_recipes",
             "recipe_parts",
             "free_surfaces",
+            "zero_width",
             "conversion",
         ],
     ),

@@ -157,3 +157,14 @@ fn places_without_a_name_of_their_own_are_named_by_their_products() {
         assert_eq!(parts, ["lens", "ring"]);
     }
 }
+
+/// An assembly whose parts are in files of their own names them; drawings and the file itself hold no shapes of it.
+#[test]
+fn files_that_hold_shapes_of_an_assembly_are_named() {
+    let others = "#100=DOCUMENT_FILE('Lens.STP','','',#103,'',$);\n#101=DOCUMENT_FILE('lens.pdf','','',#103,'',$);\n\
+                  #102=DOCUMENT_FILE('face.stp','','',#103,'',$);\n#103=DOCUMENT_TYPE('geometry');\n";
+    let import = import(&(square(FORWARD, IN_ORDER) + others));
+    let left: Vec<u64> = import.report.left_out.iter().map(|n| n.id).collect();
+    assert_eq!(left, [100]);
+    assert!(import.report.left_out[0].reason.contains("shapes are in Lens.STP"), "{:?}", import.report.left_out);
+}

@@ -151,6 +151,21 @@ fn a_face_whose_flag_contradicts_its_edges_looks_outwards() {
     assert_eq!(said, 1, "{:?}", import.report.repairs);
 }
 
+/// Two sides of a cube meet in a face without width, whose short edges have no length: it is left out, and the sides meet in one edge.
+#[test]
+fn sides_of_a_face_without_width_meet() {
+    let width = 1e-10;
+    let mut corners: Vec<[f64; 3]> = cube_corners().into_iter().take(8).collect();
+    corners.extend([[0.0, width, SIDE], [SIDE, width, SIDE]]);
+    let faces: [&[usize]; 7] =
+        [CUBE[0], &[8, 9, 6, 7], CUBE[2], &[1, 2, 6, 9, 5], CUBE[4], &[3, 0, 4, 8, 7], &[4, 5, 9, 8]];
+    let import = solid(&corners, &faces, &[".T."; 7], None);
+    assert_closes(&import);
+    let said: Vec<u64> =
+        import.report.repairs.iter().filter(|r| r.reason.contains("it has no width")).map(|r| r.id).collect();
+    assert_eq!(said, [100_066]);
+}
+
 /// A cubic void inside of a cube, once as the schema asks for it and once with faces that look into it already below a shell that turns them.
 #[test]
 fn a_void_that_is_turned_once_too_often_encloses_a_hole() {
@@ -210,4 +225,34 @@ fn short_names_are_read_as_the_long_ones() {
         text = text.replace(long, short);
     }
     assert_closes(&read(&text));
+}
+
+/// A can whose rims, full circles, miss their only vertices: the seam of its side ends at these vertices as the rims do.
+#[test]
+fn a_seam_ends_at_the_vertex_that_its_edge_misses() {
+    let (radius, height, missed) = (2.0, 3.0, 3e-4);
+    let point = |id: u32, [x, y, z]: [f64; 3]| format!("#{id}=CARTESIAN_POINT('',({x:?},{y:?},{z:?}));");
+    let points: String = [
+        (10, [0., 0., 0.]),
+        (11, [0., 0., height]),
+        (12, [radius + missed, 0., 0.]),
+        (13, [radius + missed, 0., height]),
+    ]
+    .map(|(id, at)| point(id, at))
+    .concat();
+    let rest = "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n\
+          #30=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n#31=CYLINDRICAL_SURFACE('',#30,2.);\n#32=CIRCLE('',#30,2.);\n\
+          #33=AXIS2_PLACEMENT_3D('',#11,#20,#21);\n#34=CIRCLE('',#33,2.);\n#35=PLANE('',#30);\n#36=PLANE('',#33);\n\
+          #40=VERTEX_POINT('',#12);\n#41=VERTEX_POINT('',#13);\n\
+          #50=EDGE_CURVE('',#40,#40,#32,.T.);\n#51=EDGE_CURVE('',#41,#41,#34,.T.);\n\
+          #60=ORIENTED_EDGE('',*,*,#50,.T.);\n#61=ORIENTED_EDGE('',*,*,#51,.F.);\n\
+          #62=ORIENTED_EDGE('',*,*,#50,.F.);\n#63=ORIENTED_EDGE('',*,*,#51,.T.);\n\
+          #70=EDGE_LOOP('',(#60));\n#71=EDGE_LOOP('',(#61));\n#72=EDGE_LOOP('',(#62));\n#73=EDGE_LOOP('',(#63));\n\
+          #80=FACE_OUTER_BOUND('',#70,.T.);\n#81=FACE_BOUND('',#71,.T.);\n#82=FACE_OUTER_BOUND('',#72,.T.);\n#83=FACE_OUTER_BOUND('',#73,.T.);\n\
+          #900=ADVANCED_FACE('',(#80,#81),#31,.T.);\n#901=ADVANCED_FACE('',(#82),#35,.F.);\n#902=ADVANCED_FACE('',(#83),#36,.T.);\n\
+          #910=CLOSED_SHELL('',(#900,#901,#902));\n#911=MANIFOLD_SOLID_BREP('',#910);\n#912=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#911),$);";
+    let text = format!("ISO-10303-21;HEADER;ENDSEC;DATA;{points}{rest}ENDSEC;END-ISO-10303-21;");
+    let model = read(&text).model;
+    let report = tessellate(&model, &tessellate::Settings::uniform(1e-3)).report;
+    assert_eq!((report.open_edges, report.shells.closed), (0, 1));
 }

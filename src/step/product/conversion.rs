@@ -7,6 +7,7 @@ use super::orientation::{faces_against_neighbours, is_inside_out};
 use super::recipe_parts::convert_recipes;
 use super::styles::Styles;
 use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
+use super::zero_width::{joined_vertex, remove_faces_without_width, vertex_ids, vertices_of_empty_edges};
 use crate::math::{Aabb, Point};
 use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
 use crate::nurbs::Curve;
@@ -54,15 +55,21 @@ pub(crate) fn convert(
 
     // What to convert: a face that occurs in several shells, and an edge that bounds several faces, once.
     let mut seen = FxHashSet::default();
-    let ids: Vec<u64> =
+    let mut ids: Vec<u64> =
         items.shells.iter().flat_map(|s| &s.faces).map(|f| f.0).filter(|f| seen.insert(*f)).collect();
-    out.found += ids.len();
-    let plans: FxHashMap<u64, Outcome<FacePlan>> = ids.iter().map(|&id| (id, read_face(file, id))).collect();
+    let mut plans: FxHashMap<u64, Outcome<FacePlan>> = ids.iter().map(|&id| (id, read_face(file, id))).collect();
     let in_order = ids.iter().filter_map(|id| plans[id].as_ref().ok());
     let (keys, index) = number_edges(in_order);
 
     // Each edge once: faces that share one must get the same bits, or they would not join.
     let edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(|&key| edge_curve(&geometry, key)).collect();
+    let removed = remove_faces_without_width(file, &ids, &mut plans, (&keys, &index), &edges);
+    let without = (!removed.is_empty()).then(|| items.without_faces(&removed));
+    let items = without.as_ref().unwrap_or(items);
+    let reason = "it has no width: it is left out, and the faces beside it meet";
+    out.repaired.extend(removed.iter().map(|&id| repair_note(file, id, reason.into())));
+    ids.retain(|id| plans.contains_key(id));
+    out.found += ids.len();
     let convert_one = |id: &u64| {
         let plan = plans[id].as_ref().map_err(Refusal::clone);
         (*id, plan.and_then(|plan| convert_face(&geometry, *id, plan, &edges, &index, settings)))
@@ -136,35 +143,6 @@ fn add_edges(
     numbers
 }
 
-/// Maps the second vertex of each edge without length to the first: such an edge is left out, and the faces on both of its sides would meet
-/// in two places, with a slit between them.
-fn vertices_of_empty_edges(
-    file: &File<'_>,
-    keys: &[EdgeKey],
-    edges: &[Outcome<TrimmedEdge>],
-) -> FxHashMap<u64, u64> {
-    // A chain of empty edges joins all of its vertices with the first.
-    let mut joined: FxHashMap<u64, u64> = FxHashMap::default();
-    for (key, edge) in keys.iter().zip(edges) {
-        if let (Ok(TrimmedEdge { curve: None, .. }), [Some(a), Some(b)]) = (edge, vertex_ids(file, *key)) {
-            let (a, b) = (joined_vertex(&joined, a), joined_vertex(&joined, b));
-            if a != b {
-                joined.insert(b, a);
-            }
-        }
-    }
-    joined
-}
-
-/// Returns the vertex that stands for all that empty edges join with `vertex`.
-fn joined_vertex(joined: &FxHashMap<u64, u64>, mut vertex: u64) -> u64 {
-    while let Some(&before) = joined.get(&vertex) {
-        vertex = before;
-    }
-    // Later ends at a vertex that was joined itself find the one that is left.
-    vertex
-}
-
 /// Puts the faces into shells of the part; faces that contradict their neighbours, and shells of a solid that are inside out, are turned
 /// and listed as repaired. Shells without a face are left out.
 fn add_shells(
@@ -216,18 +194,6 @@ fn add_shells(
                 colour: plan.owners.iter().find_map(|o| styles.colour(*o)),
                 name: plan.name.clone(),
             });
-        }
-    }
-}
-
-/// Returns the ids of an edge's vertices, as the file orders them; `None` for each that it does not name.
-fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
-    match key {
-        EdgeKey::Straight(a, b) => [Some(a), Some(b)],
-        EdgeKey::Entity(id) => {
-            let kinds = ["EDGE", "EDGE_CURVE", "SUBEDGE"];
-            let args = file.entity(id).and_then(|e| kinds.iter().find_map(|kind| e.attributes(kind, 1)));
-            [0, 1].map(|i| args.and_then(|a| a.id(i)))
         }
     }
 }

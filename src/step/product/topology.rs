@@ -2,7 +2,7 @@
 
 use crate::step::geometry::{Outcome, Refusal};
 use crate::step::part21::{Entity, File};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Names of solids that hold no faces but a recipe.
 const RECIPES: [&str; 16] = [
@@ -83,6 +83,14 @@ impl ShapeItems {
             && self.recipes.is_empty()
             && self.tessellated.is_empty()
             && self.refused.is_empty()
+    }
+
+    /// Returns the same shapes without some faces.
+    pub(super) fn without_faces(&self, faces: &[u64]) -> Self {
+        let faces: FxHashSet<u64> = faces.iter().copied().collect();
+        let mut rest = self.clone();
+        rest.shells.iter_mut().for_each(|shell| shell.faces.retain(|(id, _)| !faces.contains(id)));
+        rest
     }
 
     /// Sorts an item of a representation in; what is no shape, or not in the file, is left out.

@@ -1,0 +1,160 @@
+//! Edges without length and faces without width: both are left out, and what lay on their two sides meets.
+//!
+//! Of an edge without length the two vertices become one; of a face between two edges that coincide, the two edges.
+
+use super::topology::{EdgeKey, FacePlan};
+use crate::nurbs::Curve;
+use crate::step::geometry::Outcome;
+use crate::step::geometry::edges::TrimmedEdge;
+use crate::step::part21::File;
+use rustc_hash::FxHashMap;
+
+/// Distance within which points of two edges coincide, mm, besides what the edges miss their vertices by.
+const COINCIDENT_MM: f64 = 1e-6;
+/// Most that an edge's own gap adds to that, mm: more is no rounding of a writer.
+const LARGEST_GAP_MM: f64 = 1e-3;
+/// Points that are compared along two edges.
+const COMPARED_POINTS: usize = 9;
+/// Surfaces without an end: that a loop which encloses nothing means all of one, as it might of a sphere, cannot be.
+const UNBOUNDED: [&str; 3] = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE"];
+
+/// Returns the ids of an edge's vertices, as the file orders them; `None` for each that it does not name.
+pub(super) fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
+    match key {
+        EdgeKey::Straight(a, b) => [Some(a), Some(b)],
+        EdgeKey::Entity(id) => {
+            let kinds = ["EDGE", "EDGE_CURVE", "SUBEDGE"];
+            let args = file.entity(id).and_then(|e| kinds.iter().find_map(|kind| e.attributes(kind, 1)));
+            [0, 1].map(|i| args.and_then(|a| a.id(i)))
+        }
+    }
+}
+
+/// Maps the second vertex of each edge without length to the first: such an edge is left out, and the faces on both of its sides would meet
+/// in two places, with a slit between them.
+pub(super) fn vertices_of_empty_edges(
+    file: &File<'_>,
+    keys: &[EdgeKey],
+    edges: &[Outcome<TrimmedEdge>],
+) -> FxHashMap<u64, u64> {
+    // A chain of empty edges joins all of its vertices with the first.
+    let mut joined: FxHashMap<u64, u64> = FxHashMap::default();
+    for (key, edge) in keys.iter().zip(edges) {
+        if let (Ok(TrimmedEdge { curve: None, .. }), [Some(a), Some(b)]) = (edge, vertex_ids(file, *key)) {
+            let (a, b) = (joined_vertex(&joined, a), joined_vertex(&joined, b));
+            if a != b {
+                joined.insert(b, a);
+            }
+        }
+    }
+    joined
+}
+
+/// Returns the vertex that stands for all that empty edges join with `vertex`.
+pub(super) fn joined_vertex(joined: &FxHashMap<u64, u64>, mut vertex: u64) -> u64 {
+    while let Some(&before) = joined.get(&vertex) {
+        vertex = before;
+    }
+    // Later ends at a vertex that was joined itself find the one that is left.
+    vertex
+}
+
+/// Edges of a part that coincide across faces without width.
+#[derive(Default)]
+struct CoincidentEdges {
+    /// The number of an edge to that of the one in its place, and whether the latter runs the other way.
+    replaced: FxHashMap<usize, (usize, bool)>,
+}
+
+impl CoincidentEdges {
+    /// Returns the edge that stands for all that coincide with this one, and whether it runs the other way.
+    fn representative(&self, mut edge: usize) -> (usize, bool) {
+        let mut opposite = false;
+        while let Some(&(other, turned)) = self.replaced.get(&edge) {
+            edge = other;
+            opposite ^= turned;
+        }
+        (edge, opposite)
+    }
+
+    /// Joins two edges, of which the second runs the other way if `opposite`.
+    fn join(&mut self, [first, second]: [usize; 2], opposite: bool) {
+        let (a, turned_a) = self.representative(first);
+        let (b, turned_b) = self.representative(second);
+        if a != b {
+            self.replaced.insert(b, (a, opposite ^ turned_a ^ turned_b));
+        }
+    }
+}
+
+/// Finds the faces without width: those on unbounded surfaces whose only edges with length are two that coincide. Takes these out of
+/// `plans`, has the faces beside them use one edge in place of the two, and returns their ids in the order of `ids`.
+pub(super) fn remove_faces_without_width(
+    file: &File<'_>,
+    ids: &[u64],
+    plans: &mut FxHashMap<u64, Outcome<FacePlan>>,
+    (keys, index): (&[EdgeKey], &FxHashMap<EdgeKey, usize>),
+    edges: &[Outcome<TrimmedEdge>],
+) -> Vec<u64> {
+    let joined = vertices_of_empty_edges(file, keys, edges);
+    let ends = |edge: usize| vertex_ids(file, keys[edge]).map(|id| id.map(|id| joined_vertex(&joined, id)));
+    let mut coincident = CoincidentEdges::default();
+    let mut removed = Vec::new();
+    for id in ids {
+        let Some(Ok(plan)) = plans.get(id) else { continue };
+        let Some([(first, forth), (second, back)]) = two_edges(plan, index, edges) else { continue };
+        if !file.entity(plan.surface).is_some_and(|s| s.is_one_of(&UNBOUNDED)) {
+            continue;
+        }
+        // A loop of two that are both run forward comes back on the second: it runs against the first.
+        let opposite = forth == back;
+        let (from, mut to) = (ends(first), ends(second));
+        if opposite {
+            to.reverse();
+        }
+        let (Ok(a), Ok(b)) = (&edges[first], &edges[second]) else { continue };
+        if from == to && !from.contains(&None) && edges_coincide(a, b, opposite) {
+            coincident.join([first, second], opposite);
+            removed.push(*id);
+        }
+    }
+    if removed.is_empty() {
+        return removed;
+    }
+    removed.iter().for_each(|id| drop(plans.remove(id)));
+    for (key, reversed) in plans.values_mut().flatten().flat_map(|p| p.loops.iter_mut().flatten()) {
+        let (edge, opposite) = coincident.representative(index[key]);
+        *key = keys[edge];
+        *reversed ^= opposite;
+    }
+    removed
+}
+
+/// Returns the two edges of a face that have a length, and whether its loop runs against them; `None` where it has more or fewer, or one twice.
+fn two_edges(
+    plan: &FacePlan,
+    index: &FxHashMap<EdgeKey, usize>,
+    edges: &[Outcome<TrimmedEdge>],
+) -> Option<[(usize, bool); 2]> {
+    let uses = plan.loops.iter().flatten().map(|(key, reversed)| (index[key], *reversed));
+    let has_length = |(edge, _): &(usize, bool)| !matches!(&edges[*edge], Ok(TrimmedEdge { curve: None, .. }));
+    // One more than is wanted tells of all the others.
+    let found: Vec<(usize, bool)> = uses.filter(has_length).take(3).collect();
+    let both: [(usize, bool); 2] = found.try_into().ok()?;
+    (both[0].0 != both[1].0).then_some(both)
+}
+
+/// Whether two edges coincide at equal shares of their parameters, one of them backwards if `opposite`, within what they miss their vertices by.
+fn edges_coincide(a: &TrimmedEdge, b: &TrimmedEdge, opposite: bool) -> bool {
+    let (Some(first), Some(second)) = (&a.curve, &b.curve) else { return false };
+    let tolerance = COINCIDENT_MM + a.gap.min(LARGEST_GAP_MM) + b.gap.min(LARGEST_GAP_MM);
+    let point = |curve: &Curve, share: f64| {
+        let [t0, t1] = curve.domain();
+        curve.evaluate(t0 + share * (t1 - t0))
+    };
+    (0..COMPARED_POINTS).all(|k| {
+        let share = k as f64 / (COMPARED_POINTS - 1) as f64;
+        let other = if opposite { 1.0 - share } else { share };
+        (point(first, share) - point(second, other)).length() <= tolerance
+    })
+}
