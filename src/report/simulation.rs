@@ -258,18 +258,20 @@ impl SimulationReport<'_> {
         let power = errors::power_table(self.results, self.absorbed, self.unit);
         let mut receivers = Table::new("receivers", "Receivers", &columns);
         for r in &self.results.receivers {
+            // Light that did not come has no place.
+            let place = |cell: Cell| if r.power > 0.0 { cell } else { Cell::Empty };
             receivers.row([
                 r.name.as_str().into(),
                 Cell::Number(r.power, 6),
                 Cell::Number(r.power_error, 2),
                 r.max.into(),
                 r.unit.into(),
-                r.centroid[0].into(),
-                r.centroid[1].into(),
-                r.rms[0].into(),
-                Cell::Number(r.rms_error[0], 2),
-                r.rms[1].into(),
-                Cell::Number(r.rms_error[1], 2),
+                place(r.centroid[0].into()),
+                place(r.centroid[1].into()),
+                place(r.rms[0].into()),
+                place(Cell::Number(r.rms_error[0], 2)),
+                place(r.rms[1].into()),
+                place(Cell::Number(r.rms_error[1], 2)),
             ]);
         }
         let section = Section::new("Energy").with_block(power).with_block(receivers);

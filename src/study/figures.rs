@@ -56,7 +56,7 @@ pub struct ReceiverFigures {
     /// The largest cell; absent, as all that follow, where only power is counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<Figure>,
-    /// Root mean square distance from the centre along the first axis.
+    /// Root mean square distance from the centre along the first axis; absent, as all places, where no ray arrived.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_1: Option<Figure>,
     /// Root mean square distance from the centre along the second axis.
@@ -234,7 +234,8 @@ impl<'a> Errors<'a> {
         let length = if matches!(r.kind, "plane" | "disc") { "mm" } else { "deg" };
         let along = |value: f64, statistical: f64, paired: &dyn Fn(&ReceiverError) -> Paired| {
             let geometric = self.geometric(0.0, |m| paired(m).geometric());
-            Some(Figure::new(value, length, statistical, geometric))
+            // Light that did not come has no place.
+            (!is_dark).then(|| Figure::new(value, length, statistical, geometric))
         };
         let largest = if is_dark {
             r.ray_cells.iter().copied().fold(0.0, f64::max)
