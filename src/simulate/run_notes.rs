@@ -3,6 +3,7 @@
 use super::bind::BoundScene;
 use super::body::AMBIENT;
 use super::outcome::{Counts, LostCause, LostRay};
+use super::surfaces::{FaceOptics, Surface};
 use std::collections::BTreeMap;
 
 /// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
@@ -25,6 +26,16 @@ impl BoundScene {
         })
     }
 
+    /// Whether a face of this instance lets light through, though no medium is behind it.
+    fn lets_light_into_solid(&self, instance: Option<&str>) -> bool {
+        let is_open = |face: &FaceOptics| {
+            face.body == AMBIENT && matches!(&self.surfaces[face.surface as usize], Surface::Coated(c) if !c.opaque)
+        };
+        let of_instance =
+            |face: usize| self.instances.get(self.instance_of_face[face] as usize).map(String::as_str);
+        (0..self.faces.len()).any(|face| is_open(&self.faces[face]) && of_instance(face) == instance)
+    }
+
     /// Returns one sentence about lost light: where most of it was, and why; `None` where the ledger is empty. `lost` counts those beyond
     /// it.
     pub(crate) fn lost_note(&self, lost: u64, ledger: &[LostRay]) -> Option<String> {
@@ -41,6 +52,10 @@ impl BoundScene {
             }
             LostCause::ImpossibleMedium => {
                 "it came to a face from the wrong side, as where a mesh gapes or is turned, or bodies overlap"
+            }
+            LostCause::InsideSolid if self.lets_light_into_solid(at) => {
+                "a face of it lets light through, but what is behind has no medium, and its other faces are opaque: give the part a \
+                 `medium`, or the face a surface that lets nothing through"
             }
             LostCause::InsideSolid => {
                 "it came to a closed opaque solid from inside, as from a source that lies in it"

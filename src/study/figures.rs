@@ -226,8 +226,12 @@ impl<'a> Errors<'a> {
             };
         }
         // The brightest place was measured over squares of cells: what facets change of it is taken as a share.
+        let brightest = (0..r.cells.len()).max_by(|&a, &b| r.cells[a].total_cmp(&r.cells[b]));
         let max = self.geometric(self.lost_share * r.max, |m| {
-            if m.peak.facets > 0.0 { r.max * m.peak.geometric() / m.peak.facets } else { m.peak.geometric() }
+            let square = if m.peak.facets > 0.0 { r.max / m.peak.facets } else { 1.0 } * m.peak.geometric();
+            // The run may have its brightest cell elsewhere than the few rays that compared had theirs, where facets change nothing.
+            let cell = brightest.and_then(|k| m.cells.get(k)).copied();
+            cell.map_or(square, |cell| square.max(cell))
         });
         // Of a map too large to compare nothing is known.
         let max = max.filter(|_| self.measured.is_none_or(ReceiverError::has_cells));

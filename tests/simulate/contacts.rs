@@ -49,6 +49,36 @@ fn a_source_on_a_surface_or_across_one_loses_nothing() {
     }
 }
 
+/// Light that is totally reflected at the wall of a glass, nearer than the glue distance to its edge on a black board: all of it ends there.
+#[test]
+fn light_reflected_just_above_an_edge_meets_the_board() {
+    let mut world = World::default();
+    world.cuboid("glass", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 3.0));
+    world.cuboid("board", Point::new(-9.0, -9.0, -1.0), Point::new(9.0, 9.0, 0.0));
+    // Along (−0.36, 0, −0.933) it comes to the wall x = −5 between 0.1 and 0.5 µm above the board, at 69°.
+    let text = format!(
+        "[run]\nrays = 2000\n{MEDIA}[[material]]\npart = 'glass'\nmedium = 'glass'\n[[material]]\npart = 'board'\nsurface = 'absorber'
+        [[source]]\nkind = 'collimated'\nat = [-4.28, 0, 1.8663]\ndirection = [-0.36, 0, -0.933]\nradius = 7e-5\n{FAR}"
+    );
+    let r = world.run(&text, |_| ());
+    assert_eq!((r.lost_rays, r.power.absorbed), (0, 1.0), "{:?}", r.ledger.first());
+}
+
+/// A coating that lets half of the light into a black block without a medium: half is lost, and the note says by what.
+#[test]
+fn light_let_into_a_solid_without_a_medium_is_told() {
+    let mut world = World::default();
+    world.cuboid("slab", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 1.0));
+    let half = "[[0, 400, 0.1, 0.1, 0.5, 0.5], [0, 700, 0.1, 0.1, 0.5, 0.5], [90, 400, 0.1, 0.1, 0.5, 0.5], [90, 700, 0.1, 0.1, 0.5, 0.5]]";
+    let text = format!(
+        "[run]\nrays = 20_000\n[[material]]\npart = 'slab'\nsurface = 'absorber'\n[[material]]\nat = [0, 0, 0]\nsurface = 'coating'\ncoating = {half}
+        [[source]]\nkind = 'collimated'\nat = [0, 0, -5]\nradius = 1\n{FAR}"
+    );
+    let r = world.run(&text, |_| ());
+    assert!((r.power.lost - 0.5).abs() < 0.02, "{:?}", r.power);
+    assert!(r.notes.iter().any(|note| note.contains("what is behind has no medium")), "{:?}", r.notes);
+}
+
 /// Glass on a black or reflecting block, touching exactly or within the glue distance: light at 60°, beyond the critical angle,
 /// meets the block all the same.
 #[test]

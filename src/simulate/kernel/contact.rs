@@ -186,10 +186,14 @@ pub(super) fn opaque_contact(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> 
     } else {
         probe_at(context, ray, at)
     };
-    // The nearest alone: behind it the ray would be inside of the solid.
-    let hit = context.intersector.intersect(&probe, &mut Cost::default())?;
-    let face = *context.bound.faces.get(hit.face.index())?;
-    let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
-    let opaque = face.medium_on_opaque && face.body == AMBIENT;
-    (opaque && entering).then(|| FaceHit { hit, face, point: probe.point_at(hit.t) })
+    let is_front = |found: &Hit, face: &FaceOptics| {
+        face.medium_on_opaque && face.body == AMBIENT && ray.direction.dot(found.geometric_normal) < 0.0
+    };
+    // The nearest that lies along the face, or is a front, and no other: behind it the ray would be inside of the solid. A face that stands
+    // across is of an edge that the probe begins beyond, as the wall of a dome that light was reflected at just above its board.
+    let lies_along =
+        |found: &Hit| at.face.opaque_solid || found.geometric_normal.dot(at.hit.geometric_normal).abs() > ALIGNED;
+    let (hit, face) =
+        faces_along(context, probe).find(|(found, face)| is_front(found, face) || lies_along(found))?;
+    is_front(&hit, &face).then(|| FaceHit { hit, face, point: probe.point_at(hit.t) })
 }
