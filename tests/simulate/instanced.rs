@@ -206,6 +206,8 @@ fn a_cover_stands_beside_what_is_placed_often() {
 fn a_pilot_chooses_for_what_is_placed_often() {
     let lens = step::read(&fixture("step/lens_planoconvex_nurbs.stp"), &step::Settings::default()).unwrap().model;
     let text = array_scene("[[material]]\npart = '*'\nmedium = 'glass'\n").replace("rays = 6000", "rays = 60000");
+    // Clear: what each lens absorbs would be a figure of its own, of which one has more.
+    let text = text.replace("absorption_per_mm = 1e-3\n", "");
     // One lens fewer than are placed in groups, and so many: what facets change is the same.
     let [apart, grouped] = [7, 8].map(|columns| {
         let mut model = repeated(lens.clone(), 8, 45.0);
