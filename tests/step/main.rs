@@ -9,6 +9,7 @@ mod fixtures;
 mod nurbs_properties;
 mod offsets;
 mod recipes;
+mod revolved_conics;
 mod seams;
 mod shells;
 mod support;

@@ -54,6 +54,9 @@ pub(in crate::step) struct Chart {
     pub(in crate::step) size: f64,
     /// Whether `Su × Sv` is opposite to that of the file's surface.
     pub(in crate::step) flipped: bool,
+    /// Whether the file's surface has every place twice, with opposite normals, as a profile turned about its own axis of symmetry has: only
+    /// how a face's edges run tells which is meant.
+    pub(in crate::step) has_two_normals: bool,
     /// Distance from what the file means, where that had to be fitted, mm.
     pub(in crate::step) error: f64,
 }
@@ -70,7 +73,7 @@ impl Chart {
         Self::new(Kind::Cone { frame, radius, half_angle: 0.0 }, Analytic::Cylinder { frame, radius })
     }
 
-    /// Makes a chart of this kind; periods, ranges, poles and size follow from it. Not flipped, without an error.
+    /// Makes a chart of this kind; periods, ranges, poles and size follow from it. Not flipped, of one normal, without an error.
     pub(in crate::step) fn new(kind: Kind, analytic: Analytic) -> Self {
         const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
         let mut chart = Self {
@@ -81,6 +84,7 @@ impl Chart {
             poles: Vec::new(),
             size: 1.0,
             flipped: false,
+            has_two_normals: false,
             error: 0.0,
         };
         chart.characterise();

@@ -4,6 +4,7 @@ use super::curves::{explicit_knots, knot_form};
 use super::extent::FaceExtent;
 use super::tolerances::EQUAL_WEIGHTS;
 use super::{Geometry, Outcome, Refusal};
+use crate::math::Point;
 use crate::model::Analytic;
 use crate::nurbs::sanitise;
 use crate::step::chart::{Chart, Kind, SplineChart, offset};
@@ -72,7 +73,14 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let basis = self.chart(basis.id, extent.grown_by(distance.abs()), depth + 1)?;
         // Along the normal of the file's surface, which the chart's may oppose.
         let signed = if basis.flipped { -distance } else { distance };
-        offset::offset(&basis, signed).ok_or_else(|| Refusal::new(e, "the offset leaves nothing of its basis"))
+        let along = offset::offset(&basis, signed);
+        let chart = if basis.has_two_normals {
+            let against = offset::offset(&basis, -signed).map(|c| Chart { flipped: !c.flipped, ..c });
+            nearest_to(extent.points, [along, against])
+        } else {
+            along
+        };
+        chart.ok_or_else(|| Refusal::new(e, "the offset leaves nothing of its basis"))
     }
 
     /// Reads a B-spline surface in any of its forms; small faults of knots and weights are mended, others refused.
@@ -127,4 +135,12 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let analytic = if rational { Analytic::Rational } else { Analytic::Bspline };
         Ok(Chart::new(Kind::Spline(SplineChart::new(surface)), analytic))
     }
+}
+
+/// Returns that of two charts that lies nearer to the points of a face, the first of equal ones; the other where one is missing.
+fn nearest_to(points: &[Point], charts: [Option<Chart>; 2]) -> Option<Chart> {
+    let miss = |chart: &Chart| -> f64 {
+        points.iter().map(|&p| chart.derivatives(chart.locate(p, None)).point.distance(p)).sum()
+    };
+    charts.into_iter().flatten().min_by(|a, b| miss(a).total_cmp(&miss(b)))
 }

@@ -85,7 +85,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         {
             return Ok(chart);
         }
-        Ok(Chart::revolution(frame, keep_face_side_of_axis(&frame, curve, reach)))
+        let (side, has_two_normals) = keep_face_side_of_axis(&frame, curve, reach);
+        Ok(Chart { has_two_normals, ..Chart::revolution(frame, side) })
     }
 
     /// Reads a SURFACE_OF_LINEAR_EXTRUSION with attributes `a` as a chart whose u is the profile's parameter; an unbounded profile is cut

@@ -64,5 +64,8 @@ pub(super) const AXIS_SHARE: f64 = 1e-9;
 pub(super) const CLOSED_PROFILE: f64 = 1e-9;
 /// Parts of a profile fit a face equally when their sums of distances differ by less than this for each point of the face and mm.
 pub(super) const EVEN_FIT_MM: f64 = 1e-6;
+/// Two sides of a profile make one surface where a point of the face is no farther from one than from the other by this share of its size:
+/// a thousand times what golden sections leave.
+pub(super) const TWIN_SHARE: f64 = 1e-6;
 /// Golden sections on a profile leave about this share of its size as error.
 pub(super) const PROFILE_ERROR_SHARE: f64 = 1e-3;

@@ -2,7 +2,7 @@
 
 use super::boundary::{Boundary, bound_region};
 use super::fit::{Fit, Overrun};
-use super::loops::{Chain, Piece, Source, close_loop};
+use super::loops::{Chain, Piece, Source, close_loop, signed_area};
 use super::region::Region;
 use super::seams::{Seam, Seams};
 use super::task::FaceTask;
@@ -52,7 +52,7 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
     task.turn_sphere();
     let task = task;
     let chart = &task.chart;
-    let same_sense = task.same_sense != chart.flipped;
+    let mut same_sense = task.same_sense != chart.flipped;
     let fits = task.fit_edges()?;
     let mut gap = fits.values().fold(0f64, |g, f| g.max(f.gap));
     if !(gap <= LARGEST_GAP_SHARE * task.extent()) {
@@ -64,7 +64,18 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
     }
 
     // Loops in the unwrapped plane, then the boundary of a region without periods.
-    let chains = chain_loops(&task, &fits, same_sense, task.accuracy.max(2.0 * gap).max(SMALLEST_ACCURACY));
+    let tolerance = task.accuracy.max(2.0 * gap).max(SMALLEST_ACCURACY);
+    let mut chains = chain_loops(&task, &fits, same_sense, tolerance);
+    if chart.has_two_normals {
+        let turned = chain_loops(&task, &fits, !same_sense, tolerance);
+        let misfits = |chains: &[Chain]| chains.iter().any(|c| c.is_winding() || c.is_against_sense);
+        // Of two normals the one is meant about which the outer loop has the face on its left; about the other one a loop through a pole
+        // goes around the rest of the surface, if it closes at all.
+        if misfits(&chains) && !misfits(&turned) || runs_clockwise(&chains) {
+            same_sense = !same_sense;
+            chains = turned;
+        }
+    }
     let bridged = chains.iter().fold(0f64, |b, c| b.max(c.bridged));
     if bridged > 0.0 {
         repairs.push(format!("edges of a loop are {bridged:.3e} mm apart"));
@@ -134,6 +145,15 @@ fn chain_loops(task: &FaceTask<'_>, fits: &FxHashMap<usize, Fit>, same_sense: bo
         chains.push(close_loop(pieces, &task.chart, tolerance));
     }
     chains
+}
+
+/// Whether the largest of loops that do not wind around the surface runs clockwise; false where one winds.
+fn runs_clockwise(chains: &[Chain]) -> bool {
+    if chains.iter().any(Chain::is_winding) {
+        return false;
+    }
+    let areas = chains.iter().map(|chain| signed_area(&chain.polygon()));
+    areas.max_by(|a, b| a.abs().total_cmp(&b.abs())).is_some_and(|area| area < 0.0)
 }
 
 /// Returns the rectangle of all loops, moved into the base period, and the shift by whole periods that takes the loops there. Fails with a

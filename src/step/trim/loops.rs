@@ -89,12 +89,14 @@ pub(crate) struct Chain {
     pub(crate) winding: [i32; 2],
     /// Largest step that had to be bridged, mm.
     pub(crate) bridged: f64,
+    /// Whether it was run backwards, since its sides at a pole fit no other way.
+    pub(crate) is_against_sense: bool,
 }
 
 impl Chain {
     /// Pieces that close without winding.
     pub(crate) fn closed(pieces: Vec<Piece>) -> Self {
-        Self { pieces, winding: [0, 0], bridged: 0.0 }
+        Self { pieces, winding: [0, 0], bridged: 0.0, is_against_sense: false }
     }
 
     /// Returns a polygon of points along the chain, without the end.
@@ -201,6 +203,7 @@ pub(crate) fn close_loop(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Cha
         return first;
     }
     second.reverse();
+    second.is_against_sense = true;
     second
 }
 
