@@ -43,12 +43,11 @@ pub fn read_text(path: &Path) -> io::Result<String> {
         .map_err(|e| io::Error::new(io::ErrorKind::InvalidData, format!("it is no UTF-8 text: {e}")))
 }
 
-#[cfg(test)]
+#[cfg(all(test, target_os = "linux"))]
 mod tests {
     use super::*;
 
     #[test]
-    #[cfg(target_os = "linux")]
     fn what_has_no_end_is_refused() {
         for path in ["/dev/zero", "/dev/stdin", "/tmp"] {
             let refused = read_bytes(Path::new(path)).is_err() || path == "/dev/stdin";

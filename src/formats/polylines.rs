@@ -1,6 +1,6 @@
 //! Lines of points with values, as ray paths are shown and written.
 
-use crate::math::{Aabb, Point};
+use crate::math::{Aabb, Point, Ray};
 
 /// Open polylines with one value each of any number of quantities: ray paths, usually.
 ///
@@ -37,24 +37,32 @@ impl Polylines {
         })
     }
 
-    /// Cuts lines off where they first leave a box, so that rays to infinity do not decide what a viewer shows. Values stay with their
-    /// lines; lines that start outside become their first point. An empty box cuts nothing.
+    /// Cuts lines to where they first pass a box, so that rays to infinity, and sources far away, do not decide what a viewer shows. Values
+    /// stay with their lines; lines that pass the box by become their first point. An empty box cuts nothing.
     pub fn inside(&self, bounds: &Aabb) -> Self {
         if bounds.is_empty() {
             return self.clone();
         }
         let mut cut = Self { values: self.values.clone(), ..Self::default() };
         for line in self.lines() {
-            let mut kept: Vec<Point> = line.iter().copied().take_while(|p| bounds.contains(*p)).collect();
-            // The next point lies outside: the line goes on towards it to the wall.
-            if let (Some(&a), Some(&b)) = (kept.last(), line.get(kept.len()))
-                && let Some(direction) = (b - a).try_normalize()
-                && let Some((_, far)) = bounds.clip(&crate::math::Ray::new(a, direction))
-            {
-                kept.push(a + direction * far);
+            let mut kept: Vec<Point> = Vec::new();
+            for pair in line.windows(2) {
+                let (a, b) = (pair[0], pair[1]);
+                let Some(direction) = (b - a).try_normalize() else { continue };
+                let stretch = Ray::new(a, direction).with_range(0.0, a.distance(b));
+                let Some((near, far)) = bounds.clip(&stretch) else { continue };
+                // The box is entered in the middle of a stretch where its beginning lies outside.
+                if kept.is_empty() {
+                    kept.push(if bounds.contains(a) { a } else { a + direction * near });
+                }
+                if !bounds.contains(b) {
+                    kept.push(a + direction * far);
+                    break;
+                }
+                kept.push(b);
             }
+            // A line keeps one point at least, or values would belong to the wrong lines.
             if kept.is_empty() {
-                // A line keeps one point at least, or values would belong to the wrong lines.
                 kept.extend(line.first());
             }
             cut.push(kept);
@@ -71,12 +79,16 @@ mod tests {
     fn lines_end_at_the_wall_they_leave_through() {
         let mut lines = Polylines::default();
         lines.push([Point::splat(0.5), Point::new(0.5, 0.5, 0.9), Point::new(0.5, 0.5, 1e5)]);
-        lines.push([Point::splat(3.0), Point::splat(0.5)]);
+        lines.push([Point::new(2.0, 2.0, 2.0), Point::new(1.5, 1.5, 1.5), Point::splat(0.5)]);
+        lines.push([Point::new(3.0, 0.0, 0.0), Point::new(3.0, 1.0, 0.0)]);
         let cut = lines.inside(&Aabb { min: Point::ZERO, max: Point::ONE });
         let points: Vec<&[Point]> = cut.lines().collect();
         assert_eq!(points[0].len(), 3);
         assert!((points[0][2] - Point::new(0.5, 0.5, 1.0)).length() < 1e-14);
-        assert_eq!(points[1], [Point::splat(3.0)]);
+        // From outside it begins at the wall, and what passes by is a point.
+        assert_eq!(points[1].len(), 2);
+        assert!((points[1][0] - Point::ONE).length() < 1e-14 && points[1][1] == Point::splat(0.5));
+        assert_eq!(points[2], [Point::new(3.0, 0.0, 0.0)]);
         assert_eq!(lines.inside(&Aabb::EMPTY), lines);
     }
 }

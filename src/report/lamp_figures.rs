@@ -6,6 +6,8 @@ use crate::formats::Grid;
 use crate::regulation::Assessment;
 use crate::simulate::{ReceiverResult, Results};
 
+/// Angles nearer than this are one, degrees.
+const SAME_ANGLE_DEG: f64 = 1e-6;
 /// Radii at which the encircled power is drawn.
 const RADII: usize = 200;
 
@@ -23,13 +25,68 @@ fn width_at_half(values: &[f64], step: f64) -> Option<f64> {
     Some((right - left) * step)
 }
 
-/// Returns the values along both axes through the brightest cell; `None` for a grid without cells.
-fn lines_through_peak(grid: &Grid) -> Option<[Vec<f64>; 2]> {
-    let cells = grid.axes[0].cells;
-    let peak = (0..grid.values.len()).max_by(|a, b| grid.values[*a].total_cmp(&grid.values[*b]))?;
-    let row = grid.values[peak / cells * cells..][..cells].to_vec();
-    let column = grid.values.iter().skip(peak % cells).step_by(cells).copied().collect();
-    Some([row, column])
+/// A line of values through the brightest cell: what it is called, the distance of two values in degrees, the values.
+type Line = (String, f64, Vec<f64>);
+
+/// Returns the values along both axes through the brightest cell, or in its plane and the one across where the grid is over planes C all
+/// around, in which γ runs to both sides of its pole; `None` for a grid without cells.
+fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
+    let [a, b] = &grid.axes;
+    let (i, j) = grid.peak_cell()?;
+    let column =
+        |i: usize| -> Vec<f64> { grid.values.iter().skip(i % a.cells).step_by(a.cells).copied().collect() };
+    if !is_all_around(grid) {
+        let row = grid.values[j * a.cells..][..a.cells].to_vec();
+        return Some([
+            (format!("along {}", a.label), a.step(), row),
+            (format!("along {}", b.label), b.step(), column(i)),
+        ]);
+    }
+    let plane = |i: usize| {
+        let line = column(i + a.cells / 2).into_iter().rev().chain(column(i)).collect();
+        (format!("in the plane C {}°", figures(a.center(i % a.cells), 3)), b.step(), line)
+    };
+    Some([plane(i), plane(i + a.cells / 4)])
+}
+
+/// Whether a grid is over planes C all around, with γ from its pole on.
+fn is_all_around(grid: &Grid) -> bool {
+    let [c, gamma] = &grid.axes;
+    let is_whole_turn = (c.range[1] - c.range[0] - 360.0).abs() < SAME_ANGLE_DEG;
+    c.label == "C" && c.cells >= 4 && is_whole_turn && gamma.range[0].abs() < SAME_ANGLE_DEG
+}
+
+/// Returns a grid with each ring of cells at a pole (γ 0° and 180°) at its mean, where it is over planes C all around: these cells are
+/// slivers of one direction, and the brightest of so many that few rays meet would be the luckiest.
+fn with_even_poles(grid: &Grid) -> Grid {
+    let mut even = grid.clone();
+    if !is_all_around(grid) {
+        return even;
+    }
+    let [c, gamma] = &grid.axes;
+    let (n, count) = (c.cells, c.cells as f64);
+    let has_far_pole = (gamma.range[1] - 180.0).abs() < SAME_ANGLE_DEG;
+    for row in std::iter::once(0).chain(has_far_pole.then_some(gamma.cells - 1)) {
+        let ring = row * n..(row + 1) * n;
+        let mean = |values: &[f64]| values[ring.clone()].iter().sum::<f64>() / count;
+        even.values[ring.clone()].fill(mean(&grid.values));
+        // Cells of a ring count different rays; what facets change they change alike.
+        if let (Some(all), Some(error)) = (&mut even.error, &grid.error) {
+            let squares: f64 = error[ring.clone()].iter().map(|e| e * e).sum();
+            all[ring.clone()].fill(squares.sqrt() / count);
+        }
+        if let (Some(all), Some(geometric)) = (&mut even.geometric, &grid.geometric) {
+            all[ring.clone()].fill(mean(geometric));
+        }
+    }
+    even
+}
+
+/// Returns both errors of a cell together, one standard error; empty where none was estimated.
+fn cell_error(grid: &Grid, (i, j): (usize, usize)) -> Cell {
+    let k = j * grid.axes[0].cells + i;
+    let Some(statistical) = grid.error.as_ref().map(|error| error[k]) else { return Cell::Empty };
+    Cell::Number(statistical.hypot(grid.geometric.as_ref().map_or(0.0, |geometric| geometric[k])), 2)
 }
 
 /// Makes a table of the figures of a far field in candela, with the points of a regulation where it was judged by one.
@@ -41,34 +98,49 @@ pub(super) fn lamp_table(
 ) -> Table {
     let title = format!("{}: figures of the lamp", super::maps::spoken(&receiver.name));
     let name = format!("{}-lamp", crate::formats::file_stem(&receiver.name));
-    let mut table = Table::new(&name, &title, &[("", ""), ("value", ""), ("unit", ""), ("where", "")]);
+    let mut table = Table::new(&name, &title, &[("", ""), ("value", ""), ("±", ""), ("unit", ""), ("where", "")]);
+    let grid = &with_even_poles(grid);
     let degrees = |[h, v]: [f64; 2]| {
         format!("{} {}°, {} {}°", grid.axes[0].label, figures(h, 3), grid.axes[1].label, figures(v, 3))
     };
     if let Some((place, value)) = grid.peak() {
-        table.row(["Imax".into(), Cell::Number(value, 5), "cd".into(), degrees(place).into()]);
+        let error = grid.peak_cell().map_or(Cell::Empty, |cell| cell_error(grid, cell));
+        table.row(["Imax".into(), Cell::Number(value, 5), error, "cd".into(), degrees(place).into()]);
     }
     let lumens = receiver.photometric().map_or(receiver.power, |channel| channel.total);
-    table.row(["flux".into(), Cell::Number(lumens, 5), "lm".into(), "into the far field".into()]);
+    table.row(["flux".into(), Cell::Number(lumens, 5), Cell::Empty, "lm".into(), "into the far field".into()]);
     let share = 100.0 * receiver.power / results.power.emitted;
-    table.row(["efficiency".into(), Cell::Number(share, 4), "%".into(), "of what the sources emit".into()]);
+    table.row([
+        "efficiency".into(),
+        Cell::Number(share, 4),
+        Cell::Empty,
+        "%".into(),
+        "of what the sources emit".into(),
+    ]);
     if let Some(lines) = lines_through_peak(grid) {
-        for (axis, values) in grid.axes.iter().zip(&lines) {
-            let width = width_at_half(values, axis.step()).map_or(Cell::Empty, |w| Cell::Number(w, 3));
-            let name = format!("width at half, along {}", axis.label);
-            table.row([name.into(), width, "°".into(), "through Imax".into()]);
+        for (line, step, values) in &lines {
+            let width = width_at_half(values, *step).map_or(Cell::Empty, |w| Cell::Number(w, 3));
+            table.row([
+                format!("width at half, {line}").into(),
+                width,
+                Cell::Empty,
+                "°".into(),
+                "through Imax".into(),
+            ]);
         }
     }
     if let Some(value) = value_ahead(grid) {
-        table.row(["HV".into(), Cell::Number(value, 5), "cd".into(), "H 0°, V 0° as placed".into()]);
+        let place = if is_all_around(grid) { "γ 0°" } else { "H 0°, V 0° as placed" };
+        table.row(["HV".into(), Cell::Number(value, 5), Cell::Empty, "cd".into(), place.into()]);
     }
     if let Some(assessment) = assessment {
         let gradient = assessment.aim.gradient.map_or(Cell::Empty, |g| Cell::Number(g, 3));
-        table.row(["cut-off and gradient G".into(), gradient, "".into(), assessment.aim.how.as_str().into()]);
+        let how = assessment.aim.how.as_str();
+        table.row(["cut-off and gradient G".into(), gradient, Cell::Empty, "".into(), how.into()]);
         for row in assessment.rows.iter().filter(|r| r.reading.is_some()) {
             let value = row.reading.map_or(Cell::Empty, |r| Cell::Number(r.value, 5));
             let place = row.direction.map_or(String::new(), degrees);
-            table.row([row.row.id.as_str().into(), value, "cd".into(), place.into()]);
+            table.row([row.row.id.as_str().into(), value, Cell::Empty, "cd".into(), place.into()]);
         }
     }
     table
@@ -135,11 +207,12 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
 /// Draws the polar diagram of a luminaire: intensities over γ in the planes C 0–180 and C 90–270, nadir below; `None` for a grid that is
 /// not over C-planes all around.
 pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
-    let [c, gamma] = &grid.axes;
     // The diagram needs the whole turn.
-    if c.label != "C" || c.cells < 4 || (c.range[1] - c.range[0] - 360.0).abs() > 1e-6 {
+    if !is_all_around(grid) {
         return None;
     }
+    let grid = &with_even_poles(grid);
+    let [c, gamma] = &grid.axes;
     let half_plane = |angle: f64| {
         let column = ((angle - c.range[0]) / c.step()).rem_euclid(c.cells as f64);
         // A plane between two cells takes their mean.
@@ -167,6 +240,41 @@ pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A grid over C and γ of 3° cells.
+    fn luminaire(value: impl Fn(usize, f64) -> f64) -> Grid {
+        let axis = |label: &str, end: f64, cells| crate::formats::Axis {
+            label: label.into(),
+            unit: "°".into(),
+            range: [0.0, end],
+            cells,
+        };
+        let axes = [axis("C", 360.0, 120), axis("γ", 180.0, 60)];
+        let values: Vec<f64> = (0..7200).map(|k| value(k % 120, axes[1].center(k / 120).to_radians())).collect();
+        let (name, quantity, unit) = ("l".to_owned(), String::new(), "cd".to_owned());
+        let error = Some(values.iter().map(|v| 0.1 * v).collect());
+        Grid { name, quantity, unit, axes, values, error, geometric: None, layers: Vec::new() }
+    }
+
+    #[test]
+    fn figures_of_a_luminaire_are_not_those_of_one_sliver_at_its_pole() {
+        // Lambert's law, of which every other cell at the pole got twice its light and its neighbour none.
+        let grid = luminaire(|i, gamma| {
+            let noise = if gamma < 0.03 { 2.0 * (i % 2) as f64 } else { 1.0 };
+            noise * 100.0 * gamma.cos().max(0.0)
+        });
+        let even = with_even_poles(&grid);
+        let at_pole = 100.0 * 1.5f64.to_radians().cos();
+        assert!((even.peak().unwrap().1 / at_pole - 1.0).abs() < 1e-12);
+        assert!((value_ahead(&even).unwrap() / at_pole - 1.0).abs() < 1e-12);
+        // 60 cells of ±10 % of twice the value, and 60 without light: √60 · 0.2 / 120 of it.
+        let Cell::Number(error, _) = cell_error(&even, even.peak_cell().unwrap()) else { panic!("an error") };
+        assert!((error / at_pole - 0.2 * 60f64.sqrt() / 120.0).abs() < 1e-12, "{error}");
+        for (name, step, values) in lines_through_peak(&even).unwrap() {
+            let width = width_at_half(&values, step).unwrap();
+            assert!((width - 120.0).abs() < 0.1 && name.starts_with("in the plane C"), "{name}: {width}");
+        }
+    }
 
     #[test]
     fn widths_at_half_are_those_of_the_curve() {

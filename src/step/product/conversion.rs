@@ -1,7 +1,7 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
 use super::free_surfaces::convert_free_surfaces;
-use super::loop_order::{DirectedUse, put_in_order};
+use super::loop_order::{DirectedUse, drop_opposite_loops, put_in_order};
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::{faces_against_neighbours, is_inside_out};
 use super::recipe_parts::convert_recipes;
@@ -264,6 +264,7 @@ fn face_edges<'e>(
             found.loops.push(kept.into_iter().map(|u| (u.edge, u.reversed)).collect());
         }
     }
+    found.repairs.extend(drop_opposite_loops(&mut found.loops));
     Ok(found)
 }
 

@@ -85,6 +85,29 @@ fn chain_from_first<T: Copy>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<
     (largest_gap(&out) <= tolerance).then_some(out)
 }
 
+/// Drops loops that run along the edges of another one in the opposite direction, and that one, where others bound the face: both together
+/// enclose nothing, and each fitted by itself they would enclose a sliver. Returns what to say of it.
+pub(super) fn drop_opposite_loops(loops: &mut Vec<Vec<(usize, bool)>>) -> Option<&'static str> {
+    let before = loops.len();
+    let is_opposite = |a: &[(usize, bool)], b: &[(usize, bool)]| {
+        let n = a.len();
+        // The same cycle from some place on, backwards.
+        n == b.len() && (0..n).any(|k| (0..n).all(|i| a[i] == (b[(k + n - i) % n].0, !b[(k + n - i) % n].1)))
+    };
+    let mut k = 0;
+    while k < loops.len() {
+        let twin = (k + 1..loops.len()).find(|&l| is_opposite(&loops[k], &loops[l]));
+        match twin {
+            Some(l) if loops.len() > 2 => {
+                loops.remove(l);
+                loops.remove(k);
+            }
+            _ => k += 1,
+        }
+    }
+    (loops.len() < before).then_some("two bounds along the same edges in opposite directions enclose nothing")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,5 +149,18 @@ mod tests {
         uses.remove(2);
         assert_eq!(put_in_order(&mut uses, 1e-6), None);
         assert_eq!(uses.iter().map(|u| u.edge).collect::<Vec<_>>(), [0, 1, 3]);
+    }
+
+    #[test]
+    fn loops_that_cancel_each_other_go_where_another_is_left() {
+        let [there, back] = [vec![(3, false), (4, true), (5, false)], vec![(4, false), (3, true), (5, true)]];
+        let other = vec![(7, false), (8, false)];
+        let mut loops = vec![there.clone(), other.clone(), back.clone()];
+        assert!(drop_opposite_loops(&mut loops).is_some());
+        assert_eq!(loops, std::slice::from_ref(&other));
+        for kept in [vec![there.clone(), back], vec![there.clone(), there, other]] {
+            let mut loops = kept.clone();
+            assert!(drop_opposite_loops(&mut loops).is_none() && loops == kept);
+        }
     }
 }
