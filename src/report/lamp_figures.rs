@@ -5,6 +5,7 @@ use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
 use crate::regulation::Assessment;
 use crate::simulate::{ReceiverResult, Results};
+use crate::study::figures::error_of_maximum;
 
 /// Angles nearer than this are one, degrees.
 const SAME_ANGLE_DEG: f64 = 1e-6;
@@ -82,11 +83,19 @@ fn with_even_poles(grid: &Grid) -> Grid {
     even
 }
 
-/// Returns both errors of a cell together, one standard error; empty where none was estimated.
-fn cell_error(grid: &Grid, (i, j): (usize, usize)) -> Cell {
-    let k = j * grid.axes[0].cells + i;
-    let Some(statistical) = grid.error.as_ref().map(|error| error[k]) else { return Cell::Empty };
-    Cell::Number(statistical.hypot(grid.geometric.as_ref().map_or(0.0, |geometric| geometric[k])), 2)
+/// Returns both errors of the brightest cell together, one standard error; empty where none was estimated. `grid` is that of
+/// [`with_even_poles`].
+fn peak_error(grid: &Grid) -> Cell {
+    let (Some((i, j)), Some(mut errors)) = (grid.peak_cell(), grid.error.clone()) else { return Cell::Empty };
+    let cells = grid.axes[0].cells;
+    // The cells of an even pole are one value, not rivals of each other: the last one, which of equal cells is the peak, stands for all.
+    if is_all_around(grid) {
+        let last = errors.len() - 1;
+        errors[..cells - 1].fill(0.0);
+        errors[last + 1 - cells..last].fill(0.0);
+    }
+    let geometric = grid.geometric.as_ref().map_or(0.0, |geometric| geometric[j * cells + i]);
+    Cell::Number(error_of_maximum(&grid.values, &errors).hypot(geometric), 2)
 }
 
 /// Makes a table of the figures of a far field in candela, with the points of a regulation where it was judged by one.
@@ -104,8 +113,7 @@ pub(super) fn lamp_table(
         format!("{} {}°, {} {}°", grid.axes[0].label, figures(h, 3), grid.axes[1].label, figures(v, 3))
     };
     if let Some((place, value)) = grid.peak() {
-        let error = grid.peak_cell().map_or(Cell::Empty, |cell| cell_error(grid, cell));
-        table.row(["Imax".into(), Cell::Number(value, 5), error, "cd".into(), degrees(place).into()]);
+        table.row(["Imax".into(), Cell::Number(value, 5), peak_error(grid), "cd".into(), degrees(place).into()]);
     }
     let lumens = receiver.photometric().map_or(receiver.power, |channel| channel.total);
     table.row(["flux".into(), Cell::Number(lumens, 5), Cell::Empty, "lm".into(), "into the far field".into()]);
@@ -252,7 +260,8 @@ mod tests {
         let axes = [axis("C", 360.0, 120), axis("γ", 180.0, 60)];
         let values: Vec<f64> = (0..7200).map(|k| value(k % 120, axes[1].center(k / 120).to_radians())).collect();
         let (name, quantity, unit) = ("l".to_owned(), String::new(), "cd".to_owned());
-        let error = Some(values.iter().map(|v| 0.1 * v).collect());
+        // Only the cells at the pole are uncertain, by a tenth.
+        let error = Some((0..7200).map(|k| if k < 120 { 0.1 * values[k] } else { 0.0 }).collect());
         Grid { name, quantity, unit, axes, values, error, geometric: None, layers: Vec::new() }
     }
 
@@ -268,7 +277,7 @@ mod tests {
         assert!((even.peak().unwrap().1 / at_pole - 1.0).abs() < 1e-12);
         assert!((value_ahead(&even).unwrap() / at_pole - 1.0).abs() < 1e-12);
         // 60 cells of ±10 % of twice the value, and 60 without light: √60 · 0.2 / 120 of it.
-        let Cell::Number(error, _) = cell_error(&even, even.peak_cell().unwrap()) else { panic!("an error") };
+        let Cell::Number(error, _) = peak_error(&even) else { panic!("an error") };
         assert!((error / at_pole - 0.2 * 60f64.sqrt() / 120.0).abs() < 1e-12, "{error}");
         for (name, step, values) in lines_through_peak(&even).unwrap() {
             let width = width_at_half(&values, step).unwrap();

@@ -32,6 +32,7 @@ mod settings;
 mod trim;
 
 pub use error::{Error, ErrorKind};
+#[cfg(feature = "cli")]
 pub(crate) use import::peak_bytes;
 pub use import::{Import, read, read_bytes};
 pub use report::{FaceCounts, ImportReport, Note, PlacedCounts, Seconds, SurfaceCounts, UnitNames};

@@ -280,7 +280,7 @@ const REACH: f64 = 6.0;
 ///
 /// The excess is that of the largest cell after the noise is added once more (Efron, *Bootstrap Methods*, 1979), by the integral of the
 /// distribution of a maximum of independent normal values.
-fn error_of_maximum(cells: &[f64], errors: &[f64]) -> f64 {
+pub(crate) fn error_of_maximum(cells: &[f64], errors: &[f64]) -> f64 {
     let Some(largest) = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b])) else { return 0.0 };
     let Some(&own) = errors.get(largest) else { return 0.0 };
     // Below this the maximum nearly certainly does not lie.
