@@ -50,7 +50,7 @@ trait Words {
     fn word(&mut self, word: &mut u64) -> Option<()>;
 
     /// The most words that can still come: a length beyond them asks for no memory.
-    fn most(&self) -> usize;
+    fn longest_list(&self) -> usize;
 }
 
 struct Writer(Vec<u64>);
@@ -61,7 +61,7 @@ impl Words for Writer {
         Some(())
     }
 
-    fn most(&self) -> usize {
+    fn longest_list(&self) -> usize {
         usize::MAX
     }
 }
@@ -75,7 +75,7 @@ impl Words for Reader<'_> {
         Some(())
     }
 
-    fn most(&self) -> usize {
+    fn longest_list(&self) -> usize {
         self.0.len()
     }
 }
@@ -253,7 +253,7 @@ fn exchange_list<T: Clone>(
 ) -> Option<()> {
     let mut count = items.len();
     exchange_count(words, &mut count)?;
-    if count > words.most() {
+    if count > words.longest_list() {
         return None;
     }
     items.resize(count, blank.clone());

@@ -27,7 +27,8 @@ struct FaceWork {
 }
 
 impl FaceWork {
-    fn all(&self) -> f64 {
+    /// The work of all facets.
+    fn sum(&self) -> f64 {
         self.each * self.facets.len() as f64
     }
 }
@@ -57,10 +58,10 @@ pub(super) fn sample_within_budget(
         FaceWork { facets, each: evaluations * visited[face] }
     };
     let faces: Vec<FaceWork> = ranges.into_iter().map(work).collect();
-    let limit = common_limit(faces.iter().map(FaceWork::all).collect(), MOST_WORK);
+    let limit = common_limit(faces.iter().map(FaceWork::sum).collect(), MOST_WORK);
     let chosen = faces.iter().flat_map(|face| {
         let left: Vec<usize> = face.facets.clone().filter(|&f| out[f].is_none()).collect();
-        let count = if face.all() <= limit { left.len() } else { (limit / face.each) as usize };
+        let count = if face.sum() <= limit { left.len() } else { (limit / face.each) as usize };
         let (proved, open): (Vec<usize>, Vec<usize>) = left.into_iter().partition(|&f| quality[f].certified);
         let mut chosen = spread(open, count);
         let rest = count - chosen.len();

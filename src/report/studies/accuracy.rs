@@ -26,7 +26,8 @@ impl<'a> Point<'a> {
     /// Reads a row; `None` without a time or an error.
     fn from_row(row: &'a Value) -> Option<Self> {
         // The spline has no facets to make.
-        let prepare = number(row, "seconds_tessellate").unwrap_or(0.0) + number(row, "seconds_build")?;
+        let build = number(row, "seconds_build")?;
+        let prepare = number(row, "seconds_tessellate").map_or(build, |tessellate| tessellate + build);
         let trace_seconds = number(row, "seconds_trace_median")?;
         let seconds = prepare + trace_seconds;
         Some(Self { row, seconds, trace_seconds, error: number(row, "direction_error_deg_p99")? })

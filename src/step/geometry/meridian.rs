@@ -34,7 +34,10 @@ pub(crate) fn keep_face_side_of_axis(frame: &Frame, curve: Curve, reach: FaceExt
     // A conic about its own axis, or a circle about a point of the axis, fits on both sides: the first is taken.
     let scale = (PROFILE_ERROR_SHARE * size).clamp(PROFILE_ERROR_SHARE, 1.0);
     let even = EVEN_FIT_MM * points.len() as f64 * scale;
-    let first = off.iter().position(|&o| o <= least + even).unwrap_or(0);
+    let Some(first) = off.iter().position(|&o| o <= least + even) else {
+        // Distances that are no numbers compare with nothing.
+        return (parts.swap_remove(sides), false);
+    };
     let alike = TWIN_SHARE * size * points.len() as f64;
     let has_twin = (0..sides).any(|k| k != first && off[k] <= off[first] + alike);
     (parts.swap_remove(first), has_twin)

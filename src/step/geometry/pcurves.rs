@@ -52,8 +52,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 let moved = |piece: &Curve, t: f64| {
                     let d = piece.derivatives(t);
                     // Where the curve stands still, nothing says which way is aside: it stays where it is.
-                    let aside = across.cross(d.first).try_normalize().unwrap_or(Vector::ZERO);
-                    d.point + sign * aside
+                    across.cross(d.first).try_normalize().map_or(d.point, |aside| d.point + sign * aside)
                 };
                 // The offset's own derivative would need the curve's second one; a quotient is close enough for a
                 // fit.

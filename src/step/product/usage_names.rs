@@ -31,7 +31,7 @@ pub(super) fn product_name(file: &File<'_>, definition: u64) -> String {
 pub(super) fn name_usages(file: &File<'_>, usages: &mut [Usage]) {
     let text = |usage: &Usage, i: usize| {
         let args = file.entity(usage.id).and_then(|e| e.attributes("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0));
-        args.and_then(|a| a.text(i)).map(|n| n.trim().to_owned()).unwrap_or_default()
+        args.map_or_else(String::new, |a| a.name(i).trim().to_owned())
     };
     let mut children: FxHashMap<String, FxHashSet<u64>> = FxHashMap::default();
     for usage in usages.iter_mut() {
@@ -42,8 +42,8 @@ pub(super) fn name_usages(file: &File<'_>, usages: &mut [Usage]) {
     for (k, usage) in usages.iter_mut().enumerate() {
         let tells = !usage.name.is_empty() && usage.name != DEFAULT_NAME && children[&usage.name].len() == 1;
         if !tells {
-            let others = [product_name(file, usage.child), text(usage, 2), text(usage, 0)];
-            usage.name = others.into_iter().find(|n| !n.is_empty()).unwrap_or_default();
+            let others = [product_name(file, usage.child), text(usage, 2)];
+            usage.name = others.into_iter().find(|n| !n.is_empty()).unwrap_or_else(|| text(usage, 0));
             unnamed.entry(usage.name.clone()).or_default().push(k);
         }
     }
