@@ -3,11 +3,10 @@
 use super::Settings;
 use super::border::edges::Division;
 use super::border::polygons::{self, BorderPolygons, ImprintedPoints, crosses_ray_from};
-use super::border::slivers::Slivers;
 use super::border_nodes::BorderNodes;
 use super::cells::cell::{Subdivision, parameter_resolution};
 use super::cells::grid::{self, GridInput};
-use super::cells::tree::{self, TreeInput};
+use super::cells::tree;
 use super::crossing_chords::facing_samples;
 use super::emission::Emission;
 use super::face_mesh::FaceMesh;
@@ -96,16 +95,18 @@ pub(super) fn mesh_with_imprint(
     let lines: Vec<[Uv; 2]> = border.imprinted.iter().map(|s| s.map(|n| border.nodes[n].uv)).collect();
     let angle = settings.angle_deg.map(f64::to_radians);
     // The tree is asked for imprinted lines too, which no cell may lie across.
-    let (lo, hi) = polygons.bounds();
-    let resolution = parameter_resolution(lo, hi);
-    let slivers = Slivers::new(border.chords.values(), resolution);
-    let input = TreeInput { border: &polygons, slivers: &slivers, imprinted: &lines, max_angle: angle };
-    let cells = tree::split(surface, settings.acceptance, input, settings.budget);
+    let cells = tree::split(surface, settings.acceptance, &polygons, &lines, settings.budget, angle);
     let mut prover = Prover::new(surface, settings.acceptance);
     // Pairing must not join triangles across a side that neighbours have.
     let kept = border.segments.iter().chain(&border.imprinted);
     let fixed: FxHashSet<[u32; 2]> = kept.map(|s| edge_key(s[0], s[1])).collect();
-    let input = GridInput { nodes: &mut border.nodes, chords: &border.chords, resolution, taken };
+    let (lo, hi) = polygons.bounds();
+    let input = GridInput {
+        nodes: &mut border.nodes,
+        chords: &border.chords,
+        resolution: parameter_resolution(lo, hi),
+        taken,
+    };
     let mut grid = grid::build(&mut prover, &cells, input);
     if surface.steps.are_too_many() {
         return Err(Unmeshed::TooManySteps);
@@ -116,7 +117,7 @@ pub(super) fn mesh_with_imprint(
     // Without a transition its scale is of no interest, and it costs curvatures.
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
     let creases = crease_lines(surface, &nodes, &segments);
-    let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, slivers: &slivers, scale, taken };
+    let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale, taken };
     let triangulate = || delaunay::triangulate(surface, settings.acceptance, outline, settings.budget);
     let mut transition = catch_panic(triangulate)?.ok_or(Unmeshed::Empty)?;
     // Proofs that were not tried any more say nothing: the face is given up whole, whichever thread came how far.

@@ -6,4 +6,3 @@ pub(in crate::tessellate) mod edge_chords;
 pub(in crate::tessellate) mod edges;
 mod opposite_sides;
 pub(in crate::tessellate) mod polygons;
-pub(in crate::tessellate) mod slivers;

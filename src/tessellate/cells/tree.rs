@@ -9,7 +9,6 @@ use super::preferred_cuts::preferred_cuts;
 use crate::math::Uv;
 use crate::tessellate::border::bands::BorderBands;
 use crate::tessellate::border::polygons::{BorderPolygons, BorderSide};
-use crate::tessellate::border::slivers::Slivers;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::proof::pole;
 use crate::tessellate::proof::prover::Prover;
@@ -40,8 +39,7 @@ struct Tree<'s, 'a> {
     segments: Vec<[Uv; 2]>,
     /// How many are the border's.
     border: usize,
-    slivers: &'s Slivers,
-    /// The segments of the border, by their place along v.
+    /// Those, by their place along v.
     bands: BorderBands,
     /// Of each border segment, whether it is one point in space.
     poles: Vec<bool>,
@@ -100,26 +98,17 @@ struct Visit<'n> {
     depth: u32,
 }
 
-/// What cells must keep clear of or to.
-pub(in crate::tessellate) struct TreeInput<'t> {
-    pub(in crate::tessellate) border: &'t BorderPolygons,
-    /// Where no whole cell may have a corner.
-    pub(in crate::tessellate) slivers: &'t Slivers,
-    /// Lines that no cell crosses.
-    pub(in crate::tessellate) imprinted: &'t [[Uv; 2]],
-    /// Largest angle between a facet and its normals, radians; `None` where none was asked for.
-    pub(in crate::tessellate) max_angle: Option<f64>,
-}
-
 /// Splits the box around the border until every cell fits its tolerance or the budget of cells is used up, which the result says; it may
-/// hold up to twice the budget. Empty on a plane and for a border without extent.
+/// hold up to twice the budget. Empty on a plane and for a border without extent. `max_angle` is in radians; no cell crosses an `imprinted`
+/// line.
 pub(in crate::tessellate) fn split(
     surface: &FaceSurface<'_>,
     acceptance: Acceptance,
-    input: TreeInput<'_>,
+    border: &BorderPolygons,
+    imprinted: &[[Uv; 2]],
     budget: usize,
+    max_angle: Option<f64>,
 ) -> Subdivision {
-    let TreeInput { border, slivers, imprinted, max_angle } = input;
     let mut segments: Vec<[Uv; 2]> = border
         .polygons
         .iter()
@@ -137,8 +126,7 @@ pub(in crate::tessellate) fn split(
     let bands = BorderBands::new(&segments);
     segments.extend(imprinted);
     let resolution = parameter_resolution(lo, hi);
-    let tree =
-        Tree { surface, acceptance, segments, border, slivers, bands, poles, resolution, preferred, max_angle };
+    let tree = Tree { surface, acceptance, segments, border, bands, poles, resolution, preferred, max_angle };
     // Branches have equal shares whatever they need: where one is short while the whole is not, all get twice as much. The last try
     // leaves at most twice the budget.
     let all: Vec<u32> = (0..tree.segments.len() as u32).collect();
@@ -176,11 +164,7 @@ impl Tree<'_, '_> {
         {
             // At the border the samples' aligned sides let a cell be whole; else the transition takes it, and this
             // one only told the size.
-            let is_whole = || {
-                let stands_out = cell.corners().iter().any(|&c| self.slivers.hold(c));
-                !stands_out && self.is_aligned(cell, &near) && self.contains(cell.center())
-            };
-            if inside || is_whole() {
+            if inside || self.is_aligned(cell, &near) && self.contains(cell.center()) {
                 let (first, places) = (candidate.first_corner(), candidate.places());
                 let slack = branch.slack;
                 branch.cells.inside.push(ProvedCell { cell, bound, tolerance, slack, first, places });
@@ -236,9 +220,7 @@ impl Tree<'_, '_> {
         let near: Vec<u32> = visit.near.iter().copied().filter(touching).collect();
         // Free of the border all of it is inside or outside, as its middle is.
         let clear = near.is_empty();
-        // Between a chord and its curve lies what is no part of the face, though the polygon takes it in.
-        let inside = clear && !self.slivers.may_meet(cell.lo, cell.hi);
-        (!clear || self.contains(cell.center())).then_some((near, inside))
+        (!clear || self.contains(cell.center())).then_some((near, clear))
     }
 
     /// Returns a bound and tolerance, mm, of a cell that is proved within the branch's slack; `None` where it is not.

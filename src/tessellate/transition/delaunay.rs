@@ -4,7 +4,6 @@
 use crate::math::Uv;
 use crate::model::EdgeId;
 use crate::tessellate::border::bands::BorderBands;
-use crate::tessellate::border::slivers::Slivers;
 use crate::tessellate::crossing_chords::Followed;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};
@@ -29,8 +28,6 @@ pub(in crate::tessellate) struct Outline<'t> {
     pub(in crate::tessellate) imprinted: Vec<[u32; 2]>,
     /// How far edges stray from the segments of the border.
     pub(in crate::tessellate) chords: &'t BorderChords,
-    /// Where no corner may be inserted.
-    pub(in crate::tessellate) slivers: &'t Slivers,
     /// Multiplies parameters before triangulating.
     pub(in crate::tessellate) scale: Uv,
     /// Chords that no side of a triangle may be, but for those of the border.
@@ -143,12 +140,11 @@ pub(in crate::tessellate) fn triangulate(
     outline: Outline<'_>,
     budget: usize,
 ) -> Option<Transition> {
-    let Outline { nodes, segments, creases, imprinted, chords, slivers, scale, taken } = outline;
+    let Outline { nodes, segments, creases, imprinted, chords, scale, taken } = outline;
     let mut mesh = Refinement {
         surface,
         nodes,
         scale,
-        slivers,
         taken,
         cdt: Cdt::new(),
         border: FxHashMap::default(),
@@ -221,7 +217,6 @@ pub(super) struct Refinement<'s, 'a> {
     pub(super) nodes: Nodes,
     /// From parameters to coordinates of the triangulation.
     scale: Uv,
-    slivers: &'s Slivers,
     pub(super) taken: &'s TakenChords,
     cdt: Cdt,
     /// How often each edge of the triangulation that lies on the outline turns outside into inside; imprinted lines count twice.
@@ -273,7 +268,7 @@ impl Refinement<'_, '_> {
     }
 
     /// Whether a point may be inserted: inside the hull, apart from the vertices around it by more than rounding, and on no border or
-    /// imprinted line nor between a chord and its curve; creases may be split. False too for parameters that [`Self::scaled`] refuses.
+    /// imprinted line; creases may be split. False too for parameters that [`Self::scaled`] refuses.
     pub(super) fn can_insert(&self, uv: Uv) -> bool {
         use spade::PositionInTriangulation as At;
         // Between corners one rounding apart stood facets without width. Near zero a coordinate's own size says nothing of its rounding.
@@ -282,17 +277,15 @@ impl Refinement<'_, '_> {
             (p.x - v.x).abs() > SAME_COORDINATE * p.x.abs().max(size.x)
                 || (p.y - v.y).abs() > SAME_COORDINATE * p.y.abs().max(size.y)
         };
-        !self.slivers.hold(uv)
-            && self.scaled(uv).is_some_and(|p| match self.cdt.locate(p) {
-                At::OnFace(f) => self.cdt.face(f).vertices().iter().all(|v| apart(p, v.position())),
-                At::OnEdge(e) => {
-                    let e = self.cdt.directed_edge(e);
-                    let at_border =
-                        || self.border.contains_key(&edge_key(e.from().data().node, e.to().data().node));
-                    (!e.is_constraint_edge() || !at_border()) && e.vertices().iter().all(|v| apart(p, v.position()))
-                }
-                _ => false,
-            })
+        self.scaled(uv).is_some_and(|p| match self.cdt.locate(p) {
+            At::OnFace(f) => self.cdt.face(f).vertices().iter().all(|v| apart(p, v.position())),
+            At::OnEdge(e) => {
+                let e = self.cdt.directed_edge(e);
+                let at_border = || self.border.contains_key(&edge_key(e.from().data().node, e.to().data().node));
+                (!e.is_constraint_edge() || !at_border()) && e.vertices().iter().all(|v| apart(p, v.position()))
+            }
+            _ => false,
+        })
     }
 
     /// Makes segments edges of the triangulation. Returns those that could not be, and those that kept them out.
