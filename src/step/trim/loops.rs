@@ -119,7 +119,10 @@ impl Chain {
         // About the first corner: far from the origin the products would cancel.
         let Some(corner) = self.pieces.first().map(Piece::start) else { return 0.0 };
         let mut area = 0.0;
-        for piece in &self.pieces {
+        for (k, piece) in self.pieces.iter().enumerate() {
+            // Edges may miss one another by what their vertices allow: without the steps between them a loop is not closed.
+            let next = self.pieces[(k + 1) % self.pieces.len()].start();
+            area += 0.5 * (piece.end() - corner).perp_dot(next - corner);
             let sign = if piece.reversed { -0.5 } else { 0.5 };
             for span in piece.curve.breakpoints().windows(2) {
                 let width = span[1] - span[0];
@@ -310,4 +313,18 @@ fn run_along_pole(pole: &Pole, chart: &Chart, low: bool, difference: f64, same_e
     let amount =
         if amount < noise || amount > period - noise { if same_edge { period } else { 0.0 } } else { amount };
     if forward { amount } else { -amount }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_between_edges_that_miss_one_another_count_in_the_area() {
+        let side = |from: [f64; 2], to: [f64; 2]| Piece::straight(from.into(), to.into());
+        let open = Chain::closed(vec![side([0.0, 0.0], [1.0, 0.0]), side([1.0, 1.0], [0.0, 1.0])]);
+        assert_eq!(open.area(), 1.0);
+        let shifted = Chain::closed(open.pieces.iter().map(|p| p.clone().shifted(Uv::new(3.0, -2.0))).collect());
+        assert_eq!(shifted.area(), 1.0);
+    }
 }
