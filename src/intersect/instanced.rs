@@ -269,11 +269,7 @@ impl Intersector for Instanced<'_> {
             primitives: 0,
             build_seconds: self.build_seconds,
         };
-        self.groups.iter().map(|g| g.footprint()).fold(own, |sum, f| Footprint {
-            bytes: sum.bytes + f.bytes,
-            primitives: sum.primitives + f.primitives,
-            build_seconds: sum.build_seconds + f.build_seconds,
-        })
+        self.groups.iter().map(|g| g.footprint()).fold(own, |sum, f| sum + f)
     }
 }
 

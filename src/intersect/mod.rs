@@ -174,6 +174,19 @@ pub struct Footprint {
     pub build_seconds: f64,
 }
 
+impl std::ops::Add for Footprint {
+    type Output = Self;
+
+    /// Returns the footprint of two structures that answer together.
+    fn add(self, other: Self) -> Self {
+        Self {
+            bytes: self.bytes + other.bytes,
+            primitives: self.primitives + other.primitives,
+            build_seconds: self.build_seconds + other.build_seconds,
+        }
+    }
+}
+
 /// How the normal at a facet hit is got.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum NormalMode {

@@ -102,11 +102,6 @@ impl Intersector for SplineWithMeshes<'_> {
     }
 
     fn footprint(&self) -> Footprint {
-        let [spline, meshes] = [self.exact.footprint(), self.meshes.footprint()];
-        Footprint {
-            bytes: spline.bytes + meshes.bytes,
-            primitives: spline.primitives + meshes.primitives,
-            build_seconds: spline.build_seconds + meshes.build_seconds,
-        }
+        self.exact.footprint() + self.meshes.footprint()
     }
 }

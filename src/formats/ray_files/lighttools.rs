@@ -70,7 +70,7 @@ pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
     let wavelength = if columns == 8 { RowWavelength::Column(7, 1.0) } else { RowWavelength::Common(None) };
     let layout = RowLayout { columns, scale, power: 6, wavelength };
     let mut rays = RayCollector::new(path, most_in_memory).with_rows(file.file_handle()?, file.position(), layout);
-    file.read_rays(bytes / row, columns, &mut rays, |row| layout.ray(row))?;
+    file.read_rays(bytes / row, columns, &mut rays, |row| layout.ray(|column| row[column]))?;
     // A file cut between two rows would else pass.
     if file.read_array::<7>("the end mark")? != *END {
         return Err(file.malformed("LTRFEND is missing behind the rays; it was cut short"));

@@ -72,15 +72,15 @@ pub(super) enum RowWavelength {
 }
 
 impl RowLayout {
-    /// Makes the ray of a row; an error, for people, as [`LightRay::from_numbers`].
-    pub(super) fn ray(&self, row: &[f32]) -> Result<LightRay, String> {
+    /// Makes the ray of a row, whose number in a column `cell` returns; an error, for people, as [`LightRay::from_numbers`].
+    pub(super) fn ray(&self, cell: impl Fn(usize) -> f32) -> Result<LightRay, String> {
         let wavelength = match self.wavelength {
             RowWavelength::Common(nm) => nm,
-            RowWavelength::Column(place, unit) => Some(f64::from(row[place]) * unit),
+            RowWavelength::Column(place, unit) => Some(f64::from(cell(place)) * unit),
         };
         let mut numbers = [0.0; 8];
         for (place, number) in numbers[..7].iter_mut().enumerate() {
-            *number = f64::from(row[if place < 6 { place } else { self.power }]);
+            *number = f64::from(cell(if place < 6 { place } else { self.power }));
         }
         for coordinate in &mut numbers[..3] {
             *coordinate *= self.scale;
@@ -219,9 +219,8 @@ impl RayFile {
         let mut ray = match &self.place {
             Place::Memory(rays) => rays[block.first as usize + k],
             Place::Rows { layout, .. } => {
-                let row: Vec<f32> =
-                    (0..layout.columns).map(|c| row_number(&block.bytes, k * layout.columns + c)).collect();
-                let ray = layout.ray(&row);
+                // Without a copy of the row: this is done for every ray that is drawn.
+                let ray = layout.ray(|column| row_number(&block.bytes, k * layout.columns + column));
                 ray.map_err(|m| Error::new(&self.path, ErrorKind::Malformed(format!("it was changed: {m}"))))?
             }
             Place::Scratch(_) => {

@@ -133,11 +133,11 @@ impl Tm25Reader {
             let mut drawn = TableWavelengths::new(&self.header, self.places.spectrum_index);
             self.file.read_rays(self.header.rays, columns, &mut rays, |row| {
                 let nm = Some(drawn.next(row)?);
-                RowLayout { wavelength: RowWavelength::Common(nm), ..layout }.ray(row)
+                RowLayout { wavelength: RowWavelength::Common(nm), ..layout }.ray(|column| row[column])
             })?;
         } else {
             rays = rays.with_rows(self.file.file_handle()?, self.file.position(), layout);
-            self.file.read_rays(self.header.rays, columns, &mut rays, |row| layout.ray(row))?;
+            self.file.read_rays(self.header.rays, columns, &mut rays, |row| layout.ray(|column| row[column]))?;
         }
 
         let mut set = rays.finish(Some(flux))?;

@@ -58,7 +58,7 @@ pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
         if columns == 8 { RowWavelength::Column(7, MICROMETRE) } else { RowWavelength::Common(common) };
     let layout = RowLayout { columns, scale, power: 6, wavelength };
     let mut rays = RayCollector::new(path, most_in_memory).with_rows(file.file_handle()?, file.position(), layout);
-    file.read_rays(u64::from(count), columns, &mut rays, |row| layout.ray(row))?;
+    file.read_rays(u64::from(count), columns, &mut rays, |row| layout.ray(|column| row[column]))?;
     let mut set = rays.finish(Some(flux))?;
     set.scale_to(Some(f64::from(stated)));
     Ok(set)

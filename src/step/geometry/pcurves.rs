@@ -109,8 +109,9 @@ fn fit_pieces(e: Entity<'_, '_>, curve: &Curve, at: impl Fn(&Curve, f64) -> (Poi
         let (fitted, error) = fit_cubic([span[0], span[1]], |t| at(&piece, t), CURVE_ERROR_MM);
         // Of an offset both sides of a corner part, and no one curve joins them.
         let parted = whole.as_ref().map_or(0.0, |w| (w.points[w.points.len() - 1] - fitted.points[0]).length());
-        if !(error.max(parted) <= WORST_CURVE_ERROR_MM) || error.is_nan() {
-            let off = if error.is_nan() { error } else { error.max(parted) };
+        // An error that is no number stays one.
+        let off = if parted > error { parted } else { error };
+        if !(off <= WORST_CURVE_ERROR_MM) {
             return Err(Refusal::new(e, format!("no curve follows it to more than {off:.1e} mm")));
         }
         whole = Some(whole.map_or_else(|| fitted.clone(), |head| head.joined_with(&fitted)));

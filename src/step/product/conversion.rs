@@ -63,7 +63,8 @@ pub(crate) fn convert(
 
     // Each edge once: faces that share one must get the same bits, or they would not join.
     let edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(|&key| edge_curve(&geometry, key)).collect();
-    let removed = remove_faces_without_width(file, &ids, &mut plans, (&keys, &index), &edges);
+    let joined = vertices_of_empty_edges(file, &keys, &edges);
+    let removed = remove_faces_without_width(file, &ids, &mut plans, (&keys, &index), (&edges, &joined));
     let without = (!removed.is_empty()).then(|| items.without_faces(&removed));
     let items = without.as_ref().unwrap_or(items);
     let reason = "it has no width: it is left out, and the faces beside it meet";
@@ -79,7 +80,7 @@ pub(crate) fn convert(
     // Edges move into the part only now: a second copy of them, and of the faces below, took the peak of a 30 MB file
     // from 103 to 117 MiB.
     let mut part = Part::default();
-    let numbers = add_edges(&geometry, &keys, edges, &mut part);
+    let numbers = add_edges(&geometry, (&keys, &joined), edges, &mut part);
     let mut faces: FxHashMap<u64, Face> = FxHashMap::default();
     for (id, outcome) in built {
         match outcome {
@@ -106,14 +107,13 @@ fn repair_note(file: &File<'_>, id: u64, reason: String) -> Refusal {
 }
 
 /// Moves edges, and the vertices that they share, into the part. Returns the number of each key's edge there, `None` for edges that failed
-/// or have no length. Of the latter the two vertices become one.
+/// or have no length. Of the latter the two vertices become one, as `joined` says.
 fn add_edges(
     geometry: &Geometry<'_, '_>,
-    keys: &[EdgeKey],
+    (keys, joined): (&[EdgeKey], &FxHashMap<u64, u64>),
     edges: Vec<Outcome<TrimmedEdge>>,
     part: &mut Part,
 ) -> Vec<Option<EdgeId>> {
-    let joined = vertices_of_empty_edges(geometry.file, keys, &edges);
     let mut vertices: FxHashMap<u64, VertexId> = FxHashMap::default();
     let mut numbers: Vec<Option<EdgeId>> = Vec::with_capacity(keys.len());
     for (key, edge) in keys.iter().zip(edges) {
@@ -122,7 +122,7 @@ fn add_edges(
             continue;
         };
         let [a, b] = curve.domain();
-        let ends = vertex_ids(geometry.file, *key).map(|id| id.map(|id| joined_vertex(&joined, id)));
+        let ends = vertex_ids(geometry.file, *key).map(|id| id.map(|id| joined_vertex(joined, id)));
         let vertices = [(ends[0], a), (ends[1], b)].map(|(id, t)| {
             let mut add = || {
                 // The file's own vertex, where it has one: edges that meet there end at the same bits.

@@ -40,7 +40,10 @@ pub(super) fn vertices_of_empty_edges(
     // A chain of empty edges joins all of its vertices with the first.
     let mut joined: FxHashMap<u64, u64> = FxHashMap::default();
     for (key, edge) in keys.iter().zip(edges) {
-        if let (Ok(TrimmedEdge { curve: None, .. }), [Some(a), Some(b)]) = (edge, vertex_ids(file, *key)) {
+        // Few edges are empty: only of these the file is asked for the vertices.
+        if let Ok(TrimmedEdge { curve: None, .. }) = edge
+            && let [Some(a), Some(b)] = vertex_ids(file, *key)
+        {
             let (a, b) = (joined_vertex(&joined, a), joined_vertex(&joined, b));
             if a != b {
                 joined.insert(b, a);
@@ -88,16 +91,16 @@ impl CoincidentEdges {
 }
 
 /// Finds the faces without width: those on unbounded surfaces whose only edges with length are two that coincide. Takes these out of
-/// `plans`, has the faces beside them use one edge in place of the two, and returns their ids in the order of `ids`.
+/// `plans`, has the faces beside them use one edge in place of the two, and returns their ids in the order of `ids`. `joined` is that of
+/// [`vertices_of_empty_edges`].
 pub(super) fn remove_faces_without_width(
     file: &File<'_>,
     ids: &[u64],
     plans: &mut FxHashMap<u64, Outcome<FacePlan>>,
     (keys, index): (&[EdgeKey], &FxHashMap<EdgeKey, usize>),
-    edges: &[Outcome<TrimmedEdge>],
+    (edges, joined): (&[Outcome<TrimmedEdge>], &FxHashMap<u64, u64>),
 ) -> Vec<u64> {
-    let joined = vertices_of_empty_edges(file, keys, edges);
-    let ends = |edge: usize| vertex_ids(file, keys[edge]).map(|id| id.map(|id| joined_vertex(&joined, id)));
+    let ends = |edge: usize| vertex_ids(file, keys[edge]).map(|id| id.map(|id| joined_vertex(joined, id)));
     let mut coincident = CoincidentEdges::default();
     let mut removed = Vec::new();
     for id in ids {
