@@ -2,6 +2,8 @@
 
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
+use lampyris::simulate::Scene;
+use std::path::Path;
 
 const FAR: &str = "[[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 18]\n";
 
@@ -95,4 +97,48 @@ fn a_receiver_in_a_black_face_far_away_counts_all_light() {
         let r = world.run(&text, |_| ());
         assert!((r.power.received - 1.0).abs() < 1e-9, "{k}: {:?}", r.power);
     }
+}
+
+/// A chip of 2 × 2 × 1 mm lying on a wide black board with all its faces named: the one it lies on does not shine. Of the power a third
+/// leaves by the top, none of which meets the board, and two thirds by the sides, half of which does.
+#[test]
+fn a_chip_on_its_board_shines_from_what_is_free() {
+    let run = |world: &World, source: &str| {
+        let text = format!(
+            "[run]\nrays = 30000\n[[material]]\npart = '*'\nsurface = 'absorber'\n[[source]]\nkind = 'lambertian'\n\
+             power = 6\non = {source}\n{FAR}"
+        );
+        world.run(&text, |_| ())
+    };
+    for gap in [0.0, 5e-4] {
+        let mut world = black();
+        world.cuboid("chip", Point::new(-1.0, -1.0, gap), Point::new(1.0, 1.0, 1.0));
+        let r = run(&world, "{ part = 'chip' }");
+        assert_eq!(r.lost_rays, 0, "{gap}: {:?}", r.ledger.first());
+        // The chip's own faces see none of the light. The board ends at 1 m, 1e-3 of its form factor.
+        assert!((r.power.absorbed - 2.0).abs() < 0.05, "{gap}: {:?}", r.power);
+        let note = r.notes.iter().find(|n| n.contains("does not shine")).expect("a note");
+        assert!(note.contains("25.0 % of the area") && note.contains("face 'z0' of 'chip'"), "{note}");
+    }
+
+    // A black block stands on a quarter of the top: half as wide as the chip, and as high as nothing.
+    let mut world = black();
+    world.cuboid("chip", Point::new(-1.0, -1.0, 0.0), Point::new(1.0, 1.0, 1.0));
+    world.cuboid("cap", Point::new(0.0, 0.0, 1.0), Point::new(2.0, 2.0, 1.0 + 1e-6));
+    let r = run(&world, "{ part = 'chip', face = 'z1' }");
+    assert_eq!(r.power.absorbed, 0.0, "{:?}", r.power);
+    assert!(r.notes.iter().any(|n| n.contains("25.0 % of the area")), "{:?}", r.notes);
+}
+
+/// Nothing gets out of faces that are covered throughout: the scene is refused, naming them.
+#[test]
+fn faces_that_are_covered_throughout_are_refused() {
+    let mut world = black();
+    world.cuboid("chip", Point::new(-1.0, -1.0, 0.0), Point::new(1.0, 1.0, 1.0));
+    let text = format!("[[source]]\nkind = 'lambertian'\non = {{ part = 'chip', face = 'z0' }}\n{FAR}");
+    let error = Scene::parse(&text, "test.toml", Path::new(".")).unwrap().bind(&world.model).unwrap_err();
+    assert!(error.to_string().contains("lie against all of these faces"), "{error}");
+    // Light goes on in what lets it in.
+    let clear = text + "[[material]]\npart = 'die'\nmedium = 'N-BK7'\n";
+    Scene::parse(&clear, "test.toml", Path::new(".")).unwrap().bind(&world.model).unwrap();
 }

@@ -1,6 +1,6 @@
 //! A scene bound to a model: what every placed face does to light, as tables indexed by [`FaceId`](crate::math::FaceId).
 //!
-//! Inner modules, each of which sees only those before it: `bound_scene`, `nearest`, `contacts`, `role`, `select`, `face_selectors`,
+//! Inner modules, each of which sees only those before it: `bound_scene`, `nearest`, `contacts`, `role`, `select`, `luminous`, `face_selectors`,
 //! `frames`, `chosen`, `rule_table`, `materials`, `notes`, `bodies`, `wavelengths`, and this file, which binds.
 
 mod bodies;
@@ -9,6 +9,7 @@ mod chosen;
 mod contacts;
 mod face_selectors;
 mod frames;
+mod luminous;
 mod materials;
 mod nearest;
 mod notes;
@@ -63,8 +64,13 @@ impl Scene {
         let source_frames: Vec<Frame> =
             (0..self.sources.len()).map(|i| source_frame(self, model, i)).collect::<Result<_, _>>()?;
         let mut emitters = Vec::new();
+        let mut cover_notes = Vec::new();
         for (i, loaded) in loaded.into_iter().enumerate() {
-            let area = select::luminous_area(self, i, model)?;
+            let luminous = luminous::luminous_faces(self, i, model, &faces, &surfaces)?;
+            let area = luminous.map(|luminous| {
+                cover_notes.extend(luminous.note);
+                luminous.area
+            });
             // Emitters need bodies: a source says by name what it lies in.
             emitters.push(Emitter::new(self, i, &bodies, &light, loaded, area)?.placed(&source_frames[i]));
         }
@@ -92,6 +98,7 @@ impl Scene {
             notes: notes::range_notes(self, &chosen, &ranges),
         };
         bound.notes.extend(file_notes);
+        bound.notes.extend(cover_notes);
         bound.notes.extend(notes::opening_note(&bound, model));
         bound.notes.extend(notes::thin_body_note(&bound));
         bound.notes.extend(notes::ready_mesh_note(model));

@@ -1,8 +1,9 @@
 //! The face nearest to a point.
 
 use crate::math::{Aabb, Point, Uv};
-use crate::model::{Face, Model, PlacedFace};
-use crate::simulate::trim_loops::{is_inside, trim_polygons};
+use crate::model::{Model, PlacedFace};
+use crate::simulate::face_foot::nearest_on_face;
+use crate::simulate::trim_loops::trim_polygons;
 
 /// Finds the placed face nearest to a point, on the spline itself: samples inside the trimming loops, then Gauss–Newton. Faces are named by
 /// their index in the model; points and distances are in scene coordinates, mm.
@@ -15,19 +16,8 @@ pub(super) struct Nearest<'a> {
     loops: Vec<Option<Vec<Vec<Uv>>>>,
 }
 
-/// Samples across a face in each direction.
-const SAMPLES: usize = 24;
-
 /// Share of its distance that a rounded box may lie too far away.
 const BOX_ROUNDING: f64 = 1e-9;
-
-/// Steps of Gauss–Newton. It contracts by distance over radius of curvature: so many are enough for points nearer than 0.8 of it, and
-/// points on the face take five.
-const MOST_STEPS: usize = 100;
-
-/// Determinant of the normal equations, over its largest possible value, below which both derivatives point the same way: 1e-7 rad
-/// apart, where solving would lose all digits.
-const SINGULAR: f64 = 1e-14;
 
 impl<'a> Nearest<'a> {
     pub(super) fn new(model: &'a Model) -> Self {
@@ -69,7 +59,7 @@ impl<'a> Nearest<'a> {
         let in_part = match (placed.face, placed.tessellated) {
             (Some(face), _) => {
                 let loops = self.loops[index].get_or_insert_with(|| trim_polygons(face));
-                distance_to_face(face, loops, local)
+                nearest_on_face(face, loops, local).map_or(f64::INFINITY, |nearest| nearest.distance)
             }
             (None, Some(t)) => (0..t.mesh.facets.len())
                 .flat_map(|f| {
@@ -91,52 +81,6 @@ pub(super) fn face_bounds(f: &PlacedFace<'_>) -> Aabb {
         (None, None) => Aabb::EMPTY,
     };
     if local.is_empty() { local } else { Aabb::from_points(local.corners().map(|c| f.placement.point(c))) }
-}
-
-/// Returns the distance from `p` to a trimmed face, both in the coordinates of the part; `loops` are its trims as polygons in parameters.
-/// Infinite only where there is no sample inside them and no border.
-fn distance_to_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> f64 {
-    let s = &face.surface;
-    let [[u0, u1], [v0, v1]] = s.domain();
-    let away = |uv: Uv| s.evaluate(uv).distance(p);
-    // The nearest point is a foot inside the trims or lies on them.
-    let border = loops.iter().flatten().map(|&uv| away(uv)).fold(f64::INFINITY, f64::min);
-    let grid = (0..SAMPLES * SAMPLES).map(|i| {
-        let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
-        Uv::new(at(i / SAMPLES, u0, u1), at(i % SAMPLES, v0, v1))
-    });
-    // Whether a sample lies inside costs more than its distance: only those nearer than all before are asked.
-    let mut start: Option<(f64, Uv)> = None;
-    for uv in grid {
-        let distance = away(uv);
-        if start.is_none_or(|(nearest, _)| distance.total_cmp(&nearest).is_lt()) && is_inside(loops, uv) {
-            start = Some((distance, uv));
-        }
-    }
-    let start =
-        start.or_else(|| loops.iter().flatten().map(|&uv| (away(uv), uv)).min_by(|a, b| a.0.total_cmp(&b.0)));
-    let Some((mut best, mut uv)) = start else { return border };
-    // Gauss–Newton towards the foot; only what lies inside counts on the way.
-    for _ in 0..MOST_STEPS {
-        let d = s.derivatives(uv);
-        let r = p - d.point;
-        let (a, b, c) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
-        let det = a * c - b * b;
-        if det.is_nan() || det <= SINGULAR * a * c {
-            break;
-        }
-        let (g, h) = (d.du.dot(r), d.dv.dot(r));
-        // A foot beyond the domain is held at its border, where the next step may still move along.
-        let next = s.clamp(uv + Uv::new(c * g - b * h, a * h - b * g) / det);
-        if next == uv {
-            break;
-        }
-        uv = next;
-        if is_inside(loops, uv) {
-            best = best.min(away(uv));
-        }
-    }
-    best.min(border)
 }
 
 /// Returns the distance from a point to a triangle, in their unit: to the plane when the foot lies inside, else to the nearest edge; so of
@@ -161,7 +105,7 @@ fn distance_to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
 mod tests {
     use super::*;
     use crate::math::{Frame, Vector};
-    use crate::model::{Part, Shell};
+    use crate::model::{Face, Part, Shell};
     use crate::nurbs::sweep;
     use std::f64::consts::{FRAC_PI_2, TAU};
 

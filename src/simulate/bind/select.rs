@@ -3,7 +3,6 @@
 use super::nearest::Nearest;
 use crate::math::Point;
 use crate::model::{Model, PlacedFace, SurfaceKind};
-use crate::simulate::emitter::Area;
 use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, SolidKey, suggest};
 use crate::simulate::{Error, ErrorKind};
 
@@ -167,20 +166,6 @@ fn each_name_means_something(
         }
     }
     Ok(())
-}
-
-/// Returns the faces that a source shines from, ready for points to be drawn on them; `None` for a source that is not on faces.
-///
-/// # Errors
-/// When its selector means no face, or faces without area.
-pub(super) fn luminous_area(scene: &Scene, index: usize, model: &Model) -> Result<Option<Area>, Error> {
-    let Some(on) = &scene.sources[index].on else { return Ok(None) };
-    let base = [Key::Name("source"), Key::Index(index), Key::Name("on")];
-    let chosen = select_faces(scene, &base, on, model, &mut Nearest::new(model))?;
-    match Area::new(model, &chosen) {
-        Some(area) => Ok(Some(area)),
-        None => Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from")),
-    }
 }
 
 /// Returns the indices of the placed faces whose absorbed power a receiver counts: by its selector `on`, else by part and instance; all

@@ -1,9 +1,12 @@
 //! Faces of a model that shine: points drawn by area on the spline.
 
+use super::cover::Cover;
 use super::stream::{RayIndex, Stream};
 use crate::math::{FaceId, Frame, Point, Uv, Vector};
 use crate::model::{Face, Model};
 use crate::simulate::trim_loops::{is_inside, trim_polygons};
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Cells across a face in each parameter.
 const CELLS: usize = 32;
@@ -14,7 +17,7 @@ const BOUND_MARGIN: f64 = 1.2;
 /// Attempts at a point inside the trims. A face of which less than 1/1000 lies inside them would be a sliver.
 const MOST_ATTEMPTS: u32 = 10_000;
 
-/// Faces of a model that shine evenly: points are drawn by area on the spline, inside the trims.
+/// Faces of a model that shine evenly: points are drawn by area on the spline, inside the trims and where nothing opaque lies against them.
 ///
 /// A cell is drawn by a bound of its area, a point in it by rejection. The bound is [`BOUND_MARGIN`] times the largest of 9 samples
 /// of the area element; where a surface bends more than that inside 1/32 of a face, the density is too low by the excess.
@@ -34,6 +37,17 @@ struct LuminousFace {
     loops: Vec<Vec<Uv>>,
     /// Bound of `|Su × Sv|` in each cell.
     bounds: Vec<f64>,
+    /// Opaque faces that may lie against it.
+    covers: Vec<Arc<Cover>>,
+}
+
+/// How much of a luminous face is covered.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CoveredArea {
+    pub(crate) face: FaceId,
+    /// Its area, and the part of it that nothing opaque lies against, mm², both from the same samples.
+    pub(crate) whole: f64,
+    pub(crate) free: f64,
 }
 
 impl LuminousFace {
@@ -49,12 +63,41 @@ impl LuminousFace {
         let d = self.face.surface.derivatives(uv);
         d.du.cross(d.dv).length() * self.placement.scale.powi(2)
     }
+
+    /// Returns a point in the scene, mm, and the unit outward normal there.
+    fn point_and_normal(&self, uv: Uv) -> (Point, Vector) {
+        // At a pole, a point without area, the spline may have no normal.
+        let normal = self.face.surface.normal(uv).unwrap_or(Vector::Z);
+        let outward = if self.face.reversed { -normal } else { normal };
+        (self.placement.point(self.face.surface.evaluate(uv)), self.placement.normal(outward).normalize())
+    }
+
+    /// Whether light gets out at a point of it.
+    fn is_free(&self, uv: Uv) -> bool {
+        let (point, normal) = self.point_and_normal(uv);
+        !self.covers.iter().any(|cover| cover.covers(point, normal))
+    }
+
+    /// Measures how much of it is covered, by the middles of its cells.
+    fn measure_cover(&self) -> CoveredArea {
+        let mut area = CoveredArea { face: self.id, whole: 0.0, free: 0.0 };
+        for k in 0..CELLS * CELLS {
+            let [corner, size] = self.cell(k);
+            let uv = corner + size * 0.5;
+            if is_inside(&self.loops, uv) {
+                let element = self.area_element(uv) * size.x * size.y;
+                area.whole += element;
+                area.free += if self.is_free(uv) { element } else { 0.0 };
+            }
+        }
+        area
+    }
 }
 
 impl Area {
-    /// Prepares the chosen faces (indices of placed faces); `None` when none of them has a spline surface with area. Ready meshes are
-    /// skipped.
-    pub(crate) fn new(model: &Model, chosen: &[usize]) -> Option<Self> {
+    /// Prepares the chosen faces (indices of placed faces), each with the opaque faces that may lie against it; `None` when none of them has
+    /// a spline surface with area. Ready meshes are skipped.
+    pub(crate) fn new(model: &Model, chosen: &[usize], covers: &HashMap<usize, Vec<Arc<Cover>>>) -> Option<Self> {
         let mut faces = Vec::new();
         let mut sums = Vec::new();
         let mut sum = 0.0;
@@ -62,7 +105,9 @@ impl Area {
             // Ready meshes have no spline to draw points on.
             let Some(face) = f.face else { continue };
             let (id, placement, loops) = (f.id, *f.placement, trim_polygons(face));
-            let mut luminous = LuminousFace { id, face: face.clone(), placement, loops, bounds: Vec::new() };
+            let covers = covers.get(&id.index()).cloned().unwrap_or_default();
+            let mut luminous =
+                LuminousFace { id, face: face.clone(), placement, loops, bounds: Vec::new(), covers };
             for k in 0..CELLS * CELLS {
                 let [low, size] = luminous.cell(k);
                 let samples = (0..9).map(|i| Uv::new((i / 3) as f64, (i % 3) as f64) * 0.5);
@@ -78,8 +123,13 @@ impl Area {
         (sum > 0.0 && sum.is_finite()).then_some(Self { faces, sums })
     }
 
+    /// Measures of each face how much of it is covered.
+    pub(crate) fn measure_cover(&self) -> Vec<CoveredArea> {
+        self.faces.iter().map(LuminousFace::measure_cover).collect()
+    }
+
     /// Draws a point (mm, scene coordinates), its unit outward normal and its face. Where no attempt of [`MOST_ATTEMPTS`] was accepted, the
-    /// last one is returned, which may lie outside the trims.
+    /// last one is returned, which may lie outside the trims or be covered.
     pub(crate) fn point(&self, stream: &Stream, index: RayIndex) -> (Point, Vector, FaceId) {
         let whole = self.sums[self.sums.len() - 1];
         let mut last = None;
@@ -99,15 +149,13 @@ impl Area {
             let [keep, _] = stream.random(index, 2 * attempt + 11);
             let bound = luminous.bounds[cell % (CELLS * CELLS)];
             // Rejection makes uniform in parameters into uniform in area.
-            if is_inside(&luminous.loops, uv) && keep * bound <= luminous.area_element(uv) {
+            let accepted = is_inside(&luminous.loops, uv) && keep * bound <= luminous.area_element(uv);
+            if accepted && luminous.is_free(uv) {
                 break;
             }
         }
         let Some((luminous, uv)) = last else { return (Point::ZERO, Vector::Z, FaceId(0)) };
-        // At a pole, a point without area, the spline may have no normal.
-        let normal = luminous.face.surface.normal(uv).unwrap_or(Vector::Z);
-        let outward = if luminous.face.reversed { -normal } else { normal };
-        let place = &luminous.placement;
-        (place.point(luminous.face.surface.evaluate(uv)), place.normal(outward).normalize(), luminous.id)
+        let (point, normal) = luminous.point_and_normal(uv);
+        (point, normal, luminous.id)
     }
 }

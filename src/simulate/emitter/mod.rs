@@ -1,9 +1,10 @@
 //! Sources in the form that makes rays.
 //!
-//! Inner modules, each of which sees only those before it: `own_wavelengths`, `ray_list`, `measured`, `stream`, `area`, `shape`, this file with `far`,
+//! Inner modules, each of which sees only those before it: `own_wavelengths`, `ray_list`, `measured`, `stream`, `cover`, `area`, `shape`, this file with `far`,
 //! `packet`, `simd_dispatch`, `sampler`.
 
 mod area;
+mod cover;
 mod far;
 mod measured;
 mod own_wavelengths;
@@ -24,7 +25,8 @@ use crate::intersect::Beam;
 use crate::math::{Aabb, FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
 use crate::optics::sampling::sin_cos_turns;
 use crate::optics::{Spectrum, Wavelengths};
-pub(crate) use area::Area;
+pub(crate) use area::{Area, CoveredArea};
+pub(crate) use cover::Cover;
 use far::NearStart;
 pub(crate) use measured::{Loaded, load};
 pub(crate) use ray_list::{ListCursor, RayList};

@@ -25,7 +25,8 @@ pub struct Source {
     /// (+y unless said otherwise) and positive H to the right. Ray lists stand with their origin in `at`.
     /// Long ones stay on the disk; of CSV and NPZ 64 bytes a ray are unpacked into the folder for temporary files (`TMPDIR`).
     pub file: Option<String>,
-    /// The faces that shine, outward, instead of `at`, `direction`, `radius` and `size`.
+    /// The faces that shine, outward, instead of `at`, `direction`, `radius` and `size`. Where an opaque face of another solid lies against
+    /// one of them, as a board against a chip, it does not shine: all of the power leaves from the rest, and a note says how much that is.
     pub on: Option<FaceSelector>,
     /// Instance, or part that is placed once, in whose own coordinates `at`, `direction`, `x` and `polarised` are given, and the rays of a
     /// list: the source goes where it goes.

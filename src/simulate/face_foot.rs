@@ -1,0 +1,79 @@
+//! The point of a trimmed face that is nearest to a point.
+
+use super::trim_loops::is_inside;
+use crate::math::{Point, Uv};
+use crate::model::Face;
+
+/// Samples across a face in each direction.
+const SAMPLES: usize = 24;
+
+/// Steps of Gauss–Newton. It contracts by distance over radius of curvature: so many are enough for points nearer than 0.8 of it, and
+/// points on the face take five.
+const MOST_STEPS: usize = 100;
+
+/// Determinant of the normal equations, over its largest possible value, below which both derivatives point the same way: 1e-7 rad
+/// apart, where solving would lose all digits.
+const SINGULAR: f64 = 1e-14;
+
+/// A point of a face.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NearestOnFace {
+    /// How far it is, mm.
+    pub(crate) distance: f64,
+    /// Where it is, in the parameters of the face's surface.
+    pub(crate) uv: Uv,
+}
+
+/// Finds the point of a trimmed face that is nearest to `p`, both in the coordinates of the part; `loops` are its trims as polygons in
+/// parameters. `None` only where there is no sample inside them and no border.
+pub(crate) fn nearest_on_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> Option<NearestOnFace> {
+    let s = &face.surface;
+    let [[u0, u1], [v0, v1]] = s.domain();
+    let at = |uv: Uv| NearestOnFace { distance: s.evaluate(uv).distance(p), uv };
+    let nearer = |a: &NearestOnFace, b: &NearestOnFace| a.distance.total_cmp(&b.distance);
+    // The nearest point is a foot inside the trims or lies on them.
+    let border = loops.iter().flatten().map(|&uv| at(uv)).min_by(nearer);
+    let grid = (0..SAMPLES * SAMPLES).map(|i| {
+        let middle = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
+        Uv::new(middle(i / SAMPLES, u0, u1), middle(i % SAMPLES, v0, v1))
+    });
+    // Whether a sample lies inside costs more than its distance: only those nearer than all before are asked.
+    let mut start: Option<NearestOnFace> = None;
+    for uv in grid {
+        let sample = at(uv);
+        if start.is_none_or(|nearest| nearer(&sample, &nearest).is_lt()) && is_inside(loops, uv) {
+            start = Some(sample);
+        }
+    }
+    let foot = foot_from(face, loops, p, start.or(border)?);
+    Some(border.filter(|border| nearer(border, &foot).is_lt()).unwrap_or(foot))
+}
+
+/// Goes from a point of the face towards the foot of the perpendicular from `p` by Gauss–Newton; returns the nearest point inside the trims
+/// that it came by, or the one it began with.
+pub(crate) fn foot_from(face: &Face, loops: &[Vec<Uv>], p: Point, start: NearestOnFace) -> NearestOnFace {
+    let s = &face.surface;
+    let mut best = start;
+    let mut uv = start.uv;
+    for _ in 0..MOST_STEPS {
+        let d = s.derivatives(uv);
+        let r = p - d.point;
+        let (a, b, c) = (d.du.length_squared(), d.du.dot(d.dv), d.dv.length_squared());
+        let det = a * c - b * b;
+        if det.is_nan() || det <= SINGULAR * a * c {
+            break;
+        }
+        let (g, h) = (d.du.dot(r), d.dv.dot(r));
+        // A foot beyond the domain is held at its border, where the next step may still move along.
+        let next = s.clamp(uv + Uv::new(c * g - b * h, a * h - b * g) / det);
+        if next == uv {
+            break;
+        }
+        uv = next;
+        let distance = s.evaluate(uv).distance(p);
+        if distance < best.distance && is_inside(loops, uv) {
+            best = NearestOnFace { distance, uv };
+        }
+    }
+    best
+}
