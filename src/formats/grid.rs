@@ -180,9 +180,15 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
             write!(w, ",{name}")?;
         }
         writeln!(w)?;
+        // The shortest digits of a number cost more than all else of a dark cell: those of a column are found once.
+        let columns: Vec<String> = (0..a.cells).map(|i| a.center(i).to_string()).collect();
+        let mut row = String::new();
         for (k, value) in grid.values.iter().enumerate() {
             let (i, j) = (k % a.cells.max(1), k / a.cells.max(1));
-            write!(w, "{},{},{value}", a.center(i), b.center(j))?;
+            if i == 0 {
+                row = b.center(j).to_string();
+            }
+            write!(w, "{},{row},{value}", columns[i])?;
             if let Some(error) = &grid.error {
                 write!(w, ",{}", error[k])?;
             }

@@ -18,6 +18,8 @@ use crate::study::geometric_error::{GeometricError, geometric_error};
 
 /// Segments of a run that are asked again of BVH and spline.
 const RECHECKED: usize = 10_000;
+/// The fewest rays whose segments these are: 2000 paths are as many places, directions and depths, however long each is.
+const FEWEST_REPLAYED: u64 = 2000;
 /// Tolerances above a surface that a ray which left it starts at, so that facets and spline are asked the same question.
 pub const LIFT_IN_TOLERANCES: f64 = 4.0;
 
@@ -74,7 +76,7 @@ fn recheck(
 ) -> (Option<CrossCheck>, Option<GeometricError>) {
     // What the pilot found need not be measured again.
     let pilot = prepared.chosen.as_ref().and_then(|chosen| chosen.geometric.clone());
-    let rays = sample_segments(prepared, intersector);
+    let rays = sample_segments(prepared, results, intersector);
     if rays.is_empty() {
         return (None, pilot);
     }
@@ -86,13 +88,16 @@ fn recheck(
 
 /// Traces some rays of the run once more, spread evenly over it, and returns up to [`RECHECKED`] of their segments, lifted off the surfaces
 /// that they leave.
-fn sample_segments(prepared: &PreparedScene, intersector: &dyn Intersector) -> Vec<Ray> {
+fn sample_segments(prepared: &PreparedScene, results: &Results, intersector: &dyn Intersector) -> Vec<Ray> {
     let settings = prepared.run_settings();
+    let segments_a_ray = results.segments as f64 / results.rays.max(1) as f64;
+    // Twice the segments that are asked again, as rays differ in how many they have; of long paths more, that few rays not stand for all.
+    let rays = (2.0 * RECHECKED as f64 / segments_a_ray.max(1.0)) as u64;
     // No more than the run has.
-    let count = settings.rays.min(RECHECKED as u64);
+    let count = rays.clamp(FEWEST_REPLAYED, RECHECKED as u64).min(settings.rays);
     let step = (settings.rays / count.max(1)).max(1);
-    // Scenes differ in segments a ray; four is what lamps have, and a small sample only has fewer rays to check.
-    let sampler = RaySampler::new(intersector, RECHECKED as u64, 4 * count);
+    let expected = (count as f64 * segments_a_ray) as u64;
+    let sampler = RaySampler::new(intersector, RECHECKED as u64, expected);
     replay(&prepared.bound, &sampler, &settings, &(0..count).map(|k| k * step).collect::<Vec<_>>());
     let lift = LIFT_IN_TOLERANCES * prepared.mesh_settings.loosest();
     sampler.rays(RECHECKED, &prepared.job.loaded.model, |_, _| lift)

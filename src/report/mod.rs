@@ -8,6 +8,7 @@
 //! Guarantee: the page stays under 15 MB; what is simplified for showing says so in its caption. Known weakness: the 3-D views need
 //! WebGL to turn; without it their static picture remains.
 
+mod canvas;
 mod chart;
 mod chart_png;
 mod colour_picture;

@@ -214,6 +214,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "receiver_blocks",
             "verdicts",
             "cross_check",
+            "canvas",
             "raster",
             "plotly",
             "html",

@@ -98,7 +98,7 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opa
                 for p in points.iter().filter(|p| near.contains(**p)) {
                     distances += 1;
                     // Out of work, boxes decide: a face that is marked in vain costs time, one that is missed costs rays.
-                    touch |= distances > MOST_DISTANCES || nearest.distance(other, *p) <= glue;
+                    touch |= distances > MOST_DISTANCES || nearest.is_within(other, *p, glue);
                     if touch {
                         break;
                     }

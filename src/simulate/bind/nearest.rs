@@ -1,7 +1,8 @@
 //! The face nearest to a point.
 
-use crate::math::{Aabb, Point, Uv};
+use crate::math::{Aabb, Point, Uv, Vector};
 use crate::model::{Model, PlacedFace};
+use crate::nurbs::Surface;
 use crate::simulate::face_foot::nearest_on_face;
 use crate::simulate::trim_loops::trim_polygons;
 
@@ -14,6 +15,37 @@ pub(super) struct Nearest<'a> {
     faces: Vec<PlacedFace<'a>>,
     bounds: Vec<Aabb>,
     loops: Vec<Option<Vec<Vec<Uv>>>>,
+    /// Of each face with a surface that was asked for, in the coordinates of its part.
+    slabs: Vec<Option<Slab>>,
+}
+
+/// The space between two parallel planes around a surface: no more than the face itself where that is plane.
+#[derive(Clone, Copy)]
+struct Slab {
+    normal: Vector,
+    /// Distances of both planes from the origin along the normal, mm.
+    range: [f64; 2],
+}
+
+impl Slab {
+    /// Returns the slab across the diagonals of a surface's net of control points; all of space where these are parallel.
+    fn new(surface: &Surface) -> Self {
+        let points = || surface.points.iter().map(|p| p.project());
+        let [[u0, u1], [v0, v1]] = surface.domain();
+        let corner = |u, v| surface.evaluate(Uv::new(u, v));
+        let normal = (corner(u1, v1) - corner(u0, v0)).cross(corner(u0, v1) - corner(u1, v0));
+        let normal = normal.try_normalize().unwrap_or(Vector::ZERO);
+        let along = points().map(|p| p.dot(normal));
+        let range = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], d| [lo.min(d), hi.max(d)]);
+        Self { normal, range }
+    }
+
+    /// Returns a distance that no point of the surface is nearer than, mm.
+    fn distance_below(&self, p: Point) -> f64 {
+        let ([low, high], along) = (self.range, p.dot(self.normal));
+        let rounding = BOX_ROUNDING * (low.abs() + high.abs() + p.length());
+        (low - along).max(along - high) - rounding
+    }
 }
 
 /// Share of its distance that a rounded box may lie too far away.
@@ -24,7 +56,8 @@ impl<'a> Nearest<'a> {
         let faces: Vec<_> = model.placed_faces().collect();
         let bounds = faces.iter().map(face_bounds).collect();
         let loops = vec![None; faces.len()];
-        Self { faces, bounds, loops }
+        let slabs = vec![None; faces.len()];
+        Self { faces, bounds, loops, slabs }
     }
 
     /// Returns a box around these faces; empty without any.
@@ -50,6 +83,19 @@ impl<'a> Nearest<'a> {
             }
         }
         best.filter(|(d, _)| d.is_finite()).map(|(_, c)| c)
+    }
+
+    /// Whether a point is within `limit`, mm, of a placed face.
+    pub(super) fn is_within(&mut self, index: usize, p: Point, limit: f64) -> bool {
+        let placed = self.faces[index];
+        if let Some(face) = placed.face {
+            let slab = self.slabs[index].get_or_insert_with(|| Slab::new(&face.surface));
+            // Two planes cost a hundredth of the search for the foot, and tell most points that are far.
+            if slab.distance_below(placed.placement.local_point(p)) * placed.placement.scale > limit {
+                return false;
+            }
+        }
+        self.distance(index, p) <= limit
     }
 
     /// Returns the distance from a point to a placed face, mm; infinite for a face that has neither a surface nor facets.
@@ -104,7 +150,7 @@ fn distance_to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Frame, Vector};
+    use crate::math::Frame;
     use crate::model::{Face, Part, Shell};
     use crate::nurbs::sweep;
     use std::f64::consts::{FRAC_PI_2, TAU};
@@ -121,6 +167,10 @@ mod tests {
         let p = Point::new(100.0, 0.0, 0.0) + Vector::new(3.0, -4.0, 12.0).normalize() * 17.0;
         assert!((nearest.distance(0, p) - 7.0).abs() < 1e-9);
         assert!((nearest.distance(1, Point::new(100.5, 0.5, 41.0)) - 1.0).abs() < 1e-12);
+        for (face, distance) in [(0, 7.0), (1, nearest.distance(1, p))] {
+            let within = [distance - 1e-6, distance + 1e-6].map(|limit| nearest.is_within(face, p, limit));
+            assert_eq!(within, [false, true], "face {face}");
+        }
         assert_eq!(nearest.nearest_face(Point::new(100.0, 0.0, 35.0), &[0, 1]), Some(1));
         assert_eq!(nearest.nearest_face(Point::new(100.0, 0.0, 24.0), &[0, 1]), Some(0));
     }
