@@ -24,14 +24,17 @@ pub struct BulkScatter {
 
 /// Mean cosine below which the series in g is used: its next term, g², is below the rounding that division by 2g leaves.
 const ISOTROPIC: f64 = 1e-6;
+/// Most events per mm: over ways shorter than a wavelength light does not scatter event by event, and paths would never end.
+const LARGEST_COEFFICIENT: f64 = 1e4;
 
 impl BulkScatter {
     /// Scattering with this coefficient, events per mm, and mean cosine `g`.
     ///
     /// # Errors
-    /// When the coefficient is negative or `g` outside (−1, 1).
+    /// When the coefficient is negative or above 10⁴ per mm, or `g` outside (−1, 1).
     pub fn new(coefficient: f64, g: f64) -> Result<Self, Error> {
-        require("a scattering coefficient", coefficient, coefficient >= 0.0, "zero or more per mm")?;
+        let is_possible = (0.0..=LARGEST_COEFFICIENT).contains(&coefficient);
+        require("a scattering coefficient", coefficient, is_possible, "from 0 to 10 000 per mm")?;
         require("the mean cosine g", g, g.abs() < 1.0, "above -1 and below 1")?;
         Ok(Self { coefficient, g })
     }
@@ -81,6 +84,14 @@ mod tests {
             let mean = pairs(n).map(|u| s.sample(d, u).dot(d)).sum::<f64>() / n as f64;
             // Variance of the cosine is at most 1/3 + g².
             assert!((mean - g).abs() < 4.0 * (0.6f64 / n as f64).sqrt(), "g = {g}: {mean}");
+        }
+    }
+
+    #[test]
+    fn ways_shorter_than_a_wavelength_are_refused() {
+        assert!(BulkScatter::new(1e4, 0.0).is_ok() && BulkScatter::new(0.0, 0.0).is_ok());
+        for wrong in [-1.0, 1e5, f64::INFINITY, f64::NAN] {
+            assert!(BulkScatter::new(wrong, 0.0).is_err(), "{wrong}");
         }
     }
 

@@ -7,6 +7,7 @@
 use super::bind::BoundScene;
 use super::digest::Fnv;
 use super::outcome::{Counts, LostRay, PathVertex};
+use super::path_sample::PathSample;
 use super::sequence::Sequence;
 use super::tallies::{ReplicateTally, Tallies};
 use super::tally::{Moments, Sum};
@@ -30,7 +31,7 @@ pub struct PartialRun {
 }
 
 /// Begins a file of this version.
-const MAGIC: &[u8] = b"lampyris tally 7\n";
+const MAGIC: &[u8] = b"lampyris tally 8\n";
 
 impl PartialRun {
     /// Makes a part with no replicate done, of a run that does not grow.
@@ -117,6 +118,7 @@ impl PartialRun {
         let bare = |v: &PathVertex| PathVertex { point: zero, power: 0.0, ..v.clone() };
         let paths: Vec<_> =
             t.paths.iter().map(|v| (bare(v), coordinate_bits(&[v.point]), v.power.to_bits())).collect();
+        out.extend(t.paths.mask().to_le_bytes());
         append_block(&mut out, &serde_json::to_vec(&paths)?);
         let sequences: Vec<_> = t.sequences.iter().collect();
         append_block(&mut out, &serde_json::to_vec(&sequences)?);
@@ -182,6 +184,7 @@ impl PartialRun {
         let (overlaps, overlapping) = (r.u64()?, [r.u64()? as u32, r.u64()? as u32]);
         t.counts = Counts { rays, segments, corrected_normals, lost, cut_off, caught, overlaps, overlapping };
         let ledger: Vec<(LostRay, [[u64; 3]; 2])> = r.json()?;
+        let mask = r.u64()?;
         let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = r.json()?;
         t.sequences = r.json::<Vec<(Sequence, Sum)>>()?.into_iter().collect();
         // Bits, not decimals: what was written comes back exactly.
@@ -190,10 +193,11 @@ impl PartialRun {
             .into_iter()
             .map(|(l, [origin, direction])| LostRay { origin: point(origin), direction: point(direction), ..l })
             .collect();
-        t.paths = paths
+        let vertices = paths
             .into_iter()
             .map(|(v, [place], power)| PathVertex { point: point(place), power: f64::from_bits(power), ..v })
             .collect();
+        t.paths = PathSample::new(vertices, mask);
         Ok(p)
     }
 

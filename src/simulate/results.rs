@@ -190,7 +190,7 @@ impl Results {
             sequences: sequences(bound, &tallies, quantum),
             faces: bound.counts_faces().then(|| FaceResults::new(bound, &tallies, quantum)),
             ledger: std::mem::take(&mut tallies.ledger),
-            paths: std::mem::take(&mut tallies.paths),
+            paths: std::mem::take(&mut tallies.paths).into_vertices(),
             cost,
             tallies,
             quantum,

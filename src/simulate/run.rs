@@ -8,6 +8,7 @@ use super::gather::{Gathering, ThreadSums};
 use super::hooks::{Hooks, Progress, Traced};
 use super::kernel::{Context, RaySelection};
 use super::partial_run::PartialRun;
+use super::path_sample::PathSample;
 use super::plan::Plan;
 use super::recorder::Recorder;
 use super::results::Results;
@@ -61,7 +62,7 @@ pub fn trace(
     before.replicates = before.replicates.max(context.plan.replicates);
     // A smaller run kept the paths of more of its rays, among them all that are kept of this one.
     if before.grows && settings.path_samples > 0 {
-        before.tallies.paths.retain(|vertex| context.plan.samples(vertex.ray));
+        before.tallies.paths.retain(|ray| context.plan.samples(ray));
     }
     let shard = shard_replicates(context.plan.first_replicate..context.plan.replicates, settings.shard);
     let todo: Vec<u32> = shard.clone().filter(|r| before.done.binary_search(r).is_err()).collect();
@@ -192,6 +193,7 @@ pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunS
     context.plan.record_all();
     let kind = kernel_kind(bound, settings);
     let mut partial = PartialRun::empty(bound, context.plan.replicates);
+    partial.tallies.paths = PathSample::whole();
     let mut cost = Cost::default();
     let mut tally = ReplicateTally::new(bound);
     for &ray in rays {

@@ -2,6 +2,7 @@
 
 use super::bind::BoundScene;
 use super::outcome::{Counts, LostRay, PathSink, PathVertex};
+use super::path_sample::PathSample;
 use super::plan::Plan;
 use super::receiver::Shape;
 use super::sequence::{Deposit, SequenceSums, SequenceTally};
@@ -197,7 +198,7 @@ pub struct Tallies {
     /// The lost rays of the lowest index.
     pub ledger: Vec<LostRay>,
     /// Vertices of the recorded paths.
-    pub paths: Vec<PathVertex>,
+    pub paths: PathSample,
     /// Power by sequence, where that was asked for.
     #[serde(skip)]
     pub sequences: SequenceSums,
@@ -289,7 +290,7 @@ impl Tallies {
         for (sequence, sum) in &o.sequences {
             self.sequences.entry(sequence.clone()).or_default().merge(sum);
         }
-        self.paths.extend(o.paths.iter().cloned());
+        self.paths.merge(&o.paths);
         self.sort_paths();
     }
 
@@ -300,7 +301,7 @@ impl Tallies {
 
     /// Sorts the vertices of paths by ray, branch, bounce and event.
     pub(crate) fn sort_paths(&mut self) {
-        self.paths.sort_by_key(|v| (v.ray, v.branch, v.bounce, v.event));
+        self.paths.sort();
     }
 }
 

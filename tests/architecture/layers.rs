@@ -486,6 +486,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "plan",
             "run_notes",
             "sequence",
+            "path_sample",
             "tallies",
             "digest",
             "kernel",

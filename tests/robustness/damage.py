@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Damaged files through the command: no panic, no hang, no memory beyond measure, no number that is none.
 
-    tests/damage/run.py target/release/lampyris step --count 2000 [--seeds FOLDER ...] [--keep FOLDER]
-    tests/damage/run.py target/release/lampyris scenes --count 500
-    tests/damage/run.py target/release/lampyris rays photometry tally          # 200 of each format
+    tests/robustness/damage.py target/release/lampyris step --count 2000 [--seeds FOLDER ...] [--keep FOLDER]
+    tests/robustness/damage.py target/release/lampyris scenes --count 500
+    tests/robustness/damage.py target/release/lampyris rays photometry tally          # 200 of each format
 
 The damage of copy k is drawn from a generator seeded with --seed, the seed's name and k, so that it comes again. Each process has a limit
 of CPU and memory. What is counted: a panic (101) or an end by a signal; more CPU seconds than --seconds; a peak of more than 1 GB and more than 50

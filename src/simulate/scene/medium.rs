@@ -34,8 +34,8 @@ pub struct Medium {
     pub index_table: Option<Vec<[f64; 2]>>,
     /// Bulk absorption coefficient (natural logarithm), 1/mm: a number, or pairs `[nm, 1/mm]`.
     pub absorption_per_mm: Option<ByWavelength>,
-    /// Scattering events per mm of way.
-    #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
+    /// Scattering events per mm of way, at most 10 000: light does not scatter event by event over ways shorter than its wavelength.
+    #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 10_000)))]
     pub scatter_per_mm: Option<f64>,
     /// Mean cosine of the scattering angle (Henyey and Greenstein's g), in (−1, 1).
     #[cfg_attr(feature = "schema", schemars(range(min = -1, max = 1)))]
