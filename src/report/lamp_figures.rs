@@ -57,6 +57,11 @@ fn is_all_around(grid: &Grid) -> bool {
     c.label == "C" && c.cells >= 4 && is_whole_turn && gamma.range[0].abs() < SAME_ANGLE_DEG
 }
 
+/// Whether γ goes on to the pole at 180°.
+fn has_far_pole(grid: &Grid) -> bool {
+    (grid.axes[1].range[1] - 180.0).abs() < SAME_ANGLE_DEG
+}
+
 /// Returns a grid with each ring of cells at a pole (γ 0° and 180°) at its mean, where it is over planes C all around: these cells are
 /// slivers of one direction, and the brightest of so many that few rays meet would be the luckiest.
 fn with_even_poles(grid: &Grid) -> Grid {
@@ -66,8 +71,7 @@ fn with_even_poles(grid: &Grid) -> Grid {
     }
     let [c, gamma] = &grid.axes;
     let (n, count) = (c.cells, c.cells as f64);
-    let has_far_pole = (gamma.range[1] - 180.0).abs() < SAME_ANGLE_DEG;
-    for row in std::iter::once(0).chain(has_far_pole.then_some(gamma.cells - 1)) {
+    for row in std::iter::once(0).chain(has_far_pole(grid).then_some(gamma.cells - 1)) {
         let ring = row * n..(row + 1) * n;
         let mean = |values: &[f64]| values[ring.clone()].iter().sum::<f64>() / count;
         even.values[ring.clone()].fill(mean(&grid.values));
@@ -92,7 +96,9 @@ fn peak_error(grid: &Grid) -> Cell {
     if is_all_around(grid) {
         let last = errors.len() - 1;
         errors[..cells - 1].fill(0.0);
-        errors[last + 1 - cells..last].fill(0.0);
+        if has_far_pole(grid) {
+            errors[last + 1 - cells..last].fill(0.0);
+        }
     }
     let geometric = grid.geometric.as_ref().map_or(0.0, |geometric| geometric[j * cells + i]);
     Cell::Number(error_of_maximum(&grid.values, &errors).hypot(geometric), 2)
@@ -283,6 +289,19 @@ mod tests {
             let width = width_at_half(&values, step).unwrap();
             assert!((width - 120.0).abs() < 0.1 && name.starts_with("in the plane C"), "{name}: {width}");
         }
+    }
+
+    #[test]
+    fn the_peak_in_the_last_row_of_a_part_of_the_angles_keeps_its_error() {
+        let mut grid = luminaire(|i, gamma| if i == 5 { 1.0 + gamma } else { 1.0 });
+        grid.axes[1].range[1] = 60.0;
+        let own = 0.3;
+        grid.error =
+            Some(grid.values.iter().map(|v| if *v == grid.values[59 * 120 + 5] { own } else { 0.0 }).collect());
+        let even = with_even_poles(&grid);
+        assert_eq!(even.peak_cell(), Some((5, 59)));
+        let Cell::Number(error, _) = peak_error(&even) else { panic!("an error") };
+        assert!((error - own).abs() < 1e-12, "{error}");
     }
 
     #[test]

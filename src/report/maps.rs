@@ -124,13 +124,8 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
             grid.axes[1].unit
         )
     });
-    // The relative error where the light is: weighted by the light itself.
-    let error = grid.error.as_ref().map(|e| {
-        let sum: f64 = grid.values.iter().filter(|v| v.is_finite()).sum();
-        format!(
-            "Statistical error of a cell, weighted by its light: {} %. ",
-            figures(100.0 * e.iter().sum::<f64>() / sum.max(f64::MIN_POSITIVE), 2)
-        )
+    let error = lit_error(grid).map(|share| {
+        format!("Statistical error of a cell, weighted by its light: {} %. ", figures(100.0 * share, 2))
     });
     let cells = format!(
         "{} × {} cells of {} {}.",
@@ -142,7 +137,38 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
     [peak, error, Some(cells)].into_iter().flatten().collect()
 }
 
+/// Returns the relative statistical error of the cells with light, weighted by it; `None` without errors or light.
+fn lit_error(grid: &Grid) -> Option<f64> {
+    let lit = || grid.values.iter().zip(grid.error.iter().flatten()).filter(|(v, _)| **v > 0.0);
+    let light: f64 = lit().map(|(v, _)| v).sum();
+    // A dark cell's error is what one ray would add: of many such it would be all there is.
+    (light > 0.0).then(|| lit().map(|(_, error)| error).sum::<f64>() / light)
+}
+
 /// Returns a name as words: with spaces in place of underscores.
 pub(super) fn spoken(name: &str) -> String {
     name.replace('_', " ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dark_cells_add_nothing_to_the_noise_of_the_light() {
+        let axis = crate::formats::Axis { label: "x".into(), unit: "mm".into(), range: [0.0, 1.0], cells: 4 };
+        let grid = Grid {
+            name: "dark".into(),
+            quantity: String::new(),
+            unit: "W".into(),
+            axes: [axis.clone(), crate::formats::Axis { cells: 1, ..axis }],
+            values: vec![3.0, 1.0, 0.0, f64::NAN],
+            // Where no ray arrived, what one would bring.
+            error: Some(vec![0.3, 0.1, 5.0, 5.0]),
+            geometric: None,
+            layers: Vec::new(),
+        };
+        assert_eq!(lit_error(&grid), Some(0.1));
+        assert_eq!(lit_error(&Grid { values: vec![0.0; 4], ..grid }), None);
+    }
 }

@@ -280,6 +280,11 @@ fn edges_given_only_in_a_parameter_plane_or_as_an_offset_are_converted() {
         ("#80=OFFSET_CURVE_3D('',#86,1.,.F.,#82);\n#86=COMPOSITE_CURVE('',(#87),.F.);\n#87=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#88);\n\
           #88=TRIMMED_CURVE('',#81,(3.141592653589793),(6.283185307179586),.T.,.PARAMETER.);\n#81=CIRCLE('',#83,1.5);\n#82=DIRECTION('',(0.,0.,1.));\n\
           #83=AXIS2_PLACEMENT_3D('',#84,#82,#85);\n#84=CARTESIAN_POINT('',(0.5,0.,0.));\n#85=DIRECTION('',(1.,0.,0.));\n".into(), 1.0 + PI / 8.0),
+        // From the second to the fourth point of a polyline, whose parameter counts points: a triangle 0.4 high below the square.
+        ("#80=COMPOSITE_CURVE('',(#87),.F.);\n#87=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#88);\n\
+          #88=TRIMMED_CURVE('',#81,(PARAMETER_VALUE(1.)),(PARAMETER_VALUE(3.)),.T.,.PARAMETER.);\n#81=POLYLINE('',(#82,#83,#84,#85,#86));\n\
+          #82=CARTESIAN_POINT('',(-3.,0.,0.));\n#83=CARTESIAN_POINT('',(0.,0.,0.));\n#84=CARTESIAN_POINT('',(0.5,-0.4,0.));\n\
+          #85=CARTESIAN_POINT('',(1.,0.,0.));\n#86=CARTESIAN_POINT('',(2.,0.,0.));\n".into(), 1.2),
     ] {
         close(area(&import(&square_along(&curve))), expected, 1e-4);
     }

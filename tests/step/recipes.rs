@@ -1,6 +1,7 @@
 //! Solids given as a recipe: areas, volumes and closed shells against their formulas.
 
 use crate::support::{measure_model, violations};
+use lampyris::math::{Point, Vector};
 use lampyris::step::{Import, Settings, read_bytes};
 use std::f64::consts::{PI, TAU};
 
@@ -59,6 +60,37 @@ fn csg_primitives_have_the_areas_and_volumes_of_their_formulas() {
     check(&format!("#900=RIGHT_CIRCULAR_CONE('',#14,4.,0.,{angle:?});\n"), 9.0 * PI + 15.0 * PI, 12.0 * PI);
     let frustum = format!("#900=RIGHT_CIRCULAR_CONE('',#14,4.,1.,{angle:?});\n");
     check(&frustum, PI * (1.0 + 16.0) + PI * 5.0 * 5.0, PI * 4.0 / 3.0 * (1.0 + 4.0 + 16.0));
+}
+
+#[test]
+fn the_base_of_a_cone_lies_behind_its_placement() {
+    let angle = 0.75f64.atan();
+    let import = import(&format!("#900=RIGHT_CIRCULAR_CONE('',#14,4.,0.,{angle:?});\n"));
+    let (tip, axis) = (Point::new(1.0, 2.0, 3.0), Vector::new(0.0, 0.6, 0.8));
+    let vertices = &import.model.parts[0].vertices;
+    assert!(!vertices.is_empty());
+    for v in vertices {
+        let height = (*v - tip).dot(axis);
+        let radius = (*v - tip - height * axis).length();
+        assert!((height + 4.0).abs() < 1e-12 && (radius - 3.0).abs() < 1e-12 || (*v - tip).length() < 1e-12, "{v}");
+    }
+}
+
+#[test]
+fn solids_of_recipes_that_are_not_built_are_refused_by_name() {
+    let solids = [
+        ("ELLIPSOID", "#13,5.,4.,3."),
+        ("ECCENTRIC_CONE", "#13,5.,4.,3.,0.,0.,0.5"),
+        ("RECTANGULAR_PYRAMID", "#13,5.,4.,3."),
+        ("FACETED_PRIMITIVE", "(#10)"),
+        ("CONVEX_HEXAHEDRON", "(#10)"),
+        ("CYCLIDE_SEGMENT_SOLID", "#13,5.,4.,3.,0.5,0.5"),
+    ];
+    for (name, attributes) in solids {
+        let import = import(&format!("#900={name}('',{attributes});\n"));
+        let refusals = &import.report.refusals;
+        assert!(refusals.len() == 1 && refusals[0].entity.contains(name), "{name}: {refusals:?}");
+    }
 }
 
 /// A rectangle of 2 × 4 with a round hole of radius 0.5, in the plane of x and z, 3 mm from the z axis.

@@ -1,6 +1,6 @@
 //! Bounded curves as splines: trimmed, composite, and whole curves.
 
-use super::curves::{CurveShape, DirectedCurve, MAX_DEPTH, first_pcurve};
+use super::curves::{CurveShape, DirectedCurve, MAX_DEPTH, first_pcurve, polyline_lengths};
 use super::tolerances::SEAM_SHARE;
 use super::{Geometry, Outcome, Refusal};
 use crate::math::{Homogeneous, Point};
@@ -55,7 +55,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         };
         let limit = |list: Args<'f, 'a>| -> Option<f64> {
             let point = || (0..list.len()).find_map(|i| self.point(list.id(i)?).ok()).map(|p| shape.parameter(p));
-            let number = || (0..list.len()).find_map(|i| list.real(i)).map(|x| x * scale);
+            let number =
+                || (0..list.len()).find_map(|i| list.real(i)).map(|x| self.curve_parameter(basis, x) * scale);
             // The file says which of its two trimming values it means; writers that give only the other are understood too.
             if by_point { point().or_else(number) } else { number().or_else(point) }
         };
@@ -75,6 +76,16 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
         let curve = shape.segment(from, to);
         Ok(if sense == reversed { curve.reversed() } else { curve })
+    }
+
+    /// Returns the parameter of our curve for one of the file's: a POLYLINE's counts points, and ours is its arc length, mm.
+    fn curve_parameter(&self, basis: Entity<'f, 'a>, x: f64) -> f64 {
+        let points = basis.attributes("POLYLINE", 1).and_then(|a| self.points(a.list(0)).ok());
+        let Some(lengths) = points.map(|p| polyline_lengths(&p)).filter(|l| l.len() > 1) else { return x };
+        let last = (lengths.len() - 1) as f64;
+        let x = x.clamp(0.0, last);
+        let k = x.floor().min(last - 1.0) as usize;
+        lengths[k] + (lengths[k + 1] - lengths[k]) * (x - k as f64)
     }
 
     /// Returns the segments of a composite curve, in its order, turned around where that joins them clearly better than the file's own

@@ -244,8 +244,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             return Ok(CurveShape::Parabola { frame, f: positive(a.real(offset), "focal distance")? });
         }
         if let Some(a) = e.attributes("POLYLINE", 1) {
-            let points = a.list(0).ids().into_iter().map(|p| self.point(p)).collect::<Outcome<Vec<_>>>()?;
-            return polyline(&points)
+            return polyline(&self.points(a.list(0))?)
                 .map(CurveShape::spline)
                 .ok_or_else(|| Refusal::new(e, "polyline without length"));
         }
@@ -266,8 +265,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let base = e.attributes("B_SPLINE_CURVE", 1).unwrap_or_else(|| e.args());
         let shift = usize::from(!e.keyword().is_empty() && e.keyword() != "B_SPLINE_CURVE");
         let degree = base.count(shift).ok_or_else(|| Refusal::new(e, "its degree is missing"))?;
-        let ids = base.list(shift + 1).ids();
-        let points = ids.iter().map(|&p| self.point(p)).collect::<Outcome<Vec<_>>>()?;
+        let points = self.points(base.list(shift + 1))?;
         let weights = e.attributes("RATIONAL_B_SPLINE_CURVE", 6).and_then(|a| a.list(0).reals());
         let form = knot_form(e, "CURVE");
         let knots = match e.attributes("B_SPLINE_CURVE_WITH_KNOTS", 6) {
@@ -284,25 +282,26 @@ impl<'f, 'a> Geometry<'f, 'a> {
 /// Returns a polyline parametrised by arc length, mm; points nearer than [`MERGED_POINTS_MM`] are dropped. `None` when fewer than two are
 /// left.
 pub(crate) fn polyline(points: &[Point]) -> Option<Curve> {
-    let mut kept: Vec<Point> = Vec::with_capacity(points.len());
-    let mut lengths = Vec::with_capacity(points.len());
-    for &p in points {
-        match kept.last() {
-            None => {
-                kept.push(p);
-                lengths.push(0.0);
-            }
-            Some(&q) => {
-                let length = (p - q).length();
-                // Parameters must ascend: a piece without length would repeat its knot.
-                if length > MERGED_POINTS_MM {
-                    kept.push(p);
-                    lengths.push(lengths[lengths.len() - 1] + length);
-                }
-            }
-        }
-    }
+    let mut kept: Vec<(f64, Point)> = polyline_lengths(points).into_iter().zip(points.iter().copied()).collect();
+    // Parameters must ascend: a piece without length would repeat its knot.
+    kept.dedup_by_key(|(length, _)| *length);
+    let (lengths, kept): (Vec<f64>, Vec<Point>) = kept.into_iter().unzip();
     (kept.len() > 1).then(|| Curve::polyline(&lengths, &kept))
+}
+
+/// Returns the arc length, mm, from the first point of a polyline to each; a point that is dropped has that of the one before it.
+pub(super) fn polyline_lengths(points: &[Point]) -> Vec<f64> {
+    let mut lengths = Vec::with_capacity(points.len());
+    let mut last: Option<(f64, Point)> = None;
+    for &p in points {
+        last = match last {
+            None => Some((0.0, p)),
+            Some((sum, q)) if (p - q).length() > MERGED_POINTS_MM => Some((sum + (p - q).length(), p)),
+            same => same,
+        };
+        lengths.extend(last.map(|(sum, _)| sum));
+    }
+    lengths
 }
 
 /// How knots follow from the subtype when they are not given.

@@ -19,7 +19,7 @@ pub(super) mod units;
 
 use self::units::Units;
 use crate::math::{Frame, Point, Vector};
-use crate::step::part21::{Entity, File};
+use crate::step::part21::{Args, Entity, File};
 
 /// Farthest coordinate, mm: a million kilometres, where doubles are 1e-4 mm apart.
 pub(crate) const FARTHEST_MM: f64 = 1e12;
@@ -69,6 +69,11 @@ impl<'f, 'a> Geometry<'f, 'a> {
             Some(id) => self.entity(id),
             None => Err(Refusal::new(from, format!("{what} is missing"))),
         }
+    }
+
+    /// Reads a list of CARTESIAN_POINTs, mm, as [`point`](Self::point) does.
+    pub(crate) fn points(&self, list: Args<'f, 'a>) -> Outcome<Vec<Point>> {
+        list.ids().into_iter().map(|id| self.point(id)).collect()
     }
 
     /// Reads a CARTESIAN_POINT, mm; z is 0 for two coordinates. Refuses coordinates beyond [`FARTHEST_MM`] and other numbers of them.

@@ -143,8 +143,9 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 return Err(Refusal::new(e, "its radius or semi-angle is no size"));
             };
             let wide = radius + height * angle.tan();
+            // The base lies behind the placement, where its axis comes from; the tip, or the smaller face, is in it.
             let place = |r: f64, h: f64| frame.point(Point::new(r, 0.0, h));
-            let corners = [place(0.0, 0.0), place(radius, 0.0), place(wide, height), place(0.0, height)];
+            let corners = [place(0.0, -height), place(wide, -height), place(radius, 0.0), place(0.0, 0.0)];
             // Corners that coincide, as at the tip of a cone, give no side.
             let sides = (0..4).map(|k| (corners[k], corners[(k + 1) % 4])).filter(|(p, q)| p != q);
             let sides = sides.map(|(p, q)| Curve::line(p, q, [0.0, 1.0])).collect();

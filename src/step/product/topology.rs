@@ -5,7 +5,7 @@ use crate::step::part21::{Entity, File};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Names of solids that hold no faces but a recipe.
-const RECIPES: [&str; 16] = [
+const RECIPES: [&str; 22] = [
     "CSG_SOLID",
     "BOOLEAN_RESULT",
     "EXTRUDED_AREA_SOLID",
@@ -21,6 +21,12 @@ const RECIPES: [&str; 16] = [
     "RIGHT_CIRCULAR_CONE",
     "TORUS",
     "RIGHT_ANGULAR_WEDGE",
+    "ELLIPSOID",
+    "ECCENTRIC_CONE",
+    "RECTANGULAR_PYRAMID",
+    "FACETED_PRIMITIVE",
+    "CONVEX_HEXAHEDRON",
+    "CYCLIDE_SEGMENT_SOLID",
     "SOLID_REPLICA",
 ];
 
