@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
@@ -29,6 +31,28 @@ def tolerance_range(tolerance: Tolerance) -> tuple[float, float]:
 def tolerance_list(tolerances: Tolerances | None) -> list[tuple[str, tuple[float, float]]]:
     """Tolerances by name as the extension takes them."""
     return [(name, tolerance_range(t)) for name, t in (tolerances or {}).items()]
+
+
+def table_to_json(tables: Table) -> str:
+    """Tables as JSON for the extension; a number that is not finite, which JSON has not, stands as text under ``$float``."""
+
+    def finite(value: Any) -> Any:
+        if isinstance(value, float) and not math.isfinite(value):
+            return {"$float": str(value)}
+        if isinstance(value, dict):
+            return {key: finite(x) for key, x in value.items()}
+        return [finite(x) for x in value] if isinstance(value, list) else value
+
+    return json.dumps(finite(tables), allow_nan=False)
+
+
+def table_from_json(text: str) -> Table:
+    """Tables from JSON of the extension."""
+
+    def number(table: Table) -> Any:
+        return float(table["$float"]) if set(table) == {"$float"} else table
+
+    return dict(json.loads(text, object_hook=number))
 
 
 def plain(value: Any) -> Any:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import os
@@ -14,7 +15,7 @@ import threading
 from typing import Any
 
 from .results import Run
-from .scene import Part, Scene, Settings
+from .scene import Part, Scene, Settings, named_files
 
 #: Parts for each thread of the cluster: enough that a slow one or a killed one costs little.
 PARTS_PER_THREAD = 4
@@ -29,9 +30,9 @@ class Bundle:
     """A scene with all files that it names, and the settings of a run: what a worker needs that shares no disk."""
 
     def __init__(self, scene: Scene, settings: Settings) -> None:
-        tables = json.loads(json.dumps(scene._tables))
+        tables = copy.deepcopy(scene._tables)
         self.files: dict[str, bytes] = {}
-        for entry in tables.get("model", []) + [s for s in tables.get("source", []) if "file" in s]:
+        for entry in named_files(tables):
             path = pathlib.Path(scene._folder, entry["file"])
             data = path.read_bytes()
             name = f"{hashlib.sha256(data).hexdigest()[:16]}-{path.name}"

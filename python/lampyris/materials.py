@@ -77,6 +77,7 @@ def glass(medium: str | float, **keys: Any) -> Material:
     """A body of a transparent medium: a name of the catalogue (see :func:`media`) or an index; ``keys`` are those of ``[[medium]]``."""
     if isinstance(medium, str) and not keys:
         return Material({"medium": medium})
-    name = medium if isinstance(medium, str) else f"n={medium:g}"
-    table = {"name": name, **keys} if isinstance(medium, str) else {"name": name, "index": float(medium), **keys}
-    return Material({"medium": name}, plain(table))
+    # A name that tells it from the catalogue's own, and from every other index.
+    own = {"catalogue": medium} if isinstance(medium, str) else {"index": float(medium)}
+    name = ", ".join(f"{key} {value}" for key, value in {**own, **keys}.items())
+    return Material({"medium": name}, plain({"name": name, **own, **keys}))

@@ -7,12 +7,23 @@ import hashlib
 import json
 import os
 import pathlib
+import shutil
 import tempfile
 from collections.abc import Iterable
 from typing import Any
 
 from . import _lampyris
-from ._types import Path, Table, Tolerance, Tolerances, plain, tolerance_list, tolerance_range
+from ._types import (
+    Path,
+    Table,
+    Tolerance,
+    Tolerances,
+    plain,
+    table_from_json,
+    table_to_json,
+    tolerance_list,
+    tolerance_range,
+)
 from .materials import Material, Selector
 from .mesh import Mesh
 from .model import Model
@@ -122,7 +133,7 @@ class Scene:
         """From the text of a scene file."""
         scene = cls()
         scene._folder = os.path.abspath(folder)
-        scene._tables = json.loads(_lampyris.scene_to_json(text, name, scene._folder))
+        scene._tables = table_from_json(_lampyris.scene_to_json(text, name, scene._folder))
         scene._text = text
         scene._name = name
         return scene
@@ -185,15 +196,23 @@ class Scene:
     def to_toml(self) -> str:
         """The scene file: the very text that was read, or the tables."""
         if self._text is None:
-            self._text = _lampyris.toml_from_json(json.dumps(self._tables))
+            self._text = _lampyris.toml_from_json(table_to_json(self._tables))
         return self._text
 
     def save(self, path: Path) -> None:
-        """Writes the scene file; models are named by their absolute paths."""
+        """Writes the scene file; what it names stands there by its absolute path, rays that came as an array in files beside it."""
+        scene_file = pathlib.Path(path).absolute()
         tables = copy.deepcopy(self._tables)
-        for entry in tables.get("model", []) + [s for s in tables.get("source", []) if "file" in s]:
-            entry["file"] = os.path.abspath(os.path.join(self._folder, entry["file"]))
-        pathlib.Path(path).write_text(_lampyris.toml_from_json(json.dumps(tables)), encoding="utf-8")
+        for entry in named_files(tables):
+            file = pathlib.Path(self._folder, entry["file"]).absolute()
+            if self._ray_folder is not None and file.parent == pathlib.Path(self._ray_folder.name):
+                # The folder for temporary files goes with this process.
+                kept = scene_file.with_name(f"{scene_file.stem}-{file.name}")
+                shutil.copyfile(file, kept)
+                entry["file"] = kept.name
+            else:
+                entry["file"] = str(file)
+        scene_file.write_text(_lampyris.toml_from_json(table_to_json(tables)), encoding="utf-8")
 
     def prepare(self, *, progress: bool | ProgressCallback = True, **settings: Any) -> Settings:
         """Reads, binds and facets the scene, and chooses how to trace it; says how. ``settings`` are those of :meth:`trace`."""
@@ -206,7 +225,10 @@ class Scene:
 
     def _prepare(self, settings: Settings, progress: bool | ProgressCallback) -> _lampyris.Prepared:
         text = self.to_toml()
-        key = hashlib.sha256(json.dumps([text, self._folder, settings], default=str).encode()).hexdigest()
+        # A file that was written anew makes another scene.
+        files = [_state_of(os.path.join(self._folder, entry["file"])) for entry in named_files(self._tables)]
+        words = json.dumps([text, self._folder, settings, files], default=str)
+        key = hashlib.sha256(words.encode()).hexdigest()
         if self._prepared is None or self._prepared[0] != key:
             tell, close = callback(progress)
             try:
@@ -245,6 +267,8 @@ class Scene:
             rays=rays, seed=seed, threads=threads, tolerance=tolerance, angle_deg=angle_deg, accuracy_deg=accuracy_deg,
             parts=parts, faces=faces, roles=roles, normals=normals, intersector=intersector,
         )
+        if until is not None and resume is not False:
+            raise ValueError("until and resume exclude each other: give rays with resume")
         prepared = self._prepare(settings, progress)
         part = self.interrupted if resume is True else (resume or None)
         if resume is True and part is None:
@@ -252,7 +276,7 @@ class Scene:
         tell, close = callback(progress)
         words = None
         try:
-            if until is not None and part is None:
+            if until is not None:
                 found, rest, stopped, words = prepared.trace_until(until, tell)
             else:
                 found, rest, stopped = prepared.trace(None if part is None else part._core, None, tell)
@@ -293,6 +317,20 @@ class Scene:
         tables = self._tables
         counts = ", ".join(f"{len(tables.get(k, []))} {k}s" for k in ("model", "material", "source", "receiver"))
         return f"<lampyris.Scene {tables.get('title', '')!r}: {counts}>"
+
+
+def named_files(tables: Table) -> list[Table]:
+    """The tables of models, sources and media that name a file."""
+    return [entry for kind in ("model", "source", "medium") for entry in tables.get(kind, []) if "file" in entry]
+
+
+def _state_of(file: str) -> list[int] | None:
+    """Size and time of a file; ``None`` where there is none."""
+    try:
+        state = os.stat(file)
+    except OSError:
+        return None
+    return [state.st_size, state.st_mtime_ns]
 
 
 def _settings(

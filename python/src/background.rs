@@ -139,9 +139,12 @@ pub(crate) fn interruptible<T: Send + 'static>(
     }
 }
 
-/// In a pool of so many threads, or in the one that all share.
-fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
-    match threads.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n.max(1)).build()) {
+/// Most threads of one call, as of the command: more make no machine faster, and millions stop it.
+const MOST_THREADS: usize = 4096;
+
+/// In a pool of so many threads, [`MOST_THREADS`] at most, or in the one that all share.
+pub(crate) fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
+    match threads.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n.clamp(1, MOST_THREADS)).build()) {
         Some(Ok(pool)) => pool.install(work),
         _ => work(),
     }

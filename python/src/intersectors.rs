@@ -1,7 +1,7 @@
 //! Octree, BVH and spline, asked about arrays of rays.
 
 use crate::arrays::{columns, length, rows, vector};
-use crate::background::interruptible;
+use crate::background::{interruptible, on_threads};
 use crate::errors::SceneError;
 use crate::hits::{HitArrays, Hits};
 use crate::mesh::Mesh;
@@ -229,11 +229,7 @@ impl Tracer {
         let who = self.structure.intersector();
         let (arrays, cost, bad) = py.detach(|| {
             let mut arrays = HitArrays::new(n);
-            let mut work = || ask(who, from, along, [t_min, t_max], &mut arrays);
-            let (cost, bad) = match threads.map(|t| rayon::ThreadPoolBuilder::new().num_threads(t).build()) {
-                Some(Ok(pool)) => pool.install(&mut work),
-                _ => work(),
-            };
+            let (cost, bad) = on_threads(threads, || ask(who, from, along, [t_min, t_max], &mut arrays));
             (arrays, cost, bad)
         });
         if let Some(k) = bad {

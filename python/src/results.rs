@@ -5,6 +5,9 @@ use crate::errors::{SceneError, of_json};
 use lampyris::formats::{Axis, ColourMap, Grid, Picture};
 use lampyris::pipeline::{PreparedScene, SceneResults};
 use lampyris::regulation::{self, Assumptions, IntensityMap, Regulation, Traffic};
+use lampyris::simulate::ReceiverResult;
+use lampyris::simulate::scene::FarFieldType;
+use lampyris::study::figures::{cell_errors, channel_cell_errors};
 use numpy::PyArrayDyn;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
@@ -36,7 +39,7 @@ impl Results {
         Self { scene, found }
     }
 
-    fn receiver(&self, receiver: usize) -> PyResult<&lampyris::simulate::ReceiverResult> {
+    fn receiver(&self, receiver: usize) -> PyResult<&ReceiverResult> {
         self.found.results.receivers.get(receiver).ok_or_else(|| {
             PyIndexError::new_err(format!("receiver {receiver}: there are {}", self.found.results.receivers.len()))
         })
@@ -57,19 +60,22 @@ impl Results {
         serde_json::to_string(&document).map_err(of_json)
     }
 
-    /// The cells of a receiver, the second axis slow, with both errors.
+    /// The cells of a receiver, the second axis slow, with both errors: NaN off a disc, the error of one ray where none arrived.
     fn layers<'py>(&self, py: Python<'py>, receiver: usize) -> PyResult<Layers<'py>> {
         let r = self.receiver(receiver)?;
         let shape = [r.grid[1], r.grid[0]];
         let geometric = self.found.geometric_cells(&self.scene, receiver);
         Ok((
-            shaped(py, r.cells.clone(), &shape)?,
-            shaped(py, r.errors.clone(), &shape)?,
-            geometric.filter(|g| g.len() == r.cells.len()).map(|g| shaped(py, g, &shape)).transpose()?,
+            shaped(py, on_receiver(r, r.cells.clone()), &shape)?,
+            shaped(py, on_receiver(r, cell_errors(r)), &shape)?,
+            geometric
+                .filter(|g| g.len() == r.cells.len())
+                .map(|g| shaped(py, on_receiver(r, g), &shape))
+                .transpose()?,
         ))
     }
 
-    /// The cells of a further channel of a receiver and their statistical errors.
+    /// The cells of a further channel of a receiver and their statistical errors, as those of the receiver itself.
     fn channel<'py>(&self, py: Python<'py>, receiver: usize, channel: usize) -> PyResult<Pair<'py>> {
         let r = self.receiver(receiver)?;
         let c = r
@@ -77,7 +83,8 @@ impl Results {
             .get(channel)
             .ok_or_else(|| PyIndexError::new_err(format!("channel {channel}: there are {}", r.channels.len())))?;
         let shape = [r.grid[1], r.grid[0]];
-        Ok((shaped(py, c.cells.clone(), &shape)?, shaped(py, c.errors.clone(), &shape)?))
+        let (cells, errors) = (on_receiver(r, c.cells.clone()), on_receiver(r, channel_cell_errors(r, c)));
+        Ok((shaped(py, cells, &shape)?, shaped(py, errors, &shape)?))
     }
 
     /// The edges of the cells along both axes: mm of planes, degrees of angles.
@@ -104,6 +111,12 @@ impl Results {
             shaped(py, paths.iter().map(|v| v.power).collect(), &[n])?,
         ))
     }
+}
+
+/// Numbers of cells, with none off a disc.
+fn on_receiver(r: &ReceiverResult, mut cells: Vec<f64>) -> Vec<f64> {
+    r.off.iter().for_each(|&k| cells[k] = f64::NAN);
+    cells
 }
 
 /// A map of values (rows from below) as the bytes of a PNG file.
@@ -154,9 +167,10 @@ pub(crate) fn assess(
 ) -> PyResult<String> {
     let regulation = Regulation::find(regulation).map_err(SceneError::new_err)?;
     let r = results.receiver(receiver)?;
-    if r.kind != "far_field" || r.unit != "cd" {
+    if r.kind != "far_field" || r.unit != "cd" || r.angles != Some(FarFieldType::A) {
+        let angles = r.angles.map_or(String::new(), |angles| format!(" with angles {angles:?}"));
         return Err(SceneError::new_err(format!(
-            "{}: a verdict needs a far field with angles \"A\" in a run that counts lm, not a {} in {}",
+            "{}: a verdict needs a far field with angles \"A\" in a run that counts lm, not a {}{angles} in {}",
             r.name, r.kind, r.unit
         )));
     }

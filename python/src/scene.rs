@@ -8,23 +8,58 @@ use lampyris::optics::catalogue;
 use lampyris::simulate::Scene;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Checks the text of a scene and gives its tables as JSON, as they were written.
 #[pyfunction]
 pub(crate) fn scene_to_json(text: &str, name: &str, folder: PathBuf) -> PyResult<String> {
     Scene::parse(text, name, &folder).map_err(of_scene)?;
-    let tables: Value = toml::from_str(text).map_err(|e| SceneError::new_err(e.to_string()))?;
-    serde_json::to_string(&tables).map_err(of_json)
+    let tables: toml::Value = toml::from_str(text).map_err(|e| SceneError::new_err(e.to_string()))?;
+    serde_json::to_string(&json_of(tables)?).map_err(of_json)
+}
+
+/// The key under which a number that is not finite stands as text: JSON has no word for it, and `caught_after = inf` has a meaning.
+const NOT_FINITE: &str = "$float";
+
+/// A value of TOML as JSON.
+fn json_of(value: toml::Value) -> PyResult<Value> {
+    Ok(match value {
+        toml::Value::Float(x) if !x.is_finite() => json!({ NOT_FINITE: x.to_string() }),
+        toml::Value::Array(items) => Value::Array(items.into_iter().map(json_of).collect::<PyResult<_>>()?),
+        toml::Value::Table(table) => {
+            let entries = table.into_iter().map(|(key, value)| Ok((key, json_of(value)?)));
+            Value::Object(entries.collect::<PyResult<_>>()?)
+        }
+        plain => serde_json::to_value(plain).map_err(of_json)?,
+    })
+}
+
+/// What [`json_of`] made, as TOML.
+fn toml_of(value: Value) -> PyResult<toml::Value> {
+    let refuse = |e: toml::ser::Error| {
+        SceneError::new_err(format!("a scene holds what TOML has no word for: {e}; leave None out"))
+    };
+    Ok(match value {
+        Value::Object(entries) => match entries.get(NOT_FINITE).and_then(Value::as_str) {
+            Some(text) => {
+                toml::Value::Float(text.parse().map_err(|_| SceneError::new_err(format!("{text} is no number")))?)
+            }
+            None => {
+                let entries = entries.into_iter().map(|(key, value)| Ok((key, toml_of(value)?)));
+                toml::Value::Table(entries.collect::<PyResult<_>>()?)
+            }
+        },
+        Value::Array(items) => toml::Value::Array(items.into_iter().map(toml_of).collect::<PyResult<_>>()?),
+        plain => toml::Value::try_from(plain).map_err(refuse)?,
+    })
 }
 
 /// Tables given as JSON, as TOML.
 #[pyfunction]
 pub(crate) fn toml_from_json(tables: &str) -> PyResult<String> {
     let tables: Value = serde_json::from_str(tables).map_err(|e| SceneError::new_err(e.to_string()))?;
-    toml::to_string(&tables)
-        .map_err(|e| SceneError::new_err(format!("a scene holds what TOML has no word for: {e}; leave None out")))
+    toml::to_string(&toml_of(tables)?).map_err(|e| SceneError::new_err(e.to_string()))
 }
 
 /// The JSON Schema of scenes.

@@ -272,3 +272,68 @@ def test_the_lines_of_the_readme_run(tmp_path: pathlib.Path, monkeypatch: pytest
     names: dict[str, Any] = {}
     exec(code, names)
     assert names["run"]["far"].candela.max() > 0
+
+
+def beam(folder: pathlib.Path, **run: Any) -> lp.Scene:
+    """A beam of three rays onto a plane, with the models that a test adds."""
+    scene = lp.Scene(LAMP, **run)
+    scene.add(lp.rays(np.array([[x, 0.0, 200.0, 0.0, 0.0, 1.0, 1.0] for x in (-1.0, 0.0, 1.0)])))
+    return scene.add(lp.plane("wall", at=(0, 0, 300), size=(10, 10), cells=(2, 2)))
+
+
+def test_rays_of_an_array_outlive_the_process_that_saved_them(tmp_path: pathlib.Path) -> None:
+    file = tmp_path / "beam.toml"
+    scene = beam(tmp_path, rays=300)
+    scene.save(file)
+    digest = scene.trace(progress=False).digest
+    del scene
+    assert lp.Scene.from_toml(file).trace(progress=False).digest == digest
+    assert "lampyris-rays-" not in file.read_text()
+
+
+def test_numbers_without_end_are_kept(tmp_path: pathlib.Path) -> None:
+    scene = lp.Scene.parse("[run]\ncaught_after = inf\nrays = 300\n")
+    assert scene.tables["run"]["caught_after"] == float("inf")
+    assert "caught_after = inf" in scene.to_toml()
+    assert beam(tmp_path, rays=300, caught_after=float("inf")).trace(progress=False).power["emitted"] > 0
+
+
+def test_files_that_changed_are_read_again(tmp_path: pathlib.Path) -> None:
+    file = tmp_path / "rays.csv"
+    file.write_text("x,y,z,dx,dy,dz,power\n0,0,200,0,0,1,1\n")
+    scene = lp.Scene(LAMP, rays=300)
+    scene.add(lp.ray_file(file), lp.plane("wall", at=(0, 0, 300), size=(10, 10), cells=(2, 2)))
+    before = scene.trace(progress=False).power["emitted"]
+    file.write_text("x,y,z,dx,dy,dz,power\n0,0,200,0,0,1,2.5\n")
+    assert scene.trace(progress=False).power["emitted"] == pytest.approx(2.5 * before)
+
+
+def test_media_of_the_catalogue_take_further_keys_and_all_indices_their_own_name() -> None:
+    scene = lp.Scene(LAMP)
+    scene["cover_PMMA"] = lp.glass("PMMA", absorption_per_mm=0.01)
+    scene["housing"] = lp.glass(1.4918251)
+    scene["bezel"] = lp.glass(1.4918254)
+    names = [medium["name"] for medium in scene.tables["medium"]]
+    assert len(set(names)) == 3 and scene.tables["medium"][0]["catalogue"] == "PMMA"
+    lp.Scene.parse(scene.to_toml())
+
+
+def test_cells_off_a_disc_are_none_and_dark_ones_have_the_error_of_a_ray(tmp_path: pathlib.Path) -> None:
+    scene = beam(tmp_path, rays=300)
+    scene.add(lp.disc("disc", at=(0, 0, 299), radius=5.0, cells=(8, 8), absorbs=False))
+    disc = scene.trace(progress=False)["disc"]
+    off = np.isnan(disc.values)
+    assert off[0, 0] and off[-1, -1] and not off[4, 4]
+    assert (disc.statistical[~off & (disc.values == 0)] > 0).all() and np.isnan(disc.statistical[off]).all()
+
+
+def test_a_verdict_needs_angles_of_type_a(tmp_path: pathlib.Path) -> None:
+    scene = beam(tmp_path, rays=300, unit="lm")
+    scene.add(lp.far_field("b", angles="B", h_deg=(-40, 40), v_deg=(-20, 20), step_deg=1.0))
+    with pytest.raises(lp.SceneError, match="angles B"):
+        scene.trace(progress=False).assess(next(iter(lp.regulations())), "b")
+
+
+def test_resume_and_until_exclude_each_other(tmp_path: pathlib.Path) -> None:
+    with pytest.raises(ValueError, match="until and resume"):
+        beam(tmp_path).trace(until="1%@wall", resume=True)
