@@ -31,6 +31,33 @@ fn a_source_finds_the_bodies_around_it() {
     }
 }
 
+/// A box of glass without its lid does not lie around a source above it, though light comes in by the opening and leaves by the floor; nor
+/// around one beside it. Of a source in its box each ray is asked, and the answer says so.
+#[test]
+fn a_source_beside_an_open_body_is_not_in_it() {
+    let mut world = World::default();
+    world.cuboid("tub", Point::new(-2.0, -2.0, -1.0), Point::new(2.0, 2.0, 1.0));
+    world.shapes.pop();
+    let tub = &mut world.model.parts[0].shells[0];
+    tub.closed = false;
+    tub.faces.pop();
+    for (source, asked) in [
+        ("kind = 'cone'\nhalf_angle_deg = 40\nat = [0, 0, 5]\ndirection = [0, 0, -1]", false),
+        ("kind = 'point'\nat = [3, 1, 0.5]", false),
+        ("kind = 'point'\nat = [0.5, 1, 0.5]", true),
+    ] {
+        let text = |inside: &str| {
+            format!(
+                "[run]\nrays = 5000\n{MEDIA}[[material]]\npart = 'tub'\nmedium = 'glass'\n[[source]]\n{source}\n{inside}\n{FAR}"
+            )
+        };
+        let [found, said] = ["", "inside = []"].map(|inside| world.run(&text(inside), |_| ()));
+        assert_eq!(found.digest == said.digest, !asked, "{source}");
+        let told = |notes: &[String]| notes.iter().any(|n| n.contains("each ray is asked"));
+        assert_eq!((told(&found.notes), told(&said.notes)), (asked, false), "{source}: {:?}", found.notes);
+    }
+}
+
 /// Of a source exactly on a surface, or one that reaches from outside into a body, each ray is asked.
 #[test]
 fn a_source_on_a_surface_or_across_one_loses_nothing() {

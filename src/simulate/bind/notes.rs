@@ -120,7 +120,8 @@ pub(super) fn is_open(f: &PlacedFace<'_>, model: &Model) -> bool {
     f.face.is_some() && f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed)
 }
 
-/// Returns one sentence about the bodies that have faces in no closed shell, naming the first; `None` where all are closed.
+/// Returns one sentence about the bodies that have faces in no closed shell, naming the first, and about a source in the box of one; `None`
+/// where all are closed.
 pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> {
     let open = |f: &PlacedFace<'_>| {
         is_open(f, model) && bound.faces.get(f.id.index()).is_some_and(|optics| optics.body != AMBIENT)
@@ -136,9 +137,19 @@ pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> 
         (name, Some(entity)) => format!(" (face '{name}', #{entity})"),
         (name, None) => format!(" (face '{name}')"),
     };
+    // The ways of its rays out of the scene tell different things where they pass the opening, so that none stands for the others.
+    let within = |k: usize| {
+        let e = &bound.emitters[k];
+        let reaches = |&body: &u32| !bound.bodies[body as usize].bounds.intersection(e.extent()).is_empty();
+        !e.media_stated && bodies.iter().any(reaches)
+    };
+    let asked = (0..bound.emitters.len()).find(|&k| within(k)).map_or_else(String::new, |k| {
+        let source = source_label(&bound.scene, k);
+        format!("; {source} is in its box, and each ray is asked what it starts in, many times the work: say what by `inside`")
+    });
     Some(format!(
         "'{instance}'{others} has the medium '{medium}' but no closed shell{sheet}: light that passes its opening is lost; close it in \
-         the model, or give it a surface instead of a medium"
+         the model, or give it a surface instead of a medium{asked}"
     ))
 }
 

@@ -2,7 +2,7 @@
 
 use super::context::{Bodies, Context};
 use super::payload::RayPayload;
-use super::tolerances::{ALIGNED, way_through_glue};
+use super::tolerances::{ALIGNED, rounding_at, way_through_glue};
 use crate::intersect::Cost;
 use crate::math::{Point, Ray, orthonormal_pair};
 use crate::simulate::body::AMBIENT;
@@ -19,10 +19,25 @@ const TILTS: [[f64; 2]; 2] = [[0.031, 0.017], [-0.013, 0.029]];
 const LONGEST_LOOK: f64 = 1.0;
 
 /// Returns the bodies around the start of a ray, outermost first, by following it straight out of the scene; empty in the surroundings.
+/// Bodies whose box the start is out of are left out, whatever was met on the way.
 ///
 /// Where solids touch, a way out that comes near an edge of three of them may miss one; then a second and a third way are followed, and two
 /// that agree decide, or the first where none do.
 pub(super) fn media_at(context: &Context<'_>, ray: &Ray) -> Bodies {
+    let mut bodies = media_on_way_out(context, ray);
+    // A way that comes in by the opening of a body and leaves by a face would tell that it began there. Sources beside such a body were
+    // asked ray by ray for that.
+    bodies.retain(|&mut body| is_within_box(context, body, ray.origin));
+    bodies
+}
+
+/// Whether a point, mm, lies in the box around a body, as far as rounding and faces that touch let one tell.
+fn is_within_box(context: &Context<'_>, body: u32, point: Point) -> bool {
+    context.bound.bodies[body as usize].bounds.grown(context.glue_mm() + rounding_at(point)).contains(point)
+}
+
+/// Returns the bodies that two of three ways out leave without having entered them, outermost first.
+fn media_on_way_out(context: &Context<'_>, ray: &Ray) -> Bodies {
     // Away from edges of touching solids the first way out is beyond doubt, and it is nearly always enough.
     let (first, certain) = bodies_left(context, ray);
     if certain {
@@ -118,7 +133,10 @@ pub(super) fn has_left_by_opening<C: RayPayload>(
     point: Point,
 ) -> bool {
     let body = payload.body();
-    context.bound.bodies[body as usize].open && !media_at(context, &Ray::new(point, ray.direction)).contains(&body)
+    let open = context.bound.bodies[body as usize].open;
+    // Out of its box nothing has to be asked.
+    open && (!is_within_box(context, body, point)
+        || !media_at(context, &Ray::new(point, ray.direction)).contains(&body))
 }
 
 /// Faces of bodies crossed one after another on the way out.
