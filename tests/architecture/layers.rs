@@ -347,6 +347,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "recipe_parts",
             "free_surfaces",
             "zero_width",
+            "spikes",
             "conversion",
         ],
     ),

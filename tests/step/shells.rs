@@ -166,6 +166,47 @@ fn sides_of_a_face_without_width_meet() {
     assert_eq!(said, [100_066]);
 }
 
+/// The lead of an IC: a plate and a wall without thickness on one end of it. The border of the plate's sides runs up the wall by one edge and
+/// down by a shorter one, with nothing between.
+#[test]
+fn a_wall_without_thickness_stands_on_one_edge() {
+    let s = SIDE;
+    let plate = [[0.0, 0.0], [s, 0.0], [s, s], [0.0, s]].map(|[x, y]| [x, y, 0.0]);
+    let corners: Vec<[f64; 3]> =
+        plate.into_iter().chain(plate.map(|[x, y, _]| [x, y, 1.0])).chain([[s, 0.0, 5.0], [s, s, 5.0]]).collect();
+    let faces: [&[usize]; 7] =
+        [CUBE[0], CUBE[1], CUBE[5], &[1, 2, 9, 8], &[5, 8, 9, 6], &[0, 1, 8, 5, 4], &[2, 3, 7, 6, 9]];
+    let import = solid(&corners, &faces, &[".T."; 7], None);
+    assert_eq!(import.report.faces.converted, 7);
+    let r = tessellate(&import.model, &tessellate::Settings::uniform(0.1)).report;
+    assert_eq!((r.open_edges, r.nonmanifold_edges, r.shells.closed), (0, 0, 1));
+    let volume = r.volume_mm3.expect("closed");
+    assert!((volume - s * s).abs() < 1e-9, "{volume}");
+    let said: Vec<u64> = import
+        .report
+        .repairs
+        .iter()
+        .filter(|r| r.reason.contains("comes back along itself"))
+        .map(|r| r.id)
+        .collect();
+    assert_eq!(said, [100_056, 100_066]);
+}
+
+/// A side of a cube has one edge where another has two, and a face without width lies between the one and the two.
+#[test]
+fn a_face_without_width_between_one_edge_and_two_is_left_out() {
+    let mut corners: Vec<[f64; 3]> = cube_corners().into_iter().take(8).collect();
+    corners.push([0.3 * SIDE, 0.0, SIDE]);
+    let faces: [&[usize]; 7] = [CUBE[0], CUBE[1], &[0, 1, 5, 8, 4], CUBE[3], CUBE[4], CUBE[5], &[4, 8, 5]];
+    // Its corners in a line give no normal.
+    let text = solid_text(&corners, &faces, &[".T."; 7], None).replace("(NaN,NaN,NaN)", "(0.0,1.0,0.0)");
+    let import = read(&text);
+    assert_closes(&import);
+    let said: Vec<u64> =
+        import.report.repairs.iter().filter(|r| r.reason.contains("it has no width")).map(|r| r.id).collect();
+    assert_eq!(said, [100_066]);
+}
+
 /// A cubic void inside of a cube, once as the schema asks for it and once with faces that look into it already below a shell that turns them.
 #[test]
 fn a_void_that_is_turned_once_too_often_encloses_a_hole() {

@@ -5,6 +5,7 @@ use super::loop_order::{DirectedUse, drop_opposite_loops, put_in_order};
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::{faces_against_neighbours, is_inside_out};
 use super::recipe_parts::convert_recipes;
+use super::spikes::{EdgeTable, remove_spikes};
 use super::styles::Styles;
 use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
 use super::zero_width::{joined_vertex, remove_faces_without_width, vertex_ids, vertices_of_empty_edges};
@@ -59,16 +60,21 @@ pub(crate) fn convert(
         items.shells.iter().flat_map(|s| &s.faces).map(|f| f.0).filter(|f| seen.insert(*f)).collect();
     let mut plans: FxHashMap<u64, Outcome<FacePlan>> = ids.iter().map(|&id| (id, read_face(file, id))).collect();
     let in_order = ids.iter().filter_map(|id| plans[id].as_ref().ok());
-    let (keys, index) = number_edges(in_order);
+    let (mut keys, mut index) = number_edges(in_order);
 
     // Each edge once: faces that share one must get the same bits, or they would not join.
-    let edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(|&key| edge_curve(&geometry, key)).collect();
+    let mut edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(|&key| edge_curve(&geometry, key)).collect();
     let joined = vertices_of_empty_edges(file, &keys, &edges);
-    let removed = remove_faces_without_width(file, &ids, &mut plans, (&keys, &index), (&edges, &joined));
+    let mut removed = remove_faces_without_width(file, &ids, &mut plans, (&keys, &index), (&edges, &joined));
+    let table = EdgeTable { keys: &mut keys, index: &mut index, edges: &mut edges };
+    let spiked = remove_spikes(file, &ids, &mut plans, table, &joined);
+    removed.extend(spiked.removed);
     let without = (!removed.is_empty()).then(|| items.without_faces(&removed));
     let items = without.as_ref().unwrap_or(items);
     let reason = "it has no width: it is left out, and the faces beside it meet";
     out.repaired.extend(removed.iter().map(|&id| repair_note(file, id, reason.into())));
+    let reason = "its border comes back along itself: what has no width between is left out";
+    out.repaired.extend(spiked.trimmed.iter().map(|&id| repair_note(file, id, reason.into())));
     ids.retain(|id| plans.contains_key(id));
     out.found += ids.len();
     let convert_one = |id: &u64| {
@@ -136,7 +142,10 @@ fn add_edges(
                 None => add(),
             }
         });
-        let entity = if let EdgeKey::Entity(id) = key { Some(*id) } else { None };
+        let entity = match key {
+            EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => Some(*id),
+            EdgeKey::Straight(..) => None,
+        };
         numbers.push(Some(EdgeId(part.edges.len() as u32)));
         part.edges.push(Edge { curve, vertices, entity });
     }
@@ -201,7 +210,8 @@ fn add_shells(
 /// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length.
 fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<TrimmedEdge> {
     match key {
-        EdgeKey::Entity(id) => geometry.edge(id),
+        // Parts are cut from whole edges, which must be there first.
+        EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id),
         EdgeKey::Straight(a, b) => {
             let (p, q) = (geometry.point(a)?, geometry.point(b)?);
             let length = (q - p).length();

@@ -55,6 +55,8 @@ pub(crate) enum EdgeKey {
     Entity(u64),
     /// The straight line between two points of POLY_LOOPs, the smaller id first.
     Straight(u64, u64),
+    /// A part of an EDGE_CURVE, between two vertices in the order of the edge.
+    Part { entity: u64, ends: [u64; 2] },
 }
 
 /// A face's topology: ids of its surface and edges, without geometry.

@@ -21,7 +21,7 @@ const UNBOUNDED: [&str; 3] = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE"]
 /// Returns the ids of an edge's vertices, as the file orders them; `None` for each that it does not name.
 pub(super) fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
     match key {
-        EdgeKey::Straight(a, b) => [Some(a), Some(b)],
+        EdgeKey::Straight(a, b) | EdgeKey::Part { ends: [a, b], .. } => [Some(a), Some(b)],
         EdgeKey::Entity(id) => {
             let kinds = ["EDGE", "EDGE_CURVE", "SUBEDGE"];
             let args = file.entity(id).and_then(|e| kinds.iter().find_map(|kind| e.attributes(kind, 1)));
@@ -64,14 +64,14 @@ pub(super) fn joined_vertex(joined: &FxHashMap<u64, u64>, mut vertex: u64) -> u6
 
 /// Edges of a part that coincide across faces without width.
 #[derive(Default)]
-struct CoincidentEdges {
+pub(super) struct CoincidentEdges {
     /// The number of an edge to that of the one in its place, and whether the latter runs the other way.
     replaced: FxHashMap<usize, (usize, bool)>,
 }
 
 impl CoincidentEdges {
     /// Returns the edge that stands for all that coincide with this one, and whether it runs the other way.
-    fn representative(&self, mut edge: usize) -> (usize, bool) {
+    pub(super) fn representative(&self, mut edge: usize) -> (usize, bool) {
         let mut opposite = false;
         while let Some(&(other, turned)) = self.replaced.get(&edge) {
             edge = other;
@@ -81,7 +81,7 @@ impl CoincidentEdges {
     }
 
     /// Joins two edges, of which the second runs the other way if `opposite`.
-    fn join(&mut self, [first, second]: [usize; 2], opposite: bool) {
+    pub(super) fn join(&mut self, [first, second]: [usize; 2], opposite: bool) {
         let (a, turned_a) = self.representative(first);
         let (b, turned_b) = self.representative(second);
         if a != b {
@@ -147,10 +147,15 @@ fn two_edges(
     (both[0].0 != both[1].0).then_some(both)
 }
 
+/// Returns the distance, mm, within which points of two edges coincide: with what they miss their vertices by.
+pub(super) fn coincidence_tolerance(a: &TrimmedEdge, b: &TrimmedEdge) -> f64 {
+    COINCIDENT_MM + a.gap.min(LARGEST_GAP_MM) + b.gap.min(LARGEST_GAP_MM)
+}
+
 /// Whether two edges coincide at equal shares of their parameters, one of them backwards if `opposite`, within what they miss their vertices by.
 fn edges_coincide(a: &TrimmedEdge, b: &TrimmedEdge, opposite: bool) -> bool {
     let (Some(first), Some(second)) = (&a.curve, &b.curve) else { return false };
-    let tolerance = COINCIDENT_MM + a.gap.min(LARGEST_GAP_MM) + b.gap.min(LARGEST_GAP_MM);
+    let tolerance = coincidence_tolerance(a, b);
     let point = |curve: &Curve, share: f64| {
         let [t0, t1] = curve.domain();
         curve.evaluate(t0 + share * (t1 - t0))
