@@ -1,8 +1,9 @@
 //! Counts and measures what came out.
 
-use super::report::{FailedFace, FailureCause, NotCertified, Percentiles, Repair, Report, ToleranceRange};
+use super::placement::Placed;
+use super::report::{FailedFace, FailureCause, NotCertified, Percentiles, Report, ToleranceRange};
 use super::sample::{self, Sampled};
-use super::sample_budget::sample_within_budget;
+use super::sample_budget::{MeshSamples, sample_within_budget};
 use super::tessellation::{FacetQuality, Tessellation};
 use super::{angles, repairs, settings::Settings};
 use crate::math::FaceId;
@@ -12,15 +13,10 @@ use crate::model::Model;
 /// Share of the tolerance, and mm, by which a sample may be above it: one on the very tolerance differs by rounding alone.
 const SAMPLE_ROUNDING: [f64; 2] = [1e-9, 1e-10];
 
-/// Fills in `made.report` from its mesh and quality, all but the times. `failed` are the placed faces without facets, whose causes are
-/// filled in later; samples are taken only if [`Settings::measure`] says so.
-pub(super) fn fill_report(
-    made: &mut Tessellation,
-    model: &Model,
-    settings: &Settings,
-    failed: &[FaceId],
-    repairs: &[(FaceId, Repair)],
-) {
+/// Returns placed meshes with a report of them filled in, all but the times and the causes of failures; samples are taken only if
+/// [`Settings::measure`] says so.
+pub(super) fn evaluate(placed: Placed, model: &Model, settings: &Settings) -> Tessellation {
+    let Placed { mut made, failed, repairs, originals } = placed;
     let mut report = std::mem::take(&mut made.report);
     let mesh = &made.mesh;
     report.facets = mesh.facets.len();
@@ -37,18 +33,20 @@ pub(super) fn fill_report(
     let in_quads: f64 = areas.iter().zip(&mesh.facets).filter(|(_, f)| !f.is_triangle()).map(|(a, _)| a).sum();
     report.quad_area_share = if report.area_mm2 > 0.0 { (in_quads / report.area_mm2).abs() } else { 0.0 };
     report.faces.failed = failed.len();
-    report.failed = failed_faces(model, failed);
+    report.failed = failed_faces(model, &failed);
     report.over_angle = angles::steep_faces(mesh, model, settings);
     report.faces.repaired = repairs.len();
-    report.repaired = repairs::repaired_faces(made, model, repairs);
+    report.repaired = repairs::repaired_faces(&made, model, &repairs);
     report.faces.meshed = model.placed_face_count() - failed.len();
-    name_uncertified(&mut report, made, model);
-    let all_closed = count_shells(&mut report, made, model);
+    name_uncertified(&mut report, &made, model);
+    let all_closed = count_shells(&mut report, &made, model);
     report.volume_mm3 = (all_closed && report.facets > 0).then(|| made.mesh.volume());
     if settings.measure {
-        measure_samples(&mut report, made, model, &areas);
+        let samples = sample_within_budget(&made.mesh, model, &made.quality, &originals);
+        fill_in_samples(&mut report, &samples, &made.quality, &areas);
     }
     made.report = report;
+    made
 }
 
 /// Returns the faces that were not meshed, with their entities and, as yet, the default cause; empty for none.
@@ -121,10 +119,9 @@ fn count_shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool
 
 /// Fills in what samples show: sag and its excess over the tolerance, mm, and errors of normals, degrees. `areas` are those of the facets,
 /// mm².
-fn measure_samples(report: &mut Report, made: &Tessellation, model: &Model, areas: &[f64]) {
-    let sampled = sample_within_budget(&made.mesh, model, &made.quality);
-    report.unsampled = sampled.iter().filter(|s| s.is_none()).count();
-    let known = || sampled.iter().enumerate().filter_map(|(i, s)| Some((i, s.as_ref()?)));
+fn fill_in_samples(report: &mut Report, samples: &MeshSamples, quality: &[FacetQuality], areas: &[f64]) {
+    let known = || (0..areas.len()).filter_map(|i| Some((i, samples.facet(i)?)));
+    report.unsampled = areas.len() - known().count();
     report.sag_mm.sampled_max = Some(known().map(|(_, s)| s.sag).fold(0.0, f64::max));
     // By area: many small facets would else outweigh a few large ones.
     let area: f64 = known().map(|(i, _)| areas[i]).sum();
@@ -132,13 +129,20 @@ fn measure_samples(report: &mut Report, made: &Tessellation, model: &Model, area
     report.sag_mm.sampled_mean = Some(mean);
     let over =
         |s: &Sampled, q: &FacetQuality| s.sag > q.tolerance * (1.0 + SAMPLE_ROUNDING[0]) + SAMPLE_ROUNDING[1];
-    report.over = known().filter(|(i, s)| over(s, &made.quality[*i])).map(|(i, s)| (i as u32, s.sag)).collect();
+    report.over = known().filter(|(i, s)| over(s, &quality[*i])).map(|(i, s)| (i as u32, s.sag)).collect();
     report.over_tolerance = Some(report.over.len());
-    let mut errors: Vec<f32> = sampled.into_iter().flatten().flat_map(|s| s.normal_errors).collect();
-    errors.sort_by(f32::total_cmp);
+    let mut errors = samples.normal_errors();
+    errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let count: u64 = errors.iter().map(|e| e.1).sum();
+    // Of equal facets at several places the errors were found once and count as often as there are places.
     let at = |share: f64| {
-        let i = ((errors.len().saturating_sub(1)) as f64 * share) as usize;
-        errors.get(i).map_or(0.0, |&e| f64::from(e).to_degrees())
+        let i = (count.saturating_sub(1) as f64 * share) as u64;
+        let below = errors.iter().scan(0, |sum, (error, count)| {
+            *sum += count;
+            Some((*sum, *error))
+        });
+        let found = below.into_iter().find(|(sum, _)| *sum > i);
+        found.map_or(0.0, |(_, error)| f64::from(error).to_degrees())
     };
     report.normal_error_deg = Some(Percentiles { p50: at(0.5), p99: at(0.99), max: at(1.0) });
 }

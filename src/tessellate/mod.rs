@@ -84,9 +84,9 @@ pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     // Parts first, each once; then faces that touch, which need the placed model; then copies for all instances.
     let parts = assemble::mesh_parts(model, settings);
     let joined = contact::mesh_contacts(model, settings, &parts);
-    let placement::Placed { mut made, failed, repairs } = placement::place_instances(model, &parts, &joined);
-    made.report.seconds.tessellate = start.elapsed().as_secs_f64();
-    evaluation::fill_report(&mut made, model, settings, &failed, &repairs);
+    let mut placed = placement::place_instances(model, &parts, &joined);
+    placed.made.report.seconds.tessellate = start.elapsed().as_secs_f64();
+    let mut made = evaluation::evaluate(placed, model, settings);
     limits::name_causes(&mut made.report, model, |part, k| parts[part].as_ref()?.causes.get(&k).copied());
     made
 }

@@ -7,7 +7,7 @@ use super::report::Repair;
 use super::tessellation::{FacetQuality, Tessellation};
 use crate::math::{FaceId, Frame};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
-use crate::model::{Instance, Model, TessellatedFace};
+use crate::model::{Instance, Model, PartId, TessellatedFace};
 use rustc_hash::FxHashMap;
 
 /// What placing gives.
@@ -17,6 +17,8 @@ pub(super) struct Placed {
     pub(super) failed: Vec<FaceId>,
     /// Faces of which something was given up.
     pub(super) repairs: Vec<(FaceId, Repair)>,
+    /// Of each placed face the first one that has the same facets at another place: itself where there is none before it.
+    pub(super) originals: Vec<FaceId>,
 }
 
 /// Copies the facets of all instances into the scene's coordinates. `parts` are by part; `joined` are, by instance, meshes that replace
@@ -26,11 +28,21 @@ pub(super) fn place_instances(
     parts: &[Option<PartMesh>],
     joined: &FxHashMap<usize, PartMesh>,
 ) -> Placed {
-    let mut out = Placed { made: Tessellation::default(), failed: Vec::new(), repairs: Vec::new() };
+    let originals = (0..model.placed_face_count() as u32).map(FaceId).collect();
+    let mut out = Placed { made: Tessellation::default(), failed: Vec::new(), repairs: Vec::new(), originals };
+    // Turned and moved facets are as far from the spline as they were; scaled ones are not, and mirrored ones have other corners first.
+    let mut first_copies: FxHashMap<(PartId, u64, bool), FaceId> = FxHashMap::default();
     for (i, instance) in model.instances.iter().enumerate() {
         let first = model.first_face(i);
         let part = model.part(instance.part);
         let Some(mesh) = joined.get(&i).or(parts[instance.part.0 as usize].as_ref()) else { continue };
+        if !joined.contains_key(&i) {
+            let kind = (instance.part, instance.placement.scale.to_bits(), instance.placement.is_mirrored());
+            let original = *first_copies.entry(kind).or_insert(first);
+            for k in 0..part.face_count() as u32 {
+                out.originals[(first.0 + k) as usize] = FaceId(original.0 + k);
+            }
+        }
         // All shared positions of the instance come first, so that faces refer to them by their number in the part.
         let shared = out.made.mesh.positions.len() as u32;
         out.made.mesh.positions.extend(mesh.shared.iter().map(|&p| instance.placement.point(p)));

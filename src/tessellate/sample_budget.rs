@@ -7,9 +7,11 @@
 
 use super::sample::{Sampled, sample_facets};
 use super::tessellation::FacetQuality;
+use crate::math::FaceId;
 use crate::mesh::FacetMesh;
 use crate::model::Model;
 use crate::nurbs::Surface;
+use rustc_hash::FxHashMap;
 use std::ops::Range;
 
 /// Work for one model, in control points that are visited: some fifteen seconds of one core, half a million bicubic facets.
@@ -33,26 +35,63 @@ impl FaceWork {
     }
 }
 
-/// Samples the facets of a mesh, `None` for those that are left out; `quality` says which are proved.
+/// What was sampled on the facets of a mesh: once for all facets that are the same at several places.
+pub(super) struct MeshSamples {
+    /// `None` for what is left out.
+    sampled: Vec<Option<Sampled>>,
+    /// Of each facet, the index of its sample.
+    places: Vec<u32>,
+}
+
+impl MeshSamples {
+    /// What was sampled on a facet, or on the one that it is a copy of; `None` where that was left out.
+    pub(super) fn facet(&self, facet: usize) -> Option<&Sampled> {
+        self.sampled[self.places[facet] as usize].as_ref()
+    }
+
+    /// All errors of normals, radians, each with the number of facets that have it.
+    pub(super) fn normal_errors(&self) -> Vec<(f32, u64)> {
+        let mut copies = vec![0; self.sampled.len()];
+        self.places.iter().for_each(|&place| copies[place as usize] += 1);
+        let known = self.sampled.iter().zip(copies).filter_map(|(s, n)| Some((s.as_ref()?, n)));
+        known.flat_map(|(s, n)| s.normal_errors.iter().map(move |&error| (error, n))).collect()
+    }
+
+    /// Samples these facets into their places.
+    fn fill(&mut self, mesh: &FacetMesh, model: &Model, facets: Vec<usize>) {
+        let made = sample_facets(mesh, model, &facets);
+        facets.into_iter().zip(made).for_each(|(f, s)| self.sampled[self.places[f] as usize] = Some(s));
+    }
+}
+
+/// Samples the facets of a mesh; `quality` says which are proved. A face that `originals` says to be a copy of another one, by its number, is
+/// not sampled again.
 pub(super) fn sample_within_budget(
     mesh: &FacetMesh,
     model: &Model,
     quality: &[FacetQuality],
-) -> Vec<Option<Sampled>> {
-    let mut out: Vec<Option<Sampled>> = vec![None; mesh.facets.len()];
-    // Facets stand in the order of their faces.
-    let ranges: Vec<Range<usize>> = (mesh.facets.chunk_by(|a, b| a.face == b.face))
-        .scan(0, |end, facets| {
-            let start = std::mem::replace(end, *end + facets.len());
-            Some(start..*end)
-        })
-        .collect();
+    originals: &[FaceId],
+) -> MeshSamples {
+    let mut samples = MeshSamples { sampled: Vec::new(), places: Vec::with_capacity(mesh.facets.len()) };
+    // Facets stand in the order of their faces, and originals before their copies.
+    let mut first_places: FxHashMap<FaceId, u32> = FxHashMap::default();
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for facets in mesh.facets.chunk_by(|a, b| a.face == b.face) {
+        let start = samples.places.len();
+        let count = samples.sampled.len();
+        let first = *first_places.entry(originals[facets[0].face.index()]).or_insert(count as u32);
+        samples.places.extend(first..first + facets.len() as u32);
+        if first as usize == count {
+            samples.sampled.resize(count + facets.len(), None);
+            ranges.push(start..start + facets.len());
+        }
+    }
     let first: Vec<usize> = ranges.iter().flat_map(|r| spread(r.clone().collect(), FIRST_LOOK)).collect();
-    fill(&mut out, mesh, model, first);
+    samples.fill(mesh, model, first);
     let visited: Vec<f64> =
         model.placed_faces().map(|f| f.face.map_or(0.0, |face| points_visited(&face.surface))).collect();
     let work = |facets: Range<usize>| {
-        let looked: Vec<u64> = out[facets.clone()].iter().flatten().map(|s| s.evaluations).collect();
+        let looked: Vec<u64> = facets.clone().filter_map(|f| Some(samples.facet(f)?.evaluations)).collect();
         let evaluations = looked.iter().sum::<u64>() as f64 / looked.len() as f64;
         let face = mesh.facets[facets.start].face.index();
         FaceWork { facets, each: evaluations * visited[face] }
@@ -60,7 +99,7 @@ pub(super) fn sample_within_budget(
     let faces: Vec<FaceWork> = ranges.into_iter().map(work).collect();
     let limit = common_limit(faces.iter().map(FaceWork::sum).collect(), MOST_WORK);
     let chosen = faces.iter().flat_map(|face| {
-        let left: Vec<usize> = face.facets.clone().filter(|&f| out[f].is_none()).collect();
+        let left: Vec<usize> = face.facets.clone().filter(|&f| samples.facet(f).is_none()).collect();
         let count = if face.sum() <= limit { left.len() } else { (limit / face.each) as usize };
         let (proved, open): (Vec<usize>, Vec<usize>) = left.into_iter().partition(|&f| quality[f].certified);
         let mut chosen = spread(open, count);
@@ -69,14 +108,8 @@ pub(super) fn sample_within_budget(
         chosen
     });
     let chosen: Vec<usize> = chosen.collect();
-    fill(&mut out, mesh, model, chosen);
-    out
-}
-
-/// Samples these facets into their places.
-fn fill(out: &mut [Option<Sampled>], mesh: &FacetMesh, model: &Model, facets: Vec<usize>) {
-    let made = sample_facets(mesh, model, &facets);
-    facets.into_iter().zip(made).for_each(|(facet, sampled)| out[facet] = Some(sampled));
+    samples.fill(mesh, model, chosen);
+    samples
 }
 
 /// Returns `count` of the facets, evenly spread over them; all where there are no more.
@@ -109,6 +142,35 @@ fn common_limit(mut shares: Vec<f64>, most: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{Frame, Vector};
+    use crate::model::{Face, Part, Shell};
+    use crate::nurbs::sweep;
+    use crate::tessellate::{Settings, tessellate};
+
+    /// Tubes of radius 10: two in one place each, one of twice the size.
+    #[test]
+    fn equal_facets_are_sampled_once() {
+        let tube = Face::whole(sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, 3.0], [0.0, 20.0]));
+        let shells = vec![Shell { faces: vec![tube], ..Shell::default() }];
+        let mut model = Model::from_part(Part { shells, ..Part::default() });
+        for (x, scale) in [(100.0, 1.0), (200.0, 2.0)] {
+            let placement = Frame { scale, ..Frame::translation(Vector::X * x) };
+            model.instances.push(crate::model::Instance { placement, ..model.instances[0].clone() });
+        }
+        let made = tessellate(&model, &Settings { measure: true, ..Settings::uniform(0.05) });
+        let samples = sample_within_budget(&made.mesh, &model, &made.quality, &[FaceId(0), FaceId(0), FaceId(2)]);
+        let count = made.mesh.facets.len() / 3;
+        assert_eq!((samples.places.len(), samples.sampled.len()), (3 * count, 2 * count));
+        let sag = |k: usize| samples.facet(k * count).map(|s| s.sag).expect("a facet of each tube");
+        assert!(sag(0) == sag(1) && (sag(2) - 2.0 * sag(0)).abs() < 1e-9);
+        // The largest is that of the tube of twice the size, and every facet counts in the quantiles.
+        assert_eq!(
+            made.report.sag_mm.sampled_max,
+            Some((0..3 * count).filter_map(|k| samples.facet(k)).map(|s| s.sag).fold(0.0, f64::max))
+        );
+        let copies = |n: u64| samples.normal_errors().iter().filter(|e| e.1 == n).count();
+        assert!(copies(1) > 0 && copies(2) > 0 && copies(1) + copies(2) == samples.normal_errors().len());
+    }
 
     #[test]
     fn a_limit_cuts_the_largest_shares_only() {
