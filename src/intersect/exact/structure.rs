@@ -113,17 +113,7 @@ impl Exact {
     pub fn build(model: &Model, settings: &Settings) -> Self {
         let start = Instant::now();
         let geometry = Geometry::new(model, settings.trim_band);
-        let patches = subdivide(&geometry, settings);
-        let mut leaves = Vec::new();
-        let mut linearizations = Vec::new();
-        let mut pool = Vec::new();
-        for patch in patches {
-            // Patches were cut apart from each other, in parallel; here their nets come to stand in one pool, in their order.
-            let offset = pool.len() as u32;
-            leaves.extend(patch.leaves.into_iter().map(|l| Leaf { net: l.net + offset, ..l }));
-            linearizations.extend(patch.linearizations.into_iter().map(|l| l.moved_in_pool(offset)));
-            pool.extend(patch.pool);
-        }
+        let PatchLeaves { leaves, linearizations, pool } = subdivide(&geometry, settings);
         // One more start, so that the end of the last leaf is the start of the one behind it.
         let mut starts: Vec<u32> = leaves.iter().map(|l| l.net).collect();
         starts.push(pool.len() as u32);
@@ -159,17 +149,16 @@ impl Exact {
 }
 
 /// Cuts all patches into leaves, flatter than `settings.flatness` where they are fewer than `settings.leaves`.
-fn subdivide(geometry: &Geometry, settings: &Settings) -> Vec<PatchLeaves> {
+fn subdivide(geometry: &Geometry, settings: &Settings) -> PatchLeaves {
     let mut flatness = Flatness { deviation: settings.flatness, depth: settings.depth };
-    let mut patches = subdivision::subdivide_all(geometry, flatness);
-    let count = |patches: &[PatchLeaves]| patches.iter().map(|p| p.leaves.len()).sum::<usize>();
+    let mut cut = subdivision::subdivide_all(geometry, flatness);
     let flattest = FLATTEST * settings.flatness;
     // Five per cent over the flattest: a further round would change next to nothing.
-    while count(&patches) < settings.leaves && flatness.deviation > 1.05 * flattest {
+    while cut.leaves.len() < settings.leaves && flatness.deviation > 1.05 * flattest {
         flatness.deviation = (FLATTER * flatness.deviation).max(flattest);
-        patches = subdivision::subdivide_all(geometry, flatness);
+        cut = subdivision::subdivide_all(geometry, flatness);
     }
-    patches
+    cut
 }
 
 #[cfg(test)]
