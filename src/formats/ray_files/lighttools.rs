@@ -83,10 +83,11 @@ pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use crate::formats::ray_files::{Flux, read_ray_set};
 
-    fn file(header: [u32; 6], stated: f32, rays: &[f32]) -> Vec<u8> {
+    /// The bytes of a file: version, its minor, type of data, far field, colour and unit; the flux, and the numbers of all rays.
+    pub(crate) fn file(header: [u32; 6], stated: f32, rays: &[f32]) -> Vec<u8> {
         let mut bytes = b"LTRF".to_vec();
         bytes.extend(header.iter().flat_map(|x| x.to_le_bytes()));
         bytes.extend([0.0, 0.0, 0.0, stated].iter().flat_map(|x: &f32| x.to_le_bytes()));

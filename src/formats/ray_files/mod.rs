@@ -132,7 +132,18 @@ mod tests {
         tables.header.spectra = vec![vec![[450.0, 1.0], [500.0, 2.0]]];
         tables.rows.chunks_exact_mut(8).for_each(|row| row[7] = 1.0);
         write_tm25(&at("tables.tm25ray"), &tables).unwrap();
-        for name in ["a.csv", "a.npz", "scaled.tm25ray", "tables.tm25ray"] {
+        // Lengths in cm and inches, and weights beside the mean one: places and powers are worked out as each ray is read.
+        let numbers = |nm: f64| -> Vec<f32> {
+            let wavelength = |ray: &LightRay| nm * ray.wavelength_nm.expect("rays with wavelengths");
+            let row = |ray: &LightRay| {
+                [&ray.origin.to_array()[..], &ray.direction.to_array(), &[ray.power, wavelength(ray)]].concat()
+            };
+            rays.iter().flat_map(row).map(|x| x as f32).collect()
+        };
+        std::fs::write(at("weights.ray"), lighttools::tests::file([3, 0, 0, 0, 2, 2], 7.0, &numbers(1.0))).unwrap();
+        let micrometres = zemax::tests::file_of_rays(1000, [1, 2, 0], 0.0, &numbers(1e-3));
+        std::fs::write(at("inches.sdf"), micrometres).unwrap();
+        for name in ["a.csv", "a.npz", "scaled.tm25ray", "tables.tm25ray", "weights.ray", "inches.sdf"] {
             let expected = read_ray_set(&at(name), Flux::Radiant).unwrap();
             let file = RayFile::open_within(&at(name), Flux::Radiant, 10).unwrap();
             assert!(file.is_on_disk() && file.len() == 1000 && file.spectral_rays() == 1000, "{name}");

@@ -65,14 +65,24 @@ pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use crate::formats::ray_files::{Flux, read_ray_set};
 
     /// A file of one ray, made field by field as the help describes it.
     fn file(unit: u32, format: i32, flux_type: i32, stated: f32, ray: &[f32]) -> Vec<u8> {
+        file_of_rays(1, [unit as i32, format, flux_type], stated, ray)
+    }
+
+    /// A file of these numbers of all rays, with its unit, format and type of flux.
+    pub(crate) fn file_of_rays(
+        count: u32,
+        [unit, format, flux_type]: [i32; 3],
+        stated: f32,
+        numbers: &[f32],
+    ) -> Vec<u8> {
         let mut bytes = Vec::new();
         bytes.extend(1010i32.to_le_bytes());
-        bytes.extend(1u32.to_le_bytes());
+        bytes.extend(count.to_le_bytes());
         bytes.extend([0; 100]);
         bytes.extend([stated, stated, 0.633, 0.0, 0.0, 0.0, 0.0].iter().flat_map(|x: &f32| x.to_le_bytes()));
         bytes.extend(unit.to_le_bytes());
@@ -81,7 +91,7 @@ mod tests {
         bytes.extend(flux_type.to_le_bytes());
         bytes.extend([0; 8]);
         assert_eq!(bytes.len(), 208);
-        bytes.extend(ray.iter().flat_map(|x| x.to_le_bytes()));
+        bytes.extend(numbers.iter().flat_map(|x| x.to_le_bytes()));
         bytes
     }
 
