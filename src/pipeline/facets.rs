@@ -115,6 +115,12 @@ pub fn tessellate_model(
     (tessellation, start.elapsed().as_secs_f64())
 }
 
+/// Makes the facets of a model, those of parts that are placed often once and in their own coordinates, and tells the monitor.
+pub fn tessellate_by_part(model: &Model, settings: &tessellate::Settings, monitor: &dyn Monitor) -> GroupedFacets {
+    let instancing = Instancing::new(model, settings.glue_mm).map(Arc::new);
+    in_stage(monitor, Stage::Tessellating, || tessellate_groups(model, instancing.as_ref(), settings).0)
+}
+
 /// Makes the facets of every group of a model, or without `instancing` of the model in one piece; returns them with the seconds they took.
 pub(super) fn tessellate_groups(
     model: &Model,

@@ -150,7 +150,7 @@ pub(super) fn with_built_intersector<'m, T>(
 }
 
 /// Joins the structures of all groups to one that answers in the scene's coordinates; without `instancing` there must be one.
-pub(super) fn in_one_scene<'a>(
+pub fn in_one_scene<'a>(
     instancing: Option<&'a Instancing>,
     mut groups: Vec<Box<dyn Intersector + 'a>>,
 ) -> Box<dyn Intersector + 'a> {

@@ -69,3 +69,44 @@ fn normals_that_an_accuracy_chose_are_those_that_are_measured() {
     let p99 = found.pointer("/facets_vs_exact/normal_error_deg/p99").and_then(Value::as_f64).unwrap();
     assert!(p99 < 1e-4, "{p99}");
 }
+
+/// The file of a lens, placed so often, 45 mm from each other along x: an assembly around the lens' own product and shape.
+fn row_of_lenses(count: usize) -> String {
+    let lens = std::fs::read_to_string(fixture("step/lens_planoconvex_nurbs.stp")).unwrap();
+    let mut lines = "#9000=PRODUCT_DEFINITION('','',$,#9);\n#9001=SHAPE_REPRESENTATION('',(#11),#185);\n\
+                     #9002=PRODUCT_DEFINITION_SHAPE('','',#9000);\n#9003=SHAPE_DEFINITION_REPRESENTATION(#9002,#9001);\n"
+        .to_owned();
+    for k in 0..count {
+        let [point, axes, moved, related, usage, shape, placed] = std::array::from_fn(|i| 10_000 + 10 * k + i);
+        lines += &format!(
+            "#{point}=CARTESIAN_POINT('',({:?},0.,0.));\n#{axes}=AXIS2_PLACEMENT_3D('',#{point},#13,#14);\n\
+             #{moved}=ITEM_DEFINED_TRANSFORMATION('','',#11,#{axes});\n\
+             #{related}=(REPRESENTATION_RELATIONSHIP('','',#10,#9001)\
+             REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{moved})SHAPE_REPRESENTATION_RELATIONSHIP());\n\
+             #{usage}=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#9000,#5,$);\n\
+             #{shape}=PRODUCT_DEFINITION_SHAPE('','',#{usage});\n\
+             #{placed}=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{related},#{shape});\n",
+            45.0 * k as f64
+        );
+    }
+    let end = lens.rfind("ENDSEC;").unwrap();
+    format!("{}{lines}{}", &lens[..end], &lens[end..])
+}
+
+#[test]
+fn parts_that_are_placed_often_are_built_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = [1, 70].map(|count| {
+        let path = folder.path().join(format!("{count}.stp"));
+        std::fs::write(&path, row_of_lenses(count)).unwrap();
+        let (code, out, err) = lampyris(&["check", &path.display().to_string(), "--json", "--rays", "9000"]);
+        assert_eq!(code, 0, "{err}");
+        serde_json::from_str::<Value>(&out).unwrap()
+    });
+    let [one, many] = &found;
+    assert_eq!(count(many, "/scene/facets"), 70 * count(one, "/scene/facets"));
+    assert_eq!(count(many, "/scene/patches"), count(one, "/scene/patches"));
+    // Some hundred rays, for the row is thin beside its length, and each is answered as the spline answers it.
+    assert!(count(many, "/hits") > 500);
+    assert_eq!([count(many, "/facets_vs_exact/unexplained"), count(many, "/octree_vs_bvh/disagree")], [0, 0]);
+}

@@ -8,29 +8,28 @@ use crate::cli::failure::Failure;
 use crate::cli::output::appearance;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::terminal_tables::blank_table;
-use crate::cli::work::contenders::{Contenders, time_all};
+use crate::cli::work::contenders::{Contenders, Structures, time_all};
 use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder};
 use crate::cli::work::ray_input::read_rays;
+use crate::cli::work::results_folder::MOST_DRAWN;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{paired_receivers, threads};
 use crate::formats::{file_name, write_atomic};
-use crate::intersect::polish::Polished;
 use crate::intersect::{Cost, Intersector, NormalMode};
-use crate::math::Ray;
-use crate::mesh::FacetMesh;
+use crate::math::{Aabb, Ray};
 use crate::model::Model;
 use crate::pipeline::{
     AccurateSettings, IntersectorChoice, LIFT_IN_TOLERANCES, RaySampler, TracingSettings, mesh_settings,
-    settings_for_accuracy, tessellate_model,
+    settings_for_accuracy, tessellate_by_part,
 };
 use crate::report::{CheckReport, figures, grouped, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
 use crate::study::accuracy_target::AccuracyPlan;
-use crate::study::cross_check::{self, CrossCheck, Intersectors};
+use crate::study::cross_check::{self, CrossCheck};
 use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::receivers::PowerComparison;
-use crate::study::{Quantiles, Summary, records};
+use crate::study::{Progress, Quantiles, Summary, records};
 use serde_json::Value;
 use std::path::Path;
 
@@ -66,47 +65,37 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let AccurateSettings { meshing, tracing, plan: reached } =
         settings_for_accuracy(command.precision.accuracy, requested, scene, model, &monitor)?;
     let settings = mesh_settings(&meshing, scene, model)?;
-    let (tessellation, _) = tessellate_model(model, &settings, &monitor);
-    let mesh = &tessellation.mesh;
+    // Parts that are placed often are meshed, built and asked once, in their own coordinates.
+    let facets = tessellate_by_part(model, &settings, &monitor);
     let normals = IntersectorChoice::new(&tracing, scene)?.normals;
     let count = given.as_ref().map_or(tracing.rays().unwrap_or(RAYS), |rays| rays.len() as u64);
-    let contenders = Contenders::build(mesh, model, normals.on_facets(), count, console);
-    let Contenders { octree, exact, .. } = &contenders;
-    let polish = Polished::new(octree, mesh, exact);
+    let structures = Structures::build(model, &facets, normals.on_facets(), count, console);
+    let contenders = structures.contenders();
+    let (octree, exact) = (&*contenders.octree, &*contenders.exact);
     // The same rays through all three, and a cause for every difference.
     let lift = LIFT_IN_TOLERANCES * settings.loosest();
     let rays = match given {
         Some(rays) => rays,
-        None => own_rays(scene, model, mesh, octree, &tracing, lift)?,
+        None => own_rays(scene, model, &facets.bounds(), octree, &tracing, lift)?,
     };
-    let bar = console.progress_bar("judging", "rays", rays.len() as u64);
-    let intersectors = Intersectors { model, mesh, octree, bvh: &contenders.cwbvh, exact };
-    let band = cross_check::Settings { fallback_band_mm: settings.loosest(), ..Default::default() };
-    let total = rays.len() as f64;
-    let mut found =
-        cross_check::cross_check(&intersectors, &rays, &band, &|p| bar.set_position((p.done * total) as u64));
-    bar.finish_and_clear();
-    // Hits on the facets say nothing of those moved to the spline: these are measured by themselves.
-    if normals == NormalMode::Exact {
-        let [distance, angle] = polished_errors(&polish, exact, &rays, settings.loosest());
-        found.facets_vs_exact.t_error_mm = distance;
-        found.facets_vs_exact.normal_error_deg = angle;
-    }
-    time_all(&mut found, &contenders.competitors(&polish), &rays, console);
+    let mut found = judge(&contenders, &rays, settings.loosest(), normals, console);
+    // All that stand in the scene, as every other command counts them.
+    found.scene.facets = facets.facet_count();
     write_rays(command, &found, octree, &rays, console)?;
     // What the facets change of the light, which only a scene has.
-    let facets: &dyn Intersector = if normals == NormalMode::Exact { &polish } else { octree };
+    let on_facets = if normals == NormalMode::Exact { &*contenders.polish } else { octree };
     let bound = scene.map(|s| s.bind(model)).transpose()?;
     let receivers = match scene.zip(bound.as_ref()) {
-        Some((scene, bound)) => paired_receivers::trace_both(scene, bound, [facets, exact], &tracing, console),
+        Some((scene, bound)) => paired_receivers::trace_both(scene, bound, [on_facets, exact], &tracing, console),
         None => Vec::new(),
     };
     let text = json_text(&json_document(&found, normals, scene.map(|_| &receivers[..]), reached.as_ref())?)?;
     if let Some(folder) = &command.output {
+        let drawn = facets.drawn(MOST_DRAWN);
         let report = CheckReport {
             title: file_name(&command.file),
             check: &found,
-            facets: &appearance::grouped_facets(model, mesh, bound.as_ref()),
+            facets: &appearance::grouped_facets(model, &drawn, bound.as_ref()),
             normals: &normals.to_string(),
             tables: if receivers.is_empty() { Vec::new() } else { vec![paired_receivers::table(&receivers)] },
             also: reached.iter().map(|a| a.answer.clone()).collect(),
@@ -123,6 +112,31 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     // Last, for the answer counts although faces are missing.
     let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
     Ok(refused.and(report_defects(&found, console)))
+}
+
+/// Asks every ray of octree, BVH and spline, finds the causes of differences, and times all intersectors. `loosest` is the largest tolerance of
+/// the facets, mm.
+fn judge(
+    contenders: &Contenders<'_>,
+    rays: &[Ray],
+    loosest: f64,
+    normals: NormalMode,
+    console: &Console,
+) -> CrossCheck {
+    let bar = console.progress_bar("judging", "rays", rays.len() as u64);
+    let band = cross_check::Settings { fallback_band_mm: loosest, ..Default::default() };
+    let total = rays.len() as f64;
+    let progress = |p: Progress| bar.set_position((p.done * total) as u64);
+    let mut found = cross_check::cross_check_groups(&contenders.compared(), rays, &band, &progress);
+    bar.finish_and_clear();
+    // Hits on the facets say nothing of those moved to the spline: these are measured by themselves.
+    if normals == NormalMode::Exact {
+        let [distance, angle] = polished_errors(&*contenders.polish, &*contenders.exact, rays, loosest);
+        found.facets_vs_exact.t_error_mm = distance;
+        found.facets_vs_exact.normal_error_deg = angle;
+    }
+    time_all(&mut found, &contenders.competitors(), rays, console);
+    found
 }
 
 /// Writes `check.json`, which is `text`, and the page if it is wanted, into a folder of this run's own.
@@ -226,7 +240,7 @@ fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
 fn own_rays(
     scene: Option<&Scene>,
     model: &Model,
-    mesh: &FacetMesh,
+    bounds: &Aabb,
     octree: &dyn Intersector,
     tracing: &TracingSettings,
     lift: f64,
@@ -235,10 +249,10 @@ fn own_rays(
     let Some(scene) = scene else {
         let seed = tracing.seed.unwrap_or(1);
         // A third each: coherent, random and bouncing rays find different faults.
-        let (bounds, third) = (mesh.bounds(), (count / 3).max(1));
-        let camera = Camera::new(&bounds, third.min(count));
-        let uniform = Uniform::new(&bounds, seed, third.min(count - camera.len()));
-        let bounces = Bounces::new(&bounds, octree, lift, seed, count - camera.len() - uniform.len());
+        let third = (count / 3).max(1);
+        let camera = Camera::new(bounds, third.min(count));
+        let uniform = Uniform::new(bounds, seed, third.min(count - camera.len()));
+        let bounces = Bounces::new(bounds, octree, lift, seed, count - camera.len() - uniform.len());
         let chain = Chain(vec![&camera, &uniform, &bounces]);
         return Ok(chain.rays(0..chain.len()));
     };

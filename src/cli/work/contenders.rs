@@ -4,11 +4,14 @@ use crate::cli::console::Console;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::exact::{self, Exact};
 use crate::intersect::octree::{self, Octree};
+use crate::intersect::polish::Polished;
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
 use crate::mesh::FacetMesh;
-use crate::model::Model;
-use crate::study::cross_check::{Competitor, CrossCheck, measure};
+use crate::model::{Instancing, Model};
+use crate::pipeline::in_one_scene;
+use crate::study::cross_check::{Competitor, CrossCheck, GroupedIntersectors, measure};
+use crate::tessellate::GroupedFacets;
 
 /// Rays of a timed round: enough for a tenth of a second on the slowest.
 const TIMED_RAYS: usize = 20_000;
@@ -18,48 +21,113 @@ const TIMED_ROUNDS: usize = 3;
 const SHORTEST_ROUND: f64 = 1e-12;
 /// Rays of a million rays per second.
 const MILLION: f64 = 1e6;
-/// Every intersector over the same facets and the same model.
-pub(crate) struct Contenders<'a> {
-    pub(crate) octree: Octree<'a>,
-    bvh2: Bvh<'a>,
-    pub(crate) cwbvh: Bvh<'a>,
-    cwbvh_as_shipped: Bvh<'a>,
-    pub(crate) exact: Exact,
+
+/// The structures of all intersectors over the facets and the model of each group.
+pub(crate) struct Structures<'a> {
+    groups: Vec<GroupStructures<'a>>,
+    instancing: Option<&'a Instancing>,
 }
 
-impl<'a> Contenders<'a> {
-    /// Builds them all over one mesh and its model; the spline's structure is cut for so many rays. Shows a sign of life.
+struct GroupStructures<'a> {
+    model: &'a Model,
+    mesh: &'a FacetMesh,
+    octree: Octree<'a>,
+    bvh2: Bvh<'a>,
+    cwbvh: Bvh<'a>,
+    cwbvh_as_shipped: Bvh<'a>,
+    exact: Exact,
+}
+
+/// The intersectors, which answer in the scene's coordinates.
+pub(crate) struct Contenders<'s> {
+    groups: Vec<(&'s Model, &'s FacetMesh)>,
+    instancing: Option<&'s Instancing>,
+    pub(crate) octree: Box<dyn Intersector + 's>,
+    bvh2: Box<dyn Intersector + 's>,
+    cwbvh: Box<dyn Intersector + 's>,
+    cwbvh_as_shipped: Box<dyn Intersector + 's>,
+    /// The octree with hits moved to the spline.
+    pub(crate) polish: Box<dyn Intersector + 's>,
+    pub(crate) exact: Box<dyn Intersector + 's>,
+}
+
+impl<'a> Structures<'a> {
+    /// Builds them all, once a part that is placed often; the spline's are cut for so many rays. Shows a sign of life.
     pub(crate) fn build(
-        mesh: &'a FacetMesh,
-        model: &Model,
+        model: &'a Model,
+        facets: &'a GroupedFacets,
         normals: NormalMode,
         rays: u64,
         console: &Console,
     ) -> Self {
         let spinner = console.spinner("building octree, BVHs and spline");
-        let cwbvh = bvh::Settings { normals, ..Default::default() };
-        let contenders = Self {
-            octree: Octree::build(mesh, &octree::Settings { normals, ..Default::default() }),
-            bvh2: Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..cwbvh }),
-            cwbvh: Bvh::build(mesh, &cwbvh),
-            cwbvh_as_shipped: Bvh::build(mesh, &bvh::Settings { cured: false, ..cwbvh }),
-            exact: Exact::build(model, &exact::Settings::for_rays(model, rays)),
-        };
+        let instancing = facets.instancing.as_deref();
+        let models: Vec<&Model> = instancing.map_or_else(|| vec![model], |i| i.groups.iter().collect());
+        let groups = facets.meshes().zip(models).enumerate().map(|(k, (mesh, model))| {
+            // A start that is far away comes to the part with the rounding that it has there.
+            let farthest_start = instancing.map_or(0.0, |i| i.reach(k));
+            let cwbvh = bvh::Settings { normals, farthest_start, ..Default::default() };
+            GroupStructures {
+                model,
+                mesh,
+                octree: Octree::build(mesh, &octree::Settings { normals, farthest_start, ..Default::default() }),
+                bvh2: Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..cwbvh }),
+                cwbvh: Bvh::build(mesh, &cwbvh),
+                cwbvh_as_shipped: Bvh::build(mesh, &bvh::Settings { cured: false, ..cwbvh }),
+                exact: Exact::build(model, &exact::Settings::for_rays(model, rays)),
+            }
+        });
+        let structures = Self { groups: groups.collect(), instancing };
         spinner.finish_and_clear();
-        contenders
+        structures
     }
 
-    /// Returns all intersectors, the polished octree included, under the names of the document; `octree_single` is asked ray by ray.
-    pub(crate) fn competitors<'s>(&'s self, polish: &'s dyn Intersector) -> [Competitor<'s>; 7] {
+    /// Joins what `of_group` takes of each group to one intersector.
+    fn joined<'s>(
+        &'s self,
+        of_group: impl Fn(&'s GroupStructures<'a>) -> Box<dyn Intersector + 's>,
+    ) -> Box<dyn Intersector + 's> {
+        in_one_scene(self.instancing, self.groups.iter().map(of_group).collect())
+    }
+
+    /// Returns the intersectors, each of which stands for the whole model.
+    pub(crate) fn contenders(&self) -> Contenders<'_> {
+        Contenders {
+            groups: self.groups.iter().map(|g| (g.model, g.mesh)).collect(),
+            instancing: self.instancing,
+            octree: self.joined(|g| Box::new(&g.octree)),
+            bvh2: self.joined(|g| Box::new(&g.bvh2)),
+            cwbvh: self.joined(|g| Box::new(&g.cwbvh)),
+            cwbvh_as_shipped: self.joined(|g| Box::new(&g.cwbvh_as_shipped)),
+            polish: self.joined(|g| Box::new(Polished::new(&g.octree, g.mesh, &g.exact))),
+            exact: self.joined(|g| Box::new(&g.exact)),
+        }
+    }
+}
+
+impl Contenders<'_> {
+    /// Returns those whose answers are compared: octree, BVH and spline.
+    pub(crate) fn compared(&self) -> GroupedIntersectors<'_> {
+        GroupedIntersectors {
+            groups: self.groups.clone(),
+            instancing: self.instancing,
+            octree: &*self.octree,
+            bvh: &*self.cwbvh,
+            exact: &*self.exact,
+        }
+    }
+
+    /// Returns all of them under the names of the document; `octree_single` is asked ray by ray.
+    pub(crate) fn competitors(&self) -> [Competitor<'_>; 7] {
         let competitor = |name, who, batch| Competitor { name, who, batch };
         [
-            competitor("octree", &self.octree as &dyn Intersector, true),
-            competitor("octree_single", &self.octree, false),
-            competitor("bvh2", &self.bvh2, true),
-            competitor("cwbvh", &self.cwbvh, true),
-            competitor("cwbvh_as_shipped", &self.cwbvh_as_shipped, true),
-            competitor("polish", polish, true),
-            competitor("exact", &self.exact, true),
+            competitor("octree", &*self.octree, true),
+            competitor("octree_single", &*self.octree, false),
+            competitor("bvh2", &*self.bvh2, true),
+            competitor("cwbvh", &*self.cwbvh, true),
+            competitor("cwbvh_as_shipped", &*self.cwbvh_as_shipped, true),
+            competitor("polish", &*self.polish, true),
+            competitor("exact", &*self.exact, true),
         ]
     }
 }

@@ -25,7 +25,7 @@ const PAGE_BYTES: u64 = 5_000_000;
 /// What a cell of a receiver takes at least in all its files, bytes: its number as text, twice in binary.
 const CELL_BYTES: u64 = 40;
 /// Facets that are drawn where parts are placed often; the rest of their places are boxes, or nothing: three seconds of a viewer.
-const MOST_DRAWN: usize = 24_000;
+pub(crate) const MOST_DRAWN: usize = 24_000;
 /// What a facet takes at least in the model of the folder, bytes: corners and normals in single precision.
 const FACET_BYTES: u64 = 50;
 
