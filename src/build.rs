@@ -9,6 +9,12 @@ fn main() {
     // Only release builds look at git: otherwise every commit would rebuild the crate of everyone who works on it.
     let release = std::env::var("PROFILE").is_ok_and(|p| p == "release");
     let commit = std::env::var("LAMPYRIS_COMMIT").ok().or_else(packaged).or_else(|| release.then(checked_out)?);
+    if release {
+        // A file that is changed and not committed is a change to tell.
+        for path in ["src", "Cargo.toml", "Cargo.lock"] {
+            println!("cargo::rerun-if-changed={path}");
+        }
+    }
     println!("cargo::rustc-env=LAMPYRIS_COMMIT={}", commit.as_deref().unwrap_or("unknown"));
 }
 

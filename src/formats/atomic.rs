@@ -16,11 +16,15 @@ static SERIAL: AtomicU32 = AtomicU32::new(0);
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Writes a file beside its final name and renames it when `write` has succeeded, so that the name never holds half a file. An older
-/// file or link of that name is replaced, and parts that dead processes left of it are removed.
+/// file or link of that name is replaced, with its permissions kept, and parts that dead processes left of it are removed. A pipe or
+/// device, or a link to one, is written as it is.
 ///
 /// # Errors
 /// When the folder cannot be written or `write` fails; the unfinished file is removed and an older file of that name stays.
 pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
+    if is_stream(path) {
+        return write_stream(path, write).map_err(|e| Error::new(path, ErrorKind::Write(e)));
+    }
     let beside = unfinished(path);
     // Before its own file is made: a run that was killed must not leave a part for ever.
     remove_stale(path);
@@ -31,6 +35,10 @@ pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
         write(&mut out)?;
         // Dropping the buffer would hide that its last bytes found no place on the disk.
         out.into_inner().map_err(|e| e.into_error())?;
+        // What its owner alone may read stays so; where the system refuses, the file is as readable as any new one.
+        if let Ok(older) = fs::metadata(path) {
+            let _ = fs::set_permissions(&beside, older.permissions());
+        }
         // On one file system a rename replaces the old file at once: a reader sees either.
         fs::rename(&beside, path)
     };
@@ -39,6 +47,20 @@ pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
         let _ = fs::remove_file(&beside);
         Error::new(path, ErrorKind::Write(e))
     })
+}
+
+/// Whether something is there, by its links, that is neither a file nor a folder: a rename would put a file in the place of a device, and
+/// whoever reads a pipe would wait for ever.
+fn is_stream(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir())
+}
+
+/// Writes into what [`is_stream`]; a pipe waits for its reader.
+fn write_stream(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut out = BufWriter::with_capacity(1 << 18, File::options().write(true).open(path)?);
+    write(&mut out)?;
+    out.into_inner().map_err(|e| e.into_error())?;
+    Ok(())
 }
 
 /// A file that is removed when the process is stopped while it is being written.
@@ -160,6 +182,31 @@ mod tests {
         let mut kept = [own.as_str(), elsewhere, other.as_str(), "a.csv"];
         kept.sort();
         assert_eq!(left, kept);
+    }
+
+    /// A terminal is a device that any user has one of; a pipe one that any user can make.
+    #[test]
+    #[cfg(unix)]
+    fn a_pipe_is_written_and_stays_a_pipe() {
+        use std::os::unix::fs::{FileTypeExt, PermissionsExt};
+        let folder = tempfile::tempdir().unwrap();
+        let [pipe, link, file] = ["pipe", "link", "file"].map(|name| folder.path().join(name));
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        std::os::unix::fs::symlink(&pipe, &link).unwrap();
+        // Open for both, the pipe keeps what is written without waiting for anybody.
+        let mut reader = File::options().read(true).write(true).open(&pipe).unwrap();
+        for path in [&pipe, &link] {
+            write_atomic(path, |w| w.write_all(b"whole")).unwrap();
+            let mut bytes = [0; 5];
+            io::Read::read_exact(&mut reader, &mut bytes).unwrap();
+            assert_eq!(&bytes, b"whole");
+        }
+        assert!(fs::symlink_metadata(&pipe).unwrap().file_type().is_fifo());
+        // A file that its owner alone may read stays one.
+        fs::write(&file, "old").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).unwrap();
+        write_atomic(&file, |w| w.write_all(b"whole")).unwrap();
+        assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
     }
 
     #[test]

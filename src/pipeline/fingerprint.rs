@@ -45,9 +45,7 @@ pub(super) fn run_fingerprint(
         write!(Pieces(&mut hasher), "{model:?}").map_err(|e| Error::input(e.to_string()))?;
     }
     // By their bytes: a file that changed changes the run.
-    let files = scene.models.iter().map(|m| &m.file).chain(scene.sources.iter().filter_map(|s| s.file.as_ref()));
-    let files = files.chain(scene.media.iter().filter_map(|m| m.file.as_ref()));
-    for file in files {
+    for file in scene.files() {
         let path = scene.resolve(file);
         let mut read = || {
             let mut file = open_file(&path)?;

@@ -147,3 +147,34 @@ fn a_missed_error_stands_before_the_answer() {
     let answer = err.find("emitted,").unwrap();
     assert!(err[..answer].rfind("not reached").is_some(), "{err}");
 }
+
+/// A run that is stopped while it looks for its number of rays is saved as any other, and goes on with the number it had come to.
+#[test]
+#[cfg(unix)]
+fn a_signal_saves_a_run_that_is_traced_until_it_is_settled() {
+    use std::io::{BufRead, BufReader};
+    use std::process::{Command, Stdio};
+    let folder =
+        low_beam(|scene| scene.lines().filter(|l| !l.starts_with("rays")).map(|l| format!("{l}\n")).collect());
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
+        .current_dir(folder.path())
+        .args(["trace", "low_beam.toml", "--until-settled", "--tolerance", "0.2", "--threads", "1", "-o", "out"])
+        .env("COLUMNS", "200")
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let longer = said.find(|line| line.contains("going on with"));
+    assert!(longer.is_some());
+    // Until its rays are on their way, which the command does not say, a signal would end it at once.
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+    let said: String = said.collect::<Vec<_>>().join(" ");
+    assert_eq!(child.wait().unwrap().code(), Some(1), "{said}");
+    assert!(
+        said.contains("replicates are saved in") && said.contains("--resume in place of --until-settled"),
+        "{said}"
+    );
+    assert!(folder.path().join("out/checkpoint.tally").is_file());
+}

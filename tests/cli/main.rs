@@ -13,6 +13,7 @@ mod info;
 mod mishaps;
 mod names;
 mod newcomer;
+mod outputs;
 mod overrides;
 mod race;
 mod ray_files;

@@ -178,6 +178,9 @@ fn parse_ray_range(text: &str) -> Result<RayRange, String> {
 /// Largest number of rays: doubles, in which it may be written, count singly up to it.
 const MOST_RAYS: f64 = 9e15;
 
+/// Relative error of a decimal number times a power of ten: half a unit in the last place of each factor and of the product.
+const PRODUCT_ROUNDING: f64 = 1.5 * f64::EPSILON;
+
 /// Reads a whole number from 1 to [`MOST_RAYS`]; `1e6`, `1_000_000` and `10M` are understood.
 pub(crate) fn parse_count(text: &str) -> Result<u64, String> {
     let plain = text.replace('_', "");
@@ -189,8 +192,9 @@ pub(crate) fn parse_count(text: &str) -> Result<u64, String> {
         _ => (plain.as_str(), 1.0),
     };
     let value = digits.parse::<f64>().map_err(|_| format!("'{text}' is no number"))? * factor;
-    if (1.0..=MOST_RAYS).contains(&value) && value.fract() == 0.0 {
-        Ok(value as u64)
+    let whole = value.round();
+    if (1.0..=MOST_RAYS).contains(&whole) && (value - whole).abs() <= PRODUCT_ROUNDING * whole {
+        Ok(whole as u64)
     } else {
         Err(format!("a number of rays is whole and at least 1, not {text}"))
     }
@@ -229,6 +233,8 @@ mod tests {
             (parse_count("1e6"), parse_count("10M"), parse_count("1_000")),
             (Ok(1_000_000), Ok(10_000_000), Ok(1000))
         );
+        // 4.1 and 2.01 are no doubles: their products fall short of the whole number.
+        assert_eq!((parse_count("4.1M"), parse_count("2.01k")), (Ok(4_100_000), Ok(2010)));
         assert!(
             parse_count("-5").is_err()
                 && parse_count("0").is_err()

@@ -10,6 +10,7 @@ use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::contenders::{Contenders, Structures, time_all};
 use crate::cli::work::input_files::{self, Input};
+use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder};
 use crate::cli::work::ray_input::read_rays;
 use crate::cli::work::results_folder::MOST_DRAWN;
@@ -31,7 +32,7 @@ use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::receivers::PowerComparison;
 use crate::study::{Progress, Quantiles, Summary, records};
 use serde_json::Value;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Rays when nothing else is asked: a second or two on a lamp.
 const RAYS: u64 = 100_000;
@@ -45,8 +46,14 @@ const TABLE_WIDTH: usize = 100;
 /// Writes the files that were asked for. Incomplete where there are no facets, answers differ on the same facets or without a cause, or too
 /// many faces were refused.
 pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completion, Failure> {
+    refuse_intersector(&command.tracing)?;
     // Before any work: a folder that cannot be made would cost it.
-    for path in command.rays_out.iter().chain(&command.disagreements) {
+    let outputs = [("--rays-out", &command.rays_out), ("--disagreements", &command.disagreements)];
+    let outputs: Vec<(&str, &Path)> =
+        outputs.into_iter().filter_map(|(option, path)| path.as_deref().map(|path| (option, path))).collect();
+    let guard = InputGuard::new(command.rays_in.iter().map(PathBuf::as_path).chain([command.file.as_path()]));
+    for (option, path) in &outputs {
+        guard.refuse(option, path)?;
         make_folder(&folder_of(path))?;
     }
     let threads = threads::set_threads(command.tracing.threads)?;
@@ -56,6 +63,9 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         Input::Step(loaded) => (None, loaded),
         Input::Scene(scene, loaded) => (Some(&**scene), loaded),
     };
+    // Which files a scene names is known when it is read.
+    let guard = scene.map(|scene| guard.with_scene(scene));
+    outputs.iter().try_for_each(|(option, path)| guard.as_ref().map_or(Ok(()), |g| g.refuse(option, path)))?;
     if given.is_some() && scene.is_none() {
         refuse_unused_options(&command.tracing)?;
     }
@@ -156,6 +166,15 @@ fn refuse_unused_options(tracing: &TracingOptions) -> Result<(), Failure> {
         "check --rays-in does not take {option}: the file of --rays-in has all of them"
     ));
     Err(failure.with_help("leave it out"))
+}
+
+/// Refuses a choice of what finds the hits: all of them are asked.
+fn refuse_intersector(tracing: &TracingOptions) -> Result<(), Failure> {
+    if tracing.intersector.is_none() {
+        return Ok(());
+    }
+    let message = "check does not take --intersector: it compares octree, BVH and exact spline";
+    Err(Failure::arguments(message).with_help("leave it out; `lampyris trace` takes it"))
 }
 
 /// Says what no check may find (no facets, answers that differ on the same facets, differences without a cause); incomplete if any was

@@ -8,7 +8,7 @@ use crate::cli::work::results_folder;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::{completion::Completion, failure::Failure};
-use crate::formats::write_atomic;
+use crate::formats::{read_bytes, write_atomic};
 use crate::pipeline::{
     LoadedModel, MeshingSettings, PreparedScene, SceneJob, TraceRequest, TracingSettings, read_models,
 };
@@ -24,6 +24,10 @@ const LAMP_FILE: &str = "../step/lamp_multicavity.stp";
 /// LEDs, media, mirrors and receivers around it.
 const SCENE: &str = include_str!("../../../fixtures/scenes/demo.toml");
 
+/// What both are called in the folder of results.
+const MODEL_NAME: &str = "lamp.stp";
+const SCENE_NAME: &str = "lamp.toml";
+
 /// Share of the power that meets the wall at 25 m, and segments a ray, as other programs found them on facets of 0.001 mm
 /// (Mitsuba 3.9, 2e7 rays).
 const REFERENCE: [f64; 2] = [0.75595, 3.694];
@@ -37,6 +41,10 @@ pub(crate) fn run(
     console: &Console,
 ) -> Result<Completion, Failure> {
     console.say(console.bold("lampyris demo: a three-cavity lamp, from its STEP file to its light"));
+    let scene_text = SCENE.replace(LAMP_FILE, MODEL_NAME);
+    for (name, content) in [(MODEL_NAME, LAMP), (SCENE_NAME, scene_text.as_bytes())] {
+        refuse_replacing(&folder.join(name), content)?;
+    }
     let (scene, loaded) = lamp()?;
     let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
     let say_step = |name: &str, what: String, time: f64| {
@@ -73,9 +81,9 @@ pub(crate) fn run(
     let comparison = reference_comparison(r);
     let start = std::time::Instant::now();
     let (document, answer) = results_folder::write(&prepared, folder, &mut run, comparison, with_page, console)?;
-    write_atomic(&folder.join("lamp.stp"), |w| w.write_all(LAMP))?;
+    write_atomic(&folder.join(MODEL_NAME), |w| w.write_all(LAMP))?;
     // The scene beside its model, as a user would keep them.
-    write_atomic(&folder.join("lamp.toml"), |w| w.write_all(SCENE.replace(LAMP_FILE, "lamp.stp").as_bytes()))?;
+    write_atomic(&folder.join(SCENE_NAME), |w| w.write_all(scene_text.as_bytes()))?;
     say_step("write", format!("report, pictures, data into {}", folder.display()), start.elapsed().as_secs_f64());
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     console.say(format_args!(
@@ -83,6 +91,15 @@ pub(crate) fn run(
         console.dim("lamp.stp and lamp.toml beside them are yours to copy: `lampyris trace lamp.toml`")
     ));
     Ok(Completion::Complete)
+}
+
+/// Refuses to replace a file that is there and holds anything but `content`: somebody's own lamp.
+fn refuse_replacing(file: &Path, content: &[u8]) -> Result<(), Failure> {
+    if !file.exists() || read_bytes(file).is_ok_and(|bytes| bytes == content) {
+        return Ok(());
+    }
+    let message = format!("{}: is there already, and is not what the demo writes", file.display());
+    Err(Failure::arguments(message).with_help("give another folder with -o"))
 }
 
 /// Reads the built-in lamp, as scene and model, from what is compiled in.

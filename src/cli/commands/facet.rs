@@ -4,6 +4,7 @@ use crate::cli::arguments::command::FacetCommand;
 use crate::cli::console::{Console, print};
 use crate::cli::output::appearance;
 use crate::cli::output::json::json_text;
+use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::{folder_of, make_folder};
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{input_files, threads};
@@ -29,7 +30,9 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
         let kind = ErrorKind::Extension { given: lower_extension(path), known: FACET_EXTENSIONS };
         return Err(crate::formats::Error::new(path, kind).into());
     }
+    let guard = InputGuard::new([command.file.as_path()]);
     for path in &command.output {
+        guard.refuse("-o", path)?;
         make_folder(&folder_of(path))?;
     }
     threads::set_threads(command.threads)?;

@@ -54,6 +54,9 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     })?;
     scene.run.sequences = header.sequences;
     scene.run.faces = header.faces;
+    if !is_tally(command.folder) {
+        results_folder::refuse_inputs(&scene, &scene_path, command.folder)?;
+    }
     set_threads(None)?;
     let (meshing, tracing) = (header.meshing(), header.tracing());
     let cache = cache_folder::cache(command.cache)?;

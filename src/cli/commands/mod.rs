@@ -5,6 +5,7 @@ mod bvh_benchmark;
 mod cache;
 mod check;
 mod demo;
+mod dry_run;
 mod faces;
 mod facet;
 mod info;
@@ -13,6 +14,7 @@ mod licences;
 mod media;
 mod merge;
 mod meta;
+mod ray_range;
 mod replay;
 mod study;
 mod trace;
@@ -21,9 +23,11 @@ mod verdicts;
 use crate::cli::arguments::command::Command;
 use crate::cli::console::Console;
 use crate::cli::{completion::Completion, failure::Failure};
+use crate::pipeline::RayRange;
 
 /// Runs the command that was asked for, and returns how it ended or why it failed.
 pub(super) fn execute(command: Command, console: &Console) -> Result<Completion, Failure> {
+    refuse_ray_range(&command)?;
     match command {
         Command::Demo { output, page, meshing, tracing } => {
             demo::run(&output, meshing.settings(), tracing.settings(), page, console)
@@ -88,4 +92,18 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
         Command::Completions { shell } => meta::completions(shell),
         Command::Man { output } => meta::man(output.as_deref(), console),
     }
+}
+
+/// Refuses a range of rays where it would be taken for their number: only `trace` begins behind the first ray.
+fn refuse_ray_range(command: &Command) -> Result<(), Failure> {
+    let (name, tracing) = match command {
+        Command::Demo { tracing, .. } => ("demo", tracing),
+        Command::Check(command) => ("check", &command.tracing),
+        Command::Study { tracing, .. } => ("study", tracing),
+        _ => return Ok(()),
+    };
+    let Some(RayRange { first: Some(first), end }) = tracing.ray_range else { return Ok(()) };
+    let failure = Failure::arguments(format!("{name} does not take a range of rays, --rays {first}..{end}"));
+    Err(failure
+        .with_help(format!("give their number, as in --rays {}; `lampyris trace` takes ranges", end - first)))
 }

@@ -1,32 +1,36 @@
 //! `lampyris trace`: a scene from disk.
 
-use super::{replay, verdicts};
+use super::{dry_run, ray_range, replay, verdicts};
 use crate::cli::arguments::command::TraceOptions;
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
 use crate::cli::output::json::{json_text, json_value};
-use crate::cli::output::rule_table::{rule_document, rule_table};
-use crate::cli::output::terminal_tables::table_text;
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
-use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder, require_space};
+use crate::cli::work::input_guard::InputGuard;
+use crate::cli::work::output_place::{OutputPlace, folder_of, require_space, try_file};
 use crate::cli::work::path_file::PathFile;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards, tally_file};
 use crate::pipeline::{
-    AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, RayRange, SceneJob, SceneResults, TargetResult,
+    AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, SceneJob, SceneResults, TargetResult,
     TraceRequest, TracingSettings, read_scene, settings_for_accuracy,
 };
-use crate::report::{bytes, grouped, seconds};
-use crate::simulate::{GROWING_REPLICATE, PartialRun, PathSink, PathVertex, grows};
+use crate::report::{grouped, seconds};
+use crate::simulate::{PartialRun, PathSink, PathVertex, Scene};
 use serde_json::json;
 use std::path::Path;
 
 /// Room that the sums of a shard need at least, bytes.
 const LEAST_TALLY_BYTES: u64 = 100_000;
+
+/// What goes on with a run that was saved, and with one whose paths were to be written.
+const RESUME: &str = "the same command with --resume";
+const RESUME_WITHOUT_PATHS: &str =
+    "the same command with --resume in place of --paths, which are those of a whole run,";
 
 /// What `trace` was asked for.
 pub(crate) struct TraceCommand<'a> {
@@ -44,11 +48,18 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let shard =
         extra.shard.as_deref().map(|text| shards::requested_shard(text, extra.shards, console)).transpose()?;
     let replay = replay::parse_request(&extra.replay)?;
+    // A range of rays is part of a run that grows: its tally joins those of the other rays.
+    let is_range = command.tracing.ray_range.is_some_and(|range| range.first.is_some());
+    if is_range {
+        ray_range::refuse_options(extra)?;
+    }
     if extra.checkpoint.is_nan() || extra.checkpoint < 0.0 {
         return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
     let monitor = TerminalMonitor::new(console);
     let (mut scene, loaded) = read_scene(command.scene, &monitor)?;
+    let has_results = shard.is_none() && !is_range && replay.is_empty();
+    refuse_inputs(command, &scene, has_results)?;
     scene.run.sequences = extra.sequences.unwrap_or(scene.run.sequences);
     scene.run.faces = extra.faces.unwrap_or(scene.run.faces);
     let accuracy = extra.precision.accuracy;
@@ -63,7 +74,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let AccurateSettings { meshing, tracing, plan } =
         settings_for_accuracy(accuracy, requested, Some(&scene), &loaded.model, &monitor)?;
     // What is traced in parts is chosen once: by the part that came first.
-    let is_part = shard.is_some() || extra.resume || tracing.ray_range.is_some_and(|range| range.first.is_some());
+    let is_part = shard.is_some() || extra.resume || is_range;
     let job = SceneJob {
         meshing,
         tracing,
@@ -78,7 +89,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     end_file::check(&prepared, extra.ends.as_deref())?;
     lost_rays::warn(&prepared, console);
     if extra.dry_run {
-        return dry_run(&prepared, folder, console);
+        return dry_run::run(&prepared, folder, console);
     }
     let refused = input_files::report_refusals(&prepared.job.loaded.reports, extra.limits.max_refused, console);
     // A replay traces single rays and writes no results.
@@ -86,15 +97,22 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         replay::run(&prepared, &replay, folder, console)?;
         return Ok(refused);
     }
-    check_growing(&prepared, console)?;
-    // A range of rays is part of a run that grows: its tally joins those of the other rays.
-    let is_range = prepared.job.tracing.ray_range.is_some_and(|range| range.first.is_some());
+    ray_range::check_growing(&prepared, console)?;
     // A range without a shard is the only shard.
     let done = match shard.or(is_range.then_some([0, 1])) {
         Some(shard) => trace_shard(&prepared, command, shard, console)?,
         None => trace_whole(&mut prepared, command, target.as_ref(), console)?,
     };
     Ok(done.and(refused))
+}
+
+/// Refuses outputs that would replace the scene or a file that it names; `has_results` says whether results are among them.
+fn refuse_inputs(command: &TraceCommand, scene: &Scene, has_results: bool) -> Result<(), Failure> {
+    let guard = InputGuard::new([command.scene]).with_scene(scene);
+    for (option, file) in [("--paths", &command.extra.paths), ("--ends", &command.extra.ends)] {
+        file.as_deref().map_or(Ok(()), |file| guard.refuse(option, file))?;
+    }
+    if has_results { results_folder::refuse_inputs(scene, command.scene, command.folder) } else { Ok(()) }
 }
 
 /// Traces the whole run, or what is left of it, and writes its results. Interrupted, it fails with what was done saved. Incomplete where an
@@ -114,17 +132,21 @@ fn trace_whole(
     // With an error to reach, the number of rays is found by tracing.
     let found = target.map(|target| target.trace(prepared, &TerminalMonitor::of_saveable(console, None)));
     let settled = if extra.until_settled { Some(verdicts::trace_until_settled(prepared, console)?) } else { None };
+    // Traced to find the number of rays, with the option that asked for it.
+    let found = match (found, settled) {
+        (Some((portion, result)), _) => Some((portion, Some(result), "--until-error")),
+        (None, Some(portion)) => Some((portion, None, "--until-settled")),
+        (None, None) => None,
+    };
     let prepared = &*prepared;
     let checkpoint = Checkpoint::new(prepared, command.scene, file, None, extra.checkpoint, console)?;
     let (traced, result) = match found {
-        Some((portion, result)) if !portion.is_whole() => {
-            let rays = result.rays;
-            return Err(checkpoint.save_stopped(&portion, "interrupted").with_help(format!(
-                "--rays {rays} --resume in place of --until-error goes on with this many rays"
-            )));
+        Some((portion, _, option)) if !portion.is_whole() => {
+            let again = format!("--rays {} --resume in place of {option}", prepared.run_settings().rays);
+            return Err(checkpoint.save_stopped(&portion, "interrupted", &again));
         }
-        Some((portion, result)) => (Some(portion), Some(result)),
-        None => (settled, None),
+        Some((portion, result, _)) => (Some(portion), result),
+        None => (None, None),
     };
     let saved = if extra.resume { saved_run(&checkpoint, folder, console)? } else { None };
     // Called by any thread: it saves when it is time to.
@@ -143,8 +165,10 @@ fn trace_whole(
     let mut run = match prepared.trace(request, &monitor) {
         Ok(run) => run,
         Err(portion) => {
-            let because = paths.and_then(|p| p.finish().err()).map_or("interrupted".into(), |e| e.to_string());
-            return Err(checkpoint.save_stopped(&portion, &because));
+            let because = paths.and_then(PathFile::failure).map_or("interrupted".into(), |e| e.to_string());
+            // Of rays that are traced already there are no paths to be had.
+            let again = if extra.paths.is_some() { RESUME_WITHOUT_PATHS } else { RESUME };
+            return Err(checkpoint.save_stopped(&portion, &because, again));
         }
     };
     // The run counts whether its paths could be written or not.
@@ -169,12 +193,14 @@ fn trace_whole(
     let missed = result.as_ref().is_some_and(|result| !result.reached) || unsettled;
     let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { sentences };
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
-    end_file::write(prepared, extra.ends.as_deref(), console)?;
     verdicts::say_verdicts(&run, prepared, console)?;
     closing::print_listings(&run, prepared, console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
+    // Last of all, for it may fail where the results did not.
+    let ends_written = end_file::write(prepared, extra.ends.as_deref(), console);
     // Only after everything was written: until then it is all that would be left.
     checkpoint.remove();
+    ends_written?;
     let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
     Ok(lost.and(Completion::incomplete_if(missed)))
 }
@@ -210,8 +236,9 @@ fn try_outputs(
         refuse_overwriting(checkpoint)?;
     }
     results_folder::try_folder(prepared, folder, extra.page.is_wanted())?;
+    extra.ends.as_deref().map_or(Ok(()), try_file)?;
     let Some(file) = &extra.paths else { return Ok(None) };
-    make_folder(&folder_of(file))?;
+    try_file(file)?;
     PathFile::create(file).map(Some)
 }
 
@@ -267,26 +294,6 @@ fn say_verification(run: &SceneResults, console: &Console) -> Result<(), Failure
     Ok(())
 }
 
-/// Checks that the run can grow, where a range of its rays was asked for.
-///
-/// # Errors
-/// When it cannot, or the range does not begin and end with a replicate.
-fn check_growing(prepared: &PreparedScene, console: &Console) -> Result<(), Failure> {
-    let Some(RayRange { first: Some(first), end }) = prepared.job.tracing.ray_range else { return Ok(()) };
-    if !grows(&prepared.bound, &prepared.run_settings()) {
-        let failure = Failure::arguments("--rays A..B: a source of this scene has `rays` of its own");
-        return Err(failure.with_help("leave the `rays` of sources out: their power shares out the rays"));
-    }
-    if !(first.is_multiple_of(GROWING_REPLICATE) && end.is_multiple_of(GROWING_REPLICATE)) {
-        let message = format!("--rays {first}..{end}: both must be multiples of {GROWING_REPLICATE}");
-        return Err(Failure::arguments(message).with_help("rays are traced in replicates of that many"));
-    }
-    if console.verbose > 0 {
-        console.say(format_args!("rays {} to {} of a run that grows", grouped(first), grouped(end)));
-    }
-    Ok(())
-}
-
 /// Traces a shard (index from 0, count), or goes on with it, into its file; one that is done already is not traced again. Fails when
 /// interrupted, with what was done saved.
 fn trace_shard(
@@ -322,7 +329,7 @@ fn trace_shard(
     let portion = prepared.trace_part(request, &TerminalMonitor::of_saveable(console, None));
     // Fewer replicates than the shard has: it was stopped.
     if !shards::is_shard_done(&portion, replicates, shard) {
-        return Err(checkpoint.save_stopped(&portion, "interrupted"));
+        return Err(checkpoint.save_stopped(&portion, "interrupted", RESUME));
     }
     let file = checkpoint.save_anywhere(&portion)?;
     // It was rescued to another place.
@@ -357,44 +364,4 @@ fn say_shard(
         file.display()
     ));
     Ok(())
-}
-
-/// Prints what would be done, with `--json` as a document; traces and writes nothing.
-fn dry_run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result<Completion, Failure> {
-    let settings = prepared.run_settings();
-    let facets = &prepared.facets;
-    let loaded = &prepared.job.loaded;
-    let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
-    let effects = crate::simulate::Required::new(&prepared.bound);
-    if console.json {
-        let document = json!({"dry_run": true, "chosen": prepared.chosen, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
-            "faces": faces, "facets": facets.facet_count(), "mesh_bytes": facets.bytes(),
-            "intersector": prepared.choice.intersector.to_string(), "normals": prepared.choice.normals.to_string(),
-            "rules": rule_document(&prepared.bound, &loaded.model),
-            "effects": {"simulated": effects.simulated, "not_simulated": effects.not_simulated},
-            "seconds": {"read": loaded.seconds, "tessellate": prepared.tessellation_seconds}});
-        print(&json_text(&document)?)?;
-        return Ok(Completion::Complete);
-    }
-    print(&format!(
-        "would trace {} rays (seed {}) on {} threads through {} facets ({}) of {faces} faces, {} with {} normals,\n\
-         and write into {}; reading took {}, tessellation {}\n",
-        grouped(settings.rays),
-        settings.seed,
-        prepared.threads,
-        grouped(facets.facet_count() as u64),
-        bytes(facets.bytes() as u64),
-        prepared.choice.intersector,
-        prepared.choice.normals,
-        folder.display(),
-        seconds(loaded.seconds),
-        seconds(prepared.tessellation_seconds)
-    ))?;
-    for because in &effects.simulated {
-        print(&format!("simulated: {:?}, because {}\n", because.effect, because.because))?;
-    }
-    if !prepared.bound.rules().is_empty() {
-        print(&table_text(&rule_table(&prepared.bound, &loaded.model), console.width()))?;
-    }
-    Ok(Completion::Complete)
 }

@@ -5,7 +5,6 @@ use crate::cli::failure::Failure;
 use crate::cli::output::verdict::summary;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::pipeline::{self, PreparedScene, SceneResults};
-use crate::report::grouped;
 use crate::simulate::PartialRun;
 use serde_json::Value;
 
@@ -31,10 +30,10 @@ pub(super) fn are_unsettled(document: &Value) -> bool {
     rows.any(|row| row["verdict"] == "unsure")
 }
 
-/// Traces as many rays as the verdicts of the scene's regulations need.
+/// Traces as many rays as the verdicts of the scene's regulations need; not all of them where it is interrupted.
 ///
 /// # Errors
-/// When the scene names no regulation, its sources have their own numbers of rays, or the run is interrupted.
+/// When the scene names no regulation, or its sources have their own numbers of rays.
 pub(super) fn trace_until_settled(prepared: &mut PreparedScene, console: &Console) -> Result<PartialRun, Failure> {
     let scene = &prepared.job.scene;
     if scene.regulations.is_empty() {
@@ -46,9 +45,6 @@ pub(super) fn trace_until_settled(prepared: &mut PreparedScene, console: &Consol
         let failure = Failure::arguments("--until-settled: a source with `rays` of its own does not grow");
         return Err(failure.with_help("take `rays` out of the [[source]]s"));
     }
-    let (portion, rays) = pipeline::trace_until_settled(prepared, &TerminalMonitor::of_saveable(console, None));
-    if portion.is_whole() {
-        return Ok(portion);
-    }
-    Err(Failure::running(format!("interrupted at {} rays", grouped(rays))))
+    let (portion, _) = pipeline::trace_until_settled(prepared, &TerminalMonitor::of_saveable(console, None));
+    Ok(portion)
 }

@@ -7,7 +7,7 @@ use crate::formats::{
 };
 use crate::report::{colour_picture, file_stem, photometric_grid, receiver_grid};
 use crate::simulate::ReceiverResult;
-use crate::simulate::scene::FarFieldType;
+use crate::simulate::scene::{FarFieldType, Receiver, ReceiverKind};
 use std::path::Path;
 
 /// A far field whose ends are this near to those of all directions holds all of them, degrees.
@@ -68,6 +68,19 @@ pub(crate) fn write(
         }
     }
     Ok(names)
+}
+
+/// Returns the names of all files that [`write`] may make for a receiver of the scene.
+pub(crate) fn names(receiver: &Receiver) -> Vec<String> {
+    let stem = file_stem(&receiver.name);
+    let own: &[&str] = match receiver.kind {
+        ReceiverKind::Plane => &[".tm25ray", ".data3"],
+        ReceiverKind::Disc => &[".tm25ray"],
+        ReceiverKind::FarField => &[".ies", ".ldt"],
+        _ => &[],
+    };
+    let common = [".csv", ".npz", ".png", ".vti", "-colours.png"];
+    common.iter().chain(own).map(|ending| format!("{stem}{ending}")).collect()
 }
 
 /// The sampled rays of a plane or disc as a TM-25 file.

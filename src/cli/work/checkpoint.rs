@@ -148,20 +148,16 @@ impl<'a> Checkpoint<'a> {
         places.find(|file| write_atomic(file, |w| portion.write(&header, w)).is_ok()).ok_or(reason)
     }
 
-    /// Saves a run that stopped before its end, and returns the failure that says why, and how to go on from there.
-    pub(crate) fn save_stopped(&self, portion: &PartialRun, because: &str) -> Failure {
+    /// Saves a run that stopped before its end, and returns the failure that says why, and that `again` goes on from there.
+    pub(crate) fn save_stopped(&self, portion: &PartialRun, because: &str, again: &str) -> Failure {
         let share = format!("{} of {} replicates", portion.done.len(), portion.replicates);
         match self.save_anywhere(portion) {
             Ok(file) if file == self.file => {
                 Failure::running(format!("{because}: {share} are saved in {}", file.display()))
-                    .with_help("the same command with --resume goes on from there")
+                    .with_help(format!("{again} goes on from there"))
             }
-            Ok(file) => {
-                Failure::running(format!("{because}: {share} are saved in {}", file.display())).with_help(format!(
-                    "copy it to {}, and the same command with --resume goes on from there",
-                    self.file.display()
-                ))
-            }
+            Ok(file) => Failure::running(format!("{because}: {share} are saved in {}", file.display()))
+                .with_help(format!("copy it to {}, and {again} goes on from there", self.file.display())),
             Err(failure) => Failure::running(format!("{because}, and {share} could not be saved: {failure}")),
         }
     }

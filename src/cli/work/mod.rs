@@ -1,7 +1,7 @@
 //! What commands share: from options and files to runs, and what is made of these.
 //!
 //! Inner modules, each of which sees only those before it: `threads`, `path_file`, `end_file`, `terminal_monitor` and `input_files` (the
-//! ingredients), `output_place`, `shards`, `lost_rays`, `results_folder`, `tally_file`, `checkpoint`, `paired_receivers` and `contenders` (what is made
+//! ingredients), `output_place`, `input_guard`, `shards`, `lost_rays`, `results_folder`, `tally_file`, `checkpoint`, `paired_receivers` and `contenders` (what is made
 //! of a run).
 
 pub(super) mod cache_folder;
@@ -9,6 +9,7 @@ pub(super) mod checkpoint;
 pub(super) mod contenders;
 pub(super) mod end_file;
 pub(super) mod input_files;
+pub(super) mod input_guard;
 pub(super) mod lost_rays;
 pub(super) mod output_place;
 pub(super) mod paired_receivers;

@@ -2,7 +2,7 @@
 
 use crate::cli::failure::Failure;
 use crate::cli::machine;
-use crate::formats::file_name;
+use crate::formats::{file_name, write_atomic};
 use std::fs::{self, File, TryLockError};
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -118,6 +118,25 @@ fn is_file_at(_: &File, _: &Path) -> bool {
 /// When that fails.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))
+}
+
+/// Tries, before any work, whether a file can be written; makes its folder. What is there stays as it is.
+///
+/// # Errors
+/// When it cannot.
+pub(crate) fn try_file(file: &Path) -> Result<(), Failure> {
+    make_folder(&folder_of(file))?;
+    if file.is_dir() {
+        return Err(Failure::running(format!("{}: cannot be written: it is a folder", file.display())));
+    }
+    // Pipes and devices are opened when they are written: their readers may come late.
+    if file.exists() && !file.is_file() {
+        return Ok(());
+    }
+    let beside = file.with_file_name(format!("{}.try", file_name(file)));
+    write_atomic(&beside, |_| Ok(()))?;
+    fs::remove_file(&beside)?;
+    Ok(())
 }
 
 /// Returns the folder that a file is in; `.` for a bare name.

@@ -56,6 +56,11 @@ impl PathFile {
         self.state.lock().unwrap_or_else(|e| e.into_inner()).1.is_some()
     }
 
+    /// Returns the first failure to write, if there was one, and leaves nothing of the file: the paths of a part of a run are not the run's.
+    pub(crate) fn failure(self) -> Option<Error> {
+        self.state.into_inner().unwrap_or_else(|e| e.into_inner()).1
+    }
+
     /// Completes the file and returns the number of vertices; fails with the first failure to write, and leaves an older file of that name
     /// alone then.
     pub(crate) fn finish(self) -> Result<u64, Failure> {

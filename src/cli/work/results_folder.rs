@@ -1,5 +1,6 @@
 //! The folder that a traced scene leaves: receiver files, ray paths, facets, `results.json` and the page.
 
+use super::input_guard::InputGuard;
 use super::lost_rays;
 use super::output_place::{make_folder, require_space, rescue_folders};
 use crate::cli::console::Console;
@@ -9,15 +10,16 @@ use crate::cli::output::closing::LEDGER;
 use crate::cli::output::face_tables;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table, sequence_tables};
-use crate::formats::{ColourMap, Facets, Polylines, write_atomic, write_facets, write_vtp};
+use crate::formats::{ColourMap, Facets, Polylines, read_text, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
 use crate::mesh::FacetMesh;
 use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults};
 use crate::regulation::Assessment;
 use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, grouped, path_lines};
-use crate::simulate::arrivals;
+use crate::simulate::{Scene, arrivals};
 use crate::study::figures::{Figure, ReceiverFigures};
 use serde_json::Value;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// What the page takes at least, bytes: plotly.js and a few pictures.
@@ -28,6 +30,11 @@ const CELL_BYTES: u64 = 40;
 pub(crate) const MOST_DRAWN: usize = 24_000;
 /// What a facet takes at least in the model of the folder, bytes: corners and normals in single precision.
 const FACET_BYTES: u64 = 50;
+
+/// Files of every folder of results.
+const OWN_FILES: [&str; 5] = ["results.json", "report.html", "facets.glb", "paths.vtp", LEDGER];
+/// Folders of the page's pictures and tables, with the extensions of the files in them.
+const PAGE_FOLDERS: [(&str, &[&str]); 2] = [("figures", &["svg", "png"]), ("tables", &["csv"])];
 
 /// Tries, before anything is traced, whether the folder can hold the results: room, and a file of every receiver's name.
 ///
@@ -46,6 +53,53 @@ pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_page: boo
         std::fs::remove_file(&file)?;
     }
     Ok(())
+}
+
+/// Refuses, before any work, a folder in which results would replace the scene or a file that it names.
+///
+/// # Errors
+/// When they would.
+pub(crate) fn refuse_inputs(scene: &Scene, scene_file: &Path, folder: &Path) -> Result<(), Failure> {
+    let receivers: HashSet<String> = scene.receivers.iter().flat_map(receiver_files::names).collect();
+    // The folders of the page are its own: what they hold goes with the run that made it.
+    let is_written = |name: &Path| {
+        is_of_page(name) || name.to_str().is_some_and(|name| OWN_FILES.contains(&name) || receivers.contains(name))
+    };
+    InputGuard::new([scene_file]).with_scene(scene).refuse_folder(folder, is_written)
+}
+
+/// Whether a file, named relative to a folder of results, is a picture or table of its page by its folder and extension.
+fn is_of_page(name: &Path) -> bool {
+    let extension = name.extension().and_then(|e| e.to_str()).unwrap_or("");
+    PAGE_FOLDERS
+        .iter()
+        .any(|(folder, kinds)| name.parent() == Some(Path::new(folder)) && kinds.contains(&extension))
+}
+
+/// Removes what an earlier run left in the folder, as far as its `results.json` and the names of its own tell, so that no file of it stands
+/// beside those of this run. Files that the scene names stay; a failure is passed over, for what is written next replaces most of them.
+fn remove_earlier(prepared: &PreparedScene, folder: &Path) {
+    let Some(earlier) = read_text(&folder.join("results.json")).ok() else { return };
+    let Ok(earlier) = serde_json::from_str::<Value>(&earlier) else { return };
+    // Only what lampyris wrote has one.
+    if earlier["digest"].is_null() {
+        return;
+    }
+    let listed =
+        earlier["receivers"].as_array().into_iter().flatten().filter_map(|r| r["files"].as_array()).flatten();
+    let mut names: Vec<PathBuf> = listed.filter_map(|file| file.as_str().map(PathBuf::from)).collect();
+    // A document that somebody changed names files of the folder alone.
+    names.retain(|name| name.file_name() == Some(name.as_os_str()));
+    names.extend(OWN_FILES.map(PathBuf::from));
+    for (inner, _) in PAGE_FOLDERS {
+        let entries = std::fs::read_dir(folder.join(inner)).into_iter().flatten().flatten();
+        names.extend(entries.map(|entry| Path::new(inner).join(entry.file_name())).filter(|name| is_of_page(name)));
+    }
+    let scene = &prepared.job.scene;
+    let guard = InputGuard::new([Path::new(&scene.origin.file)]).with_scene(scene);
+    for file in names.iter().map(|name| folder.join(name)).filter(|file| guard.refuse("-o", file).is_ok()) {
+        let _ = std::fs::remove_file(file);
+    }
 }
 
 /// Writes the results into a new folder wherever one can be, when they cannot be written where they should; returns the folder, `None` if
@@ -84,6 +138,7 @@ pub(crate) fn write(
 ) -> Result<(Value, String), Failure> {
     let spinner = console.spinner("writing");
     make_folder(folder)?;
+    remove_earlier(prepared, folder);
     for k in 0..run.results.receivers.len() {
         let rays = arrivals(&prepared.bound, k, &run.results);
         let receiver = &run.results.receivers[k];

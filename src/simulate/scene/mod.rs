@@ -151,6 +151,13 @@ impl Scene {
         schema
     }
 
+    /// Returns the files that the scene names, as it does: models, then those of sources, then glass catalogues.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        let models = self.models.iter().map(|m| m.file.as_str());
+        let sources = self.sources.iter().filter_map(|s| s.file.as_deref());
+        models.chain(sources).chain(self.media.iter().filter_map(|m| m.file.as_deref()))
+    }
+
     /// Returns a path named in the scene, seen from where the program runs; an absolute one stays as it is.
     pub fn resolve(&self, file: &str) -> PathBuf {
         self.origin.folder.join(file)

@@ -1,0 +1,52 @@
+//! `lampyris trace --dry-run`: what a run would do, without its rays.
+
+use crate::cli::completion::Completion;
+use crate::cli::console::{Console, print};
+use crate::cli::failure::Failure;
+use crate::cli::output::json::json_text;
+use crate::cli::output::rule_table::{rule_document, rule_table};
+use crate::cli::output::terminal_tables::table_text;
+use crate::pipeline::PreparedScene;
+use crate::report::{bytes, grouped, seconds};
+use serde_json::json;
+use std::path::Path;
+
+/// Prints what would be done, with `--json` as a document; traces and writes nothing.
+pub(super) fn run(prepared: &PreparedScene, folder: &Path, console: &Console) -> Result<Completion, Failure> {
+    let settings = prepared.run_settings();
+    let facets = &prepared.facets;
+    let loaded = &prepared.job.loaded;
+    let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
+    let effects = crate::simulate::Required::new(&prepared.bound);
+    if console.json {
+        let document = json!({"dry_run": true, "chosen": prepared.chosen, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
+            "faces": faces, "facets": facets.facet_count(), "mesh_bytes": facets.bytes(),
+            "intersector": prepared.choice.intersector.to_string(), "normals": prepared.choice.normals.to_string(),
+            "rules": rule_document(&prepared.bound, &loaded.model),
+            "effects": {"simulated": effects.simulated, "not_simulated": effects.not_simulated},
+            "seconds": {"read": loaded.seconds, "tessellate": prepared.tessellation_seconds}});
+        print(&json_text(&document)?)?;
+        return Ok(Completion::Complete);
+    }
+    print(&format!(
+        "would trace {} rays (seed {}) on {} threads through {} facets ({}) of {faces} faces, {} with {} normals,\n\
+         and write into {}; reading took {}, tessellation {}\n",
+        grouped(settings.rays),
+        settings.seed,
+        prepared.threads,
+        grouped(facets.facet_count() as u64),
+        bytes(facets.bytes() as u64),
+        prepared.choice.intersector,
+        prepared.choice.normals,
+        folder.display(),
+        seconds(loaded.seconds),
+        seconds(prepared.tessellation_seconds)
+    ))?;
+    for because in &effects.simulated {
+        print(&format!("simulated: {:?}, because {}\n", because.effect, because.because))?;
+    }
+    if !prepared.bound.rules().is_empty() {
+        print(&table_text(&rule_table(&prepared.bound, &loaded.model), console.width()))?;
+    }
+    Ok(Completion::Complete)
+}
