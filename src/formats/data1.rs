@@ -51,6 +51,8 @@ pub(super) struct Lines<'a> {
 impl<'a> Lines<'a> {
     /// Stands before the first line of `text`; `path` is what errors name. Blank lines are passed over, but counted.
     pub(super) fn new(path: &'a Path, text: &'a str) -> Self {
+        // Some editors put a byte order mark in front.
+        let text = text.trim_start_matches('\u{feff}');
         let lines = text.lines().enumerate().map(|(n, l)| (n + 1, l.trim())).filter(|(_, l)| !l.is_empty());
         Self { path, lines: Box::new(lines), at: 0 }
     }
@@ -124,6 +126,14 @@ mod tests {
             && (a.direction - b.direction).length() < 2e-16));
         assert_eq!(back.len(), 50);
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().next(), Some("50"));
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("light.data1");
+        std::fs::write(&path, "\u{feff}1\n0 0 0 0 0 1 1\n").unwrap();
+        assert_eq!(read_data1(&path).unwrap().len(), 1);
     }
 
     #[test]

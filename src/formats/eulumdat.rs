@@ -31,8 +31,11 @@ pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
     let stored: Vec<f64> = match ldt.symmetry {
         Symmetry::VerticalAxis => vec![0.0],
         Symmetry::PlaneC90C270 => {
-            // From −90 (C270) to 90 in steps of 360/n: half of the planes stand on each side of C0.
-            (0..ldt.intensities.len()).map(|i| 90.0 - 180.0 * (1.0 - i as f64 / (n / 2) as f64)).collect()
+            let first = ldt.c_angles.iter().position(|c| (c - 270.0).abs() < SAME_ANGLE_DEG);
+            let first = first.ok_or_else(|| malformed("no C-plane is at 270°, where symmetry 3 begins".into()))?;
+            // From −90 (C270) through C0 to C90, behind the last plane going on with the first.
+            let planes = ldt.c_angles.iter().cycle().skip(first).take(ldt.intensities.len());
+            planes.map(|&c| if c > 180.0 { c - 360.0 } else { c }).collect()
         }
         _ => ldt.c_angles.iter().copied().take(ldt.intensities.len()).collect(),
     };
@@ -148,8 +151,10 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     (ldt.luminous_area_width, ldt.luminous_area_length, ldt.height_c0) = (width, length, height);
     // The size of the luminaire is not known; that of its opening stands in for it.
     (ldt.width, ldt.length, ldt.height) = (width, length, height);
-    ldt.light_output_ratio = 100.0;
-    ldt.downward_flux_fraction = 100.0;
+    // Of a dark luminaire neither share has a meaning; the format has no word for that.
+    let share = |part: f64, whole: f64| if whole > 0.0 { 100.0 * part / whole } else { 100.0 };
+    ldt.light_output_ratio = share(p.flux(), lumens);
+    ldt.downward_flux_fraction = share(p.downward_flux(), p.flux());
     ldt.conversion_factor = 1.0;
     ldt.lamp_sets = vec![LampSet {
         num_lamps: if p.lamp_lumens.is_some() { 1 } else { -1 },
@@ -162,7 +167,8 @@ pub fn write_eulumdat(path: &Path, p: &Photometry) -> Result<(), Error> {
     ldt.g_angles = all.vertical_deg.clone();
     ldt.intensities =
         all.candela.chunks(rows).take(planes).map(|r| r.iter().map(|c| c * per_klm).collect()).collect();
-    let text = ldt.to_ldt();
+    // The format ends lines as DOS does.
+    let text = ldt.to_ldt().replace('\n', "\r\n");
     write_atomic(path, |w| w.write_all(text.as_bytes()))
 }
 
@@ -237,21 +243,49 @@ mod tests {
 
     #[test]
     fn the_plane_c90_c270_is_mirrored_as_the_format_means_it() {
-        // Eight planes; C270 to C90 through C0 are stored: intensities 100 + index.
-        let mut lines: Vec<String> =
-            ["x", "3", "3", "8", "45", "2", "90", "", "", "", "", ""].map(String::from).into();
-        lines.extend((0..9).map(|_| "0".into()));
-        lines.extend(["100", "100", "1", "0", "1", "1", "lamp", "1000", "", "", "10"].map(String::from));
-        lines.extend((0..10).map(|_| "1".into()));
-        lines.extend((0..8).map(|i| (45 * i).to_string()));
-        lines.extend(["0", "90"].map(String::from));
-        for i in 0..5 {
-            lines.extend([(100 + i).to_string(), "0".into()]);
+        // Eight planes, even or not; C270 to C90 through C0 are stored: intensities 100 + index.
+        let parse = |planes: [i32; 8]| {
+            let mut lines: Vec<String> =
+                ["x", "3", "3", "8", "45", "2", "90", "", "", "", "", ""].map(String::from).into();
+            lines.extend((0..9).map(|_| "0".into()));
+            lines.extend(["100", "100", "1", "0", "1", "1", "lamp", "1000", "", "", "10"].map(String::from));
+            lines.extend((0..10).map(|_| "1".into()));
+            lines.extend(planes.map(|c| c.to_string()));
+            lines.extend(["0", "90"].map(String::from));
+            for i in 0..5 {
+                lines.extend([(100 + i).to_string(), "0".into()]);
+            }
+            parse_eulumdat(Path::new("a.ldt"), &lines.join("\n"))
+        };
+        for step in [30, 45] {
+            let p = parse([0, step, 90, 180 - step, 180, 180 + step, 270, 360 - step]).unwrap().expanded();
+            let at = |c: i32| p.candela[2 * p.horizontal_deg.iter().position(|&h| h == f64::from(c)).unwrap()];
+            assert_eq!([270, 360 - step, 0, step, 90].map(at), [100.0, 101.0, 102.0, 103.0, 104.0]);
+            assert_eq!([180 + step, 180, 180 - step].map(at), [101.0, 102.0, 103.0]);
         }
-        let p = parse_eulumdat(Path::new("a.ldt"), &lines.join("\n")).unwrap().expanded();
-        let at = |c: f64| p.candela[2 * p.horizontal_deg.iter().position(|&h| h == c).unwrap()];
-        assert_eq!([270.0, 315.0, 0.0, 45.0, 90.0].map(at), [100.0, 101.0, 102.0, 103.0, 104.0]);
-        assert_eq!([225.0, 180.0, 135.0].map(at), [101.0, 102.0, 103.0]);
+        assert!(parse([0, 1, 2, 3, 4, 5, 6, 7]).unwrap_err().to_string().contains("270"));
+    }
+
+    /// Of equal light everywhere half goes down, of a lamp of twice the flux half comes out.
+    #[test]
+    fn shares_of_the_flux_are_those_of_the_light() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ldt");
+        // With a row at the horizontal plane, and with rows on both sides of it.
+        for rows in [4, 5] {
+            for planes in [vec![0.0], steps(0.0, 360.0, 4)] {
+                let p = photometry_of(PhotometricType::C, &planes, &steps(0.0, 180.0, rows), |_, _| 100.0);
+                let twice = Photometry { lamp_lumens: Some(2.0 * p.flux()), ..p };
+                write_eulumdat(&path, &twice).unwrap();
+                let text = std::fs::read_to_string(&path).unwrap();
+                assert_eq!(text.matches('\n').count(), text.matches("\r\n").count());
+                let ldt = Eulumdat::parse(&text).unwrap();
+                let [down, out] = [ldt.downward_flux_fraction, ldt.light_output_ratio];
+                assert!((down - 50.0).abs() < 0.01 && (out - 50.0).abs() < 0.01, "{rows}: {down} {out}");
+            }
+        }
+        let below = photometry_of(PhotometricType::C, &[0.0], &steps(0.0, 90.0, 5), |_, v| 100.0 - v);
+        assert!((below.downward_flux() / below.flux() - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -85,6 +85,7 @@ pub fn parse_ies(path: &Path, text: &str) -> Result<Photometry, Error> {
     let vertical_deg = numbers.read_ascending(rows, "vertical angles")?;
     let horizontal_deg = numbers.read_ascending(planes, "horizontal angles")?;
     let mut candela = numbers.read_list(rows.saturating_mul(planes), "candela values")?;
+    numbers.expect_end()?;
     candela.iter_mut().for_each(|c| *c *= multiplier * factor);
     if let Some(bad) = candela.iter().find(|c| !(**c >= 0.0 && c.is_finite())) {
         return Err(numbers.error(format!("an intensity of {bad} cd; intensities must be zero or more")));
@@ -165,6 +166,16 @@ impl Numbers<'_> {
             return Err(self.error(format!("{count} numbers should follow ({what}), but only {left} do")));
         }
         (0..count).map(|_| self.read_number(what)).collect()
+    }
+
+    /// Refuses numbers behind the last that the file promises: others may have been taken for them. Words that are none are left alone.
+    fn expect_end(&self) -> Result<(), Error> {
+        let mut left = self.words[self.at..].iter();
+        let Some((line, word)) = left.find(|(_, word)| word.parse::<f64>().is_ok()) else { return Ok(()) };
+        let message = format!(
+            "'{word}' stands behind the last candela value; a comma parts two numbers, decimals have a point"
+        );
+        Err(Error::at_line(self.path, *line, message))
     }
 
     /// Reads `count` numbers, each above the one before.

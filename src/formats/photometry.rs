@@ -163,6 +163,30 @@ impl Photometry {
     }
 }
 
+impl Photometry {
+    /// Returns the lumens of type C from γ = 0° to 90°, as [`Photometry::flux`] counts them: down, for a luminaire.
+    pub(super) fn downward_flux(&self) -> f64 {
+        const HORIZONTAL_DEG: f64 = 90.0;
+        let rows = self.vertical_deg.len();
+        let below = self.vertical_deg.iter().take_while(|v| **v < HORIZONTAL_DEG).count();
+        if below == 0 {
+            return 0.0;
+        }
+        let mut vertical_deg = self.vertical_deg[..below].to_vec();
+        let mut candela: Vec<Vec<f64>> = self.candela.chunks(rows).map(|plane| plane[..below].to_vec()).collect();
+        // Between the rows on its sides the light on the horizontal plane is linear, as the flux takes it.
+        if let Some(&above) = self.vertical_deg.get(below) {
+            let last = self.vertical_deg[below - 1];
+            let share = (HORIZONTAL_DEG - last) / (above - last);
+            vertical_deg.push(HORIZONTAL_DEG);
+            for (cut, plane) in candela.iter_mut().zip(self.candela.chunks(rows)) {
+                cut.push(plane[below - 1] + share * (plane[below] - plane[below - 1]));
+            }
+        }
+        Self { vertical_deg, candela: candela.concat(), ..self.clone() }.flux()
+    }
+}
+
 /// Integrals of the hat functions of nodes in degrees; `halves` gives those of the falling and the rising half on an interval in radians.
 fn hat_integrals(nodes_deg: &[f64], halves: impl Fn(f64, f64) -> [f64; 2]) -> Vec<f64> {
     let mut sums = vec![0.0; nodes_deg.len()];

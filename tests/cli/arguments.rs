@@ -34,6 +34,8 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         (&["study", "stability", "--face", "#7=0.1"], "study stability does not take --face"),
         (&["study", "interpolation", "--role", "mirror=0.1"], "study interpolation does not take --role"),
         (&["study", "interpolation", "--tolerance", "0.1"], "several of its own"),
+        (&["trace", "s.toml", "--max-lost", "nan"], "a share is a number"),
+        (&["info", "s.stp", "--max-refused", "nan"], "a share is a number"),
         (&["tarce"], "trace"),
         (&[], "Usage"),
     ] {

@@ -216,3 +216,15 @@ fn pipes_and_devices_are_refused() {
         assert!(read_data3(path).is_err() && Scene::read(path).is_err());
     }
 }
+
+/// With decimal commas every number is two, and the last intensities are left over.
+#[test]
+fn numbers_behind_the_last_of_an_ies_file_are_refused() {
+    let parse = |text: &str| lampyris::formats::parse_ies(std::path::Path::new("lamp.ies"), text);
+    let commas = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 3 1 1 2 0 0 0\n1 1 0\n0 45 90\n0\n100,5 70,2 0,0\n";
+    let error = parse(commas).unwrap_err().to_string();
+    assert!(error.contains(":7") && error.contains("comma"), "{error}");
+    let points = commas.replace(",5 70,2 0,0", ".5 70.2 0.0");
+    // A remark or the end mark of an old system is no number.
+    assert!(parse(&points).is_ok() && parse(&(points + "END\n\u{1a}")).is_ok());
+}

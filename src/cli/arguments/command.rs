@@ -1,7 +1,7 @@
 //! The commands and their own options.
 
 use super::help_text;
-use super::options::{AccuracyOption, CacheOption, MeshingOptions, TracingOptions, parse_count};
+use super::options::{AccuracyOption, CacheOption, MeshingOptions, TracingOptions, parse_count, parse_share};
 use crate::step;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -122,7 +122,7 @@ pub(crate) enum Command {
         #[arg(long, value_name = "P%@RECEIVER")]
         until_error: Option<String>,
         /// Largest share of energy that may be lost before the exit code becomes 4
-        #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST)]
+        #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST, value_parser = parse_share)]
         max_lost: f64,
         #[command(flatten)]
         cache: CacheOption,
@@ -261,7 +261,7 @@ pub(crate) struct TraceOptions {
     /// Go on where an interrupted run stopped
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Save a long run every so many seconds, for --resume
+    /// Save a long run every so many seconds, for --resume; one of --until-error or --until-settled is saved when it is stopped alone
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
     pub(crate) checkpoint: f64,
     /// Trace until the statistical error (1σ) of a receiver's power is below P percent, or, with :cells after its name, that of
@@ -298,7 +298,7 @@ pub(crate) struct TraceOptions {
     #[arg(long)]
     pub(crate) dry_run: bool,
     /// Largest share of energy that may be lost before the exit code becomes 4
-    #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST)]
+    #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST, value_parser = parse_share)]
     pub(crate) max_lost: f64,
     #[command(flatten)]
     pub(crate) cache: CacheOption,
@@ -351,7 +351,7 @@ impl Default for PlacedLimit {
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct RefusalLimit {
     /// Largest share of faces that may be refused before the exit code becomes 4
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = parse_share)]
     pub(crate) max_refused: f64,
 }
 

@@ -200,6 +200,13 @@ pub(crate) fn parse_count(text: &str) -> Result<u64, String> {
     }
 }
 
+/// Reads a share, 0 or more; above 1 nothing is too much.
+pub(crate) fn parse_share(text: &str) -> Result<f64, String> {
+    // Compared with no number, every share would be within it, or none.
+    let value = text.trim().parse::<f64>().ok().filter(|share| *share >= 0.0);
+    value.ok_or_else(|| format!("a share is a number from 0 to 1, as in 0.01, not '{text}'"))
+}
+
 /// Reads a direction error above 0 and below 90 degrees, with or without `deg`.
 fn parse_accuracy(text: &str) -> Result<f64, String> {
     // A bare number is taken for degrees.
@@ -241,6 +248,12 @@ mod tests {
                 && parse_count("1.5").is_err()
                 && parse_count("").is_err()
         );
+    }
+
+    #[test]
+    fn shares() {
+        assert_eq!((parse_share("0"), parse_share("1e-6")), (Ok(0.0), Ok(1e-6)));
+        assert!(["nan", "-0.1", "x", ""].iter().all(|text| parse_share(text).is_err()));
     }
 
     #[test]

@@ -86,7 +86,11 @@ pub(crate) fn names(receiver: &Receiver) -> Vec<String> {
 /// The sampled rays of a plane or disc as a TM-25 file.
 fn sampled_rays(receiver: &ReceiverResult, rays: &[LightRay]) -> Tm25 {
     let flux = if receiver.unit == "lx" { Flux::Luminous } else { Flux::Radiant };
-    let mut file = Tm25::from_rays(rays, flux);
+    let total: f64 = rays.iter().map(|ray| ray.power).sum();
+    // A sample has its own chance: its rays are to carry what the receiver counted, which all rays of the run found.
+    let share = if total > 0.0 { receiver.power / total } else { 1.0 };
+    let rays: Vec<LightRay> = rays.iter().map(|ray| LightRay { power: ray.power * share, ..*ray }).collect();
+    let mut file = Tm25::from_rays(&rays, flux);
     file.header.descriptions[SOFTWARE] = concat!("lampyris ", env!("CARGO_PKG_VERSION")).into();
     file.header.descriptions[ADDITIONAL] =
         "a sample of the rays of a simulation where they met the receiver; each stands for many".into();
