@@ -3,7 +3,7 @@
 use crate::support::judge;
 use crate::support::trimmed::{chain, face};
 use lampyris::math::{Frame, Point, Uv};
-use lampyris::nurbs::{conic, sweep};
+use lampyris::nurbs::{Surface, conic, sweep};
 use lampyris::tessellate::{Settings, Tessellation, tessellate};
 use std::collections::HashSet;
 
@@ -239,4 +239,31 @@ fn the_rim_of_a_cone_is_divided_for_the_tolerance_of_its_apex() {
     // A chord of sag 0.05, the tight tolerance, spans 2 acos(1 - 0.05 / r).
     let sectors = wide / (2.0 * (1.0 - 0.05 / r).acos());
     assert!((made.report.facets as f64) < 2.0 * sectors, "{} facets, {sectors} sectors", made.report.facets);
+}
+
+/// A wall of height h(x), its edge below cut level: straight in space, bent as h in the parameter plane, where chords take in what lies below
+/// the cut. A facet may reach there as far as its tolerance.
+#[test]
+fn facets_keep_to_an_edge_that_is_straight_in_space() {
+    let (wide, depth, level) = (4.8, 4.0, -0.7);
+    let heights = [1.6, -0.9, 2.4, 0.2];
+    let rows = (0..)
+        .zip(heights)
+        .flat_map(|(i, h)| [h - depth, h].map(|z| Point::new(wide * f64::from(i) / 3.0, 0.0, z).extend(1.0)));
+    let knots = [vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0, 1.0]];
+    let wall = Surface { degree: [3, 1], knots, points: rows.collect() };
+    let top = |u: f64| wall.evaluate(Uv::new(u, 1.0)).z;
+    let cut = |u: f64| Uv::new(u, 1.0 - (top(u) - level) / depth);
+    let loops = vec![vec![
+        chain(64, cut),
+        chain(1, |f| cut(1.0).lerp(Uv::ONE, f)),
+        chain(64, |f| Uv::new(1.0 - f, 1.0)),
+        chain(1, |f| Uv::new(0.0, 1.0).lerp(cut(0.0), f)),
+    ]];
+    for tolerance in [0.2, 0.1, 0.05, 0.02, 0.01] {
+        let made = tessellate(&face(wall.clone(), &loops), &measured(tolerance));
+        assert_proved(&made);
+        let lowest = made.mesh.positions.iter().map(|p| p.z - level).fold(0.0, f64::min);
+        assert!(lowest >= -tolerance, "{lowest} at {tolerance}");
+    }
 }

@@ -5,6 +5,8 @@ use crate::math::{Point, Uv, Vector};
 use crate::model::EdgeUse;
 use crate::nurbs::{Curve, FundamentalForms};
 use crate::tessellate::face_surface::{CREASE, FaceSurface};
+use crate::tessellate::proof::border_chord::STRAIGHT_EDGE;
+use crate::tessellate::proof::flat_triangle::distance_to_chord;
 
 /// Share of the tolerance that chords of edges may take; the rest is left to rounding and to the proof's slack.
 const EDGE_SHARE: f64 = 0.96;
@@ -14,6 +16,8 @@ const FACET_REACH: f64 = 0.25;
 const CLOSED_CURVE: f64 = 1e-9;
 /// Tolerances by which the uv chord may leave the curve.
 const UV_SLACK: f64 = 2.0;
+/// The same where the chord of an edge that is straight in space runs outside of the face.
+const HOLLOW_SLACK: f64 = 1.0;
 /// Share of a chord's length by which it may leave the curve where no facet beside it is known to need more.
 const UV_SHARE: f64 = 0.02;
 /// The file's own gaps by which the uv chord may leave the curve further.
@@ -97,32 +101,46 @@ pub(super) fn divide_further(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: 
 }
 
 /// Adds parameters where the edge crosses creases, and where the straight line between two samples in the parameter plane of a face strays
-/// from the edge in space: by more than some tolerances and, at `denser` 0, a share of the chord. A gap that the file itself has between
-/// edge and surface is allowed on top: one of 9 mm once made 67,000 chords.
+/// from the edge in space: by more than some tolerances and, at `denser` 0, a share of the chord; by more than the tolerance where it runs
+/// outside of the face beside an edge that is straight in space, so that facets do. A gap that the file itself has between edge and surface is
+/// allowed on top: one of 9 mm once made 67,000 chords.
 fn follow_in_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32, mut t: Vec<f64>) -> Vec<f64> {
     cross_creases(curve, sides, &mut t);
     let at = |t: f64| curve.evaluate(t);
-    let slack = |s: &EdgeSide<'_, '_>| UV_SLACK * s.surface.field.tightest() / 4f64.powi(denser as i32);
+    let shorter = 0.25f64.powi(denser as i32);
+    let tightest = sides.iter().map(|s| s.surface.field.tightest()).fold(f64::INFINITY, f64::min);
     bisect_coarse(&mut t, |a, b| {
         let chord = [at(a), at(b)];
+        let is_straight = distance_to_chord(at(0.5 * (a + b)), &chord) <= STRAIGHT_EDGE * tightest;
         sides.iter().any(|s| {
             let (ua, ub) = (s.edge_use.uv.evaluate(a), s.edge_use.uv.evaluate(b));
             [0.25, 0.5, 0.75].iter().any(|&f| {
+                let t = a + (b - a) * f;
+                let curve_uv = s.edge_use.uv.evaluate(t);
+                // The face lies to the left: a curve on that side of its chord leaves a strip beside the face to the facets.
+                let hollow = is_straight
+                    && !s.surface.affine
+                    && ((ub - ua).perp_dot(curve_uv - ua) > 0.0) != s.edge_use.reversed;
+                let slack = if hollow { HOLLOW_SLACK } else { UV_SLACK } * s.surface.field.tightest() * shorter;
                 let on = s.surface.point(s.surface.spline.clamp(ua.lerp(ub, f)));
                 // At the same parameter it is usually close enough; only else is the nearest point looked for.
-                if (on - at(a + (b - a) * f)).length() <= slack(s) {
+                if (on - at(t)).length() <= slack {
                     return false;
                 }
                 let near = nearest_on(&at, a, b, on);
                 let off = (on - near).length();
                 // Chords in the parameter plane need not be closer than that as long as nothing fails for it; in
                 // denser rounds they must.
-                if off <= slack(s) || denser == 0 && off <= UV_SHARE * (chord[1] - chord[0]).length() {
+                let loose = denser == 0 && !hollow && off <= UV_SHARE * (chord[1] - chord[0]).length();
+                if off <= slack
+                    || loose
+                    || hollow
+                        && off <= HOLLOW_SLACK * s.surface.tolerance(s.surface.spline.clamp(curve_uv)) * shorter
+                {
                     return false;
                 }
-                let t = a + (b - a) * f;
-                let gap = (s.surface.point(s.surface.spline.clamp(s.edge_use.uv.evaluate(t))) - at(t)).length();
-                off > slack(s) + GAP_SLACK * gap
+                let gap = (s.surface.point(s.surface.spline.clamp(curve_uv)) - at(t)).length();
+                off > slack + GAP_SLACK * gap
             })
         })
     });

@@ -16,6 +16,9 @@ const NEGLIGIBLE: f64 = 1e-3;
 const GAP_PROBES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Share of the domain within which a uv curve is the straight line of its chord: rounding of its control points.
 const STRAIGHT: f64 = 1e-12;
+/// Share of the tolerance within which an edge is straight in space. Beside one that bends, the strip between it and its chord is about as wide
+/// as the chord's sag, which is held to the tolerance by itself.
+pub(in crate::tessellate) const STRAIGHT_EDGE: f64 = 0.1;
 /// Share of the surface's size that covers the rounding of points on it; see `prover.rs`.
 const ROUNDING: f64 = 1e-12;
 /// Share of the tolerance that is small for a curve's deviation: beyond it finer hulls are looked at.
@@ -31,7 +34,8 @@ pub(in crate::tessellate) type BorderChords = FxHashMap<[u32; 2], BorderChord>;
 #[derive(Clone, Debug, Default)]
 pub(in crate::tessellate) struct BorderChord {
     /// Bound of the distance between the edge's curve and the line of the chord, mm, with the offset of the chord's ends
-    /// from the surface.
+    /// from the surface; of an edge that is straight in space no less than how far its chord in the parameter plane runs
+    /// outside of the face.
     pub(in crate::tessellate) deviation: f64,
     /// The file's own gap between edge and face here, mm, which no shorter chord closes; included in `deviation`.
     pub(in crate::tessellate) gap: f64,
@@ -76,6 +80,9 @@ impl BorderChord {
         // On a plane the piece between curve and chord lies in the plane of the facet.
         if !surface.affine {
             chord.between = parameter_hull(surface, side, [a, b], uv);
+            if deviation <= STRAIGHT_EDGE * surface.field.tightest() {
+                chord.deviation = chord.deviation.max(overshoot(surface, &chord.between, uv) + offset);
+            }
         }
         chord
     }
@@ -163,6 +170,32 @@ fn curve_deviation(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f
         depths.extend([depth + 1, depth + 1]);
     }
     worst
+}
+
+/// Returns how far the surface over `hull`, around a curve and its `chord` in parameters, reaches beyond the curve, mm: facets that end at
+/// the chord do. 0 where the curve does not lie to the left of the chord, as the face does. How long lines across are is sampled, not proved.
+fn overshoot(surface: &FaceSurface<'_>, hull: &[Uv], chord: [Uv; 2]) -> f64 {
+    let d = chord[1] - chord[0];
+    let left = hull.iter().map(|&q| d.perp_dot(q - chord[0])).fold(0.0, f64::max);
+    if left <= STRAIGHT * d.length() * surface.extent().max_element() {
+        return 0.0;
+    }
+    // Across the chord on the surface: orthogonal to it in space, one mm long there.
+    let middle = surface.second_derivatives(0.5 * (chord[0] + chord[1]));
+    let along = middle.du * d.x + middle.dv * d.y;
+    let [e, f, g] = [middle.du.dot(middle.du), middle.du.dot(middle.dv), middle.dv.dot(middle.dv)];
+    let across = Uv::new(-(f * d.x + g * d.y), e * d.x + f * d.y) / (along.length() * (e * g - f * f).sqrt());
+    let height = left / d.perp_dot(across);
+    // At a pole nothing is across.
+    if !(height > 0.0 && height.is_finite()) {
+        return 0.0;
+    }
+    // Any place between lies on a line across from the chord to the curve: no farther from the curve than that is long.
+    let stretch = |&q: &Uv| {
+        let at = surface.second_derivatives(q);
+        (at.du * across.x + at.dv * across.y).length()
+    };
+    height * hull.iter().map(stretch).fold(1.0, f64::max)
 }
 
 /// Returns the convex hull, counter-clockwise, of the chord and the curve over `[a, b]` in the parameter plane; empty where the curve is
