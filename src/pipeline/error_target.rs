@@ -58,7 +58,7 @@ impl ErrorTarget {
     /// Parses `P%@RECEIVER` or `P%@RECEIVER:cells`.
     ///
     /// # Errors
-    /// When the text is neither, P is not above 0 and below 100, or the scene has no such receiver.
+    /// When the text is neither, P is not above 0 and below 100, the scene has no such receiver, or a source of it has `rays` of its own.
     pub fn new(text: &str, scene: &Scene) -> Result<Self, Error> {
         let about = |message: String| Error::setting("until_error", format!("{text}: {message}"));
         let form = || about("write P%@RECEIVER, as in 0.5%@wall or 3%@wall:cells".into());
@@ -75,6 +75,11 @@ impl ErrorTarget {
         if !names.contains(&receiver) {
             let error = about(format!("the scene has no receiver '{receiver}'"));
             return Err(error.help(suggest::closest_name("its receivers are", receiver, &names)));
+        }
+        // Rays of its own do not grow with the run: more would be asked for than are ever traced.
+        if scene.sources.iter().any(|s| s.rays.is_some()) {
+            let error = about("a source with `rays` of its own does not grow".into());
+            return Err(error.help("take `rays` out of the [[source]]s"));
         }
         Ok(Self { percent, receiver: receiver.into(), cells })
     }
@@ -163,6 +168,14 @@ mod tests {
         let missing = |found: Option<f64>| target.result_of(found, 100_000).missing_rays;
         assert_eq!((missing(Some(2.0)), missing(Some(1.0))), (340_000, 0));
         assert_eq!((missing(Some(1.000_1)), missing(None)), (15_000, 1_500_000));
+    }
+
+    #[test]
+    fn a_source_with_rays_of_its_own_has_no_error_to_reach() {
+        let text = "[[source]]\nkind = 'point'\nrays = 1000\n[[receiver]]\nname = 'wall'\nsize = [1, 1]\n";
+        let scene = Scene::parse(text, "s.toml", Path::new(".")).unwrap();
+        let error = ErrorTarget::new("1%@wall", &scene).unwrap_err();
+        assert!(error.to_string().contains("`rays` of its own"), "{error}");
     }
 
     #[test]

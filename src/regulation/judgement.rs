@@ -15,6 +15,15 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// Rises from pass to fail.
+    pub(super) fn severity(self) -> u8 {
+        match self {
+            Self::Pass => 0,
+            Self::Unsure => 1,
+            Self::Fail => 2,
+        }
+    }
+
     /// The verdict of requirements that must all be met: fail if one fails, else unsure if one is; pass without any.
     pub(super) fn all(verdicts: impl IntoIterator<Item = Self>) -> Self {
         // One failure decides; doubt counts only where nothing fails.

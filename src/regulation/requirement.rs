@@ -35,7 +35,7 @@ pub(super) struct Photometer<'a> {
     pub(super) tolerance_deg: f64,
 }
 
-/// Zones end here, degrees from the middle: what the texts leave open to 90° is behind the lamp's own rim.
+/// Zones and lines end here, degrees from the middle: what the texts leave open to 90° is behind the lamp's own rim.
 const MOST_DEG: f64 = 88.0;
 
 /// Directions within which a row may be met: rings of this many.
@@ -63,13 +63,14 @@ impl Photometer<'_> {
         directions
     }
 
-    /// Directions along a line, both ends included, at most half an opening apart; degrees of the table.
+    /// Directions along a line, both ends included, at most half an opening apart, degrees of the table; none beyond [`MOST_DEG`].
     fn line_directions(&self, from: [f64; 2], to: [f64; 2]) -> Vec<[f64; 2]> {
         let length = (to[0] - from[0]).hypot(to[1] - from[1]);
         // Half an opening apart, so that nothing bright lies between two of them unseen.
         let steps = (length / self.sensor.half_deg).ceil().max(1.0);
         let at = |k: f64| [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * k / steps);
-        (0..=steps as usize).map(|k| at(k as f64)).collect()
+        let held = |direction: &[f64; 2]| direction.iter().all(|angle| angle.abs() <= MOST_DEG);
+        (0..=steps as usize).map(|k| at(k as f64)).filter(held).collect()
     }
 
     /// Directions in a polygon, rim included, half an opening apart, that the far field holds, degrees of the table; and whether it holds
@@ -252,7 +253,20 @@ fn contains(polygon: &[[f64; 2]], p: [f64; 2]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::contains;
+    use super::*;
+
+    #[test]
+    fn a_line_to_the_side_lies_in_the_field_of_a_half_space() {
+        let edges =
+            |half: f64, cells: usize| (0..=cells).map(|k| half * (2.0 * k as f64 / cells as f64 - 1.0)).collect();
+        let map = IntensityMap::new(edges(90.0, 1800), edges(2.0, 40), vec![[0.0; 3]; 1800 * 40]).unwrap();
+        let aim = Aim::unchanged("test");
+        let sensor = Sensor { half_deg: 0.0745, round: false };
+        let photometer = Photometer { map: &map, aim: &aim, sensor, tolerance_deg: 0.0 };
+        let directions = photometer.line_directions([1.0, 1.5], [90.0, 1.5]);
+        assert!(directions.iter().all(|d| photometer.measure(*d).is_some()));
+        assert!(directions.last().unwrap()[0] > 87.9);
+    }
 
     #[test]
     fn a_polygon_holds_its_inside_and_its_rim() {

@@ -112,14 +112,11 @@ fn assess_aimed(
     if leaning {
         let groups: Vec<(Option<u32>, Option<Verdict>)> =
             rows.iter().filter(|r| r.row.kind == "group_sum").map(|r| (r.row.group, r.verdict)).collect();
-        for point in rows.iter_mut().filter(|r| r.row.kind == "point" && r.row.group.is_some()) {
+        let points = rows.iter_mut().filter(|r| r.row.kind == "point" && r.row.group.is_some());
+        for point in points.filter(|r| r.verdict.is_some_and(|own| own != Verdict::Pass)) {
             let group = groups.iter().find(|g| g.0 == point.row.group).and_then(|g| g.1);
-            point.verdict = match (point.verdict, group) {
-                (Some(Verdict::Pass), _) | (_, Some(Verdict::Pass)) => Some(Verdict::Pass),
-                // A group that is unsure may still save its point.
-                (Some(Verdict::Fail), Some(Verdict::Fail) | None) => Some(Verdict::Fail),
-                (own, _) => own.map(|_| Verdict::Unsure),
-            };
+            let judge = |row: &Row| judge_row(&photometer, regulation, assumptions, row);
+            *point = judge_leaning(&point.row, group, judge);
         }
     }
     // A group of points counts through its points.
@@ -133,6 +130,23 @@ fn assess_aimed(
         rows,
         verdict,
     }
+}
+
+/// Judges a point whose minimum its group may save; its maximum holds whatever the group reaches. `judge` judges a row by itself.
+fn judge_leaning(point: &Row, group: Option<Verdict>, judge: impl Fn(&Row) -> RowVerdict) -> RowVerdict {
+    let mut least = judge(&Row { max: None, ..point.clone() });
+    least.verdict = least.verdict.map(|own| match (own, group) {
+        (Verdict::Pass, _) | (_, Some(Verdict::Pass)) => Verdict::Pass,
+        (Verdict::Fail, Some(Verdict::Fail) | None) => Verdict::Fail,
+        // A group that is unsure may still save its point.
+        _ => Verdict::Unsure,
+    });
+    // What passes has nothing left to settle.
+    least.settles = least.settles.filter(|_| least.verdict != Some(Verdict::Pass));
+    let greatest = judge(&Row { min: None, ..point.clone() });
+    let severity = |judged: &RowVerdict| judged.verdict.map(Verdict::severity);
+    let worst = if severity(&greatest) > severity(&least) { greatest } else { least };
+    RowVerdict { row: point.clone(), ..worst }
 }
 
 /// Judges a row by itself, by its worst requirement; rows with conditions on use, and those that ask nothing measured, stay without a
@@ -153,11 +167,7 @@ fn judge_row(photometer: &Photometer, regulation: &Regulation, assumptions: &Ass
     let requirements = requirements(photometer, &regulation.rules, &asked, &regulation.function.rows);
     let judged: Vec<Judgement> = requirements.iter().map(|r| Judgement::of_requirement(photometer, r)).collect();
     // The requirement that speaks for the row: the worst one.
-    let worst = judged.iter().max_by_key(|j| match j.verdict {
-        Verdict::Fail => 2,
-        Verdict::Unsure => 1,
-        Verdict::Pass => 0,
-    });
+    let worst = judged.iter().max_by_key(|j| j.verdict.severity());
     let Some(worst) = worst else { return verdict };
     verdict.verdict = Some(worst.verdict);
     if let Some(decisive) = &worst.decisive {
@@ -317,6 +327,25 @@ mod tests {
             let judged = judge_row(&photometer, &regulation, &Assumptions::default(), &nowhere);
             assert_eq!(judged.verdict, Some(Verdict::Unsure), "{kind}");
         }
+    }
+
+    /// A tail lamp's group may stand for the least value of a point (2 cd at H-V), never for its greatest (18 cd).
+    #[test]
+    fn a_group_saves_a_minimum_and_no_maximum() {
+        let regulation = Regulation::find("FMVSS 108 tail-1").unwrap();
+        let verdicts = |intensity: &dyn Fn(f64, f64) -> f64| {
+            let (h, v) = (edges(22.0, 0.1), edges(12.0, 0.1));
+            let middle = |e: &[f64], k: usize| 0.5 * (e[k] + e[k + 1]);
+            let cells = (0..240 * 440).map(|k| intensity(middle(&h, k % 440), middle(&v, k / 440)));
+            let cells = cells.map(|i| [i, 1e-3 * i, 0.0]).collect();
+            let lamp = IntensityMap::new(h.clone(), v.clone(), cells).unwrap();
+            let assessment = assess(&lamp, &regulation, &Assumptions::default()).unwrap();
+            (row(&assessment, "H-V").verdict.unwrap(), assessment.verdict)
+        };
+        assert_eq!(verdicts(&|_, _| 5.0), (Verdict::Pass, Verdict::Pass));
+        assert_eq!(verdicts(&|h, v| if h.hypot(v) < 2.0 { 1.0 } else { 5.0 }), (Verdict::Pass, Verdict::Pass));
+        assert_eq!(verdicts(&|h, v| if h.hypot(v) < 2.0 { 100.0 } else { 5.0 }), (Verdict::Fail, Verdict::Fail));
+        assert_eq!(verdicts(&|_, _| 100.0), (Verdict::Fail, Verdict::Fail));
     }
 
     /// Ten thousand lamps whose true intensity lies within a few errors of a limit, read with a normal error: wrong verdicts stay

@@ -99,3 +99,13 @@ fn counting_by_face_changes_nothing_and_merges() {
     let merged = sum.unwrap().tallies;
     assert_eq!((&merged.entered, &merged.left), (&whole.tallies.entered, &whole.tallies.left));
 }
+
+/// Two points on one face name one face: a wall that takes all light takes 1 W of 1 W.
+#[test]
+fn a_face_that_two_points_name_absorbs_once() {
+    let mut world = World::default();
+    world.cuboid("wall", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 3.0));
+    let text = "[run]\nrays = 1000\n[[source]]\nkind = 'collimated'\nat = [0, 0, -10]\nradius = 5
+        [[receiver]]\nname = 'wall'\nkind = 'absorbed'\non = { at = [[0, 0, 0], [1, 0, 0]] }\n";
+    assert_eq!(world.run(text, |_| ()).receivers[0].power, 1.0);
+}

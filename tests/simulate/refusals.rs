@@ -88,6 +88,8 @@ fn what_means_nothing_is_refused_by_name() {
         (format!("{PLANE}h_deg = [-5, 5]"), "h_deg", 4),
         (format!("{PLANE}instance = 'x'"), "instance", 4),
         ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nsize = [1, 1]".into(), "size", 4),
+        ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nabsorbs = false".into(), "absorbs", 4),
+        ("[[receiver]]\nname = 'r'\nkind = 'absorbed'\npart = 'x'\ninteractions = 7".into(), "interactions", 5),
         (format!("{PLANE}cells = [4000, 4000]\nbins_nm = [400, 500, 600, 700]"), "cells", 4),
         ("[[model]]\nname = 'x'".into(), "file", 1),
         ("[[model]]\nfile = 'x.stp'\nplacement = { z = [0, 0, 0] }".into(), "z", 3),

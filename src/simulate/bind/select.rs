@@ -177,7 +177,10 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Res
     let receiver = &scene.receivers[index];
     if let Some(on) = &receiver.on {
         let base = [Key::Name("receiver"), Key::Index(index), Key::Name("on")];
-        let chosen = select_faces(scene, &base, on, model, &mut Nearest::new(model))?;
+        let mut chosen = select_faces(scene, &base, on, model, &mut Nearest::new(model))?;
+        // Two points on one face name it twice: what it absorbs counts once.
+        chosen.sort_unstable();
+        chosen.dedup();
         return Ok(chosen.into_iter().map(|f| f as u32).collect());
     }
     let rule = FaceSelector {

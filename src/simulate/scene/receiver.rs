@@ -165,7 +165,7 @@ impl Receiver {
         use ReceiverKind::{Absorbed, Disc, FarField, Plane, Sphere};
         let unset = Self::default();
         // One table for all kinds: a new key that is missing here would be ignored in silence.
-        let keys: [(&str, bool, &[ReceiverKind], &str); 14] = [
+        let keys: [(&str, bool, &[ReceiverKind], &str); 16] = [
             ("frame", self.frame.is_some(), &[Plane, Disc, Sphere, FarField], "plane, disc, sphere or far_field"),
             ("at", self.at != unset.at, &[Plane, Disc, Sphere], "plane, disc or sphere"),
             (
@@ -178,6 +178,13 @@ impl Receiver {
             ("up", self.up != unset.up, &[Sphere, FarField], "sphere or far_field"),
             ("size", self.size.is_some(), &[Plane], "plane"),
             ("radius", self.radius.is_some(), &[Disc, Sphere], "disc or sphere"),
+            ("absorbs", !self.absorbs, &[Plane, Disc, Sphere], "plane, disc or sphere"),
+            (
+                "interactions",
+                self.interactions.is_some(),
+                &[Plane, Disc, Sphere, FarField],
+                "plane, disc, sphere or far_field",
+            ),
             ("one_sided", self.one_sided, &[Plane, Disc], "plane or disc"),
             ("angles", self.angles != unset.angles, &[FarField], "far_field"),
             ("h_deg", self.h_deg != unset.h_deg, &[FarField], "far_field"),
