@@ -131,6 +131,31 @@ fn glass_in_contact_with_an_opaque_solid() {
     }
 }
 
+/// A black bar that covers only a strip along the rim of a glass, 0.2 mm of 6 or less: of a beam twice as wide, up to the rim, the bar takes
+/// the half, and all of one as wide as the strip; no light is lost.
+#[test]
+fn glass_that_an_opaque_solid_touches_along_a_narrow_strip() {
+    for (strip, z) in [(0.2, 2.25), (0.02, 2.25), (0.2, 2.2495)] {
+        let mut world = World::default();
+        world.cuboid("glass", Point::new(-3.0, -3.0, 0.0), Point::new(3.0, 3.0, 2.25));
+        world.cuboid("bar", Point::new(3.0 - strip, -5.0, z), Point::new(5.0, 5.0, 3.25));
+        let text = |width: f64| {
+            format!(
+                "[run]\nrays = 10_000\n{MEDIA}[[material]]\npart = 'glass'\nmedium = 'glass'
+                [[source]]\nkind = 'collimated'\nat = [{}, 0, 1]\nsize = [{width}, {width}]\n{FAR}",
+                3.0 - 0.5 * width
+            )
+        };
+        // What does not meet the bar goes up and down at right angles to both faces of the glass, beside the bar.
+        for share in [0.5, 1.0] {
+            let r = world.run(&text(strip / share), |_| ());
+            assert_eq!(r.lost_rays, 0, "strip {strip}, z {z}: {:?}", r.ledger.first());
+            let sigma = (share * (1.0 - share) / 10_000.0_f64).sqrt();
+            assert!((r.power.absorbed - share).abs() <= 4.0 * sigma, "strip {strip}, z {z}: {:?}", r.power);
+        }
+    }
+}
+
 /// A medium that is given to one face is that of the solid behind it.
 #[test]
 fn a_medium_fills_its_solid() {

@@ -63,9 +63,9 @@ const MOST_DISTANCES: usize = 50_000;
 /// Samples across a face in each parameter.
 const SAMPLES: usize = 5;
 
-/// Marks faces of bodies, and opaque faces without a medium (`opaque`), that lie on each other: a sample point of one is within the glue
-/// distance of the other. After [`MOST_DISTANCES`] questions, faces whose boxes meet are marked unasked. All `false` where either is
-/// missing.
+/// Marks faces of bodies, and opaque faces without a medium (`opaque`), that lie on each other: both are flat, in one plane, and their boxes
+/// meet, or a sample point of one is within the glue distance of the other. After [`MOST_DISTANCES`] questions, faces whose boxes meet are
+/// marked unasked. All `false` where either is missing.
 pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opaque: &[bool]) -> Vec<bool> {
     let mut on_opaque = vec![false; of_face.len()];
     // Nothing to find: no bodies, or nothing opaque.
@@ -90,19 +90,20 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opa
             if !mixed || (on_opaque[*a] && on_opaque[*b]) || box_a.intersection(*box_b).is_empty() {
                 continue;
             }
-            let mut touch = false;
+            // Flat faces are decided by their planes: a seat or a rim can be narrower than any samples are apart.
+            let mut touch = nearest.are_in_one_plane([*a, *b], box_a.intersection(*box_b), glue);
             // Both ways: the points of a large face may all miss a small one that lies on it.
             for (one, other, around) in [(*a, *b, box_b), (*b, *a, box_a)] {
+                if touch {
+                    break;
+                }
                 let points = samples[one].get_or_insert_with(|| inner_points(&placed[one]));
                 let near = around.grown(glue);
-                for p in points.iter().filter(|p| near.contains(**p)) {
+                touch = points.iter().filter(|p| near.contains(**p)).any(|p| {
                     distances += 1;
                     // Out of work, boxes decide: a face that is marked in vain costs time, one that is missed costs rays.
-                    touch |= distances > MOST_DISTANCES || nearest.is_within(other, *p, glue);
-                    if touch {
-                        break;
-                    }
-                }
+                    distances > MOST_DISTANCES || nearest.is_within(other, *p, glue)
+                });
             }
             if touch {
                 (on_opaque[*a], on_opaque[*b]) = (true, true);

@@ -51,6 +51,10 @@ impl Slab {
 /// Share of its distance that a rounded box may lie too far away.
 const BOX_ROUNDING: f64 = 1e-9;
 
+/// Cosine above which two planes count as parallel: 8°. Planes at a larger angle are within a distance of each other on a strip 7 times as
+/// wide at most, which is an edge and no contact.
+const PARALLEL: f64 = 0.99;
+
 impl<'a> Nearest<'a> {
     pub(super) fn new(model: &'a Model) -> Self {
         let faces: Vec<_> = model.placed_faces().collect();
@@ -96,6 +100,32 @@ impl<'a> Nearest<'a> {
             }
         }
         self.distance(index, p) <= limit
+    }
+
+    /// Whether both placed faces are flat to within `limit`, mm, parallel, and no farther than `limit` apart somewhere in a box, trims left out.
+    pub(super) fn are_in_one_plane(&mut self, faces: [usize; 2], around: Aabb, limit: f64) -> bool {
+        let [Some((a, normal_a)), Some((b, normal_b))] = faces.map(|f| self.plane(f, limit)) else { return false };
+        let cosine = normal_a.dot(normal_b);
+        if cosine.abs() < PARALLEL {
+            return false;
+        }
+        // From the one plane to the other: linear in the point, so that the corners have the extremes.
+        let apart = |p: Point| (p - a).dot(normal_a) - cosine.signum() * (p - b).dot(normal_b);
+        let [low, high] = (around.corners().into_iter().map(apart))
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], d| [low.min(d), high.max(d)]);
+        let reach = limit + BOX_ROUNDING * (a.length() + b.length());
+        low <= reach && high >= -reach
+    }
+
+    /// Returns a point of the plane of a placed face, in scene coordinates, and its normal; `None` where the face is not flat to `limit`, mm.
+    fn plane(&mut self, index: usize, limit: f64) -> Option<(Point, Vector)> {
+        let placed = self.faces[index];
+        let face = placed.face?;
+        let slab = *self.slabs[index].get_or_insert_with(|| Slab::new(&face.surface));
+        let [low, high] = slab.range;
+        let is_flat = slab.normal != Vector::ZERO && (high - low) * placed.placement.scale <= limit;
+        let middle = slab.normal * (0.5 * (low + high));
+        is_flat.then(|| (placed.placement.point(middle), placed.placement.direction(slab.normal)))
     }
 
     /// Returns the distance from a point to a placed face, mm; infinite for a face that has neither a surface nor facets.
