@@ -4,7 +4,7 @@ use super::cover::Cover;
 use super::stream::{RayIndex, Stream};
 use crate::math::{FaceId, Frame, Point, Uv, Vector};
 use crate::model::{Face, Model};
-use crate::simulate::trim_loops::{is_inside, trim_polygons};
+use crate::simulate::trim_loops::TrimRegion;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -28,13 +28,13 @@ pub(crate) struct Area {
     sums: Vec<f64>,
 }
 
-/// A face that emits, at its place, with its trims as polygons.
+/// A face that emits, at its place.
 #[derive(Clone, Debug)]
 struct LuminousFace {
     id: FaceId,
     face: Face,
     placement: Frame,
-    loops: Vec<Vec<Uv>>,
+    region: TrimRegion,
     /// Bound of `|Su × Sv|` in each cell.
     bounds: Vec<f64>,
     /// Opaque faces that may lie against it.
@@ -84,7 +84,7 @@ impl LuminousFace {
         for k in 0..CELLS * CELLS {
             let [corner, size] = self.cell(k);
             let uv = corner + size * 0.5;
-            if is_inside(&self.loops, uv) {
+            if self.region.contains(uv) {
                 let element = self.area_element(uv) * size.x * size.y;
                 area.whole += element;
                 area.free += if self.is_free(uv) { element } else { 0.0 };
@@ -104,10 +104,10 @@ impl Area {
         for f in model.placed_faces().filter(|f| chosen.contains(&f.id.index())) {
             // Ready meshes have no spline to draw points on.
             let Some(face) = f.face else { continue };
-            let (id, placement, loops) = (f.id, *f.placement, trim_polygons(face));
+            let (id, placement, region) = (f.id, *f.placement, TrimRegion::new(face));
             let covers = covers.get(&id.index()).cloned().unwrap_or_default();
             let mut luminous =
-                LuminousFace { id, face: face.clone(), placement, loops, bounds: Vec::new(), covers };
+                LuminousFace { id, face: face.clone(), placement, region, bounds: Vec::new(), covers };
             for k in 0..CELLS * CELLS {
                 let [low, size] = luminous.cell(k);
                 let samples = (0..9).map(|i| Uv::new((i / 3) as f64, (i % 3) as f64) * 0.5);
@@ -149,7 +149,7 @@ impl Area {
             let [keep, _] = stream.random(index, 2 * attempt + 11);
             let bound = luminous.bounds[cell % (CELLS * CELLS)];
             // Rejection makes uniform in parameters into uniform in area.
-            let accepted = is_inside(&luminous.loops, uv) && keep * bound <= luminous.area_element(uv);
+            let accepted = luminous.region.contains(uv) && keep * bound <= luminous.area_element(uv);
             if accepted && luminous.is_free(uv) {
                 break;
             }
