@@ -10,6 +10,7 @@ use crate::model::Model;
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::default_accuracy::{self, Chosen, PilotSource, TimedFacets, Undecided};
 use crate::tessellate::{self, GroupedFacets};
+use std::cell::OnceCell;
 use std::slice;
 use std::sync::Arc;
 
@@ -33,7 +34,9 @@ struct Source<'a> {
     made: &'a GroupedFacets,
     /// All of the mesher but the tolerance.
     mesher: &'a tessellate::Settings,
-    exact: Box<dyn Intersector + 'a>,
+    /// The true surface of each group, built when first asked for.
+    surfaces: &'a dyn Fn() -> &'a [Arc<TrueSurface>],
+    exact: OnceCell<Box<dyn Intersector + 'a>>,
 }
 
 impl PilotSource for Source<'_> {
@@ -54,21 +57,23 @@ impl PilotSource for Source<'_> {
     }
 
     fn exact(&self) -> &dyn Intersector {
-        &*self.exact
+        // Flat faces and short runs are judged without a ray, and need no spline.
+        &**self.exact.get_or_init(|| true_intersector(self.made.instancing.as_deref(), (self.surfaces)()))
     }
 }
 
 /// Chooses for a run whose facets of the default tolerance are made; with facets finer than these, where such are taken.
-pub(super) fn choose(
-    (model, surfaces): (&Model, &[Arc<TrueSurface>]),
-    bound: &BoundScene,
-    run: &RunSettings,
-    (facets, mesher): (&GroupedFacets, &tessellate::Settings),
+/// `surfaces` builds the true surface of each group, and is asked only where a pilot is traced.
+pub(super) fn choose<'a>(
+    (model, surfaces): (&'a Model, &'a dyn Fn() -> &'a [Arc<TrueSurface>]),
+    bound: &'a BoundScene,
+    run: &'a RunSettings,
+    (facets, mesher): (&'a GroupedFacets, &'a tessellate::Settings),
     monitor: &dyn Monitor,
 ) -> (Chosen, Option<TimedFacets>) {
     let instancing = facets.instancing.as_deref();
     let models = instancing.map_or(slice::from_ref(model), |i| &i.groups);
-    let source = Source { model, made: facets, mesher, exact: true_intersector(instancing, surfaces) };
+    let source = Source { model, made: facets, mesher, surfaces, exact: OnceCell::new() };
     in_stage(monitor, Stage::Choosing, || {
         let tolerance = mesher.tolerance;
         default_accuracy::choose(&Undecided { models, bound, run, source: &source, facets, tolerance })

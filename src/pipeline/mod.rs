@@ -26,6 +26,7 @@ mod cross_check;
 mod default_accuracy;
 mod error;
 mod error_target;
+mod expected_facets;
 mod facets;
 mod fingerprint;
 mod intersectors;

@@ -3,6 +3,7 @@
 use super::cache::{Cache, CachedFacets, facets_key, group_keys};
 use super::default_accuracy;
 use super::error::Error;
+use super::expected_facets::expected_facets;
 use super::facets::{mesh_settings, tessellate_groups};
 use super::fingerprint::run_fingerprint;
 use super::intersectors::{self, IntersectorChoice, TrueSurface};
@@ -26,6 +27,9 @@ use std::ops::Range;
 use std::slice;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
+
+/// Facets that are made before it is chosen how to trace: a second or two. Far more of them cost more than the spline does.
+const MOST_BEFORE_CHOICE: f64 = 1e5;
 
 /// Ray paths kept for pictures.
 const RECORDED_PATHS: u64 = 2000;
@@ -192,12 +196,26 @@ impl PreparedScene {
             prepared.take_choice(chosen, monitor);
             prepared.make_facets(instancing.as_ref(), monitor);
         } else {
+            let excess = if is_open { prepared.bound_facets(instancing.as_deref()) } else { None };
             prepared.make_facets(instancing.as_ref(), monitor);
             if is_open {
-                prepared.choose_accuracy(monitor);
+                prepared.choose_accuracy(excess, monitor);
             }
         }
         Ok(prepared)
+    }
+
+    /// Makes the tolerance of the settings as much coarser as leaves [`MOST_BEFORE_CHOICE`] facets; returns how many the default would take,
+    /// `None`, and nothing changed, where these are not too many.
+    fn bound_facets(&mut self, instancing: Option<&Instancing>) -> Option<f64> {
+        let [_, loosest] = self.mesh_settings.tolerance;
+        let models = instancing.map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups);
+        let expected: f64 = models.iter().map(|model| expected_facets(model, loosest)).sum();
+        let factor = expected / MOST_BEFORE_CHOICE;
+        (factor > 1.0).then(|| {
+            self.mesh_settings.tolerance = self.mesh_settings.tolerance.map(|t| t * factor);
+            expected
+        })
     }
 
     /// Makes the facets of the settings.
@@ -249,12 +267,18 @@ impl PreparedScene {
     }
 
     /// Chooses the facets or the spline that a pilot finds sufficient, and keeps the choice in the cache. May put finer facets in place of
-    /// those that were made.
-    fn choose_accuracy(&mut self, monitor: &dyn Monitor) {
+    /// those that were made. `excess` is how many of the default tolerance were too many to be tried.
+    fn choose_accuracy(&mut self, excess: Option<f64>, monitor: &dyn Monitor) {
         let run = RunSettings { sequences: false, ..self.run_settings() };
-        let model = (&self.job.loaded.model, &*self.true_surfaces());
+        let surfaces = || self.true_surfaces();
         let facets = (&self.facets, &self.mesh_settings);
-        let (chosen, finer) = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
+        let model = (&self.job.loaded.model, &surfaces as &dyn Fn() -> _);
+        let (mut chosen, finer) = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
+        if let Some(expected) = excess {
+            chosen.because += &format!(
+                "; facets of 0.05 to 0.2 mm would be some {expected:.1e}, so that coarser ones were tried"
+            );
+        }
         // Named by the run before it is decided: that is what others know when they ask.
         if let (Some(cache), Ok(undecided)) = (&self.job.cache, self.fingerprint())
             && chosen.pilot_rays > 0
@@ -274,15 +298,16 @@ impl PreparedScene {
     }
 
     /// Returns the true surface of each group, built when first asked for.
-    fn true_surfaces(&self) -> Vec<Arc<TrueSurface>> {
-        self.surfaces.get_or_init(|| self.build_surfaces(&exact::Settings::default())).clone()
+    fn true_surfaces(&self) -> &[Arc<TrueSurface>] {
+        self.surfaces.get_or_init(|| self.build_surfaces(&exact::Settings::default()))
     }
 
     /// Returns true surfaces for some thousands of rays: those of pilot or run, else ones that are built sooner and not kept.
     pub(super) fn surfaces_for_few_rays(&self) -> Vec<Arc<TrueSurface>> {
-        // Those of the pilot too where another process had it: the last digits of the check are then the same.
-        if self.chosen.is_some() {
-            return self.true_surfaces();
+        // Those of the pilot too where another process had it: the last digits of the check are then the same. On faces that are flat
+        // there is no pilot.
+        if self.chosen.as_ref().is_some_and(|c| c.pilot_rays > 0 || c.intersector == "exact") {
+            return self.true_surfaces().to_vec();
         }
         self.surfaces.get().cloned().unwrap_or_else(|| self.build_surfaces(&exact::Settings::for_few_rays()))
     }
@@ -339,7 +364,7 @@ impl PreparedScene {
             }
             None => Octree::build(meshes[group], settings),
         };
-        let builders = intersectors::Builders { octree: &octree, surfaces: &|| self.true_surfaces() };
+        let builders = intersectors::Builders { octree: &octree, surfaces: &|| self.true_surfaces().to_vec() };
         let facets = (meshes.as_slice(), self.facets.instancing.as_deref());
         intersectors::with_built_intersector(self.choice, builders, facets, monitor, |intersector, footprint| {
             work(intersector, footprint.build_seconds)

@@ -97,6 +97,12 @@ impl SceneResults {
         if let Some(check) = &self.check {
             document["check"] = serde_json::to_value(check)?;
         }
+        // Light that did not come has no place: 0 would be one.
+        for (k, _) in self.results.receivers.iter().enumerate().filter(|(_, r)| r.power == 0.0) {
+            for key in ["centroid", "centroid_error", "rms", "rms_error"] {
+                document["receivers"][k][key] = Value::Null;
+            }
+        }
         for (k, figures) in self.figures(prepared).iter().enumerate() {
             document["receivers"][k]["figures"] = serde_json::to_value(figures)?;
         }

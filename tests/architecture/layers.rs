@@ -118,6 +118,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "monitor",
             "loading",
             "cache",
+            "expected_facets",
             "facets",
             "intersectors",
             "fingerprint",

@@ -349,3 +349,24 @@ fn faces_are_listed_with_their_power() {
     let document: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(document["faces"]["first"][0]["left_geometric"], document["power"]["lost"]);
 }
+
+/// Light that did not come has no place: neither 0 nor any other.
+#[test]
+fn a_receiver_without_light_has_no_centroid() {
+    let collimated = |receivers: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let text = format!("[run]\nrays = 2000\n[[source]]\nkind = 'collimated'\n{receivers}");
+        std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+        let args = ["trace", "scene.toml", "-o", "out", "--json", "--no-report"];
+        let (code, text, err) = lampyris_in(folder.path(), &args);
+        assert_eq!(code, 0, "{err}");
+        serde_json::from_str::<Value>(&text).unwrap()
+    };
+    let plane =
+        |z: f64| format!("[[receiver]]\nname = 'at {z}'\nat = [0, 0, {z}]\nsize = [4, 4]\ncells = [2, 2]\n");
+    let found = collimated(&(plane(9.0) + &plane(-9.0)));
+    for key in ["centroid", "centroid_error", "rms", "rms_error"] {
+        assert!(found["receivers"][0][key].is_array(), "{key}");
+        assert!(found["receivers"][1][key].is_null(), "{key}");
+    }
+}
