@@ -73,7 +73,9 @@ fn lost_rays_are_written_down_and_can_be_traced_again() {
     assert!(folder.path().join("again/replay.vtp").is_file());
     let (code, out, err) =
         lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "again", "--replay", rows[0][0]]);
-    assert!(code == 0 && out.contains("lost: no exit"), "{out}{err}");
+    // Light that comes in by the opening meets a face from inside, in a medium that it never entered.
+    assert_eq!(rows[0][3], "impossible_medium");
+    assert!(code == 0 && out.contains("lost: impossible medium"), "{out}{err}");
     for (wrong, code, says) in
         [("99999999", 2, "20000 rays"), ("gone.csv", 3, "gone.csv"), ("scene.toml", 3, "not a ledger")]
     {
