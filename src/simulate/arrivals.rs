@@ -10,11 +10,14 @@ use crate::math::Ray;
 const ROUNDING: f64 = 1e-9;
 
 /// Returns one ray for each time a recorded path crossed a plane or sphere that counts it: the point (mm, scene coordinates), the
-/// direction, and a power scaled so that the sum over all recorded paths is what the run emitted: an estimate of what the receiver counted.
+/// direction, and a power scaled so that the sum over all recorded paths is what the run emitted: an estimate of what the receiver counted. Of
+/// a receiver that lets light pass the sum is what it counted.
 ///
 /// `wavelength_nm` is never set. Empty for a number without a receiver, a far field or faces, and for results without recorded paths.
 pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<LightRay> {
-    let Some(receiver) = bound.receivers.get(receiver) else { return Vec::new() };
+    let Some((receiver, counted)) = bound.receivers.get(receiver).zip(results.receivers.get(receiver)) else {
+        return Vec::new();
+    };
     let emitted: f64 = results.paths.iter().filter(|v| v.event == Event::Emitted).map(|v| v.power).sum();
     // The sample stands for all: what its paths emitted, scaled to what the run did.
     let share = results.power.emitted / emitted.max(f64::MIN_POSITIVE);
@@ -31,7 +34,7 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
             {
                 continue;
             }
-            // A receiver that lets light pass counts it before the medium and the next face take their part.
+            // A receiver that lets light pass counts it before the next face takes its part.
             let power = if receiver.absorbs { b.power } else { a.power } * share;
             let (ray, end) = (Ray::new(a.point, direction), segment_end(a, b, receiver.absorbs));
             let mut after = 0.0;
@@ -41,6 +44,11 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
                 after = t;
             }
         }
+    }
+    // What a medium takes up to the receiver no vertex tells: the sum is that of the receiver, where it was counted.
+    let sum: f64 = rays.iter().map(|ray| ray.power).sum();
+    if !receiver.absorbs && sum > 0.0 {
+        rays.iter_mut().for_each(|ray| ray.power *= counted.power / sum);
     }
     rays
 }

@@ -94,6 +94,26 @@ fn beers_law() {
     assert!((bulk.power - 0.96 * (1.0 - (-0.3f64).exp())).abs() < 1e-9);
 }
 
+/// A plane that lets light pass counts what has come so far: exp(−α z) in fog, not what the segment began with.
+#[test]
+fn a_receiver_in_an_absorbing_medium_counts_what_arrives() {
+    let passed = |z: f64| plane(&format!("passed_{z}"), [0.0, 0.0, z], 20.0) + "absorbs = false\n";
+    let text = [
+        "ambient = 'fog'\n[run]\nrays = 1000\n",
+        "[[medium]]\nname = 'fog'\nindex = 1\nabsorption_per_mm = 0.01\n",
+        &collimated([0.0; 3], [0.0, 0.0, 1.0], 2.0),
+        &passed(30.0),
+        &passed(100.0),
+        &plane("end", [0.0, 0.0, 200.0], 20.0),
+    ]
+    .concat();
+    let r = World::default().run(&text, |_| ());
+    for (receiver, expected) in r.receivers.iter().zip([-0.3f64, -1.0, -2.0].map(f64::exp)) {
+        // In whole quanta: 5e-13 of a ray.
+        assert!((receiver.power - expected).abs() < 1e-11, "{}: {}", receiver.name, receiver.power);
+    }
+}
+
 /// A bar of 1 × 1 × 10 000 mm, rays at 45° to its walls: 10 000 total reflections, nothing lost.
 #[test]
 fn a_light_guide_of_ten_thousand_reflections_loses_nothing() {

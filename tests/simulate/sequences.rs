@@ -161,5 +161,8 @@ fn arrivals_at_a_passing_receiver_have_the_power_that_it_counted() {
             let arrived: f64 = arrivals(&bound, k, &results).iter().map(|ray| ray.power).sum();
             assert!((arrived / receiver.power - 1.0).abs() < 1e-9, "{} {interfaces}: {arrived}", receiver.name);
         }
+        // Before the glass nothing was absorbed yet: a ray of the source is the thousandth part of its watt.
+        let strongest = arrivals(&bound, 0, &results).iter().map(|ray| ray.power).fold(0.0, f64::max);
+        assert!((strongest - 1e-3).abs() < 1e-12, "{interfaces}: {strongest}");
     }
 }

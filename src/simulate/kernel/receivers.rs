@@ -5,7 +5,7 @@ use super::path::{NO_RECEIVER, Path, SCATTERS};
 use super::payload::RayPayload;
 use super::receiver_index::Candidates;
 use super::tolerances::{LONGEST_SEGMENT, rounding};
-use super::tracer::Tracer;
+use super::tracer::{Tracer, remaining_quanta};
 use crate::intersect::Hit;
 use crate::math::{Point, Ray};
 use crate::simulate::random::Purpose;
@@ -77,9 +77,11 @@ pub(super) fn clip_outside<'h, C: RayPayload>(
 }
 
 impl<C: RayPayload> Tracer<'_, '_, C> {
-    /// Counts the light on receivers that let it pass, on its way to `end`, mm; a sphere may count it twice.
-    pub(super) fn count_passing(&mut self, path: &Path<C>, ray: &Ray, end: f64) {
+    /// Counts the light on receivers that let it pass, on its way to `end`, mm, as what a body of this absorption, 1/mm, leaves of it up to
+    /// there; a sphere may count it twice.
+    pub(super) fn count_passing(&mut self, path: &Path<C>, ray: &Ray, end: f64, absorption: f64) {
         let context = self.context;
+        let length = end;
         // A receiver that lies in a face is crossed on the way to the face, not on the way from it.
         let start = ray.t_min + in_front(ray, 0.0);
         let end = end + in_front(ray, end.min(LONGEST_SEGMENT));
@@ -88,22 +90,25 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             // A sphere may be crossed twice.
             let mut passed = start;
             while let Some(t) = context.bound.receivers[r as usize].crossing(ray, passed, end) {
-                self.count_at(path, r, ray.point_at(t));
+                // No more than the body takes on the whole segment: a receiver in its end is met a rounding later.
+                let arriving = remaining_quanta(path.quanta, absorption, t.min(length));
+                self.count_at(path, arriving, r, ray.point_at(t));
                 passed = t;
             }
         }
     }
 
-    /// Counts light that meets receiver `r`, a plane or sphere, at a point; not after another number of bounces than the receiver asks for.
+    /// Counts so many quanta of a path that meets receiver `r`, a plane or sphere, at a point; not after another number of bounces than the
+    /// receiver asks for.
     #[inline(always)]
-    pub(super) fn count_at(&mut self, path: &Path<C>, r: u32, point: Point) {
+    pub(super) fn count_at(&mut self, path: &Path<C>, quanta: f64, r: u32, point: Point) {
         let receiver = &self.context.bound.receivers[r as usize];
         // Receivers that count light after so many bounces only.
         if !C::ENDS_ONLY && receiver.interactions.is_some_and(|n| n != path.bounce) {
             return;
         }
         if let Some(spot) = receiver.spot(point) {
-            self.deposit(receiver, path, r, &spot);
+            self.deposit(receiver, path, quanta, r, &spot);
         }
     }
 
@@ -118,32 +123,32 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             if let Some(spot) = receiver.direction(ray.direction) {
                 received = true;
                 if C::ENDS_ONLY || receiver.interactions.is_none_or(|n| n == path.bounce) {
-                    self.deposit(receiver, path, r, &spot);
+                    self.deposit(receiver, path, path.quanta, r, &spot);
                 }
             }
         }
         received
     }
 
-    /// Adds a path's power to receiver `r` at a spot: to its cell, its total, its moments and its channels.
+    /// Adds so many quanta of a path to receiver `r` at a spot: to its cell, its total, its moments and its channels.
     #[inline(always)]
-    fn deposit(&mut self, receiver: &Receiver, path: &Path<C>, r: u32, spot: &Spot) {
+    fn deposit(&mut self, receiver: &Receiver, path: &Path<C>, quanta: f64, r: u32, spot: &Spot) {
         let r = r as usize;
         let tally = &mut *self.tally;
         // Cells are added up later, in order; the total is a whole number of quanta, for which order does not
         // matter.
-        tally.receivers[r].add_deferred(spot.cell, path.quanta);
-        tally.receiver_totals[r] += quanta_as_integer(path.quanta);
-        tally.moments[r].add(path.quanta, spot.at, spot.radius2);
+        tally.receivers[r].add_deferred(spot.cell, quanta);
+        tally.receiver_totals[r] += quanta_as_integer(quanta);
+        tally.moments[r].add(quanta, spot.at, spot.radius2);
         if !C::ENDS_ONLY {
-            self.note_deposit(path, DepositPlace::Receiver(r as u32), quanta_as_integer(path.quanta));
+            self.note_deposit(path, DepositPlace::Receiver(r as u32), quanta_as_integer(quanta));
         }
         let tally = &mut *self.tally;
         if !C::ENDS_ONLY && receiver.channels.count() > 0 {
             let cells = receiver.cell_count();
             let nm = path.payload.wavelength().unwrap_or(self.context.bound.light.wavelength);
             receiver.channels.weigh(nm, |channel, weight| {
-                tally.receivers[r].add((channel + 1) * cells + spot.cell, round_quanta(path.quanta * weight));
+                tally.receivers[r].add((channel + 1) * cells + spot.cell, round_quanta(quanta * weight));
             });
         }
     }

@@ -75,12 +75,14 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     /// endless segment is absorbed in the surroundings alone.
     #[inline(always)]
     fn cover_segment(&mut self, path: &mut Path<C>, ray: &Ray, end: f64) {
-        if !C::ENDS_ONLY && !self.context.passing.is_empty() {
-            self.count_passing(path, ray, end);
-        }
         // Endless segments end in the surroundings; of a body they would take all light that only missed a face by
         // an error.
-        if C::MEDIA && (end.is_finite() || path.payload.body() == AMBIENT) {
+        let absorbed = C::MEDIA && (end.is_finite() || path.payload.body() == AMBIENT);
+        if !C::ENDS_ONLY && !self.context.passing.is_empty() {
+            let absorption = if absorbed { self.absorption(path) } else { 0.0 };
+            self.count_passing(path, ray, end, absorption);
+        }
+        if absorbed {
             self.absorb_in_body(path, end);
         }
     }
@@ -318,7 +320,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             }
             self.record(path, point, Event::Received, None);
             self.tally.ends.received += quanta_as_integer(path.quanta);
-            self.count_at(path, path.receiver, point);
+            self.count_at(path, path.quanta, path.receiver, point);
             return;
         }
         if C::MEDIA && path.payload.body() != AMBIENT {

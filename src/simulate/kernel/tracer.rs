@@ -17,6 +17,13 @@ pub(super) struct Tracer<'t, 'a, C> {
     pub(super) pending: Vec<(Path<C>, Ray)>,
 }
 
+/// Returns what so many quanta are after `length`, mm, of an absorption, 1/mm (Beer's law), in whole quanta: what is kept and what is taken
+/// add up. All of them where nothing absorbs.
+#[inline(always)]
+pub(super) fn remaining_quanta(quanta: f64, absorption: f64, length: f64) -> f64 {
+    if absorption > 0.0 { round_quanta(quanta * (-absorption * length).exp()) } else { quanta }
+}
+
 impl<C: RayPayload> Tracer<'_, '_, C> {
     /// Adds a vertex to the tally if the path of this ray is recorded; `face` is `None` where it is at none.
     #[inline(always)]
@@ -49,17 +56,21 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
+    /// Returns the absorption of the body that a path is in, at its wavelength, 1/mm.
+    #[inline(always)]
+    pub(super) fn absorption(&self, path: &Path<C>) -> f64 {
+        self.context.bound.bodies[path.payload.body() as usize].absorption(path.payload.wavelength())
+    }
+
     /// Takes from a path, and books, what its body absorbs over `length`, mm (Beer's law), in whole quanta; nothing in a clear body.
     #[inline(always)]
     pub(super) fn absorb_in_body(&mut self, path: &mut Path<C>, length: f64) {
-        let body = path.payload.body();
-        let alpha = self.context.bound.bodies[body as usize].absorption(path.payload.wavelength());
+        let alpha = self.absorption(path);
         if alpha > 0.0 {
-            // Rounded to whole quanta: what is kept and what is taken add up.
-            let kept = round_quanta(path.quanta * (-alpha * length).exp());
+            let kept = remaining_quanta(path.quanta, alpha, length);
             let taken = path.quanta - kept;
             self.tally.ends.absorbed += quanta_as_integer(taken);
-            self.tally.bulk.add(body as usize, taken);
+            self.tally.bulk.add(path.payload.body() as usize, taken);
             path.quanta = kept;
         }
     }
