@@ -26,7 +26,16 @@ pub struct AgfGlass {
 /// Micrometres to nanometres.
 const NM_PER_UM: f64 = 1e3;
 
+/// Wavelengths are stated in steps of a millionth of a nanometre: what is left of the conversion from decimals is rounded away.
+const STEPS_PER_NM: f64 = 1e6;
+
 impl AgfGlass {
+    /// Returns the wavelengths that the formula holds for, nm; `None` where the file does not say, or states an empty range.
+    pub fn range_nm(&self) -> Option<[f64; 2]> {
+        let range = self.range_um?.map(|um| (um * NM_PER_UM * STEPS_PER_NM).round() / STEPS_PER_NM);
+        (range[0] < range[1]).then_some(range)
+    }
+
     /// Absorption coefficients by wavelength, `[nm, 1/mm]`, wavelengths rising: Beer's law solved for them. Transmittances of 0, which
     /// would be an infinite coefficient, are left out; above 1 they count as 1, and of a wavelength that comes twice the first counts.
     pub fn absorption(&self) -> Vec<[f64; 2]> {

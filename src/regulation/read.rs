@@ -30,8 +30,12 @@ impl IntensityMap {
         let h = needed(place(&|n| n == "H_deg"), "H_deg")?;
         let v = needed(place(&|n| n == "V_deg"), "V_deg")?;
         let intensity = needed(place(&|n| n.ends_with("_cd")), "in cd")?;
-        let statistical = needed(place(&|n| STATISTICAL.contains(&n)), "of standard errors")?;
-        let geometric = place(&|n| n == GEOMETRIC);
+        // Of a run in watts the intensity is a channel, with errors of its own beside those of the power.
+        let own = |error: &str| place(&|n| n.strip_prefix(names[intensity]).is_some_and(|rest| rest == error));
+        let of_channel = own("_standard_error");
+        let statistical = of_channel.or_else(|| place(&|n| STATISTICAL.contains(&n)));
+        let statistical = needed(statistical, "of standard errors")?;
+        let geometric = if of_channel.is_some() { own("_geometric") } else { place(&|n| n == GEOMETRIC) };
 
         let mut cells: BTreeMap<(i64, i64), [f64; 3]> = BTreeMap::new();
         let [mut columns, mut rows] = [BTreeMap::new(), BTreeMap::new()];
@@ -97,6 +101,19 @@ mod tests {
         let error =
             floor.read(&floor.measure(Sensor { half_deg: 0.04, round: false }, -0.05, -0.05).unwrap()).statistical;
         assert!((error - 1e-6 / 0.1f64.to_radians().powi(2)).abs() < 1e-3, "{error}");
+    }
+
+    #[test]
+    fn a_channel_is_read_with_its_own_errors() {
+        let header = "H_deg,V_deg,radiant_intensity_W_per_sr,standard_error,luminous_intensity_cd,\
+                      luminous_intensity_cd_standard_error,statistical,geometric,luminous_intensity_cd_geometric\n";
+        let cells = ["0,0", "1,0", "0,1", "1,1"].map(|at| format!("{at},0.5,0.05,300,30,0.05,0.01,6\n")).concat();
+        let map = IntensityMap::from_csv(&format!("{header}{cells}"), None).unwrap();
+        let read = map.read(&map.measure(Sensor { half_deg: 0.2, round: false }, 0.0, 0.0).unwrap());
+        // One cell alone: its weight is 1 to rounding.
+        for (found, expected) in [(read.value, 300.0), (read.statistical, 30.0), (read.geometric, 6.0)] {
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
     }
 
     #[test]

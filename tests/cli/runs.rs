@@ -31,25 +31,10 @@ fn opened(model: String) -> String {
     model[..list].to_owned() + &model[rest..]
 }
 
-/// A lens without one of its faces loses the light that misses the face; each lost ray is in the ledger and ends the same way
-/// when it is traced again.
-#[test]
-fn lost_rays_are_written_down_and_can_be_traced_again() {
-    let folder = lens(opened);
-    let arguments = ["trace", "scene.toml", "-o", "out", "--json", "--max-refused", "1"];
-    let found = document(folder.path(), &arguments, 4);
-    let lost = found["lost_rays"].as_u64().unwrap();
-    assert!(lost > 0 && found["power"]["lost"].as_f64().unwrap() > 0.0);
-    assert_eq!(found["ledger"], "lost_rays.csv");
-    let ledger = std::fs::read_to_string(folder.path().join("out/lost_rays.csv")).unwrap();
-    let rows: Vec<Vec<&str>> = ledger.lines().skip(1).map(|l| l.split(',').collect()).collect();
-    assert_eq!(rows.len() as u64, lost.min(1000));
-    assert!(ledger.starts_with("ray,branch,bounce,cause,power,x_mm,"));
-    let again = document(
-        folder.path(),
-        &["trace", "scene.toml", "-o", "again", "--replay", "out/lost_rays.csv", "--json"],
-        0,
-    );
+/// Traces the rays of a ledger's rows again, which end as these say.
+fn assert_lost_again(folder: &Path, rows: &[Vec<&str>]) {
+    let again =
+        document(folder, &["trace", "scene.toml", "-o", "again", "--replay", "out/lost_rays.csv", "--json"], 0);
     let rays = again["rays"].as_array().unwrap();
     assert_eq!(rays.len(), rows.len());
     for (row, ray) in rows.iter().zip(rays) {
@@ -70,6 +55,23 @@ fn lost_rays_are_written_down_and_can_be_traced_again() {
             (Some("emitted"), Some("lost"))
         );
     }
+}
+
+/// A lens without one of its faces loses the light that misses the face; each lost ray is in the ledger and ends the same way
+/// when it is traced again.
+#[test]
+fn lost_rays_are_written_down_and_can_be_traced_again() {
+    let folder = lens(opened);
+    let arguments = ["trace", "scene.toml", "-o", "out", "--json", "--max-refused", "1"];
+    let found = document(folder.path(), &arguments, 4);
+    let lost = found["lost_rays"].as_u64().unwrap();
+    assert!(lost > 0 && found["power"]["lost"].as_f64().unwrap() > 0.0);
+    assert_eq!(found["ledger"], "lost_rays.csv");
+    let ledger = std::fs::read_to_string(folder.path().join("out/lost_rays.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = ledger.lines().skip(1).map(|l| l.split(',').collect()).collect();
+    assert_eq!(rows.len() as u64, lost.min(1000));
+    assert!(ledger.starts_with("ray,branch,bounce,cause,power,x_mm,"));
+    assert_lost_again(folder.path(), &rows);
     assert!(folder.path().join("again/replay.vtp").is_file());
     let (code, out, err) =
         lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "again", "--replay", rows[0][0]]);
@@ -83,6 +85,20 @@ fn lost_rays_are_written_down_and_can_be_traced_again() {
             lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "again", "--replay", wrong]);
         assert!(found == code && err.contains(says), "{wrong}: {found} {err}");
     }
+}
+
+/// Ranges are divided into replicates of 5000 rays, which a run of 20,000 by itself is not.
+#[test]
+fn rays_lost_in_merged_ranges_can_be_traced_again() {
+    let folder = lens(opened);
+    for rays in ["0..10000", "10000..20000"] {
+        lampyris_in(folder.path(), &["trace", "scene.toml", "--rays", rays, "-o", "parts", "--max-refused", "1"]);
+    }
+    lampyris_in(folder.path(), &["merge", "parts", "-o", "out", "--no-report"]);
+    let ledger = std::fs::read_to_string(folder.path().join("out/lost_rays.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = ledger.lines().skip(1).map(|l| l.split(',').collect()).collect();
+    assert!(rows.len() > 10);
+    assert_lost_again(folder.path(), &rows);
 }
 
 /// A document without the keys that differ from run to run.

@@ -49,6 +49,25 @@ fn a_plate_of_a_catalogue_transmits_what_its_data_sheet_says() {
     }
 }
 
+/// A file's own range counts, its `LD` line: 365 to 1014 nm of the older glass.
+#[test]
+fn light_beyond_the_range_of_a_glass_is_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("glasses.agf"), CATALOGUE).unwrap();
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-9.0, -9.0, 0.0), Point::new(9.0, 9.0, 10.0));
+    let notes = |nm: f64| {
+        let text = format!(
+            "[run]\nwavelength_nm = {nm}\n[[medium]]\nname = 'glass'\nfile = 'glasses.agf'\ncatalogue = 'BK7'\n\
+             [[material]]\npart = 'plate'\nmedium = 'glass'\n[[source]]\nkind = 'collimated'\nat = [0, 0, -5]\n"
+        );
+        Scene::parse(&text, "test.toml", folder.path()).unwrap().bind(&world.model).unwrap().notes().to_vec()
+    };
+    assert!(notes(1000.0).is_empty(), "{:?}", notes(1000.0));
+    let beyond = notes(1064.0).join("\n");
+    assert!(beyond.contains("'BK7' is known for 365 to 1014 nm") && beyond.contains("1064 nm"), "{beyond}");
+}
+
 #[test]
 fn what_a_catalogue_does_not_hold_is_named() {
     assert!(scene("catalogue = 'N-BK7'").is_ok());

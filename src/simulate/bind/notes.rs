@@ -91,7 +91,12 @@ fn medium_ranges(scene: &Scene, name: &str) -> Vec<KnownRange> {
     let own = scene.media.iter().find(|m| m.name == name);
     let entry = own.map_or(Some(name), |m| m.catalogue.as_deref());
     if let Some(entry) = entry {
-        add(format!("the index of '{entry}'"), catalogue::range_nm(entry), FORMULA);
+        // A catalogue of the user's says itself how far its formulas hold, also of a glass that has a namesake here.
+        let range = match own.and_then(|m| m.glass.as_ref()) {
+            Some(glass) => glass.range_nm(),
+            None => catalogue::range_nm(entry),
+        };
+        add(format!("the index of '{entry}'"), range, FORMULA);
     }
     if let Some(medium::Medium { index_table, absorption_per_mm, .. }) = own {
         // A single point is a constant.
