@@ -110,10 +110,17 @@ impl Judgement {
     pub(super) fn of_requirement(photometer: &Photometer, requirement: &Requirement) -> Self {
         // Of many comparisons one may be lucky: what one alone may decide is asked for at a confidence divided by their number. For a
         // normal error P(Z > z) ≤ exp(−z²/2)/2, so that z = √(2 ln(n / 2p)) is enough.
-        let count = requirement.comparisons.len().max(1) as f64;
+        let count = (requirement.comparisons.len().max(1) * requirement.choices) as f64;
         let many = if count > 1.0 { (2.0 * (count / (2.0 * ONE_SIDED)).ln()).sqrt().max(SIGMAS) } else { SIGMAS };
         // Luck helps where one reading is enough: to pass where any will do, to fail where all must hold.
-        let (to_pass, to_fail) = if requirement.any { (many, SIGMAS) } else { (SIGMAS, many) };
+        let (to_pass, to_fail) = if requirement.choices > 1 {
+            // What all are compared with is the luckiest of many, which may help either way.
+            (many, many)
+        } else if requirement.any {
+            (many, SIGMAS)
+        } else {
+            (SIGMAS, many)
+        };
 
         let mut passing = 0;
         let mut failing = 0;

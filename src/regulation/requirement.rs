@@ -20,6 +20,8 @@ pub(super) struct Comparison {
 #[derive(Clone, Debug)]
 pub(super) struct Requirement {
     pub(super) comparisons: Vec<Comparison>,
+    /// Directions among which that of a reading that all are compared with was chosen, as that of most light; 1 where it is given.
+    pub(super) choices: usize,
     /// Whether one that holds is enough.
     pub(super) any: bool,
     /// Directions of the row that the far field does not hold.
@@ -115,10 +117,12 @@ impl Photometer<'_> {
         self.zone_directions(&[[h[0], v[0]], [h[1], v[0]], [h[1], v[1]], [h[0], v[1]]]).0
     }
 
-    /// The direction of the table in which the photometer reads most; `None` where the far field holds no opening.
-    fn brightest_direction(&self) -> Option<[f64; 2]> {
+    /// Returns the direction of the table in which the photometer reads most, and of how many; `None` where the far field holds no opening.
+    fn brightest_direction(&self) -> Option<([f64; 2], usize)> {
         let read = |d: &[f64; 2]| self.measure(*d).map_or(0.0, |m| self.map.read(&m).value);
-        self.all_directions().into_iter().max_by(|a, b| read(a).total_cmp(&read(b)))
+        let all = self.all_directions();
+        let choices = all.len();
+        all.into_iter().max_by(|a, b| read(a).total_cmp(&read(b))).map(|brightest| (brightest, choices))
     }
 }
 
@@ -153,7 +157,7 @@ fn limits_at(photometer: &Photometer, row: &Row, directions: &[[f64; 2]], any: [
     let requirement = |(limit, at_least, any): (Option<f64>, bool, bool)| {
         let limit = limit?;
         // A limit that is not given asks for nothing.
-        let mut requirement = Requirement { comparisons: Vec::new(), any, unseen: 0 };
+        let mut requirement = Requirement { comparisons: Vec::new(), choices: 1, any, unseen: 0 };
         for direction in directions {
             match photometer.measure(*direction) {
                 Some(measurement) => {
@@ -190,11 +194,13 @@ fn sum_requirement(photometer: &Photometer, row: &Row) -> Option<Requirement> {
         match photometer.measure(*point) {
             Some(measurement) => total = total.plus(1.0, &measurement),
             // A sum of which a part is unseen is unknown: no part of it may count for the whole.
-            None => return Some(Requirement { comparisons: Vec::new(), any: false, unseen: points.len() }),
+            None => {
+                return Some(Requirement { comparisons: Vec::new(), choices: 1, any: false, unseen: points.len() });
+            }
         }
     }
     let comparison = Comparison { measurement: total, limit, at_least: true, direction: points[0] };
-    Some(Requirement { comparisons: vec![comparison], any: false, unseen: 0 })
+    Some(Requirement { comparisons: vec![comparison], choices: 1, any: false, unseen: 0 })
 }
 
 /// The requirement of a reading compared with a multiple of another: the difference is one measurement, so that what both have in common
@@ -202,9 +208,9 @@ fn sum_requirement(photometer: &Photometer, row: &Row) -> Option<Requirement> {
 fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Option<Requirement> {
     // Without a factor the row is text.
     let factor = row.factor?;
-    let reference = match row.of.as_deref()? {
+    let (reference, choices) = match row.of.as_deref()? {
         "imax" => photometer.brightest_direction()?,
-        name => rows.iter().find(|r| r.id == name).and_then(|r| Some([r.h?, r.v?]))?,
+        name => (rows.iter().find(|r| r.id == name).and_then(|r| Some([r.h?, r.v?]))?, 1),
     };
     let (directions, complete) = match (&row.polygon, row.h.zip(row.v)) {
         (Some(polygon), _) => photometer.zone_directions(polygon),
@@ -214,7 +220,7 @@ fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Opt
     let reference = photometer.measure(reference);
     // For a point near its place any direction will do, in a zone all of them must hold.
     let any = row.polygon.is_none() && photometer.tolerance_deg > 0.0;
-    let mut requirement = Requirement { comparisons: Vec::new(), any, unseen: usize::from(!complete) };
+    let mut requirement = Requirement { comparisons: Vec::new(), choices, any, unseen: usize::from(!complete) };
     for direction in directions {
         match (photometer.measure(direction), &reference) {
             (Some(measurement), Some(reference)) => requirement.comparisons.push(Comparison {
