@@ -32,3 +32,4 @@ mod support;
 mod touching;
 #[path = "../support/turned.rs"]
 mod turned;
+mod verdicts;

@@ -129,23 +129,15 @@ fn trace_whole(
     let _owned = OutputPlace::folder(folder)?;
     let with_page = extra.page.is_wanted();
     let paths = try_outputs(prepared, command, &file)?;
-    // With an error to reach, the number of rays is found by tracing.
-    let found = target.map(|target| target.trace(prepared, &TerminalMonitor::of_saveable(console, None)));
-    let settled = if extra.until_settled { Some(verdicts::trace_until_settled(prepared, console)?) } else { None };
-    // Traced to find the number of rays, with the option that asked for it.
-    let found = match (found, settled) {
-        (Some((portion, result)), _) => Some((portion, Some(result), "--until-error")),
-        (None, Some(portion)) => Some((portion, None, "--until-settled")),
-        (None, None) => None,
-    };
+    let found = trace_until(prepared, target, extra.until_settled, console)?;
     let prepared = &*prepared;
     let checkpoint = Checkpoint::new(prepared, command.scene, file, None, extra.checkpoint, console)?;
     let (traced, result) = match found {
-        Some((portion, _, option)) if !portion.is_whole() => {
+        Some(SearchedRun { portion, option, .. }) if !portion.is_whole() => {
             let again = format!("--rays {} --resume in place of {option}", prepared.run_settings().rays);
             return Err(checkpoint.save_stopped(&portion, "interrupted", &again));
         }
-        Some((portion, result, _)) => (Some(portion), result),
+        Some(SearchedRun { portion, result, .. }) => (Some(portion), result),
         None => (None, None),
     };
     let saved = if extra.resume { saved_run(&checkpoint, folder, console)? } else { None };
@@ -203,6 +195,33 @@ fn trace_whole(
     ends_written?;
     let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
     Ok(lost.and(Completion::incomplete_if(missed)))
+}
+
+/// What was traced to find a number of rays.
+struct SearchedRun {
+    portion: PartialRun,
+    /// What came of an error that was to be reached.
+    result: Option<TargetResult>,
+    /// The option that asked.
+    option: &'static str,
+}
+
+/// Traces as many rays as the error or the verdicts that are to be reached need; `None` where none are.
+fn trace_until(
+    prepared: &mut PreparedScene,
+    target: Option<&ErrorTarget>,
+    until_settled: bool,
+    console: &Console,
+) -> Result<Option<SearchedRun>, Failure> {
+    if let Some(target) = target {
+        let (portion, result) = target.trace(prepared, &TerminalMonitor::of_saveable(console, None));
+        return Ok(Some(SearchedRun { portion, result: Some(result), option: "--until-error" }));
+    }
+    if !until_settled {
+        return Ok(None);
+    }
+    let portion = verdicts::trace_until_settled(prepared, console)?;
+    Ok(Some(SearchedRun { portion, result: None, option: "--until-settled" }))
 }
 
 /// Returns what is done of an interrupted run, and says so; `None` where there is none.
