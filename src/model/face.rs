@@ -215,6 +215,31 @@ pub struct TrimLoop {
     pub uses: Vec<EdgeUse>,
 }
 
+impl TrimLoop {
+    /// Returns the loop as a polygon in its own direction, which closes by itself: `pieces` says into how many pieces a span of a use is
+    /// divided.
+    pub(crate) fn polygon(&self, pieces: impl Fn(&UvCurve, [f64; 2]) -> usize) -> Vec<Uv> {
+        let mut points = Vec::new();
+        for u in &self.uses {
+            let breaks = u.uv.breakpoints();
+            let start = points.len();
+            for span in breaks.windows(2) {
+                let count = pieces(&u.uv, [span[0], span[1]]);
+                let share = |k: usize| k as f64 / count as f64;
+                points.extend((0..count).map(|k| u.uv.evaluate(span[0] + (span[1] - span[0]) * share(k))));
+            }
+            points.push(u.uv.evaluate(breaks[breaks.len() - 1]));
+            if u.reversed {
+                // In the loop's direction, for the polygon to close.
+                points[start..].reverse();
+            }
+            // The next use begins with this point.
+            points.pop();
+        }
+        points
+    }
+}
+
 /// One side of an edge, as a face's loop runs along it.
 #[derive(Clone, Debug)]
 pub struct EdgeUse {

@@ -2,6 +2,7 @@
 
 use super::Face;
 use crate::math::Uv;
+use crate::nurbs::UvCurve;
 
 /// Points on a curved edge use at least; a span of its spline has four at least.
 const POINTS_PER_USE: usize = 24;
@@ -20,30 +21,12 @@ pub(super) struct Outline {
 impl Outline {
     /// Follows every loop by a polygon, fine enough to tell inside from outside but near the trims.
     pub(super) fn new(face: &Face) -> Self {
-        let polygon = |l: &super::TrimLoop| {
-            let mut points = Vec::new();
-            for u in &l.uses {
-                let breaks = u.uv.breakpoints();
-                let spans = breaks.len() - 1;
-                let per_span =
-                    // A straight use is its two ends.
-                    if u.uv.degree == 1 { 1 } else { POINTS_PER_USE.div_ceil(spans).max(POINTS_PER_SPAN) };
-                let start = points.len();
-                for w in breaks.windows(2) {
-                    let share = |k: usize| k as f64 / per_span as f64;
-                    points.extend((0..per_span).map(|k| u.uv.evaluate(w[0] + (w[1] - w[0]) * share(k))));
-                }
-                points.push(u.uv.evaluate(breaks[spans]));
-                if u.reversed {
-                    // In the loop's direction, for the polygon to close.
-                    points[start..].reverse();
-                }
-                // The next use begins with this point.
-                points.pop();
-            }
-            points
+        // A straight use is its two ends.
+        let pieces = |curve: &UvCurve, _: [f64; 2]| match curve.degree {
+            1 => 1,
+            _ => POINTS_PER_USE.div_ceil(curve.breakpoints().len() - 1).max(POINTS_PER_SPAN),
         };
-        Self { polygons: face.loops.iter().map(polygon).collect(), domain: face.surface.domain() }
+        Self { polygons: face.loops.iter().map(|l| l.polygon(pieces)).collect(), domain: face.surface.domain() }
     }
 
     /// Lower and upper corner of the polygons, or of the domain without any, in surface parameters.

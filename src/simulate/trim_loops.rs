@@ -86,22 +86,7 @@ fn fine_polygon(trim: &TrimLoop) -> Vec<Uv> {
     let controls = trim.uses.iter().flat_map(|u| &u.uv.points).map(|c| c.truncate() / c.z);
     let (low, high) = controls.fold((Uv::MAX, Uv::MIN), |(low, high), p| (low.min(p), high.max(p)));
     let tolerance = LOOP_SHARE * (high - low);
-    let mut points = Vec::new();
-    for u in &trim.uses {
-        let breaks = u.uv.breakpoints();
-        let start = points.len();
-        for span in breaks.windows(2) {
-            let n = piece_count(&u.uv, [span[0], span[1]], tolerance);
-            points.extend((0..n).map(|k| u.uv.evaluate(span[0] + (span[1] - span[0]) * k as f64 / n as f64)));
-        }
-        points.push(u.uv.evaluate(breaks[breaks.len() - 1]));
-        if u.reversed {
-            points[start..].reverse();
-        }
-        // The next use begins with this point.
-        points.pop();
-    }
-    points
+    trim.polygon(|curve, span| piece_count(curve, span, tolerance))
 }
 
 /// Returns into how many pieces to divide a span, so that their chords are beside it by no more than `tolerance` in u and v.
