@@ -3,38 +3,47 @@
 use std::path::Path;
 use std::process::Command;
 
+/// What the program is built from: a change elsewhere does not change it.
+const SOURCES: [&str; 3] = ["src", "Cargo.toml", "Cargo.lock"];
+
 fn main() {
     println!("cargo::rerun-if-changed=src/build.rs");
     println!("cargo::rerun-if-env-changed=LAMPYRIS_COMMIT");
     // Only release builds look at git: otherwise every commit would rebuild the crate of everyone who works on it.
     let release = std::env::var("PROFILE").is_ok_and(|p| p == "release");
-    let commit = std::env::var("LAMPYRIS_COMMIT").ok().or_else(packaged).or_else(|| release.then(checked_out)?);
+    let commit =
+        std::env::var("LAMPYRIS_COMMIT").ok().or_else(packaged_commit).or_else(|| release.then(git_commit)?);
     if release {
         // A file that is changed and not committed is a change to tell.
-        for path in ["src", "Cargo.toml", "Cargo.lock"] {
+        for path in SOURCES {
             println!("cargo::rerun-if-changed={path}");
         }
     }
     println!("cargo::rustc-env=LAMPYRIS_COMMIT={}", commit.as_deref().unwrap_or("unknown"));
 }
 
-/// The commit that `cargo publish` wrote into the package.
-fn packaged() -> Option<String> {
+/// Returns the first 12 digits of the commit that `cargo publish` wrote into the package; `None` outside of a package.
+fn packaged_commit() -> Option<String> {
     let text = std::fs::read_to_string(".cargo_vcs_info.json").ok()?;
     let after = text.split("\"sha1\"").nth(1)?;
     after.split('"').nth(1).map(|sha| sha.chars().take(12).collect())
 }
 
-/// The commit of the working tree, with a mark when files differ from it.
-fn checked_out() -> Option<String> {
+/// Returns the first 12 digits of the commit that is checked out, with `+changes` behind them where a tracked file of [`SOURCES`] differs from
+/// it; `None` without git or outside of a repository. Tells cargo to ask anew when another commit is checked out.
+fn git_commit() -> Option<String> {
     let git = |args: &[&str]| {
         let out = Command::new("git").args(args).output().ok().filter(|o| o.status.success())?;
         Some(String::from_utf8_lossy(&out.stdout).trim().to_owned())
     };
-    if let Some(head) = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|p| Path::new(p).exists()) {
-        println!("cargo::rerun-if-changed={head}");
+    let place = |name: &str| git(&["rev-parse", "--git-path", name]).filter(|p| Path::new(p).exists());
+    // Without a log of HEAD, HEAD itself changes with the branch, and the branch with each commit.
+    let moves = place("logs/HEAD").map_or_else(|| [place("HEAD"), place("refs/heads")], |log| [Some(log), None]);
+    for path in moves.iter().flatten() {
+        println!("cargo::rerun-if-changed={path}");
     }
     let commit = git(&["rev-parse", "--short=12", "HEAD"])?;
-    let changed = !git(&["status", "--porcelain", "--untracked-files=no"])?.is_empty();
+    let status = ["--no-optional-locks", "status", "--porcelain", "--untracked-files=no", "--"];
+    let changed = !git(&[&status[..], &SOURCES].concat())?.is_empty();
     Some(if changed { format!("{commit}+changes") } else { commit })
 }

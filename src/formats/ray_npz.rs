@@ -128,7 +128,7 @@ impl<'a> ArrayReader<'a> {
         Ok(Self { entry, bytes, width, rows: dims[0], done: 0 })
     }
 
-    /// Reads the numbers of the next row, as many as `row` has.
+    /// Fills `row`, as long as the array is wide, with the numbers of the next row. The error, for people, names the row but not the array.
     fn read_row(&mut self, row: &mut [f64]) -> Result<(), String> {
         for number in row {
             let mut raw = [0; 8];

@@ -14,7 +14,7 @@ pub(crate) fn write_array<T: NoUninit>(to: &mut dyn Write, array: &[T]) -> io::R
 /// Records that are made or taken apart at a time: they stay in the cache of a core.
 const RECORDS: usize = 1 << 12;
 
-/// Writes elements as [`write_array`] does, each as the record that `record` makes of it.
+/// Writes the number of elements as eight bytes, then the record that `record` makes of each, as [`write_array`] would all records at once.
 pub(crate) fn write_records<T, R: NoUninit>(
     to: &mut dyn Write,
     elements: &[T],

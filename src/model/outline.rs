@@ -2,6 +2,7 @@
 
 use super::Face;
 use crate::math::Uv;
+use crate::math::polygon::{is_inside_polygons, polygon_sides, row_crossing};
 use crate::nurbs::UvCurve;
 
 /// Points on a curved edge use at least; a span of its spline has four at least.
@@ -39,9 +40,9 @@ impl Outline {
         points.fold([Uv::INFINITY, Uv::NEG_INFINITY], |[lo, hi], p| [lo.min(*p), hi.max(*p)])
     }
 
-    /// Whether surface parameters lie inside the trims, by the number of polygons around them; without polygons all do.
+    /// Whether surface parameters lie inside the trims; without polygons all do.
     pub(super) fn contains(&self, p: Uv) -> bool {
-        self.polygons.is_empty() || self.polygons.iter().filter(|q| surrounds(q, p)).count() % 2 == 1
+        is_inside_polygons(&self.polygons, p)
     }
 
     /// Surface parameters well inside: the middle of the longest stretch of one of a few rows; `None` when no row is crossed.
@@ -54,7 +55,8 @@ impl Outline {
             let v = lo.y + share * (hi.y - lo.y);
             let mut crossings: Vec<f64> = Vec::new();
             for polygon in &self.polygons {
-                crossings.extend(sides(polygon).filter(|(a, b)| (a.y > v) != (b.y > v)).map(|s| abscissa(s, v)));
+                let crossed = polygon_sides(polygon).filter(|[a, b]| (a.y > v) != (b.y > v));
+                crossings.extend(crossed.map(|side| row_crossing(side, v)));
             }
             crossings.sort_by(f64::total_cmp);
             let stretches = crossings.chunks_exact(2).filter(|s| s[1] > s[0]);
@@ -63,19 +65,4 @@ impl Outline {
             Some(Uv::new(0.5 * (longest[0] + longest[1]), v))
         })
     }
-}
-
-fn sides(polygon: &[Uv]) -> impl Iterator<Item = (Uv, Uv)> {
-    // The polygon closes by itself.
-    (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
-}
-
-/// The u at which a side crosses the row `v`, which must lie between its ends.
-fn abscissa((a, b): (Uv, Uv), v: f64) -> f64 {
-    a.x + (v - a.y) / (b.y - a.y) * (b.x - a.x)
-}
-
-/// Whether a polygon surrounds a point, by even and odd crossings.
-fn surrounds(polygon: &[Uv], p: Uv) -> bool {
-    sides(polygon).filter(|&(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < abscissa((a, b), p.y)).count() % 2 == 1
 }

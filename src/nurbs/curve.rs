@@ -140,15 +140,15 @@ impl<P: ControlPoint> Spline<P> {
     /// Homogeneous point at `t`, which is clamped to the domain.
     pub(super) fn homogeneous_at(&self, t: f64) -> P {
         match self.degree {
-            0..NARROW => self.point_in::<NARROW>(t),
-            NARROW..MIDDLE => self.point_in::<MIDDLE>(t),
-            MIDDLE..BROAD => self.point_in::<BROAD>(t),
-            _ => self.point_in::<WIDE>(t),
+            0..NARROW => self.point_of_width::<NARROW>(t),
+            NARROW..MIDDLE => self.point_of_width::<MIDDLE>(t),
+            MIDDLE..BROAD => self.point_of_width::<BROAD>(t),
+            _ => self.point_of_width::<WIDE>(t),
         }
     }
 
-    /// As [`Spline::homogeneous_at`], with tables of width `W`.
-    fn point_in<const W: usize>(&self, t: f64) -> P {
+    /// As [`Spline::homogeneous_at`], with room for `W` basis functions, which the degree must stay below.
+    fn point_of_width<const W: usize>(&self, t: f64) -> P {
         let [t0, t1] = self.domain();
         let t = t.clamp(t0, t1);
         let span = find_span(&self.knots, self.degree, t);
@@ -160,15 +160,15 @@ impl<P: ControlPoint> Spline<P> {
     /// Homogeneous point and derivatives up to `order` (at most 2) at `t`, which is clamped to the domain; zero beyond the order.
     fn homogeneous(&self, t: f64, order: usize) -> [P; 3] {
         match self.degree {
-            0..NARROW => self.homogeneous_in::<NARROW>(t, order),
-            NARROW..MIDDLE => self.homogeneous_in::<MIDDLE>(t, order),
-            MIDDLE..BROAD => self.homogeneous_in::<BROAD>(t, order),
-            _ => self.homogeneous_in::<WIDE>(t, order),
+            0..NARROW => self.homogeneous_of_width::<NARROW>(t, order),
+            NARROW..MIDDLE => self.homogeneous_of_width::<MIDDLE>(t, order),
+            MIDDLE..BROAD => self.homogeneous_of_width::<BROAD>(t, order),
+            _ => self.homogeneous_of_width::<WIDE>(t, order),
         }
     }
 
-    /// As [`Spline::homogeneous`], with tables of width `W`.
-    fn homogeneous_in<const W: usize>(&self, t: f64, order: usize) -> [P; 3] {
+    /// As [`Spline::homogeneous`], with room for `W` basis functions, which the degree must stay below.
+    fn homogeneous_of_width<const W: usize>(&self, t: f64, order: usize) -> [P; 3] {
         let [t0, t1] = self.domain();
         let t = t.clamp(t0, t1);
         let span = find_span(&self.knots, self.degree, t);

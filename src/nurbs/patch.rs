@@ -73,13 +73,13 @@ impl BezierPatch {
         patches
     }
 
-    /// Homogeneous point and first derivatives by the local parameters, u first. These are in `[0, 1]²`; beyond it the polynomial goes on.
+    /// Homogeneous `[S, S_u, S_v]`: the point and its derivatives by the local parameters. These are in `[0, 1]²`; beyond it the polynomial goes on.
     pub fn homogeneous(&self, local: Uv) -> [Homogeneous; 3] {
-        as_wide_as_needed!(self.homogeneous_in(local))
+        as_wide_as_needed!(self.homogeneous_of_width(local))
     }
 
-    /// As [`BezierPatch::homogeneous`], with tables of width `W`.
-    fn homogeneous_in<const W: usize>(&self, local: Uv) -> [Homogeneous; 3] {
+    /// As [`BezierPatch::homogeneous`], with room for `W` basis functions, which the degree must stay below.
+    fn homogeneous_of_width<const W: usize>(&self, local: Uv) -> [Homogeneous; 3] {
         let [p, q] = self.degree;
         let (bu, du) = bernstein_to_first::<W>(p, local.x);
         let (bv, dv) = bernstein_to_first::<W>(q, local.y);
@@ -101,11 +101,11 @@ impl BezierPatch {
 
     /// Homogeneous point at local parameters in `[0, 1]²`: the first of [`BezierPatch::homogeneous`], in a third of its time.
     pub fn homogeneous_point(&self, local: Uv) -> Homogeneous {
-        as_wide_as_needed!(self.point_in(local))
+        as_wide_as_needed!(self.point_of_width(local))
     }
 
-    /// As [`BezierPatch::homogeneous_point`], with tables of width `W`.
-    fn point_in<const W: usize>(&self, local: Uv) -> Homogeneous {
+    /// As [`BezierPatch::homogeneous_point`], with room for `W` basis functions, which the degree must stay below.
+    fn point_of_width<const W: usize>(&self, local: Uv) -> Homogeneous {
         let [p, q] = self.degree;
         let bu = bernstein::<W>(p, local.x);
         let bv = bernstein::<W>(q, local.y);
@@ -119,11 +119,11 @@ impl BezierPatch {
     /// Homogeneous points at three local parameters of each direction, `[i][j]` at `(u[i], v[j])`; the same bits as
     /// [`BezierPatch::homogeneous_point`].
     pub fn homogeneous_lattice(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
-        as_wide_as_needed!(self.lattice_in(u, v))
+        as_wide_as_needed!(self.lattice_of_width(u, v))
     }
 
-    /// As [`BezierPatch::homogeneous_lattice`], with tables of width `W`.
-    fn lattice_in<const W: usize>(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
+    /// As [`BezierPatch::homogeneous_lattice`], with room for `W` basis functions, which the degree must stay below.
+    fn lattice_of_width<const W: usize>(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
         let [p, q] = self.degree;
         let (bu, bv) = (u.map(|x| bernstein::<W>(p, x)), v.map(|x| bernstein::<W>(q, x)));
         let mut sums = [[Homogeneous::ZERO; 3]; 3];
@@ -140,11 +140,11 @@ impl BezierPatch {
 
     /// Position, first and second derivatives with respect to the surface's parameters, at local parameters in `[0, 1]²`.
     pub fn second_derivatives(&self, local: Uv) -> SecondDerivatives {
-        as_wide_as_needed!(self.second_in(local))
+        as_wide_as_needed!(self.second_of_width(local))
     }
 
-    /// As [`BezierPatch::second_derivatives`], with tables of width `W`.
-    fn second_in<const W: usize>(&self, local: Uv) -> SecondDerivatives {
+    /// As [`BezierPatch::second_derivatives`], with room for `W` basis functions, which the degree must stay below.
+    fn second_of_width<const W: usize>(&self, local: Uv) -> SecondDerivatives {
         let [p, q] = self.degree;
         let (bu, bv) = (bernstein_to_second::<W>(p, local.x), bernstein_to_second::<W>(q, local.y));
         let mut sums = [Homogeneous::ZERO; 6];

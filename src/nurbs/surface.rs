@@ -101,15 +101,15 @@ impl Surface {
     /// Position at `uv`, which is clamped to the domain.
     pub fn evaluate(&self, uv: Uv) -> Point {
         match self.degree[0].max(self.degree[1]) {
-            0..NARROW => self.point_in::<NARROW>(uv),
-            NARROW..MIDDLE => self.point_in::<MIDDLE>(uv),
-            MIDDLE..BROAD => self.point_in::<BROAD>(uv),
-            _ => self.point_in::<WIDE>(uv),
+            0..NARROW => self.point_of_width::<NARROW>(uv),
+            NARROW..MIDDLE => self.point_of_width::<MIDDLE>(uv),
+            MIDDLE..BROAD => self.point_of_width::<BROAD>(uv),
+            _ => self.point_of_width::<WIDE>(uv),
         }
     }
 
-    /// As [`Surface::evaluate`], with tables of width `W`.
-    fn point_in<const W: usize>(&self, uv: Uv) -> Point {
+    /// As [`Surface::evaluate`], with room for `W` basis functions, which the degree must stay below.
+    fn point_of_width<const W: usize>(&self, uv: Uv) -> Point {
         let uv = self.clamp(uv);
         let [p, q] = self.degree;
         let count_v = self.counts()[1];
@@ -141,15 +141,15 @@ impl Surface {
     /// Homogeneous (S, Su, Sv) for `order` 1, or (S, Su, Sv, Suu, Suv, Svv) for 2, at `uv`, which is clamped to the domain.
     fn sums<const N: usize>(&self, uv: Uv, order: usize) -> [Homogeneous; N] {
         match self.degree[0].max(self.degree[1]) {
-            0..NARROW => self.sums_in::<N, NARROW>(uv, order),
-            NARROW..MIDDLE => self.sums_in::<N, MIDDLE>(uv, order),
-            MIDDLE..BROAD => self.sums_in::<N, BROAD>(uv, order),
-            _ => self.sums_in::<N, WIDE>(uv, order),
+            0..NARROW => self.sums_of_width::<N, NARROW>(uv, order),
+            NARROW..MIDDLE => self.sums_of_width::<N, MIDDLE>(uv, order),
+            MIDDLE..BROAD => self.sums_of_width::<N, BROAD>(uv, order),
+            _ => self.sums_of_width::<N, WIDE>(uv, order),
         }
     }
 
-    /// As [`Surface::sums`], with tables of width `W`.
-    fn sums_in<const N: usize, const W: usize>(&self, uv: Uv, order: usize) -> [Homogeneous; N] {
+    /// As [`Surface::sums`], with room for `W` basis functions, which the degree must stay below.
+    fn sums_of_width<const N: usize, const W: usize>(&self, uv: Uv, order: usize) -> [Homogeneous; N] {
         const DERIVATIVE: [(usize, usize); 6] = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
         let uv = self.clamp(uv);
         let [p, q] = self.degree;

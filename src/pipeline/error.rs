@@ -118,7 +118,7 @@ impl From<step::Error> for Error {
 
 impl From<simulate::Error> for Error {
     fn from(e: simulate::Error) -> Self {
-        let place = match (e.file(), e.line()) {
+        let place = match (e.file(), e.line_and_column()) {
             // Scenes that came from memory have no file.
             ("", _) => String::new(),
             (file, None) => format!("{file}: "),

@@ -84,7 +84,7 @@ impl Error {
     }
 
     /// Returns line and column of the place that is meant, both from 1 and the column in characters; `None` where no place is.
-    pub fn line(&self) -> Option<(usize, usize)> {
+    pub fn line_and_column(&self) -> Option<(usize, usize)> {
         let (text, span) = (self.text.as_deref()?, self.span.as_ref()?);
         let before = text.get(..span.start)?;
         let line = before.matches('\n').count() + 1;
@@ -99,7 +99,7 @@ impl Error {
 
     /// Returns file, line and column as far as they are known, to stand before the message.
     fn place(&self) -> String {
-        match (self.file.is_empty(), self.line()) {
+        match (self.file.is_empty(), self.line_and_column()) {
             (true, None) => String::new(),
             (true, Some((l, c))) => format!("line {l}, column {c}: "),
             (false, None) => format!("{}: ", self.file),

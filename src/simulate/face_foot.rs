@@ -1,6 +1,6 @@
 //! The point of a trimmed face that is nearest to a point.
 
-use super::trim_loops::is_inside;
+use crate::math::polygon::is_inside_polygons;
 use crate::math::{Point, Uv};
 use crate::model::Face;
 
@@ -41,7 +41,7 @@ pub(crate) fn nearest_on_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> Optio
     let mut start: Option<NearestOnFace> = None;
     for uv in grid {
         let sample = at(uv);
-        if start.is_none_or(|nearest| nearer(&sample, &nearest).is_lt()) && is_inside(loops, uv) {
+        if start.is_none_or(|nearest| nearer(&sample, &nearest).is_lt()) && is_inside_polygons(loops, uv) {
             start = Some(sample);
         }
     }
@@ -71,7 +71,7 @@ pub(crate) fn foot_from(face: &Face, loops: &[Vec<Uv>], p: Point, start: Nearest
         }
         uv = next;
         let distance = s.evaluate(uv).distance(p);
-        if distance < best.distance && is_inside(loops, uv) {
+        if distance < best.distance && is_inside_polygons(loops, uv) {
             best = NearestOnFace { distance, uv };
         }
     }

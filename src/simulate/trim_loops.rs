@@ -1,6 +1,7 @@
 //! Trimming loops as polygons in the parameter plane, for what is drawn or sampled on a face.
 
 use crate::math::Uv;
+use crate::math::polygon::{is_inside_sides, polygon_sides};
 use crate::model::{EdgeUse, Face, TrimLoop};
 use crate::nurbs::UvCurve;
 
@@ -23,12 +24,6 @@ pub(crate) fn trim_polygons(face: &Face) -> Vec<Vec<Uv>> {
     face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
 }
 
-/// Whether a parameter point lies inside the loops: an odd number of crossings. Without loops every point does.
-pub(crate) fn is_inside(loops: &[Vec<Uv>], p: Uv) -> bool {
-    let sides = loops.iter().flat_map(|l| (0..l.len()).map(move |k| [l[k], l[(k + 1) % l.len()]]));
-    loops.is_empty() || has_odd_crossings(sides, p)
-}
-
 /// How far the polygons of a [`TrimRegion`] may be beside their loops, as a share of a loop's extent: of a disc 2e-6 of the area is missed.
 const LOOP_SHARE: f64 = 1e-6;
 /// Pieces into which a span of a curved edge is divided at first, and at most.
@@ -48,7 +43,7 @@ pub(crate) struct TrimRegion {
 impl TrimRegion {
     pub(crate) fn new(face: &Face) -> Self {
         let polygons: Vec<Vec<Uv>> = face.loops.iter().map(fine_polygon).collect();
-        let sides = || polygons.iter().flat_map(|l| (0..l.len()).map(move |k| [l[k], l[(k + 1) % l.len()]]));
+        let sides = || polygons.iter().flat_map(|polygon| polygon_sides(polygon));
         let count = sides().count();
         let (low, high) = (polygons.iter().flatten())
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p.y), high.max(p.y)));
@@ -70,15 +65,8 @@ impl TrimRegion {
 
     /// Whether a parameter point lies inside the loops; without loops every point does.
     pub(crate) fn contains(&self, p: Uv) -> bool {
-        self.bands.is_empty() || has_odd_crossings(self.bands[self.band(p.y)].iter().copied(), p)
+        self.bands.is_empty() || is_inside_sides(self.bands[self.band(p.y)].iter().copied(), p)
     }
-}
-
-/// Whether a line from `p` along u meets an odd number of sides; half open in v, so that a corner counts once.
-fn has_odd_crossings(sides: impl Iterator<Item = [Uv; 2]>, p: Uv) -> bool {
-    let crosses =
-        |[a, b]: &[Uv; 2]| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
-    sides.filter(crosses).count() % 2 == 1
 }
 
 /// Returns a loop as a polygon that follows it within [`LOOP_SHARE`] of its extent.

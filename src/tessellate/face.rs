@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::border::edges::Division;
-use super::border::polygons::{self, BorderPolygons, ImprintedPoints, crosses_ray_from};
+use super::border::polygons::{self, BorderPolygons, ImprintedPoints};
 use super::border_nodes::BorderNodes;
 use super::cells::cell::{Subdivision, parameter_resolution};
 use super::cells::grid::{self, GridInput};
@@ -20,6 +20,7 @@ use super::transition::creases::crease_lines;
 use super::transition::delaunay::{self, Outline, Transition};
 use super::transition::pairing::{self, TransitionFacet};
 use super::triangulator::{GaveUp, catch_panic};
+use crate::math::polygon::{is_inside_sides, polygon_sides};
 use crate::math::{Point, Uv};
 use crate::model::{EdgeId, Face, Part};
 use crate::nurbs::FundamentalForms;
@@ -199,11 +200,10 @@ fn covers_area_of_border(transition: &Transition, quads: &[ProvedFacet<4>], poly
         return true;
     }
     // Loops may run either way: one inside an odd number of others is a hole. Loops may touch, so that the middles of its sides vote.
-    let sides = |p: &Vec<Uv>| (0..p.len()).map(|k| [p[k], p[(k + 1) % p.len()]]).collect::<Vec<_>>();
-    let sides: Vec<Vec<[Uv; 2]>> = loops.iter().map(sides).collect();
+    let sides: Vec<Vec<[Uv; 2]>> = loops.iter().map(|polygon| polygon_sides(polygon).collect()).collect();
     let is_inside_odd = |k: usize, point: Uv| {
         let others = sides.iter().enumerate().filter(|(j, _)| *j != k).flat_map(|(_, sides)| sides);
-        others.filter(|side| crosses_ray_from(point, **side)).count() % 2 == 1
+        is_inside_sides(others.copied(), point)
     };
     let is_hole = |k: usize| {
         // A few sides are enough for a vote; a loop that touches another in a corner misleads one or two.

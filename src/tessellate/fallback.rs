@@ -10,6 +10,7 @@ use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
 use super::face_surface::FaceSurface;
 use super::nodes::Position;
 use super::sample;
+use crate::math::polygon::is_inside_sides;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Face, Part};
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -123,17 +124,13 @@ fn planar_triangulation(loops: &mut [Vec<BorderCorner>], up: Vector) -> Option<V
             if cdt.try_add_constraint(a, b).len() != 1 {
                 return None;
             }
-            segments.push([ring[k].at, ring[(k + 1) % ring.len()].at]);
+            segments.push([ring[k].at, ring[(k + 1) % ring.len()].at].map(|p| Uv::new(p.x, p.y)));
         }
     }
     // The triangulation fills the convex hull: even–odd at the centroid tells what the loops hold.
     let inside = |t: &[BorderCorner; 3]| {
-        let p = t.map(|c| [c.at.x, c.at.y]);
-        let (px, py) = ((p[0][0] + p[1][0] + p[2][0]) / 3.0, (p[0][1] + p[1][1] + p[2][1]) / 3.0);
-        let crosses = |[a, b]: &[Point2<f64>; 2]| {
-            (a.y > py) != (b.y > py) && px < a.x + (py - a.y) / (b.y - a.y) * (b.x - a.x)
-        };
-        segments.iter().filter(|s| crosses(s)).count() % 2 == 1
+        let [a, b, c] = t.map(|corner| Uv::new(corner.at.x, corner.at.y));
+        is_inside_sides(segments.iter().copied(), (a + b + c) / 3.0)
     };
     Some(cdt.inner_faces().map(|f| f.vertices().map(|v| *v.data())).filter(inside).collect())
 }

@@ -5,12 +5,13 @@
 //! patch of degree 25, ends when its proofs have taken more steps than any real face takes. Nothing looks at a clock, so the outcome is
 //! the same on any machine and for any number of threads.
 
-use super::border::polygons::{self, crosses_ray_from};
+use super::border::polygons;
 use super::face_surface::FaceSurface;
 use super::placed_part::PlacedPart;
 use super::report::{FailureCause, Report};
 use super::settings::Settings;
 use crate::math::Uv;
+use crate::math::polygon::is_inside_sides;
 use crate::model::{Face, Model};
 use crate::nurbs::FundamentalForms;
 use rayon::prelude::*;
@@ -93,7 +94,7 @@ pub(super) fn expected_cells(face: &Face, surface: &FaceSurface<'_>) -> f64 {
         let along_v = chords(forms.normal_curvature(Uv::Y), d.dv.length() * size.y);
         Some(along_u * along_v).filter(|cells| cells.is_finite())
     };
-    let inside = |uv: &Uv| border.iter().filter(|s| crosses_ray_from(*uv, **s)).count() % 2 == 1;
+    let inside = |uv: &Uv| is_inside_sides(border.iter().copied(), *uv);
     let place = |k: usize| lo + (Uv::new((k / PLACES) as f64, (k % PLACES) as f64) + 0.5) / PLACES as f64 * size;
     let places = (0..PLACES * PLACES).map(place).filter(inside);
     let mut cells: Vec<f64> = places.filter_map(cells_if_alike).collect();

@@ -68,6 +68,14 @@ impl Conic {
         })
     }
 
+    /// Returns the distance from the axis, mm, at which two conics have the same slope besides the axis itself; `None` where there is none.
+    pub(super) fn equal_slope(&self, other: &Self) -> Option<f64> {
+        // From c₁²·(1 − (1+K₂)c₂²h²) = c₂²·(1 − (1+K₁)c₁²h²), for curvatures of one sign.
+        let [r1, r2] = [self.radius, other.radius];
+        let h = ((r2 * r2 - r1 * r1) / (other.conic - self.conic)).sqrt();
+        (r1 * r2 > 0.0 && h.is_finite() && h > 0.0).then_some(h)
+    }
+
     /// Returns the slope dz/dh at a distance from the axis within the shape's reach.
     fn slope(&self, h: f64) -> f64 {
         if self.radius.is_infinite() {

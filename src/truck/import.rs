@@ -3,6 +3,7 @@
 use super::face::{WireEdge, convert_face, points_of_use};
 use super::geometry::{curve, point};
 use super::modeling;
+use crate::math::polygon::is_inside_polygons;
 use crate::math::{Aabb, Uv, Vector};
 use crate::model::{Edge, EdgeId, Face, Model, Part, Shell, VertexId};
 use std::collections::HashMap;
@@ -191,14 +192,7 @@ fn face_samples(face: &Face) -> Vec<(Vector, Vector)> {
     let at = |i: usize, a: f64, b: f64| a + (b - a) * (i as f64 + 0.5) / GRID as f64;
     (0..GRID * GRID)
         .map(|k| Uv::new(at(k / GRID, u0, u1), at(k % GRID, v0, v1)))
-        .filter(|&uv| is_inside(&outline, uv))
+        .filter(|&uv| is_inside_polygons(&outline, uv))
         .filter_map(|uv| Some((face.surface.evaluate(uv), face.surface.normal(uv)? * sign)))
         .collect()
-}
-
-/// Whether parameters are inside loops, by crossings of a line to the right; without loops everything is.
-fn is_inside(outline: &[Vec<Uv>], p: Uv) -> bool {
-    let crosses = |a: Uv, b: Uv| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y);
-    let crossings = outline.iter().map(|l| (0..l.len()).filter(|&i| crosses(l[i], l[(i + 1) % l.len()])).count());
-    outline.is_empty() || crossings.sum::<usize>() % 2 == 1
 }

@@ -35,10 +35,10 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// Makes the lens as a truck solid, mm.
+    /// Makes the lens as a truck solid, mm: front, back and rim, turned about the z axis.
     ///
     /// # Errors
-    /// When the surfaces meet inside the aperture or do not reach it.
+    /// When the surfaces meet anywhere within the aperture, its rim included, or do not reach it.
     pub fn solid(&self) -> Result<Solid, ShapeError> {
         let reach = self.half_aperture;
         let front = self.front.profile(0.0, reach)?;
@@ -53,6 +53,18 @@ impl Lens {
             edge > THINNEST_RIM,
             "positive: make the lens thicker or the aperture smaller",
         )?;
+        // Between axis and rim the thickness is least where the slopes are equal, if anywhere.
+        if let Some(h) = self.front.equal_slope(&self.back).filter(|h| *h < reach)
+            && let (Some(front), Some(back)) = (self.front.sag(h), self.back.sag(h))
+        {
+            let inner = self.thickness + back - front;
+            check_value(
+                "the thickness between axis and rim",
+                inner,
+                inner > 0.0,
+                "positive: make the lens thicker",
+            )?;
+        }
         let at = |x: f64, z: f64| builder::vertex(Point3::new(x, 0.0, z));
         let vertices =
             [at(0.0, 0.0), at(reach, rim[0]), at(reach, self.thickness + rim[1]), at(0.0, self.thickness)];

@@ -231,7 +231,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "model",
         &["part face", "placed", "outline", "bounds", "account", "tight_box", "near_parts", "instancing", "mod"],
     ),
-    ("math", &["mod", "simd", "ray", "aabb", "box_tree", "frame", "roots", "quadrature", "units"]),
+    ("math", &["mod", "simd", "ray", "aabb", "box_tree", "frame", "roots", "quadrature", "polygon", "units"]),
     (
         "intersect",
         &[
@@ -299,7 +299,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "pack",
             "subdivision",
             "flatten",
-            "frame",
+            "mesh_box",
             "tree",
             "stored",
             "ray",

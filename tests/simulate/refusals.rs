@@ -139,7 +139,7 @@ fn what_means_nothing_is_refused_by_name() {
         let e = Scene::parse(&text, "scene.toml", Path::new(".")).expect_err(&head);
         let said = e.to_string();
         assert!(said.contains(key), "{head}: {said}");
-        assert_eq!(e.line().map(|l| l.0), Some(line), "{head}: {said}");
+        assert_eq!(e.line_and_column().map(|l| l.0), Some(line), "{head}: {said}");
     }
     let text = "[run]\npolarisation = true\n[[source]]\nkind = 'point'\npolarised = [0, 0, 0]";
     let said = Scene::parse(text, "scene.toml", Path::new(".")).unwrap_err().to_string();
@@ -173,7 +173,7 @@ fn rules_that_do_not_fit_the_model_are_refused_with_advice() {
     ] {
         let scene = Scene::parse(&text, "scene.toml", Path::new(".")).expect(&text);
         let e = scene.bind(&model).expect_err(&text);
-        assert!(e.to_string().contains(says) && e.line().is_some(), "{text}: {e}");
+        assert!(e.to_string().contains(says) && e.line_and_column().is_some(), "{text}: {e}");
     }
 }
 

@@ -268,6 +268,16 @@ fn nonsense_is_refused_with_what_to_do() {
     let thin = Lens { front: Conic::sphere(50.0), back: Conic::sphere(-50.0), thickness: 1.0, half_aperture: 20.0 };
     let e = thin.model("thin").unwrap_err().to_string();
     assert!(e.contains("thickness at the rim") && e.contains("thicker"), "{e}");
+    // A paraboloid of R = 50 and a sphere of R = 55: by hand 0.25 mm nearer to each other at h² = 525 than on the axis, and apart at the rim.
+    let shell = |thickness| Lens {
+        front: Conic::paraboloid(25.0),
+        back: Conic::sphere(55.0),
+        thickness,
+        half_aperture: 40.0,
+    };
+    let e = shell(0.24).solid().unwrap_err().to_string();
+    assert!(e.contains("between axis and rim"), "{e}");
+    shell(0.26).solid().unwrap();
     assert!(Reflector::ellipsoid(30.0, 50.0, 10.0).is_err());
     assert!(Reflector { shape: Conic::paraboloid(25.0), half_aperture: 5.0, hole: 6.0 }.shell().is_err());
 }

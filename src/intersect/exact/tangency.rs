@@ -65,7 +65,7 @@ struct Bend {
     range: Range,
 }
 
-/// The two functions and their derivatives by p and q, in homogeneous units.
+/// `g` and `h` of the module and their derivatives by p and q, as shares of what is looked at; mm times the weight of the point.
 struct Heights {
     g: f64,
     h: f64,
@@ -346,8 +346,8 @@ impl Search<'_> {
         [0, 1].map(|k| (local[k] - self.from[k].into()).to_f64() / self.extent[k])
     }
 
-    /// g and h from 32 digits, in homogeneous units, and their derivatives by shares, at local parameters of the patch and the same as
-    /// shares `x`.
+    /// Evaluates `g` and `h` with their first derivatives at one point, given twice: as `local` parameters of the patch in 32 digits, of which
+    /// the values are computed, and as shares `x`, which serve for the weight alone.
     #[inline(always)]
     fn heights(&self, local: &[Number; 2], x: [f64; 2]) -> Heights {
         let Bend { p, q, along, across, .. } = *self.bend;

@@ -99,13 +99,13 @@ impl RayState {
         let origin = [ray.origin.x, ray.origin.y, ray.origin.z, 0.0];
         let inverse =
             direction.map(|d| 1.0 / if d.abs() < LEAST_COMPONENT { LEAST_COMPONENT.copysign(d) } else { d });
-        let frame = &tree.frame;
+        let mesh_box = &tree.mesh_box;
         // Far origins are moved to where they enter, since f32 is good only near the mesh. Rays of one kind mostly start all inside
         // or all outside.
         let mut meets = true;
         self.shift = 0.0;
-        if !(frame.holds(origin) & (ray.t_min >= 0.0)) {
-            let passage = frame.passage(ray, origin, inverse);
+        if !(mesh_box.holds(origin) & (ray.t_min >= 0.0)) {
+            let passage = mesh_box.passage(ray, origin, inverse);
             meets = (passage.near <= passage.far) & passage.near.is_finite();
             self.shift = passage.near;
         }
@@ -114,13 +114,13 @@ impl RayState {
         let mut octant = 0;
         for a in 0..4 {
             let inverse = inverse[a] as f32;
-            let exact = (origin[a] - frame.center[a]) + direction[a] * self.shift;
+            let exact = (origin[a] - mesh_box.center[a]) + direction[a] * self.shift;
             let o = exact as f32;
             b.origin[a] = o;
             if a < 3 {
                 b.inverse[a] = both_signs(inverse);
             }
-            b.slack[a] = ((4.0 * o.abs() + frame.reach[a]) * ROUNDING + moved) * inverse.abs();
+            b.slack[a] = ((4.0 * o.abs() + mesh_box.reach[a]) * ROUNDING + moved) * inverse.abs();
             self.sieve.high[a] = o;
             self.sieve.low[a] = (exact - f64::from(o)) as f32;
             octant |= u8::from(inverse < 0.0) << a;

@@ -1,6 +1,6 @@
 //! The tree as rays walk it, and what its walkers need of the mesh.
 
-use super::frame::Frame;
+use super::mesh_box::MeshBox;
 use super::node::{Block, Link, Node, Target};
 use super::subdivision::subdivide;
 use super::{Settings, Statistics, flatten, huge_pages};
@@ -19,7 +19,7 @@ pub(super) struct Tree<'m> {
     pub(super) surroundings: Surroundings<'m>,
     /// Middle of the mesh, about which nodes and blocks are given.
     pub(super) center: Point,
-    pub(super) frame: Frame,
+    pub(super) mesh_box: MeshBox,
     pub(super) nodes: Vec<Node>,
     pub(super) blocks: Vec<Block>,
     /// `None` without facets.
@@ -55,8 +55,8 @@ impl<'m> Tree<'m> {
         let surroundings = Surroundings::new(mesh);
         let (finite, center) = (surroundings.bounds, middle(&surroundings));
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * BOUNDS_ROOM) };
-        let frame = Frame::new(center, &bounds);
-        Self { surroundings, center, frame, nodes, blocks, root, slopes }
+        let mesh_box = MeshBox::new(center, &bounds);
+        Self { surroundings, center, mesh_box, nodes, blocks, root, slopes }
     }
 
     /// The facet that a ray leaves where it is known not to meet it again, else `u32::MAX`, which no facet has.

@@ -1,11 +1,12 @@
 //! Faces of two solids at one place: which faces may touch which.
 
 use super::nearest::{Nearest, face_bounds};
+use crate::math::polygon::is_inside_polygons;
 use crate::math::{Aabb, Point, Uv};
 use crate::model::{Model, PlacedFace};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::scene::Scene;
-use crate::simulate::trim_loops::{is_inside, trim_polygons};
+use crate::simulate::trim_loops::trim_polygons;
 
 /// Marks the faces whose box comes within the glue distance of the box of a face of another body, and returns those pairs of bodies too,
 /// some more than once. `of_face` is the body of each placed face; faces of the surroundings are never marked.
@@ -122,7 +123,7 @@ fn inner_points(f: &PlacedFace<'_>) -> Vec<Point> {
     let at = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
     (0..SAMPLES * SAMPLES)
         .map(|k| Uv::new(at(k / SAMPLES, u0, u1), at(k % SAMPLES, v0, v1)))
-        .filter(|&uv| is_inside(&loops, uv))
+        .filter(|&uv| is_inside_polygons(&loops, uv))
         .map(|uv| f.placement.point(face.surface.evaluate(uv)))
         .collect()
 }

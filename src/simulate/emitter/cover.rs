@@ -1,9 +1,10 @@
 //! Opaque faces that lie against a luminous face: no light gets out between the two.
 
+use crate::math::polygon::is_inside_polygons;
 use crate::math::{Aabb, Frame, Point, Uv, Vector};
 use crate::model::{Face, PlacedFace};
 use crate::simulate::face_foot::{NearestOnFace, foot_from, nearest_on_face};
-use crate::simulate::trim_loops::{is_inside, trim_polygons};
+use crate::simulate::trim_loops::trim_polygons;
 
 /// Cosine below which two outward normals look at each other: −60°, as where the kernel asks for faces at one place.
 const AGAINST: f64 = -0.5;
@@ -40,7 +41,7 @@ impl Cover {
             // In a plane every way leads to the foot, and no samples are needed to find where to begin.
             let [[u0, u1], [v0, v1]] = surface.domain();
             let uv = Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1));
-            let inside = is_inside(&self.loops, uv);
+            let inside = is_inside_polygons(&self.loops, uv);
             let distance = if inside { surface.evaluate(uv).distance(local) } else { f64::INFINITY };
             Some(foot_from(&self.face, &self.loops, local, NearestOnFace { distance, uv }))
         } else {

@@ -89,8 +89,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(Chart { has_two_normals, ..Chart::revolution(frame, side) })
     }
 
-    /// Reads a SURFACE_OF_LINEAR_EXTRUSION with attributes `a` as a chart whose u is the profile's parameter; an unbounded profile is cut
-    /// to `reach`.
+    /// Reads a SURFACE_OF_LINEAR_EXTRUSION with attributes `a` as a chart: u is the profile's parameter, v how many times the file's vector
+    /// the point lies from the profile, without bounds. An unbounded profile is cut to what the face can need of it, by `reach`.
     pub(super) fn extrusion(
         &self,
         e: Entity<'f, 'a>,

@@ -6,6 +6,7 @@
 //! grid of points on each face. First on few; where that says inside out on more, and with a bound on the error that thin walls
 //! fail, for which the file is believed.
 
+use crate::math::polygon::is_inside_polygons;
 use crate::math::{Aabb, Point, Uv};
 use crate::model::{EdgeId, Face};
 use rayon::prelude::*;
@@ -117,14 +118,6 @@ fn loop_polygons(face: &Face) -> Vec<Vec<Uv>> {
     face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
 }
 
-/// Whether a point lies inside of the polygons, by even and odd crossings; always, if there are none.
-fn is_inside(loops: &[Vec<Uv>], p: Uv) -> bool {
-    let sides = loops.iter().flat_map(|l| (0..l.len()).map(move |i| (l[i], l[(i + 1) % l.len()])));
-    let crossed =
-        |(a, b): &(Uv, Uv)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x);
-    loops.is_empty() || sides.filter(crossed).count() % 2 == 1
-}
-
 /// Returns a third of the flow of `p - center` out of a face, mm³, and what it would be with all signs alike, by the middles of a grid of
 /// `grid` cells each way over what `loops` enclose (none: all); zeros if that has no area.
 fn flux(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> [f64; 2] {
@@ -143,7 +136,7 @@ fn flux(face: &Face, loops: &[Vec<Uv>], center: Point, grid: usize) -> [f64; 2] 
     let (mut sum, mut whole) = (0.0, 0.0);
     for k in 0..grid * grid {
         let uv = low + step * Uv::new((k % grid) as f64 + 0.5, (k / grid) as f64 + 0.5);
-        if !is_inside(loops, uv) {
+        if !is_inside_polygons(loops, uv) {
             continue;
         }
         let d = face.surface.derivatives(uv);

@@ -2,6 +2,7 @@
 
 use super::tolerances::{EMPTY_STEP, POLE_RESOLUTION_MM, POLE_TURN_SLACK, WIDE_STEP};
 use crate::math::Uv;
+use crate::math::polygon::{is_inside_sides, polygon_sides};
 use crate::math::quadrature::GAUSS;
 use crate::nurbs::{ControlPoint, UvCurve};
 use crate::step::chart::{Chart, Pole};
@@ -63,21 +64,22 @@ impl Piece {
         Self { source: Source::Nothing, reversed: false, curve: UvCurve::line(from, to, [0.0, 1.0]) }
     }
 
-    /// Appends points along the piece in the direction of the loop, without the last; `density` times as many as a first test needs.
-    fn sample(&self, density: usize, into: &mut Vec<Uv>) {
-        let start = into.len();
+    /// Appends points of the piece to `polygon`, in the direction of the loop and evenly over each span of the curve, from its start on; its
+    /// end, where the next piece starts, is left out. `density` is how many times the points of a first test; a straight piece has one a span.
+    fn append_points(&self, density: usize, polygon: &mut Vec<Uv>) {
+        let start = polygon.len();
         let breaks = self.curve.breakpoints();
         let per_span = if self.curve.degree == 1 { 1 } else { density * 16usize.div_ceil(breaks.len() - 1).max(3) };
         for pair in breaks.windows(2) {
             for k in 0..per_span {
-                into.push(self.curve.evaluate(pair[0] + (pair[1] - pair[0]) * k as f64 / per_span as f64));
+                polygon.push(self.curve.evaluate(pair[0] + (pair[1] - pair[0]) * k as f64 / per_span as f64));
             }
         }
-        into.push(self.end_point(true));
+        polygon.push(self.end_point(true));
         if self.reversed {
-            into[start..].reverse();
+            polygon[start..].reverse();
         }
-        into.pop();
+        polygon.pop();
     }
 }
 
@@ -108,7 +110,7 @@ impl Chain {
     pub(crate) fn polygon_of_density(&self, density: usize) -> Vec<Uv> {
         let mut points = Vec::new();
         for piece in &self.pieces {
-            piece.sample(density, &mut points);
+            piece.append_points(density, &mut points);
         }
         points
     }
@@ -175,17 +177,9 @@ pub(crate) fn signed_area(polygon: &[Uv]) -> f64 {
     0.5 * (0..n).map(|i| (polygon[i] - o).perp_dot(polygon[(i + 1) % n] - o)).sum::<f64>()
 }
 
-/// Whether a point is inside a polygon, by crossings; on its border either answer may come.
+/// Whether a point is inside a polygon; on its border either answer may come.
 pub(crate) fn contains(polygon: &[Uv], p: Uv) -> bool {
-    let n = polygon.len();
-    let mut inside = false;
-    for i in 0..n {
-        let (a, b) = (polygon[i], polygon[(i + 1) % n]);
-        if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) {
-            inside = !inside;
-        }
-    }
-    inside
+    is_inside_sides(polygon_sides(polygon), p)
 }
 
 /// Chains edge uses, in their order, to a loop; each is shifted by whole periods to begin where the one before ends, within `tolerance` mm,

@@ -1,7 +1,7 @@
 //! Which side of a border places lie on, asked many times.
 
-use super::polygons::crosses_ray_from;
 use crate::math::Uv;
+use crate::math::polygon::is_inside_sides;
 
 /// Most bands: a segment that runs along all of them stands in each.
 const MOST_BANDS: usize = 256;
@@ -41,7 +41,7 @@ impl BorderBands {
     /// Whether `p` lies inside the closed loops of the border, by the parity of their crossings with the ray along +u. On the border either
     /// answer may come.
     pub(in crate::tessellate) fn encloses(&self, p: Uv) -> bool {
-        self.bands[self.band(p.y)].iter().filter(|&&s| crosses_ray_from(p, s)).count() % 2 == 1
+        is_inside_sides(self.bands[self.band(p.y)].iter().copied(), p)
     }
 }
 
@@ -59,8 +59,7 @@ mod tests {
         let bands = BorderBands::new(&segments);
         for k in 0..4000 {
             let p = Uv::new(1.0 + 4.0 * ((k * 37) % 101) as f64 / 101.0, -9.5 + 5.0 * (k % 97) as f64 / 97.0);
-            let crossings = segments.iter().filter(|&&s| crosses_ray_from(p, s)).count();
-            assert_eq!(bands.encloses(p), crossings % 2 == 1, "{p}");
+            assert_eq!(bands.encloses(p), is_inside_sides(segments.iter().copied(), p), "{p}");
         }
         // All on one height, and none at all.
         assert!(!BorderBands::new(&[[Uv::ZERO, Uv::X]]).encloses(Uv::new(-1.0, 0.0)));

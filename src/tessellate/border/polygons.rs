@@ -271,11 +271,6 @@ impl OwnPoints {
     }
 }
 
-/// Whether the ray from `p` along +u crosses the segment from `a` to `b`; over closed loops an odd number of crossings means inside.
-pub(in crate::tessellate) fn crosses_ray_from(p: Uv, [a, b]: [Uv; 2]) -> bool {
-    (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
-}
-
 /// Corners of a face of another solid that lies on this one, in this part's coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::tessellate) struct ImprintedPoints<'p> {

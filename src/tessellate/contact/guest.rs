@@ -3,10 +3,11 @@
 use super::closure::SideCounts;
 use super::detection::Extent;
 use super::trimmed::TrimmedFace;
+use crate::math::polygon::is_inside_sides;
 use crate::math::{Point, Uv};
 use crate::model::{EdgeUse, Part};
 use crate::tessellate::assemble::PartMesh;
-use crate::tessellate::border::polygons::{BorderPolygons, BorderSide, PolygonVertex, crosses_ray_from};
+use crate::tessellate::border::polygons::{BorderPolygons, BorderSide, PolygonVertex};
 use crate::tessellate::border_nodes::BorderNodes;
 use crate::tessellate::cells::cell::Cell;
 use crate::tessellate::emission::Emission;
@@ -97,7 +98,7 @@ impl<'f, 'm> Guest<'f, 'm> {
 
     /// Whether parameters lie inside the border.
     pub(super) fn contains(&self, uv: Uv) -> bool {
-        self.sides().filter(|(_, _, a, b)| crosses_ray_from(uv, [a.uv, b.uv])).count() % 2 == 1
+        is_inside_sides(self.sides().map(|(_, _, a, b)| [a.uv, b.uv]), uv)
     }
 }
 

@@ -1,11 +1,12 @@
 //! One placed face, as contacts see it: its trimmed region, and places on it in the model's coordinates.
 
 use super::projector::Projector;
+use crate::math::polygon::is_inside_sides;
 use crate::math::{Frame, Point, Uv};
 use crate::model::{EdgeId, Face, Instance, Model, Part, TrimLoop};
 use crate::nurbs::project;
 use crate::tessellate::assemble::{PartMesh, face_with_surface};
-use crate::tessellate::border::polygons::{self, BorderPolygons, ImprintedPoints, PolygonVertex, crosses_ray_from};
+use crate::tessellate::border::polygons::{self, BorderPolygons, ImprintedPoints, PolygonVertex};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
 use crate::tessellate::settings::{Settings, ToleranceField};
@@ -90,7 +91,7 @@ impl<'m> TrimmedFace<'m> {
     pub(super) fn contains(&self, uv: Uv) -> bool {
         let sides =
             self.polygons.polygons.iter().flat_map(|p| (0..p.len()).map(|i| [p[i].uv, p[(i + 1) % p.len()].uv]));
-        sides.filter(|&s| crosses_ray_from(uv, s)).count() % 2 == 1
+        is_inside_sides(sides, uv)
     }
 
     /// Returns the edges of the face's loops, each once; none for a face without loops.

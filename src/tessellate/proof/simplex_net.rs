@@ -180,8 +180,8 @@ fn steps_of_expansion(corners: usize, [p, q]: [usize; 2]) -> u64 {
     ((q + 1) * first + second) as u64
 }
 
-/// Takes all de Casteljau steps of one direction over `steps + 1` nets of a degree, which stand `stride` apart in `work[0]`; the result
-/// is first in the returned one of the two.
+/// Takes all de Casteljau steps of one direction over `steps + 1` nets of a degree, which stand `stride` apart in `work[0]`: the two buffers
+/// take turns. Returns the index of the one that begins with the resulting net, of degree `degree + steps`; both are overwritten.
 #[inline(always)]
 fn de_casteljau<const N: usize>(
     work: &mut [Vec<Homogeneous>; 2],

@@ -2,7 +2,7 @@
 //! normals.
 
 use crate::math::Uv;
-use crate::tessellate::border::polygons::crosses_ray_from;
+use crate::math::polygon::is_inside_sides;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::{Nodes, edge_key};
 use rustc_hash::FxHashSet;
@@ -24,7 +24,7 @@ pub(in crate::tessellate) fn crease_lines(
     used.dedup();
     let uv = |n: u32| nodes[n].uv;
     // Even–odd over what bounds the transition.
-    let is_inside = |p: Uv| segments.iter().filter(|s| crosses_ray_from(p, s.map(uv))).count() % 2 == 1;
+    let is_inside = |p: Uv| is_inside_sides(segments.iter().map(|s| s.map(uv)), p);
     for d in 0..2 {
         for &crease in &surface.sharp[d] {
             let mut on: Vec<u32> =

@@ -332,7 +332,7 @@ pub(super) fn answer<L: Lanes>(
                 cost.tests += 1 + u64::from(other.is_some());
                 let one = &shown[entries[first].facet as usize];
                 let other = other.map(|e| &shown[e.facet as usize]);
-                pair::test_pair::<L>(one, other, &lookup.line, &mut edges, &mut best);
+                pair::test_facet_pair::<L>(one, other, &lookup.line, &mut edges, &mut best);
                 first += 2;
             }
             hits[index] = best.hit();

@@ -10,10 +10,10 @@ use crate::intersect::octree::facet_pair::Edges;
 use crate::intersect::octree::lanes::Lanes;
 use std::hint::select_unpredictable;
 
-/// Tests two facets, or one if there is no other, and offers hits to `best`; `edges` is room to work in. Bits of triangles are two apart,
-/// as their sides are.
+/// Tests all triangles of two facets, or of `first` alone, against a line and offers every hit to `best`, which keeps the nearest; `edges` is
+/// overwritten. Where an edge function is zero both facets are tested one by one, as the walk does it.
 #[inline(always)]
-pub(super) fn test_pair<L: Lanes>(
+pub(super) fn test_facet_pair<L: Lanes>(
     first: &BufferFacet,
     other: Option<&BufferFacet>,
     line: &Line,
@@ -22,6 +22,7 @@ pub(super) fn test_pair<L: Lanes>(
 ) {
     // A missing other repeats the first, and its bits are not present.
     let second = other.unwrap_or(first);
+    // Bits of triangles are two apart, as their sides are.
     let present = first.triangle_bits() | select_unpredictable(other.is_some(), second.triangle_bits() << 4, 0);
     L::pair_edges([&first.corners, &second.corners], line, edges);
     // Of each triangle: two edges of the outline, and the diagonal from this side or from the other.

@@ -1,4 +1,4 @@
-//! The mesh as rays see it from far: the box they must enter, and the middle about which nodes and blocks are given.
+//! The mesh as rays see it from far: the box they must enter, and the point about which nodes and blocks are given.
 
 use crate::math::{Aabb, Point, Ray};
 
@@ -7,12 +7,13 @@ const CROSSING_ERROR: f64 = 8.0 * f64::EPSILON;
 
 /// What rays need of the mesh, in four lanes of which the last means nothing.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
+pub(super) struct MeshBox {
+    /// The point about which nodes and blocks are given, mm.
     pub(super) center: [f64; 4],
-    /// Around all facets, grown a little.
+    /// Corners of the box, mm.
     low: [f64; 4],
     high: [f64; 4],
-    /// Three times the size: what an f32 box test is wrong by, in roundings.
+    /// Three times the size of the box, mm: what an f32 box test is wrong by, in roundings.
     pub(super) reach: [f32; 4],
 }
 
@@ -23,8 +24,8 @@ pub(super) struct Passage {
     pub(super) far: f64,
 }
 
-impl Frame {
-    /// Takes the middle and the box of the mesh, mm, the latter already grown.
+impl MeshBox {
+    /// Spreads `center` and `bounds`, mm, over four lanes as they are: the caller has grown the box by the margin that rays need.
     pub(super) fn new(center: Point, bounds: &Aabb) -> Self {
         let lanes = |p: Point, last: f64| [p.x, p.y, p.z, last];
         Self {
