@@ -56,7 +56,9 @@ impl Channels {
             Self::Photometric => add(0, xyz_of_watt(nm)[1] / CHANNEL_LUMENS),
             Self::Xyz => (0..3).zip(xyz_of_watt(nm)).for_each(|(c, x)| add(c, x / CHANNEL_LUMENS)),
             Self::Bins(edges) => {
-                let k = edges.partition_point(|e| *e <= nm);
+                // A bin holds the edge that it begins with, the last one both, as cells do.
+                let begun = edges.partition_point(|e| *e <= nm);
+                let k = if edges.last() == Some(&nm) { begun - 1 } else { begun };
                 if k > 0 && k < edges.len() {
                     add(k - 1, 1.0);
                 }

@@ -1,6 +1,7 @@
 //! Which rays a run traces: how many of each source, in which replicate, of what power, and which of them are recorded.
 
 use super::bind::BoundScene;
+use super::emitter::Emitter;
 use super::settings::RunSettings;
 use super::tally::QUANTA;
 
@@ -15,6 +16,15 @@ const FEWEST_RAYS: u64 = 16;
 
 /// Most rays of a replicate, 2^21 or some more, whose quanta a word of 64 bits can hold.
 const MOST_RAYS_LOG2: u32 = 21;
+
+/// Most quanta of one ray: whole numbers up to 2⁵³ are exact.
+const HEAVIEST_RAY: f64 = (1u64 << 53) as f64;
+
+/// Most quanta of a replicate, half of what its words of 63 bits hold.
+const FULLEST_REPLICATE: f64 = (1u64 << 62) as f64;
+
+/// Bound of the squares of replicates' quanta, 2¹³¹: sums of the squares of moments, a quarter of a quantum each at most, stay below 2¹²⁷.
+const SUM_OF_SQUARES: f64 = (1u128 << 127) as f64 * 16.0;
 
 /// Rays of a replicate of a run that can grow: round numbers of rays are whole numbers of replicates, and what a replicate costs
 /// beside its rays is below a per cent.
@@ -47,6 +57,8 @@ pub(crate) struct Plan {
     pub(crate) rays: u64,
     /// Power of a quantum, in the unit of the sources.
     pub(crate) quantum: f64,
+    /// Quanta of an average ray: [`QUANTA`], or a smaller power of two where sums would not hold as many.
+    pub(crate) average_ray: f64,
     /// Power of all sources, in their unit.
     pub(crate) emitted: f64,
     /// Every 2ᵏ-th ray is recorded; none when absent.
@@ -66,19 +78,9 @@ impl Plan {
         // A run that can grow is divided replicate by replicate, source by source within each; any other source by source.
         let counts = rays_of_sources(bound, if grows { GROWING_REPLICATE } else { settings.rays }, emitted);
         let divided: u64 = counts.iter().sum();
-        let mut first = 0;
-        let shares = bound
-            .emitters
-            .iter()
-            .zip(&counts)
-            .map(|(e, &n)| {
-                // Each source emits exactly its power: its rays weigh a little more or less than the average one.
-                let quanta = (QUANTA * (e.power / emitted) * (divided as f64 / n as f64)).round().max(1.0);
-                let share = SourceShare { first, rays: n, quanta };
-                first += n;
-                share
-            })
-            .collect();
+        // Each source emits exactly its power: its rays weigh a little more or less than the average one.
+        let weight = |(e, &n): (&Emitter, &u64)| (n, (e.power / emitted) * (divided as f64 / n as f64));
+        let weights: Vec<(u64, f64)> = bound.emitters.iter().zip(&counts).map(weight).collect();
         // Errors come from the spread of replicates, each of which needs rays enough to be a sample of the whole.
         let replicates = if grows {
             settings.rays.div_ceil(GROWING_REPLICATE) as u32
@@ -88,12 +90,20 @@ impl Plan {
             let replicates = settings.replicates.clamp(2, (divided / FEWEST_RAYS).clamp(2, 1 << 16) as u32);
             replicates.max((divided >> MOST_RAYS_LOG2) as u32)
         };
+        let average_ray = average_quanta(&weights, (!grows).then_some(replicates));
+        let mut first = 0;
+        let share = |&(rays, weight): &(u64, f64)| {
+            let share = SourceShare { first, rays, quanta: (average_ray * weight).round().max(1.0) };
+            first += rays;
+            share
+        };
+        let shares = weights.iter().map(share).collect();
         let first_replicate = if grows { settings.first_ray.div_ceil(GROWING_REPLICATE) as u32 } else { 0 };
         let rays = if grows { divided * u64::from(replicates) } else { divided };
         // A power of two, so that whether a ray is recorded is one `and` of its index.
         let record_mask =
             (settings.path_samples > 0).then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
-        let quantum = emitted / (rays as f64 * QUANTA);
+        let quantum = emitted / (rays as f64 * average_ray);
         Self {
             shares,
             replicate_rays: grows.then_some(divided),
@@ -101,6 +111,7 @@ impl Plan {
             replicates,
             rays,
             quantum,
+            average_ray,
             emitted,
             record_mask,
             sample_mask: record_mask,
@@ -229,6 +240,28 @@ fn grows_unasked(settings: &RunSettings) -> bool {
     usual && settings.rays >= FEWEST_GROWING * GROWING_REPLICATE && settings.rays.is_multiple_of(GROWING_REPLICATE)
 }
 
+/// Returns the quanta of an average ray: [`QUANTA`], halved until the heaviest ray is a whole number that is exact and no sum of a replicate, or
+/// of the squares of so many, overflows. `weights` are the rays of each source and what one of them weighs against the average; `replicates`
+/// is `None` where these are those of each replicate.
+fn average_quanta(weights: &[(u64, f64)], replicates: Option<u32>) -> f64 {
+    let parts = f64::from(replicates.unwrap_or(1));
+    let heaviest = weights.iter().map(|w| w.1).fold(0.0, f64::max);
+    // A source of few rays may have them all in one replicate.
+    let fullest: f64 = weights.iter().map(|(rays, weight)| (*rays as f64 / parts).ceil() * weight).sum();
+    let fits = |average: f64| {
+        let replicate = average * fullest;
+        // How many replicates a run that grows will have is not known; its own are small.
+        let squares = if replicates.is_some() { parts * replicate * replicate } else { 0.0 };
+        average * heaviest <= HEAVIEST_RAY && replicate <= FULLEST_REPLICATE && squares < SUM_OF_SQUARES
+    };
+    let mut average = QUANTA;
+    // A power of two: the share of every ray keeps its digits.
+    while !fits(average) && average > 1.0 {
+        average *= 0.5;
+    }
+    average
+}
+
 /// Shares out so many rays among the sources by their power, at least one to each; a source with a number of its own has that.
 fn rays_of_sources(bound: &BoundScene, rays: u64, emitted: f64) -> Vec<u64> {
     // Rounded sums, not rounded shares: three equal sources share a million rays without losing one.
@@ -243,4 +276,25 @@ fn rays_of_sources(bound: &BoundScene, rays: u64, emitted: f64) -> Vec<u64> {
         given = upto;
     }
     counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_heaviest_ray_and_the_squares_of_large_runs_fit_their_words() {
+        // The usual run, and the largest whose sums hold 2⁴⁰ quanta a ray.
+        for rays in [1_000_000, 1 << 29] {
+            assert_eq!(average_quanta(&[(rays, 1.0)], Some(((rays >> MOST_RAYS_LOG2) as u32).max(128))), QUANTA);
+        }
+        // One ray with half the power beside 8·10⁷ others: 2⁶⁵ quanta of 2⁴⁰ a mean ray.
+        let (n, lone) = (8e7, 0.5 * (8e7 + 1.0));
+        let average = average_quanta(&[(1, lone), (8e7 as u64, 0.5 * (n + 1.0) / n)], Some(128));
+        assert!(average * lone <= 2f64.powi(53) && 2.0 * average * lone > 2f64.powi(53));
+        // 2³¹ rays in 2¹⁰ replicates at the rim of a receiver: each has Σ w·x = 2²¹ rays, cut to a quarter quantum; squared, times 2¹⁰.
+        let average = average_quanta(&[(1 << 31, 1.0)], Some(1 << 10));
+        let squares = 2f64.powi(10) * (2f64.powi(21) * average / 4.0).powi(2);
+        assert!(squares < 2f64.powi(127) && average > 2f64.powi(37));
+    }
 }

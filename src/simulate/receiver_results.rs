@@ -3,7 +3,7 @@
 use super::receiver::{Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
 use super::tallies::Tallies;
-use super::tally::Sum;
+use super::tally::{Moments, Sum};
 use serde::{Serialize, Serializer};
 
 /// Square millimetres to a square metre.
@@ -162,13 +162,20 @@ impl ReceiverResult {
         let errors = sums.iter().enumerate().map(|(k, s)| s.error(tallies.replicates) * per(k)).collect();
         let total = &tallies.receivers[i];
         let means = tallies.moments[i].means(total.total);
+        // A mean square is no less than the square of the mean, by whatever units both are counted in.
+        let means = means.map(|[mean, square]| [mean, square.max(mean * mean)]);
         let of_means = tallies.spreads[i].errors(total, &tallies.moments[i], tallies.replicates);
         let rays = ray_count(total, tallies.replicates, ray);
         let of_spread = [0, 1].map(|a| spread_errors(means[a], [of_means[a], of_means[2 + a]]));
-        let of_place = [0, 1].map(|a| place_errors(means[a], of_spread[a], rays));
-        let along_axes = |errors: [[f64; 2]; 2], k: usize| [0, 1].map(|a| half[a] * errors[a][k]);
         // Distances are counted in units of the longer half side, in which a circle stays one.
         let largest = half[0].max(half[1]);
+        let farthest = tallies.moments[i].farthest();
+        let of_place = [0, 1].map(|a| {
+            let of_rays = place_errors(means[a], of_spread[a], rays);
+            let of_units = unit_errors(means[a], farthest * largest / half[a]);
+            [0, 1].map(|k| of_rays[k].hypot(of_units[k]))
+        });
+        let along_axes = |errors: [[f64; 2]; 2], k: usize| [0, 1].map(|a| half[a] * errors[a][k]);
         Self {
             name: r.name.clone(),
             kind,
@@ -183,7 +190,7 @@ impl ReceiverResult {
             rms: [0, 1].map(|a| half[a] * means[a][1].sqrt()),
             rms_error: along_axes(of_place, 1),
             spread_errors: [along_axes(of_spread, 0), along_axes(of_spread, 1)],
-            farthest: largest * tallies.moments[i].farthest(),
+            farthest: largest * farthest,
             files: Vec::new(),
             half,
             middle,
@@ -247,6 +254,17 @@ fn place_errors([mean, square]: [f64; 2], [of_mean, of_rms]: [f64; 2], rays: f64
     // No first order: the square may be nothing beside what the ray adds to it.
     let wider = (square + of_square).sqrt() - square.sqrt();
     [(same_rays * of_mean).hypot(of_place), (same_rays * of_rms).hypot(wider)]
+}
+
+/// Returns what the units that places are counted in leave open of mean place and root mean square, in half sides: half a unit of a
+/// coordinate, and of its square. `farthest` is the largest distance of light from the centre.
+fn unit_errors([mean, square]: [f64; 2], farthest: f64) -> [f64; 2] {
+    let half_unit = 0.5 / Moments::GRAIN;
+    // Near the centre squares are far below their unit: the mean and the farthest light, counted finer, say more.
+    let least = (square - half_unit).max((mean.abs() - half_unit).max(0.0).powi(2));
+    let most = (square + half_unit).min((farthest + Moments::FARTHEST_UNIT).powi(2)).max(square);
+    let of_rms = (most.sqrt() - square.sqrt()).max(square.sqrt() - least.sqrt());
+    [half_unit, of_rms]
 }
 
 /// The smallest cell but for those off the receiver, rising.

@@ -56,7 +56,7 @@ pub(crate) struct Deposit {
 }
 
 /// Power by sequence, quanta of one replicate.
-pub(crate) type SequenceTally = BTreeMap<Sequence, u64>;
+pub(crate) type SequenceTally = BTreeMap<Sequence, u128>;
 
 /// Power by sequence over replicates.
 pub type SequenceSums = BTreeMap<Sequence, Sum>;
@@ -119,7 +119,7 @@ pub(crate) fn add_ray(
         let more = steps.len() > MOST_STEPS;
         steps.truncate(MOST_STEPS);
         let mut add = |receiver: u32, steps: Vec<SequenceStep>| {
-            *tally.entry(Sequence { receiver, source, steps, more }).or_default() += deposit.quanta;
+            *tally.entry(Sequence { receiver, source, steps, more }).or_default() += u128::from(deposit.quanta);
         };
         match deposit.place {
             DepositPlace::Receiver(receiver) => add(receiver, steps),

@@ -1,12 +1,13 @@
 //! Where light ended: the tally of one replicate, and the sums over replicates.
 
 use super::bind::BoundScene;
+use super::grid::Grid;
 use super::outcome::{Counts, LostRay, PathSink, PathVertex};
 use super::path_sample::PathSample;
 use super::plan::Plan;
 use super::receiver::Shape;
 use super::sequence::{Deposit, SequenceSums, SequenceTally};
-use super::tally::{Grid, MomentSpread, Moments, Sum, quanta_as_integer};
+use super::tally::{MomentSpread, Moments, Sum, quanta_as_integer};
 use crate::math::FaceId;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +19,7 @@ pub(crate) const LEDGER: usize = 1000;
 pub struct ReplicateTally {
     /// The cells of each receiver, with those of its channels behind them, in quanta.
     pub(crate) receivers: Vec<Grid>,
-    pub(crate) receiver_totals: Vec<u64>,
+    pub(crate) receiver_totals: Vec<u128>,
     pub(crate) moments: Vec<Moments>,
     /// Quanta absorbed by each face, and inside each body.
     pub(crate) absorbed: Grid,
@@ -101,9 +102,12 @@ impl ReplicateTally {
     pub(crate) fn finish(&mut self, bound: &BoundScene) {
         for (i, receiver) in bound.receivers.iter().enumerate() {
             if let Shape::Absorbed { faces } = &receiver.shape {
-                let sum: u64 = faces.iter().map(|&f| self.absorbed.get(f as usize)).sum();
-                self.receivers[i].add(0, sum as f64);
-                self.receiver_totals[i] += sum;
+                for &face in faces {
+                    let quanta = self.absorbed.get(face as usize);
+                    // No face takes more than is emitted, which fits.
+                    self.receivers[i].add_integer(0, quanta as u64);
+                    self.receiver_totals[i] += quanta;
+                }
             }
             self.receivers[i].add_pending();
         }
@@ -116,7 +120,7 @@ impl ReplicateTally {
     }
 
     /// Returns the power of a receiver, in quanta.
-    pub fn power(&self, receiver: usize) -> u64 {
+    pub fn power(&self, receiver: usize) -> u128 {
         self.receiver_totals[receiver]
     }
 
@@ -127,7 +131,7 @@ impl ReplicateTally {
 
     /// Goes through the cells of a receiver that hold something, each once and in no particular order, with their quanta; those of its
     /// channels follow those of its power.
-    pub fn cells(&self, receiver: usize) -> impl Iterator<Item = (usize, u64)> {
+    pub fn cells(&self, receiver: usize) -> impl Iterator<Item = (usize, u128)> {
         self.receivers[receiver].touched()
     }
 
@@ -258,7 +262,7 @@ impl Tallies {
         replicate.bulk.flush(&mut self.bulk);
         let e = std::mem::take(&mut replicate.ends);
         let ends = [e.emitted, e.received, e.absorbed, e.escaped, e.cut_off, e.lost];
-        self.ends.iter_mut().zip(ends).for_each(|(s, e)| s.add_replicate(e));
+        self.ends.iter_mut().zip(ends).for_each(|(s, e)| s.add_replicate(u128::from(e)));
         self.counts.add(&std::mem::take(&mut replicate.counts));
         self.ledger.append(&mut replicate.ledger);
         trim_ledger(&mut self.ledger);

@@ -8,10 +8,10 @@
 //! replicates, which is honest for random numbers, nets and split rays alike (batch means; with 128 replicates the
 //! error of the error is 6 %).
 
-use crate::intersect::prefetch;
 use serde::{Deserialize, Serialize};
 
-/// Quanta of an average ray when it leaves its source: 9.1e-13 of a ray is the finest share of power.
+/// Quanta of an average ray when it leaves its source: 9.1e-13 of a ray is the finest share of power. Fewer, by a power of two, in runs with
+/// rays so heavy, or so many, that sums of as many would not fit their words.
 pub const QUANTA: f64 = (1u64 << 40) as f64;
 
 /// Squares are kept of numbers cut by this many bits, so that a replicate of 2³⁰ rays cannot overflow.
@@ -46,7 +46,7 @@ fn nearest_integer(x: f64) -> i64 {
 /// use lampyris::simulate::Sum;
 /// // Two replicates of 10 and 14 units of 2²⁰ quanta: their spread makes a standard error of the sum of 4.
 /// let mut sum = Sum::default();
-/// [10u64, 14].iter().for_each(|n| sum.add_replicate(n << 20));
+/// [10u128, 14].iter().for_each(|n| sum.add_replicate(n << 20));
 /// assert_eq!((sum.total >> 20, sum.error(2)), (24, 4.0 * 1_048_576.0));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,10 +59,14 @@ pub struct Sum {
 
 impl Sum {
     /// Adds what one whole replicate gathered.
-    pub fn add_replicate(&mut self, quanta: u64) {
-        self.total += u128::from(quanta);
-        // Saturating: of a replicate that overflows the error is wrong, not the run.
-        self.squares = self.squares.saturating_add(u128::from(quanta >> CUT).pow(2));
+    pub fn add_replicate(&mut self, quanta: u128) {
+        self.total += quanta;
+        // Nearly all fit a word, whose square is one multiplication; what does not fit at all has no error, as `error` says.
+        let square = match u64::try_from(quanta >> CUT) {
+            Ok(cut) => u128::from(cut) * u128::from(cut),
+            Err(_) => u128::MAX,
+        };
+        self.squares = self.squares.saturating_add(square);
     }
 
     /// Adds the sum of other replicates.
@@ -71,97 +75,18 @@ impl Sum {
         self.squares = self.squares.saturating_add(o.squares);
     }
 
-    /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates; fewer than two count as two.
+    /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates; fewer than two count as two. The total
+    /// itself where the sum of squares is full and tells nothing.
     pub fn error(&self, replicates: u32) -> f64 {
+        if self.squares == u128::MAX {
+            return self.total as f64;
+        }
         let k = f64::from(replicates.max(2));
         let squares = self.squares as f64 * f64::from(1u32 << (2 * CUT));
         let total = self.total as f64;
         // The spread of replicates about their mean, and from it the error of the sum of all: k/(k − 1) for the
         // mean that was taken from the same numbers.
         ((squares - total * total / k).max(0.0) * k / (k - 1.0)).sqrt()
-    }
-}
-
-/// Cells ahead of the one that is added whose memory is asked for.
-const PREFETCH_AHEAD: usize = 16;
-
-/// A grid of sums: many cells, most of them untouched in any one replicate.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Grid {
-    cells: Vec<u64>,
-    /// The cells that hold something, of which the first `count` mean something; as long as the cells and one more.
-    touched: Vec<u32>,
-    count: usize,
-    /// What [`Self::add_deferred`] has still to add, and where.
-    waiting: (usize, f64),
-}
-
-impl Grid {
-    pub(crate) fn new(cells: usize) -> Self {
-        Self { cells: vec![0; cells], touched: vec![0; cells + 1], count: 0, waiting: (0, 0.0) }
-    }
-
-    /// Adds quanta to a cell. Without a branch on whether it is empty: half the cells of a picture are, and to wait for the answer was 7 %
-    /// of a run.
-    #[inline]
-    pub(crate) fn add(&mut self, cell: usize, quanta: f64) {
-        let quanta = quanta_as_integer(quanta);
-        let c = &mut self.cells[cell];
-        self.touched[self.count] = cell as u32;
-        // The place is written in any case and kept by the count, so that no branch has to be foretold.
-        self.count += usize::from((*c == 0) & (quanta > 0));
-        *c += quanta;
-    }
-
-    /// Adds quanta to a cell when the next ones come, and asks for its memory now: for a grid larger than the nearest cache. What waits is
-    /// part of what [`Self::flush`] moves, not of what the others tell before [`Self::add_pending`]. To add at once was 10 % of the
-    /// kernel's time.
-    #[inline(always)]
-    pub(crate) fn add_deferred(&mut self, cell: usize, quanta: f64) {
-        prefetch(&self.cells, cell);
-        let (earlier_cell, earlier_quanta) = std::mem::replace(&mut self.waiting, (cell, quanta));
-        self.add(earlier_cell, earlier_quanta);
-    }
-
-    /// Goes through the cells that hold something, each once, with what they hold.
-    pub(crate) fn touched(&self) -> impl Iterator<Item = (usize, u64)> {
-        self.touched[..self.count].iter().map(|&c| (c as usize, self.cells[c as usize]))
-    }
-
-    pub(crate) fn get(&self, cell: usize) -> u64 {
-        self.cells[cell]
-    }
-
-    /// Adds what [`Self::add_deferred`] has still to add.
-    pub(crate) fn add_pending(&mut self) {
-        if !self.cells.is_empty() {
-            let (cell, quanta) = std::mem::take(&mut self.waiting);
-            self.add(cell, quanta);
-        }
-    }
-
-    /// Forgets what it holds and what waits, without adding it anywhere; costs what was touched, not what there is.
-    pub(crate) fn clear(&mut self) {
-        self.waiting = (0, 0.0);
-        for &cell in &self.touched[..self.count] {
-            self.cells[cell as usize] = 0;
-        }
-        self.count = 0;
-    }
-
-    /// Adds what the replicate gathered to the sums of the run, and empties the grid.
-    pub(crate) fn flush(&mut self, sums: &mut [Sum]) {
-        self.add_pending();
-        let touched = &self.touched[..self.count];
-        for (k, &cell) in touched.iter().enumerate() {
-            // The sums of a picture of 200 × 200 cells take a megabyte.
-            if let Some(&later) = touched.get(k + PREFETCH_AHEAD) {
-                prefetch(sums, later as usize);
-                prefetch(&self.cells, later as usize);
-            }
-            sums[cell as usize].add_replicate(std::mem::take(&mut self.cells[cell as usize]));
-        }
-        self.count = 0;
     }
 }
 
@@ -184,6 +109,8 @@ const GRAIN: f64 = Moments::GRAIN;
 impl Moments {
     /// Units of a coordinate, and of its square, to a half side.
     pub const GRAIN: f64 = (1u64 << 32) as f64;
+    /// What [`Self::farthest`] is less than the largest distance at most.
+    pub(crate) const FARTHEST_UNIT: f64 = 1.0 / (1u64 << 30) as f64;
 
     /// Adds `quanta` at `x`, `y` in units of the half sides, both within ±1; `radius2` as a share of the half side squared.
     #[inline]
@@ -241,11 +168,11 @@ const CUT_MOMENT: u32 = 34;
 
 impl MomentSpread {
     /// Adds what one whole replicate gathered: its power in quanta and its moments.
-    pub fn add_replicate(&mut self, quanta: u64, m: &Moments) {
-        let power = i128::from(quanta >> CUT);
+    pub fn add_replicate(&mut self, quanta: u128, m: &Moments) {
+        let power = (quanta >> CUT) as i128;
         for (sums, moment) in self.products.iter_mut().zip(m.as_list()) {
             let moment = moment >> CUT_MOMENT;
-            sums[0] = sums[0].saturating_add(moment * power);
+            sums[0] = sums[0].saturating_add(moment.saturating_mul(power));
             sums[1] = sums[1].saturating_add(moment.saturating_mul(moment));
         }
     }
@@ -256,14 +183,19 @@ impl MomentSpread {
         pairs.for_each(|(a, b)| *a = a.saturating_add(*b));
     }
 
-    /// Returns the standard errors of the two means, then of the two mean squares of [`Moments::means`], as ratios of sums over replicates.
+    /// Returns the standard errors of the two means, then of the two mean squares of [`Moments::means`], as ratios of sums over replicates; 1,
+    /// the half side itself, where a sum is full and tells nothing.
     pub fn errors(&self, power: &Sum, m: &Moments, replicates: u32) -> [f64; 4] {
         let k = f64::from(replicates.max(2));
         let total = power.total.max(1) as f64;
         let unit = [f64::from(1u32 << CUT), 2f64.powi(CUT_MOMENT as i32) / GRAIN];
         let squares = power.squares as f64 * unit[0] * unit[0];
         let moments = m.as_list();
+        let full = |sum: i128| sum == i128::MAX || sum == i128::MIN;
         std::array::from_fn(|i| {
+            if self.products[i].into_iter().any(full) || power.squares == u128::MAX {
+                return 1.0;
+            }
             let mean = moments[i] as f64 / GRAIN / total;
             let [with_power, with_self] = self.products[i].map(|x| x as f64 * unit[1]);
             // First order in the fluctuations of a ratio (the delta method): the moment less the mean times the
@@ -303,25 +235,17 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_is_part_of_what_is_flushed() {
-        let (mut grid, mut sums) = (Grid::new(3), vec![Sum::default(); 3]);
-        for (cell, quanta) in [(2, 5.0), (0, 7.0), (2, 11.0)] {
-            grid.add_deferred(cell, quanta);
+    fn sums_that_are_full_state_no_small_error() {
+        let mut sum = Sum::default();
+        [1u128 << 80, 1 << 80].iter().for_each(|quanta| sum.add_replicate(*quanta));
+        assert_eq!(sum.error(2), 2f64.powi(81));
+        let (mut spread, mut whole) = (MomentSpread::default(), Moments::default());
+        for _ in 0..2 {
+            let m = Moments { first: [1 << 110, 0], second: [1 << 110, 0], farthest: 0 };
+            spread.add_replicate(1 << 80, &m);
+            whole.merge(&m);
         }
-        grid.flush(&mut sums);
-        assert_eq!([0, 1, 2].map(|k: usize| sums[k].total), [7, 0, 16]);
-    }
-
-    #[test]
-    fn sums_do_not_depend_on_order() {
-        let quanta: Vec<f64> = (0..1000u64).map(|i| (i * 7919 % 1009) as f64 * 1e9).collect();
-        let run = |order: &mut dyn Iterator<Item = usize>| {
-            let (mut grid, mut sums) = (Grid::new(7), vec![Sum::default(); 7]);
-            order.for_each(|i| grid.add(i % 7, quanta[i]));
-            grid.flush(&mut sums);
-            sums
-        };
-        assert_eq!(run(&mut (0..1000)), run(&mut (0..1000).rev()));
+        assert_eq!(spread.errors(&sum, &whole, 2), [1.0; 4]);
     }
 
     /// Two replicates of equal power, at 0.5 and at 0.25: mean 0.375 ± 0.125, mean square 0.15625 ± 0.09375.
@@ -331,8 +255,8 @@ mod tests {
         for x in [0.5, 0.25] {
             let mut m = Moments::default();
             m.add(QUANTA, [x, 0.0], x * x);
-            spread.add_replicate(QUANTA as u64, &m);
-            power.add_replicate(QUANTA as u64);
+            spread.add_replicate(QUANTA as u128, &m);
+            power.add_replicate(QUANTA as u128);
             whole.merge(&m);
         }
         for (found, expected) in spread.errors(&power, &whole, 2).into_iter().zip([0.125, 0.0, 0.09375, 0.0]) {

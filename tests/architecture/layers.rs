@@ -483,6 +483,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "surfaces",
             "body",
             "tally",
+            "grid",
             "trim_loops",
             "face_foot",
             "emitter",

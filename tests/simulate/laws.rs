@@ -114,6 +114,47 @@ fn a_receiver_in_an_absorbing_medium_counts_what_arrives() {
     }
 }
 
+/// All light at one place, far finer than the units that places are counted in: what these leave open is in the errors.
+#[test]
+fn the_place_of_a_fine_beam_is_known_within_its_error() {
+    let place = [1.234_567_890_123, -0.271_828_182_845_9];
+    let text = [
+        "[run]\nrays = 2048\n",
+        &collimated([place[0], place[1], 0.0], [0.0, 0.0, 1.0], 1e-13),
+        &plane("wide", [0.0, 0.0, 100.0], 20.0),
+        // Around the beam, whose width is then nothing.
+        &plane("centred", [place[0], place[1], 200.0], 20.0).replace("cells", "absorbs = true\ncells"),
+    ]
+    .concat()
+    .replacen("name = 'wide'", "name = 'wide'\nabsorbs = false", 1);
+    let r = World::default().run(&text, |_| ());
+    for (receiver, place) in r.receivers.iter().zip([place, [0.0; 2]]) {
+        for (axis, x) in place.into_iter().enumerate() {
+            for (found, error, expected) in [
+                (receiver.centroid[axis], receiver.centroid_error[axis], x),
+                (receiver.rms[axis], receiver.rms_error[axis], x.abs()),
+            ] {
+                assert!((found - expected).abs() <= error && error < 1e-7, "{axis}: {found} ± {error}, {x}");
+            }
+            assert!(receiver.rms[axis] >= receiver.centroid[axis].abs() - receiver.centroid_error[axis]);
+        }
+    }
+}
+
+/// Light of the last edge belongs to the last bin, as that of the first to the first.
+#[test]
+fn bins_of_wavelengths_hold_both_their_ends() {
+    for (nm, expected) in [(600.0, [1.0, 0.0]), (650.0, [0.0, 1.0]), (700.0, [0.0, 1.0]), (700.1, [0.0; 2])] {
+        let light = collimated([0.0; 3], [0.0, 0.0, 1.0], 2.0)
+            + &format!("spectrum = {{ kind = 'lines', values = [[{nm}, 1]] }}\n");
+        let receiver = plane("r", [0.0, 0.0, 9.0], 20.0) + "bins_nm = [600, 650, 700]\n";
+        let text = ["[run]\nrays = 64\n", &light, &receiver];
+        let r = World::default().run(&text.concat(), |_| ());
+        let found = [0, 1].map(|k: usize| r.receivers[0].channels[k].total);
+        assert_eq!(found.map(|x| (x * 1e9).round() / 1e9), expected, "{nm} nm");
+    }
+}
+
 /// A bar of 1 × 1 × 10 000 mm, rays at 45° to its walls: 10 000 total reflections, nothing lost.
 #[test]
 fn a_light_guide_of_ten_thousand_reflections_loses_nothing() {

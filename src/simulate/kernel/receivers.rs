@@ -138,7 +138,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         // Cells are added up later, in order; the total is a whole number of quanta, for which order does not
         // matter.
         tally.receivers[r].add_deferred(spot.cell, quanta);
-        tally.receiver_totals[r] += quanta_as_integer(quanta);
+        tally.receiver_totals[r] += u128::from(quanta_as_integer(quanta));
         tally.moments[r].add(quanta, spot.at, spot.radius2);
         if !C::ENDS_ONLY {
             self.note_deposit(path, DepositPlace::Receiver(r as u32), quanta_as_integer(quanta));

@@ -132,7 +132,6 @@ fn coating_interaction<'s, C: RayPayload>(
     ray: &Ray,
     at: &mut SurfaceInteraction<'_>,
 ) -> Interaction<'s, C> {
-    let here = path.payload.body();
     // What lets nothing through needs no medium behind it, so that mirrors may be open sheets.
     let transmits = C::MEDIA && at.face.body != AMBIENT && !coated.opaque;
     let crossing = if transmits {
@@ -144,8 +143,8 @@ fn coating_interaction<'s, C: RayPayload>(
         Ok(crossing) => crossing,
         Err(cause) => return Interaction::Lose(cause),
     };
-    // The shares of the coating between these media.
-    let [n1, n2] = [here, across.body()].map(|body| context.index(body, &payload));
+    // The shares of the coating between these media, which may have been found anew.
+    let [n1, n2] = [payload.body(), across.body()].map(|body| context.index(body, &payload));
     let d = ray.direction;
     let (normal, cos_i, transmitted) = refracted(d, n1 / n2, at);
     let wavelength = payload.wavelength().unwrap_or(context.bound.light.wavelength);

@@ -7,7 +7,7 @@ use crate::math::{FaceId, Point, Ray};
 use crate::simulate::outcome::{Event, LostCause, LostRay, PathVertex};
 use crate::simulate::sequence::{Deposit, DepositPlace};
 use crate::simulate::tallies::ReplicateTally;
-use crate::simulate::tally::{QUANTA, quanta_as_integer, round_quanta};
+use crate::simulate::tally::{quanta_as_integer, round_quanta};
 
 /// Follows paths and books where their light ends.
 pub(super) struct Tracer<'t, 'a, C> {
@@ -31,7 +31,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         // Only sampled paths are recorded, and asking costs next to nothing.
         if !C::ENDS_ONLY && self.context.plan.records(path.ray) {
             let Path { ray, branch, bounce, .. } = *path;
-            let (power, face) = (path.quanta / QUANTA, face.map(|f| f.0));
+            let (power, face) = (path.quanta / self.context.plan.average_ray, face.map(|f| f.0));
             self.tally.paths.push(PathVertex { ray, branch, bounce, point, power, event, face });
         }
     }

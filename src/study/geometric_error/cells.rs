@@ -5,7 +5,7 @@
 
 use super::paired::{Paired, standard_error};
 use super::replicates::{ReplicateSums, ReplicatedRun};
-use crate::simulate::{BoundScene, QUANTA};
+use crate::simulate::BoundScene;
 use serde::Serialize;
 
 /// Rays that the brightest square of cells holds at least: one of this many is known within 7 % alone, and its change better.
@@ -70,6 +70,8 @@ pub(super) struct CellPairs<'r> {
     cells: Vec<Cell>,
     /// The cells of power, whose quanta tell how many rays came; `None` where the layer's own do, as it is not weighted.
     power: Option<Vec<Cell>>,
+    /// Quanta of a ray of the mean power.
+    ray: f64,
     /// From quanta to the receiver's unit, cell by cell; 0 for cells off a disc, where no light is counted.
     unit: Vec<f64>,
     /// The inverse of that, and 0 too off a disc.
@@ -96,12 +98,16 @@ impl<'r> CellPairs<'r> {
         let cells = cells_of_layer(layer)?;
         // Lux and W/m² of cells in mm².
         let scale = if result.kind == "far_field" { 1.0 } else { 1e6 };
-        let quantum = runs[1].results.quantum * worth;
+        let results = &runs[1].results;
+        // A power of two, which rounding of the quotient must not blur.
+        let ray =
+            2f64.powi((results.power.emitted / (results.rays as f64 * results.quantum)).log2().round() as i32);
+        let quantum = results.quantum * worth;
         let per_measure = |m: f64| if m > 0.0 { quantum * scale / m } else { 0.0 };
         let unit: Vec<f64> =
             (0..cells.len()).map(|c| per_measure(receiver.measure(c % grid[0], c / grid[0]))).collect();
         let measure = unit.iter().map(|u| if *u > 0.0 { 1.0 / u } else { 0.0 }).collect();
-        Some(Self { grid, cells, power, unit, measure, replicates, layer })
+        Some(Self { grid, cells, power, ray, unit, measure, replicates, layer })
     }
 
     /// Goes through the indices of the cells of a block, as far as the grid goes.
@@ -138,7 +144,7 @@ impl<'r> CellPairs<'r> {
     /// wherever they are.
     pub(super) fn peak(&self) -> Peak {
         // Power is counted in quanta: as many make one ray of the mean power.
-        let rays = |block: Block| self.cells_of(block).map(|c| self.cells[c].spline).sum::<f64>() / QUANTA;
+        let rays = |block: Block| self.cells_of(block).map(|c| self.cells[c].spline).sum::<f64>() / self.ray;
         let mut side = 1;
         let (mut block, mut spline) = self.brightest(side, |c| c.spline);
         while rays(block) < PEAK_RAYS && side < self.covering_side() {
@@ -197,7 +203,7 @@ impl<'r> CellPairs<'r> {
             let counted = self.power.as_ref().unwrap_or(&self.cells);
             let power = |of: fn(&Cell) -> f64| self.cells_of(block).map(|c| of(&counted[c])).sum::<f64>();
             // A quantum of a weighted channel is a small part of one of power: its own would be taken for far fewer rays.
-            let rays = power(|c| c.facets).max(power(|c| c.spline)) / QUANTA;
+            let rays = power(|c| c.facets).max(power(|c| c.spline)) / self.ray;
             if rays == 0.0 {
                 continue;
             }

@@ -92,7 +92,9 @@ impl Totals {
             let mut reached = vec![Vec::new(); layers];
             for (i, (before, now)) in before.iter_mut().zip(&tallies.cells[k]).enumerate() {
                 if *before != now.total {
-                    reached[i / cells].push(((i % cells) as u32, (now.total - *before) as u64));
+                    // More than a word holds is told from as much by no comparison of so few rays.
+                    let quanta = u64::try_from(now.total - *before).unwrap_or(u64::MAX);
+                    reached[i / cells].push(((i % cells) as u32, quanta));
                     *before = now.total;
                 }
             }
