@@ -9,7 +9,7 @@ use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
 use crate::model::Model;
 use crate::simulate::{RunSettings, Scene, simulate};
-use crate::study::accuracy_target::{AccuracyPlan, AccuracyTarget, meet_target, meet_target_for_rays};
+use crate::study::accuracy_target::{AccuracyPlan, AccuracyTarget, JobLight, meet_target, meet_target_for_light};
 use crate::study::{ModelMeshSource, Progress};
 
 /// How far above a surface a ray starts that left it, mm: facets lie at most 0.8 mm off the surface here.
@@ -70,7 +70,9 @@ pub fn settings_for_accuracy(
                 let settings = RunSettings { rays: count, seed, path_samples: 0, ..RunSettings::from(&scene.run) };
                 scene_rays(&product, model, &settings, &bound)
             };
-            meet_target_for_rays(model, &product, &ask, &rays, &progress)
+            let relative_index = |face| bound.entered_body(face).map(|body| bound.relative_index(body));
+            let light = JobLight { rays: &rays, relative_index: &relative_index };
+            meet_target_for_light(model, &product, &ask, light, &progress)
         }
     };
     monitor.end();

@@ -9,12 +9,13 @@
 //! the largest error beside the 99th percentile, and rays that no angle stands for. Known weakness: other rays (more grazing ones) err
 //! more.
 
+mod direction_error;
 mod search;
 mod solution;
 mod survey;
 
 pub use super::tolerance_plan::{RelativeTolerance, TolerancePlan};
-pub use search::{RayGenerator, meet_target, meet_target_for_rays};
+pub use search::{JobLight, RayGenerator, meet_target, meet_target_for_light};
 
 use crate::intersect::NormalMode;
 use serde::Serialize;
@@ -25,7 +26,7 @@ const MOST_FACETS: f64 = 6e6;
 /// What is asked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AccuracyTarget {
-    /// Direction error that 99 % of the mirrored rays must keep, degrees.
+    /// Direction error that 99 % of the rays must keep, mirrored and, where a face is known to let light through, refracted; degrees.
     pub degrees: f64,
     /// Rays that the job will trace: a long job pays for finer facets or faster normals differently than a short one; 0 when only
     /// the facets are wanted.

@@ -1,5 +1,6 @@
 //! The search for the cheapest tolerances and normals that meet an accuracy target.
 
+use super::direction_error::direction_error_deg;
 use super::solution::Solution;
 use super::survey::{Survey, p99, tolerance_factor};
 use super::{AccuracyPlan, AccuracyTarget, Trial};
@@ -7,8 +8,7 @@ use crate::intersect::{Hit, NormalMode};
 use crate::math::{Aabb, FaceId, Ray};
 use crate::model::Model;
 use crate::study::Progress;
-use crate::study::cross_check::angle_deg;
-use crate::study::mesh_source::{FacetTree, MeshSource, answer, reflect, with_intersectors};
+use crate::study::mesh_source::{FacetTree, MeshSource, answer, with_intersectors};
 use crate::study::rays::{RaySource, Uniform};
 use crate::study::timing::Clock;
 use crate::study::tolerance_plan::TolerancePlan;
@@ -37,6 +37,15 @@ const LARGEST_MESHES: f64 = 3.0;
 /// Rays of a seed, and how many: those that the job will meet.
 pub type RayGenerator<'r> = dyn Fn(u64, u64) -> Vec<Ray> + Sync + 'r;
 
+/// The light of a job.
+#[derive(Clone, Copy)]
+pub struct JobLight<'r> {
+    /// Its rays.
+    pub rays: &'r RayGenerator<'r>,
+    /// The index of the body that a face bounds over that around it; `None` where no light passes the face.
+    pub relative_index: &'r (dyn Fn(FaceId) -> Option<f64> + Sync),
+}
+
 /// Finds the cheapest tolerances and normals that reach an accuracy, for random rays through the model; the best found where none reaches
 /// it. Makes several meshes for each kind of normals, on the current rayon pool, and ends after a counted amount of work.
 ///
@@ -55,19 +64,21 @@ pub fn meet_target(
         let source = Uniform::new(&bounds, seed, count);
         source.rays(0..source.len())
     };
-    meet_target_for_rays(model, mesh_source, target, &uniform, progress)
+    // Of a bare model it is not known which faces are glass.
+    let light = JobLight { rays: &uniform, relative_index: &|_| None };
+    meet_target_for_light(model, mesh_source, target, light, progress)
 }
 
-/// Finds the cheapest tolerances and normals that reach an accuracy for rays of one's own, such as those of a scene: `rays` is asked for so
-/// many under several seeds. The best found where none reaches it; runs on the current rayon pool, and ends after a counted amount of work.
+/// Finds the cheapest tolerances and normals that reach an accuracy for light of one's own, such as that of a scene, whose rays are asked
+/// for under several seeds. The best found where none reaches it; runs on the current rayon pool, and ends after a counted amount of work.
 ///
 /// # Errors
 /// When the angle is not above 0 and below 90 degrees.
-pub fn meet_target_for_rays(
+pub fn meet_target_for_light(
     model: &Model,
     mesh_source: &dyn MeshSource,
     target: &AccuracyTarget,
-    rays: &RayGenerator<'_>,
+    light: JobLight<'_>,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<AccuracyPlan, String> {
     target.check_angle()?;
@@ -75,13 +86,13 @@ pub fn meet_target_for_rays(
     let clock = Clock::new(progress);
     // The spline's hits are the truth, and tell which faces matter and how sharply they bend.
     clock.report("pilot rays", 0.0);
-    let pilots = ReferenceRays::new(mesh_source, rays(target.seed, PILOTS));
+    let pilots = ReferenceRays::new(mesh_source, (light.rays)(target.seed, PILOTS));
     let survey = Survey::new(model, &pilots.rays, &pilots.truth);
     let coarse = coarse_tolerance(model);
     let search = Search {
         mesh_source,
         target,
-        rays,
+        light,
         pilots,
         survey,
         coarse,
@@ -190,7 +201,7 @@ struct Measured {
 struct Search<'a> {
     mesh_source: &'a dyn MeshSource,
     target: &'a AccuracyTarget,
-    rays: &'a RayGenerator<'a>,
+    light: JobLight<'a>,
     pilots: ReferenceRays,
     survey: Survey,
     /// Tolerance of facets that only find the face, mm.
@@ -204,7 +215,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Meshes by a plan, times the reference rays on it, and compares the mirrored directions with the spline's; rays that hit on one of
+    /// Meshes by a plan, times the reference rays on it, and compares where light goes with the spline; rays that hit on one of
     /// both alone, or other faces, are counted as flips.
     fn measure(&self, plan: &TolerancePlan, normals: NormalMode, on: &ReferenceRays) -> Measured {
         let meshed = self.mesh_source.mesh_plan(plan);
@@ -228,8 +239,8 @@ impl Search<'_> {
             match (hit, truth) {
                 (None, None) => {}
                 (Some(h), Some(t)) if h.face == t.face => {
-                    let (a, b) = (reflect(ray.direction, h.normal), reflect(ray.direction, t.normal));
-                    measured.errors.push((t.face, angle_deg(a, b)));
+                    let index = (self.light.relative_index)(t.face);
+                    measured.errors.push((t.face, direction_error_deg(ray.direction, h.normal, t.normal, index)));
                 }
                 // On another face there is no angle: such rays are told apart from the percentile.
                 _ => measured.flips += 1,
@@ -298,7 +309,7 @@ impl Search<'_> {
             self.fresh.set(self.fresh.get() + 1);
             // Another seed for each set: facets tuned to one set of rays must not be judged by it.
             let seed = self.target.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let fresh = ReferenceRays::new(self.mesh_source, (self.rays)(seed, self.target.check_rays));
+            let fresh = ReferenceRays::new(self.mesh_source, (self.light.rays)(seed, self.target.check_rays));
             let m = self.measure(&plan, normals, &fresh);
             self.made.set(self.made.get() + m.made.len() as f64);
             let mut errors: Vec<f64> = m.errors.iter().map(|e| e.1).collect();

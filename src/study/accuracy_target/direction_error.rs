@@ -1,0 +1,53 @@
+//! How far off its true direction light leaves a facet.
+
+use crate::math::Vector;
+use crate::study::cross_check::angle_deg;
+use crate::study::mesh_source::{reflect, refract};
+
+/// Returns the larger of the angles, degrees, between the directions that a facet's normal and the spline's send light of direction
+/// `incoming` to: mirrored, and refracted where the face lets light through and neither reflects it totally. All are unit vectors,
+/// normals outward.
+///
+/// `relative_index` is the index of the body that the face bounds over that around it, `None` where no light passes. Just short of total reflection light leaves the
+/// body misdirected by many times the error of the normal, mirrored light by twice at most.
+pub(super) fn direction_error_deg(
+    incoming: Vector,
+    facet: Vector,
+    spline: Vector,
+    relative_index: Option<f64>,
+) -> f64 {
+    let mirrored = angle_deg(reflect(incoming, facet), reflect(incoming, spline));
+    let Some(inside) = relative_index else { return mirrored };
+    let comes_out = incoming.dot(spline) > 0.0;
+    let index_ahead = if comes_out { inside.recip() } else { inside };
+    match (refract(incoming, facet, index_ahead), refract(incoming, spline, index_ahead)) {
+        (Some(facet), Some(spline)) => mirrored.max(angle_deg(facet, spline)),
+        // What is reflected totally on one side passes on the other with next to no power.
+        _ => mirrored,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The direction so many degrees off z, towards x.
+    fn off_z(degrees: f64) -> Vector {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Vector::new(sin, 0.0, cos)
+    }
+
+    #[test]
+    fn beside_total_reflection_the_refracted_light_errs_most() {
+        let error = |light: Vector, index| direction_error_deg(light, off_z(0.01), Vector::Z, index);
+        // A mirror turns light by twice what its normal is turned.
+        assert!((error(off_z(40.0), None) - 0.02).abs() < 1e-9);
+        // asin(1.5 sin 41.5°) = 83.67°, and 83.54° for a normal turned by 0.01°: Snell's law by hand, less the turn itself.
+        let leaves = |incidence: f64| (1.5 * incidence.to_radians().sin()).asin().to_degrees();
+        let truth = leaves(41.5) - (leaves(41.49) + 0.01);
+        assert!(truth > 0.06 && (error(off_z(41.5), Some(1.5)) - truth).abs() < 1e-6);
+        // Into the body it is a third of the normal's error, and the mirrored light errs more; beyond the critical angle nothing leaves.
+        assert!((error(-off_z(40.0), Some(1.5)) - 0.02).abs() < 1e-9);
+        assert!((error(off_z(45.0), Some(1.5)) - 0.02).abs() < 1e-9);
+    }
+}
