@@ -6,6 +6,7 @@ use std::process::Command;
 /// What the program is built from: a change elsewhere does not change it.
 const SOURCES: [&str; 3] = ["src", "Cargo.toml", "Cargo.lock"];
 
+/// Sets `LAMPYRIS_COMMIT` for the crate: that of the environment, of the package or of the repository, else `unknown`.
 fn main() {
     println!("cargo::rerun-if-changed=src/build.rs");
     println!("cargo::rerun-if-env-changed=LAMPYRIS_COMMIT");

@@ -20,14 +20,14 @@ from .mesh import Mesh
 from .model import Account, Model, read_step
 from .receivers import Receiver as ReceiverTable
 from .receivers import absorbed, disc, far_field, plane, sphere
-from .results import Figure, Receiver, Run
+from .results import Ends, Figure, Receiver, Run
 from .scene import Interrupted, Part, Scene, media, scene_schema
 from .sources import Source, collimated, cone, cosine, eulumdat, ies, lambertian, led, point, ray_file, rays
 from .tracers import Bvh, Exact, Octree
 from .verdicts import Assessment, regulations
 
 __all__ = [
-    "Account", "Assessment", "Bvh", "Defect", "Exact", "Figure", "Hits", "InputError", "Interrupted", "Material",
+    "Account", "Assessment", "Bvh", "Defect", "Ends", "Exact", "Figure", "Hits", "InputError", "Interrupted", "Material",
     "Mesh", "Model", "Octree", "Part", "Receiver", "ReceiverTable", "Run", "Scene", "SceneError", "Selector",
     "Source", "__version__", "absorbed", "absorber", "coating", "collimated", "cone", "cosine", "diffuse",
     "disc", "eulumdat", "far_field", "glass", "ies", "interface", "lambertian", "led", "media", "metal", "mirror", "plane",

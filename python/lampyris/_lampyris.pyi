@@ -33,6 +33,7 @@ __all__ = [
 
 __version__: str
 
+_Array = npt.NDArray[Any]
 _Progress = Callable[[str, int, int, list[str]], None]
 _Range = tuple[float, float]
 _Ranges = list[tuple[str, _Range]]
@@ -180,6 +181,13 @@ class Prepared:
     def trace_until(
         self, until: str, progress: _Progress | None = None
     ) -> tuple[Results | None, Part | None, BaseException | None, str]: ...
+    def ends(
+        self, progress: _Progress | None = None
+    ) -> tuple[
+        tuple[_Array, _Array, _Array, _Array, _Array, _Array],
+        tuple[FloatArray, FloatArray, FloatArray],
+        list[tuple[int, str]],
+    ]: ...
     def read_part(self, bytes: bytes) -> Part: ...
     @property
     def fingerprint(self) -> str: ...

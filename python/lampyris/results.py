@@ -152,6 +152,50 @@ class Receiver:
         return text
 
 
+class Ends:
+    """Where the rays of lists ended: arrays with a row for each ray, and one more for each part that an interface split off it."""
+
+    def __init__(self, numbers: tuple[Any, ...], places: tuple[FloatArray, ...], words: list[tuple[int, str]]) -> None:
+        #: The source, by its place in the scene.
+        self.source: Any
+        #: The ray, by its place in the list.
+        self.ray: Any
+        #: Which part of a ray that was split; 0 for one that was not.
+        self.branch: Any
+        #: The placed face where it ended; -1 where it was at none.
+        self.face: Any
+        #: Hits before.
+        self.bounces: Any
+        self.source, self.ray, self.branch, codes, self.face, self.bounces = numbers
+        table = np.full(256, "", dtype=f"<U{max((len(word) for _, word in words), default=1)}")
+        for code, word in words:
+            table[code] = word
+        #: How it ended, in the words of ``lampyris trace --ends``: ``received``, ``absorbed``, ``escaped``, ``lost`` …
+        self.event = table[codes]
+        #: Where, mm, (n, 3); of light that left the scene a point on its way.
+        self.point: FloatArray
+        #: Unit directions in which they came there, (n, 3).
+        self.direction: FloatArray
+        #: Power that came there, in the unit of the run.
+        self.power: FloatArray
+        self.point, self.direction, self.power = places
+
+    def to_frame(self) -> Any:
+        """A ``pandas.DataFrame`` with the columns of ``lampyris trace --ends FILE.csv``."""
+        import pandas
+
+        columns = {name: getattr(self, name) for name in ("source", "ray", "branch", "event", "face", "bounces")}
+        columns |= dict(zip(("x_mm", "y_mm", "z_mm"), self.point.T)) | dict(zip(("dx", "dy", "dz"), self.direction.T))
+        return pandas.DataFrame({**columns, "power": self.power})
+
+    def __len__(self) -> int:
+        return len(self.power)
+
+    def __repr__(self) -> str:
+        words, counts = np.unique(self.event, return_counts=True)
+        return f"<lampyris.Ends: {', '.join(f'{n} {word}' for word, n in zip(words, counts)) or 'none'}>"
+
+
 class Run(Mapping[str, Receiver]):
     """The results of a traced scene; a mapping of receivers by name."""
 
@@ -204,6 +248,20 @@ class Run(Mapping[str, Receiver]):
     def check(self) -> dict[str, Any] | None:
         """Some of the rays asked again of BVH and spline."""
         return self.document.get("check")
+
+    @property
+    def faces(self) -> list[dict[str, Any]]:
+        """The faces that absorbed and let out most, as many as ``Scene(faces=N)`` asked for; empty where it did not.
+
+        Each has ``face``, ``selector``, ``absorbed``, ``entered`` and ``left``, these with ``…_error`` and ``…_geometric``.
+        """
+        return list((self.document.get("faces") or {"first": []})["first"])
+
+    def faces_to_frame(self) -> Any:
+        """A ``pandas.DataFrame`` of :attr:`faces`."""
+        import pandas
+
+        return pandas.DataFrame(self.faces)
 
     @property
     def paths(self) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from .mesh import Mesh
 from .model import Model
 from .progress import ProgressCallback, callback
 from .receivers import Receiver
-from .results import Run
+from .results import Ends, Run
 from .sources import Source
 
 #: Settings of a trace that are none of the scene's own.
@@ -292,6 +292,18 @@ class Scene:
             raise _lampyris.Defect("a trace ended without results; please report it")
         self.interrupted = None
         return Run(found, None if words is None else json.loads(words))
+
+    def ends(self, *, progress: bool | ProgressCallback = True, **settings: Any) -> Ends:
+        """Where every ray of the scene's lists ended: each is traced once, by itself, with its own power, as ``lampyris trace --ends`` does.
+
+        ``settings`` are those of :meth:`trace`.
+        """
+        prepared = self._prepare(_settings(**settings), progress)
+        tell, close = callback(progress)
+        try:
+            return Ends(*prepared.ends(tell))
+        finally:
+            close()
 
     def trace_part(
         self, index: int, count: int, *, progress: bool | ProgressCallback = False, **settings: Any

@@ -15,6 +15,11 @@ class Assessment(dict[str, Any]):
         """``pass``, ``fail`` or ``unsure``."""
         return str(self["verdict"])
 
+    @property
+    def traffic(self) -> str:
+        """The side of the road that it was judged for: ``right`` or ``left``."""
+        return str(self["traffic"])
+
     def to_frame(self) -> Any:
         """A ``pandas.DataFrame``, a row of the table each."""
         import pandas

@@ -32,7 +32,8 @@ pub(crate) fn columns<'py>(
             array.getattr("shape")?
         )));
     }
-    let array = numpy.call_method1("ascontiguousarray", (array, numpy.getattr("float64")?))?;
+    // Contiguous and aligned: fields of packed records are read by numpy, which copies them.
+    let array = numpy.call_method1("require", (array, numpy.getattr("float64")?, ("C", "A")))?;
     let array = array.cast_into::<PyArray2<f64>>().map_err(|_| {
         PyTypeError::new_err(format!("{name}: an array of float64 with shape (n, {width}) is needed"))
     })?;

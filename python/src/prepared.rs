@@ -1,5 +1,6 @@
 //! Scenes that are bound, faceted and ready to be traced, and the parts of their runs.
 
+use crate::arrays::{flat, shaped};
 use crate::background::{Outcome, interruptible};
 use crate::errors::{Defect, SceneError, of_pipeline, of_scene};
 use crate::mesh::Mesh;
@@ -10,8 +11,9 @@ use lampyris::pipeline::{
     self, AccurateSettings, ErrorTarget, LoadedModel, MeshingSettings, PreparedScene, RayRange, SceneJob,
     TraceRequest, TracingSettings, read_models, settings_for_accuracy,
 };
-use lampyris::simulate::{PartialRun, Scene};
+use lampyris::simulate::{MOST_LISTED_RAYS, PartialRun, RunSettings, Scene, listed_ends, ray_lists};
 use lampyris::step::{self, Import};
+use numpy::PyArrayDyn;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -24,6 +26,15 @@ use std::sync::Arc;
 type Traced = (Option<Results>, Option<Part>, Option<PyErr>);
 /// The same with what came of the error that was asked for, as JSON.
 type TracedUntil = (Option<Results>, Option<Part>, Option<PyErr>, String);
+
+/// An array of whole or real numbers.
+type Array<'py, T> = Bound<'py, PyArrayDyn<T>>;
+/// Ends of listed rays: source, ray, branch, event, face, bounces; point, direction, power; the words of events.
+type Ends<'py> = (
+    (Array<'py, u32>, Array<'py, u64>, Array<'py, u32>, Array<'py, u8>, Array<'py, i64>, Array<'py, u32>),
+    (Array<'py, f64>, Array<'py, f64>, Array<'py, f64>),
+    Vec<(u8, String)>,
+);
 
 /// What stands at the head of the bytes of a part.
 #[derive(Deserialize, Serialize)]
@@ -218,6 +229,57 @@ impl Prepared {
                 )
             }
         })
+    }
+
+    /// Where every ray of the scene's lists ended: arrays of source, ray, branch, event, face (-1 for none), bounces, point, direction, power,
+    /// and the numbers of events with their words.
+    ///
+    /// Raises `ValueError` where no source is a list, and for lists of too many rays.
+    #[pyo3(signature = (progress = None))]
+    fn ends<'py>(&self, py: Python<'py>, progress: Option<Py<PyAny>>) -> PyResult<Ends<'py>> {
+        let lists = ray_lists(&self.scene.bound);
+        if lists.is_empty() {
+            return Err(PyValueError::new_err(
+                "no source of this scene is a list of rays, as lampyris.rays(…); run.paths has some paths of any source",
+            ));
+        }
+        let rays: u64 = lists.iter().map(|(_, rays)| rays).sum();
+        if rays > MOST_LISTED_RAYS {
+            return Err(PyValueError::new_err(format!(
+                "the lists have {rays} rays, of which at most {MOST_LISTED_RAYS} can be followed one by one; give shorter lists"
+            )));
+        }
+        let scene = self.scene.clone();
+        let work = move |monitor: &dyn pipeline::Monitor| {
+            let settings = RunSettings { threads: scene.threads, ..scene.run_settings() };
+            scene.with_intersector(monitor, |intersector, _| listed_ends(&scene.bound, intersector, &settings))
+        };
+        let Outcome { made: ends, stopped } = interruptible(py, progress.as_ref(), self.threads, move |s| work(s))?;
+        if let Some(e) = stopped {
+            return Err(e);
+        }
+        let n = ends.len();
+        let mut words: Vec<(u8, String)> = Vec::new();
+        for event in ends.iter().map(|end| end.event) {
+            if words.iter().all(|(code, _)| *code != event as u8) {
+                let word = serde_json::to_value(event).map_err(crate::errors::of_json)?;
+                words.push((event as u8, word.as_str().unwrap_or("unknown").to_owned()));
+            }
+        }
+        let numbers = (
+            shaped(py, ends.iter().map(|end| end.source).collect(), &[n])?,
+            shaped(py, ends.iter().map(|end| end.ray).collect(), &[n])?,
+            shaped(py, ends.iter().map(|end| end.branch).collect(), &[n])?,
+            shaped(py, ends.iter().map(|end| end.event as u8).collect(), &[n])?,
+            shaped(py, ends.iter().map(|end| end.face.map_or(-1, i64::from)).collect(), &[n])?,
+            shaped(py, ends.iter().map(|end| end.bounces).collect(), &[n])?,
+        );
+        let places = (
+            shaped(py, flat(ends.iter().map(|end| end.point)), &[n, 3])?,
+            shaped(py, flat(ends.iter().map(|end| end.direction)), &[n, 3])?,
+            shaped(py, ends.iter().map(|end| end.power).collect(), &[n])?,
+        );
+        Ok((numbers, places, words))
     }
 
     /// A part from its bytes.

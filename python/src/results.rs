@@ -9,7 +9,7 @@ use lampyris::simulate::ReceiverResult;
 use lampyris::simulate::scene::FarFieldType;
 use lampyris::study::figures::{cell_errors, channel_cell_errors};
 use numpy::PyArrayDyn;
-use pyo3::exceptions::PyIndexError;
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde_json::json;
@@ -119,7 +119,12 @@ fn on_receiver(r: &ReceiverResult, mut cells: Vec<f64>) -> Vec<f64> {
     cells
 }
 
+/// Most pixels of a picture: half a gigabyte while it is made.
+const MOST_PIXELS: usize = 1 << 27;
+
 /// A map of values (rows from below) as the bytes of a PNG file.
+///
+/// Raises `ValueError` for a picture of more than 134 million pixels.
 #[pyfunction]
 #[pyo3(signature = (values, zoom = 1, exponent = 1.0))]
 pub(crate) fn value_map(
@@ -131,6 +136,12 @@ pub(crate) fn value_map(
     let width = values.getattr("shape")?.extract::<Vec<usize>>()?.get(1).copied().unwrap_or(1);
     let array = columns(values, "values", width)?;
     let numbers = rows(&array)?.to_vec();
+    let pixels = numbers.len().saturating_mul(zoom as usize).saturating_mul(zoom as usize);
+    if pixels > MOST_PIXELS {
+        return Err(PyValueError::new_err(format!(
+            "zoom = {zoom}: the picture would have {pixels} pixels, more than {MOST_PIXELS}; take a smaller one"
+        )));
+    }
     let axis =
         |label: &str, cells: usize| Axis { label: label.into(), unit: String::new(), range: [0.0, 1.0], cells };
     let grid = Grid {

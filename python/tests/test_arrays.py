@@ -62,6 +62,9 @@ def test_arrays_in_one_piece_are_read_where_they_lie_and_no_other_is_changed() -
     strided[:, ::2] = origins
     assert np.array_equal(tree.intersect(strided[:, ::2], directions).t, expected)
     assert np.array_equal(tree.intersect(origins.tolist(), directions).t, expected)
+    # As in packed records, whose fields stand at any byte.
+    unaligned = np.frombuffer(b"x" + origins.tobytes(), dtype=np.float64, offset=1).reshape(-1, 3)
+    assert not unaligned.flags.aligned and np.array_equal(tree.intersect(unaligned, directions).t, expected)
     assert np.allclose(tree.intersect(origins.astype(np.float32), directions).t, expected, atol=1e-5, equal_nan=True)
     assert np.allclose(tree.intersect(origins, 3.0 * directions).t, expected, atol=1e-12, equal_nan=True)
     for threads in (1, 3):

@@ -215,7 +215,8 @@ def test_a_lamp_gets_its_verdict() -> None:
     run = scene.trace(intersector="octree", progress=False)
     name = next(iter(lp.regulations()))
     verdict = run.assess(name, "fine")
-    assert verdict.verdict in ("pass", "fail", "unsure") and verdict["rows"]
+    assert verdict.verdict in ("pass", "fail", "unsure") and verdict["rows"] and verdict.traffic == "right"
+    assert run.assess(name, "fine", left_hand=True).traffic == "left"
     assert verdict.verdict in verdict._repr_html_()
     with pytest.raises(ValueError, match="name the far field"):
         run.assess(name)
@@ -325,6 +326,28 @@ def test_cells_off_a_disc_are_none_and_dark_ones_have_the_error_of_a_ray(tmp_pat
     off = np.isnan(disc.values)
     assert off[0, 0] and off[-1, -1] and not off[4, 4]
     assert (disc.statistical[~off & (disc.values == 0)] > 0).all() and np.isnan(disc.statistical[off]).all()
+
+
+def test_the_ends_of_listed_rays_and_the_light_of_faces_are_told() -> None:
+    # Three rays along z: one meets the receiver, one passes it, one stands beside it and goes the other way.
+    array = np.array([[0.0, 0, 0, 0, 0, 1, 1], [9.0, 0, 0, 0, 0, 1, 2], [1.0, 0, 0, 0, 0, -1, 4]])
+    scene = lp.Scene(faces=3)
+    scene.add(lp.rays(array), lp.plane("wall", at=(0, 0, 10), size=(4, 4), cells=(1, 1)))
+    ends = scene.ends(progress=False)
+    assert ends.ray.tolist() == [0, 1, 2] and ends.event.tolist() == ["received", "escaped", "escaped"]
+    assert ends.power.tolist() == [1, 2, 4] and ends.face.tolist() == [-1, -1, -1]
+    assert np.allclose(ends.point[0], [0, 0, 10]) and np.allclose(ends.direction, array[:, 3:6])
+    assert "1 received" in repr(ends) and "2 escaped" in repr(ends)
+    run = scene.trace(rays=1000, progress=False)
+    assert run.faces == []
+    scene = lamp(5_000)
+    scene.tables["run"]["faces"] = 3
+    faces = scene.trace(progress=False).faces
+    assert len(faces) == 3 and {"face", "selector", "absorbed", "absorbed_error", "left"} <= set(faces[0])
+    scene = lp.Scene()
+    scene.add(lp.point(at=(0, 0, 0)), lp.plane("wall", at=(0, 0, 10), size=(4, 4), cells=(1, 1)))
+    with pytest.raises(ValueError, match="no source of this scene is a list of rays"):
+        scene.ends(progress=False)
 
 
 def test_a_verdict_needs_angles_of_type_a(tmp_path: pathlib.Path) -> None:

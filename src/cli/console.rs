@@ -5,7 +5,7 @@ use crate::report::Provenance;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 /// Bold, dim, and normal again (ECMA-48, SGR).
 const EMPHASIS: [&str; 3] = ["\x1b[1m", "\x1b[2m", "\x1b[0m"];
@@ -154,6 +154,7 @@ impl Console {
     pub(crate) fn provenance(&self, seed: Option<u64>, threads: usize) -> Provenance {
         Provenance {
             command: self.command.clone(),
+            time: super::machine::utc_text(SystemTime::now() - self.started.elapsed()),
             version: env!("CARGO_PKG_VERSION").into(),
             commit: env!("LAMPYRIS_COMMIT").into(),
             hardware: super::machine::hardware(),

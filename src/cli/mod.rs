@@ -26,7 +26,7 @@ use clap::Parser;
 use completion::Completion;
 use console::Console;
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 /// Runs the command with these arguments (the first is the program's name) and tells how it ended.
@@ -45,7 +45,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
                 // What was typed holds terminal codes: said without them, and so without colours of our own.
                 let _ = writeln!(std::io::stderr().lock(), "{}", printable(&shown));
             } else {
-                let _ = e.print();
+                // A reader that has seen enough, such as `head`, is content.
+                let is_failure = |failure: &std::io::Error| failure.kind() != ErrorKind::BrokenPipe;
+                if let Some(failure) = e.print().err().filter(is_failure) {
+                    let _ = writeln!(std::io::stderr().lock(), "error: {failure}");
+                    return ExitCode::FAILURE;
+                }
             }
             return ExitCode::from(u8::try_from(code).unwrap_or(2));
         }

@@ -89,18 +89,26 @@ pub fn remove_unfinished_files() {
     }
 }
 
+/// What the names of all unfinished files of a file begin with: its own name, or of a long one a part that leaves room for what follows.
+fn unfinished_prefix(path: &Path) -> String {
+    let name = file_name(path);
+    if name.len() <= LONGEST_WHOLE {
+        return format!(".{name}.");
+    }
+    format!(".{}.", file_stem(&name))
+}
+
 /// A name in the same folder (renaming across devices is a copy) that no other machine, process or thread uses.
 pub(super) fn unfinished(path: &Path) -> PathBuf {
-    let name = file_name(path);
     // Threads of one process may write the same name: each takes a number of its own.
     let serial = SERIAL.fetch_add(1, Ordering::Relaxed);
-    path.with_file_name(format!(".{name}.{}-{serial}.part", Writer::this()))
+    path.with_file_name(format!("{}{}-{serial}.part", unfinished_prefix(path), Writer::this()))
 }
 
 /// Removes what processes that are no more have left unfinished of this file. Of another machine's, and where the system does not tell
 /// which processes are, that is what has stood still for a day.
 pub(super) fn remove_stale(path: &Path) {
-    let Some(name) = path.file_name().map(|n| format!(".{}.", n.to_string_lossy())) else { return };
+    let name = unfinished_prefix(path);
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -115,6 +123,9 @@ pub(super) fn remove_stale(path: &Path) {
         }
     }
 }
+
+/// Longest file name, bytes, that stands whole in those of its unfinished files: some thirty bytes say who writes it, and file systems take 255.
+const LONGEST_WHOLE: usize = 200;
 
 /// Longest stem of a file name, bytes: file systems take 255, of which extensions and the names of unfinished files need some.
 const LONGEST_STEM: usize = 120;
@@ -215,6 +226,14 @@ mod tests {
         let [a, b] = [file_stem(&long('a')), file_stem(&long('b'))];
         assert!(a.len() <= LONGEST_STEM && b.len() <= LONGEST_STEM && a != b, "{a} {b}");
         assert_eq!(file_stem("../a b\u{1b}"), "___a_b_");
+    }
+
+    #[test]
+    fn a_name_as_long_as_the_system_takes_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("{}.obj", "a".repeat(251)));
+        write_atomic(&path, |w| w.write_all(b"whole")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
     }
 
     #[test]

@@ -41,6 +41,8 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
 /// When the file cannot be read, a line does not hold sixteen finite numbers, or the count is not that of the lines.
 pub fn read_data2(path: &Path) -> Result<Vec<Data2Facet>, Error> {
     let text = read_text(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    // Some editors put a byte order mark in front.
+    let text = text.trim_start_matches('\u{feff}');
     let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty());
     let (first, count) = lines
         .next()

@@ -4,6 +4,7 @@ use super::input::read_bytes;
 use super::photometry::SAME_ANGLE_DEG;
 use super::{Error, ErrorKind, PhotometricType, Photometry, write_atomic};
 use eulumdat::{Eulumdat, LampSet, Symmetry, TypeIndicator};
+use std::ops::Range;
 use std::path::Path;
 
 /// Reads an EULUMDAT file. Intensities become candela by the flux of the first set of lamps and the file's conversion factor.
@@ -16,13 +17,30 @@ pub fn read_eulumdat(path: &Path) -> Result<Photometry, Error> {
     parse_eulumdat(path, &String::from_utf8_lossy(&bytes))
 }
 
+/// Lines of a file, from 0, that hold numbers which a luminaire may lack: dimensions, shares of the flux, conversion factor, tilt.
+const OPTIONAL_NUMBERS: Range<usize> = 12..25;
+
+/// Returns the text with 0 in place of the numbers that programs leave blank and the reader needs not.
+fn filled(text: &str) -> String {
+    let number = |(k, line)| if OPTIONAL_NUMBERS.contains(&k) && str::trim(line).is_empty() { "0" } else { line };
+    text.lines().enumerate().map(number).collect::<Vec<_>>().join("\n")
+}
+
 /// Reads EULUMDAT text; `path` is for messages alone.
 ///
 /// # Errors
 /// As [`read_eulumdat`].
 pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
     let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
-    let ldt = Eulumdat::parse(text).map_err(|e| malformed(format!("not EULUMDAT: {e}")))?;
+    let ldt = Eulumdat::parse(&filled(text)).map_err(|e| {
+        // The crate counts lines from 0.
+        let message = e.to_string();
+        let place = message.strip_prefix("Parse error at line ").and_then(|m| m.split_once(": "));
+        match place.and_then(|(line, said)| Some((line.parse::<usize>().ok()?, said))) {
+            Some((line, said)) => Error::at_line(path, line + 1, format!("not EULUMDAT: {said}")),
+            None => malformed(format!("not EULUMDAT: {message}")),
+        }
+    })?;
     let (n, rows) = (ldt.num_c_planes, ldt.g_angles.len());
     if n == 0 || rows < 2 || ldt.intensities.is_empty() {
         return Err(malformed("the file holds no intensities; check the numbers of C-planes and γ angles".into()));
@@ -267,6 +285,26 @@ mod tests {
     }
 
     /// Of equal light everywhere half goes down, of a lamp of twice the flux half comes out.
+    #[test]
+    fn blank_numbers_are_zero_and_faults_name_their_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ldt");
+        let p = photometry_of(PhotometricType::C, &[0.0], &steps(0.0, 90.0, 3), |_, v| 800.0 - v);
+        write_eulumdat(&path, &p).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let with = |line: usize, put: &str| {
+            let lines = text.lines().enumerate().map(|(k, l)| if k + 1 == line { put } else { l });
+            parse_eulumdat(&path, &lines.collect::<Vec<_>>().join("\n"))
+        };
+        for optional in [13, 25] {
+            assert_eq!(with(optional, "").unwrap().candela, with(optional, "0").unwrap().candela);
+        }
+        for line in [2, 23] {
+            let error = with(line, "wide").unwrap_err().to_string();
+            assert!(error.contains(&format!("a.ldt:{line}: ")) && error.contains("'wide'"), "{error}");
+        }
+    }
+
     #[test]
     fn shares_of_the_flux_are_those_of_the_light() {
         let folder = tempfile::tempdir().unwrap();

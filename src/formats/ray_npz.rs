@@ -118,7 +118,8 @@ impl<'a> ArrayReader<'a> {
             _ => dims.len() == 2 && dims[1] == width as u64,
         };
         if !fits || !header.contains("'fortran_order':False") {
-            return Err(format!("shape ({shape}), where (n, {width}) in C order is needed"));
+            let needed = if width == 1 { "(n,)".to_owned() } else { format!("(n, {width})") };
+            return Err(format!("shape ({shape}), where {needed} in C order is needed"));
         }
         // Saturating: a shape of 2⁶⁰ rows must be refused, not wrapped.
         let wanted = dims[0].saturating_mul(width as u64).saturating_mul(bytes);

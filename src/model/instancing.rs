@@ -140,6 +140,7 @@ impl Instancing {
         (placement, FaceId(face.0 - run.first + run.local))
     }
 
+    /// Returns the run of consecutive faces that a face is in; `None` for one beyond the model.
     #[inline]
     fn run(&self, face: FaceId) -> Option<&FaceRun> {
         // Where most of a model is one part, its runs are as long as each other and this is the one: searching among a hundred thousand

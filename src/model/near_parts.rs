@@ -75,6 +75,7 @@ impl NearSearch {
         }
     }
 
+    /// Marks all owners of boxes within `room` of a patch as `place` puts it, halving it so many times for boxes that fit better.
     fn mark_near_patch(&mut self, patch: &BezierPatch, place: (&Frame, f64), halvings: usize) {
         let (placement, room) = place;
         let bounds = placed(&patch.bounds(), placement).grown(room);
@@ -94,6 +95,7 @@ impl NearSearch {
         });
     }
 
+    /// Whether the box of an owner that is not marked yet lies within the room of these bounds.
     fn meets_unmarked(&self, bounds: &Aabb) -> bool {
         self.tree.any_meeting(&bounds.grown(self.room), |k| !self.near[self.owners[k as usize] as usize])
     }

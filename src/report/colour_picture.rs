@@ -57,7 +57,7 @@ pub fn colour_picture(grid: &Grid) -> Option<Picture> {
     expose(grid, FILE_PIXELS.div_ceil(longer)).map(|exposed| exposed.picture)
 }
 
-/// The picture as a chart, framed around its light.
+/// Returns the picture as a chart, framed around its light; `None` as [`expose`].
 pub(super) fn colour_chart(grid: &Grid) -> Option<Chart> {
     let framed = lit_part(grid);
     let grid = framed.as_ref().unwrap_or(grid);

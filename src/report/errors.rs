@@ -170,13 +170,14 @@ pub(super) fn power_table(results: &Results, absorbed: &[Figure], unit: &str) ->
         [name.into(), Cell::Number(power, 6), Cell::Number(100.0 * power / p.emitted, 5)].into_iter()
     };
     table.row(cells("emitted", p.emitted));
-    table.row(cells("received", p.received));
+    let errors = &results.power_errors;
+    table.row(cells("received", p.received).chain([Cell::Number(errors.received, 2)]));
     for (a, figure) in results.absorbed.iter().zip(absorbed) {
         table.row(cells(&format!("absorbed in {} ({})", a.name, a.r#in), a.power).chain(error_cells(figure)));
     }
-    table.row(cells("escaped", p.escaped));
-    table.row(cells("cut off by limits", p.cut_off));
-    table.row(cells("lost", p.lost));
+    table.row(cells("escaped", p.escaped).chain([Cell::Number(errors.escaped, 2)]));
+    table.row(cells("cut off by limits", p.cut_off).chain([Cell::Number(errors.cut_off, 2)]));
+    table.row(cells("lost", p.lost).chain([Cell::Number(errors.lost, 2)]));
     table
 }
 

@@ -1,4 +1,4 @@
-//! The part of a grid that is lit: what a picture shows of a receiver that is larger than its light.
+//! What a picture shows of a grid: the part that is lit, in no more cells than a screen has use for.
 
 use crate::formats::{Axis, Grid, Layer};
 
@@ -13,6 +13,41 @@ const WORTH: f64 = 0.75;
 
 /// Fewest cells along an axis: a narrow spot is shown with its surroundings.
 const FEWEST_CELLS: usize = 24;
+
+/// Most cells along an axis of a picture in the page: as many as it has pixels, and 2 MB of the page.
+const MOST_CELLS: usize = 600;
+
+/// Joins cells of the values to blocks, so that at most [`MOST_CELLS`] remain along each axis, each with the mean of its finite cells; errors
+/// and layers are left out. `None` where there are no more. The last blocks may reach beyond the grid.
+pub(super) fn joined_cells(grid: &Grid) -> Option<(Grid, [usize; 2])> {
+    let cells = grid.axes.each_ref().map(|axis| axis.cells);
+    let block = cells.map(|n| n.div_ceil(MOST_CELLS).max(1));
+    if block == [1, 1] {
+        return None;
+    }
+    let joined = [0, 1].map(|k: usize| cells[k].div_ceil(block[k]));
+    let (mut sums, mut counts) = (vec![0.0; joined[0] * joined[1]], vec![0.0; joined[0] * joined[1]]);
+    for (k, value) in grid.values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+        let at = k / cells[0] / block[1] * joined[0] + k % cells[0] / block[0];
+        sums[at] += value;
+        counts[at] += 1.0;
+    }
+    let axis = |k: usize| {
+        let axis = &grid.axes[k];
+        let end = axis.range[0] + axis.step() * (joined[k] * block[k]) as f64;
+        Axis { range: [axis.range[0], end], cells: joined[k], ..axis.clone() }
+    };
+    let grid = Grid {
+        axes: [axis(0), axis(1)],
+        // A block without a cell, as beyond the rim of a disc, has no value: 0/0.
+        values: sums.iter().zip(&counts).map(|(sum, count)| sum / count).collect(),
+        error: None,
+        geometric: None,
+        layers: Vec::new(),
+        ..grid.clone()
+    };
+    Some((grid, block))
+}
 
 /// Cuts a grid to the part around all cells that are not dark; `None` where that is most of it, or nothing.
 pub(super) fn lit_part(grid: &Grid) -> Option<Grid> {
@@ -56,6 +91,25 @@ pub(super) fn lit_part(grid: &Grid) -> Option<Grid> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn blocks_of_cells_have_their_mean() {
+        let axis = |cells: usize| Axis { label: "x".into(), unit: "mm".into(), range: [0.0, cells as f64], cells };
+        // 1201 × 2 cells make 401 × 2: blocks of three columns, of which the last has one.
+        let mut values: Vec<f64> = (0..2402).map(|k| (k % 1201) as f64).collect();
+        values[1] = f64::NAN;
+        let (name, quantity, unit) = (String::new(), String::new(), "lx".into());
+        let axes = [axis(1201), axis(2)];
+        let grid = Grid { name, quantity, unit, axes, values, error: None, geometric: None, layers: Vec::new() };
+        let (joined, block) = joined_cells(&grid).unwrap();
+        assert_eq!((block, joined.axes[0].cells, joined.axes[1].cells), ([3, 1], 401, 2));
+        assert_eq!(
+            [joined.values[0], joined.values[1], joined.values[400], joined.values[401]],
+            [1.0, 4.0, 1200.0, 1.0]
+        );
+        assert_eq!(joined.axes[0].step(), 3.0);
+        assert!(joined_cells(&joined).is_none());
+    }
 
     #[test]
     fn a_spot_on_a_wide_wall_is_framed() {

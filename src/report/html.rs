@@ -177,6 +177,7 @@ fn provenance_markup(p: &Provenance) -> Markup {
             h2 { "Where these numbers come from" }
             dl {
                 dt { "Command" } dd { code { (p.command) } }
+                dt { "Time" } dd { (p.time) }
                 dt { "Program" } dd { "lampyris " (p.version) ", commit " code { (p.commit) } }
                 dt { "Hardware" } dd { (p.hardware) }
                 dt { "Threads" } dd { (p.threads) }

@@ -37,14 +37,14 @@ pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
         axes: [axis(0), axis(1)],
         values: on_receiver(r, &r.cells),
         // Where errors were not kept for cells there are none.
-        error: (r.errors.len() == r.cells.len()).then(|| cell_errors(r)),
+        error: (r.errors.len() == r.cells.len()).then(|| on_receiver(r, &cell_errors(r))),
         geometric: None,
         layers: r.channels.iter().map(|channel| layer(r, channel)).collect(),
     })
 }
 
-/// Values of cells, with none off a disc.
-fn on_receiver(r: &ReceiverResult, cells: &[f64]) -> Vec<f64> {
+/// Returns the numbers of cells, NaN for those off a disc.
+pub(crate) fn on_receiver(r: &ReceiverResult, cells: &[f64]) -> Vec<f64> {
     let mut values = cells.to_vec();
     r.off.iter().for_each(|&k| values[k] = f64::NAN);
     values
@@ -60,7 +60,7 @@ fn layer(r: &ReceiverResult, channel: &ChannelResult) -> Layer {
         },
         unit: channel.unit.into(),
         values: on_receiver(r, &channel.cells),
-        error: channel_cell_errors(r, channel),
+        error: on_receiver(r, &channel_cell_errors(r, channel)),
         geometric: None,
     }
 }
@@ -81,21 +81,32 @@ pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
     })
 }
 
+/// Cells of a cut that are drawn: more than a screen has pixels, and 400 kB of the page.
+const MOST_CUT_POINTS: usize = 2000;
+
 /// Draws the values along both axes through the peak, with their errors; `None` for a grid without cells.
 pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [a, b] = &grid.axes;
     let (column, row) = grid.peak_cell()?;
-    let along = |axis: &Axis, fixed: &Axis, at: usize, cell: &dyn Fn(usize) -> usize| Series {
+    // Every so many-th cell of a very fine receiver, the brightest among them: each has a bar of its error in the page.
+    let shown = |axis: &Axis, peak: usize| {
+        let step = axis.cells.div_ceil(MOST_CUT_POINTS);
+        (peak % step..axis.cells).step_by(step)
+    };
+    let along = |[axis, fixed]: [&Axis; 2], [peak, at]: [usize; 2], cell: &dyn Fn(usize) -> usize| Series {
         name: format!("along {} at {} = {} {}", axis.label, fixed.label, figures(fixed.center(at), 3), fixed.unit),
-        points: (0..axis.cells).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
+        points: shown(axis, peak).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
         errors: grid.error.as_ref().map_or_else(Vec::new, |e| {
             let facets = |k: usize| grid.geometric.as_ref().and_then(|g| g.get(cell(k))).copied();
-            (0..axis.cells).map(|k| facets(k).map_or(e[cell(k)], |g| g.hypot(e[cell(k)]))).collect()
+            shown(axis, peak).map(|k| facets(k).map_or(e[cell(k)], |g| g.hypot(e[cell(k)]))).collect()
         }),
         style: SeriesStyle::Line,
         ..Series::default()
     };
-    let series = vec![along(a, b, row, &|k| row * a.cells + k), along(b, a, column, &|k| k * a.cells + column)];
+    let series = vec![
+        along([a, b], [column, row], &|k| row * a.cells + k),
+        along([b, a], [row, column], &|k| k * a.cells + column),
+    ];
     // Cuts along two axes of different units have no unit in common.
     let unit = if a.unit == b.unit { a.unit.as_str() } else { "" };
     let axes =
@@ -127,13 +138,9 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
     let error = lit_error(grid).map(|share| {
         format!("Statistical error of a cell, weighted by its light: {} %. ", figures(100.0 * share, 2))
     });
-    let cells = format!(
-        "{} × {} cells of {} {}.",
-        r.grid[0],
-        r.grid[1],
-        figures(grid.axes[0].step(), 3),
-        grid.axes[0].unit
-    );
+    let steps = grid.axes.each_ref().map(|axis| format!("{} {}", figures(axis.step(), 3), axis.unit));
+    let size = if steps[0] == steps[1] { steps[0].clone() } else { steps.join(" × ") };
+    let cells = format!("{} × {} cells of {size}.", r.grid[0], r.grid[1]);
     [peak, error, Some(cells)].into_iter().flatten().collect()
 }
 

@@ -42,6 +42,7 @@ pub use colour_picture::colour_picture;
 pub use contour::Isoline;
 pub use cross_check::{CheckReport, verdict};
 pub use document::{Block, Report, Section};
+pub(crate) use maps::on_receiver;
 pub use maps::{photometric_grid, receiver_grid};
 pub use number::{bytes, figures, grouped, seconds};
 pub use provenance::Provenance;

@@ -70,6 +70,11 @@ fn axis(style: &AxisStyle, values: impl Iterator<Item = f64>) -> Value {
         "automargin": true, "separatethousands": true, "exponentformat": if style.log { "power" } else { "none" }})
 }
 
+/// Returns a text as plotly shows it letter by letter: names of parts and receivers are data, and it reads them as HTML.
+fn plain(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
 /// Returns a chart as plotly's figure: an object with `data` and `layout`.
 pub(super) fn chart(chart: &Chart) -> Value {
     let (data, extra): (Vec<Value>, Value) = match &chart.content {
@@ -78,8 +83,9 @@ pub(super) fn chart(chart: &Chart) -> Value {
             (traces, json!({}))
         }
         Content::Bars { categories, layers, stacked } => {
+            let names: Vec<String> = categories.iter().map(|name| plain(name)).collect();
             let bars = layers.iter().enumerate().map(|(k, (name, values))| {
-                json!({"type": "bar", "name": name, "x": categories, "y": values,
+                json!({"type": "bar", "name": plain(name), "x": names, "y": values,
                     "marker": {"color": PALETTE[k % PALETTE.len()]}})
             });
             let mode = if *stacked { "stack" } else { "group" };
@@ -157,8 +163,8 @@ fn mark_traces(marks: &Marks) -> Vec<Value> {
     }
     if !marks.points.is_empty() {
         let along = |k: usize| doubles(marks.points.iter().map(move |p| p.at[k]));
-        let names: Vec<&str> = marks.points.iter().map(|p| p.name.as_str()).collect();
-        let notes: Vec<String> = marks.points.iter().map(|p| format!("{}: {}", p.name, p.note)).collect();
+        let names: Vec<String> = marks.points.iter().map(|p| plain(&p.name)).collect();
+        let notes: Vec<String> = marks.points.iter().map(|p| plain(&format!("{}: {}", p.name, p.note))).collect();
         traces.push(json!({"type": "scatter", "mode": "markers+text", "x": along(0), "y": along(1), "text": names,
             "hovertext": notes, "hoverinfo": "text", "textposition": "top right",
             "textfont": {"color": "#5eead4", "size": 11}, "marker": {"color": "#5eead4", "size": 7}}));
@@ -213,14 +219,14 @@ fn trace(colour: &str, s: &Series) -> Value {
         SeriesStyle::Points | SeriesStyle::Faint => "markers",
     };
     let faint = s.style == SeriesStyle::Faint;
-    let mut trace = json!({"type": "scatter", "mode": mode, "name": s.name,
+    let mut trace = json!({"type": "scatter", "mode": mode, "name": plain(&s.name),
         "x": doubles(s.points.iter().map(|p| p[0])), "y": doubles(s.points.iter().map(|p| p[1])),
         "opacity": if faint { 0.55 } else { 1.0 }, "marker": {"size": if faint { 6 } else { 8 }},
         "line": {"width": 2, "dash": if s.style == SeriesStyle::Dashed { "dash" } else { "solid" }}});
     trace["marker"]["color"] = colour.into();
     trace["line"]["color"] = colour.into();
     if !s.labels.is_empty() {
-        trace["text"] = json!(s.labels);
+        trace["text"] = s.labels.iter().map(|label| plain(label)).collect();
         trace["hovertemplate"] = json!("%{text}<br>%{x:.4g}, %{y:.4g}<extra>%{fullData.name}</extra>");
     }
     if !s.errors.is_empty() {
@@ -250,7 +256,7 @@ pub(super) fn view(view: &View) -> Value {
 fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
     match shape {
         Shape::Surface { name, points, triangles, colour, opacity, values, labels } => {
-            let mut mesh = json!({"type": "mesh3d", "name": name, "showlegend": values.is_none(),
+            let mut mesh = json!({"type": "mesh3d", "name": plain(name), "showlegend": values.is_none(),
                 "x": singles(points.iter().map(|p| p[0])), "y": singles(points.iter().map(|p| p[1])),
                 "z": singles(points.iter().map(|p| p[2])), "i": indices(triangles.iter().map(|t| t[0])),
                 "j": indices(triangles.iter().map(|t| t[1])), "k": indices(triangles.iter().map(|t| t[2])),
@@ -283,13 +289,13 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
             // A NaN lifts the pen between two lines.
             let along =
                 |k: usize| singles(lines.iter().flat_map(move |l| l.iter().map(move |p| p[k]).chain([f32::NAN])));
-            json!({"type": "scatter3d", "mode": "lines", "name": name, "hoverinfo": "name", "connectgaps": false,
+            json!({"type": "scatter3d", "mode": "lines", "name": plain(name), "hoverinfo": "name", "connectgaps": false,
                 "x": along(0), "y": along(1), "z": along(2), "opacity": 0.8,
                 "line": {"color": css(*colour), "width": width}})
         }
         Shape::Points { name, points, colour } => {
             let along = |k: usize| singles(points.iter().map(move |p| p[k]));
-            json!({"type": "scatter3d", "mode": "markers", "name": name, "hoverinfo": "name",
+            json!({"type": "scatter3d", "mode": "markers", "name": plain(name), "hoverinfo": "name",
                 "x": along(0), "y": along(1), "z": along(2), "marker": {"size": 4, "color": css(*colour)}})
         }
     }

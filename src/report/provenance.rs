@@ -7,6 +7,8 @@ use serde::Serialize;
 pub struct Provenance {
     /// The command as it can be typed again.
     pub command: String,
+    /// When it began, UTC, as ISO 8601 has it.
+    pub time: String,
     /// Version of the program.
     pub version: String,
     /// Commit it was built from; `unknown` outside release builds.

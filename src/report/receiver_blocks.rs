@@ -1,7 +1,7 @@
 //! What the page shows of one receiver: its map, and what people of the trade read beside it.
 
 use super::colour_picture::colour_chart;
-use super::framing::lit_part;
+use super::framing::{joined_cells, lit_part};
 use super::lamp_figures::{encircled_power, lamp_table, polar};
 use super::maps::{reading, spoken};
 use super::{Block, Chart};
@@ -15,13 +15,18 @@ pub(super) fn framed_map(r: &ReceiverResult, grid: &Grid) -> Chart {
     let stem = file_stem(&r.name);
     // Candela and lux beside watts: the unit tells the files apart.
     let name = if grid.unit == r.unit { stem } else { format!("{stem}-{}", grid.unit) };
-    let caption = reading(r, grid);
-    match lit_part(grid) {
-        Some(part) => {
-            let caption = format!("{caption} Shown: the part that is lit; the files hold all of it.");
-            Chart::map(&name, &title, &caption, part)
+    let mut caption = reading(r, grid);
+    let part = lit_part(grid);
+    if part.is_some() {
+        caption += " Shown: the part that is lit; the files hold all of it.";
+    }
+    let shown = part.unwrap_or_else(|| grid.clone());
+    match joined_cells(&shown) {
+        Some((joined, [a, b])) => {
+            caption += &format!(" Shown: means of {a} × {b} cells; the files hold each.");
+            Chart::map(&name, &title, &caption, joined)
         }
-        None => Chart::map(&name, &title, &caption, grid.clone()),
+        None => Chart::map(&name, &title, &caption, shown),
     }
 }
 

@@ -15,6 +15,9 @@ use crate::math::{Point, Vector};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// Most rays of all lists together whose ends are told: they take half a gigabyte.
+pub const MOST_LISTED_RAYS: u64 = 5_000_000;
+
 /// Rays that a thread takes at a time.
 const BLOCK: u64 = 4096;
 

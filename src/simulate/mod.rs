@@ -64,7 +64,7 @@ pub use effects::{Because, Required};
 pub use error::{Error, ErrorKind};
 pub use face_results::{FaceResult, FaceResults};
 pub use hooks::{Hooks, Progress, ReplicateHook, Traced};
-pub use listed_rays::{ListedEnd, listed_ends, ray_lists};
+pub use listed_rays::{ListedEnd, MOST_LISTED_RAYS, listed_ends, ray_lists};
 pub use outcome::{Counts, Event, LostCause, LostRay, PathSink, PathVertex};
 pub use partial_run::{Fingerprint, FingerprintHasher, PartialRun};
 pub use path_sample::PathSample;

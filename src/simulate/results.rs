@@ -43,6 +43,8 @@ pub struct Results {
     pub notes: Vec<String>,
     /// Where the power went.
     pub power: Power,
+    /// Standard errors of [`Results::power`] from the spread of the rays; 0 for what was emitted, which is known.
+    pub power_errors: Power,
     /// Paths that were lost.
     pub lost_rays: u64,
     /// Paths that a limit cut off.
@@ -61,6 +63,9 @@ pub struct Results {
     /// What faces absorbed and let through, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub faces: Option<FaceResults>,
+    /// Whether the run is divided into replicates of a fixed size, so that further ones may follow; it decides which ray bears which number.
+    #[serde(skip)]
+    pub grows: bool,
     /// Lost rays of the lowest index, at most 1000.
     #[serde(skip)]
     pub ledger: Vec<LostRay>,
@@ -109,6 +114,11 @@ pub struct Power {
 }
 
 impl Power {
+    /// Names the six ends in the order of the tallies.
+    fn from_ends([emitted, received, absorbed, escaped, cut_off, lost]: [f64; 6]) -> Self {
+        Self { emitted, received, absorbed, escaped, cut_off, lost }
+    }
+
     /// Returns what does not add up, as a share of what was emitted; not a number where nothing was.
     pub fn imbalance(&self) -> f64 {
         let sum = self.received + self.absorbed + self.escaped + self.cut_off + self.lost;
@@ -158,7 +168,7 @@ impl Results {
         let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(few_replicates(tallies.replicates));
         let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let power = tallies.ends.map(|s| s.total as f64 * quantum);
-        let [emitted, received, absorbed, escaped, cut_off_power, lost_power] = power;
+        let errors = tallies.ends.map(|s| s.error(tallies.replicates) * quantum);
         let digest = digest(&tallies);
         Self {
             rays,
@@ -173,7 +183,8 @@ impl Results {
                 kernel: kernel_kind(bound, settings).name(),
             },
             notes,
-            power: Power { emitted, received, absorbed, escaped, cut_off: cut_off_power, lost: lost_power },
+            power: Power::from_ends(power),
+            power_errors: Power { emitted: 0.0, ..Power::from_ends(errors) },
             lost_rays: lost,
             cut_off_rays: cut_off,
             caught_rays: caught,
@@ -189,6 +200,7 @@ impl Results {
                 .collect(),
             sequences: sequences(bound, &tallies, quantum),
             faces: bound.counts_faces().then(|| FaceResults::new(bound, &tallies, quantum)),
+            grows: plan.grows(),
             ledger: std::mem::take(&mut tallies.ledger),
             paths: std::mem::take(&mut tallies.paths).into_vertices(),
             cost,

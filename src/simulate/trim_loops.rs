@@ -41,6 +41,7 @@ pub(crate) struct TrimRegion {
 }
 
 impl TrimRegion {
+    /// Divides the loops of a face into polygons and these into bands; an untrimmed face gets none.
     pub(crate) fn new(face: &Face) -> Self {
         let polygons: Vec<Vec<Uv>> = face.loops.iter().map(fine_polygon).collect();
         let sides = || polygons.iter().flat_map(|polygon| polygon_sides(polygon));

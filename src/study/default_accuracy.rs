@@ -225,7 +225,7 @@ impl Undecided<'_> {
             let has_mesh = self.faces().any(|face| face.is_none());
             (ON_FACETS, if has_mesh { READY_OR_FLAT } else { FLAT })
         } else if self.judged_rays() <= SHORT_RUN {
-            (ON_SPLINE, "the run is so short that the spline costs less than to find out whether facets do")
+            (ON_SPLINE, "the run has so few rays that a pilot would cost a good part of what facets could save")
         } else if self.bound.emitters.iter().any(|e| e.rays.is_some_and(|n| n > self.judged_rays() / SHARE)) {
             (ON_SPLINE, "a source has so many rays of its own that a pilot would trace most of the run")
         } else if self.has_huge_map() {

@@ -36,6 +36,9 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         (&["study", "interpolation", "--tolerance", "0.1"], "several of its own"),
         (&["trace", "s.toml", "--max-lost", "nan"], "a share is a number"),
         (&["info", "s.stp", "--max-refused", "nan"], "a share is a number"),
+        (&["study", "accuracy", "--angle", "5"], "study accuracy does not take --angle"),
+        (&["study", "accuracy", "--role", "mirror=0.1"], "study accuracy does not take --role"),
+        (&["man", "--json"], "man has no JSON document"),
         (&["tarce"], "trace"),
         (&[], "Usage"),
     ] {
@@ -44,6 +47,17 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         assert!(err.contains(says), "{arguments:?}: {err}");
         assert!(!err.contains('\x1b'), "NO_COLOR is respected");
     }
+}
+
+/// A device that is full takes no help.
+#[test]
+#[cfg(target_os = "linux")]
+fn help_that_could_not_be_written_is_a_failure() {
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let program = assert_cmd::cargo::cargo_bin("lampyris");
+    let ended = std::process::Command::new(program).arg("--help").stdout(full).output().unwrap();
+    assert_eq!(ended.status.code(), Some(1), "{ended:?}");
+    assert!(String::from_utf8_lossy(&ended.stderr).starts_with("error: "), "{ended:?}");
 }
 
 #[test]

@@ -153,6 +153,14 @@ fn shards_merge_to_the_bits_of_one_run() {
         let read = |folder: &str| std::fs::read(path.join(folder).join(file)).unwrap();
         assert!(read("whole") == read("merged"), "{file}");
     }
+    // A sum of parts, and one that would replace a part.
+    let sum = document(path, &["merge", "part1.tally", "part2.tally", "-o", "sum.tally", "--json"], 0);
+    assert_eq!((sum["of"].as_u64(), sum["file"].as_str()), (Some(128), Some("sum.tally")), "{sum}");
+    assert!((80..90).contains(&sum["replicates"].as_u64().unwrap()), "two thirds: {sum}");
+    let before = std::fs::read(path.join("part1.tally")).unwrap();
+    let (code, _, err) = lampyris_in(path, &["merge", "part1.tally", "part2.tally", "-o", "part1.tally"]);
+    assert!(code == 2 && err.contains("is one of the parts"), "{code} {err}");
+    assert!(std::fs::read(path.join("part1.tally")).unwrap() == before);
     // A part too few, one twice, one of another run, a damaged one.
     let other = ["trace", "scene.toml", "--shard", "2/3", "-o", "other.tally", "--seed", "9"];
     assert_eq!(lampyris_in(path, &other).0, 0);

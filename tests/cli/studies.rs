@@ -8,10 +8,14 @@ use serde_json::Value;
 fn every_effect_that_a_scene_does_not_call_for_is_priced_alone() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().display().to_string();
-    let scene = fixture("scenes/s3_reflector.toml").display().to_string();
+    let text = std::fs::read_to_string(fixture("scenes/s3_reflector.toml")).unwrap();
+    let model = format!("{}/", fixture("step").display());
+    let scene = folder.path().join("scene.toml").display().to_string();
+    std::fs::write(&scene, text.replace("../step/", &model).replace("[run]", "[run]\nseed = 7")).unwrap();
     let (code, out, err) = lampyris(&["study", "effects", "--rays", "3000", "--json", "-o", &path, &scene]);
     assert_eq!(code, 0, "{err}");
     let document: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(document["seed"], 7, "that of the scene");
     let rows = document["rows"].as_array().unwrap();
     // S3 is mirrors and black faces: eight of the nine effects are not called for.
     assert_eq!((rows.len(), &rows[0]["choice"], &rows[9]["choice"]), (10, &"pruned".into(), &"full".into()));

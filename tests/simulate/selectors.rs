@@ -6,7 +6,7 @@ use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
 use lampyris::mesh::FacetMesh;
 use lampyris::model::{Analytic, Model, PlacedFace, TessellatedFace};
-use lampyris::simulate::{Error, RuleFaces, Scene, face_selectors};
+use lampyris::simulate::{BoundScene, Error, RuleFaces, Scene, face_selectors};
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -32,9 +32,13 @@ fn twins() -> Model {
     model
 }
 
-fn rules(model: &Model, materials: &str) -> Result<Vec<RuleFaces>, Error> {
+fn bound(model: &Model, materials: &str) -> Result<BoundScene, Error> {
     let text = format!("[[source]]\nkind = 'point'\nat = [50, 0, 0]\n{materials}");
-    Scene::parse(&text, "s.toml", Path::new("."))?.bind(model).map(|bound| bound.rules().to_vec())
+    Scene::parse(&text, "s.toml", Path::new("."))?.bind(model)
+}
+
+fn rules(model: &Model, materials: &str) -> Result<Vec<RuleFaces>, Error> {
+    bound(model, materials).map(|bound| bound.rules().to_vec())
 }
 
 #[test]
@@ -64,6 +68,12 @@ fn the_last_rule_decides_and_the_table_says_so() {
     assert_eq!(table.len(), 2, "every face is named");
     assert_eq!((table[0].faces.as_slice(), table[0].gives.as_str()), (&[][..], "surface mirror"));
     assert_eq!((table[1].faces.as_slice(), table[1].selects.as_str()), (&[0, 1][..], "solid = [0,1]"));
+    let notes = bound(&twins(), materials).unwrap().notes().join("; ");
+    assert!(notes.contains("[[material]] 1 (all faces) decides no face"), "{notes}");
+    // A surface above a medium leaves the medium.
+    let both = "[[material]]\nmedium = 'N-BK7'\n[[material]]\nsurface = 'interface'\n";
+    let notes = bound(&twins(), both).unwrap().notes().join("; ");
+    assert!(!notes.contains("decides no face"), "{notes}");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use crate::model::{Model, PartAccount, SolidAccount};
 use crate::pipeline::LoadedModel;
 use crate::report::figures;
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -84,7 +85,7 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     text += "# A face that no rule names absorbs all light that meets it. Rules select by part, instance, solid, face, entity (the #id\n\
         # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins. `lampyris info FILE --faces`\n\
         # shows what selects each face, `lampyris media` lists the media that have names.\n";
-    let rules: Vec<String> = model.account().iter().flat_map(rule_texts).collect();
+    let rules = rule_texts(&model.account());
     text.extend(rules.iter().take(MOST_RULES).map(String::as_str));
     let rest = rules.len().saturating_sub(MOST_RULES);
     if rest > 0 {
@@ -93,25 +94,49 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     text + &light_text(model)
 }
 
-/// Returns the rules for a part: one, or one for each of its solids where it has several; none for solids without faces.
-fn rule_texts(part: &PartAccount) -> Vec<String> {
-    let name = if part.name.is_empty() { "\"*\"".to_owned() } else { toml_string(&part.name) };
-    let solids = part.solids.iter().filter(|s| !s.faces.is_empty());
-    let is_one = solids.clone().count() < 2;
-    let selector = |solid: &SolidAccount| {
-        if is_one { format!("part = {name}") } else { format!("part = {name}\nsolid = {}", solid.index) }
-    };
-    solids.map(|solid| rule_text(&selector(solid), solid)).collect()
+/// Returns the rules for all parts that are placed: one for each name, or one for each solid where a part of that name has several; none for
+/// solids without faces.
+fn rule_texts(parts: &[PartAccount]) -> Vec<String> {
+    // A selector by name means all parts of that name: what the first one is like is said of all.
+    let mut names: Vec<(&str, Vec<&PartAccount>)> = Vec::new();
+    for part in parts.iter().filter(|part| part.instances > 0) {
+        match names.iter_mut().find(|(name, _)| *name == part.name) {
+            Some((_, alike)) => alike.push(part),
+            None => names.push((&part.name, vec![part])),
+        }
+    }
+    // Parts without a name are selected by `*`, which means the others too: these stand below, where they win.
+    names.sort_by_key(|(name, _)| !name.is_empty());
+    let mut rules = Vec::new();
+    for (name, parts) in names {
+        let name = if name.is_empty() { "\"*\"".to_owned() } else { toml_string(name) };
+        let solids = |part: &&PartAccount| part.solids.iter().filter(|s| !s.faces.is_empty()).count();
+        if parts.iter().all(|part| solids(part) < 2) {
+            let first = parts.iter().flat_map(|part| &part.solids).find(|s| !s.faces.is_empty());
+            rules.extend(first.map(|solid| rule_text(&format!("part = {name}"), solid, parts.len())));
+            continue;
+        }
+        let mut numbered: BTreeMap<usize, Vec<&SolidAccount>> = BTreeMap::new();
+        for solid in parts.iter().flat_map(|part| &part.solids).filter(|s| !s.faces.is_empty()) {
+            numbered.entry(solid.index).or_default().push(solid);
+        }
+        let rule = |(index, solids): (usize, Vec<&SolidAccount>)| {
+            rule_text(&format!("part = {name}\nsolid = {index}"), solids[0], solids.len())
+        };
+        rules.extend(numbered.into_iter().map(rule));
+    }
+    rules
 }
 
-/// Returns a rule for one solid, with what may be said of it in comments.
-fn rule_text(selector: &str, solid: &SolidAccount) -> String {
+/// Returns a rule for one solid, or the first of `alike` that the selector means, with what may be said of it in comments.
+fn rule_text(selector: &str, solid: &SolidAccount, alike: usize) -> String {
+    let first = if alike > 1 { format!("the first of {alike} of this name: ") } else { String::new() };
     let closed = if solid.closed { "closed" } else { "open: a medium would have a gap" };
     let size = solid.size_mm().map(toml_number).join(" × ");
     let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
     format!(
         "[[material]]\n\
-         {selector}  # {closed}, {} faces, {size} mm{colour}\n\
+         {selector}  # {first}{closed}, {} faces, {size} mm{colour}\n\
          surface = \"absorber\"  # or \"mirror\" with reflectance = 0.9; or, in place of surface: medium = \"PMMA\"\n\n",
         solid.faces.len()
     )
@@ -193,11 +218,46 @@ fn toml_string(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{FaceAccount, SurfaceKind};
 
     #[test]
     fn the_axis_is_that_about_which_the_box_is_square() {
         let halves = [[3.0, 5.0, 5.01], [5.0, 3.0, 5.0], [5.0, 5.0, 3.0], [5.0, 5.0, 5.0], [1.0, 2.0, 3.0]];
         assert_eq!(halves.map(optical_axis), [0, 1, 2, 2, 2]);
+    }
+
+    #[test]
+    fn parts_of_one_name_get_one_rule_and_those_without_a_name_stand_above() {
+        let face = FaceAccount {
+            id: None,
+            name: String::new(),
+            colour: None,
+            layer: None,
+            kind: SurfaceKind::Plane,
+            radius_mm: None,
+            area_mm2: 1.0,
+            bbox_mm: [[0.0; 3], [1.0; 3]],
+            at: [0.0; 3],
+        };
+        let solid = |index| SolidAccount { index, name: String::new(), closed: true, faces: vec![face.clone()] };
+        let part = |name: &str, instances: usize, solids: usize| PartAccount {
+            name: name.into(),
+            instances,
+            solids: (0..solids).map(solid).collect(),
+        };
+        let parts =
+            [part("led", 1, 1), part("led", 2, 1), part("", 1, 1), part("board", 1, 2), part("spare", 0, 1)];
+        let rules = rule_texts(&parts);
+        let selectors: Vec<String> = rules
+            .iter()
+            .map(|rule| rule.lines().skip(1).take_while(|l| !l.starts_with("surface")).collect())
+            .collect();
+        assert_eq!(rules.len(), 4, "{rules:?}");
+        assert!(selectors[0].starts_with("part = \"*\""), "{selectors:?}");
+        assert!(selectors[1].starts_with("part = \"led\"") && selectors[1].contains("first of 2"), "{selectors:?}");
+        for (k, rule) in rules[2..].iter().enumerate() {
+            assert!(rule.contains(&format!("part = \"board\"\nsolid = {k}")), "{rule}");
+        }
     }
 
     #[test]

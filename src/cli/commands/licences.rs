@@ -1,8 +1,10 @@
 //! `lampyris licences`: the licences of what the binary holds.
 
 use crate::cli::completion::Completion;
-use crate::cli::console::print;
+use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
+use crate::cli::output::json::json_text;
+use serde_json::{Value, json};
 
 /// Works that stand in the binary as they are: what they are for, under which licence, and its text.
 const EMBEDDED: [(&str, &str, &str); 2] = [
@@ -17,8 +19,17 @@ const EMBEDDED: [(&str, &str, &str); 2] = [
 /// Libraries compiled in, `name version licence` a line, as `cargo tree -e normal` lists them.
 const LIBRARIES: &str = include_str!("../licences/libraries.txt");
 
-/// Prints the licences of the program, of what stands in it, and of the libraries compiled in.
-pub(crate) fn run() -> Result<Completion, Failure> {
+/// Prints the licences of the program, of what stands in it, and of the libraries compiled in; with `--json` as a document.
+pub(crate) fn run(console: &Console) -> Result<Completion, Failure> {
+    if console.json {
+        let work =
+            |(work, licence, text): &(&str, &str, &str)| json!({"work": work, "licence": licence, "text": text});
+        let works: Vec<Value> = EMBEDDED.iter().map(work).collect();
+        let document = json!({"version": env!("CARGO_PKG_VERSION"), "licence": "MIT OR Apache-2.0",
+            "works": works, "libraries": LIBRARIES.lines().collect::<Vec<_>>()});
+        print(&json_text(&document)?)?;
+        return Ok(Completion::Complete);
+    }
     let mut text = format!(
         "lampyris {} is licensed under MIT or Apache-2.0, at your choice.\n\n\
          It holds these works as they are:\n",

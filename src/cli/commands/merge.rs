@@ -3,10 +3,10 @@
 use crate::cli::arguments::command::RefusalLimit;
 use crate::cli::arguments::options::CacheOption;
 use crate::cli::completion::Completion;
-use crate::cli::console::Console;
+use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
-use crate::cli::output::json::json_value;
+use crate::cli::output::json::{json_text, json_value};
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::cli::work::output_place::OutputPlace;
@@ -18,6 +18,7 @@ use crate::cli::work::usage::Usage;
 use crate::cli::work::{input_files, lost_rays, results_folder};
 use crate::pipeline::{ErrorTarget, PreparedScene, SceneJob, TraceRequest, read_scene};
 use crate::simulate::{GROWING_REPLICATE, PartialRun};
+use serde_json::json;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -43,6 +44,7 @@ const LOOK_AGAIN: Duration = Duration::from_millis(500);
 /// `.tally`. Incomplete where light was lost or faces refused beyond the limits, or the error asked for was not reached.
 pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completion, Failure> {
     let patience = Patience::new(command.wait)?;
+    refuse_part_as_output(command)?;
     let monitor = TerminalMonitor::new(console);
     let first = first_part(command, &patience, console)?;
     let header: TallyHeader = PartialRun::header(&read_part(&first)?).map_err(|m| input_failure(&first, m))?;
@@ -118,7 +120,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
         .and(Completion::incomplete_if(result.is_some_and(|result| !result.reached))))
 }
 
-/// Writes the sum of the parts, whole or not, as a tally for a merge of merges, and says so.
+/// Writes the sum of the parts, whole or not, as a tally for a merge of merges, and says so, or with `--json` prints what it holds.
 fn write_sum(
     command: &MergeCommand,
     prepared: &PreparedScene,
@@ -129,6 +131,13 @@ fn write_sum(
     let file = command.folder.to_path_buf();
     let _owned = OutputPlace::file(&file)?;
     Checkpoint::new(prepared, scene, file, None, 0.0, console)?.save_sum(sum, usage)?;
+    if console.json {
+        let counts = &sum.tallies.counts;
+        let document = json!({"replicates": sum.done.len(), "of": sum.replicates, "rays": counts.rays,
+            "segments": counts.segments, "lost_rays": counts.lost, "file": command.folder.display().to_string()});
+        print(&json_text(&document)?)?;
+        return Ok(Completion::Complete);
+    }
     console.say(format_args!(
         "{} of {} replicates in {}",
         sum.done.len(),
@@ -136,6 +145,17 @@ fn write_sum(
         command.folder.display()
     ));
     Ok(Completion::Complete)
+}
+
+/// Refuses a sum that would replace one of its parts: merged once more, their rays would count twice or be lost.
+fn refuse_part_as_output(command: &MergeCommand) -> Result<(), Failure> {
+    let Ok(output) = command.folder.canonicalize() else { return Ok(()) };
+    let parts = part_files(command.parts)?;
+    if !parts.iter().any(|part| part.canonicalize().is_ok_and(|part| part == output)) {
+        return Ok(());
+    }
+    let failure = Failure::arguments(format!("{}: is one of the parts", command.folder.display()));
+    Err(failure.with_help("give another name with -o; parts stay as they are"))
 }
 
 /// How long to wait for parts.

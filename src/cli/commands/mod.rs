@@ -76,7 +76,7 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
         Command::Cache { folder, clear } => cache::run(&folder, clear, console),
         Command::Init { file, output } => init::run(&file, output.as_deref(), console),
         Command::Media => media::run(console),
-        Command::Licences => licences::run(),
+        Command::Licences => licences::run(console),
         Command::Assess { list: true, .. } => assess::list(console),
         Command::Assess { result, regulation, receiver, left_hand, as_placed, list: _ } => {
             let command = assess::AssessCommand {
@@ -88,10 +88,27 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
             };
             assess::run(&command, console)
         }
-        Command::Schema { text } => meta::schema(text),
-        Command::Completions { shell } => meta::completions(shell),
-        Command::Man { output } => meta::man(output.as_deref(), console),
+        Command::Schema { text } => {
+            refuse_json(console, text, "schema --text")?;
+            meta::schema(text)
+        }
+        Command::Completions { shell } => {
+            refuse_json(console, true, "completions")?;
+            meta::completions(shell)
+        }
+        Command::Man { output } => {
+            refuse_json(console, true, "man")?;
+            meta::man(output.as_deref(), console)
+        }
     }
+}
+
+/// Refuses `--json` where a page for people, or text for a shell, `is_asked` for.
+fn refuse_json(console: &Console, is_asked: bool, command: &str) -> Result<(), Failure> {
+    if console.json && is_asked {
+        return Err(Failure::arguments(format!("{command} has no JSON document")).with_help("leave --json out"));
+    }
+    Ok(())
 }
 
 /// Refuses a range of rays where it would be taken for their number: only `trace` begins behind the first ray.

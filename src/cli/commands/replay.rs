@@ -11,43 +11,29 @@ use crate::pipeline::PreparedScene;
 use crate::report::path_lines;
 use crate::simulate::{PathVertex, Results, RunSettings, replay};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What `--replay` asks for: rays by number, and the seed and number of rays of a ledger.
+/// What `--replay` asks for: rays by number, and the run of a ledger.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct ReplayRequest {
     /// Ascending, each once, counted from 0.
     pub(crate) rays: Vec<u64>,
-    /// Seed and number of rays of the ledger's run; `None` where no ledger was given.
-    run: Option<[u64; 2]>,
-    /// Where the ledger says that they were lost.
-    lost: Vec<LostLine>,
+    /// The ledger's run; `None` where no ledger was given.
+    run: Option<LedgerRun>,
 }
 
-/// What a line of a ledger says that tells one ray from another.
-#[derive(Debug, PartialEq)]
-struct LostLine {
-    ray: u64,
-    branch: u32,
-    /// Origin, mm, and direction of the last segment.
-    segment: [f64; 6],
+/// What decides which ray of a run bears which number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LedgerRun {
+    seed: u64,
+    rays: u64,
+    /// Whether it is divided into replicates of a fixed size.
+    grows: bool,
 }
 
 impl ReplayRequest {
     pub(crate) fn is_empty(&self) -> bool {
         self.rays.is_empty()
-    }
-
-    /// Whether the rays were lost as the ledger says; `true` without one.
-    fn describes(&self, found: &Results) -> bool {
-        let lost: BTreeMap<(u64, u32), [f64; 6]> = (found.ledger.iter())
-            .map(|l| {
-                let ([x, y, z], [dx, dy, dz]) = (l.origin.to_array(), l.direction.to_array());
-                ((l.ray, l.branch), [x, y, z, dx, dy, dz])
-            })
-            .collect();
-        self.lost.iter().all(|line| lost.get(&(line.ray, line.branch)) == Some(&line.segment))
     }
 }
 
@@ -71,12 +57,7 @@ pub(crate) fn parse_request(words: &[String]) -> Result<ReplayRequest, Failure> 
     Ok(request)
 }
 
-/// Columns of a ledger before the first name, and the first of origin and direction among them.
-const NUMBERS: usize = 11;
-const SEGMENT: usize = 5;
-
-/// Adds the rays of a ledger of lost rays to the request, and the seed and number of rays of its run; a message if it is none or of another
-/// run.
+/// Adds the rays of a ledger of lost rays to the request, and its run; a message if it is none or of another run.
 fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
     let mut lines = text.lines();
     if lines.next() != Some(COLUMNS) {
@@ -86,19 +67,16 @@ fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
         let number = |s: Option<&str>| {
             s.and_then(|s| s.parse::<u64>().ok()).ok_or(format!("line {}: a number is missing", k + 2))
         };
-        // Names, which may hold commas, stand behind these.
-        let columns: Vec<&str> = line.split(',').take(NUMBERS).collect();
-        let ray = number(columns.first().copied())?;
-        request.rays.push(ray);
-        let branch = number(columns.get(1).copied())? as u32;
-        let segment: Vec<f64> = columns.iter().skip(SEGMENT).filter_map(|s| s.parse().ok()).collect();
-        let segment = segment.try_into().map_err(|_| format!("line {}: a number is missing", k + 2))?;
-        request.lost.push(LostLine { ray, branch, segment });
+        request.rays.push(number(line.split(',').next())?);
+        // From the end: names, which may hold commas, stand before these.
         let mut last = line.rsplit(',');
+        let grows = last.next().and_then(|s| s.parse().ok());
+        let grows = grows.ok_or(format!("line {}: the last cell must be true or false", k + 2))?;
         let (rays, seed) = (number(last.next())?, number(last.next())?);
+        let run = LedgerRun { seed, rays, grows };
         // One ledger is of one run; of two nobody could say which seed holds.
-        if request.run.replace([seed, rays]).is_some_and(|r| r != [seed, rays]) {
-            return Err(format!("line {}: another seed or number of rays than the lines before", k + 2));
+        if request.run.replace(run).is_some_and(|other| other != run) {
+            return Err(format!("line {}: another seed, number of rays or plan than the lines before", k + 2));
         }
     }
     Ok(())
@@ -113,18 +91,12 @@ pub(crate) fn run(
     console: &Console,
 ) -> Result<(), Failure> {
     let settings = prepared.run_settings();
-    let [seed, rays] = request.run.unwrap_or([settings.seed, settings.rays]);
-    // A ray is traced again only by the seed and the number of rays of its own run.
-    let settings = RunSettings { seed, rays, ..settings };
+    let RunSettings { seed, rays, grows, .. } = settings;
+    // A ray is traced again only by the seed, the number of rays and the plan of its own run.
+    let LedgerRun { seed, rays, grows } = request.run.unwrap_or(LedgerRun { seed, rays, grows });
+    let settings = RunSettings { seed, rays, grows, ..settings };
     let found = prepared.with_intersector(&TerminalMonitor::new(console), |intersector, _| {
-        let found = replay(&prepared.bound, intersector, &settings, &request.rays);
-        if request.describes(&found) {
-            return found;
-        }
-        // A run that was merged of ranges grows, and numbers its rays otherwise; its ledger does not say so.
-        let growing = RunSettings { grows: true, ..settings.clone() };
-        let again = replay(&prepared.bound, intersector, &growing, &request.rays);
-        if request.describes(&again) { again } else { found }
+        replay(&prepared.bound, intersector, &settings, &request.rays)
     });
     // Rays beyond the last are not traced.
     if found.rays < request.rays.len() as u64 {
@@ -188,13 +160,12 @@ mod tests {
     #[test]
     fn a_ledger_gives_its_rays_and_its_run() {
         let line =
-            |ray: u64, seed: u64| format!("{ray},0,1,no_exit,1,0,0,0,0,0,1,\"a,b\",\"g\",,\"\",{seed},100\n");
+            |ray: u64, seed: u64| format!("{ray},0,1,no_exit,1,0,0,0,0,0,1,\"a,b\",\"g\",,\"\",{seed},100,true\n");
         let text = format!("{COLUMNS}\n{}{}", line(7, 3), line(9, 3));
         let mut request = ReplayRequest::default();
         read_ledger(&text, &mut request).unwrap();
-        assert_eq!((&request.rays, request.run), (&vec![7, 9], Some([3, 100])));
-        let first = LostLine { ray: 7, branch: 0, segment: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0] };
-        assert_eq!(request.lost[0], first);
+        let run = LedgerRun { seed: 3, rays: 100, grows: true };
+        assert_eq!((&request.rays, request.run), (&vec![7, 9], Some(run)));
         assert!(read_ledger(&format!("{text}{}", line(1, 4)), &mut request).unwrap_err().contains("line 4"));
         assert!(read_ledger("ray\n1\n", &mut request).unwrap_err().contains("not a ledger"));
     }

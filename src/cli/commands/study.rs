@@ -57,12 +57,14 @@ struct StudyResult {
     answer: String,
     /// More rows, by name.
     extra_rows: Vec<(&'static str, Value)>,
+    /// The seed that a scene traced with; `None` for that of the command.
+    seed: Option<u64>,
 }
 
 impl StudyResult {
     fn new(rows: &impl Serialize, answer: impl Into<String>) -> Result<Self, Failure> {
         let rows = json_value(rows)?;
-        Ok(Self { rows, answer: answer.into(), extra_rows: Vec::new() })
+        Ok(Self { rows, answer: answer.into(), extra_rows: Vec::new(), seed: None })
     }
 
     /// Adds a further table under a name of its own.
@@ -87,8 +89,7 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     let m = &command.meshing;
     let t = &command.tracing;
     let traces_scene = kind == Effects;
-    // The race of hierarchies takes a tolerance, but the same on all faces.
-    let faceted = matches!(kind, Effects | Accuracy);
+    // Studies of their own facets take a tolerance at most, the same on all faces.
     let given = [
         ("--intersector", t.intersector.is_some(), traces_scene, "it compares those that it is about"),
         ("--normals", t.normals.is_some(), traces_scene, "it compares those that it is about"),
@@ -97,10 +98,10 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
         (
             "--tolerance",
             m.tolerance.is_some(),
-            faceted || matches!(kind, Bvh | Complexity),
+            matches!(kind, Effects | Accuracy | Bvh | Complexity),
             "it goes through several of its own",
         ),
-        ("--angle", m.angle_deg.is_some(), faceted, "it goes through facets of its own"),
+        ("--angle", m.angle_deg.is_some(), traces_scene, "it goes through facets of its own"),
         ("--embree", command.embree.is_some(), kind == Bvh, "it compares those that it is about"),
         ("--rays-in", command.rays_in.is_some(), kind == Bvh, "it asks rays of its own"),
         (
@@ -109,9 +110,9 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
             false,
             "the file of --rays-in has all of them",
         ),
-        ("--part", !m.part.is_empty(), faceted, "it goes through facets of its own"),
-        ("--face", !m.face.is_empty(), faceted, "it goes through facets of its own"),
-        ("--role", !m.role.is_empty(), faceted, "it goes through facets of its own"),
+        ("--part", !m.part.is_empty(), traces_scene, "it goes through facets of its own"),
+        ("--face", !m.face.is_empty(), traces_scene, "it goes through facets of its own"),
+        ("--role", !m.role.is_empty(), traces_scene, "it goes through facets of its own"),
     ];
     // The first one is told; the others would be in vain too.
     let idle = given.iter().find(|(_, given, used, _)| *given && !used);
@@ -154,10 +155,12 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         StudyKind::Effects => study_effects(command, threads, console)?,
     };
     bar.finish_and_clear();
+    let seed = found.seed.unwrap_or(seed);
     let provenance = console.provenance(Some(seed), threads);
     let mut document = json!({
         "study": command.kind.name(),
         "command": provenance.command,
+        "time": provenance.time,
         "version": provenance.version,
         "commit": provenance.commit,
         "hardware": provenance.hardware,
@@ -374,5 +377,5 @@ fn study_effects(command: &StudyCommand, threads: usize, console: &Console) -> R
     let rows = with_intersector(choice, &loaded.model, &made.mesh, &TerminalMonitor::new(console), |who, _| {
         effects::effects(&name, &bound, who, &run, 5)
     });
-    StudyResult::new(&rows, effects::answer(&rows))
+    Ok(StudyResult { seed: Some(run.seed), ..StudyResult::new(&rows, effects::answer(&rows))? })
 }

@@ -21,7 +21,7 @@ fn name(names: &[String], face: &FaceResult) -> String {
     names.get(face.face as usize).cloned().unwrap_or_else(|| format!("face {}", face.face))
 }
 
-/// The table; `None` where it was not asked for.
+/// Returns the table of the faces that took or let through most light, with both errors; `None` where the run did not count them.
 fn face_table(run: &SceneResults, prepared: &PreparedScene) -> Option<Table> {
     let (model, unit) = (&prepared.job.loaded.model, prepared.power_unit());
     let found = run.results.faces.as_ref()?;

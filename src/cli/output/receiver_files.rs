@@ -5,7 +5,7 @@ use crate::formats::{
     Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_eulumdat,
     write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_png, write_tm25, write_vti,
 };
-use crate::report::{colour_picture, file_stem, photometric_grid, receiver_grid};
+use crate::report::{colour_picture, file_stem, on_receiver, photometric_grid, receiver_grid};
 use crate::simulate::ReceiverResult;
 use crate::simulate::scene::{FarFieldType, Receiver, ReceiverKind};
 use std::path::Path;
@@ -24,7 +24,10 @@ pub(crate) fn write(
     let Some(grid) = receiver_grid(receiver) else { return Ok(Vec::new()) };
     let mut grid = grid;
     // The first layer is that of the grid itself, the others are those of its channels.
-    let mut layers = geometric.into_iter().map(|layer| layer.filter(|g| g.len() == grid.values.len()));
+    let mut layers = geometric.into_iter().map(|layer| {
+        let full = layer.filter(|g| g.len() == grid.values.len());
+        full.map(|g| on_receiver(receiver, &g))
+    });
     grid.geometric = layers.next().flatten();
     for (layer, geometric) in grid.layers.iter_mut().zip(layers) {
         layer.geometric = geometric;

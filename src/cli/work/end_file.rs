@@ -6,11 +6,8 @@ use crate::cli::failure::Failure;
 use crate::formats::{Column, NpzStream, file_name, write_atomic};
 use crate::pipeline::PreparedScene;
 use crate::report::grouped;
-use crate::simulate::{ListedEnd, RunSettings, listed_ends, ray_lists};
+use crate::simulate::{ListedEnd, MOST_LISTED_RAYS, RunSettings, listed_ends, ray_lists};
 use std::path::Path;
-
-/// Most rays of all lists together: their ends take half a gigabyte.
-const MOST_RAYS: u64 = 5_000_000;
 
 /// The arrays of an NPZ file, one row an end.
 const COLUMNS: [Column; 9] = [
@@ -41,14 +38,14 @@ pub(crate) fn check(prepared: &PreparedScene, file: Option<&Path>) -> Result<(),
         return Err(refuse("no source of this scene is a list of rays").with_help(help));
     }
     let rays: u64 = lists.iter().map(|(_, rays)| rays).sum();
-    if rays > MOST_RAYS {
+    if rays > MOST_LISTED_RAYS {
         let largest = lists.iter().max_by_key(|(_, rays)| rays).map_or(0, |(source, _)| *source as usize);
         let named = prepared.job.scene.sources[largest].file.clone();
         let message = format!(
             "{} has most of the {} rays of this scene, of which at most {} can be followed one by one",
             named.map_or_else(|| format!("source {}", largest + 1), |name| file_name(Path::new(&name))),
             grouped(rays),
-            grouped(MOST_RAYS)
+            grouped(MOST_LISTED_RAYS)
         );
         return Err(refuse(&message).with_help("give a shorter list, or take --paths"));
     }
@@ -79,10 +76,12 @@ pub(crate) fn write(prepared: &PreparedScene, file: Option<&Path>, console: &Con
     Ok(())
 }
 
+/// Returns the number of the face as NPZ holds it.
 fn face(end: &ListedEnd) -> i64 {
     end.face.map_or(NO_FACE, i64::from)
 }
 
+/// Writes a line for each end, events as words.
 fn write_csv(file: &Path, ends: &[ListedEnd]) -> Result<(), Failure> {
     write_atomic(file, |out| {
         writeln!(out, "source,ray,branch,event,face,bounces,x_mm,y_mm,z_mm,dx,dy,dz,power")?;
@@ -99,6 +98,7 @@ fn write_csv(file: &Path, ends: &[ListedEnd]) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Writes the arrays of [`COLUMNS`].
 fn write_npz(file: &Path, ends: &[ListedEnd]) -> Result<(), Failure> {
     let mut stream = NpzStream::create(file, &COLUMNS)?;
     // In blocks, so that the bytes of all columns need not stand in memory beside the ends.

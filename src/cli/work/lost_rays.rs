@@ -4,7 +4,7 @@ use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
-use crate::formats::{csv_quoted_text, write_atomic};
+use crate::formats::{csv_quoted_text, printable_line, write_atomic};
 use crate::pipeline::PreparedScene;
 use crate::report::figures;
 use crate::simulate::{LostCause, Results};
@@ -16,7 +16,7 @@ const NAMED_REASONS: usize = 3;
 
 /// The first line of a ledger.
 pub(crate) const COLUMNS: &str =
-    "ray,branch,bounce,cause,power,x_mm,y_mm,z_mm,dx,dy,dz,instance,medium,face,hit_instance,seed,rays";
+    "ray,branch,bounce,cause,power,x_mm,y_mm,z_mm,dx,dy,dz,instance,medium,face,hit_instance,seed,rays,grows";
 
 /// Writes the ledger of lost rays into the folder, lengths in mm; returns whether there was one to write.
 pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) -> Result<bool, Failure> {
@@ -29,13 +29,15 @@ pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) 
         for l in &results.ledger {
             let power = l.quanta as f64 * results.quantum;
             let (o, d) = (l.origin, l.direction);
-            let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]).map(csv_quoted_text);
+            // A name that holds line ends would take several lines.
+            let cell = |name: &str| csv_quoted_text(&printable_line(name));
+            let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]).map(cell);
             // A ray that left the scene was lost at no face: an empty cell.
             let face = l.face.map_or(String::new(), |f| f.to_string());
-            let hit = csv_quoted_text(l.face.and_then(|f| prepared.bound.instance(f)).unwrap_or(""));
+            let hit = cell(l.face.and_then(|f| prepared.bound.instance(f)).unwrap_or(""));
             writeln!(
                 w,
-                "{},{},{},{},{power},{},{},{},{},{},{},{instance},{medium},{face},{hit},{},{}",
+                "{},{},{},{},{power},{},{},{},{},{},{},{instance},{medium},{face},{hit},{},{},{}",
                 l.ray,
                 l.branch,
                 l.bounce,
@@ -47,7 +49,8 @@ pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) 
                 d.y,
                 d.z,
                 settings.seed,
-                settings.rays
+                settings.rays,
+                results.grows
             )?;
         }
         Ok(())

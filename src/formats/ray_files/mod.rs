@@ -40,7 +40,7 @@ impl RayFile {
         Self::open_within(path, preferred, MOST_IN_MEMORY)
     }
 
-    /// The same, with so many rays at most in memory.
+    /// As [`RayFile::open`], with at most `most_in_memory` rays of a list in memory; further ones go to a scratch file.
     fn open_within(path: &Path, preferred: Flux, most_in_memory: u64) -> Result<Self, Error> {
         let mut start = [0; 4];
         let mut file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;

@@ -108,7 +108,7 @@ impl Tm25Reader {
         self.into_ray_file(preferred, u64::MAX)?.into_set()
     }
 
-    /// The same, with so many rays at most in memory.
+    /// Makes the rays of it, looked at once each; where they are more than `most_in_memory` they are read from the disk as they are drawn.
     pub(super) fn into_ray_file(mut self, preferred: Flux, most_in_memory: u64) -> Result<RayFile, Error> {
         let flux = match (self.places.radiant, self.places.luminous) {
             (Some(_), Some(_)) => preferred,

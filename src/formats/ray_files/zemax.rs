@@ -60,6 +60,14 @@ pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
     let mut rays = RayCollector::new(path, most_in_memory).with_rows(file.file_handle()?, file.position(), layout);
     file.read_rays(u64::from(count), columns, &mut rays, |row| layout.ray(|column| row[column]))?;
     let mut set = rays.finish(Some(flux))?;
+    // Nothing may stand behind the rays: a count that is too small would leave light out unseen.
+    let (behind, row) = (file.length() - file.position(), 4 * columns as u64);
+    if behind > 0 {
+        let rays = behind / row;
+        set.notes.push(format!(
+            "the header counts {count} rays, and {behind} bytes behind them ({rays} rays more) were not read"
+        ));
+    }
     set.scale_to(Some(f64::from(stated)));
     Ok(set)
 }
@@ -111,6 +119,12 @@ pub(super) mod tests {
         assert_eq!((set.rays[0].origin.x, set.rays[0].power, set.flux), (1.0, 2.0, Some(Flux::Luminous)));
         assert!((set.rays[0].wavelength_nm.unwrap() - 633.0).abs() < 1e-4);
         assert_eq!(set.notes.len(), 1);
+
+        // One ray of two is counted.
+        let two = [[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]; 2].concat();
+        std::fs::write(&path, file_of_rays(1, [4, 0, 0], 0.0, &two)).unwrap();
+        let set = read_ray_set(&path, Flux::Radiant).unwrap();
+        assert!(set.rays.len() == 1 && set.notes[0].contains("28 bytes behind them"), "{:?}", set.notes);
     }
 
     #[test]

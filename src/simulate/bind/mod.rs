@@ -97,6 +97,7 @@ impl Scene {
             rules: rule_table::rule_table(self, &chosen),
             notes: notes::range_notes(self, &chosen, &ranges),
         };
+        bound.notes.extend(notes::replaced_rules_note(&bound.rules));
         bound.notes.extend(file_notes);
         bound.notes.extend(cover_notes);
         bound.notes.extend(notes::opening_note(&bound, model));

@@ -1,7 +1,7 @@
 //! What someone who reads the results must know about the scene: bodies that are open or too thin, and light of wavelengths that a table or
 //! a formula was not made for.
 
-use super::bound_scene::BoundScene;
+use super::bound_scene::{BoundScene, RuleFaces};
 use super::chosen::ChosenRules;
 use crate::model::{Model, PlacedFace};
 use crate::optics::catalogue;
@@ -118,6 +118,25 @@ fn surface_ranges(m: &Material) -> impl Iterator<Item = (&'static str, [f64; 2])
         _ => None,
     };
     [("coating", coating), ("reflectance", reflectance)].into_iter().filter_map(|(key, range)| Some((key, range?)))
+}
+
+/// Returns one sentence about the rules that later ones replace on all their faces; `None` where there is none.
+pub(super) fn replaced_rules_note(rules: &[RuleFaces]) -> Option<String> {
+    let replaced: Vec<String> = (rules.iter())
+        .filter(|rule| rule.faces.is_empty())
+        .filter_map(|rule| {
+            let selects = if rule.selects.is_empty() { "all faces" } else { &rule.selects };
+            Some(format!("[[material]] {} ({selects})", rule.rule?))
+        })
+        .collect();
+    let last = replaced.last()?;
+    Some(match replaced.len() {
+        1 => format!("{last} decides no face: later rules replace it on all that it selects"),
+        n => format!(
+            "{last} and {} more rules decide no face: later ones replace them on all that they select",
+            n - 1
+        ),
+    })
 }
 
 /// Whether a face belongs to no closed shell; `false` for ready meshes, of which that is not known.

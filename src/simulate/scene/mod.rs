@@ -207,25 +207,29 @@ impl Scene {
         Ok(())
     }
 
-    /// Refuses two receivers whose names make the same file name, and one that would write over lost_rays.csv.
+    /// Refuses two receivers whose names make the same file name, with or without what pictures in colours add to it, and one that would write
+    /// over lost_rays.csv.
     fn check_receiver_names(&self) -> Result<(), Error> {
         // By the name of the file, not of the receiver: `a b` and `a_b` would write over each other.
         let mut stems: HashMap<String, &str> = HashMap::new();
-        for (i, Receiver { name, .. }) in self.receivers.iter().enumerate() {
+        for (i, Receiver { name, channels, .. }) in self.receivers.iter().enumerate() {
             let stem = file_stem(name);
-            let message = match stems.get(&stem) {
-                _ if stem == "lost_rays" => format!("a receiver called '{name}' would overwrite lost_rays.csv"),
-                Some(other) if *other == name => format!("two receivers are called '{name}'"),
-                Some(other) => {
-                    format!("the files of the receivers '{other}' and '{name}' would both be called '{stem}'")
-                }
-                None => {
-                    stems.insert(stem, name);
-                    continue;
-                }
-            };
-            let at = [Key::Name("receiver"), Key::Index(i), Key::Name("name")];
-            return Err(self.error(ErrorKind::Value, &at, message).help("give each a name of its own"));
+            let colours = (*channels == Some(Channels::Xyz)).then(|| format!("{stem}-colours"));
+            for stem in [Some(stem), colours].into_iter().flatten() {
+                let message = match stems.get(&stem) {
+                    _ if stem == "lost_rays" => format!("a receiver called '{name}' would overwrite lost_rays.csv"),
+                    Some(other) if *other == name => format!("two receivers are called '{name}'"),
+                    Some(other) => {
+                        format!("the files of the receivers '{other}' and '{name}' would both be called '{stem}'")
+                    }
+                    None => {
+                        stems.insert(stem, name);
+                        continue;
+                    }
+                };
+                let at = [Key::Name("receiver"), Key::Index(i), Key::Name("name")];
+                return Err(self.error(ErrorKind::Value, &at, message).help("give each a name of its own"));
+            }
         }
         Ok(())
     }

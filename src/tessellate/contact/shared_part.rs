@@ -71,6 +71,7 @@ impl Union<'_> {
         }
     }
 
+    /// Takes over a corner of `mesh` and returns its number here; places of its own that are the same to the bit become one.
     fn add_corner(&mut self, mesh: &FaceMesh, corner: u32) -> u32 {
         let mut corner = mesh.corners[corner as usize];
         if let Position::Own(p) = corner.position {
