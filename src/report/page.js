@@ -63,7 +63,8 @@
   // Maps of light on a linear or a logarithmic scale of colours, over four decades below the peak.
   const scales = (box) => {
     const trace = box._fullData[0], linear = [...trace.z].map((row) => [...row]);
-    const most = Math.max(...linear.map((row) => Math.max(...row)));
+    // Cells off a disc are NaN, and one of them would be the maximum of all.
+    const most = Math.max(...linear.map((row) => Math.max(0, ...row.filter(Number.isFinite))));
     if (!(most > 0)) return;
     const floor = most * 1e-4, decades = [];
     for (let e = Math.ceil(Math.log10(floor)); e <= Math.log10(most); e++) decades.push(e);

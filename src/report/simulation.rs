@@ -182,7 +182,9 @@ impl SimulationReport<'_> {
             sections.push(self.cross_check(check));
         }
         sections.extend([self.effects(), self.cost()]);
-        Report { title: self.title.clone(), answer: self.answer(), sections, provenance: self.provenance.clone() }
+        let (title, provenance) = (self.title.clone(), self.provenance.clone());
+        // Receivers are called as their users like.
+        Report { title, answer: self.answer(), sections, provenance }.with_distinct_names()
     }
 
     /// Makes the section on light: notes, the map of each receiver, and facets with ray paths.
