@@ -10,6 +10,7 @@ use super::sequence::{Deposit, SequenceSums, SequenceTally};
 use super::tally::{MomentSpread, Moments, Sum, quanta_as_integer};
 use crate::math::FaceId;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Most lost rays that are kept; those of the lowest index.
 pub(crate) const LEDGER: usize = 1000;
@@ -133,6 +134,28 @@ impl ReplicateTally {
     /// channels follow those of its power.
     pub fn cells(&self, receiver: usize) -> impl Iterator<Item = (usize, u128)> {
         self.receivers[receiver].touched()
+    }
+
+    /// Returns the faces that it reached, rising, with the quanta that they absorbed, that entered their body through them and that left it;
+    /// none where the scene does not ask what passes each face.
+    pub(crate) fn face_quanta(&self) -> Vec<(u32, [u128; 3])> {
+        let Some(crossings) = &self.crossings else { return Vec::new() };
+        let grids = [&self.absorbed, &crossings.entered, &crossings.left];
+        let mut faces: Vec<usize> = grids.iter().flat_map(|grid| grid.touched()).map(|(face, _)| face).collect();
+        faces.sort_unstable();
+        faces.dedup();
+        faces.into_iter().map(|face| (face as u32, grids.map(|grid| grid.get(face)))).collect()
+    }
+
+    /// Returns the quanta that each instance took, then each body inside, as [`Tallies::of_model`] counts them: those that took any, rising.
+    pub(crate) fn of_model(&self, bound: &BoundScene) -> Vec<(u32, u128)> {
+        let mut taken = BTreeMap::new();
+        for (face, quanta) in self.absorbed.touched() {
+            *taken.entry(bound.instance_of_face[face]).or_insert(0) += quanta;
+        }
+        let bodies = self.bulk.touched().map(|(body, quanta)| ((bound.instances.len() + body) as u32, quanta));
+        taken.extend(bodies);
+        taken.into_iter().collect()
     }
 
     /// Books power that a face takes, a whole number of quanta.

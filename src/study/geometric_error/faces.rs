@@ -2,7 +2,6 @@
 
 use super::paired::Paired;
 use super::replicates::ReplicatedRun;
-use crate::simulate::PartialRun;
 use rustc_hash::FxHashMap;
 
 /// Quanta that a replicate left in a face, took into its body through it, and out.
@@ -28,28 +27,6 @@ impl FaceError {
     /// Returns the geometric errors of what is absorbed, enters and leaves; `lost` is power that might have come to any face.
     pub fn geometric(&self, lost: f64) -> [f64; 3] {
         [self.absorbed, self.entered, self.left].map(|paired| paired.geometric().hypot(lost))
-    }
-}
-
-/// The sums of all faces after some of a run's replicates.
-#[derive(Default)]
-pub(super) struct FaceTotals(Vec<[u128; 3]>);
-
-impl FaceTotals {
-    /// Takes over the sums of a portion with one more replicate and returns what that one brought to each face that it reached, by rising
-    /// face; nothing where the run does not count crossings.
-    pub(super) fn advance(&mut self, portion: &PartialRun) -> FaceSums {
-        let tallies = &portion.tallies;
-        self.0.resize(tallies.entered.len(), [0; 3]);
-        let mut reached = Vec::new();
-        for (face, before) in self.0.iter_mut().enumerate() {
-            let now = [&tallies.faces[face], &tallies.entered[face], &tallies.left[face]].map(|sum| sum.total);
-            if *before != now {
-                reached.push((face as u32, [0, 1, 2].map(|k| (now[k] - before[k]) as u64)));
-                *before = now;
-            }
-        }
-        reached
     }
 }
 

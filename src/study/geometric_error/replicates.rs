@@ -1,8 +1,8 @@
 //! A run taken apart into its replicates: what each of them brought to every receiver and every cell.
 
-use super::faces::{FaceSums, FaceTotals};
+use super::faces::FaceSums;
 use crate::intersect::Intersector;
-use crate::simulate::{BoundScene, Hooks, Moments, PartialRun, Results, RunSettings, Sum, replicates, trace};
+use crate::simulate::{BoundScene, Hooks, Moments, ReplicateTally, Results, RunSettings, replicates, trace};
 use std::sync::Mutex;
 
 /// Cells of a receiver up to which each replicate's are kept apart: 128 MB of sums, and a tenth of a second for all replicates.
@@ -39,23 +39,13 @@ struct Brought {
     of_model: Vec<(u32, u64)>,
 }
 
-/// The sums of a run after some of its replicates.
-#[derive(Default)]
-struct Totals {
-    done: Vec<u32>,
-    power: Vec<u128>,
-    moments: Vec<Moments>,
-    cells: Vec<Vec<u128>>,
-    channels: Vec<Vec<u128>>,
-    faces: FaceTotals,
-    model: Vec<u128>,
-}
-
 /// Cells of a receiver that are kept apart.
 #[derive(Clone, Copy)]
 struct KeptCells {
     /// Cells of one layer.
     cells: usize,
+    /// Further channels.
+    channels: usize,
     /// Power and further channels; none of grids that are too large, or power alone.
     layers: usize,
 }
@@ -66,62 +56,48 @@ impl KeptCells {
         let fits = |layers: usize| cells * layers <= MOST_CELLS;
         // Power alone where all channels together are too many.
         let layers = if fits(1 + channels) { 1 + channels } else { usize::from(fits(1)) };
-        Self { cells, layers }
+        Self { cells, channels, layers }
     }
-}
 
-impl Totals {
-    /// Takes over the sums of a portion and returns the number of the one replicate that is new in it, with what it brought; `None` where
-    /// none is new.
-    fn advance(&mut self, portion: &PartialRun, kept: &[KeptCells]) -> Option<(u32, Brought)> {
-        // Portions are handed over one replicate at a time; the one that is not yet known is new.
-        let new = *portion.done.iter().find(|r| self.done.binary_search(r).is_err())?;
-        let tallies = &portion.tallies;
-        self.power.resize(tallies.receivers.len(), 0);
-        self.moments.resize(tallies.receivers.len(), Moments::default());
-        self.cells.resize_with(tallies.receivers.len(), Vec::new);
-        self.channels.resize_with(tallies.receivers.len(), Vec::new);
-        let sums = (0..tallies.receivers.len()).map(|k| {
-            let (power, moments) = (tallies.receivers[k].total, tallies.moments[k]);
-            // Exact until the last step: sums of whole numbers.
-            let first = [0, 1].map(|a| (moments.first[a] - self.moments[k].first[a]) as f64 / Moments::GRAIN);
-            let second = [0, 1].map(|a| (moments.second[a] - self.moments[k].second[a]) as f64 / Moments::GRAIN);
-            let KeptCells { cells, layers } = kept[k];
-            let before = &mut self.cells[k];
-            before.resize(cells * layers, 0);
-            let mut reached = vec![Vec::new(); layers];
-            for (i, (before, now)) in before.iter_mut().zip(&tallies.cells[k]).enumerate() {
-                if *before != now.total {
-                    // More than a word holds is told from as much by no comparison of so few rays.
-                    let quanta = u64::try_from(now.total - *before).unwrap_or(u64::MAX);
-                    reached[i / cells].push(((i % cells) as u32, quanta));
-                    *before = now.total;
-                }
+    /// Returns what a finished replicate brought to receiver `k`, whose cells these are.
+    fn sums(&self, k: usize, tally: &ReplicateTally) -> ReplicateSums {
+        let moments = tally.moments(k);
+        let first = moments.first.map(|sum| sum as f64 / Moments::GRAIN);
+        let second = moments.second.map(|sum| sum as f64 / Moments::GRAIN);
+        let mut layers = vec![Vec::new(); self.layers];
+        let mut channels = vec![0; self.channels];
+        for (cell, quanta) in tally.cells(k) {
+            let layer = cell / self.cells;
+            if layer > 0 {
+                channels[layer - 1] += quanta;
             }
-            let before = &mut self.channels[k];
-            before.resize(tallies.channels[k].len(), 0);
-            let channel = |(before, now): (&mut u128, &Sum)| now.total - std::mem::replace(before, now.total);
-            let channels = before.iter_mut().zip(&tallies.channels[k]).map(channel).collect();
-            let brought = ReplicateSums { power: power - self.power[k], first, second, layers: reached, channels };
-            self.power[k] = power;
-            self.moments[k] = moments;
-            brought
-        });
-        let receivers = sums.collect();
-        let mut of_model = Vec::new();
-        self.model.resize(tallies.of_model().count(), 0);
-        for (i, (before, now)) in self.model.iter_mut().zip(tallies.of_model()).enumerate() {
-            if *before != now.total {
-                of_model.push((i as u32, (now.total - *before) as u64));
-                *before = now.total;
+            if let Some(reached) = layers.get_mut(layer) {
+                reached.push(((cell % self.cells) as u32, word_of_quanta(quanta)));
             }
         }
-        self.done.clone_from(&portion.done);
-        Some((new, Brought { receivers, faces: self.faces.advance(portion), of_model }))
+        layers.iter_mut().for_each(|reached| reached.sort_unstable());
+        ReplicateSums { power: tally.power(k), first, second, layers, channels }
     }
 }
 
-/// Traces a run and keeps what each replicate brought, by asking for the sums after each; replicates that were not traced stay empty.
+impl Brought {
+    /// Takes from a finished replicate what it brought. Of cells and faces those alone that it reached: to go through all of them after each
+    /// replicate took longer than to trace a pilot.
+    fn new(bound: &BoundScene, kept: &[KeptCells], tally: &ReplicateTally) -> Self {
+        Self {
+            receivers: kept.iter().enumerate().map(|(k, kept)| kept.sums(k, tally)).collect(),
+            faces: tally.face_quanta().into_iter().map(|(f, quanta)| (f, quanta.map(word_of_quanta))).collect(),
+            of_model: tally.of_model(bound).into_iter().map(|(k, quanta)| (k, word_of_quanta(quanta))).collect(),
+        }
+    }
+}
+
+/// Returns quanta as a word, the largest for more: so much is told from more by no comparison of so few rays.
+fn word_of_quanta(quanta: u128) -> u64 {
+    u64::try_from(quanta).unwrap_or(u64::MAX)
+}
+
+/// Traces a run and keeps what each replicate brought; replicates that were not traced stay empty.
 pub(in crate::study) fn trace_replicates(
     bound: &BoundScene,
     intersector: &dyn Intersector,
@@ -130,18 +106,15 @@ pub(in crate::study) fn trace_replicates(
     let count = replicates(bound, settings) as usize;
     let kept = bound.receivers.iter().map(|r| KeptCells::new(r.cell_count(), r.channels.count()));
     let kept: Vec<KeptCells> = kept.collect();
-    let state = Mutex::new((Totals::default(), vec![Brought::default(); count]));
-    let finished = |portion: &PartialRun| {
-        // A panic elsewhere ends the run anyway; the sums so far are whole.
-        let mut state = state.lock().unwrap_or_else(|e| e.into_inner());
-        let (totals, by_replicate) = &mut *state;
-        if let Some((new, brought)) = totals.advance(portion, &kept) {
-            by_replicate[new as usize] = brought;
-        }
+    let by_replicate = Mutex::new(vec![Brought::default(); count]);
+    let replicate = |replicate: u32, tally: &ReplicateTally| {
+        let brought = Brought::new(bound, &kept, tally);
+        // A panic elsewhere ends the run anyway; what is there so far is whole.
+        by_replicate.lock().unwrap_or_else(|e| e.into_inner())[replicate as usize] = brought;
     };
-    let hooks = Hooks { finished: Some(&finished), ..Hooks::with_progress(&|_| true) };
+    let hooks = Hooks { replicate: Some(&replicate), ..Hooks::with_progress(&|_| true) };
     let results = Results::new(bound, settings, trace(bound, intersector, settings, None, &hooks));
-    let (_, by_replicate) = state.into_inner().unwrap_or_else(|e| e.into_inner());
+    let by_replicate = by_replicate.into_inner().unwrap_or_else(|e| e.into_inner());
     let mut run = ReplicatedRun { results, replicates: Vec::new(), faces: Vec::new(), of_model: Vec::new() };
     for brought in by_replicate {
         run.replicates.push(brought.receivers);
