@@ -8,7 +8,7 @@ use std::sync::Mutex;
 /// Rays noted over rays wanted: a fifth more, as some cannot be asked again.
 const SPARE: f64 = 1.2;
 
-/// Passes every question on and notes some: those whose hash is smallest, so that neither threads nor batches decide which.
+/// Passes every question on and notes some segments of paths: those whose hash is smallest, so that neither threads nor batches decide which.
 pub struct RaySampler<'a> {
     inner: &'a dyn Intersector,
     threshold: u64,
@@ -66,8 +66,8 @@ fn hash(ray: &Ray) -> u64 {
 }
 
 impl Intersector for RaySampler<'_> {
+    /// Single questions are no segments of a path: they ask what sources lie in, or where a face is that a ray starts from.
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
-        self.note(ray);
         self.inner.intersect(ray, cost)
     }
 

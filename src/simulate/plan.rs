@@ -209,18 +209,26 @@ impl Plan {
         self.sample_mask.is_some_and(|m| ray & m == 0)
     }
 
+    /// Returns the source whose share has the ray of this number, in the run or in a replicate of one that can grow.
+    fn source_of(&self, number: u64) -> Option<usize> {
+        // By halves: there may be thousands.
+        let source = self.shares.partition_point(|s| s.first <= number).checked_sub(1)?;
+        let share = &self.shares[source];
+        (number < share.first + share.rays).then_some(source)
+    }
+
     /// Returns the source and the replicate of a ray, by its number; `None` when the run has no such ray.
     pub(crate) fn locate(&self, ray: u64) -> Option<(usize, u32)> {
+        // Ranges of sources and replicates follow each other, so that a ray's number tells both.
+        if let Some(size) = self.replicate_rays {
+            let replicate = u32::try_from(ray / size).ok().filter(|r| *r < self.replicates)?;
+            return Some((self.source_of(ray % size)?, replicate));
+        }
+        let source = self.source_of(ray)?;
         let holds = |source: usize, replicate: u32| {
-            // Ranges of sources and replicates follow each other, so that a ray's number tells both.
             let [from, to] = self.range(source, replicate);
             (from..to).contains(&ray)
         };
-        if let Some(size) = self.replicate_rays {
-            let replicate = u32::try_from(ray / size).ok().filter(|r| *r < self.replicates)?;
-            return (0..self.shares.len()).find(|&s| holds(s, replicate)).map(|s| (s, replicate));
-        }
-        let source = self.shares.iter().position(|s| (s.first..s.first + s.rays).contains(&ray))?;
         let share = &self.shares[source];
         let guess = (u128::from(ray - share.first) * u128::from(self.replicates) / u128::from(share.rays)) as u32;
         // Rounding puts the replicate next to the guess.

@@ -1,9 +1,10 @@
 //! The bodies of a model with the media that the rules give them.
 
+use super::bound_scene::BoundScene;
 use super::chosen::ChosenRules;
 use super::nearest::face_bounds;
 use super::notes::is_open;
-use crate::math::Aabb;
+use crate::math::{Aabb, BoxTree};
 use crate::model::Model;
 use crate::optics;
 use crate::simulate::body::{AMBIENT, Body};
@@ -63,6 +64,15 @@ pub(super) fn find_bodies(
     };
     let nested = order.iter().enumerate().any(meets);
     Ok((bodies, of_face, nested))
+}
+
+/// Returns boxes around all bodies and all faces of opaque solids, which rays of a source may start in or on, each grown by `margin`, mm,
+/// for what facets and rounding put outside.
+pub(super) fn solids(bound: &BoundScene, model: &Model, margin: f64) -> BoxTree {
+    let bodies = bound.bodies.iter().skip(1).map(|body| body.bounds);
+    let opaque = model.placed_faces().filter(|f| bound.faces[f.id.index()].opaque_solid);
+    let boxes: Vec<Aabb> = bodies.chain(opaque.map(|f| face_bounds(&f))).map(|b| b.grown(margin)).collect();
+    BoxTree::new(&boxes)
 }
 
 /// Sets for each body how far light may go in it by total reflection alone, mm: `caught_after` times the diagonal of its box; unchanged

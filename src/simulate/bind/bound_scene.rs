@@ -1,6 +1,6 @@
 //! A scene bound to a model.
 
-use crate::math::{Aabb, FaceId};
+use crate::math::{Aabb, BoxTree, FaceId};
 use crate::simulate::body::{AMBIENT, Body};
 use crate::simulate::emitter::Emitter;
 use crate::simulate::receiver::Receiver;
@@ -40,6 +40,8 @@ pub struct BoundScene {
     pub(crate) receivers: Vec<Receiver>,
     /// Around all faces and the places of the sources, with room to spare.
     pub(crate) region: Aabb,
+    /// Boxes around bodies and faces of opaque solids, which tell the sources that lie clear of them; `None` where these are few.
+    pub(crate) solids: Option<BoxTree>,
     /// Names of the instances, and the instance of each face.
     pub(crate) instances: Vec<String>,
     pub(crate) instance_of_face: Vec<u32>,

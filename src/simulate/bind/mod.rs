@@ -33,6 +33,9 @@ pub use face_selectors::face_selectors;
 /// What the box of a scene is grown by, as a share of its diagonal: room for what facets and rounding put outside the splines' boxes.
 const REGION_MARGIN: f64 = 1e-3;
 
+/// Sources from which on boxes tell which of them lie clear of all solids: of fewer some rays are asked in less time.
+const MANY_SOURCES: usize = 64;
+
 impl Scene {
     /// Finds what every rule of the scene means in a model (all its models assembled into one, see [`Scene::assemble`]).
     ///
@@ -79,7 +82,8 @@ impl Scene {
         let scene_box = receivers.iter().map(Receiver::bounds).fold(faces_box, Aabb::union);
         start_near(self, &mut emitters, &source_frames, &bodies[AMBIENT as usize], &scene_box)?;
         let region = emitters.iter().map(Emitter::extent).fold(faces_box, Aabb::union);
-        let region = if region.is_empty() { region } else { region.grown(REGION_MARGIN * region.diagonal()) };
+        let margin = if region.is_empty() { 0.0 } else { REGION_MARGIN * region.diagonal() };
+        let region = region.grown(margin);
         let mut bound = BoundScene {
             scene: self.clone(),
             // Solids of one body that touch need a stack too, for both are entered before one is left.
@@ -92,12 +96,14 @@ impl Scene {
             emitters,
             receivers,
             region,
+            solids: None,
             instances: (0..model.instances.len()).map(|k| model.label(k)).collect(),
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
             rules: rule_table::rule_table(self, &chosen),
             notes: notes::range_notes(self, &chosen, &ranges),
         };
         bound.notes.extend(notes::replaced_rules_note(&bound.rules));
+        bound.solids = (bound.emitters.len() >= MANY_SOURCES).then(|| bodies::solids(&bound, model, margin));
         bound.notes.extend(file_notes);
         bound.notes.extend(cover_notes);
         bound.notes.extend(notes::opening_note(&bound, model));

@@ -37,7 +37,8 @@ use shape::{
 };
 use smallvec::SmallVec;
 use std::f64::consts::PI;
-pub(crate) use stream::{RayIndex, Stream};
+use stream::Stream;
+pub(crate) use stream::{Portion, RayIndex};
 
 /// A source ready to emit.
 #[derive(Clone, Debug)]
@@ -206,6 +207,13 @@ impl Emitter {
         }
         let size = Vector::splat(self.bounding_radius());
         Aabb::from_points([self.frame.origin - size, self.frame.origin + size])
+    }
+
+    /// Returns a box around the starts of all its rays, mm; `None` where they are not known beforehand, as of faces, lists of rays and
+    /// sources that are far away.
+    pub(crate) fn starts(&self) -> Option<Aabb> {
+        let simple = matches!(self.shape, Shape::Point | Shape::Disc(_) | Shape::Rectangle(_));
+        (simple && self.near_start.is_none()).then(|| self.extent())
     }
 
     /// Moves the start of a ray of a far source to beside the scene.

@@ -151,6 +151,7 @@ impl Emitter {
 #[cfg(test)]
 mod tests {
     use super::super::sampler::RaySampler;
+    use super::super::stream::Portion;
     use super::*;
     use crate::math::{Frame, Ray};
     use crate::simulate::scene::Sampling;
@@ -177,7 +178,8 @@ mod tests {
                 near_start: None,
             };
             let rays = 5000;
-            let sampler = || RaySampler::new(&emitter, Stream::new(7, Sampling::Sobol, 3, 0, rays), 100);
+            let portion = Portion { replicate: 3, source: 0, rays, lattice: [0, 1] };
+            let sampler = || RaySampler::new(&emitter, 7, Sampling::Sobol, portion, 100);
             let (mut batch, mut single) = (sampler(), sampler());
             let [mut a, mut b] = [Ray::new(Point::ZERO, Vector::Z); 2];
             let mut seen = vec![false; rays as usize];

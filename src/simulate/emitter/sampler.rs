@@ -1,7 +1,7 @@
 //! The rays of one source in one replicate, in the order in which they start.
 
 use super::packet::RayPacket;
-use super::stream::{RayIndex, Stream};
+use super::stream::{Portion, RayIndex, Stream};
 use super::{Emission, Emitter, ListCursor, simd_dispatch};
 use crate::math::Ray;
 use crate::simulate::scene::Sampling;
@@ -19,27 +19,40 @@ pub(crate) struct RaySampler {
 }
 
 impl RaySampler {
-    /// Makes a sampler that draws from `stream`, in packets where that pays; the first of its rays has the number `first` in the run.
-    pub(crate) fn new(emitter: &Emitter, stream: Stream, first: u64) -> Self {
-        let stream = stream.with_pairs(emitter.needed_pairs());
-        // Packets need the net's numbers, a plain source, and enough rays to pay for one.
-        let packed = stream.sampling() == Sampling::Sobol
-            && stream.needs_numbers()
-            && emitter.fits_packets()
-            && !stream.is_short();
-        Self { stream, packet: packed.then(RayPacket::boxed), first, cursor: ListCursor::default() }
+    /// Makes a sampler of a portion of the emitter's rays, of which the first has the number `first` in the run.
+    pub(crate) fn new(emitter: &Emitter, seed: u64, sampling: Sampling, portion: Portion, first: u64) -> Self {
+        let stream = Stream::new(seed, sampling, portion, emitter.needed_pairs());
+        let mut sampler = Self { stream, packet: None, first, cursor: ListCursor::default() };
+        sampler.choose_packets(emitter);
+        sampler
     }
 
-    /// Gives the stream back, whose memory the next source may use.
-    pub(crate) fn into_stream(self) -> Stream {
-        self.stream
+    /// Turns to another portion of the same run, of an emitter that may be another one, in the memory that it has: replicates may have
+    /// thousands of sources of a ray each.
+    pub(crate) fn restart(&mut self, emitter: &Emitter, portion: Portion, first: u64) {
+        self.stream.restart(portion, emitter.needed_pairs());
+        (self.first, self.cursor) = (first, ListCursor::default());
+        self.choose_packets(emitter);
+    }
+
+    /// Takes packets where they pay.
+    fn choose_packets(&mut self, emitter: &Emitter) {
+        // Packets need the net's numbers, a plain source, and enough rays to pay for one.
+        let packed = self.stream.sampling() == Sampling::Sobol
+            && self.stream.needs_numbers()
+            && !self.stream.is_short()
+            && emitter.fits_packets();
+        let packet = self.packet.take();
+        self.packet = packed.then(|| packet.unwrap_or_else(RayPacket::boxed));
     }
 
     /// Writes the ray that starts after `started` others to `ray`, and returns its numbers and emission. To be called with 0, 1, 2, … in
     /// turn. By reference: a whole ray that is written in pieces and copied at once was waited for, 15 % of the kernel's time.
     #[inline(always)]
     pub(crate) fn next_ray(&mut self, emitter: &Emitter, started: u32, ray: &mut Ray) -> (RayIndex, Emission) {
-        if self.stream.is_refill_due(started) {
+        if self.stream.is_refill_due(started) && self.stream.is_short() {
+            self.stream.fill_short();
+        } else if self.stream.is_refill_due(started) {
             simd_dispatch::refill(emitter, &mut self.stream, self.packet.as_deref_mut(), started);
         }
         let index = self.index(self.stream.index_to_start(started));
@@ -92,10 +105,14 @@ mod tests {
             let scene = Scene::parse(&format!("[[source]]\n{source}\n"), "test.toml", Path::new(".")).unwrap();
             let bound = scene.bind(&crate::model::Model::default()).unwrap();
             let emitter = &bound.emitters[0];
-            let sampler = |rays: u64| RaySampler::new(emitter, Stream::new(7, Sampling::Sobol, 3, 0, rays), 100);
-            for rays in [1, 5, 8, 9, 70] {
+            let portion = |rays: u64| Portion { replicate: 3, source: 0, rays, lattice: [0, 1] };
+            let sampler = |rays: u64| RaySampler::new(emitter, 7, Sampling::Sobol, portion(rays), 100);
+            // One that has drawn others before draws the same.
+            let mut queue = sampler(300);
+            queue.next_ray(emitter, 0, &mut Ray::new(crate::math::Point::ZERO, crate::math::Vector::Z));
+            for rays in [1, 5, 70, 8, 9] {
                 let mut seen = vec![false; rays as usize];
-                let mut queue = sampler(rays);
+                queue.restart(emitter, portion(rays), 100);
                 for started in 0..rays as u32 {
                     let [mut ray, mut alone] = [Ray::new(crate::math::Point::ZERO, crate::math::Vector::Z); 2];
                     let (index, _) = queue.next_ray(emitter, started, &mut ray);

@@ -50,7 +50,7 @@ pub(crate) struct Stream {
     scrambles: [u32; random::DIMENSIONS],
     /// Which of how many interleaved lattices of places in a ray list it takes.
     lattice: [u32; 2],
-    /// Rays of this source in this replicate.
+    /// Rays of this source in this replicate; at most 2³² − 1 are counted.
     rays: u32,
     /// The rays of a chunk in the order in which they start, and the numbers of the net for each, of the pairs that the source asks
     /// for.
@@ -59,6 +59,17 @@ pub(crate) struct Stream {
     numbers: [Vec<u32>; random::DIMENSIONS],
     /// The ray of the first number, modulo those of a chunk.
     first_number: u32,
+}
+
+/// The rays of one source in one replicate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Portion {
+    pub(crate) replicate: u32,
+    pub(crate) source: u32,
+    /// How many there are.
+    pub(crate) rays: u64,
+    /// Which of how many interleaved lattices of places in a ray list they take: `[k, n]` for the k-th of n.
+    pub(crate) lattice: [u32; 2],
 }
 
 /// A ray of a source.
@@ -71,45 +82,43 @@ pub(crate) struct RayIndex {
 }
 
 impl Stream {
-    /// Makes the numbers of one source in one replicate, which has `rays` of its rays (at most 2³² − 1 are counted), all pairs of them and
-    /// one lattice. Nothing is drawn before a refill.
-    pub(crate) fn new(seed: u64, sampling: Sampling, replicate: u32, source: u32, rays: u64) -> Self {
-        let key = Key { seed, ray: u64::from(replicate), branch: source, bounce: 0 };
-        let (a, b) = (key.words(Purpose::Scramble), Key { bounce: 1, ..key }.words(Purpose::Scramble));
-        let scrambles = [a[0], a[1], a[2], a[3], b[0], b[1]];
-        let rays = rays.min(u64::from(u32::MAX)) as u32;
-        let numbers = Default::default();
-        Self {
+    /// Makes the numbers of a portion, of these pairs alone: for the place, the direction and the wavelength. Nothing is drawn before a
+    /// refill.
+    pub(super) fn new(seed: u64, sampling: Sampling, portion: Portion, pairs: [bool; 3]) -> Self {
+        let mut stream = Self {
             seed,
             sampling,
-            scrambles,
+            scrambles: [0; random::DIMENSIONS],
             lattice: [0, 1],
-            rays,
+            rays: 0,
             order: Vec::new(),
-            pairs: [true; 3],
-            numbers,
+            pairs,
+            numbers: Default::default(),
             first_number: 0,
-        }
+        };
+        stream.restart(portion, pairs);
+        stream
     }
 
-    /// Returns this stream with the memory of `old`, which is no longer needed.
-    pub(crate) fn in_place_of(self, old: Self) -> Self {
-        Self { order: old.order, numbers: old.numbers, ..self }
+    /// Turns to another portion of the same run, in the memory that it has.
+    pub(super) fn restart(&mut self, portion: Portion, pairs: [bool; 3]) {
+        let Portion { replicate, source, rays, lattice } = portion;
+        let key = Key { seed: self.seed, ray: u64::from(replicate), branch: source, bounce: 0 };
+        // Where a source has one ray in a replicate, its scrambles cost more than the ray: those that no pair needs are left out.
+        let [place_or_direction, wavelength] = [pairs[0] || pairs[1], pairs[2]];
+        if place_or_direction {
+            self.scrambles[..4].copy_from_slice(&key.words(Purpose::Scramble));
+        }
+        if wavelength {
+            self.scrambles[4..].copy_from_slice(&Key { bounce: 1, ..key }.words(Purpose::Scramble)[..2]);
+        }
+        self.rays = rays.min(u64::from(u32::MAX)) as u32;
+        (self.lattice, self.pairs, self.first_number) = (lattice, pairs, 0);
     }
 
     /// Whether so few rays are drawn that making them singly costs less than a packet.
     pub(super) fn is_short(&self) -> bool {
         self.rays <= SHORT
-    }
-
-    /// Returns the same stream with these pairs of numbers alone: for the place, the direction and the wavelength.
-    pub(super) fn with_pairs(self, pairs: [bool; 3]) -> Self {
-        Self { pairs, ..self }
-    }
-
-    /// Returns the same stream that takes, of the places in a ray list, lattice `[k, n]`: the k-th of n that interleave.
-    pub(crate) fn with_lattice(self, lattice: [u32; 2]) -> Self {
-        Self { lattice, ..self }
     }
 
     pub(super) fn sampling(&self) -> Sampling {
@@ -173,9 +182,6 @@ impl Stream {
     fn fill_chunk(&mut self, first: u32) {
         // What a source with few rays does not ask for is not made.
         let n = CHUNK.min((self.rays - first) as usize);
-        if self.is_short() {
-            return self.fill_short(first, n);
-        }
         for d in 0..random::DIMENSIONS {
             if !self.pairs[d / 2] {
                 continue;
@@ -211,21 +217,22 @@ impl Stream {
         }
     }
 
-    /// Makes the numbers of the `n` rays from `first` on of a source that has [`SHORT`] at most, and the order in which they start.
-    #[inline(always)]
-    fn fill_short(&mut self, first: u32, n: usize) {
+    /// Makes the numbers of all rays of a [short](Self::is_short) stream, and the order in which they start.
+    pub(super) fn fill_short(&mut self) {
         for d in 0..random::DIMENSIONS {
             if self.pairs[d / 2] {
                 self.numbers[d].clear();
-                self.numbers[d].extend((0..n as u32).map(|k| random::scrambled(first + k, d, self.scrambles[d])));
+                self.numbers[d].extend((0..self.rays).map(|k| random::scrambled(k, d, self.scrambles[d])));
             }
         }
         let along = self.sorted_dimension();
         let [x, y] = [&self.numbers[along], &self.numbers[along + 1]];
         self.order.clear();
-        self.order.extend(0..n as u32);
+        self.order.extend(0..self.rays);
         // Stable, as the counting sort of a chunk is.
-        self.order.sort_by_key(|&k| z_order_cell(x[k as usize], y[k as usize]));
+        if self.rays > 1 {
+            self.order.sort_by_key(|&k| z_order_cell(x[k as usize], y[k as usize]));
+        }
     }
 
     /// Returns the first of the two dimensions by which rays are put in order: of the direction, or of the place where no direction is

@@ -11,7 +11,7 @@ use super::starting_media::{start_behind_glue, start_clear_of_faces};
 use super::tracer::Tracer;
 use crate::math::Ray;
 use crate::optics::polarised::Stokes;
-use crate::simulate::emitter::{Emission, RaySampler, Stream};
+use crate::simulate::emitter::{Emission, Portion, RaySampler};
 use crate::simulate::outcome::{Event, LostCause};
 use crate::simulate::scene::Sampling;
 use crate::simulate::tally::quanta_as_integer;
@@ -56,9 +56,10 @@ impl SourceQueue {
             RaySelection::Listed { source, ray } => {
                 (queue.last, queue.source, queue.listed) = (0, source as usize, Some(ray));
                 // Independent numbers: by its place in the list a ray has no place in a net.
-                let stream = Stream::new(context.settings.seed, Sampling::Random, 0, source, 1);
+                let portion = Portion { replicate: 0, source, rays: 1, lattice: [0, 1] };
                 if let Some(emitter) = context.bound.emitters.get(source as usize) {
-                    queue.sampler = Some(RaySampler::new(emitter, stream, ray));
+                    let seed = context.settings.seed;
+                    queue.sampler = Some(RaySampler::new(emitter, seed, Sampling::Random, portion, ray));
                     queue.range = [0, 1];
                 }
             }
@@ -72,17 +73,19 @@ impl SourceQueue {
         let Some(emitter) = context.bound.emitters.get(source) else { return };
         self.range = context.plan.range(source, self.replicate);
         self.next = self.range[0];
-        let s = context.settings;
-        let rays = self.range[1] - self.range[0];
-        let stream = Stream::new(s.seed, s.sampling, self.replicate, source as u32, rays)
-            .with_lattice(context.plan.lattice(self.replicate));
-        // The memory of the last source's stream is taken over: replicates have many sources, and each would
-        // allocate anew.
-        let stream = match self.sampler.take() {
-            Some(sampler) => stream.in_place_of(sampler.into_stream()),
-            None => stream,
+        let portion = Portion {
+            replicate: self.replicate,
+            source: source as u32,
+            rays: self.range[1] - self.range[0],
+            lattice: context.plan.lattice(self.replicate),
         };
-        self.sampler = Some(RaySampler::new(emitter, stream, self.range[0]));
+        match &mut self.sampler {
+            Some(sampler) => sampler.restart(emitter, portion, self.range[0]),
+            None => {
+                let s = context.settings;
+                self.sampler = Some(RaySampler::new(emitter, s.seed, s.sampling, portion, self.range[0]));
+            }
+        }
     }
 
     /// Writes the next ray that can start to `path` and `ray`; `false` at the end of the replicate. Rays that cannot start are booked as

@@ -9,7 +9,7 @@ use crate::intersect::{Cost, Intersector};
 use crate::math::{Point, Ray, Vector};
 use crate::simulate::bind::BoundScene;
 use crate::simulate::body::AMBIENT;
-use crate::simulate::emitter::{Emitter, RaySampler, Stream};
+use crate::simulate::emitter::{Emitter, Portion, RaySampler};
 use crate::simulate::settings::RunSettings;
 
 /// Rays of a source that are asked before it is believed that all start in the same bodies.
@@ -23,18 +23,33 @@ impl<'a> Context<'a> {
     pub(crate) fn new(bound: &'a BoundScene, intersector: &'a dyn Intersector, settings: &'a RunSettings) -> Self {
         let mut context = Self::without_media(bound, intersector, settings);
         let sources = bound.emitters.iter().enumerate();
-        context.starting_media = sources.map(|(k, e)| starting_media(&context, k, e)).collect();
+        // Once for all sources: it looks at all of them.
+        let has_media = bound.has_media();
+        context.starting_media = sources.map(|(k, e)| starting_media(&context, k, e, has_media)).collect();
         context
     }
 }
 
+/// Whether all rays of a source start clear of every body and every opaque solid, so that none need be asked; not known where the scene
+/// has few sources.
+fn starts_clear(context: &Context<'_>, emitter: &Emitter) -> bool {
+    let (Some(solids), Some(starts)) = (&context.bound.solids, emitter.starts()) else { return false };
+    // A start is looked for faces as far as the glue to either side, and taken for inside of a box as far beyond it.
+    let room = 2.0 * context.glue_mm() + rounding_at(starts.min) + rounding_at(starts.max);
+    !solids.any_meeting(&starts.grown(room), |_| true)
+}
+
 /// Decides what the rays of one source start in, from [`PROBED_RAYS`] of its rays, of as many replicates as there are: the same bodies
 /// where all agree and none starts on a face.
-fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> StartingMedia {
+fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_media: bool) -> StartingMedia {
+    if starts_clear(context, emitter) {
+        return StartingMedia::Same(emitter.inside.clone());
+    }
     // Stated media are believed; only starts on faces are still looked for.
-    let stated = emitter.media_stated || !context.bound.has_media();
+    let stated = emitter.media_stated || !has_media;
     let replicates = context.plan.replicates;
     let mut first: Option<Bodies> = None;
+    let mut sampler: Option<RaySampler> = None;
     for k in 0..PROBED_RAYS {
         // Over all replicates and the whole of each: they are spread over the whole of a ray list. As many where replicates are few, of
         // which each has several then: two rays would tell nothing of a source that straddles a boundary.
@@ -44,11 +59,16 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter) -> St
             continue;
         }
         let s = context.settings;
-        let stream = Stream::new(s.seed, s.sampling, replicate, source as u32, to - from)
-            .with_lattice(context.plan.lattice(replicate));
+        let lattice = context.plan.lattice(replicate);
+        let portion = Portion { replicate, source: source as u32, rays: to - from, lattice };
         let mut ray = Ray::new(Point::ZERO, Vector::Z);
         let index = ((to - from) * k / PROBED_RAYS) as u32;
-        let (_, emission) = RaySampler::new(emitter, stream, from).single_ray(emitter, index, &mut ray);
+        match &mut sampler {
+            Some(sampler) => sampler.restart(emitter, portion, from),
+            None => sampler = Some(RaySampler::new(emitter, s.seed, s.sampling, portion, from)),
+        }
+        let Some(sampler) = &mut sampler else { continue };
+        let (_, emission) = sampler.single_ray(emitter, index, &mut ray);
         // One start on a face decides for all: the rays of such a source must each be asked. Luminous faces find their own start.
         if emission.from.is_none() && start_clear_of_faces(context, &ray).is_some() {
             return StartingMedia::OnFace;
