@@ -1,6 +1,7 @@
 //! Edges of a mesh: which are open, shared or used more than twice.
 
 use super::FacetMesh;
+use crate::math::FaceId;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -9,16 +10,20 @@ use std::ops::Range;
 pub struct Topology {
     /// Edges with a facet on one side only.
     pub open_edges: usize,
-    /// Edges with more than two facets.
+    /// Edges with more than two facets, but for `touching_edges`.
     pub nonmanifold_edges: usize,
+    /// Edges along which a closed surface touches itself: four facets or more, half of them each way, all of different faces. Around such an
+    /// edge the facets pair off, and what is inside is as clear as elsewhere.
+    pub touching_edges: usize,
     /// Edges whose two facets run along them in the same direction: one of the two is turned inside out.
     pub turned_edges: usize,
 }
 
 impl Topology {
-    /// Whether every edge has two facets that agree which side is outside; true without facets too.
+    /// Whether every edge has two facets that agree which side is outside, or pairs of such facets where the surface touches itself; true
+    /// without facets too.
     pub fn is_closed(&self) -> bool {
-        *self == Self::default()
+        self.open_edges + self.nonmanifold_edges + self.turned_edges == 0
     }
 }
 
@@ -28,27 +33,53 @@ impl FacetMesh {
     pub fn topology(&self, facets: Range<usize>) -> Topology {
         // Uses along and against the edge's order of positions.
         let mut edges: FxHashMap<[u32; 2], [u32; 2]> = FxHashMap::default();
-        for f in facets {
-            let p = self.corner_positions(f);
-            for k in 0..4 {
-                let (a, b) = (p[k], p[(k + 1) % 4]);
-                // A triangle's last side has no length.
-                if a != b {
-                    edges.entry([a.min(b), a.max(b)]).or_default()[(a > b) as usize] += 1;
-                }
+        for f in facets.clone() {
+            for (edge, is_against) in self.sides(f) {
+                edges.entry(edge).or_default()[is_against as usize] += 1;
             }
         }
         let mut t = Topology::default();
-        for [along, against] in edges.into_values() {
+        let mut paired: FxHashMap<[u32; 2], Vec<FaceId>> = FxHashMap::default();
+        for (edge, [along, against]) in edges {
             match along + against {
                 1 => t.open_edges += 1,
                 // Neighbours that are turned alike use their edge in opposite directions.
                 2 if along != against => t.turned_edges += 1,
                 2 => {}
+                _ if along == against => {
+                    paired.insert(edge, Vec::new());
+                }
                 _ => t.nonmanifold_edges += 1,
             }
         }
+        // Faces are asked only for these few: kept for all edges they would double the memory.
+        let asked = if paired.is_empty() { 0..0 } else { facets };
+        for f in asked {
+            for (edge, _) in self.sides(f) {
+                if let Some(faces) = paired.get_mut(&edge) {
+                    faces.push(self.facets[f].face);
+                }
+            }
+        }
+        for mut faces in paired.into_values() {
+            faces.sort_unstable();
+            // A face that has it twice has it inside: it is no edge of the file, and should be no edge of other faces.
+            if faces.windows(2).any(|pair| pair[0] == pair[1]) {
+                t.nonmanifold_edges += 1;
+            } else {
+                t.touching_edges += 1;
+            }
+        }
         t
+    }
+
+    /// Returns the sides of a facet that have a length: their positions, the smaller index first, and whether the facet runs against that
+    /// order.
+    fn sides(&self, facet: usize) -> impl Iterator<Item = ([u32; 2], bool)> {
+        let p = self.corner_positions(facet);
+        let sides = (0..4).map(move |k| (p[k], p[(k + 1) % 4]));
+        // A triangle's last side has no length.
+        sides.filter(|(a, b)| a != b).map(|(a, b)| ([a.min(b), a.max(b)], a > b))
     }
 }
 
@@ -58,16 +89,18 @@ mod tests {
     use crate::math::{FaceId, Point, Uv, Vector};
     use crate::mesh::{Facet, MeshVertex};
 
-    fn topology(faces: &[[u32; 3]]) -> Topology {
-        let mesh = tetrahedron(faces);
-        mesh.topology(0..mesh.facets.len())
+    /// Triangles on six positions, each with its face.
+    fn mesh(triangles: impl Iterator<Item = ([u32; 3], u32)>) -> FacetMesh {
+        let positions = vec![Point::ZERO, Point::X, Point::Y, Point::Z, -Point::Y, -Point::Z];
+        let vertices = (0..6).map(|position| MeshVertex { position, normal: Vector::Z, uv: Uv::ZERO }).collect();
+        let facets =
+            triangles.map(|([a, b, c], face)| Facet { vertices: [a, b, c, c], face: FaceId(face) }).collect();
+        FacetMesh { positions, vertices, facets, sag: Vec::new() }
     }
 
-    fn tetrahedron(faces: &[[u32; 3]]) -> FacetMesh {
-        let positions = vec![Point::ZERO, Point::X, Point::Y, Point::Z];
-        let vertices = (0..4).map(|position| MeshVertex { position, normal: Vector::Z, uv: Uv::ZERO }).collect();
-        let facets = faces.iter().map(|&[a, b, c]| Facet { vertices: [a, b, c, c], face: FaceId(0) }).collect();
-        FacetMesh { positions, vertices, facets, sag: Vec::new() }
+    fn topology(triangles: &[[u32; 3]]) -> Topology {
+        let mesh = mesh(triangles.iter().map(|t| (*t, 0)));
+        mesh.topology(0..mesh.facets.len())
     }
 
     #[test]
@@ -77,5 +110,21 @@ mod tests {
         assert_eq!(topology(&sides[1..]).open_edges, 3);
         let turned = [[0, 1, 2], sides[1], sides[2], sides[3]];
         assert_eq!(topology(&turned).turned_edges, 3);
+    }
+    #[test]
+    fn two_tetrahedra_that_touch_along_an_edge_are_closed_if_it_bounds_four_faces() {
+        // The second is the first turned by half a turn about the edge from 0 to 1.
+        let sides = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3], [0, 4, 1], [0, 1, 5], [0, 5, 4], [1, 4, 5]];
+        let of_faces = |faces: [u32; 8]| {
+            let mesh = mesh(sides.into_iter().zip(faces));
+            mesh.topology(0..8)
+        };
+        let all = of_faces([0, 1, 2, 3, 4, 5, 6, 7]);
+        assert!(all.is_closed() && all.touching_edges == 1, "{all:?}");
+        // A face that runs on across it does not end there.
+        let across = of_faces([0, 0, 2, 3, 4, 5, 6, 7]);
+        assert_eq!((across.nonmanifold_edges, across.touching_edges), (1, 0));
+        // One facet more on it does not pair off; its other two sides have three facets too.
+        assert_eq!(topology(&[&sides[..], &[[0, 1, 2]]].concat()).nonmanifold_edges, 3);
     }
 }

@@ -6,12 +6,13 @@ use super::part21::{File, parse};
 use super::product::assembly::{Assembly, PlacedRepresentation};
 use super::product::conversion::convert;
 use super::product::numbering::ConvertedPart;
+use super::product::shared_items::SharedItems;
 use super::product::styles::Styles;
 use super::product::topology::ShapeItems;
 use super::report::{ImportReport, Note, UnitNames};
 use super::{Error, ErrorKind, Settings};
 use crate::formats;
-use crate::math::{Aabb, Frame};
+use crate::math::Aabb;
 use crate::model::{Instance, Model, PartId};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::path::Path;
@@ -143,16 +144,20 @@ fn convert_assembly(
         model: Model { name: name.to_string(), ..Model::default() },
         report,
     };
-    // A representation becomes a part where it is placed first.
-    let mut parts: FxHashMap<u64, Option<PartFaces>> = FxHashMap::default();
-    let mut items_placed: FxHashMap<u64, Frame> = FxHashMap::default();
+    let mut shared = SharedItems::new(file, &assembly, &placed);
+    // What a representation adds becomes a part where it is placed first; it adds less where another has brought the same.
+    let mut parts: FxHashMap<(u64, Vec<u64>), Option<PartFaces>> = FxHashMap::default();
     for p in placed {
-        let entry = match parts.get(&p.representation) {
+        let key = (p.representation, shared.place(&p));
+        let entry = match parts.get(&key) {
             Some(known) => *known,
             None => {
-                let items = items_not_placed(file, &assembly, &p, &mut items_placed);
-                let made = reader.convert_representation(assembly.units_of(p.representation), &p, &items);
-                parts.insert(p.representation, made);
+                let made = reader.convert_representation(
+                    assembly.units_of(p.representation),
+                    &p,
+                    &shared.items(key.0, &key.1),
+                );
+                parts.insert(key, made);
                 made
             }
         };
@@ -197,28 +202,6 @@ fn absent_shapes(file: &File<'_>) -> String {
     let commonest =
         if listed.is_empty() { "it has no entity".into() } else { format!("commonest are {}", listed.join(", ")) };
     format!("no face, surface or mesh was found; {commonest}; export solids or surfaces")
-}
-
-/// Returns the items of a representation that do not stand in its place already, and adds them to `items_placed`: linked representations
-/// often name the same shapes, each of which is meant once in a place. An orphan repeats none at all.
-fn items_not_placed(
-    file: &File<'_>,
-    assembly: &Assembly<'_, '_>,
-    p: &PlacedRepresentation,
-    items_placed: &mut FxHashMap<u64, Frame>,
-) -> Vec<u64> {
-    let mut items = assembly.items(p.representation);
-    items.retain(|item| !items_placed.get(item).is_some_and(|place| p.orphan || *place == p.placement));
-    for item in &items {
-        items_placed.entry(*item).or_insert(p.placement);
-        // Shells of models and elements of sets stand with them.
-        let mut inner = Vec::new();
-        file.entity(*item).into_iter().flat_map(|e| e.all_args()).for_each(|a| a.deep_ids(&mut inner));
-        for id in inner {
-            items_placed.entry(id).or_insert(p.placement);
-        }
-    }
-    items
 }
 
 /// Fills in the report's counts of parts, instances, shells and placed faces, and the names, each once.

@@ -101,10 +101,12 @@ fn count_shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool
                 continue;
             }
             // What bounds no volume by the file's own word is not counted as broken.
-            let Topology { open_edges, nonmanifold_edges, turned_edges } = made.mesh.topology(start..end);
+            let topology = made.mesh.topology(start..end);
+            let Topology { open_edges, nonmanifold_edges, touching_edges, turned_edges } = topology;
             report.open_edges += open_edges;
             report.nonmanifold_edges += nonmanifold_edges + turned_edges;
-            if start < end && open_edges + nonmanifold_edges + turned_edges == 0 {
+            report.touching_edges += touching_edges;
+            if start < end && topology.is_closed() {
                 report.shells.closed += 1;
             } else {
                 report.shells.open += 1;

@@ -47,8 +47,11 @@ pub struct Report {
     pub shells: ShellCounts,
     /// Edges with one facet, in shells that the file calls closed.
     pub open_edges: usize,
-    /// Edges with more than two facets, or two that disagree which side is outside, in those shells.
+    /// Edges with more than two facets that do not pair off, or two that disagree which side is outside, in those shells.
     pub nonmanifold_edges: usize,
+    /// Edges along which those shells touch themselves, with two facets or more each way, all of different faces: they are closed there.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub touching_edges: usize,
     /// Placed faces.
     pub faces: FaceCounts,
     /// Those without facets: nothing could be made of them.

@@ -345,6 +345,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "usage_names",
             "assembly",
             "placed_count",
+            "shared_items",
             "tessellated",
             "numbering",
             "solid_recipes",

@@ -2,6 +2,7 @@
 
 use crate::faces::{import, read, square};
 use lampyris::model::SurfaceKind;
+use lampyris::step::{Settings, read_bytes};
 
 const FORWARD: [&str; 4] = [".T."; 4];
 const IN_ORDER: [usize; 4] = [0, 1, 2, 3];
@@ -167,4 +168,46 @@ fn files_that_hold_shapes_of_an_assembly_are_named() {
     let left: Vec<u64> = import.report.left_out.iter().map(|n| n.id).collect();
     assert_eq!(left, [100]);
     assert!(import.report.left_out[0].reason.contains("shapes are in Lens.STP"), "{:?}", import.report.left_out);
+}
+
+/// Boxes of what stands where `data` names the block #10 in representations #20 and #21 and maps them into one.
+fn places_of_blocks(mapped: &str) -> Vec<[f64; 2]> {
+    let text = format!(
+        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\
+         #1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+         #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+         #5=CARTESIAN_POINT('',(0.,0.,0.));\n#6=DIRECTION('',(0.,0.,1.));\n#7=DIRECTION('',(1.,0.,0.));\n\
+         #8=AXIS2_PLACEMENT_3D('',#5,#6,#7);\n#9=AXIS2_PLACEMENT_3D('',#15,#6,#7);\n#15=CARTESIAN_POINT('',(100.,0.,0.));\n\
+         #10=BLOCK('',#8,10.,10.,10.);\n\
+         #20=SHAPE_REPRESENTATION('A',(#8,#10),#1);\n#21=SHAPE_REPRESENTATION('B',(#8,#10),#1);\n\
+         #22=REPRESENTATION_MAP(#8,#20);\n#23=REPRESENTATION_MAP(#8,#21);\n\
+         #30=MAPPED_ITEM('',#22,#8);\n#31=MAPPED_ITEM('',#23,#8);\n#32=MAPPED_ITEM('',#23,#9);\n\
+         #40=SHAPE_REPRESENTATION('',({mapped}),#1);\nENDSEC;\nEND-ISO-10303-21;\n"
+    );
+    let import = read_bytes("blocks.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
+    assert_eq!(import.report.faces_placed.found, import.report.faces_placed.converted);
+    let mut boxes: Vec<[f64; 2]> = import
+        .model
+        .instances
+        .iter()
+        .map(|i| {
+            let part = import.model.part(i.part);
+            assert_eq!(part.face_count(), 6);
+            let xs = part.vertices.iter().map(|v| i.placement.point(*v).x);
+            xs.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)])
+        })
+        .collect();
+    boxes.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    boxes
+}
+
+#[test]
+fn a_shape_that_two_representations_name_stands_once_in_each_place() {
+    let (here, there) = ([0.0, 10.0], [100.0, 110.0]);
+    // Twice in one place and once elsewhere, in any order; the second representation alone elsewhere; the first twice.
+    for mapped in ["#30,#31,#32", "#30,#32,#31", "#32,#31,#30", "#31,#32,#30", "#30,#32"] {
+        assert_eq!(places_of_blocks(mapped), [here, there], "{mapped}");
+    }
+    assert_eq!(places_of_blocks("#30,#31"), [here]);
+    assert_eq!(places_of_blocks("#31,#32"), [here, there]);
 }

@@ -416,6 +416,25 @@ fn a_rectangle_that_runs_against_one_parameter_has_the_other_normal() {
     }
 }
 
+/// From one end of the period back to the other, with the sense of the parameter: all around, as the other way.
+#[test]
+fn a_rectangle_from_the_end_of_a_period_to_its_start_is_all_of_it() {
+    for around in ["0.,6.283185307179586", "6.283185307179586,0.", "6.28318530718,0."] {
+        let data = format!(
+            "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+            #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n\
+            #3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+            #10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=AXIS2_PLACEMENT_3D('',#10,$,$);\n#12=CYLINDRICAL_SURFACE('',#11,5.);\n\
+            #13=RECTANGULAR_TRIMMED_SURFACE('',#12,{around},0.,10.,.T.,.T.);\n#14=GEOMETRIC_SET('',(#13));\n\
+            #15=GEOMETRICALLY_BOUNDED_SURFACE_SHAPE_REPRESENTATION('',(#14),#1);\n"
+        );
+        let text = format!("ISO-10303-21;HEADER;FILE_SCHEMA(('X'));ENDSEC;DATA;{data}ENDSEC;END-ISO-10303-21;");
+        let import = read_bytes("tube.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
+        assert_eq!(import.report.faces.refused, 0, "{around}: {:?}", import.report.refusals);
+        close(area(&import), 100.0 * PI, 1e-4);
+    }
+}
+
 /// A sphere whose points are all at the origin, and whose radius is where doubles are a millimetre apart.
 #[test]
 fn a_face_that_reaches_beyond_all_rounding_is_refused_by_name() {

@@ -297,3 +297,58 @@ fn a_seam_ends_at_the_vertex_that_its_edge_misses() {
     let report = tessellate(&model, &tessellate::Settings::uniform(1e-3)).report;
     assert_eq!((report.open_edges, report.shells.closed), (0, 1));
 }
+
+/// Two cubes in one shell that touch along an edge, which four faces have: a closed solid all the same.
+#[test]
+fn a_solid_that_touches_itself_along_an_edge_is_closed() {
+    let cube: Vec<[f64; 3]> = cube_corners().into_iter().take(8).collect();
+    // The second stands on the edge from (10, 10, 0) to (10, 10, 10): its corners 0 and 4 are the first one's 2 and 6.
+    let corners: Vec<[f64; 3]> =
+        cube.iter().copied().chain(cube.iter().map(|&[x, y, z]| [x + SIDE, y + SIDE, z])).collect();
+    let same = |k: usize| {
+        if k == 0 {
+            2
+        } else if k == 4 {
+            6
+        } else {
+            k + 8
+        }
+    };
+    let second = CUBE.map(|face| face.iter().map(|&k| same(k)).collect::<Vec<_>>());
+    let faces: Vec<&[usize]> = CUBE.into_iter().chain(second.iter().map(|f| f.as_slice())).collect();
+    let import = solid(&corners, &faces, &[".T."; 12], None);
+    let report = tessellate(&import.model, &tessellate::Settings::uniform(0.1)).report;
+    assert_eq!((report.open_edges, report.nonmanifold_edges, report.touching_edges), (0, 0, 1));
+    assert_eq!((report.shells.closed, report.shells.open), (1, 0));
+    let volume = report.volume_mm3.expect("closed");
+    assert!((volume - 2.0 * SIDE.powi(3)).abs() < 1e-9, "{volume}");
+}
+
+/// A face between two straight edges with the same vertices, of which one is a line that misses them by more than a writer rounds.
+#[test]
+fn a_face_between_two_straight_edges_is_left_out() {
+    let missed = 1.5e-3;
+    let corners: Vec<[f64; 3]> = cube_corners().into_iter().take(8).collect();
+    let faces: [&[usize]; 7] = [CUBE[0], CUBE[1], CUBE[2], CUBE[3], CUBE[4], CUBE[5], &[4, 5]];
+    // Its corners in a line give no normal.
+    let text = solid_text(&corners, &faces, &[".T."; 7], None).replace("(NaN,NaN,NaN)", "(0.0,1.0,0.0)");
+    // The edge from corner 4 to 5 is the first of the second face; the third face and this one get another in its place.
+    let first = text.find("=EDGE_CURVE('',#204,#205,").expect("an edge");
+    let start = text[..first].rfind('#').expect("its id");
+    let edge = text[start..first].to_string();
+    let mut parts: Vec<String> = text.split(&format!("*,{edge},")).map(String::from).collect();
+    assert_eq!(parts.len(), 5);
+    let last = parts.split_off(2);
+    let text = [parts.join(&format!("*,{edge},")), last[..2].join("*,#93,"), last[2].clone()];
+    let text = [text[0].clone(), format!("*,#93,{}", text[1]), format!("*,{edge},{}", text[2])].concat();
+    let other = format!(
+        "DATA;\n#90=CARTESIAN_POINT('',(0.,{:?},{SIDE:?}));#91=DIRECTION('',(1.,0.,0.));#92=VECTOR('',#91,1.);\
+         #94=LINE('',#90,#92);#93=EDGE_CURVE('',#204,#205,#94,.T.);\n",
+        -missed
+    );
+    let import = read(&text.replacen("DATA;\n", &other, 1));
+    assert_closes(&import);
+    let said: Vec<u64> =
+        import.report.repairs.iter().filter(|r| r.reason.contains("it has no width")).map(|r| r.id).collect();
+    assert_eq!(said, [100_066]);
+}

@@ -165,7 +165,11 @@ fn trim_rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart)
             (lo, hi) = (hi, lo);
         }
         match chart.period[d] {
-            Some(p) if hi <= lo => hi = lo + (hi - lo).rem_euclid(p),
+            // From 2π back to 0, with the sense, is all of the period and not nothing of it.
+            Some(p) if hi < lo => {
+                let width = (hi - lo).rem_euclid(p);
+                hi = lo + if width < p * PERIOD_SLACK { p } else { width };
+            }
             None if hi < lo => (lo, hi) = (hi, lo),
             _ => {}
         }

@@ -15,6 +15,7 @@ mod placed_count;
 mod purpose;
 mod recipe_parts;
 mod relations;
+pub(super) mod shared_items;
 mod solid_recipes;
 mod spikes;
 pub(super) mod styles;

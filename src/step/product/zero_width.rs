@@ -152,9 +152,15 @@ pub(super) fn coincidence_tolerance(a: &TrimmedEdge, b: &TrimmedEdge) -> f64 {
     COINCIDENT_MM + a.gap.min(LARGEST_GAP_MM) + b.gap.min(LARGEST_GAP_MM)
 }
 
-/// Whether two edges coincide at equal shares of their parameters, one of them backwards if `opposite`, within what they miss their vertices by.
+/// Whether two edges between the same vertices coincide: both are straight, or equal at equal shares of their parameters, one of them
+/// backwards if `opposite`, within what they miss their vertices by.
 fn edges_coincide(a: &TrimmedEdge, b: &TrimmedEdge, opposite: bool) -> bool {
     let (Some(first), Some(second)) = (&a.curve, &b.curve) else { return false };
+    // However far a writer's line misses its vertices, between two of them there is one straight line.
+    let is_straight = |curve: &Curve| curve.degree == 1 && curve.points.len() == 2;
+    if is_straight(first) && is_straight(second) {
+        return true;
+    }
     let tolerance = coincidence_tolerance(a, b);
     let point = |curve: &Curve, share: f64| {
         let [t0, t1] = curve.domain();

@@ -3,9 +3,6 @@
 use crate::math::Uv;
 use crate::math::polygon::is_inside_sides;
 
-/// Most bands: a segment that runs along all of them stands in each.
-const MOST_BANDS: usize = 256;
-
 /// Segments in bands across v, so that a place is compared only with those at its height: a damaged face with 5,000 of them spent nine
 /// tenths of its time comparing.
 pub(in crate::tessellate) struct BorderBands {
@@ -21,8 +18,13 @@ impl BorderBands {
         let heights = || segments.iter().flatten().map(|p| p.y);
         let (lowest, highest) =
             (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
-        let count = segments.len().clamp(1, MOST_BANDS);
-        let density = if highest > lowest { count as f64 / (highest - lowest) } else { 0.0 };
+        let height = highest - lowest;
+        // A place meets the segments that cross its height and those that only end in its band. With as many bands as make the two alike the
+        // bands hold each segment twice, however many run along all of them.
+        let crossing = segments.iter().map(|[a, b]| (b.y - a.y).abs()).sum::<f64>() / height;
+        let count = (segments.len() as f64 / crossing.max(1.0)) as usize;
+        let count = count.clamp(1, segments.len().max(1));
+        let density = if height > 0.0 { count as f64 / height } else { 0.0 };
         let mut out = Self { lowest, density, bands: vec![Vec::new(); count] };
         for segment in segments {
             let [a, b] = segment.map(|p| out.band(p.y));

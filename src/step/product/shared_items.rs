@@ -1,0 +1,118 @@
+//! Shapes that several representations name: which of their items a placed representation adds to what stands already.
+//!
+//! Linked representations often name the same shapes, each of which is meant once in a place. The same shape in another place is another one,
+//! whichever representation brings it there.
+
+use super::assembly::{Assembly, PlacedRepresentation};
+use super::topology::ShapeItems;
+use crate::math::Frame;
+use crate::step::part21::File;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// A placement that can be a key: its bits, with one zero.
+type PlacementKey = [u64; 13];
+
+/// The shapes that are named by more than one of the placed representations, and where they stand so far.
+pub(crate) struct SharedItems {
+    /// The shapes of each placed representation.
+    items: FxHashMap<u64, Vec<u64>>,
+    /// The items of a representation that are a shared shape or hold some, with those that they bring.
+    brings: FxHashMap<u64, Vec<(u64, Vec<u64>)>>,
+    /// Shared shapes with the places where they stand, and the representation that brought each there first.
+    standing: FxHashMap<(u64, PlacementKey), u64>,
+    /// Shared shapes that products have brought anywhere.
+    of_products: FxHashSet<u64>,
+}
+
+impl SharedItems {
+    /// Finds the shapes that several of the placed representations name, as an item or within one.
+    pub(crate) fn new(file: &File<'_>, assembly: &Assembly<'_, '_>, placed: &[PlacedRepresentation]) -> Self {
+        let mut items: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
+        for p in placed {
+            items.entry(p.representation).or_insert_with(|| {
+                let mut ids = assembly.items(p.representation);
+                // Placements are shared by most representations of a file, and stand for nothing.
+                ids.retain(|&id| is_shape(file, id));
+                ids
+            });
+        }
+        let shapes: FxHashSet<u64> = items.values().flatten().copied().collect();
+        // Shells of models and elements of sets stand with them.
+        let with_inner = |item: u64| -> Vec<u64> {
+            let mut named = Vec::new();
+            file.entity(item).into_iter().flat_map(|e| e.all_args()).for_each(|a| a.deep_ids(&mut named));
+            named.retain(|id| *id != item && shapes.contains(id));
+            named.push(item);
+            named
+        };
+        let mut first_owner: FxHashMap<u64, u64> = FxHashMap::default();
+        let mut shared: FxHashSet<u64> = FxHashSet::default();
+        let mut brings: FxHashMap<u64, Vec<(u64, Vec<u64>)>> = FxHashMap::default();
+        for (&representation, ids) in &items {
+            let named: Vec<(u64, Vec<u64>)> = ids.iter().map(|&item| (item, with_inner(item))).collect();
+            for &id in named.iter().flat_map(|(_, ids)| ids) {
+                if *first_owner.entry(id).or_insert(representation) != representation {
+                    shared.insert(id);
+                }
+            }
+            brings.insert(representation, named);
+        }
+        for named in brings.values_mut() {
+            named.iter_mut().for_each(|(_, ids)| ids.retain(|id| shared.contains(id)));
+            named.retain(|(_, ids)| !ids.is_empty());
+        }
+        brings.retain(|_, named| !named.is_empty());
+        Self { items, brings, standing: FxHashMap::default(), of_products: FxHashSet::default() }
+    }
+
+    /// Returns the shapes of a representation but those in `left_out`, in its order.
+    pub(crate) fn items(&self, representation: u64, left_out: &[u64]) -> Vec<u64> {
+        let items = self.items.get(&representation).into_iter().flatten();
+        items.filter(|item| !left_out.contains(item)).copied().collect()
+    }
+
+    /// Returns the shapes of a placed representation that stand already, brought to this place by another representation, and notes that the
+    /// others stand there now. Of an orphan all that a product has brought
+    /// anywhere are returned.
+    pub(crate) fn place(&mut self, p: &PlacedRepresentation) -> Vec<u64> {
+        let mut left_out = Vec::new();
+        let Some(named) = self.brings.get(&p.representation) else { return left_out };
+        let place = placement_key(&p.placement);
+        // A product that is used twice in one place stands there twice, as its file says: only others' shapes are left out.
+        let is_of_another = |owner: Option<&u64>| owner.is_some_and(|o| *o != p.representation);
+        let mut added = Vec::new();
+        for (item, ids) in named {
+            let is_repeated = p.orphan && self.of_products.contains(item);
+            if is_repeated || is_of_another(self.standing.get(&(*item, place))) {
+                left_out.push(*item);
+            } else {
+                added.extend(ids);
+            }
+        }
+        for id in added {
+            self.standing.entry((id, place)).or_insert(p.representation);
+            if !p.orphan {
+                self.of_products.insert(id);
+            }
+        }
+        left_out
+    }
+}
+
+/// Whether an item of a representation is a shape, or is refused as one.
+fn is_shape(file: &File<'_>, id: u64) -> bool {
+    let mut items = ShapeItems::default();
+    items.add(file, id);
+    !items.is_empty()
+}
+
+/// Returns the numbers of a placement as a key.
+fn placement_key(f: &Frame) -> PlacementKey {
+    let numbers = [f.origin, f.x, f.y, f.z].map(|v| v.to_array()).concat();
+    let mut key = [0; 13];
+    for (k, x) in key.iter_mut().zip(numbers.into_iter().chain([f.scale])) {
+        // Adding 0 makes −0 and 0 one.
+        *k = (x + 0.0).to_bits();
+    }
+    key
+}
