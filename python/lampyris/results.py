@@ -253,7 +253,8 @@ class Run(Mapping[str, Receiver]):
     def faces(self) -> list[dict[str, Any]]:
         """The faces that absorbed and let out most, as many as ``Scene(faces=N)`` asked for; empty where it did not.
 
-        Each has ``face``, ``selector``, ``absorbed``, ``entered`` and ``left``, these with ``…_error`` and ``…_geometric``.
+        Each has ``face``, its number among the placed faces as hits have it, ``absorbed``, ``entered`` and ``left``, these with ``…_error``
+        and ``…_geometric``.
         """
         return list((self.document.get("faces") or {"first": []})["first"])
 
@@ -293,7 +294,7 @@ class Run(Mapping[str, Receiver]):
         elif receiver not in self._receivers:
             raise KeyError(f"no receiver {receiver!r}; there are {', '.join(names)}")
         text = _lampyris.assess(self._results, names.index(receiver), regulation, left_hand, as_placed)
-        return Assessment(json.loads(text))
+        return Assessment({"traffic": "left" if left_hand else "right", **json.loads(text)})
 
     def to_json(self, path: Path | None = None) -> str:
         """The document as text, written to a file where one is named."""

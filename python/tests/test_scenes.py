@@ -343,7 +343,7 @@ def test_the_ends_of_listed_rays_and_the_light_of_faces_are_told() -> None:
     scene = lamp(5_000)
     scene.tables["run"]["faces"] = 3
     faces = scene.trace(progress=False).faces
-    assert len(faces) == 3 and {"face", "selector", "absorbed", "absorbed_error", "left"} <= set(faces[0])
+    assert len(faces) == 3 and {"face", "absorbed", "absorbed_error", "left"} <= set(faces[0])
     scene = lp.Scene()
     scene.add(lp.point(at=(0, 0, 0)), lp.plane("wall", at=(0, 0, 10), size=(4, 4), cells=(1, 1)))
     with pytest.raises(ValueError, match="no source of this scene is a list of rays"):
