@@ -168,7 +168,14 @@ impl Results {
         let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(few_replicates(tallies.replicates));
         let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let power = tallies.ends.map(|s| s.total as f64 * quantum);
-        let errors = tallies.ends.map(|s| s.error(tallies.replicates) * quantum);
+        // Replicates may have unequal numbers of rays, which spread what they emitted too: that spread is of no end. Numbers of rays are not
+        // drawn, so that both spreads are independent, and their squares add up.
+        let spread = |s: &Sum| s.error(tallies.replicates) * quantum;
+        let by_size = if power[0] > 0.0 { spread(&tallies.ends[0]) / power[0] } else { 0.0 };
+        let errors = tallies.ends.each_ref().map(|s| {
+            let due_to_size = by_size * s.total as f64 * quantum;
+            (spread(s).powi(2) - due_to_size.powi(2)).max(0.0).sqrt()
+        });
         let digest = digest(&tallies);
         Self {
             rays,
