@@ -1,15 +1,15 @@
 //! What is built or found out once: facets, octrees and choices in a folder that runs, processes and machines may share.
 //!
 //! An entry is named by a hash of all that decides it: program, kind of machine, models, settings of the mesher. It is written under
-//! another name and renamed when it is whole; so a hundred processes that start at once need no lock: each finds an entry, or builds its
-//! own, and all build the same. A checksum at its end notices damage, and what is damaged is removed and built anew. Of too much, what
-//! was not used for longest goes.
+//! another name and renamed when it is whole; of a hundred processes that start at once one builds, while the others wait for its entry
+//! ([`super::turn`]). A checksum at its end notices damage, and what is damaged is removed and built anew. Of too much, what was not used
+//! for longest goes.
 //!
 //! Guarantee: a run has the same bits with and without it. Known weakness: who may write the folder is trusted with results: an entry
-//! changed on purpose may change them, though no index of it leaves its array. Processes that start at once on an empty folder build
-//! each for itself.
+//! changed on purpose may change them, though no index of it leaves its array.
 
 use super::monitor::Monitor;
+use super::turn::Turn;
 use crate::intersect::octree::{self, Octree};
 use crate::mesh::FacetMesh;
 use crate::mesh::arrays::{ArrayReader, invalid, write_array};
@@ -76,6 +76,19 @@ impl Cache {
     pub(super) fn keep_choice(&self, undecided: &Fingerprint, chosen: &Chosen, monitor: &dyn Monitor) {
         let name = format!("{}{}", undecided.0, KINDS[2]);
         self.keep(&name, monitor, |to| write_array(to, &chosen.to_words()));
+    }
+
+    /// Returns what was chosen for the run of this name, or the turn to choose: another process that does so is waited for.
+    pub(super) fn choice_or_turn(&self, undecided: &Fingerprint, monitor: &dyn Monitor) -> Result<Chosen, Turn> {
+        let turn = self.turn(&format!("{}{}", undecided.0, KINDS[2]));
+        turn.map_or_else(|| self.choice(undecided, monitor).ok_or_else(Turn::default), Err)
+    }
+
+    /// Waits while another process makes the entry of this name; returns the turn to make it, `None` where it is made.
+    fn turn(&self, name: &str) -> Option<Turn> {
+        // As an unfinished entry is: what a killed process left goes as those do.
+        let turn = Turn::wait(&self.folder.join(format!(".{name}.turn{UNFINISHED}")));
+        (!self.folder.join(name).is_file()).then_some(turn)
     }
 
     /// Returns the folder, which may not exist yet.
@@ -219,6 +232,11 @@ impl CachedFacets<'_> {
         self.cache.fetch(&self.name(KINDS[0]), self.monitor, read)
     }
 
+    /// Returns the turn to make the facets, which another process may be making; `None` where they are kept meanwhile.
+    pub(super) fn mesh_turn(&self) -> Option<Turn> {
+        self.cache.turn(&self.name(KINDS[0]))
+    }
+
     /// Keeps the facets for a later run; a failure is only told to the monitor.
     pub(super) fn keep_mesh(&self, mesh: &FacetMesh) {
         self.cache.keep(&self.name(KINDS[0]), self.monitor, |to| mesh.write_arrays(to));
@@ -228,11 +246,20 @@ impl CachedFacets<'_> {
     pub(super) fn octree<'m>(&self, mesh: &'m FacetMesh, settings: &octree::Settings) -> Octree<'m> {
         let name = self.name(KINDS[1]);
         let read = |from: &mut ArrayReader| Octree::read_arrays(mesh, settings, from);
-        self.cache.fetch(&name, self.monitor, read).unwrap_or_else(|| {
-            let built = Octree::build(mesh, settings);
-            self.cache.keep(&name, self.monitor, |to| built.write_arrays(to));
-            built
-        })
+        let kept = || self.cache.fetch(&name, self.monitor, read);
+        if let Some(octree) = kept() {
+            return octree;
+        }
+        let turn = self.cache.turn(&name);
+        // Made by another process while this one waited.
+        if turn.is_none()
+            && let Some(octree) = kept()
+        {
+            return octree;
+        }
+        let built = Octree::build(mesh, settings);
+        self.cache.keep(&name, self.monitor, |to| built.write_arrays(to));
+        built
     }
 
     /// Returns the name of the file of this kind of entry.

@@ -80,6 +80,19 @@ pub(super) fn choose<'a>(
     })
 }
 
+/// Whether a pilot is needed to choose: not for flat faces and short runs.
+pub(super) fn needs_pilot(
+    model: &Model,
+    bound: &BoundScene,
+    run: &RunSettings,
+    (facets, mesher): (&GroupedFacets, &tessellate::Settings),
+) -> bool {
+    let models = facets.instancing.as_deref().map_or(slice::from_ref(model), |i| &i.groups);
+    let source = Source { model, made: facets, mesher, surfaces: &|| &[], exact: OnceCell::new() };
+    let tolerance = mesher.tolerance;
+    Undecided { models, bound, run, source: &source, facets, tolerance }.needs_pilot()
+}
+
 /// Returns what finds the hits of a run that was chosen so, and its normals.
 pub(super) fn intersector_choice(chosen: &Chosen) -> IntersectorChoice {
     let intersector = match chosen.intersector {

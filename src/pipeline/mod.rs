@@ -16,8 +16,8 @@
 //!
 //! Guarantee: the same scene, files and settings give the same bits, whoever asks and whatever listens.
 //!
-//! Inner modules, each of which sees only those before it: `error`, `suggest`, `settings`, `monitor`, `loading`, `cache`, `facets`
-//! `intersectors` and `fingerprint` (the ingredients), `ray_sampler`, `accuracy_target`, `default_accuracy` and `prepared_scene` with `scene_results` and
+//! Inner modules, each of which sees only those before it: `error`, `suggest`, `settings`, `monitor`, `loading`, `turn`, `cache`,
+//! `facets`, `intersectors` and `fingerprint` (the ingredients), `scene_job`, `ray_sampler`, `accuracy_target`, `default_accuracy` and `prepared_scene` with `scene_results` and
 //! `cross_check` (the run), `error_target`, `verdicts` and `settled_target` (what is made of it).
 
 mod accuracy_target;
@@ -34,10 +34,12 @@ mod loading;
 mod monitor;
 mod prepared_scene;
 mod ray_sampler;
+mod scene_job;
 mod scene_results;
 mod settings;
 mod settled_target;
 mod suggest;
+mod turn;
 mod verdicts;
 
 pub use accuracy_target::{AccurateSettings, settings_for_accuracy, settings_for_accurate_facets};
@@ -49,8 +51,9 @@ pub use facets::{mesh_settings, tessellate_by_part, tessellate_model};
 pub use intersectors::{IntersectorChoice, in_one_scene, with_intersector};
 pub use loading::{LoadedModel, read_models, read_scene, read_scene_models, step_settings};
 pub use monitor::{Monitor, Silent, Stage};
-pub use prepared_scene::{PartChoice, PreparedScene, SceneJob, TraceRequest};
+pub use prepared_scene::{PreparedScene, TraceRequest};
 pub use ray_sampler::RaySampler;
+pub use scene_job::{PartChoice, SceneJob};
 pub use scene_results::SceneResults;
 pub use settings::{IntersectorKind, MeshingSettings, RayRange, TracingSettings};
 pub use settled_target::trace_until_settled;

@@ -1,15 +1,16 @@
 //! A scene that is bound and faceted, and the tracing of it.
 
-use super::cache::{Cache, CachedFacets, facets_key, group_keys};
+use super::cache::{CachedFacets, group_keys};
 use super::default_accuracy;
 use super::error::Error;
 use super::expected_facets::expected_facets;
-use super::facets::{mesh_settings, tessellate_groups};
+use super::facets::mesh_settings;
 use super::fingerprint::run_fingerprint;
 use super::intersectors::{self, IntersectorChoice, TrueSurface};
-use super::loading::LoadedModel;
-use super::monitor::{Monitor, Stage, in_stage};
-use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
+use super::monitor::{Monitor, Stage};
+use super::scene_job::SceneJob;
+use super::settings::IntersectorKind;
+use super::turn::Turn;
 use crate::intersect::Intersector;
 use crate::intersect::exact;
 use crate::intersect::octree::{self, Octree};
@@ -20,100 +21,18 @@ use crate::simulate::{
     BoundScene, Fingerprint, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, replicate_range,
     trace,
 };
-use crate::study::accuracy_target::AccuracyPlan;
 use crate::study::default_accuracy::Chosen;
-use crate::tessellate::{self, GroupedFacets, Tessellation};
+use crate::tessellate::{self, GroupedFacets};
 use std::ops::Range;
 use std::slice;
 use std::sync::{Arc, OnceLock};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Facets that are made before it is chosen how to trace: a second or two. Far more of them cost more than the spline does.
 const MOST_BEFORE_CHOICE: f64 = 1e5;
 
 /// Ray paths kept for pictures.
 const RECORDED_PATHS: u64 = 2000;
-
-/// A scene with its model, and what is asked of it.
-#[derive(Clone, Debug)]
-pub struct SceneJob {
-    /// The scene.
-    pub scene: Arc<Scene>,
-    /// Its models.
-    pub loaded: Arc<LoadedModel>,
-    /// How its facets are made.
-    pub meshing: MeshingSettings,
-    /// How it is traced.
-    pub tracing: TracingSettings,
-    /// How an accuracy that was asked for was reached.
-    pub accuracy: Option<AccuracyPlan>,
-    /// What another part chose, which is taken in place of a pilot where that part is of the same run.
-    pub chosen: Option<PartChoice>,
-    /// Where facets and octree are kept for other runs; built anew where there is none.
-    pub cache: Option<Cache>,
-}
-
-/// What a part of a run chose.
-#[derive(Clone, Debug)]
-pub struct PartChoice {
-    /// The choice, with what its pilot found.
-    pub chosen: Chosen,
-    /// The fingerprint of that run.
-    pub fingerprint: Fingerprint,
-}
-
-impl SceneJob {
-    /// Makes the job of a scene as it stands, with all that it does not say left to choose, and without a cache.
-    pub fn new(scene: impl Into<Arc<Scene>>, loaded: impl Into<Arc<LoadedModel>>) -> Self {
-        Self {
-            scene: scene.into(),
-            loaded: loaded.into(),
-            meshing: MeshingSettings::default(),
-            tracing: TracingSettings::default(),
-            accuracy: None,
-            chosen: None,
-            cache: None,
-        }
-    }
-
-    /// Reads the facets of the model or of its groups from the cache, or makes and keeps them; returns them with the seconds that took.
-    /// Those from the cache have no report.
-    fn facets(
-        &self,
-        instancing: Option<&Arc<Instancing>>,
-        settings: &tessellate::Settings,
-        monitor: &dyn Monitor,
-    ) -> (GroupedFacets, f64) {
-        let (start, model) = (Instant::now(), &self.loaded.model);
-        let make = || in_stage(monitor, Stage::Tessellating, || tessellate_groups(model, instancing, settings));
-        // Without a cache, or where a file of the scene has gone since, facets are made anew.
-        let Some((cache, key)) = self.cached(settings) else { return make() };
-        let groups = instancing.map_or(slice::from_ref(model), |i| &i.groups);
-        let keys = group_keys(&key, groups.len());
-        let kept = |key| CachedFacets { cache, key, monitor };
-        let meshes = groups.iter().zip(&keys).map(|(group, key)| kept(key).mesh(group.placed_face_count()));
-        if let Some(meshes) = meshes.collect::<Option<Vec<_>>>() {
-            let groups = meshes.into_iter().map(|mesh| Tessellation { mesh, ..Tessellation::default() }).collect();
-            return (GroupedFacets { groups, instancing: instancing.cloned() }, start.elapsed().as_secs_f64());
-        }
-        let (made, seconds) = make();
-        made.meshes().zip(&keys).for_each(|(mesh, key)| kept(key).keep_mesh(mesh));
-        (made, seconds)
-    }
-
-    /// Whether the model is what the files of the scene hold, so that they stand for it; one without parts needs none.
-    pub(super) fn is_model_from_files(&self) -> bool {
-        let files = self.scene.models.len();
-        self.loaded.model.instances.is_empty() || (files > 0 && self.loaded.reports.len() == files)
-    }
-
-    /// Returns the cache, and the name that facets of these settings have in it; `None` without a cache, or where the model is from no file
-    /// or a file of the scene is gone.
-    fn cached(&self, settings: &tessellate::Settings) -> Option<(&Cache, Fingerprint)> {
-        let cache = self.cache.as_ref().filter(|_| self.is_model_from_files())?;
-        Some((cache, facets_key(&self.scene, settings)?))
-    }
-}
 
 /// A job whose scene fits its model and whose facets are made.
 #[derive(Clone, Debug)]
@@ -195,12 +114,10 @@ impl PreparedScene {
             // Before any facets are made: it says how fine they are.
             prepared.take_choice(chosen, monitor);
             prepared.make_facets(instancing.as_ref(), monitor);
+        } else if is_open {
+            prepared.choose_and_make_facets(instancing.as_ref(), monitor);
         } else {
-            let excess = if is_open { prepared.bound_facets(instancing.as_deref()) } else { None };
             prepared.make_facets(instancing.as_ref(), monitor);
-            if is_open {
-                prepared.choose_accuracy(excess, monitor);
-            }
         }
         Ok(prepared)
     }
@@ -216,6 +133,37 @@ impl PreparedScene {
             self.mesh_settings.tolerance = self.mesh_settings.tolerance.map(|t| t * factor);
             expected
         })
+    }
+
+    /// Chooses by a pilot how to trace, or takes what another process finds that chooses for the same run, and makes the facets of that.
+    fn choose_and_make_facets(&mut self, instancing: Option<&Arc<Instancing>>, monitor: &dyn Monitor) {
+        // Named by the run before anything of it is decided: that is what others know when they ask.
+        let undecided = self.job.cache.as_ref().and(self.fingerprint().ok());
+        let excess = self.bound_facets(instancing.map(Arc::as_ref));
+        self.make_facets(instancing, monitor);
+        let run = RunSettings { sequences: false, ..self.run_settings() };
+        let facets = (&self.facets, &self.mesh_settings);
+        // Without a pilot to choose is cheaper than to wait.
+        let needs_pilot = default_accuracy::needs_pilot(&self.job.loaded.model, &self.bound, &run, facets);
+        let cached = self.job.cache.clone().zip(undecided).filter(|_| needs_pilot);
+        let turn = match cached.as_ref().map(|(cache, undecided)| cache.choice_or_turn(undecided, monitor)) {
+            Some(Ok(chosen)) => {
+                let made = self.mesh_settings.tolerance;
+                self.take_choice(chosen, monitor);
+                if self.mesh_settings.tolerance != made {
+                    self.make_facets(instancing, monitor);
+                }
+                return;
+            }
+            Some(Err(turn)) => turn,
+            None => Turn::default(),
+        };
+        let chosen = self.choose_accuracy(run, excess, monitor);
+        if let Some((cache, undecided)) = &cached {
+            cache.keep_choice(undecided, &chosen, monitor);
+        }
+        drop(turn);
+        self.take_choice(chosen, monitor);
     }
 
     /// Makes the facets of the settings.
@@ -266,10 +214,9 @@ impl PreparedScene {
         run_fingerprint(self.scene_and_model(), &self.run_settings(), (&self.mesh_settings, &self.choice))
     }
 
-    /// Chooses the facets or the spline that a pilot finds sufficient, and keeps the choice in the cache. May put finer facets in place of
-    /// those that were made. `excess` is how many of the default tolerance were too many to be tried.
-    fn choose_accuracy(&mut self, excess: Option<f64>, monitor: &dyn Monitor) {
-        let run = RunSettings { sequences: false, ..self.run_settings() };
+    /// Chooses the facets or the spline that a pilot finds sufficient. May put finer facets in place of those that were made. `excess` is how
+    /// many of the default tolerance were too many to be tried.
+    fn choose_accuracy(&mut self, run: RunSettings, excess: Option<f64>, monitor: &dyn Monitor) -> Chosen {
         let surfaces = || self.true_surfaces();
         let facets = (&self.facets, &self.mesh_settings);
         let model = (&self.job.loaded.model, &surfaces as &dyn Fn() -> _);
@@ -279,17 +226,11 @@ impl PreparedScene {
                 "; facets of 0.05 to 0.2 mm would be some {expected:.1e}, so that coarser ones were tried"
             );
         }
-        // Named by the run before it is decided: that is what others know when they ask.
-        if let (Some(cache), Ok(undecided)) = (&self.job.cache, self.fingerprint())
-            && chosen.pilot_rays > 0
-        {
-            cache.keep_choice(&undecided, &chosen, monitor);
-        }
         if let Some(finer) = finer {
             self.facets = finer.facets;
             self.tessellation_seconds += finer.seconds;
         }
-        self.take_choice(chosen, monitor);
+        chosen
     }
 
     /// The models of the groups; of a scene in one piece the whole one.

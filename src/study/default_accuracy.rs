@@ -215,6 +215,11 @@ fn alternative(
 }
 
 impl Undecided<'_> {
+    /// Whether it takes a pilot to choose.
+    pub fn needs_pilot(&self) -> bool {
+        self.without_pilot().is_none()
+    }
+
     /// Chooses facets or spline by what is known without tracing, as for flat faces, ready meshes alone and short runs; `None` where a pilot is
     /// needed.
     fn without_pilot(&self) -> Option<Chosen> {

@@ -2,8 +2,8 @@
 
 use lampyris::model::Model;
 use lampyris::pipeline::{
-    ErrorTarget, IntersectorKind, LoadedModel, MeshingSettings, Monitor, PreparedScene, RayRange, SceneJob, Silent,
-    Stage, TraceRequest, TracingSettings, read_scene,
+    Cache, ErrorTarget, IntersectorKind, LoadedModel, MeshingSettings, Monitor, PreparedScene, RayRange, SceneJob,
+    Silent, Stage, TraceRequest, TracingSettings, read_scene,
 };
 use lampyris::regulation::Verdict;
 use lampyris::simulate::Scene;
@@ -135,4 +135,49 @@ fn parts_of_other_scenes_and_models_are_told_apart_without_text() {
     let [first, second] = [&in_memory, &moved].map(|model| of(&without_text, model));
     assert_ne!(first, second);
     assert_eq!(first, of(&without_text, &in_memory));
+}
+
+/// Four processes that start at once on an empty cache trace one pilot: the seconds that it took are the same for all, to the bit.
+#[test]
+fn who_starts_at_once_waits_for_one_pilot() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes/s1_lens.toml");
+    let (scene, loaded) = read_scene(&scene, &Silent).unwrap();
+    let tracing = TracingSettings {
+        ray_range: Some(RayRange { first: None, end: 40_000 }),
+        threads: Some(1),
+        ..TracingSettings::default()
+    };
+    let cache = Some(Cache::new(folder.path().join("kept")));
+    let job = SceneJob { tracing, cache, ..SceneJob::new(scene, loaded) };
+    let prepare = || PreparedScene::new(job.clone(), &Silent).unwrap().chosen.unwrap();
+    let chosen: Vec<_> = std::thread::scope(|scope| {
+        let started: Vec<_> = (0..4).map(|_| scope.spawn(prepare)).collect();
+        started.into_iter().map(|thread| thread.join().unwrap()).collect()
+    });
+    assert!(chosen[0].pilot_rays > 0 && chosen.iter().all(|c| c == &chosen[0]), "{chosen:?}");
+    // Nothing is left but the entries.
+    let names = std::fs::read_dir(folder.path().join("kept")).unwrap().map(|e| e.unwrap().file_name());
+    assert!(names.into_iter().all(|name| !name.to_str().unwrap().ends_with(".part")));
+}
+
+/// A lens of kilometres, of which facets of the default tolerance are too many to be tried: its choice is kept under the name by which the next run
+/// asks.
+#[test]
+fn a_choice_on_coarser_facets_is_found_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/lens_planoconvex_nurbs.stp");
+    let text = format!(
+        "[run]\nrays = 40_000\n[[model]]\nfile = {model:?}\nunit_mm = 30_000\n[[medium]]\nname = 'glass'\nindex = 1.5\n\
+         [[material]]\npart = '*'\nmedium = 'glass'\n[[source]]\nkind = 'collimated'\nat = [0, 0, -3e5]\n\
+         direction = [0, 0, 1]\nradius = 3e5\npower = 1\n[[receiver]]\nname = 'wall'\nkind = 'plane'\nat = [0, 0, 2e6]\n\
+         normal = [0, 0, 1]\nsize = [1e6, 1e6]\ncells = [2, 2]\n"
+    );
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    let (scene, loaded) = read_scene(&folder.path().join("scene.toml"), &Silent).unwrap();
+    let cache = Some(Cache::new(folder.path().join("kept")));
+    let job = SceneJob { cache, ..SceneJob::new(scene, loaded) };
+    let [first, second] = [(); 2].map(|()| PreparedScene::new(job.clone(), &Silent).unwrap().chosen.unwrap());
+    assert!(first.because.contains("coarser ones were tried"), "{}", first.because);
+    assert_eq!(first, second, "with the seconds of the pilot");
 }
