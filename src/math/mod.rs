@@ -6,6 +6,7 @@
 mod aabb;
 mod box_tree;
 mod frame;
+mod maximum;
 pub(crate) mod polygon;
 pub(crate) mod quadrature;
 mod ray;
@@ -16,6 +17,7 @@ pub mod units;
 pub use aabb::Aabb;
 pub use box_tree::{BoxTree, BoxWalk};
 pub use frame::Frame;
+pub(crate) use maximum::error_of_maximum;
 pub use ray::{Departure, Ray, Triangle};
 pub use roots::{quadratic_roots, safe_newton};
 

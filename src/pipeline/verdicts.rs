@@ -2,7 +2,7 @@
 
 use super::prepared_scene::PreparedScene;
 use super::scene_results::SceneResults;
-use crate::regulation::{Assessment, Assumptions, IntensityMap, Regulation, Traffic, assess};
+use crate::regulation::{Assessment, Assumptions, IntensityMap, RaySample, Regulation, Traffic, assess};
 use crate::simulate::scene::RegulationUse;
 use crate::simulate::{ReceiverResult, Results};
 use crate::study::figures::cell_errors;
@@ -17,14 +17,14 @@ pub struct ReceiverVerdict {
 }
 
 /// Makes the map of intensities, cd, of a far field over H and V, with both errors as they are printed; geometric ones are zero for `None`.
-/// `ray_flux` is the mean power of a ray, lm.
+/// `rays` are those of the run.
 ///
 /// # Errors
 /// When `geometric` has not an error for every cell.
 fn intensities(
     receiver: &ReceiverResult,
     geometric: Option<&[f64]>,
-    ray_flux: f64,
+    rays: RaySample,
 ) -> Result<IntensityMap, String> {
     let edges = |k: usize| -> Vec<f64> {
         let step = 2.0 * receiver.half[k] / receiver.grid[k] as f64;
@@ -36,8 +36,7 @@ fn intensities(
         .collect();
     // A map that was not compared cell by cell cannot be judged with both errors.
     let cells = cells.ok_or("its cells have no errors from the facets")?;
-    // Where faint rays alone arrived their spread tells nothing of those that carry all.
-    Ok(IntensityMap::new(edges(0), edges(1), cells)?.with_ray_flux(ray_flux))
+    Ok(IntensityMap::new(edges(0), edges(1), cells)?.with_rays(rays))
 }
 
 /// Judges a run's results by one regulation; `geometric` returns the errors of a receiver's cells from the facets.
@@ -53,8 +52,8 @@ pub(super) fn verdict(
     let regulation = Regulation::find(&wanted.id)?;
     let receiver = wanted.receiver_index(&prepared.job.scene).ok_or("the scene has no such far field")?;
     let errors = geometric(receiver);
-    let ray_flux = results.power.emitted / results.rays.max(1) as f64;
-    let map = intensities(&results.receivers[receiver], errors.as_deref(), ray_flux)?;
+    let rays = RaySample { heaviest_flux: results.heaviest_ray, replicates: results.replicates };
+    let map = intensities(&results.receivers[receiver], errors.as_deref(), rays)?;
     let assumptions = Assumptions {
         traffic: if wanted.left_hand { Traffic::Left } else { Traffic::Right },
         as_placed: wanted.as_placed,

@@ -1,12 +1,14 @@
 //! When a reading is enough for a verdict, and what would make it so.
 
+use super::few_rays::Noise;
 use super::map::Reading;
 use super::requirement::{Comparison, Photometer, Requirement};
+use crate::math::error_of_maximum;
 
 /// What a row, or a lamp, comes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Met, by more than three combined standard errors.
+    /// Met, by more than three combined standard errors; of few rays, by as much as their number may be off at the same confidence.
     Pass,
     /// Not met, by more than three combined standard errors.
     Fail,
@@ -68,7 +70,9 @@ pub(super) struct Judgement {
     pub(super) unseen: usize,
 }
 
-/// The reading that decides: the worst of those that must all hold, the best of those of which one is enough.
+/// The reading that decides: the worst of those that must all hold, or the least sure where one is in doubt, the best of those of which one is
+/// enough.
+#[derive(Clone, Copy)]
 pub(super) struct Decisive {
     pub(super) reading: Reading,
     pub(super) direction: [f64; 2],
@@ -76,29 +80,44 @@ pub(super) struct Decisive {
     margin: f64,
     /// Standard errors that the margin must have.
     sigmas: f64,
+    noise: Noise,
 }
+
+/// Doublings of the rays by which the search for enough of them is refined: to 0.1 %.
+const HALVINGS: usize = 16;
 
 impl Decisive {
     /// Returns with how many rays in all, never fewer than `traced`, and on facets of which tolerance this margin would be enough.
     ///
-    /// `tolerance_mm` is the run's own, `None` where it traced no facets; the answer's is `None` where facets need not be finer. `None` where
-    /// 10¹⁵ rays or more would be needed.
+    /// `tolerance_mm` is the run's own, `None` where it traced no facets; the answer's is `None` where facets need not be finer. `None`
+    /// where 10¹⁵ rays or more would be needed.
     pub(super) fn what_settles(&self, traced: u64, tolerance_mm: Option<f64>) -> Option<Settles> {
         /// Runs beyond this are no advice.
         const MOST_RAYS: f64 = 1e15;
+        const MOST_DOUBLINGS: f64 = 50.0;
         // At most so large may the whole error be.
         let wanted = self.margin.abs() / self.sigmas;
         // On its very limit a reading stays unsure with any error.
         if wanted == 0.0 {
             return None;
         }
-        let Reading { statistical, geometric, .. } = self.reading;
+        let geometric = self.reading.geometric;
         // Where the facets leave no room, both errors get half of the square.
         let finer = geometric > 0.5f64.sqrt() * wanted;
         // Otherwise the geometric error stays as it is, and the statistical one gets what it leaves of the square.
         let room = if finer { wanted * 0.5f64.sqrt() } else { (wanted * wanted - geometric * geometric).sqrt() };
-        // Statistical errors fall with the root of the rays; fewer rays than traced are no advice.
-        let rays = (traced as f64 * (statistical / room).powi(2)).max(traced as f64).ceil();
+        // What few rays leave open falls faster than the root of their number: looked for, not worked out. Fewer than traced are no advice.
+        let enough = |doublings: f64| self.noise.reach(self.sigmas, doublings.exp2()) <= self.sigmas * room;
+        let [mut too_few, mut doublings] = [0.0, if enough(0.0) { 0.0 } else { MOST_DOUBLINGS }];
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (too_few + doublings);
+            if enough(middle) {
+                doublings = middle;
+            } else {
+                too_few = middle;
+            }
+        }
+        let rays = (traced as f64 * doublings.exp2()).ceil();
         let tolerance_mm = tolerance_mm.filter(|_| finer).map(|t| t * room / geometric);
         (rays.is_finite() && rays < MOST_RAYS).then_some(Settles { rays: rays as u64, tolerance_mm })
     }
@@ -125,18 +144,40 @@ impl Judgement {
         let mut passing = 0;
         let mut failing = 0;
         let mut decisive: Option<Decisive> = None;
+        let mut doubtful: Option<(f64, Decisive)> = None;
+        let mut read = Vec::with_capacity(requirement.comparisons.len());
         for comparison in &requirement.comparisons {
-            let (reading, margin) = read_margin(photometer, comparison);
-            let error = reading.error();
+            let (mut reading, margin) = read_margin(photometer, comparison);
+            let sigmas = if margin >= 0.0 { to_pass } else { to_fail };
+            // The truth would be on the other side of the limit: more light than was read below it, less above.
+            let sign = if reading.value < comparison.limit { 1.0 } else { -1.0 };
+            let noise = photometer.map.noise(&comparison.measurement, sign, margin, sigmas);
+            let reach = noise.reach(sigmas, 1.0).hypot(sigmas * reading.geometric);
+            let enough = margin.abs() >= reach;
             // A limit that is just reached is met, where there is no error.
-            passing += usize::from(margin >= to_pass * error && margin >= 0.0);
-            failing += usize::from(-margin >= to_fail * error && margin < 0.0);
+            passing += usize::from(enough && margin >= 0.0);
+            failing += usize::from(enough && margin < 0.0);
+            // Of less than a ray the spread is none.
+            reading.statistical = reading.statistical.max(noise.ray_cd.min(noise.reach(1.0, 1.0)));
+            read.push([reading.value, reading.statistical]);
             // The best of those of which any is enough, the worst of those that must all hold.
             let decides = |d: &Decisive| (margin > d.margin) == requirement.any && margin != d.margin;
+            let this = Decisive { reading, direction: comparison.direction, margin, sigmas, noise };
             if decisive.as_ref().is_none_or(decides) {
-                let sigmas = if margin >= 0.0 { to_pass } else { to_fail };
-                decisive = Some(Decisive { reading, direction: comparison.direction, margin, sigmas });
+                decisive = Some(this);
             }
+            // Where all must hold, the least sure of those in doubt is what the row waits for.
+            let share = margin / reach;
+            if !requirement.any && !enough && doubtful.as_ref().is_none_or(|(least, _)| share < *least) {
+                doubtful = Some((share, this));
+            }
+        }
+        // The brightest of many readings is too bright by their noise, which its own error does not hold.
+        if let Some(brightest) =
+            decisive.as_mut().filter(|_| requirement.any && requirement.comparisons.iter().all(|c| c.at_least))
+        {
+            let [values, errors] = [0, 1].map(|k| read.iter().map(|r| r[k]).collect::<Vec<_>>());
+            brightest.reading.statistical = error_of_maximum(&values, &errors);
         }
         let all = requirement.comparisons.len();
         // A direction outside the far field may hide anything: only what one reading alone decides is still known.
@@ -147,7 +188,8 @@ impl Judgement {
             ((failing > 0).then_some(Verdict::Fail), (passing == all && complete).then_some(Verdict::Pass))
         };
         let verdict = alone.or(together).unwrap_or(Verdict::Unsure);
-        Self { verdict, decisive, unseen: requirement.unseen }
+        let in_doubt = doubtful.filter(|_| verdict == Verdict::Unsure).map(|(_, in_doubt)| in_doubt);
+        Self { verdict, decisive: in_doubt.or(decisive), unseen: requirement.unseen }
     }
 }
 
@@ -167,11 +209,29 @@ mod tests {
     fn nothing_settles_a_reading_on_its_very_limit() {
         let on_limit = |statistical: f64, geometric: f64| {
             let reading = Reading { value: 1.0, statistical, geometric };
-            Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0 }.what_settles(1000, Some(0.1))
+            let noise =
+                Noise { ray_cd: 0.0, hidden: 0.0, counted: 0.0, other: statistical * statistical, replicates: 128 };
+            Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0, noise }
+                .what_settles(1000, Some(0.1))
         };
         // Without a statistical error, zero by zero must not become the rays already traced and facets of 0 mm.
         for (statistical, geometric) in [(0.0, 0.1), (0.1, 0.0), (0.1, 0.1)] {
             assert_eq!(on_limit(statistical, geometric), None);
         }
+    }
+
+    /// Errors fall with the root of the rays, what may hide in darkness with their number.
+    #[test]
+    fn what_settles_follows_from_what_few_rays_leave_open() {
+        let rays = |noise: Noise| {
+            let reading = Reading { value: 1.0, statistical: 1.0, geometric: 0.0 };
+            Decisive { reading, direction: [0.0, 0.0], margin: 1.0, sigmas: 3.0, noise }
+                .what_settles(1000, None)
+                .map(|settles| settles.rays as f64 / 1000.0)
+        };
+        let spread = Noise { ray_cd: 0.0, hidden: 0.0, counted: 4.0, other: 0.0, replicates: 128 };
+        assert!((rays(spread).unwrap() / 36.0 - 1.0).abs() < 2e-3);
+        let dark = Noise { ray_cd: 4.0, counted: 0.0, ..spread };
+        assert!((rays(dark).unwrap() / 27.0 - 1.0).abs() < 0.01, "{:?}", rays(dark));
     }
 }

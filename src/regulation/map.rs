@@ -1,5 +1,6 @@
 //! A far field as a photometer reads it: intensities over azimuth and elevation with the errors of every cell.
 
+use super::few_rays::{LandedRays, MANY_REPLICATES, Noise, RaySample};
 use std::collections::BTreeMap;
 
 /// Cosine of the elevation that an opening's width is divided by at least: at the poles, where it would be endless, it is wider than
@@ -14,6 +15,8 @@ pub struct IntensityMap {
     v_edges: Vec<f64>,
     /// Row after row, V slow: candela, its statistical and its geometric standard error.
     cells: Vec<[f64; 3]>,
+    /// What is known of the rays that made them.
+    landed: Option<LandedRays>,
 }
 
 /// A value with both its errors, candela.
@@ -88,20 +91,24 @@ impl IntensityMap {
         if cells.iter().flatten().any(|x| !x.is_finite()) {
             return Err("an intensity or an error is no finite number".into());
         }
-        Ok(Self { h_edges, v_edges, cells })
+        Ok(Self { h_edges, v_edges, cells, landed: None })
     }
 
-    /// Raises the statistical error of each cell to at least what one ray of this flux, lm, makes there: a cell that no ray met may hold as
-    /// much.
-    pub fn with_ray_flux(mut self, flux: f64) -> Self {
-        let width: Vec<f64> = self.h_edges.windows(2).map(|e| (e[1] - e[0]).to_radians()).collect();
-        let height = |row: usize| self.v_edges[row + 1].to_radians().sin() - self.v_edges[row].to_radians().sin();
-        let columns = width.len();
-        // The flux of a ray spread over the cell's solid angle.
-        for (index, cell) in self.cells.iter_mut().enumerate() {
-            cell[1] = cell[1].max(flux / (width[index % columns] * height(index / columns)));
-        }
+    /// Adds what is known of the rays that made the map: a reading of few of them is then judged by what may not have come. Errors of cells
+    /// without light are not read.
+    pub fn with_rays(mut self, sample: RaySample) -> Self {
+        let cells =
+            self.cells.iter().enumerate().map(|(k, [value, error, _])| [*value, *error, self.solid_angle(k)]);
+        self.landed = Some(LandedRays::new(sample, self.h_edges.len() - 1, cells));
         self
+    }
+
+    /// Solid angle of a cell, sr.
+    fn solid_angle(&self, cell: usize) -> f64 {
+        let columns = self.h_edges.len() - 1;
+        let (row, column) = (cell / columns, cell % columns);
+        let width = (self.h_edges[column + 1] - self.h_edges[column]).to_radians();
+        width * (self.v_edges[row + 1].to_radians().sin() - self.v_edges[row].to_radians().sin())
     }
 
     /// The largest side of a cell, degrees.
@@ -120,7 +127,12 @@ impl IntensityMap {
         let columns = self.h_edges.len() - 1;
         let cells = self.cells.chunks(columns).flat_map(|row| row.iter().rev().copied()).collect();
         // Edges turn their order with their sign: they must rise again.
-        Self { h_edges: self.h_edges.iter().rev().map(|h| -h).collect(), v_edges: self.v_edges.clone(), cells }
+        let h_edges = self.h_edges.iter().rev().map(|h| -h).collect();
+        let map = Self { h_edges, v_edges: self.v_edges.clone(), cells, landed: None };
+        match &self.landed {
+            Some(landed) => map.with_rays(landed.sample),
+            None => map,
+        }
     }
 
     /// What a photometer aimed at `(h, v)`, degrees of the map, adds up: the mean over its opening, weighed by solid angle. `None` where
@@ -164,10 +176,44 @@ impl IntensityMap {
         for (cell, weight) in &measurement.weights {
             let [i, s, g] = self.cells[*cell];
             value += weight * i;
-            variance += (weight * s).powi(2);
+            variance += (weight * self.spread(i, s)).powi(2);
             geometric += (weight * g).abs();
         }
         Reading { value, statistical: variance.sqrt(), geometric }
+    }
+
+    /// The error of a cell as far as rays made it: none of a dark one, whose stated error is what one ray would make.
+    fn spread(&self, value: f64, error: f64) -> f64 {
+        if self.landed.is_some() && value <= 0.0 { 0.0 } else { error }
+    }
+
+    /// Returns how far the truth may lie from a reading that is `margin` cd from its limit: above it for a `sign` of 1, below for −1.
+    pub(super) fn noise(&self, measurement: &Measurement, sign: f64, margin: f64, sigmas: f64) -> Noise {
+        let replicates = self.landed.as_ref().map_or(u32::MAX, |landed| landed.sample.replicates);
+        let mut light = 0.0;
+        let mut noise = Noise { ray_cd: 0.0, hidden: 0.0, counted: 0.0, other: 0.0, replicates };
+        for (&cell, &weight) in &measurement.weights {
+            let [value, error, _] = self.cells[cell];
+            let variance = (weight * self.spread(value, error)).powi(2);
+            match &self.landed {
+                // More rays here bring the reading nearer to what it might be.
+                Some(landed) if sign * weight > 0.0 => {
+                    let ray = landed.landing_ray(cell, margin, sigmas);
+                    noise.counted += variance;
+                    noise.ray_cd = noise.ray_cd.max(weight.abs() * ray.flux / self.solid_angle(cell));
+                    noise.hidden += weight.abs() * ray.hidden;
+                }
+                _ => noise.other += variance,
+            }
+            if sign * weight > 0.0 {
+                light += weight.abs() * value.max(0.0);
+            }
+        }
+        // A few replicates may agree by chance: then the count of rays says more than their spread.
+        if replicates < MANY_REPLICATES {
+            noise.counted = noise.counted.max(light * noise.ray_cd);
+        }
+        noise
     }
 }
 

@@ -1,5 +1,6 @@
 //! The far field of a run, read back from its files.
 
+use super::few_rays::RaySample;
 use super::map::IntensityMap;
 use std::collections::BTreeMap;
 
@@ -14,11 +15,11 @@ impl IntensityMap {
     /// Makes a map of the text of a far-field receiver's CSV file: columns `H_deg`, `V_deg`, an intensity in cd and its standard error, and
     /// if there is one, its geometric error, else 0; a cell a line, in any order.
     ///
-    /// `ray_flux` is the flux of one ray in lm, where it is known: a cell that no ray met may hold as much, so that no error is smaller.
+    /// `rays` are those of the run, where they are known: what few of them leave open.
     ///
     /// # Errors
     /// When a column is missing, a cell stands twice or the cells make no regular grid; the message names the line where one is at fault.
-    pub fn from_csv(text: &str, ray_flux: Option<f64>) -> Result<Self, String> {
+    pub fn from_csv(text: &str, rays: Option<RaySample>) -> Result<Self, String> {
         // Comments are allowed, as in other CSV files that the program reads.
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
         let (_, header) = lines.next().ok_or("the file is empty")?;
@@ -66,7 +67,7 @@ impl IntensityMap {
         let edges = |centres: BTreeMap<i64, f64>| edges_between(&centres.into_values().collect::<Vec<_>>());
         let (h_edges, v_edges) = (edges(columns)?, edges(rows)?);
         let map = Self::new(h_edges, v_edges, cells.into_values().collect())?;
-        Ok(ray_flux.into_iter().fold(map, Self::with_ray_flux))
+        Ok(rays.into_iter().fold(map, Self::with_rays))
     }
 }
 
@@ -96,11 +97,14 @@ mod tests {
             (cell(0.05, -0.05).value, cell(-0.05, 0.05).statistical, cell(0.05, 0.05).geometric),
             (2.0, 0.3, 0.04)
         );
-        // A ray of 1e-6 lm is 0.33 cd in a cell of (0.1°)².
-        let floor = IntensityMap::from_csv(text, Some(1e-6)).unwrap();
-        let error =
-            floor.read(&floor.measure(Sensor { half_deg: 0.04, round: false }, -0.05, -0.05).unwrap()).statistical;
-        assert!((error - 1e-6 / 0.1f64.to_radians().powi(2)).abs() < 1e-3, "{error}");
+        // A ray of 1e-6 lm is 0.33 cd in a cell of (0.1°)², of which 6.7 may not have come.
+        let dark = text.replace("-0.05,-0.05,1,0.1", "-0.05,-0.05,0,0.4");
+        let rays = RaySample { heaviest_flux: 1e-6, replicates: 200 };
+        let dark = IntensityMap::from_csv(&dark, Some(rays)).unwrap();
+        let measurement = dark.measure(Sensor { half_deg: 0.04, round: false }, -0.05, -0.05).unwrap();
+        let reach = dark.noise(&measurement, 1.0, 1e-3, 3.0).reach(3.0, 1.0);
+        assert!((reach / (6.74 * 1e-6 / 0.1f64.to_radians().powi(2)) - 1.0).abs() < 1e-2, "{reach}");
+        assert_eq!(dark.read(&measurement).statistical, 0.0);
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod cross_check;
 mod document;
 mod drawing;
 mod errors;
+mod even_poles;
 mod framing;
 mod html;
 mod lamp_figures;

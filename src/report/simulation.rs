@@ -1,6 +1,7 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
 use super::cross_check::{self, verdict};
+use super::even_poles::with_even_poles;
 use super::maps::{cuts, photometric_grid, receiver_grid, spoken};
 use super::verdicts::{self, verdict_sentence};
 use super::{Block, Cell, Provenance, Report, Section, Table, View};
@@ -108,7 +109,7 @@ impl SimulationReport<'_> {
         let brightest = directions.filter_map(|(x, f)| Some((receiver_grid(x)?, f.max.as_ref()?)));
         // The largest of many cells that few rays met says nothing of the lamp.
         for (grid, max) in brightest.filter(|(_, max)| max.statistical < MOST_UNCERTAIN_PEAK * max.value) {
-            if let Some(([h, v], _)) = grid.peak() {
+            if let Some(([h, v], _)) = with_even_poles(&grid).peak() {
                 text += &format!(
                     "The brightest direction is {} {}°, {} {}° with **{}**. ",
                     grid.axes[0].label,

@@ -22,7 +22,7 @@ pub struct ReceiverResult {
     pub power_error: f64,
     /// Cells along both sides.
     pub grid: [usize; 2],
-    /// Largest cell, in `unit`.
+    /// Largest cell, in `unit`; of planes C all around with each ring of cells at a pole at its mean.
     pub max: f64,
     /// Smallest cell, in `unit`.
     pub min: f64,
@@ -176,13 +176,13 @@ impl ReceiverResult {
             [0, 1].map(|k| of_rays[k].hypot(of_units[k]))
         });
         let along_axes = |errors: [[f64; 2]; 2], k: usize| [0, 1].map(|a| half[a] * errors[a][k]);
-        Self {
+        let mut result = Self {
             name: r.name.clone(),
             kind,
             power: total.total as f64 * quantum,
             power_error: total.error(tallies.replicates) * quantum,
             grid,
-            max: cells.iter().copied().fold(0.0, f64::max),
+            max: 0.0,
             min: least_on_receiver(&cells, &off),
             unit,
             centroid: [0, 1].map(|a| middle[a] + half[a] * means[a][0]),
@@ -201,7 +201,36 @@ impl ReceiverResult {
             ray_power: ray * quantum,
             ray_cells: (0..r.cell_count()).map(|k| ray * per(k)).collect(),
             off,
+        };
+        result.max = result.cells_with_even_poles()[0].iter().copied().fold(0.0, f64::max);
+        result
+    }
+
+    /// Returns the cells and their errors with each ring of cells at a pole (γ 0° and 180°) at its mean, where planes C go all around:
+    /// these are slivers of one direction, and the brightest of so many that few rays meet would be the luckiest. The error of a ring
+    /// stands at its last cell, the others, which are no rivals of it, have none.
+    pub fn cells_with_even_poles(&self) -> [Vec<f64>; 2] {
+        /// Angles nearer than this are one, degrees.
+        const SAME_ANGLE_DEG: f64 = 1e-6;
+        let mut even = [self.cells.clone(), self.errors.clone()];
+        let n = self.grid[0];
+        let is_all_around = (self.half[0] - 180.0).abs() < SAME_ANGLE_DEG && n >= 4;
+        if self.angles != Some(FarFieldType::C) || !is_all_around {
+            return even;
         }
+        let ends = [self.middle[1] - self.half[1], self.middle[1] + self.half[1]];
+        for (end, pole, row) in [(ends[0], 0.0, 0), (ends[1], 180.0, self.grid[1] - 1)] {
+            if (end - pole).abs() < SAME_ANGLE_DEG {
+                let ring = row * n..(row + 1) * n;
+                let mean = even[0][ring.clone()].iter().sum::<f64>() / n as f64;
+                even[0][ring.clone()].fill(mean);
+                // Cells of a ring count different rays.
+                let squares: f64 = even[1][ring.clone()].iter().map(|e| e * e).sum();
+                even[1][ring.clone()].fill(0.0);
+                even[1][ring.end - 1] = squares.sqrt() / n as f64;
+            }
+        }
+        even
     }
 
     /// The channel of lumens, of a receiver that counts them beside watts.

@@ -27,6 +27,10 @@ const MILLION: f64 = 1e6;
 pub struct Results {
     /// Rays that left the sources.
     pub rays: u64,
+    /// Replicates of the run, whose spread the statistical errors are.
+    pub replicates: u32,
+    /// Power of a ray, as it leaves, of the source whose rays carry most.
+    pub heaviest_ray: f64,
     /// Seconds of each stage; whoever read and built the scene fills in those but `trace`.
     pub seconds: Seconds,
     /// Nearest-hit queries of all rays.
@@ -179,6 +183,8 @@ impl Results {
         let digest = digest(&tallies);
         Self {
             rays,
+            replicates: tallies.replicates,
+            heaviest_ray: plan.heaviest_ray() * quantum,
             seconds: Seconds { trace, ..Seconds::default() },
             segments,
             mrays_per_s: rays as f64 / trace / MILLION,

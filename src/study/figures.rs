@@ -4,6 +4,7 @@
 //! the limit of 95 % of what may be there (the rule of three: of n rays none arrives with probability e⁻³ where 3/n of them should).
 
 use super::geometric_error::{GeometricError, Paired, ReceiverError};
+use crate::math::error_of_maximum;
 use crate::simulate::{ChannelResult, ReceiverResult, Results};
 use serde::Serialize;
 
@@ -226,7 +227,8 @@ impl<'a> Errors<'a> {
             };
         }
         // The brightest place was measured over squares of cells: what facets change of it is taken as a share.
-        let brightest = (0..r.cells.len()).max_by(|&a, &b| r.cells[a].total_cmp(&r.cells[b]));
+        let [cells, errors] = r.cells_with_even_poles();
+        let brightest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b]));
         let max = self.geometric(self.lost_share * r.max, |m| {
             let square = if m.peak.facets > 0.0 { r.max / m.peak.facets } else { 1.0 } * m.peak.geometric();
             // The run may have its brightest cell elsewhere than the few rays that compared had theirs, where facets change nothing.
@@ -244,7 +246,7 @@ impl<'a> Errors<'a> {
         let largest = if is_dark {
             r.ray_cells.iter().copied().fold(0.0, f64::max)
         } else {
-            error_of_maximum(&r.cells, &r.errors)
+            error_of_maximum(&cells, &errors)
         };
         ReceiverFigures {
             power,
@@ -267,69 +269,5 @@ impl<'a> Errors<'a> {
             ChannelFigure { name: c.name.clone(), figure: Figure::new(c.total, unit, statistical, geometric) }
         };
         r.channels.iter().enumerate().map(of_channel).collect()
-    }
-}
-
-/// Steps of the integral over possible maxima: its ends are 12 standard errors apart, and a tenth of one is near enough.
-const STEPS: usize = 128;
-/// Standard errors beyond which a cell is taken as never to be the largest.
-const REACH: f64 = 6.0;
-
-/// Returns the standard error of the largest of many cells: its own, and what the largest of noisy cells exceeds the largest true one by. 0
-/// without cells.
-///
-/// The excess is that of the largest cell after the noise is added once more (Efron, *Bootstrap Methods*, 1979), by the integral of the
-/// distribution of a maximum of independent normal values.
-pub(crate) fn error_of_maximum(cells: &[f64], errors: &[f64]) -> f64 {
-    let Some(largest) = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b])) else { return 0.0 };
-    let Some(&own) = errors.get(largest) else { return 0.0 };
-    // Below this the maximum nearly certainly does not lie.
-    let low = cells[largest] - REACH * own;
-    let rivals: Vec<[f64; 2]> = (cells.iter().zip(errors))
-        .filter(|(v, e)| **e > 0.0 && **v + REACH * **e > cells[largest])
-        .map(|(v, e)| [*v, *e])
-        .collect();
-    let high = rivals.iter().map(|[v, e]| v + REACH * e).fold(cells[largest], f64::max);
-    if high <= low {
-        return own;
-    }
-    let step = (high - low) / STEPS as f64;
-    let exceeded = (0..STEPS).map(|k| {
-        // The mean of a maximum is what its distribution function lacks to 1, integrated.
-        let x = low + (k as f64 + 0.5) * step;
-        let below: f64 = rivals.iter().map(|[v, e]| normal((x - v) / e)).product();
-        (1.0 - below) * step
-    });
-    let expected = low + exceeded.sum::<f64>();
-    own.hypot((expected - cells[largest]).max(0.0))
-}
-
-/// Returns the distribution function of the standard normal distribution, within 1e-5 (Abramowitz and Stegun, *Handbook*, 26.2.16).
-fn normal(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.33267 * x.abs());
-    let density = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
-    let beyond = density * t * (0.436_183_6 + t * (-0.120_167_6 + t * 0.937_298_0));
-    if x > 0.0 { 1.0 - beyond } else { beyond }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_normal_distribution_is_that_of_the_tables() {
-        for (x, expected) in [(0.0, 0.5), (1.0, 0.841_345), (-1.0, 0.158_655), (2.0, 0.977_250), (3.0, 0.998_650)] {
-            assert!((normal(x) - expected).abs() < 2e-5, "{x}");
-        }
-    }
-
-    /// The mean of the largest of two equal normal values is 1/√π of their standard error above each.
-    #[test]
-    fn the_largest_of_two_equal_cells_is_too_large_by_known_noise() {
-        let error = error_of_maximum(&[10.0, 10.0], &[1.0, 1.0]);
-        let excess = 1.0 / std::f64::consts::PI.sqrt();
-        assert!((error - 1f64.hypot(excess)).abs() < 2e-3, "{error}");
-        let alone = error_of_maximum(&[10.0, 1.0], &[1.0, 1.0]);
-        assert!((alone - 1.0).abs() < 2e-3, "{alone}");
     }
 }

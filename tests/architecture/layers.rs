@@ -58,7 +58,19 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     ),
     (
         "regulation",
-        &["table", "map", "read", "aim", "requirement", "judgement", "assessment", "verdict", "document", "mod"],
+        &[
+            "table",
+            "few_rays",
+            "map",
+            "read",
+            "aim",
+            "requirement",
+            "judgement",
+            "assessment",
+            "verdict",
+            "document",
+            "mod",
+        ],
     ),
     (
         "cli/commands",
@@ -204,6 +216,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "contour",
             "chart",
             "level_labels",
+            "even_poles",
             "maps",
             "provenance",
             "drawing",
@@ -233,7 +246,10 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "model",
         &["part face", "placed", "outline", "bounds", "account", "tight_box", "near_parts", "instancing", "mod"],
     ),
-    ("math", &["mod", "simd", "ray", "aabb", "box_tree", "frame", "roots", "quadrature", "polygon", "units"]),
+    (
+        "math",
+        &["mod", "simd", "ray", "aabb", "box_tree", "frame", "roots", "quadrature", "polygon", "maximum", "units"],
+    ),
     (
         "intersect",
         &[

@@ -155,6 +155,22 @@ fn bins_of_wavelengths_hold_both_their_ends() {
     }
 }
 
+/// Cells at the poles of planes C are slivers of one direction: together they are one candidate for the brightest, not many lucky ones.
+#[test]
+fn the_brightest_direction_is_no_lucky_sliver_at_a_pole() {
+    let text = "[run]\nrays = 10_000\n[[source]]\nkind = 'point'\n[[receiver]]\nname = 'far'\nkind = 'far_field'
+        angles = 'C'\nh_deg = [0, 360]\nv_deg = [0, 180]\ncells = [72, 90]\n";
+    let r = World::default().run(text, |_| ());
+    let far = &r.receivers[0];
+    let (first, rest) = far.cells.split_at(72);
+    let (between, last) = rest.split_at(rest.len() - 72);
+    let largest = |cells: &[f64]| cells.iter().copied().fold(0.0, f64::max);
+    let mean = |ring: &[f64]| ring.iter().sum::<f64>() / 72.0;
+    assert_eq!(far.max, largest(between).max(mean(first)).max(mean(last)));
+    // A sliver of 5e-5 sr has 0.04 rays: the luckiest has one.
+    assert!(largest(first).max(largest(last)) > far.max);
+}
+
 /// A bar of 1 × 1 × 10 000 mm, rays at 45° to its walls: 10 000 total reflections, nothing lost.
 #[test]
 fn a_light_guide_of_ten_thousand_reflections_loses_nothing() {

@@ -5,7 +5,7 @@ use crate::cli::output::json::json_text;
 use crate::cli::output::verdict::summary;
 use crate::cli::work::output_place::folder_of;
 use crate::cli::{completion::Completion, failure::Failure};
-use crate::regulation::{Assumptions, IntensityMap, Regulation, Traffic, assess};
+use crate::regulation::{Assumptions, IntensityMap, RaySample, Regulation, Traffic, assess};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -117,10 +117,12 @@ impl ResultsFile {
         let path = self.folder.join(csv);
         let failure = |what: String| Failure::input(format!("{}: {what}", path.display()));
         let text = std::fs::read_to_string(&path).map_err(|e| failure(format!("cannot read: {e}")))?;
-        let (rays, emitted) = (self.results["rays"].as_f64(), self.results["power"]["emitted"].as_f64());
-        // A run without rays tells no flux of one.
-        let ray_flux = rays.zip(emitted).filter(|(rays, _)| *rays > 0.0).map(|(rays, emitted)| emitted / rays);
-        IntensityMap::from_csv(&text, ray_flux).map_err(failure)
+        // Results of earlier versions do not say.
+        let heaviest = self.results["heaviest_ray"].as_f64();
+        let replicates = self.results["replicates"].as_u64().and_then(|n| u32::try_from(n).ok());
+        let rays = heaviest.zip(replicates);
+        let rays = rays.map(|(heaviest_flux, replicates)| RaySample { heaviest_flux, replicates });
+        IntensityMap::from_csv(&text, rays).map_err(failure)
     }
 
     /// Returns the looser end of the tolerance of the run's facets, mm; `None` where it traced none.

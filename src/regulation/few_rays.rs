@@ -1,0 +1,193 @@
+//! What few rays leave open of a reading: the spread of replicates tells nothing of rays that did not come.
+//!
+//! Rays that land in an opening are counts. If each adds `a` candela and they are `m`, the truth may lie as far above as the upper limit of
+//! a Poisson count of `m`, times `a`: 6.6 rays at three standard errors where none came, by root and skewness where many did. Rays of
+//! several weights count as `m = V/a²` of the heaviest weight that may land there, with `V` the variance of the reading: by that the root
+//! of `V` stays what it is, and what heavy rays might add that did not come is added.
+//!
+//! Which weight may land is read off the map. Around the opening lies a window so large that light of the heaviest rays of all, as bright
+//! there as the limit lies beside the reading, would have been met in it with the same confidence; what landed in it weighs as `a = V/P`,
+//! the ratio of variance to flux. Of the heaviest, `A`, no more than V/A of the flux can be there, which is added, for between many light
+//! ones they lower that ratio little seen. All this trusts the rays of each weight to be no denser in the opening than on the mean of the
+//! window. Where the window is dark, or larger than the map, `A` itself is taken.
+
+/// Rays of a run, as far as they decide what few of them prove.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RaySample {
+    /// Flux of a ray of the source whose rays carry most, lm.
+    pub heaviest_flux: f64,
+    /// Replicates whose spread the errors are.
+    pub replicates: u32,
+}
+
+/// From so many replicates on an error of three is as good as that of endlessly many: beyond it lie 0.16 % for 0.135 %.
+pub(super) const MANY_REPLICATES: u32 = 100;
+
+/// Returns the upper limit of the mean of a Poisson count, at the one-sided confidence of so many normal standard errors (Wilson and
+/// Hilferty, PNAS 17, 1931): of none at three 6.7, exactly −ln 0.00135 = 6.6.
+pub(super) fn upper_count(count: f64, sigmas: f64) -> f64 {
+    let next = count + 1.0;
+    next * (1.0 - 1.0 / (9.0 * next) + sigmas / (3.0 * next.sqrt())).powi(3)
+}
+
+/// Returns Student's t that is exceeded as seldom as so many normal standard errors, for the spread of so many replicates (Wallace, Ann.
+/// Math. Stat. 30, 1959, turned round): 4.1 for 3 of ten, never too small.
+pub(super) fn student(sigmas: f64, replicates: u32) -> f64 {
+    if replicates >= MANY_REPLICATES {
+        return sigmas;
+    }
+    let freedom = f64::from(replicates.max(2) - 1);
+    let z = sigmas * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
+    // So large for one degree of freedom that it must not become endless.
+    (freedom * (z * z / freedom).min(100.0).exp_m1()).sqrt()
+}
+
+/// What may land in a cell and is not seen there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LandingRay {
+    /// Flux of a ray, lm.
+    pub(super) flux: f64,
+    /// Intensity by heavier rays, cd.
+    pub(super) hidden: f64,
+}
+
+/// How far the truth may lie from a reading towards its limit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Noise {
+    /// What the heaviest ray that may land adds to the reading, cd; 0 where the truth lies towards fewer rays, or nothing is known of them.
+    pub(super) ray_cd: f64,
+    /// What heavier rays may add, cd, so few that they are not told from the others.
+    pub(super) hidden: f64,
+    /// Variance of what more rays would bring nearer to the limit, cd².
+    pub(super) counted: f64,
+    /// Variance of the rest, cd².
+    pub(super) other: f64,
+    /// Replicates whose spread these are.
+    pub(super) replicates: u32,
+}
+
+impl Noise {
+    /// Returns the distance, cd, that the truth keeps below at the one-sided confidence of so many standard errors, after `growth` times
+    /// the rays.
+    pub(super) fn reach(&self, sigmas: f64, growth: f64) -> f64 {
+        let t = student(sigmas, self.replicates);
+        let [counted, other] = [self.counted, self.other].map(|variance| (variance / growth).sqrt());
+        let mut reach = t * counted;
+        if self.ray_cd > 0.0 {
+            let ray = self.ray_cd / growth;
+            let count = (counted / ray).powi(2);
+            // The spread's own doubt comes on top of that of the count.
+            reach = ray * (upper_count(count, sigmas) - count) + self.hidden / growth + (t - sigmas) * counted;
+        }
+        reach.hypot(t * other)
+    }
+}
+
+/// The flux of the cells of a map and its variance, summed over rows and columns so that those of any box of cells take four look-ups.
+#[derive(Clone, Debug)]
+pub(super) struct LandedRays {
+    pub(super) sample: RaySample,
+    columns: usize,
+    rows: usize,
+    /// Flux, lm, its variance, lm², and solid angle, sr, of the cells before a row and a column; a row and a column more than cells.
+    sums: Vec<[f64; 3]>,
+}
+
+impl LandedRays {
+    /// Sums up cells of intensity and error, cd, and solid angle, sr, row after row.
+    pub(super) fn new(sample: RaySample, columns: usize, cells: impl Iterator<Item = [f64; 3]>) -> Self {
+        let mut sums = vec![[0.0; 3]; columns + 1];
+        let mut row = [0.0; 3];
+        for (index, [intensity, error, angle]) in cells.enumerate() {
+            if index % columns == 0 {
+                row = [0.0; 3];
+                sums.push([0.0; 3]);
+            }
+            // A dark cell's error is stated and not spread.
+            let error = if intensity > 0.0 { error } else { 0.0 };
+            let cell = [intensity * angle, (error * angle).powi(2), angle];
+            let above = sums[sums.len() - columns - 1];
+            row = [0, 1, 2].map(|k| row[k] + cell[k]);
+            sums.push([0, 1, 2].map(|k| above[k] + row[k]));
+        }
+        let rows = sums.len() / (columns + 1) - 1;
+        Self { sample, columns, rows, sums }
+    }
+
+    /// Returns flux, variance and solid angle of the cells of a box, ends excluded.
+    fn of_box(&self, [left, right]: [usize; 2], [low, high]: [usize; 2]) -> [f64; 3] {
+        let at = |row: usize, column: usize| self.sums[row * (self.columns + 1) + column];
+        let corners = [at(high, right), at(low, right), at(high, left), at(low, left)];
+        [0, 1, 2].map(|k| corners[0][k] - corners[1][k] - corners[2][k] + corners[3][k])
+    }
+
+    /// Returns the heaviest rays that may land in a cell beside a reading that is `margin` cd from its limit.
+    pub(super) fn landing_ray(&self, cell: usize, margin: f64, sigmas: f64) -> LandingRay {
+        let heaviest = self.sample.heaviest_flux;
+        let unknown = LandingRay { flux: heaviest, hidden: 0.0 };
+        // Light of the heaviest rays, as bright as the margin, brings so many to the window that none is met as seldom as asked for.
+        let wanted = upper_count(0.0, sigmas) * heaviest / margin.abs();
+        let (row, column) = (cell / self.columns, cell % self.columns);
+        let whole = self.columns.max(self.rows);
+        let mut reach = 1;
+        loop {
+            let across = [column.saturating_sub(reach), (column + reach + 1).min(self.columns)];
+            let along = [row.saturating_sub(reach), (row + reach + 1).min(self.rows)];
+            let [flux, variance, angle] = self.of_box(across, along);
+            if angle >= wanted {
+                // Differences of long sums: what is left of nothing is not to be divided by.
+                if flux <= heaviest * 1e-9 || variance <= 0.0 {
+                    return unknown;
+                }
+                let landed = (variance / flux).min(heaviest);
+                return LandingRay {
+                    flux: landed,
+                    hidden: variance / (heaviest * angle) * (1.0 - landed / heaviest),
+                };
+            }
+            if reach >= whole {
+                return unknown;
+            }
+            reach += reach.div_ceil(4);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_of_counts_are_those_of_the_tables() {
+        // Exact upper limits at 99.865 %: −ln 0.00135, and by the incomplete gamma function.
+        for (count, exact) in [(0.0, 6.608), (1.0, 8.900), (3.0, 12.68), (10.0, 23.65), (100.0, 133.8)] {
+            assert!((upper_count(count, 3.0) / exact - 1.0).abs() < 0.025, "{count}: {}", upper_count(count, 3.0));
+        }
+    }
+
+    #[test]
+    fn few_replicates_ask_for_more_errors() {
+        // Student's t at 99.865 % one-sided, from tables.
+        for (replicates, exact) in [(3, 19.21), (10, 4.09), (31, 3.27), (64, 3.119)] {
+            let found = student(3.0, replicates);
+            assert!(found >= exact * 0.999 && found < exact * 1.25, "{replicates}: {found}");
+        }
+        assert!(student(3.0, 2) > 235.0 && student(3.0, 2).is_finite());
+        assert_eq!(student(3.0, 128), 3.0);
+    }
+
+    /// A field of rays of 1 lm in each of 100 cells, and one of 50 lm in the corner.
+    #[test]
+    fn the_weight_of_rays_is_that_of_the_neighbourhood() {
+        let cells = (0..100).map(|k| if k == 99 { [50.0, 50.0, 1.0] } else { [1.0, 1.0, 1.0] });
+        let landed = LandedRays::new(RaySample { heaviest_flux: 50.0, replicates: 128 }, 10, cells);
+        assert_eq!(landed.of_box([0, 10], [0, 10]), [149.0, 2599.0, 100.0]);
+        // 6.7 rays of 50 lm at 40 cd take 8.4 cells: a window of nine holds only light ones, of which 9/50 lm may hide heavy ones.
+        let beside = landed.landing_ray(0, 100.0, 3.0);
+        assert!((beside.flux - 1.0).abs() < 1e-9 && (beside.hidden - 0.98 / 50.0).abs() < 1e-9, "{beside:?}");
+        let near = landed.landing_ray(99, 100.0, 3.0);
+        assert!(near.flux > 45.0, "{near:?}");
+        // No window is large enough to show that there is none.
+        assert_eq!(landed.landing_ray(0, 1.0, 3.0).flux, 50.0);
+    }
+}
