@@ -43,6 +43,7 @@ pub use colour_picture::colour_picture;
 pub use contour::Isoline;
 pub use cross_check::{CheckReport, verdict};
 pub use document::{Block, Report, Section};
+#[cfg(feature = "cli")]
 pub(crate) use maps::on_receiver;
 pub use maps::{photometric_grid, receiver_grid};
 pub use number::{bytes, figures, grouped, seconds};

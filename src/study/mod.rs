@@ -38,7 +38,7 @@ mod timing;
 mod tolerance_plan;
 mod worst_figure;
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "report")]
 pub(crate) use hit_errors::slope;
 pub use mesh_source::{FacetTree, MeasuredMesh, MeshSource};
 pub use model_mesh_source::ModelMeshSource;
