@@ -6,6 +6,7 @@ use super::face::{self, FaceInput, Unmeshed};
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::fallback;
+use super::further_rounds::FurtherRounds;
 use super::limits;
 use super::nodes::Position;
 use super::placed_part::PlacedPart;
@@ -96,6 +97,7 @@ fn mesh_part(
     // What edges and faces come to by themselves is kept from round to round: few edges change.
     let mut own: Vec<OwnDivision> = Vec::new();
     let mut before: Option<PreviousRound> = None;
+    let mut rounds = FurtherRounds::new(faces.len(), settings);
     let mut round = 0;
     let (divisions, shared, mut meshes) = loop {
         let (divisions, shared) = edges::divide(part, &known, &sides, (&denser, &further), &mut own);
@@ -103,31 +105,36 @@ fn mesh_part(
             let (surface, taken) = (surface.as_ref()?, &NO_CHORDS);
             mesh_face(&FaceInput { part, face, surface, divisions: &divisions, shared: &shared, settings, taken })
         };
+        let mut is_kept = vec![false; faces.len()];
         let meshes: Vec<Option<FaceMesh>> = match before.take() {
             None => faces.par_iter().map(mesh).collect(),
             Some(before) => {
                 // Few edges change: faces whose own did not are as they were, but for the numbers of their corners.
                 let renumbering = Renumbering::new(part, (&before.divisions, before.shared), &divisions);
-                let again = |((face, _), old): (&(&Face, Option<FaceSurface<'_>>), &Option<FaceMesh>)| {
-                    old.is_none()
-                        || face.loops.iter().flat_map(|l| &l.uses).any(|u| renumbering.has_changed(u.edge))
+                let stays = |((face, _), old): (&(&Face, Option<FaceSurface<'_>>), &Option<FaceMesh>)| {
+                    old.is_some()
+                        && !face.loops.iter().flat_map(|l| &l.uses).any(|u| renumbering.has_changed(u.edge))
                 };
-                let dirty: Vec<bool> = faces.iter().zip(&before.meshes).map(again).collect();
-                let all = faces.par_iter().zip(before.meshes).zip(dirty);
-                let renew = |((face, old), dirty)| {
-                    if dirty { mesh(face) } else { Option::map(old, |m| renumbering.renumbered(m)) }
+                is_kept = faces.iter().zip(&before.meshes).map(stays).collect();
+                let all = faces.par_iter().zip(before.meshes).zip(&is_kept);
+                let renew = |((face, old), is_kept): (_, &bool)| {
+                    if *is_kept { Option::map(old, |m| renumbering.renumbered(m)) } else { mesh(face) }
                 };
                 all.map(renew).collect()
             }
         };
+        rounds.count(&meshes, |k| !is_kept[k]);
+        let settled = rounds.settled_edges(faces.iter().map(|(face, _)| *face));
         // A last round that asks for more is taken as it is; what does not hold is counted.
-        let coarse = coarse_edges(&faces, &meshes, &divisions, round);
+        let mut coarse = coarse_edges(&faces, &meshes, &divisions, round);
+        coarse.retain(|e| !settled.contains(e));
         if round < MAX_ROUNDS_OF_REPAIRED && !coarse.is_empty() {
             round += 1;
             coarse.into_iter().for_each(|e| denser[e] = round);
         } else {
             // Where shorter chords still cross, as between arcs that touch, each gets the other's corners.
-            let facing: Vec<(EdgeId, f64)> = meshes.iter().flatten().flat_map(|m| m.facing.clone()).collect();
+            let mut facing: Vec<(EdgeId, f64)> = meshes.iter().flatten().flat_map(|m| m.facing.clone()).collect();
+            facing.retain(|(edge, _)| !settled.contains(&(edge.0 as usize)));
             if facing.is_empty() || round == MAX_ROUNDS_OF_CROSSING {
                 break (divisions, shared, meshes);
             }
@@ -140,20 +147,30 @@ fn mesh_part(
     // diagonal that is taken.
     let mut taken: Vec<TakenChords> = vec![TakenChords::default(); faces.len()];
     for _ in 0..MAX_ROUNDS {
-        for (k, chords) in doubled_chords(part, &meshes, &taken) {
+        let doubled = doubled_chords(part, &meshes, &taken);
+        for (k, chords) in doubled.into_iter().filter(|(k, _)| !rounds.are_over(*k)) {
             taken[k].extend(chords);
             let (face, Some(surface)) = &faces[k] else { continue };
             let (divisions, shared, taken) = (&divisions[..], &shared[..], &taken[k]);
             meshes[k] = mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken });
         }
     }
+    let causes = exceeded_limits(&faces, too_large);
+    with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken })
+}
+
+/// Returns, by their places, the faces that exceeded a limit: those that were too large to begin, with the cells that `too_large` gives, and
+/// those whose proofs took too many steps.
+fn exceeded_limits(
+    faces: &[(&Face, Option<FaceSurface<'_>>)],
+    too_large: impl Fn(usize) -> Option<f64>,
+) -> FxHashMap<usize, FailureCause> {
     let cause = |(k, (_, surface)): (usize, &(&Face, Option<FaceSurface<'_>>))| {
         let over_steps = surface.as_ref().is_some_and(|s| s.steps.are_too_many());
         let cells = too_large(k).map(FailureCause::TooManyFacets);
         Some((k, cells.or(over_steps.then_some(FailureCause::TooManySteps))?))
     };
-    let causes = faces.iter().enumerate().filter_map(cause).collect();
-    with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken })
+    faces.iter().enumerate().filter_map(cause).collect()
 }
 
 /// Returns for each edge its sides on faces with a usable surface: only these have a say in how it is divided.

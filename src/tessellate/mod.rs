@@ -27,6 +27,7 @@ mod face;
 mod face_mesh;
 mod face_surface;
 mod fallback;
+mod further_rounds;
 mod grouped;
 mod imprint;
 mod limits;

@@ -448,6 +448,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "border_nodes",
             "emission",
             "fallback",
+            "further_rounds",
             "tessellation",
             "sample_budget",
             "repairs",

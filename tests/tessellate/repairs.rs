@@ -242,9 +242,9 @@ fn touching_arc(radius: f64, angle: f64) -> (Curve, UvCurve) {
     (Curve { degree: 2, knots: knots.clone(), points }, UvCurve { degree: 2, knots, points: flat })
 }
 
-#[test]
-fn chords_of_two_arcs_that_touch_do_not_cross() {
-    // Between circles of 66 and 65 mm that touch: near the cusp they are nearer to each other than any chord to its arc.
+/// A plane face between two arcs that touch in a corner of it, and a line; its area with chords of both that sag alike.
+fn face_between_touching_arcs() -> (Model, f64) {
+    // Circles of 66 and 65 mm: near the cusp they are nearer to each other than any chord to its arc.
     let (radii, angles) = ([66.0, 65.0], [0.5, 0.45]);
     let [(outer, outer_uv), (inner, inner_uv)] = [0, 1].map(|k| touching_arc(radii[k], angles[k]));
     let [a, b] = [outer.evaluate(1.0), inner.evaluate(1.0)];
@@ -261,10 +261,15 @@ fn chords_of_two_arcs_that_touch_do_not_cross() {
         shells: vec![Shell { faces: vec![face], ..Shell::default() }],
         ..Part::default()
     };
-    let model = Model::from_part(part);
     // The triangle of the chords of both, with the segments beyond them.
     let segment = |k: usize| 0.5 * radii[k] * radii[k] * (angles[k] - angles[k].sin());
     let expected = 0.5 * a.truncate().perp_dot(b.truncate()) + segment(0) - segment(1);
+    (Model::from_part(part), expected)
+}
+
+#[test]
+fn chords_of_two_arcs_that_touch_do_not_cross() {
+    let (model, expected) = face_between_touching_arcs();
     for tolerance in [0.2, 0.1, 0.05, 0.02] {
         let made = tessellate(&model, &measured(tolerance));
         assert_eq!(made.report.repaired, [], "{tolerance}");
@@ -272,4 +277,14 @@ fn chords_of_two_arcs_that_touch_do_not_cross() {
         // Chords of both sag alike; what is left is less than a tolerance along the line.
         assert!((made.report.area_mm2 - expected).abs() < 0.05 * expected, "{} {expected}", made.report.area_mm2);
     }
+}
+
+/// A face that has been meshed into as many facets as its work allows keeps the border that it has, and says so.
+#[test]
+fn a_face_is_not_meshed_again_beyond_its_work() {
+    let (model, _) = face_between_touching_arcs();
+    // A plane takes no proofs: its facets alone are counted, 10,000 steps each.
+    let made = tessellate(&model, &Settings { most_steps: 10_000, ..measured(0.2) });
+    assert_eq!(made.report.faces.failed, 0);
+    assert_eq!(made.report.repaired[0].how, Repair::CrossingBorder);
 }

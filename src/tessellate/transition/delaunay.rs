@@ -169,7 +169,7 @@ pub(in crate::tessellate) fn triangulate(
     let mut round = 0;
     loop {
         // Prove what is new; what was there before stands as it did.
-        let triangles = mesh.inner_triangles(by_centre.as_ref());
+        let triangles = mesh.inner_triangles(by_centre.as_ref(), &known);
         let new: Vec<[u32; 3]> =
             triangles.iter().copied().filter(|&t| !known.contains_key(&sorted_nodes(t))).collect();
         let prove =
@@ -336,13 +336,20 @@ impl Refinement<'_, '_> {
     }
 
     /// Returns the nodes of the triangles inside: by crossings of the border from outside, or by their centres within `by_centre` where
-    /// constraints are missing.
-    fn inner_triangles(&self, by_centre: Option<&BorderBands>) -> Vec<[u32; 3]> {
+    /// constraints are missing; `known` are the triangles that were found inside before.
+    fn inner_triangles(
+        &self,
+        by_centre: Option<&BorderBands>,
+        known: &FxHashMap<[u32; 3], ProvedFacet<3>>,
+    ) -> Vec<[u32; 3]> {
         type Face<'c> = FaceHandle<'c, InnerTag, Vertex, (), spade::CdtEdge<()>, ()>;
         let nodes = |f: Face<'_>| f.vertices().map(|v| v.data().node);
         if let Some(border) = by_centre {
             let uv = |n: u32| self.nodes[n].uv;
-            let is_inside = |t: &[u32; 3]| border.encloses((uv(t[0]) + uv(t[1]) + uv(t[2])) / 3.0);
+            // Most triangles are those of the round before, and a border of thousands of sides is slow to ask.
+            let is_inside = |t: &[u32; 3]| {
+                known.contains_key(&sorted_nodes(*t)) || border.encloses((uv(t[0]) + uv(t[1]) + uv(t[2])) / 3.0)
+            };
             return self.cdt.inner_faces().map(nodes).filter(is_inside).collect();
         }
         let inside = self.sides_of_border();
