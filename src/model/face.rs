@@ -238,6 +238,21 @@ impl TrimLoop {
         }
         points
     }
+
+    /// Returns the area within the loop in parameters, positive where it runs counter-clockwise.
+    pub(crate) fn signed_area(&self) -> f64 {
+        // About the first corner: far from the origin of the parameters the products would cancel.
+        let Some(corner) = self.uses.first().map(EdgeUse::start) else { return 0.0 };
+        let mut area = 0.0;
+        for (k, u) in self.uses.iter().enumerate() {
+            let along = u.uv.swept_area(corner);
+            area += if u.reversed { -along } else { along };
+            // Uses may miss one another by a little: without the steps between them a loop is not closed.
+            let next = self.uses[(k + 1) % self.uses.len()].start();
+            area += 0.5 * (u.end() - corner).perp_dot(next - corner);
+        }
+        area
+    }
 }
 
 /// One side of an edge, as a face's loop runs along it.

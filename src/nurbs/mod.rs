@@ -19,6 +19,7 @@ pub mod project;
 pub mod sanitise;
 mod surface;
 pub mod sweep;
+mod swept_area;
 
 pub use basis::{MAX_DEGREE, find_span};
 pub use curvature::FundamentalForms;

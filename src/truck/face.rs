@@ -140,7 +140,7 @@ fn spline_parts(
 /// Returns the loops closed in the parameter plane, the outer one, which comes first, counter-clockwise and the others clockwise.
 fn oriented_loops(surface: &Surface, loops: Vec<TrimLoop>) -> Result<Vec<TrimLoop>, String> {
     let mut closed = loops.into_iter().map(|l| close_loop(surface, l)).collect::<Result<Vec<_>, _>>()?;
-    let areas: Vec<f64> = closed.iter().map(signed_area).collect();
+    let areas: Vec<f64> = closed.iter().map(TrimLoop::signed_area).collect();
     // In the plane of parameters the largest loop holds the others.
     let outer = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs()));
     for (i, l) in closed.iter_mut().enumerate() {
@@ -201,12 +201,6 @@ fn move_end(u: &mut EdgeUse, start: bool, to: Uv) {
     let last = u.uv.points.len() - 1;
     let p = &mut u.uv.points[if start != u.reversed { 0 } else { last }];
     *p = ControlPoint::weighted(to, p.weight());
-}
-
-/// Returns the area in parameters, positive where the loop runs counter-clockwise.
-fn signed_area(l: &TrimLoop) -> f64 {
-    let points: Vec<Uv> = l.uses.iter().flat_map(points_of_use).collect();
-    (0..points.len()).map(|i| points[i].perp_dot(points[(i + 1) % points.len()])).sum::<f64>() * 0.5
 }
 
 /// Returns sixteen points along a use in the loop's direction, its end left out.

@@ -349,6 +349,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "project",
             "sanitise",
             "sweep",
+            "swept_area",
         ],
     ),
     (

@@ -14,3 +14,4 @@ mod paths;
 mod polish;
 mod referee;
 mod support;
+mod thin_rings;

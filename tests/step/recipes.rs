@@ -135,3 +135,39 @@ fn a_boolean_is_refused_by_name() {
     assert_eq!((import.report.faces.converted, import.report.faces.refused), (0, 1));
     assert_eq!(import.report.refusals[0].entity, "BOOLEAN_RESULT");
 }
+
+/// Edges of a full circle about #13 in `count` arcs, as a loop numbered `id`; statements from `id` on.
+fn circle_loop(id: usize, radius: f64, count: usize) -> String {
+    // The axes of #13, by hand.
+    let (x, y) = (Vector::X, Vector::new(0.0, 0.8, -0.6));
+    let mut text = format!("#{}=CIRCLE('',#13,{radius:?});\n", id + 1);
+    let (vertex, edge) = (|k: usize| id + 10 + 3 * (k % count), |k: usize| id + 12 + 3 * k);
+    for k in 0..count {
+        let (sin, cos) = (TAU * k as f64 / count as f64).sin_cos();
+        let p = Point::new(1.0, 2.0, 3.0) + radius * (cos * x + sin * y);
+        text += &format!("#{}=VERTEX_POINT('',#{});\n", vertex(k), vertex(k) + 1);
+        text += &format!("#{}=CARTESIAN_POINT('',({:?},{:?},{:?}));\n", vertex(k) + 1, p.x, p.y, p.z);
+        text += &format!("#{}=EDGE_CURVE('',#{},#{},#{},.T.);\n", edge(k), vertex(k), vertex(k + 1), id + 1);
+        text += &format!("#{}=ORIENTED_EDGE('',*,*,#{},.T.);\n", id + 100 + k, edge(k));
+    }
+    let uses: Vec<String> = (0..count).map(|k| format!("#{}", id + 100 + k)).collect();
+    text + &format!("#{id}=EDGE_LOOP('',({}));\n", uses.join(","))
+}
+
+#[test]
+fn walls_of_tubes_may_be_thinner_than_the_sag_of_their_circles_arcs() {
+    for [outer, inner] in [[1, 1], [1, 3], [3, 1]] {
+        let data = circle_loop(1000, 50.0, outer)
+            + &circle_loop(2000, 49.5, inner)
+            + "#20=PLANE('',#13);\n#21=FACE_OUTER_BOUND('',#1000,.T.);\n#22=FACE_BOUND('',#2000,.F.);\n\
+               #23=ADVANCED_FACE('',(#21,#22),#20,.T.);\n#900=EXTRUDED_FACE_SOLID('',#23,#11,20.);\n";
+        let ends = PI * (50.0 * 50.0 - 49.5 * 49.5);
+        let [area, volume] = closed_solid(&data);
+        // The measure's chords leave out 6e-6 of a disc, which is a hundred times as much of a wall of R/100; inside out nothing is left.
+        assert!(
+            (area / (2.0 * ends + 20.0 * TAU * 99.5) - 1.0).abs() < 1e-3,
+            "{outer} and {inner} edges: {area} mm²"
+        );
+        assert!((volume / (20.0 * ends) - 1.0).abs() < 1e-3, "{outer} and {inner} edges: {volume} mm³");
+    }
+}

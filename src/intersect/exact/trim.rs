@@ -7,6 +7,7 @@ use super::edge_use::{EdgeUse, edge_uses};
 use super::trim_piece::{TrimPiece, trim_pieces};
 use crate::intersect::prefetch;
 use crate::math::Uv;
+use crate::math::quadrature::GAUSS;
 use crate::model::Face;
 use smallvec::SmallVec;
 
@@ -23,6 +24,10 @@ const REACH_OF_BAND: f64 = 64.0;
 const LEAST_REACH: f64 = 1e-9;
 /// The largest share of the domain that cells keep off a trim: with more, none would be decided.
 const LARGEST_REACH: f64 = 1e-2;
+
+/// Loops that enclose less than this share of the box around them, turns either way taken off one another, are none that cut holes: a loop
+/// like an eight has rounding for a sign.
+const NO_AREA: f64 = 1e-12;
 
 /// What a cell or rectangle of the domain is; `Border` where it is not decided as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,7 +119,7 @@ impl Trim {
         }
         // Outer loops run counterclockwise and holes clockwise: a negative sum says that there are holes alone, and
         // the face goes on to the ends of the domain.
-        trim.outside_is_inside = trim.signed_area() < 0.0;
+        trim.outside_is_inside = trim.signed_area() < -NO_AREA * (hi - lo).element_product();
         if trim.outside_is_inside {
             // Holes alone: what lies around them counts too.
             let cell = extent / n as f64;
@@ -130,18 +135,18 @@ impl Trim {
         self.uses.iter().map(|u| u.gap).fold(0.0, f64::max)
     }
 
-    /// Signed area within the loops in parameters, by chords: only its sign is sure, negative where they run clockwise.
+    /// Signed area within the loops in parameters, negative where they run clockwise: by Green's theorem along every piece, for chords of
+    /// two circles of a thin ring may sweep less by the outer one.
     fn signed_area(&self) -> f64 {
-        // Chords will do: pieces are so short beside their loop that the sign is that of the curves.
-        let from_origin = |q: &glam::DVec3| q.truncate() / q.z - self.origin;
-        self.pieces
-            .iter()
-            .map(|p| {
-                let start = from_origin(&p.points[0]);
-                let end = from_origin(&p.points[p.points.len() - 1]);
-                0.5 * start.perp_dot(end) * if p.reversed { -1.0 } else { 1.0 }
-            })
-            .sum()
+        // About the grid's corner: far from the origin of the parameters the products would cancel.
+        let swept = |piece: &TrimPiece| {
+            let along = |(t, weight): (f64, f64)| {
+                let (place, derivative) = piece.evaluate(t);
+                weight * (place - self.origin).perp_dot(derivative)
+            };
+            0.5 * GAUSS.map(along).into_iter().sum::<f64>()
+        };
+        self.pieces.iter().map(|p| if p.reversed { -swept(p) } else { swept(p) }).sum()
     }
 
     /// The cells of an axis that an interval meets, held to the grid.

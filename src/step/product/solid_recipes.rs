@@ -19,8 +19,6 @@ const ON_AXIS_MM: f64 = 1e-9;
 const WHOLE_TURN_SLACK: f64 = 1e-6;
 /// Cosine of sweep and normal below which a profile is swept within its own plane.
 const FLAT_SWEEP: f64 = 1e-9;
-/// Samples of a curve of a profile for the area that tells which way a loop runs.
-const SAMPLES: usize = 16;
 
 /// A solid as edges and faces, before its faces are trimmed.
 #[derive(Default)]
@@ -216,18 +214,11 @@ impl Profile {
     }
 }
 
-/// Returns the area of a loop about a normal, mm², by a polygon: only its sign and its order of size matter.
+/// Returns the area within a loop of curves that join one another, about a normal, mm².
 fn signed_area(curves: &[Curve], normal: Vector) -> f64 {
-    let mut points: Vec<Point> = Vec::new();
-    for curve in curves {
-        let [a, b] = curve.domain();
-        points.extend((0..SAMPLES).map(|i| curve.evaluate(a + (b - a) * i as f64 / SAMPLES as f64)));
-    }
-    let n = points.len();
     // About a point of the loop: far from the origin the products would cancel.
-    let origin = points[0];
-    let sum = (0..n).map(|i| (points[i] - origin).cross(points[(i + 1) % n] - origin)).sum::<Vector>();
-    0.5 * sum.dot(normal)
+    let Some(center) = curves.first().map(|c| c.evaluate(c.domain()[0])) else { return 0.0 };
+    curves.iter().map(|c| c.swept_area(center)).sum::<Vector>().dot(normal)
 }
 
 /// Returns the same loops of edges, run the other way.

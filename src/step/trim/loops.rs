@@ -3,7 +3,6 @@
 use super::tolerances::{EMPTY_STEP, POLE_RESOLUTION_MM, POLE_TURN_SLACK, WIDE_STEP};
 use crate::math::Uv;
 use crate::math::polygon::{is_inside_sides, polygon_sides};
-use crate::math::quadrature::GAUSS;
 use crate::nurbs::{ControlPoint, UvCurve};
 use crate::step::chart::{Chart, Pole};
 
@@ -115,8 +114,7 @@ impl Chain {
         points
     }
 
-    /// Returns the signed area inside a closed chain, by Green's theorem along its curves: polygons of two circles with different arcs hide
-    /// a ring narrower than their sag, and took the inner one for the larger.
+    /// Returns the signed area inside a closed chain, along its curves.
     pub(crate) fn area(&self) -> f64 {
         // About the first corner: far from the origin the products would cancel.
         let Some(corner) = self.pieces.first().map(Piece::start) else { return 0.0 };
@@ -125,14 +123,8 @@ impl Chain {
             // Edges may miss one another by what their vertices allow: without the steps between them a loop is not closed.
             let next = self.pieces[(k + 1) % self.pieces.len()].start();
             area += 0.5 * (piece.end() - corner).perp_dot(next - corner);
-            let sign = if piece.reversed { -0.5 } else { 0.5 };
-            for span in piece.curve.breakpoints().windows(2) {
-                let width = span[1] - span[0];
-                for (x, weight) in GAUSS {
-                    let d = piece.curve.derivatives(span[0] + x * width);
-                    area += sign * weight * width * (d.point - corner).perp_dot(d.first);
-                }
-            }
+            let along = piece.curve.swept_area(corner);
+            area += if piece.reversed { -along } else { along };
         }
         area
     }
@@ -317,8 +309,8 @@ mod tests {
     fn steps_between_edges_that_miss_one_another_count_in_the_area() {
         let side = |from: [f64; 2], to: [f64; 2]| Piece::straight(from.into(), to.into());
         let open = Chain::closed(vec![side([0.0, 0.0], [1.0, 0.0]), side([1.0, 1.0], [0.0, 1.0])]);
-        assert_eq!(open.area(), 1.0);
+        assert!((open.area() - 1.0).abs() < 1e-15);
         let shifted = Chain::closed(open.pieces.iter().map(|p| p.clone().shifted(Uv::new(3.0, -2.0))).collect());
-        assert_eq!(shifted.area(), 1.0);
+        assert!((shifted.area() - 1.0).abs() < 1e-15);
     }
 }

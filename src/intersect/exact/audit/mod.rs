@@ -87,7 +87,8 @@ impl Audit {
                 id: placed.id,
                 domain: face.surface.domain(),
                 trims: trims(&face.loops),
-                holes_alone: area(&face.loops) < 0.0,
+                // Along whole curves, where the tracer goes by its own pieces: a fault in one of the two does not hide in the other.
+                holes_alone: face.loops.iter().map(TrimLoop::signed_area).sum::<f64>() < 0.0,
             });
         }
         let boxes: Vec<Aabb> = pieces.iter().map(|(_, p)| p.bounds()).collect();
@@ -184,20 +185,6 @@ fn trims(loops: &[TrimLoop]) -> Vec<Trim> {
         uses.into_iter().flat_map(|(_, pieces)| pieces).for_each(&mut add);
     }
     out
-}
-
-/// Signed area within the loops in surface parameters, positive where they run counterclockwise, from points along each curve.
-fn area(loops: &[TrimLoop]) -> f64 {
-    // Independent of the tracer's own rule on purpose, which adds up chords of Bézier pieces.
-    let uses = loops.iter().flat_map(|l| &l.uses);
-    uses.map(|u| {
-        let [a, b] = u.uv.domain();
-        let n = 64 * u.uv.points.len();
-        let at = |k: usize| u.uv.evaluate(a + (b - a) * k as f64 / n as f64);
-        let signed = (0..n).map(|k| 0.5 * at(k).perp_dot(at(k + 1))).sum::<f64>();
-        if u.reversed { -signed } else { signed }
-    })
-    .sum()
 }
 
 /// Lower and upper corner of the box around homogeneous control points of a uv curve.
