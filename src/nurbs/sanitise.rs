@@ -148,14 +148,16 @@ fn homogeneous(points: &[Point], weights: Option<&[f64]>) -> Result<Vec<Homogene
         return Err(Defect::Weights);
     }
     // Weights of ordinary size stay as they are, to the bit.
-    let scale = if largest.log2().abs() > 20.0 { 1.0 / largest } else { 1.0 };
-    let weight = |i: usize| weights.map_or(1.0, |w| w[i] * scale);
+    let scale = if largest.log2().abs() > 20.0 { largest } else { 1.0 };
+    // Divided: the inverse of a subnormal weight is infinite.
+    let weight = |i: usize| weights.map_or(1.0, |w| w[i] / scale);
+    let least = SMALLEST_WEIGHT * largest / scale;
     points
         .iter()
         .enumerate()
         .map(|(i, &p)| {
             let w = weight(i);
-            if !(w > SMALLEST_WEIGHT) {
+            if !(w > least) {
                 Err(Defect::Weights)
             } else if !(p.is_finite() && p.abs().max_element() < LARGEST_COORDINATE_MM) {
                 Err(Defect::Points)

@@ -16,6 +16,11 @@ const SHARP: f64 = 0.05;
 /// Share of the domain within which a place is on a crease.
 pub(super) const CREASE: f64 = 1e-7;
 
+/// Share of the surface's size that covers rounding: some thousand roundings of a coordinate as long.
+const ROUNDING: f64 = 1e-12;
+/// And ulps of its largest coordinate, which count where it is small beside its distance from the origin: a ball of 1 mm at 10¹¹ mm strayed
+/// from its facets by ten times what was proved.
+const ULPS: f64 = 16.0;
 /// Largest tolerance of a surface that closes on itself, in shares of its size; a ball is a third as large in radius as its box is across.
 const CLOSED_TOLERANCE: f64 = 0.05;
 /// Ratio of the lengths of both derivatives below which the shorter is nothing but rounding.
@@ -52,6 +57,8 @@ pub(super) struct FaceSurface<'a> {
     pub(super) sharp: [Vec<f64>; 2],
     /// Diagonal of the box around the control points, mm of the part.
     pub(super) size: f64,
+    /// What covers the rounding of points on it in a proof, mm.
+    pub(super) rounding: f64,
     /// Whether sides of the domain are single points: those at both ends of u, and of v.
     poles: [[bool; 2]; 2],
     /// Whether both ends of u, of v are one curve in space.
@@ -79,7 +86,10 @@ impl<'a> FaceSurface<'a> {
         let creases = sharper(BENT);
         // Most surfaces have no creases at all, and need not be looked at twice.
         let sharp = if creases.iter().all(|c| c.is_empty()) { creases.clone() } else { sharper(SHARP) };
-        let (patches, size) = (surface.bezier_patches(), surface.bounds().diagonal());
+        let patches = surface.bezier_patches();
+        let bounds = surface.bounds();
+        let size = bounds.diagonal();
+        let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
         let curving = SecondDerivativeBounds::new(surface, &patches, &breaks);
         let least = POLE * size;
         let poles = [0, 1].map(|d| [0, 1].map(|end| side_size(surface, d, end) <= least));
@@ -104,6 +114,7 @@ impl<'a> FaceSurface<'a> {
             creases,
             sharp,
             size,
+            rounding: (ROUNDING * size).max(ULPS * f64::EPSILON * farthest),
             poles,
             closed,
             gap: None,

@@ -218,3 +218,37 @@ fn corpus_finds_exactly_one_face_at_an_edge() {
     }
     assert!(bad.is_empty(), "{bad:?}");
 }
+
+/// A closed cylinder of radius and height 10 mm that stands on the plane z = 0.
+fn cylinder() -> Model {
+    let text = "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\
+        #1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2))REPRESENTATION_CONTEXT('',''));\n\
+        #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=SHAPE_REPRESENTATION('',(#4),#1);\n\
+        #4=RIGHT_CIRCULAR_CYLINDER('',#5,10.,10.);\n#5=AXIS1_PLACEMENT('',#6,#7);\n#6=CARTESIAN_POINT('',(0.,0.,0.));\n\
+        #7=DIRECTION('',(0.,0.,1.));\nENDSEC;\nEND-ISO-10303-21;\n";
+    let import = lampyris::step::read_bytes("cylinder.stp", text.as_bytes(), &lampyris::step::Settings::default());
+    import.expect("Part 21").model
+}
+
+#[test]
+fn rays_that_graze_a_border_meet_both_sheets_of_the_face_beside_it() {
+    let exact = Exact::build(&cylinder(), &Settings::default());
+    let mut s = Stream(11);
+    for sine in [0.1, 1e-2, 1e-3, 1e-4] {
+        for stray in [0.0, 1e-9, 5e-7] {
+            for _ in 0..1000 {
+                // Through a point of the upper rim, or beside it, downwards and nearly along the side.
+                let (sin, cos) = s.within(0.0, std::f64::consts::TAU).sin_cos();
+                let (outward, along) = (Vector::new(cos, sin, 0.0), Vector::new(-sin, cos, 0.0));
+                let rim = 10.0 * outward + Vector::new(s.within(-stray, stray), s.within(-stray, stray), 10.0);
+                let way =
+                    s.within(0.3, 0.9) * along - s.within(0.2, 0.8) * Vector::Z + s.within(-sine, sine) * outward;
+                let d = way.normalize();
+                let crossings = exact.crossings(&Ray::new(rim - 30.0 * d, d), &mut Cost::default());
+                let certain = crossings.iter().all(|h| h.certainty == Certainty::Certified);
+                // What goes into a closed solid comes out of it.
+                assert!(!certain || crossings.len().is_multiple_of(2), "{rim} {d}: {crossings:?}");
+            }
+        }
+    }
+}

@@ -84,6 +84,12 @@ impl Exact {
             return (place.inside, flagged);
         }
         let facing = du.cross(dv).dot(query.d);
+        // A ray that grazes a face beside its border meets it twice, before and behind where it bends away: the edge seen near both lies on
+        // the sheet of one, and of the other it says nothing.
+        place.near.retain(|n| self.geometry.facing(face, n.uv, query.d) * facing > 0.0);
+        if place.near.is_empty() {
+            return (place.inside, flagged);
+        }
         let ray = [query.o, query.n1, query.n2];
         let inside = match self.geometry.side_of_edges(face, trim, ray, facing, &place.near) {
             Some(inside) => inside,

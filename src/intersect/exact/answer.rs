@@ -44,12 +44,14 @@ const GIVEN_ROUNDING: f64 = 4.0;
 /// A normal is taken where the next step is below this, as a share of a leaf: with 2e-12 the angular momentum of a ray in a mirror
 /// ball drifted by 5e-10 in 20,000 bounces.
 const UNBIASED: f64 = 2e-15;
+/// By how much the square of a direction's length may miss 1: normalised in `f32`, and some.
+const UNIT_ROUNDING: f64 = 1e-5;
 /// Corrections before a hit is named; steps square, so that the second is mostly the last.
 const CORRECTIONS: usize = 4;
 
 impl Exact {
     /// Finds the first hit with `t` in the range of the ray, in the model's coordinates, and proves it or the miss. A ray that is not
-    /// finite or has no direction misses, uncertified. The point that the ray leaves does not count.
+    /// finite, has no range or no direction of unit length misses, uncertified. The point that the ray leaves does not count.
     pub fn first(&self, ray: &Ray, cost: &mut Cost) -> Answer {
         let mut query = Query::IDLE;
         self.restart(&mut query, ray, self.settings.budget);
@@ -95,7 +97,7 @@ impl Exact {
         Passage { crossings: hits, near_trims }
     }
 
-    /// Takes up a ray with this budget of clipping steps; one that is not finite or has no direction will miss, undecided.
+    /// Takes up a ray with this budget of clipping steps; one that is not sound will miss, undecided.
     #[inline(always)]
     pub(super) fn restart(&self, query: &mut Query, ray: &Ray, budget: u32) {
         query.restart(ray, &self.geometry, &self.tree, budget);
@@ -200,9 +202,11 @@ fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, direction: Vector) -> 
     })
 }
 
-/// Whether a ray has finite coordinates and a direction.
+/// Whether a ray has a finite origin, a direction of unit length but for rounding, and a range.
 fn is_sound(ray: &Ray) -> bool {
-    ray.origin.is_finite() && ray.direction.is_finite() && ray.direction.length_squared() > 0.0
+    // NaN is beyond any bound.
+    let is_unit = (ray.direction.length_squared() - 1.0).abs() <= UNIT_ROUNDING;
+    ray.origin.is_finite() && is_unit && !ray.t_min.is_nan() && !ray.t_max.is_nan()
 }
 
 impl Intersector for Exact {

@@ -202,6 +202,13 @@ impl Geometry {
         };
         face.first_patch + span(0, uv.x) * (grid.breaks[1].len() as u32 - 1) + span(1, uv.y)
     }
+
+    /// A number with the sign of `(Su × Sv) · direction` at parameters of a face, in the world.
+    pub(super) fn facing(&self, face: &FaceRecord, uv: Uv, direction: Vector) -> f64 {
+        let patch = &self.patches[self.patch_at(face, uv) as usize];
+        let (_, du, dv) = project(&patch.jet(patch.local(uv)));
+        du.cross(dv).dot(direction)
+    }
 }
 
 /// The vertices at start and end of each of a part's edges, with the radii, mm, within which their sectors decide; where the part has no

@@ -50,8 +50,9 @@ pub(super) struct Place {
 pub(super) struct Near {
     /// Index into [`Trim::uses`].
     pub(super) owner: u32,
-    /// The edge's parameter at the nearest point.
+    /// The edge's parameter at the nearest point, and the surface's.
     pub(super) parameter: f64,
+    pub(super) uv: Uv,
     /// mm.
     pub(super) distance: f64,
 }
@@ -299,7 +300,7 @@ impl Trim {
                 continue;
             }
             let parameter = piece.range[0] + (piece.range[1] - piece.range[0]) * t;
-            let found = Near { owner: piece.owner, parameter, distance };
+            let found = Near { owner: piece.owner, parameter, uv: piece.evaluate(t).0, distance };
             // An edge comes in several pieces; its nearest one is where the search on the edge itself begins.
             match near.iter_mut().find(|n| n.owner == piece.owner) {
                 Some(n) if distance < n.distance => *n = found,

@@ -19,8 +19,6 @@ const STRAIGHT: f64 = 1e-12;
 /// Share of the tolerance within which an edge is straight in space. Beside one that bends, the strip between it and its chord is about as wide
 /// as the chord's sag, which is held to the tolerance by itself.
 pub(in crate::tessellate) const STRAIGHT_EDGE: f64 = 0.1;
-/// Share of the surface's size that covers the rounding of points on it; see `prover.rs`.
-const ROUNDING: f64 = 1e-12;
 /// Share of the tolerance that is small for a curve's deviation: beyond it finer hulls are looked at.
 const SMALL_SHARE: f64 = 0.5;
 /// Halvings of one knot span, and the parts that several are cut into: coarse first, finer where that is not clearly small.
@@ -102,7 +100,7 @@ impl BorderChord {
         }
         let at = uv.map(|x| surface.point(x));
         // The chord runs between the edge's own points, the surface through its: both ends may be off by the gap.
-        let off = (at[0] - xyz[0]).length().max((at[1] - xyz[1]).length()) + ROUNDING * surface.size;
+        let off = (at[0] - xyz[0]).length().max((at[1] - xyz[1]).length()) + surface.rounding;
         // In the middle of the chord: facets on either side have tolerances of their own, and what does not fit
         // theirs is bounded anew.
         let limit = surface.tolerance(0.5 * (uv[0] + uv[1]));

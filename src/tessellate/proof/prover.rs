@@ -17,7 +17,7 @@
 //!
 //! No projected Jacobian enters: folds are covered too. Where corners do not lie on the surface (the file's own gap between edge and face)
 //! the boundary curves are taken to begin and end with straight pieces from the corners to the surface, so that the bound is no less than
-//! the longest of these. Rounding is covered by 1e-12 of the surface's size.
+//! the longest of these. Rounding is covered by 1e-12 of the surface's size, or by ulps of its place where that is far.
 
 use super::cubic_reduction::{self, CubicReduction};
 use super::deviation::DeviationBounds;
@@ -31,8 +31,6 @@ use crate::nurbs::BezierPatch;
 use crate::tessellate::face_surface::{FaceSurface, patch_uv};
 use crate::tessellate::settings::Acceptance;
 
-/// Share of the surface's size that covers rounding: some thousand roundings of a coordinate.
-const ROUNDING: f64 = 1e-12;
 /// Knot rectangles that one triangle may span and still be tried.
 const MAX_PIECES: usize = 20_000;
 /// Knot rectangles up to which second derivatives are looked at one by one.
@@ -68,7 +66,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             reduction: CubicReduction::default(),
             scalar: ScalarBezier::default(),
             patch_scalar: ScalarPatch::default(),
-            margin: ROUNDING * surface.size,
+            margin: surface.rounding,
         }
     }
 
