@@ -128,9 +128,20 @@ impl Photometry {
             _ => return self.clone(),
         };
         let rows = self.vertical_deg.len();
-        let candela =
-            all.iter().flat_map(|&(_, i)| self.candela[i * rows..(i + 1) * rows].iter().copied()).collect();
-        Self { horizontal_deg: all.into_iter().map(|p| p.0).collect(), candela, ..self.clone() }
+        let plane = |i: usize| self.candela[i * rows..(i + 1) * rows].iter().copied();
+        let mut candela: Vec<f64> = all.iter().flat_map(|&(_, i)| plane(i)).collect();
+        let mut horizontal_deg: Vec<f64> = all.iter().map(|p| p.0).collect();
+        let ((low, first), (high, last)) = (all[0], all[all.len() - 1]);
+        if self.kind == PhotometricType::C && low > 0.0 {
+            // Mirrored planes without one at 180°: between the last and the first of a turn light goes on as between any two.
+            let share = (360.0 - high) / (low + 360.0 - high);
+            let between: Vec<f64> = plane(last).zip(plane(first)).map(|(a, b)| a + share * (b - a)).collect();
+            candela.splice(0..0, between.iter().copied());
+            candela.extend(between);
+            horizontal_deg.insert(0, 0.0);
+            horizontal_deg.push(360.0);
+        }
+        Self { horizontal_deg, candela, ..self.clone() }
     }
 
     /// Lumens of the whole distribution, exact for intensities bilinear in the angles; symmetry is expanded first.
@@ -285,6 +296,12 @@ pub(super) mod tests {
             whole.candela.iter().step_by(2).copied().collect::<Vec<_>>(),
             [180.0, 90.0, 180.0, 270.0, 180.0]
         );
+        // Without a plane at 180°: 80° and 340° are images, and a fifth of the way between them lies 0°.
+        let half =
+            photometry_of(PhotometricType::C, &[90.0, 100.0, 200.0, 270.0], &[0.0, 90.0], |h, _| h).expanded();
+        assert_eq!(half.horizontal_deg, [0.0, 80.0, 90.0, 100.0, 200.0, 270.0, 340.0, 360.0]);
+        let first: Vec<f64> = half.candela.iter().step_by(2).copied().collect();
+        assert_eq!(first, [180.0, 100.0, 90.0, 100.0, 200.0, 270.0, 200.0, 180.0]);
         let beam = photometry_of(PhotometricType::A, &[0.0, 10.0], &[0.0, 5.0], |h, v| h + v).expanded();
         assert_eq!((beam.horizontal_deg.as_slice(), beam.candela[1]), ([-10.0, 0.0, 10.0].as_slice(), 15.0));
         let open = photometry_of(PhotometricType::C, &steps(0.0, 345.0, 23), &[0.0, 90.0], |_, _| 1.0);

@@ -11,6 +11,8 @@ const NET_ORDER: f64 = 0.6;
 const RANDOM_ORDER: f64 = 0.5;
 /// Errors below this share of a figure are nobody's concern.
 const NEGLIGIBLE: f64 = 1e-6;
+/// The largest multiple of a standard error that is told: beyond, that error is none.
+const LARGEST_RATIO: f64 = 1e9;
 
 /// The figure that facets get most wrong.
 #[derive(Clone, Debug, Default)]
@@ -68,7 +70,12 @@ impl Worst {
     /// Takes the figure `name`, of what and which, in place of the worst so far if it is worse.
     fn weigh(&mut self, [of, figure]: [&str; 2], geometric: f64, allowed: f64, value: f64) {
         // No figure is asked for beyond a millionth of itself.
-        let ratio = geometric / allowed.max(NEGLIGIBLE * value.abs()).max(f64::MIN_POSITIVE);
+        // What facets do not change, or not by a number, is no worst.
+        if geometric.is_nan() || geometric <= 0.0 {
+            return;
+        }
+        // Of a figure that is 0 without an error no multiple is a number to be read.
+        let ratio = (geometric / allowed.max(NEGLIGIBLE * value.abs())).min(LARGEST_RATIO);
         if ratio > self.ratio {
             let share = (value != 0.0).then(|| geometric / value.abs());
             *self = Self { ratio, share, figure: format!("{of}: {figure}") };
@@ -81,6 +88,9 @@ impl Worst {
             return "not at all".into();
         }
         let by = self.share.map_or_else(|| "where it is 0".into(), |s| format!("by {s:.1e} of it"));
+        if self.ratio >= LARGEST_RATIO {
+            return format!("{} {by}, without any standard error", self.figure);
+        }
         format!("{} {by}, {} of its standard error", self.figure, two_digits(self.ratio))
     }
 }
@@ -97,11 +107,21 @@ fn two_digits(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::two_digits;
+    use super::*;
 
     #[test]
     fn two_digits_are_told() {
         let told = [477.48, 12.3, 4.04, 0.519, 0.0123, 99.7].map(two_digits);
         assert_eq!(told, ["480", "12", "4.0", "0.52", "0.012", "100"]);
+    }
+
+    #[test]
+    fn a_figure_of_zero_without_error_has_no_endless_multiple() {
+        let mut worst = Worst::default();
+        worst.weigh(["lamp", "absorbed"], 0.0, 0.0, 0.0);
+        assert_eq!(worst.in_words(), "not at all");
+        worst.weigh(["lamp", "absorbed"], 1e-4, 0.0, 0.0);
+        assert_eq!(worst.in_words(), "lamp: absorbed where it is 0, without any standard error");
+        assert_eq!(worst.ratio, LARGEST_RATIO);
     }
 }
