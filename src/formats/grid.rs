@@ -2,6 +2,7 @@
 
 use super::npz::{NpyArray, write_npz};
 use super::{Error, ErrorKind, write_atomic};
+use std::io::{self, Write};
 use std::path::Path;
 
 /// Values over a regular grid of cells: what a receiver recorded.
@@ -188,20 +189,27 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
             if i == 0 {
                 row = b.center(j).to_string();
             }
-            write!(w, "{},{row},{value}", columns[i])?;
+            write!(w, "{},{row}", columns[i])?;
+            write_field(w, *value)?;
             if let Some(error) = &grid.error {
-                write!(w, ",{}", error[k])?;
+                write_field(w, error[k])?;
             }
             for layer in &grid.layers {
-                write!(w, ",{},{}", layer.values[k], layer.error[k])?;
+                write_field(w, layer.values[k])?;
+                write_field(w, layer.error[k])?;
             }
             for (_, values) in grid.error_layers() {
-                write!(w, ",{}", values[k])?;
+                write_field(w, values[k])?;
             }
             writeln!(w)?;
         }
         Ok(())
     })
+}
+
+/// Writes a comma and the shortest digits of a number; those of 0, which most cells of a picture are, without looking for them.
+fn write_field(w: &mut dyn Write, number: f64) -> io::Result<()> {
+    if number.to_bits() == 0 { w.write_all(b",0") } else { write!(w, ",{number}") }
 }
 
 /// Writes a grid as NPZ: `values[j, i]`, `error[j, i]`, the cell edges of both axes, and of each layer an array of its name and one

@@ -17,6 +17,8 @@ pub(super) struct Nearest<'a> {
     loops: Vec<Option<Vec<Vec<Uv>>>>,
     /// Of each face with a surface that was asked for, in the coordinates of its part.
     slabs: Vec<Option<Slab>>,
+    /// Boxes around the pieces of these surfaces.
+    pieces: Vec<Option<Vec<Aabb>>>,
 }
 
 /// The space between two parallel planes around a surface: no more than the face itself where that is plane.
@@ -48,6 +50,21 @@ impl Slab {
     }
 }
 
+/// Boxes around the pieces of a surface, unless it has more patches: their sides are an eighth of it and less, and they are made in less
+/// time than one foot is found.
+const PIECES: usize = 128;
+
+/// Returns boxes around the patches of a surface, halved until there are [`PIECES`], in the coordinates of its part.
+fn piece_boxes(surface: &Surface) -> Vec<Aabb> {
+    let mut patches = surface.bezier_patches();
+    let mut direction = 0;
+    while !patches.is_empty() && 2 * patches.len() <= PIECES {
+        patches = patches.iter().flat_map(|patch| patch.halves(direction)).collect();
+        direction = 1 - direction;
+    }
+    patches.iter().map(|patch| patch.bounds()).collect()
+}
+
 /// Share of its distance that a rounded box may lie too far away.
 const BOX_ROUNDING: f64 = 1e-9;
 
@@ -61,7 +78,8 @@ impl<'a> Nearest<'a> {
         let bounds = faces.iter().map(face_bounds).collect();
         let loops = vec![None; faces.len()];
         let slabs = vec![None; faces.len()];
-        Self { faces, bounds, loops, slabs }
+        let pieces = vec![None; faces.len()];
+        Self { faces, bounds, loops, slabs, pieces }
     }
 
     /// Returns a box around these faces; empty without any.
@@ -94,8 +112,18 @@ impl<'a> Nearest<'a> {
         let placed = self.faces[index];
         if let Some(face) = placed.face {
             let slab = self.slabs[index].get_or_insert_with(|| Slab::new(&face.surface));
+            let local = placed.placement.local_point(p);
             // Two planes cost a hundredth of the search for the foot, and tell most points that are far.
-            if slab.distance_below(placed.placement.local_point(p)) * placed.placement.scale > limit {
+            if slab.distance_below(local) * placed.placement.scale > limit {
+                return false;
+            }
+            // Within a reflector planes tell nothing; what lies in no box around a piece is far from all of them.
+            let pieces = self.pieces[index].get_or_insert_with(|| piece_boxes(&face.surface));
+            let near = |b: &Aabb| {
+                let rounding = BOX_ROUNDING * (local.length() + b.diagonal());
+                b.grown(limit / placed.placement.scale + rounding).contains(local)
+            };
+            if !pieces.iter().any(near) {
                 return false;
             }
         }
