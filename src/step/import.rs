@@ -64,6 +64,13 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     if file.fault_count > file.faults.len() {
         report.problems.push(format!("{} further statements were skipped", file.fault_count - file.faults.len()));
     }
+    let missing = file.missing_ids();
+    if let Some(first) = missing.first() {
+        let count = missing.len();
+        report
+            .problems
+            .push(format!("{name}: #{first} is referred to but is not in the file; there are {count} such"));
+    }
     let model = convert_assembly(&file, name, settings, &mut report)?;
     let bounds = if settings.measure_box { model.bounds() } else { Aabb::EMPTY };
     if !bounds.is_empty() {
@@ -253,6 +260,15 @@ impl Reader<'_, '_, '_> {
         let ConvertedPart { mut part, found, refused, repaired } = converted;
         part.name = if placed.product.is_empty() { placed.name.clone() } else { placed.product.clone() };
         part.colour = self.styles.colour(placed.representation);
+        // The colour of an occurrence stands above the part's alone: where some have one, the only shell's is its part's.
+        let mut owners = items.shells.iter().flat_map(|plan| &plan.owners).chain(ids);
+        if let [shell] = &mut part.shells[..]
+            && owners.any(|owner| self.styles.is_overridden(*owner))
+        {
+            part.colour = shell.colour.take().or(part.colour);
+            // Faces of a recipe, which have no entities, hold its colour themselves.
+            shell.faces.iter_mut().filter(|face| face.entity.is_none()).for_each(|face| face.colour = None);
+        }
 
         let report = &mut *self.report;
         report.faces.found += found;

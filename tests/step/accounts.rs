@@ -64,7 +64,7 @@ fn parts_of_edges_and_faces_have_the_geometry_of_their_parents() {
 fn a_colour_is_found_beside_a_reference_that_leads_nowhere() {
     let style = "#100=STYLED_ITEM('',(#101),#900);\n#101=PRESENTATION_STYLE_ASSIGNMENT((#999,#102));\n\
                  #102=COLOUR_RGB('',0.25,0.5,0.75);\n";
-    let import = import(&(square(FORWARD, IN_ORDER) + style));
+    let import = read(&(square(FORWARD, IN_ORDER) + style));
     let face = &import.model.parts[0].shells[0].faces[0];
     assert_eq!(face.colour.map(|c| c.0), Some([0.25, 0.5, 0.75]));
 }

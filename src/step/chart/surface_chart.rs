@@ -280,7 +280,8 @@ impl Chart {
         match &self.kind {
             Kind::Plane { .. } => Some([length; 2]),
             Kind::Cone { .. } => Some([angle, length]),
-            Kind::Torus { .. } => Some([angle; 2]),
+            // A lemon's angles run the other way here, and from another place.
+            Kind::Torus { major, .. } => (*major >= 0.0).then_some([angle; 2]),
             Kind::Revolution { meridian, .. } => direct(meridian).then_some([angle, 1.0]),
             Kind::Extrusion { base, .. } => direct(base).then_some([1.0; 2]),
             Kind::Spline(_) => Some([1.0; 2]),

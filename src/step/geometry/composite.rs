@@ -6,10 +6,26 @@ use super::{Geometry, Outcome, Refusal};
 use crate::math::{Homogeneous, Point};
 use crate::nurbs::Curve;
 use crate::step::part21::{Args, Entity};
+use rustc_hash::FxHashMap;
 use std::f64::consts::PI;
 
-/// Most segments of one composite curve.
-const MAX_SEGMENTS: usize = 100_000;
+/// Most segments of one composite curve, those of its segments counted with them.
+const MAX_SEGMENTS: u64 = 100_000;
+/// Kinds of entities between a composite curve and the segments of the composite curves in it.
+const AROUND_SEGMENTS: [&str; 12] = [
+    "COMPOSITE_CURVE",
+    "COMPOSITE_CURVE_ON_SURFACE",
+    "BOUNDARY_CURVE",
+    "OUTER_BOUNDARY_CURVE",
+    "COMPOSITE_CURVE_SEGMENT",
+    "REPARAMETRISED_COMPOSITE_CURVE_SEGMENT",
+    "TRIMMED_CURVE",
+    "CURVE_REPLICA",
+    "OFFSET_CURVE_3D",
+    "SURFACE_CURVE",
+    "SEAM_CURVE",
+    "INTERSECTION_CURVE",
+];
 
 impl<'f, 'a> Geometry<'f, 'a> {
     /// Reads a bounded curve, mm, as a spline in its own direction; conics that are closed become one turn. Refuses unbounded curves, and
@@ -88,6 +104,27 @@ impl<'f, 'a> Geometry<'f, 'a> {
         lengths[k] + (lengths[k + 1] - lengths[k]) * (x - k as f64)
     }
 
+    /// Returns how many segments a composite curve has, also inside of its segments; 1 for any other curve. `known` holds the numbers of
+    /// entities that were met; those of a cycle, whose reading ends at [`MAX_DEPTH`], count once.
+    fn segment_count(&self, e: Entity<'f, 'a>, depth: usize, known: &mut FxHashMap<u64, u64>) -> u64 {
+        // A curve and its segment are two entities, and a trim between them a third.
+        if depth > 3 * MAX_DEPTH || !e.is_one_of(&AROUND_SEGMENTS) {
+            return 1;
+        }
+        if let Some(&count) = known.get(&e.id) {
+            return count;
+        }
+        known.insert(e.id, 1);
+        let mut inner = Vec::new();
+        e.all_args().for_each(|args| args.deep_ids(&mut inner));
+        let curves = inner.into_iter().filter_map(|id| self.file.entity(id));
+        let curves = curves.filter(|inner| inner.is_one_of(&AROUND_SEGMENTS));
+        let count: u64 =
+            curves.fold(0, |n: u64, inner| n.saturating_add(self.segment_count(inner, depth + 1, known)));
+        known.insert(e.id, count.max(1));
+        count.max(1)
+    }
+
     /// Returns the segments of a composite curve, in its order, turned around where that joins them clearly better than the file's own
     /// senses. Gaps stay.
     pub(crate) fn segments(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Vec<Curve>> {
@@ -96,7 +133,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
             .find_map(|n| e.attributes(n, 1).filter(|a| a.list(0).len() > 0));
         let Some(own) = own else { return Err(Refusal::new(e, "composite curve without segments")) };
         let list = own.list(0);
-        if list.len() > MAX_SEGMENTS {
+        // Six lines can name a million segments: they are counted before one is read.
+        if self.segment_count(e, 0, &mut FxHashMap::default()) > MAX_SEGMENTS {
             return Err(Refusal::new(e, "composite curve with too many segments"));
         }
         let mut curves: Vec<Curve> = Vec::with_capacity(list.len());
@@ -143,9 +181,15 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
         let segments = self.segments(e, depth)?;
         let degree = segments.iter().map(|c| c.degree).max().unwrap_or(1);
-        let mut parts = segments.iter().map(|c| elevate_degree(c, degree));
-        let first = parts.next().ok_or_else(|| Refusal::new(e, "composite curve without segments"))?;
-        Ok(parts.fold(first, |whole, part| whole.joined_with(&part)))
+        let mut parts: Vec<Curve> = segments.iter().map(|c| elevate_degree(c, degree)).collect();
+        // Neighbours first: joined one by one to the whole, each would copy all before it.
+        while parts.len() > 1 {
+            parts = parts
+                .chunks(2)
+                .map(|pair| pair[1..].iter().fold(pair[0].clone(), |a, b| a.joined_with(b)))
+                .collect();
+        }
+        parts.pop().ok_or_else(|| Refusal::new(e, "composite curve without segments"))
     }
 }
 

@@ -266,7 +266,11 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let shift = usize::from(!e.keyword().is_empty() && e.keyword() != "B_SPLINE_CURVE");
         let degree = base.count(shift).ok_or_else(|| Refusal::new(e, "its degree is missing"))?;
         let points = self.points(base.list(shift + 1))?;
-        let weights = e.attributes("RATIONAL_B_SPLINE_CURVE", 6).and_then(|a| a.list(0).reals());
+        let weights = match e.attributes("RATIONAL_B_SPLINE_CURVE", 6).map(|a| a.list(0).reals()) {
+            Some(None) => return Err(Refusal::new(e, "weights are no numbers")),
+            Some(weights) => weights,
+            None => None,
+        };
         let form = knot_form(e, "CURVE");
         let knots = match e.attributes("B_SPLINE_CURVE_WITH_KNOTS", 6) {
             Some(a) => explicit_knots(a.list(0), a.list(1)),

@@ -26,8 +26,9 @@ pub(crate) struct TrimmedEdge {
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// Reads an edge's curve between its vertices, mm; that of a SUBEDGE is cut from its parent's. Refuses other kinds of edges.
-    pub(crate) fn edge(&self, id: u64) -> Outcome<TrimmedEdge> {
+    /// Reads an edge's curve between its vertices, mm; that of a SUBEDGE is cut from its parent's. Refuses other kinds of edges. `alone` is
+    /// whether a loop has no other edge: of a closed curve it is then the whole, though its vertices are two that lie apart by rounding.
+    pub(crate) fn edge(&self, id: u64, alone: bool) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
         let vertices = e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1));
         let Some(vertices) = vertices.or_else(|| e.attributes("SUBEDGE", 1)) else {
@@ -41,7 +42,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         // A simple EDGE_CURVE has its vertices before its geometry.
         let own = owner.attributes("EDGE_CURVE", 3);
         let (curve, sense) = own.map_or((None, true), |a| (a.id(0), a.flag(1) != Some(false)));
-        self.edge_between(e.id, [vertices.id(0), vertices.id(1)], curve, sense)
+        self.edge_between(e.id, [vertices.id(0), vertices.id(1)], curve, (sense, alone))
     }
 
     /// Reads edge #`id` from its first to its second vertex, mm: that part of `curve`, or all of a closed one where both vertices are one
@@ -52,7 +53,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         id: u64,
         vertices: [Option<u64>; 2],
         curve: Option<u64>,
-        sense: bool,
+        (sense, alone): (bool, bool),
     ) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
         let [Some(v0), Some(v1)] = vertices else { return Err(Refusal::new(e, "a vertex is missing")) };
@@ -65,6 +66,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
             return Ok(TrimmedEdge { curve, gap: 0.0, repair: None });
         };
         let directed = self.curve(curve, 0)?;
+        // A loop of one edge encloses something: next to nothing of the curve cannot be meant.
+        let closed = closed || alone && directed.shape.period().is_some() && coincident(p, q, LOOSE_VERTEX_MM);
         trim_to_vertices(&directed, p, q, closed, sense)
             .ok_or_else(|| Refusal::new(e, "its vertices leave nothing of its curve"))
     }

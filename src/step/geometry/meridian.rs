@@ -122,7 +122,12 @@ mod tests {
         for z in [[0.6, 3.15], [-0.6, -3.15]] {
             let points = z.map(on);
             // The middle of ring-shaped faces is on the axis and tells nothing.
-            let reach = FaceExtent { center: Point::new(327.0, -306.0, 0.0), radius: 3.2, points: &points };
+            let reach = FaceExtent {
+                center: Point::new(327.0, -306.0, 0.0),
+                radius: 3.2,
+                points: &points,
+                parameters: None,
+            };
             let (part, has_twin) = keep_face_side_of_axis(&axis, circle.clone(), reach);
             assert!(!has_twin);
             for p in points {

@@ -24,6 +24,9 @@ use crate::step::part21::{Args, Entity, File};
 /// Farthest coordinate, mm: a million kilometres, where doubles are 1e-4 mm apart.
 pub(crate) const FARTHEST_MM: f64 = 1e12;
 
+/// Largest components of a direction whose squares neither vanish nor overflow.
+const EXACT_LENGTHS: std::ops::Range<f64> = 1e-100..1e100;
+
 /// Why a piece of geometry cannot be had: the entity and the reason.
 #[derive(Clone, Debug)]
 pub(crate) struct Refusal {
@@ -113,7 +116,9 @@ impl<'f, 'a> Geometry<'f, 'a> {
             [x, y] => Vector::new(*x, *y, 0.0),
             _ => return None,
         };
-        (d.is_finite() && d.length_squared() > 0.0).then_some(d)
+        // Of numbers near the ends of what a double holds the length would be none.
+        let largest = d.abs().max_element();
+        (d.is_finite() && largest > 0.0).then(|| if EXACT_LENGTHS.contains(&largest) { d } else { d / largest })
     }
 
     /// Reads a VECTOR with its magnitude, mm; a magnitude of zero or none counts as one unit.

@@ -5,7 +5,7 @@ use super::extent::FaceExtent;
 use super::tolerances::{CURVE_ERROR_MM, DIFFERENCE_STEP, PARALLEL_AXIS, WORST_CURVE_ERROR_MM};
 use super::units::Units;
 use super::{Geometry, Outcome, Refusal};
-use crate::math::{Point, Uv, Vector};
+use crate::math::{Aabb, Point, Uv, Vector};
 use crate::nurbs::{Curve, fit_cubic};
 use crate::step::chart::Chart;
 use crate::step::part21::{Args, Entity};
@@ -76,13 +76,16 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let representation = definition.attributes("REPRESENTATION", 0).unwrap_or_else(|| definition.args());
         let item = representation.list(1).ids().first().copied();
         let item = self.resolve(definition, item, "curve in the parameter plane")?;
-        let chart = self.chart(basis.id, FaceExtent::UNKNOWN, depth + 1)?;
-        let Some(scale) = chart.parameter_scale(self.units.length, self.units.angle) else {
-            return Err(Refusal::new(e, "its parameters cannot be taken over to the swept conic"));
-        };
         // Parameters are pure numbers; only angles of conics keep their unit.
         let plane = Geometry { file: self.file, units: Units { length: 1.0, ..self.units } };
         let curve = plane.bounded_curve(item.id, depth + 1)?;
+        let Aabb { min, max } = curve.bounds();
+        let ranges =
+            [[min.x, max.x], [min.y, max.y]].map(|[a, b]| [Some(a), Some(if a < b { b } else { a + 1.0 })]);
+        let chart = self.chart(basis.id, FaceExtent::UNKNOWN.over_parameters(ranges), depth + 1)?;
+        let Some(scale) = chart.parameter_scale(self.units.length, self.units.angle) else {
+            return Err(Refusal::new(e, "its parameters cannot be taken over to the surface's closed form"));
+        };
         lift_to_surface(e, &chart, &curve, scale)
     }
 }

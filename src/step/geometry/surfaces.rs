@@ -45,6 +45,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
         if let Some(a) = e.attributes("RECTANGULAR_TRIMMED_SURFACE", 1) {
             let basis = self.resolve(e, a.id(0), "basis surface")?;
+            let range = |d: usize| [a.real(1 + 2 * d), a.real(2 + 2 * d)];
+            let extent = extent.over_parameters([range(0), range(1)]);
             let mut chart = self.chart(basis.id, extent, depth + 1)?;
             // One parameter turned around turns the normal, which is ∂u × ∂v; both leave it (ISO 10303-42, usense and vsense).
             chart.flipped ^= a.flag(5).is_some_and(|u| a.flag(6) == Some(!u));

@@ -3,8 +3,10 @@
 use super::curves::{CurveShape, DirectedCurve};
 use super::extent::FaceExtent;
 use super::meridian::keep_face_side_of_axis;
-use super::tolerances::{COPLANAR_MM, PARALLEL_AXIS, REACH_MARGIN, SMALLEST_REACH_MM, STEEP_RADIUS};
-use super::{Geometry, Outcome};
+use super::tolerances::{
+    COPLANAR_MM, MERGED_POINTS_MM, PARALLEL_AXIS, REACH_MARGIN, SMALLEST_REACH_MM, STEEP_RADIUS,
+};
+use super::{Geometry, Outcome, Refusal};
 use crate::math::{Frame, Point, Vector};
 use crate::model::Analytic;
 use crate::nurbs::Curve;
@@ -13,15 +15,21 @@ use crate::step::part21::{Args, Entity};
 use std::f64::consts::PI;
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// Returns the curve that a surface sweeps, cut to what can matter within the face's extent, as a spline, mm; for a line, its origin
-    /// and direction too.
+    /// Returns the curve that a surface sweeps, cut to what can matter within the face's extent, as a spline, mm; for a line of a face with
+    /// edges, its origin and direction too. Without edges its parameter is the file's, and one without ends is cut to the range of the
+    /// surface's parameter `swept`, 0 for u, or refused where there is none.
     fn swept_curve(
         &self,
         id: u64,
-        FaceExtent { center, radius, .. }: FaceExtent<'_>,
+        FaceExtent { center, radius, points, parameters }: FaceExtent<'_>,
+        swept: usize,
         depth: usize,
     ) -> Outcome<(Curve, Option<(Point, Vector)>)> {
         let e = self.entity(id)?;
+        let by_parameters = points.is_empty();
+        if by_parameters && let Some(a) = e.attributes("POLYLINE", 1) {
+            return Ok((self.counted_polyline(e, a.list(0))?, None));
+        }
         if e.is_one_of(&["TRIMMED_CURVE", "COMPOSITE_CURVE", "POLYLINE"])
             && let Ok(curve) = self.bounded_curve(id, depth + 1)
         {
@@ -34,6 +42,11 @@ impl<'f, 'a> Geometry<'f, 'a> {
             directed.shape.segment(t - reach, t + reach)
         };
         let curve = match &directed.shape {
+            CurveShape::Line { .. } | CurveShape::Parabola { .. } if by_parameters => {
+                let range = parameters.map(|p| p[swept]).filter(|[a, b]| a < b && (b - a).is_finite());
+                let [a, b] = range.ok_or_else(|| Refusal::new(e, "it has no ends, and neither has the surface"))?;
+                directed.shape.segment(a, b)
+            }
             CurveShape::Line { origin, direction } => {
                 let curve = around(directed.shape.parameter(center), direction.length());
                 let line = Some((*origin, *direction));
@@ -54,6 +67,17 @@ impl<'f, 'a> Geometry<'f, 'a> {
             CurveShape::Spline { curve, .. } => curve.clone(),
         };
         Ok((if directed.reversed { curve.reversed() } else { curve }, None))
+    }
+
+    /// Reads a POLYLINE by the parameter that the file gives it, which counts its points from 0; refused where two of them in a row coincide.
+    fn counted_polyline(&self, e: Entity<'f, 'a>, list: Args<'f, 'a>) -> Outcome<Curve> {
+        let points = self.points(list)?;
+        let coincide = points.windows(2).any(|w| (w[1] - w[0]).length() <= MERGED_POINTS_MM);
+        if points.len() < 2 || coincide {
+            return Err(Refusal::new(e, "points of it coincide, and its parameter counts them"));
+        }
+        let counts: Vec<f64> = (0..points.len()).map(|k| k as f64).collect();
+        Ok(Curve::polyline(&counts, &points))
     }
 
     /// Reads a SURFACE_OF_REVOLUTION with attributes `a`; a sphere, torus or cylinder in closed form where it is one and the face has
@@ -79,7 +103,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         {
             return Ok(chart);
         }
-        let (curve, line) = self.swept_curve(profile.id, around, depth)?;
+        let (curve, line) = self.swept_curve(profile.id, around, 1, depth)?;
         if let Some((origin, direction)) = line
             && let Some(chart) = revolved_line(&frame, origin, direction)
         {
@@ -110,7 +134,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
             CurveShape::Spline { .. } => reach.center,
         });
         let d = base_point.map_or(0.0, |b| (b - reach.center).length());
-        let (base, _) = self.swept_curve(profile.id, reach.grown_by(d), depth)?;
+        let (base, _) = self.swept_curve(profile.id, reach.grown_by(d), 0, depth)?;
         Ok(Chart::new(Kind::Extrusion { base, direction }, Analytic::Extrusion))
     }
 }

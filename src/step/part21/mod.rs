@@ -147,6 +147,15 @@ impl<'a> File<'a> {
         Some(self.args(record.values))
     }
 
+    /// Returns the ids that are referred to but that no instance has, each once, ascending.
+    pub(super) fn missing_ids(&self) -> Vec<u64> {
+        let ids = self.values.iter().filter_map(|value| if let Value::Ref(id) = value { Some(*id) } else { None });
+        let mut missing: Vec<u64> = ids.filter(|id| self.entity(*id).is_none()).collect();
+        missing.sort_unstable();
+        missing.dedup();
+        missing
+    }
+
     fn args(&self, span: Span) -> Args<'_, 'a> {
         Args { file: self, values: &self.values[span.range()] }
     }

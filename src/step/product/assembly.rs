@@ -4,7 +4,10 @@
 //! and inside representations along relationships and MAPPED_ITEMs. Shapes that no product reaches are placed where they are.
 
 use super::purpose::{holds_mesh, purpose_besides_shape};
-use super::relations::{WITH_TRANSFORMATION, property_attributes, related_representations};
+use super::relations::{
+    Link, WITH_TRANSFORMATION, property_attributes, related_representations, shape_definition_attributes,
+    usage_attributes,
+};
 use super::usage_names::{Usage, name_usages, product_name};
 use crate::math::Frame;
 use crate::step::geometry::units::Units;
@@ -29,13 +32,6 @@ pub(crate) struct PlacedRepresentation {
     pub(crate) orphan: bool,
 }
 
-/// A directed relationship: the representation it leads to, and how that is placed; `None` where that cannot be read.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Link {
-    pub(super) to: u64,
-    placement: Option<Frame>,
-}
-
 /// The structure of a file, and the state of the walk through it.
 pub(crate) struct Assembly<'f, 'a> {
     pub(super) file: &'f File<'a>,
@@ -45,10 +41,10 @@ pub(crate) struct Assembly<'f, 'a> {
     /// Product definition → its representations.
     pub(super) shapes: FxHashMap<u64, Vec<u64>>,
     /// Representations that stand for a product.
-    owned: FxHashSet<u64>,
+    pub(super) owned: FxHashSet<u64>,
     pub(super) usages: FxHashMap<u64, Vec<Usage>>,
     /// Usage → placement of the child in the parent; `None` where that cannot be read.
-    placements: FxHashMap<u64, Option<Frame>>,
+    pub(super) placements: FxHashMap<u64, Option<Frame>>,
     pub(super) links: FxHashMap<u64, Vec<Link>>,
     /// Representations that are not the shape of a product, and what they are.
     pub(crate) left_out: Vec<(u64, String)>,
@@ -95,9 +91,9 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let mut contextual = Vec::new();
         let mut relations = Vec::new();
         for e in file.entities() {
-            if let Some(args) = e.attributes("SHAPE_DEFINITION_REPRESENTATION", 0) {
+            if let Some(args) = shape_definition_attributes(e) {
                 a.read_shape_definition(args.entity(0), args.id(1));
-            } else if let Some(args) = e.attributes("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0) {
+            } else if let Some(args) = usage_attributes(e) {
                 if let (Some(parent), Some(child)) = (args.id(3), args.id(4)) {
                     a.usages.entry(parent).or_default().push(Usage { child, name: String::new(), id: e.id });
                 }
@@ -146,11 +142,13 @@ impl<'f, 'a> Assembly<'f, 'a> {
         // PRODUCT_DEFINITION_SHAPE of a product definition; those of usages and shape aspects place nothing.
         let target = property_attributes(definition).entity(2);
         let Some(target) = target else { return };
+        // Shapes of usages are placed by them. A complex one is a relationship of product definitions by name.
+        if target.keywords().any(|k| k.contains("USAGE")) {
+            return;
+        }
         if !target.keywords().any(|k| k.starts_with("PRODUCT_DEFINITION")) {
-            // Shapes of usages are placed by them; the geometry of an aspect is a part of its product's, named once more.
-            if !target.keywords().any(|k| k.contains("USAGE")) {
-                self.aspects.insert(representation, target.id);
-            }
+            // The geometry of an aspect is a part of its product's, named once more.
+            self.aspects.insert(representation, target.id);
             return;
         }
         let shapes = self.shapes.entry(target.id).or_default();
@@ -190,7 +188,11 @@ impl<'f, 'a> Assembly<'f, 'a> {
     /// Reads where the child of a usage stands in the parent, by a CONTEXT_DEPENDENT_SHAPE_REPRESENTATION; its relation goes into `used`.
     fn read_contextual(&mut self, e: Entity<'f, 'a>, used: &mut FxHashSet<u64>) {
         let args = e.args();
-        let (Some(relation), Some(shape)) = (args.entity(0), args.entity(1)) else { return };
+        let (Some(relation), Some(shape)) = (args.entity(0), args.entity(1)) else {
+            self.problems
+                .push(format!("#{}: its relationship or its usage is not in the file: it places nothing", e.id));
+            return;
+        };
         used.insert(relation.id);
         let Some(usage) = property_attributes(shape).id(2) else { return };
         let Some([first, second]) = related_representations(relation) else { return };
@@ -199,14 +201,16 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
         let mut placement = self.transformation(relation, [first, second]);
         // The first representation is the child's; some writers swap them.
-        let ends = self.file.entity(usage).and_then(|u| u.attributes("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0));
+        let ends = self.file.entity(usage).and_then(usage_attributes);
         if let Some((parent, child)) = ends.and_then(|a| Some((a.id(3)?, a.id(4)?))) {
             let has = |product: u64, r: u64| self.shapes.get(&product).is_some_and(|s| s.contains(&r));
             if has(parent, first) && has(child, second) && !has(child, first) {
                 placement = placement.map(|p| p.inverse());
             }
         }
-        self.placements.entry(usage).or_insert(placement);
+        if *self.placements.entry(usage).or_insert(placement) != placement {
+            self.problems.push(format!("#{}: usage #{usage} has another place already, which counts alone", e.id));
+        }
     }
 
     /// Links the two representations of a relationship: one way by its transformation, or both ways, unmoved, if it has none.
@@ -228,7 +232,10 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let mut products: Vec<u64> = self.shapes.keys().chain(self.usages.keys()).copied().collect();
         products.sort_unstable();
         products.dedup();
-        let roots: Vec<u64> = products.iter().copied().filter(|p| !children.contains(p)).collect();
+        let moved = self.products_placed_by_others();
+        // What others place and nothing reaches after all is placed below, by itself.
+        let roots: Vec<u64> =
+            products.iter().copied().filter(|p| !children.contains(p) && !moved.contains(p)).collect();
         for root in roots {
             self.place_product(root, Frame::IDENTITY, String::new(), &mut Vec::new(), &[]);
         }
@@ -299,7 +306,12 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
         // Taken out while its children are placed; nothing asks for it meanwhile, for `path` stops a product inside itself.
         if let Some(usages) = self.usages.remove(&definition) {
+            let placed_within = self.placed_within(definition, &usages);
             for usage in &usages {
+                // A mapped item or a relationship places it already; at the parent's origin it would stand once more.
+                if !self.placements.contains_key(&usage.id) && placed_within.contains(&usage.child) {
+                    continue;
+                }
                 // Without a placement of its own the child stands where the parent does.
                 let local = self.placements.get(&usage.id).copied().unwrap_or(Some(Frame::IDENTITY));
                 let (kept, at) = (self.placed.len(), placement.compose(&local.unwrap_or(Frame::IDENTITY)));

@@ -63,7 +63,10 @@ pub(crate) fn convert(
     let (mut keys, mut index) = number_edges(in_order);
 
     // Each edge once: faces that share one must get the same bits, or they would not join.
-    let mut edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(|&key| edge_curve(&geometry, key)).collect();
+    let single = plans.values().flatten().flat_map(|plan| &plan.loops).filter(|l| l.len() == 1);
+    let alone: FxHashSet<EdgeKey> = single.map(|l| l[0].0).collect();
+    let mut edges: Vec<Outcome<TrimmedEdge>> =
+        keys.par_iter().map(|key| edge_curve(&geometry, *key, alone.contains(key))).collect();
     let joined = vertices_of_empty_edges(file, &keys, &edges);
     let mut removed = remove_faces_without_width(file, &ids, &mut plans, (&keys, &index), (&edges, &joined));
     let table = EdgeTable { keys: &mut keys, index: &mut index, edges: &mut edges };
@@ -207,11 +210,12 @@ fn add_shells(
     }
 }
 
-/// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length.
-fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey) -> Outcome<TrimmedEdge> {
+/// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length. `alone` is whether a
+/// loop has no other edge.
+fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey, alone: bool) -> Outcome<TrimmedEdge> {
     match key {
         // Parts are cut from whole edges, which must be there first.
-        EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id),
+        EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id, alone),
         EdgeKey::Straight(a, b) => {
             let (p, q) = (geometry.point(a)?, geometry.point(b)?);
             let length = (q - p).length();

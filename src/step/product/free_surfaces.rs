@@ -7,7 +7,7 @@ use super::topology::ShapeItems;
 use crate::math::{Aabb, Point};
 use crate::model::{Edge, EdgeId, Part, Shell, VertexId};
 use crate::nurbs::Curve;
-use crate::step::chart::{Chart, Kind};
+use crate::step::chart::Chart;
 use crate::step::geometry::extent::FaceExtent;
 use crate::step::geometry::{Geometry, Outcome, Refusal};
 use crate::step::part21::Entity;
@@ -22,6 +22,9 @@ use rustc_hash::FxHashMap;
 const LOOSE_BOUNDARY_MM: f64 = 1e-3;
 /// A rectangle short of a whole period by less than this share of it is whole.
 const PERIOD_SLACK: f64 = 1e-9;
+
+/// Trimming parameters beyond a surface's end by no more than this share of its range are at the end: writers round to six digits.
+const RANGE_SLACK: f64 = 1e-5;
 
 /// A built face with its boundary curves, loop by loop.
 type Bounded = (BuiltFace, Vec<Vec<Curve>>);
@@ -152,7 +155,7 @@ fn trim_rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart)
     };
     let scale = chart.parameter_scale(geometry.units.length, geometry.units.angle);
     let Some(scale) = scale else {
-        return Err(Refusal::new(e, "its parameters cannot be taken over to the swept conic"));
+        return Err(Refusal::new(e, "its parameters cannot be taken over to the surface's closed form"));
     };
     let mut range = [[0.0; 2]; 2];
     for d in 0..2 {
@@ -173,10 +176,19 @@ fn trim_rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart)
             None if hi < lo => (lo, hi) = (hi, lo),
             _ => {}
         }
+        if !(lo.is_finite() && hi.is_finite()) {
+            return Err(Refusal::new(e, "a trimming parameter is no number"));
+        }
+        if chart.period[d].is_none() {
+            // Beyond its ends a sphere would be wound again and again, and other surfaces have nothing to show.
+            let [a, b] = chart.range[d];
+            let slack = RANGE_SLACK * (b - a);
+            if lo < a - slack || hi > b + slack {
+                return Err(Refusal::new(e, "its trimming parameters leave the surface"));
+            }
+            (lo, hi) = (lo.max(a), hi.min(b));
+        }
         range[d] = [lo, hi];
-    }
-    if matches!(chart.kind, Kind::Spline(_)) && range.iter().flatten().any(|x| !x.is_finite()) {
-        return Err(Refusal::new(e, "a trimming parameter is no number"));
     }
     Ok(range)
 }

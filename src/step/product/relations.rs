@@ -1,13 +1,44 @@
 //! What stands in the entities that relate representations, products and their properties.
 
+use crate::math::Frame;
 use crate::step::part21::{Args, Entity};
 
 /// What states where one of two related representations stands in the other; without it both stand in the same place.
 pub(super) const WITH_TRANSFORMATION: &str = "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
 
+/// A directed relationship: the representation it leads to, and how that is placed; `None` where that cannot be read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Link {
+    pub(super) to: u64,
+    pub(super) placement: Option<Frame>,
+}
+
+impl Link {
+    /// Whether it leads to another place, or to one that cannot be read.
+    pub(super) fn is_moved(&self) -> bool {
+        self.placement.is_none_or(|p| !p.is_identity())
+    }
+}
+
 /// Returns the attributes of a property definition, the third of which is what it describes; subtypes add none.
 pub(super) fn property_attributes<'f, 'a>(definition: Entity<'f, 'a>) -> Args<'f, 'a> {
     definition.attributes("PROPERTY_DEFINITION", 0).unwrap_or_else(|| definition.args())
+}
+
+/// Returns the attributes of an entity `name`; those of a complex instance, whose own record has none, from its supertype's.
+fn own_or_inherited<'f, 'a>(e: Entity<'f, 'a>, name: &str, supertype: &str) -> Option<Args<'f, 'a>> {
+    let own = e.attributes(name, 0)?;
+    Some(e.attributes(supertype, 0).unwrap_or(own))
+}
+
+/// Returns the attributes of a NEXT_ASSEMBLY_USAGE_OCCURRENCE: id, name, description, parent and child; `None` of any other entity.
+pub(super) fn usage_attributes<'f, 'a>(e: Entity<'f, 'a>) -> Option<Args<'f, 'a>> {
+    own_or_inherited(e, "NEXT_ASSEMBLY_USAGE_OCCURRENCE", "PRODUCT_DEFINITION_RELATIONSHIP")
+}
+
+/// Returns the attributes of a SHAPE_DEFINITION_REPRESENTATION: definition and representation; `None` of any other entity.
+pub(super) fn shape_definition_attributes<'f, 'a>(e: Entity<'f, 'a>) -> Option<Args<'f, 'a>> {
+    own_or_inherited(e, "SHAPE_DEFINITION_REPRESENTATION", "PROPERTY_DEFINITION_REPRESENTATION")
 }
 
 /// Returns the two representations of a relationship; `None` where one is missing.

@@ -164,14 +164,16 @@ impl<'f, 'a> Geometry<'f, 'a> {
             (surface, boundaries.map(|b| self.segments(self.entity(b)?, 0)).collect::<Outcome<Vec<_>>>()?)
         } else {
             let plan = read_face(self.file, area.id)?;
-            let curve = |(key, reversed): &(EdgeKey, bool)| -> Outcome<Curve> {
+            let curve = |(key, reversed): &(EdgeKey, bool), alone: bool| -> Outcome<Curve> {
                 let EdgeKey::Entity(edge) = key else {
                     return Err(Refusal::new(area, "polygonal loops of a profile are not supported"));
                 };
-                let curve = self.edge(*edge)?.curve.ok_or_else(|| Refusal::new(area, "an edge has no length"))?;
+                let curve =
+                    self.edge(*edge, alone)?.curve.ok_or_else(|| Refusal::new(area, "an edge has no length"))?;
                 Ok(if *reversed { curve.reversed() } else { curve })
             };
-            let loops = plan.loops.iter().map(|l| l.iter().map(curve).collect()).collect::<Outcome<Vec<_>>>()?;
+            let border = |l: &Vec<(EdgeKey, bool)>| l.iter().map(|use_| curve(use_, l.len() == 1)).collect();
+            let loops = plan.loops.iter().map(border).collect::<Outcome<Vec<_>>>()?;
             (self.entity(plan.surface)?, loops)
         };
         let plane =

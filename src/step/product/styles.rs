@@ -1,8 +1,9 @@
 //! Colours and layers: STYLED_ITEM and OVER_RIDING_STYLED_ITEM down to a COLOUR_RGB, and PRESENTATION_LAYER_ASSIGNMENT.
 
+use super::relations::{property_attributes, shape_definition_attributes, usage_attributes};
 use crate::model::Colour;
 use crate::step::part21::{Entity, File};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::sync::Arc;
 
 /// Most entities looked at for one style.
@@ -13,14 +14,20 @@ const MAX_STEPS: usize = 64;
 pub(crate) struct Styles {
     colours: FxHashMap<u64, Colour>,
     layers: FxHashMap<u64, Arc<str>>,
+    /// Items that one occurrence or more shows in another colour than the rest.
+    overridden: FxHashSet<u64>,
 }
 
 impl Styles {
-    /// Collects the surface colours and layers that a file gives to items; overriding styles win over plain ones.
+    /// Collects the surface colours and layers that a file gives to items; overriding styles win over plain ones. A colour that holds for one
+    /// usage of a product alone becomes the usage's.
     pub(crate) fn read(file: &File<'_>) -> Self {
         let mut plain = FxHashMap::default();
         let mut over = FxHashMap::default();
-        let mut layers = FxHashMap::default();
+        let (mut layers, mut overridden) = (FxHashMap::default(), FxHashSet::default());
+        let usages = usages_by_shape(file);
+        // Of thousands of items many share a style.
+        let mut known: FxHashMap<u64, Option<Colour>> = FxHashMap::default();
         for e in file.entities() {
             if let Some(args) = e.attributes("PRESENTATION_LAYER_ASSIGNMENT", 0) {
                 let name: Arc<str> = args.name(0).into();
@@ -35,15 +42,22 @@ impl Styles {
             };
             let Some(args) = args else { continue };
             let Some(item) = args.id(1) else { continue };
-            let colour = args.list(0).ids().into_iter().find_map(|s| colour(file, s));
-            if let Some(colour) = colour {
+            for style in args.list(0).ids() {
+                let Some(colour) = *known.entry(style).or_insert_with(|| colour(file, style)) else { continue };
+                // Elsewhere the item keeps the colour that it has.
+                if let Some(usage) = style_context(file, style).and_then(|context| usages.get(&context)) {
+                    overridden.insert(item);
+                    over.insert(*usage, colour);
+                    continue;
+                }
                 let table = if overriding { &mut over } else { &mut plain };
                 table.insert(item, colour);
+                break;
             }
         }
         // Last, for an overriding style stands above the plain one wherever the file has it.
         plain.extend(over);
-        Self { colours: plain, layers }
+        Self { colours: plain, layers, overridden }
     }
 
     /// Returns the colour given to an item itself; `None` where it has none of its own.
@@ -51,10 +65,39 @@ impl Styles {
         self.colours.get(&item).copied()
     }
 
+    /// Whether an occurrence shows an item in a colour of its own.
+    pub(crate) fn is_overridden(&self, item: u64) -> bool {
+        self.overridden.contains(&item)
+    }
+
     /// Returns the layer on which an item is put itself; `None` for none.
     pub(crate) fn layer(&self, item: u64) -> Option<Arc<str>> {
         self.layers.get(&item).cloned()
     }
+}
+
+/// Returns the usages of products by what styles name them by: their shapes, and the entities that place them.
+fn usages_by_shape(file: &File<'_>) -> FxHashMap<u64, u64> {
+    let mut usages = FxHashMap::default();
+    for e in file.entities() {
+        let (shape, definition) = if let Some(a) = shape_definition_attributes(e) {
+            (a.id(1), a.entity(0))
+        } else if let Some(a) = e.attributes("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION", 0) {
+            (Some(e.id), a.entity(1))
+        } else {
+            continue;
+        };
+        let target = definition.and_then(|d| property_attributes(d).entity(2));
+        if let (Some(shape), Some(usage)) = (shape, target.filter(|t| usage_attributes(*t).is_some())) {
+            usages.insert(shape, usage.id);
+        }
+    }
+    usages
+}
+
+/// Returns what a style is limited to; `None` for one that holds everywhere.
+fn style_context(file: &File<'_>, style: u64) -> Option<u64> {
+    file.entity(style)?.attributes("PRESENTATION_STYLE_BY_CONTEXT", 1)?.id(0)
 }
 
 /// Returns the first surface colour that a style leads to within [`MAX_STEPS`] entities; `None` without one.
@@ -77,6 +120,8 @@ fn colour(file: &File<'_>, style: u64) -> Option<Colour> {
         for args in e.all_args() {
             let mut ids = Vec::new();
             args.deep_ids(&mut ids);
+            // More than will be looked at need not wait.
+            ids.truncate(MAX_STEPS);
             ids.retain(|id| !queue.contains(id));
             queue.extend(ids);
         }

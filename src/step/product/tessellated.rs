@@ -5,6 +5,7 @@ use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::TessellatedFace;
 use crate::step::geometry::{Geometry, Outcome, Refusal};
 use crate::step::part21::{Args, Entity};
+use rustc_hash::FxHashSet;
 
 /// Deepest nesting of tessellated items.
 const MAX_DEPTH: usize = 8;
@@ -14,12 +15,19 @@ const MAX_DEPTH: usize = 8;
 pub(crate) struct TessellatedItems {
     pub(crate) faces: Vec<TessellatedFace>,
     pub(crate) refused: Vec<Refusal>,
+    /// Items that were met: a mesh that is listed again in its place is no second one.
+    visited: FxHashSet<u64>,
 }
+
+/// Names of the items that hold other tessellated items.
+const SETS: [&str; 3] = ["TESSELLATED_SOLID", "TESSELLATED_SHELL", "TESSELLATED_GEOMETRIC_SET"];
 
 /// Where a kind of leaf keeps its indices, and how triangles are listed.
 struct Layout {
     /// Position, among the attributes, of the one of this name.
     pnindex: usize,
+    /// Position of the link to an exact face, of a leaf that has one.
+    link: Option<usize>,
     /// Whether triangles are listed as strips and fans.
     strips: bool,
 }
@@ -28,20 +36,30 @@ struct Layout {
 fn leaf_layout(keyword: &str) -> Option<Layout> {
     // A face has its link to an exact face before the indices, a set has none (ISO 10303-42).
     Some(match keyword {
-        "TRIANGULATED_FACE" => Layout { pnindex: 5, strips: false },
-        "COMPLEX_TRIANGULATED_FACE" => Layout { pnindex: 5, strips: true },
-        "TRIANGULATED_SURFACE_SET" => Layout { pnindex: 4, strips: false },
-        "COMPLEX_TRIANGULATED_SURFACE_SET" => Layout { pnindex: 4, strips: true },
+        "TRIANGULATED_FACE" => Layout { pnindex: 5, link: Some(4), strips: false },
+        "COMPLEX_TRIANGULATED_FACE" => Layout { pnindex: 5, link: Some(4), strips: true },
+        "TRIANGULATED_SURFACE_SET" => Layout { pnindex: 4, link: None, strips: false },
+        "COMPLEX_TRIANGULATED_SURFACE_SET" => Layout { pnindex: 4, link: None, strips: true },
         _ => return None,
     })
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// Collects the triangulated faces of a tessellated item, and refusals of those that are broken, in `into`. A solid or shell that is
-    /// linked to an exact shape is only its picture and gives nothing; nor does an item of another kind.
+    /// Collects the triangulated faces of a tessellated item, and refusals of those that are broken, in `into`. A solid, shell or face that
+    /// is linked to an exact shape is only its picture and gives nothing; nor do points and wires.
     pub(crate) fn tessellated(&self, id: u64, depth: usize, into: &mut TessellatedItems) {
         let Ok(e) = self.entity(id) else { return };
-        if let Some(layout) = leaf_layout(e.keyword()) {
+        // A kilobyte can list a shell in itself a hundred times to any depth.
+        if !into.visited.insert(id) {
+            return;
+        }
+        let set = SETS.iter().find_map(|kind| e.attributes(kind, 1));
+        if e.is_a("REPOSITIONED_TESSELLATED_ITEM") {
+            into.refused.push(Refusal::new(e, "a mesh with a place of its own is not converted"));
+        } else if let Some(layout) = leaf_layout(e.keyword()) {
+            if self.is_picture_of_face(e, &layout) {
+                return;
+            }
             match self.triangles(e, &layout) {
                 Ok(mesh) => {
                     let name = e.args().name(0);
@@ -49,16 +67,24 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 }
                 Err(refusal) => into.refused.push(refusal),
             }
-        } else if depth < MAX_DEPTH
-            && e.is_one_of(&["TESSELLATED_SOLID", "TESSELLATED_SHELL", "TESSELLATED_GEOMETRIC_SET"])
-        {
-            let linked = e.args().id(2).is_some_and(|link| self.file.entity(link).is_some());
-            if !linked {
-                for item in e.args().list(1).ids() {
+        } else if let Some(set) = set {
+            if depth >= MAX_DEPTH {
+                into.refused.push(Refusal::new(e, "meshes are nested too deeply"));
+            } else if set.entity(1).is_none() {
+                for item in set.list(0).ids() {
                     self.tessellated(item, depth + 1, into);
                 }
             }
+        } else if e.keywords().any(|k| k.contains("TRIANGULATED")) {
+            into.refused.push(Refusal::new(e, "this kind of mesh is not converted"));
         }
+    }
+
+    /// Whether a leaf names the exact face that it shows. One that names a surface shows a part of it that nothing else bounds.
+    fn is_picture_of_face(&self, e: Entity<'f, 'a>, layout: &Layout) -> bool {
+        // Of the kinds of leaves, faces alone have a link: before their indices.
+        let link = layout.link.and_then(|at| e.args().entity(at));
+        link.is_some_and(|face| face.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE", "SUBFACE", "ORIENTED_FACE"]))
     }
 
     /// Returns the triangles of a leaf as a mesh, mm, with the file's normals where it gives them, else flat ones; triangles without area

@@ -147,8 +147,12 @@ impl ShapeItems {
             self.tessellated.push(id);
         } else if e.is_one_of(&RECIPES) {
             self.recipes.push(id);
-        } else if is_surface(e) && !self.surfaces.contains(&id) {
-            self.surfaces.push(id);
+        } else if is_surface(e) {
+            if !self.surfaces.contains(&id) {
+                self.surfaces.push(id);
+            }
+        } else if e.keywords().any(is_unsupported_shape) {
+            self.refused.push(Refusal::new(e, "this kind of shape is not converted"));
         }
     }
 
@@ -239,6 +243,17 @@ fn is_tessellated(keyword: &str) -> bool {
     )
 }
 
+/// Whether a keyword is that of a shape which light could meet, of a kind that is not read.
+fn is_unsupported_shape(keyword: &str) -> bool {
+    // By the ends of names: schemas add solids and volumes with each edition.
+    ["_SOLID", "_VOLUME", "HALF_SPACE"].iter().any(|end| keyword.ends_with(end))
+        || matches!(
+            keyword,
+            "SURFACE_REPLICA" | "SURFACE_PATCH" | "ORIENTED_FACE" | "REPOSITIONED_TESSELLATED_ITEM"
+        )
+        || keyword.contains("TRIANGULATED")
+}
+
 /// Whether an entity is a surface, told by its name.
 pub(crate) fn is_surface(e: Entity<'_, '_>) -> bool {
     e.keywords().any(|k| {
@@ -249,7 +264,7 @@ pub(crate) fn is_surface(e: Entity<'_, '_>) -> bool {
     })
 }
 
-/// Reads the surface, sense and bounds of a face, without geometry. Bounds that are missing are passed over; missing edges refuse the face.
+/// Reads the surface, sense and bounds of a face, without geometry. Refused where a bound, its loop or an edge is missing.
 pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     let Some(e) = file.entity(id) else {
         return Err(Refusal {
@@ -278,14 +293,16 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     };
     let Some(surface) = surface else { return Err(Refusal::new(e, "its surface is missing")) };
     let mut loops = Vec::new();
-    for bound in bounds.iter().flat_map(|b| b.ids()) {
-        let Some(bound) = file.entity(bound) else { continue };
+    let listed = bounds.map_or(0, |b| b.len());
+    for bound in bounds.iter().flat_map(|b| (0..listed).map(|i| b.entity(i))) {
+        // Without it the face would have no hole there, or no end.
+        let Some(bound) = bound else { return Err(Refusal::new(e, "a bound of it is missing")) };
         let a = bound
             .attributes("FACE_BOUND", 1)
             .or_else(|| bound.attributes("FACE_OUTER_BOUND", 1))
             .unwrap_or_else(|| bound.args());
-        let Some(edges) = a.entity(0).map(|l| edge_loop(l)).transpose()? else { continue };
-        let mut edges = edges;
+        let Some(border) = a.entity(0) else { return Err(Refusal::new(bound, "its loop is missing")) };
+        let mut edges = edge_loop(border)?;
         // A bound against its loop is run backwards: order and senses turn both.
         if a.flag(1) == Some(false) {
             edges.reverse();

@@ -2,6 +2,7 @@
 //!
 //! Writers often leave the name of a NEXT_ASSEMBLY_USAGE_OCCURRENCE blank, or give the same one to all.
 
+use super::relations::usage_attributes;
 use crate::step::part21::File;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -18,7 +19,10 @@ pub(super) struct Usage {
 /// Returns the product's name, or else its id, without blanks around it; empty where it cannot be found: what uses it names it then.
 pub(super) fn product_name(file: &File<'_>, definition: u64) -> String {
     let product = || {
-        let formation = file.entity(definition)?.attributes("PRODUCT_DEFINITION", 0)?.entity(2)?;
+        let definition = file.entity(definition)?;
+        // A subtype, such as one with documents, writes the same attributes first.
+        let own = definition.attributes("PRODUCT_DEFINITION", 0).unwrap_or_else(|| definition.args());
+        let formation = own.entity(2)?;
         let product = formation.args().entity(2)?;
         let args = product.attributes("PRODUCT", 0)?;
         [1, 0].into_iter().filter_map(|i| args.text(i)).map(|n| n.trim().to_owned()).find(|n| !n.is_empty())
@@ -30,7 +34,7 @@ pub(super) fn product_name(file: &File<'_>, definition: u64) -> String {
 /// names the usage, numbered from 1 where it is used several times, or else the usage's description or id does.
 pub(super) fn name_usages(file: &File<'_>, usages: &mut [Usage]) {
     let text = |usage: &Usage, i: usize| {
-        let args = file.entity(usage.id).and_then(|e| e.attributes("NEXT_ASSEMBLY_USAGE_OCCURRENCE", 0));
+        let args = file.entity(usage.id).and_then(usage_attributes);
         args.map_or_else(String::new, |a| a.name(i).trim().to_owned())
     };
     let mut children: FxHashMap<String, FxHashSet<u64>> = FxHashMap::default();

@@ -3,7 +3,7 @@
 //! Of an edge without length the two vertices become one; of a face between two edges that coincide, the two edges.
 
 use super::topology::{EdgeKey, FacePlan};
-use crate::nurbs::Curve;
+use crate::nurbs::{ControlPoint, Curve};
 use crate::step::geometry::Outcome;
 use crate::step::geometry::edges::TrimmedEdge;
 use crate::step::part21::File;
@@ -13,6 +13,8 @@ use rustc_hash::FxHashMap;
 const COINCIDENT_MM: f64 = 1e-6;
 /// Most that an edge's own gap adds to that, mm: more is no rounding of a writer.
 const LARGEST_GAP_MM: f64 = 1e-3;
+/// Ends of a curve nearer than this are one: no edge is shorter.
+const CLOSED_MM: f64 = 1e-9;
 /// Points that are compared along two edges.
 const COMPARED_POINTS: usize = 9;
 /// Surfaces without an end: that a loop which encloses nothing means all of one, as it might of a sphere, cannot be.
@@ -30,7 +32,7 @@ pub(super) fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
     }
 }
 
-/// Maps the second vertex of each edge without length to the first: such an edge is left out, and the faces on both of its sides would meet
+/// Maps the second vertex of each edge without length, and of each closed one, to the first: such an edge is left out, and the faces on both of its sides would meet
 /// in two places, with a slit between them.
 pub(super) fn vertices_of_empty_edges(
     file: &File<'_>,
@@ -40,8 +42,8 @@ pub(super) fn vertices_of_empty_edges(
     // A chain of empty edges joins all of its vertices with the first.
     let mut joined: FxHashMap<u64, u64> = FxHashMap::default();
     for (key, edge) in keys.iter().zip(edges) {
-        // Few edges are empty: only of these the file is asked for the vertices.
-        if let Ok(TrimmedEdge { curve: None, .. }) = edge
+        // Few edges are empty or closed: only of these the file is asked for the vertices.
+        if edge.as_ref().is_ok_and(|edge| edge.curve.as_ref().is_none_or(ends_in_one_place))
             && let [Some(a), Some(b)] = vertex_ids(file, *key)
         {
             let (a, b) = (joined_vertex(&joined, a), joined_vertex(&joined, b));
@@ -51,6 +53,12 @@ pub(super) fn vertices_of_empty_edges(
         }
     }
     joined
+}
+
+/// Whether a curve, whose first and last control points are its ends, comes back to where it starts.
+fn ends_in_one_place(curve: &Curve) -> bool {
+    let last = curve.points.len() - 1;
+    (curve.points[0].position() - curve.points[last].position()).length() <= CLOSED_MM
 }
 
 /// Returns the vertex that stands for all that empty edges join with `vertex`.

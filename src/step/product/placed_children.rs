@@ -1,0 +1,65 @@
+//! Children of products that representations place: by mapped items and by relationships with a transformation.
+//!
+//! Source: ISO 10303-44 with AP214: a usage may stand beside a mapped item that places the same child, without a placement of its own.
+
+use super::assembly::Assembly;
+use super::usage_names::Usage;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+impl Assembly<'_, '_> {
+    /// Returns those children of a product, among `usages` without a placement, that its own representations place.
+    pub(super) fn placed_within(&self, definition: u64, usages: &[Usage]) -> FxHashSet<u64> {
+        let unplaced = |usage: &&Usage| !self.placements.contains_key(&usage.id);
+        let children: FxHashSet<u64> = usages.iter().filter(unplaced).map(|usage| usage.child).collect();
+        if children.is_empty() {
+            return children;
+        }
+        let mut shown: FxHashSet<u64> = FxHashSet::default();
+        for representation in self.representations(definition) {
+            let mapped = self.items(representation).into_iter().filter_map(|item| self.mapped_representation(item));
+            shown.extend(mapped);
+            let links = self.links.get(&representation).into_iter().flatten();
+            shown.extend(links.filter(|link| link.is_moved()).map(|link| link.to));
+        }
+        let is_shown = |child: &u64| {
+            // The representation leads to shapes, not to further usages: what these place would be lost.
+            let places_more = self.usages.get(child).is_some_and(|u| u.iter().any(|u| !unplaced(&u)));
+            !places_more && self.representations(*child).iter().any(|r| shown.contains(r))
+        };
+        children.into_iter().filter(is_shown).collect()
+    }
+
+    /// Returns the products of which a representation of another product places one by a transformation.
+    pub(super) fn products_placed_by_others(&self) -> FxHashSet<u64> {
+        let mut places: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
+        for (from, links) in self.links.iter().filter(|(from, _)| self.owned.contains(from)) {
+            for link in links.iter().filter(|link| link.is_moved()) {
+                places.entry(link.to).or_default().push(*from);
+            }
+        }
+        let by_others =
+            |own: &Vec<u64>| own.iter().filter_map(|r| places.get(r)).flatten().any(|from| !own.contains(from));
+        self.shapes.iter().filter(|(_, own)| by_others(own)).map(|(product, _)| *product).collect()
+    }
+
+    /// Returns the representations of a product, and those that stand unmoved in one of them and are no other product's.
+    fn representations(&self, definition: u64) -> Vec<u64> {
+        let mut found = self.shapes.get(&definition).cloned().unwrap_or_else(Vec::new);
+        let mut at = 0;
+        while at < found.len() {
+            for link in self.links.get(&found[at]).into_iter().flatten() {
+                if !link.is_moved() && !self.owned.contains(&link.to) && !found.contains(&link.to) {
+                    found.push(link.to);
+                }
+            }
+            at += 1;
+        }
+        found
+    }
+
+    /// Returns the representation that a MAPPED_ITEM shows; `None` for any other item.
+    fn mapped_representation(&self, item: u64) -> Option<u64> {
+        let map = self.file.entity(item)?.attributes("MAPPED_ITEM", 1)?.entity(0)?;
+        map.attributes("REPRESENTATION_MAP", 0)?.id(1)
+    }
+}

@@ -1,0 +1,258 @@
+//! What files say in rare forms, or wrongly, is read right or refused by name: nothing is lost, added or moved in silence.
+
+use crate::support::measure_model;
+use lampyris::step::{Import, Settings, read_bytes};
+use std::f64::consts::PI;
+
+/// A representation of item #900 in millimetres and radians; #10 is the origin, #11 to #13 are x, y and z, #14 is a placement there.
+fn read(data: &str) -> Import {
+    let text = format!(
+        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\
+         #1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+         #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+         #6=SHAPE_REPRESENTATION('',(#900),#1);\n#10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=DIRECTION('',(1.,0.,0.));\n\
+         #12=DIRECTION('',(0.,1.,0.));\n#13=DIRECTION('',(0.,0.,1.));\n#14=AXIS2_PLACEMENT_3D('',#10,#13,#11);\n\
+         {data}ENDSEC;\nEND-ISO-10303-21;\n"
+    );
+    read_bytes("silence.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
+}
+
+/// The area of what is read, of which nothing is refused.
+fn area(import: &Import) -> f64 {
+    assert_eq!(import.report.faces.refused, 0, "{:?}", import.report.refusals);
+    measure_model(&import.model).area
+}
+
+fn close(a: f64, b: f64, relative: f64) {
+    assert!((a / b - 1.0).abs() < relative, "{a} for {b}");
+}
+
+/// Asserts that all there is was refused, for this reason.
+fn assert_refused(data: &str, reason: &str) {
+    let import = read(data);
+    assert_eq!(import.model.placed_face_count(), 0, "{data}");
+    let refusals = &import.report.refusals;
+    assert!(refusals.iter().any(|r| r.reason.contains(reason)), "{data}: {refusals:?}");
+}
+
+/// Surface #20 of `record` between its parameters.
+fn trimmed(record: &str, ranges: &str) -> String {
+    format!("{record}#900=GEOMETRIC_SET('',(#901));\n#901=RECTANGULAR_TRIMMED_SURFACE('',#20,{ranges},.T.,.T.);\n")
+}
+
+/// A line through (10, 0, 5) that is turned about z, or moved along it by three for each unit of v.
+fn swept_line(direction: &str, revolved: bool) -> String {
+    let surface =
+        if revolved { "SURFACE_OF_REVOLUTION('',#24,#25)" } else { "SURFACE_OF_LINEAR_EXTRUSION('',#24,#26)" };
+    format!(
+        "#20={surface};\n#21=CARTESIAN_POINT('',(10.,0.,5.));\n#22=DIRECTION('',({direction}));\n#23=VECTOR('',#22,2.);\n\
+         #24=LINE('',#21,#23);\n#25=AXIS1_PLACEMENT('',#10,#13);\n#26=VECTOR('',#13,3.);\n"
+    )
+}
+
+/// The parameter of a swept line counts its vector from its own point, whatever the surface is else (ISO 10303-42).
+#[test]
+fn surfaces_swept_by_a_line_lie_where_its_parameters_say() {
+    let cylinder = read(&trimmed(&swept_line("0.,0.,1.", true), "0.,3.141592653589793,0.,1.5"));
+    close(area(&cylinder), 30.0 * PI, 1e-9);
+    let [lo, hi] = cylinder.report.bbox_mm.expect("a face");
+    assert!((lo[2] - 5.0).abs() < 1e-9 && (hi[2] - 8.0).abs() < 1e-9, "{lo:?} {hi:?}");
+    // Half a frustum of radii 10 and 13.6 and slant 6.
+    let cone = read(&trimmed(&swept_line("0.6,0.,0.8", true), "0.,3.141592653589793,0.,3."));
+    close(area(&cone), 0.5 * PI * 23.6 * 6.0, 1e-9);
+    let plane = read(&trimmed(&swept_line("1.,0.,0.", false), "0.,4.,0.,2."));
+    close(area(&plane), 48.0, 1e-9);
+    assert_eq!(plane.report.bbox_mm, Some([[10.0, 0.0, 5.0], [18.0, 0.0, 11.0]]));
+    let bare = swept_line("1.,0.,0.", false).replace("#20=", "#900=");
+    assert_refused(&bare, "it has no ends");
+}
+
+/// The parameter of a polyline counts its points: 0 to 2 is all of two sides of 10 mm.
+#[test]
+fn a_swept_polyline_is_trimmed_by_its_points() {
+    let wall = "#20=SURFACE_OF_LINEAR_EXTRUSION('',#24,#26);\n#21=CARTESIAN_POINT('',(10.,0.,0.));\n#22=CARTESIAN_POINT('',(10.,10.,0.));\n\
+                #24=POLYLINE('',(#10,#21,#22));\n#26=VECTOR('',#13,3.);\n";
+    close(area(&read(&trimmed(wall, "0.,2.,0.,2."))), 120.0, 1e-9);
+    close(area(&read(&trimmed(wall, "0.5,1.5,0.,2."))), 60.0, 1e-9);
+}
+
+/// Degrees in a file of radians would wind a sphere 28 times; values that were rounded at the pole are the pole.
+#[test]
+fn trimming_parameters_beyond_a_sphere_are_refused() {
+    let sphere = "#20=SPHERICAL_SURFACE('',#14,5.);\n";
+    close(area(&read(&trimmed(sphere, "0.,6.283185307179586,-1.570797,1.570797"))), 100.0 * PI, 1e-6);
+    assert_refused(&trimmed(sphere, "0.,360.,-90.,90."), "leave the surface");
+    assert_refused(&trimmed(sphere, "0.,6.283185307179586,0.,1.E10"), "leave the surface");
+    let lemon = "#20=DEGENERATE_TOROIDAL_SURFACE('',#14,3.,5.,.F.);\n";
+    assert_refused(&trimmed(lemon, "0.,1.,2.541592653589793,3.3415926535897933"), "cannot be taken over");
+}
+
+#[test]
+fn a_curve_whose_weights_are_no_numbers_is_no_polynomial() {
+    let curve = |weight: &str| {
+        format!(
+            "#20=SURFACE_OF_LINEAR_EXTRUSION('',#24,#26);\n#21=CARTESIAN_POINT('',(5.,10.,0.));\n#22=CARTESIAN_POINT('',(10.,0.,0.));\n\
+             #24=(BOUNDED_CURVE()B_SPLINE_CURVE(2,(#10,#21,#22),.UNSPECIFIED.,.F.,.F.)B_SPLINE_CURVE_WITH_KNOTS((3,3),(0.,1.),.UNSPECIFIED.)\
+             CURVE()GEOMETRIC_REPRESENTATION_ITEM()RATIONAL_B_SPLINE_CURVE((1.,{weight},1.))REPRESENTATION_ITEM(''));\n\
+             #26=VECTOR('',#13,3.);\n"
+        )
+    };
+    area(&read(&trimmed(&curve("1."), "0.,1.,0.,1.")));
+    assert_refused(&trimmed(&curve("$"), "0.,1.,0.,1."), "weights are no numbers");
+}
+
+/// A square of 10 mm with a round hole of radius 2 whose edge has two vertices, `apart` mm from each other; #70 is the hole's bound, #68
+/// its loop.
+fn plate(apart: f64) -> String {
+    let y = 2.0 * (apart / 2.0).sin();
+    let x = 5.0 + 2.0 * (apart / 2.0).cos();
+    let corners = [[0., 0.], [10., 0.], [10., 10.], [0., 10.]];
+    let points: String = (0..4)
+        .map(|k| {
+            let [x, y] = corners[k];
+            format!("#{}=CARTESIAN_POINT('',({x:?},{y:?},0.));\n", 30 + k)
+        })
+        .collect();
+    points
+        + &format!(
+            "#40=POLY_LOOP('',(#30,#31,#32,#33));\n#41=FACE_OUTER_BOUND('',#40,.T.);\n\
+             #60=CARTESIAN_POINT('',({x:?},5.,0.));\n#61=CARTESIAN_POINT('',({x:?},{:?},0.));\n#62=VERTEX_POINT('',#60);\n#63=VERTEX_POINT('',#61);\n\
+             #64=CARTESIAN_POINT('',(5.,5.,0.));\n#65=AXIS2_PLACEMENT_3D('',#64,#13,#11);\n#66=CIRCLE('',#65,2.);\n\
+             #67=EDGE_CURVE('',#62,#63,#66,.T.);\n#68=EDGE_LOOP('',(#69));\n#69=ORIENTED_EDGE('',*,*,#67,.F.);\n#70=FACE_BOUND('',#68,.T.);\n\
+             #71=PLANE('',#14);\n#72=ADVANCED_FACE('',(#41,#70),#71,.T.);\n#73=OPEN_SHELL('',(#72));\n\
+             #900=SHELL_BASED_SURFACE_MODEL('',(#73));\n",
+            5.0 + y
+        )
+}
+
+/// The only edge of a loop goes all around, though its vertices were written twice and rounded.
+#[test]
+fn a_hole_whose_vertices_differ_by_rounding_stays_open() {
+    for apart in [0.0, 1e-12, 1e-8, -1e-8, 1e-6, -1e-6] {
+        let import = read(&plate(apart));
+        // The quadrature walks a polygon.
+        close(area(&import), 100.0 - 4.0 * PI, 1e-4);
+        let part = &import.model.parts[0];
+        let hole = part.edges.iter().find(|e| e.entity == Some(67)).expect("the hole's edge");
+        assert_eq!(hole.vertices[0], hole.vertices[1], "{apart:e}");
+    }
+}
+
+#[test]
+fn a_face_that_lacks_a_bound_is_refused() {
+    let whole = plate(0.0);
+    for (from, to, reason) in [
+        ("(#41,#70)", "(#41,#9999)", "a bound of it is missing"),
+        ("(#41,#70)", "(#41,$)", "a bound of it is missing"),
+        ("FACE_BOUND('',#68", "FACE_BOUND('',#9999", "its loop is missing"),
+    ] {
+        assert_refused(&whole.replace(from, to), reason);
+    }
+}
+
+/// A mesh of one triangle, #51, of 50 mm².
+const TRIANGLE: &str = "#50=COORDINATES_LIST('',3,((0.,0.,0.),(10.,0.,0.),(0.,10.,0.)));\n";
+
+/// A shell may list itself: each mesh stands in its place once, and reading comes to an end.
+#[test]
+fn a_mesh_that_is_listed_again_is_no_second_one() {
+    let itself = vec!["#900"; 100].join(",");
+    let shell = format!(
+        "{TRIANGLE}#51=TRIANGULATED_FACE('',#50,3,((0.,0.,1.)),$,(),((1,2,3)));\n#900=TESSELLATED_SHELL('',(#51,{itself},#51),$);\n"
+    );
+    let import = read(&shell);
+    assert_eq!(import.model.placed_face_count(), 1);
+    close(area(&import), 50.0, 1e-12);
+}
+
+/// A mesh that names the exact face which it shows stands there no second time; one that names a surface bounds it.
+#[test]
+fn a_mesh_linked_to_a_face_is_its_picture() {
+    let linked = |to: &str| {
+        plate(0.0).replace("#900=", "#901=")
+            + &format!(
+                "{TRIANGLE}#51=TRIANGULATED_FACE('',#50,3,((0.,0.,1.)),{to},(),((1,2,3)));\n#900=TESSELLATED_SHELL('',(#51),$);\n"
+            )
+    };
+    assert_eq!(read(&linked("#72")).model.placed_face_count(), 0);
+    assert_eq!(read(&linked("#71")).model.placed_face_count(), 1);
+}
+
+/// Meshes in forms that are not read are named.
+#[test]
+fn a_mesh_with_a_place_of_its_own_is_refused() {
+    let mesh = format!(
+        "{TRIANGLE}#51=TRIANGULATED_FACE('',#50,3,((0.,0.,1.)),$,(),((1,2,3)));\n\
+         #900=(GEOMETRIC_REPRESENTATION_ITEM()REPOSITIONED_TESSELLATED_ITEM(#14)REPRESENTATION_ITEM('')TESSELLATED_GEOMETRIC_SET((#51))\
+         TESSELLATED_ITEM());\n"
+    );
+    assert_refused(&mesh, "place of its own");
+    let in_complex_form = mesh.replace("REPOSITIONED_TESSELLATED_ITEM(#14)", "");
+    assert_eq!(read(&in_complex_form).model.placed_face_count(), 1);
+    assert_refused("#900=CUBIC_BEZIER_TRIANGULATED_FACE('',$,3,$,$,$);\n", "not converted");
+}
+
+#[test]
+fn kinds_of_shapes_that_are_not_read_are_refused() {
+    for item in [
+        "SURFACE_REPLICA('',#71,#14)",
+        "BOXED_HALF_SPACE('',#71,.T.,$)",
+        "SPHERICAL_VOLUME('',#14,2.)",
+        "ORIENTED_FACE('',*,#72,.T.)",
+        "TRIMMED_VOLUME('',$,0.,1.,0.,1.,0.,1.)",
+    ] {
+        assert_refused(&format!("{}#900={item};\n", plate(0.0).replace("#900=", "#901=")), "not converted");
+    }
+    // Points, curves and what they stand in are no shapes, and no loss.
+    for item in [
+        "CARTESIAN_POINT('',(1.,2.,3.))",
+        "AXIS2_PLACEMENT_3D('',#10,$,$)",
+        "CIRCLE('',#14,2.)",
+        "GEOMETRIC_CURVE_SET('',(#66))",
+    ] {
+        let import = read(&format!("{}#900={item};\n", plate(0.0).replace("#900=", "#901=")));
+        assert_eq!(import.report.refusals.len(), 0, "{item}");
+    }
+}
+
+/// Composite curves of composite curves, eight to eight: counted before they are read.
+#[test]
+fn composite_curves_that_multiply_are_refused() {
+    let nested = |levels: usize| {
+        let mut data = String::from(
+            "#30=CARTESIAN_POINT('',(10.,0.,0.));\n#31=CARTESIAN_POINT('',(0.,10.,0.));\n#32=POLYLINE('',(#10,#30,#31,#10));\n\
+             #40=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#32);\n#41=COMPOSITE_CURVE('',(#40),.F.);\n",
+        );
+        for level in 1..levels {
+            let (segment, curve) = (40 + 2 * level, 41 + 2 * level);
+            let list = vec![format!("#{segment}"); 8].join(",");
+            data += &format!("#{segment}=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#{});\n", curve - 2);
+            data += &format!("#{curve}=COMPOSITE_CURVE('',({list}),.F.);\n");
+        }
+        let last = 41 + 2 * (levels - 1);
+        data + &format!(
+            "#80=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#{last});\n#81=BOUNDARY_CURVE('',(#80),.F.);\n#71=PLANE('',#14);\n\
+             #900=CURVE_BOUNDED_SURFACE('',#71,(#81),.F.);\n"
+        )
+    };
+    close(area(&read(&nested(1))), 50.0, 1e-9);
+    assert_refused(&nested(8), "too many segments");
+}
+
+/// What has no length as a double's square has a direction all the same.
+#[test]
+fn a_tiny_direction_is_a_direction() {
+    let block = "#20=DIRECTION('',(0.,1.E-170,0.));\n#21=AXIS2_PLACEMENT_3D('',#10,#20,#11);\n#900=BLOCK('',#21,1.,2.,3.);\n";
+    let [lo, hi] = read(block).report.bbox_mm.expect("a block");
+    for (got, expected) in lo.into_iter().chain(hi).zip([0.0, 0.0, -2.0, 1.0, 3.0, 0.0]) {
+        assert!((got - expected).abs() < 1e-9, "{lo:?} {hi:?}");
+    }
+}
+
+#[test]
+fn references_that_lead_nowhere_are_told() {
+    let import = read(&(plate(0.0) + "#80=PRODUCT('','','',(#9999));\n#81=PRODUCT('','','',(#9998,#9999));\n"));
+    let problems = &import.report.problems;
+    assert!(problems.len() == 1 && problems[0].contains("2 such") && problems[0].contains("#9998"), "{problems:?}");
+    assert_eq!(read(&plate(0.0)).report.problems, Vec::<String>::new());
+}
