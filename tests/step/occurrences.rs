@@ -112,3 +112,18 @@ fn a_colour_of_one_occurrence_is_not_that_of_all() {
         assert_eq!(colour_at(200.0), Some([1.0, 0.0, 0.0]));
     }
 }
+
+/// A shape that no product names is placed where it is, whatever its representation calls itself.
+#[test]
+fn shapes_of_no_product_are_placed() {
+    let orphan = "#400=AXIS2_PLACEMENT_3D('',#12,#13,#14);\n#401=BLOCK('',#400,10.,10.,10.);\n";
+    for kind in ["SHAPE_REPRESENTATION", "SHAPE_REPRESENTATION_WITH_PARAMETERS"] {
+        let import =
+            read("", &[SHAPE, USAGE, RELATION, PLACED, orphan, &format!("#402={kind}('',(#401),#1);\n")].concat());
+        assert_eq!(
+            (import.model.placed_face_count(), import.report.bbox_mm.map(|b| b[1][0])),
+            (12, Some(210.0)),
+            "{kind}"
+        );
+    }
+}

@@ -43,7 +43,9 @@ pub(super) fn decode(raw: &[u8]) -> String {
 /// none.
 fn decode_escape(rest: &[u8]) -> Option<(String, usize)> {
     if rest.starts_with(b"\\S\\") {
-        return rest.get(3).map(|&b| (char::from(b | 0x80).to_string(), 4));
+        // An apostrophe is written twice in a text, here too.
+        let used = if rest[3..].starts_with(b"''") { 5 } else { 4 };
+        return rest.get(3).map(|&b| (char::from(b | 0x80).to_string(), used));
     }
     // The choice of a page of ISO 8859: `\S\` is read by the first of them, Latin-1, whatever it says.
     if rest.starts_with(b"\\P") && rest.get(3) == Some(&b'\\') {
@@ -66,7 +68,8 @@ fn decode_escape(rest: &[u8]) -> Option<(String, usize)> {
     if !rest[end..].starts_with(b"\\X0\\") {
         return None;
     }
-    let codes = &rest[4..end];
+    // Writers fold lines inside of codes too.
+    let codes: Vec<u8> = rest[4..end].iter().copied().filter(|b| *b > b' ').collect();
     let text = if wide {
         // What is no character is shown as one that says so.
         codes.chunks(8).map(|c| parse_hex(c).and_then(char::from_u32).unwrap_or('\u{fffd}')).collect()
@@ -93,6 +96,8 @@ mod tests {
         assert_eq!(decode(b"\\S\\d"), "ä");
         assert_eq!(decode(b"\\X2\\041B04380441\\X0\\t"), "Лисt");
         assert_eq!(decode(b"\\X4\\0001F600\\X0\\"), "😀");
+        assert_eq!(decode(b"\\X2\\041704\r\n350440\n043A\\X0\\"), "Зерк");
+        assert_eq!(decode(b"A\\S\\''B"), "A§B");
         assert_eq!(decode(b"\xe9t\xe9"), "été");
         assert_eq!(decode("été".as_bytes()), "été");
         assert_eq!(decode(b"a\\\\b"), "a\\b");

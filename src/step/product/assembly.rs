@@ -3,7 +3,7 @@
 //! Walks from the products that no other uses along NEXT_ASSEMBLY_USAGE_OCCURRENCEs and CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs,
 //! and inside representations along relationships and MAPPED_ITEMs. Shapes that no product reaches are placed where they are.
 
-use super::purpose::{holds_mesh, purpose_besides_shape};
+use super::purpose::{holds_mesh, is_shape_representation, purpose_besides_shape};
 use super::relations::{
     Link, WITH_TRANSFORMATION, property_attributes, related_representations, shape_definition_attributes,
     usage_attributes,
@@ -255,12 +255,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         self.in_orphans = true;
         // From here on what products reach is closed: an orphan that leads to it would show it twice.
         self.by_products = self.reached.clone();
-        let candidates: Vec<u64> = self
-            .file
-            .entities()
-            .filter(|e| e.keywords().any(|k| k.ends_with("SHAPE_REPRESENTATION")))
-            .map(|e| e.id)
-            .collect();
+        let candidates: Vec<u64> =
+            self.file.entities().filter(|e| e.keywords().any(is_shape_representation)).map(|e| e.id).collect();
         let mapped: FxHashSet<u64> =
             self.file.entities().filter_map(|e| e.attributes("REPRESENTATION_MAP", 0)?.id(1)).collect();
         for id in candidates {

@@ -16,6 +16,13 @@ pub(super) fn purpose_besides_shape(file: &File<'_>, id: u64) -> Option<&'static
     e.keywords().any(shows).then_some("says how something is shown")
 }
 
+/// Whether a keyword is that of a representation of a shape; of one with parameters too, but of no relationship.
+pub(super) fn is_shape_representation(keyword: &str) -> bool {
+    keyword.contains("SHAPE_REPRESENTATION")
+        && !keyword.starts_with("CONTEXT_DEPENDENT_")
+        && !keyword.ends_with("_RELATIONSHIP")
+}
+
 /// Whether one of these items is a ready mesh, told by its name.
 pub(super) fn holds_mesh(file: &File<'_>, items: &[u64]) -> bool {
     let mesh = |k: &str| k.contains("TRIANGULATED") || k.starts_with("TESSELLATED");
