@@ -4,7 +4,7 @@ use crate::arrays::{columns, flat, rows, shaped};
 use crate::errors::{SceneError, of_json};
 use lampyris::formats::{Axis, ColourMap, Grid, Picture};
 use lampyris::pipeline::{PreparedScene, SceneResults};
-use lampyris::regulation::{self, Assumptions, IntensityMap, Regulation, Traffic};
+use lampyris::regulation::{self, Assumptions, IntensityMap, RaySample, Regulation, Traffic};
 use lampyris::simulate::ReceiverResult;
 use lampyris::simulate::scene::FarFieldType;
 use lampyris::study::figures::{cell_errors, channel_cell_errors};
@@ -197,8 +197,8 @@ pub(crate) fn assess(
         }
     }
     let found = &results.found.results;
-    let ray_flux = (found.rays > 0).then(|| found.power.emitted / found.rays as f64);
-    let map = IntensityMap::from_csv(&csv, ray_flux).map_err(SceneError::new_err)?;
+    let rays = RaySample { heaviest_flux: found.heaviest_ray, replicates: found.replicates };
+    let map = IntensityMap::from_csv(&csv, Some(rays)).map_err(SceneError::new_err)?;
     let assumptions = Assumptions {
         traffic: if left_hand { Traffic::Left } else { Traffic::Right },
         as_placed,

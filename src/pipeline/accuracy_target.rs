@@ -3,7 +3,7 @@
 use super::error::Error;
 use super::intersectors::IntersectorChoice;
 use super::monitor::{Monitor, Stage};
-use super::ray_sampler::RaySampler;
+use super::ray_recorder::RayRecorder;
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::Ray;
@@ -135,11 +135,11 @@ fn scene_rays(
 ) -> Vec<Ray> {
     let exact: &dyn Intersector = product.spline();
     // As many as are traced: about every ray meets one surface.
-    let sampler = RaySampler::new(exact, settings.rays, settings.rays);
-    simulate(bound, &sampler, settings, &|_| true);
+    let recorder = RayRecorder::new(exact, settings.rays, settings.rays);
+    simulate(bound, &recorder, settings, &|_| true);
     let lift = |ray: &Ray, cosine: f64| {
         let way = exact.intersect(ray, &mut Cost::default()).map_or(f64::INFINITY, |hit| hit.t * cosine);
         RAY_LIFT_MM.min(LIFTED_SHARE * way)
     };
-    sampler.rays(settings.rays as usize, model, lift)
+    recorder.rays(settings.rays as usize, model, lift)
 }

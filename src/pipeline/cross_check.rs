@@ -4,7 +4,7 @@
 use super::intersectors::{farthest_start, in_one_scene, true_intersector};
 use super::monitor::{Monitor, Stage, in_stage};
 use super::prepared_scene::{PreparedScene, TraceRequest};
-use super::ray_sampler::RaySampler;
+use super::ray_recorder::RayRecorder;
 use super::scene_results::SceneResults;
 use super::settings::IntersectorKind;
 use crate::intersect::bvh::{self, Bvh};
@@ -97,10 +97,10 @@ fn sample_segments(prepared: &PreparedScene, results: &Results, intersector: &dy
     let count = rays.clamp(FEWEST_REPLAYED, RECHECKED as u64).min(settings.rays);
     let step = (settings.rays / count.max(1)).max(1);
     let expected = (count as f64 * segments_a_ray) as u64;
-    let sampler = RaySampler::new(intersector, RECHECKED as u64, expected);
-    replay(&prepared.bound, &sampler, &settings, &(0..count).map(|k| k * step).collect::<Vec<_>>());
+    let recorder = RayRecorder::new(intersector, RECHECKED as u64, expected);
+    replay(&prepared.bound, &recorder, &settings, &(0..count).map(|k| k * step).collect::<Vec<_>>());
     let lift = LIFT_IN_TOLERANCES * prepared.mesh_settings.loosest();
-    sampler.rays(RECHECKED, &prepared.job.loaded.model, |_, _| lift)
+    recorder.rays(RECHECKED, &prepared.job.loaded.model, |_, _| lift)
 }
 
 /// Builds what the run has not of BVH and octree, and compares both and the spline on these rays.

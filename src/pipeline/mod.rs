@@ -17,8 +17,9 @@
 //! Guarantee: the same scene, files and settings give the same bits, whoever asks and whatever listens.
 //!
 //! Inner modules, each of which sees only those before it: `error`, `suggest`, `settings`, `monitor`, `loading`, `turn`, `cache`,
-//! `facets`, `intersectors` and `fingerprint` (the ingredients), `scene_job`, `ray_sampler`, `accuracy_target`, `default_accuracy` and `prepared_scene` with `scene_results` and
-//! `cross_check` (the run), `error_target`, `verdicts` and `settled_target` (what is made of it).
+//! `expected_facets`, `facets`, `intersectors` and `fingerprint` (the ingredients), `scene_job`, `ray_recorder`, `accuracy_target`,
+//! `default_accuracy` and `prepared_scene` with `scene_results` and `cross_check` (the run), `error_target`, `verdicts` and
+//! `settled_target` (what is made of it).
 
 mod accuracy_target;
 mod cache;
@@ -33,7 +34,7 @@ mod intersectors;
 mod loading;
 mod monitor;
 mod prepared_scene;
-mod ray_sampler;
+mod ray_recorder;
 mod scene_job;
 mod scene_results;
 mod settings;
@@ -52,7 +53,7 @@ pub use intersectors::{IntersectorChoice, in_one_scene, with_intersector};
 pub use loading::{LoadedModel, read_models, read_scene, read_scene_models, step_settings};
 pub use monitor::{Monitor, Silent, Stage};
 pub use prepared_scene::{PreparedScene, TraceRequest};
-pub use ray_sampler::RaySampler;
+pub use ray_recorder::RayRecorder;
 pub use scene_job::{PartChoice, SceneJob};
 pub use scene_results::SceneResults;
 pub use settings::{IntersectorKind, MeshingSettings, RayRange, TracingSettings};

@@ -136,7 +136,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "intersectors",
             "fingerprint",
             "scene_job",
-            "ray_sampler",
+            "ray_recorder",
             "accuracy_target",
             "default_accuracy",
             "prepared_scene",

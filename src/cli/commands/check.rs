@@ -21,7 +21,7 @@ use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::{Aabb, Ray};
 use crate::model::Model;
 use crate::pipeline::{
-    AccurateSettings, IntersectorChoice, LIFT_IN_TOLERANCES, RaySampler, TracingSettings, mesh_settings,
+    AccurateSettings, IntersectorChoice, LIFT_IN_TOLERANCES, RayRecorder, TracingSettings, mesh_settings,
     settings_for_accuracy, tessellate_by_part,
 };
 use crate::report::{CheckReport, figures, grouped, verdict};
@@ -282,9 +282,9 @@ fn own_rays(
         seed: tracing.seed.unwrap_or(scene.run.seed),
         ..RunSettings::from(&scene.run)
     };
-    let sampler = RaySampler::new(octree, count, count);
-    simulate(&bound, &sampler, &settings, &|_| true);
-    Ok(sampler.rays(count as usize, model, |_, _| lift))
+    let recorder = RayRecorder::new(octree, count, count);
+    simulate(&bound, &recorder, &settings, &|_| true);
+    Ok(recorder.rays(count as usize, model, |_, _| lift))
 }
 
 /// Returns how far hits moved to the spline are from it, along the ray in mm and in the normal in degrees. Beyond `near` mm it is another

@@ -9,13 +9,13 @@ use std::sync::Mutex;
 const SPARE: f64 = 1.2;
 
 /// Passes every question on and notes some segments of paths: those whose hash is smallest, so that neither threads nor batches decide which.
-pub struct RaySampler<'a> {
+pub struct RayRecorder<'a> {
     inner: &'a dyn Intersector,
     threshold: u64,
     sample: Mutex<Vec<(u64, Ray)>>,
 }
 
-impl<'a> RaySampler<'a> {
+impl<'a> RayRecorder<'a> {
     /// Notes about `wanted` and a fifth more of `expected` rays; all where fewer come than are wanted.
     pub fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
         let share = (SPARE * wanted as f64 / expected.max(1) as f64).min(1.0);
@@ -65,7 +65,7 @@ fn hash(ray: &Ray) -> u64 {
     z ^ (z >> 31)
 }
 
-impl Intersector for RaySampler<'_> {
+impl Intersector for RayRecorder<'_> {
     /// Single questions are no segments of a path: they ask what sources lie in, or where a face is that a ray starts from.
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         self.inner.intersect(ray, cost)
@@ -82,7 +82,7 @@ impl Intersector for RaySampler<'_> {
 
     /// A ray that escapes is not asked about any more: it is noted here.
     fn escapes(&self, ray: &Ray) -> bool {
-        // Asked first: the sampler must not change what the intersector is asked.
+        // Asked first: the recorder must not change what the intersector is asked.
         let escapes = self.inner.escapes(ray);
         if escapes {
             self.note(ray);
@@ -115,9 +115,9 @@ mod tests {
         let rays: Vec<Ray> =
             (0..20_000).map(|k| Ray::new(Point::splat(f64::from(k)), Vector::new(0.6, 0.0, 0.8))).collect();
         let sample = |rays: &[Ray]| {
-            let sampler = RaySampler::new(&Nothing, 500, rays.len() as u64);
-            sampler.intersect_batch(rays, &mut vec![None; rays.len()], &mut Cost::default());
-            sampler.rays(500, &Model::default(), |_, _| 0.1)
+            let recorder = RayRecorder::new(&Nothing, 500, rays.len() as u64);
+            recorder.intersect_batch(rays, &mut vec![None; rays.len()], &mut Cost::default());
+            recorder.rays(500, &Model::default(), |_, _| 0.1)
         };
         let (forward, backward) = (sample(&rays), sample(&rays.iter().rev().copied().collect::<Vec<_>>()));
         assert_eq!(forward.len(), 500);
