@@ -151,7 +151,7 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
     } else {
         nodes_without_children(&mut document);
     }
-    container(path, &document, &buffer.bytes)
+    write_container(path, &document, &buffer.bytes)
 }
 
 /// Removes the list of children of the first node, which glTF forbids to be empty.
@@ -161,8 +161,9 @@ fn nodes_without_children(document: &mut Value) {
     }
 }
 
-/// Writes a GLB file of the document, padded to four bytes, and the binary chunk, which must be and is left out when empty.
-fn container(path: &Path, document: &Value, binary: &[u8]) -> Result<(), Error> {
+/// Writes a GLB file: the document, padded here to four bytes, and the binary chunk, which the caller has padded and which is left out when
+/// empty.
+fn write_container(path: &Path, document: &Value, binary: &[u8]) -> Result<(), Error> {
     let mut text = document.to_string().into_bytes();
     while !text.len().is_multiple_of(4) {
         text.push(b' ');

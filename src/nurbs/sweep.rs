@@ -26,7 +26,7 @@ pub fn extrusion(curve: &Curve, direction: Vector, [v0, v1]: [f64; 2]) -> Surfac
     }
 }
 
-/// Turns `curve(v)`, in the coordinates that `axis` is in, about the z axis of `axis` by the angle u in `angles`, radians.
+/// Turns `curve(v)`, in the coordinates that `axis` is in, about the z axis of `axis` by the angle u in `angles`, radians, rising.
 pub fn revolution(curve: &Curve, axis: &Frame, angles: [f64; 2]) -> Surface {
     let (knots, arc) = conic::unit_arc(angles);
     let meridian: Vec<(Point, f64)> = curve.points.iter().map(|p| (axis.local_point(p.project()), p.w)).collect();

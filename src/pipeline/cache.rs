@@ -284,7 +284,7 @@ pub(super) fn facets_key(scene: &Scene, mesher: &tessellate::Settings) -> Option
     Some(Fingerprint::new(&pieces))
 }
 
-/// Returns the names of so many groups of a model; a model in one piece has its own.
+/// Returns the cache names of the groups that a model is divided into, by their numbers; a model in one piece keeps its own.
 pub(super) fn group_keys(key: &Fingerprint, groups: usize) -> Vec<Fingerprint> {
     if groups == 1 {
         return vec![key.clone()];

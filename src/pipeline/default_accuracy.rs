@@ -93,7 +93,7 @@ pub(super) fn needs_pilot(
     Undecided { models, bound, run, source: &source, facets, tolerance }.needs_pilot()
 }
 
-/// Returns what finds the hits of a run that was chosen so, and its normals.
+/// Returns what finds the hits of a run whose accuracy was chosen, and its normals: the exact spline by that name, else the octree.
 pub(super) fn intersector_choice(chosen: &Chosen) -> IntersectorChoice {
     let intersector = match chosen.intersector {
         "exact" => IntersectorKind::Exact,

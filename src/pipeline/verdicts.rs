@@ -20,7 +20,7 @@ pub struct ReceiverVerdict {
 /// `rays` are those of the run.
 ///
 /// # Errors
-/// When `geometric` has not an error for every cell.
+/// When `geometric` has not an error for every cell, or a value or an error is no finite number.
 fn intensities(
     receiver: &ReceiverResult,
     geometric: Option<&[f64]>,

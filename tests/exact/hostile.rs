@@ -223,6 +223,30 @@ fn no_certified_answer_on_a_hostile_face_is_wrong() {
     assert!(out.flagged * 100 < out.certified, "{} flagged, {} certified", out.flagged, out.certified);
 }
 
+/// A ray along the line where a face folds meets it where the two roots beside each other cannot be settled: each is told once.
+#[test]
+fn a_root_that_stays_open_is_one_crossing() {
+    const FACE: usize = 143;
+    const RAY: usize = 42;
+    let mut s = Stream(1_000_003 + FACE as u64);
+    let surface = surface(&mut s, FACE % KINDS.len());
+    let exact = Exact::build(&model([surface.clone()]), &Settings::default());
+    let size = surface.bounds().diagonal();
+    let mut next = |k: usize| {
+        // On the sides of the domain, beside one, and anywhere.
+        let uv = match k % 6 {
+            0 => Uv::new(0.0, s.within(0.0, 1.0)),
+            1 => Uv::new(s.within(0.0, 1.0), 0.0),
+            2 => Uv::new(10f64.powf(s.within(-14.0, -3.0)), s.within(0.0, 1.0)),
+            _ => Uv::new(s.within(0.0, 1.0), s.within(0.0, 1.0)),
+        };
+        ray(&mut s, &surface, size, uv, k % 10)
+    };
+    let rays: Vec<Ray> = (0..=RAY).map(&mut next).collect();
+    let crossings = exact.crossings(&rays[RAY], &mut Cost::default());
+    assert_eq!(crossings.len(), 2, "{crossings:?}");
+}
+
 #[test]
 #[ignore = "minutes, in release: LAMPYRIS_RAYS rays, a million by default, from LAMPYRIS_SEED on"]
 fn no_certified_answer_on_many_hostile_faces_is_wrong() {

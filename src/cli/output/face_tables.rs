@@ -70,7 +70,8 @@ pub(crate) fn face_section(run: &SceneResults, prepared: &PreparedScene) -> Opti
     Some(Section::new("Light by face").with_block(face_table(run, prepared)?))
 }
 
-/// Puts what selects each face into the document of the results.
+/// Puts into the document of the results, beside each face that it lists, what selects that face; its number where the model has too many
+/// to be named.
 pub(crate) fn add_selectors(document: &mut Value, results: &Results, model: &Model) {
     let Some(found) = &results.faces else { return };
     let names = face_names(model);

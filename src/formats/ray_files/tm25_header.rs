@@ -146,7 +146,9 @@ impl Tm25Header {
         self.columns.places(self.column_names.len())
     }
 
-    /// Reads the header and leaves the reader at the first ray; what was supposed goes to `notes`.
+    /// Reads the header from the first byte of the file on and leaves the reader at the first ray. What the file leaves out and what is not
+    /// kept goes to `notes`; an error for other versions, values that the standard does not know, and where the rays would not end with the
+    /// file.
     pub(super) fn read(file: &mut ByteReader, notes: &mut Vec<String>) -> Result<Self, Error> {
         // The mark was read by whoever chose this reader; a caller who did not ask is told here.
         if &file.read_array::<4>("the mark TM25")? != b"TM25" {

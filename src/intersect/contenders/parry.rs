@@ -47,7 +47,7 @@ impl Intersector for Parry<'_> {
         let t_max = if ray.t_max < f64::from(f32::MAX) { ray.t_max as f32 } else { f32::MAX };
         let t_min = ray.t_min as f32;
         let tests = Cell::new(0);
-        let (found, t) = self.tree.cast_ray(&asked, t_max, |index, nearest| {
+        let nearest = self.tree.cast_ray(&asked, t_max, |index, nearest| {
             if own == Some(self.codes[index as usize].facet()) {
                 return None;
             }
@@ -55,8 +55,10 @@ impl Intersector for Parry<'_> {
             let [a, b, c] = self.triangles[index as usize];
             let t = local_ray_intersection_with_triangle(a, b, c, &asked)?.0.time_of_impact;
             (t >= t_min && t <= nearest).then_some(t)
-        })?;
+        });
+        // Of a miss too.
         cost.tests += tests.get();
+        let (found, t) = nearest?;
         let [a, b, c] = self.triangles[found as usize];
         let (_, weights) = local_ray_intersection_with_triangle(a, b, c, &asked)?;
         let hit = self.codes[found as usize].hit(f64::from(t), [weights.y, weights.z].map(f64::from));

@@ -207,7 +207,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Skips blanks and returns the next byte, without taking it; [`END`] at the end.
+    /// Skips blanks, comments and print directives and returns the next byte without taking it; [`END`] at the end.
     fn peek(&mut self) -> u8 {
         // Most bytes are no blanks: the test before the call is what reading costs.
         if let Some(&c) = self.source.get(self.at)

@@ -104,7 +104,7 @@ impl BorderChord {
         // In the middle of the chord: facets on either side have tolerances of their own, and what does not fit
         // theirs is bounded anew.
         let limit = surface.tolerance(0.5 * (uv[0] + uv[1]));
-        self.sliver = deviation.sliver_bound(surface, &self.between, uv, at, limit - off).map(|x| x + off);
+        self.sliver = deviation.chord_bound(surface, &self.between, uv, at, limit - off).map(|x| x + off);
     }
 
     /// Returns what the border adds to the bound of a triangle that has the chord as a side, mm. `xyz` are the triangle's corners; above

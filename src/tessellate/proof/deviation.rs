@@ -93,9 +93,9 @@ impl DeviationBounds {
         self.max_over_patches(patches, &LinearMap::new(corners, at)?, at[0], limit)
     }
 
-    /// Returns a bound of the distance, mm, from the surface over a convex polygon to a chord that the polygon holds, where it is within
-    /// `limit`; else `None`. The chord's parameters lie at `at` in space.
-    pub(in crate::tessellate) fn sliver_bound(
+    /// Returns a bound of the distance, mm, from the surface over a convex polygon to a chord that the polygon holds; `None` where it is above
+    /// `limit` or the chord has no length. The chord's ends, at `chord` in parameters, lie at `at` in space.
+    pub(in crate::tessellate) fn chord_bound(
         &mut self,
         surface: &FaceSurface<'_>,
         polygon: &[Uv],

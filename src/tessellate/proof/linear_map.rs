@@ -167,7 +167,7 @@ mod tests {
                     worst = worst.max(distance_to_chord(s.evaluate(x), &at));
                 }
             }
-            let bound = |limit: f64| DeviationBounds::default().sliver_bound(&surface, &polygon, chord, at, limit);
+            let bound = |limit: f64| DeviationBounds::default().chord_bound(&surface, &polygon, chord, at, limit);
             assert!(bound(0.999 * worst).is_none());
             let bound = bound(1.2 * worst).unwrap();
             assert!(worst <= bound && bound <= 1.2 * worst, "{worst} {bound}");
