@@ -100,7 +100,7 @@ fn sample_segments(prepared: &PreparedScene, results: &Results, intersector: &dy
     let recorder = RayRecorder::new(intersector, RECHECKED as u64, expected);
     replay(&prepared.bound, &recorder, &settings, &(0..count).map(|k| k * step).collect::<Vec<_>>());
     let lift = LIFT_IN_TOLERANCES * prepared.mesh_settings.loosest();
-    recorder.rays(RECHECKED, &prepared.job.loaded.model, |_, _| lift)
+    recorder.rays(RECHECKED, &prepared.job.loaded.model, |ray, up| ray.origin + lift * up)
 }
 
 /// Builds what the run has not of BVH and octree, and compares both and the spline on these rays.

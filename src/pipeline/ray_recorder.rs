@@ -1,7 +1,7 @@
 //! A fair sample of the very rays of a run, to be asked again of other intersectors.
 
 use crate::intersect::{Cost, ExpectedRays, Footprint, Hit, Intersector};
-use crate::math::{Point, Ray};
+use crate::math::{Point, Ray, Vector};
 use crate::model::{Model, PlacedFace};
 use std::sync::Mutex;
 
@@ -32,27 +32,26 @@ impl<'a> RayRecorder<'a> {
     }
 
     /// Returns at most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts above it,
-    /// in free space, so that all intersectors are asked the same question whatever they take for the surface: so many mm as `lift` says of
-    /// the ray and its cosine to the normal. One that left a ready mesh, which has no surface, is left out.
-    pub fn rays(self, wanted: usize, model: &Model, lift: impl Fn(&Ray, f64) -> f64) -> Vec<Ray> {
+    /// in free space, so that all intersectors are asked the same question whatever they take for the surface: where `start` says of the ray
+    /// and the unit normal to the side that it goes to. One that left a ready mesh, which has no surface, is left out.
+    pub fn rays(self, wanted: usize, model: &Model, start: impl Fn(&Ray, Vector) -> Point) -> Vec<Ray> {
         let faces: Vec<PlacedFace> = model.placed_faces().collect();
         let mut noted = self.sample.into_inner().unwrap_or_else(|e| e.into_inner());
         // By the hash: an order that no thread and no batch decides, and that mixes sources and bounces.
         noted.sort_by_key(|(hash, _)| *hash);
-        noted.into_iter().filter_map(|(_, ray)| lift_off(ray, &faces, &lift)).take(wanted).collect()
+        noted.into_iter().filter_map(|(_, ray)| lift_off(ray, &faces, &start)).take(wanted).collect()
     }
 }
 
-/// Moves the start of a ray a little above the surface that it left, to the side that it goes to; unchanged where it left none, `None`
-/// where that has no surface or no normal there.
-fn lift_off(ray: Ray, faces: &[PlacedFace], lift: &impl Fn(&Ray, f64) -> f64) -> Option<Ray> {
+/// Moves the start of a ray above the surface that it left, to where `start` says; unchanged where it left none, `None` where that has no
+/// surface or no normal there.
+fn lift_off(ray: Ray, faces: &[PlacedFace], start: &impl Fn(&Ray, Vector) -> Point) -> Option<Ray> {
     let Some(departure) = ray.departure else { return Some(ray) };
     let placed = faces.get(departure.face.index())?;
     let normal = placed.placement.normal(placed.face?.surface.normal(departure.uv)?);
-    let along = normal.dot(ray.direction);
     // To the side on which it goes on.
-    let side = lift(&ray, along.abs()).copysign(along);
-    Some(Ray::new(ray.origin + side * normal, ray.direction))
+    let up = normal * 1f64.copysign(normal.dot(ray.direction));
+    Some(Ray::new(start(&ray, up), ray.direction))
 }
 
 /// Mixes the bits of origin and direction (the finaliser of SplitMix64, Steele et al. 2014).
@@ -98,7 +97,6 @@ impl Intersector for RayRecorder<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vector;
 
     struct Nothing;
     impl Intersector for Nothing {
@@ -117,7 +115,7 @@ mod tests {
         let sample = |rays: &[Ray]| {
             let recorder = RayRecorder::new(&Nothing, 500, rays.len() as u64);
             recorder.intersect_batch(rays, &mut vec![None; rays.len()], &mut Cost::default());
-            recorder.rays(500, &Model::default(), |_, _| 0.1)
+            recorder.rays(500, &Model::default(), |ray, up| ray.origin + 0.1 * up)
         };
         let (forward, backward) = (sample(&rays), sample(&rays.iter().rev().copied().collect::<Vec<_>>()));
         assert_eq!(forward.len(), 500);

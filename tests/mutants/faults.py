@@ -70,7 +70,7 @@ FAULTS = [
     ("node bound to nearest below", OCTREE + "node.rs", "let low = «(f64::from(bounds.low[a]) - origin) / step»;", "((f64::from(bounds.low[a]) - origin) / step).round()", FACETS),
     ("node bound to nearest above", OCTREE + "node.rs", "let high = «(f64::from(bounds.high[a]) - origin) / step»;", "((f64::from(bounds.high[a]) - origin) / step).round()", FACETS),
     ("steps too short", OCTREE + "node.rs", "/ 254.0 * «STEP_ROOM») as f32", "(1.0 - 1e-3)", FACETS),
-    ("box slack dropped", OCTREE + "ray_state.rs", "b.slack[a] = «((4.0 * o.abs() + frame.reach[a]) * ROUNDING + moved) * inverse.abs()»;", "0.0", FACETS),
+    ("box slack dropped", OCTREE + "ray_state.rs", "b.slack[a] = «((4.0 * o.abs() + mesh_box.reach[a]) * ROUNDING + moved) * inverse.abs()»;", "0.0", FACETS),
     ("sieve slack dropped", OCTREE + "ray_state.rs", "self.sieve.slack = «moved»;", "0.0", FACETS),
     # The proof of facets.
     ("Taylor bound a third", PROOF + "deviation.rs", "/ («8.0» * lightest))", "24.0", "tessellate lib:proof"),
@@ -81,7 +81,7 @@ FAULTS = [
     # Tallies.
     ("squares of other replicates forgotten", "src/simulate/tally.rs", "self.squares = self.squares.saturating_add(«o.squares»);", "0", "lib:tally simulate cli"),
     ("rounding of quanta downward", "src/simulate/tally.rs", "{ «(x + SHIFT) - SHIFT» } else", "x.floor()", "lib:tally simulate"),
-    ("a waiting cell is lost", "src/simulate/tally.rs", "pub(crate) fn flush(&mut self, sums: &mut [Sum]) {\n        «self.add_pending();»", "", "lib:tally simulate"),
+    ("a waiting cell is lost", "src/simulate/grid.rs", "pub(crate) fn flush(&mut self, sums: &mut [Sum]) {\n        «self.add_pending();»", "", "lib:tally simulate"),
     ("error without its correction", "src/simulate/tally.rs", "(squares - total * total / k).max(0.0) * «k» / (k - 1.0)", "1.0", "lib:tally simulate"),
     # Contacts.
     ("partner looks the same way", KERNEL + "contact.rs", "other.body != at.face.body && opposite && «against»", "!against", "simulate:of_two_coatings simulate"),

@@ -284,7 +284,7 @@ fn own_rays(
     };
     let recorder = RayRecorder::new(octree, count, count);
     simulate(&bound, &recorder, &settings, &|_| true);
-    Ok(recorder.rays(count as usize, model, |_, _| lift))
+    Ok(recorder.rays(count as usize, model, |ray, up| ray.origin + lift * up))
 }
 
 /// Returns how far hits moved to the spline are from it, along the ray in mm and in the normal in degrees. Beyond `near` mm it is another
