@@ -3,7 +3,7 @@
 use super::EdgeId;
 use crate::math::{Frame, Uv};
 use crate::mesh::FacetMesh;
-use crate::nurbs::{Surface, UvCurve};
+use crate::nurbs::{Surface, UvCurve, area_within};
 use serde::Serialize;
 use std::fmt;
 use std::sync::Arc;
@@ -241,17 +241,7 @@ impl TrimLoop {
 
     /// Returns the area within the loop in parameters, positive where it runs counter-clockwise.
     pub(crate) fn signed_area(&self) -> f64 {
-        // About the first corner: far from the origin of the parameters the products would cancel.
-        let Some(corner) = self.uses.first().map(EdgeUse::start) else { return 0.0 };
-        let mut area = 0.0;
-        for (k, u) in self.uses.iter().enumerate() {
-            let along = u.uv.swept_area(corner);
-            area += if u.reversed { -along } else { along };
-            // Uses may miss one another by a little: without the steps between them a loop is not closed.
-            let next = self.uses[(k + 1) % self.uses.len()].start();
-            area += 0.5 * (u.end() - corner).perp_dot(next - corner);
-        }
-        area
+        area_within(self.uses.iter().map(|u| (&u.uv, u.reversed)))
     }
 }
 

@@ -27,3 +27,4 @@ pub use curve::{ControlPoint, Curve, CurveDerivatives, Spline, UvCurve};
 pub(crate) use fit::fit_cubic;
 pub use patch::BezierPatch;
 pub use surface::{Derivatives, SecondDerivatives, Surface};
+pub(crate) use swept_area::area_within;

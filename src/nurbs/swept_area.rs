@@ -13,8 +13,23 @@ use std::ops::Mul;
 const PARTS: usize = 2;
 
 impl<P: ControlPoint> Spline<P> {
-    /// Integral, over the parameter, of what `integrand` makes of place and first derivative.
-    fn integral<T: Sum + Mul<f64, Output = T>>(&self, integrand: impl Fn(P::Position, P::Position) -> T) -> T {
+    /// Sums up the `product` of where a point of the curve is, seen from `center`, and how it moves on, as it runs along the curve.
+    fn swept_product<T: Sum + Mul<f64, Output = T>>(
+        &self,
+        center: P::Position,
+        product: impl Fn(P::Position, P::Position) -> T,
+    ) -> T {
+        if self.degree == 1 {
+            // Weights change how fast the point runs, not where: sides of a polygon are exact.
+            return self
+                .points
+                .windows(2)
+                .map(|side| {
+                    let [from, to] = [side[0], side[1]].map(P::position);
+                    product(from - center, to - from)
+                })
+                .sum();
+        }
         let breaks = self.breakpoints();
         let nodes = breaks.windows(2).flat_map(|span| {
             let width = (span[1] - span[0]) / PARTS as f64;
@@ -24,25 +39,46 @@ impl<P: ControlPoint> Spline<P> {
         nodes
             .map(|(t, weight)| {
                 let d = self.derivatives(t);
-                integrand(d.point, d.first) * weight
+                product(d.point - center, d.first) * weight
             })
             .sum()
     }
-}
 
-impl UvCurve {
-    /// Area, in parameters, that the line from `center` to a point of the curve sweeps as the point runs along it: positive
-    /// counter-clockwise.
-    pub(crate) fn swept_area(&self, center: Uv) -> f64 {
-        0.5 * self.integral(|point, first| (point - center).perp_dot(first))
+    /// First and last point.
+    fn ends(&self) -> [P::Position; 2] {
+        [self.points[0], self.points[self.points.len() - 1]].map(P::position)
     }
 }
 
 impl Curve {
-    /// As for curves of parameters, mm²: the vector whose product with the unit normal of a plane is the area swept in it.
+    /// Returns the area, mm², that the line from `center` to a point of the curve sweeps as the point runs along it: the vector whose product
+    /// with the unit normal of a plane is the area swept in it.
     pub(crate) fn swept_area(&self, center: Point) -> Vector {
-        0.5 * self.integral(|point, first| (point - center).cross(first))
+        0.5 * self.swept_product(center, Vector::cross)
     }
+}
+
+/// Returns the area, in parameters, within a loop of curves, each with whether the loop runs against it; positive where the loop runs
+/// counter-clockwise, 0 without curves. Straight steps join those that miss one another.
+pub(crate) fn area_within<'a>(curves: impl Iterator<Item = (&'a UvCurve, bool)>) -> f64 {
+    let mut area = 0.0;
+    let mut corner: Option<Uv> = None;
+    let mut last = Uv::ZERO;
+    for (curve, reversed) in curves {
+        let mut ends = curve.ends();
+        if reversed {
+            ends.swap(0, 1);
+        }
+        // About the first corner: far from the origin the products would cancel.
+        let center = *corner.get_or_insert(ends[0]);
+        let along = curve.swept_product(center, Uv::perp_dot);
+        area += if reversed { -along } else { along };
+        // The step from the curve before; about its own start nothing is swept by the first.
+        area += (last - center).perp_dot(ends[0] - center);
+        last = ends[1];
+    }
+    // A last step closes the loop at the corner itself, which sweeps nothing.
+    0.5 * area
 }
 
 #[cfg(test)]
@@ -61,7 +97,16 @@ mod tests {
             // r²φ/2 about the centre.
             assert!((area - Vector::Z * (12.5 * angle)).length() < 1e-7, "{angle}: {area}");
         }
-        let line = UvCurve::line(Uv::new(1.0, 0.0), Uv::new(0.0, 2.0), [0.0, 7.0]);
-        assert!((line.swept_area(Uv::ZERO) - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn steps_between_curves_that_miss_one_another_count_and_straight_sides_are_exact() {
+        let line = |from: [f64; 2], to: [f64; 2]| UvCurve::line(from.into(), to.into(), [0.0, 7.0]);
+        let mut unevenly_fast = line([1.0, 1.0], [0.0, 1.0]);
+        unevenly_fast.points[1] *= 3.0;
+        let sides = [line([0.0, 0.0], [1.0, 0.0]), unevenly_fast];
+        assert_eq!(area_within(sides.iter().map(|side| (side, false))), 1.0);
+        assert_eq!(area_within(sides.iter().rev().map(|side| (side, true))), -1.0);
+        assert_eq!(area_within(std::iter::empty()), 0.0);
     }
 }
