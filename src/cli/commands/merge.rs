@@ -9,6 +9,7 @@ use crate::cli::output::closing;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
+use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::shards::{is_tally, replicates_of_shard};
 use crate::cli::work::tally_file::TallyHeader;
@@ -44,7 +45,9 @@ const LOOK_AGAIN: Duration = Duration::from_millis(500);
 /// `.tally`. Incomplete where light was lost or faces refused beyond the limits, or the error asked for was not reached.
 pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completion, Failure> {
     let patience = Patience::new(command.wait)?;
-    refuse_part_as_output(command)?;
+    // A sum in the place of a part: merged once more, their rays would count twice or be lost.
+    let parts = part_files(command.parts)?;
+    InputGuard::new(parts.iter().map(PathBuf::as_path)).refuse("-o", command.folder)?;
     let monitor = TerminalMonitor::new(console);
     let first = first_part(command, &patience, console)?;
     let header: TallyHeader = PartialRun::header(&read_part(&first)?).map_err(|m| input_failure(&first, m))?;
@@ -145,17 +148,6 @@ fn write_sum(
         command.folder.display()
     ));
     Ok(Completion::Complete)
-}
-
-/// Refuses a sum that would replace one of its parts: merged once more, their rays would count twice or be lost.
-fn refuse_part_as_output(command: &MergeCommand) -> Result<(), Failure> {
-    let Ok(output) = command.folder.canonicalize() else { return Ok(()) };
-    let parts = part_files(command.parts)?;
-    if !parts.iter().any(|part| part.canonicalize().is_ok_and(|part| part == output)) {
-        return Ok(());
-    }
-    let failure = Failure::arguments(format!("{}: is one of the parts", command.folder.display()));
-    Err(failure.with_help("give another name with -o; parts stay as they are"))
 }
 
 /// How long to wait for parts.
