@@ -69,26 +69,29 @@ impl Cache {
     /// Returns what was chosen for the run of this name, before it was decided; `None` where that is not kept.
     pub(super) fn choice(&self, undecided: &Fingerprint, monitor: &dyn Monitor) -> Option<Chosen> {
         let read = |from: &mut ArrayReader| Chosen::from_words(&from.array()?).ok_or_else(|| invalid("no choice"));
-        self.fetch(&format!("{}{}", undecided.0, KINDS[2]), monitor, read)
+        self.fetch(&choice_name(undecided), monitor, read)
+    }
+
+    /// As [`Cache::choice`], or the turn to choose: another process that does so is waited for.
+    pub(super) fn choice_or_turn(&self, undecided: &Fingerprint, monitor: &dyn Monitor) -> Result<Chosen, Turn> {
+        self.fetch_or_turn(&choice_name(undecided), || self.choice(undecided, monitor))
     }
 
     /// Keeps what was chosen for a later run, another shard or range among them; a failure is only told to the monitor.
     pub(super) fn keep_choice(&self, undecided: &Fingerprint, chosen: &Chosen, monitor: &dyn Monitor) {
-        let name = format!("{}{}", undecided.0, KINDS[2]);
-        self.keep(&name, monitor, |to| write_array(to, &chosen.to_words()));
+        self.keep(&choice_name(undecided), monitor, |to| write_array(to, &chosen.to_words()));
     }
 
-    /// Returns what was chosen for the run of this name, or the turn to choose: another process that does so is waited for.
-    pub(super) fn choice_or_turn(&self, undecided: &Fingerprint, monitor: &dyn Monitor) -> Result<Chosen, Turn> {
-        let turn = self.turn(&format!("{}{}", undecided.0, KINDS[2]));
-        turn.map_or_else(|| self.choice(undecided, monitor).ok_or_else(Turn::default), Err)
-    }
-
-    /// Waits while another process makes the entry of this name; returns the turn to make it, `None` where it is made.
-    fn turn(&self, name: &str) -> Option<Turn> {
+    /// Returns what `fetch` finds in the entry of this name, which another process may be making and is waited for; the turn to make it where
+    /// it is not kept.
+    fn fetch_or_turn<T>(&self, name: &str, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
+        if let Some(kept) = fetch() {
+            return Ok(kept);
+        }
         // As an unfinished entry is: what a killed process left goes as those do.
         let turn = Turn::wait(&self.folder.join(format!(".{name}.turn{UNFINISHED}")));
-        (!self.folder.join(name).is_file()).then_some(turn)
+        // Another process may have made it meanwhile.
+        fetch().ok_or(turn)
     }
 
     /// Returns the folder, which may not exist yet.
@@ -232,9 +235,10 @@ impl CachedFacets<'_> {
         self.cache.fetch(&self.name(KINDS[0]), self.monitor, read)
     }
 
-    /// Returns the turn to make the facets, which another process may be making; `None` where they are kept meanwhile.
-    pub(super) fn mesh_turn(&self) -> Option<Turn> {
-        self.cache.turn(&self.name(KINDS[0]))
+    /// Returns what `fetch` reads where these facets are kept, among others; the turn to make them, which another process may be making,
+    /// where they are not.
+    pub(super) fn mesh_or_turn<T>(&self, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
+        self.cache.fetch_or_turn(&self.name(KINDS[0]), fetch)
     }
 
     /// Keeps the facets for a later run; a failure is only told to the monitor.
@@ -246,17 +250,10 @@ impl CachedFacets<'_> {
     pub(super) fn octree<'m>(&self, mesh: &'m FacetMesh, settings: &octree::Settings) -> Octree<'m> {
         let name = self.name(KINDS[1]);
         let read = |from: &mut ArrayReader| Octree::read_arrays(mesh, settings, from);
-        let kept = || self.cache.fetch(&name, self.monitor, read);
-        if let Some(octree) = kept() {
-            return octree;
-        }
-        let turn = self.cache.turn(&name);
-        // Made by another process while this one waited.
-        if turn.is_none()
-            && let Some(octree) = kept()
-        {
-            return octree;
-        }
+        let _turn = match self.cache.fetch_or_turn(&name, || self.cache.fetch(&name, self.monitor, read)) {
+            Ok(octree) => return octree,
+            Err(turn) => turn,
+        };
         let built = Octree::build(mesh, settings);
         self.cache.keep(&name, self.monitor, |to| built.write_arrays(to));
         built
@@ -266,6 +263,11 @@ impl CachedFacets<'_> {
     fn name(&self, kind: &str) -> String {
         format!("{}{kind}", self.key.0)
     }
+}
+
+/// Returns the name of the file that keeps what was chosen for a run.
+fn choice_name(undecided: &Fingerprint) -> String {
+    format!("{}{}", undecided.0, KINDS[2])
 }
 
 /// Hashes all that decides facets and octree, the bytes of the models' files among it; `None` where a file can no longer be read.

@@ -76,15 +76,17 @@ impl SceneJob {
             groups.iter().zip(&keys).map(|(group, key)| kept(key).mesh(group.placed_face_count())).collect()
         };
         // The last group is kept last: who waits for it has them all.
-        let mut meshes = fetch();
-        let turn = keys.last().filter(|_| meshes.is_none()).and_then(|key| kept(key).mesh_turn());
-        if meshes.is_none() && turn.is_none() {
-            meshes = fetch();
-        }
-        if let Some(meshes) = meshes {
-            let groups = meshes.into_iter().map(|mesh| Tessellation { mesh, ..Tessellation::default() }).collect();
-            return (GroupedFacets { groups, instancing: instancing.cloned() }, start.elapsed().as_secs_f64());
-        }
+        let kept_or_turn = keys.last().map(|last| kept(last).mesh_or_turn(fetch));
+        let _turn = match kept_or_turn {
+            Some(Ok(meshes)) => {
+                let group = |mesh| Tessellation { mesh, ..Tessellation::default() };
+                let groups = meshes.into_iter().map(group).collect();
+                let facets = GroupedFacets { groups, instancing: instancing.cloned() };
+                return (facets, start.elapsed().as_secs_f64());
+            }
+            Some(Err(turn)) => Some(turn),
+            None => None,
+        };
         let (made, seconds) = make();
         made.meshes().zip(&keys).for_each(|(mesh, key)| kept(key).keep_mesh(mesh));
         (made, seconds)
