@@ -1,6 +1,6 @@
 //! Figures of a lamp in the words of the trade: Imax, HV, widths at half, flux and efficiency; where the light of a spot lies.
 
-use super::even_poles::{has_far_pole, is_all_around, with_even_poles};
+use super::even_poles::{is_all_around, pole_rings, with_even_poles};
 use super::number::figures;
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
@@ -54,14 +54,7 @@ fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
 fn peak_error(grid: &Grid) -> Cell {
     let (Some((i, j)), Some(mut errors)) = (grid.peak_cell(), grid.error.clone()) else { return Cell::Empty };
     let cells = grid.axes[0].cells;
-    // The cells of an even pole are one value, not rivals of each other: the last one, which of equal cells is the peak, stands for all.
-    if is_all_around(grid) {
-        let last = errors.len() - 1;
-        errors[..cells - 1].fill(0.0);
-        if has_far_pole(grid) {
-            errors[last + 1 - cells..last].fill(0.0);
-        }
-    }
+    pole_rings(grid).clear_rivals(&mut errors);
     let geometric = grid.geometric.as_ref().map_or(0.0, |geometric| geometric[j * cells + i]);
     Cell::Number(error_of_maximum(&grid.values, &errors).hypot(geometric), 2)
 }

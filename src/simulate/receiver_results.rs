@@ -1,10 +1,12 @@
 //! What one receiver counted, in the units of the scene.
 
+use super::pole_rings::PoleRings;
 use super::receiver::{Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
 use super::tallies::Tallies;
 use super::tally::{Moments, Sum};
 use serde::{Serialize, Serializer};
+use std::borrow::Cow;
 
 /// Square millimetres to a square metre.
 const MM2_PER_M2: f64 = 1e6;
@@ -121,6 +123,49 @@ impl ChannelResult {
     }
 }
 
+/// How the figures of a receiver are told, by its shape.
+struct ShapeFigures {
+    /// As [`ReceiverResult::kind`].
+    kind: &'static str,
+    /// Unit of the cells.
+    unit: &'static str,
+    /// Factor from power over the measure of a cell to `unit`.
+    scale: f64,
+    /// As [`ReceiverResult::half`].
+    half: [f64; 2],
+    /// As [`ReceiverResult::middle`].
+    middle: [f64; 2],
+    /// Type of the angles of a far field.
+    angles: Option<FarFieldType>,
+}
+
+impl ShapeFigures {
+    /// Those of a shape, for sources in this unit of power.
+    fn new(shape: &Shape, unit: PowerUnit) -> Self {
+        let is_lumen = unit == PowerUnit::Lumen;
+        let per_area = if is_lumen { "lx" } else { "W/m2" };
+        let on_area =
+            |kind, half| Self { kind, unit: per_area, scale: MM2_PER_M2, half, middle: [0.0; 2], angles: None };
+        match shape {
+            Shape::Plane { half, .. } => on_area("plane", *half),
+            Shape::Disc { radius, .. } => on_area("disc", [*radius; 2]),
+            Shape::Sphere { .. } => on_area("sphere", [180.0, 90.0]),
+            Shape::FarField { angles, low, high, .. } => Self {
+                kind: "far_field",
+                unit: if is_lumen { "cd" } else { "W/sr" },
+                scale: 1.0,
+                half: [0, 1].map(|a| 0.5 * (high[a] - low[a]).to_degrees()),
+                middle: [0, 1].map(|a| 0.5 * (high[a] + low[a]).to_degrees()),
+                angles: Some(*angles),
+            },
+            Shape::Absorbed { .. } => {
+                let unit = if is_lumen { "lm" } else { "W" };
+                Self { kind: "absorbed", unit, scale: 1.0, half: [1.0; 2], middle: [0.0; 2], angles: None }
+            }
+        }
+    }
+}
+
 impl ReceiverResult {
     /// The figures of receiver `i`: sums of quanta turned into densities and their errors; `ray` is the most quanta of a ray.
     pub(super) fn new(
@@ -131,21 +176,7 @@ impl ReceiverResult {
         unit: PowerUnit,
     ) -> Self {
         let grid = r.cells.map(|n| n as usize);
-        let degrees = |low: [f64; 2], high: [f64; 2]| {
-            let half = [0, 1].map(|a| 0.5 * (high[a] - low[a]).to_degrees());
-            (half, [0, 1].map(|a| 0.5 * (high[a] + low[a]).to_degrees()))
-        };
-        let lumen = unit == PowerUnit::Lumen;
-        let (per_area, per_angle) = if lumen { ("lx", "cd") } else { ("W/m2", "W/sr") };
-        let (kind, unit, scale, (half, middle), angles) = match &r.shape {
-            Shape::Plane { half, .. } => ("plane", per_area, MM2_PER_M2, (*half, [0.0; 2]), None),
-            Shape::Disc { radius, .. } => ("disc", per_area, MM2_PER_M2, ([*radius; 2], [0.0; 2]), None),
-            Shape::Sphere { .. } => ("sphere", per_area, MM2_PER_M2, ([180.0, 90.0], [0.0; 2]), None),
-            Shape::FarField { angles, low, high, .. } => {
-                ("far_field", per_angle, 1.0, degrees(*low, *high), Some(*angles))
-            }
-            Shape::Absorbed { .. } => ("absorbed", if lumen { "lm" } else { "W" }, 1.0, ([1.0; 2], [0.0; 2]), None),
-        };
+        let ShapeFigures { kind, unit, scale, half, middle, angles } = ShapeFigures::new(&r.shape, unit);
         // Quanta of a cell to its mean density: per area, or per solid angle for a far field.
         let measure = |k: usize| r.measure(k % grid[0], k / grid[0]);
         let off: Vec<usize> = (0..r.cell_count()).filter(|&k| measure(k) == 0.0).collect();
@@ -207,27 +238,16 @@ impl ReceiverResult {
     }
 
     /// Returns the cells and their errors with each ring of cells at a pole (γ 0° and 180°) at its mean, where planes C go all around:
-    /// these are slivers of one direction, and the brightest of so many that few rays meet would be the luckiest. The error of a ring
-    /// stands at its last cell, the others, which are no rivals of it, have none.
-    pub fn cells_with_even_poles(&self) -> [Vec<f64>; 2] {
-        /// Angles nearer than this are one, degrees.
-        const SAME_ANGLE_DEG: f64 = 1e-6;
-        let mut even = [self.cells.clone(), self.errors.clone()];
-        let n = self.grid[0];
-        let is_all_around = (self.half[0] - 180.0).abs() < SAME_ANGLE_DEG && n >= 4;
-        if self.angles != Some(FarFieldType::C) || !is_all_around {
-            return even;
-        }
-        let ends = [self.middle[1] - self.half[1], self.middle[1] + self.half[1]];
-        for (end, pole, row) in [(ends[0], 0.0, 0), (ends[1], 180.0, self.grid[1] - 1)] {
-            if (end - pole).abs() < SAME_ANGLE_DEG {
-                let ring = row * n..(row + 1) * n;
-                let mean = even[0][ring.clone()].iter().sum::<f64>() / n as f64;
-                even[0][ring.clone()].fill(mean);
-                // Cells of a ring count different rays.
-                let squares: f64 = even[1][ring.clone()].iter().map(|e| e * e).sum();
-                even[1][ring.clone()].fill(0.0);
-                even[1][ring.end - 1] = squares.sqrt() / n as f64;
+    /// these are slivers of one direction. The error of a ring stands at its last cell, the others, which are no rivals of it, have none.
+    pub fn cells_with_even_poles(&self) -> [Cow<'_, [f64]>; 2] {
+        let mut even = [Cow::Borrowed(self.cells.as_slice()), Cow::Borrowed(self.errors.as_slice())];
+        if self.angles == Some(FarFieldType::C) {
+            let bounds = |a: usize| [self.middle[a] - self.half[a], self.middle[a] + self.half[a]];
+            let rings = PoleRings::new(self.grid, bounds(0), bounds(1));
+            if !rings.is_empty() {
+                rings.level(even[0].to_mut());
+                rings.level_errors(even[1].to_mut());
+                rings.clear_rivals(even[1].to_mut());
             }
         }
         even

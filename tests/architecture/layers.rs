@@ -527,6 +527,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "sequence_recorder",
             "sequence_results",
             "face_results",
+            "pole_rings",
             "receiver_results",
             "results",
             "arrivals",
