@@ -82,7 +82,7 @@ class Exact(_Tracer):
     def __init__(self, model: Model) -> None:
         if not isinstance(model, Model):
             raise TypeError(f"Exact takes a Model, not {type(model).__name__}; read one with lampyris.read_step")
-        super().__init__(_lampyris.Tracer.of_model(model._core))
+        super().__init__(_lampyris.Tracer.from_model(model._core))
 
 
 def _mesh(mesh: Any, what: str) -> _lampyris.Mesh:

@@ -189,7 +189,7 @@ impl Tracer {
 
     /// The spline of a model itself, certified.
     #[staticmethod]
-    fn of_model(py: Python<'_>, model: &Model) -> PyResult<Self> {
+    fn from_model(py: Python<'_>, model: &Model) -> PyResult<Self> {
         let import = model.import.clone();
         let build = move |_: &_| Exact::build(&import.model, &exact::Settings::default());
         let exact = interruptible(py, None, None, build)?.made;

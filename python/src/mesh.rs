@@ -21,7 +21,7 @@ pub(crate) struct Mesh {
 }
 
 impl Mesh {
-    pub(crate) fn of_model(mesh: FacetMesh, report: Report) -> Self {
+    pub(crate) fn with_report(mesh: FacetMesh, report: Report) -> Self {
         Self { mesh: Arc::new(mesh), report: Some(Box::new(report)) }
     }
 

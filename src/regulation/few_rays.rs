@@ -23,6 +23,11 @@ pub struct RaySample {
 /// From so many replicates on an error of three is as good as that of endlessly many: beyond it lie 0.16 % for 0.135 %.
 pub(super) const MANY_REPLICATES: u32 = 100;
 
+/// Flux below so much of the heaviest ray's is what rounding leaves of none in differences of sums over a map of 10⁷ rays.
+const CANCELLED_SHARE: f64 = 1e-9;
+/// Exponents are held below this: the quantile of one degree of freedom must not become endless.
+const LARGEST_EXPONENT: f64 = 100.0;
+
 /// Returns the upper limit of the mean of a Poisson count, at the one-sided confidence of so many normal standard errors (Wilson and
 /// Hilferty, PNAS 17, 1931): of none at three 6.7, exactly −ln 0.00135 = 6.6.
 pub(super) fn upper_count(count: f64, sigmas: f64) -> f64 {
@@ -38,8 +43,7 @@ pub(super) fn student(sigmas: f64, replicates: u32) -> f64 {
     }
     let freedom = f64::from(replicates.max(2) - 1);
     let z = sigmas * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
-    // So large for one degree of freedom that it must not become endless.
-    (freedom * (z * z / freedom).min(100.0).exp_m1()).sqrt()
+    (freedom * (z * z / freedom).min(LARGEST_EXPONENT).exp_m1()).sqrt()
 }
 
 /// What may land in a cell and is not seen there.
@@ -115,7 +119,7 @@ impl LandedRays {
     }
 
     /// Returns flux, variance and solid angle of the cells of a box, ends excluded.
-    fn of_box(&self, [left, right]: [usize; 2], [low, high]: [usize; 2]) -> [f64; 3] {
+    fn box_sums(&self, [left, right]: [usize; 2], [low, high]: [usize; 2]) -> [f64; 3] {
         let at = |row: usize, column: usize| self.sums[row * (self.columns + 1) + column];
         let corners = [at(high, right), at(low, right), at(high, left), at(low, left)];
         [0, 1, 2].map(|k| corners[0][k] - corners[1][k] - corners[2][k] + corners[3][k])
@@ -133,10 +137,10 @@ impl LandedRays {
         loop {
             let across = [column.saturating_sub(reach), (column + reach + 1).min(self.columns)];
             let along = [row.saturating_sub(reach), (row + reach + 1).min(self.rows)];
-            let [flux, variance, angle] = self.of_box(across, along);
+            let [flux, variance, angle] = self.box_sums(across, along);
             if angle >= wanted {
-                // Differences of long sums: what is left of nothing is not to be divided by.
-                if flux <= heaviest * 1e-9 || variance <= 0.0 {
+                // What is left of nothing is not to be divided by.
+                if flux <= heaviest * CANCELLED_SHARE || variance <= 0.0 {
                     return unknown;
                 }
                 let landed = (variance / flux).min(heaviest);
@@ -181,7 +185,7 @@ mod tests {
     fn the_weight_of_rays_is_that_of_the_neighbourhood() {
         let cells = (0..100).map(|k| if k == 99 { [50.0, 50.0, 1.0] } else { [1.0, 1.0, 1.0] });
         let landed = LandedRays::new(RaySample { heaviest_flux: 50.0, replicates: 128 }, 10, cells);
-        assert_eq!(landed.of_box([0, 10], [0, 10]), [149.0, 2599.0, 100.0]);
+        assert_eq!(landed.box_sums([0, 10], [0, 10]), [149.0, 2599.0, 100.0]);
         // 6.7 rays of 50 lm at 40 cd take 8.4 cells: a window of nine holds only light ones, of which 9/50 lm may hide heavy ones.
         let beside = landed.landing_ray(0, 100.0, 3.0);
         assert!((beside.flux - 1.0).abs() < 1e-9 && (beside.hidden - 0.98 / 50.0).abs() < 1e-9, "{beside:?}");

@@ -141,7 +141,7 @@ pub struct Absorbed {
     pub power: f64,
     /// Its standard error.
     pub error: f64,
-    /// Its place in [`Tallies::of_model`].
+    /// Its place in [`Tallies::model_sums`].
     #[serde(skip)]
     pub index: usize,
 }
@@ -254,6 +254,6 @@ fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absor
         error: s.error(tallies.replicates) * quantum,
         index,
     };
-    let places = faces.chain(bulk).zip(tallies.of_model()).enumerate();
+    let places = faces.chain(bulk).zip(tallies.model_sums()).enumerate();
     places.filter(|(_, (_, s))| s.total > 0).map(result).collect()
 }

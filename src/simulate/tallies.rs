@@ -147,8 +147,8 @@ impl ReplicateTally {
         faces.into_iter().map(|face| (face as u32, grids.map(|grid| grid.get(face)))).collect()
     }
 
-    /// Returns the quanta that each instance took, then each body inside, as [`Tallies::of_model`] counts them: those that took any, rising.
-    pub(crate) fn of_model(&self, bound: &BoundScene) -> Vec<(u32, u128)> {
+    /// Returns the quanta that each instance took, then each body inside, as [`Tallies::model_sums`] counts them: those that took any, rising.
+    pub(crate) fn model_quanta(&self, bound: &BoundScene) -> Vec<(u32, u128)> {
         let mut taken = BTreeMap::new();
         for (face, quanta) in self.absorbed.touched() {
             *taken.entry(bound.instance_of_face[face]).or_insert(0) += quanta;
@@ -322,7 +322,7 @@ impl Tallies {
     }
 
     /// Goes through what the model took: the faces of each instance, then the inside of each body.
-    pub fn of_model(&self) -> impl Iterator<Item = &Sum> {
+    pub fn model_sums(&self) -> impl Iterator<Item = &Sum> {
         self.instances.iter().chain(&self.bulk)
     }
 

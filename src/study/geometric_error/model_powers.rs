@@ -17,15 +17,15 @@ pub struct AbsorbedError {
     pub power: Paired,
     /// Standard error of that on the spline, from these rays alone.
     pub statistical: f64,
-    /// Its place in [`Tallies::of_model`](crate::simulate::Tallies::of_model).
+    /// Its place in [`Tallies::model_sums`](crate::simulate::Tallies::model_sums).
     #[serde(skip)]
     pub index: usize,
 }
 
 /// Compares what bodies and media took in both runs; what neither lit is left out.
 pub(super) fn absorbed_errors(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -> Vec<AbsorbedError> {
-    let pairs = runs[0].of_model.iter().zip(&runs[1].of_model).map(|(a, b)| [a.as_slice(), b.as_slice()]);
-    let places = runs[1].results.tallies.of_model().count();
+    let pairs = runs[0].model_quanta.iter().zip(&runs[1].model_quanta).map(|(a, b)| [a.as_slice(), b.as_slice()]);
+    let places = runs[1].results.tallies.model_sums().count();
     let cells = paired_cells(places, &pairs.collect::<Vec<_>>());
     let instances = bound.instances.iter().map(|name| [name.as_str(), "faces"]);
     let names = instances.chain((0..).map_while(|body| bound.body(body)));

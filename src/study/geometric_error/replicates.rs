@@ -26,9 +26,9 @@ pub(in crate::study) struct ReplicatedRun {
     pub(in crate::study) replicates: Vec<Vec<ReplicateSums>>,
     /// What each replicate brought to the faces that it reached, where the scene asks for that.
     pub(super) faces: Vec<FaceSums>,
-    /// What each replicate brought to bodies and media, as places of [`Tallies::of_model`](crate::simulate::Tallies::of_model), rising, with
+    /// What each replicate brought to bodies and media, as places of [`Tallies::model_sums`](crate::simulate::Tallies::model_sums), rising, with
     /// quanta.
-    pub(super) of_model: Vec<Vec<(u32, u64)>>,
+    pub(super) model_quanta: Vec<Vec<(u32, u64)>>,
 }
 
 /// What one replicate brought to the receivers, to the faces, and to bodies and media.
@@ -36,7 +36,7 @@ pub(in crate::study) struct ReplicatedRun {
 struct Brought {
     receivers: Vec<ReplicateSums>,
     faces: FaceSums,
-    of_model: Vec<(u32, u64)>,
+    model_quanta: Vec<(u32, u64)>,
 }
 
 /// Cells of a receiver that are kept apart.
@@ -87,7 +87,11 @@ impl Brought {
         Self {
             receivers: kept.iter().enumerate().map(|(k, kept)| kept.sums(k, tally)).collect(),
             faces: tally.face_quanta().into_iter().map(|(f, quanta)| (f, quanta.map(word_of_quanta))).collect(),
-            of_model: tally.of_model(bound).into_iter().map(|(k, quanta)| (k, word_of_quanta(quanta))).collect(),
+            model_quanta: tally
+                .model_quanta(bound)
+                .into_iter()
+                .map(|(k, quanta)| (k, word_of_quanta(quanta)))
+                .collect(),
         }
     }
 }
@@ -115,11 +119,11 @@ pub(in crate::study) fn trace_replicates(
     let hooks = Hooks { replicate: Some(&replicate), ..Hooks::with_progress(&|_| true) };
     let results = Results::new(bound, settings, trace(bound, intersector, settings, None, &hooks));
     let by_replicate = by_replicate.into_inner().unwrap_or_else(|e| e.into_inner());
-    let mut run = ReplicatedRun { results, replicates: Vec::new(), faces: Vec::new(), of_model: Vec::new() };
+    let mut run = ReplicatedRun { results, replicates: Vec::new(), faces: Vec::new(), model_quanta: Vec::new() };
     for brought in by_replicate {
         run.replicates.push(brought.receivers);
         run.faces.push(brought.faces);
-        run.of_model.push(brought.of_model);
+        run.model_quanta.push(brought.model_quanta);
     }
     run
 }
