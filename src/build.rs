@@ -30,8 +30,8 @@ fn packaged_commit() -> Option<String> {
     after.split('"').nth(1).map(|sha| sha.chars().take(12).collect())
 }
 
-/// Returns the first 12 digits of the commit that is checked out, with `+changes` behind them where a tracked file of [`SOURCES`] differs from
-/// it; `None` without git or outside of a repository. Tells cargo to ask anew when another commit is checked out.
+/// Returns the first 12 digits of the commit that is checked out, with `+changes` behind them where a tracked file of [`SOURCES`] differs
+/// from it; `None` without git or outside of a repository. Tells cargo to ask anew when another commit is checked out.
 fn git_commit() -> Option<String> {
     let git = |args: &[&str]| {
         let out = Command::new("git").args(args).output().ok().filter(|o| o.status.success())?;

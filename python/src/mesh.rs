@@ -32,7 +32,8 @@ impl Mesh {
 
 #[pymethods]
 impl Mesh {
-    /// From points (n, 3) and corners of triangles (m, 3) or quads (m, 4); normals are those of the corners (n, 3), else of the flat facets.
+    /// From points (n, 3) and corners of triangles (m, 3) or quads (m, 4); normals are those of the corners (n, 3), else of the flat
+    /// facets.
     #[staticmethod]
     #[pyo3(signature = (positions, facets, normals = None))]
     fn from_arrays(

@@ -231,8 +231,8 @@ impl Prepared {
         })
     }
 
-    /// Where every ray of the scene's lists ended: arrays of source, ray, branch, event, face (-1 for none), bounces, point, direction, power,
-    /// and the numbers of events with their words.
+    /// Where every ray of the scene's lists ended: arrays of source, ray, branch, event, face (-1 for none), bounces, point, direction,
+    /// power, and the numbers of events with their words.
     ///
     /// Raises `ValueError` where no source is a list, and for lists of too many rays.
     #[pyo3(signature = (progress = None))]

@@ -124,7 +124,8 @@ pub(super) fn remove_stale(path: &Path) {
     }
 }
 
-/// Longest file name, bytes, that stands whole in those of its unfinished files: some thirty bytes say who writes it, and file systems take 255.
+/// Longest file name, bytes, that stands whole in those of its unfinished files: some thirty bytes say who writes it, and file systems take
+/// 255.
 const LONGEST_WHOLE: usize = 200;
 
 /// Longest stem of a file name, bytes: file systems take 255, of which extensions and the names of unfinished files need some.

@@ -284,7 +284,6 @@ mod tests {
         assert!(parse([0, 1, 2, 3, 4, 5, 6, 7]).unwrap_err().to_string().contains("270"));
     }
 
-    /// Of equal light everywhere half goes down, of a lamp of twice the flux half comes out.
     #[test]
     fn blank_numbers_are_zero_and_faults_name_their_line() {
         let folder = tempfile::tempdir().unwrap();
@@ -305,6 +304,7 @@ mod tests {
         }
     }
 
+    /// Of equal light everywhere half goes down, of a lamp of twice the flux half comes out.
     #[test]
     fn shares_of_the_flux_are_those_of_the_light() {
         let folder = tempfile::tempdir().unwrap();

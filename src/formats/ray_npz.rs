@@ -84,8 +84,8 @@ struct ArrayReader<'a> {
 }
 
 impl<'a> ArrayReader<'a> {
-    /// Reads the head of an array of shape `(n, width)`, or `(n,)` for a width of 1; its bytes are taken off `budget`, and more than that is
-    /// an error.
+    /// Reads the head of an array of shape `(n, width)`, or `(n,)` for a width of 1; its bytes are taken off `budget`, and more than that
+    /// is an error.
     fn open(entry: ZipFile<'a, BufReader<File>>, width: usize, budget: &mut u64) -> Result<Self, String> {
         let mut entry = BufReader::with_capacity(BUFFER, entry);
         let cut = |e: std::io::Error| e.to_string();

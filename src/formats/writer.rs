@@ -1,6 +1,7 @@
 //! Who writes a file: the number of a process says it on one machine alone, and folders are shared.
 //!
-//! Known weakness: where the system tells nothing of the machine, two machines of a share can only be told apart by their processes' numbers.
+//! Known weakness: where the system tells nothing of the machine, two machines of a share can only be told apart by their processes'
+//! numbers.
 
 use std::fmt;
 use std::sync::OnceLock;

@@ -12,8 +12,8 @@ pub struct Topology {
     pub open_edges: usize,
     /// Edges with more than two facets, but for `touching_edges`.
     pub nonmanifold_edges: usize,
-    /// Edges along which a closed surface touches itself: four facets or more, half of them each way, all of different faces. Around such an
-    /// edge the facets pair off, and what is inside is as clear as elsewhere.
+    /// Edges along which a closed surface touches itself: four facets or more, half of them each way, all of different faces. Around such
+    /// an edge the facets pair off, and what is inside is as clear as elsewhere.
     pub touching_edges: usize,
     /// Edges whose two facets run along them in the same direction: one of the two is turned inside out.
     pub turned_edges: usize,
@@ -111,6 +111,7 @@ mod tests {
         let turned = [[0, 1, 2], sides[1], sides[2], sides[3]];
         assert_eq!(topology(&turned).turned_edges, 3);
     }
+
     #[test]
     fn two_tetrahedra_that_touch_along_an_edge_are_closed_if_it_bounds_four_faces() {
         // The second is the first turned by half a turn about the edge from 0 to 1.

@@ -7,8 +7,8 @@ use super::{Analytic, Face, Instance, Model, Part};
 use crate::math::{Aabb, BoxTree, Frame};
 use crate::nurbs::BezierPatch;
 
-/// Times that a patch of a face that is placed seldom is halved each way at most, where it comes near parts that are placed often: the boxes
-/// of a quarter of a circle then reach inward by less than a hundredth of its radius.
+/// Times that a patch of a face that is placed seldom is halved each way at most, where it comes near parts that are placed often: the
+/// boxes of a quarter of a circle then reach inward by less than a hundredth of its radius.
 const HALVINGS: usize = 5;
 
 /// The curved faces of the parts that are placed often, as boxes, and what was found of them.

@@ -73,7 +73,8 @@ impl BezierPatch {
         patches
     }
 
-    /// Homogeneous `[S, S_u, S_v]`: the point and its derivatives by the local parameters. These are in `[0, 1]²`; beyond it the polynomial goes on.
+    /// Homogeneous `[S, S_u, S_v]`: the point and its derivatives by the local parameters. These are in `[0, 1]²`; beyond it the polynomial
+    /// goes on.
     pub fn homogeneous(&self, local: Uv) -> [Homogeneous; 3] {
         as_wide_as_needed!(self.homogeneous_of_width(local))
     }

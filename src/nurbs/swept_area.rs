@@ -51,8 +51,8 @@ impl<P: ControlPoint> Spline<P> {
 }
 
 impl Curve {
-    /// Returns the area, mm², that the line from `center` to a point of the curve sweeps as the point runs along it: the vector whose product
-    /// with the unit normal of a plane is the area swept in it.
+    /// Returns the area, mm², that the line from `center` to a point of the curve sweeps as the point runs along it: the vector whose
+    /// product with the unit normal of a plane is the area swept in it.
     pub(crate) fn swept_area(&self, center: Point) -> Vector {
         0.5 * self.swept_product(center, Vector::cross)
     }

@@ -9,8 +9,8 @@ pub fn linear_srgb([x, y, z]: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Encodes one linear part (red, green or blue, 1 being the most that the screen shows) by the sRGB curve as a byte; parts outside 0 to 1 are
-/// cut to it, and NaN is 0.
+/// Encodes one linear part (red, green or blue, 1 being the most that the screen shows) by the sRGB curve as a byte; parts outside 0 to 1
+/// are cut to it, and NaN is 0.
 pub fn srgb_byte(linear: f64) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
     // Straight where a power would be infinitely steep.

@@ -33,7 +33,8 @@ pub struct AccurateSettings {
 /// own; `None` leaves the settings as they are. Traces on facets and spline to find them, and tells the monitor.
 ///
 /// # Errors
-/// When the angle is not above 0 and below 90 degrees, the settings give a tolerance too, ask for the exact intersector, or do not fit the scene, or the scene does not fit the model.
+/// When the angle is not above 0 and below 90 degrees, the settings give a tolerance too, ask for the exact intersector, or do not fit the
+/// scene, or the scene does not fit the model.
 pub fn settings_for_accuracy(
     accuracy_deg: Option<f64>,
     (mut meshing, mut tracing): (MeshingSettings, TracingSettings),

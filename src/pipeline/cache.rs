@@ -82,8 +82,8 @@ impl Cache {
         self.keep(&choice_name(undecided), monitor, |to| write_array(to, &chosen.to_words()));
     }
 
-    /// Returns what `fetch` finds in the entry of this name, which another process may be making and is waited for; the turn to make it where
-    /// it is not kept.
+    /// Returns what `fetch` finds in the entry of this name, which another process may be making and is waited for; the turn to make it
+    /// where it is not kept.
     fn fetch_or_turn<T>(&self, name: &str, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
         if let Some(kept) = fetch() {
             return Ok(kept);

@@ -6,8 +6,8 @@ use crate::model::{Face, Model};
 /// Samples across a face in each direction: within a tenth for a sphere, and it is the order of size that counts.
 const SAMPLES: usize = 8;
 
-/// Returns about how many facets the faces of a model that bend in two directions need within a tolerance, mm. Those that bend in one alone are
-/// left out: their facets may be as long as they are.
+/// Returns about how many facets the faces of a model that bend in two directions need within a tolerance, mm. Those that bend in one alone
+/// are left out: their facets may be as long as they are.
 ///
 /// A square of side s lies up to s² κ / 4 off a sphere of curvature κ; of other surfaces κ is √|κ₁ κ₂|.
 pub(super) fn expected_facets(model: &Model, tolerance_mm: f64) -> f64 {

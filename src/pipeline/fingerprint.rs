@@ -9,8 +9,8 @@ use crate::simulate::{BoundScene, Fingerprint, FingerprintHasher, RunSettings, S
 use crate::tessellate;
 use std::fmt::{self, Write};
 
-/// Hashes all that decides the bits of a run of these settings: program, scene, its files, facets, intersector, settings; of a run that grows
-/// not the number of rays. `in_memory` is a model that no file of the scene holds.
+/// Hashes all that decides the bits of a run of these settings: program, scene, its files, facets, intersector, settings; of a run that
+/// grows not the number of rays. `in_memory` is a model that no file of the scene holds.
 ///
 /// # Errors
 /// When a file of the scene cannot be read.

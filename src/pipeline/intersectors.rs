@@ -104,8 +104,8 @@ pub(super) struct Builders<'a, 'm> {
     pub(super) surfaces: &'a dyn Fn() -> Vec<Arc<TrueSurface>>,
 }
 
-/// Joins the octrees and true surfaces of the caller's making to the chosen intersector over the meshes of all groups, and calls `work` with it
-/// and what it took to build; a BVH is built here. Without `instancing` there is one group.
+/// Joins the octrees and true surfaces of the caller's making to the chosen intersector over the meshes of all groups, and calls `work`
+/// with it and what it took to build; a BVH is built here. Without `instancing` there is one group.
 pub(super) fn with_built_intersector<'m, T>(
     choice: IntersectorChoice,
     Builders { octree, surfaces }: Builders<'_, 'm>,

@@ -122,8 +122,8 @@ impl PreparedScene {
         Ok(prepared)
     }
 
-    /// Makes the tolerance of the settings as much coarser as leaves [`MOST_BEFORE_CHOICE`] facets; returns how many the default would take,
-    /// `None`, and nothing changed, where these are not too many.
+    /// Makes the tolerance of the settings as much coarser as leaves [`MOST_BEFORE_CHOICE`] facets; returns how many the default would
+    /// take, `None`, and nothing changed, where these are not too many.
     fn bound_facets(&mut self, instancing: Option<&Instancing>) -> Option<f64> {
         let [_, loosest] = self.mesh_settings.tolerance;
         let models = instancing.map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups);
@@ -214,8 +214,8 @@ impl PreparedScene {
         run_fingerprint(self.scene_and_model(), &self.run_settings(), (&self.mesh_settings, &self.choice))
     }
 
-    /// Chooses the facets or the spline that a pilot finds sufficient. May put finer facets in place of those that were made. `excess` is how
-    /// many of the default tolerance were too many to be tried.
+    /// Chooses the facets or the spline that a pilot finds sufficient. May put finer facets in place of those that were made. `excess` is
+    /// how many of the default tolerance were too many to be tried.
     fn choose_accuracy(&mut self, run: RunSettings, excess: Option<f64>, monitor: &dyn Monitor) -> Chosen {
         let surfaces = || self.true_surfaces();
         let facets = (&self.facets, &self.mesh_settings);

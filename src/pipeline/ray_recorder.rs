@@ -8,7 +8,8 @@ use std::sync::Mutex;
 /// Rays noted over rays wanted: a fifth more, as some cannot be asked again.
 const SPARE: f64 = 1.2;
 
-/// Passes every question on and notes some segments of paths: those whose hash is smallest, so that neither threads nor batches decide which.
+/// Passes every question on and notes some segments of paths: those whose hash is smallest, so that neither threads nor batches decide
+/// which.
 pub struct RayRecorder<'a> {
     inner: &'a dyn Intersector,
     threshold: u64,
@@ -32,8 +33,8 @@ impl<'a> RayRecorder<'a> {
     }
 
     /// Returns at most `wanted` of the noted rays, in an order that depends on the rays alone. A ray that left a surface starts above it,
-    /// in free space, so that all intersectors are asked the same question whatever they take for the surface: where `start` says of the ray
-    /// and the unit normal to the side that it goes to. One that left a ready mesh, which has no surface, is left out.
+    /// in free space, so that all intersectors are asked the same question whatever they take for the surface: where `start` says of the
+    /// ray and the unit normal to the side that it goes to. One that left a ready mesh, which has no surface, is left out.
     pub fn rays(self, wanted: usize, model: &Model, start: impl Fn(&Ray, Vector) -> Point) -> Vec<Ray> {
         let faces: Vec<PlacedFace> = model.placed_faces().collect();
         let mut noted = self.sample.into_inner().unwrap_or_else(|e| e.into_inner());

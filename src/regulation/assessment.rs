@@ -25,8 +25,8 @@ pub struct RowVerdict {
 pub struct Assessment {
     /// The regulation.
     pub regulation: Regulation,
-    /// The side of the road. For left-hand traffic `aim` and the rows' directions are those of the tables, as they are written for the other
-    /// side: the lamp was mirrored.
+    /// The side of the road. For left-hand traffic `aim` and the rows' directions are those of the tables, as they are written for the
+    /// other side: the lamp was mirrored.
     pub traffic: Traffic,
     /// How the lamp was aimed.
     pub aim: Aim,

@@ -70,8 +70,8 @@ pub(super) struct Judgement {
     pub(super) unseen: usize,
 }
 
-/// The reading that decides: the worst of those that must all hold, or the least sure where one is in doubt, the best of those of which one is
-/// enough.
+/// The reading that decides: the worst of those that must all hold, or the least sure where one is in doubt, the best of those of which one
+/// is enough.
 #[derive(Clone, Copy)]
 pub(super) struct Decisive {
     pub(super) reading: Reading,

@@ -2,15 +2,16 @@
 //! errors of the simulation.
 //!
 //! A verdict is *pass* or *fail* only where the value is farther from its limit than three combined standard errors (statistical and
-//! geometric, added in quadrature), or as far as few rays or few replicates leave open at the same confidence; else it is *unsure*, and [`Settles`] says what would settle it. Rows that ask for every direction of a
-//! line or zone, or for the brightest of many, are many comparisons: what a single lucky one of them could decide is asked for at a
-//! confidence that is divided by their number, so that a wrong pass or fail stays below 0.3 % a row.
+//! geometric, added in quadrature), or as far as few rays or few replicates leave open at the same confidence; else it is *unsure*, and
+//! [`Settles`] says what would settle it. Rows that ask for every direction of a line or zone, or for the brightest of many, are many
+//! comparisons: what a single lucky one of them could decide is asked for at a confidence that is divided by their number, so that a wrong
+//! pass or fail stays below 0.3 % a row.
 //!
 //! The tables (`tables/*.json`) hold one row a requirement with its source and whether a second source was compared. A verdict repeats
 //! that: it is an engineer's answer about a simulated lamp, not a statement of conformity.
 //!
-//! Layers: `few_rays` ← `map` (intensities with errors, from files by `read`) and `table` (what is asked) ← `aim` ← `requirement` ← `judgement` ←
-//! `assessment` ← `verdict` ← `document`.
+//! Layers: `few_rays` ← `map` (intensities with errors, from files by `read`) and `table` (what is asked) ← `aim` ← `requirement` ←
+//! `judgement` ← `assessment` ← `verdict` ← `document`.
 
 mod aim;
 mod assessment;

@@ -17,8 +17,8 @@ const FEWEST_CELLS: usize = 24;
 /// Most cells along an axis of a picture in the page: as many as it has pixels, and 2 MB of the page.
 const MOST_CELLS: usize = 600;
 
-/// Joins cells of the values to blocks, so that at most [`MOST_CELLS`] remain along each axis, each with the mean of its finite cells; errors
-/// and layers are left out. `None` where there are no more. The last blocks may reach beyond the grid.
+/// Joins cells of the values to blocks, so that at most [`MOST_CELLS`] remain along each axis, each with the mean of its finite cells;
+/// errors and layers are left out. `None` where there are no more. The last blocks may reach beyond the grid.
 pub(super) fn joined_cells(grid: &Grid) -> Option<(Grid, [usize; 2])> {
     let cells = grid.axes.each_ref().map(|axis| axis.cells);
     let block = cells.map(|n| n.div_ceil(MOST_CELLS).max(1));

@@ -10,8 +10,8 @@ use crate::math::Ray;
 const ROUNDING: f64 = 1e-9;
 
 /// Returns one ray for each time a recorded path crossed a plane or sphere that counts it: the point (mm, scene coordinates), the
-/// direction, and a power scaled so that the sum over all recorded paths is what the run emitted: an estimate of what the receiver counted. Of
-/// a receiver that lets light pass the sum is what it counted.
+/// direction, and a power scaled so that the sum over all recorded paths is what the run emitted: an estimate of what the receiver counted.
+/// Of a receiver that lets light pass the sum is what it counted.
 ///
 /// `wavelength_nm` is never set. Empty for a number without a receiver, a far field or faces, and for results without recorded paths.
 pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<LightRay> {

@@ -248,9 +248,9 @@ fn grows_unasked(settings: &RunSettings) -> bool {
     usual && settings.rays >= FEWEST_GROWING * GROWING_REPLICATE && settings.rays.is_multiple_of(GROWING_REPLICATE)
 }
 
-/// Returns the quanta of an average ray: [`QUANTA`], halved until the heaviest ray is a whole number that is exact and no sum of a replicate, or
-/// of the squares of so many, overflows. `weights` are the rays of each source and what one of them weighs against the average; `replicates`
-/// is `None` where these are those of each replicate.
+/// Returns the quanta of an average ray: [`QUANTA`], halved until the heaviest ray is a whole number that is exact and no sum of a
+/// replicate, or of the squares of so many, overflows. `weights` are the rays of each source and what one of them weighs against the
+/// average; `replicates` is `None` where these are those of each replicate.
 fn average_quanta(weights: &[(u64, f64)], replicates: Option<u32>) -> f64 {
     let parts = f64::from(replicates.unwrap_or(1));
     let heaviest = weights.iter().map(|w| w.1).fold(0.0, f64::max);

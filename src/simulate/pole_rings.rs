@@ -1,5 +1,5 @@
-//! Rings of cells at the poles of planes C all around: slivers of one direction, and the brightest of so many that few rays meet would be the
-//! luckiest.
+//! Rings of cells at the poles of planes C all around: slivers of one direction, and the brightest of so many that few rays meet would be
+//! the luckiest.
 
 use std::ops::Range;
 
@@ -54,8 +54,8 @@ impl PoleRings {
         }
     }
 
-    /// Clears the errors of all cells of a ring but its last, which of equal cells is the brightest: one value, whose cells are no rivals of
-    /// each other.
+    /// Clears the errors of all cells of a ring but its last, which of equal cells is the brightest: one value, whose cells are no rivals
+    /// of each other.
     pub(crate) fn clear_rivals(&self, errors: &mut [f64]) {
         for ring in &self.rings {
             errors[ring.start..ring.end - 1].fill(0.0);

@@ -67,7 +67,8 @@ pub struct Results {
     /// What faces absorbed and let through, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub faces: Option<FaceResults>,
-    /// Whether the run is divided into replicates of a fixed size, so that further ones may follow; it decides which ray bears which number.
+    /// Whether the run is divided into replicates of a fixed size, so that further ones may follow; it decides which ray bears which
+    /// number.
     #[serde(skip)]
     pub grows: bool,
     /// Lost rays of the lowest index, at most 1000.
@@ -172,8 +173,8 @@ impl Results {
         let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(few_replicates(tallies.replicates));
         let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let power = tallies.ends.map(|s| s.total as f64 * quantum);
-        // Replicates may have unequal numbers of rays, which spread what they emitted too: that spread is of no end. Numbers of rays are not
-        // drawn, so that both spreads are independent, and their squares add up.
+        // Replicates may have unequal numbers of rays, which spread what they emitted too: that spread is of no end. Numbers of rays are
+        // not drawn, so that both spreads are independent, and their squares add up.
         let spread = |s: &Sum| s.error(tallies.replicates) * quantum;
         let by_size = if power[0] > 0.0 { spread(&tallies.ends[0]) / power[0] } else { 0.0 };
         let errors = tallies.ends.each_ref().map(|s| {

@@ -136,8 +136,8 @@ impl ReplicateTally {
         self.receivers[receiver].touched()
     }
 
-    /// Returns the faces that it reached, rising, with the quanta that they absorbed, that entered their body through them and that left it;
-    /// none where the scene does not ask what passes each face.
+    /// Returns the faces that it reached, rising, with the quanta that they absorbed, that entered their body through them and that left
+    /// it; none where the scene does not ask what passes each face.
     pub(crate) fn face_quanta(&self) -> Vec<(u32, [u128; 3])> {
         let Some(crossings) = &self.crossings else { return Vec::new() };
         let grids = [&self.absorbed, &crossings.entered, &crossings.left];
@@ -147,7 +147,8 @@ impl ReplicateTally {
         faces.into_iter().map(|face| (face as u32, grids.map(|grid| grid.get(face)))).collect()
     }
 
-    /// Returns the quanta that each instance took, then each body inside, as [`Tallies::model_sums`] counts them: those that took any, rising.
+    /// Returns the quanta that each instance took, then each body inside, as [`Tallies::model_sums`] counts them: those that took any,
+    /// rising.
     pub(crate) fn model_quanta(&self, bound: &BoundScene) -> Vec<(u32, u128)> {
         let mut taken = BTreeMap::new();
         for (face, quanta) in self.absorbed.touched() {

@@ -10,8 +10,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Quanta of an average ray when it leaves its source: 9.1e-13 of a ray is the finest share of power. Fewer, by a power of two, in runs with
-/// rays so heavy, or so many, that sums of as many would not fit their words.
+/// Quanta of an average ray when it leaves its source: 9.1e-13 of a ray is the finest share of power. Fewer, by a power of two, in runs
+/// with rays so heavy, or so many, that sums of as many would not fit their words.
 pub const QUANTA: f64 = (1u64 << 40) as f64;
 
 /// Squares are kept of numbers cut by this many bits, so that a replicate of 2³⁰ rays cannot overflow.
@@ -75,8 +75,8 @@ impl Sum {
         self.squares = self.squares.saturating_add(o.squares);
     }
 
-    /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates; fewer than two count as two. The total
-    /// itself where the sum of squares is full and tells nothing.
+    /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates; fewer than two count as two. The
+    /// total itself where the sum of squares is full and tells nothing.
     pub fn error(&self, replicates: u32) -> f64 {
         if self.squares == u128::MAX {
             return self.total as f64;
@@ -183,8 +183,8 @@ impl MomentSpread {
         pairs.for_each(|(a, b)| *a = a.saturating_add(*b));
     }
 
-    /// Returns the standard errors of the two means, then of the two mean squares of [`Moments::means`], as ratios of sums over replicates; 1,
-    /// the half side itself, where a sum is full and tells nothing.
+    /// Returns the standard errors of the two means, then of the two mean squares of [`Moments::means`], as ratios of sums over replicates;
+    /// 1, the half side itself, where a sum is full and tells nothing.
     pub fn errors(&self, power: &Sum, m: &Moments, replicates: u32) -> [f64; 4] {
         let k = f64::from(replicates.max(2));
         let total = power.total.max(1) as f64;

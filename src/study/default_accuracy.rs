@@ -91,8 +91,7 @@ pub struct Alternative {
     pub intersector: &'static str,
     /// Seconds of tracing the whole run so, from those of the pilot.
     pub seconds: f64,
-    /// What it gets wrong of the figure that it gets most wrong, as a share of that figure;
-    /// absent where it is 0 on the spline, as the width of a perfect focus is.
+    /// What it gets wrong of the figure that it gets most wrong, as a share of that figure; absent where it is 0 on the spline, as the width of a perfect focus is.
     pub geometric_share: Option<f64>,
     /// The same in standard errors of the whole run; up to 1 is allowed.
     pub geometric_to_statistical: f64,
@@ -220,8 +219,8 @@ impl Undecided<'_> {
         self.without_pilot().is_none()
     }
 
-    /// Chooses facets or spline by what is known without tracing, as for flat faces, ready meshes alone and short runs; `None` where a pilot is
-    /// needed.
+    /// Chooses facets or spline by what is known without tracing, as for flat faces, ready meshes alone and short runs; `None` where a
+    /// pilot is needed.
     fn without_pilot(&self) -> Option<Chosen> {
         // What is cheap to ask comes first.
         let ((intersector, normals), because) = if self.facets.is_empty() {

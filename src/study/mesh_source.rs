@@ -110,8 +110,8 @@ pub(super) fn reflect(d: Vector, n: Vector) -> Vector {
     d - n * (2.0 * d.dot(n))
 }
 
-/// Returns the direction behind a surface; `None` for total reflection. `index_ratio` is the index behind it over that before it, the inverse
-/// of what [`crate::optics::refract`] takes. Both vectors have unit length; the normal may point to either side.
+/// Returns the direction behind a surface; `None` for total reflection. `index_ratio` is the index behind it over that before it, the
+/// inverse of what [`crate::optics::refract`] takes. Both vectors have unit length; the normal may point to either side.
 pub(super) fn refract(d: Vector, n: Vector, index_ratio: f64) -> Option<Vector> {
     // Snell's law wants the normal against the ray.
     let n = if d.dot(n) > 0.0 { -n } else { n };

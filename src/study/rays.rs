@@ -79,7 +79,8 @@ impl RaySource for Camera {
     }
 }
 
-/// Random rays: direction uniform, through a uniform point of the box grown by a fortieth of its diagonal, from outside the bounding sphere.
+/// Random rays: direction uniform, through a uniform point of the box grown by a fortieth of its diagonal, from outside the bounding
+/// sphere.
 #[derive(Clone, Copy, Debug)]
 pub struct Uniform {
     bounds: Aabb,

@@ -23,8 +23,8 @@ pub struct SurfacePaths<'a> {
 }
 
 impl<'a> SurfacePaths<'a> {
-    /// Makes `count` rays, none where no facet's first triangle has an area; `guide` finds the points that the rays after the first leave, on the facets
-    /// of `mesh`.
+    /// Makes `count` rays, none where no facet's first triangle has an area; `guide` finds the points that the rays after the first leave,
+    /// on the facets of `mesh`.
     pub fn new(mesh: &'a FacetMesh, guide: &'a dyn Intersector, seed: u64, count: u64) -> Self {
         let mut sum = 0.0;
         let areas: Vec<f64> = (0..mesh.facets.len())
@@ -85,8 +85,8 @@ impl<'a> SurfacePaths<'a> {
     }
 }
 
-/// Returns the unit normal of the first triangle of a facet; `None` where it is a line or a point, as it may be where the second has all the
-/// area.
+/// Returns the unit normal of the first triangle of a facet; `None` where it is a line or a point, as it may be where the second has all
+/// the area.
 fn first_normal(mesh: &FacetMesh, facet: usize) -> Option<Vector> {
     let [a, b, c, _] = mesh.corners(facet);
     (b - a).cross(c - a).try_normalize()

@@ -159,8 +159,8 @@ fn mesh_part(
     with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken })
 }
 
-/// Returns, by their places, the faces that exceeded a limit: those that were too large to begin, with the cells that `too_large` gives, and
-/// those whose proofs took too many steps.
+/// Returns, by their places, the faces that exceeded a limit: those that were too large to begin, with the cells that `too_large` gives,
+/// and those whose proofs took too many steps.
 fn exceeded_limits(
     faces: &[(&Face, Option<FaceSurface<'_>>)],
     too_large: impl Fn(usize) -> Option<f64>,

@@ -1,9 +1,9 @@
 //! What a model may cost to mesh, in counted work: facets that its faces are expected to need, and steps of their proofs.
 //!
 //! A number in a file can ask for any number of facets: a lens whose unit is the kilometre, a ball of a million kilometres. Faces that are
-//! sure to need more than the model may have are not begun, the largest first, and the rest goes on. What cannot be foreseen, such as a wild
-//! patch of degree 25, ends when its proofs have taken more steps than any real face takes. Nothing looks at a clock, so the outcome is
-//! the same on any machine and for any number of threads.
+//! sure to need more than the model may have are not begun, the largest first, and the rest goes on. What cannot be foreseen, such as a
+//! wild patch of degree 25, ends when its proofs have taken more steps than any real face takes. Nothing looks at a clock, so the outcome
+//! is the same on any machine and for any number of threads.
 
 use super::border::polygons;
 use super::face_surface::FaceSurface;

@@ -311,9 +311,9 @@ fn nearest_from(surface: &CountedSurface<'_>, x: Point, start: Uv) -> (Uv, f64) 
     (best, away)
 }
 
-/// A triangle, which may be degenerate, in its own plane: x along its longest side, y along its height. What is perpendicular to the longest
-/// side is small, so that no digits are lost on needles: by products of lengths, a point over a needle of 500 m that was 0.1 µm thick seemed
-/// to be 0.7 m away.
+/// A triangle, which may be degenerate, in its own plane: x along its longest side, y along its height. What is perpendicular to the
+/// longest side is small, so that no digits are lost on needles: by products of lengths, a point over a needle of 500 m that was 0.1 µm
+/// thick seemed to be 0.7 m away.
 struct TriangleFrame {
     origin: Point,
     /// Unit vector along the longest side, which starts at the origin; zero where all corners are in one place.

@@ -64,8 +64,8 @@ impl MeshSamples {
     }
 }
 
-/// Samples the facets of a mesh; `quality` says which are proved. A face that `originals` says to be a copy of another one, by its number, is
-/// not sampled again.
+/// Samples the facets of a mesh; `quality` says which are proved. A face that `originals` says to be a copy of another one, by its number,
+/// is not sampled again.
 pub(super) fn sample_within_budget(
     mesh: &FacetMesh,
     model: &Model,

@@ -209,7 +209,8 @@ fn a_face_that_a_ray_runs_along_is_met_inside_its_border_from_far_away() {
 
 #[test]
 fn of_a_sheet_that_bends_by_less_than_its_rounding_no_later_root_is_certified() {
-    // z = bend·(x/64)²: across a ray that runs along it obliquely, both coordinates are of the sheet's size and round by more than it bends.
+    // z = bend·(x/64)²: across a ray that runs along it obliquely, both coordinates are of the sheet's size and round by more than it
+    // bends.
     let knots = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
     let mut s = Stream(91);
     let mut double = 0;

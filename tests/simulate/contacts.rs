@@ -76,7 +76,8 @@ fn a_source_on_a_surface_or_across_one_loses_nothing() {
     }
 }
 
-/// Light that is totally reflected at the wall of a glass, nearer than the glue distance to its edge on a black board: all of it ends there.
+/// Light that is totally reflected at the wall of a glass, nearer than the glue distance to its edge on a black board: all of it ends
+/// there.
 #[test]
 fn light_reflected_just_above_an_edge_meets_the_board() {
     let mut world = World::default();
@@ -131,8 +132,8 @@ fn glass_in_contact_with_an_opaque_solid() {
     }
 }
 
-/// A black bar that covers only a strip along the rim of a glass, 0.2 mm of 6 or less: of a beam twice as wide, up to the rim, the bar takes
-/// the half, and all of one as wide as the strip; no light is lost.
+/// A black bar that covers only a strip along the rim of a glass, 0.2 mm of 6 or less: of a beam twice as wide, up to the rim, the bar
+/// takes the half, and all of one as wide as the strip; no light is lost.
 #[test]
 fn glass_that_an_opaque_solid_touches_along_a_narrow_strip() {
     for (strip, z) in [(0.2, 2.25), (0.02, 2.25), (0.2, 2.2495)] {

@@ -161,8 +161,8 @@ fn who_starts_at_once_waits_for_one_pilot() {
     assert!(names.into_iter().all(|name| !name.to_str().unwrap().ends_with(".part")));
 }
 
-/// A lens of kilometres, of which facets of the default tolerance are too many to be tried: its choice is kept under the name by which the next run
-/// asks.
+/// A lens of kilometres, of which facets of the default tolerance are too many to be tried: its choice is kept under the name by which the
+/// next run asks.
 #[test]
 fn a_choice_on_coarser_facets_is_found_again() {
     let folder = tempfile::tempdir().unwrap();

@@ -277,8 +277,9 @@ fn a_source_that_straddles_a_boundary_is_seen_with_two_replicates() {
     }
 }
 
-/// Of 120 beams 30 start within a plate of 3 mm that absorbs 1/mm, 30 before it, 30 on a black die, and 30 pass beside both: boxes tell which of so
-/// many start clear of all solids, and only of those no ray is asked. What a pass absorbs is 1 − e^(−3), and 4 % turn back at each face.
+/// Of 120 beams 30 start within a plate of 3 mm that absorbs 1/mm, 30 before it, 30 on a black die, and 30 pass beside both: boxes tell
+/// which of so many start clear of all solids, and only of those no ray is asked. What a pass absorbs is 1 − e^(−3), and 4 % turn back at
+/// each face.
 #[test]
 fn of_many_sources_those_in_and_on_solids_are_seen() {
     let mut world = World::default();

@@ -59,8 +59,8 @@ fn one_point() -> Regulation {
     regulation
 }
 
-/// The verdict about 350 cd at most, where rays of `classes` (mean number in an opening, candela of one) fell into every cell of a map around,
-/// in `replicates`.
+/// The verdict about 350 cd at most, where rays of `classes` (mean number in an opening, candela of one) fell into every cell of a map
+/// around, in `replicates`.
 fn counted_verdict(regulation: &Regulation, even: &mut Even, classes: &[[f64; 2]], replicates: u32) -> Verdict {
     let (width, [h, v]) = (0.149, [-3.43, 0.57]);
     let edges = |middle: f64| (0..=SIDE).map(|k| middle + width * (k as f64 - 0.5 * SIDE as f64)).collect();
@@ -109,8 +109,8 @@ fn few_rays_pass_no_lamp_that_is_too_bright() {
     }
 }
 
-/// A point that is dark, or lit by rays far below its limit, passes: 6.6 rays of 14 cd are no 350, and rays of 3 cd land where heavy ones never
-/// do.
+/// A point that is dark, or lit by rays far below its limit, passes: 6.6 rays of 14 cd are no 350, and rays of 3 cd land where heavy ones
+/// never do.
 #[test]
 fn dark_points_pass_where_rays_are_light() {
     let (regulation, mut even) = (one_point(), Even(7));

@@ -22,7 +22,8 @@ fn read(items: &str, data: &str) -> Import {
     read_bytes("assembly.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
 }
 
-/// The shape of the part; a usage of it, #110, whose shape is #111; a relation that puts it at x = 100, #109; and that it does for the usage.
+/// The shape of the part; a usage of it, #110, whose shape is #111; a relation that puts it at x = 100, #109; and that it does for the
+/// usage.
 const SHAPE: &str = "#108=SHAPE_DEFINITION_REPRESENTATION(#107,#106);\n";
 const USAGE: &str =
     "#110=NEXT_ASSEMBLY_USAGE_OCCURRENCE('1','u','',#101,#102,$);\n#111=PRODUCT_DEFINITION_SHAPE('','',#110);\n";

@@ -19,8 +19,8 @@ fn read(text: &str) -> Import {
     read_bytes("solid.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
 }
 
-/// A solid with plane faces, given by the corners of each, counter-clockwise from outside. `senses` are the faces' flags; `tiny` is a pair of
-/// corners whose edge has a curve that leaves both at one parameter.
+/// A solid with plane faces, given by the corners of each, counter-clockwise from outside. `senses` are the faces' flags; `tiny` is a pair
+/// of corners whose edge has a curve that leaves both at one parameter.
 fn solid_text(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: Option<[usize; 2]>) -> String {
     let mut data = String::new();
     let triple = |p: [f64; 3]| format!("({:?},{:?},{:?})", p[0], p[1], p[2]);
@@ -166,8 +166,8 @@ fn sides_of_a_face_without_width_meet() {
     assert_eq!(said, [100_066]);
 }
 
-/// The lead of an IC: a plate and a wall without thickness on one end of it. The border of the plate's sides runs up the wall by one edge and
-/// down by a shorter one, with nothing between.
+/// The lead of an IC: a plate and a wall without thickness on one end of it. The border of the plate's sides runs up the wall by one edge
+/// and down by a shorter one, with nothing between.
 #[test]
 fn a_wall_without_thickness_stands_on_one_edge() {
     let s = SIDE;
@@ -207,7 +207,8 @@ fn a_face_without_width_between_one_edge_and_two_is_left_out() {
     assert_eq!(said, [100_066]);
 }
 
-/// A cubic void inside of a cube, once as the schema asks for it and once with faces that look into it already below a shell that turns them.
+/// A cubic void inside of a cube, once as the schema asks for it and once with faces that look into it already below a shell that turns
+/// them.
 #[test]
 fn a_void_that_is_turned_once_too_often_encloses_a_hole() {
     let side = 4.0;

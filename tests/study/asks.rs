@@ -215,7 +215,8 @@ fn a_search_ends_with_the_best_of_so_many_facets() {
     let found = found.unwrap();
     assert!(!found.kept && found.answer.contains("more than a search may make"), "{}", found.answer);
     assert!(found.reached_deg.unwrap() < 2.0 && found.facets > 1000, "{}", found.answer);
-    // Pilots look at four meshes of 2,700. The forecast of facets is good to a factor of two or so; without a limit it is a million of them.
+    // Pilots look at four meshes of 2,700. The forecast of facets is good to a factor of two or so; without a limit it is a million of
+    // them.
     let made = source.facets.lock().unwrap().clone();
     assert!(made.iter().sum::<usize>() < 40_000, "{made:?}");
     // With true normals it is reached at once, and flat ones cost no mesh of a million facets to be left out.

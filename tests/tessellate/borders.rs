@@ -65,7 +65,8 @@ fn a_gap_of_the_file_is_not_divided() {
     assert!(made.report.facets < 200, "{}", made.report.facets);
 }
 
-/// A cylinder cut aslant: with an angle of 4 degrees no triangle of the strip along the cut may turn farther from the normals at its corners.
+/// A cylinder cut aslant: with an angle of 4 degrees no triangle of the strip along the cut may turn farther from the normals at its
+/// corners.
 #[test]
 fn the_angle_holds_along_trims_too() {
     let turn = [0.0, 2.0];
@@ -220,8 +221,8 @@ fn a_crescent_between_two_arcs_is_divided_on_both_sides() {
     }
 }
 
-/// Towards the apex of a cone the tolerance tightens, and chords of the rim that hold where they are do not hold for sectors that reach there.
-/// Shorter chords make one sector each; places between rim and apex would make several rings.
+/// Towards the apex of a cone the tolerance tightens, and chords of the rim that hold where they are do not hold for sectors that reach
+/// there. Shorter chords make one sector each; places between rim and apex would make several rings.
 #[test]
 fn the_rim_of_a_cone_is_divided_for_the_tolerance_of_its_apex() {
     let (r, half_angle, wide) = (400.0, 0.6f64, 2.0);
@@ -241,8 +242,8 @@ fn the_rim_of_a_cone_is_divided_for_the_tolerance_of_its_apex() {
     assert!((made.report.facets as f64) < 2.0 * sectors, "{} facets, {sectors} sectors", made.report.facets);
 }
 
-/// A wall of height h(x), its edge below cut level: straight in space, bent as h in the parameter plane, where chords take in what lies below
-/// the cut. A facet may reach there as far as its tolerance.
+/// A wall of height h(x), its edge below cut level: straight in space, bent as h in the parameter plane, where chords take in what lies
+/// below the cut. A facet may reach there as far as its tolerance.
 #[test]
 fn facets_keep_to_an_edge_that_is_straight_in_space() {
     let (wide, depth, level) = (4.8, 4.0, -0.7);

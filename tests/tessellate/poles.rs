@@ -92,8 +92,8 @@ fn a_ring_of_sectors_that_no_two_can_be_joined_of_comes_to_an_end() {
     assert!(fan(&surface, 0.3).unwrap().proved > 0);
 }
 
-/// Caps of spheres of a kilometre and more as splines, four metres from the origin and aslant, so that every control point is rounded, those
-/// of the pole one by one: every vertex normal is that of the sphere, as near as rounded control points tell it.
+/// Caps of spheres of a kilometre and more as splines, four metres from the origin and aslant, so that every control point is rounded,
+/// those of the pole one by one: every vertex normal is that of the sphere, as near as rounded control points tell it.
 #[test]
 fn poles_of_large_spheres_have_their_normals() {
     let axis = Vector::new(0.48, -0.6, 0.64);

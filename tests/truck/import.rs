@@ -268,7 +268,8 @@ fn nonsense_is_refused_with_what_to_do() {
     let thin = Lens { front: Conic::sphere(50.0), back: Conic::sphere(-50.0), thickness: 1.0, half_aperture: 20.0 };
     let e = thin.model("thin").unwrap_err().to_string();
     assert!(e.contains("thickness at the rim") && e.contains("thicker"), "{e}");
-    // A paraboloid of R = 50 and a sphere of R = 55: by hand 0.25 mm nearer to each other at h² = 525 than on the axis, and apart at the rim.
+    // A paraboloid of R = 50 and a sphere of R = 55: by hand 0.25 mm nearer to each other at h² = 525 than on the axis, and apart at the
+    // rim.
     let shell = |thickness| Lens {
         front: Conic::paraboloid(25.0),
         back: Conic::sphere(55.0),

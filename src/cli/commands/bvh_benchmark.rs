@@ -211,8 +211,9 @@ impl BvhBenchmark {
         Ok(())
     }
 
-    /// Measures all intersectors on rays of one kind and appends a row for each of three calls: batches and single rays on one thread, batches
-    /// on `threads`. Returns the work of the octree, which must be the first of `entrants`, for the rays asked once, before any is timed.
+    /// Measures all intersectors on rays of one kind and appends a row for each of three calls: batches and single rays on one thread,
+    /// batches on `threads`. Returns the work of the octree, which must be the first of `entrants`, for the rays asked once, before any is
+    /// timed.
     fn measure_rays(&mut self, question: &Question, entrants: &[Entrant], threads: usize) -> Cost {
         let Question { mesh, kind, rays, .. } = *question;
         // The octree's answers are what others are compared with; who is right is asked of the arbiter.

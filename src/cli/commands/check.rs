@@ -124,8 +124,8 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     Ok(refused.and(report_defects(&found, console)))
 }
 
-/// Asks every ray of octree, BVH and spline, finds the causes of differences, and times all intersectors. `loosest` is the largest tolerance of
-/// the facets, mm.
+/// Asks every ray of octree, BVH and spline, finds the causes of differences, and times all intersectors. `loosest` is the largest
+/// tolerance of the facets, mm.
 fn judge(
     contenders: &Contenders<'_>,
     rays: &[Ray],

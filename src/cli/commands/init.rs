@@ -94,8 +94,8 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     text + &light_text(model)
 }
 
-/// Returns the rules for all parts that are placed: one for each name, or one for each solid where a part of that name has several; none for
-/// solids without faces.
+/// Returns the rules for all parts that are placed: one for each name, or one for each solid where a part of that name has several; none
+/// for solids without faces.
 fn rule_texts(parts: &[PartAccount]) -> Vec<String> {
     // A selector by name means all parts of that name: what the first one is like is said of all.
     let mut names: Vec<(&str, Vec<&PartAccount>)> = Vec::new();

@@ -1,4 +1,5 @@
-//! The files of one receiver: CSV, NPZ, PNG, VTI for every grid, TM-25 for planes and discs, Data_3 for planes, IES LM-63 for whole far fields in candela.
+//! The files of one receiver: CSV, NPZ, PNG, VTI for every grid, TM-25 for planes and discs, Data_3 for planes, IES LM-63 for whole far
+//! fields in candela.
 
 use crate::cli::failure::Failure;
 use crate::formats::{

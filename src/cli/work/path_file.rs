@@ -56,7 +56,8 @@ impl PathFile {
         self.state.lock().unwrap_or_else(|e| e.into_inner()).1.is_some()
     }
 
-    /// Returns the first failure to write, if there was one, and leaves nothing of the file: the paths of a part of a run are not the run's.
+    /// Returns the first failure to write, if there was one, and leaves nothing of the file: the paths of a part of a run are not the
+    /// run's.
     pub(crate) fn failure(self) -> Option<Error> {
         self.state.into_inner().unwrap_or_else(|e| e.into_inner()).1
     }

@@ -1,4 +1,5 @@
-//! Rays on their way from a file to where a run reads them: memory for short lists, for longer ones rows of the file itself or a file of ours.
+//! Rays on their way from a file to where a run reads them: memory for short lists, for longer ones rows of the file itself or a file of
+//! ours.
 
 use super::ray_file::{Flux, Place, RayFile, RowLayout};
 use crate::formats::scratch::ScratchFile;

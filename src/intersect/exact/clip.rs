@@ -121,8 +121,8 @@ impl Exact {
         }
     }
 
-    /// Looks for every root on a leaf in 32 digits, for rays that run along it or touch it within the rounding of `f64`; takes its work from
-    /// the query's budget and leaves there what it finds.
+    /// Looks for every root on a leaf in 32 digits, for rays that run along it or touch it within the rounding of `f64`; takes its work
+    /// from the query's budget and leaves there what it finds.
     #[cold]
     fn clip_precisely(&self, query: &mut Query, clipping: Clipping<'_>) {
         query.budget = query.budget.saturating_sub(PRECISE_WORK);

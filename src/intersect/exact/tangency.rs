@@ -346,8 +346,8 @@ impl Search<'_> {
         [0, 1].map(|k| (local[k] - self.from[k].into()).to_f64() / self.extent[k])
     }
 
-    /// Evaluates `g` and `h` with their first derivatives at one point, given twice: as `local` parameters of the patch in 32 digits, of which
-    /// the values are computed, and as shares `x`, which serve for the weight alone.
+    /// Evaluates `g` and `h` with their first derivatives at one point, given twice: as `local` parameters of the patch in 32 digits, of
+    /// which the values are computed, and as shares `x`, which serve for the weight alone.
     #[inline(always)]
     fn heights(&self, local: &[Number; 2], x: [f64; 2]) -> Heights {
         let Bend { p, q, along, across, .. } = *self.bend;

@@ -43,8 +43,8 @@ impl<'m> Tree<'m> {
         Self::new(mesh, nodes, blocks, root, slopes)
     }
 
-    /// Joins nodes and blocks, given relative to the middle of the mesh, and the slopes of all facets with what walks need of `mesh`; checks
-    /// nothing.
+    /// Joins nodes and blocks, given relative to the middle of the mesh, and the slopes of all facets with what walks need of `mesh`;
+    /// checks nothing.
     pub(super) fn new(
         mesh: &'m FacetMesh,
         nodes: Vec<Node>,

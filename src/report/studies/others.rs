@@ -254,7 +254,8 @@ pub(super) fn bvh(rows: &[&Value]) -> Parts {
     ("Octree against bounding-volume hierarchies".into(), answer, vec![section])
 }
 
-/// Makes a table of every rate beside the octree's on the same model, rays, facets, call and threads; no ratio where the octree was not asked.
+/// Makes a table of every rate beside the octree's on the same model, rays, facets, call and threads; no ratio where the octree was not
+/// asked.
 fn rate_table(rows: &[&Value]) -> Table {
     let columns = [
         ("rays", ""),

@@ -64,9 +64,9 @@ const MOST_DISTANCES: usize = 50_000;
 /// Samples across a face in each parameter.
 const SAMPLES: usize = 5;
 
-/// Marks faces of bodies, and opaque faces without a medium (`opaque`), that lie on each other: both are flat, in one plane, and their boxes
-/// meet, or a sample point of one is within the glue distance of the other. After [`MOST_DISTANCES`] questions, faces whose boxes meet are
-/// marked unasked. All `false` where either is missing.
+/// Marks faces of bodies, and opaque faces without a medium (`opaque`), that lie on each other: both are flat, in one plane, and their
+/// boxes meet, or a sample point of one is within the glue distance of the other. After [`MOST_DISTANCES`] questions, faces whose boxes
+/// meet are marked unasked. All `false` where either is missing.
 pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opaque: &[bool]) -> Vec<bool> {
     let mut on_opaque = vec![false; of_face.len()];
     // Nothing to find: no bodies, or nothing opaque.

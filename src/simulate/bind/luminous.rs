@@ -59,8 +59,9 @@ pub(super) fn luminous_faces(
     Ok(Some(Luminous { area, note }))
 }
 
-/// Returns for each chosen face that is opaque the opaque faces of other shells that come within the glue distance of its box, by the numbers
-/// of placed faces; faces without any are left out. What lets light in, or is the boundary of a medium, covers nothing: light goes on there.
+/// Returns for each chosen face that is opaque the opaque faces of other shells that come within the glue distance of its box, by the
+/// numbers of placed faces; faces without any are left out. What lets light in, or is the boundary of a medium, covers nothing: light goes
+/// on there.
 fn possible_covers(
     scene: &Scene,
     model: &Model,

@@ -31,7 +31,8 @@ pub(super) fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> 
     })
 }
 
-/// Returns the index of a surface in the table, appending it where it is not there yet; `None` where there are as many as an index can name.
+/// Returns the index of a surface in the table, appending it where it is not there yet; `None` where there are as many as an index can
+/// name.
 pub(super) fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> Option<u16> {
     // Few surfaces are used by many faces: the table stays so short that a linear look is fastest.
     let found = surfaces.iter().position(|s| *s == surface).unwrap_or_else(|| {

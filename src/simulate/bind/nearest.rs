@@ -130,7 +130,8 @@ impl<'a> Nearest<'a> {
         self.distance(index, p) <= limit
     }
 
-    /// Whether both placed faces are flat to within `limit`, mm, parallel, and no farther than `limit` apart somewhere in a box, trims left out.
+    /// Whether both placed faces are flat to within `limit`, mm, parallel, and no farther than `limit` apart somewhere in a box, trims left
+    /// out.
     pub(super) fn are_in_one_plane(&mut self, faces: [usize; 2], around: Aabb, limit: f64) -> bool {
         let [Some((a, normal_a)), Some((b, normal_b))] = faces.map(|f| self.plane(f, limit)) else { return false };
         let cosine = normal_a.dot(normal_b);
@@ -145,7 +146,8 @@ impl<'a> Nearest<'a> {
         low <= reach && high >= -reach
     }
 
-    /// Returns a point of the plane of a placed face, in scene coordinates, and its normal; `None` where the face is not flat to `limit`, mm.
+    /// Returns a point of the plane of a placed face, in scene coordinates, and its normal; `None` where the face is not flat to `limit`,
+    /// mm.
     fn plane(&mut self, index: usize, limit: f64) -> Option<(Point, Vector)> {
         let placed = self.faces[index];
         let face = placed.face?;

@@ -95,8 +95,8 @@ impl LuminousFace {
 }
 
 impl Area {
-    /// Prepares the chosen faces (indices of placed faces), each with the opaque faces that may lie against it; `None` when none of them has
-    /// a spline surface with area. Ready meshes are skipped.
+    /// Prepares the chosen faces (indices of placed faces), each with the opaque faces that may lie against it; `None` when none of them
+    /// has a spline surface with area. Ready meshes are skipped.
     pub(crate) fn new(model: &Model, chosen: &[usize], covers: &HashMap<usize, Vec<Arc<Cover>>>) -> Option<Self> {
         let mut faces = Vec::new();
         let mut sums = Vec::new();

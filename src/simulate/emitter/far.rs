@@ -98,8 +98,8 @@ impl NearStart {
 impl Emitter {
     /// Makes the rays of a source that is more than [`FAR_DIAGONALS`] diagonals away start beside `scene_box` (mm); leaves one that is
     /// nearer, and any source where the box is empty. A collimated source itself is moved along its axis; of others each ray is, when it is
-    /// emitted. Not for surroundings that absorb or scatter, which would act on the way that is skipped. `direction` is the axis as the scene
-    /// gives it, of any length but zero; on an error nothing is changed.
+    /// emitted. Not for surroundings that absorb or scatter, which would act on the way that is skipped. `direction` is the axis as the
+    /// scene gives it, of any length but zero; on an error nothing is changed.
     ///
     /// # Errors
     /// With what is wrong, when the source is so far away that its rays are not known within the scene.
@@ -141,7 +141,8 @@ impl Emitter {
         Ok(())
     }
 
-    /// Returns the distance from a point to the farthest start of its rays, mm, of a list a bound of it; 0 for faces, which belong to the scene.
+    /// Returns the distance from a point to the farthest start of its rays, mm, of a list a bound of it; 0 for faces, which belong to the
+    /// scene.
     fn farthest_start(&self, centre: Point) -> f64 {
         match &self.shape {
             Shape::Faces(_) => 0.0,

@@ -1,7 +1,7 @@
 //! Sources in the form that makes rays.
 //!
-//! Inner modules, each of which sees only those before it: `own_wavelengths`, `ray_list`, `measured`, `stream`, `cover`, `area`, `shape`, this file with `far`,
-//! `packet`, `simd_dispatch`, `sampler`.
+//! Inner modules, each of which sees only those before it: `own_wavelengths`, `ray_list`, `measured`, `stream`, `cover`, `area`, `shape`,
+//! this file with `far`, `packet`, `simd_dispatch`, `sampler`.
 
 mod area;
 mod cover;

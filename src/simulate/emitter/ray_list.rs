@@ -204,8 +204,8 @@ impl RayList {
         Some(LightRay { power, ..self.file.ray(&cursor.block, k).ok()? })
     }
 
-    /// Returns the ray at which the running sum of powers passes `share`, from 0 to 1, of the whole; `None` when the file cannot be read any
-    /// more or was changed.
+    /// Returns the ray at which the running sum of powers passes `share`, from 0 to 1, of the whole; `None` when the file cannot be read
+    /// any more or was changed.
     pub(crate) fn ray_at_share(&self, share: f64, cursor: &mut ListCursor) -> Option<LightRay> {
         // The running sum is searched: each ray is drawn in proportion to its power.
         let at = share * self.power();
@@ -238,8 +238,8 @@ fn file_spectrum(file: &RayFile) -> Result<Option<Wavelengths>, Fault> {
     sampler.map(Some).map_err(|e| Fault::new(e.to_string(), "give the source a `spectrum` and mend the file's"))
 }
 
-/// Returns what makes lumens of a file's watts: lm/W of the scene's spectrum, else the file's, else of each ray's own wavelength, and a note
-/// that says so; `None` where there are no wavelengths but the scene gives the source's power.
+/// Returns what makes lumens of a file's watts: lm/W of the scene's spectrum, else the file's, else of each ray's own wavelength, and a
+/// note that says so; `None` where there are no wavelengths but the scene gives the source's power.
 ///
 /// # Errors
 /// When there are neither wavelengths nor such a power.

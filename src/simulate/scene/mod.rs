@@ -207,8 +207,8 @@ impl Scene {
         Ok(())
     }
 
-    /// Refuses two receivers whose names make the same file name, with or without what pictures in colours add to it, and one that would write
-    /// over lost_rays.csv.
+    /// Refuses two receivers whose names make the same file name, with or without what pictures in colours add to it, and one that would
+    /// write over lost_rays.csv.
     fn check_receiver_names(&self) -> Result<(), Error> {
         // By the name of the file, not of the receiver: `a b` and `a_b` would write over each other.
         let mut stems: HashMap<String, &str> = HashMap::new();

@@ -98,7 +98,8 @@ pub enum ReceiverKind {
     Disc,
     /// All light that leaves the scene, by direction: power per solid angle.
     FarField,
-    /// A sphere in space, by direction from its centre as angles of type A: power per area; one that light passes counts it on its way in and out.
+    /// A sphere in space, by direction from its centre as angles of type A: power per area; one that light passes counts it on its way in
+    /// and out.
     Sphere,
     /// What the faces of a part absorb.
     Absorbed,

@@ -21,7 +21,8 @@ pub(crate) fn nearest_or_all(word: &str, names: &[&str]) -> String {
     }
 }
 
-/// Returns the edit distance (Levenshtein 1966), which tells letters by their case. Quadratic; words are cut at 64 characters so that no input makes it long.
+/// Returns the edit distance (Levenshtein 1966), which tells letters by their case. Quadratic; words are cut at 64 characters so that no
+/// input makes it long.
 pub(crate) fn edit_distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
     let mut row: Vec<usize> = (0..=b.len()).collect();

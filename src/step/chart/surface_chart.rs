@@ -54,8 +54,8 @@ pub(in crate::step) struct Chart {
     pub(in crate::step) size: f64,
     /// Whether `Su × Sv` is opposite to that of the file's surface.
     pub(in crate::step) flipped: bool,
-    /// Whether the file's surface has every place twice, with opposite normals, as a profile turned about its own axis of symmetry has: only
-    /// how a face's edges run tells which is meant.
+    /// Whether the file's surface has every place twice, with opposite normals, as a profile turned about its own axis of symmetry has:
+    /// only how a face's edges run tells which is meant.
     pub(in crate::step) has_two_normals: bool,
     /// Distance from what the file means, where that had to be fitted, mm.
     pub(in crate::step) error: f64,

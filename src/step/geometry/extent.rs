@@ -27,8 +27,8 @@ impl<'r> FaceExtent<'r> {
         Self { center: bounds.center(), radius: 0.5 * bounds.diagonal(), points, parameters: None }
     }
 
-    /// Returns the same, and where it has neither edges nor ranges of parameters, with these, which may be in either order; numbers that are
-    /// none leave it as it is.
+    /// Returns the same, and where it has neither edges nor ranges of parameters, with these, which may be in either order; numbers that
+    /// are none leave it as it is.
     pub(crate) fn over_parameters(self, ranges: [[Option<f64>; 2]; 2]) -> Self {
         if !self.points.is_empty() || self.parameters.is_some() {
             return self;

@@ -69,7 +69,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok((if directed.reversed { curve.reversed() } else { curve }, None))
     }
 
-    /// Reads a POLYLINE by the parameter that the file gives it, which counts its points from 0; refused where two of them in a row coincide.
+    /// Reads a POLYLINE by the parameter that the file gives it, which counts its points from 0; refused where two of them in a row
+    /// coincide.
     fn counted_polyline(&self, e: Entity<'f, 'a>, list: Args<'f, 'a>) -> Outcome<Curve> {
         let points = self.points(list)?;
         let coincide = points.windows(2).any(|w| (w[1] - w[0]).length() <= MERGED_POINTS_MM);

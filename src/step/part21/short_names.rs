@@ -1,7 +1,7 @@
 //! The short names of entities, as some writers give them in place of the long ones: `ADVFC` for `ADVANCED_FACE`.
 //!
-//! Source: ISO 10303-21:2016, 7.3.4 (either may stand), and the annexes of short names of ISO 10303-41, -42, -43, -44, -46 and -203. Only names
-//! that the reader asks for are listed.
+//! Source: ISO 10303-21:2016, 7.3.4 (either may stand), and the annexes of short names of ISO 10303-41, -42, -43, -44, -46 and -203. Only
+//! names that the reader asks for are listed.
 
 use super::Span;
 

@@ -1,7 +1,7 @@
 //! Shapes that several representations name: which of their items a placed representation adds to what stands already.
 //!
-//! Linked representations often name the same shapes, each of which is meant once in a place. The same shape in another place is another one,
-//! whichever representation brings it there.
+//! Linked representations often name the same shapes, each of which is meant once in a place. The same shape in another place is another
+//! one, whichever representation brings it there.
 
 use super::assembly::{Assembly, PlacedRepresentation};
 use super::topology::ShapeItems;
@@ -71,9 +71,8 @@ impl SharedItems {
         items.filter(|item| !left_out.contains(item)).copied().collect()
     }
 
-    /// Returns the shapes of a placed representation that stand already, brought to this place by another representation, and notes that the
-    /// others stand there now. Of an orphan all that a product has brought
-    /// anywhere are returned.
+    /// Returns the shapes of a placed representation that stand already, brought to this place by another representation, and notes that
+    /// the others stand there now. Of an orphan all that a product has brought anywhere are returned.
     pub(crate) fn place(&mut self, p: &PlacedRepresentation) -> Vec<u64> {
         let mut left_out = Vec::new();
         let Some(named) = self.brings.get(&p.representation) else { return left_out };

@@ -1,7 +1,8 @@
-//! Spikes of plane faces: where the border comes back along itself, nothing lies between. The two edges become one, and the face ends before.
+//! Spikes of plane faces: where the border comes back along itself, nothing lies between. The two edges become one, and the face ends
+//! before.
 //!
-//! The fins of bent leads are drawn so: a plate, a wall that stands on its end, and a face beside both whose border runs up the wall and down
-//! again. Where one edge is longer, it is split at the vertex where the other ends, for all of its faces.
+//! The fins of bent leads are drawn so: a plate, a wall that stands on its end, and a face beside both whose border runs up the wall and
+//! down again. Where one edge is longer, it is split at the vertex where the other ends, for all of its faces.
 
 use super::topology::{EdgeKey, FacePlan};
 use super::zero_width::{CoincidentEdges, coincidence_tolerance, joined_vertex, vertex_ids};
@@ -49,8 +50,8 @@ struct Spikes<'t, 'f, 'a> {
     parts: FxHashMap<usize, [usize; 2]>,
 }
 
-/// Takes the spikes out of the plane faces of `plans`, in the order of `ids`, splits edges and has faces use one edge where two coincide; those
-/// of which nothing is left are taken out of `plans`. `joined` maps a vertex to the one in its place.
+/// Takes the spikes out of the plane faces of `plans`, in the order of `ids`, splits edges and has faces use one edge where two coincide;
+/// those of which nothing is left are taken out of `plans`. `joined` maps a vertex to the one in its place.
 pub(super) fn remove_spikes(
     file: &File<'_>,
     ids: &[u64],

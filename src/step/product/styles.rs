@@ -19,8 +19,8 @@ pub(crate) struct Styles {
 }
 
 impl Styles {
-    /// Collects the surface colours and layers that a file gives to items; overriding styles win over plain ones. A colour that holds for one
-    /// usage of a product alone becomes the usage's.
+    /// Collects the surface colours and layers that a file gives to items; overriding styles win over plain ones. A colour that holds for
+    /// one usage of a product alone becomes the usage's.
     pub(crate) fn read(file: &File<'_>) -> Self {
         let mut plain = FxHashMap::default();
         let mut over = FxHashMap::default();

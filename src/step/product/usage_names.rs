@@ -30,8 +30,8 @@ pub(super) fn product_name(file: &File<'_>, definition: u64) -> String {
     product().unwrap_or_default()
 }
 
-/// Names the usages in one product. A name that is blank, a writer's default, or given to several children is none: then the child's product
-/// names the usage, numbered from 1 where it is used several times, or else the usage's description or id does.
+/// Names the usages in one product. A name that is blank, a writer's default, or given to several children is none: then the child's
+/// product names the usage, numbered from 1 where it is used several times, or else the usage's description or id does.
 pub(super) fn name_usages(file: &File<'_>, usages: &mut [Usage]) {
     let text = |usage: &Usage, i: usize| {
         let args = file.entity(usage.id).and_then(usage_attributes);

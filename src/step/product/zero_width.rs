@@ -32,8 +32,8 @@ pub(super) fn vertex_ids(file: &File<'_>, key: EdgeKey) -> [Option<u64>; 2] {
     }
 }
 
-/// Maps the second vertex of each edge without length, and of each closed one, to the first: such an edge is left out, and the faces on both of its sides would meet
-/// in two places, with a slit between them.
+/// Maps the second vertex of each edge without length, and of each closed one, to the first: such an edge is left out, and the faces on
+/// both of its sides would meet in two places, with a slit between them.
 pub(super) fn vertices_of_empty_edges(
     file: &File<'_>,
     keys: &[EdgeKey],
@@ -141,7 +141,8 @@ pub(super) fn remove_faces_without_width(
     removed
 }
 
-/// Returns the two edges of a face that have a length, and whether its loop runs against them; `None` where it has more or fewer, or one twice.
+/// Returns the two edges of a face that have a length, and whether its loop runs against them; `None` where it has more or fewer, or one
+/// twice.
 fn two_edges(
     plan: &FacePlan,
     index: &FxHashMap<EdgeKey, usize>,

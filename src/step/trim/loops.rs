@@ -63,8 +63,9 @@ impl Piece {
         Self { source: Source::Nothing, reversed: false, curve: UvCurve::line(from, to, [0.0, 1.0]) }
     }
 
-    /// Appends points of the piece to `polygon`, in the direction of the loop and evenly over each span of the curve, from its start on; its
-    /// end, where the next piece starts, is left out. `density` is how many times the points of a first test; a straight piece has one a span.
+    /// Appends points of the piece to `polygon`, in the direction of the loop and evenly over each span of the curve, from its start on;
+    /// its end, where the next piece starts, is left out. `density` is how many times the points of a first test; a straight piece has one
+    /// a span.
     fn append_points(&self, density: usize, polygon: &mut Vec<Uv>) {
         let start = polygon.len();
         let breaks = self.curve.breakpoints();

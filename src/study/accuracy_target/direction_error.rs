@@ -8,8 +8,8 @@ use crate::study::mesh_source::{reflect, refract};
 /// `incoming` to: mirrored, and refracted where the face lets light through and neither reflects it totally. All are unit vectors,
 /// normals outward.
 ///
-/// `relative_index` is the index of the body that the face bounds over that around it, `None` where no light passes. Just short of total reflection light leaves the
-/// body misdirected by many times the error of the normal, mirrored light by twice at most.
+/// `relative_index` is the index of the body that the face bounds over that around it, `None` where no light passes. Just short of total
+/// reflection light leaves the body misdirected by many times the error of the normal, mirrored light by twice at most.
 pub(super) fn direction_error_deg(
     incoming: Vector,
     facet: Vector,

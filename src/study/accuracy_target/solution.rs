@@ -63,8 +63,8 @@ impl Solution {
         format!("; {} % more meet another face or none", three_digits(100.0 * share))
     }
 
-    /// Returns what was asked, what was reached and by which facets and normals, as one sentence; `gave_up` where finer facets were too many
-    /// to be tried.
+    /// Returns what was asked, what was reached and by which facets and normals, as one sentence; `gave_up` where finer facets were too
+    /// many to be tried.
     pub(super) fn answer_sentence(&self, target: &AccuracyTarget, gave_up: bool) -> String {
         let [low, high] = self.plan.tolerance_mm();
         let range = if low == high {

@@ -1,5 +1,5 @@
-//! Differences between facets and spline in a model whose parts that are placed often have coordinates of their own: each is explained where
-//! the first hit is, in that part's.
+//! Differences between facets and spline in a model whose parts that are placed often have coordinates of their own: each is explained
+//! where the first hit is, in that part's.
 
 use super::classify::Classifier;
 use super::verdict::Cause;

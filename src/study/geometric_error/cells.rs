@@ -227,7 +227,8 @@ impl<'r> CellPairs<'r> {
     }
 }
 
-/// Sums up `count` cells from the pairs of what each replicate brought on facets and on the spline: lists of cell and quanta that rise by cell.
+/// Sums up `count` cells from the pairs of what each replicate brought on facets and on the spline: lists of cell and quanta that rise by
+/// cell.
 pub(super) fn paired_cells(count: usize, replicates: &[[&[(u32, u64)]; 2]]) -> Vec<Cell> {
     let mut cells = vec![Cell::default(); count];
     for [facets, spline] in replicates {

@@ -26,8 +26,8 @@ pub(in crate::study) struct ReplicatedRun {
     pub(in crate::study) replicates: Vec<Vec<ReplicateSums>>,
     /// What each replicate brought to the faces that it reached, where the scene asks for that.
     pub(super) faces: Vec<FaceSums>,
-    /// What each replicate brought to bodies and media, as places of [`Tallies::model_sums`](crate::simulate::Tallies::model_sums), rising, with
-    /// quanta.
+    /// What each replicate brought to bodies and media, as places of [`Tallies::model_sums`](crate::simulate::Tallies::model_sums), rising,
+    /// with quanta.
     pub(super) model_quanta: Vec<Vec<(u32, u64)>>,
 }
 
@@ -81,8 +81,8 @@ impl KeptCells {
 }
 
 impl Brought {
-    /// Takes from a finished replicate what it brought. Of cells and faces those alone that it reached: to go through all of them after each
-    /// replicate took longer than to trace a pilot.
+    /// Takes from a finished replicate what it brought. Of cells and faces those alone that it reached: to go through all of them after
+    /// each replicate took longer than to trace a pilot.
     fn new(bound: &BoundScene, kept: &[KeptCells], tally: &ReplicateTally) -> Self {
         Self {
             receivers: kept.iter().enumerate().map(|(k, kept)| kept.sums(k, tally)).collect(),

@@ -54,7 +54,8 @@ fn ray_past_origin(random: &mut Random, b: f64) -> Ray {
     Ray::new((a * cos + c * sin) * b - d * 150.0, d)
 }
 
-/// Returns both crossings, by a ray of [`ray_past_origin`], of the sphere into which it dips `depth` mm deep: exact for the shortest chords too.
+/// Returns both crossings, by a ray of [`ray_past_origin`], of the sphere into which it dips `depth` mm deep: exact for the shortest chords
+/// too.
 fn ball_crossings(depth: f64) -> [Truth; 2] {
     // 2·√(R² − b²) by the difference R − b: squares would lose what is left of a grazing chord.
     let half = (depth * (2.0 * R - depth)).sqrt();

@@ -19,8 +19,8 @@ impl BorderBands {
         let (lowest, highest) =
             (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
         let height = highest - lowest;
-        // A place meets the segments that cross its height and those that only end in its band. With as many bands as make the two alike the
-        // bands hold each segment twice, however many run along all of them.
+        // A place meets the segments that cross its height and those that only end in its band. With as many bands as make the two alike
+        // the bands hold each segment twice, however many run along all of them.
         let crossing = segments.iter().map(|[a, b]| (b.y - a.y).abs()).sum::<f64>() / height;
         let count = (segments.len() as f64 / crossing.max(1.0)) as usize;
         let count = count.clamp(1, segments.len().max(1));

@@ -56,8 +56,8 @@ fn chord_tolerance(surface: &FaceSurface<'_>, uv: Uv, along: Vector) -> f64 {
     xi * (1.0 - (sag / xi).min(0.5))
 }
 
-/// Returns the tolerance, mm, for a chord of an edge at its parameter `t` in the direction `along`, of any length but zero: [`EDGE_SHARE`] of
-/// the least that its faces give, quartered for each `denser`. Infinite without sides.
+/// Returns the tolerance, mm, for a chord of an edge at its parameter `t` in the direction `along`, of any length but zero: [`EDGE_SHARE`]
+/// of the least that its faces give, quartered for each `denser`. Infinite without sides.
 fn edge_tolerance(sides: &[EdgeSide<'_, '_>], denser: u32, t: f64, along: Vector) -> f64 {
     let each =
         sides.iter().map(|s| chord_tolerance(s.surface, s.surface.spline.clamp(s.edge_use.uv.evaluate(t)), along));
@@ -102,8 +102,8 @@ pub(super) fn divide_further(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: 
 
 /// Adds parameters where the edge crosses creases, and where the straight line between two samples in the parameter plane of a face strays
 /// from the edge in space: by more than some tolerances and, at `denser` 0, a share of the chord; by more than the tolerance where it runs
-/// outside of the face beside an edge that is straight in space, so that facets do. A gap that the file itself has between edge and surface is
-/// allowed on top: one of 9 mm once made 67,000 chords.
+/// outside of the face beside an edge that is straight in space, so that facets do. A gap that the file itself has between edge and surface
+/// is allowed on top: one of 9 mm once made 67,000 chords.
 fn follow_in_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32, mut t: Vec<f64>) -> Vec<f64> {
     cross_creases(curve, sides, &mut t);
     let at = |t: f64| curve.evaluate(t);

@@ -126,7 +126,8 @@ fn choose_seam_side(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
     uv
 }
 
-/// The facets of the carrier that lie in a guest, and the guest's border. `first` is the number of its first corner in the carrier's imprint.
+/// The facets of the carrier that lie in a guest, and the guest's border. `first` is the number of its first corner in the carrier's
+/// imprint.
 pub(super) fn taken_facets(
     guest: &Guest<'_, '_>,
     carrier: &TrimmedFace<'_>,

@@ -3,13 +3,14 @@
 //!
 //! Where a face (the guest) lies on another (the carrier) within [`Settings::glue_mm`], whatever their parametrisations, the guest's border
 //! is imprinted on the carrier: its corners become nodes there, its chords edges that no facet crosses. The guest then takes over the
-//! carrier's facets inside its border, turned around, and each is proved anew on the guest's own surface. Where only a part of the guest lies
-//! there, the carrier's border is imprinted on the guest too, which keeps facets of its own outside of it. Edges that run together get the
-//! samples of both, so that neighbours of either face still meet it, and those that run inside the other face chords short enough for it.
+//! carrier's facets inside its border, turned around, and each is proved anew on the guest's own surface. Where only a part of the guest
+//! lies there, the carrier's border is imprinted on the guest too, which keeps facets of its own outside of it. Edges that run together get
+//! the samples of both, so that neighbours of either face still meet it, and those that run inside the other face chords short enough for
+//! it.
 //!
-//! Guarantee: where they touch, a guest has the carrier's facets exactly, but for its own border's corners, which may lie off the carrier by
-//! the glue distance; shells stay closed, as a guest whose facets do not fill its border side on side keeps its own. Known weakness: a face
-//! has one carrier, so of three that touch in turn two are faceted apart.
+//! Guarantee: where they touch, a guest has the carrier's facets exactly, but for its own border's corners, which may lie off the carrier
+//! by the glue distance; shells stay closed, as a guest whose facets do not fill its border side on side keeps its own. Known weakness: a
+//! face has one carrier, so of three that touch in turn two are faceted apart.
 
 mod closure;
 mod detection;
@@ -153,7 +154,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         instances.par_iter().filter_map(divide).collect()
     }
 
-    /// Makes the input for meshing a face on the edge divisions of `mesh`, its part, without the chords that it has given up to others there.
+    /// Makes the input for meshing a face on the edge divisions of `mesh`, its part, without the chords that it has given up to others
+    /// there.
     fn input<'i>(&'i self, face: &'i TrimmedFace<'m>, mesh: &'i PartMesh) -> FaceInput<'i, 'm> {
         FaceInput {
             part: face.part,

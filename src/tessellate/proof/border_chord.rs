@@ -16,8 +16,8 @@ const NEGLIGIBLE: f64 = 1e-3;
 const GAP_PROBES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Share of the domain within which a uv curve is the straight line of its chord: rounding of its control points.
 const STRAIGHT: f64 = 1e-12;
-/// Share of the tolerance within which an edge is straight in space. Beside one that bends, the strip between it and its chord is about as wide
-/// as the chord's sag, which is held to the tolerance by itself.
+/// Share of the tolerance within which an edge is straight in space. Beside one that bends, the strip between it and its chord is about as
+/// wide as the chord's sag, which is held to the tolerance by itself.
 pub(in crate::tessellate) const STRAIGHT_EDGE: f64 = 0.1;
 /// Share of the tolerance that is small for a curve's deviation: beyond it finer hulls are looked at.
 const SMALL_SHARE: f64 = 0.5;
@@ -171,7 +171,8 @@ fn curve_deviation(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f
 }
 
 /// Returns how far the surface over `hull`, around a curve and its `chord` in parameters, reaches beyond the curve, mm: facets that end at
-/// the chord do. 0 where the curve does not lie to the left of the chord, as the face does. How long lines across are is sampled, not proved.
+/// the chord do. 0 where the curve does not lie to the left of the chord, as the face does. How long lines across are is sampled, not
+/// proved.
 fn overshoot(surface: &FaceSurface<'_>, hull: &[Uv], chord: [Uv; 2]) -> f64 {
     let d = chord[1] - chord[0];
     let left = hull.iter().map(|&q| d.perp_dot(q - chord[0])).fold(0.0, f64::max);

@@ -93,8 +93,8 @@ impl DeviationBounds {
         self.max_over_patches(patches, &LinearMap::new(corners, at)?, at[0], limit)
     }
 
-    /// Returns a bound of the distance, mm, from the surface over a convex polygon to a chord that the polygon holds; `None` where it is above
-    /// `limit` or the chord has no length. The chord's ends, at `chord` in parameters, lie at `at` in space.
+    /// Returns a bound of the distance, mm, from the surface over a convex polygon to a chord that the polygon holds; `None` where it is
+    /// above `limit` or the chord has no length. The chord's ends, at `chord` in parameters, lie at `at` in space.
     pub(in crate::tessellate) fn chord_bound(
         &mut self,
         surface: &FaceSurface<'_>,

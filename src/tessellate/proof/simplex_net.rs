@@ -180,8 +180,8 @@ fn steps_of_expansion(corners: usize, [p, q]: [usize; 2]) -> u64 {
     ((q + 1) * first + second) as u64
 }
 
-/// Takes all de Casteljau steps of one direction over `steps + 1` nets of a degree, which stand `stride` apart in `work[0]`: the two buffers
-/// take turns. Returns the index of the one that begins with the resulting net, of degree `degree + steps`; both are overwritten.
+/// Takes all de Casteljau steps of one direction over `steps + 1` nets of a degree, which stand `stride` apart in `work[0]`: the two
+/// buffers take turns. Returns the index of the one that begins with the resulting net, of degree `degree + steps`; both are overwritten.
 #[inline(always)]
 fn de_casteljau<const N: usize>(
     work: &mut [Vec<Homogeneous>; 2],
@@ -239,8 +239,8 @@ fn blend<const N: usize>(a: &[Homogeneous], b: &[Homogeneous], d: usize, at: [f6
 
 impl Half {
     /// Makes the table that turns the net of a rectangle of degrees p and q into the net of the Bézier triangle over its half: each
-    /// coefficient as a sum of control points with weights, which hold binomials and multinomials already. With s = λ_B + λ_C along the first side and t = λ_C along the second, (λ_B + λ_C)^i
-    /// λ_A^(p−i) λ_C^j (λ_A + λ_B)^(q−j) is multiplied out.
+    /// coefficient as a sum of control points with weights, which hold binomials and multinomials already. With s = λ_B + λ_C along the
+    /// first side and t = λ_C along the second, (λ_B + λ_C)^i λ_A^(p−i) λ_C^j (λ_A + λ_B)^(q−j) is multiplied out.
     fn new([p, q]: [usize; 2]) -> Self {
         // Divided by the multinomials here once, and not for each net.
         let mut shares = Vec::new();

@@ -226,8 +226,8 @@ fn prove_sector_quad(
     Some((pole, first?.max(second?)))
 }
 
-/// Returns the indices of pairs to make from `candidates`, which stand in order of squareness: good quads first, then those of triangles that
-/// have but one mate left, then the rest. Heeds what is `taken`, a flag a triangle, and marks the triangles of its pairs so.
+/// Returns the indices of pairs to make from `candidates`, which stand in order of squareness: good quads first, then those of triangles
+/// that have but one mate left, then the rest. Heeds what is `taken`, a flag a triangle, and marks the triangles of its pairs so.
 fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
     let mut chosen = Vec::new();
     let of = CandidatesOf::new(candidates, taken.len(), |_| true);

@@ -221,8 +221,8 @@ fn corners(face: &Face, made: &Tessellation, facets: std::ops::Range<usize>, gap
                 }
                 continue;
             }
-            // On a crease, or so near to it that a facet beyond may end here, the normal of any side will do; where there is none, or one that
-            // rounding decides, any at all.
+            // On a crease, or so near to it that a facet beyond may end here, the normal of any side will do; where there is none, or one
+            // that rounding decides, any at all.
             let at = Uv::from_array([0, 1].map(|d| {
                 let [a, b] = poles.domain[d];
                 let times = |k: &f64| s.knots[d].iter().filter(|x| *x == k).count();

@@ -1,4 +1,5 @@
-//! Random trimmed cylinders, cones, spheres and tori: parts between cuts around the axis, poles and seams included, with a hole and its lid.
+//! Random trimmed cylinders, cones, spheres and tori: parts between cuts around the axis, poles and seams included, with a hole and its
+//! lid.
 
 use super::shells::fine;
 use lampyris::math::{Frame, Point, Uv, Vector};

@@ -10,8 +10,8 @@ use crate::intersect::octree::facet_pair::Edges;
 use crate::intersect::octree::lanes::Lanes;
 use std::hint::select_unpredictable;
 
-/// Tests all triangles of two facets, or of `first` alone, against a line and offers every hit to `best`, which keeps the nearest; `edges` is
-/// overwritten. Where an edge function is zero both facets are tested one by one, as the walk does it.
+/// Tests all triangles of two facets, or of `first` alone, against a line and offers every hit to `best`, which keeps the nearest; `edges`
+/// is overwritten. Where an edge function is zero both facets are tested one by one, as the walk does it.
 #[inline(always)]
 pub(super) fn test_facet_pair<L: Lanes>(
     first: &BufferFacet,
