@@ -1,8 +1,8 @@
 //! What each face did to the power that met it, in the units of the scene.
 
 use super::bind::BoundScene;
+use super::power_scale::PowerScale;
 use super::tallies::Tallies;
-use super::tally::Sum;
 use serde::Serialize;
 
 /// Power at one face, in the unit of the sources; errors are standard errors.
@@ -40,7 +40,7 @@ pub struct FaceResults {
 
 impl FaceResults {
     /// The faces of most power, as many as the scene asks for.
-    pub(crate) fn new(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Self {
+    pub(crate) fn new(bound: &BoundScene, tallies: &Tallies, scale: &PowerScale) -> Self {
         let sums = |face: u32| {
             let k = face as usize;
             [&tallies.faces[k], &tallies.entered[k], &tallies.left[k]]
@@ -52,23 +52,22 @@ impl FaceResults {
             let [absorbed, _, left] = sums(face);
             std::cmp::Reverse(absorbed.total + left.total)
         });
-        let power = |s: &Sum| s.total as f64 * quantum;
-        let error = |s: &Sum| s.error(tallies.replicates) * quantum;
         let result = |&face: &u32| {
             let [absorbed, entered, left] = sums(face);
             FaceResult {
                 face,
-                absorbed: power(absorbed),
-                absorbed_error: error(absorbed),
-                entered: power(entered),
-                entered_error: error(entered),
-                left: power(left),
-                left_error: error(left),
+                absorbed: scale.power(absorbed),
+                absorbed_error: scale.error(absorbed),
+                entered: scale.power(entered),
+                entered_error: scale.error(entered),
+                left: scale.power(left),
+                left_error: scale.error(left),
             }
         };
         let listed = lit.len().min(bound.scene.run.faces as usize);
         // Whole quanta first: a sum of no floating-point numbers is −0.
-        let rest = |k: usize| lit[listed..].iter().map(|&face| sums(face)[k].total).sum::<u128>() as f64 * quantum;
+        let rest =
+            |k: usize| lit[listed..].iter().map(|&face| sums(face)[k].total).sum::<u128>() as f64 * scale.quantum;
         Self {
             count: lit.len(),
             first: lit[..listed].iter().map(result).collect(),

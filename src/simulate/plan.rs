@@ -152,6 +152,27 @@ impl Plan {
         if self.grows() { [0, 1] } else { [replicate, self.replicates] }
     }
 
+    /// Returns the standard error that replicates of unequal size feign in the sum of `replicates` of them, as a share of the sum, where every
+    /// ray brings as much: that of the source whose rays are divided most evenly, for the light may be all its own; 0 where a source
+    /// has no ray in one of them, which no spread of numbers of rays tells about.
+    pub(super) fn size_spread(&self, replicates: &[u32]) -> f64 {
+        let count = replicates.len() as f64;
+        let scarce = self.shares.iter().any(|share| share.rays < u64::from(self.replicates));
+        if self.grows() || replicates.len() < 2 || scarce {
+            return 0.0;
+        }
+        let of_source = |source: usize| {
+            let rays = replicates.iter().map(|&r| {
+                let [from, to] = self.range(source, r);
+                (to - from) as f64
+            });
+            let total: f64 = rays.clone().sum();
+            let squares: f64 = rays.map(|n| (n - total / count).powi(2)).sum();
+            (squares * count / (count - 1.0)).sqrt() / total
+        };
+        (0..self.shares.len()).map(of_source).fold(f64::INFINITY, f64::min)
+    }
+
     /// Goes through the rays of a replicate, each as its source and its number in the run.
     pub(super) fn rays_of_replicate(&self, replicate: u32) -> impl Iterator<Item = (usize, u64)> {
         (0..self.shares.len()).flat_map(move |source| {

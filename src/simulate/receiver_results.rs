@@ -1,6 +1,7 @@
 //! What one receiver counted, in the units of the scene.
 
 use super::pole_rings::PoleRings;
+use super::power_scale::PowerScale;
 use super::receiver::{Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
 use super::tallies::Tallies;
@@ -102,23 +103,22 @@ fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S:
 }
 
 impl ChannelResult {
-    /// The figures of channel `c` from the sums of its total and its cells; `quantum` and `per` make power and density of a count, the
+    /// The figures of channel `c` from the sums of its total and its cells; `scale` and `per` make power and density of a power, the
     /// latter by the cell.
     fn new(
         r: &Receiver,
         (c, total, sums): (usize, &Sum, &[Sum]),
-        tallies: &Tallies,
-        (quantum, per): (f64, &impl Fn(usize) -> f64),
+        (scale, per): (&PowerScale, &impl Fn(usize) -> f64),
         unit: &'static str,
     ) -> Self {
         let worth = r.channels.worth();
         Self {
             name: r.channels.name(c),
             unit,
-            total: total.total as f64 * quantum * worth,
-            error: total.error(tallies.replicates) * quantum * worth,
-            cells: sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k) * worth).collect(),
-            errors: sums.iter().enumerate().map(|(k, s)| s.error(tallies.replicates) * per(k) * worth).collect(),
+            total: scale.power(total) * worth,
+            error: scale.error(total) * worth,
+            cells: sums.iter().enumerate().map(|(k, s)| scale.power(s) * per(k) * worth).collect(),
+            errors: sums.iter().enumerate().map(|(k, s)| scale.error(s) * per(k) * worth).collect(),
         }
     }
 }
@@ -167,30 +167,30 @@ impl ShapeFigures {
 }
 
 impl ReceiverResult {
-    /// The figures of receiver `i`: sums of quanta turned into densities and their errors; `ray` is the most quanta of a ray.
+    /// The figures of receiver `i`: sums of quanta turned into densities and their errors by `power_scale`; `ray` is the most quanta of a ray.
     pub(super) fn new(
         r: &Receiver,
         i: usize,
         tallies: &Tallies,
-        [quantum, ray]: [f64; 2],
+        (power_scale, ray): (&PowerScale, f64),
         unit: PowerUnit,
     ) -> Self {
         let grid = r.cells.map(|n| n as usize);
         let ShapeFigures { kind, unit, scale, half, middle, angles } = ShapeFigures::new(&r.shape, unit);
-        // Quanta of a cell to its mean density: per area, or per solid angle for a far field.
+        // Power of a cell to its mean density: per area, or per solid angle for a far field.
         let measure = |k: usize| r.measure(k % grid[0], k / grid[0]);
         let off: Vec<usize> = (0..r.cell_count()).filter(|&k| measure(k) == 0.0).collect();
         // No light is counted off a disc: nothing over nothing stays nothing.
-        let per = |k: usize| if measure(k) > 0.0 { quantum * scale / measure(k) } else { 0.0 };
+        let per = |k: usize| if measure(k) > 0.0 { scale / measure(k) } else { 0.0 };
         let (sums, further) = tallies.cells[i].split_at(r.cell_count());
         let photometric = if scale == 1.0 { "cd" } else { "lx" };
         let channel_unit = if r.channels.worth() == 1.0 { unit } else { photometric };
         let channel = |(c, sums)| {
-            ChannelResult::new(r, (c, &tallies.channels[i][c], sums), tallies, (quantum, &per), channel_unit)
+            ChannelResult::new(r, (c, &tallies.channels[i][c], sums), (power_scale, &per), channel_unit)
         };
         let channels = further.chunks(r.cell_count()).enumerate().map(channel).collect();
-        let cells: Vec<f64> = sums.iter().enumerate().map(|(k, s)| s.total as f64 * per(k)).collect();
-        let errors = sums.iter().enumerate().map(|(k, s)| s.error(tallies.replicates) * per(k)).collect();
+        let cells: Vec<f64> = sums.iter().enumerate().map(|(k, s)| power_scale.power(s) * per(k)).collect();
+        let errors = sums.iter().enumerate().map(|(k, s)| power_scale.error(s) * per(k)).collect();
         let total = &tallies.receivers[i];
         let means = tallies.moments[i].means(total.total);
         // A mean square is no less than the square of the mean, by whatever units both are counted in.
@@ -210,8 +210,8 @@ impl ReceiverResult {
         let mut result = Self {
             name: r.name.clone(),
             kind,
-            power: total.total as f64 * quantum,
-            power_error: total.error(tallies.replicates) * quantum,
+            power: power_scale.power(total),
+            power_error: power_scale.error(total),
             grid,
             max: 0.0,
             min: least_on_receiver(&cells, &off),
@@ -229,8 +229,8 @@ impl ReceiverResult {
             channels,
             cells,
             errors,
-            ray_power: ray * quantum,
-            ray_cells: (0..r.cell_count()).map(|k| ray * per(k)).collect(),
+            ray_power: ray * power_scale.quantum,
+            ray_cells: (0..r.cell_count()).map(|k| ray * power_scale.quantum * per(k)).collect(),
             off,
         };
         result.max = result.cells_with_even_poles()[0].iter().copied().fold(0.0, f64::max);

@@ -8,6 +8,7 @@ use super::face_results::FaceResults;
 use super::hooks::Traced;
 use super::outcome::{Counts, LostRay, PathVertex};
 use super::plan::Plan;
+use super::power_scale::PowerScale;
 use super::receiver_results::ReceiverResult;
 use super::seconds::Seconds;
 use super::sequence_results::ReceiverSequences;
@@ -172,15 +173,9 @@ impl Results {
         // worth.
         let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(few_replicates(tallies.replicates));
         let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
-        let power = tallies.ends.map(|s| s.total as f64 * quantum);
-        // Replicates may have unequal numbers of rays, which spread what they emitted too: that spread is of no end. Numbers of rays are
-        // not drawn, so that both spreads are independent, and their squares add up.
-        let spread = |s: &Sum| s.error(tallies.replicates) * quantum;
-        let by_size = if power[0] > 0.0 { spread(&tallies.ends[0]) / power[0] } else { 0.0 };
-        let errors = tallies.ends.each_ref().map(|s| {
-            let due_to_size = by_size * s.total as f64 * quantum;
-            (spread(s).powi(2) - due_to_size.powi(2)).max(0.0).sqrt()
-        });
+        let scale = PowerScale::new(quantum, &plan, &partial.done);
+        let power = tallies.ends.each_ref().map(|s| scale.power(s));
+        let errors = tallies.ends.each_ref().map(|s| scale.error(s));
         let digest = digest(&tallies);
         Self {
             rays,
@@ -203,17 +198,17 @@ impl Results {
             cut_off_rays: cut_off,
             caught_rays: caught,
             corrected_normals,
-            absorbed: absorbed_by(bound, &tallies, quantum),
+            absorbed: absorbed_by(bound, &tallies, &scale),
             receivers: bound
                 .receivers
                 .iter()
                 .enumerate()
                 .map(|(i, r)| {
-                    ReceiverResult::new(r, i, &tallies, [quantum, plan.heaviest_ray()], bound.scene.run.unit)
+                    ReceiverResult::new(r, i, &tallies, (&scale, plan.heaviest_ray()), bound.scene.run.unit)
                 })
                 .collect(),
-            sequences: sequences(bound, &tallies, quantum),
-            faces: bound.counts_faces().then(|| FaceResults::new(bound, &tallies, quantum)),
+            sequences: sequences(bound, &tallies, &scale),
+            faces: bound.counts_faces().then(|| FaceResults::new(bound, &tallies, &scale)),
             grows: plan.grows(),
             ledger: std::mem::take(&mut tallies.ledger),
             paths: std::mem::take(&mut tallies.paths).into_vertices(),
@@ -226,9 +221,9 @@ impl Results {
 }
 
 /// Returns a table of sequences for each receiver; none where the scene does not ask for them.
-fn sequences(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<ReceiverSequences> {
+fn sequences(bound: &BoundScene, tallies: &Tallies, scale: &PowerScale) -> Vec<ReceiverSequences> {
     let receivers = if bound.scene.run.sequences > 0 { bound.receivers.len() } else { 0 };
-    (0..receivers as u32).map(|r| ReceiverSequences::new(bound, tallies, r, quantum)).collect()
+    (0..receivers as u32).map(|r| ReceiverSequences::new(bound, tallies, r, scale)).collect()
 }
 
 /// Student's t for 95 % with 1 to 10 degrees of freedom.
@@ -243,7 +238,7 @@ fn few_replicates(replicates: u32) -> Option<String> {
 }
 
 /// Returns the power that the faces of each instance and the medium of each body have taken; those that took none are left out.
-fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absorbed> {
+fn absorbed_by(bound: &BoundScene, tallies: &Tallies, scale: &PowerScale) -> Vec<Absorbed> {
     let faces = bound.instances.iter().map(|name| (name.as_str(), "faces"));
     // Media and faces apart: whoever tunes an absorption asks about the one, whoever chooses a paint about the
     // other.
@@ -251,8 +246,8 @@ fn absorbed_by(bound: &BoundScene, tallies: &Tallies, quantum: f64) -> Vec<Absor
     let result = |(index, ((name, r#in), s)): (usize, ((&str, &str), &Sum))| Absorbed {
         name: name.into(),
         r#in: r#in.into(),
-        power: s.total as f64 * quantum,
-        error: s.error(tallies.replicates) * quantum,
+        power: scale.power(s),
+        error: scale.error(s),
         index,
     };
     let places = faces.chain(bulk).zip(tallies.model_sums()).enumerate();

@@ -1,6 +1,7 @@
 //! What a run found out about the ways of light, in the units of the scene.
 
 use super::bind::BoundScene;
+use super::power_scale::PowerScale;
 use super::sequence::{Sequence, SequenceStep};
 use super::tallies::Tallies;
 use super::tally::Sum;
@@ -36,17 +37,17 @@ pub struct ReceiverSequences {
 
 impl ReceiverSequences {
     /// Makes the table of one receiver: as many sequences of the most power as the scene asks for, and the rest as a sum.
-    pub(crate) fn new(bound: &BoundScene, tallies: &Tallies, receiver: u32, quantum: f64) -> Self {
+    pub(crate) fn new(bound: &BoundScene, tallies: &Tallies, receiver: u32, scale: &PowerScale) -> Self {
         let most = bound.scene.run.sequences as usize;
         let mut of_receiver: Vec<(&Sequence, &Sum)> =
             tallies.sequences.iter().filter(|(s, _)| s.receiver == receiver).collect();
         // Equal powers stay in the order of the sequences, so that the table is the same however the run was divided.
         of_receiver.sort_by_key(|(_, sum)| std::cmp::Reverse(sum.total));
         let count = of_receiver.len();
-        let rest = of_receiver.iter().skip(most).map(|(_, sum)| sum.total).sum::<u128>() as f64 * quantum;
+        let rest = of_receiver.iter().skip(most).map(|(_, sum)| sum.total).sum::<u128>() as f64 * scale.quantum;
         let result = |(s, sum): (&Sequence, &Sum)| SequenceResult {
-            power: sum.total as f64 * quantum,
-            power_error: sum.error(tallies.replicates) * quantum,
+            power: scale.power(sum),
+            power_error: scale.error(sum),
             source: s.source,
             source_name: source_name(bound, s.source),
             steps: s.steps.clone(),

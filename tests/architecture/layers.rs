@@ -521,6 +521,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "dispatch",
             "listed_rays",
             "partial_run",
+            "power_scale",
             "hooks",
             "gather",
             "recorder",

@@ -55,6 +55,29 @@ fn what_escapes_has_the_error_of_what_is_received() {
     assert!(all.power.escaped == 1.0 && all.power_errors.escaped < 1e-6, "{:?}", all.power_errors);
 }
 
+/// Light of unequal replicates that all falls on a receiver is known; of light that nearly all does, the error is that of the rays beside it,
+/// a binomial one: not 2.7 rays of 5000, which is what 39 or 40 rays in each of 128 replicates spread by.
+#[test]
+fn unequal_replicates_are_no_error_of_a_receiver() {
+    let screen = |size: f64| {
+        format!(
+            "[run]\nrays = 5000\nsampling = 'random'\n[[source]]\nkind = 'collimated'\nradius = 1\n\
+             [[receiver]]\nname = 'screen'\nat = [0, 0, 5]\nsize = [{size}, 4]\ncells = [2, 2]\n\
+             [[receiver]]\nname = 'behind'\nkind = 'far_field'\ncells = [2, 2]\n"
+        )
+    };
+    let whole = World::default().run(&screen(4.0), |_| {});
+    assert_eq!((whole.receivers[0].power, whole.receivers[0].power_error), (1.0, 0.0));
+    // Two segments are beside a screen of half width h: 2·(acos h − h·√(1 − h²))/π of the disc.
+    let h = 0.98f64;
+    let missed = 2.0 * (h.acos() - h * (1.0 - h * h).sqrt()) / PI;
+    let expected = (missed * (1.0 - missed) / 5000.0).sqrt();
+    let nearly = World::default().run(&screen(2.0 * h), |_| {});
+    let error = nearly.receivers[0].power_error;
+    assert!(error > 0.5 * expected && error < 1.6 * expected, "{error} {expected}");
+    assert!((nearly.receivers[0].power - (1.0 - missed)).abs() < SIGMAS * error);
+}
+
 /// Between parallel coaxial discs of radii a and b at the distance h the view factor is (S − √(S² − 4b²/a²))/2 with
 /// S = 1 + (h² + b²)/a² (Howell, C-41).
 #[test]
