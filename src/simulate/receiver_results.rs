@@ -241,16 +241,22 @@ impl ReceiverResult {
     /// these are slivers of one direction. The error of a ring stands at its last cell, the others, which are no rivals of it, have none.
     pub fn cells_with_even_poles(&self) -> [Cow<'_, [f64]>; 2] {
         let mut even = [Cow::Borrowed(self.cells.as_slice()), Cow::Borrowed(self.errors.as_slice())];
-        if self.angles == Some(FarFieldType::C) {
-            let bounds = |a: usize| [self.middle[a] - self.half[a], self.middle[a] + self.half[a]];
-            let rings = PoleRings::new(self.grid, bounds(0), bounds(1));
-            if !rings.is_empty() {
-                rings.level(even[0].to_mut());
-                rings.level_errors(even[1].to_mut());
-                rings.clear_rivals(even[1].to_mut());
-            }
+        let rings = self.pole_rings();
+        if !rings.is_empty() {
+            rings.level(even[0].to_mut());
+            rings.level_errors(even[1].to_mut());
+            rings.clear_rivals(even[1].to_mut());
         }
         even
+    }
+
+    /// Returns the rings of cells at the poles of a map of planes C; none of others.
+    pub(crate) fn pole_rings(&self) -> PoleRings {
+        if self.angles != Some(FarFieldType::C) {
+            return PoleRings::default();
+        }
+        let bounds = |a: usize| [self.middle[a] - self.half[a], self.middle[a] + self.half[a]];
+        PoleRings::new(self.grid, bounds(0), bounds(1))
     }
 
     /// The channel of lumens, of a receiver that counts them beside watts.

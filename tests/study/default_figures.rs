@@ -150,6 +150,29 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
     assert!(max.geometric.is_some_and(|g| g <= max.statistical), "{max:?}");
 }
 
+/// Cells around a pole are one direction, which is printed at its mean: what facets change of it is judged there, not in the square of cells
+/// that holds as many rays.
+#[test]
+fn the_brightest_pole_is_judged_where_it_is_printed() {
+    let known = known_scenes::parabolic_lamp(25.0, 0.2);
+    let half = known.half;
+    let [head, _] = known.text.split_once("h_deg").map(<[&str; 2]>::from).unwrap();
+    let text = format!("{head}angles = 'C'\nh_deg = [0, 360]\nv_deg = [0, {half:?}]\ncells = [36, 8]\n");
+    let known = KnownScene { text, ..known };
+    let (bound, settings) = bind(&known);
+    let source = ModelMeshSource::new(&known.model);
+    let mesh = tessellate(&known.model, &tessellate::Settings::default()).mesh;
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let few = RunSettings { rays: 16_384, replicates: 64, ..settings };
+    let error = geometric_error(&bound, [&octree, source.exact()], &few);
+    let results = [&octree as &dyn Intersector, source.exact()].map(|i| simulate(&bound, i, &few, &|_| true));
+    let receiver = &error.receivers[0];
+    assert_eq!(receiver.peak_cells, 1, "{receiver:?}");
+    for (judged, printed) in [receiver.peak.facets, receiver.peak.spline].iter().zip(&results) {
+        assert!((judged / printed.receivers[0].max - 1.0).abs() < 1e-9, "{judged} {}", printed.receivers[0].max);
+    }
+}
+
 /// A black ball in the middle of a beam of twice its radius takes a quarter of the light; facets within the sphere take less, and neither
 /// the choice nor the figures keep silent on it, though no receiver sees it.
 #[test]

@@ -56,17 +56,31 @@ impl Cell {
     }
 }
 
-/// A square of cells, cut off at the sides of the grid.
+/// A rectangle of cells, cut off at the sides of the grid.
 #[derive(Clone, Copy)]
 struct Block {
     x: usize,
     y: usize,
-    side: usize,
+    size: [usize; 2],
+}
+
+impl Block {
+    /// Makes a square.
+    fn square(x: usize, y: usize, side: usize) -> Self {
+        Self { x, y, size: [side; 2] }
+    }
+
+    /// Whether it has the cell of column `x` and row `y`.
+    fn contains(&self, x: usize, y: usize) -> bool {
+        (self.x..self.x + self.size[0]).contains(&x) && (self.y..self.y + self.size[1]).contains(&y)
+    }
 }
 
 /// The cells of a receiver in two runs of the same rays.
 pub(super) struct CellPairs<'r> {
     grid: [usize; 2],
+    /// Rows of cells that are slivers of one direction, a pole.
+    pole_rows: Vec<usize>,
     cells: Vec<Cell>,
     /// The cells of power, whose quanta tell how many rays came; `None` where the layer's own do, as it is not weighted.
     power: Option<Vec<Cell>>,
@@ -106,15 +120,18 @@ impl<'r> CellPairs<'r> {
         let per_measure = |m: f64| if m > 0.0 { quantum * scale / m } else { 0.0 };
         let unit: Vec<f64> =
             (0..cells.len()).map(|c| per_measure(receiver.measure(c % grid[0], c / grid[0]))).collect();
+        let [first, last] = result.pole_rings().has_poles(cells.len());
+        let pole_rows = [first.then_some(0), last.then(|| grid[1] - 1)].into_iter().flatten().collect();
         let measure = unit.iter().map(|u| if *u > 0.0 { 1.0 / u } else { 0.0 }).collect();
-        Some(Self { grid, cells, power, ray, unit, measure, replicates, layer })
+        Some(Self { grid, pole_rows, cells, power, ray, unit, measure, replicates, layer })
     }
 
     /// Goes through the indices of the cells of a block, as far as the grid goes.
     fn cells_of(&self, block: Block) -> impl Iterator<Item = usize> + '_ {
         let [nx, ny] = self.grid;
-        let rows = block.y..(block.y + block.side).min(ny);
-        rows.flat_map(move |y| (block.x..(block.x + block.side).min(nx)).map(move |x| y * nx + x))
+        let [width, height] = block.size;
+        let rows = block.y..(block.y + height).min(ny);
+        rows.flat_map(move |y| (block.x..(block.x + width).min(nx)).map(move |x| y * nx + x))
     }
 
     /// Returns the side of the smallest square of a power of two that covers the grid.
@@ -122,15 +139,16 @@ impl<'r> CellPairs<'r> {
         self.grid[0].max(self.grid[1]).next_power_of_two()
     }
 
-    /// Returns the square of `side` cells that is brightest by `quanta`, of those side by side from the first corner, and its density.
+    /// Returns the square of `side` cells that is brightest by `quanta`, of those side by side from the first corner, and its density; of
+    /// single cells those around a pole are one, as in the figure that is printed.
     fn brightest(&self, side: usize, quanta: impl Fn(&Cell) -> f64) -> (Block, f64) {
         let corners =
             (0..self.grid[1]).step_by(side).flat_map(|y| (0..self.grid[0]).step_by(side).map(move |x| (x, y)));
-        let blocks = corners.map(|(x, y)| {
-            let block = Block { x, y, side };
-            (block, self.density(block, &quanta))
-        });
-        blocks.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Block { x: 0, y: 0, side }, 0.0))
+        let poles = if side == 1 { self.pole_rows.as_slice() } else { &[] };
+        let squares = corners.filter(|(_, y)| !poles.contains(y)).map(|(x, y)| Block::square(x, y, side));
+        let rings = poles.iter().map(|&y| Block { x: 0, y, size: [self.grid[0], 1] });
+        let blocks = squares.chain(rings).map(|block| (block, self.density(block, &quanta)));
+        blocks.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Block::square(0, 0, side), 0.0))
     }
 
     /// Returns the quanta of a square over its measure, in the receiver's unit; 0 for an empty one.
@@ -157,10 +175,7 @@ impl<'r> CellPairs<'r> {
         let measures = [inverse(on_facets), inverse(block)];
         let by_replicate = |run: usize, block: Block| {
             let (nx, layer) = (self.grid[0], self.layer);
-            let within = move |c: usize| {
-                let (x, y) = (c % nx, c / nx);
-                (block.x..block.x + block.side).contains(&x) && (block.y..block.y + block.side).contains(&y)
-            };
+            let within = move |c: usize| block.contains(c % nx, c / nx);
             let sum = move |s: &&ReplicateSums| {
                 s.layers[layer].iter().filter(|(c, _)| within(*c as usize)).map(|(_, q)| *q as f64).sum::<f64>()
             };
@@ -176,7 +191,9 @@ impl<'r> CellPairs<'r> {
         let blurred = ((excess - 3.0 * chance.sqrt()).max(0.0) / count).sqrt();
         let variance: f64 = self.cells_of(block).map(|c| self.cells[c].spline_variance * unit(c).powi(2)).sum();
         let density = Paired { facets, spline, error: if side > 1 { noise.hypot(blurred) } else { noise } };
-        Peak { density, cells: side, statistical: (variance / count).sqrt() }
+        // A ring about a pole is one place, which is known as well as all its cells together.
+        let places = if block.size[0] == side { count } else { count * count };
+        Peak { density, cells: side, statistical: (variance / places).sqrt() }
     }
 
     /// Compares all cells together, as shares of the root of the sum of the spline's squares.
@@ -197,7 +214,7 @@ impl<'r> CellPairs<'r> {
     pub(super) fn cell_errors(&self) -> (Vec<f64>, usize) {
         let mut layer = vec![0.0; self.cells.len()];
         let mut pooled = 1;
-        let mut stack = vec![Block { x: 0, y: 0, side: self.covering_side() }];
+        let mut stack = vec![Block::square(0, 0, self.covering_side())];
         while let Some(block) = stack.pop() {
             let quanta = |of: fn(&Cell) -> f64| self.cells_of(block).map(|c| of(&self.cells[c])).sum::<f64>();
             let counted = self.power.as_ref().unwrap_or(&self.cells);
@@ -208,14 +225,15 @@ impl<'r> CellPairs<'r> {
                 continue;
             }
             // Where rays are many a block is parted in four; where they are few its cells stay pooled, so that their noise averages.
-            if rays > POOLED_RAYS && block.side > 1 {
-                let side = block.side / 2;
+            let whole_side = block.size[0];
+            if rays > POOLED_RAYS && whole_side > 1 {
+                let side = whole_side / 2;
                 let quarters = [(0, 0), (side, 0), (0, side), (side, side)];
-                stack.extend(quarters.map(|(dx, dy)| Block { x: block.x + dx, y: block.y + dy, side }));
+                stack.extend(quarters.map(|(dx, dy)| Block::square(block.x + dx, block.y + dy, side)));
                 continue;
             }
             let count = self.cells_of(block).count().max(1) as f64;
-            pooled = pooled.max(block.side.min(self.grid[0].max(self.grid[1])));
+            pooled = pooled.max(whole_side.min(self.grid[0].max(self.grid[1])));
             let excess = quanta(Cell::excess) / count;
             let mean = quanta(Cell::difference) / count;
             let noise = quanta(|c| c.difference_variance) / (count * count);
