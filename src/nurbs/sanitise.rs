@@ -2,8 +2,8 @@
 //!
 //! Guarantee: what comes out satisfies the invariants of [`Curve`] and [`Surface`] and is the same shape over the
 //! domain `[knots[degree], knots[n]]`, up to knots that are merged because they differ by less than 1e-10 of the
-//! domain. Known weakness: a knot whose multiplicity exceeds the degree inside the domain splits the spline; the
-//! multiplicity is then cut to the degree, which closes a gap if there was one.
+//! domain. A knot whose multiplicity exceeds the degree inside the domain splits the spline: the multiplicity is cut to
+//! the degree where the pieces meet, and the spline refused where they do not.
 
 // Negated comparisons refuse NaN together with what is out of range.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -18,6 +18,10 @@ const MAX_POINTS: usize = 1 << 22;
 const SMALLEST_WEIGHT: f64 = 1e-12;
 /// Largest coordinate, mm: of differences that matter, 1e-1 mm and more, nothing is left of a double beyond it.
 const LARGEST_COORDINATE_MM: f64 = 1e15;
+/// Ends of pieces this near, mm, are one place, and those that differ by this share of a coordinate, as rounding to seven digits does.
+const JOINED_MM: f64 = 1e-3;
+/// See [`JOINED_MM`].
+const JOINED_SHARE: f64 = 1e-6;
 /// Knots nearer than this share of the domain are one knot.
 const SAME_KNOT: f64 = 1e-10;
 
@@ -46,6 +50,9 @@ pub enum Defect {
     /// A coordinate is no number.
     #[error("a control point is not finite")]
     Points,
+    /// Pieces lie apart at a knot of full multiplicity.
+    #[error("it is torn: its pieces lie apart at a knot")]
+    Torn,
 }
 
 /// What had to be changed.
@@ -228,6 +235,14 @@ fn conform(
                 }
                 let drop = if i == 0 { 0 } else { i.min(lines[0].len() - 1) };
                 knots.remove(i);
+                // Inside the domain both points are places of the spline: one piece ends at the first, the next begins at the other.
+                let is_torn = |line: &Vec<Homogeneous>| {
+                    let [a, b] = [line[drop - 1], line[drop]].map(|p| p.position());
+                    (a - b).length() > JOINED_MM + JOINED_SHARE * a.abs().max_element()
+                };
+                if !at_end && lines.iter().any(is_torn) {
+                    return Err(Defect::Torn);
+                }
                 for line in &mut lines {
                     line.remove(drop);
                 }

@@ -9,8 +9,10 @@ use crate::math::{Point, Uv, Vector};
 use std::iter::Sum;
 use std::ops::Mul;
 
-/// Parts of a span of knots that are integrated one by one: of quarter circles the area is then right to 2e-10.
-const PARTS: usize = 2;
+/// Parts of a span of knots that are integrated one by one where weights differ: of quarter circles the area is then right to 2e-10.
+const RATIONAL_PARTS: usize = 2;
+/// Highest degree of a polynomial whose spans one rule of [`GAUSS`] integrates exactly: the integrand's is twice that less one.
+const EXACT_DEGREE: usize = 5;
 
 impl<P: ControlPoint> Spline<P> {
     /// Sums up the `product` of where a point of the curve is, seen from `center`, and how it moves on, as it runs along the curve.
@@ -31,10 +33,12 @@ impl<P: ControlPoint> Spline<P> {
                 .sum();
         }
         let breaks = self.breakpoints();
+        let is_polynomial = self.points.iter().all(|p| p.weight() == self.points[0].weight());
+        let parts = if is_polynomial && self.degree <= EXACT_DEGREE { 1 } else { RATIONAL_PARTS };
         let nodes = breaks.windows(2).flat_map(|span| {
-            let width = (span[1] - span[0]) / PARTS as f64;
+            let width = (span[1] - span[0]) / parts as f64;
             let start = move |part: usize| span[0] + part as f64 * width;
-            (0..PARTS).flat_map(move |part| GAUSS.map(|(x, weight)| (start(part) + x * width, weight * width)))
+            (0..parts).flat_map(move |part| GAUSS.map(|(x, weight)| (start(part) + x * width, weight * width)))
         });
         nodes
             .map(|(t, weight)| {

@@ -3,6 +3,7 @@
 use super::geometry::Refusal;
 use super::geometry::units::{Units, contexts};
 use super::part21::{File, parse};
+use super::product::asides::Asides;
 use super::product::assembly::{Assembly, PlacedRepresentation};
 use super::product::conversion::convert;
 use super::product::numbering::ConvertedPart;
@@ -142,7 +143,9 @@ fn convert_assembly(
             report.left_out.push(Note { id: *id, entity: file.entity_name(*id), reason: reason.clone() });
         }
     }
-    report.left_out.extend(external_files(file, name));
+    let asides = Asides::collect(file);
+    report.problems.extend(asides.void_directions(name));
+    report.left_out.extend(asides.external_files(name));
     report.problems.extend(assembly.problems.iter().cloned());
     let mut reader = Reader {
         file,
@@ -152,18 +155,18 @@ fn convert_assembly(
         report,
     };
     let mut shared = SharedItems::new(file, &assembly, &placed);
+    let mut hidden = asides.hidden_items(file);
     // What a representation adds becomes a part where it is placed first; it adds less where another has brought the same.
     let mut parts: FxHashMap<(u64, Vec<u64>), Option<PartFaces>> = FxHashMap::default();
     for p in placed {
+        hidden.find_among(p.owners.iter().chain([&p.representation]));
         let key = (p.representation, shared.place(&p));
         let entry = match parts.get(&key) {
             Some(known) => *known,
             None => {
-                let made = reader.convert_representation(
-                    assembly.units_of(p.representation),
-                    &p,
-                    &shared.items(key.0, &key.1),
-                );
+                let items = shared.items(key.0, &key.1);
+                let made = reader.convert_representation(assembly.units_of(p.representation), &p, &items);
+                hidden.find_among(&items);
                 parts.insert(key, made);
                 made
             }
@@ -173,29 +176,14 @@ fn convert_assembly(
         }
     }
     let Reader { model, report, .. } = reader;
+    let faces = model.parts.iter().flat_map(|p| &p.shells).flat_map(|s| &s.faces);
+    hidden.find_among(faces.filter_map(|f| f.entity.as_ref()));
+    report.hidden = hidden.notes(file);
     count_model(&model, report);
     if report.faces.found == 0 {
         report.problems.push(format!("{name}: {}", absent_shapes(file)));
     }
     Ok(model)
-}
-
-/// Names the other STEP files that a file's products have their shapes in.
-fn external_files(file: &File<'_>, own: &str) -> Vec<Note> {
-    let mut notes = Vec::new();
-    for e in file.entities() {
-        let Some(other) = e.attributes("DOCUMENT_FILE", 0).and_then(|a| a.text(0)) else { continue };
-        // Drawings and files of a CAD system, or the file itself, may be named as well.
-        let extension = Path::new(&other).extension();
-        let is_step = extension.is_some_and(|x| ["stp", "step"].iter().any(|known| x.eq_ignore_ascii_case(known)));
-        if is_step && !other.eq_ignore_ascii_case(own) {
-            let reason = format!(
-                "shapes are in {other}, which is not read with this file: export the assembly as one file, or use that file too"
-            );
-            notes.push(Note { id: e.id, entity: e.name(), reason });
-        }
-    }
-    notes
 }
 
 /// Tells of a file without a face what it holds instead: the entities that it has most of.

@@ -33,6 +33,8 @@ pub struct ImportReport {
     /// Representations with shapes that are no product's shape (of aspects, datums, construction, drawings), and other files
     /// that hold shapes of this one: they are not in the model.
     pub left_out: Vec<Note>,
+    /// Items that the file hides and that are read all the same: light meets what a viewer does not show.
+    pub hidden: Vec<Note>,
     /// Names of parts and instances.
     pub names: Vec<String>,
     /// Faces that were repaired, and how.

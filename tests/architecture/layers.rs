@@ -358,6 +358,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "loop_order",
             "orientation",
             "topology",
+            "asides",
             "purpose",
             "relations",
             "styles",

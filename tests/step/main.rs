@@ -9,6 +9,7 @@ mod fixtures;
 mod nurbs_properties;
 mod occurrences;
 mod offsets;
+mod rare_forms;
 mod recipes;
 mod revolved_conics;
 mod seams;

@@ -5,12 +5,17 @@ use lampyris::step::{Import, Settings, read_bytes};
 use std::f64::consts::PI;
 
 /// A representation of item #900 in millimetres and radians; #10 is the origin, #11 to #13 are x, y and z, #14 is a placement there.
-fn read(data: &str) -> Import {
+pub(crate) fn read(data: &str) -> Import {
+    read_sections("", "#900", data)
+}
+
+/// The same of these items, in a file with other sections before its data.
+pub(crate) fn read_sections(sections: &str, items: &str, data: &str) -> Import {
     let text = format!(
-        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\
+        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\n{sections}DATA;\n\
          #1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
          #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
-         #6=SHAPE_REPRESENTATION('',(#900),#1);\n#10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=DIRECTION('',(1.,0.,0.));\n\
+         #6=SHAPE_REPRESENTATION('',({items}),#1);\n#10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=DIRECTION('',(1.,0.,0.));\n\
          #12=DIRECTION('',(0.,1.,0.));\n#13=DIRECTION('',(0.,0.,1.));\n#14=AXIS2_PLACEMENT_3D('',#10,#13,#11);\n\
          {data}ENDSEC;\nEND-ISO-10303-21;\n"
     );
@@ -18,17 +23,17 @@ fn read(data: &str) -> Import {
 }
 
 /// The area of what is read, of which nothing is refused.
-fn area(import: &Import) -> f64 {
+pub(crate) fn area(import: &Import) -> f64 {
     assert_eq!(import.report.faces.refused, 0, "{:?}", import.report.refusals);
     measure_model(&import.model).area
 }
 
-fn close(a: f64, b: f64, relative: f64) {
+pub(crate) fn close(a: f64, b: f64, relative: f64) {
     assert!((a / b - 1.0).abs() < relative, "{a} for {b}");
 }
 
 /// Asserts that all there is was refused, for this reason.
-fn assert_refused(data: &str, reason: &str) {
+pub(crate) fn assert_refused(data: &str, reason: &str) {
     let import = read(data);
     assert_eq!(import.model.placed_face_count(), 0, "{data}");
     let refusals = &import.report.refusals;
@@ -36,7 +41,7 @@ fn assert_refused(data: &str, reason: &str) {
 }
 
 /// Surface #20 of `record` between its parameters.
-fn trimmed(record: &str, ranges: &str) -> String {
+pub(crate) fn trimmed(record: &str, ranges: &str) -> String {
     format!("{record}#900=GEOMETRIC_SET('',(#901));\n#901=RECTANGULAR_TRIMMED_SURFACE('',#20,{ranges},.T.,.T.);\n")
 }
 
@@ -103,7 +108,7 @@ fn a_curve_whose_weights_are_no_numbers_is_no_polynomial() {
 
 /// A square of 10 mm with a round hole of radius 2 whose edge has two vertices, `apart` mm from each other; #70 is the hole's bound, #68
 /// its loop.
-fn plate(apart: f64) -> String {
+pub(crate) fn plate(apart: f64) -> String {
     let y = 2.0 * (apart / 2.0).sin();
     let x = 5.0 + 2.0 * (apart / 2.0).cos();
     let corners = [[0., 0.], [10., 0.], [10., 10.], [0., 10.]];

@@ -78,7 +78,8 @@ fn import_summary(r: &ImportReport, console: &Console) -> String {
     let refused = r.refusals.iter().map(|n| ("refused", n));
     let repaired = r.repairs.iter().map(|n| ("repaired", n));
     let left_out = r.left_out.iter().map(|n| ("left out", n));
-    let notes: Vec<_> = refused.chain(repaired).chain(left_out).collect();
+    let hidden = r.hidden.iter().map(|n| ("hidden", n));
+    let notes: Vec<_> = refused.chain(repaired).chain(left_out).chain(hidden).collect();
     let most = if console.verbose > 0 { usize::MAX } else { SHOWN_NOTES };
     if !notes.is_empty() {
         let mut table = blank_table(console.width());

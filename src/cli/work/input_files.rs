@@ -49,9 +49,13 @@ pub(crate) fn scene_or_model(path: &Path, placed: PlacedLimit, console: &Console
     Ok(Input::Step(model_file(path, placed, console)?))
 }
 
-/// Says how many faces were refused, if any were; incomplete where that is a larger share of all than `max_refused`.
+/// Says how many faces were refused and what the files hide, if they do; incomplete where that is a larger share of all than `max_refused`.
 pub(crate) fn report_refusals(reports: &[ImportReport], max_refused: f64, console: &Console) -> Completion {
     let (found, refused) = reports.iter().fold((0, 0), |(f, r), i| (f + i.faces.found, r + i.faces.refused));
+    let hidden: usize = reports.iter().map(|r| r.hidden.len()).sum();
+    if hidden > 0 {
+        console.say(format_args!("light meets {hidden} items that the model hides; `lampyris info` lists them"));
+    }
     if refused == 0 {
         return Completion::Complete;
     }

@@ -57,6 +57,9 @@ pub(in crate::step) struct Chart {
     /// Whether the file's surface has every place twice, with opposite normals, as a profile turned about its own axis of symmetry has:
     /// only how a face's edges run tells which is meant.
     pub(in crate::step) has_two_normals: bool,
+    /// Whether the swept curve of an extrusion or a revolution has the file's own parameter although its weights differ, as a spline of the
+    /// file has; a conic that was made into a spline has another.
+    pub(in crate::step) sweeps_spline: bool,
     /// Distance from what the file means, where that had to be fitted, mm.
     pub(in crate::step) error: f64,
 }
@@ -85,6 +88,7 @@ impl Chart {
             size: 1.0,
             flipped: false,
             has_two_normals: false,
+            sweeps_spline: false,
             error: 0.0,
         };
         chart.characterise();
@@ -276,7 +280,7 @@ impl Chart {
     /// proportional.
     pub(in crate::step) fn parameter_scale(&self, length: f64, angle: f64) -> Option<[f64; 2]> {
         // Weights alike leave a curve's parameter proportional to the file's; a rational arc has its own.
-        let direct = |c: &Curve| c.points.iter().all(|p| p.w == c.points[0].w);
+        let direct = |c: &Curve| self.sweeps_spline || c.points.iter().all(|p| p.w == c.points[0].w);
         match &self.kind {
             Kind::Plane { .. } => Some([length; 2]),
             Kind::Cone { .. } => Some([angle, length]),

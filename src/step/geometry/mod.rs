@@ -158,7 +158,9 @@ impl<'f, 'a> Geometry<'f, 'a> {
             _ => {
                 // ISO 10303-42, `build_axes`: without an axis the placement's Z is that of the space.
                 let axis = self.direction(args.id(first)).unwrap_or(Vector::Z);
-                Frame::from_axis(origin, axis, self.direction(args.id(first + 1)))
+                // There, `first_proj_axis`: without a reference the space's X, projected, wherever it leaves any.
+                let reference = self.direction(args.id(first + 1)).unwrap_or(Vector::X);
+                Frame::from_axis(origin, axis, Some(reference))
             }
         })
     }

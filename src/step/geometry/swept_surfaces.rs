@@ -14,6 +14,10 @@ use crate::step::chart::{Chart, Kind};
 use crate::step::part21::{Args, Entity};
 use std::f64::consts::PI;
 
+/// Names of splines, whose parameters are the file's.
+const SPLINES: [&str; 5] =
+    ["B_SPLINE_CURVE", "B_SPLINE_CURVE_WITH_KNOTS", "BEZIER_CURVE", "UNIFORM_CURVE", "QUASI_UNIFORM_CURVE"];
+
 impl<'f, 'a> Geometry<'f, 'a> {
     /// Returns the curve that a surface sweeps, cut to what can matter within the face's extent, as a spline, mm; for a line of a face with
     /// edges, its origin and direction too. Without edges its parameter is the file's, and one without ends is cut to the range of the
@@ -29,6 +33,9 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let by_parameters = points.is_empty();
         if by_parameters && let Some(a) = e.attributes("POLYLINE", 1) {
             return Ok((self.counted_polyline(e, a.list(0))?, None));
+        }
+        if by_parameters && e.is_a("COMPOSITE_CURVE") {
+            return Ok((self.counted_composite(e, depth)?, None));
         }
         if e.is_one_of(&["TRIMMED_CURVE", "COMPOSITE_CURVE", "POLYLINE"])
             && let Ok(curve) = self.bounded_curve(id, depth + 1)
@@ -111,7 +118,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
             return Ok(chart);
         }
         let (side, has_two_normals) = keep_face_side_of_axis(&frame, curve, reach);
-        Ok(Chart { has_two_normals, ..Chart::revolution(frame, side) })
+        let sweeps_spline = self.is_spline(profile);
+        Ok(Chart { has_two_normals, sweeps_spline, ..Chart::revolution(frame, side) })
     }
 
     /// Reads a SURFACE_OF_LINEAR_EXTRUSION with attributes `a` as a chart: u is the profile's parameter, v how many times the file's vector
@@ -136,7 +144,34 @@ impl<'f, 'a> Geometry<'f, 'a> {
         });
         let d = base_point.map_or(0.0, |b| (b - reach.center).length());
         let (base, _) = self.swept_curve(profile.id, reach.grown_by(d), 0, depth)?;
-        Ok(Chart::new(Kind::Extrusion { base, direction }, Analytic::Extrusion))
+        let sweeps_spline = self.is_spline(profile);
+        Ok(Chart { sweeps_spline, ..Chart::new(Kind::Extrusion { base, direction }, Analytic::Extrusion) })
+    }
+
+    /// Whether a swept curve is a B-spline of the file, or a part of one.
+    fn is_spline(&self, profile: Entity<'f, 'a>) -> bool {
+        let trimmed = profile.attributes("TRIMMED_CURVE", 1).and_then(|a| a.entity(0));
+        trimmed.unwrap_or(profile).keywords().any(|k| SPLINES.contains(&k))
+    }
+
+    /// Reads a COMPOSITE_CURVE by the parameter that the file gives it, which runs through its segments' from 0 on; refused where ours is
+    /// another: of conics and polylines.
+    fn counted_composite(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
+        let parents = e.attributes("COMPOSITE_CURVE", 1).map(|a| a.list(0));
+        let parents =
+            parents.iter().flat_map(|list| (0..list.len()).filter_map(|i| list.entity(i)?.args().entity(2)));
+        let is_line = |parent: Entity<'f, 'a>| {
+            parent.attributes("TRIMMED_CURVE", 1).and_then(|a| a.entity(0)).is_some_and(|basis| basis.is_a("LINE"))
+        };
+        if !parents.clone().all(|parent| is_line(parent) || self.is_spline(parent)) {
+            return Err(Refusal::new(
+                e,
+                "its parameters cannot be taken over: they count those of conics or polylines",
+            ));
+        }
+        let curve = self.composite_curve(e, depth + 1)?;
+        let [a, b] = curve.domain();
+        Ok(curve.reparametrised([0.0, b - a]))
     }
 }
 

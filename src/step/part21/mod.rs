@@ -5,14 +5,16 @@
 //! its line; nesting, memory and time are bounded by the length of the input. Known weakness: one thread, and
 //! sources beyond 4 GiB are refused, because spans are 32 bits.
 
+mod index;
 mod number;
 mod parser;
+mod sections;
 mod short_names;
 mod text;
 
 pub(super) use parser::parse;
 
-use rustc_hash::FxHashMap;
+use index::Index;
 use short_names::Keyword;
 
 /// Reals below this that stand for a count are exact: 2⁵³ is 9e15.
@@ -82,14 +84,6 @@ pub(super) struct Fault {
     pub(super) what: &'static str,
 }
 
-/// Positions of instances by id.
-#[derive(Debug)]
-enum Index {
-    /// `table[id]` is the position plus one; 0 for none.
-    Dense(Vec<u32>),
-    Sparse(FxHashMap<u64, u32>),
-}
-
 /// A parsed file.
 #[derive(Debug)]
 pub(super) struct File<'a> {
@@ -118,11 +112,7 @@ impl<'a> File<'a> {
 
     /// Returns the instance with an id; `None` when the file has none such.
     pub(super) fn entity(&self, id: u64) -> Option<Entity<'_, 'a>> {
-        let position = match &self.index {
-            Index::Dense(table) => table.get(usize::try_from(id).ok()?).copied()?.checked_sub(1)?,
-            Index::Sparse(map) => *map.get(&id)?,
-        };
-        Some(self.instance(position as usize))
+        self.index.position(id).map(|position| self.instance(position as usize))
     }
 
     /// Returns the instance at a place in the file's order.
@@ -150,7 +140,7 @@ impl<'a> File<'a> {
     /// Returns the ids that are referred to but that no instance has, each once, ascending.
     pub(super) fn missing_ids(&self) -> Vec<u64> {
         let ids = self.values.iter().filter_map(|value| if let Value::Ref(id) = value { Some(*id) } else { None });
-        let mut missing: Vec<u64> = ids.filter(|id| self.entity(*id).is_none()).collect();
+        let mut missing: Vec<u64> = ids.filter(|id| self.index.position(*id).is_none()).collect();
         missing.sort_unstable();
         missing.dedup();
         missing

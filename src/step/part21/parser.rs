@@ -1,9 +1,10 @@
 //! The one pass over the text: statements into the arena of values, faults noted and stepped over.
 
-use super::{Fault, File, Index, Instance, Keyword, Record, Span, Value, number::number};
+use super::index::Index;
+use super::number::number;
+use super::sections::section_besides_data;
+use super::{Fault, File, Instance, Keyword, Record, Span, Value};
 use crate::step::{Error, ErrorKind};
-use rustc_hash::FxHashMap;
-use std::collections::hash_map::Entry;
 
 /// Deepest nesting of lists; schemas need 3, real files have shown 4.
 const MAX_DEPTH: usize = 32;
@@ -37,7 +38,7 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     if !marked && p.instances.is_empty() {
         return Err(Error::new(ErrorKind::NotStep { file: name.into() }));
     }
-    let (index, repeated) = index_instances(&p.instances);
+    let (index, repeated) = Index::new(&p.instances);
     for position in repeated {
         let instance = p.instances[position];
         let start = p.records[instance.first as usize].name.start as usize;
@@ -54,35 +55,6 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
         faults: p.faults,
         fault_count: p.fault_count,
     })
-}
-
-/// Makes the index of instances by number, the first where several have one; returns the positions of the others too.
-fn index_instances(instances: &[Instance]) -> (Index, Vec<usize>) {
-    let largest = instances.iter().map(|i| i.id).fold(0, u64::max);
-    let mut repeated = Vec::new();
-    // Writers number nearly without gaps: a table is smaller and quicker then. One number of 10¹⁸ must not make one of that size.
-    if largest <= 4 * instances.len() as u64 + 1024 {
-        let mut table = vec![0; largest as usize + 1];
-        for (k, i) in instances.iter().enumerate() {
-            let slot = &mut table[i.id as usize];
-            if *slot == 0 {
-                *slot = k as u32 + 1;
-            } else {
-                repeated.push(k);
-            }
-        }
-        return (Index::Dense(table), repeated);
-    }
-    let mut map = FxHashMap::default();
-    for (k, i) in instances.iter().enumerate() {
-        match map.entry(i.id) {
-            Entry::Vacant(slot) => {
-                slot.insert(k as u32);
-            }
-            Entry::Occupied(_) => repeated.push(k),
-        }
-    }
-    (Index::Sparse(map), repeated)
 }
 
 struct Parser<'a> {
@@ -131,6 +103,17 @@ impl Parser<'_> {
                     // A long word at the very beginning is some other kind of file.
                     if !marked && self.instances.is_empty() && self.at - start > 64 {
                         return false;
+                    }
+                    if let Some(section) = section_besides_data(name.bytes(self.source), &self.source[self.at..]) {
+                        for (at, id) in section.elsewhere {
+                            self.note(
+                                self.at + at,
+                                Some(id),
+                                "stands in another file, which is not read with this one",
+                            );
+                        }
+                        self.at += section.length;
+                        continue;
                     }
                     let outcome = if self.peek() == b'(' {
                         self.list(0).map(|values| self.header.push(Record { name, values }))

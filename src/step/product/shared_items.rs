@@ -9,6 +9,20 @@ use crate::math::Frame;
 use crate::step::part21::File;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+/// What may hold one another, from the lowest rank to the highest.
+const FACES: [&str; 4] = ["ADVANCED_FACE", "FACE_SURFACE", "SUBFACE", "ORIENTED_FACE"];
+const SHELLS: [&str; 3] = ["OPEN_SHELL", "CLOSED_SHELL", "CONNECTED_FACE_SET"];
+const ORIENTED_SHELLS: [&str; 2] = ["ORIENTED_OPEN_SHELL", "ORIENTED_CLOSED_SHELL"];
+const MODELS: [&str; 5] = [
+    "MANIFOLD_SOLID_BREP",
+    "FACETED_BREP",
+    "BREP_WITH_VOIDS",
+    "SHELL_BASED_SURFACE_MODEL",
+    "FACE_BASED_SURFACE_MODEL",
+];
+/// Rank of [`MODELS`].
+const MODEL_RANK: usize = 3;
+
 /// A placement that can be a key: its bits, with one zero.
 type PlacementKey = [u64; 13];
 
@@ -33,7 +47,7 @@ impl SharedItems {
                 let mut ids = assembly.items(p.representation);
                 // Placements are shared by most representations of a file, and stand for nothing.
                 ids.retain(|&id| is_shape(file, id));
-                ids
+                outermost_items(file, ids)
             });
         }
         let shapes: FxHashSet<u64> = items.values().flatten().copied().collect();
@@ -98,8 +112,37 @@ impl SharedItems {
     }
 }
 
+/// Returns the shapes of one representation but those that another of them holds: a shell beside its model, a face beside its shell.
+fn outermost_items(file: &File<'_>, mut items: Vec<u64>) -> Vec<u64> {
+    // What holds others is of a higher rank than they are, so that nothing holds itself.
+    let rank = |id: &u64| -> Option<usize> {
+        let ranks: [&[&str]; 4] = [&FACES, &SHELLS, &ORIENTED_SHELLS, &MODELS];
+        let e = file.entity(*id)?;
+        ranks.iter().position(|kinds| e.is_one_of(kinds))
+    };
+    let lowest = items.iter().filter_map(rank).min();
+    if items.len() < 2 || lowest == Some(MODEL_RANK) {
+        return items;
+    }
+    let mut held: FxHashSet<u64> = FxHashSet::default();
+    let mut open = items.clone();
+    while let Some(id) = open.pop() {
+        let Some(outer) = rank(&id).filter(|outer| Some(*outer) > lowest) else { continue };
+        let mut inner = Vec::new();
+        file.entity(id).into_iter().flat_map(|e| e.all_args()).for_each(|a| a.deep_ids(&mut inner));
+        inner.retain(|id| rank(id).is_some_and(|rank| rank < outer) && held.insert(*id));
+        open.extend(inner);
+    }
+    items.retain(|id| !held.contains(id));
+    items
+}
+
 /// Whether an item of a representation is a shape, or is refused as one.
 fn is_shape(file: &File<'_>, id: u64) -> bool {
+    // Most items of an assembly are one of these: sorted in as shapes they took 4 % of its reading.
+    if file.entity(id).is_none_or(|e| e.is_one_of(&["AXIS2_PLACEMENT_3D", "MAPPED_ITEM"])) {
+        return false;
+    }
     let mut items = ShapeItems::default();
     items.add(file, id);
     !items.is_empty()

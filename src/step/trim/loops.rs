@@ -5,9 +5,10 @@ use crate::math::Uv;
 use crate::math::polygon::{is_inside_sides, polygon_sides};
 use crate::nurbs::{ControlPoint, UvCurve, area_within};
 use crate::step::chart::{Chart, Pole};
+use rustc_hash::FxHashSet;
 
 /// Where a piece of a loop comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Source {
     /// An edge of the part, by its number in the task.
     Edge(usize),
@@ -126,10 +127,8 @@ impl Chain {
 
     /// Whether the chain runs along an edge of the file twice, as along a seam.
     pub(crate) fn is_cut_open(&self) -> bool {
-        let twice = |i: usize, p: &Piece| {
-            matches!(p.source, Source::Edge(_)) && self.pieces[..i].iter().any(|q| q.source == p.source)
-        };
-        self.pieces.iter().enumerate().any(|(i, p)| twice(i, p))
+        let mut seen = FxHashSet::default();
+        self.pieces.iter().any(|p| matches!(p.source, Source::Edge(_)) && !seen.insert(p.source))
     }
 
     /// Moves all pieces in the parameter plane.
