@@ -91,7 +91,8 @@ pub struct Alternative {
     pub intersector: &'static str,
     /// Seconds of tracing the whole run so, from those of the pilot.
     pub seconds: f64,
-    /// What it gets wrong of the figure that it gets most wrong, as a share of that figure; absent where it is 0 on the spline, as the width of a perfect focus is.
+    /// What it gets wrong of the figure that it gets most wrong, as a share of that figure; absent where it is 0 on the spline, as the
+    /// width of a perfect focus is.
     pub geometric_share: Option<f64>,
     /// The same in standard errors of the whole run; up to 1 is allowed.
     pub geometric_to_statistical: f64,

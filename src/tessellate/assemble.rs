@@ -6,10 +6,10 @@ use super::face::{self, FaceInput, Unmeshed};
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::fallback;
-use super::further_rounds::FurtherRounds;
 use super::limits;
 use super::nodes::Position;
 use super::placed_part::PlacedPart;
+use super::remesh_budget::RemeshBudget;
 use super::report::{FailureCause, Repair};
 use super::settings::Settings;
 use super::taken_chords::{NO_CHORDS, TakenChords, doubled_chords};
@@ -97,7 +97,7 @@ fn mesh_part(
     // What edges and faces come to by themselves is kept from round to round: few edges change.
     let mut own: Vec<OwnDivision> = Vec::new();
     let mut before: Option<PreviousRound> = None;
-    let mut rounds = FurtherRounds::new(faces.len(), settings);
+    let mut budget = RemeshBudget::new(faces.len(), settings);
     let mut round = 0;
     let (divisions, shared, mut meshes) = loop {
         let (divisions, shared) = edges::divide(part, &known, &sides, (&denser, &further), &mut own);
@@ -123,8 +123,10 @@ fn mesh_part(
                 all.map(renew).collect()
             }
         };
-        rounds.count(&meshes, |k| !is_kept[k]);
-        let settled = rounds.settled_edges(faces.iter().map(|(face, _)| *face));
+        for (k, mesh) in meshes.iter().enumerate().filter(|(k, _)| !is_kept[*k]) {
+            budget.spend(k, mesh.as_ref());
+        }
+        let settled = budget.edges_of_spent(faces.iter().map(|(face, _)| *face));
         // A last round that asks for more is taken as it is; what does not hold is counted.
         let mut coarse = coarse_edges(&faces, &meshes, &divisions, round);
         coarse.retain(|e| !settled.contains(e));
@@ -147,20 +149,21 @@ fn mesh_part(
     // diagonal that is taken.
     let mut taken: Vec<TakenChords> = vec![TakenChords::default(); faces.len()];
     for _ in 0..MAX_ROUNDS {
-        let doubled = doubled_chords(part, &meshes, &taken);
-        for (k, chords) in doubled.into_iter().filter(|(k, _)| !rounds.are_over(*k)) {
+        let shells = part.shells.iter().map(|shell| shell.faces.len());
+        for (k, chords) in doubled_chords(shells, &meshes, &taken, |k| budget.is_spent(k)) {
             taken[k].extend(chords);
             let (face, Some(surface)) = &faces[k] else { continue };
             let (divisions, shared, taken) = (&divisions[..], &shared[..], &taken[k]);
             meshes[k] = mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken });
+            budget.spend(k, meshes[k].as_ref());
         }
     }
     let causes = exceeded_limits(&faces, too_large);
     with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken })
 }
 
-/// Returns, by their places, the faces that exceeded a limit: those that were too large to begin, with the cells that `too_large` gives,
-/// and those whose proofs took too many steps.
+/// Returns why faces, by their places, were left without facets: too many cells, of which `too_large` knows the number, or too many steps
+/// of proofs.
 fn exceeded_limits(
     faces: &[(&Face, Option<FaceSurface<'_>>)],
     too_large: impl Fn(usize) -> Option<f64>,

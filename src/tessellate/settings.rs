@@ -28,8 +28,8 @@ pub struct Settings {
     /// are left without facets ([`super::FailureCause::TooManyFacets`]).
     pub most_cells: u64,
     /// Most steps that the proofs of one face may take, each a sum of two control points; a face of a surface so wild that they take more
-    /// is left without facets ([`super::FailureCause::TooManySteps`]). One that has been meshed into a facet for every 10,000 of them is
-    /// not meshed anew for a better border; what does not hold there is counted.
+    /// is left without facets ([`super::FailureCause::TooManySteps`]). One whose facets in all rounds together weigh as much, a facet as
+    /// 10,000 steps, is not meshed anew; what does not hold there is counted.
     pub most_steps: u64,
     /// What decides whether a facet is good enough.
     pub acceptance: Acceptance,

@@ -6,7 +6,6 @@
 
 use super::face_mesh::FaceMesh;
 use super::nodes::Position;
-use crate::model::Part;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use std::ops::Range;
 
@@ -40,24 +39,25 @@ impl TakenChords {
     }
 }
 
-/// Returns the faces of a part with diagonals that must go because the chord is the side of more than two facets of the shell, with these
-/// diagonals; the last of several diagonals stays where no other chord is. `taken` is what each face was asked to give up before, and is
-/// not asked for again.
+/// Returns the faces with diagonals that must go because the chord is the side of more than two facets of the shell, with these diagonals;
+/// `shells` are the numbers of faces of each shell, in the order of `meshes`; the last of several diagonals stays where no other chord is.
+/// What each face was asked to give up before, `taken`, is not asked for again, and of a face that `is_settled` nothing is.
 pub(super) fn doubled_chords(
-    part: &Part,
+    shells: impl Iterator<Item = usize>,
     meshes: &[Option<FaceMesh>],
     taken: &[TakenChords],
+    is_settled: impl Fn(usize) -> bool,
 ) -> Vec<(usize, Vec<[u32; 2]>)> {
     let mut doubled: Vec<(usize, Vec<[u32; 2]>)> = Vec::new();
     let mut first = 0;
-    for shell in &part.shells {
-        let range = first..first + shell.faces.len();
+    for faces in shells {
+        let range = first..first + faces;
         first = range.end;
         let Chords { mut uses, diagonals } = Chords::new(meshes, range);
         for (k, chord) in diagonals {
-            let asked_before = taken[k].0.contains(&chord);
+            let stays = is_settled(k) || taken[k].0.contains(&chord);
             // Where only diagonals are, one of them stays.
-            let Some(left) = uses.get_mut(&chord).filter(|left| **left > 2 && !asked_before) else { continue };
+            let Some(left) = uses.get_mut(&chord).filter(|left| **left > 2 && !stays) else { continue };
             // A diagonal is two sides: with it gone the chord has two facets less.
             *left -= 2;
             match doubled.last_mut() {
@@ -107,5 +107,30 @@ impl Chords {
         }
         diagonals.sort_unstable();
         Self { uses, diagonals }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Uv, Vector};
+    use crate::tessellate::face_mesh::{Corner, MeshedFacet};
+
+    #[test]
+    fn a_chord_is_asked_of_a_face_that_can_still_give_it_up() {
+        // Both faces of a shell have the diagonal from 0 to 2, the first of another shell too.
+        let corner = |k| Corner { position: Position::Shared(k), normal: Vector::Z, uv: Uv::ZERO };
+        let facet = |corners| MeshedFacet { corners, bound: 0.0, tolerance: 1.0 };
+        let facets = vec![facet([0, 1, 2, 2]), facet([0, 2, 3, 3])];
+        let mesh = Some(FaceMesh { corners: (0..4).map(corner).collect(), facets, ..FaceMesh::default() });
+        let meshes = [mesh.clone(), mesh.clone(), mesh];
+        let mut taken = vec![TakenChords::default(); 3];
+        let asked = |taken: &[TakenChords], settled: usize| {
+            doubled_chords([2, 1].into_iter(), &meshes, taken, |k| k == settled)
+        };
+        assert_eq!(asked(&taken, 9), [(0, vec![[0, 2]])]);
+        assert_eq!(asked(&taken, 0), [(1, vec![[0, 2]])]);
+        taken[0].extend([[0, 2]]);
+        assert_eq!(asked(&taken, 9), [(1, vec![[0, 2]])]);
     }
 }

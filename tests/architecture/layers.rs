@@ -451,7 +451,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "border_nodes",
             "emission",
             "fallback",
-            "further_rounds",
+            "remesh_budget",
             "tessellation",
             "sample_budget",
             "repairs",
