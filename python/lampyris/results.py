@@ -294,7 +294,7 @@ class Run(Mapping[str, Receiver]):
         elif receiver not in self._receivers:
             raise KeyError(f"no receiver {receiver!r}; there are {', '.join(names)}")
         text = _lampyris.assess(self._results, names.index(receiver), regulation, left_hand, as_placed)
-        return Assessment({"traffic": "left" if left_hand else "right", **json.loads(text)})
+        return Assessment(json.loads(text))
 
     def to_json(self, path: Path | None = None) -> str:
         """The document as text, written to a file where one is named."""

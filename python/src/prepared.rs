@@ -321,7 +321,7 @@ impl Prepared {
     /// How it is traced and why, what is in the scene, as JSON.
     fn summary_json(&self) -> PyResult<String> {
         let scene = &self.scene;
-        let [finest, loosest] = scene.mesh_settings.tolerance;
+        let [finest, loosest] = scene.mesh_settings.range();
         let settings = scene.run_settings();
         let summary = json!({
             "rays": settings.rays, "seed": settings.seed, "threads": scene.threads,

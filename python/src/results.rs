@@ -4,16 +4,14 @@ use crate::arrays::{columns, flat, rows, shaped};
 use crate::errors::{SceneError, of_json};
 use lampyris::formats::{Axis, ColourMap, Grid, Picture};
 use lampyris::pipeline::{PreparedScene, SceneResults};
-use lampyris::regulation::{self, Assumptions, IntensityMap, RaySample, Regulation, Traffic};
+use lampyris::regulation::Regulation;
 use lampyris::simulate::ReceiverResult;
-use lampyris::simulate::scene::FarFieldType;
+use lampyris::simulate::scene::{FarFieldType, RegulationUse};
 use lampyris::study::figures::{cell_errors, channel_cell_errors};
 use numpy::PyArrayDyn;
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use serde_json::json;
-use std::fmt::Write as _;
 use std::sync::Arc;
 
 /// What a run counted, with both errors.
@@ -176,7 +174,6 @@ pub(crate) fn assess(
     left_hand: bool,
     as_placed: bool,
 ) -> PyResult<String> {
-    let regulation = Regulation::find(regulation).map_err(SceneError::new_err)?;
     let r = results.receiver(receiver)?;
     if r.kind != "far_field" || r.unit != "cd" || r.angles != Some(FarFieldType::A) {
         let angles = r.angles.map_or(String::new(), |angles| format!(" with angles {angles:?}"));
@@ -185,44 +182,9 @@ pub(crate) fn assess(
             r.name, r.kind, r.unit
         )));
     }
-    let geometric = results.found.geometric_cells(&results.scene, receiver);
-    let mut csv = String::from("H_deg,V_deg,intensity_cd,statistical,geometric\n");
-    let center =
-        |axis: usize, k: usize| r.middle[axis] + r.half[axis] * ((2 * k + 1) as f64 / r.grid[axis] as f64 - 1.0);
-    for j in 0..r.grid[1] {
-        for i in 0..r.grid[0] {
-            let k = j * r.grid[0] + i;
-            let error = geometric.as_ref().and_then(|g| g.get(k)).copied().unwrap_or(0.0);
-            let _ = writeln!(csv, "{},{},{},{},{error}", center(0, i), center(1, j), r.cells[k], r.errors[k]);
-        }
-    }
-    let found = &results.found.results;
-    let rays = RaySample { heaviest_flux: found.heaviest_ray, replicates: found.replicates };
-    let map = IntensityMap::from_csv(&csv, Some(rays)).map_err(SceneError::new_err)?;
-    let assumptions = Assumptions {
-        traffic: if left_hand { Traffic::Left } else { Traffic::Right },
-        as_placed,
-        rays: found.rays,
-        tolerance_mm: results.scene.chosen.as_ref().map(|c| c.tolerance_mm[1]),
-    };
-    let a = py.detach(|| regulation::assess(&map, &regulation, &assumptions)).map_err(|e| {
+    let wanted = RegulationUse { id: regulation.into(), receiver: Some(r.name.clone()), left_hand, as_placed };
+    let judged = py.detach(|| results.found.verdict(&results.scene, &wanted)).map_err(|e| {
         SceneError::new_err(format!("{e}; set cells, h_deg and v_deg of the far field and trace again"))
     })?;
-    let rows: Vec<_> = (a.rows.iter())
-        .map(|r| {
-            json!({
-                "id": r.row.id, "kind": r.row.kind,
-                "h_deg": r.direction.map(|d| d[0]), "v_deg": r.direction.map(|d| d[1]),
-                "min": r.row.min, "max": r.row.max, "value": r.reading.map(|x| x.value),
-                "statistical": r.reading.map(|x| x.statistical), "geometric": r.reading.map(|x| x.geometric),
-                "verdict": r.verdict.map(|v| v.to_string()),
-            })
-        })
-        .collect();
-    let document = json!({
-        "regulation": a.regulation.id, "title": a.regulation.title, "checked": a.regulation.checked(),
-        "aim": {"h_deg": a.aim.h_deg, "v_deg": a.aim.v_deg, "how": a.aim.how},
-        "sensor_deg": a.sensor_deg, "rows": rows, "verdict": a.verdict.to_string(),
-    });
-    serde_json::to_string(&document).map_err(of_json)
+    serde_json::to_string(&judged.assessment.document()).map_err(of_json)
 }

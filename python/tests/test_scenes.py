@@ -216,6 +216,8 @@ def test_a_lamp_gets_its_verdict() -> None:
     name = next(iter(lp.regulations()))
     verdict = run.assess(name, "fine")
     assert verdict.verdict in ("pass", "fail", "unsure") and verdict["rows"] and verdict.traffic == "right"
+    # The document of the command, and no selection of it.
+    assert {"settles", "when", "note", "source", "evidence"} <= set(verdict["rows"][0]) and "gradient" in verdict["aim"]
     assert run.assess(name, "fine", left_hand=True).traffic == "left"
     assert verdict.verdict in verdict._repr_html_()
     with pytest.raises(ValueError, match="name the far field"):

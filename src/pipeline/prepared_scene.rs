@@ -77,9 +77,10 @@ pub struct TraceRequest<'a> {
 }
 
 impl PreparedScene {
-    /// Returns the finest and loosest tolerance of the facets that the run is traced on, mm; `None` where it is traced on the spline.
+    /// Returns the finest and loosest tolerance of the facets that the run is traced on, those of single parts and faces among them, mm;
+    /// `None` where it is traced on the spline.
     pub fn tolerance_mm(&self) -> Option<[f64; 2]> {
-        (self.choice.intersector != IntersectorKind::Exact).then_some(self.mesh_settings.tolerance)
+        (self.choice.intersector != IntersectorKind::Exact).then(|| self.mesh_settings.range())
     }
 
     /// Binds the scene (so that its mistakes come before any work), makes the facets, and chooses how to trace where nobody asks: by a

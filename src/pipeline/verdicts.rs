@@ -65,12 +65,19 @@ pub(super) fn verdict(
 }
 
 impl SceneResults {
+    /// Returns the verdict of one regulation about a far field of the run, be it named by the scene or not.
+    ///
+    /// # Errors
+    /// When the regulation is not known, or the far field cannot be judged; the message says why.
+    pub fn verdict(&self, prepared: &PreparedScene, wanted: &RegulationUse) -> Result<ReceiverVerdict, String> {
+        verdict(wanted, prepared, &self.results, |k| self.geometric_cells(prepared, k))
+    }
+
     /// Returns the verdicts of the scene's regulations, in its order.
     ///
     /// # Errors
     /// When a far field cannot be judged; the message says why.
     pub fn verdicts(&self, prepared: &PreparedScene) -> Result<Vec<ReceiverVerdict>, String> {
-        let wanted = &prepared.job.scene.regulations;
-        wanted.iter().map(|w| verdict(w, prepared, &self.results, |k| self.geometric_cells(prepared, k))).collect()
+        prepared.job.scene.regulations.iter().map(|wanted| self.verdict(prepared, wanted)).collect()
     }
 }

@@ -111,11 +111,15 @@ impl Settings {
         Self { tolerance: [tolerance; 2], ..Self::default() }
     }
 
+    /// Returns the smallest and the largest tolerance anywhere, overrides among them, mm.
+    pub fn range(&self) -> [f64; 2] {
+        let all = self.overrides.iter().map(|o| o.tolerance).chain([self.tolerance]).flatten();
+        all.fold([f64::INFINITY, 0.0], |[low, high], t| [low.min(t), high.max(t)])
+    }
+
     /// Returns the largest tolerance anywhere, mm.
     pub fn loosest(&self) -> f64 {
-        let all = self.overrides.iter().map(|o| o.tolerance).chain([self.tolerance]);
-        // All places' own tolerances too: one may be looser than the model's.
-        all.flatten().fold(0.0, f64::max)
+        self.range()[1]
     }
 }
 

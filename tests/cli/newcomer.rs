@@ -61,6 +61,9 @@ fn media_and_licences_are_listed() {
     assert!(code == 0 && (glass["index"].as_f64().unwrap() - 1.51680).abs() < 5e-6, "{glass}");
     let (code, out, _) = lampyris(&["licences"]);
     assert!(code == 0 && out.contains("UBUNTU FONT LICENCE") && out.contains("Plotly"), "{out}");
+    let (code, out, _) = lampyris(&["licences", "--json"]);
+    let found: Value = serde_json::from_str(&out).unwrap();
+    assert!(code == 0 && found["licence"].is_string() && found["version"] == env!("CARGO_PKG_VERSION"), "{found}");
 }
 
 /// The faces of a plano-convex lens: a cap of a sphere, a plane and a rim, with figures in closed form.

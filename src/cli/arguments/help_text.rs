@@ -72,7 +72,7 @@ Examples:
 Every study writes report.html, study.json, figures/ (SVG and PNG) and tables/ (CSV) into its folder, \
 lampyris-study-KIND by default.
 
-JSON (--json, and study.json): study, command, version, commit, hardware, seed, answer, and rows, one measurement each, null where it \
+JSON (--json, and study.json): study, command, time, version, commit, hardware, seed, answer, and rows, one measurement each, null where it \
 does not apply. accuracy has 'slopes' and, for a scene, 'receivers' beside the rows: for every tolerance and kind of normals what the \
 facets change (geometric) beside the noise of the rays (statistical). The rows of bvh count rays answered otherwise than by the \
 octree under 'differs', those of them that were wrong by arithmetic of twice the digits under 'wrong', and those that even it could \
