@@ -193,6 +193,19 @@ fn no_file_is_longer_than_one_idea() {
     assert!(long.is_empty(), "longer than {LONGEST} lines:\n{}", long.join("\n"));
 }
 
+/// Columns that a line of comment may have; `cargo fmt` wraps none.
+const COMMENT_COLUMNS: usize = 140;
+
+#[test]
+fn comments_end_where_code_does() {
+    let long: Vec<String> = sources()
+        .iter()
+        .filter(|f| f.longest_comment > COMMENT_COLUMNS)
+        .map(|f| format!("{}: {} columns", f.path.display(), f.longest_comment))
+        .collect();
+    assert!(long.is_empty(), "comments beyond {COMMENT_COLUMNS} columns:\n{}", long.join("\n"));
+}
+
 #[test]
 fn every_file_says_what_it_is_for() {
     let without: Vec<String> =
@@ -207,7 +220,14 @@ mod reading {
 
     fn file(module: &str, text: &str) -> SourceFile {
         let module: Module = module.split('/').filter(|m| !m.is_empty()).map(str::to_owned).collect();
-        SourceFile { path: module.iter().collect(), module, tokens: tokens(text), lines: 0, has_header: true }
+        SourceFile {
+            path: module.iter().collect(),
+            module,
+            tokens: tokens(text),
+            lines: 0,
+            longest_comment: 0,
+            has_header: true,
+        }
     }
 
     fn used(files: &[SourceFile], module: &str) -> Vec<String> {

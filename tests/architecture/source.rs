@@ -36,6 +36,8 @@ pub(crate) struct SourceFile {
     /// The tokens outside test modules.
     pub(crate) tokens: Vec<Token>,
     pub(crate) lines: usize,
+    /// Columns of its longest line that is a comment.
+    pub(crate) longest_comment: usize,
     pub(crate) has_header: bool,
 }
 
@@ -49,8 +51,16 @@ impl SourceFile {
             module.pop();
         }
         let tokens = without_tests(tokens(&text));
-        let (lines, has_header) = (text.lines().count(), text.starts_with("//!"));
-        Self { path, module, tokens, lines, has_header }
+        let comments = text.lines().filter(|line| line.trim_start().starts_with("//"));
+        let longest_comment = comments.map(|line| line.chars().count()).max().unwrap_or_default();
+        Self {
+            path,
+            module,
+            tokens,
+            lines: text.lines().count(),
+            longest_comment,
+            has_header: text.starts_with("//!"),
+        }
     }
 }
 

@@ -7,9 +7,10 @@
 //! `φ(p) = g(p, q(p))` has `φ″ = (g − λh)_ττ` with `λ = g_q/h_q` and `τ = (1, q′)`. All of these are bounded by Bernstein hulls.
 //!
 //! * Let x̂ be a point of the curve, and x a root in the box. The segment between them has a slope in the range of q′, and Taylor's theorem
-//!   for `g − λ̂h` along it says `0 ≥ φ̂ + φ̂′Δp + ½mΔp²` for a lower bound m > 0 of φ″. Where that is positive over the box there is no root.
-//! * Where φ̂ < 0 < m, φ is convex and has two zeros at most: both are found by Newton's method from either side of x̂. The curve between two
-//!   roots stays in the box where it strays from its chord by less than the room that is left around them.
+//!   for `g − λ̂h` along it says `0 ≥ φ̂ + φ̂′Δp + ½mΔp²` for a lower bound m > 0 of φ″. Where that is positive over the box there is no
+//!   root.
+//! * Where φ̂ < 0 < m, φ is convex and has two zeros at most: both are found by Newton's method from either side of x̂. The curve between
+//!   two roots stays in the box where it strays from its chord by less than the room that is left around them.
 //!
 //! φ̂ and φ̂′ are computed in 32 digits on the surface as given: they tell heights of 1e-25 mm.
 
