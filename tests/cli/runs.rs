@@ -92,12 +92,16 @@ fn lost_rays_are_written_down_and_can_be_traced_again() {
 fn rays_lost_in_merged_ranges_can_be_traced_again() {
     let folder = lens(opened);
     for rays in ["0..10000", "10000..20000"] {
-        lampyris_in(folder.path(), &["trace", "scene.toml", "--rays", rays, "-o", "parts", "--max-refused", "1"]);
+        let part = ["trace", "scene.toml", "--rays", rays, "-o", "parts", "--max-refused", "1"];
+        let (code, _, err) = lampyris_in(folder.path(), &part);
+        assert_eq!(code, 0, "{err}");
     }
-    lampyris_in(folder.path(), &["merge", "parts", "-o", "out", "--no-report"]);
+    let (code, _, err) = lampyris_in(folder.path(), &["merge", "parts", "-o", "out", "--no-report"]);
+    // The whole run tells that light was lost.
+    assert_eq!(code, 4, "{err}");
     let ledger = std::fs::read_to_string(folder.path().join("out/lost_rays.csv")).unwrap();
     let rows: Vec<Vec<&str>> = ledger.lines().skip(1).map(|l| l.split(',').collect()).collect();
-    assert!(rows.len() > 10);
+    assert!(!rows.is_empty(), "{ledger}");
     assert_lost_again(folder.path(), &rows);
 }
 

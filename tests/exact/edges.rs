@@ -230,13 +230,18 @@ fn cylinder() -> Model {
     import.expect("Part 21").model
 }
 
+/// Depth below the side, mm, from which a ray through the rim is no matter of the band along it, which is half as wide.
+const CLEAR_MM: f64 = 2e-6;
+
 #[test]
 fn rays_that_graze_a_border_meet_both_sheets_of_the_face_beside_it() {
     let exact = Exact::build(&cylinder(), &Settings::default());
+    const RAYS: usize = 1000;
     let mut s = Stream(11);
     for sine in [0.1, 1e-2, 1e-3, 1e-4] {
         for stray in [0.0, 1e-9, 5e-7] {
-            for _ in 0..1000 {
+            let (mut all_certain, mut passing) = (0, 0);
+            for _ in 0..RAYS {
                 // Through a point of the upper rim, or beside it, downwards and nearly along the side.
                 let (sin, cos) = s.within(0.0, std::f64::consts::TAU).sin_cos();
                 let (outward, along) = (Vector::new(cos, sin, 0.0), Vector::new(-sin, cos, 0.0));
@@ -246,9 +251,20 @@ fn rays_that_graze_a_border_meet_both_sheets_of_the_face_beside_it() {
                 let d = way.normalize();
                 let crossings = exact.crossings(&Ray::new(rim - 30.0 * d, d), &mut Cost::default());
                 let certain = crossings.iter().all(|h| h.certainty == Certainty::Certified);
+                all_certain += usize::from(certain);
                 // What goes into a closed solid comes out of it.
                 assert!(!certain || crossings.len().is_multiple_of(2), "{rim} {d}: {crossings:?}");
+                // By the quadratic of the side: from the rim on, the ray is within it for so long.
+                let [radial, tangential] = [d.dot(outward), d.dot(along)];
+                let chord = -20.0 * radial / (radial * radial + tangential * tangential);
+                let depth = chord.max(0.0).powi(2) * (radial * radial + tangential * tangential) / 80.0;
+                if depth > CLEAR_MM {
+                    passing += 1;
+                    assert_eq!(crossings.len(), 2, "{depth} mm within, {rim} {d}: {crossings:?}");
+                }
             }
+            assert!(all_certain * 10 > RAYS * 9, "{all_certain} of {RAYS} certain at {sine}, {stray}");
+            assert!(sine < 1e-2 || passing * 4 > RAYS, "{passing} of {RAYS} pass through at {sine}");
         }
     }
 }

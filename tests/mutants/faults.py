@@ -81,7 +81,7 @@ FAULTS = [
     # Tallies.
     ("squares of other replicates forgotten", "src/simulate/tally.rs", "self.squares = self.squares.saturating_add(«o.squares»);", "0", "lib:tally simulate cli"),
     ("rounding of quanta downward", "src/simulate/tally.rs", "{ «(x + SHIFT) - SHIFT» } else", "x.floor()", "lib:tally simulate"),
-    ("a waiting cell is lost", "src/simulate/grid.rs", "pub(crate) fn flush(&mut self, sums: &mut [Sum]) {\n        «self.add_pending();»", "", "lib:tally simulate"),
+    ("a waiting cell is lost", "src/simulate/grid.rs", "pub(crate) fn flush(&mut self, sums: &mut [Sum]) {\n        «self.add_pending();»", "", "lib:grid simulate"),
     ("error without its correction", "src/simulate/tally.rs", "(squares - total * total / k).max(0.0) * «k» / (k - 1.0)", "1.0", "lib:tally simulate"),
     # Contacts.
     ("partner looks the same way", KERNEL + "contact.rs", "other.body != at.face.body && opposite && «against»", "!against", "simulate:of_two_coatings simulate"),

@@ -137,7 +137,7 @@ fn parts_of_other_scenes_and_models_are_told_apart_without_text() {
     assert_eq!(first, of(&without_text, &in_memory));
 }
 
-/// Four processes that start at once on an empty cache trace one pilot: the seconds that it took are the same for all, to the bit.
+/// Of four threads that start at once on an empty cache one traces a pilot: the seconds that it took are the same for all, to the bit.
 #[test]
 fn who_starts_at_once_waits_for_one_pilot() {
     let folder = tempfile::tempdir().unwrap();
@@ -161,8 +161,8 @@ fn who_starts_at_once_waits_for_one_pilot() {
     assert!(names.into_iter().all(|name| !name.to_str().unwrap().ends_with(".part")));
 }
 
-/// A lens of kilometres, of which facets of the default tolerance are too many to be tried: its choice is kept under the name by which the
-/// next run asks.
+/// A lens of kilometres, of which facets of the default tolerance are too many to be tried: its choice is cached under the key that
+/// the next run looks up.
 #[test]
 fn a_choice_on_coarser_facets_is_found_again() {
     let folder = tempfile::tempdir().unwrap();

@@ -65,8 +65,13 @@ fn a_colour_is_found_beside_a_reference_that_leads_nowhere() {
     let style = "#100=STYLED_ITEM('',(#101),#900);\n#101=PRESENTATION_STYLE_ASSIGNMENT((#999,#102));\n\
                  #102=COLOUR_RGB('',0.25,0.5,0.75);\n";
     let import = read(&(square(FORWARD, IN_ORDER) + style));
-    let face = &import.model.parts[0].shells[0].faces[0];
+    let part = &import.model.parts[0];
+    let face = &part.shells[0].faces[0];
     assert_eq!(face.colour.map(|c| c.0), Some([0.25, 0.5, 0.75]));
+    assert_eq!(crate::support::violations(part, face), Vec::<String>::new());
+    // The reference is told, and nothing else.
+    let problems = &import.report.problems;
+    assert!(problems.len() == 1 && problems[0].contains("#999"), "{problems:?}");
 }
 
 /// Scaled 2.5 times, mirrored in y and moved to (1, 1, 0), with the name and description of a transformation and without.
@@ -170,7 +175,8 @@ fn files_that_hold_shapes_of_an_assembly_are_named() {
     assert!(import.report.left_out[0].reason.contains("shapes are in Lens.STP"), "{:?}", import.report.left_out);
 }
 
-/// Boxes of what stands where `data` names the block #10 in representations #20 and #21 and maps them into one.
+/// Extent in x of each instance, rising, of a block #10 that the representations #20 and #21 both name, where `mapped` are the items of the
+/// root.
 fn places_of_blocks(mapped: &str) -> Vec<[f64; 2]> {
     let text = format!(
         "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\

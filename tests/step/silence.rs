@@ -102,7 +102,8 @@ fn a_curve_whose_weights_are_no_numbers_is_no_polynomial() {
              #26=VECTOR('',#13,3.);\n"
         )
     };
-    area(&read(&trimmed(&curve("1."), "0.,1.,0.,1.")));
+    // From (0, 0) by (5, 10) to (10, 0), 3 mm high: a parabola of 10 mm and a rise of 5 has the length 5·(√5 + ½·asinh 2).
+    close(area(&read(&trimmed(&curve("1."), "0.,1.,0.,1."))), 15.0 * (5f64.sqrt() + 0.5 * 2f64.asinh()), 1e-9);
     assert_refused(&trimmed(&curve("$"), "0.,1.,0.,1."), "weights are no numbers");
 }
 
@@ -155,7 +156,7 @@ fn a_face_that_lacks_a_bound_is_refused() {
     }
 }
 
-/// A mesh of one triangle, #51, of 50 mm².
+/// Corners #50 of a right triangle of 50 mm².
 const TRIANGLE: &str = "#50=COORDINATES_LIST('',3,((0.,0.,0.),(10.,0.,0.),(0.,10.,0.)));\n";
 
 /// A shell may list itself: each mesh stands in its place once, and reading comes to an end.
