@@ -1,4 +1,4 @@
-//! Polygons in the parameter plane, and what lies inside of them by even and odd crossings.
+//! Polygons in the parameter plane, and what lies inside of them by the even–odd rule.
 
 use super::Uv;
 

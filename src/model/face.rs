@@ -216,8 +216,8 @@ pub struct TrimLoop {
 }
 
 impl TrimLoop {
-    /// Returns the loop as a polygon in its own direction, which closes by itself: `pieces` says into how many pieces a span of a use is
-    /// divided.
+    /// Returns the loop as a polygon in its own direction, which does not repeat its start at the end: `pieces` says into how many pieces a
+    /// span of a use is divided.
     pub(crate) fn polygon(&self, pieces: impl Fn(&UvCurve, [f64; 2]) -> usize) -> Vec<Uv> {
         let mut points = Vec::new();
         for u in &self.uses {

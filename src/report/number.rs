@@ -84,7 +84,7 @@ fn without_end_zeros(mantissa: &str) -> &str {
     if mantissa.contains('.') { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa }
 }
 
-/// Sets the digits of a whole number apart in groups of three, from five digits on.
+/// Groups the digits of a whole number, sign allowed, by threes with [`NARROW_SPACE`], from five digits on.
 fn in_thousands(whole: &str) -> String {
     let (sign, digits) = whole.strip_prefix('-').map_or(("", whole), |d| ("-", d));
     // Four digits are read at a glance.

@@ -237,7 +237,8 @@ fn few_replicates(replicates: u32) -> Option<String> {
     ))
 }
 
-/// Returns the power that the faces of each instance and the medium of each body have taken; those that took none are left out.
+/// Returns the power that the faces of each instance, then the medium of each body, have taken, with its statistical error. Those that took
+/// none are left out; [`Absorbed::index`] counts them too.
 fn absorbed_by(bound: &BoundScene, tallies: &Tallies, scale: &PowerScale) -> Vec<Absorbed> {
     let faces = bound.instances.iter().map(|name| (name.as_str(), "faces"));
     // Media and faces apart: whoever tunes an absorption asks about the one, whoever chooses a paint about the

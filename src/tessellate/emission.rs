@@ -32,8 +32,8 @@ impl<'e, 's, 'a> Emission<'e, 's, 'a> {
         self.made
     }
 
-    /// Adds a facet, turned around on a flipped surface. `pole` is the index of a corner that gets its own, and the parameters for its
-    /// normal.
+    /// Adds a facet, turned around on a flipped surface; a triangle repeats its last node. `pole` is the index of the corner at a pole,
+    /// which is not shared with other facets, and the parameters that it gets there.
     pub(super) fn add_facet(&mut self, facet: &ProvedFacet<4>, pole: Option<(usize, Uv)>) {
         let nodes = facet.nodes;
         let uv = nodes.map(|n| self.nodes[n].uv);

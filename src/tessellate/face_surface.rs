@@ -16,11 +16,11 @@ const SHARP: f64 = 0.05;
 /// Share of the domain within which a place is on a crease.
 pub(super) const CREASE: f64 = 1e-7;
 
-/// Share of the surface's size that covers rounding: some thousand roundings of a coordinate as long.
-const ROUNDING: f64 = 1e-12;
-/// And ulps of its largest coordinate, which count where it is small beside its distance from the origin: a ball of 1 mm at 10¹¹ mm strayed
-/// from its facets by ten times what was proved.
-const ULPS: f64 = 16.0;
+/// Rounding margin of a proof, as a share of the surface's size: some thousand roundings of a coordinate.
+const SIZE_MARGIN: f64 = 1e-12;
+/// Rounding margin in ulps of the largest coordinate, which governs far from the origin: without it a ball of 1 mm at 10¹¹ mm strayed from
+/// its facets by ten times the bound.
+const PLACE_MARGIN_ULPS: f64 = 16.0;
 /// Largest tolerance of a surface that closes on itself, in shares of its size; a ball is a third as large in radius as its box is across.
 const CLOSED_TOLERANCE: f64 = 0.05;
 /// Ratio of the lengths of both derivatives below which the shorter is nothing but rounding.
@@ -114,7 +114,7 @@ impl<'a> FaceSurface<'a> {
             creases,
             sharp,
             size,
-            rounding: (ROUNDING * size).max(ULPS * f64::EPSILON * farthest),
+            rounding: (SIZE_MARGIN * size).max(PLACE_MARGIN_ULPS * f64::EPSILON * farthest),
             poles,
             closed,
             gap: None,

@@ -68,7 +68,8 @@ impl Conic {
         })
     }
 
-    /// Returns the distance from the axis, mm, at which two conics have the same slope besides the axis itself; `None` where there is none.
+    /// Returns the distance from the axis, mm, at which two conics have the same slope, other than on the axis itself; `None` where there
+    /// is none.
     pub(super) fn equal_slope(&self, other: &Self) -> Option<f64> {
         // From c₁²·(1 − (1+K₂)c₂²h²) = c₂²·(1 − (1+K₁)c₁²h²), for curvatures of one sign.
         let [r1, r2] = [self.radius, other.radius];
@@ -86,7 +87,8 @@ impl Conic {
     }
 
     /// Returns the profile from the vertex `(0, z0)` to `(reach, z0 + sag)` in the x–z plane, mm, exact as one rational quadratic; a line
-    /// where it is flat. Fails for a radius of zero, a reach that is not positive, or one beyond the conic's.
+    /// where it is flat. Fails for a radius of zero, a reach that is not positive, a number that is not finite, and where the conic does
+    /// not extend to the reach.
     pub(super) fn profile(&self, z0: f64, reach: f64) -> Result<Curve, ShapeError> {
         // The curvature must be a number, which a plane's is too: the radius itself need not be finite.
         if !(1.0 / self.radius).is_finite() {

@@ -38,7 +38,8 @@ impl Lens {
     /// Makes the lens as a truck solid, mm: front, back and rim, turned about the z axis.
     ///
     /// # Errors
-    /// When the surfaces meet anywhere within the aperture, its rim included, or do not reach it.
+    /// When the surfaces meet anywhere within the aperture, its rim included, or do not reach it; when a radius is zero, thickness or
+    /// aperture is not positive, or a number is not finite.
     pub fn solid(&self) -> Result<Solid, ShapeError> {
         let reach = self.half_aperture;
         let front = self.front.profile(0.0, reach)?;

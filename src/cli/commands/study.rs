@@ -243,7 +243,8 @@ fn study_accuracy(
     StudyResult::new(&study.rows, study.answer)?.with_rows("slopes", &study.slopes)?.with_rows("receivers", &light)
 }
 
-/// Makes the section with a view of where on the surface the normals err, on facets of the tolerance asked for.
+/// Makes the section with a view of where on the surface the normals err, on facets of the tolerance asked for: reads and meshes the
+/// model again.
 fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Failure> {
     let (scene, loaded, _) = read_model(command.file, console)?;
     let settings = mesh_settings(&command.meshing, scene.as_ref(), &loaded.model)?;

@@ -54,8 +54,8 @@ impl InputGuard {
     }
 }
 
-/// Whether an input is in the folder, by its name or where that leads, under a name for which `is_written`. A folder that is not there yet
-/// holds none.
+/// Whether an input lies in the folder, itself or by where it leads, at a path, relative to the folder, that `is_written` accepts. A folder
+/// that does not exist holds nothing.
 fn is_inside(input: &Path, folder: &Path, is_written: &impl Fn(&Path) -> bool) -> bool {
     let Ok(folder) = folder.canonicalize() else { return false };
     let inside = |place: &PathBuf| place.strip_prefix(&folder).is_ok_and(is_written);

@@ -1,6 +1,8 @@
-//! Ray sets of measured light sources, as vendors publish them: IES TM-25 (read and written), Zemax binary and LightTools binary (read).
+//! Ray sets of measured light sources, as vendors publish them: IES TM-25 (read and written), Zemax binary and LightTools binary (read);
+//! and lists of rays in NPZ and CSV.
 //!
-//! A file is recognised by its first bytes, never by its name, for `.ray` and `.dat` mean a dozen things. Rays come in the unit of flux
+//! A measured set is recognised by its first bytes, never by its name, for `.ray` and `.dat` mean a dozen things; lists are told apart by
+//! their extension. Rays come in the unit of flux
 //! that the caller counts in where the file holds both. Where the header's total disagrees with the sum of the rays, as it does in files
 //! whose rays carry relative weights, the rays are scaled to the header's total and a note says so.
 //!
@@ -68,9 +70,10 @@ pub fn read_ray_set(path: &Path, preferred: Flux) -> Result<RaySet, Error> {
     RayFile::open_within(path, preferred, u64::MAX)?.into_set()
 }
 
-/// Reads a list of rays; `.npz` by arrays `origin` (n × 3), `direction` (n × 3), `power` (n) and, if wanted,
-/// `wavelength_nm` (n), of f64 or f32; anything else as CSV with columns `x, y, z, dx, dy, dz, power` and, if wanted,
-/// `wavelength_nm`. Positions are mm. A CSV header may name the columns in any order; lines that start with `#` are comments.
+/// Reads a list of rays, by the file's extension: `.npz` with arrays `origin` (n × 3), `direction` (n × 3), `power` (n) and optionally
+/// `wavelength_nm` (n), of f64 or f32; anything else as CSV with columns `x, y, z, dx, dy, dz, power` and optionally `wavelength_nm`, in
+/// this order or as a header names them. Positions are mm, directions of any length are normalised, powers are in whatever unit the list
+/// uses. Lines that start with `#` are comments.
 ///
 /// # Errors
 /// When the file cannot be read or its content makes no rays; the message names the line.

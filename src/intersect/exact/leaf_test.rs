@@ -56,7 +56,7 @@ impl Exact {
         let [a, b, f1] = leaf.projected(query.n1, k1);
         let [c, d, f2] = leaf.projected(query.n2, k2);
         let det = a * d - b * c;
-        let (r1, r2) = (leaf.radius(query.n1, k1), leaf.radius(query.n2, k2));
+        let (r1, r2) = (leaf.derivative_spread(query.n1, k1), leaf.derivative_spread(query.n2, k2));
         let inv = 1.0 / det;
         let (y00, y01, y10, y11) = (d * inv, -b * inv, -c * inv, a * inv);
 

@@ -84,9 +84,10 @@ impl Linearization {
         [all[0], all[1], all[2]]
     }
 
-    /// How far these derivatives may stray over the leaf's enlarged domain, summed over both parameters.
+    /// Largest amount by which the derivatives that [`Self::projected`] gives for `n` and `k` may differ from those in the middle, anywhere
+    /// on the leaf's enlarged domain: the sum of both parameters' bounds.
     #[inline(always)]
-    pub(super) fn radius(&self, n: Vector, k: f64) -> f64 {
+    pub(super) fn derivative_spread(&self, n: Vector, k: f64) -> f64 {
         let [x, y, z, w] = &self.rows;
         n.x.abs() * x[3] + n.y.abs() * y[3] + n.z.abs() * z[3] + k.abs() * w[3]
     }

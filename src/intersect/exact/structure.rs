@@ -148,7 +148,7 @@ impl Exact {
     }
 }
 
-/// Cuts all patches into leaves, flatter than `settings.flatness` where they are fewer than `settings.leaves`.
+/// Cuts all patches into leaves of `settings.flatness`, or of down to [`FLATTEST`] of it while they are fewer than `settings.leaves`.
 fn subdivide(geometry: &Geometry, settings: &Settings) -> PatchLeaves {
     let mut flatness = Flatness { deviation: settings.flatness, depth: settings.depth };
     let mut cut = subdivision::subdivide_all(geometry, flatness);

@@ -259,8 +259,9 @@ impl<'a> Polished<'a> {
         })
     }
 
-    /// Asks the exact model over the whole range of the ray, uncounted; `None` for a miss. The hit names no facet ([`NO_FACET`]) but its
-    /// face, for a ray that leaves a named facet could not meet it again.
+    /// Returns the first hit of the spline within the ray's range, apart from the point that the ray leaves; marked
+    /// [`Certainty::Polished`] whatever the exact model proved, and not counted in any cost. It names its face but no facet ([`NO_FACET`]),
+    /// for a ray that leaves a named facet could not meet it again.
     fn ask_spline(&self, ray: &Ray) -> Option<Hit> {
         let hit = self.exact.first(ray, &mut Cost::default()).hit?;
         Some(Hit { primitive: NO_FACET, certainty: Certainty::Polished, ..hit })

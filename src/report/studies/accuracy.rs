@@ -228,7 +228,8 @@ fn slope_chart(rows: &[&Value]) -> Chart {
     Chart::series("slopes", "Convergence", caption, axes, series)
 }
 
-/// Draws the times that meshing, building and tracing take, of at most 14 rows: the spline's and those of bilinear normals in the octree.
+/// Draws the times that meshing, building and tracing take, of the first 14 rows at most: the spline's and those of bilinear normals in the
+/// octree.
 fn time_chart(rows: &[&Value]) -> Chart {
     let shown: Vec<&&Value> = (rows.iter())
         .filter(|r| {

@@ -8,8 +8,9 @@ use crate::simulate::body::AMBIENT;
 use crate::simulate::scene::Scene;
 use crate::simulate::trim_loops::trim_polygons;
 
-/// Marks the faces whose box comes within the glue distance of the box of a face of another body, and returns those pairs of bodies too,
-/// some more than once. `of_face` is the body of each placed face; faces of the surroundings are never marked.
+/// Marks the faces whose box comes within the glue distance of the box of a face of another body, and returns those pairs of bodies too, in
+/// no particular order, some more than once and either way round. `of_face` is the body of each placed face; faces of the surroundings are
+/// never marked.
 pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u32]) -> (Vec<bool>, Vec<[u32; 2]>) {
     // Each box is grown by half of the glue, so that two within its whole meet.
     let boxed = |f: PlacedFace<'_>| (f.id.index(), face_bounds(&f).grown(0.5 * scene.run.glue_mm));

@@ -181,7 +181,8 @@ fn coating_interaction<'s, C: RayPayload>(
     })
 }
 
-/// Returns the share of power that matrix `m` leaves of a ray with this polarisation; `unpolarised` when polarisation is not followed.
+/// Returns the share of its power, 0 to 1, that the interface `m` leaves of a ray along `d` at the normal `n`, of either side, in its state
+/// of polarisation; `unpolarised` where that is not followed. The payload is read alone.
 #[inline]
 fn polarised_share<C: RayPayload>(
     context: &Context<'_>,

@@ -73,8 +73,10 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// Returns the part of a curve from `p` to `q`, the whole of it if `closed`; `sense` is whether the edge runs along the curve as the file
-/// names it. A wrong sense on an open curve is corrected. `None` where the vertices leave nothing of it but lie apart.
+/// Returns the edge from `p` to `q` along a curve, the whole of it if `closed`; `sense` is whether the edge runs along the curve as the
+/// file names it, which is corrected on an open curve. A line that passes both vertices by is replaced by the segment between them; an edge
+/// whose vertices coincide has no curve. `None` where nothing of the curve lies between vertices that are apart, or its numbers are not
+/// finite.
 pub(crate) fn trim_to_vertices(
     directed: &DirectedCurve,
     p: Point,

@@ -29,7 +29,8 @@ impl Assembly<'_, '_> {
         children.into_iter().filter(is_shown).collect()
     }
 
-    /// Returns the products of which a representation of another product places one by a transformation.
+    /// Returns the product definitions, by id, one of whose representations another product's representation places by a relationship with
+    /// a transformation; mapped items are not looked at.
     pub(super) fn products_placed_by_others(&self) -> FxHashSet<u64> {
         let mut places: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
         for (from, links) in self.links.iter().filter(|(from, _)| self.owned.contains(from)) {

@@ -139,6 +139,7 @@ impl Spikes<'_, '_, '_> {
         out
     }
 
+    /// Names uses by the keys of their edges, which outlive a renumbering, each with whether it runs against its edge.
     fn keys_of(&self, uses: &[Use]) -> Vec<(EdgeKey, bool)> {
         uses.iter().map(|&(edge, reversed)| (self.table.keys[edge], reversed)).collect()
     }

@@ -121,6 +121,7 @@ impl Chain {
         area_within(self.pieces.iter().map(|p| (&p.curve, p.reversed)))
     }
 
+    /// Whether it runs around a period, so that it closes on the surface but not in the plane.
     pub(crate) fn is_winding(&self) -> bool {
         self.winding != [0, 0]
     }

@@ -19,8 +19,8 @@ impl BorderBands {
         let (lowest, highest) =
             (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
         let height = highest - lowest;
-        // A place meets the segments that cross its height and those that only end in its band. With as many bands as make the two alike
-        // the bands hold each segment twice, however many run along all of them.
+        // As many bands as segments divided by the mean number that crosses a height: each segment then stands in two bands on average,
+        // even where many run along the whole height. Without height that mean is no number, and `max` makes it 1.
         let crossing = segments.iter().map(|[a, b]| (b.y - a.y).abs()).sum::<f64>() / height;
         let count = (segments.len() as f64 / crossing.max(1.0)) as usize;
         let count = count.clamp(1, segments.len().max(1));

@@ -56,7 +56,7 @@ fn chord_tolerance(surface: &FaceSurface<'_>, uv: Uv, along: Vector) -> f64 {
     xi * (1.0 - (sag / xi).min(0.5))
 }
 
-/// Returns the tolerance, mm, for a chord of an edge at its parameter `t` in the direction `along`, of any length but zero: [`EDGE_SHARE`]
+/// Returns the tolerance, mm, for a chord of an edge at its parameter `t` in direction `along` (not zero, of any length): [`EDGE_SHARE`]
 /// of the least that its faces give, quartered for each `denser`. Infinite without sides.
 fn edge_tolerance(sides: &[EdgeSide<'_, '_>], denser: u32, t: f64, along: Vector) -> f64 {
     let each =

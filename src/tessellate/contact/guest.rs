@@ -241,7 +241,8 @@ fn node_key(position: Position, uv: Uv) -> (Position, [u64; 2]) {
 }
 
 impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
-    /// Indexes the guest's corners by the carrier's nodes. `first` is the number of its first corner in the imprint, `glue` in mm.
+    /// Starts from the guest's `border` nodes, to which it adds. The guest's corners are found by the positions of the carrier's nodes; in
+    /// the imprint they are numbered from `first` on. `glue` is the distance, mm, within which both faces lie on each other.
     fn new(
         guest: &'b Guest<'f, 'm>,
         carrier: &'b TrimmedFace<'c>,

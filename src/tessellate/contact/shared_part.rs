@@ -71,7 +71,8 @@ impl Union<'_> {
         }
     }
 
-    /// Takes over a corner of `mesh` and returns its number here; places of its own that are the same to the bit become one.
+    /// Copies a corner of `mesh` and returns its number here; positions that belong to a face alone are merged where they are bitwise
+    /// equal.
     fn add_corner(&mut self, mesh: &FaceMesh, corner: u32) -> u32 {
         let mut corner = mesh.corners[corner as usize];
         if let Position::Own(p) = corner.position {

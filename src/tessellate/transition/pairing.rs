@@ -227,7 +227,7 @@ fn prove_sector_quad(
 }
 
 /// Returns the indices of pairs to make from `candidates`, which stand in order of squareness: good quads first, then those of triangles
-/// that have but one mate left, then the rest. Heeds what is `taken`, a flag a triangle, and marks the triangles of its pairs so.
+/// that have but one mate left, then the rest. Skips triangles that are flagged in `taken`, and flags those it pairs.
 fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
     let mut chosen = Vec::new();
     let of = CandidatesOf::new(candidates, taken.len(), |_| true);
