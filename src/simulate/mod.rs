@@ -12,9 +12,9 @@
 //! Known weakness: geometrical optics; a path carries at most 7 bodies inside each other.
 //!
 //! Inner modules, each of which sees only those before it: `error`, `outcome`, `random`, `scene`, `assemble`, `channels`, `disc_cells`,
-//! `receiver`, `seconds`, `settings`, `surfaces`, `body`, `tally`, `grid`, `trim_loops`, `face_foot`, `emitter`, `bind`, `effects`, `plan`, `power_scale`,
-//! `run_notes`, `sequence`, `tallies`, `digest`, `kernel`, `dispatch`, `listed_rays`, `partial_run`, `hooks`, `gather`, `recorder`,
-//! `sequence_recorder`, `sequence_results`, `face_results`, `receiver_results`, `results`, `arrivals`, `run`, `verify`.
+//! `receiver`, `seconds`, `settings`, `surfaces`, `body`, `tally`, `grid`, `trim_loops`, `face_foot`, `emitter`, `bind`, `effects`, `plan`,
+//! `power_scale`, `run_notes`, `sequence`, `tallies`, `digest`, `kernel`, `dispatch`, `listed_rays`, `partial_run`, `hooks`, `gather`,
+//! `recorder`, `sequence_recorder`, `sequence_results`, `face_results`, `receiver_results`, `results`, `arrivals`, `run`, `verify`.
 
 mod arrivals;
 mod assemble;

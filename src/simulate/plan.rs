@@ -152,8 +152,8 @@ impl Plan {
         if self.grows() { [0, 1] } else { [replicate, self.replicates] }
     }
 
-    /// Returns the standard error that replicates of unequal size feign in the sum of `replicates` of them, as a share of the sum, where every
-    /// ray brings as much: that of the source whose rays are divided most evenly, for the light may be all its own; 0 where a source
+    /// Returns the standard error that replicates of unequal size feign in the sum of `replicates` of them, as a share of the sum, where
+    /// every ray brings as much: that of the source whose rays are divided most evenly, for the light may be all its own; 0 where a source
     /// has no ray in one of them, which no spread of numbers of rays tells about.
     pub(super) fn size_spread(&self, replicates: &[u32]) -> f64 {
         let count = replicates.len() as f64;

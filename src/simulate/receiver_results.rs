@@ -167,7 +167,8 @@ impl ShapeFigures {
 }
 
 impl ReceiverResult {
-    /// The figures of receiver `i`: sums of quanta turned into densities and their errors by `power_scale`; `ray` is the most quanta of a ray.
+    /// The figures of receiver `i`: sums of quanta turned into densities and their errors by `power_scale`; `ray` is the most quanta of a
+    /// ray.
     pub(super) fn new(
         r: &Receiver,
         i: usize,

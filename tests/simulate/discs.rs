@@ -55,8 +55,8 @@ fn what_escapes_has_the_error_of_what_is_received() {
     assert!(all.power.escaped == 1.0 && all.power_errors.escaped < 1e-6, "{:?}", all.power_errors);
 }
 
-/// Light of unequal replicates that all falls on a receiver is known; of light that nearly all does, the error is that of the rays beside it,
-/// a binomial one: not 2.7 rays of 5000, which is what 39 or 40 rays in each of 128 replicates spread by.
+/// Light of unequal replicates that all falls on a receiver is known; of light that nearly all does, the error is that of the rays beside
+/// it, a binomial one: not 2.7 rays of 5000, which is what 39 or 40 rays in each of 128 replicates spread by.
 #[test]
 fn unequal_replicates_are_no_error_of_a_receiver() {
     let screen = |size: f64| {

@@ -150,8 +150,8 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
     assert!(max.geometric.is_some_and(|g| g <= max.statistical), "{max:?}");
 }
 
-/// Cells around a pole are one direction, which is printed at its mean: what facets change of it is judged there, not in the square of cells
-/// that holds as many rays.
+/// Cells around a pole are one direction, which is printed at its mean: what facets change of it is judged there, not in the square of
+/// cells that holds as many rays.
 #[test]
 fn the_brightest_pole_is_judged_where_it_is_printed() {
     let known = known_scenes::parabolic_lamp(25.0, 0.2);
