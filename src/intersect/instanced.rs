@@ -282,7 +282,7 @@ mod tests {
     fn nothing_is_met_where_there_are_no_groups() {
         let nothing = Instancing::default();
         let empty = Instanced::new(&nothing, Vec::new());
-        empty.prepare_for(&ExpectedRays { rays: 1, threads: 1, beams: &[] });
+        empty.prepare_for(&ExpectedRays { rays: 1, threads: 1, beams: &[], sag: 0.0 });
         let ray = Ray::new(Point::ZERO, Vector::X);
         assert!(empty.intersect(&ray, &mut Cost::default()).is_none() && !empty.escapes(&ray));
     }

@@ -44,6 +44,12 @@ pub trait Intersector: Sync {
         false
     }
 
+    /// As [`Self::escapes`] for rays between places of the spline: the ray leaves the piece of it that its facet stands for, and both this
+    /// and what it might meet lie up to `sag` mm off their facets. Only known where the same was announced ([`ExpectedRays::sag`]).
+    fn escapes_spline(&self, _ray: &Ray, _sag: f64) -> bool {
+        false
+    }
+
     /// Returns what the structure holds and what it took to build.
     fn footprint(&self) -> Footprint;
 }
@@ -66,6 +72,10 @@ impl<T: Intersector + ?Sized> Intersector for &T {
         (**self).escapes(ray)
     }
 
+    fn escapes_spline(&self, ray: &Ray, sag: f64) -> bool {
+        (**self).escapes_spline(ray, sag)
+    }
+
     fn footprint(&self) -> Footprint {
         (**self).footprint()
     }
@@ -80,6 +90,8 @@ pub struct ExpectedRays<'a> {
     pub threads: usize,
     /// Those of them that have a place or a direction in common, with their number.
     pub beams: &'a [(Beam, u64)],
+    /// How far off their facets places that rays leave may lie, mm: 0 unless hits are moved to the spline.
+    pub sag: f64,
 }
 
 /// What rays of a source have in common.

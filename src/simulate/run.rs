@@ -166,7 +166,12 @@ fn announce(context: &Context<'_>, threads: usize) {
     let of_shard = |rays: u64| rays / u64::from(context.settings.shard[1].max(1));
     let beam = |(k, e): (usize, &Emitter)| Some((e.beam()?, of_shard(context.plan.rays_of_source(k))));
     let beams: Vec<_> = context.bound.emitters.iter().enumerate().filter_map(beam).collect();
-    context.intersector.prepare_for(&ExpectedRays { rays: of_shard(context.plan.rays), threads, beams: &beams });
+    context.intersector.prepare_for(&ExpectedRays {
+        rays: of_shard(context.plan.rays),
+        threads,
+        beams: &beams,
+        sag: 0.0,
+    });
 }
 
 /// Lets the intersector work out beforehand what it will know of a run, so that two runs on it compare.

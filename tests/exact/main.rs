@@ -12,6 +12,7 @@ mod hostile;
 mod models;
 mod paths;
 mod polish;
+mod polished_starts;
 mod referee;
 mod support;
 mod thin_rings;

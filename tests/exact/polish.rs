@@ -57,12 +57,12 @@ impl Intersector for EveryFacet<'_> {
     }
 }
 
-fn mesh(model: &Model, tolerance: f64) -> FacetMesh {
+pub(crate) fn mesh(model: &Model, tolerance: f64) -> FacetMesh {
     let settings = tessellate::Settings { tolerance: [tolerance; 2], measure: false, ..Default::default() };
     tessellate(model, &settings).mesh
 }
 
-fn bounds(mesh: &FacetMesh) -> Aabb {
+pub(crate) fn bounds(mesh: &FacetMesh) -> Aabb {
     mesh.bounds()
 }
 
@@ -221,7 +221,7 @@ fn a_batch_gives_the_bits_of_rays_asked_alone() {
         let met = hits.iter().flatten().filter(|h| h.certainty == Certainty::Polished).count();
         assert!(met > rays.len() / 4, "{name}: {met} of {}", rays.len());
         let beams = [(Beam::Point(lamp), 1 << 40), (Beam::Collimated { origin: lamp, direction: down }, 1 << 40)];
-        polished.prepare_for(&ExpectedRays { rays: 1 << 40, threads: 2, beams: &beams });
+        polished.prepare_for(&ExpectedRays { rays: 1 << 40, threads: 2, beams: &beams, sag: 0.0 });
         let mut prepared = vec![None; rays.len()];
         polished.intersect_batch(&rays, &mut prepared, &mut Cost::default());
         assert_eq!(bits(&prepared), bits(&alone), "{name}");

@@ -170,7 +170,7 @@ fn what_leaves_a_part_meets_what_it_meets_in_one_mesh() {
         let whole = facets.whole();
         let flat = Octree::build(&whole, &Default::default());
         let [instanced, expecting] = [0, 1].map(|_| scene.instanced(scene.octrees(&facets)));
-        expecting.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 1, beams: &[] });
+        expecting.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 1, beams: &[], sag: 0.0 });
         let mut rays = scene.rays(2000);
         // A ray leaves a facet, which has another number in one mesh.
         let mut in_one_mesh = rays.clone();

@@ -33,7 +33,7 @@ fn same(name: &str, mesh: &FacetMesh, beam: Beam, rays: &[Ray]) {
     let plain = Octree::build(mesh, &octree::Settings::default());
     let judge = Bvh::build(mesh, &bvh::Settings::default());
     let beams = [(Beam::Point(Point::splat(0.5)), u64::MAX), (beam, u64::MAX)];
-    knowing.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 2, beams: &beams });
+    knowing.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 2, beams: &beams, sag: 0.0 });
     let ask = |who: &dyn Intersector| {
         let (mut hits, mut cost) = (vec![None; rays.len()], Cost::default());
         who.intersect_batch(rays, &mut hits, &mut cost);
@@ -44,7 +44,7 @@ fn same(name: &str, mesh: &FacetMesh, beam: Beam, rays: &[Ray]) {
     assert!(known.iter().all(Option::is_none) || less.nodes < more.nodes / 4, "{name}: {less:?} against {more:?}");
     for instruction_set in [octree::InstructionSet::Avx2, octree::InstructionSet::Portable] {
         let other = Octree::build(mesh, &octree::Settings { instruction_set, ..octree::Settings::default() });
-        other.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 2, beams: &beams });
+        other.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 2, beams: &beams, sag: 0.0 });
         assert!(ask(&other).0 == walked, "{name}: {beam:?} {instruction_set:?}");
     }
     for (k, ray) in rays.iter().enumerate() {

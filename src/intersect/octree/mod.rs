@@ -85,6 +85,8 @@ pub struct Octree<'m> {
     level: Level,
     /// Of the facets that many rays leave; empty until [`Intersector::prepare_for`] finds that they pay.
     horizons: OnceLock<Horizons>,
+    /// The same for rays that leave the spline over the facet.
+    spline_horizons: OnceLock<Horizons>,
     /// Of the sources whose rays are expected.
     light_buffers: RwLock<Vec<LightBuffer>>,
     statistics: Statistics,
@@ -132,6 +134,7 @@ impl<'m> Octree<'m> {
             settings: *settings,
             level: settings.instruction_set.level(),
             horizons: OnceLock::new(),
+            spline_horizons: OnceLock::new(),
             light_buffers: RwLock::default(),
             statistics,
             build_seconds: started.elapsed().as_secs_f64(),
@@ -145,6 +148,7 @@ impl<'m> Octree<'m> {
             settings: self.settings,
             level: self.level,
             horizons: OnceLock::new(),
+            spline_horizons: OnceLock::new(),
             light_buffers: RwLock::default(),
             statistics: self.statistics.clone(),
             build_seconds: self.build_seconds,
@@ -194,7 +198,9 @@ impl<'m> Octree<'m> {
     /// Bytes of what was worked out about expected rays.
     fn preparation_bytes(&self) -> usize {
         let buffers = self.light_buffers.read().unwrap_or_else(PoisonError::into_inner);
-        self.horizons.get().map_or(0, Horizons::bytes) + buffers.iter().map(LightBuffer::bytes).sum::<usize>()
+        let horizons = [&self.horizons, &self.spline_horizons];
+        horizons.iter().filter_map(|h| h.get()).map(Horizons::bytes).sum::<usize>()
+            + buffers.iter().map(LightBuffer::bytes).sum::<usize>()
     }
 
     /// Finds the nearest hit of each ray with the instructions that were chosen, and overwrites `hits`; `light_buffers`, which may be
@@ -227,11 +233,12 @@ impl Intersector for Octree<'_> {
     }
 
     fn prepare_for(&self, expected: &ExpectedRays<'_>) {
-        if self.horizons.get().is_none()
-            && let Some(horizons) = Horizons::if_worth(expected.rays, &self.tree)
+        let own = if expected.sag > 0.0 { &self.spline_horizons } else { &self.horizons };
+        if own.get().is_none()
+            && let Some(horizons) = Horizons::if_worth(expected.rays, &self.tree, expected.sag)
         {
             // Whoever came first has as good ones.
-            let _ = self.horizons.set(horizons);
+            let _ = own.set(horizons);
         }
         let mut buffers = self.light_buffers.write().unwrap_or_else(PoisonError::into_inner);
         let kept = std::mem::take(&mut *buffers);
@@ -242,6 +249,12 @@ impl Intersector for Octree<'_> {
     fn escapes(&self, ray: &Ray) -> bool {
         let (Some(horizons), Some(from)) = (self.horizons.get(), ray.departure) else { return false };
         horizons.is_free(&self.tree, from.primitive as usize, ray.direction)
+    }
+
+    #[inline]
+    fn escapes_spline(&self, ray: &Ray, sag: f64) -> bool {
+        let (Some(horizons), Some(from)) = (self.spline_horizons.get(), ray.departure) else { return false };
+        horizons.holds_for(sag) && horizons.is_free(&self.tree, from.primitive as usize, ray.direction)
     }
 
     fn footprint(&self) -> Footprint {

@@ -5,6 +5,7 @@
 //! range, the facets are asked about what is behind it. Every other ray, some in a hundred, is asked alone.
 
 use super::clear_start::ClearStart;
+use super::curved_cells::LOOK_BACK_OF_FLAT;
 use super::facet_record::FacetRecord;
 use super::{
     LEAST_SLACK_SINE, LEAST_WINDOW, LEAST_WINDOW_SINE, OWN_POINT, Polished, SHORT_OF_SAGS, WINDOW_OF_SAGS, is_own,
@@ -163,7 +164,11 @@ impl Polished<'_> {
             // Where nothing can lie behind the start no look back is needed, and the ray stays one that light
             // buffers know.
             let is_clear = ray.t_min == 0.0 && clear.iter().any(|start| start.holds(ray));
-            return Some(if is_clear { [0.0, slack] } else { [slack; 2] });
+            if is_clear {
+                return Some([0.0, slack]);
+            }
+            let is_near = self.curved.may_be_near(ray.point_at(ray.t_min));
+            return Some([if is_near { slack } else { LOOK_BACK_OF_FLAT }, slack]);
         };
         // A departure from the spline alone names no facet, and one that names another face's tells nothing of the
         // side that is left.

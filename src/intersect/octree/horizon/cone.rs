@@ -5,11 +5,18 @@
 //! for from the cheapest: that of T's plane, those of a ball around both sets, of six lines around T, and at last the very one that
 //! is nearest to the axis, which lies across one or two of the differences. Only boxes that may be nearer to the axis than what was
 //! found already are opened.
+//!
+//! Rays that leave the spline start up to a sag off T, and what they might meet lies as far off Q. A start and a goal that are moved by
+//! `r` together, from a distance of at least `g`, turn the difference by at most `asin r/g`: a cone wider by that angle that is free for
+//! T and Q has a free one within it for all that lies so near to them. What shares a corner with T has no distance, and is judged by its
+//! normals ([`Sheet`]).
 
-use super::{BOX_ROOM, Lines, lines_around};
+use super::sheet::Sheet;
+use super::{BOX_ROOM, LINES, Lines, lines_around};
 use crate::intersect::octree::node::{Link, Target};
 use crate::intersect::octree::tree::Tree;
 use crate::math::{Aabb, Point, Vector};
+use std::f64::consts::FRAC_PI_2;
 
 /// Half an angle below which a cone is of no use.
 const LEAST_HALF_ANGLE: f64 = 0.02;
@@ -20,15 +27,17 @@ const ANGLE_ROOM: f64 = 1e-3;
 const BALL_ROOM: f64 = 1e-9;
 
 /// Returns the cosine of half the angle of a free cone of a facet around the unit vector `axis`: half the angle, in radians, is at most
-/// `widest`. `None` where the cone would be too narrow to be of use, or a triangle of the facet has no area.
-pub(super) fn cosine_of_free_cone(tree: &Tree, facet: usize, axis: Vector, widest: f64) -> Option<f64> {
+/// `widest`. With a `sag`, mm, it is free for rays that leave the spline over the facet, where all that stands there is spline as near to
+/// its facets. `None` where the cone would be too narrow to be of use, or a triangle of the facet has no area.
+pub(super) fn cosine_of_free_cone(tree: &Tree, facet: usize, axis: Vector, widest: f64, sag: f64) -> Option<f64> {
     let mesh = tree.surroundings.mesh;
     let [a, b, c, d] = mesh.corners(facet);
-    let first = Base::new([a, b, c], tree.surroundings.reach)?;
+    let base = |corners| Base::new(corners, tree.surroundings.reach, 2.0 * sag);
+    let first = base([a, b, c])?;
     let bases = if mesh.facets[facet].is_triangle() {
         [Some((first, [a, b, c, c])), None]
     } else {
-        let second = Base::new([a, c, d], tree.surroundings.reach)?;
+        let second = base([a, c, d])?;
         // A ray may leave either triangle, and the other one may stand in its way where the facet is folded.
         [Some((first, [a, c, d, d])), Some((second, [a, b, c, c]))]
     };
@@ -37,9 +46,16 @@ pub(super) fn cosine_of_free_cone(tree: &Tree, facet: usize, axis: Vector, wides
     for (base, _) in bases.iter().flatten() {
         limit.lower(axis.dot(base.normal));
     }
+    let sheet = (sag > 0.0).then(|| Sheet::around(mesh, facet));
+    if let Some(sheet) = &sheet {
+        limit.lower_angle(sheet.half_angle(facet, axis));
+    }
     for (base, other) in bases.iter().flatten() {
-        base.narrow_to_avoid(other, &mut limit);
-        base.search(tree, facet, &mut limit);
+        // The other triangle of a facet is of its sheet.
+        if sheet.is_none() {
+            base.narrow_to_avoid(other, &mut limit);
+        }
+        base.search(tree, facet, sheet.as_ref(), &mut limit);
     }
     let angle = limit.sine.clamp(0.0, 1.0).asin();
     // Too narrow a cone would catch next to no ray, and its test costs each.
@@ -67,6 +83,16 @@ impl Limit {
             self.cosine = (1.0 - self.sine * self.sine).sqrt();
         }
     }
+
+    /// Narrows the cone to half this angle, radians; NaN closes it.
+    fn lower_angle(&mut self, angle: f64) {
+        self.lower(if angle > 0.0 { angle.min(FRAC_PI_2).sin() } else { 0.0 });
+    }
+
+    /// The cone with so many radians more to each side, up to half of all directions.
+    fn widened(&self, angle: f64) -> Self {
+        Self::new(self.axis, (self.sine.asin() + angle).min(FRAC_PI_2))
+    }
 }
 
 /// A triangle that rays leave.
@@ -78,22 +104,30 @@ struct Base {
     /// Middle and radius of a ball around it.
     middle: Point,
     radius: f64,
-    /// How far off its triangle a start may lie, mm.
+    /// How far off its triangle a start may lie for rounding, mm.
     reach: f64,
+    /// How far start and goal may lie off their facets together, mm.
+    room: f64,
 }
 
 impl Base {
-    /// A triangle with the reach of its starts, mm; `None` without area.
-    fn new(corners: [Point; 3], reach: f64) -> Option<Self> {
+    /// A triangle with the reach of its starts and the room for start and goal, mm; `None` without area.
+    fn new(corners: [Point; 3], reach: f64, room: f64) -> Option<Self> {
         let [a, b, c] = corners;
         let (normal, lines) = lines_around(corners)?;
         let middle = (a + b + c) / 3.0;
         let radius = corners.iter().map(|p| (*p - middle).length()).fold(0.0, f64::max);
-        Some(Self { corners, normal, lines, middle, radius, reach })
+        Some(Self { corners, normal, lines, middle, radius, reach, room })
     }
 
-    /// Narrows `limit` until no ray within the cone meets a facet of the tree but `facet`, its own; ends early once the cone is of no use.
-    fn search(&self, tree: &Tree, facet: usize, limit: &mut Limit) {
+    /// Height over the plane up to which nothing stands in the way of a ray.
+    fn floor(&self) -> f64 {
+        if self.room > 0.0 { -self.room } else { self.reach }
+    }
+
+    /// Narrows `limit` until no ray within the cone meets a facet of the tree but `facet`, its own, and what of its `sheet` the normals
+    /// exclude; ends early once the cone is of no use.
+    fn search(&self, tree: &Tree, facet: usize, sheet: Option<&Sheet>, limit: &mut Limit) {
         let mesh = tree.surroundings.mesh;
         let mut open: Vec<Link> = tree.root.into_iter().collect();
         while let Some(link) = open.pop() {
@@ -115,6 +149,11 @@ impl Base {
                     let block = &tree.blocks[index];
                     // Its own facet is asked separately, triangle by triangle.
                     for k in (0..count).filter(|&k| block.facets[k] as usize != facet) {
+                        let other = block.facets[k] as usize;
+                        if let Some(sheet) = sheet.filter(|sheet| sheet.holds(other)) {
+                            limit.lower_angle(sheet.half_angle(other, limit.axis));
+                            continue;
+                        }
                         self.narrow_to_avoid(&block.positions[k].map(|p| mesh.positions[p as usize]), limit);
                     }
                 }
@@ -128,12 +167,12 @@ impl Base {
         let (middle, half) = (b.center() + center, 0.5 * b.size());
         let room = BOX_ROOM * half.max_element();
         let height = (middle - self.corners[0]).dot(self.normal) + half.dot(self.normal.abs()) + room;
-        height > self.reach && self.may_meet_ball(middle, half.length() + room, limit)
+        height > self.floor() && self.may_meet_ball(middle, half.length() + room, limit)
     }
 
     /// Whether a ray within the cone may meet a ball, in the mesh's coordinates, mm.
     fn may_meet_ball(&self, middle: Point, radius: f64, limit: &Limit) -> bool {
-        let (to, radius) = (middle - self.middle, (self.radius + radius) * (1.0 + BALL_ROOM));
+        let (to, radius) = (middle - self.middle, (self.radius + radius + self.room) * (1.0 + BALL_ROOM));
         let (along, beside) = (to.dot(limit.axis), to.length_squared() - radius * radius);
         // Of the angle to its middle and that which it fills.
         beside <= 0.0 || along > limit.cosine * beside.sqrt() - limit.sine * radius
@@ -147,7 +186,8 @@ impl Base {
             // The hull of a folded quad is more than the quad: its triangles may be off where the hull is not.
             for triangle in [[a, b, c], [a, c, d]] {
                 if !self.is_off(&triangle, limit) {
-                    limit.lower(self.sine_to(&triangle, limit.axis));
+                    let turn = self.turn(&triangle);
+                    limit.lower_angle(self.sine_to(&triangle, limit.axis).min(1.0).asin() - turn);
                 }
             }
         }
@@ -156,12 +196,38 @@ impl Base {
     /// Whether a quick test shows that no ray within the cone meets the hull of these points; `false` says nothing.
     fn is_off(&self, points: &[Point], limit: &Limit) -> bool {
         let heights = |p: &Point| (*p - self.corners[0]).dot(self.normal);
-        if points.iter().all(|p| heights(p) <= self.reach) {
+        if points.iter().all(|p| heights(p) <= self.floor()) {
             return true;
         }
         let middle = points.iter().sum::<Point>() / points.len() as f64;
         let radius = points.iter().map(|p| (*p - middle).length()).fold(0.0, f64::max);
-        !self.may_meet_ball(middle, radius, limit) || self.is_beyond_a_line(points, limit)
+        if !self.may_meet_ball(middle, radius, limit) {
+            return true;
+        }
+        match self.turn(points) {
+            0.0 => self.is_beyond_a_line(points, limit),
+            turn => self.is_beyond_a_line(points, &limit.widened(turn)),
+        }
+    }
+
+    /// The angle, radians, by which the room may turn a difference between this triangle and the hull of these points; a right angle where
+    /// they are not seen to be farther apart than that.
+    fn turn(&self, points: &[Point]) -> f64 {
+        if self.room == 0.0 {
+            return 0.0;
+        }
+        // Planes with the triangle on one side: those through the lines, and its own to both sides.
+        let (mut least, mut above, mut below) = ([f64::INFINITY; LINES], f64::INFINITY, f64::INFINITY);
+        for p in points {
+            let to = *p - self.corners[0];
+            let height = to.dot(self.normal);
+            (above, below) = (above.min(height), below.min(-height));
+            for (least, (across, at)) in least.iter_mut().zip(&self.lines) {
+                *least = least.min(to.dot(*across) - at);
+            }
+        }
+        let apart = least.into_iter().fold(above.max(below), f64::max);
+        if apart > self.room { (self.room / apart).asin() } else { FRAC_PI_2 }
     }
 
     /// Whether a plane through one of the lines keeps the points from the whole cone.

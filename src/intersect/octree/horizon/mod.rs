@@ -5,9 +5,12 @@
 //! them an axis is taken and how wide the cone around it is that nothing stands in ([`cone`]), which one product of two directions
 //! then tells of a ray. Where many rays leave beside their cone, how high anything stands to all sides is found ([`skyline`]).
 //!
+//! Rays that leave the spline start up to a sag off their facet: for these cones with room for it are found apart ([`cone`], [`sheet`]).
+//!
 //! Guarantee: conservative; heights up to the reach of a start, a picometre for a lamp, count as nothing.
 
 mod cone;
+mod sheet;
 mod skyline;
 
 use super::tree::Tree;
@@ -71,6 +74,8 @@ pub(super) struct Horizons {
     facets: Vec<RayRecord>,
     /// Rays beside its cone after which a facet's horizon is found.
     rays_before_search: u32,
+    /// How far off their facets starts and what stands there may lie, mm: 0 where rays leave the facets themselves.
+    sag: f64,
 }
 
 /// A cone within which rays that leave a facet meet nothing, shared by threads.
@@ -137,7 +142,7 @@ impl RayRecord {
     /// Notes a ray of this unit direction that left the facet beside its cone; after enough of them one thread finds the cone or the
     /// horizon, the others walk on. A ray that goes into the body is not noted.
     #[cold]
-    fn note(&self, tree: &Tree, facet: usize, cone: &Cone, direction: Vector, rays_before_search: u32) {
+    fn note(&self, tree: &Tree, facet: usize, direction: Vector, horizons: &Horizons) {
         let [a, b, c, _] = tree.surroundings.mesh.corners(facet);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let up = normal.dot(direction);
@@ -148,14 +153,14 @@ impl RayRecord {
         }
         // The first few rays lay the cone, and those beside it the horizon.
         if self.left.load(Ordering::Relaxed) <= RAYS_BEFORE_CONE {
-            return self.gather(tree, facet, cone, normal, direction);
+            return self.gather(tree, facet, normal, direction, horizons);
         }
         let (x, y) = orthonormal_pair(normal);
         // The bits of positive numbers are in their order.
         self.least.fetch_min((slope as f32).to_bits(), Ordering::Relaxed);
         self.sectors.fetch_or(1 << sector(x.dot(direction) as f32, y.dot(direction) as f32), Ordering::Relaxed);
         // Equal, not above: of all threads one alone counts to this number, and that one searches.
-        if self.beside.fetch_add(1, Ordering::Relaxed) == rays_before_search {
+        if self.beside.fetch_add(1, Ordering::Relaxed) == horizons.rays_before_search {
             let least = f64::from(f32::from_bits(self.least.load(Ordering::Relaxed)));
             let sectors = self.sectors.load(Ordering::Relaxed);
             let floor =
@@ -166,7 +171,8 @@ impl RayRecord {
 
     /// Widens the bounds of the directions that the cone is laid around by a ray's, a unit vector, and lays the cone once there are
     /// [`RAYS_BEFORE_CONE`] and one more.
-    fn gather(&self, tree: &Tree, facet: usize, cone: &Cone, normal: Vector, direction: Vector) {
+    fn gather(&self, tree: &Tree, facet: usize, normal: Vector, direction: Vector, horizons: &Horizons) {
+        let cone = &horizons.cones[facet];
         let direction = direction.to_array();
         for axis in 0..3 {
             let place = (direction[axis] / DIRECTION_STEP) as i32;
@@ -186,7 +192,7 @@ impl RayRecord {
         let axis = if widest < FRAC_PI_2 { low + high } else { normal };
         if let Some(axis) = axis.try_normalize() {
             let widest = widest.min(FRAC_PI_2);
-            match cone::cosine_of_free_cone(tree, facet, axis, widest) {
+            match cone::cosine_of_free_cone(tree, facet, axis, widest, horizons.sag) {
                 Some(cosine) => cone.publish(axis, cosine),
                 // Something stands right ahead: what leaves is met. An axis of zero ends the watch of this facet.
                 None => cone.axis.iter().for_each(|x| x.store(0, Ordering::Relaxed)),
@@ -203,7 +209,7 @@ impl Horizons {
     }
 
     /// Starts without cones and horizons, for a run of `rays` rays; `None` when they are too few for the facets of the tree.
-    pub(super) fn if_worth(rays: u64, tree: &Tree) -> Option<Self> {
+    pub(super) fn if_worth(rays: u64, tree: &Tree, sag: f64) -> Option<Self> {
         let mesh = tree.surroundings.mesh;
         let each = rays / mesh.facets.len().max(1) as u64;
         let rays_before_search =
@@ -216,7 +222,14 @@ impl Horizons {
             cones: (0..mesh.facets.len()).map(cone).collect(),
             facets: mesh.facets.iter().map(|_| RayRecord::new()).collect(),
             rays_before_search,
+            sag,
         })
+    }
+
+    /// Whether they were found with at least so much room, mm.
+    #[inline(always)]
+    pub(super) fn holds_for(&self, sag: f64) -> bool {
+        sag <= self.sag
     }
 
     /// Whether a ray of this unit direction that leaves this facet is known to meet nothing; `false` says nothing. A ray that is not may be
@@ -235,8 +248,10 @@ impl Horizons {
         let record = &self.facets[facet];
         match record.horizon.get() {
             Some(horizon) => horizon.is_below(direction),
+            // Horizons have no room for a sag: rays from the spline are known to be free by cones alone.
+            None if self.sag > 0.0 && record.left.load(Ordering::Relaxed) > RAYS_BEFORE_CONE => false,
             None => {
-                record.note(tree, facet, &self.cones[facet], direction, self.rays_before_search);
+                record.note(tree, facet, direction, self);
                 false
             }
         }

@@ -1,0 +1,126 @@
+//! Starts of polished rays: which are known to be free of the whole model, and which must look for facets behind them.
+
+use crate::polish::{bounds, mesh};
+use crate::support::*;
+use lampyris::intersect::exact::{Exact, Settings};
+use lampyris::intersect::octree::{self, Octree};
+use lampyris::intersect::polish::Polished;
+use lampyris::intersect::{Certainty, Cost, ExpectedRays, Footprint, Hit, Intersector};
+use lampyris::math::{Departure, FaceId, Frame, Point, Ray, Vector};
+use lampyris::nurbs::sweep;
+use std::f64::consts::{FRAC_PI_2, TAU};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Bundles of rays from polished hits, the places often beside the border of a facet: what is known to be free of the model is a miss of
+/// the facets and of the spline. One model has a second sheet so near to the first that they lie within each other's sag.
+#[test]
+fn a_ray_that_escapes_the_spline_meets_nothing() {
+    let tilted = |z: f64| Frame::translation(Vector::new(0.0, 0.0, z));
+    let cap = |z: f64, r: f64| sweep::sphere(&tilted(z), r, [0.0, TAU], [-FRAC_PI_2, -0.9]);
+    let models = [
+        ("sphere", model([sphere(50.0)]), 0.3),
+        ("torus", model([torus(50.0, 15.0)]), 0.1),
+        ("reflector", model([reflector(6)]), 0.3),
+        ("bowl", model([cap(0.0, 50.0)]), 0.15),
+        ("two sheets", model([cap(0.0, 50.0), cap(0.15, 50.0)]), 0.0),
+    ];
+    for (name, model, least_share) in models {
+        let mesh = mesh(&model, 0.2);
+        let exact = Exact::build(&model, &Settings::default());
+        let octree = Octree::build(&mesh, &octree::Settings::default());
+        let asked = Polished::new(&octree, &mesh, &exact);
+        let judge = octree.without_preparation();
+        let judge = Polished::new(&judge, &mesh, &exact);
+        asked.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 1, beams: &[], sag: 0.0 });
+        let (b, mut s) = (bounds(&mesh), Stream(19));
+        let (mut rays, mut free, mut known) = (0, 0, 0);
+        let mut last_known = 0;
+        for _ in 0..60_000 {
+            let Some(hit) = judge.intersect(&s.ray(b.center(), 0.4 * b.size()), &mut Cost::default()) else {
+                continue;
+            };
+            let from = hit.departure();
+            let uv = exact.normal_at(from.face, from.uv);
+            let Some(normal) = uv.filter(|_| hit.certainty == Certainty::Polished) else { continue };
+            // Its own way for each facet, on both sides of the sheets and mostly along their normals.
+            let mut of_facet = Stream(u64::from(from.primitive));
+            let side = if of_facet.next() < 0.5 { -1.0 } else { 1.0 };
+            let way = (side * normal + of_facet.direction() * 0.8 + s.direction() * 0.15).normalize();
+            let place = model.parts[0].shells[0].faces[from.face.index()].surface.evaluate(from.uv);
+            let ray = Ray::new(place, way).with_departure(from);
+            rays += 1;
+            let met = judge.intersect(&ray, &mut Cost::default());
+            free += usize::from(met.is_none());
+            if asked.escapes(&ray) {
+                known += 1;
+                assert!(met.is_none(), "{name}: {ray:?} meets {met:?}");
+                let truth = exact.first(&ray, &mut Cost::default()).hit;
+                assert!(truth.is_none(), "{name}: {ray:?} meets {truth:?} of the spline");
+                // Nothing is known of a place that the facet does not stand for.
+                let beside = Departure { primitive: last_known, ..from };
+                assert!(last_known == from.primitive || !asked.escapes(&ray.with_departure(beside)), "{name}");
+                last_known = from.primitive;
+            }
+        }
+        println!("{name}: {known} known of {free} free of {rays}");
+        assert!(
+            known as f64 >= least_share * free as f64 && free > 1000,
+            "{name}: {known} of {free} free rays known"
+        );
+    }
+}
+
+/// Facets that count how often they are asked.
+struct CountedAsks<'a>(&'a Octree<'a>, AtomicUsize);
+
+impl Intersector for CountedAsks<'_> {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        self.1.fetch_add(1, Ordering::Relaxed);
+        self.0.intersect(ray, cost)
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        self.1.fetch_add(rays.len(), Ordering::Relaxed);
+        self.0.intersect_batch(rays, hits, cost);
+    }
+
+    fn footprint(&self) -> Footprint {
+        self.0.footprint()
+    }
+}
+
+/// Light of a chip starts a hundredth of a millimetre over it: the flat chip behind is not asked about. Of a ball the facet behind a start
+/// hides the piece of it that lies ahead.
+#[test]
+fn only_curved_facets_are_looked_for_behind_a_start() {
+    let chip = sweep::plane(&Frame::IDENTITY, [[-0.5, 0.5], [-0.5, 0.5]]);
+    let model = model([sphere(50.0), chip]);
+    let mesh = mesh(&model, 0.2);
+    let exact = Exact::build(&model, &Settings::default());
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let facets = CountedAsks(&octree, AtomicUsize::new(0));
+    let polished = Polished::new(&facets, &mesh, &exact);
+    let mut s = Stream(23);
+    let up = |s: &mut Stream| (s.direction() * 0.9 + Vector::Z).normalize();
+    let over_chip: Vec<Ray> = (0..1000)
+        .map(|_| Ray::new(Point::new(s.within(-0.4, 0.4), s.within(-0.4, 0.4), 0.01), up(&mut s)))
+        .collect();
+    let mut hits = vec![None; over_chip.len()];
+    polished.intersect_batch(&over_chip, &mut hits, &mut Cost::default());
+    let of_ball = |h: &Option<Hit>| h.is_some_and(|h| h.face == FaceId(0));
+    assert!(hits.iter().filter(|h| of_ball(h)).count() > 950);
+    let asked = facets.1.load(Ordering::Relaxed);
+    assert!(asked < 1100, "{asked} questions for 1000 rays");
+    // In the middle of facets, between them and the ball.
+    let mut hidden = 0;
+    for f in (0..mesh.facets.len()).filter(|&f| mesh.facets[f].face == FaceId(0) && !mesh.facets[f].is_triangle()) {
+        let out = mesh.corners(f).iter().sum::<Point>().normalize();
+        let ray = Ray::new(out * (50.0 - 0.01), out);
+        let is_hidden = octree.intersect(&ray, &mut Cost::default()).is_none();
+        hidden += usize::from(is_hidden);
+        let mut hits = [None; 2];
+        polished.intersect_batch(&[ray, ray], &mut hits, &mut Cost::default());
+        assert!(hits[0].is_some_and(|h| (h.t - 0.01).abs() < 1e-9), "{ray:?} {hits:?}");
+    }
+    assert!(hidden > 100, "{hidden}");
+}
