@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::names::{normal_mode, require_tolerance};
 use crate::results::Results;
 use lampyris::pipeline::{
-    self, AccurateSettings, ErrorTarget, LoadedModel, MeshingSettings, PreparedScene, RayRange, SceneJob,
+    self, AccurateSettings, ErrorTarget, GrowingSearch, LoadedModel, MeshingSettings, PreparedScene, RayRange, SceneJob,
     TraceRequest, TracingSettings, read_models, settings_for_accuracy,
 };
 use lampyris::simulate::{MOST_LISTED_RAYS, PartialRun, RunSettings, Scene, listed_ends, ray_lists};
@@ -207,7 +207,7 @@ impl Prepared {
         let target = ErrorTarget::new(until, &self.scene.job.scene).map_err(of_pipeline)?;
         let mut scene = PreparedScene::clone(&self.scene);
         let work = move |monitor: &dyn pipeline::Monitor| {
-            let (run, result) = target.trace(&mut scene, monitor);
+            let (run, result) = target.trace(&mut scene, GrowingSearch::default(), monitor);
             if !run.is_whole() {
                 return (Err(Box::new(run)), scene, result);
             }

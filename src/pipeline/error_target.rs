@@ -4,8 +4,9 @@
 //! `--rays N`, whatever number of threads found the N. The runs before the last cost about half of it at most.
 
 use super::error::Error;
+use super::growing_search::GrowingSearch;
 use super::monitor::Monitor;
-use super::prepared_scene::{PreparedScene, TraceRequest};
+use super::prepared_scene::PreparedScene;
 use super::suggest;
 use crate::simulate::{GROWING_REPLICATE, PartialRun, ReceiverResult, Results, Scene};
 use crate::study::figures::cell_errors;
@@ -94,12 +95,18 @@ impl ErrorTarget {
 
     /// Traces runs of growing length, each from its first ray, until the error is small enough, the most rays are traced, or the monitor
     /// asks to stop: then not all is traced. Sets `prepared.rays` to the number of the last.
-    pub fn trace(&self, prepared: &mut PreparedScene, monitor: &dyn Monitor) -> (PartialRun, TargetResult) {
+    pub fn trace(
+        &self,
+        prepared: &mut PreparedScene,
+        search: GrowingSearch<'_>,
+        monitor: &dyn Monitor,
+    ) -> (PartialRun, TargetResult) {
         let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
-        let mut rays = FIRST_RAYS.min(most);
+        let mut rays = search.first_rays(FIRST_RAYS, most);
         loop {
             prepared.rays = Some(rays);
-            let (portion, found) = self.attempt(prepared, monitor);
+            let (portion, results) = search.trace(prepared, monitor);
+            let found = self.error(&results);
             let result = self.result_of(found, rays);
             if result.reached || !portion.is_whole() || rays >= most {
                 return (portion, result);
@@ -137,16 +144,6 @@ impl ErrorTarget {
     fn growth(&self, found: Option<f64>) -> f64 {
         // The error falls with the root of the rays, so that they go with the square of what is missing.
         found.map_or(GROWTH_FROM_NOTHING, |e| (GROWTH_MARGIN * (e / self.percent).powi(2)).min(GROWTH_RANGE[1]))
-    }
-
-    /// Traces the rays that `prepared` asks for, and returns the sums with the error they reached, percent; `None` where nothing arrived.
-    fn attempt(&self, prepared: &PreparedScene, monitor: &dyn Monitor) -> (PartialRun, Option<f64>) {
-        let settings = prepared.run_settings();
-        prepared.with_intersector(monitor, |intersector, _| {
-            let traced = prepared.run(intersector, &settings, TraceRequest::default(), monitor);
-            let portion = traced.partial.clone();
-            (portion, self.error(&Results::new(&prepared.bound, &settings, traced)))
-        })
     }
 }
 

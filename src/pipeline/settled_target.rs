@@ -3,8 +3,9 @@
 //! Runs of growing length are traced, each from its beginning, as for [`ErrorTarget`](super::ErrorTarget). While they grow, the errors of
 //! the rays alone are looked at: more rays take nothing from those of the facets, which the last run measures.
 
+use super::growing_search::GrowingSearch;
 use super::monitor::Monitor;
-use super::prepared_scene::{PreparedScene, TraceRequest};
+use super::prepared_scene::PreparedScene;
 use super::verdicts::verdict;
 use crate::regulation::{RowVerdict, Verdict};
 use crate::simulate::{PartialRun, Results};
@@ -21,17 +22,17 @@ const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 
 /// Traces runs of growing length, each from its first ray, until no row of a verdict is unsure by the errors of the rays, the most rays are
 /// traced, or the monitor asks to stop: then not all is traced. Sets `prepared.rays`; returns the sums and the number of rays.
-pub fn trace_until_settled(prepared: &mut PreparedScene, monitor: &dyn Monitor) -> (PartialRun, u64) {
+pub fn trace_until_settled(
+    prepared: &mut PreparedScene,
+    search: GrowingSearch<'_>,
+    monitor: &dyn Monitor,
+) -> (PartialRun, u64) {
     let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
-    let mut rays = FIRST_RAYS.min(most);
+    let mut rays = search.first_rays(FIRST_RAYS, most);
     loop {
         prepared.rays = Some(rays);
-        let settings = prepared.run_settings();
-        let (portion, wanted) = prepared.with_intersector(monitor, |intersector, _| {
-            let traced = prepared.run(intersector, &settings, TraceRequest::default(), monitor);
-            let portion = traced.partial.clone();
-            (portion, rays_wanted(prepared, &Results::new(&prepared.bound, &settings, traced)))
-        });
+        let (portion, results) = search.trace(prepared, monitor);
+        let wanted = rays_wanted(prepared, &results);
         // Settled, stopped or at the most: either way this is the run.
         let Some(&most_wanted) = wanted.iter().max().filter(|_| portion.is_whole() && rays < most) else {
             return (portion, rays);

@@ -93,6 +93,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "study",
             "dry_run",
             "ray_range",
+            "trace_until",
             "trace",
             "mod",
         ],
@@ -142,6 +143,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "prepared_scene",
             "scene_results",
             "cross_check",
+            "growing_search",
             "error_target",
             "verdicts",
             "settled_target",
@@ -189,6 +191,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "cie",
             "colour",
+            "dispersion",
             "effects",
             "error",
             "testing",

@@ -172,9 +172,6 @@ fn a_signal_saves_a_run_that_is_traced_until_it_is_settled() {
     assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
     let said: String = said.collect::<Vec<_>>().join(" ");
     assert_eq!(child.wait().unwrap().code(), Some(1), "{said}");
-    assert!(
-        said.contains("replicates are saved in") && said.contains("--resume in place of --until-settled"),
-        "{said}"
-    );
+    assert!(said.contains("replicates are saved in") && said.contains("the same command with --resume"), "{said}");
     assert!(folder.path().join("out/checkpoint.tally").is_file());
 }

@@ -220,6 +220,40 @@ fn a_killed_run_resumes_to_the_same_bits() {
     assert!(!saved.exists());
 }
 
+/// A search for a number of rays that is killed goes on with the run that it was at, to the bits of one that was not.
+#[test]
+fn a_killed_search_resumes_to_the_same_bits() {
+    let folder = lens(|m| m);
+    let path = folder.path();
+    let search = ["trace", "scene.toml", "--until-error", "0.0001%@focus", "--rays", "600000", "--json", "-o"];
+    let whole = document(path, &[&search[..], &["whole"]].concat(), 4);
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
+        .current_dir(path)
+        .args(search)
+        .args(["out", "--threads", "1", "--checkpoint", "0"])
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let saved = path.join("out/checkpoint.tally");
+    for _ in 0..2000 {
+        if saved.is_file() || child.try_wait().unwrap().is_some() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    // Into the second run, which follows the 50,000 rays of the first.
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(saved.is_file() && !path.join("out/results.json").exists(), "it was killed on the way");
+    let (code, out, err) = lampyris_in(path, &[&search[..], &["out", "--resume"]].concat());
+    assert!(code == 4 && err.contains("going on from"), "{code} {err}");
+    let resumed: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((&whole["digest"], &whole["power"]), (&resumed["digest"], &resumed["power"]));
+    assert_eq!(whole["until_error"], resumed["until_error"]);
+    assert!(!saved.exists());
+}
+
 #[test]
 fn a_run_goes_on_until_its_error_is_small_enough() {
     let folder = lens(|m| m);

@@ -261,15 +261,15 @@ pub(crate) struct TraceOptions {
     /// Go on where an interrupted run stopped
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Save a long run every so many seconds, for --resume; one of --until-error or --until-settled is saved when it is stopped alone
+    /// Save a long run every so many seconds, for --resume
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
     pub(crate) checkpoint: f64,
     /// Trace until the statistical error (1σ) of a receiver's power is below P percent, or, with :cells after its name, that of
     /// its cells weighted by their light; --rays is then the most to trace
-    #[arg(long, value_name = "P%@RECEIVER", conflicts_with_all = ["shard", "resume", "verify_pruning", "paths"])]
+    #[arg(long, value_name = "P%@RECEIVER", conflicts_with_all = ["shard", "verify_pruning", "paths"])]
     pub(crate) until_error: Option<String>,
     /// Trace until no row of the scene's [[regulation]] is unsure by the rays, or say that it cannot; --rays is then the most to trace
-    #[arg(long, conflicts_with_all = ["shard", "resume", "verify_pruning", "paths", "until_error"])]
+    #[arg(long, conflicts_with_all = ["shard", "verify_pruning", "paths", "until_error"])]
     pub(crate) until_settled: bool,
     /// Write every vertex of every ray path, in constant memory: arrays ray, branch, bounce, event, point (mm) and power (share
     /// of an average ray), in no particular order; events from 0: emitted, split, reflected, transmitted, scattered, absorbed,

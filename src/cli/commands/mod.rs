@@ -18,6 +18,7 @@ mod ray_range;
 mod replay;
 mod study;
 mod trace;
+mod trace_until;
 mod verdicts;
 
 use crate::cli::arguments::command::Command;

@@ -1,5 +1,6 @@
 //! `lampyris trace`: a scene from disk.
 
+use super::trace_until::{SearchPlace, SearchedRun, Until, trace_until};
 use super::{dry_run, ray_range, replay, verdicts};
 use crate::cli::arguments::command::TraceOptions;
 use crate::cli::completion::Completion;
@@ -129,24 +130,25 @@ fn trace_whole(
     let _owned = OutputPlace::folder(folder)?;
     let with_page = extra.page.is_wanted();
     let paths = try_outputs(prepared, command, &file)?;
-    let found = trace_until(prepared, target, extra.until_settled, console)?;
+    let until = target.map(Until::Error).or(extra.until_settled.then_some(Until::Settled));
+    let place = SearchPlace { scene: command.scene, file: &file, every_seconds: extra.checkpoint, console };
+    let found = until.map(|until| trace_until(prepared, until, &place, extra.resume)).transpose()?;
     let prepared = &*prepared;
     let checkpoint = Checkpoint::new(prepared, command.scene, file, None, extra.checkpoint, console)?;
-    let (traced, result) = match found {
-        Some(SearchedRun { portion, option, .. }) if !portion.is_whole() => {
-            let again = format!("--rays {} --resume in place of {option}", prepared.run_settings().rays);
-            return Err(checkpoint.save_stopped(&portion, "interrupted", &again));
+    let (traced, saved, result) = match found {
+        Some(SearchedRun { portion, .. }) if !portion.is_whole() => {
+            return Err(checkpoint.save_stopped(&portion, "interrupted", RESUME));
         }
-        Some(SearchedRun { portion, result, .. }) => (Some(portion), result),
-        None => (None, None),
+        Some(SearchedRun { portion, result }) => (Some(portion), None, result),
+        None if extra.resume => (None, checkpoint.read_and_say()?, None),
+        None => (None, None, None),
     };
-    let saved = if extra.resume { saved_run(&checkpoint, folder, console)? } else { None };
     // Called by any thread: it saves when it is time to.
     let save = |p: &PartialRun| checkpoint.save_when_due(p);
     let take = paths.as_ref().map(|paths| |vertices: &[PathVertex]| paths.append(vertices));
     let request = TraceRequest {
         verify_pruning: extra.verify_pruning,
-        // What was traced to find the number of rays is saved no more.
+        // What was traced to find the number of rays is saved.
         finished: traced.is_none().then_some(&save),
         from: traced.or(saved),
         every: checkpoint.interval(),
@@ -195,43 +197,6 @@ fn trace_whole(
     ends_written?;
     let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
     Ok(lost.and(Completion::incomplete_if(missed)))
-}
-
-/// What was traced to find a number of rays.
-struct SearchedRun {
-    portion: PartialRun,
-    /// What came of an error that was to be reached.
-    result: Option<TargetResult>,
-    /// The option that asked.
-    option: &'static str,
-}
-
-/// Traces as many rays as the error or the verdicts that are to be reached need; `None` where none are.
-fn trace_until(
-    prepared: &mut PreparedScene,
-    target: Option<&ErrorTarget>,
-    until_settled: bool,
-    console: &Console,
-) -> Result<Option<SearchedRun>, Failure> {
-    if let Some(target) = target {
-        let (portion, result) = target.trace(prepared, &TerminalMonitor::of_saveable(console, None));
-        return Ok(Some(SearchedRun { portion, result: Some(result), option: "--until-error" }));
-    }
-    if !until_settled {
-        return Ok(None);
-    }
-    let portion = verdicts::trace_until_settled(prepared, console)?;
-    Ok(Some(SearchedRun { portion, result: None, option: "--until-settled" }))
-}
-
-/// Returns what is done of an interrupted run, and says so; `None` where there is none.
-fn saved_run(checkpoint: &Checkpoint, folder: &Path, console: &Console) -> Result<Option<PartialRun>, Failure> {
-    let saved = checkpoint.read()?;
-    console.say(match &saved {
-        Some(p) => format!("going on from {} of {} replicates", p.done.len(), p.replicates),
-        None => format!("{} holds no interrupted run: starting from the beginning", folder.display()),
-    });
-    Ok(saved)
 }
 
 /// Says what came of --until-error, and gives the sentence for the page; none where nothing was asked.

@@ -3,9 +3,7 @@
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::verdict::summary;
-use crate::cli::work::terminal_monitor::TerminalMonitor;
-use crate::pipeline::{self, PreparedScene, SceneResults};
-use crate::simulate::PartialRun;
+use crate::pipeline::{PreparedScene, SceneResults};
 use serde_json::Value;
 
 /// What is said where --until-settled did not settle every row.
@@ -30,11 +28,11 @@ pub(super) fn are_unsettled(document: &Value) -> bool {
     rows.any(|row| row["verdict"] == "unsure")
 }
 
-/// Traces as many rays as the verdicts of the scene's regulations need; not all of them where it is interrupted.
+/// Checks that more rays can settle the verdicts of a scene.
 ///
 /// # Errors
 /// When the scene names no regulation, or its sources have their own numbers of rays.
-pub(super) fn trace_until_settled(prepared: &mut PreparedScene, console: &Console) -> Result<PartialRun, Failure> {
+pub(super) fn check_settling(prepared: &PreparedScene) -> Result<(), Failure> {
     let scene = &prepared.job.scene;
     if scene.regulations.is_empty() {
         let failure = Failure::arguments("--until-settled: the scene names no regulation");
@@ -45,6 +43,5 @@ pub(super) fn trace_until_settled(prepared: &mut PreparedScene, console: &Consol
         let failure = Failure::arguments("--until-settled: a source with `rays` of its own does not grow");
         return Err(failure.with_help("take `rays` out of the [[source]]s"));
     }
-    let (portion, _) = pipeline::trace_until_settled(prepared, &TerminalMonitor::of_saveable(console, None));
-    Ok(portion)
+    Ok(())
 }

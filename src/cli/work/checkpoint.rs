@@ -94,6 +94,20 @@ impl<'a> Checkpoint<'a> {
         })
     }
 
+    /// Reads what an interrupted run left behind, and says how much that is.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub(crate) fn read_and_say(&self) -> Result<Option<PartialRun>, Failure> {
+        let saved = self.read()?;
+        let folder = folder_of(&self.file);
+        self.console.say(match &saved {
+            Some(p) => format!("going on from {} of {} replicates", p.done.len(), p.replicates),
+            None => format!("{} holds no interrupted run: starting from the beginning", folder.display()),
+        });
+        Ok(saved)
+    }
+
     /// Saves the run if it is time to; a failure is said and the run goes on.
     pub(crate) fn save_when_due(&self, portion: &PartialRun) {
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());

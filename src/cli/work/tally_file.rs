@@ -103,6 +103,11 @@ impl TallyHeader {
         })
     }
 
+    /// Returns the number of rays of the run, where the scene's own was not taken.
+    pub(crate) fn rays(&self) -> Option<u64> {
+        self.rays
+    }
+
     /// Returns the same header with what the run took.
     pub(crate) fn with_usage(&self, usage: Usage) -> Self {
         Self { usage, ..self.clone() }

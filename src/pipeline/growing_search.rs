@@ -1,0 +1,57 @@
+//! Runs of growing length, each from its first ray, until one is long enough: where the search begins, and what keeps its runs.
+
+use super::monitor::Monitor;
+use super::prepared_scene::{PreparedScene, TraceRequest};
+use crate::simulate::{PartialRun, Results};
+
+/// Keeps a run while it is traced, so that what is done of it outlives its process.
+pub trait RunKeeper {
+    /// Calls `trace` once, for the run that `prepared` asks for, with what is done of it already and with what is told of the rest.
+    fn keep(&self, prepared: &PreparedScene, trace: &mut dyn FnMut(TraceRequest<'_>));
+}
+
+/// Keeps nothing, and has nothing done.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unkept;
+
+impl RunKeeper for Unkept {
+    fn keep(&self, _prepared: &PreparedScene, trace: &mut dyn FnMut(TraceRequest<'_>)) {
+        trace(TraceRequest::default());
+    }
+}
+
+/// A search for a number of rays.
+#[derive(Clone, Copy)]
+pub struct GrowingSearch<'a> {
+    /// Rays of the first run, where an earlier search had come so far; `None` for those that a search begins with.
+    pub first_rays: Option<u64>,
+    /// Keeps its runs.
+    pub keeper: &'a dyn RunKeeper,
+}
+
+impl Default for GrowingSearch<'_> {
+    /// From the beginning; nothing is kept.
+    fn default() -> Self {
+        Self { first_rays: None, keeper: &Unkept }
+    }
+}
+
+impl GrowingSearch<'_> {
+    /// Returns the number of rays of the first run: `usual`, and at most `most`, but what an earlier search had come to is gone on with.
+    pub(super) fn first_rays(&self, usual: u64, most: u64) -> u64 {
+        self.first_rays.unwrap_or(usual.min(most))
+    }
+
+    /// Traces the run that `prepared` asks for, and returns its sums and its results.
+    pub(super) fn trace(&self, prepared: &PreparedScene, monitor: &dyn Monitor) -> (PartialRun, Results) {
+        let settings = prepared.run_settings();
+        prepared.with_intersector(monitor, |intersector, _| {
+            let run = |request: TraceRequest<'_>| prepared.run(intersector, &settings, request, monitor);
+            let mut traced = None;
+            self.keeper.keep(prepared, &mut |request| traced = Some(run(request)));
+            let traced = traced.unwrap_or_else(|| run(TraceRequest::default()));
+            let portion = traced.partial.clone();
+            (portion, Results::new(&prepared.bound, &settings, traced))
+        })
+    }
+}
