@@ -34,7 +34,7 @@ const BATCH: usize = 32;
 /// let ball = Face::whole(sweep::sphere(&Frame::IDENTITY, 1.0, [0.0, 2.0 * PI], [-FRAC_PI_2, FRAC_PI_2]));
 /// let part = Part { shells: vec![Shell { faces: vec![ball], ..Shell::default() }], ..Part::default() };
 /// let place = |k: u32| Frame::translation(3.0 * f64::from(k) * Vector::X);
-/// let ball = |k| Instance { name: String::new(), part: PartId(0), placement: place(k), colour: None };
+/// let ball = |k| Instance { name: String::new(), path: String::new(), part: PartId(0), placement: place(k), colour: None };
 /// let model = Model { name: String::new(), parts: vec![part], instances: (0..1000).map(ball).collect() };
 ///
 /// let instancing = Instancing::new(&model, 0.0).unwrap();

@@ -190,7 +190,8 @@ impl Instancing {
 /// A model of a part alone, at the origin in this scale, and the box around it, which holds its edges and vertices too.
 fn lone_part(part: &Part, scale: f64) -> (Model, Aabb) {
     let placement = Frame { scale, ..Frame::IDENTITY };
-    let instance = Instance { name: part.name.clone(), part: PartId(0), placement, colour: None };
+    let instance =
+        Instance { name: part.name.clone(), path: String::new(), part: PartId(0), placement, colour: None };
     let model = Model { name: part.name.clone(), parts: vec![part.clone()], instances: vec![instance] };
     (model, part.tight_box(scale))
 }
@@ -216,7 +217,13 @@ mod tests {
             let mut place = |part: u32, y: f64| {
                 let placement =
                     Frame { z: -Vector::Z, ..Frame::translation(Vector::new(pitch * k as f64, y, 0.0)) };
-                model.instances.push(Instance { name: String::new(), part: PartId(part), placement, colour: None });
+                model.instances.push(Instance {
+                    name: String::new(),
+                    path: String::new(),
+                    part: PartId(part),
+                    placement,
+                    colour: None,
+                });
             };
             place(0, 0.0);
             if k % 3 == 0 {
@@ -276,7 +283,13 @@ mod tests {
             let mut model = row(100, 5.0);
             model.parts.push(ball("cover", radius, 1));
             let placement = Frame::translation(250.0 * Vector::X);
-            model.instances.push(Instance { name: String::new(), part: PartId(2), placement, colour: None });
+            model.instances.push(Instance {
+                name: String::new(),
+                path: String::new(),
+                part: PartId(2),
+                placement,
+                colour: None,
+            });
             let instancing = Instancing::new(&model, 1e-3).unwrap();
             assert_eq!(instancing.placements.len(), kept);
         }

@@ -2,6 +2,7 @@
 
 use super::{Colour, Face, Part, PartId, SurfaceKind, TessellatedFace};
 use crate::math::{FaceId, Frame};
+use rustc_hash::FxHashMap;
 
 /// A CAD model: distinct parts, and where they stand.
 #[derive(Clone, Debug, Default)]
@@ -19,12 +20,22 @@ pub struct Model {
 pub struct Instance {
     /// Name of the occurrence; the part's name when it had none.
     pub name: String,
+    /// Names of the occurrences that it is placed through, from the outermost down to its own, as `left/led`; alike ones are numbered.
+    /// Empty where no file says.
+    pub path: String,
     /// What is placed.
     pub part: PartId,
     /// From the part's coordinates to the model's.
     pub placement: Frame,
     /// Colour given to this occurrence.
     pub colour: Option<Colour>,
+}
+
+impl Instance {
+    /// Returns what a selector may call it: its name, and its path where it has one.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(self.name.as_str()).chain((!self.path.is_empty()).then_some(self.path.as_str()))
+    }
 }
 
 /// A face where it stands. Either `face` (a surface) or `tessellated` (a ready mesh) is given.
@@ -52,7 +63,13 @@ impl Model {
     /// A model of one part that stands where it is, with the part's name for both model and instance.
     pub fn from_part(part: Part) -> Self {
         let name = part.name.clone();
-        let instance = Instance { name: name.clone(), part: PartId(0), placement: Frame::IDENTITY, colour: None };
+        let instance = Instance {
+            name: name.clone(),
+            path: String::new(),
+            part: PartId(0),
+            placement: Frame::IDENTITY,
+            colour: None,
+        };
         Self { name, parts: vec![part], instances: vec![instance] }
     }
 
@@ -64,9 +81,25 @@ impl Model {
         &self.parts[id.0 as usize]
     }
 
-    /// What to call an instance, by its index: its own name, its part's where some program made one up (`=>[0:1:1:2]`) or gave none, or
-    /// `part` and its number from 1.
-    pub fn label(&self, instance: usize) -> String {
+    /// Returns what to call each instance: its own name, its part's where some program made one up (`=>[0:1:1:2]`) or gave none, or `part`
+    /// and its number from 1; its path where several would be called alike.
+    pub fn labels(&self) -> Vec<String> {
+        let mut labels: Vec<String> = (0..self.instances.len()).map(|k| self.own_label(k)).collect();
+        let mut uses: FxHashMap<&str, u32> = FxHashMap::default();
+        for label in &labels {
+            *uses.entry(label).or_insert(0) += 1;
+        }
+        let shared: Vec<bool> = labels.iter().map(|label| uses[label.as_str()] > 1).collect();
+        for ((label, instance), is_shared) in labels.iter_mut().zip(&self.instances).zip(shared) {
+            if is_shared && !instance.path.is_empty() {
+                label.clone_from(&instance.path);
+            }
+        }
+        labels
+    }
+
+    /// What to call an instance, by its index, whatever others are called.
+    fn own_label(&self, instance: usize) -> String {
         let own = &self.instances[instance].name;
         let part = &self.part(self.instances[instance].part).name;
         // `=>[0:1:1:2]` is a label of OpenCASCADE's document, not a name.
@@ -191,6 +224,7 @@ mod tests {
         let mut model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
         model.instances.push(Instance {
             name: "second".into(),
+            path: String::new(),
             part: PartId(0),
             placement: Frame::translation(Vector::Z),
             colour: Some(Colour([1.0, 0.0, 0.0])),

@@ -60,6 +60,9 @@ impl Scene {
                 }
                 if !entry.name.is_empty() {
                     instance.name = format!("{}/{}", entry.name, instance.name);
+                    if !instance.path.is_empty() {
+                        instance.path = format!("{}/{}", entry.name, instance.path);
+                    }
                 }
                 whole.instances.push(instance);
             }

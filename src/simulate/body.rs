@@ -81,6 +81,12 @@ impl Body {
 }
 
 impl Body {
+    /// Whether it is the body of an instance of this name: the whole, or what follows the occurrences that it is placed through.
+    pub(crate) fn is_called(&self, name: &str) -> bool {
+        let outer = self.name.strip_suffix(name);
+        outer.is_some_and(|outer| outer.is_empty() || outer.ends_with('/'))
+    }
+
     /// Whether light of any wavelength crosses from one into the other without being bent.
     pub(crate) fn matches_index(&self, other: &Self) -> bool {
         self.index == other.index && self.dispersive == other.dispersive

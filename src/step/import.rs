@@ -175,7 +175,8 @@ fn convert_assembly(
             reader.add_instance(part, p);
         }
     }
-    let Reader { model, report, .. } = reader;
+    let Reader { mut model, report, .. } = reader;
+    number_alike_paths(&mut model.instances);
     let faces = model.parts.iter().flat_map(|p| &p.shells).flat_map(|s| &s.faces);
     hidden.find_among(faces.filter_map(|f| f.entity.as_ref()));
     report.hidden = hidden.notes(file);
@@ -184,6 +185,25 @@ fn convert_assembly(
         report.problems.push(format!("{name}: {}", absent_shapes(file)));
     }
     Ok(model)
+}
+
+/// Numbers instances whose paths are alike from 2 on, as `left/led:2`, in the file's order, so that each path means one.
+fn number_alike_paths(instances: &mut [Instance]) {
+    let mut taken: FxHashSet<String> = instances.iter().map(|i| i.path.clone()).collect();
+    let mut uses: FxHashMap<String, u32> = FxHashMap::default();
+    for instance in instances {
+        let count = uses.entry(instance.path.clone()).or_insert(0);
+        *count += 1;
+        while *count > 1 {
+            let numbered = format!("{}:{count}", instance.path);
+            // A file may have such a name of its own.
+            if taken.insert(numbered.clone()) {
+                instance.path = numbered;
+                break;
+            }
+            *count += 1;
+        }
+    }
 }
 
 /// Tells of a file without a face what it holds instead: the entities that it has most of.
@@ -287,7 +307,8 @@ impl Reader<'_, '_, '_> {
         }
         let name = if p.name.is_empty() { self.model.part(part).name.clone() } else { p.name };
         let colour = p.owners.iter().rev().find_map(|o| self.styles.colour(*o));
-        self.model.instances.push(Instance { name, part, placement: p.placement, colour });
+        let path = if p.path.is_empty() { name.clone() } else { p.path };
+        self.model.instances.push(Instance { name, path, part, placement: p.placement, colour });
     }
 }
 

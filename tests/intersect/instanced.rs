@@ -46,7 +46,7 @@ fn array(middle: Point, pitch: f64, count: usize) -> Model {
         // Each size often enough, but for a few.
         placement.scale = if k % 50 == 7 { 1.3 } else { [1.0, 2.0][k / 2 % 2] };
         let part = PartId((k % 2) as u32);
-        model.instances.push(Instance { name: String::new(), part, placement, colour: None });
+        model.instances.push(Instance { name: String::new(), path: String::new(), part, placement, colour: None });
     }
     model
 }

@@ -80,7 +80,13 @@ fn a_frame_must_be_one() {
     assert!(message.contains("`frame` belongs to a source with `at`"), "{message}");
     // A second place of the part, under a name of its own: the part's name no longer says which, the instances' do.
     world.model.instances[0].name = "left".into();
-    world.model.instances.push(Instance { name: "right".into(), part: PartId(0), placement, colour: None });
+    world.model.instances.push(Instance {
+        name: "right".into(),
+        path: String::new(),
+        part: PartId(0),
+        placement,
+        colour: None,
+    });
     world.model.parts[0].name = "headlamp".into();
     let message = bind(&world, "frame = 'headlamp'");
     assert!(message.contains("placed 2 times"), "{message}");

@@ -36,7 +36,13 @@ fn light_that_runs_round_in_a_ring_stays_in_it() {
     let surface = sweep::torus(&Frame::IDENTITY, 20.0, 2.0, [0.0, TAU], [0.0, TAU]);
     let shells = vec![Shell { faces: vec![Face::whole(surface)], closed: true, ..Shell::default() }];
     let part = Part { name: "ring".into(), shells, ..Part::default() };
-    let placed = Instance { name: "ring".into(), part: PartId(0), placement: Frame::IDENTITY, colour: None };
+    let placed = Instance {
+        name: "ring".into(),
+        path: String::new(),
+        part: PartId(0),
+        placement: Frame::IDENTITY,
+        colour: None,
+    };
     let model = Model { parts: vec![part], instances: vec![placed], ..Model::default() };
     let text = format!(
         "[run]\nrays = 500\nmax_bounces = 1000\ncaught_after = inf\n{GUIDE}

@@ -61,6 +61,34 @@ fn two_solids_of_one_part_are_told_apart() {
     }
 }
 
+/// A part that stands twice under one name, in two assemblies: the path tells which, the name means both.
+#[test]
+fn places_of_one_name_are_told_apart_by_their_paths() {
+    let mut world = World::default();
+    world.sphere("b1", Point::ZERO, 1.0);
+    let mut model = world.model;
+    let mut second = model.instances[0].clone();
+    second.placement = Frame::translation(Vector::X * 10.0);
+    model.instances.push(second);
+    model.instances.iter_mut().zip(["A/b1", "B/b1"]).for_each(|(instance, path)| instance.path = path.into());
+    for (instance, faces) in [("A/b1", &[0][..]), ("B/*", &[1]), ("b1", &[0, 1])] {
+        let table = rules(&model, &format!("[[material]]\ninstance = '{instance}'\nsurface = 'mirror'\n")).unwrap();
+        assert_eq!(table[0].faces, faces, "{instance}");
+    }
+    let error = rules(&model, "[[material]]\ninstance = 'C/b1'\nsurface = 'mirror'\n").unwrap_err();
+    assert!(error.to_string().contains("/b1'"), "{error}");
+    // The selector of a face, names in results, and the frame of a source say the path.
+    let faces: Vec<PlacedFace<'_>> = model.placed_faces().collect();
+    let selectors: Vec<String> = face_selectors(&model, &faces).iter().map(|s| s.to_string()).collect();
+    assert!(selectors[1].contains("instance = \"B/b1\"") && !selectors[1].contains("at ="), "{selectors:?}");
+    assert_eq!(model.labels(), ["A/b1", "B/b1"]);
+    let text = |frame: &str| format!("[[source]]\nkind = 'point'\nframe = '{frame}'\nat = [5, 0, 0]\n");
+    let bind = |frame: &str| Scene::parse(&text(frame), "s.toml", Path::new(".")).unwrap().bind(&model);
+    assert!(bind("B/b1").is_ok());
+    let error = bind("b1").unwrap_err().to_string();
+    assert!(error.contains("placed 2 times") && error.contains("'A/b1'"), "{error}");
+}
+
 #[test]
 fn the_last_rule_decides_and_the_table_says_so() {
     let materials = "[[material]]\nsurface = 'mirror'\n[[material]]\nsolid = [0, 1]\nsurface = 'diffuse'\n";

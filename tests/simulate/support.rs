@@ -46,7 +46,13 @@ impl World {
         let shells = vec![Shell { faces, closed, ..Shell::default() }];
         self.model.parts.push(Part { name: name.into(), shells, ..Part::default() });
         let part = PartId(self.model.parts.len() as u32 - 1);
-        self.model.instances.push(Instance { name: name.into(), part, placement: Frame::IDENTITY, colour: None });
+        self.model.instances.push(Instance {
+            name: name.into(),
+            path: String::new(),
+            part,
+            placement: Frame::IDENTITY,
+            colour: None,
+        });
         self
     }
 

@@ -128,3 +128,18 @@ fn shapes_of_no_product_are_placed() {
         );
     }
 }
+
+/// Each place has a path of its own through the assemblies around it; alike ones are numbered in the file's order.
+#[test]
+fn places_have_paths_of_their_own() {
+    let sub = "#201=PRODUCT_DEFINITION('','',#221,$);\n#221=PRODUCT_DEFINITION_FORMATION('','',#231);\n\
+               #231=PRODUCT('sub','sub','',());\n\
+               #210=NEXT_ASSEMBLY_USAGE_OCCURRENCE('1','A','',#101,#201,$);\n\
+               #211=NEXT_ASSEMBLY_USAGE_OCCURRENCE('2','B','',#101,#201,$);\n\
+               #212=NEXT_ASSEMBLY_USAGE_OCCURRENCE('3','b1','',#201,#102,$);\n\
+               #213=NEXT_ASSEMBLY_USAGE_OCCURRENCE('4','b1','',#201,#102,$);\n";
+    let import = read("", &[SHAPE, sub].concat());
+    let paths: Vec<&str> = import.model.instances.iter().map(|i| i.path.as_str()).collect();
+    assert_eq!(paths, ["A/b1", "A/b1:2", "B/b1", "B/b1:2"]);
+    assert_eq!(import.model.labels(), paths);
+}

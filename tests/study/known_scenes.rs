@@ -75,7 +75,7 @@ pub(crate) fn doublet(scale: f64) -> KnownScene {
     model.parts.extend(second.parts);
     let part = PartId(model.parts.len() as u32 - 1);
     let placement = Frame::translation(Point::new(0.0, 0.0, thick));
-    model.instances.push(Instance { name: "flint".into(), part, placement, colour: None });
+    model.instances.push(Instance { name: "flint".into(), path: String::new(), part, placement, colour: None });
     let interface = |z: f64, c: Conic, index: f64| Interface { z, radius: c.radius, conic: c.conic, index };
     let surfaces =
         [interface(0.0, front, 1.5168), interface(thick, inner, 1.62), interface(thick + thin, back, 1.0)];

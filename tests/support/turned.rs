@@ -59,6 +59,7 @@ pub(crate) fn turned(name: &str, profile: &[Curve], from: f64) -> Part {
 pub(crate) fn assembly(parts: Vec<Part>) -> Model {
     let instance = |(i, part): (usize, &Part)| Instance {
         name: part.name.clone(),
+        path: String::new(),
         part: PartId(i as u32),
         placement: Frame::IDENTITY,
         colour: None,

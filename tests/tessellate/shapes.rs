@@ -216,7 +216,13 @@ fn measured_normals_of_a_sphere_stay_within_the_cone_of_a_facet() {
 fn a_mirrored_and_scaled_instance_stays_turned_outward() {
     let mut model = Model::from_part(can(10.0, 30.0, None));
     let placement = Frame { x: -Vector::X, scale: 2.0, ..Frame::translation(Vector::X * 100.0) };
-    model.instances.push(Instance { name: String::new(), part: PartId(0), placement, colour: None });
+    model.instances.push(Instance {
+        name: String::new(),
+        path: String::new(),
+        part: PartId(0),
+        placement,
+        colour: None,
+    });
     let made = tessellate(&model, &measured(0.1));
     assert_sound(&made, "mirrored");
     let exact = PI * 100.0 * 30.0 * 9.0;

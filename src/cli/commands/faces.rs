@@ -11,6 +11,9 @@ use serde_json::json;
 /// Faces of a solid that are listed without -v; of more, the first ones and how many there are.
 const SHOWN_FACES: usize = 60;
 
+/// Places of a part that are listed.
+const SHOWN_PLACES: usize = 12;
+
 /// Coordinates below this are rounding of what the file has as 0, mm.
 const ROUNDING_MM: f64 = 1e-9;
 
@@ -20,6 +23,9 @@ pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failur
     let mut selectors = part_selectors(model).into_iter();
     if console.json {
         let mut document = json!({"parts": json_value(&parts)?});
+        for (k, places) in places_of_parts(model).into_iter().enumerate() {
+            document["parts"][k]["places"] = places.into();
+        }
         let solids =
             document["parts"].as_array_mut().into_iter().flatten().flat_map(|part| part["solids"].as_array_mut());
         for face in solids.flatten().flat_map(|solid| solid["faces"].as_array_mut()).flatten() {
@@ -28,7 +34,9 @@ pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failur
         return Ok(print(&json_text(&document)?)?);
     }
     let most = if console.verbose > 0 { usize::MAX } else { SHOWN_FACES };
-    let tree: String = parts.iter().map(|part| part_text(part, most, &mut selectors)).collect();
+    let places = places_of_parts(model);
+    let tree: String =
+        parts.iter().zip(&places).map(|(part, places)| part_text(part, places, most, &mut selectors)).collect();
     print(&tree)?;
     console.say(console.dim(
         "  behind each face: what selects it in a rule of a scene; rules also take solid, layer, kind, radius_mm, colour and at (a point)",
@@ -59,9 +67,32 @@ fn part_selectors(model: &Model) -> Vec<Option<String>> {
     selectors
 }
 
-/// Returns the lines of a part: its name, how often it is placed, and its solids. Takes a selector for each of its faces.
-fn part_text(part: &PartAccount, most: usize, selectors: &mut impl Iterator<Item = Option<String>>) -> String {
-    let placed = if part.instances == 1 { String::new() } else { format!(", placed {} times", part.instances) };
+/// Returns for each part what selects each of its places by `instance`: names that others do not have, or paths.
+fn places_of_parts(model: &Model) -> Vec<Vec<String>> {
+    let mut places = vec![Vec::new(); model.parts.len()];
+    for (instance, label) in model.instances.iter().zip(model.labels()) {
+        places[instance.part.0 as usize].push(label);
+    }
+    places
+}
+
+/// Returns the lines of a part: its name, how often it is placed and as which instances, and its solids. Takes a selector for each of its
+/// faces.
+fn part_text(
+    part: &PartAccount,
+    places: &[String],
+    most: usize,
+    selectors: &mut impl Iterator<Item = Option<String>>,
+) -> String {
+    let placed = match places {
+        [_] => String::new(),
+        [] => ", placed nowhere".into(),
+        _ => {
+            let named: Vec<String> = places.iter().take(SHOWN_PLACES.min(most)).map(|p| quoted_name(p)).collect();
+            let more = if places.len() > named.len() { ", …" } else { "" };
+            format!(", placed {} times: instance = {}{more}", part.instances, named.join(", "))
+        }
+    };
     let mut text = format!("part {}{placed}\n", quoted_name(&part.name));
     for solid in &part.solids {
         text += &solid_text(solid, most, selectors);

@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 
 /// Solids that get a rule of their own; of more, a comment says how many there are.
 const MOST_RULES: usize = 40;
+/// Parts that are placed several times, and places of each, that are named in a comment.
+const MOST_PLACED_PARTS: usize = 10;
+const MOST_PLACES: usize = 6;
 /// Distance of source and receiver from the model, and margin of the beam, as shares of the box' diagonal.
 const DISTANCE: f64 = 0.5;
 const BEAM_MARGIN: f64 = 1.05;
@@ -87,11 +90,31 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
         # shows what selects each face, `lampyris media` lists the media that have names.\n";
     let rules = rule_texts(&model.account());
     text.extend(rules.iter().take(MOST_RULES).map(String::as_str));
+    text += &places_text(model);
     let rest = rules.len().saturating_sub(MOST_RULES);
     if rest > 0 {
         text += &format!("# … and {rest} more solids: `lampyris info --faces` names them\n\n");
     }
     text + &light_text(model)
+}
+
+/// Returns comments that say what selects one place of a part that has several, of the first such parts; empty where no part has.
+fn places_text(model: &Model) -> String {
+    let mut places: Vec<Vec<String>> = vec![Vec::new(); model.parts.len()];
+    for (instance, label) in model.instances.iter().zip(model.labels()) {
+        places[instance.part.0 as usize].push(label);
+    }
+    let line = |labels: &Vec<String>| {
+        let first: Vec<String> = labels.iter().take(MOST_PLACES).map(|label| toml_string(label)).collect();
+        let more = if labels.len() > MOST_PLACES { ", …" } else { "" };
+        format!("#   instance = {}{more}\n", first.join(" or "))
+    };
+    let mut distinct = places.iter().filter(|labels| labels.len() > 1 && labels.iter().any(|l| l != &labels[0]));
+    let lines: String = distinct.by_ref().take(MOST_PLACED_PARTS).map(line).collect();
+    if lines.is_empty() {
+        return lines;
+    }
+    format!("# Of parts that are placed several times each place has a name of its own:\n{lines}\n")
 }
 
 /// Returns the rules for all parts that are placed: one for each name, or one for each solid where a part of that name has several; none

@@ -49,10 +49,11 @@ pub(crate) fn grouped_facets<'a>(model: &Model, mesh: &'a FacetMesh, bound: Opti
             looks.len() as u32 - 1
         }));
     }
+    let labels = model.labels();
     // A part of several looks has several entries in a legend, which must differ.
     let name = |instance: usize, look: &str| match (looks_of_instance[instance], look) {
-        (1, _) | (_, "") => model.label(instance),
-        _ => format!("{}, {look}", model.label(instance)),
+        (1, _) | (_, "") => labels[instance].clone(),
+        _ => format!("{}, {look}", labels[instance]),
     };
     let groups: Vec<Group> = (looks.iter())
         .map(|(look, colour)| match look {

@@ -28,12 +28,13 @@ const SHARE_DIGITS: usize = 4;
 
 /// Names of faces as ways have them: what selects each, without the braces around it, behind its instance where there are several.
 pub(super) fn face_names(model: &Model) -> Vec<String> {
+    let labels = model.labels();
     let name = |(face, label): (PlacedFace<'_>, String)| {
         let bare = label.strip_prefix("on = { ").and_then(|l| l.strip_suffix(" }")).unwrap_or(&label);
         if model.instances.len() < 2 || bare.starts_with("instance") {
             return bare.to_owned();
         }
-        format!("{} ({bare})", model.label(face.instance))
+        format!("{} ({bare})", labels[face.instance])
     };
     model.placed_faces().zip(face_labels(model)).map(name).collect()
 }

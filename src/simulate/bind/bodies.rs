@@ -28,6 +28,7 @@ pub(super) fn find_bodies(
         Some(name) => medium::find(scene, name, &[Key::Name("ambient")])?,
         None => optics::Medium::vacuum(),
     };
+    let labels = model.labels();
     let mut bodies = vec![Body::new(ambient, "surroundings".into(), light)];
     let mut places: HashMap<(usize, &str), usize> = HashMap::new();
     let mut of_face = vec![AMBIENT; chosen.len()];
@@ -41,7 +42,7 @@ pub(super) fn find_bodies(
             // Looked up once a body, not once a face.
             None => {
                 let at = [Key::Name("material"), Key::Index(rule), Key::Name("medium")];
-                let instance = model.label(f.instance);
+                let instance = labels[f.instance].clone();
                 let body = Body::new(medium::find(scene, name, &at)?, instance, light);
                 if !body.has_valid_index() {
                     let message = format!("'{name}' has no index at {} nm", light.wavelength);

@@ -57,6 +57,11 @@ impl BoundScene {
         self.bodies.get(body as usize).map(|b| [b.name.as_str(), b.medium.as_str()])
     }
 
+    /// Returns how many faces the scene has listed, of those that absorb and let out most.
+    pub(crate) fn listed_faces(&self) -> usize {
+        self.scene.run.faces as usize
+    }
+
     /// Whether the scene asks what passes each face.
     pub(crate) fn counts_faces(&self) -> bool {
         self.scene.run.faces > 0

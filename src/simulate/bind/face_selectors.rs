@@ -28,19 +28,45 @@ const COMBINATIONS: [&[Key]; 10] = [
     &[Key::Part, Key::Instance, Key::Solid, Key::Entity],
 ];
 
+/// The names of a model's parts and instances, as selectors hold them.
+struct Names<'m> {
+    model: &'m Model,
+    /// Whether an instance shares its name with another.
+    shared: Vec<bool>,
+}
+
+impl<'m> Names<'m> {
+    fn new(model: &'m Model) -> Self {
+        let mut uses: HashMap<&str, u32> = HashMap::new();
+        for instance in &model.instances {
+            *uses.entry(&instance.name).or_insert(0) += 1;
+        }
+        let shared = model.instances.iter().map(|instance| uses[instance.name.as_str()] > 1).collect();
+        Self { model, shared }
+    }
+
+    /// Returns the name of a face's instance, or its path where others have that name too.
+    fn instance(&self, face: &PlacedFace<'_>) -> &'m str {
+        let instance = &self.model.instances[face.instance];
+        let is_told_by_path = self.shared[face.instance] && !instance.path.is_empty();
+        if is_told_by_path { &instance.path } else { &instance.name }
+    }
+}
+
 /// Returns the name if a selector can hold it: it is not empty, and no `*` makes it a pattern.
 fn usable_name(name: &str) -> Option<&str> {
     (!name.is_empty() && !name.contains('*')).then_some(name)
 }
 
 /// Returns the selector of a face made of these keys; `None` where the face, its part or its instance lacks one of them.
-fn selector_of_keys(keys: &[Key], face: &PlacedFace<'_>, model: &Model) -> Option<FaceSelector> {
+fn selector_of_keys(keys: &[Key], face: &PlacedFace<'_>, names: &Names<'_>) -> Option<FaceSelector> {
+    let model = names.model;
     let mut selector = FaceSelector::default();
     let name = |name: &str| Some(OneOrMany::One(usable_name(name)?.to_owned()));
     for key in keys {
         match key {
             Key::Part => selector.part = Some(name(&model.part(face.part).name)?),
-            Key::Instance => selector.instance = Some(name(&model.instances[face.instance].name)?),
+            Key::Instance => selector.instance = Some(name(names.instance(face))?),
             Key::Solid => selector.solid = Some(OneOrMany::One(SolidKey::Number(face.solid))),
             Key::Name => selector.face = Some(name(face.name())?),
             Key::Entity => selector.entity = Some(OneOrMany::One(face.entity()?)),
@@ -52,13 +78,15 @@ fn selector_of_keys(keys: &[Key], face: &PlacedFace<'_>, model: &Model) -> Optio
 /// Returns for each of these faces the shortest selector that means it alone among them: its name or `#id`, with part, instance and solid
 /// where these are needed. Where no combination tells it apart, all that it has with a point on it; a face without geometry has no point.
 pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelector> {
+    let names = Names::new(model);
     let mut chosen: Vec<Option<FaceSelector>> = vec![None; faces.len()];
     for keys in COMBINATIONS {
         if chosen.iter().all(Option::is_some) {
             break;
         }
         // A selector tells a face apart when no other face of these has the same text.
-        let selectors: Vec<Option<FaceSelector>> = faces.iter().map(|f| selector_of_keys(keys, f, model)).collect();
+        let selectors: Vec<Option<FaceSelector>> =
+            faces.iter().map(|f| selector_of_keys(keys, f, &names)).collect();
         let texts: Vec<Option<String>> = selectors.iter().map(|s| Some(s.as_ref()?.to_string())).collect();
         let mut uses: HashMap<&str, u32> = HashMap::new();
         for text in texts.iter().flatten() {
@@ -73,13 +101,13 @@ pub fn face_selectors(model: &Model, faces: &[PlacedFace<'_>]) -> Vec<FaceSelect
     chosen
         .into_iter()
         .zip(faces)
-        .map(|(chosen, face)| chosen.unwrap_or_else(|| selector_by_point(face, model)))
+        .map(|(chosen, face)| chosen.unwrap_or_else(|| selector_by_point(face, &names)))
         .collect()
 }
 
 /// Returns a selector of everything that a face has but its name, and a point on it, mm, in scene coordinates; without the point where the
 /// face has neither a surface nor facets.
-fn selector_by_point(face: &PlacedFace<'_>, model: &Model) -> FaceSelector {
+fn selector_by_point(face: &PlacedFace<'_>, names: &Names<'_>) -> FaceSelector {
     let name = |name: &str| usable_name(name).map(|name| OneOrMany::One(name.to_owned()));
     // A point inside of the trims, which no other face is as near to.
     let on_surface = face.face.map(|f| f.surface.evaluate(f.inner_parameters()));
@@ -89,8 +117,8 @@ fn selector_by_point(face: &PlacedFace<'_>, model: &Model) -> FaceSelector {
         Some((a + b + c) / 3.0)
     };
     FaceSelector {
-        part: name(&model.part(face.part).name),
-        instance: name(&model.instances[face.instance].name),
+        part: name(&names.model.part(face.part).name),
+        instance: name(names.instance(face)),
         solid: Some(OneOrMany::One(SolidKey::Number(face.solid))),
         entity: face.entity().map(OneOrMany::One),
         at: on_surface.or_else(on_mesh).map(|p| OneOrMany::One(face.placement.point(p).to_array())),

@@ -11,7 +11,7 @@ pub(super) fn frame(scene: &Scene, model: &Model, of: [Key<'_>; 2], name: Option
     let Some(name) = name else { return Ok(Frame::IDENTITY) };
     let at = [of[0], of[1], Key::Name("frame")];
     // An instance says which of several is meant, so that its name comes first.
-    let mut named: Vec<_> = model.instances.iter().filter(|i| i.name == name).collect();
+    let mut named: Vec<_> = model.instances.iter().filter(|i| i.names().any(|own| own == name)).collect();
     if named.is_empty() {
         named = model.instances.iter().filter(|i| model.part(i.part).name == name).collect();
     }
@@ -24,7 +24,12 @@ pub(super) fn frame(scene: &Scene, model: &Model, of: [Key<'_>; 2], name: Option
         }
         _ => {
             let message = format!("'{name}' is placed {} times, each with a frame of its own", named.len());
-            Err(scene.error(ErrorKind::NoMatch, &at, message).help("name an instance that there is once"))
+            let paths: Vec<&str> = named.iter().map(|i| i.path.as_str()).filter(|p| !p.is_empty()).collect();
+            let help = match paths[..] {
+                [] => "name an instance that there is once".to_owned(),
+                [first, ..] => format!("name one by its path, as '{first}'; `lampyris info --faces` lists them"),
+            };
+            Err(scene.error(ErrorKind::NoMatch, &at, message).help(help))
         }
     }
 }

@@ -119,7 +119,7 @@ fn covered_note(scene: &Scene, index: usize, model: &Model, measured: &[CoveredA
             (None, "") => format!("face {}", f.id.0),
             (None, name) => format!("face '{name}'"),
         };
-        format!(", most of it {:.0} % of {name} of '{}'", 100.0 * covered(a) / a.whole, model.label(f.instance))
+        format!(", most of it {:.0} % of {name} of '{}'", 100.0 * covered(a) / a.whole, model.labels()[f.instance])
     });
     format!(
         "{:.1} % of the area that {label} names lies against opaque faces of other solids{example}: it does not shine, and all of the \

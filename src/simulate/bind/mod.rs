@@ -97,7 +97,7 @@ impl Scene {
             receivers,
             region,
             solids: None,
-            instances: (0..model.instances.len()).map(|k| model.label(k)).collect(),
+            instances: model.labels(),
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
             rules: rule_table::rule_table(self, &chosen),
             notes: notes::range_notes(self, &chosen, &ranges),

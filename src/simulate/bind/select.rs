@@ -2,7 +2,7 @@
 
 use super::nearest::Nearest;
 use crate::math::Point;
-use crate::model::{Model, PlacedFace, SurfaceKind};
+use crate::model::{Instance, Model, PlacedFace, SurfaceKind};
 use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, SolidKey, suggest};
 use crate::simulate::{Error, ErrorKind};
 
@@ -59,7 +59,7 @@ fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -
     let same_colour =
         |wanted: [f64; 3], have: [f64; 3]| have.iter().zip(wanted).all(|(a, b)| (a - b).abs() < COLOUR_STEP);
     matches_any(&rule.part, &model.part(face.part).name)
-        && matches_any(&rule.instance, &model.instances[face.instance].name)
+        && model.instances[face.instance].names().any(|name| matches_any(&rule.instance, name))
         && matches_any(&rule.face, face.name())
         && matches_any(&rule.kind, face.kind().word())
         && rule.entity.as_ref().is_none_or(|e| face.entity().is_some_and(|id| e.as_slice().contains(&id)))
@@ -129,7 +129,7 @@ fn each_name_means_something(
     model: &Model,
 ) -> Result<(), Error> {
     let parts = model.instances.iter().map(|i| model.part(i.part).name.as_str());
-    let instances = model.instances.iter().map(|i| i.name.as_str());
+    let instances = model.instances.iter().flat_map(Instance::names);
     let faces = model.placed_faces().filter_map(|f| match (f.face, f.tessellated) {
         (Some(face), _) => Some(face.name.as_str()),
         (None, ready) => ready.map(|t| t.name.as_str()),
@@ -192,7 +192,7 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Res
     let faces: Vec<u32> = model
         .placed_faces()
         .filter(|f| matches_any(&rule.part, &model.part(f.part).name))
-        .filter(|f| matches_any(&rule.instance, &model.instances[f.instance].name))
+        .filter(|f| model.instances[f.instance].names().any(|name| matches_any(&rule.instance, name)))
         .map(|f| f.id.0)
         .collect();
     if faces.is_empty() {

@@ -322,7 +322,7 @@ impl Emitter {
 fn stated_media(scene: &Scene, source: usize, bodies: &[Body]) -> Result<SmallVec<[u32; 4]>, Error> {
     let mut media = SmallVec::new();
     for instance in scene.sources[source].inside.iter().flat_map(|n| n.as_slice()) {
-        let Some(body) = bodies.iter().skip(1).position(|b| b.name == *instance) else {
+        let Some(body) = bodies.iter().skip(1).position(|b| b.is_called(instance)) else {
             let at = [scene::Key::Name("source"), scene::Key::Index(source), scene::Key::Name("inside")];
             let message = format!("no instance called '{instance}' has a medium");
             let names: Vec<&str> = bodies.iter().skip(1).map(|b| b.name.as_str()).collect();

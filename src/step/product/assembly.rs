@@ -8,7 +8,7 @@ use super::relations::{
     Link, WITH_TRANSFORMATION, property_attributes, related_representations, shape_definition_attributes,
     usage_attributes,
 };
-use super::usage_names::{Usage, name_usages, product_name};
+use super::usage_names::{Usage, name_usages, occurrence_names, occurrence_path, product_name};
 use crate::math::Frame;
 use crate::step::geometry::units::Units;
 use crate::step::geometry::{FARTHEST_MM, Geometry};
@@ -24,6 +24,8 @@ pub(crate) struct PlacedRepresentation {
     pub(crate) placement: Frame,
     /// Name of the occurrence, empty when it had none.
     pub(crate) name: String,
+    /// Names of the occurrences from the outermost down to its own, joined by `/`; of those without a name that of their product.
+    pub(crate) path: String,
     /// Name of the product, empty when it had none.
     pub(crate) product: String,
     /// Entities that may carry a style for this occurrence.
@@ -247,6 +249,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
             }
         }
         self.place_orphans();
+        let names = occurrence_names(self.file, self.usages.values().flatten());
+        self.placed.iter_mut().for_each(|p| p.path = occurrence_path(&names, &p.owners));
         if self.visited > limit { Err(self.visited) } else { Ok((std::mem::take(&mut self.placed), self)) }
     }
 
@@ -355,6 +359,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             representation: id,
             placement,
             name: name.to_string(),
+            path: String::new(),
             product: product.to_string(),
             owners: owners.to_vec(),
             orphan: self.in_orphans,

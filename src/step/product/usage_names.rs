@@ -59,3 +59,23 @@ pub(super) fn name_usages(file: &File<'_>, usages: &mut [Usage]) {
         }
     }
 }
+
+/// Returns what the occurrences of these usages are called in paths, by the `#id` of the usage: by its name, or by its product where that
+/// tells nothing.
+pub(super) fn occurrence_names<'u>(
+    file: &File<'_>,
+    usages: impl Iterator<Item = &'u Usage>,
+) -> FxHashMap<u64, String> {
+    let name = |usage: &Usage| match usage.name.as_str() {
+        // `=>[0:1:1:2]` is a label of OpenCASCADE's document, not a name.
+        own if own.is_empty() || own.starts_with("=>[") => product_name(file, usage.child),
+        own => own.to_owned(),
+    };
+    usages.map(|usage| (usage.id, name(usage))).collect()
+}
+
+/// Returns the path of what these entities own, the outermost first: the names of the usages among them, joined by `/`.
+pub(super) fn occurrence_path(names: &FxHashMap<u64, String>, owners: &[u64]) -> String {
+    let path: Vec<&str> = owners.iter().filter_map(|id| names.get(id).map(String::as_str)).collect();
+    path.join("/")
+}
