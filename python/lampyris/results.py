@@ -253,8 +253,8 @@ class Run(Mapping[str, Receiver]):
     def faces(self) -> list[dict[str, Any]]:
         """The faces that absorbed and let out most, as many as ``Scene(faces=N)`` asked for; empty where it did not.
 
-        Each has ``face``, its number among the placed faces as hits have it, ``absorbed``, ``entered`` and ``left``, these with ``…_error``
-        and ``…_geometric``.
+        Each has ``face``, its number among the placed faces as hits have it, ``selector``, which means it in a rule of a scene
+        (``part = "led", entity = 12``), ``absorbed``, ``entered`` and ``left``, these with ``…_error`` and ``…_geometric``.
         """
         return list((self.document.get("faces") or {"first": []})["first"])
 
@@ -263,6 +263,14 @@ class Run(Mapping[str, Receiver]):
         import pandas
 
         return pandas.DataFrame(self.faces)
+
+    @property
+    def verdicts(self) -> list[Assessment]:
+        """The verdicts of the scene's own ``[[regulation]]`` tables, in their order; empty where it names none.
+
+        Raises ``SceneError`` where a far field cannot be judged.
+        """
+        return [Assessment(verdict) for verdict in json.loads(self._results.verdicts_json())]
 
     @property
     def paths(self) -> dict[str, Any]:

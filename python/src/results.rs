@@ -5,13 +5,14 @@ use crate::errors::{SceneError, of_json};
 use lampyris::formats::{Axis, ColourMap, Grid, Picture};
 use lampyris::pipeline::{PreparedScene, SceneResults};
 use lampyris::regulation::Regulation;
-use lampyris::simulate::ReceiverResult;
 use lampyris::simulate::scene::{FarFieldType, RegulationUse};
+use lampyris::simulate::{ReceiverResult, face_selectors};
 use lampyris::study::figures::{cell_errors, channel_cell_errors};
 use numpy::PyArrayDyn;
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use serde_json::Value;
 use std::sync::Arc;
 
 /// What a run counted, with both errors.
@@ -42,6 +43,17 @@ impl Results {
             PyIndexError::new_err(format!("receiver {receiver}: there are {}", self.found.results.receivers.len()))
         })
     }
+
+    /// Puts beside each face that the document lists what selects it in a rule of a scene.
+    fn add_selectors(&self, document: &mut Value) {
+        let Some(listed) = &self.found.results.faces else { return };
+        let model = &self.scene.job.loaded.model;
+        // A selector is the shortest that means one face among all.
+        let selectors = face_selectors(model, &model.placed_faces().collect::<Vec<_>>());
+        for (k, face) in listed.first.iter().enumerate() {
+            document["faces"]["first"][k]["selector"] = selectors[face.face as usize].to_string().into();
+        }
+    }
 }
 
 #[pymethods]
@@ -52,10 +64,18 @@ impl Results {
         &self.found.results.digest
     }
 
-    /// The document of `results.json`.
+    /// The document of `results.json`, with the selector of each listed face.
     fn document_json(&self) -> PyResult<String> {
-        let document = self.found.document(&self.scene).map_err(of_json)?;
+        let mut document = self.found.document(&self.scene).map_err(of_json)?;
+        self.add_selectors(&mut document);
         serde_json::to_string(&document).map_err(of_json)
+    }
+
+    /// The verdicts of the scene's regulations, in its order, as a list of the objects of `assess`.
+    fn verdicts_json(&self, py: Python<'_>) -> PyResult<String> {
+        let verdicts = py.detach(|| self.found.verdicts(&self.scene)).map_err(SceneError::new_err)?;
+        let documents: Vec<Value> = verdicts.iter().map(|v| v.assessment.document()).collect();
+        serde_json::to_string(&documents).map_err(of_json)
     }
 
     /// The cells of a receiver, the second axis slow, with both errors: NaN off a disc, the error of one ray where none arrived.

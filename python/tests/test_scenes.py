@@ -220,6 +220,11 @@ def test_a_lamp_gets_its_verdict() -> None:
     assert {"settles", "when", "note", "source", "evidence"} <= set(verdict["rows"][0]) and "gradient" in verdict["aim"]
     assert run.assess(name, "fine", left_hand=True).traffic == "left"
     assert verdict.verdict in verdict._repr_html_()
+    assert run.verdicts == []
+    scene.tables["regulation"] = [{"id": name, "receiver": "fine"}]
+    (own,) = scene.trace(intersector="octree", progress=False).verdicts
+    assert (own["regulation"], own.verdict, own.traffic) == (name, verdict.verdict, "right")
+    assert [row["value"] for row in own["rows"]] == [row["value"] for row in verdict["rows"]]
     with pytest.raises(ValueError, match="name the far field"):
         run.assess(name)
     with pytest.raises(ValueError):
@@ -346,6 +351,8 @@ def test_the_ends_of_listed_rays_and_the_light_of_faces_are_told() -> None:
     scene.tables["run"]["faces"] = 3
     faces = scene.trace(progress=False).faces
     assert len(faces) == 3 and {"face", "absorbed", "absorbed_error", "left"} <= set(faces[0])
+    # The selector means that face and no other: a rule by it decides one.
+    assert all(face["selector"] for face in faces) and len({face["selector"] for face in faces}) == 3
     scene = lp.Scene()
     scene.add(lp.point(at=(0, 0, 0)), lp.plane("wall", at=(0, 0, 10), size=(4, 4), cells=(1, 1)))
     with pytest.raises(ValueError, match="no source of this scene is a list of rays"):
