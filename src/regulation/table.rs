@@ -119,6 +119,13 @@ pub struct Row {
     pub evidence: String,
 }
 
+impl Row {
+    /// Adds a remark behind what there is.
+    pub(super) fn add_note(&mut self, remark: &str) {
+        self.note = Some(self.note.take().map_or_else(|| remark.to_owned(), |note| format!("{note}; {remark}")));
+    }
+}
+
 /// How a file says that its rows are measured.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rules {

@@ -135,18 +135,24 @@ fn assess_aimed(
 /// Judges a point whose minimum its group may save; its maximum holds whatever the group reaches. `judge` judges a row by itself.
 fn judge_leaning(point: &Row, group: Option<Verdict>, judge: impl Fn(&Row) -> RowVerdict) -> RowVerdict {
     let mut least = judge(&Row { max: None, ..point.clone() });
+    let own = least.verdict;
     least.verdict = least.verdict.map(|own| match (own, group) {
         (Verdict::Pass, _) | (_, Some(Verdict::Pass)) => Verdict::Pass,
         (Verdict::Fail, Some(Verdict::Fail) | None) => Verdict::Fail,
         // A group that is unsure may still save its point.
         _ => Verdict::Unsure,
     });
+    let is_saved = least.verdict == Some(Verdict::Pass) && own != Some(Verdict::Pass);
     // What passes has nothing left to settle.
     least.settles = least.settles.filter(|_| least.verdict != Some(Verdict::Pass));
     let greatest = judge(&Row { min: None, ..point.clone() });
     let severity = |judged: &RowVerdict| judged.verdict.map(Verdict::severity);
     let worst = if severity(&greatest) > severity(&least) { greatest } else { least };
-    RowVerdict { row: point.clone(), ..worst }
+    let mut row = point.clone();
+    if is_saved {
+        row.add_note("its own minimum is not met beyond doubt, the sum of its group is, which is enough");
+    }
+    RowVerdict { row, ..worst }
 }
 
 /// Judges a row by itself, by its worst requirement; rows with conditions on use, and those that ask nothing measured, stay without a
@@ -161,8 +167,14 @@ fn judge_row(photometer: &Photometer, regulation: &Regulation, assumptions: &Ass
     let mut asked = row.clone();
     if let Some(floor) = regulation.function.point_floor().filter(|f| *f > 0.0 && row.group.is_some())
         && row.kind == "point"
+        && let Some(min) = row.min
     {
-        asked.min = asked.min.map(|min| floor * min);
+        asked.min = Some(floor * min);
+        // Else it would read as if less than is asked were enough.
+        let share = 100.0 * floor;
+        verdict
+            .row
+            .add_note(&format!("{share:.0} % of it, {:.3} cd, is enough here beside its group's sum", floor * min));
     }
     let requirements = requirements(photometer, &regulation.rules, &asked, &regulation.function.rows);
     let judged: Vec<Judgement> = requirements.iter().map(|r| Judgement::of_requirement(photometer, r)).collect();
@@ -333,19 +345,23 @@ mod tests {
     #[test]
     fn a_group_saves_a_minimum_and_no_maximum() {
         let regulation = Regulation::find("FMVSS 108 tail-1").unwrap();
-        let verdicts = |intensity: &dyn Fn(f64, f64) -> f64| {
+        let assessed = |intensity: &dyn Fn(f64, f64) -> f64| {
             let (h, v) = (edges(22.0, 0.1), edges(12.0, 0.1));
             let middle = |e: &[f64], k: usize| 0.5 * (e[k] + e[k + 1]);
             let cells = (0..240 * 440).map(|k| intensity(middle(&h, k % 440), middle(&v, k / 440)));
             let cells = cells.map(|i| [i, 1e-3 * i, 0.0]).collect();
             let lamp = IntensityMap::new(h.clone(), v.clone(), cells).unwrap();
-            let assessment = assess(&lamp, &regulation, &Assumptions::default()).unwrap();
-            (row(&assessment, "H-V").verdict.unwrap(), assessment.verdict)
+            assess(&lamp, &regulation, &Assumptions::default()).unwrap()
         };
-        assert_eq!(verdicts(&|_, _| 5.0), (Verdict::Pass, Verdict::Pass));
-        assert_eq!(verdicts(&|h, v| if h.hypot(v) < 2.0 { 1.0 } else { 5.0 }), (Verdict::Pass, Verdict::Pass));
-        assert_eq!(verdicts(&|h, v| if h.hypot(v) < 2.0 { 100.0 } else { 5.0 }), (Verdict::Fail, Verdict::Fail));
-        assert_eq!(verdicts(&|_, _| 100.0), (Verdict::Fail, Verdict::Fail));
+        let verdicts = |assessment: Assessment| (row(&assessment, "H-V").verdict.unwrap(), assessment.verdict);
+        // What passes below its own minimum says why.
+        let saved = assessed(&|h, v| if h.hypot(v) < 2.0 { 1.0 } else { 5.0 });
+        assert!(row(&saved, "H-V").row.note.as_ref().unwrap().contains("sum of its group"));
+        assert_eq!(verdicts(saved), (Verdict::Pass, Verdict::Pass));
+        assert_eq!(verdicts(assessed(&|_, _| 5.0)), (Verdict::Pass, Verdict::Pass));
+        let glaring = assessed(&|h, v| if h.hypot(v) < 2.0 { 100.0 } else { 5.0 });
+        assert_eq!(verdicts(glaring), (Verdict::Fail, Verdict::Fail));
+        assert_eq!(verdicts(assessed(&|_, _| 100.0)), (Verdict::Fail, Verdict::Fail));
     }
 
     /// Ten thousand lamps whose true intensity lies within a few errors of a limit, read with a normal error: wrong verdicts stay

@@ -8,6 +8,8 @@ use crate::math::error_of_maximum;
 use crate::regulation::Assessment;
 use crate::simulate::{ReceiverResult, Results};
 
+/// Share of the power at which the curve of encircled power ends, per cent.
+const FRAMED_PERCENT: f64 = 99.5;
 /// Radii at which the encircled power is drawn.
 const RADII: usize = 200;
 
@@ -156,16 +158,20 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
         })
         .collect();
     let radius_of = |percent: f64| summed.iter().find(|p| p[1] >= percent).map_or(0.0, |p| p[0]);
+    // A few stray rays far away would press the curve of all others against its axis.
+    let lit = summed.partition_point(|p| p[1] < FRAMED_PERCENT) + 1;
+    let (framed, beyond) = summed.split_at(lit.min(summed.len()));
+    let rest = beyond.last().map_or(String::new(), |last| format!(", all within {} mm", figures(last[0], 3)));
     let caption = format!(
-        "Around the mean position of the light, cell by cell ({} mm): 50 % within {} mm, 80 % within {} mm, 95 % within {} mm.",
+        "Around the mean position of the light, cell by cell ({} mm): 50 % within {} mm, 80 % within {} mm, 95 % within {} mm{rest}.",
         figures(a.step(), 2),
         figures(radius_of(50.0), 3),
         figures(radius_of(80.0), 3),
         figures(radius_of(95.0), 3)
     );
-    let mut points: Vec<[f64; 2]> = summed.iter().step_by(summed.len().div_ceil(RADII)).copied().collect();
-    // The last point, so that the curve ends at 100 %.
-    points.extend(summed.last());
+    let mut points: Vec<[f64; 2]> = framed.iter().step_by(framed.len().div_ceil(RADII)).copied().collect();
+    // The last point, so that the curve ends where its caption says.
+    points.extend(framed.last());
     let series = vec![Series { points, style: SeriesStyle::Line, ..Series::default() }];
     let name = format!("{}-encircled", crate::formats::file_stem(&receiver.name));
     let title = format!("{}: encircled power", super::maps::spoken(&receiver.name));

@@ -54,9 +54,11 @@ pub fn direction_text([h, v]: [f64; 2]) -> String {
     format!("{} {}", side(h, 'R', 'L'), side(v, 'U', 'D'))
 }
 
-/// Writes what would settle an unsure row; empty for any other.
+/// Writes what would settle an unsure row; of any other that was judged what the table or its rules remark on it, or nothing.
 pub fn settling_text(row: &RowVerdict) -> String {
-    let Some(settles) = row.settles else { return String::new() };
+    let Some(settles) = row.settles else {
+        return row.row.note.clone().filter(|_| row.verdict.is_some()).unwrap_or_default();
+    };
     let rays = format!("{:.1e} rays", settles.rays as f64);
     settles.tolerance_mm.map_or(rays.clone(), |t| format!("{rays}, {} mm", figures(t, 2)))
 }
