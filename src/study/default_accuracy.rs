@@ -154,7 +154,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     // Once: every way is compared with the same rays of the spline.
     let spline = trace_replicates(bound, undecided.source.exact(), &settings);
     let error = compare(bound, [&undecided.trace_facets(undecided.facets, &settings), &spline]);
-    let worst = worst_figure(&error, &settings, scale);
+    let worst = worst_figure(bound, &error, &settings, scale);
     let mut alternatives = vec![
         alternative(tolerance, ON_FACETS, &worst, error.seconds[0] * scale),
         alternative(tolerance, ON_SPLINE, &Worst::default(), error.seconds[1] * scale),
@@ -183,7 +183,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
         let finer = tolerance.map(|t| t / factor);
         let made = undecided.source.facets(finer);
         let error = compare(bound, [&undecided.trace_facets(&made.facets, &settings), &spline]);
-        let finer_worst = worst_figure(&error, &settings, scale);
+        let finer_worst = worst_figure(bound, &error, &settings, scale);
         let seconds = error.seconds[0] * scale + made.seconds;
         // Between the two that are always there.
         alternatives.insert(1, alternative(finer, ON_FACETS, &finer_worst, seconds));

@@ -10,7 +10,7 @@ use super::geometric_error::{
 use crate::intersect::NormalMode;
 
 /// The first word; what begins with another is of another version.
-const FORM: u64 = 3;
+const FORM: u64 = 4;
 /// What a choice can name, by its number.
 const INTERSECTORS: [&str; 2] = ["octree", "exact"];
 /// What positions on a receiver are counted in, by its number.
@@ -148,11 +148,12 @@ fn exchange_absorbed(words: &mut dyn Words, absorbed: &mut AbsorbedError) -> Opt
 
 /// Goes through what they change of a face.
 fn exchange_face(words: &mut dyn Words, error: &mut FaceError) -> Option<()> {
-    let FaceError { face, absorbed, entered, left } = error;
+    let FaceError { face, absorbed, entered, left, statistical } = error;
     let mut word = u64::from(*face);
     words.word(&mut word)?;
     *face = u32::try_from(word).ok()?;
-    [absorbed, entered, left].into_iter().try_for_each(|paired| exchange_paired(words, paired))
+    [absorbed, entered, left].into_iter().try_for_each(|paired| exchange_paired(words, paired))?;
+    exchange_numbers(words, statistical)
 }
 
 /// Goes through what they change of a receiver.
@@ -328,7 +329,13 @@ mod tests {
                 statistical: 0.01,
                 index: 5,
             }],
-            faces: vec![FaceError { face: 12, absorbed: paired(10.0), entered: paired(11.0), left: paired(12.0) }],
+            faces: vec![FaceError {
+                face: 12,
+                absorbed: paired(10.0),
+                entered: paired(11.0),
+                left: paired(12.0),
+                statistical: [13.0, 14.0, 15.0],
+            }],
         };
         Chosen {
             tolerance_mm: [0.1 + 0.2, 0.7],

@@ -1,8 +1,9 @@
 //! The figure of a run that facets get most wrong, against the standard error that the whole run will have.
 
-use super::geometric_error::{GeometricError, ReceiverError};
-use crate::simulate::RunSettings;
+use super::geometric_error::{FaceError, GeometricError, ReceiverError};
+use crate::math::FaceId;
 use crate::simulate::scene::Sampling;
+use crate::simulate::{BoundScene, RunSettings};
 
 /// Standard errors of sums over a scrambled net fall with the number of rays to this power: 0.52 to 0.68 for power, positions and
 /// widths on the three scenes of the fixtures from 2¹⁴ to 2²⁰ rays.
@@ -24,9 +25,14 @@ pub(super) struct Worst {
     pub(super) figure: String,
 }
 
-/// Finds the figure whose geometric error is largest against the statistical one that a run of `scale` times the rays will have; a ratio of
-/// 0 and no name where facets change nothing.
-pub(super) fn worst_figure(error: &GeometricError, settings: &RunSettings, scale: f64) -> Worst {
+/// Finds the figure whose geometric error is largest against the statistical one that a run of `scale` times the rays will have, among them
+/// those of the faces that the scene lists; a ratio of 0 and no name where facets change nothing.
+pub(super) fn worst_figure(
+    bound: &BoundScene,
+    error: &GeometricError,
+    settings: &RunSettings,
+    scale: f64,
+) -> Worst {
     let order = if settings.sampling == Sampling::Sobol { NET_ORDER } else { RANDOM_ORDER };
     let [sums, cells] = [scale.powf(-order), scale.powf(-RANDOM_ORDER)];
     let mut worst = Worst::default();
@@ -39,7 +45,23 @@ pub(super) fn worst_figure(error: &GeometricError, settings: &RunSettings, scale
         let figure = format!("absorbed in {}", a.r#in);
         worst.weigh([&a.name, &figure], a.power.geometric(), a.statistical * sums, a.power.spline);
     }
+    for f in listed_faces(bound, error) {
+        let name = format!("face {} of {}", f.face, bound.instance_of(FaceId(f.face)));
+        let powers = [("absorbed", f.absorbed), ("entered", f.entered), ("left", f.left)];
+        for ((figure, power), statistical) in powers.into_iter().zip(f.statistical) {
+            worst.weigh([&name, figure], power.geometric(), statistical * sums, power.spline);
+        }
+    }
     worst
+}
+
+/// Returns the faces that the scene will list: those that absorb and let out most on the spline.
+fn listed_faces<'e>(bound: &BoundScene, error: &'e GeometricError) -> Vec<&'e FaceError> {
+    let mut faces: Vec<&FaceError> = error.faces.iter().collect();
+    // Stable: faces of equal power stay in the order of the model, as in the results.
+    faces.sort_by(|a, b| b.listed_power().total_cmp(&a.listed_power()));
+    faces.truncate(bound.listed_faces());
+    faces
 }
 
 /// Calls `weigh` with every figure of a receiver: its name, its geometric error, the statistical one of the whole run, its value. `sums`

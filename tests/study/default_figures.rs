@@ -205,6 +205,25 @@ fn what_a_black_ball_takes_is_judged_without_a_receiver() {
     assert!(absorbed_figures(&results, Surface::Unmeasured, "W")[0].geometric.is_none());
 }
 
+/// A clear ball in a beam takes nothing and no receiver sees it, but the scene asks for what passes its face: facets within the sphere let
+/// in less, and the choice goes by that.
+#[test]
+fn faces_that_are_listed_are_judged() {
+    let scene = |run: &str| {
+        let text = format!(
+            "{run}[[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart = '*'\nmedium = 'glass'\n\
+             [[source]]\nkind = 'collimated'\nat = [0, 0, -5]\nradius = 2\n"
+        );
+        KnownScene { text, figures: Vec::new(), ..known_scenes::ball(1.0, 1.5) }
+    };
+    let unasked = default_answer(&scene(""), 200_000, 2).chosen;
+    assert_eq!(unasked.intersector, "octree", "{}", unasked.because);
+    let asked = default_answer(&scene("[run]\nfaces = 1\n"), 200_000, 2).chosen;
+    assert_eq!(asked.intersector, "exact", "{}", asked.because);
+    let figure = &asked.alternatives[0].figure;
+    assert!(figure.starts_with("face ") && (figure.ends_with("entered") || figure.ends_with("left")), "{figure}");
+}
+
 /// What a medium takes is judged apart from its faces: of Beer's law over the chords of a ball of radius 1 in parallel light of its own
 /// refractive index, 1 − 2(1 − (1 + 2k)e⁻²ᵏ)/(2k)² is absorbed.
 #[test]

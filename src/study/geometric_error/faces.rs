@@ -21,9 +21,16 @@ pub struct FaceError {
     pub entered: Paired,
     /// Power that left its body through it.
     pub left: Paired,
+    /// Standard errors of these three on the spline, from these rays alone.
+    pub statistical: [f64; 3],
 }
 
 impl FaceError {
+    /// Returns what the spline has the face absorb and let out: faces are listed by it.
+    pub fn listed_power(&self) -> f64 {
+        self.absorbed.spline + self.left.spline
+    }
+
     /// Returns the geometric errors of what is absorbed, enters and leaves; `lost` is power that might have come to any face.
     pub fn geometric(&self, lost: f64) -> [f64; 3] {
         [self.absorbed, self.entered, self.left].map(|paired| paired.geometric().hypot(lost))
@@ -37,6 +44,8 @@ struct PairedSums {
     totals: [f64; 2],
     /// Of the squares of the replicates' differences.
     squares: f64,
+    /// Of the squares of the spline's replicates.
+    spline_squares: f64,
 }
 
 impl PairedSums {
@@ -45,17 +54,27 @@ impl PairedSums {
         self.totals[0] += facets;
         self.totals[1] += spline;
         self.squares += (facets - spline).powi(2);
+        self.spline_squares += spline * spline;
     }
 
     /// Both values, and the standard error of their difference over so many replicates.
     fn paired(&self, replicates: usize, quantum: f64) -> Paired {
-        let n = replicates.max(2) as f64;
-        let difference = self.totals[0] - self.totals[1];
-        // Of the squared deviations from the mean; replicates that did not reach the face count too.
-        let deviations = (self.squares - difference * difference / n).max(0.0);
+        let error = standard_error(self.squares, self.totals[0] - self.totals[1], replicates) * quantum;
         let [facets, spline] = self.totals.map(|total| total * quantum);
-        Paired { facets, spline, error: (deviations * n / (n - 1.0)).sqrt() * quantum }
+        Paired { facets, spline, error }
     }
+
+    /// The standard error of the spline's value.
+    fn statistical(&self, replicates: usize, quantum: f64) -> f64 {
+        standard_error(self.spline_squares, self.totals[1], replicates) * quantum
+    }
+}
+
+/// Returns the standard error of a sum over so many replicates, those among them that did not reach the face, from the sum of their
+/// squares.
+fn standard_error(squares: f64, sum: f64, replicates: usize) -> f64 {
+    let n = replicates.max(2) as f64;
+    ((squares - sum * sum / n).max(0.0) * n / (n - 1.0)).sqrt()
 }
 
 /// Compares the power at each face that rays of either run met, the first on facets, by rising face.
@@ -74,7 +93,8 @@ pub(super) fn face_errors(runs: [&ReplicatedRun; 2]) -> Vec<FaceError> {
     let (replicates, quantum) = (runs[1].faces.len(), runs[1].results.quantum);
     let error = |(face, sums): (u32, [PairedSums; 3])| {
         let [absorbed, entered, left] = sums.map(|s| s.paired(replicates, quantum));
-        FaceError { face, absorbed, entered, left }
+        let statistical = sums.map(|s| s.statistical(replicates, quantum));
+        FaceError { face, absorbed, entered, left, statistical }
     };
     let mut errors: Vec<FaceError> = sums.into_iter().map(error).collect();
     errors.sort_by_key(|e| e.face);
@@ -84,7 +104,7 @@ pub(super) fn face_errors(runs: [&ReplicatedRun; 2]) -> Vec<FaceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::geometric_error::paired::standard_error;
+    use crate::study::geometric_error::paired;
 
     /// The error from sums is that of the replicates' differences.
     #[test]
@@ -93,8 +113,10 @@ mod tests {
         let mut sums = PairedSums::default();
         brought.iter().for_each(|[a, b]| sums.add(*a, *b));
         let found = sums.paired(brought.len(), 0.5);
-        let expected = 0.5 * standard_error(brought.iter().map(|[a, b]| *a as f64 - *b as f64));
+        let expected = 0.5 * paired::standard_error(brought.iter().map(|[a, b]| *a as f64 - *b as f64));
         assert_eq!((found.facets, found.spline), (12.0, 7.5));
         assert!((found.error / expected - 1.0).abs() < 1e-12, "{} {expected}", found.error);
+        let on_spline = 0.5 * paired::standard_error(brought.iter().map(|[_, b]| *b as f64));
+        assert!((sums.statistical(brought.len(), 0.5) / on_spline - 1.0).abs() < 1e-12);
     }
 }
