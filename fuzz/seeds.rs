@@ -2,8 +2,8 @@
 //! `FOLDER/photometry`. The other targets start from `fixtures`, or make their own.
 
 use lampyris::formats::{
-    Data3, Facets, LightRay, PhotometricType, Photometry, write_data1, write_data3, write_eulumdat, write_facets,
-    write_ies, write_rays,
+    Data3, Facets, Flux, LightRay, PhotometricType, Photometry, Tm25, write_data1, write_data3, write_eulumdat,
+    write_facets, write_ies, write_rays, write_tm25,
 };
 use lampyris::math::{FaceId, Point, Uv, Vector};
 use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
@@ -18,6 +18,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     write_eulumdat(&photometry.join("lamp.ldt"), &lamp())?;
     write_rays(&rays.join("0.csv"), &light())?;
     write_rays(&rays.join("1.npz"), &light())?;
+    for (name, flux) in [("2-radiant.tm25ray", Flux::Radiant), ("2-luminous.tm25ray", Flux::Luminous)] {
+        write_tm25(&rays.join(name), &Tm25::from_rays(&light(), flux))?;
+    }
+    std::fs::write(rays.join("2-zemax.dat"), zemax())?;
+    std::fs::write(rays.join("2-lighttools.ray"), lighttools())?;
     write_data1(&rays.join("3.data1"), &light())?;
     write_facets(&rays.join("4.data2"), &Facets::plain(&square(), "square"))?;
     write_data3(&rays.join("5.data3"), &Data3 { size: [3, 4], results: vec![1.5; 12], rays: light() })?;
@@ -40,6 +45,41 @@ fn light() -> Vec<LightRay> {
             wavelength_nm: (k % 2 == 0).then_some(550.0),
         })
         .collect()
+}
+
+/// The numbers of the rays, a row each: place, direction, flux and wavelength, nm times `nm`.
+fn rows(nm: f64) -> Vec<u8> {
+    let row = |ray: &LightRay| {
+        let wavelength = ray.wavelength_nm.unwrap_or(600.0) * nm;
+        [&ray.origin.to_array()[..], &ray.direction.to_array(), &[ray.power, wavelength]].concat()
+    };
+    light().iter().flat_map(row).flat_map(|x| (x as f32).to_le_bytes()).collect()
+}
+
+/// A Zemax binary source file: identifier, number of rays, description, fluxes, wavelength and angles, mm, placement, rays with
+/// wavelengths in µm, watts.
+fn zemax() -> Vec<u8> {
+    let count = light().len() as u32;
+    let flux = light().iter().map(|ray| ray.power).sum::<f64>() as f32;
+    let mut bytes = [1010i32.to_le_bytes(), count.to_le_bytes()].concat();
+    bytes.extend([0; 100]);
+    bytes.extend([flux, flux, 0.0, 0.0, 0.0, 0.0, 0.0].iter().flat_map(|x: &f32| x.to_le_bytes()));
+    bytes.extend(4u32.to_le_bytes());
+    bytes.extend([0; 52]);
+    bytes.extend([2i32, 0, 0, 0].iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(rows(1e-3));
+    bytes
+}
+
+/// A LightTools binary ray data file of version 3: watts, places, wavelengths, mm, the origin, the flux, no polarisation.
+fn lighttools() -> Vec<u8> {
+    let mut bytes = b"LTRF".to_vec();
+    bytes.extend([3u32, 0, 0, 0, 2, 1].iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend([0.0, 0.0, 0.0, 2.5].iter().flat_map(|x: &f32| x.to_le_bytes()));
+    bytes.extend(0u32.to_le_bytes());
+    bytes.extend(rows(1.0));
+    bytes.extend(b"LTRFEND");
+    bytes
 }
 
 fn lamp() -> Photometry {

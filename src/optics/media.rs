@@ -1,5 +1,6 @@
 //! What light travels through: refractive index and absorption over the wavelength.
 
+use super::dispersion::Dispersion;
 use super::error::{Error, require};
 use super::phase::BulkScatter;
 use super::table::Table;
@@ -50,6 +51,8 @@ pub enum Index {
     Cauchy(Vec<f64>),
     /// `n² = A₀ + A₁λ² + A₂λ⁻² + A₃λ⁻⁴ + A₄λ⁻⁶ + A₅λ⁻⁸`: the form of Schott's catalogues before 1992.
     Schott([f64; 6]),
+    /// A sum of powers and poles, as further formulas of glass catalogues are.
+    Sum(Dispersion),
     /// Points over the wavelength in nm, linear between them.
     Table(Table),
 }
@@ -74,6 +77,7 @@ impl Index {
             Self::Schott([a0, a1, rest @ ..]) => {
                 (a0 + a1 * l2 + rest.iter().rev().fold(0.0, |n, a| (n + a) / l2)).sqrt()
             }
+            Self::Sum(dispersion) => dispersion.value(um),
             Self::Table(table) => table.value(wavelength_nm),
         }
     }
@@ -85,6 +89,7 @@ impl Index {
             Self::Sellmeier(terms) => terms.iter().any(|t| t[0] != 0.0),
             Self::Cauchy(terms) => terms.iter().skip(1).any(|&a| a != 0.0),
             Self::Schott([_, rest @ ..]) => rest.iter().any(|&a| a != 0.0),
+            Self::Sum(dispersion) => dispersion.is_dispersive(),
             Self::Table(table) => !table.is_constant(),
         }
     }

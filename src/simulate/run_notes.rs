@@ -3,12 +3,17 @@
 use super::bind::BoundScene;
 use super::body::AMBIENT;
 use super::outcome::{Counts, LostCause, LostRay};
+use super::plan::Plan;
 use super::surfaces::{FaceOptics, Surface};
 use std::collections::BTreeMap;
 
 /// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
 /// one scene once in 10^6 segments.
 const OVERLAP_SEGMENTS: u64 = 10_000;
+/// Rays of a source below which next to nothing is known of its light.
+const SCARCE_RAYS: u64 = 64;
+/// Share of the mean power of a source below which it is told: among thousands alike each has few rays, and all together enough.
+const WEAK: f64 = 0.1;
 
 impl BoundScene {
     /// Returns one sentence about bodies of different media that a run found to overlap; `None` where that was rarer than once in
@@ -24,6 +29,31 @@ impl BoundScene {
                  model, or give finer facets where solids touch in curved faces"
             )
         })
+    }
+
+    /// Returns one sentence about sources so weak beside the others that they send next to no rays; `None` where there are none.
+    pub(crate) fn scarce_sources_note(&self, plan: &Plan) -> Option<String> {
+        let even_share = plan.emitted / self.emitters.len() as f64;
+        let is_scarce = |source: &usize| {
+            let emitter = &self.emitters[*source];
+            plan.rays_of_source(*source) < SCARCE_RAYS
+                && emitter.rays.is_none()
+                && emitter.power < WEAK * even_share
+        };
+        let scarce: Vec<usize> = (0..self.emitters.len()).filter(is_scarce).collect();
+        let &first = scarce.iter().min_by_key(|source| plan.rays_of_source(**source))?;
+        let name = match self.scene.sources.get(first).map(|s| s.name.as_str()) {
+            Some(name) if !name.is_empty() => format!("the source '{name}'"),
+            _ => format!("[[source]] {}", first + 1),
+        };
+        let (rays, percent) = (plan.rays_of_source(first), 100.0 * self.emitters[first].power / plan.emitted);
+        let others =
+            if scarce.len() > 1 { format!(" ({} sources have so few)", scarce.len()) } else { String::new() };
+        Some(format!(
+            "{name} sends {rays} of the {} rays, as it has {percent:.1e} % of the power{others}: what it lights alone is not known; give it \
+             `rays` of its own",
+            plan.rays
+        ))
     }
 
     /// Whether a face of this instance lets light through, though no medium is behind it.

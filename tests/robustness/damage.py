@@ -34,6 +34,8 @@ KILLED_AT = 6  # times --seconds of CPU at which a process is ended
 ADDRESS_SPACE = 8 * 10**9  # bytes at which an allocation fails
 CODES = {0, 1, 2, 3, 4}
 NUMBERS = [b"1e30", b"0", b"nan", b"-1", b"1e-30", b"1e308", b"-1e30", b"inf", b"99999999999999999999", b"0.", b"1e6", b"2", b"0.5", b"45", b"1e-3"]
+# Files between two lines on how far a kind is.
+TOLD_EVERY = 50
 ODD_STRINGS = ["", "*", "\\u001b[31m", "A" * 300, "../x", "=1+1", "nul\\u0000", "\\u202e", "mirror", "far_field", "glass", "N-BK7"]
 
 
@@ -265,13 +267,17 @@ def main():
             pool = concurrent.futures.ThreadPoolExecutor(options.jobs)
             trials = pool.map(lambda k: trial(program, kind, files[k % len(files)], k // len(files), options), range(count))
             worst, most, codes, faults = 0.0, 0, collections.Counter(), 0
-            for row in (row for rows in trials for row in rows):
-                if isinstance(row, str):
-                    faults += 1
-                    print(row, flush=True)
-                    continue
-                worst, most = max(worst, row.cpu), max(most, row.bytes)
-                codes[row.code] += 1
+            for done, rows in enumerate(trials, 1):
+                for row in rows:
+                    if isinstance(row, str):
+                        faults += 1
+                        print(row, flush=True)
+                        continue
+                    worst, most = max(worst, row.cpu), max(most, row.bytes)
+                    codes[row.code] += 1
+                # A run of hours that is ended early has said how far it was, and what it had found.
+                if done % TOLD_EVERY == 0 and done < count:
+                    print(f"{kind}: {done} of {count}: {faults} faults; worst {worst:.1f} s CPU, {most / 1e6:.0f} MB", flush=True)
             failed += faults
             ends = ", ".join(f"{n} × {code}" for code, n in sorted(codes.items()))
             print(f"{kind}: {count} files of {len(files)} seeds: {faults} faults; exits {ends}; worst {worst:.1f} s CPU, {most / 1e6:.0f} MB", flush=True)

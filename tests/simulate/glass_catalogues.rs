@@ -16,7 +16,7 @@ const CATALOGUE: &str = "CC a catalogue of three glasses\n\
     NM BK7 1 517642.251 1.5168 64.17 0 1\n\
     CD 2.2718929E+000 -1.0108077E-002 1.0592509E-002 2.0816965E-004 -7.6472538E-006 4.9240991E-007\n\
     LD 3.6500E-001 1.0140E+000\n\
-    NM ODD 5 0 1.5 60\n\
+    NM ODD 4 0 1.5 60\n\
     CD 1.5 0.01 0.0005\n";
 
 fn scene(medium: &str) -> Result<Scene, String> {
@@ -74,11 +74,42 @@ fn what_a_catalogue_does_not_hold_is_named() {
     for (medium, words) in [
         ("catalogue = 'N-BK8'", "N-BK7"),
         ("", "the name of a glass"),
-        ("catalogue = 'ODD'", "dispersion formula 5"),
+        ("catalogue = 'ODD'", "dispersion formula 4"),
     ] {
         let message = scene(medium).unwrap_err();
         assert!(message.contains(words), "{message}");
     }
     let missing = Scene::parse("[[medium]]\nname = 'x'\nfile = 'none.agf'\ncatalogue = 'y'\n", "t", Path::new("."));
     assert!(missing.unwrap_err().to_string().contains("none.agf"));
+}
+
+/// The formulas that whole catalogues of other makers use, with made-up coefficients; n at 500 nm by an evaluation beside this program.
+#[test]
+fn every_formula_gives_its_index() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("g.agf");
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-9.0, -9.0, 0.0), Point::new(9.0, 9.0, 10.0));
+    for (formula, coefficients, n) in [
+        (3, "1.9 0.02 0.003 -0.004 0.0002 -1e-05", 2.049974116),
+        (5, "1.5 0.01 0.0005", 1.525656854),
+        (7, "2.7 0.02 0.015 0.01", 1.668114619),
+        (8, "1.3 1.2 0.012 0.008", 1.599532495),
+        (9, "1.5 0.9 0.01 0.8 90", 1.560535673),
+        (10, "2.2 -0.01 0.011 0.0002 -7e-06 5e-07 2e-08 -1e-09", 1.498130964),
+        (12, "2.2 -0.01 0.011 0.0002 -7e-06 5e-07 -0.0003 2e-05", 1.498119342),
+        (13, "2.2 -0.01 -0.0002 0.011 0.0002 -7e-06 5e-07 2e-08 -1e-09", 1.498126792),
+    ] {
+        std::fs::write(&file, format!("NM G {formula} 0 1.5 60\nCD {coefficients}\n")).unwrap();
+        let text = format!(
+            "[run]\nrays = 100\nwavelength_nm = 500\ninterfaces = 'split'\nsplit_floor = 0\nsequences = 1\n\
+             [[medium]]\nname = 'glass'\nfile = '{}'\ncatalogue = 'G'\n[[material]]\npart = 'plate'\nmedium = 'glass'\n\
+             [[source]]\nkind = 'collimated'\nat = [0, 0, -5]\ndirection = [0, 0, 1]\nradius = 2\n\
+             [[receiver]]\nname = 'behind'\nat = [0, 0, 20]\nsize = [9, 9]\n",
+            file.display()
+        );
+        let power = world.run(&text, |_| ()).sequences[0].first[0].power;
+        let once = (1.0 - ((n - 1.0) / (n + 1.0f64)).powi(2)).powi(2);
+        assert!((power - once).abs() < 1e-8, "{formula}: {power} {once}");
+    }
 }

@@ -302,3 +302,18 @@ fn of_many_sources_those_in_and_on_solids_are_seen() {
     let absorbed = world.run(&text, |_| ()).power.absorbed;
     assert!((absorbed / expected - 1.0).abs() < 2e-3, "{absorbed} {expected}");
 }
+
+/// A source of a millionth of the power has one ray of 100,000: a note says which, and with rays of its own it says nothing.
+#[test]
+fn a_source_that_sends_next_to_no_rays_is_named() {
+    let scene = |weak: &str| {
+        format!(
+            "[run]\nrays = 100_000\n[[source]]\npower = 1000\n[[source]]\nname = 'pilot lamp'\nat = [0, 0, 9]\npower = 0.001\n{weak}\n\
+             [[receiver]]\nname = 'all'\nkind = 'far_field'\n"
+        )
+    };
+    let notes = |weak: &str| World::default().run(&scene(weak), |_| ()).notes.join("\n");
+    let note = notes("");
+    assert!(note.contains("'pilot lamp' sends 1 of the") && note.contains("`rays`"), "{note}");
+    assert_eq!(notes("rays = 10_000"), "");
+}

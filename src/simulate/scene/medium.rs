@@ -2,7 +2,7 @@
 
 use super::{Key, Scene, suggest};
 use crate::formats::{AgfGlass, read_agf};
-use crate::optics::{self, Absorption, BulkScatter, Index, Table, catalogue};
+use crate::optics::{self, Absorption, BulkScatter, Dispersion, Index, Pole, Table, catalogue};
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
@@ -18,8 +18,8 @@ pub struct Medium {
     pub index: Option<f64>,
     /// Name in the catalogue: `N-BK7`, `PMMA`, `PC`, `fused silica`, `silicone`, `water`; or in the one of `file`.
     pub catalogue: Option<String>,
-    /// Glass catalogue in AGF form that `catalogue` is a name in, relative to the scene file. The glass absorbs by its internal
-    /// transmittances there unless `absorption_per_mm` says otherwise.
+    /// Glass catalogue in AGF form that `catalogue` is a name in, relative to the scene file; all its dispersion formulas but 4 are read.
+    /// The glass absorbs by its internal transmittances there unless `absorption_per_mm` says otherwise.
     pub file: Option<String>,
     /// What the file says of the glass; filled in when the scene is read, `None` without a file.
     #[serde(skip)]
@@ -108,10 +108,18 @@ impl Medium {
 /// Returns the index of a glass by the formula of its catalogue (OpticStudio's numbers of them).
 ///
 /// # Errors
-/// For a formula other than Schott's and Sellmeier's.
+/// For formula 4, whose last term programs write in two ways, and for numbers that mean none.
 fn agf_index(glass: &AgfGlass) -> Result<Index, String> {
     /// Formulas of n² − 1 as a sum of `K λ²/(λ² − L)`: of three, four and five terms.
     const SELLMEIER: [(u32, usize); 3] = [(2, 3), (6, 4), (11, 5)];
+    /// Exponents of λ in the extended formulas of n².
+    const EXTENDED: [(u32, &[i32]); 3] = [
+        (10, &[0, 2, -2, -4, -6, -8, -10, -12]),
+        (12, &[0, 2, -2, -4, -6, -8, 4, 6]),
+        (13, &[0, 2, 4, -2, -4, -6, -8, -10, -12]),
+    ];
+    /// The pole of Herzberger's formula, µm².
+    const HERZBERGER: f64 = 0.028;
     let AgfGlass { name, formula, coefficients, .. } = glass;
     // Makers leave out the zeros at the end of a line.
     let coefficient = |k: usize| coefficients.get(k).copied().unwrap_or(0.0);
@@ -124,9 +132,32 @@ fn agf_index(glass: &AgfGlass) -> Result<Index, String> {
     if is_schott {
         return Ok(Index::Schott(std::array::from_fn(coefficient)));
     }
-    Err(format!(
-        "'{name}' has dispersion formula {formula}; 1 (Schott), 2, 6 and 11 (Sellmeier) are read: give its `index_table`"
-    ))
+    if let Some((_, exponents)) = EXTENDED.iter().find(|(number, _)| number == formula) {
+        let powers = exponents.iter().enumerate().map(|(k, exponent)| (coefficient(k), 2 * exponent)).collect();
+        return Ok(Index::Sum(Dispersion { is_square: true, powers, poles: Vec::new() }));
+    }
+    let [a, b, c, d, e, f] = std::array::from_fn(coefficient);
+    let pole = |strength: f64, power: i32, at: f64| Pole { strength, power, at, order: 1 };
+    let (is_square, powers, poles) = match formula {
+        // Herzberger: n = A + B L + C L² + D λ² + E λ⁴ + F λ⁶ with L = 1/(λ² − 0.028).
+        3 => {
+            let second = Pole { order: 2, ..pole(c, 0, HERZBERGER) };
+            (false, vec![(a, 0), (d, 4), (e, 8), (f, 12)], vec![pole(b, 0, HERZBERGER), second])
+        }
+        // Conrady: n = A + B/λ + C/λ^3.5.
+        5 => (false, vec![(a, 0), (b, -2), (c, -7)], Vec::new()),
+        // Handbook of Optics: n² = A + B/(λ² − C) − D λ², and with B λ² in place of B.
+        7 => (true, vec![(a, 0), (-d, 4)], vec![pole(b, 0, c)]),
+        8 => (true, vec![(a, 0), (-d, 4)], vec![pole(b, 2, c)]),
+        // Sellmeier 4: n² = A + B λ²/(λ² − C) + D λ²/(λ² − E).
+        9 => (true, vec![(a, 0)], vec![pole(b, 2, c), pole(d, 2, e)]),
+        _ => {
+            return Err(format!(
+                "'{name}' has dispersion formula {formula}; 1 to 3 and 5 to 13 are read: give its `index_table`"
+            ));
+        }
+    };
+    Ok(Index::Sum(Dispersion { is_square, powers, poles }))
 }
 
 /// Returns the absorption of a glass from its transmittances; none where fewer than two are known.
