@@ -171,10 +171,7 @@ fn judge_row(photometer: &Photometer, regulation: &Regulation, assumptions: &Ass
     {
         asked.min = Some(floor * min);
         // Else it would read as if less than is asked were enough.
-        let share = 100.0 * floor;
-        verdict
-            .row
-            .add_note(&format!("{share:.0} % of it, {:.3} cd, is enough here beside its group's sum", floor * min));
+        verdict.row.add_note(&format!("{:.3} cd are enough here beside its group's sum", floor * min));
     }
     let requirements = requirements(photometer, &regulation.rules, &asked, &regulation.function.rows);
     let judged: Vec<Judgement> = requirements.iter().map(|r| Judgement::of_requirement(photometer, r)).collect();
