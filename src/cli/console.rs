@@ -54,9 +54,14 @@ impl Console {
     /// Writes a message for people to stderr, with what a terminal would obey written out; nothing if quiet.
     pub(crate) fn say(&self, message: impl std::fmt::Display) {
         if !self.quiet {
-            // A closed stderr is no reason to stop working.
-            let _ = writeln!(io::stderr().lock(), "{}", self.shown(&message.to_string()));
+            self.insist(message);
         }
+    }
+
+    /// Writes a message for people to stderr, quiet or not: why a run that was done does not end with exit code 0.
+    pub(crate) fn insist(&self, message: impl std::fmt::Display) {
+        // A closed stderr is no reason to stop working.
+        let _ = writeln!(io::stderr().lock(), "{}", self.shown(&message.to_string()));
     }
 
     /// Returns the text as a terminal may be given it: names are data, so that all it would obey is written out, but for our own emphasis.

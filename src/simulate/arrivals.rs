@@ -1,10 +1,13 @@
 //! The rays that recorded paths brought to a receiver.
 
 use super::bind::BoundScene;
+use super::emitter::{Portion, RaySampler};
 use super::outcome::{Event, PathVertex};
+use super::plan::Plan;
 use super::results::Results;
+use super::settings::RunSettings;
 use crate::formats::LightRay;
-use crate::math::Ray;
+use crate::math::{Point, Ray, Vector};
 
 /// Share of its length by which a segment that ends on a receiver may fall short of it: 10^6 times the rounding of its vertices.
 const ROUNDING: f64 = 1e-9;
@@ -13,8 +16,14 @@ const ROUNDING: f64 = 1e-9;
 /// direction, and a power scaled so that the sum over all recorded paths is what the run emitted: an estimate of what the receiver counted.
 /// Of a receiver that lets light pass the sum is what it counted.
 ///
-/// `wavelength_nm` is never set. Empty for a number without a receiver, a far field or faces, and for results without recorded paths.
-pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<LightRay> {
+/// In a run of several wavelengths each ray has its own, in a run of one none. `settings` are those of the run. Empty for a number without a receiver, a far field or faces, and for results without recorded paths.
+pub fn arrivals(
+    bound: &BoundScene,
+    settings: &RunSettings,
+    receiver: usize,
+    results: &Results,
+) -> Vec<LightRay> {
+    let plan = Plan::new(bound, settings);
     let Some((receiver, counted)) = bound.receivers.get(receiver).zip(results.receivers.get(receiver)) else {
         return Vec::new();
     };
@@ -23,6 +32,7 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
     let share = results.power.emitted / emitted.max(f64::MIN_POSITIVE);
     let mut rays = Vec::new();
     for path in results.paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
+        let first = rays.len();
         for pair in path.windows(2) {
             let [a, b] = [&pair[0], &pair[1]];
             // Vertices may coincide, as where a path splits.
@@ -44,6 +54,9 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
                 after = t;
             }
         }
+        // On its way light keeps the wavelength that its source gave it.
+        let wavelength_nm = if rays.len() > first { wavelength(bound, settings, &plan, path[0].ray) } else { None };
+        rays[first..].iter_mut().for_each(|ray| ray.wavelength_nm = wavelength_nm);
     }
     // What a medium takes up to the receiver no vertex tells: the sum is that of the receiver, where it was counted.
     let sum: f64 = rays.iter().map(|ray| ray.power).sum();
@@ -51,6 +64,19 @@ pub fn arrivals(bound: &BoundScene, receiver: usize, results: &Results) -> Vec<L
         rays.iter_mut().for_each(|ray| ray.power *= counted.power / sum);
     }
     rays
+}
+
+/// Returns the wavelength of a ray, nm, drawn again as its source did; `None` in a run of one wavelength, or for a ray that it does not have.
+fn wavelength(bound: &BoundScene, settings: &RunSettings, plan: &Plan, ray: u64) -> Option<f64> {
+    let (source, replicate) = plan.locate(ray).filter(|_| bound.light.coloured)?;
+    let emitter = &bound.emitters[source];
+    let [first, last] = plan.range(source, replicate);
+    let lattice = plan.lattice(replicate);
+    let portion = Portion { replicate, source: source as u32, rays: last - first, lattice };
+    let mut sampler = RaySampler::new(emitter, settings.seed, settings.sampling, portion, first);
+    // Where it starts is not asked.
+    let mut start = Ray::new(Point::ZERO, Vector::Z);
+    sampler.single_ray(emitter, (ray - first) as u32, &mut start).1.wavelength
 }
 
 /// Returns how far from `a`, mm, a recorded segment may meet a receiver: its length, infinite where it escapes at `b`, and lengthened by

@@ -551,6 +551,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "luminous",
             "face_selectors",
             "frames",
+            "flush_receivers",
             "chosen",
             "rule_table",
             "materials",

@@ -325,6 +325,9 @@ fn merged_parts_end_as_the_single_run_does() {
     }
     let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "out", "--max-refused", "1"]);
     assert!(code == 4 && err.contains("of the energy was lost"), "{code} {err}");
+    // Quiet or not: an exit code alone does not say what is wrong.
+    let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "out", "--max-refused", "1", "-q"]);
+    assert!(code == 4 && err.contains("of the energy was lost") && err.lines().count() == 1, "{code} {err}");
     assert_eq!(lampyris_in(path, &["merge", "parts", "-o", "out", "--max-refused", "1", "--max-lost", "1"]).0, 0);
     std::fs::create_dir(path.join("moved")).unwrap();
     for file in ["scene.toml", "model.stp"] {

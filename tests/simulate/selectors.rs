@@ -187,3 +187,23 @@ fn every_face_of_the_corpus_has_a_selector_of_its_own() {
     }
     println!("{total} faces, each with a selector of its own");
 }
+
+/// A receiver in the face of a plate counts what rounding leaves on either side of it: a note says so, and none where it stands off or lies
+/// beside the plate.
+#[test]
+fn a_receiver_in_a_face_is_named() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 3.0));
+    let mut model = world.model;
+    let top = &mut model.parts[0].shells[0].faces[5];
+    top.analytic = Analytic::Plane { frame: Frame::translation(Vector::Z * 3.0) };
+    let notes = |receiver: &str| {
+        let text = format!("[[receiver]]\nname = 'r'\nsize = [2, 2]\nabsorbs = false\n{receiver}\n");
+        bound(&model, &text).unwrap().notes().join("\n")
+    };
+    assert!(notes("at = [1, 2, 3]").contains("'r' lies in face 5 of 'plate'"), "{}", notes("at = [1, 2, 3]"));
+    assert!(notes("at = [1, 2, 3]\nnormal = [0, 0, -1]").contains("lies in"));
+    for off in ["at = [1, 2, 3.001]", "at = [7, 2, 3]", "at = [1, 2, 3]\nnormal = [1, 0, 1]"] {
+        assert_eq!(notes(off), "", "{off}");
+    }
+}

@@ -157,12 +157,31 @@ fn arrivals_at_a_passing_receiver_have_the_power_that_it_counted() {
         let results = world.run(&text, |s| s.path_samples = s.rays);
         let scene = Scene::parse(&text, "test.toml", Path::new(".")).unwrap();
         let bound = scene.bind(&world.model).unwrap();
+        let settings = RunSettings::from(&scene.run);
         for (k, receiver) in results.receivers.iter().enumerate() {
-            let arrived: f64 = arrivals(&bound, k, &results).iter().map(|ray| ray.power).sum();
+            let arrived: f64 = arrivals(&bound, &settings, k, &results).iter().map(|ray| ray.power).sum();
             assert!((arrived / receiver.power - 1.0).abs() < 1e-9, "{} {interfaces}: {arrived}", receiver.name);
         }
         // Before the glass nothing was absorbed yet: a ray of the source is the thousandth part of its watt.
-        let strongest = arrivals(&bound, 0, &results).iter().map(|ray| ray.power).fold(0.0, f64::max);
+        let strongest = arrivals(&bound, &settings, 0, &results).iter().map(|ray| ray.power).fold(0.0, f64::max);
         assert!((strongest - 1e-3).abs() < 1e-12, "{interfaces}: {strongest}");
+    }
+}
+
+/// Where every ray is recorded those of a wavelength bring what its bin counted, from two sources of three lines.
+#[test]
+fn arrivals_have_the_wavelengths_that_were_counted() {
+    let text = "[run]\nrays = 1000\n[[source]]\nkind = 'collimated'\nat = [0, 0, -20]\nradius = 4\n\
+        spectrum = { kind = 'lines', values = [[450, 3], [600, 1]] }\n\
+        [[source]]\nkind = 'point'\nat = [0, 0, -9]\npower = 0.5\n\
+        [[receiver]]\nname = 'wall'\nat = [0, 0, 5]\nsize = [20, 20]\nbins_nm = [400, 500, 595, 700]\n";
+    let world = World::default();
+    let results = world.run(text, |s| s.path_samples = s.rays);
+    let scene = Scene::parse(text, "test.toml", Path::new(".")).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    let rays = arrivals(&bound, &RunSettings::from(&scene.run), 0, &results);
+    for (nm, bin) in [450.0, 587.5618, 600.0].into_iter().zip(&results.receivers[0].channels) {
+        let sum: f64 = rays.iter().filter(|ray| ray.wavelength_nm == Some(nm)).map(|ray| ray.power).sum();
+        assert!(bin.total > 0.0 && (sum / bin.total - 1.0).abs() < 1e-9, "{nm}: {sum} {}", bin.total);
     }
 }

@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
     /// Print one JSON document on stdout instead of text
     #[arg(long, global = true, display_order = 901, help_heading = EVERYWHERE)]
     pub(crate) json: bool,
-    /// No messages and no progress
+    /// No messages and no progress, but why the exit code is not 0
     #[arg(short, long, global = true, display_order = 902, help_heading = EVERYWHERE)]
     pub(crate) quiet: bool,
     /// Say more; twice for everything

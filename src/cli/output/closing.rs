@@ -24,6 +24,9 @@ pub(crate) fn print_listings(
     prepared: &PreparedScene,
     console: &Console,
 ) -> Result<(), Failure> {
+    if console.quiet {
+        return Ok(());
+    }
     let (model, unit) = (&prepared.job.loaded.model, prepared.power_unit());
     print_faces(run, prepared, console)?;
     Ok(print_sequences(&run.results, model, unit, console)?)

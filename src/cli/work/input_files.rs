@@ -59,7 +59,8 @@ pub(crate) fn report_refusals(reports: &[ImportReport], max_refused: f64, consol
     if refused == 0 {
         return Completion::Complete;
     }
-    console
-        .say(format_args!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons"));
-    Completion::incomplete_if(refused as f64 > max_refused * found as f64)
+    let message = format!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons");
+    let is_incomplete = refused as f64 > max_refused * found as f64;
+    if is_incomplete { console.insist(message) } else { console.say(message) }
+    Completion::incomplete_if(is_incomplete)
 }

@@ -73,14 +73,14 @@ pub(crate) fn report_lost_light(
 ) -> Completion {
     // Shares of it would be no numbers.
     if !results.power.emitted.is_finite() {
-        console.say("the powers of the sources sum to no finite number: the powers of this run mean nothing");
+        console.insist("the powers of the sources sum to no finite number: the powers of this run mean nothing");
         return Completion::Incomplete;
     }
     let share = results.power.lost / results.power.emitted;
     if share <= max_lost {
         return Completion::Complete;
     }
-    console.say(format_args!(
+    console.insist(format_args!(
         "{} % of the energy was lost, more than --max-lost allows: {}; {} names every ray",
         figures(100.0 * share, 2),
         loss_reasons(results, prepared),

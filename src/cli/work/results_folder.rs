@@ -139,8 +139,9 @@ pub(crate) fn write(
     let spinner = console.spinner("writing");
     make_folder(folder)?;
     remove_earlier(prepared, folder);
+    let settings = prepared.run_settings();
     for k in 0..run.results.receivers.len() {
-        let rays = arrivals(&prepared.bound, k, &run.results);
+        let rays = arrivals(&prepared.bound, &settings, k, &run.results);
         let receiver = &run.results.receivers[k];
         let geometric = [vec![run.geometric_cells(prepared, k)], run.geometric_channel_cells(prepared, k)].concat();
         run.results.receivers[k].files = receiver_files::write(folder, receiver, geometric, rays)?;

@@ -8,6 +8,7 @@ mod bound_scene;
 mod chosen;
 mod contacts;
 mod face_selectors;
+mod flush_receivers;
 mod frames;
 mod luminous;
 mod materials;
@@ -109,6 +110,7 @@ impl Scene {
         bound.notes.extend(notes::opening_note(&bound, model));
         bound.notes.extend(notes::thin_body_note(&bound));
         bound.notes.extend(notes::ready_mesh_note(model));
+        bound.notes.extend(flush_receivers::flush_receiver_notes(&bound.receivers, model));
         Ok(bound)
     }
 }
