@@ -16,13 +16,9 @@ const ROUNDING: f64 = 1e-9;
 /// direction, and a power scaled so that the sum over all recorded paths is what the run emitted: an estimate of what the receiver counted.
 /// Of a receiver that lets light pass the sum is what it counted.
 ///
-/// In a run of several wavelengths each ray has its own, in a run of one none. `settings` are those of the run. Empty for a number without a receiver, a far field or faces, and for results without recorded paths.
-pub fn arrivals(
-    bound: &BoundScene,
-    settings: &RunSettings,
-    receiver: usize,
-    results: &Results,
-) -> Vec<LightRay> {
+/// In a run of several wavelengths each ray has its own, in a run of one none. `settings` are those of the run. Empty for a number without
+/// a receiver, a far field or faces, and for results without recorded paths.
+pub fn arrivals(bound: &BoundScene, settings: &RunSettings, receiver: usize, results: &Results) -> Vec<LightRay> {
     let plan = Plan::new(bound, settings);
     let Some((receiver, counted)) = bound.receivers.get(receiver).zip(results.receivers.get(receiver)) else {
         return Vec::new();
@@ -66,7 +62,8 @@ pub fn arrivals(
     rays
 }
 
-/// Returns the wavelength of a ray, nm, drawn again as its source did; `None` in a run of one wavelength, or for a ray that it does not have.
+/// Returns the wavelength of a ray, nm, drawn again as its source did; `None` in a run of one wavelength, or for a ray that it does not
+/// have.
 fn wavelength(bound: &BoundScene, settings: &RunSettings, plan: &Plan, ray: u64) -> Option<f64> {
     let (source, replicate) = plan.locate(ray).filter(|_| bound.light.coloured)?;
     let emitter = &bound.emitters[source];
