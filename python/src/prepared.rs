@@ -8,8 +8,8 @@ use crate::model::Model;
 use crate::names::{normal_mode, require_tolerance};
 use crate::results::Results;
 use lampyris::pipeline::{
-    self, AccurateSettings, ErrorTarget, GrowingSearch, LoadedModel, MeshingSettings, PreparedScene, RayRange, SceneJob,
-    TraceRequest, TracingSettings, read_models, settings_for_accuracy,
+    self, AccurateSettings, ErrorTarget, GrowingSearch, LoadedModel, MeshingSettings, PreparedScene, RayRange,
+    SceneJob, TraceRequest, TracingSettings, read_models, settings_for_accuracy,
 };
 use lampyris::simulate::{MOST_LISTED_RAYS, PartialRun, RunSettings, Scene, listed_ends, ray_lists};
 use lampyris::step::{self, Import};

@@ -61,6 +61,10 @@ pub(crate) fn report_refusals(reports: &[ImportReport], max_refused: f64, consol
     }
     let message = format!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons");
     let is_incomplete = refused as f64 > max_refused * found as f64;
-    if is_incomplete { console.insist(message) } else { console.say(message) }
+    if is_incomplete {
+        console.insist(message)
+    } else {
+        console.say(message)
+    }
     Completion::incomplete_if(is_incomplete)
 }
