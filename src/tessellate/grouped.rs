@@ -4,7 +4,7 @@ use super::settings::{FaceSelector, Settings};
 use super::tessellation::Tessellation;
 use crate::math::{Aabb, FaceId, Point, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
-use crate::model::{Instancing, Placement};
+use crate::model::{Instancing, Model, Placement};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -46,6 +46,17 @@ impl GroupedFacets {
     /// Returns the number of facets in the scene, each counted at all places of its group.
     pub fn facet_count(&self) -> usize {
         self.counted().map(|(mesh, count)| mesh.facets.len() * count).sum()
+    }
+
+    /// Returns how many faces of the scene have no facet, each counted at all places of its group; `model` is the one that was meshed.
+    pub fn faces_without_facets(&self, model: &Model) -> usize {
+        let models = self.instancing.as_ref().map_or(std::slice::from_ref(model), |i| &i.groups);
+        let bare = |(model, (mesh, count)): (&Model, (&FacetMesh, usize))| {
+            let mut is_bare = vec![true; model.placed_face_count()];
+            mesh.facets.iter().for_each(|f| is_bare[f.face.index()] = false);
+            is_bare.into_iter().filter(|bare| *bare).count() * count
+        };
+        models.iter().zip(self.counted()).map(bare).sum()
     }
 
     /// Returns how many bytes the meshes and the list of places hold.

@@ -27,6 +27,27 @@ const FREE_SIZE: f64 = 20_000.0;
 /// Pieces in which a curve of a trim is looked at.
 const TRIM_STEPS: u32 = 8;
 
+/// Cells that the faces of any model may have at the default tolerance: those of a ball of 25 m, some eight seconds of one core.
+const CELLS_OF_ANY: f64 = 200_000.0;
+
+/// Returns the settings with no more cells, for a face and for all together, than a model of this size may have: at the default tolerance
+/// they follow its control points, and of a finer one as many more are granted as it takes.
+///
+/// A damaged coordinate turns a file of 17 kB into a face of 667 m: it took a minute and a gigabyte. None of 948 real files is cut.
+pub(super) fn within_size(model: &Model, settings: &Settings) -> Settings {
+    let faces = model.parts.iter().flat_map(|p| &p.shells).flat_map(|s| &s.faces);
+    let points: usize = faces.map(|face| face.surface.points.len()).sum();
+    let tolerances = settings.overrides.iter().map(|o| o.tolerance).chain([settings.tolerance]);
+    let tightest = tolerances.flatten().filter(|t| *t > 0.0).fold(f64::INFINITY, f64::min);
+    let finer = (Settings::default().tolerance[0] / tightest).max(1.0);
+    let cells = ((CELLS_OF_ANY + settings.cells_of_point * points as f64) * finer) as u64;
+    Settings {
+        most_cells: settings.most_cells.min(cells),
+        budget: settings.budget.min(usize::try_from(cells).unwrap_or(usize::MAX)),
+        ..settings.clone()
+    }
+}
+
 /// Faces of parts that are not begun, with the cells they would need: by part, and by the face's place in the part.
 pub(super) type TooLarge = FxHashMap<(usize, usize), f64>;
 
@@ -128,9 +149,32 @@ pub(super) fn name_causes(
 mod tests {
     use super::*;
     use crate::math::Frame;
+    use crate::model::{Part, Shell};
     use crate::nurbs::sweep;
     use crate::tessellate::settings::ToleranceField;
     use std::f64::consts::{FRAC_PI_2, PI};
+
+    fn ball(radius: f64) -> Model {
+        let surface = sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-FRAC_PI_2, FRAC_PI_2]);
+        let shell = Shell { faces: vec![Face::whole(surface)], ..Shell::default() };
+        Model::from_part(Part { shells: vec![shell], ..Part::default() })
+    }
+
+    /// A tolerance of a tenth needs ten times the cells on the same ball, and is granted them; a larger one needs fewer.
+    #[test]
+    fn limits_follow_the_size_of_the_model_and_its_tolerance() {
+        let ball = ball(1.0);
+        let points = ball.parts[0].shells[0].faces[0].surface.points.len();
+        let of = |tolerance: f64, cells_of_point: f64| {
+            let asked = Settings { most_cells: u64::MAX, cells_of_point, ..Settings::uniform(tolerance) };
+            within_size(&ball, &asked).most_cells
+        };
+        assert_eq!([of(0.05, 0.0), of(0.2, 0.0), of(0.005, 0.0)], [200_000, 200_000, 2_000_000]);
+        assert_eq!(of(0.05, 1e4), 200_000 + 10_000 * points as u64);
+        // What is asked to be less stays so.
+        let few = Settings { most_cells: 10, budget: 20, ..Settings::default() };
+        assert_eq!(within_size(&ball, &few), few);
+    }
 
     #[test]
     fn cells_of_a_ball_and_a_tube_are_those_of_their_chords() {

@@ -82,6 +82,7 @@ pub use triangulator::is_panic_guarded;
 /// ```
 pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     let start = std::time::Instant::now();
+    let settings = &limits::within_size(model, settings);
     // Parts first, each once; then faces that touch, which need the placed model; then copies for all instances.
     let parts = assemble::mesh_parts(model, settings);
     let joined = contact::mesh_contacts(model, settings, &parts);

@@ -27,6 +27,9 @@ pub struct Settings {
     /// Most cells that the faces of all parts together may be sure to need, beside some for each; the largest of a model that needs more
     /// are left without facets ([`super::FailureCause::TooManyFacets`]).
     pub most_cells: u64,
+    /// Cells for each control point of the model's surfaces, beside 200,000, that `budget` and `most_cells` are cut to at the default
+    /// tolerance, so that what a model costs follows its size. Infinite for no such cut.
+    pub cells_of_point: f64,
     /// Most steps that the proofs of one face may take, each a sum of two control points; a face of a surface so wild that they take more
     /// is left without facets ([`super::FailureCause::TooManySteps`]). One whose facets in all rounds together weigh as much, a facet as
     /// 10,000 steps, is not meshed anew; what does not hold there is counted.
@@ -97,6 +100,7 @@ impl Default for Settings {
             overrides: Vec::new(),
             budget: 400_000,
             most_cells: 4_000_000,
+            cells_of_point: 50.0,
             most_steps: 4_000_000_000,
             acceptance: Acceptance::Proved,
             glue_mm: 0.0,

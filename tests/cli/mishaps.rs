@@ -216,3 +216,24 @@ fn a_scene_whose_path_is_no_text_is_traced_in_parts_and_merged() {
     assert_eq!(lampyris_in(path, &["trace", "scene.toml", "-o", "whole"]).0, 0);
     assert_eq!(digest(&path.join("out")), digest(&path.join("whole")));
 }
+
+/// A ball too large for facets: on facets light would pass where it is, and the answer looked like any other.
+#[test]
+fn faces_that_have_no_facets_make_a_trace_incomplete() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\
+                 #6=SHAPE_REPRESENTATION('',(#900,#901),$);\n#10=CARTESIAN_POINT('',(0.,0.,0.));\n#15=CARTESIAN_POINT('',(4.E6,0.,50.));\n\
+                 #900=SPHERE('huge',3.E6,#10);\n#901=SPHERE('small',10.,#15);\nENDSEC;\nEND-ISO-10303-21;\n";
+    fs::write(folder.path().join("model.stp"), model).unwrap();
+    let scene = "[[model]]\nfile = \"model.stp\"\n[[source]]\nname = \"lamp\"\nkind = \"point\"\nat = [4e6, 0, 0]\npower = 1\n";
+    fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let run =
+        |more: &[&str]| lampyris_in(folder.path(), &[&["trace", "scene.toml", "--rays", "200"], more].concat());
+    let (code, _, err) = run(&["--intersector", "octree"]);
+    assert!(code == 4 && err.contains("1 of 2 faces have no facets"), "{code} {err}");
+    let (code, _, err) = run(&["--intersector", "octree", "--max-refused", "0.5"]);
+    assert!(code == 0 && err.contains("1 of 2 faces have no facets"), "{code} {err}");
+    // The spline needs none.
+    let (code, _, err) = run(&["--intersector", "exact"]);
+    assert!(code == 0 && !err.contains("no facets"), "{code} {err}");
+}

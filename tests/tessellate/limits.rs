@@ -60,3 +60,11 @@ fn a_wild_patch_ends_with_its_steps_on_any_number_of_threads() {
     assert_eq!((failed.face, failed.cause), (0, FailureCause::TooManySteps));
     assert_eq!((one.report.failed, one.mesh.facets.len()), (four.report.failed, four.mesh.facets.len()));
 }
+
+/// In a model of two faces a ball of 100 m is no part that anyone meant.
+#[test]
+fn a_face_may_need_what_follows_the_size_of_its_model() {
+    let made = tessellate(&model(vec![ball(1e5), ball(10.0)]), &Settings::uniform(0.2));
+    let [failed] = made.report.failed[..] else { panic!("{:?}", made.report.failed) };
+    assert!(failed.face == 0 && matches!(failed.cause, FailureCause::TooManyFacets(_)), "{failed:?}");
+}

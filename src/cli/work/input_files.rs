@@ -4,7 +4,7 @@ use super::terminal_monitor::TerminalMonitor;
 use crate::cli::arguments::command::PlacedLimit;
 use crate::cli::console::Console;
 use crate::cli::{completion::Completion, failure::Failure};
-use crate::pipeline::{LoadedModel, read_scene};
+use crate::pipeline::{IntersectorKind, LoadedModel, PreparedScene, read_scene};
 use crate::simulate::Scene;
 use crate::step::{self, Import, ImportReport};
 use std::path::Path;
@@ -67,4 +67,22 @@ pub(crate) fn report_refusals(reports: &[ImportReport], max_refused: f64, consol
         console.say(message)
     }
     Completion::incomplete_if(is_incomplete)
+}
+
+/// Says how many faces of a run that is traced on facets have none, if any: light passes where they are. Incomplete where that is a larger
+/// share of all than `max_refused`.
+pub(crate) fn report_bare_faces(prepared: &PreparedScene, max_refused: f64, console: &Console) -> Completion {
+    // The spline needs no facets, nor has a run that is traced on it any that count.
+    if prepared.choice.intersector == IntersectorKind::Exact {
+        return Completion::Complete;
+    }
+    let model = &prepared.job.loaded.model;
+    let (bare, all) = (prepared.facets.faces_without_facets(model), model.placed_face_count());
+    if bare == 0 {
+        return Completion::Complete;
+    }
+    console.say(format_args!(
+        "{bare} of {all} faces have no facets, and light passes where they are; `lampyris facet` names them with the reasons"
+    ));
+    Completion::incomplete_if(bare as f64 > max_refused * all as f64)
 }
