@@ -17,11 +17,12 @@ impl<'f, 'a> Asides<'f, 'a> {
     pub(crate) fn collect(file: &'f File<'a>) -> Self {
         let mut asides = Self { void_directions: Vec::new(), documents: Vec::new(), invisibilities: Vec::new() };
         for e in file.entities() {
+            // Names as bytes: made texts of, those of all entities took 3 % more.
             if e.is_a("DIRECTION") {
                 asides.void_directions.extend(is_void(e).then_some(e.id));
             } else if e.is_a("DOCUMENT_FILE") {
                 asides.documents.push(e);
-            } else if e.is_one_of(&["INVISIBILITY", "CONTEXT_DEPENDENT_INVISIBILITY"]) {
+            } else if e.is_a("INVISIBILITY") || e.is_a("CONTEXT_DEPENDENT_INVISIBILITY") {
                 asides.invisibilities.push(e);
             }
         }
