@@ -23,7 +23,8 @@ pub struct Source {
     /// Its main axis points along `direction`, for type C with the plane C 0 along `x` and C 90 to its left as seen by one who looks
     /// along `direction` (counterclockwise in the plan of a luminaire that shines down), for types A and B with upward along `x`
     /// (+y unless said otherwise) and positive H to the right. Ray lists stand with their origin in `at`.
-    /// Long ones stay on the disk; of CSV and NPZ 64 bytes a ray are unpacked into the folder for temporary files (`TMPDIR`).
+    /// Long ones stay on the disk; of CSV and NPZ 64 bytes a ray are unpacked into the folder for temporary files (`TMPDIR`). The TILT
+    /// table of an IES file, which is for tilted lamps, is left out.
     pub file: Option<String>,
     /// The faces that shine, outward, instead of `at`, `direction`, `radius` and `size`. Where an opaque face of another solid lies against
     /// one of them, as a board against a chip, it does not shine: all of the power leaves from the rest, and a note says how much that is.
