@@ -88,12 +88,7 @@ impl Exact {
                 let t = ray.direction.dot(off);
                 let trim = &self.geometry.trims[record.trim as usize];
                 let inside = match trim.cell_at(uv) {
-                    // With a band of nothing the parity decides alone: no certificate hangs on it, so no edge is asked.
-                    Region::Border => {
-                        let widths = [0, 1].map(|d: usize| patch.domain[d][1] - patch.domain[d][0]);
-                        let (su, sv) = (du / widths[0], dv / widths[1]);
-                        trim.locate(uv, [su.length_squared(), su.dot(sv), sv.length_squared()], 0.0).inside
-                    }
+                    Region::Border => trim.is_inside(uv),
                     decided => decided == Region::Inside,
                 };
                 return Some(SurfacePoint { t, uv, normal, residual, inside, patch: index });

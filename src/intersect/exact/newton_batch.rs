@@ -10,7 +10,7 @@ use super::geometry::Geometry;
 use super::net::V4;
 use super::newton::{STALLED, SurfacePoint};
 use super::newton_lanes::{Ends, Starts, step, step_fixed};
-use super::patch::{Patch, TRUSTED, project};
+use super::patch::TRUSTED;
 use super::structure::Exact;
 use super::tolerances::TANGENT;
 use super::trim::Region;
@@ -245,20 +245,10 @@ fn point(ends: &Ends, lane: usize, geometry: &Geometry, index: u32) -> Option<Su
     let inside = match trim.cell_at(uv) {
         Region::Inside => true,
         Region::Outside => false,
-        Region::Border => is_inside(geometry, patch, local, uv),
+        Region::Border => trim.is_inside(uv),
     };
     let normal = record.sign * Vector::new(ends.normal[0][lane], ends.normal[1][lane], ends.normal[2][lane]);
     Some(SurfacePoint { t: ends.t[lane], uv, normal, residual: ends.residual[lane], inside, patch: index })
-}
-
-/// Whether a point in a border cell, given in parameters of its patch and of the surface, lies inside the trims.
-#[inline(never)]
-fn is_inside(geometry: &Geometry, patch: &Patch, local: [f64; 2], uv: Uv) -> bool {
-    let (_, du, dv) = project(&patch.jet(local));
-    let widths = [0, 1].map(|d: usize| patch.domain[d][1] - patch.domain[d][0]);
-    let (su, sv) = (du / widths[0], dv / widths[1]);
-    let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
-    geometry.trim_of(patch).locate(uv, metric, 0.0).inside
 }
 
 #[cfg(test)]

@@ -192,6 +192,13 @@ impl Trim {
         }
     }
 
+    /// Whether `q`, which lies in a border cell, is inside, as [`Self::locate`] says too: no certificate hangs on a polished root, so that
+    /// no edge near it is asked for, nor the metric that this takes.
+    #[inline(never)]
+    pub(super) fn is_inside(&self, q: Uv) -> bool {
+        self.parity(q, *self.cell_range(q.y, q.y, 1).start())
+    }
+
     /// Whether a point lies inside, by the pieces of its row that the half-line towards +u crosses.
     fn parity(&self, q: Uv, row: usize) -> bool {
         let crossings = self.rows[row].iter().filter(|&&k| self.pieces[k as usize].crosses(q)).count();
