@@ -18,6 +18,8 @@ pub struct RowVerdict {
     pub verdict: Option<Verdict>,
     /// What would settle it, if it is unsure.
     pub settles: Option<Settles>,
+    /// How many of the directions that it asks about lie outside the far field: with any, no rays settle it.
+    pub unseen: usize,
 }
 
 /// A lamp measured by a regulation.

@@ -17,13 +17,14 @@ impl Assessment {
                 "statistical": r.reading.map(|x| x.statistical),
                 "geometric": r.reading.map(|x| x.geometric),
                 "verdict": r.verdict.map(|v| v.to_string()),
-                "settles": settles, "when": r.row.when, "note": r.row.note,
+                "settles": settles, "unseen": r.unseen, "when": r.row.when, "note": r.row.note,
                 "source": r.row.source, "evidence": r.row.evidence,
             })
         });
         json!({
             "regulation": self.regulation.id, "title": self.regulation.title, "checked": self.regulation.checked(),
-            "traffic": self.traffic.word(), "aim": {"h_deg": self.aim.h_deg, "v_deg": self.aim.v_deg, "gradient": self.aim.gradient, "how": self.aim.how},
+            "traffic": self.traffic.word(), "aim": {"h_deg": self.aim.h_deg, "v_deg": self.aim.v_deg, "gradient": self.aim.gradient,
+                "how": self.aim.how, "rivals_deg": self.aim.rivals},
             "sensor_deg": self.sensor_deg, "rows": rows.collect::<Vec<_>>(), "verdict": self.verdict.to_string(),
         })
     }

@@ -237,6 +237,18 @@ fn overlaps(edges: &[f64], from: f64, to: f64, measure: impl Fn(f64) -> f64) -> 
 }
 
 #[cfg(test)]
+impl IntensityMap {
+    /// The same cells with a value and a statistical error of each that `noise` makes of its value.
+    pub(super) fn with_noise(mut self, mut noise: impl FnMut(f64) -> [f64; 2]) -> Self {
+        for cell in &mut self.cells {
+            let [value, statistical] = noise(cell[0]);
+            *cell = [value, statistical, 0.0];
+        }
+        self
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -11,7 +11,7 @@
 //! that: it is an engineer's answer about a simulated lamp, not a statement of conformity.
 //!
 //! Layers: `few_rays` ← `map` (intensities with errors, from files by `read`) and `table` (what is asked) ← `aim` ← `requirement` ←
-//! `judgement` ← `assessment` ← `verdict` ← `document`.
+//! `judgement` ← `assessment` ← `row_verdict` ← `verdict` ← `document`.
 
 mod aim;
 mod assessment;
@@ -21,6 +21,7 @@ mod judgement;
 mod map;
 mod read;
 mod requirement;
+mod row_verdict;
 mod table;
 mod verdict;
 

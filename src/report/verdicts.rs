@@ -56,6 +56,9 @@ pub fn direction_text([h, v]: [f64; 2]) -> String {
 
 /// Writes what would settle an unsure row; of any other that was judged what the table or its rules remark on it, or nothing.
 pub fn settling_text(row: &RowVerdict) -> String {
+    if row.verdict == Some(Verdict::Unsure) && row.unseen > 0 {
+        return "a wider far field".into();
+    }
     let Some(settles) = row.settles else {
         return row.row.note.clone().filter(|_| row.verdict.is_some()).unwrap_or_default();
     };
@@ -168,8 +171,8 @@ mod tests {
         let mut regulation = Regulation::find("UN R112 B passing").unwrap();
         let row = regulation.function.rows.drain(..).next().unwrap();
         let direction = Some([3.5, 0.5]);
-        let rows = vec![RowVerdict { row, reading: None, direction, verdict: None, settles: None }];
-        let aim = Aim { h_deg: 0.5, v_deg: 0.25, gradient: None, how: String::new() };
+        let rows = vec![RowVerdict { row, reading: None, direction, verdict: None, settles: None, unseen: 0 }];
+        let aim = Aim { h_deg: 0.5, v_deg: 0.25, gradient: None, how: String::new(), rivals: vec![] };
         let (traffic, verdict) = (Traffic::Left, Verdict::Pass);
         let a = Assessment { regulation, traffic, aim, sensor_deg: 0.1, rows, verdict };
         let axis = |half: f64| Axis { label: "H".into(), unit: "deg".into(), range: [-half, half], cells: 40 };
@@ -195,7 +198,7 @@ mod tests {
 
     #[test]
     fn verdicts_on_one_far_field_have_names_of_their_own() {
-        let aim = Aim { h_deg: 0.0, v_deg: 0.0, gradient: None, how: "as placed".into() };
+        let aim = Aim { h_deg: 0.0, v_deg: 0.0, gradient: None, how: "as placed".into(), rivals: vec![] };
         let by = |id: &str| {
             let regulation = Regulation::find(id).unwrap();
             let (traffic, verdict) = (Traffic::Right, Verdict::Pass);

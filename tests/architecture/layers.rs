@@ -67,6 +67,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "requirement",
             "judgement",
             "assessment",
+            "row_verdict",
             "verdict",
             "document",
             "mod",

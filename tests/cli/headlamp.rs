@@ -116,6 +116,22 @@ fn until_settled_traces_on_or_says_what_it_cannot() {
     assert_eq!(found["rays"], 30_000);
 }
 
+/// The field of visibility goes on to 45°, the far field to 30°: no rays tell what is beyond, and none are traced for it.
+#[test]
+fn what_no_rays_settle_is_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "[run]\nunit = 'lm'\n[[source]]\nkind = 'cosine'\nexponent = 40\npower = 18\ndirection = [0, 0, 1]\n\
+        [[receiver]]\nname = 'far'\nkind = 'far_field'\nh_deg = [-30, 30]\nv_deg = [-30, 30]\ncells = [60, 60]\n\
+        [[regulation]]\nid = 'UN R148-01 rear-position-R1'\n";
+    std::fs::write(folder.path().join("lamp.toml"), scene).unwrap();
+    let arguments = ["trace", "lamp.toml", "--until-settled", "--rays", "4_000_000", "--json", "--no-report"];
+    let (_, out, err) = lampyris_in(folder.path(), &arguments);
+    let found: Value = serde_json::from_str(&out).unwrap();
+    let rows = found["regulations"][0]["rows"].as_array().unwrap();
+    assert!(rows.iter().any(|row| row["verdict"] == "unsure" && row["unseen"].as_u64() > Some(0)), "{rows:?}");
+    assert!(found["rays"].as_u64().unwrap() < 4_000_000, "{} {err}", found["rays"]);
+}
+
 /// The tolerance of a run stands in one place, whoever chose it.
 #[test]
 fn results_name_the_tolerance() {

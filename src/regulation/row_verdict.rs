@@ -1,0 +1,98 @@
+//! One row of a regulation judged about a lamp as it is aimed.
+
+use super::aim::Aim;
+use super::assessment::{Assumptions, RowVerdict};
+use super::judgement::{Judgement, Verdict};
+use super::map::{IntensityMap, Sensor};
+use super::requirement::{Photometer, requirements};
+use super::table::{Regulation, Row};
+
+/// Judges every row as the map is aimed, points that may lean on their group with that; whether another aim is open is not asked.
+pub(super) fn judge_rows(
+    map: &IntensityMap,
+    regulation: &Regulation,
+    assumptions: &Assumptions,
+    sensor: Sensor,
+    aim: &Aim,
+) -> Vec<RowVerdict> {
+    let photometer = Photometer { map, aim, sensor, tolerance_deg: regulation.rules.tolerance_deg };
+    let judge = |row: &Row| judge_row(&photometer, regulation, assumptions, row);
+    let mut rows: Vec<RowVerdict> = regulation.function.rows.iter().map(judge).collect();
+    // Where a point may lean on its group, it does so only if its own minimum is not met.
+    let leaning = regulation.function.point_floor() == Some(0.0);
+    if leaning {
+        let groups: Vec<(Option<u32>, Option<Verdict>)> =
+            rows.iter().filter(|r| r.row.kind == "group_sum").map(|r| (r.row.group, r.verdict)).collect();
+        let points = rows.iter_mut().filter(|r| r.row.kind == "point" && r.row.group.is_some());
+        for point in points.filter(|r| r.verdict.is_some_and(|own| own != Verdict::Pass)) {
+            let group = groups.iter().find(|g| g.0 == point.row.group).and_then(|g| g.1);
+            *point = judge_leaning(&point.row, group, judge);
+        }
+    }
+    rows
+}
+
+/// Judges a point whose minimum its group may save; its maximum holds whatever the group reaches. `judge` judges a row by itself.
+fn judge_leaning(point: &Row, group: Option<Verdict>, judge: impl Fn(&Row) -> RowVerdict) -> RowVerdict {
+    let mut least = judge(&Row { max: None, ..point.clone() });
+    let own = least.verdict;
+    least.verdict = least.verdict.map(|own| match (own, group) {
+        (Verdict::Pass, _) | (_, Some(Verdict::Pass)) => Verdict::Pass,
+        (Verdict::Fail, Some(Verdict::Fail) | None) => Verdict::Fail,
+        // A group that is unsure may still save its point.
+        _ => Verdict::Unsure,
+    });
+    let is_saved = least.verdict == Some(Verdict::Pass) && own != Some(Verdict::Pass);
+    // What passes has nothing left to settle.
+    least.settles = least.settles.filter(|_| least.verdict != Some(Verdict::Pass));
+    let greatest = judge(&Row { min: None, ..point.clone() });
+    let severity = |judged: &RowVerdict| judged.verdict.map(Verdict::severity);
+    let worst = if severity(&greatest) > severity(&least) { greatest } else { least };
+    let mut row = point.clone();
+    if is_saved {
+        row.add_note("its own minimum is not met beyond doubt, the sum of its group is, which is enough");
+    }
+    RowVerdict { row, ..worst }
+}
+
+/// Judges a row by itself, by its worst requirement; rows with conditions on use, and those that ask nothing measured, stay without a
+/// verdict.
+pub(super) fn judge_row(
+    photometer: &Photometer,
+    regulation: &Regulation,
+    assumptions: &Assumptions,
+    row: &Row,
+) -> RowVerdict {
+    let mut verdict =
+        RowVerdict { row: row.clone(), reading: None, direction: None, verdict: None, settles: None, unseen: 0 };
+    // Conditions are about the lamp's use, which the simulation does not know.
+    if row.when.is_some() {
+        return verdict;
+    }
+    // A share of the printed minimum; what is printed stays in the row that is reported.
+    let mut asked = row.clone();
+    if let Some(floor) = regulation.function.point_floor().filter(|f| *f > 0.0 && row.group.is_some())
+        && row.kind == "point"
+        && let Some(min) = row.min
+    {
+        asked.min = Some(floor * min);
+        // Else it would read as if less than is asked were enough.
+        verdict.row.add_note(&format!("{:.3} cd are enough here beside its group's sum", floor * min));
+    }
+    let requirements = requirements(photometer, &regulation.rules, &asked, &regulation.function.rows);
+    let judged: Vec<Judgement> = requirements.iter().map(|r| Judgement::of_requirement(photometer, r)).collect();
+    // The requirement that speaks for the row: the worst one.
+    let worst = judged.iter().max_by_key(|j| j.verdict.severity());
+    let Some(worst) = worst else { return verdict };
+    verdict.verdict = Some(worst.verdict);
+    verdict.unseen = worst.unseen;
+    if let Some(decisive) = &worst.decisive {
+        verdict.reading = Some(decisive.reading);
+        verdict.direction = Some(decisive.direction);
+        // Outside the field no number of rays helps.
+        if worst.verdict == Verdict::Unsure && worst.unseen == 0 {
+            verdict.settles = decisive.what_settles(assumptions.rays, assumptions.tolerance_mm);
+        }
+    }
+    verdict
+}
