@@ -59,7 +59,9 @@ pub fn settings_for_accuracy(
     if let Some(normals) = tracing.normals {
         ask.kinds = vec![normals];
     }
-    let product = ModelMeshSource::new(model);
+    let mut product = ModelMeshSource::new(model);
+    // Faces of two bodies in one place are faceted once, as the run will.
+    product.mesher.glue_mm = scene.map_or(product.mesher.glue_mm, |scene| scene.run.glue_mm);
     monitor.begin(Stage::Aiming);
     let progress = |p: Progress| monitor.study_progress(&p);
     let found = match scene {

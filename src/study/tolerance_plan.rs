@@ -77,6 +77,12 @@ impl TolerancePlan {
         ends.fold([f64::INFINITY, 0.0], |[a, b], [c, d]| [a.min(c), b.max(d)])
     }
 
+    /// Returns the largest tolerance of any face, mm.
+    pub(in crate::study) fn loosest_mm(&self) -> f64 {
+        let all = self.places.iter().chain([&self.other]);
+        all.map(|share| self.range(share).0[1]).fold(0.0, f64::max)
+    }
+
     /// Puts the plan into the mesher's settings, before overrides that are there already: those win.
     pub fn apply(&self, settings: &mut Settings) {
         (settings.tolerance, settings.radii) = self.range(&self.other);

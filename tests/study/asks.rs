@@ -129,6 +129,18 @@ fn rays_inside_a_small_part_are_judged() {
     assert!(found.kept && (met - 2.0 / 3.0).abs() < 0.02, "{met} {}", found.answer);
 }
 
+/// A third of the hits of light in a doublet are on the cemented surface, which belongs to either lens: they are judged too.
+#[test]
+fn light_between_cemented_lenses_is_judged() {
+    let doublet = known_scenes::doublet(1.0);
+    let scene = Scene::parse(&doublet.text, "doublet.toml", Path::new(".")).unwrap();
+    let tracing = TracingSettings { normals: Some(NormalMode::Bilinear), ..Default::default() };
+    let asked = (MeshingSettings::default(), tracing);
+    let found =
+        settings_for_accuracy(Some(0.1), asked, Some(&scene), &doublet.model, &Silent).unwrap().plan.unwrap();
+    assert!(found.kept && found.flips * 50 < found.checked, "{} flips: {}", found.flips, found.answer);
+}
+
 /// A mesher whose spline is the model's with other numbers of faces, and that counts the facets it is asked for.
 struct Counted<'m> {
     product: ModelMeshSource<'m>,

@@ -1,8 +1,29 @@
 //! How far off its true direction light leaves a facet.
 
-use crate::math::Vector;
+use crate::intersect::Hit;
+use crate::math::{FaceId, Vector};
 use crate::study::cross_check::angle_deg;
 use crate::study::mesh_source::{reflect, refract};
+
+/// Returns how far off, degrees, light of direction `incoming` leaves its hit on facets, by its hit on the spline; `None` where the two are
+/// on faces that are not in one place, within `apart_mm` along the normal. `relative_index` is that of [`direction_error_deg`] for a face.
+pub(super) fn error_of_hit(
+    incoming: Vector,
+    [facet, spline]: [&Hit; 2],
+    apart_mm: f64,
+    relative_index: &dyn Fn(FaceId) -> Option<f64>,
+) -> Option<f64> {
+    let inside = relative_index(spline.face);
+    if facet.face == spline.face {
+        return Some(direction_error_deg(incoming, facet.normal, spline.normal, inside));
+    }
+    // Where two bodies touch, facets may name the face of the one and the spline that of the other, which looks the other way.
+    let distance = (facet.t - spline.t) * spline.normal.dot(incoming);
+    let touches = facet.normal.dot(spline.normal) < 0.0 && distance.abs() <= apart_mm;
+    // From body to body the surroundings cancel.
+    let between = inside.zip(relative_index(facet.face)).map(|(inside, around)| inside / around).or(inside);
+    touches.then(|| direction_error_deg(incoming, -facet.normal, spline.normal, between))
+}
 
 /// Returns the larger of the angles, degrees, between the directions that a facet's normal and the spline's send light of direction
 /// `incoming` to: mirrored, and refracted where the face lets light through and neither reflects it totally. All are unit vectors,
@@ -10,12 +31,7 @@ use crate::study::mesh_source::{reflect, refract};
 ///
 /// `relative_index` is the index of the body that the face bounds over that around it, `None` where no light passes. Just short of total
 /// reflection light leaves the body misdirected by many times the error of the normal, mirrored light by twice at most.
-pub(super) fn direction_error_deg(
-    incoming: Vector,
-    facet: Vector,
-    spline: Vector,
-    relative_index: Option<f64>,
-) -> f64 {
+fn direction_error_deg(incoming: Vector, facet: Vector, spline: Vector, relative_index: Option<f64>) -> f64 {
     let mirrored = angle_deg(reflect(incoming, facet), reflect(incoming, spline));
     let Some(inside) = relative_index else { return mirrored };
     let comes_out = incoming.dot(spline) > 0.0;

@@ -1,6 +1,6 @@
 //! The search for the cheapest tolerances and normals that meet an accuracy target.
 
-use super::direction_error::direction_error_deg;
+use super::direction_error::error_of_hit;
 use super::solution::Solution;
 use super::survey::{Survey, p99, tolerance_factor};
 use super::{AccuracyPlan, AccuracyTarget, Trial};
@@ -216,7 +216,7 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// Meshes by a plan, times the reference rays on it, and compares where light goes with the spline; rays that hit on one of
-    /// both alone, or other faces, are counted as flips.
+    /// both alone, or on faces in other places, are counted as flips.
     fn measure(&self, plan: &TolerancePlan, normals: NormalMode, on: &ReferenceRays) -> Measured {
         let meshed = self.mesh_source.mesh_plan(plan);
         let mut hits = vec![None; on.rays.len()];
@@ -235,15 +235,21 @@ impl Search<'_> {
                 let made = meshed.mesh.facets.iter().map(|f| f.face).collect();
                 Measured { made, prepare, per_ray, errors: Vec::new(), flips: 0 }
             });
+        // Facets of two bodies that touch stray from their spline to either side.
+        let apart = 2.0 * plan.loosest_mm();
         for ((ray, hit), truth) in on.rays.iter().zip(&hits).zip(&on.truth) {
-            match (hit, truth) {
-                (None, None) => {}
-                (Some(h), Some(t)) if h.face == t.face => {
-                    let index = (self.light.relative_index)(t.face);
-                    measured.errors.push((t.face, direction_error_deg(ray.direction, h.normal, t.normal, index)));
+            let (hit, truth) = match (hit, truth) {
+                (None, None) => continue,
+                (Some(hit), Some(truth)) => (hit, truth),
+                _ => {
+                    measured.flips += 1;
+                    continue;
                 }
-                // On another face there is no angle: such rays are told apart from the percentile.
-                _ => measured.flips += 1,
+            };
+            match error_of_hit(ray.direction, [hit, truth], apart, &self.light.relative_index) {
+                Some(error) => measured.errors.push((truth.face, error)),
+                // In another place there is no angle: such rays are told apart from the percentile.
+                None => measured.flips += 1,
             }
         }
         measured
