@@ -24,6 +24,9 @@ const GROWTH_MARGIN: f64 = 1.1;
 /// Least and greatest growth: fewer would be a run for little, more would trust a poor first error too much.
 const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 
+/// No answer asks for more rays than these: a machine's word holds them.
+const MOST_WANTED: f64 = 1e18;
+
 /// What is asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorTarget {
@@ -112,7 +115,7 @@ impl ErrorTarget {
                 return (portion, result);
             }
             // At least twice as many, though the first error may promise less: it is a guess itself.
-            rays = ((rays as f64 * self.growth(found).max(GROWTH_RANGE[0])) as u64).min(most);
+            rays = ((rays as f64 * self.growth(found).clamp(GROWTH_RANGE[0], GROWTH_RANGE[1])) as u64).min(most);
             monitor.grows(found, rays);
         }
     }
@@ -125,7 +128,7 @@ impl ErrorTarget {
     /// Returns what a run of so many rays has reached of this target, `found` percent, and how many rays are missing.
     fn result_of(&self, found: Option<f64>, rays: u64) -> TargetResult {
         let reached = found.is_some_and(|e| e <= self.percent);
-        let wanted = (rays as f64 * self.growth(found)) as u64;
+        let wanted = (rays as f64 * self.growth(found)).min(MOST_WANTED) as u64;
         // A run that grows goes by whole replicates.
         let missing = wanted.saturating_sub(rays).next_multiple_of(GROWING_REPLICATE).max(GROWING_REPLICATE);
         TargetResult {
@@ -139,11 +142,10 @@ impl ErrorTarget {
         }
     }
 
-    /// Returns how many times as many rays the error asks for, at most 64: it falls at least as the root of the rays. 16 where nothing
-    /// arrived.
+    /// Returns how many times as many rays the error asks for: it falls at least as the root of the rays. 16 where nothing arrived.
     fn growth(&self, found: Option<f64>) -> f64 {
         // The error falls with the root of the rays, so that they go with the square of what is missing.
-        found.map_or(GROWTH_FROM_NOTHING, |e| (GROWTH_MARGIN * (e / self.percent).powi(2)).min(GROWTH_RANGE[1]))
+        found.map_or(GROWTH_FROM_NOTHING, |e| GROWTH_MARGIN * (e / self.percent).powi(2))
     }
 }
 
@@ -165,6 +167,8 @@ mod tests {
         let missing = |found: Option<f64>| target.result_of(found, 100_000).missing_rays;
         assert_eq!((missing(Some(2.0)), missing(Some(1.0))), (340_000, 0));
         assert_eq!((missing(Some(1.000_1)), missing(None)), (15_000, 1_500_000));
+        // However many: 400 times and a tenth more.
+        assert_eq!(missing(Some(20.0)), 43_900_000);
     }
 
     #[test]

@@ -64,18 +64,17 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     scene.run.sequences = extra.sequences.unwrap_or(scene.run.sequences);
     scene.run.faces = extra.faces.unwrap_or(scene.run.faces);
     let accuracy = extra.precision.accuracy;
-    if accuracy.is_some() && (shard.is_some() || extra.resume) {
+    // What is traced in parts is chosen once: by the part that came first.
+    let is_part = shard.is_some() || extra.resume || is_range;
+    if accuracy.is_some() && is_part {
         let message = "--accuracy chooses by times that it measures, which differ from run to run: parts would not fit together";
-        return Err(
-            Failure::arguments(message).with_help("give --tolerance and --normals with --shard and --resume")
-        );
+        return Err(Failure::arguments(message)
+            .with_help("give --tolerance and --normals with --shard, --resume and --rays A..B"));
     }
     set_threads(command.tracing.threads)?;
     let requested = (command.meshing.clone(), command.tracing.clone());
     let AccurateSettings { meshing, tracing, plan } =
         settings_for_accuracy(accuracy, requested, Some(&scene), &loaded.model, &monitor)?;
-    // What is traced in parts is chosen once: by the part that came first.
-    let is_part = shard.is_some() || extra.resume || is_range;
     let job = SceneJob {
         meshing,
         tracing,
@@ -342,11 +341,16 @@ fn say_shard(
             "seconds": {"trace": portion.seconds}, "file": file.display().to_string()});
         return Ok(print(&json_text(&document)?)?);
     }
-    console.say(format_args!(
-        "shard {} of {count}: {} rays in {}; `lampyris merge` puts all {count} together",
-        index + 1,
-        grouped(counts.rays),
-        file.display()
-    ));
+    let (rays, file) = (grouped(counts.rays), file.display());
+    match count {
+        // A range of the rays of a run that grows.
+        1 => {
+            console.say(format_args!("{rays} rays in {file}; `lampyris merge` adds them to those of other ranges"))
+        }
+        _ => console.say(format_args!(
+            "shard {} of {count}: {rays} rays in {file}; `lampyris merge` puts all {count} together",
+            index + 1
+        )),
+    }
     Ok(())
 }
