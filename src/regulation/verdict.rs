@@ -320,7 +320,7 @@ mod tests {
             [(value + error * normal).max(0.0), error]
         };
         let (mut led_astray, mut passed) = (0, 0);
-        for _ in 0..12 {
+        for _ in 0..6 {
             let noisy = map(&beam, 0.0, 0.0).with_noise(&mut noise);
             let found = assess(&noisy, &regulation, &Assumptions::default()).unwrap();
             led_astray += usize::from((found.aim.h_deg - truth.aim.h_deg).abs() > 0.5);
@@ -329,7 +329,7 @@ mod tests {
                 assert!(found.verdict != Some(Verdict::Fail) || truth.verdict == found.verdict, "{}", truth.row.id);
             }
         }
-        assert!(led_astray > 0 && passed > 12, "{led_astray} {passed}");
+        assert!(led_astray > 0 && passed > 6, "{led_astray} {passed}");
         // What fails however the lamp is aimed still does: it has a tenth of the light.
         let dim = map(|h, v| 0.1 * beam(h, v), 0.0, 0.0).with_noise(&mut noise);
         assert_eq!(assess(&dim, &regulation, &Assumptions::default()).unwrap().verdict, Verdict::Fail);
