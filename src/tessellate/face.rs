@@ -12,6 +12,7 @@ use super::emission::Emission;
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::imprint::{CarrierFacets, Imprint};
+use super::limits::face_budget;
 use super::nodes::{ProvedFacet, edge_key};
 use super::proof::prover::Prover;
 use super::report::Repair;
@@ -95,8 +96,9 @@ pub(super) fn mesh_with_imprint(
     let vertex_nodes = border.add_imprint(surface, imprint);
     let lines: Vec<[Uv; 2]> = border.imprinted.iter().map(|s| s.map(|n| border.nodes[n].uv)).collect();
     let angle = settings.angle_deg.map(f64::to_radians);
+    let budget = face_budget(face, surface, settings);
     // The tree is asked for imprinted lines too, which no cell may lie across.
-    let cells = tree::split(surface, settings.acceptance, &polygons, &lines, settings.budget, angle);
+    let cells = tree::split(surface, settings.acceptance, &polygons, &lines, budget, angle);
     let mut prover = Prover::new(surface, settings.acceptance);
     // Pairing must not join triangles across a side that neighbours have.
     let kept = border.segments.iter().chain(&border.imprinted);
@@ -119,7 +121,7 @@ pub(super) fn mesh_with_imprint(
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
     let creases = crease_lines(surface, &nodes, &segments);
     let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale, taken };
-    let triangulate = || delaunay::triangulate(surface, settings.acceptance, outline, settings.budget);
+    let triangulate = || delaunay::triangulate(surface, settings.acceptance, outline, budget);
     let mut transition = catch_panic(triangulate)?.ok_or(Unmeshed::Empty)?;
     // Proofs that were not tried any more say nothing: the face is given up whole, whichever thread came how far.
     if surface.steps.are_too_many() {

@@ -48,6 +48,34 @@ pub(super) fn within_size(model: &Model, settings: &Settings) -> Settings {
     }
 }
 
+/// Cells that a face too large to be meant may have at the default tolerance: some seconds of one core.
+const CELLS_OF_LARGE_FACE: f64 = 50_000.0;
+/// How many times the cells that a face is expected to need it may have: [`expected_cells`] estimates from below.
+const TIMES_EXPECTED: f64 = 4.0;
+
+/// Returns the cells that a face may have of those that the settings grant each: of a large one by its control points and its curvature.
+///
+/// Where no facet fits, as along a fold that a damaged coordinate makes, cells are halved until the budget ends, however few the curvature
+/// of the rest foretells. A small face with a fold may be a real one, and keeps its budget.
+pub(super) fn face_budget(face: &Face, surface: &FaceSurface<'_>, settings: &Settings) -> usize {
+    let tightest = surface.field.tightest();
+    // No division reaches a tolerance within the rounding of coordinates, which a closed face that is nearly a point has.
+    if tightest <= surface.rounding {
+        return settings.budget.min(CELLS_OF_LARGE_FACE as usize);
+    }
+    // What an angle needs follows no tolerance.
+    if settings.angle_deg.is_some() || surface.size <= FREE_SIZE * tightest {
+        return settings.budget;
+    }
+    let finer = (Settings::default().tolerance[0] / tightest).max(1.0);
+    let of_points = settings.cells_of_point * surface.spline.points.len() as f64;
+    let any = CELLS_OF_LARGE_FACE.max(of_points) * finer;
+    if settings.budget as f64 <= any {
+        return settings.budget;
+    }
+    settings.budget.min(any.max(TIMES_EXPECTED * expected_cells(face, surface)) as usize)
+}
+
 /// Faces of parts that are not begun, with the cells they would need: by part, and by the face's place in the part.
 pub(super) type TooLarge = FxHashMap<(usize, usize), f64>;
 
@@ -148,9 +176,9 @@ pub(super) fn name_causes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Frame;
+    use crate::math::{Frame, Point};
     use crate::model::{Part, Shell};
-    use crate::nurbs::sweep;
+    use crate::nurbs::{Surface, sweep};
     use crate::tessellate::settings::ToleranceField;
     use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -174,6 +202,33 @@ mod tests {
         // What is asked to be less stays so.
         let few = Settings { most_cells: 10, budget: 20, ..Settings::default() };
         assert_eq!(within_size(&ball, &few), few);
+    }
+
+    /// What a ball of 20 m needs is known from its curvature, π / 2 · R / ξ cells, and it may have several times as many; a tube of that
+    /// length has what any large face has, at a tolerance of a tenth ten times that. A small one keeps its budget, and one that is nearly
+    /// a point has no use for it.
+    #[test]
+    fn the_budget_of_a_large_face_follows_its_curvature_its_points_and_its_tolerance() {
+        let of = |surface: Surface, tolerance: f64, cells_of_point: f64| {
+            let asked = Settings { budget: 10_000_000, cells_of_point, ..Settings::uniform(tolerance) };
+            let field = ToleranceField::new([tolerance; 2], [1.0, 10.0], Default::default(), 1.0);
+            let face = Face::whole(surface);
+            face_budget(&face, &FaceSurface::new(&face.surface, false, field), &asked)
+        };
+        let ball =
+            |frame: &Frame, radius: f64| sweep::sphere(frame, radius, [0.0, 2.0 * PI], [-FRAC_PI_2, FRAC_PI_2]);
+        let tube = || sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, PI], [0.0, 2e4]);
+        assert_eq!(
+            [of(tube(), 0.05, 0.0), of(tube(), 0.2, 0.0), of(tube(), 0.005, 0.0)],
+            [50_000, 50_000, 500_000]
+        );
+        assert_eq!(of(tube(), 0.05, 1e5), 100_000 * tube().points.len());
+        let needed = (FRAC_PI_2 * 2e4 / 0.05) as usize;
+        let large = of(ball(&Frame::IDENTITY, 2e4), 0.05, 0.0);
+        assert!(large > 2 * needed && large < 5 * needed, "{large} {needed}");
+        assert_eq!(of(ball(&Frame::IDENTITY, 1.0), 0.05, 0.0), 10_000_000);
+        // Closed, so that its tolerance follows its size, which is less than a rounding of where it is.
+        assert_eq!(of(ball(&Frame::translation(Point::new(5.0, 6.0, 3.0)), 1e-300), 0.05, 0.0), 50_000);
     }
 
     #[test]

@@ -28,7 +28,8 @@ pub struct Settings {
     /// are left without facets ([`super::FailureCause::TooManyFacets`]).
     pub most_cells: u64,
     /// Cells for each control point of the model's surfaces, beside 200,000, that `budget` and `most_cells` are cut to at the default
-    /// tolerance, so that what a model costs follows its size. Infinite for no such cut.
+    /// tolerance, so that what a model costs follows its size; and of one large face beside 50,000, or four times what its curvature
+    /// foretells where that is more. Infinite for no such cut.
     pub cells_of_point: f64,
     /// Most steps that the proofs of one face may take, each a sum of two control points; a face of a surface so wild that they take more
     /// is left without facets ([`super::FailureCause::TooManySteps`]). One whose facets in all rounds together weigh as much, a facet as
