@@ -10,6 +10,9 @@ use crate::mesh::FacetMesh;
 
 /// Cells along each axis: 32 kB of bits, found once for each mesh.
 const CELLS: usize = 64;
+/// Cells marked a facet, and in all besides, before every cell counts as near: a second at most for a million facets.
+const MOST_MARKED_OF_FACET: usize = 100;
+const MOST_MARKED: usize = 16 * CELLS * CELLS * CELLS;
 /// A facet of no more sag, mm, is flat: ten times what the proof of a plane of 1 m leaves for rounding.
 const FLAT_SAG: f32 = 1e-8;
 /// How far behind its start a ray that is near no curved facet looks, mm: twice [`FLAT_SAG`] at the least sine by which that is lengthened.
@@ -33,10 +36,17 @@ impl CurvedCells {
         let bounds = curved().map(box_of).fold(Aabb::EMPTY, |all, b| all.union(b));
         let mut cells =
             Self { bounds, density: CELLS as f64 / bounds.size(), marks: vec![0; CELLS * CELLS * CELLS / 64] };
+        let mut marked = 0;
         for f in curved() {
             let b = box_of(f);
             // Rounding is the same here and where a place is asked, and keeps the order.
             let (low, high) = (cells.cell(b.min), cells.cell(b.max));
+            marked += (0..3).map(|axis| high[axis] - low[axis] + 1).product::<usize>();
+            // Long facets across the grid, each in half of all cells: then no cell is told apart.
+            if marked > MOST_MARKED_OF_FACET * records.len() + MOST_MARKED {
+                cells.marks.fill(u64::MAX);
+                break;
+            }
             for z in low[2]..=high[2] {
                 for y in low[1]..=high[1] {
                     for x in low[0]..=high[0] {
