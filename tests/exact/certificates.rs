@@ -4,7 +4,7 @@ use crate::referee;
 use crate::support::*;
 use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::{Certainty, Cost};
-use lampyris::math::{FaceId, Frame, Point, Ray, Uv, Vector};
+use lampyris::math::{Departure, FaceId, Frame, Point, Ray, Uv, Vector};
 use lampyris::nurbs::{Surface, sweep};
 
 /// A sheet of 100 mm in degree `p` that rises by `slope` about the line x = `pivot`.
@@ -101,6 +101,31 @@ fn only_the_point_that_a_ray_leaves_is_left_out() {
         let ray = from_the_middle(&exact, height, Vector::new(1.0, 0.0, -slope));
         let answer = exact.first(&ray, &mut Cost::default());
         assert_eq!((answer.hit, answer.certainty), (None, Certainty::Certified), "{height} at {slope}");
+    }
+}
+
+/// A floor and a wall in one face, of patches of a metre: a ray that starts on the floor a micrometre from the wall meets it, however
+/// nearly it runs along it.
+#[test]
+fn a_ray_that_starts_beside_a_crease_meets_the_wall_beyond() {
+    let at = |x: f64, z: f64| [0.0, 1000.0].map(|y| Point::new(x, y, z).extend(1.0));
+    let surface = Surface {
+        degree: [1, 1],
+        knots: [vec![0.0, 0.0, 1.0, 2.0, 2.0], vec![0.0, 0.0, 1.0, 1.0]],
+        points: [at(0.0, 0.0), at(1000.0, 0.0), at(1000.0, 1000.0)].concat(),
+    };
+    let exact = Exact::build(&model([surface.clone()]), &Settings::default());
+    for beside in [1e-8, 1.1e-9, 9e-10, 1e-10, 2e-11] {
+        let uv = Uv::new(1.0 - beside, 0.5);
+        let start = surface.evaluate(uv);
+        for slope in [1e-3, 1e-5, 1e-6, 1e-7] {
+            let d = Vector::new(slope, 0.0, 1.0).normalize();
+            let departure = Departure { face: FaceId(0), primitive: 0, uv, triangle: None };
+            let answer = exact.first(&Ray::new(start, d).with_departure(departure), &mut Cost::default());
+            let t = (1000.0 - start.x) / d.x;
+            let hit = answer.hit.filter(|hit| (hit.t - t).abs() < 1e-12 / slope + 1e-9);
+            assert!(t > 1000.0 || hit.is_some(), "{beside} at {slope}: {answer:?} for {t}");
+        }
     }
 }
 
