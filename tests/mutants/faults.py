@@ -51,7 +51,7 @@ FAULTS = [
     # Settling in 32 digits.
     ("open roots not settled", EXACT + "leaf_test.rs", "let open = leaf.ill_scaled || «settlement::is_open([u, v], margins)»;", "false", SPLINE),
     ("settled roots count beyond the face", EXACT + "settlement.rs", "if «!sides.iter().any(|&(k, end)| is_over(k, end))» {", "true", SPLINE),
-    ("settled roots of another root kept", EXACT + "settlement.rs", "settled.filter(|root| «near(leaf.leaf_parameters(root.local))»)", "true", SPLINE),
+    ("settled roots of another root kept", EXACT + "settlement.rs", "settled.filter(|root| «near(leaf.leaf_parameters(root.local))»)", "true", "lib:settlement " + SPLINE),
     ("unsettled roots told as certified", EXACT + "settlement.rs", "Candidate { certainty: «Certainty::Uncertified», ..found }", "Certainty::Certified", SPLINE),
     # Polishing.
     ("polish accepts a point off the ray", EXACT + "newton.rs", "if «residual > near + rounding» {", "residual > 1e-2", SPLINE),
@@ -95,6 +95,4 @@ FAULTS = [
 ]
 
 # Faults that no test can see, with the reason.
-EQUIVALENT = {
-    "unsettled roots told as certified": "what stays open begins two radii of the leaf before its root, so that every answer with it is flagged anyhow",
-}
+EQUIVALENT = {}
