@@ -3,15 +3,8 @@
 /// Highest polynomial degree the program handles; real files go to 13.
 pub const MAX_DEGREE: usize = 25;
 
-/// Values of the `degree + 1 ≤ W` non-zero basis functions and of their first two derivatives.
-///
-/// Tables of the full width would have to be cleared for every evaluation, which took a quarter of the time of meshing.
-pub(super) struct Basis<const W: usize> {
-    /// `value[k][i]`: k-th derivative of the i-th non-zero basis function.
-    pub(super) value: [[f64; W]; 3],
-}
-
-/// Widths of tables that callers choose among: degrees below 4, below 8, below 14, all.
+/// Widths of tables that callers choose among: degrees below 4, below 8, below 14, all. Tables of the full width would have to be cleared
+/// for every evaluation, which took a quarter of the time of meshing.
 pub(super) const NARROW: usize = 4;
 /// See [`NARROW`].
 pub(super) const MIDDLE: usize = 8;
@@ -26,6 +19,9 @@ pub(super) const WIDE: usize = MAX_DEGREE + 1;
 /// `t` outside the domain gives the first or last span; the end of the domain belongs to the last span.
 pub fn find_span(knots: &[f64], degree: usize, t: f64) -> usize {
     let last = knots.len() - degree - 2;
+    if last == degree {
+        return degree;
+    }
     let mut k = knots[degree..=last].partition_point(|&x| x <= t) + degree;
     k = k.saturating_sub(1).clamp(degree, last);
     // A span without length holds no parameter: back to the last one that has, or on to the first.
@@ -38,98 +34,88 @@ pub fn find_span(knots: &[f64], degree: usize, t: f64) -> usize {
     k
 }
 
-/// Values at `t` of the `degree + 1` basis functions that are not zero in a span, 0 beyond: the same bits as [`basis`] gives for them.
-/// Meshing asks for little else.
-#[inline]
-pub(super) fn basis_functions<const W: usize>(knots: &[f64], degree: usize, span: usize, t: f64) -> [f64; W] {
-    assert!(degree < W && span >= degree && span + degree < knots.len());
-    let mut value = [0.0; W];
-    let (mut left, mut right) = ([0.0; W], [0.0; W]);
-    value[0] = 1.0;
-    // Cox–de Boor (*The NURBS Book*, A2.2): all terms are positive inside the span, so that nothing cancels.
-    for j in 1..=degree {
-        left[j] = t - knots[span + 1 - j];
-        right[j] = knots[span + j] - t;
-        let mut saved = 0.0;
-        for r in 0..j {
-            // Never zero: between the two knots lies the span, which is not empty.
-            let term = value[r] / (right[r + 1] + left[j - r]);
-            value[r] = saved + right[r + 1] * term;
-            saved = left[j - r] * term;
+/// Values at `t` of the `degree + 1 ≤ W` basis functions that are not zero in a span, and their derivatives up to `ORDER` (at most 2), 0
+/// beyond: the k-th derivative of the i-th of them is `[k][i]`. *The NURBS Book*, A2.3, with its rows of coefficients written out.
+///
+/// Inlined, so that callers who know the degree have no loops.
+#[inline(always)]
+pub(super) fn basis<const ORDER: usize, const W: usize>(
+    knots: &[f64],
+    degree: usize,
+    span: usize,
+    t: f64,
+) -> [[f64; W]; 3] {
+    let p = degree;
+    let LowerDegrees { functions: [own, lower, lowest], widths: [widths, lower_widths] } =
+        lower_degrees::<W>(knots, p, span, t);
+    let mut value = [own, [0.0; W], [0.0; W]];
+    // Derivatives beyond the degree vanish.
+    if ORDER == 0 || p == 0 {
+        return value;
+    }
+    let mut inverse = [0.0; W];
+    for r in 0..p {
+        inverse[r] = 1.0 / widths[r];
+    }
+    // At the ends fewer functions of lower degree overlap: a function's neighbour there is none.
+    for r in 0..=p {
+        let mut sum = if r > 0 { inverse[r - 1] * lower[r - 1] } else { 0.0 };
+        if r < p {
+            sum -= inverse[r] * lower[r];
         }
-        value[j] = saved;
+        value[1][r] = p as f64 * sum;
+    }
+    if ORDER == 1 || p == 1 {
+        return value;
+    }
+    for r in 0..=p {
+        // The coefficients of the two functions of the degree below, of which this one is the difference.
+        let before = if r > 0 { inverse[r - 1] } else { 0.0 };
+        let behind = if r < p { -inverse[r] } else { 0.0 };
+        let mut sum = if r > 1 { before / lower_widths[r - 2] * lowest[r - 2] } else { 0.0 };
+        if r > 0 && r < p {
+            sum += (behind - before) / lower_widths[r - 1] * lowest[r - 1];
+        }
+        if r + 2 <= p {
+            sum -= behind / lower_widths[r] * lowest[r];
+        }
+        value[2][r] = (p * (p - 1)) as f64 * sum;
     }
     value
 }
 
-/// Values at `t` of the basis functions that are not zero in a span, and derivatives up to `order` (at most 2), 0 beyond: *The NURBS
-/// Book*, A2.3.
-#[inline]
-pub(super) fn basis<const W: usize>(knots: &[f64], degree: usize, span: usize, t: f64, order: usize) -> Basis<W> {
-    let p = degree;
-    assert!(p < W);
-    let mut table = [[0.0; W]; W];
+/// The basis functions of a span and of the two degrees below.
+struct LowerDegrees<const W: usize> {
+    /// Values of the functions of the degree, of one less and of two less; 0 beyond the last.
+    functions: [[f64; W]; 3],
+    /// Lengths of the supports of the functions of one degree less, and of two less, over which they are divided.
+    widths: [[f64; W]; 2],
+}
+
+/// Cox–de Boor (*The NURBS Book*, A2.2): all terms are positive inside the span, so that nothing cancels.
+#[inline(always)]
+fn lower_degrees<const W: usize>(knots: &[f64], degree: usize, span: usize, t: f64) -> LowerDegrees<W> {
+    assert!(degree < W && span >= degree && span + degree < knots.len());
+    let (mut own, mut lower, mut lowest) = ([0.0; W], [0.0; W], [0.0; W]);
+    let (mut widths, mut lower_widths) = ([0.0; W], [0.0; W]);
     let (mut left, mut right) = ([0.0; W], [0.0; W]);
-    table[0][0] = 1.0;
-    for j in 1..=p {
+    own[0] = 1.0;
+    for j in 1..=degree {
         left[j] = t - knots[span + 1 - j];
         right[j] = knots[span + j] - t;
+        (lowest, lower, lower_widths) = (lower, own, widths);
         let mut saved = 0.0;
         for r in 0..j {
-            // Lower triangle: knot differences; upper triangle: basis functions.
-            table[j][r] = right[r + 1] + left[j - r];
-            let term = table[r][j - 1] / table[j][r];
-            table[r][j] = saved + right[r + 1] * term;
+            // Never zero: between the two knots lies the span, which is not empty.
+            let width = right[r + 1] + left[j - r];
+            let term = own[r] / width;
+            widths[r] = width;
+            own[r] = saved + right[r + 1] * term;
             saved = left[j - r] * term;
         }
-        table[j][j] = saved;
+        own[j] = saved;
     }
-    let mut value = [[0.0; W]; 3];
-    // The last column holds the functions themselves; derivatives follow from the differences left in the lower triangle.
-    for r in 0..=p {
-        value[0][r] = table[r][p];
-    }
-    // Derivatives beyond the degree vanish, as the table already says.
-    let order = order.min(p);
-    if order == 0 {
-        return Basis { value };
-    }
-    for r in 0..=p {
-        // Two rows of the coefficients a(k, j) of A2.3, each of which needs the one before alone.
-        let mut a = [[0.0; W]; 2];
-        let (mut s1, mut s2) = (0, 1);
-        a[0][0] = 1.0;
-        for k in 1..=order {
-            let mut d = 0.0;
-            let pk = p - k;
-            if r >= k {
-                a[s2][0] = a[s1][0] / table[pk + 1][r - k];
-                d = a[s2][0] * table[r - k][pk];
-            }
-            // At the ends of the table fewer functions of lower degree overlap.
-            let j1 = if r + 1 >= k { 1 } else { k - r };
-            let j2 = if r <= pk + 1 { k - 1 } else { p - r };
-            for j in j1..=j2 {
-                a[s2][j] = (a[s1][j] - a[s1][j - 1]) / table[pk + 1][r + j - k];
-                d += a[s2][j] * table[r + j - k][pk];
-            }
-            if r <= pk {
-                a[s2][k] = -a[s1][k - 1] / table[pk + 1][r];
-                d += a[s2][k] * table[r][pk];
-            }
-            value[k][r] = d;
-            std::mem::swap(&mut s1, &mut s2);
-        }
-    }
-    // The k-th derivative has the factor p!/(p − k)!.
-    let mut factor = p as f64;
-    for k in 1..=order {
-        for x in &mut value[k][..=p] {
-            *x *= factor;
-        }
-        factor *= (p - k) as f64;
-    }
-    Basis { value }
+    LowerDegrees { functions: [own, lower, lowest], widths: [widths, lower_widths] }
 }
 
 #[cfg(test)]
@@ -144,14 +130,19 @@ mod tests {
         }
     }
 
+    /// On one span they are Bernstein's polynomials, whose derivatives are known.
     #[test]
-    fn functions_alone_have_the_same_bits() {
-        let knots = [0.0, 0.0, 0.0, 0.0, 0.3, 0.7, 0.7, 1.0, 1.0, 1.0, 1.0];
-        for i in 0..=50 {
-            let t = i as f64 / 50.0;
-            let span = find_span(&knots, 3, t);
-            let b: Basis<NARROW> = basis(&knots, 3, span, t, 0);
-            assert_eq!(basis_functions::<NARROW>(&knots, 3, span, t), b.value[0]);
+    fn on_one_span_they_are_bernstein_polynomials() {
+        let knots = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+        for i in 0..=20 {
+            let t = i as f64 / 20.0;
+            let s = 1.0 - t;
+            let values = [s * s * s, 3.0 * t * s * s, 3.0 * t * t * s, t * t * t];
+            let first = [-3.0 * s * s, 3.0 * s * s - 6.0 * s * t, 6.0 * s * t - 3.0 * t * t, 3.0 * t * t];
+            let second = [6.0 * s, 6.0 * t - 12.0 * s, 6.0 * s - 12.0 * t, 6.0 * t];
+            for (got, wanted) in basis::<2, NARROW>(&knots, 3, 3, t).iter().zip([values, first, second]) {
+                assert!(got.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-14), "{t}: {got:?} {wanted:?}");
+            }
         }
     }
 
@@ -160,8 +151,8 @@ mod tests {
         let knots = [0.0, 0.0, 0.0, 0.0, 0.3, 0.7, 0.7, 1.0, 1.0, 1.0, 1.0];
         for i in 0..=20 {
             let t = i as f64 / 20.0;
-            let b: Basis<NARROW> = basis(&knots, 3, find_span(&knots, 3, t), t, 2);
-            let sum = |k: usize| b.value[k][..4].iter().sum::<f64>();
+            let b = basis::<2, NARROW>(&knots, 3, find_span(&knots, 3, t), t);
+            let sum = |k: usize| b[k].iter().sum::<f64>();
             assert!((sum(0) - 1.0).abs() < 1e-14 && sum(1).abs() < 1e-12 && sum(2).abs() < 1e-11);
         }
     }

@@ -1,6 +1,6 @@
 //! Curves in space and in the parameter plane: one rational spline over either kind of control point.
 
-use super::basis::{BROAD, Basis, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, basis_functions, find_span};
+use super::basis::{BROAD, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, find_span};
 use crate::math::{Aabb, Homogeneous, Point};
 use glam::{DVec2, DVec3};
 use std::ops::{Add, Mul, Sub};
@@ -129,7 +129,7 @@ impl<P: ControlPoint> Spline<P> {
     /// Position and first two derivatives at `t`, which is clamped to the domain.
     pub fn derivatives(&self, t: f64) -> CurveDerivatives<P::Position> {
         // The quotient rule for S = A/w: S′ = (A′ − S·w′)/w and S″ = (A″ − 2·S′·w′ − S·w″)/w.
-        let [a, a1, a2] = self.homogeneous(t, 2);
+        let [a, a1, a2] = self.homogeneous::<2>(t);
         let inv = 1.0 / a.weight();
         let point = a.numerator() * inv;
         let first = (a1.numerator() - point * a1.weight()) * inv;
@@ -139,46 +139,35 @@ impl<P: ControlPoint> Spline<P> {
 
     /// Homogeneous point at `t`, which is clamped to the domain.
     pub(super) fn homogeneous_at(&self, t: f64) -> P {
+        self.homogeneous::<0>(t)[0]
+    }
+
+    /// Homogeneous point and derivatives up to `ORDER` (at most 2) at `t`, which is clamped to the domain; zero beyond the order.
+    fn homogeneous<const ORDER: usize>(&self, t: f64) -> [P; 3] {
+        // Known degrees leave no loops, as for surfaces.
         match self.degree {
-            0..NARROW => self.point_of_width::<NARROW>(t),
-            NARROW..MIDDLE => self.point_of_width::<MIDDLE>(t),
-            MIDDLE..BROAD => self.point_of_width::<BROAD>(t),
-            _ => self.point_of_width::<WIDE>(t),
+            1 => self.homogeneous_of_degree::<ORDER, NARROW>(t, 1),
+            2 => self.homogeneous_of_degree::<ORDER, NARROW>(t, 2),
+            3 => self.homogeneous_of_degree::<ORDER, NARROW>(t, 3),
+            p @ 0..MIDDLE => self.homogeneous_of_degree::<ORDER, MIDDLE>(t, p),
+            p @ MIDDLE..BROAD => self.homogeneous_of_degree::<ORDER, BROAD>(t, p),
+            p => self.homogeneous_of_degree::<ORDER, WIDE>(t, p),
         }
     }
 
-    /// As [`Spline::homogeneous_at`], with room for `W` basis functions, which the degree must stay below.
-    fn point_of_width<const W: usize>(&self, t: f64) -> P {
+    /// As [`Spline::homogeneous`], with room for `W` basis functions; `degree` is the curve's, below `W`.
+    #[inline(always)]
+    fn homogeneous_of_degree<const ORDER: usize, const W: usize>(&self, t: f64, degree: usize) -> [P; 3] {
         let [t0, t1] = self.domain();
         let t = t.clamp(t0, t1);
-        let span = find_span(&self.knots, self.degree, t);
-        let b = basis_functions::<W>(&self.knots, self.degree, span, t);
-        let active = &self.points[span - self.degree..=span];
-        active.iter().zip(&b).fold(P::ZERO, |sum, (&p, &w)| sum + p * w)
-    }
-
-    /// Homogeneous point and derivatives up to `order` (at most 2) at `t`, which is clamped to the domain; zero beyond the order.
-    fn homogeneous(&self, t: f64, order: usize) -> [P; 3] {
-        match self.degree {
-            0..NARROW => self.homogeneous_of_width::<NARROW>(t, order),
-            NARROW..MIDDLE => self.homogeneous_of_width::<MIDDLE>(t, order),
-            MIDDLE..BROAD => self.homogeneous_of_width::<BROAD>(t, order),
-            _ => self.homogeneous_of_width::<WIDE>(t, order),
-        }
-    }
-
-    /// As [`Spline::homogeneous`], with room for `W` basis functions, which the degree must stay below.
-    fn homogeneous_of_width<const W: usize>(&self, t: f64, order: usize) -> [P; 3] {
-        let [t0, t1] = self.domain();
-        let t = t.clamp(t0, t1);
-        let span = find_span(&self.knots, self.degree, t);
-        let b: Basis<W> = basis(&self.knots, self.degree, span, t, order);
-        let active = &self.points[span - self.degree..=span];
+        let span = find_span(&self.knots, degree, t);
+        let b = basis::<ORDER, W>(&self.knots, degree, span, t);
+        let active = &self.points[span - degree..=span];
         std::array::from_fn(|k| {
-            if k > order {
+            if k > ORDER {
                 return P::ZERO;
             }
-            active.iter().zip(&b.value[k]).fold(P::ZERO, |sum, (&p, &w)| sum + p * w)
+            active.iter().zip(&b[k]).fold(P::ZERO, |sum, (&p, &w)| sum + p * w)
         })
     }
 
