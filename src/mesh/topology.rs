@@ -1,7 +1,7 @@
 //! Edges of a mesh: which are open, shared or used more than twice.
 
 use super::FacetMesh;
-use crate::math::FaceId;
+use crate::math::{FaceId, Uv};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -12,8 +12,9 @@ pub struct Topology {
     pub open_edges: usize,
     /// Edges with more than two facets, but for `touching_edges`.
     pub nonmanifold_edges: usize,
-    /// Edges along which a closed surface touches itself: four facets or more, half of them each way, all of different faces. Around such
-    /// an edge the facets pair off, and what is inside is as clear as elsewhere.
+    /// Edges along which a closed surface touches itself: four facets or more, half of them each way, at each of which a face ends: all of
+    /// different faces, or of one with its seam there. Around such an edge the facets pair off, and what is inside is as clear as
+    /// elsewhere.
     pub touching_edges: usize,
     /// Edges whose two facets run along them in the same direction: one of the two is turned inside out.
     pub turned_edges: usize,
@@ -34,12 +35,12 @@ impl FacetMesh {
         // Uses along and against the edge's order of positions.
         let mut edges: FxHashMap<[u32; 2], [u32; 2]> = FxHashMap::default();
         for f in facets.clone() {
-            for (edge, is_against) in self.sides(f) {
-                edges.entry(edge).or_default()[is_against as usize] += 1;
+            for side in self.sides(f) {
+                edges.entry(side.positions).or_default()[side.is_against as usize] += 1;
             }
         }
         let mut t = Topology::default();
-        let mut paired: FxHashMap<[u32; 2], Vec<FaceId>> = FxHashMap::default();
+        let mut paired: FxHashMap<[u32; 2], Vec<(FaceId, [Uv; 2])>> = FxHashMap::default();
         for (edge, [along, against]) in edges {
             match along + against {
                 1 => t.open_edges += 1,
@@ -55,16 +56,19 @@ impl FacetMesh {
         // Faces are asked only for these few: kept for all edges they would double the memory.
         let asked = if paired.is_empty() { 0..0 } else { facets };
         for f in asked {
-            for (edge, _) in self.sides(f) {
-                if let Some(faces) = paired.get_mut(&edge) {
-                    faces.push(self.facets[f].face);
+            for side in self.sides(f) {
+                if let Some(uses) = paired.get_mut(&side.positions) {
+                    uses.push((self.facets[f].face, side.uv));
                 }
             }
         }
-        for mut faces in paired.into_values() {
-            faces.sort_unstable();
-            // A face that has it twice has it inside: it is no edge of the file, and should be no edge of other faces.
-            if faces.windows(2).any(|pair| pair[0] == pair[1]) {
+        for uses in paired.into_values() {
+            // A face that runs on across it has it inside: it is no edge of the file, and should be no edge of other faces. Along its seam
+            // a face ends on either side, at other parameters.
+            let runs_on = |(face, [a, b]): &(FaceId, [Uv; 2]), (other, [c, d]): &(FaceId, [Uv; 2])| {
+                face == other && (a == c || b == d)
+            };
+            if (1..uses.len()).any(|i| uses[..i].iter().any(|before| runs_on(before, &uses[i]))) {
                 t.nonmanifold_edges += 1;
             } else {
                 t.touching_edges += 1;
@@ -73,20 +77,33 @@ impl FacetMesh {
         t
     }
 
-    /// Returns the sides of a facet that have a length: their positions, the smaller index first, and whether the facet runs against that
-    /// order.
-    fn sides(&self, facet: usize) -> impl Iterator<Item = ([u32; 2], bool)> {
-        let p = self.corner_positions(facet);
-        let sides = (0..4).map(move |k| (p[k], p[(k + 1) % 4]));
+    /// Returns the sides of a facet that have a length.
+    fn sides(&self, facet: usize) -> impl Iterator<Item = Side> {
+        let (p, vertices) = (self.corner_positions(facet), self.facets[facet].vertices);
         // A triangle's last side has no length.
-        sides.filter(|(a, b)| a != b).map(|(a, b)| ([a.min(b), a.max(b)], a > b))
+        (0..4).map(move |k| [k, (k + 1) % 4]).filter(move |[a, b]| p[*a] != p[*b]).map(move |ends| {
+            let is_against = p[ends[0]] > p[ends[1]];
+            let [a, b] = if is_against { [ends[1], ends[0]] } else { ends };
+            let uv = [a, b].map(|k| self.vertices[vertices[k] as usize].uv);
+            Side { positions: [p[a], p[b]], uv, is_against }
+        })
     }
+}
+
+/// A side of a facet.
+struct Side {
+    /// Those of its ends, the smaller index first.
+    positions: [u32; 2],
+    /// The facet's parameters there.
+    uv: [Uv; 2],
+    /// Whether the facet runs from the second to the first.
+    is_against: bool,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{FaceId, Point, Uv, Vector};
+    use crate::math::{Point, Vector};
     use crate::mesh::{Facet, MeshVertex};
 
     /// Triangles on six positions, each with its face.
@@ -125,6 +142,12 @@ mod tests {
         // A face that runs on across it does not end there.
         let across = of_faces([0, 0, 2, 3, 4, 5, 6, 7]);
         assert_eq!((across.nonmanifold_edges, across.touching_edges), (1, 0));
+        // Two facets of one face at other parameters are its seam.
+        let mut seam = mesh(sides.into_iter().zip([0, 0, 2, 3, 4, 5, 6, 7]));
+        let shifted = seam.vertices.len() as u32;
+        seam.vertices.extend([0, 1].map(|k: usize| MeshVertex { uv: Uv::new(1.0, 0.0), ..seam.vertices[k] }));
+        seam.facets[1].vertices = [shifted, shifted + 1, 3, 3];
+        assert_eq!((seam.topology(0..8).nonmanifold_edges, seam.topology(0..8).touching_edges), (0, 1));
         // One facet more on it does not pair off; its other two sides have three facets too.
         assert_eq!(topology(&[&sides[..], &[[0, 1, 2]]].concat()).nonmanifold_edges, 3);
     }
