@@ -74,6 +74,21 @@ fn no_diagonal_is_in_two_faces_where_another_solid_lies_on_one() {
     }
 }
 
+/// A bond wire: two facets around it would be enough for the tolerance, and would have all their corners in two places.
+#[test]
+fn a_tube_thinner_than_its_tolerance_does_not_fold_flat() {
+    for radius in [0.0125, 0.005, 0.001] {
+        let wire = sweep::torus(&Frame::IDENTITY, 1.0, radius, [0.0, 0.5 * PI], [0.0, 2.0 * PI]);
+        let shell = Shell { faces: vec![Face::whole(wire)], ..Shell::default() };
+        let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+        for tolerance in TOLERANCES {
+            let mesh = tessellate(&model, &Settings::uniform(tolerance)).mesh;
+            let t = mesh.topology(0..mesh.facets.len());
+            assert_eq!((t.nonmanifold_edges, t.touching_edges, t.turned_edges), (0, 0, 0), "{radius} {tolerance}");
+        }
+    }
+}
+
 /// Two rims nearer than a chord's sag: chords cross until they are short enough.
 #[test]
 fn rings_thinner_than_the_tolerance_are_faces() {

@@ -28,6 +28,9 @@ const COARSEST: f64 = 1e9;
 const PARALLEL: u32 = 5;
 /// Depth at which splitting ends: parameters have no more digits.
 const MAX_DEPTH: u32 = 60;
+/// Share of a closed direction by which a border may fall short of all of it, and a cell of half of it: far above what parameters are
+/// rounded by.
+const WHOLE_TURN: f64 = 1e-6;
 /// Share of a cell's size that a preferred cut keeps from its sides.
 const CUT_CLEARANCE: f64 = 1e-3;
 
@@ -47,6 +50,8 @@ struct Tree<'s, 'a> {
     resolution: Uv,
     /// Parameters at which cells are cut rather than elsewhere, in u and v.
     preferred: [Vec<f64>; 2],
+    /// A cell must be shorter than this, in u and v: half of a direction in which the face comes back to where it began, else infinite.
+    half_turn: Uv,
     /// Largest angle between a facet and its normals, radians; `None` where none was asked for.
     max_angle: Option<f64>,
 }
@@ -126,7 +131,9 @@ pub(in crate::tessellate) fn split(
     let bands = BorderBands::new(&segments);
     segments.extend(imprinted);
     let resolution = parameter_resolution(lo, hi);
-    let tree = Tree { surface, acceptance, segments, border, bands, poles, resolution, preferred, max_angle };
+    let half_turn = half_turn(surface, root);
+    let tree =
+        Tree { surface, acceptance, segments, border, bands, poles, resolution, preferred, half_turn, max_angle };
     // Branches have equal shares whatever they need: where one is short while the whole is not, all get twice as much. The last try
     // leaves at most twice the budget.
     let all: Vec<u32> = (0..tree.segments.len() as u32).collect();
@@ -157,9 +164,9 @@ impl Tree<'_, '_> {
             return;
         }
         let candidate = CandidateFacet::new(self.surface, cell);
-        let crease = self.crease_to_cut(cell);
+        let cut = self.crease_to_cut(cell).or_else(|| self.turn_to_cut(cell));
         // A crease is cut along before anything is proved: no facet may lie across it.
-        if crease.is_none()
+        if cut.is_none()
             && let Some((bound, tolerance)) = self.prove_fit(branch, cell, &candidate)
         {
             // At the border the samples' aligned sides let a cell be whole; else the transition takes it, and this
@@ -173,7 +180,7 @@ impl Tree<'_, '_> {
             }
             return;
         }
-        let (direction, at) = crease.unwrap_or_else(|| {
+        let (direction, at) = cut.unwrap_or_else(|| {
             let d = candidate.parameter_to_halve(
                 self.surface,
                 cell,
@@ -271,6 +278,12 @@ impl Tree<'_, '_> {
         })
     }
 
+    /// Returns where a cell that goes halfway round the face is cut, with the parameter that is constant there; `None` for a shorter one.
+    fn turn_to_cut(&self, cell: Cell) -> Option<(usize, f64)> {
+        let is_long = |d: &usize| cell.hi[*d] - cell.lo[*d] >= self.half_turn[*d];
+        (0..2).find(is_long).map(|d| (d, self.cut_parameter(cell, d)))
+    }
+
     /// Returns where a cell is cut in direction `d`: at the middle one of the preferred cuts that keep off its sides, else half-way.
     fn cut_parameter(&self, cell: Cell, d: usize) -> f64 {
         let (lo, hi) = (cell.lo[d], cell.hi[d]);
@@ -307,6 +320,19 @@ impl Tree<'_, '_> {
     fn contains(&self, p: Uv) -> bool {
         self.bands.encloses(p)
     }
+}
+
+/// Returns half of `root` in each direction in which the face comes back to where it began, else infinity. Of a tube thinner than its
+/// tolerance two facets around would have their corners in the same two places: the facets of one side would be those of the other.
+fn half_turn(surface: &FaceSurface<'_>, root: Cell) -> Uv {
+    let domain = surface.spline.domain();
+    let half = |d: usize| {
+        let (length, whole) = (root.hi[d] - root.lo[d], domain[d][1] - domain[d][0]);
+        let comes_back = surface.closed[d] && length >= (1.0 - WHOLE_TURN) * whole;
+        // A little less, so that rounding leaves no two cells of one half each.
+        if comes_back { (0.5 - WHOLE_TURN) * length } else { f64::INFINITY }
+    };
+    Uv::new(half(0), half(1))
 }
 
 /// Returns a bound, mm, of a cell with a side on a pole as the triangle that it becomes; `None` for a cell without one, and where none is
