@@ -133,9 +133,10 @@ fn what_an_interrupted_run_saved_is_not_written_over() {
     child.wait().unwrap();
     let saved = path.join("out/checkpoint.tally");
     let before = fs::read(&saved).unwrap();
-    for rays in ["3000000", "1000"] {
-        let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--rays", rays, "-o", "out"]);
-        assert!(code == 2 && err.contains("--resume"), "{code} {err}");
+    // Before the search for an accuracy too, which says what it reached.
+    for asked in [["--rays", "3000000"], ["--rays", "1000"], ["--accuracy", "5deg"]] {
+        let (code, _, err) = lampyris_in(path, &[&["trace", "scene.toml", "-o", "out"][..], &asked].concat());
+        assert!(code == 2 && err.contains("--resume") && !err.contains("reached"), "{code} {err}");
         assert!(fs::read(&saved).unwrap() == before);
     }
 }

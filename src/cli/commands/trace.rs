@@ -61,6 +61,10 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let (mut scene, loaded) = read_scene(command.scene, &monitor)?;
     let has_results = shard.is_none() && !is_range && replay.is_empty();
     refuse_inputs(command, &scene, has_results)?;
+    // Before the search for an accuracy and the pilot, which take their time; and again once the folder is this process's own.
+    if has_results && !extra.resume && !extra.dry_run {
+        refuse_overwriting(&folder.join(CHECKPOINT))?;
+    }
     scene.run.sequences = extra.sequences.unwrap_or(scene.run.sequences);
     scene.run.faces = extra.faces.unwrap_or(scene.run.faces);
     let accuracy = extra.precision.accuracy;
