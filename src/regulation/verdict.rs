@@ -1,7 +1,7 @@
 //! A lamp measured by a regulation: aimed, read row by row, realigned where the regulation allows it.
 
 use super::aim::Aim;
-use super::assessment::{Assessment, Assumptions, RowVerdict};
+use super::assessment::{Assessment, Assumptions};
 use super::judgement::Verdict;
 use super::map::{IntensityMap, Sensor};
 use super::requirement::Photometer;
@@ -142,6 +142,7 @@ fn assess_aimed(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::regulation::assessment::RowVerdict;
 
     fn edges(half: f64, cell: f64) -> Vec<f64> {
         let cells = (2.0 * half / cell).round() as usize;
