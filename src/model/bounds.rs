@@ -63,16 +63,18 @@ impl Model {
     /// A box around all placed faces, mm; within about 1e-3 of a face's size. Empty without faces.
     pub fn bounds(&self) -> Aabb {
         let hulls: Vec<PartHulls<'_>> = self.parts.iter().map(PartHulls::new).collect();
+        let mut placed_hulls: Vec<(Aabb, usize)> = Vec::with_capacity(self.instances.len());
+        for (i, instance) in self.instances.iter().enumerate() {
+            let whole = &hulls[instance.part.0 as usize].whole;
+            // A part without shapes reaches nowhere.
+            if !whole.is_empty() {
+                placed_hulls.push((placed(whole, &instance.placement), i));
+            }
+        }
         let mut bounds = Aabb::EMPTY;
         for side in SIDES {
-            let mut reaches: Vec<(f64, usize)> = Vec::with_capacity(self.instances.len());
-            for (i, instance) in self.instances.iter().enumerate() {
-                let whole = &hulls[instance.part.0 as usize].whole;
-                // A part without shapes reaches nowhere.
-                if !whole.is_empty() {
-                    reaches.push((side.reach(&placed(whole, &instance.placement)), i));
-                }
-            }
+            let mut reaches: Vec<(f64, usize)> =
+                placed_hulls.iter().map(|(hull, i)| (side.reach(hull), *i)).collect();
             // The farthest first: once a hull reaches no farther than the box, none behind it does.
             reaches.sort_by(|a, b| b.0.total_cmp(&a.0));
             for (reach, i) in reaches {

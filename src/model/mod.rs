@@ -23,4 +23,5 @@ pub use account::{FaceAccount, PartAccount, SolidAccount};
 pub use face::{Analytic, Colour, EdgeUse, Face, SurfaceKind, TessellatedFace, TrimLoop};
 pub use instancing::{Instancing, Placement};
 pub use part::{Edge, EdgeId, Part, PartId, Shell, VertexId};
+pub(crate) use placed::are_shared;
 pub use placed::{Instance, Model, PlacedFace};

@@ -38,6 +38,15 @@ impl Instance {
     }
 }
 
+/// Returns for each of these names whether another of them is the same.
+pub(crate) fn are_shared<'n>(names: impl Iterator<Item = &'n str> + Clone) -> Vec<bool> {
+    let mut uses: FxHashMap<&str, u32> = FxHashMap::default();
+    for name in names.clone() {
+        *uses.entry(name).or_insert(0) += 1;
+    }
+    names.map(|name| uses[name] > 1).collect()
+}
+
 /// A face where it stands. Either `face` (a surface) or `tessellated` (a ready mesh) is given.
 #[derive(Clone, Copy, Debug)]
 pub struct PlacedFace<'a> {
@@ -85,11 +94,7 @@ impl Model {
     /// and its number from 1; its path where several would be called alike.
     pub fn labels(&self) -> Vec<String> {
         let mut labels: Vec<String> = (0..self.instances.len()).map(|k| self.own_label(k)).collect();
-        let mut uses: FxHashMap<&str, u32> = FxHashMap::default();
-        for label in &labels {
-            *uses.entry(label).or_insert(0) += 1;
-        }
-        let shared: Vec<bool> = labels.iter().map(|label| uses[label.as_str()] > 1).collect();
+        let shared = are_shared(labels.iter().map(String::as_str));
         for ((label, instance), is_shared) in labels.iter_mut().zip(&self.instances).zip(shared) {
             if is_shared && !instance.path.is_empty() {
                 label.clone_from(&instance.path);

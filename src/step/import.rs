@@ -3,7 +3,7 @@
 use super::geometry::Refusal;
 use super::geometry::units::{Units, contexts};
 use super::part21::{File, parse};
-use super::product::asides::Asides;
+use super::product::asides::{HiddenItems, external_files, void_directions};
 use super::product::assembly::{Assembly, PlacedRepresentation};
 use super::product::conversion::convert;
 use super::product::numbering::ConvertedPart;
@@ -14,7 +14,7 @@ use super::report::{ImportReport, Note, UnitNames};
 use super::{Error, ErrorKind, Settings};
 use crate::formats;
 use crate::math::Aabb;
-use crate::model::{Instance, Model, PartId};
+use crate::model::{Instance, Model, PartId, are_shared};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::path::Path;
 use std::time::Instant;
@@ -143,9 +143,8 @@ fn convert_assembly(
             report.left_out.push(Note { id: *id, entity: file.entity_name(*id), reason: reason.clone() });
         }
     }
-    let asides = Asides::collect(file);
-    report.problems.extend(asides.void_directions(name));
-    report.left_out.extend(asides.external_files(name));
+    report.problems.extend(void_directions(file, name));
+    report.left_out.extend(external_files(file, name));
     report.problems.extend(assembly.problems.iter().cloned());
     let mut reader = Reader {
         file,
@@ -155,7 +154,7 @@ fn convert_assembly(
         report,
     };
     let mut shared = SharedItems::new(file, &assembly, &placed);
-    let mut hidden = asides.hidden_items(file);
+    let mut hidden = HiddenItems::new(file);
     // What a representation adds becomes a part where it is placed first; it adds less where another has brought the same.
     let mut parts: FxHashMap<(u64, Vec<u64>), Option<PartFaces>> = FxHashMap::default();
     for p in placed {
@@ -189,9 +188,13 @@ fn convert_assembly(
 
 /// Numbers instances whose paths are alike from 2 on, as `left/led:2`, in the file's order, so that each path means one.
 fn number_alike_paths(instances: &mut [Instance]) {
+    let is_shared = are_shared(instances.iter().map(|i| i.path.as_str()));
+    if !is_shared.contains(&true) {
+        return;
+    }
     let mut taken: FxHashSet<String> = instances.iter().map(|i| i.path.clone()).collect();
     let mut uses: FxHashMap<String, u32> = FxHashMap::default();
-    for instance in instances {
+    for (instance, _) in instances.iter_mut().zip(is_shared).filter(|(_, is_shared)| *is_shared) {
         let count = uses.entry(instance.path.clone()).or_insert(0);
         *count += 1;
         while *count > 1 {

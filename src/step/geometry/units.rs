@@ -142,7 +142,7 @@ fn conventional_unit(name: &str) -> Option<(Kind, f64)> {
 
 /// Returns all contexts of a file that assign units, by their ids.
 pub(crate) fn contexts<'f, 'a>(file: &'f File<'a>) -> impl Iterator<Item = (u64, Assigned)> + use<'f, 'a> {
-    file.entities().filter(|e| e.is_a("GLOBAL_UNIT_ASSIGNED_CONTEXT")).map(|e| (e.id, read_context(e)))
+    file.entities_named(&["GLOBAL_UNIT_ASSIGNED_CONTEXT"]).map(|e| (e.id, read_context(e)))
 }
 
 #[cfg(test)]

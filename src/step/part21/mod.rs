@@ -10,28 +10,17 @@ mod number;
 mod parser;
 mod sections;
 mod short_names;
+mod span;
 mod text;
 
 pub(super) use parser::parse;
 
-use index::Index;
+use index::{Index, Kinds};
 use short_names::Keyword;
+use span::Span;
 
 /// Reals below this that stand for a count are exact: 2⁵³ is 9e15.
 const EXACT_COUNT: f64 = 1e15;
-
-/// A range of the source or of an arena.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Span {
-    start: u32,
-    len: u32,
-}
-
-impl Span {
-    fn range(self) -> std::ops::Range<usize> {
-        self.start as usize..self.start as usize + self.len as usize
-    }
-}
 
 /// One parameter of a record.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,6 +83,7 @@ pub(super) struct File<'a> {
     instances: Vec<Instance>,
     header: Vec<Record>,
     index: Index,
+    kinds: Kinds<'a>,
     /// The first statements that were skipped.
     pub(super) faults: Vec<Fault>,
     /// How many were skipped.
@@ -129,6 +119,17 @@ impl<'a> File<'a> {
     /// Returns all instances in the order of the file.
     pub(super) fn entities(&self) -> impl Iterator<Item = Entity<'_, 'a>> {
         (0..self.instances.len()).map(|i| self.instance(i))
+    }
+
+    /// Returns the instances with a record of one of these names, in the order of the file.
+    pub(super) fn entities_named(&self, names: &[&str]) -> impl Iterator<Item = Entity<'_, 'a>> {
+        self.entities_of_kind(|name| names.contains(&name))
+    }
+
+    /// Returns the instances with a record whose name is meant, in the order of the file; each name is asked about once.
+    pub(super) fn entities_of_kind(&self, is_meant: impl Fn(&str) -> bool) -> impl Iterator<Item = Entity<'_, 'a>> {
+        let positions = self.kinds.positions(|name| std::str::from_utf8(name).is_ok_and(&is_meant));
+        positions.into_iter().map(|position| self.instance(position as usize))
     }
 
     /// Returns the parameters of the first header record of this name, such as `FILE_SCHEMA`.
@@ -188,7 +189,7 @@ impl<'f, 'a> Entity<'f, 'a> {
 
     /// Whether one of the records has one of these names.
     pub(super) fn is_one_of(&self, names: &[&str]) -> bool {
-        self.keywords().any(|k| names.contains(&k))
+        names.iter().any(|name| self.is_a(name))
     }
 
     /// Returns the parameters that the record `name` adds: all of them in a complex instance, those after the `inherited` first ones in a

@@ -1,9 +1,11 @@
 //! The one pass over the text: statements into the arena of values, faults noted and stepped over.
 
-use super::index::Index;
+use super::index::{Index, Kinds};
 use super::number::number;
 use super::sections::section_besides_data;
-use super::{Fault, File, Instance, Keyword, Record, Span, Value};
+use super::short_names::Keyword;
+use super::span::Span;
+use super::{Fault, File, Instance, Record, Value};
 use crate::step::{Error, ErrorKind};
 
 /// Deepest nesting of lists; schemas need 3, real files have shown 4.
@@ -38,12 +40,17 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     if !marked && p.instances.is_empty() {
         return Err(Error::new(ErrorKind::NotStep { file: name.into() }));
     }
-    let (index, repeated) = Index::new(&p.instances);
+    let (index, repeated) = Index::new(p.instances.iter().map(|i| i.id));
     for position in repeated {
         let instance = p.instances[position];
         let start = p.records[instance.first as usize].name.start as usize;
         p.note(start, Some(instance.id), "its number stands for an earlier instance already; this one is left out");
     }
+    let names = (0u32..).zip(&p.instances).flat_map(|(position, i)| {
+        let records = &p.records[i.first as usize..][..i.count as usize];
+        records.iter().map(move |record| (record.name.bytes(source), position))
+    });
+    let kinds = Kinds::new(names);
     Ok(File {
         source,
         values: p.values,
@@ -52,6 +59,7 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
         instances: p.instances,
         header: p.header,
         index,
+        kinds,
         faults: p.faults,
         fault_count: p.fault_count,
     })

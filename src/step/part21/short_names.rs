@@ -3,7 +3,7 @@
 //! Source: ISO 10303-21:2016, 7.3.4 (either may stand), and the annexes of short names of ISO 10303-41, -42, -43, -44, -46 and -203. Only
 //! names that the reader asks for are listed.
 
-use super::Span;
+use super::span::Span;
 
 /// The longest short name.
 const LONGEST: usize = 6;

@@ -2,10 +2,18 @@
 
 /// Decodes what stands between the apostrophes of a text. Line breaks are dropped; escapes that are unknown or broken stay as they are.
 pub(super) fn decode(raw: &[u8]) -> String {
+    // Raw bytes are UTF-8 if they are valid as such, otherwise Latin-1.
+    let text = std::str::from_utf8(raw);
+    let is_itself = |b: &u8| *b >= b' ' && !matches!(b, b'\'' | b'\\');
+    // Most texts are nothing but themselves.
+    if let Ok(text) = text
+        && raw.iter().all(is_itself)
+    {
+        return text.to_owned();
+    }
+    let utf8 = text.is_ok();
     let mut out = String::with_capacity(raw.len());
     let mut i = 0;
-    // Raw bytes are UTF-8 if they are valid as such, otherwise Latin-1.
-    let utf8 = std::str::from_utf8(raw).is_ok();
     let mut plain: Vec<u8> = Vec::new();
     let flush = |plain: &mut Vec<u8>, out: &mut String| {
         if utf8 {

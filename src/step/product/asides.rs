@@ -5,69 +5,32 @@ use crate::step::report::Note;
 use rustc_hash::FxHashSet;
 use std::path::Path;
 
-/// The entities of a file that say something beside its shapes, each kind in the order of the file.
-pub(crate) struct Asides<'f, 'a> {
-    void_directions: Vec<u64>,
-    documents: Vec<Entity<'f, 'a>>,
-    invisibilities: Vec<Entity<'f, 'a>>,
+/// Tells of directions that point nowhere, how many there are and which is the first; `None` where there is none. `name` is the file's.
+pub(crate) fn void_directions(file: &File<'_>, name: &str) -> Option<String> {
+    let mut void = file.entities_named(&["DIRECTION"]).filter(|e| is_void(*e));
+    let first = void.next()?.id;
+    let count = 1 + void.count();
+    Some(format!(
+        "{name}: #{first} DIRECTION points nowhere; there are {count} such. Placements with one take the axis that they would have without"
+    ))
 }
 
-impl<'f, 'a> Asides<'f, 'a> {
-    /// Looks for them in one pass: one for each kind took 2 % of reading a file of a million entities.
-    pub(crate) fn collect(file: &'f File<'a>) -> Self {
-        let mut asides = Self { void_directions: Vec::new(), documents: Vec::new(), invisibilities: Vec::new() };
-        for e in file.entities() {
-            // Names as bytes: made texts of, those of all entities took 3 % more.
-            if e.is_a("DIRECTION") {
-                asides.void_directions.extend(is_void(e).then_some(e.id));
-            } else if e.is_a("DOCUMENT_FILE") {
-                asides.documents.push(e);
-            } else if e.is_a("INVISIBILITY") || e.is_a("CONTEXT_DEPENDENT_INVISIBILITY") {
-                asides.invisibilities.push(e);
-            }
+/// Names the other STEP files, than `own`, that the products have their shapes in.
+pub(crate) fn external_files(file: &File<'_>, own: &str) -> Vec<Note> {
+    let mut notes = Vec::new();
+    for e in file.entities_named(&["DOCUMENT_FILE"]) {
+        let Some(other) = e.attributes("DOCUMENT_FILE", 0).and_then(|a| a.text(0)) else { continue };
+        // Drawings and files of a CAD system, or the file itself, may be named as well.
+        let extension = Path::new(&other).extension();
+        let is_step = extension.is_some_and(|x| ["stp", "step"].iter().any(|known| x.eq_ignore_ascii_case(known)));
+        if is_step && !other.eq_ignore_ascii_case(own) {
+            let reason = format!(
+                "shapes are in {other}, which is not read with this file: export the assembly as one file, or use that file too"
+            );
+            notes.push(Note { id: e.id, entity: e.name(), reason });
         }
-        asides
     }
-
-    /// Tells of directions that point nowhere, how many there are and which is the first; `None` where there is none.
-    pub(crate) fn void_directions(&self, name: &str) -> Option<String> {
-        let first = self.void_directions.first()?;
-        let count = self.void_directions.len();
-        Some(format!(
-            "{name}: #{first} DIRECTION points nowhere; there are {count} such. Placements with one take the axis that they would have without"
-        ))
-    }
-
-    /// Names the other STEP files, than `own`, that the products have their shapes in.
-    pub(crate) fn external_files(&self, own: &str) -> Vec<Note> {
-        let mut notes = Vec::new();
-        for e in &self.documents {
-            let Some(other) = e.attributes("DOCUMENT_FILE", 0).and_then(|a| a.text(0)) else { continue };
-            // Drawings and files of a CAD system, or the file itself, may be named as well.
-            let extension = Path::new(&other).extension();
-            let is_step =
-                extension.is_some_and(|x| ["stp", "step"].iter().any(|known| x.eq_ignore_ascii_case(known)));
-            if is_step && !other.eq_ignore_ascii_case(own) {
-                let reason = format!(
-                    "shapes are in {other}, which is not read with this file: export the assembly as one file, or use that file too"
-                );
-                notes.push(Note { id: e.id, entity: e.name(), reason });
-            }
-        }
-        notes
-    }
-
-    /// Returns the items that the file hides: what styles stand for, and what is on layers.
-    pub(crate) fn hidden_items(&self, file: &File<'_>) -> HiddenItems {
-        let mut seen = FxHashSet::default();
-        let lists = self.invisibilities.iter().filter_map(|e| {
-            // In a complex instance that is limited to a context, the list stands in the record of the supertype.
-            e.attributes("INVISIBILITY", 0).or_else(|| e.attributes("CONTEXT_DEPENDENT_INVISIBILITY", 0))
-        });
-        let named = lists.flat_map(|args| args.list(0).ids());
-        let shown = named.flat_map(|id| file.entity(id).map_or_else(Vec::new, shown_items));
-        HiddenItems { items: shown.filter(|id| seen.insert(*id)).collect(), found: FxHashSet::default() }
-    }
+    notes
 }
 
 /// Whether a DIRECTION has no component that is a number and not 0.
@@ -97,6 +60,18 @@ pub(crate) struct HiddenItems {
 }
 
 impl HiddenItems {
+    /// Collects the items that a file hides: what styles stand for, and what is on layers.
+    pub(crate) fn new(file: &File<'_>) -> Self {
+        let mut seen = FxHashSet::default();
+        let lists = file.entities_named(&["INVISIBILITY", "CONTEXT_DEPENDENT_INVISIBILITY"]).filter_map(|e| {
+            // In a complex instance that is limited to a context, the list stands in the record of the supertype.
+            e.attributes("INVISIBILITY", 0).or_else(|| e.attributes("CONTEXT_DEPENDENT_INVISIBILITY", 0))
+        });
+        let named = lists.flat_map(|args| args.list(0).ids());
+        let shown = named.flat_map(|id| file.entity(id).map_or_else(Vec::new, shown_items));
+        Self { items: shown.filter(|id| seen.insert(*id)).collect(), found: FxHashSet::default() }
+    }
+
     /// Notes which of these entities, which the model holds, are hidden.
     pub(crate) fn find_among<'i>(&mut self, entities: impl IntoIterator<Item = &'i u64>) {
         if !self.items.is_empty() {

@@ -5,18 +5,19 @@
 
 use super::purpose::{holds_mesh, is_shape_representation, purpose_besides_shape};
 use super::relations::{
-    Link, WITH_TRANSFORMATION, property_attributes, related_representations, shape_definition_attributes,
-    usage_attributes,
+    Link, RELATIONS, WITH_TRANSFORMATION, property_attributes, related_representations,
+    shape_definition_attributes, usage_attributes,
 };
-use super::usage_names::{Usage, name_usages, occurrence_names, occurrence_path, product_name};
+use super::usage_names::{Occurrence, ProductNames, Usage, name_in_path, name_usages};
 use crate::math::Frame;
 use crate::step::geometry::units::Units;
 use crate::step::geometry::{FARTHEST_MM, Geometry};
-use crate::step::part21::{Entity, File};
+use crate::step::part21::{Args, Entity, File};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Deepest nesting of assemblies.
 const MAX_DEPTH: usize = 64;
+
 /// A representation where it stands.
 #[derive(Clone, Debug)]
 pub(crate) struct PlacedRepresentation {
@@ -45,6 +46,7 @@ pub(crate) struct Assembly<'f, 'a> {
     /// Representations that stand for a product.
     pub(super) owned: FxHashSet<u64>,
     pub(super) usages: FxHashMap<u64, Vec<Usage>>,
+    products: ProductNames,
     /// Usage → placement of the child in the parent; `None` where that cannot be read.
     pub(super) placements: FxHashMap<u64, Option<Frame>>,
     pub(super) links: FxHashMap<u64, Vec<Link>>,
@@ -76,6 +78,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             shapes: FxHashMap::default(),
             owned: FxHashSet::default(),
             usages: FxHashMap::default(),
+            products: ProductNames::default(),
             placements: FxHashMap::default(),
             links: FxHashMap::default(),
             left_out: Vec::new(),
@@ -92,7 +95,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         // Read last: both kinds of relations point to shapes and usages that may stand anywhere in the file.
         let mut contextual = Vec::new();
         let mut relations = Vec::new();
-        for e in file.entities() {
+        for e in file.entities_named(&RELATIONS) {
             if let Some(args) = shape_definition_attributes(e) {
                 a.read_shape_definition(args.entity(0), args.id(1));
             } else if let Some(args) = usage_attributes(e) {
@@ -101,11 +104,11 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 }
             } else if e.is_a("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION") {
                 contextual.push(e);
-            } else if e.is_one_of(&["SHAPE_REPRESENTATION_RELATIONSHIP", "REPRESENTATION_RELATIONSHIP"]) {
+            } else {
                 relations.push(e);
             }
         }
-        a.usages.values_mut().for_each(|usages| name_usages(file, usages));
+        a.usages.values_mut().for_each(|usages| name_usages(file, &mut a.products, usages));
         let mut used = FxHashSet::default();
         for e in contextual {
             a.read_contextual(e, &mut used);
@@ -133,9 +136,17 @@ impl<'f, 'a> Assembly<'f, 'a> {
 
     /// Returns the ids of the items of a representation; empty when the file does not have it.
     pub(crate) fn items(&self, representation: u64) -> Vec<u64> {
-        let Some(e) = self.file.entity(representation) else { return Vec::new() };
-        let args = e.attributes("REPRESENTATION", 0).unwrap_or_else(|| e.args());
-        args.list(1).ids()
+        self.item_list(representation).map_or_else(Vec::new, |list| list.ids())
+    }
+
+    /// Whether an item is one of a representation's.
+    fn is_item(&self, id: u64, representation: u64) -> bool {
+        self.item_list(representation).is_some_and(|list| (0..list.len()).any(|i| list.id(i) == Some(id)))
+    }
+
+    fn item_list(&self, representation: u64) -> Option<Args<'f, 'a>> {
+        let e = self.file.entity(representation)?;
+        Some(e.attributes("REPRESENTATION", 0).unwrap_or_else(|| e.args()).list(1))
     }
 
     /// Notes which product a representation shows, or which aspect of one; nothing where either is missing.
@@ -173,7 +184,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             let (from, to) = (args.id(2)?, args.id(3)?);
             // Each placement is in the units of the representation that holds it.
             let (mut holder_from, mut holder_to) = (first, second);
-            if self.items(first).contains(&to) && self.items(second).contains(&from) {
+            if self.is_item(to, first) && self.is_item(from, second) {
                 (holder_from, holder_to) = (second, first);
             }
             let from = self.geometry(holder_from).placement(from).ok()?;
@@ -239,18 +250,16 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let roots: Vec<u64> =
             products.iter().copied().filter(|p| !children.contains(p) && !moved.contains(p)).collect();
         for root in roots {
-            self.place_product(root, Frame::IDENTITY, String::new(), &mut Vec::new(), &[]);
+            self.place_product(root, Frame::IDENTITY, &Occurrence::ROOT, &mut Vec::new());
         }
         // Products in a cycle, and shapes without a product.
         for product in products {
             let seen = self.shapes.get(&product).is_some_and(|s| s.iter().any(|r| self.reached.contains(r)));
             if !seen && self.shapes.contains_key(&product) {
-                self.place_product(product, Frame::IDENTITY, String::new(), &mut Vec::new(), &[]);
+                self.place_product(product, Frame::IDENTITY, &Occurrence::ROOT, &mut Vec::new());
             }
         }
         self.place_orphans();
-        let names = occurrence_names(self.file, self.usages.values().flatten());
-        self.placed.iter_mut().for_each(|p| p.path = occurrence_path(&names, &p.owners));
         if self.visited > limit { Err(self.visited) } else { Ok((std::mem::take(&mut self.placed), self)) }
     }
 
@@ -259,10 +268,9 @@ impl<'f, 'a> Assembly<'f, 'a> {
         self.in_orphans = true;
         // From here on what products reach is closed: an orphan that leads to it would show it twice.
         self.by_products = self.reached.clone();
-        let candidates: Vec<u64> =
-            self.file.entities().filter(|e| e.keywords().any(is_shape_representation)).map(|e| e.id).collect();
-        let mapped: FxHashSet<u64> =
-            self.file.entities().filter_map(|e| e.attributes("REPRESENTATION_MAP", 0)?.id(1)).collect();
+        let candidates: Vec<u64> = self.file.entities_of_kind(is_shape_representation).map(|e| e.id).collect();
+        let maps = self.file.entities_named(&["REPRESENTATION_MAP"]);
+        let mapped: FxHashSet<u64> = maps.filter_map(|e| e.attributes("REPRESENTATION_MAP", 0)?.id(1)).collect();
         for id in candidates {
             if self.reached.contains(&id) || mapped.contains(&id) {
                 continue;
@@ -275,36 +283,30 @@ impl<'f, 'a> Assembly<'f, 'a> {
                     format!("describes {what}, which is no product: its shape is named by its product"),
                 ));
             } else {
-                self.place_representation(id, Frame::IDENTITY, ("", ""), &mut Vec::new(), &[]);
+                self.place_representation(id, Frame::IDENTITY, &Occurrence::ROOT, &mut Vec::new());
             }
         }
     }
 
-    /// Places a product with its representations and its children; `path` holds the products around it.
-    fn place_product(
-        &mut self,
-        definition: u64,
-        placement: Frame,
-        name: String,
-        path: &mut Vec<u64>,
-        owners: &[u64],
-    ) {
+    /// Places a product with its representations and its children; `around` holds the products around it.
+    fn place_product(&mut self, definition: u64, placement: Frame, used: &Occurrence<'_>, around: &mut Vec<u64>) {
         self.visited += 1;
         if self.visited > self.limit {
             return;
         }
-        if path.len() >= MAX_DEPTH || path.contains(&definition) {
+        if around.len() >= MAX_DEPTH || around.contains(&definition) {
             if self.cyclic.insert(definition) {
                 self.problems.push(format!("#{definition}: products contain each other"));
             }
             return;
         }
-        path.push(definition);
-        let product = product_name(self.file, definition);
+        around.push(definition);
+        let product = self.products.name(self.file, definition);
+        let shown = Occurrence { product: &product, ..*used };
         for representation in self.shapes.get(&definition).cloned().into_iter().flatten() {
-            self.place_representation(representation, placement, (&name, &product), &mut Vec::new(), owners);
+            self.place_representation(representation, placement, &shown, &mut Vec::new());
         }
-        // Taken out while its children are placed; nothing asks for it meanwhile, for `path` stops a product inside itself.
+        // Taken out while its children are placed; nothing asks for it meanwhile, for `around` stops a product inside itself.
         if let Some(usages) = self.usages.remove(&definition) {
             let placed_within = self.placed_within(definition, &usages);
             for usage in &usages {
@@ -315,28 +317,26 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 // Without a placement of its own the child stands where the parent does.
                 let local = self.placements.get(&usage.id).copied().unwrap_or(Some(Frame::IDENTITY));
                 let (kept, at) = (self.placed.len(), placement.compose(&local.unwrap_or(Frame::IDENTITY)));
-                self.place_product(usage.child, at, usage.name.clone(), path, &[owners, &[usage.id]].concat());
+                let child = self.products.name(self.file, usage.child);
+                let name = name_in_path(usage, &child);
+                let path = used.path.map_or_else(|| name.to_owned(), |outer| format!("{outer}/{name}"));
+                let owners = [used.owners, &[usage.id]].concat();
+                let inner = Occurrence { name: &usage.name, path: Some(&path), product: "", owners: &owners };
+                self.place_product(usage.child, at, &inner, around);
                 // Walked all the same, then left out: else it would come back as a shape that no product reaches.
                 self.placed.truncate(if local.is_some() { self.placed.len() } else { kept });
             }
             self.usages.insert(definition, usages);
         }
-        path.pop();
+        around.pop();
     }
 
-    /// Places the shapes of a representation and, by its relations and mapped items, of others; `path` holds those around it.
-    fn place_representation(
-        &mut self,
-        id: u64,
-        placement: Frame,
-        (name, product): (&str, &str),
-        path: &mut Vec<u64>,
-        owners: &[u64],
-    ) {
+    /// Places the shapes of a representation and, by its relations and mapped items, of others; `around` holds those around it.
+    fn place_representation(&mut self, id: u64, placement: Frame, used: &Occurrence<'_>, around: &mut Vec<u64>) {
         self.visited += 1;
         // A few lines can name a million instances: the limit is on visits, not on depth alone.
-        let exhausted = self.visited > self.limit || path.len() >= MAX_DEPTH;
-        if exhausted || path.contains(&id) || self.by_products.contains(&id) {
+        let exhausted = self.visited > self.limit || around.len() >= MAX_DEPTH;
+        if exhausted || around.contains(&id) || self.by_products.contains(&id) {
             return;
         }
         if !(placement.origin.abs().max_element() <= FARTHEST_MM) {
@@ -353,15 +353,15 @@ impl<'f, 'a> Assembly<'f, 'a> {
             }
             return;
         }
-        path.push(id);
+        around.push(id);
         self.reached.insert(id);
         self.placed.push(PlacedRepresentation {
             representation: id,
             placement,
-            name: name.to_string(),
-            path: String::new(),
-            product: product.to_string(),
-            owners: owners.to_vec(),
+            name: used.name.to_string(),
+            path: used.path.map_or_else(String::new, str::to_owned),
+            product: used.product.to_string(),
+            owners: used.owners.to_vec(),
             orphan: self.in_orphans,
         });
         let geometry = self.geometry(id);
@@ -377,21 +377,21 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 self.problems.push(format!("#{item} MAPPED_ITEM: its placement cannot be read"));
                 continue;
             };
-            let inner = [owners, &[item]].concat();
+            let owners = [used.owners, &[item]].concat();
             // The origin of the mapped representation comes to lie on the target.
             let at = placement.compose(&target.compose(&origin.inverse()));
-            self.place_representation(to, at, (name, product), path, &inner);
+            self.place_representation(to, at, &Occurrence { owners: &owners, ..*used }, around);
         }
         for link in self.links.get(&id).cloned().into_iter().flatten() {
             // A representation of another product is placed by its own usage.
             let elsewhere = self.owned.contains(&link.to) && link.placement.is_none_or(|p| p.is_identity());
-            if !path.contains(&link.to) && !elsewhere {
+            if !around.contains(&link.to) && !elsewhere {
                 let (kept, at) = (self.placed.len(), placement.compose(&link.placement.unwrap_or(Frame::IDENTITY)));
-                self.place_representation(link.to, at, (name, product), path, owners);
+                self.place_representation(link.to, at, used, around);
                 // As for usages.
                 self.placed.truncate(if link.placement.is_some() { self.placed.len() } else { kept });
             }
         }
-        path.pop();
+        around.pop();
     }
 }

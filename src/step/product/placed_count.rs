@@ -19,7 +19,7 @@ impl Assembly<'_, '_> {
         let roots = products.into_iter().filter(|p| !children.contains(p));
         let placed = roots.fold(0u64, |n, root| n.saturating_add(counter.product(root, 0)));
         // Representations without a product nest by their mapped items.
-        let lone = self.file.entities().filter(|e| e.is_a("MAPPED_ITEM"));
+        let lone = self.file.entities_named(&["MAPPED_ITEM"]);
         let maps = lone
             .filter_map(|e| e.attributes("MAPPED_ITEM", 1)?.entity(0)?.attributes("REPRESENTATION_MAP", 0)?.id(1));
         let maps: FxHashSet<u64> = maps.collect();

@@ -3,6 +3,15 @@
 use crate::math::Frame;
 use crate::step::part21::{Args, Entity};
 
+/// The entities that relate products, representations and their shapes.
+pub(super) const RELATIONS: [&str; 5] = [
+    "SHAPE_DEFINITION_REPRESENTATION",
+    "NEXT_ASSEMBLY_USAGE_OCCURRENCE",
+    "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION",
+    "SHAPE_REPRESENTATION_RELATIONSHIP",
+    "REPRESENTATION_RELATIONSHIP",
+];
+
 /// What states where one of two related representations stands in the other; without it both stand in the same place.
 pub(super) const WITH_TRANSFORMATION: &str = "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
 

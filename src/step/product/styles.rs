@@ -28,7 +28,7 @@ impl Styles {
         let usages = usages_by_shape(file);
         // Of thousands of items many share a style.
         let mut known: FxHashMap<u64, Option<Colour>> = FxHashMap::default();
-        for e in file.entities() {
+        for e in file.entities_named(&["PRESENTATION_LAYER_ASSIGNMENT", "STYLED_ITEM", "OVER_RIDING_STYLED_ITEM"]) {
             if let Some(args) = e.attributes("PRESENTATION_LAYER_ASSIGNMENT", 0) {
                 let name: Arc<str> = args.name(0).into();
                 // One name for all items of a layer: files hold thousands.
@@ -79,7 +79,7 @@ impl Styles {
 /// Returns the usages of products by what styles name them by: their shapes, and the entities that place them.
 fn usages_by_shape(file: &File<'_>) -> FxHashMap<u64, u64> {
     let mut usages = FxHashMap::default();
-    for e in file.entities() {
+    for e in file.entities_named(&["SHAPE_DEFINITION_REPRESENTATION", "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"]) {
         let (shape, definition) = if let Some(a) = shape_definition_attributes(e) {
             (a.id(1), a.entity(0))
         } else if let Some(a) = e.attributes("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION", 0) {

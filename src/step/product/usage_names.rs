@@ -4,7 +4,8 @@
 
 use super::relations::usage_attributes;
 use crate::step::part21::File;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
 
 /// What a common translator calls every usage.
 const DEFAULT_NAME: &str = "Next assembly relationship";
@@ -16,8 +17,38 @@ pub(super) struct Usage {
     pub(super) id: u64,
 }
 
-/// Returns the product's name, or else its id, without blanks around it; empty where it cannot be found: what uses it names it then.
-pub(super) fn product_name(file: &File<'_>, definition: u64) -> String {
+/// What a placed representation is called, and what it is placed by.
+#[derive(Clone, Copy)]
+pub(super) struct Occurrence<'o> {
+    /// Name of the usage, empty when it had none.
+    pub(super) name: &'o str,
+    /// Names of the usages from the outermost down to its own, joined by `/`; of those without a name that of their product. `None` where
+    /// no usage places it.
+    pub(super) path: Option<&'o str>,
+    /// Name of the product, empty when it had none.
+    pub(super) product: &'o str,
+    /// Entities that may carry a style for it, the outermost first.
+    pub(super) owners: &'o [u64],
+}
+
+impl Occurrence<'_> {
+    /// What no usage places, and what has no name.
+    pub(super) const ROOT: Self = Self { name: "", path: None, product: "", owners: &[] };
+}
+
+/// Names of products by their definitions; each is read once.
+#[derive(Default)]
+pub(super) struct ProductNames(FxHashMap<u64, Arc<str>>);
+
+impl ProductNames {
+    /// Returns the product's name, or else its id, without blanks around it; empty where it cannot be found: what uses it names it then.
+    pub(super) fn name(&mut self, file: &File<'_>, definition: u64) -> Arc<str> {
+        self.0.entry(definition).or_insert_with(|| product_name(file, definition).into()).clone()
+    }
+}
+
+/// Returns the name of a product, as [`ProductNames::name`].
+fn product_name(file: &File<'_>, definition: u64) -> String {
     let product = || {
         let definition = file.entity(definition)?;
         // A subtype, such as one with documents, writes the same attributes first.
@@ -32,50 +63,38 @@ pub(super) fn product_name(file: &File<'_>, definition: u64) -> String {
 
 /// Names the usages in one product. A name that is blank, a writer's default, or given to several children is none: then the child's
 /// product names the usage, numbered from 1 where it is used several times, or else the usage's description or id does.
-pub(super) fn name_usages(file: &File<'_>, usages: &mut [Usage]) {
+pub(super) fn name_usages(file: &File<'_>, products: &mut ProductNames, usages: &mut [Usage]) {
     let text = |usage: &Usage, i: usize| {
         let args = file.entity(usage.id).and_then(usage_attributes);
         args.map_or_else(String::new, |a| a.name(i).trim().to_owned())
     };
-    let mut children: FxHashMap<String, FxHashSet<u64>> = FxHashMap::default();
-    for usage in usages.iter_mut() {
-        usage.name = text(usage, 1);
-        children.entry(usage.name.clone()).or_default().insert(usage.child);
+    usages.iter_mut().for_each(|usage| usage.name = text(usage, 1));
+    // The child that a name is given to; `None` for several.
+    let mut children: FxHashMap<&str, Option<u64>> = FxHashMap::default();
+    for usage in &*usages {
+        let child = children.entry(&usage.name).or_insert(Some(usage.child));
+        *child = child.filter(|c| *c == usage.child);
     }
-    let mut unnamed: FxHashMap<String, Vec<usize>> = FxHashMap::default();
-    for (k, usage) in usages.iter_mut().enumerate() {
-        let tells = !usage.name.is_empty() && usage.name != DEFAULT_NAME && children[&usage.name].len() == 1;
-        if !tells {
-            let others = [product_name(file, usage.child), text(usage, 2)];
-            usage.name = others.into_iter().find(|n| !n.is_empty()).unwrap_or_else(|| text(usage, 0));
-            unnamed.entry(usage.name.clone()).or_default().push(k);
-        }
+    let tells = |u: &Usage| !u.name.is_empty() && u.name != DEFAULT_NAME && children[u.name.as_str()].is_some();
+    let unnamed: Vec<usize> = (0..usages.len()).filter(|&k| !tells(&usages[k])).collect();
+    for &k in &unnamed {
+        let usage = &mut usages[k];
+        let product = products.name(file, usage.child);
+        let others = [product.to_string(), text(usage, 2)];
+        usage.name = others.into_iter().find(|n| !n.is_empty()).unwrap_or_else(|| text(usage, 0));
     }
     // A selector must be able to mean one of several places.
-    let repeated = unnamed.into_iter().filter(|(name, places)| !name.is_empty() && places.len() > 1);
-    for (name, places) in repeated {
-        for (number, k) in places.into_iter().enumerate() {
-            usages[k].name = format!("{name}:{}", number + 1);
-        }
+    let mut places: FxHashMap<&str, Vec<usize>> = FxHashMap::default();
+    unnamed.iter().for_each(|&k| places.entry(&usages[k].name).or_default().push(k));
+    let repeated = places.into_iter().filter(|(name, places)| !name.is_empty() && places.len() > 1);
+    let repeated: Vec<Vec<usize>> = repeated.map(|(_, places)| places).collect();
+    for (number, k) in repeated.iter().flat_map(|places| (1..).zip(places)) {
+        usages[*k].name += &format!(":{number}");
     }
 }
 
-/// Returns what the occurrences of these usages are called in paths, by the `#id` of the usage: by its name, or by its product where that
-/// tells nothing.
-pub(super) fn occurrence_names<'u>(
-    file: &File<'_>,
-    usages: impl Iterator<Item = &'u Usage>,
-) -> FxHashMap<u64, String> {
-    let name = |usage: &Usage| match usage.name.as_str() {
-        // `=>[0:1:1:2]` is a label of OpenCASCADE's document, not a name.
-        own if own.is_empty() || own.starts_with("=>[") => product_name(file, usage.child),
-        own => own.to_owned(),
-    };
-    usages.map(|usage| (usage.id, name(usage))).collect()
-}
-
-/// Returns the path of what these entities own, the outermost first: the names of the usages among them, joined by `/`.
-pub(super) fn occurrence_path(names: &FxHashMap<u64, String>, owners: &[u64]) -> String {
-    let path: Vec<&str> = owners.iter().filter_map(|id| names.get(id).map(String::as_str)).collect();
-    path.join("/")
+/// Returns what the occurrence of a usage is called in paths: by its name, or by its product where that tells nothing.
+pub(super) fn name_in_path<'u>(usage: &'u Usage, product: &'u str) -> &'u str {
+    // `=>[0:1:1:2]` is a label of OpenCASCADE's document, not a name.
+    if usage.name.is_empty() || usage.name.starts_with("=>[") { product } else { &usage.name }
 }
