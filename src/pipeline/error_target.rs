@@ -4,7 +4,7 @@
 //! `--rays N`, whatever number of threads found the N. The runs before the last cost about half of it at most.
 
 use super::error::Error;
-use super::growing_search::GrowingSearch;
+use super::growing_search::{GROWTH_MARGIN, GrowingSearch, most_rays, next_rays};
 use super::monitor::Monitor;
 use super::prepared_scene::PreparedScene;
 use super::suggest;
@@ -14,16 +14,8 @@ use serde::Serialize;
 
 /// Rays of the first run.
 const FIRST_RAYS: u64 = 50_000;
-/// The most rays, when the options do not say.
-const MOST_RAYS: u64 = 10_000_000_000;
-
 /// Growth of the rays from one run to the next where nothing arrived.
 const GROWTH_FROM_NOTHING: f64 = 16.0;
-/// More rays than the error asks for, for the error has an error.
-const GROWTH_MARGIN: f64 = 1.1;
-/// Least and greatest growth: fewer would be a run for little, more would trust a poor first error too much.
-const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
-
 /// No answer asks for more rays than these: a machine's word holds them.
 const MOST_WANTED: f64 = 1e18;
 
@@ -104,7 +96,7 @@ impl ErrorTarget {
         search: GrowingSearch<'_>,
         monitor: &dyn Monitor,
     ) -> (PartialRun, TargetResult) {
-        let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
+        let most = most_rays(prepared);
         let mut rays = search.first_rays(FIRST_RAYS, most);
         loop {
             prepared.rays = Some(rays);
@@ -114,8 +106,7 @@ impl ErrorTarget {
             if result.reached || !portion.is_whole() || rays >= most {
                 return (portion, result);
             }
-            // At least twice as many, though the first error may promise less: it is a guess itself.
-            rays = ((rays as f64 * self.growth(found).clamp(GROWTH_RANGE[0], GROWTH_RANGE[1])) as u64).min(most);
+            rays = next_rays(rays, self.growth(found), most);
             monitor.grows(found, rays);
         }
     }

@@ -4,6 +4,13 @@ use super::monitor::Monitor;
 use super::prepared_scene::{PreparedScene, TraceRequest};
 use crate::simulate::{PartialRun, Results};
 
+/// The most rays, where the settings do not say.
+const MOST_RAYS: u64 = 10_000_000_000;
+/// More rays than an error asks for, for it has an error itself.
+pub(super) const GROWTH_MARGIN: f64 = 1.1;
+/// Least and greatest growth of the rays: fewer would be a run for little, more would trust a poor first error too much.
+const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
+
 /// Keeps a run while it is traced, so that what is done of it outlives its process.
 pub trait RunKeeper {
     /// Calls `trace` once, for the run that `prepared` asks for, with what is done of it already and with what is told of the rest.
@@ -53,5 +60,28 @@ impl GrowingSearch<'_> {
             let portion = traced.partial.clone();
             (portion, Results::new(&prepared.bound, &settings, traced))
         })
+    }
+}
+
+/// Returns the most rays that a run of a search may have.
+pub(super) fn most_rays(prepared: &PreparedScene) -> u64 {
+    prepared.job.tracing.rays().unwrap_or(MOST_RAYS)
+}
+
+/// Returns the number of rays of the run after one of so many, by which `growth` times as many would do; at most `most`.
+pub(super) fn next_rays(rays: u64, growth: f64, most: u64) -> u64 {
+    let [least, greatest] = GROWTH_RANGE;
+    ((rays as f64 * growth.clamp(least, greatest)) as u64).min(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_grow_at_least_twofold_and_at_most_64_fold() {
+        let next = |growth: f64| next_rays(1_000, growth, 50_000);
+        assert_eq!([1.1, 2.0, 4.4, 50.0, 1e9].map(next), [2_000, 2_000, 4_400, 50_000, 50_000]);
+        assert_eq!(next_rays(1_000, 1e9, MOST_RAYS), 64_000);
     }
 }

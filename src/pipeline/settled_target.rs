@@ -3,7 +3,7 @@
 //! Runs of growing length are traced, each from its beginning, as for [`ErrorTarget`](super::ErrorTarget). While they grow, the errors of
 //! the rays alone are looked at: more rays take nothing from those of the facets, which the last run measures.
 
-use super::growing_search::GrowingSearch;
+use super::growing_search::{GROWTH_MARGIN, GrowingSearch, most_rays, next_rays};
 use super::monitor::Monitor;
 use super::prepared_scene::PreparedScene;
 use super::verdicts::verdict;
@@ -12,13 +12,6 @@ use crate::simulate::{PartialRun, Results};
 
 /// Rays of the first run.
 const FIRST_RAYS: u64 = 200_000;
-/// The most rays, where the settings do not say.
-const MOST_RAYS: u64 = 10_000_000_000;
-
-/// More rays than a row asks for, for its error has an error.
-const GROWTH_MARGIN: f64 = 1.1;
-/// Least and greatest growth of a run.
-const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 
 /// Traces runs of growing length, each from its first ray, until no row of a verdict is unsure by the errors of the rays, the most rays are
 /// traced, or the monitor asks to stop: then not all is traced. Sets `prepared.rays`; returns the sums and the number of rays.
@@ -27,7 +20,7 @@ pub fn trace_until_settled(
     search: GrowingSearch<'_>,
     monitor: &dyn Monitor,
 ) -> (PartialRun, u64) {
-    let most = prepared.job.tracing.rays().unwrap_or(MOST_RAYS);
+    let most = most_rays(prepared);
     let mut rays = search.first_rays(FIRST_RAYS, most);
     loop {
         prepared.rays = Some(rays);
@@ -37,8 +30,7 @@ pub fn trace_until_settled(
         let Some(&most_wanted) = wanted.iter().max().filter(|_| portion.is_whole() && rays < most) else {
             return (portion, rays);
         };
-        let growth = (GROWTH_MARGIN * most_wanted as f64 / rays as f64).clamp(GROWTH_RANGE[0], GROWTH_RANGE[1]);
-        rays = ((rays as f64 * growth) as u64).min(most);
+        rays = next_rays(rays, GROWTH_MARGIN * most_wanted as f64 / rays as f64, most);
         monitor.unsettled(wanted.len(), rays);
     }
 }
