@@ -13,8 +13,9 @@ use crate::simulate::surfaces::SceneLight;
 use crate::simulate::{Error, ErrorKind};
 use std::collections::HashMap;
 
-/// Makes the bodies, one for each instance and medium, with the surroundings as body 0. Returns them, the body of each placed face (0
-/// without a medium), and whether any two boxes come within the glue distance: bodies that do not can neither touch nor nest.
+/// Makes the bodies, one for each instance, called by its label, and medium, with the surroundings as body 0. Returns them, the body of
+/// each placed face (0 without a medium), and whether any two boxes come within the glue distance: bodies that do not can neither touch
+/// nor nest.
 ///
 /// # Errors
 /// When a medium is not known, or has no index at the wavelength of the scene.
@@ -23,12 +24,12 @@ pub(super) fn find_bodies(
     model: &Model,
     chosen: &ChosenRules,
     light: &SceneLight,
+    labels: &[String],
 ) -> Result<(Vec<Body>, Vec<u32>, bool), Error> {
     let ambient = match &scene.ambient {
         Some(name) => medium::find(scene, name, &[Key::Name("ambient")])?,
         None => optics::Medium::vacuum(),
     };
-    let labels = model.labels();
     let mut bodies = vec![Body::new(ambient, "surroundings".into(), light)];
     let mut places: HashMap<(usize, &str), usize> = HashMap::new();
     let mut of_face = vec![AMBIENT; chosen.len()];

@@ -1,6 +1,6 @@
 //! The selector of each face: the shortest one that means this face alone, to be put into a rule.
 
-use crate::model::{Model, PlacedFace};
+use crate::model::{Model, PlacedFace, are_shared};
 use crate::simulate::scene::{FaceSelector, OneOrMany, SolidKey};
 use std::collections::HashMap;
 
@@ -37,12 +37,7 @@ struct Names<'m> {
 
 impl<'m> Names<'m> {
     fn new(model: &'m Model) -> Self {
-        let mut uses: HashMap<&str, u32> = HashMap::new();
-        for instance in &model.instances {
-            *uses.entry(&instance.name).or_insert(0) += 1;
-        }
-        let shared = model.instances.iter().map(|instance| uses[instance.name.as_str()] > 1).collect();
-        Self { model, shared }
+        Self { model, shared: are_shared(model.instances.iter().map(|i| i.name.as_str())) }
     }
 
     /// Returns the name of a face's instance, or its path where others have that name too.

@@ -8,8 +8,9 @@ use crate::simulate::receiver::{Receiver, Shape};
 /// Distance, as a share of the receiver's half side, below which a face is in its plane.
 const FLUSH: f64 = 1e-9;
 
-/// Returns a sentence for each receiver that lets light pass and lies in a flat face of the model, naming the first such face.
-pub(super) fn flush_receiver_notes(receivers: &[Receiver], model: &Model) -> Vec<String> {
+/// Returns a sentence for each receiver that lets light pass and lies in a flat face of the model, naming the first such face. `labels` are
+/// what to call the instances.
+pub(super) fn flush_receiver_notes(receivers: &[Receiver], model: &Model, labels: &[String]) -> Vec<String> {
     let notes = receivers.iter().filter(|r| !r.absorbs).filter_map(|receiver| {
         let (frame, half) = match &receiver.shape {
             Shape::Plane { frame, half, .. } => (frame, *half),
@@ -18,7 +19,7 @@ pub(super) fn flush_receiver_notes(receivers: &[Receiver], model: &Model) -> Vec
         };
         let face = model.placed_faces().find(|face| is_flush(face, frame, half))?;
         let what = face.entity().map_or_else(|| format!("face {}", face.id.0), |id| format!("face #{id}"));
-        let part = &model.labels()[face.instance];
+        let part = &labels[face.instance];
         Some(format!(
             "the receiver '{}' lies in {what} of '{part}': light that crosses or leaves the face there is counted on one side of it or on \
              neither; move it off by a thousandth of a millimetre, to the side that is meant",

@@ -4,10 +4,8 @@ use super::nearest::{Nearest, face_bounds};
 use super::select::select_faces;
 use crate::math::Aabb;
 use crate::model::{Model, PlacedFace};
-use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::{Area, Cover, CoveredArea};
 use crate::simulate::scene::{Key, Scene};
-use crate::simulate::surfaces::{FaceOptics, Surface};
 use crate::simulate::{Error, ErrorKind};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -22,8 +20,8 @@ pub(super) struct Luminous {
     pub(super) note: Option<String>,
 }
 
-/// Returns the faces that a source shines from, ready for points to be drawn on them; `None` for a source that is not on faces. `faces` and
-/// `surfaces` are what each placed face is to light.
+/// Returns the faces that a source shines from, ready for points to be drawn on them; `None` for a source that is not on faces. `opaque`
+/// says which placed faces let no light through, `labels` what to call the instances.
 ///
 /// # Errors
 /// When its selector means no face, faces without area, or faces that are covered throughout.
@@ -31,15 +29,13 @@ pub(super) fn luminous_faces(
     scene: &Scene,
     index: usize,
     model: &Model,
-    faces: &[FaceOptics],
-    surfaces: &[Surface],
+    opaque: &[bool],
+    labels: &[String],
 ) -> Result<Option<Luminous>, Error> {
     let Some(on) = &scene.sources[index].on else { return Ok(None) };
     let base = [Key::Name("source"), Key::Index(index), Key::Name("on")];
     let chosen = select_faces(scene, &base, on, model, &mut Nearest::new(model))?;
-    let is_opaque = |f: &FaceOptics| f.body == AMBIENT && surfaces[f.surface as usize].is_opaque();
-    let opaque: Vec<bool> = faces.iter().map(is_opaque).collect();
-    let covers = possible_covers(scene, model, &chosen, &opaque);
+    let covers = possible_covers(scene, model, &chosen, opaque);
     let Some(area) = Area::new(model, &chosen, &covers) else {
         return Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from"));
     };
@@ -55,7 +51,9 @@ pub(super) fn luminous_faces(
         return Err(error.help("name faces that are free, or give what lies against them a `medium`"));
     }
     let share = 1.0 - free / whole;
-    let note = (share >= TOLD_SHARE).then(|| covered_note(scene, index, model, &measured, share));
+    let name = &scene.sources[index].name;
+    let source = if name.is_empty() { format!("[[source]] {}", index + 1) } else { format!("'{name}'") };
+    let note = (share >= TOLD_SHARE).then(|| covered_note(&source, model, labels, &measured, share));
     Ok(Some(Luminous { area, note }))
 }
 
@@ -106,10 +104,7 @@ fn possible_covers(
 }
 
 /// Returns the sentence about the share of its area that a source has covered, naming the face of which most is.
-fn covered_note(scene: &Scene, index: usize, model: &Model, measured: &[CoveredArea], share: f64) -> String {
-    let source = &scene.sources[index];
-    let label =
-        if source.name.is_empty() { format!("[[source]] {}", index + 1) } else { format!("'{}'", source.name) };
+fn covered_note(source: &str, model: &Model, labels: &[String], measured: &[CoveredArea], share: f64) -> String {
     let covered = |a: &CoveredArea| a.whole - a.free;
     let most = measured.iter().max_by(|a, b| covered(a).total_cmp(&covered(b)));
     let face = most.and_then(|a| Some((a, model.placed_faces().find(|f| f.id == a.face)?)));
@@ -119,10 +114,10 @@ fn covered_note(scene: &Scene, index: usize, model: &Model, measured: &[CoveredA
             (None, "") => format!("face {}", f.id.0),
             (None, name) => format!("face '{name}'"),
         };
-        format!(", most of it {:.0} % of {name} of '{}'", 100.0 * covered(a) / a.whole, model.labels()[f.instance])
+        format!(", most of it {:.0} % of {name} of '{}'", 100.0 * covered(a) / a.whole, labels[f.instance])
     });
     format!(
-        "{:.1} % of the area that {label} names lies against opaque faces of other solids{example}: it does not shine, and all of the \
+        "{:.1} % of the area that {source} names lies against opaque faces of other solids{example}: it does not shine, and all of the \
          power leaves from the rest",
         100.0 * share
     )

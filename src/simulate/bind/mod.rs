@@ -55,7 +55,8 @@ impl Scene {
         let file_notes = notes::source_file_notes(self, &loaded);
         // Bodies, from the rules that give media.
         let chosen = chosen::choose_rules(self, model)?;
-        let (mut bodies, body_of_face, nested) = bodies::find_bodies(self, model, &chosen, &light)?;
+        let labels = model.labels();
+        let (mut bodies, body_of_face, nested) = bodies::find_bodies(self, model, &chosen, &light, &labels)?;
         materials::check_interfaces(self, model, &chosen, &body_of_face)?;
         wavelengths::check_indices(self, &loaded, &bodies)?;
         // Faces, from the rules that give surfaces and from what lies against what.
@@ -67,10 +68,12 @@ impl Scene {
         // Sources and receivers.
         let source_frames: Vec<Frame> =
             (0..self.sources.len()).map(|i| source_frame(self, model, i)).collect::<Result<_, _>>()?;
+        let is_opaque = |f: &FaceOptics| f.body == AMBIENT && surfaces[f.surface as usize].is_opaque();
+        let opaque: Vec<bool> = faces.iter().map(is_opaque).collect();
         let mut emitters = Vec::new();
         let mut cover_notes = Vec::new();
         for (i, loaded) in loaded.into_iter().enumerate() {
-            let luminous = luminous::luminous_faces(self, i, model, &faces, &surfaces)?;
+            let luminous = luminous::luminous_faces(self, i, model, &opaque, &labels)?;
             let area = luminous.map(|luminous| {
                 cover_notes.extend(luminous.note);
                 luminous.area
@@ -98,7 +101,7 @@ impl Scene {
             receivers,
             region,
             solids: None,
-            instances: model.labels(),
+            instances: labels,
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
             rules: rule_table::rule_table(self, &chosen),
             notes: notes::range_notes(self, &chosen, &ranges),
@@ -110,7 +113,7 @@ impl Scene {
         bound.notes.extend(notes::opening_note(&bound, model));
         bound.notes.extend(notes::thin_body_note(&bound));
         bound.notes.extend(notes::ready_mesh_note(model));
-        bound.notes.extend(flush_receivers::flush_receiver_notes(&bound.receivers, model));
+        bound.notes.extend(flush_receivers::flush_receiver_notes(&bound.receivers, model, &bound.instances));
         Ok(bound)
     }
 }
