@@ -52,6 +52,7 @@ pub use simulation::{SimulationReport, path_lines};
 pub use studies::study_report;
 pub use table::{Cell, Column, Table};
 pub use verdicts::{
-    direction_text, requirement_text, settling_text, traffic_sentence, verdict_counts, verdict_sentence,
+    direction_text, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
+    verdict_sentence,
 };
 pub use view::{Shape, View};

@@ -54,16 +54,19 @@ pub fn direction_text([h, v]: [f64; 2]) -> String {
     format!("{} {}", side(h, 'R', 'L'), side(v, 'U', 'D'))
 }
 
-/// Writes what would settle an unsure row; of any other that was judged what the table or its rules remark on it, or nothing.
+/// Writes what would settle an unsure row; nothing for any other.
 pub fn settling_text(row: &RowVerdict) -> String {
     if row.verdict == Some(Verdict::Unsure) && row.unseen > 0 {
         return "a wider far field".into();
     }
-    let Some(settles) = row.settles else {
-        return row.row.note.clone().filter(|_| row.verdict.is_some()).unwrap_or_default();
-    };
+    let Some(settles) = row.settles else { return String::new() };
     let rays = format!("{:.1e} rays", settles.rays as f64);
     settles.tolerance_mm.map_or(rays.clone(), |t| format!("{rays}, {} mm", figures(t, 2)))
+}
+
+/// Returns what the table or its rules remark on a row that was judged; `None` where they remark nothing, or nothing was judged.
+pub fn judged_note(row: &RowVerdict) -> Option<&str> {
+    row.row.note.as_deref().filter(|_| row.verdict.is_some())
 }
 
 /// Makes the sections of all verdicts, each with the index of its receiver; what has no far field, of those that `grid_of` returns, is left
@@ -115,6 +118,7 @@ fn table(a: &Assessment, name: &str) -> Table {
         ("± facets", "cd"),
         ("verdict", ""),
         ("settled by", ""),
+        ("note", ""),
     ];
     let caption = "Pass and fail only where the value is more than three combined standard errors from its limit; H right, V up, degrees \
         of the table after aiming.";
@@ -130,6 +134,7 @@ fn table(a: &Assessment, name: &str) -> Table {
             number(row.reading.map(|r| r.geometric), 2),
             row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
             settling_text(row).into(),
+            judged_note(row).unwrap_or("").into(),
         ]);
     }
     table

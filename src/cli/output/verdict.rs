@@ -3,13 +3,15 @@
 use super::terminal_tables::blank_table;
 use crate::cli::console::Console;
 use crate::regulation::{Assessment, RowVerdict};
-use crate::report::{direction_text, figures, requirement_text, settling_text, traffic_sentence, verdict_counts};
+use crate::report::{
+    direction_text, figures, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
+};
 use comfy_table::CellAlignment;
 
 /// Significant digits of intensities: more than any photometer has.
 const DIGITS: usize = 5;
 
-/// Describes an assessment in lines and a table: aim, photometer, every row and the whole.
+/// Describes an assessment in lines and a table: aim, photometer, every row, what is remarked on rows, and the whole.
 pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     let mut text = format!("{}  {}\n", console.bold(&a.regulation.id), a.regulation.function.name);
     text += &format!("  aim     {}\n", a.aim.how);
@@ -30,9 +32,25 @@ pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     }
     let counts = verdict_counts(a);
     let unjudged = a.rows.len() - counts.iter().sum::<usize>();
-    text += &format!("{table}\n  {} pass, {} fail, {} unsure", counts[0], counts[1], counts[2]);
+    text += &format!("{table}\n");
+    for (note, rows) in notes(a) {
+        text += &format!("  {}: {note}\n", rows.join(", "));
+    }
+    text += &format!("  {} pass, {} fail, {} unsure", counts[0], counts[1], counts[2]);
     text += &if unjudged > 0 { format!(", {unjudged} not judged (notes and conditions)") } else { String::new() };
     text + &format!("; the whole: {}\n", console.bold(&a.verdict.to_string()))
+}
+
+/// Returns what is remarked on rows that were judged, in the order of the table, each with the rows that it is remarked on.
+fn notes(a: &Assessment) -> Vec<(&str, Vec<&str>)> {
+    let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (row, note) in a.rows.iter().filter_map(|row| Some((row, judged_note(row)?))) {
+        match notes.iter_mut().find(|(known, _)| *known == note) {
+            Some((_, rows)) => rows.push(&row.row.id),
+            None => notes.push((note, vec![&row.row.id])),
+        }
+    }
+    notes
 }
 
 /// Returns the eight cells of a row of the table; a dash where nothing was read.
@@ -50,4 +68,30 @@ fn row_cells(row: &RowVerdict) -> [String; 8] {
         row.verdict.map_or("not judged".to_owned(), |v| v.to_string()),
         settling_text(row),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regulation::{Aim, Regulation, Traffic, Verdict};
+
+    /// The tables of a brake light remark one thing on two of its groups; neither is in need of being settled.
+    #[test]
+    fn what_tables_remark_stands_below_and_settles_nothing() {
+        let mut regulation = Regulation::find("FMVSS 108 stop").unwrap();
+        let rows: Vec<RowVerdict> = regulation.function.rows.drain(..).map(passed).collect();
+        let aim = Aim { h_deg: 0.0, v_deg: 0.0, gradient: None, how: String::new(), rivals: vec![] };
+        let (traffic, verdict) = (Traffic::Right, Verdict::Pass);
+        let a = Assessment { regulation, traffic, aim, sensor_deg: 0.1, rows, verdict };
+        let notes = notes(&a);
+        assert!(
+            notes.iter().any(|(note, rows)| note.starts_with("as printed") && rows[..] == ["Group 1", "Group 5"]),
+            "{notes:?}"
+        );
+        assert!(a.rows.iter().all(|row| row_cells(row)[7].is_empty()));
+    }
+
+    fn passed(row: crate::regulation::Row) -> RowVerdict {
+        RowVerdict { row, reading: None, direction: None, verdict: Some(Verdict::Pass), settles: None, unseen: 0 }
+    }
 }
