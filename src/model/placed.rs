@@ -103,6 +103,15 @@ impl Model {
         labels
     }
 
+    /// Returns for each part what to call each of its instances: [`Model::labels`] by parts.
+    pub fn labels_of_parts(&self) -> Vec<Vec<String>> {
+        let mut places = vec![Vec::new(); self.parts.len()];
+        for (instance, label) in self.instances.iter().zip(self.labels()) {
+            places[instance.part.0 as usize].push(label);
+        }
+        places
+    }
+
     /// What to call an instance, by its index, whatever others are called.
     fn own_label(&self, instance: usize) -> String {
         let own = &self.instances[instance].name;

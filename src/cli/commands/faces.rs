@@ -23,7 +23,7 @@ pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failur
     let mut selectors = part_selectors(model).into_iter();
     if console.json {
         let mut document = json!({"parts": json_value(&parts)?});
-        for (k, places) in places_of_parts(model).into_iter().enumerate() {
+        for (k, places) in model.labels_of_parts().into_iter().enumerate() {
             document["parts"][k]["places"] = places.into();
         }
         let solids =
@@ -34,7 +34,7 @@ pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failur
         return Ok(print(&json_text(&document)?)?);
     }
     let most = if console.verbose > 0 { usize::MAX } else { SHOWN_FACES };
-    let places = places_of_parts(model);
+    let places = model.labels_of_parts();
     let tree: String =
         parts.iter().zip(&places).map(|(part, places)| part_text(part, places, most, &mut selectors)).collect();
     print(&tree)?;
@@ -65,15 +65,6 @@ fn part_selectors(model: &Model) -> Vec<Option<String>> {
         }
     }
     selectors
-}
-
-/// Returns for each part what selects each of its places by `instance`: names that others do not have, or paths.
-fn places_of_parts(model: &Model) -> Vec<Vec<String>> {
-    let mut places = vec![Vec::new(); model.parts.len()];
-    for (instance, label) in model.instances.iter().zip(model.labels()) {
-        places[instance.part.0 as usize].push(label);
-    }
-    places
 }
 
 /// Returns the lines of a part: its name, how often it is placed and as which instances, and its solids. Takes a selector for each of its

@@ -100,10 +100,7 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
 
 /// Returns comments that say what selects one place of a part that has several, of the first such parts; empty where no part has.
 fn places_text(model: &Model) -> String {
-    let mut places: Vec<Vec<String>> = vec![Vec::new(); model.parts.len()];
-    for (instance, label) in model.instances.iter().zip(model.labels()) {
-        places[instance.part.0 as usize].push(label);
-    }
+    let places = model.labels_of_parts();
     let line = |labels: &Vec<String>| {
         let first: Vec<String> = labels.iter().take(MOST_PLACES).map(|label| toml_string(label)).collect();
         let more = if labels.len() > MOST_PLACES { ", …" } else { "" };
