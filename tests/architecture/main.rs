@@ -183,14 +183,19 @@ fn third_party_crates_come_in_through_their_doors() {
     assert!(broken.is_empty(), "crates outside their doors:\n{}", broken.join("\n"));
 }
 
+/// Asserts that no file has more than `most` of these units, as `measure` counts them.
+fn assert_none_above(most: usize, units: &str, measure: impl Fn(&SourceFile) -> usize) {
+    let above: Vec<String> = sources()
+        .iter()
+        .filter(|f| measure(f) > most)
+        .map(|f| format!("{}: {} {units}", f.path.display(), measure(f)))
+        .collect();
+    assert!(above.is_empty(), "more than {most} {units}:\n{}", above.join("\n"));
+}
+
 #[test]
 fn no_file_is_longer_than_one_idea() {
-    let long: Vec<String> = sources()
-        .iter()
-        .filter(|f| f.lines > LONGEST)
-        .map(|f| format!("{}: {} lines", f.path.display(), f.lines))
-        .collect();
-    assert!(long.is_empty(), "longer than {LONGEST} lines:\n{}", long.join("\n"));
+    assert_none_above(LONGEST, "lines", |f| f.lines);
 }
 
 /// Columns that a line of comment may have; `cargo fmt` wraps none.
@@ -198,12 +203,7 @@ const COMMENT_COLUMNS: usize = 140;
 
 #[test]
 fn comments_end_where_code_does() {
-    let long: Vec<String> = sources()
-        .iter()
-        .filter(|f| f.longest_comment > COMMENT_COLUMNS)
-        .map(|f| format!("{}: {} columns", f.path.display(), f.longest_comment))
-        .collect();
-    assert!(long.is_empty(), "comments beyond {COMMENT_COLUMNS} columns:\n{}", long.join("\n"));
+    assert_none_above(COMMENT_COLUMNS, "columns of comment", |f| f.longest_comment);
 }
 
 #[test]

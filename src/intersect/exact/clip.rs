@@ -107,7 +107,7 @@ impl Exact {
         let (net, size) = seen_along(query, leaf.net(&self.pool), oc);
         let noise = self.noise(leaf, oc);
         let margin = size.map(|s| noise + halving_rounding(leaf) * s);
-        let departure = query.departure.and_then(|own| own.local_to(leaf, &self.geometry));
+        let departure = query.departure.and_then(|own| own.local_to(leaf, query.o, &self.geometry));
         let seen = SeenLeaf { net, frame: [query.n1, query.n2], margin, precise: false };
         let patch = &self.geometry.patches[leaf.patch as usize];
         let at_pole = self.geometry.passes_pole(patch, [query.o, query.d], CONTACT_LENGTH * TANGENT);

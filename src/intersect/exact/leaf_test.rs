@@ -154,7 +154,7 @@ impl Exact {
         }
         // One root at most lies in the enlarged domain: if the departure does, this is it.
         if let Some(own) = query.departure
-            && let Some(left) = own.local_to(&self.leaves[index as usize], &self.geometry)
+            && let Some(left) = own.local_to(&self.leaves[index as usize], query.o, &self.geometry)
             && within(left[0], EXTENSION)
             && within(left[1], EXTENSION)
             && own.is_unique_root(t)

@@ -42,7 +42,6 @@ pub(super) struct DeparturePoint {
     pub(super) face: u32,
     patch: u32,
     uv: Uv,
-    origin: Point,
     /// Distance from the ray's origin to the stated surface point, mm.
     pub(super) off: f64,
     /// Below this, mm, the origin is taken to be that point.
@@ -174,12 +173,12 @@ impl DeparturePoint {
         let (s, ..) = project(&p.jet(p.local(uv)));
         let off = (ray.origin - p.center - s).length();
         let tolerance = TANGENT + ORIGIN_ROUNDING * f64::EPSILON * ray.origin.abs().max_element();
-        Some(Self { face, patch, uv, origin: ray.origin, off, tolerance })
+        Some(Self { face, patch, uv, off, tolerance })
     }
 
     /// The departure in the leaf's parameters, which may lie far outside of it; `None` on another face, and on another patch unless it lies
-    /// on the common border and that patch goes on there as its own does.
-    pub(super) fn local_to(&self, leaf: &Leaf, geometry: &Geometry) -> Option<[f64; 2]> {
+    /// on the common border and that patch goes on there as its own does. `origin` is the ray's.
+    pub(super) fn local_to(&self, leaf: &Leaf, origin: Point, geometry: &Geometry) -> Option<[f64; 2]> {
         // Parameters of another face say nothing here; seams and poles are told by place, in `is_same_point`.
         if leaf.face != self.face {
             return None;
@@ -193,7 +192,7 @@ impl DeparturePoint {
             // Beyond a crease the departure is no point of the patch: a ray that starts beside a wall meets it, however far ahead.
             let patch = &geometry.patches[leaf.patch as usize];
             let (border, du, dv) = project(&patch.jet(local));
-            let beside = (self.origin - patch.center - border).dot(du.cross(dv).normalize_or_zero());
+            let beside = (origin - patch.center - border).dot(du.cross(dv).normalize_or_zero());
             if beside.abs() > self.tolerance + self.off {
                 return None;
             }

@@ -7,9 +7,8 @@
 use super::clear_start::ClearStart;
 use super::curved_cells::LOOK_BACK_OF_FLAT;
 use super::facet_record::FacetRecord;
-use super::{
-    LEAST_SLACK_SINE, LEAST_WINDOW, LEAST_WINDOW_SINE, OWN_POINT, Polished, SHORT_OF_SAGS, WINDOW_OF_SAGS, is_own,
-};
+use super::limits::{LEAST_SLACK_SINE, LEAST_WINDOW, LEAST_WINDOW_SINE, OWN_POINT, SHORT_OF_SAGS, WINDOW_OF_SAGS};
+use super::{Polished, is_own};
 use crate::intersect::exact::{Seed, SurfacePoint};
 use crate::intersect::{Certainty, Cost, Hit, prefetch};
 use crate::math::Ray;

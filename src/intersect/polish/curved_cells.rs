@@ -5,6 +5,7 @@
 //! and asked the facets a second time.
 
 use super::facet_record::FacetRecord;
+use super::limits::LEAST_SLACK_SINE;
 use crate::math::{Aabb, Point, Vector};
 use crate::mesh::FacetMesh;
 
@@ -16,7 +17,7 @@ const MOST_MARKED: usize = 16 * CELLS * CELLS * CELLS;
 /// A facet of no more sag, mm, is flat: ten times what the proof of a plane of 1 m leaves for rounding.
 const FLAT_SAG: f32 = 1e-8;
 /// How far behind its start a ray that is near no curved facet looks, mm: twice [`FLAT_SAG`] at the least sine by which that is lengthened.
-pub(super) const LOOK_BACK_OF_FLAT: f64 = 2.0 * FLAT_SAG as f64 / super::LEAST_SLACK_SINE;
+pub(super) const LOOK_BACK_OF_FLAT: f64 = 2.0 * FLAT_SAG as f64 / LEAST_SLACK_SINE;
 
 /// Cells of space, each marked if a curved facet may lie within a reach of a place in it.
 pub(super) struct CurvedCells {
@@ -50,8 +51,8 @@ impl CurvedCells {
             for z in low[2]..=high[2] {
                 for y in low[1]..=high[1] {
                     for x in low[0]..=high[0] {
-                        let bit = (z * CELLS + y) * CELLS + x;
-                        cells.marks[bit / 64] |= 1 << (bit % 64);
+                        let (word, bit) = place_of_mark([x, y, z]);
+                        cells.marks[word] |= 1 << bit;
                     }
                 }
             }
@@ -72,13 +73,19 @@ impl CurvedCells {
         if !self.bounds.contains(place) {
             return false;
         }
-        let [x, y, z] = self.cell(place);
-        let bit = (z * CELLS + y) * CELLS + x;
-        self.marks[bit / 64] >> (bit % 64) & 1 == 1
+        let (word, bit) = place_of_mark(self.cell(place));
+        self.marks[word] >> bit & 1 == 1
     }
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.marks)
     }
+}
+
+/// The word of [`CurvedCells::marks`] that holds the mark of a cell, and its bit there.
+#[inline(always)]
+fn place_of_mark([x, y, z]: [usize; 3]) -> (usize, usize) {
+    let bit = (z * CELLS + y) * CELLS + x;
+    (bit / 64, bit % 64)
 }

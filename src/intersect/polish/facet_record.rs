@@ -1,5 +1,6 @@
 //! What polishing asks of a facet again and again, in half a cache line.
 
+use super::limits::{HIDDEN_BELOW, NO_SAG};
 use crate::intersect::exact::Exact;
 use crate::math::{FaceId, Ray, Uv};
 use crate::mesh::FacetMesh;
@@ -7,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 /// A ray whose sine to the facet that it leaves, times the facet's length, is above so many sags is told by the facet's own normal, which
 /// is off the spline's by four sags over that length where the curvature does not change: twice what a root may hide below.
-const CLEAR_OF_SAGS: f64 = 2.0 * super::HIDDEN_BELOW;
+const CLEAR_OF_SAGS: f64 = 2.0 * HIDDEN_BELOW;
 /// And it is above this: a hundred times what `f32` rounds.
 const LEAST_CLEAR_SINE: f64 = 1e-5;
 /// In [`FacetRecord::patch`]: the facet lies on several patches.
@@ -45,7 +46,7 @@ impl FacetRecord {
                 let length = a.distance(b).max(b.distance(c)).max(c.distance(d)).max(d.distance(a));
                 // A facet without area gets a normal of zero, and with it a sine that never decides.
                 let normal = (b - a).cross(c - a).normalize_or_zero();
-                let sag = mesh.sag.get(f).copied().filter(|s| s.is_finite()).unwrap_or(sag).max(super::NO_SAG);
+                let sag = mesh.sag.get(f).copied().filter(|s| s.is_finite()).unwrap_or(sag).max(NO_SAG);
                 let least_sine = (CLEAR_OF_SAGS * sag / length).max(LEAST_CLEAR_SINE);
                 let corners = facet.vertices.map(|v| mesh.vertices[v as usize].uv);
                 let patch = match exact.patch_around(facet.face, &corners) {

@@ -16,6 +16,7 @@ mod batch;
 mod clear_start;
 mod curved_cells;
 mod facet_record;
+mod limits;
 mod piece;
 mod solids;
 
@@ -26,34 +27,19 @@ use crate::mesh::FacetMesh;
 use clear_start::ClearStart;
 use curved_cells::CurvedCells;
 use facet_record::FacetRecord;
+use limits::{
+    HIDDEN_BELOW, LEAST_SLACK_SINE, LEAST_WINDOW, LEAST_WINDOW_SINE, NO_SAG, OWN_POINT, SHORT_OF_SAGS,
+    WINDOW_OF_SAGS,
+};
 use piece::Piece;
 use std::sync::{PoisonError, RwLock};
 
 /// Newton steps before the exact window is asked: residual p99 1e-11 after three on a sphere at 0.05 mm.
 const STEPS: u32 = 6;
-/// A ray of no more than so many sags is asked of the spline as well: where it meets a face flat, the facet there lies farther
-/// away than the ray is long. Of light that grazes a rod glued in a hole the hole's face was not seen.
-const SHORT_OF_SAGS: f64 = 4.0;
-/// A facet of less sag lies on the spline, mm: no root hides between them.
-const NO_SAG: f64 = 1e-9;
-/// A root is sought this many sags from its facet across the ray: facet and spline lie a sag apart, and either may be met beside
-/// the other's place.
-const WINDOW_OF_SAGS: f64 = 16.0;
-/// The least sine by which that window is lengthened along the ray.
-const LEAST_WINDOW_SINE: f64 = 1e-3;
-/// The shortest window, mm.
-const LEAST_WINDOW: f64 = 1e-6;
-/// The least sine by which a search begins before the facets.
-const LEAST_SLACK_SINE: f64 = 0.05;
 /// Size of a facet that is not known, in sags: of a sphere's facets of a twelfth of its radius.
 const UNKNOWN_SIZE: f64 = 10.0;
-/// A ray whose sine times the facet's length is below so many sags may have its next root between the surface it leaves and the
-/// facets: by `sin²θ / 2κ` and `κL²/8` that is below two, and the rest is room for a curvature that changes.
-const HIDDEN_BELOW: f64 = 12.0;
 /// Such a root is sought over so many lengths of the facet.
 const HIDDEN_LENGTHS: f64 = 4.0;
-/// A root within this distance along the ray may be the one that it leaves, mm: a thousand times what starts are off.
-const OWN_POINT: f64 = 1e-6;
 /// And it is when it lies this near to it, mm, beside [`OWN_ROUNDING`].
 const SAME_POINT: f64 = 1e-7;
 /// Ulps of its largest coordinate that a ray's origin may be off.

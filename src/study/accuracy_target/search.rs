@@ -123,7 +123,8 @@ pub fn meet_target_for_light(
         let Some(found) = search.reach(candidate, is_open, &mut trials) else { continue };
         let better = |b: &Solution| match (found.is_kept(target), b.is_kept(target)) {
             (true, true) => found.seconds() < b.seconds(),
-            (a, b_kept) => a && !b_kept || a == b_kept && found.errs_less(b),
+            (false, false) => found.errs_less(b),
+            (is_kept, _) => is_kept,
         };
         if best.as_ref().is_none_or(better) {
             best = Some(found);
@@ -238,17 +239,17 @@ impl Search<'_> {
         // Facets of two bodies that touch stray from their spline to either side.
         let apart = 2.0 * plan.loosest_mm();
         for ((ray, hit), truth) in on.rays.iter().zip(&hits).zip(&on.truth) {
-            let (hit, truth) = match (hit, truth) {
+            let error = match (hit, truth) {
                 (None, None) => continue,
-                (Some(hit), Some(truth)) => (hit, truth),
-                _ => {
-                    measured.flips += 1;
-                    continue;
+                (Some(hit), Some(truth)) => {
+                    let error = error_of_hit(ray.direction, [hit, truth], apart, &self.light.relative_index);
+                    error.map(|error| (truth.face, error))
                 }
+                _ => None,
             };
-            match error_of_hit(ray.direction, [hit, truth], apart, &self.light.relative_index) {
-                Some(error) => measured.errors.push((truth.face, error)),
-                // In another place there is no angle: such rays are told apart from the percentile.
+            // In another place there is no angle: such rays are told apart from the percentile.
+            match error {
+                Some(error) => measured.errors.push(error),
                 None => measured.flips += 1,
             }
         }
