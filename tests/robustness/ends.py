@@ -48,6 +48,23 @@ class Ends:
         wait_for(started, self.folder / out / ("checkpoint.tally" if every == "0" else ".lampyris.lock"))
         return started
 
+    def trace_in_parts(self, out, scene="scene.toml"):
+        """The digest of a run in two parts, which are merged."""
+        for part in "12":
+            self.trace("parts", "--shard", f"{part}/2", scene=scene)
+        run([self.program, "merge", "parts", "-o", out, "-q"], self.folder)
+        return digest(self.folder / out)
+
+    def resumed(self):
+        self.trace("out", "--resume")
+        return digest(self.folder / "out")
+
+    def finished(self, started):
+        """The digest of what a run that is to end well leaves."""
+        code, err = started.wait()
+        expect(code == 0, f"exit {code}: {err}")
+        return digest(self.folder / "out")
+
     def rescued(self, err):
         """The digest of the folder that a message names."""
         message = " ".join(err.split())
@@ -81,19 +98,13 @@ class Ends:
         self.trace("out")
         expect(len([f for f in files(self.folder / "out") if f.startswith("A" * 50)]) >= 4, "files of the receiver")
         # The name is part of no ray, but of the scene: the powers are compared by a run of the same scene in parts.
-        for part in "12":
-            self.trace("parts", "--shard", f"{part}/2")
-        run([self.program, "merge", "parts", "-o", "merged", "-q"], self.folder)
-        expect(digest(self.folder / "out") == digest(self.folder / "merged"), "merged otherwise")
+        expect(digest(self.folder / "out") == self.trace_in_parts("merged"), "merged otherwise")
         return self.expected
 
     def end_path_without_text(self):
         odd = b"sc\xff\xfene.toml"
         os.rename(self.folder / "scene.toml", os.fsencode(self.folder) + b"/" + odd)
-        for part in "12":
-            self.trace("parts", "--shard", f"{part}/2", scene=os.fsdecode(odd))
-        run([self.program, "merge", "parts", "-o", "out", "-q"], self.folder)
-        return digest(self.folder / "out")
+        return self.trace_in_parts("out", os.fsdecode(odd))
 
     def resumed_after(self, number, code):
         started = self.begin()
@@ -102,8 +113,7 @@ class Ends:
         expect(ended == code, f"exit {ended}: {err}")
         _, refusal = self.trace("out", code=2)
         expect("--resume" in refusal, refusal)
-        self.trace("out", "--resume")
-        return digest(self.folder / "out")
+        return self.resumed()
 
     def end_kill(self):
         return self.resumed_after(signal.SIGKILL, -signal.SIGKILL)
@@ -120,25 +130,20 @@ class Ends:
     def end_closed_stdout(self):
         started = Run([self.program, "trace", "scene.toml", "-o", "out", "--json", *LONG], self.folder)
         started.close_stdout()
-        code, err = started.wait()
-        expect(code == 0, f"exit {code}: {err}")
-        return digest(self.folder / "out")
+        return self.finished(started)
 
     def end_memory(self):
         started = self.begin()
         started.limit_memory()
         code, err = started.wait()
         expect(code != 0, "it did not run out of memory")
-        self.trace("out", "--resume")
-        return digest(self.folder / "out")
+        return self.resumed()
 
     def end_two_owners(self):
         started = self.begin()
         _, refusal = self.trace("out", "--resume", code=1)
         expect(f"process {started.pid}" in refusal, refusal)
-        code, err = started.wait()
-        expect(code == 0, f"exit {code}: {err}")
-        return digest(self.folder / "out")
+        return self.finished(started)
 
     def end_removed_folder(self):
         started = self.begin()
