@@ -3,6 +3,9 @@
 //! `cargo bench --bench exact_rays [-- FILE.stp ...]`: closed forms and freeform surfaces, then the files. Rays come from a
 //! sphere of three radii towards the bounding box. Rounds alternate between the models; the minimum and the median count.
 
+#[path = "../tests/support/random.rs"]
+mod random;
+
 // The bench uses a part of what the tests share.
 #[allow(dead_code)]
 #[path = "../tests/exact/support.rs"]
@@ -33,8 +36,8 @@ fn bounds(model: &Model) -> Aabb {
 
 fn case(name: &str, model: &Model) -> Case {
     let bounds = bounds(model);
-    let mut stream = Stream(99);
-    let rays = (0..RAYS).map(|_| stream.ray(bounds.center(), 0.5 * bounds.size())).collect();
+    let mut random = Random(99);
+    let rays = (0..RAYS).map(|_| random.ray(bounds.center(), 0.5 * bounds.size())).collect();
     Case { name: name.into(), exact: Exact::build(model, &Settings::default()), rays, seconds: Vec::new() }
 }
 

@@ -4,6 +4,9 @@
 //! alternate between the octree alone and the octree polished, on the same rays that all hit; the difference of the medians is
 //! the surcharge a hit. The residual is the distance between the hit and the spline evaluated at the hit's parameters.
 
+#[path = "../tests/support/random.rs"]
+mod random;
+
 // The bench uses a part of what the tests share.
 #[allow(dead_code)]
 #[path = "../tests/exact/support.rs"]
@@ -36,8 +39,8 @@ fn bench(name: &str, model: &Model) {
     let octree = Octree::build(&mesh, &octree::Settings::default());
     let exact = Exact::build(model, &Settings::default());
     let polished = Polished::new(&octree, &mesh, &exact);
-    let (bounds, mut stream) = (mesh.bounds(), Stream(99));
-    let mut rays: Vec<Ray> = (0..4 * RAYS).map(|_| stream.ray(bounds.center(), 0.4 * bounds.size())).collect();
+    let (bounds, mut random) = (mesh.bounds(), Random(99));
+    let mut rays: Vec<Ray> = (0..4 * RAYS).map(|_| random.ray(bounds.center(), 0.4 * bounds.size())).collect();
     rays.retain(|r| octree.intersect(r, &mut Cost::default()).is_some());
     rays.truncate(RAYS);
     let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];

@@ -2,9 +2,12 @@
 
 #[path = "support/files.rs"]
 mod files;
+#[path = "support/random.rs"]
+mod random;
 
-use files::{corpus, fixture, step_files};
+use files::{corpus, fixture, part21, step_files};
 use lampyris::step::{ErrorKind, Settings, read_bytes};
+use random::Random;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,10 +15,6 @@ use std::time::{Duration, Instant};
 
 fn import(text: &str) -> lampyris::step::Import {
     read_bytes("hostile.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
-}
-
-fn file(data: &str) -> String {
-    format!("ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('X'));\nENDSEC;\nDATA;\n{data}\nENDSEC;\nEND-ISO-10303-21;\n")
 }
 
 /// A plane square as an open shell; `extra` records are appended, in place of those with their numbers.
@@ -37,7 +36,7 @@ fn square(extra: &str) -> String {
         line.split_once('=').is_some_and(|(id, _)| extra.lines().any(|e| e.starts_with(&format!("{id}="))))
     };
     let kept: String = d.lines().filter(|line| !replaced(line)).map(|line| format!("{line}\n")).collect();
-    file(&(kept + extra))
+    part21(&(kept + extra))
 }
 
 #[test]
@@ -159,12 +158,6 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static HEAP: Counting = Counting;
 
-/// A small generator of our own, so that the damage is the same on every machine.
-fn next(state: &mut u64) -> usize {
-    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-    (*state >> 33) as usize
-}
-
 fn damage(path: &Path, cuts: usize, flips: usize) -> Duration {
     let bytes = std::fs::read(path).expect("a file of the list");
     let name = path.file_name().expect("a file").to_string_lossy().into_owned();
@@ -180,12 +173,12 @@ fn damage(path: &Path, cuts: usize, flips: usize) -> Duration {
     for k in 0..cuts {
         attempt(&bytes[..bytes.len() * k / cuts]);
     }
-    let mut state = bytes.len() as u64;
+    let mut random = Random(bytes.len() as u64);
     for _ in 0..flips {
         let mut damaged = bytes.clone();
         for _ in 0..20 {
-            let at = next(&mut state) % damaged.len();
-            damaged[at] = next(&mut state) as u8;
+            let at = random.below(damaged.len());
+            damaged[at] = random.bits() as u8;
         }
         attempt(&damaged);
     }

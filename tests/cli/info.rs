@@ -1,6 +1,6 @@
 //! `info` and what bad STEP files get, with the real binary.
 
-use crate::files::fixture;
+use crate::files::{fixture, part21};
 use crate::support::lampyris;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -150,7 +150,7 @@ fn the_page_of_scenes_is_that_of_the_program() {
 #[test]
 fn info_on_a_file_without_shapes_names_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
-    let text = "ISO-10303-21;HEADER;ENDSEC;DATA;#1=CARTESIAN_POINT('',(0.,0.,0.));#2=MY_SHAPE(#1);#3=MY_SHAPE(#1);ENDSEC;END-ISO-10303-21;";
+    let text = part21("#1=CARTESIAN_POINT('',(0.,0.,0.));#2=MY_SHAPE(#1);#3=MY_SHAPE(#1);");
     let path = written(folder.path(), "points.stp", text.as_bytes());
     let (code, out, _) = lampyris(&["info", path.to_str().unwrap()]);
     assert_eq!(code, 4, "{out}");

@@ -1,6 +1,6 @@
 //! Bad luck while a scene is traced: nothing that was traced is lost, and nothing that was saved is written over.
 
-use crate::files::fixture;
+use crate::files::{fixture, part21};
 use crate::support::lampyris_in;
 use serde_json::Value;
 use std::fs;
@@ -233,9 +233,10 @@ fn a_scene_whose_path_is_no_text_is_traced_in_parts_and_merged() {
 #[test]
 fn faces_that_have_no_facets_make_a_trace_incomplete() {
     let folder = tempfile::tempdir().unwrap();
-    let model = "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\
-                 #6=SHAPE_REPRESENTATION('',(#900,#901),$);\n#10=CARTESIAN_POINT('',(0.,0.,0.));\n#15=CARTESIAN_POINT('',(4.E6,0.,50.));\n\
-                 #900=SPHERE('huge',3.E6,#10);\n#901=SPHERE('small',10.,#15);\nENDSEC;\nEND-ISO-10303-21;\n";
+    let model = part21(
+        "#6=SHAPE_REPRESENTATION('',(#900,#901),$);\n#10=CARTESIAN_POINT('',(0.,0.,0.));\n#15=CARTESIAN_POINT('',(4.E6,0.,50.));\n\
+         #900=SPHERE('huge',3.E6,#10);\n#901=SPHERE('small',10.,#15);\n",
+    );
     fs::write(folder.path().join("model.stp"), model).unwrap();
     let scene = "[[model]]\nfile = \"model.stp\"\n[[source]]\nname = \"lamp\"\nkind = \"point\"\nat = [4e6, 0, 0]\npower = 1\n";
     fs::write(folder.path().join("scene.toml"), scene).unwrap();

@@ -49,13 +49,13 @@ fn compare(name: &str, model: &Model, rays: impl Iterator<Item = Ray>) -> Tally 
 }
 
 fn aimed(surface: &Surface, seed: u64, n: usize) -> Vec<Ray> {
-    let mut s = Stream(seed);
+    let mut s = Random(seed);
     let b = Aabb::from_points(surface.points.iter().map(|p| p.project()));
     (0..n).map(|_| s.ray(b.center(), 0.5 * b.size())).collect()
 }
 
-fn random_surface(s: &mut Stream, degree: [usize; 2], weights: f64) -> Surface {
-    let count = degree.map(|d| d + 1 + (s.next() * 4.0) as usize);
+fn random_surface(s: &mut Random, degree: [usize; 2], weights: f64) -> Surface {
+    let count = degree.map(|d| d + 1 + (s.unit() * 4.0) as usize);
     freeform(degree, count, |u, v| {
         let wild = 12.0;
         let p =
@@ -81,7 +81,7 @@ fn closed_forms_and_freeform() {
 
 #[test]
 fn every_degree_and_mixed_ones() {
-    let mut s = Stream(31);
+    let mut s = Random(31);
     let (mut flagged, mut rays) = (0, 0);
     for p in 1..=13usize {
         for q in [1, 2, 3, 14 - p] {
@@ -99,19 +99,19 @@ fn every_degree_and_mixed_ones() {
 }
 
 /// Surfaces that real files hold and that are hard: named, from a stream.
-fn hard_surface(kind: &str, s: &mut Stream) -> Surface {
-    let degree = [1, 1].map(|d| d + (s.next() * 4.0) as usize);
-    let count = degree.map(|d| d + 2 + (s.next() * 2.0) as usize);
+fn hard_surface(kind: &str, s: &mut Random) -> Surface {
+    let degree = [1, 1].map(|d| d + (s.unit() * 4.0) as usize);
+    let count = degree.map(|d| d + 2 + (s.unit() * 2.0) as usize);
     match kind {
         "one or both ends collapsed to a point" => {
-            let both = s.next() < 0.5;
+            let both = s.unit() < 0.5;
             freeform(degree, count, |u, v| {
                 let r = if both { 4.0 * u * (1.0 - u) } else { u };
                 (Point::new(100.0 * u, 60.0 * r * (v - 0.5), r * s.within(-15.0, 15.0)), s.within(1.0, 2.0))
             })
         }
         "weights of 100 beside 0.01" => freeform(degree, count, |u, v| {
-            let w = if s.next() < 0.5 { 100.0 } else { 0.01 };
+            let w = if s.unit() < 0.5 { 100.0 } else { 0.01 };
             (Point::new(100.0 * u, 100.0 * v, s.within(-20.0, 20.0)), w)
         }),
         "cusps" => freeform([3, 3], [7, 7], |u, v| {
@@ -119,7 +119,7 @@ fn hard_surface(kind: &str, s: &mut Stream) -> Surface {
             let q = (u * 3.0).floor() / 3.0;
             (Point::new(100.0 * q, 100.0 * v, 30.0 * (9.0 * q).sin() + s.within(-3.0, 3.0)), 1.0)
         }),
-        "self-intersecting" => freeform(degree, count, |_, _| (50.0 * Point::from(s.direction() * s.next()), 1.0)),
+        "self-intersecting" => freeform(degree, count, |_, _| (50.0 * Point::from(s.direction() * s.unit()), 1.0)),
         "a thousand metres away" => freeform(degree, count, |u, v| {
             (Point::new(1e6 + 100.0 * u, -1e6 + 100.0 * v, 1e6 + s.within(-20.0, 20.0)), s.within(1.0, 2.0))
         }),
@@ -153,14 +153,14 @@ fn hard_surfaces() {
     ] {
         let mut total = Tally::default();
         for k in 0..40 {
-            let mut s = Stream(77 + 1000 * k);
+            let mut s = Random(77 + 1000 * k);
             let surface = hard_surface(kind, &mut s);
             let mut rays = aimed(&surface, k, 5);
             // As many through points on knot lines and near the low ends, where patches meet or collapse.
             for i in 0..5 {
                 let uv = Uv::from([0, 1].map(|d| {
                     let ([a, b], knots) = (surface.domain()[d], &surface.knots[d]);
-                    let knot = knots[(s.next() * knots.len() as f64) as usize];
+                    let knot = knots[(s.unit() * knots.len() as f64) as usize];
                     let low = a + (b - a) * 10f64.powf(s.within(-9.0, -1.0));
                     if knot > a && knot < b {
                         knot
@@ -194,8 +194,8 @@ fn fuzz_surfaces() {
     let [rays, flagged, undecided] = (0..surfaces)
         .into_par_iter()
         .map(|k| {
-            let mut s = Stream(41 + 1000 * k);
-            let degree = [1 + (s.next() * 6.0) as usize, 1 + (s.next() * 6.0) as usize];
+            let mut s = Random(41 + 1000 * k);
+            let degree = [1 + (s.unit() * 6.0) as usize, 1 + (s.unit() * 6.0) as usize];
             let weights = 10f64.powf(s.within(0.0, 2.0));
             let surface = random_surface(&mut s, degree, weights);
             let aims = aimed(&surface, k, 10);

@@ -47,7 +47,7 @@ fn a_nearly_flat_face_is_hit_inside_its_border_at_the_right_place() {
 fn what_a_budget_leaves_open_is_flagged() {
     // Without any clipping: at grazing entries and at poles the first crossing stays open, and often a later one is found.
     let exact = Exact::build(&model([sphere(50.0)]), &Settings { budget: 0, ..Settings::default() });
-    let mut s = Stream(31);
+    let mut s = Random(31);
     let (mut later, mut none, mut passed) = (0, 0, 0);
     for k in 0..3000 {
         let (ray, truths) = if k % 2 == 0 {
@@ -134,7 +134,7 @@ fn a_face_is_met_inside_its_border_from_a_thousand_kilometres() {
     let turned = Frame::from_axis(Point::new(3.1, -2.7, 1.3), Vector::new(0.3, 0.5, 0.8), None);
     let surface = sweep::plane(&turned, [[0.0, 100.0]; 2]);
     let exact = Exact::build(&model([surface.clone()]), &Settings::default());
-    let mut s = Stream(83);
+    let mut s = Random(83);
     let mut near = 0;
     for k in 0..3000 {
         // Across the border by up to 10 µm, at sines where rounding blurs the place along the ray by as much.
@@ -164,7 +164,7 @@ fn tangencies_are_told_to_the_last_bit() {
     let points = [(-64.0, 64.0), (0.0, -64.0), (64.0, 64.0)];
     let points = points.iter().flat_map(|&(x, z)| [-32.0, 32.0].map(|y| Point::new(x, y, z).extend(1.0))).collect();
     let exact = Exact::build(&model([Surface { degree: [2, 1], knots, points }]), &Settings::default());
-    let mut s = Stream(85);
+    let mut s = Random(85);
     for k in 0..400 {
         let height = 10f64.powf(s.within(-16.0, -7.0)) * if k % 2 == 0 { 1.0 } else { -1.0 };
         let d = if k % 3 == 0 { Vector::X } else { Vector::new(1.0, s.within(-0.3, 0.3), 0.0).normalize() };
@@ -190,7 +190,7 @@ fn a_contact_of_fourth_order_is_told_as_tangent() {
     let places = [(-64.0, 64.0), (-32.0, -64.0), (0.0, 64.0), (32.0, -64.0), (64.0, 64.0)];
     let points = places.iter().flat_map(|&(x, z)| [-32.0, 32.0].map(|y| Point::new(x, y, z).extend(1.0))).collect();
     let exact = Exact::build(&model([Surface { degree: [4, 1], knots, points }]), &Settings::default());
-    let mut s = Stream(87);
+    let mut s = Random(87);
     let mut tangent = 0;
     for _ in 0..100 {
         // Below the sheet: nothing is met, and what is told to be met within rounding is no certified hit.
@@ -209,7 +209,7 @@ fn a_face_that_a_ray_runs_along_is_met_inside_its_border_from_far_away() {
     let turned = Frame::from_axis(Point::new(3.1, -2.7, 1.3), Vector::new(0.3, 0.5, 0.8), None);
     let surface = sweep::plane(&turned, [[0.0, 100.0]; 2]);
     let exact = Exact::build(&model([surface.clone()]), &Settings::default());
-    let mut s = Stream(89);
+    let mut s = Random(89);
     let mut near = 0;
     for k in 0..2000 {
         // At sines where the rounding of the way to the face moves the place along it by a hundredth of a millimetre to some.
@@ -237,7 +237,7 @@ fn of_a_sheet_that_bends_by_less_than_its_rounding_no_later_root_is_certified() 
     // z = bend·(x/64)²: across a ray that runs along it obliquely, both coordinates are of the sheet's size and round by more than it
     // bends.
     let knots = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
-    let mut s = Stream(91);
+    let mut s = Random(91);
     let mut double = 0;
     for _ in 0..800 {
         let bend = 10f64.powf(s.within(-20.0, -16.0));

@@ -14,7 +14,7 @@ fn build(m: &lampyris::model::Model) -> Exact {
 #[test]
 fn random_rays_on_a_sphere() {
     let exact = build(&model([sphere(50.0)]));
-    let mut s = Stream(1);
+    let mut s = Random(1);
     let mut flagged = 0;
     for _ in 0..30_000 {
         let ray = s.ray(Point::ZERO, Vector::splat(50.0));
@@ -40,7 +40,7 @@ fn random_rays_on_a_sphere() {
 #[test]
 fn grazing_a_sphere_is_decided_or_flagged() {
     let exact = build(&model([sphere(50.0)]));
-    let mut s = Stream(2);
+    let mut s = Random(2);
     for k in 0..=12 {
         for sign in [-1.0, 1.0] {
             let delta = if k == 0 { 0.0 } else { sign * 10f64.powi(-k) };
@@ -72,7 +72,7 @@ fn grazing_a_sphere_is_decided_or_flagged() {
 #[test]
 fn a_ray_that_leaves_a_sphere_finds_the_other_side() {
     let exact = build(&model([sphere(50.0)]));
-    let mut s = Stream(3);
+    let mut s = Random(3);
     let (mut flagged, n) = (0, 20_000);
     for k in 0..n {
         let ray = s.ray(Point::ZERO, Vector::splat(25.0));
@@ -105,7 +105,7 @@ fn a_ray_that_leaves_a_sphere_finds_the_other_side() {
 #[test]
 fn a_ray_that_leaves_a_sphere_outward_meets_nothing() {
     let exact = build(&model([sphere(50.0)]));
-    let mut s = Stream(4);
+    let mut s = Random(4);
     for _ in 0..20_000 {
         let ray = s.ray(Point::ZERO, Vector::splat(25.0));
         let first = exact.intersect(&ray, &mut Cost::default()).expect("aimed well inside");
@@ -124,7 +124,7 @@ fn a_ray_that_leaves_a_sphere_outward_meets_nothing() {
 fn crossings_of_a_torus_satisfy_its_equation_and_are_even() {
     for minor in [15.0, 0.01] {
         let exact = build(&model([torus(50.0, minor)]));
-        let mut s = Stream(5);
+        let mut s = Random(5);
         let f = |p: Point| (p.x.hypot(p.y) - 50.0).hypot(p.z) - minor;
         for _ in 0..4_000 {
             let phi = s.within(-3.0, 3.0);
@@ -183,7 +183,7 @@ fn rays_far_from_the_trims_and_beside_a_slanted_strip_test_no_leaf() {
     let part = Part { shells: vec![Shell { faces: vec![trimmed, strip], ..Shell::default() }], ..Part::default() };
     let exact = Exact::build(&Model::from_part(part), &Settings::default());
     let normal = x.cross(y);
-    let mut s = Stream(5);
+    let mut s = Random(5);
     let mut cost = Cost::default();
     for _ in 0..2000 {
         let [u, v] = [s.within(-450.0, 450.0), s.within(-450.0, 450.0)];

@@ -10,14 +10,14 @@ use std::time::Instant;
 /// Rays that meet a point of the surface under an angle of 1e-6 to 1e-3 to the tangent plane, from outside and from inside.
 fn grazing(surface: &Surface, n: usize) -> Vec<Ray> {
     let [[u0, u1], [v0, v1]] = surface.domain();
-    let mut s = Stream(77);
+    let mut s = Random(77);
     (0..n)
         .map(|_| {
             let [u, v] = [s.within(u0, u1), s.within(v0, v1)];
             let at = surface.derivatives(Uv::new(u, v));
             let normal = at.du.cross(at.dv).normalize();
             let along = normal.cross(s.direction()).normalize();
-            let angle = 10f64.powf(s.within(-6.0, -3.0)) * if s.next() < 0.5 { -1.0 } else { 1.0 };
+            let angle = 10f64.powf(s.within(-6.0, -3.0)) * if s.unit() < 0.5 { -1.0 } else { 1.0 };
             let d: Vector = (along + normal * angle).normalize();
             Ray::new(at.point - d * 300.0, d)
         })

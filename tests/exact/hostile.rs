@@ -29,7 +29,7 @@ const KINDS: [&str; 16] = [
 ];
 
 /// Inner knots: some of full multiplicity, or in pairs 1e-9 apart.
-fn knots(s: &mut Stream, points: usize, degree: usize, kind: usize) -> Vec<f64> {
+fn knots(s: &mut Random, points: usize, degree: usize, kind: usize) -> Vec<f64> {
     let mut inner: Vec<f64> = (0..points - degree - 1).map(|_| s.within(0.05, 0.95)).collect();
     for k in 1..inner.len() {
         match kind {
@@ -42,8 +42,8 @@ fn knots(s: &mut Stream, points: usize, degree: usize, kind: usize) -> Vec<f64> 
     [vec![0.0; degree + 1], inner, vec![1.0; degree + 1]].concat()
 }
 
-fn surface(s: &mut Stream, kind: usize) -> Surface {
-    let whole = |s: &mut Stream, a: usize, b: usize| a + (s.next() * (b - a + 1) as f64) as usize;
+fn surface(s: &mut Random, kind: usize) -> Surface {
+    let whole = |s: &mut Random, a: usize, b: usize| a + (s.unit() * (b - a + 1) as f64) as usize;
     let degree = [whole(s, 2, 5), whole(s, 2, 5)];
     let counts = degree.map(|d| d + 1 + if matches!(kind, 0 | 4) { 0 } else { whole(s, 0, 3) });
     let knots = [0, 1].map(|d| knots(s, counts[d], degree[d], kind));
@@ -90,7 +90,7 @@ fn surface(s: &mut Stream, kind: usize) -> Surface {
 }
 
 /// A ray towards the place of `uv`, of one of ten kinds; the ray and whether it starts there.
-fn ray(s: &mut Stream, surface: &Surface, size: f64, uv: Uv, kind: usize) -> Ray {
+fn ray(s: &mut Random, surface: &Surface, size: f64, uv: Uv, kind: usize) -> Ray {
     let at = place_at(surface, uv);
     let (p, du, dv) = (rounded(at.point), rounded(at.du), rounded(at.dv));
     let normal = rounded(cross(at.du, at.dv)).normalize_or(Vector::Z);
@@ -101,8 +101,8 @@ fn ray(s: &mut Stream, surface: &Surface, size: f64, uv: Uv, kind: usize) -> Ray
     let d = match kind {
         2 => tangent,
         3 => (tangent + normal * 10f64.powf(s.within(-9.0, -1.0))).normalize(),
-        4 => Vector::AXES[(s.next() * 3.0) as usize],
-        5 => (s.direction() * Vector::new(1.0, 1.0, [0.0, 5e-324, 1e-300, 1e-17][(s.next() * 4.0) as usize]))
+        4 => Vector::AXES[(s.unit() * 3.0) as usize],
+        5 => (s.direction() * Vector::new(1.0, 1.0, [0.0, 5e-324, 1e-300, 1e-17][(s.unit() * 4.0) as usize]))
             .normalize(),
         _ => s.direction(),
     };
@@ -201,7 +201,7 @@ fn judge(surface: &Surface, exact: &Exact, ray: &Ray, aimed: Uv, size: f64, what
 fn run_face(seed: u64, face: usize, rays: usize) -> [Verdicts; 10] {
     let mut out: [Verdicts; 10] = Default::default();
     let kind = face % KINDS.len();
-    let mut s = Stream(seed.wrapping_mul(1_000_003) + face as u64);
+    let mut s = Random(seed.wrapping_mul(1_000_003) + face as u64);
     let surface = surface(&mut s, kind);
     let exact = Exact::build(&model([surface.clone()]), &Settings::default());
     let size = surface.bounds().diagonal();
@@ -228,7 +228,7 @@ fn no_certified_answer_on_a_hostile_face_is_wrong() {
 fn a_root_that_stays_open_is_one_crossing() {
     const FACE: usize = 143;
     const RAY: usize = 42;
-    let mut s = Stream(1_000_003 + FACE as u64);
+    let mut s = Random(1_000_003 + FACE as u64);
     let surface = surface(&mut s, FACE % KINDS.len());
     let exact = Exact::build(&model([surface.clone()]), &Settings::default());
     let size = surface.bounds().diagonal();

@@ -13,6 +13,8 @@ mod models;
 mod paths;
 mod polish;
 mod polished_starts;
+#[path = "../support/random.rs"]
+mod random;
 mod referee;
 mod support;
 mod thin_rings;

@@ -49,7 +49,7 @@ impl Judged {
 
     /// Rays that certainty and trims leave undisputed must find the same first hit as clipping does.
     fn against_audit(&self, n: usize, seed: u64) -> Counts {
-        let mut s = Stream(seed);
+        let mut s = Random(seed);
         let [mut hits, mut flagged, mut undecided, mut wrong] = Counts::default();
         for _ in 0..n {
             let ray = s.ray(self.bounds.center(), 0.5 * self.bounds.size());
@@ -136,7 +136,7 @@ fn corpus_against_clipping() {
 /// Rays through random points of edges of closed shells, and through their vertices.
 fn through_edges(name: &str, model: &Model, n: usize) -> (usize, usize, usize) {
     let exact = Exact::build(model, &Settings::default());
-    let mut s = Stream(17);
+    let mut s = Random(17);
     let closed =
         |part: usize| model.parts[part].shells.iter().all(|s| s.closed) && !model.parts[part].shells.is_empty();
     let mut edges = Vec::new();
@@ -152,7 +152,7 @@ fn through_edges(name: &str, model: &Model, n: usize) -> (usize, usize, usize) {
     let reach = 4.0 * bounds(model).diagonal();
     let (mut odd, mut flagged) = (0, 0);
     for k in 0..n {
-        let (edge, placement) = edges[(s.next() * edges.len() as f64) as usize];
+        let (edge, placement) = edges[(s.unit() * edges.len() as f64) as usize];
         let [a, b] = edge.curve.domain();
         let target: Point = placement.point(edge.curve.evaluate(s.within(a, b)));
         // A third passes by at distances down to a micrometre's thousandth.
@@ -217,7 +217,7 @@ fn corpus_certificates() {
             continue;
         }
         let b = bounds(&model);
-        let mut s = Stream(3);
+        let mut s = Random(3);
         let start = std::time::Instant::now();
         let mut cost = Cost::default();
         let n = 20_000;

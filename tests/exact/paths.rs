@@ -83,11 +83,11 @@ fn a_path_comes_back_the_way_it_went() {
     const BOUNCES: usize = 60;
     for radius in [1e-3, 50.0, 1e4] {
         on_every_ground(&model([sphere(radius)]), 2e-3 * radius, |name, ground| {
-            let mut random = Stream(5);
+            let mut random = Random(5);
             // A ball turns each ray by the same angle: an error of direction adds up with every bounce, it does not multiply.
             let bound = (BOUNCES * BOUNCES) as f64 * 1e-12 * radius;
             for path in 0..20 {
-                let start = Ray::new(random.direction() * (0.9 * radius * random.next()), random.direction());
+                let start = Ray::new(random.direction() * (0.9 * radius * random.unit()), random.direction());
                 let mut ray = start;
                 let mut walls = Vec::new();
                 for _ in 0..BOUNCES {
@@ -154,7 +154,7 @@ fn light_in_a_glass_ball_is_caught_from_the_critical_angle_on() {
         if name == "facets" {
             return;
         }
-        let mut random = Stream(9);
+        let mut random = Random(9);
         for k in 0..200 {
             let off = [1e-3, 1e-6, 1e-9][k % 3] * if k % 2 == 0 { 1.0 } else { -1.0 };
             let b = radius / index * (1.0 + off);

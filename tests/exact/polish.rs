@@ -75,7 +75,7 @@ fn polished_hits_are_the_first_hits_of_the_spline() {
         let facets = EveryFacet(&mesh);
         let polished = Polished::new(&facets, &mesh, &exact);
         let b = bounds(&mesh);
-        let mut s = Stream(8);
+        let mut s = Random(8);
         let (mut hits, mut other, mut flips, mut cost) = (0, 0, 0, Cost::default());
         for _ in 0..3000 {
             let ray = s.ray(b.center(), 0.5 * b.size());
@@ -111,7 +111,7 @@ fn a_departure_from_the_spline_is_never_lost() {
         let facets = EveryFacet(&mesh);
         let polished = Polished::new(&facets, &mesh, &exact);
         let b = bounds(&mesh);
-        let mut s = Stream(9);
+        let mut s = Random(9);
         let (mut asked, mut differ, mut own) = (0, 0, 0);
         for k in 0..3000 {
             let ray = s.ray(b.center(), 0.4 * b.size());
@@ -122,7 +122,7 @@ fn a_departure_from_the_spline_is_never_lost() {
             let from = first.departure();
             let o: Point = ray.point_at(first.t);
             let along: Vector = first.normal.cross(s.direction()).normalize();
-            let side = if s.next() < 0.5 { -1.0 } else { 1.0 };
+            let side = if s.unit() < 0.5 { -1.0 } else { 1.0 };
             let d = if k % 3 == 0 {
                 (along + side * first.normal * 10f64.powf(s.within(-4.0, -0.5))).normalize()
             } else {
@@ -169,7 +169,7 @@ fn short_flat_rays_meet_the_sphere() {
     let polished = Polished::new(&facets, &mesh, &exact);
     let other = mesh.facets.iter().position(|f| f.face == FaceId(1)).unwrap() as u32;
     let from = Departure { face: FaceId(1), primitive: other, uv: Uv::new(45.0, 0.0), triangle: None };
-    let mut random = Stream(11);
+    let mut random = Random(11);
     for _ in 0..300 {
         let out = random.direction();
         let along = out.cross(random.direction()).normalize();
@@ -196,7 +196,7 @@ fn a_batch_gives_the_bits_of_rays_asked_alone() {
         let exact = Exact::build(&model, &Settings::default());
         let octree = Octree::build(&mesh, &octree::Settings::default());
         let polished = Polished::new(&octree, &mesh, &exact);
-        let (b, mut s) = (bounds(&mesh), Stream(10));
+        let (b, mut s) = (bounds(&mesh), Random(10));
         let lamp = b.center() + 3.0 * b.size();
         let down = (b.center() - lamp).normalize();
         let mut rays: Vec<Ray> = (0..2000)
@@ -231,7 +231,7 @@ fn a_batch_gives_the_bits_of_rays_asked_alone() {
 #[test]
 fn a_point_that_newton_has_not_reached_is_none() {
     let exact = Exact::build(&model([sphere(50.0)]), &Settings::default());
-    let mut s = Stream(41);
+    let mut s = Random(41);
     let mut points = [0; 4];
     for k in 0..2000 {
         let (d, target) = (s.direction(), s.direction() * 50.0);
@@ -260,7 +260,7 @@ fn a_reversed_face_has_its_normals_turned() {
     let mesh = tessellate(&model, &tessellate::Settings { measure: false, ..Default::default() }).mesh;
     let facets = EveryFacet(&mesh);
     let polished = Polished::new(&facets, &mesh, &exact);
-    let mut s = Stream(43);
+    let mut s = Random(43);
     for _ in 0..50 {
         let ray = Ray::new(s.direction() * 20.0, s.direction());
         for (name, ground) in [("polished", &polished as &dyn Intersector), ("spline", &exact)] {
@@ -279,10 +279,10 @@ fn newton_goes_on_across_the_seam_of_a_closed_surface() {
     let surface = sphere(50.0);
     let [[first, last], [low, high]] = surface.domain();
     let exact = Exact::build(&model([surface.clone()]), &Settings::default());
-    let mut s = Stream(47);
+    let mut s = Random(47);
     for k in 0..200 {
         let aside = 0.01 * (last - first);
-        let (near, far) = (first + aside * s.next(), last - aside * s.next());
+        let (near, far) = (first + aside * s.unit(), last - aside * s.unit());
         let (at, seed) = if k % 2 == 0 { (near, far) } else { (far, near) };
         let v = s.within(low + 0.2 * (high - low), high - 0.2 * (high - low));
         let target = surface.evaluate(Uv::new(at, v));
@@ -295,7 +295,7 @@ fn newton_goes_on_across_the_seam_of_a_closed_surface() {
 #[test]
 fn a_chord_shorter_than_a_micrometre_is_no_start() {
     let exact = Exact::build(&model([sphere(50.0)]), &Settings::default());
-    let mut s = Stream(53);
+    let mut s = Random(53);
     for _ in 0..300 {
         let first = Ray::new(s.direction() * 20.0, s.direction());
         let hit = exact.first(&first, &mut Cost::default()).hit.unwrap();

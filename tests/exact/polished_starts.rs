@@ -32,7 +32,7 @@ fn a_ray_that_escapes_the_spline_meets_nothing() {
         let judge = octree.without_preparation();
         let judge = Polished::new(&judge, &mesh, &exact);
         asked.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 1, beams: &[], sag: 0.0 });
-        let (b, mut s) = (bounds(&mesh), Stream(19));
+        let (b, mut s) = (bounds(&mesh), Random(19));
         let (mut rays, mut free, mut known) = (0, 0, 0);
         let mut last_known = 0;
         for _ in 0..60_000 {
@@ -43,8 +43,8 @@ fn a_ray_that_escapes_the_spline_meets_nothing() {
             let uv = exact.normal_at(from.face, from.uv);
             let Some(normal) = uv.filter(|_| hit.certainty == Certainty::Polished) else { continue };
             // Its own way for each facet, on both sides of the sheets and mostly along their normals.
-            let mut of_facet = Stream(u64::from(from.primitive));
-            let side = if of_facet.next() < 0.5 { -1.0 } else { 1.0 };
+            let mut of_facet = Random(u64::from(from.primitive));
+            let side = if of_facet.unit() < 0.5 { -1.0 } else { 1.0 };
             let way = (side * normal + of_facet.direction() * 0.8 + s.direction() * 0.15).normalize();
             let place = model.parts[0].shells[0].faces[from.face.index()].surface.evaluate(from.uv);
             let ray = Ray::new(place, way).with_departure(from);
@@ -100,8 +100,8 @@ fn only_curved_facets_are_looked_for_behind_a_start() {
     let octree = Octree::build(&mesh, &octree::Settings::default());
     let facets = CountedAsks(&octree, AtomicUsize::new(0));
     let polished = Polished::new(&facets, &mesh, &exact);
-    let mut s = Stream(23);
-    let up = |s: &mut Stream| (s.direction() * 0.9 + Vector::Z).normalize();
+    let mut s = Random(23);
+    let up = |s: &mut Random| (s.direction() * 0.9 + Vector::Z).normalize();
     let over_chip: Vec<Ray> = (0..1000)
         .map(|_| Ray::new(Point::new(s.within(-0.4, 0.4), s.within(-0.4, 0.4), 0.01), up(&mut s)))
         .collect();

@@ -1,41 +1,10 @@
 //! Models in closed form, and deterministic rays.
 
-use lampyris::math::{Frame, Homogeneous, Point, Ray, Vector};
+pub(crate) use crate::random::Random;
+use lampyris::math::{Frame, Homogeneous, Point};
 use lampyris::model::{Analytic, Face, Model, Part, Shell};
 use lampyris::nurbs::{Surface, sweep};
 use std::f64::consts::{FRAC_PI_2, PI};
-
-/// SplitMix64 (Steele, Lea and Flood 2014): small, seedable, the same everywhere.
-pub(crate) struct Stream(pub(crate) u64);
-
-impl Stream {
-    pub(crate) fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub(crate) fn within(&mut self, a: f64, b: f64) -> f64 {
-        a + (b - a) * self.next()
-    }
-
-    /// A unit vector, evenly spread.
-    pub(crate) fn direction(&mut self) -> Vector {
-        let (z, phi) = (self.within(-1.0, 1.0), self.within(-PI, PI));
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        Vector::new(r * phi.cos(), r * phi.sin(), z).normalize()
-    }
-
-    /// A ray from a sphere of three times the radius towards a box around the centre.
-    pub(crate) fn ray(&mut self, center: Point, half: Vector) -> Ray {
-        let origin = center + self.direction() * 3.0 * half.length();
-        let target =
-            center + half * Vector::new(self.within(-1.1, 1.1), self.within(-1.1, 1.1), self.within(-1.1, 1.1));
-        Ray::new(origin, (target - origin).normalize())
-    }
-}
 
 pub(crate) fn face(surface: Surface) -> Face {
     Face { analytic: Analytic::Rational, ..Face::whole(surface) }
@@ -77,7 +46,7 @@ pub(crate) fn freeform(
 
 /// A wavy reflector of 200 mm × 200 mm with `n × n` control points.
 pub(crate) fn reflector(n: usize) -> Surface {
-    let mut s = Stream(11);
+    let mut s = Random(11);
     freeform([3, 3], [n, n], |u, v| {
         let (x, y) = (200.0 * u - 100.0, 200.0 * v - 100.0);
         let z = (x * x + y * y) / 400.0 + 1.5 * (x / 9.0).sin() * (y / 11.0).cos() + s.within(-0.6, 0.6);
@@ -87,6 +56,6 @@ pub(crate) fn reflector(n: usize) -> Surface {
 
 /// One bicubic patch of 100 mm with heights of ±30 mm.
 pub(crate) fn bicubic() -> Surface {
-    let mut s = Stream(7);
+    let mut s = Random(7);
     freeform([3, 3], [4, 4], |u, v| (Point::new(100.0 * u - 50.0, 100.0 * v - 50.0, s.within(-30.0, 30.0)), 1.0))
 }

@@ -4,6 +4,7 @@
 //! farther.
 
 use crate::files::fixture;
+use crate::random::Random;
 use lampyris::formats::{
     self, Data3, Flux, LightRay, PhotometricType, Photometry, read_data1, read_data2, read_data3, read_eulumdat,
     read_ies, read_ray_set, read_rays, write_data1, write_data3, write_eulumdat, write_facets, write_ies,
@@ -19,22 +20,6 @@ use std::time::{Duration, Instant};
 const COPIES: u64 = 200;
 /// Longest that one small file may take: none of the seeds is over 200 kB.
 const LONGEST: Duration = Duration::from_secs(10);
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n.max(1) as u64) as usize
-    }
-}
 
 /// Words that break readers: huge counts, signs, numbers that are none, ends of other formats.
 const WORDS: [&[u8]; 14] = [
@@ -79,7 +64,7 @@ fn damaged(seed: &[u8], random: &mut Random) -> Vec<u8> {
                 }
             }
             _ => {
-                let random_bytes: Vec<u8> = (0..8).map(|_| random.next() as u8).collect();
+                let random_bytes: Vec<u8> = (0..8).map(|_| random.bits() as u8).collect();
                 let stop = (at + 8).min(bytes.len());
                 bytes.splice(at..stop, random_bytes);
             }

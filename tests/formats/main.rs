@@ -5,6 +5,8 @@ mod facets;
 #[path = "../support/files.rs"]
 mod files;
 mod grids;
+#[path = "../support/random.rs"]
+mod random;
 mod ray_sets;
 #[cfg(feature = "report")]
 mod report_page;

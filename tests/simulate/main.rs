@@ -22,6 +22,8 @@ mod laws;
 mod listed_rays;
 mod pipeline;
 mod polished;
+#[path = "../support/random.rs"]
+mod random;
 mod ready_meshes;
 mod refusals;
 mod scenes;

@@ -1,18 +1,13 @@
 //! Verdicts of noisy far fields, whose truth is known.
 
+use crate::random::Random;
 use lampyris::regulation::{Assumptions, IntensityMap, RaySample, Regulation, Verdict, assess};
-
-/// Numbers of a congruential generator that are left out at first: seeds that differ in few bits begin alike.
-const WARM_UP: usize = 4;
 
 /// A normal number of mean 0 and variance 1, nearly, that belongs to a cell and a seed: twelve uniform ones less their mean.
 fn noise(cell: usize, seed: u64) -> f64 {
-    let mut state = seed ^ (cell as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    let uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    std::iter::repeat_with(uniform).skip(WARM_UP).take(12).sum::<f64>() - 6.0
+    // Begun at the first number of a stream: numbers of streams begun beside each other have nothing in common.
+    let mut random = Random(Random(seed << 32 | cell as u64).bits());
+    (0..12).map(|_| random.unit()).sum::<f64>() - 6.0
 }
 
 /// Radius of the dim middle of a lamp, degrees: more than the opening of the sensor.
@@ -50,24 +45,14 @@ fn the_luckiest_of_many_noisy_directions_fails_no_lamp() {
     assert!(failed > 54, "{failed} of 60");
 }
 
-/// Uniform numbers between 0 and 1.
-struct Uniform(u64);
-
-impl Uniform {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+/// A count of this mean (Knuth's product of uniform numbers).
+fn count(random: &mut Random, mean: f64) -> u32 {
+    let (mut n, mut product) = (0, random.unit());
+    while product > (-mean).exp() {
+        product *= random.unit();
+        n += 1;
     }
-
-    /// A count of this mean (Knuth's product of uniform numbers).
-    fn count(&mut self, mean: f64) -> u32 {
-        let (mut n, mut product) = (0, self.next());
-        while product > (-mean).exp() {
-            product *= self.next();
-            n += 1;
-        }
-        n
-    }
+    n
 }
 
 /// Largest intensity, cd, allowed at B50L, its place, and the opening of the sensor, degrees.
@@ -88,19 +73,14 @@ fn one_point() -> Regulation {
 
 /// The verdict about 350 cd at most, where rays of `classes` (mean number in an opening, candela of one) fell into every cell of a map
 /// around, in `replicates`.
-fn counted_verdict(
-    regulation: &Regulation,
-    uniform: &mut Uniform,
-    classes: &[[f64; 2]],
-    replicates: u32,
-) -> Verdict {
+fn counted_verdict(regulation: &Regulation, random: &mut Random, classes: &[[f64; 2]], replicates: u32) -> Verdict {
     let (width, [h, v]) = (OPENING, B50L);
     let edges = |middle: f64| (0..=SIDE).map(|k| middle + width * (k as f64 - 0.5 * SIDE as f64)).collect();
     let mut cell = || {
         let mut parts = vec![0.0; replicates as usize];
         for [mean, ray] in classes {
-            for _ in 0..uniform.count(*mean) {
-                parts[(uniform.next() * f64::from(replicates)) as usize] += ray;
+            for _ in 0..count(random, *mean) {
+                parts[(random.unit() * f64::from(replicates)) as usize] += ray;
             }
         }
         let value: f64 = parts.iter().sum();
@@ -126,7 +106,7 @@ const CONFIDENCE: f64 = 0.0016;
 /// with 2.7 %, and ten light rays tell nothing of heavy ones that are seldom met.
 #[test]
 fn few_rays_pass_no_lamp_that_is_too_bright() {
-    let (regulation, mut uniform) = (one_point(), Uniform(20_261_123));
+    let (regulation, mut random) = (one_point(), Random(20_261_123));
     for (classes, replicates) in [
         (vec![[3.6, 100.0]], 128),
         (vec![[9.1, 40.0]], 128),
@@ -138,7 +118,7 @@ fn few_rays_pass_no_lamp_that_is_too_bright() {
         (vec![[100.0, 3.6]], 8),
     ] {
         let wrong = (0..TRIALS)
-            .filter(|_| counted_verdict(&regulation, &mut uniform, &classes, replicates) == Verdict::Pass)
+            .filter(|_| counted_verdict(&regulation, &mut random, &classes, replicates) == Verdict::Pass)
             .count();
         // The share allowed, and three errors of the number found.
         let expected = CONFIDENCE * TRIALS as f64;
@@ -151,12 +131,12 @@ fn few_rays_pass_no_lamp_that_is_too_bright() {
 /// never do.
 #[test]
 fn dark_points_pass_where_rays_are_light() {
-    let (regulation, mut uniform) = (one_point(), Uniform(7));
+    let (regulation, mut random) = (one_point(), Random(7));
     for (classes, replicates) in
         [(vec![[0.01, 14.0]], 2000), (vec![[20.0, 3.0], [0.0, 130.0]], 128), (vec![[40.0, 4.0]], 128)]
     {
         let passed = (0..100)
-            .filter(|_| counted_verdict(&regulation, &mut uniform, &classes, replicates) == Verdict::Pass)
+            .filter(|_| counted_verdict(&regulation, &mut random, &classes, replicates) == Verdict::Pass)
             .count();
         assert!(passed >= 97, "{classes:?}: {passed} of 100");
     }

@@ -1,6 +1,7 @@
 //! What an import says of its file: faces one by one, and what is no shape of a product.
 
 use crate::faces::{import, read, square};
+use crate::files::{MILLIMETRES, part21};
 use lampyris::model::SurfaceKind;
 use lampyris::step::{Settings, read_bytes};
 
@@ -178,18 +179,16 @@ fn files_that_hold_shapes_of_an_assembly_are_named() {
 /// Extent in x of each instance, rising, of a block #10 that the representations #20 and #21 both name, where `mapped` are the items of the
 /// root.
 fn places_of_blocks(mapped: &str) -> Vec<[f64; 2]> {
-    let text = format!(
-        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\
-         #1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
-         #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+    let text = part21(&format!(
+        "{MILLIMETRES}\
          #5=CARTESIAN_POINT('',(0.,0.,0.));\n#6=DIRECTION('',(0.,0.,1.));\n#7=DIRECTION('',(1.,0.,0.));\n\
          #8=AXIS2_PLACEMENT_3D('',#5,#6,#7);\n#9=AXIS2_PLACEMENT_3D('',#15,#6,#7);\n#15=CARTESIAN_POINT('',(100.,0.,0.));\n\
          #10=BLOCK('',#8,10.,10.,10.);\n\
          #20=SHAPE_REPRESENTATION('A',(#8,#10),#1);\n#21=SHAPE_REPRESENTATION('B',(#8,#10),#1);\n\
          #22=REPRESENTATION_MAP(#8,#20);\n#23=REPRESENTATION_MAP(#8,#21);\n\
          #30=MAPPED_ITEM('',#22,#8);\n#31=MAPPED_ITEM('',#23,#8);\n#32=MAPPED_ITEM('',#23,#9);\n\
-         #40=SHAPE_REPRESENTATION('',({mapped}),#1);\nENDSEC;\nEND-ISO-10303-21;\n"
-    );
+         #40=SHAPE_REPRESENTATION('',({mapped}),#1);\n"
+    ));
     let import = read_bytes("blocks.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
     assert_eq!(import.report.faces_placed.found, import.report.faces_placed.converted);
     let mut boxes: Vec<[f64; 2]> = import

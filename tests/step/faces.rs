@@ -1,17 +1,15 @@
 //! Faces as real exporters write them, in the smallest file that shows the trait, against closed forms.
 
+use crate::files::{MILLIMETRES, part21};
 use lampyris::step::{Import, Settings, read_bytes};
 use std::f64::consts::PI;
 
 /// A shell of face #900 in a file in millimetres and radians; `data` defines the face.
 pub(crate) fn read(data: &str) -> Import {
-    let frame = "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
-                 #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
-                 #4=OPEN_SHELL('',(#900));\n#5=SHELL_BASED_SURFACE_MODEL('',(#4));\n\
-                 #6=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#5),#1);\n";
-    let text = format!(
-        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n{frame}{data}ENDSEC;\nEND-ISO-10303-21;\n"
-    );
+    let text = part21(&format!(
+        "{MILLIMETRES}#4=OPEN_SHELL('',(#900));\n#5=SHELL_BASED_SURFACE_MODEL('',(#4));\n\
+         #6=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#5),#1);\n{data}"
+    ));
     read_bytes("face.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
 }
 
@@ -325,7 +323,7 @@ fn every_context_has_its_own_units() {
         ("@2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.CENTI.,.METRE.));", 10.0),
     ];
     let data: String = units.iter().enumerate().map(|(k, (u, _))| own(k as u32 + 1, u)).collect();
-    let text = format!("ISO-10303-21;HEADER;FILE_SCHEMA(('X'));ENDSEC;DATA;{data}ENDSEC;END-ISO-10303-21;");
+    let text = part21(&data);
     let import = read_bytes("units.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
     assert_eq!(import.report.faces.converted, 4, "{:?} {:?}", import.report.refusals, import.report.problems);
     let mut sides: Vec<f64> =
@@ -376,7 +374,7 @@ fn rectangles_of_parameters_are_in_the_units_of_their_context() {
         #10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=AXIS2_PLACEMENT_3D('',#10,$,$);\n#12=SPHERICAL_SURFACE('',#11,2.);\n\
         #13=RECTANGULAR_TRIMMED_SURFACE('',#12,0.,90.,30.,90.,.T.,.T.);\n#14=GEOMETRIC_SET('',(#13));\n\
         #15=GEOMETRICALLY_BOUNDED_SURFACE_SHAPE_REPRESENTATION('',(#14),#1);\n";
-    let text = format!("ISO-10303-21;HEADER;FILE_SCHEMA(('X'));ENDSEC;DATA;{data}ENDSEC;END-ISO-10303-21;");
+    let text = part21(data);
     let import = read_bytes("belt.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
     // A zone's area is that of the cylinder around it: a quarter of 2π·20·(20 − 10) mm².
     close(area(&import), 100.0 * PI, 1e-4);
@@ -406,7 +404,7 @@ fn a_rectangle_that_runs_against_one_parameter_has_the_other_normal() {
             flag(with_u),
             flag(with_v),
         );
-        let text = format!("ISO-10303-21;HEADER;FILE_SCHEMA(('X'));ENDSEC;DATA;{data}ENDSEC;END-ISO-10303-21;");
+        let text = part21(&data);
         let import = read_bytes("zone.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
         close(area(&import), 1.5 * 20.0 * 20.0 * (1f64.sin() - 0.5f64.sin()), 1e-4);
         let mesh = lampyris::tessellate::tessellate(&import.model, &Default::default()).mesh;
@@ -428,7 +426,7 @@ fn a_rectangle_from_the_end_of_a_period_to_its_start_is_all_of_it() {
             #13=RECTANGULAR_TRIMMED_SURFACE('',#12,{around},0.,10.,.T.,.T.);\n#14=GEOMETRIC_SET('',(#13));\n\
             #15=GEOMETRICALLY_BOUNDED_SURFACE_SHAPE_REPRESENTATION('',(#14),#1);\n"
         );
-        let text = format!("ISO-10303-21;HEADER;FILE_SCHEMA(('X'));ENDSEC;DATA;{data}ENDSEC;END-ISO-10303-21;");
+        let text = part21(&data);
         let import = read_bytes("tube.stp", text.as_bytes(), &Settings::default()).expect("Part 21");
         assert_eq!(import.report.faces.refused, 0, "{around}: {:?}", import.report.refusals);
         close(area(&import), 100.0 * PI, 1e-4);

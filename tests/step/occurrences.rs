@@ -1,14 +1,13 @@
 //! Where the parts of assemblies stand that files describe in rare forms, or in part, and what colour each place shows.
 
+use crate::files::{MILLIMETRES, part21};
 use lampyris::step::{Import, Settings, read_bytes};
 
 /// Two products: #101 with representation #103, which has `items` and two placements, #21 at x = 100 and #22 at x = 200; #102, `part`, with
 /// representation #106 of a block of 10 mm at the origin, #24. `data` relates them.
 fn read(items: &str, data: &str) -> Import {
-    let text = format!(
-        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\
-         #1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
-         #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+    let text = part21(&format!(
+        "{MILLIMETRES}\
          #10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=CARTESIAN_POINT('',(100.,0.,0.));\n#12=CARTESIAN_POINT('',(200.,0.,0.));\n\
          #13=DIRECTION('',(0.,0.,1.));\n#14=DIRECTION('',(1.,0.,0.));\n#20=AXIS2_PLACEMENT_3D('',#10,#13,#14);\n\
          #21=AXIS2_PLACEMENT_3D('',#11,#13,#14);\n#22=AXIS2_PLACEMENT_3D('',#12,#13,#14);\n#23=BLOCK('',#20,10.,10.,10.);\n\
@@ -17,8 +16,8 @@ fn read(items: &str, data: &str) -> Import {
          #105=SHAPE_DEFINITION_REPRESENTATION(#104,#103);\n\
          #102=PRODUCT_DEFINITION_WITH_ASSOCIATED_DOCUMENTS('','',#122,$,());\n#122=PRODUCT_DEFINITION_FORMATION('','',#132);\n\
          #132=PRODUCT('part','part','',());\n#106=SHAPE_REPRESENTATION('',(#24,#20),#1);\n#107=PRODUCT_DEFINITION_SHAPE('','',#102);\n\
-         {data}ENDSEC;\nEND-ISO-10303-21;\n"
-    );
+         {data}"
+    ));
     read_bytes("assembly.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
 }
 

@@ -1,5 +1,6 @@
 //! Solids given as a recipe: areas, volumes and closed shells against their formulas.
 
+use crate::files::{MILLIMETRES, part21};
 use crate::support::{measure_model, violations};
 use lampyris::math::{Point, Vector};
 use lampyris::step::{Import, Settings, read_bytes};
@@ -7,14 +8,12 @@ use std::f64::consts::{PI, TAU};
 
 /// Common points, directions and placements, and one solid #900.
 fn import(data: &str) -> Import {
-    let text = format!(
-        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n\
-         #1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
-         #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+    let text = part21(&format!(
+        "{MILLIMETRES}\
          #6=SHAPE_REPRESENTATION('',(#900),#1);\n\
          #10=CARTESIAN_POINT('',(1.,2.,3.));\n#11=DIRECTION('',(0.,0.6,0.8));\n#12=DIRECTION('',(1.,0.,0.));\n\
-         #13=AXIS2_PLACEMENT_3D('',#10,#11,#12);\n#14=AXIS1_PLACEMENT('',#10,#11);\n{data}ENDSEC;\nEND-ISO-10303-21;\n"
-    );
+         #13=AXIS2_PLACEMENT_3D('',#10,#11,#12);\n#14=AXIS1_PLACEMENT('',#10,#11);\n{data}"
+    ));
     read_bytes("recipe.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
 }
 

@@ -1,5 +1,6 @@
 //! Closed shells whose files have edges or flags of sense that no solid can have: they close all the same.
 
+use crate::files::{MILLIMETRES, part21};
 use lampyris::step::{Import, Settings, read_bytes};
 use lampyris::tessellate::{self, tessellate};
 use std::collections::BTreeMap;
@@ -91,13 +92,10 @@ fn solid_text(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: O
         .unwrap();
         shell.push(format!("#{}", id + 6));
     }
-    let frame = "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
-                 #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
-                 #5=MANIFOLD_SOLID_BREP('',#4);\n#6=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#5),#1);\n";
-    format!(
-        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n{frame}#4=CLOSED_SHELL('',({}));\n{data}ENDSEC;\nEND-ISO-10303-21;\n",
+    part21(&format!(
+        "{MILLIMETRES}#4=CLOSED_SHELL('',({}));\n#5=MANIFOLD_SOLID_BREP('',#4);\n#6=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#5),#1);\n{data}",
         shell.join(",")
-    )
+    ))
 }
 
 /// Corners of a cube; the last one stands a little before the one at (0, 10, 10) on the edge from (0, 0, 10).
@@ -293,8 +291,7 @@ fn a_seam_ends_at_the_vertex_that_its_edge_misses() {
           #80=FACE_OUTER_BOUND('',#70,.T.);\n#81=FACE_BOUND('',#71,.T.);\n#82=FACE_OUTER_BOUND('',#72,.T.);\n#83=FACE_OUTER_BOUND('',#73,.T.);\n\
           #900=ADVANCED_FACE('',(#80,#81),#31,.T.);\n#901=ADVANCED_FACE('',(#82),#35,.F.);\n#902=ADVANCED_FACE('',(#83),#36,.T.);\n\
           #910=CLOSED_SHELL('',(#900,#901,#902));\n#911=MANIFOLD_SOLID_BREP('',#910);\n#912=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#911),$);";
-    let text = format!("ISO-10303-21;HEADER;ENDSEC;DATA;{points}{rest}ENDSEC;END-ISO-10303-21;");
-    let model = read(&text).model;
+    let model = read(&part21(&format!("{points}{rest}"))).model;
     let report = tessellate(&model, &tessellate::Settings::uniform(1e-3)).report;
     assert_eq!((report.open_edges, report.shells.closed), (0, 1));
 }

@@ -1,5 +1,6 @@
 //! What files say in rare forms, or wrongly, is read right or refused by name: nothing is lost, added or moved in silence.
 
+use crate::files::{MILLIMETRES, part21};
 use crate::support::measure_model;
 use lampyris::step::{Import, Settings, read_bytes};
 use std::f64::consts::PI;
@@ -11,14 +12,13 @@ pub(crate) fn read(data: &str) -> Import {
 
 /// The same of these items, in a file with other sections before its data.
 pub(crate) fn read_sections(sections: &str, items: &str, data: &str) -> Import {
-    let text = format!(
-        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\n{sections}DATA;\n\
-         #1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
-         #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n\
+    let text = part21(&format!(
+        "{MILLIMETRES}\
          #6=SHAPE_REPRESENTATION('',({items}),#1);\n#10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=DIRECTION('',(1.,0.,0.));\n\
          #12=DIRECTION('',(0.,1.,0.));\n#13=DIRECTION('',(0.,0.,1.));\n#14=AXIS2_PLACEMENT_3D('',#10,#13,#11);\n\
-         {data}ENDSEC;\nEND-ISO-10303-21;\n"
-    );
+         {data}"
+    ));
+    let text = text.replacen("DATA;", &format!("{sections}DATA;"), 1);
     read_bytes("silence.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
 }
 

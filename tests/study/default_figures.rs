@@ -9,7 +9,7 @@ use lampyris::intersect::{Intersector, NormalMode};
 use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
 use lampyris::study::default_accuracy::{Chosen, PilotSource, TimedFacets, Undecided, choose};
 use lampyris::study::figures::{Figure, Limit, ReceiverFigures, Surface, figures};
-use lampyris::study::geometric_error::{Paired, geometric_error};
+use lampyris::study::geometric_error::{GeometricError, Paired, geometric_error};
 use lampyris::study::model_figures::absorbed_figures;
 use lampyris::study::{FacetTree, MeshSource, ModelMeshSource, Random};
 use lampyris::tessellate::{self, GroupedFacets, Tessellation, tessellate};
@@ -150,6 +150,17 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
     assert!(max.geometric.is_some_and(|g| g <= max.statistical), "{max:?}");
 }
 
+/// What facets of the default tolerance change in a run of so many rays, and its results on them and on the spline.
+fn facets_and_spline(known: &KnownScene, rays: u64) -> (GeometricError, [Results; 2]) {
+    let (bound, settings) = bind(known);
+    let source = ModelMeshSource::new(&known.model);
+    let mesh = tessellate(&known.model, &tessellate::Settings::default()).mesh;
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let few = RunSettings { rays, replicates: 64, ..settings };
+    let both = [&octree as &dyn Intersector, source.exact()];
+    (geometric_error(&bound, both, &few), both.map(|i| simulate(&bound, i, &few, &|_| true)))
+}
+
 /// Cells around a pole are one direction, which is printed at its mean: what facets change of it is judged there, not in the square of
 /// cells that holds as many rays.
 #[test]
@@ -159,13 +170,7 @@ fn the_brightest_pole_is_judged_where_it_is_printed() {
     let [head, _] = known.text.split_once("h_deg").map(<[&str; 2]>::from).unwrap();
     let text = format!("{head}angles = 'C'\nh_deg = [0, 360]\nv_deg = [0, {half:?}]\ncells = [36, 8]\n");
     let known = KnownScene { text, ..known };
-    let (bound, settings) = bind(&known);
-    let source = ModelMeshSource::new(&known.model);
-    let mesh = tessellate(&known.model, &tessellate::Settings::default()).mesh;
-    let octree = Octree::build(&mesh, &octree::Settings::default());
-    let few = RunSettings { rays: 16_384, replicates: 64, ..settings };
-    let error = geometric_error(&bound, [&octree, source.exact()], &few);
-    let results = [&octree as &dyn Intersector, source.exact()].map(|i| simulate(&bound, i, &few, &|_| true));
+    let (error, results) = facets_and_spline(&known, 16_384);
     let receiver = &error.receivers[0];
     assert_eq!(receiver.peak_cells, 1, "{receiver:?}");
     for (judged, printed) in [receiver.peak.facets, receiver.peak.spline].iter().zip(&results) {
@@ -248,18 +253,12 @@ fn what_a_glass_takes_is_judged_without_a_receiver() {
 fn facets_change_a_bin_as_they_change_its_light() {
     let mut known = known_scenes::parabolic_lamp(25.0, 0.2);
     known.text += "bins_nm = [400, 500, 700]\n";
-    let (bound, settings) = bind(&known);
-    let source = ModelMeshSource::new(&known.model);
-    let mesh = tessellate(&known.model, &tessellate::Settings::default()).mesh;
-    let octree = Octree::build(&mesh, &octree::Settings::default());
-    let few = RunSettings { rays: 8192, replicates: 64, ..settings };
-    let error = geometric_error(&bound, [&octree, source.exact()], &few);
+    let (error, [results, _]) = facets_and_spline(&known, 8192);
     let [empty, full] = &error.receivers[0].channels[..] else { panic!("two bins") };
     assert_eq!((empty.total, empty.statistical), (Default::default(), 0.0));
     assert_eq!(full.total, error.receivers[0].power);
     assert_eq!(full.cells, error.receivers[0].cells);
     assert!(full.cells.iter().any(|&c| c > 0.0));
-    let results = simulate(&bound, &octree, &few, &|_| true);
     let figures = figures(&results, Surface::Facets(&error), "W");
     let bin = named(&figures[0], "500-700 nm");
     assert_eq!((bin.value, bin.geometric), (figures[0].power.value, figures[0].power.geometric));

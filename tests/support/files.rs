@@ -32,3 +32,14 @@ pub(crate) fn step_files(folder: &Path) -> Vec<PathBuf> {
 pub(crate) fn read_model(path: &Path) -> Option<Model> {
     step::read(path, &step::Settings::default()).ok().map(|import| import.model)
 }
+
+/// A context #1 of millimetres and radians, with its units #2 and #3, for the entities of a [`part21`] file.
+pub(crate) const MILLIMETRES: &str = "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+    #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n";
+
+/// The text of a Part 21 file of these entities.
+pub(crate) fn part21(entities: &str) -> String {
+    format!(
+        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n{entities}\nENDSEC;\nEND-ISO-10303-21;\n"
+    )
+}
