@@ -67,6 +67,30 @@ fn the_budget_goes_where_it_is_needed() {
     assert_eq!((made.report.facets, made.report.certified), (facets, facets));
 }
 
+/// A bowl z = (x² + y²) / 8192 of 8 × 8 mm, 10¹¹ mm from the origin along each axis, where neighbouring numbers are 1.5e-5 mm apart. Its
+/// control points are exact there; what is computed between them is not, and no bound may leave that out.
+#[test]
+fn far_from_the_origin_bounds_hold_the_rounding_of_places() {
+    const FAR: f64 = 1e11;
+    let place = |i: usize| (FAR + 4.0 * i as f64, if i == 2 { 0.007_812_5 } else { 0.0 });
+    let points = (0..9).map(|k| {
+        let ((x, up), (y, more)) = (place(k / 3), place(k % 3));
+        Homogeneous::new(x, y, FAR + up + more, 1.0)
+    });
+    let knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+    let bowl = Surface { degree: [2, 2], knots: [knots.clone(), knots], points: points.collect() };
+    // By the angle facets are so small that next to nothing is left of their sag.
+    let settings = Settings { angle_deg: Some(0.01), ..Settings::uniform(1e-3) };
+    let made = tessellate(&model(bowl, false), &settings);
+    assert!(made.report.facets > 1000 && made.report.certified == made.report.facets, "{:?}", made.report);
+    for (f, &sag) in made.mesh.sag.iter().enumerate() {
+        // The difference of near numbers is exact. The bowl is steep by 1/360 at most, so that it is as far as it is high.
+        let corners = made.mesh.corners(f).map(|p| p - Point::splat(FAR));
+        let off = corners.map(|p| (p.z - (p.x * p.x + p.y * p.y) / 8192.0).abs()).into_iter().fold(0.0, f64::max);
+        assert!(sag >= 0.999 * off, "facet {f} is off by {off:e} mm, by its bound {sag:e}");
+    }
+}
+
 /// Mean angle between the flat triangles and the exact normals at their corners, radians.
 fn flat_error(made: &Tessellation) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
