@@ -40,7 +40,7 @@ const SCAN_H_DEG: f64 = 5.0;
 const DARK_SHARE: f64 = 0.01;
 
 /// Standard errors by which an edge must be steeper than another place to be the edge for sure, and within which its own place lies.
-const SIGMAS: f64 = 3.0;
+pub(super) const SIGMAS: f64 = 3.0;
 
 /// Places nearer than this to an edge are part of it, degrees.
 const SAME_EDGE_DEG: f64 = 2.5 * STEP_DEG;

@@ -7,9 +7,11 @@
 //!
 //! Which weight may land is read off the map. Around the opening lies a window so large that light of the heaviest rays of all, as bright
 //! there as the limit lies beside the reading, would have been met in it with the same confidence; what landed in it weighs as `a = V/P`,
-//! the ratio of variance to flux. Of the heaviest, `A`, no more than V/A of the flux can be there, which is added, for between many light
-//! ones they lower that ratio little seen. All this trusts the rays of each weight to be no denser in the opening than on the mean of the
-//! window. Where the window is dark, or larger than the map, `A` itself is taken.
+//! the ratio of variance to flux. Of the heaviest, `A`, no more than V/A of the flux can be there, for between many light ones they lower
+//! that ratio little seen. As few as they are, all of them may be missing from the opening; of many, no more than the spread of their
+//! number: that is added. (Rays of one weight from a net spread less than by chance, so that their ratio looks like that of a mixture.) All
+//! this trusts the rays of each weight to be no denser in the opening than on the mean of the window. Where the window is dark, or larger
+//! than the map, `A` itself is taken.
 
 /// Rays of a run, as far as they decide what few of them prove.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +53,9 @@ pub(super) fn student(sigmas: f64, replicates: u32) -> f64 {
 pub(super) struct LandingRay {
     /// Flux of a ray, lm.
     pub(super) flux: f64,
-    /// Intensity by heavier rays, cd.
+    /// Flux of the heaviest of all, lm.
+    pub(super) heaviest: f64,
+    /// Intensity by those, cd.
     pub(super) hidden: f64,
 }
 
@@ -60,8 +64,10 @@ pub(super) struct LandingRay {
 pub(super) struct Noise {
     /// What the heaviest ray that may land adds to the reading, cd; 0 where the truth lies towards fewer rays, or nothing is known of them.
     pub(super) ray_cd: f64,
-    /// What heavier rays may add, cd, so few that they are not told from the others.
+    /// What heavier rays may add on the mean, cd, so few that they are not told from the others.
     pub(super) hidden: f64,
+    /// What one of these adds, cd.
+    pub(super) hidden_ray_cd: f64,
     /// Variance of what more rays would bring nearer to the limit, cd².
     pub(super) counted: f64,
     /// Variance of the rest, cd².
@@ -81,9 +87,17 @@ impl Noise {
             let ray = self.ray_cd / growth;
             let count = (counted / ray).powi(2);
             // The spread's own doubt comes on top of that of the count.
-            reach = ray * (upper_count(count, sigmas) - count) + self.hidden / growth + (t - sigmas) * counted;
+            reach =
+                ray * (upper_count(count, sigmas) - count) + self.missing(sigmas, growth) + (t - sigmas) * counted;
         }
         reach.hypot(t * other)
+    }
+
+    /// Returns how much of the light of hidden rays, cd, may be missing from the reading: of few all, of many the spread of their number.
+    /// With more rays each is lighter, and their light stays.
+    fn missing(&self, sigmas: f64, growth: f64) -> f64 {
+        let spread = (self.hidden * self.hidden_ray_cd / growth).sqrt();
+        self.hidden.min(sigmas * spread)
     }
 }
 
@@ -128,7 +142,7 @@ impl LandedRays {
     /// Returns the heaviest rays that may land in a cell beside a reading that is `margin` cd from its limit.
     pub(super) fn landing_ray(&self, cell: usize, margin: f64, sigmas: f64) -> LandingRay {
         let heaviest = self.sample.heaviest_flux;
-        let unknown = LandingRay { flux: heaviest, hidden: 0.0 };
+        let unknown = LandingRay { flux: heaviest, heaviest, hidden: 0.0 };
         // Light of the heaviest rays, as bright as the margin, brings so many to the window that none is met as seldom as asked for.
         let wanted = upper_count(0.0, sigmas) * heaviest / margin.abs();
         let (row, column) = (cell / self.columns, cell % self.columns);
@@ -146,6 +160,7 @@ impl LandedRays {
                 let landed = (variance / flux).min(heaviest);
                 return LandingRay {
                     flux: landed,
+                    heaviest,
                     hidden: variance / (heaviest * angle) * (1.0 - landed / heaviest),
                 };
             }
@@ -178,6 +193,26 @@ mod tests {
         }
         assert!(student(3.0, 2) > 235.0 && student(3.0, 2).is_finite());
         assert_eq!(student(3.0, 128), 3.0);
+    }
+
+    /// Nets of 10⁴ and 10⁶ rays of one weight that bring 1000 cd, with a fifth of the variance of chance: what may be missing falls with the
+    /// root of the rays, and a lone heavy ray may be missing altogether.
+    #[test]
+    fn light_that_might_be_missing_falls_with_more_rays() {
+        let reach = |rays: f64, growth: f64| {
+            let ray = 1000.0 / rays;
+            let (landed, hidden) = (0.2 * ray, 0.2 * 0.8 * 1000.0);
+            let counted = 0.2 * ray * 1000.0;
+            Noise { ray_cd: landed, hidden, hidden_ray_cd: ray, counted, other: 0.0, replicates: 128 }
+                .reach(3.0, growth)
+        };
+        // By chance alone the error would be 10 cd and 1 cd.
+        assert!(reach(1e4, 1.0) < 3.0 * 2.0 * 10.0 && reach(1e6, 1.0) < 3.0 * 2.0, "{}", reach(1e6, 1.0));
+        // What a hundred times the rays promise is what they give.
+        assert!((reach(1e4, 100.0) / reach(1e6, 1.0) - 1.0).abs() < 1e-9);
+        let few =
+            Noise { ray_cd: 1e-3, hidden: 2.0, hidden_ray_cd: 5.0, counted: 0.0, other: 0.0, replicates: 128 };
+        assert!((few.reach(3.0, 1.0) - 2.0).abs() < 0.01);
     }
 
     /// A field of rays of 1 lm in each of 100 cells, and one of 50 lm in the corner.

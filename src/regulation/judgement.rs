@@ -205,12 +205,14 @@ fn read_margin(photometer: &Photometer, comparison: &Comparison) -> (Reading, f6
 mod tests {
     use super::*;
 
+    const NONE: Noise =
+        Noise { ray_cd: 0.0, hidden: 0.0, hidden_ray_cd: 0.0, counted: 0.0, other: 0.0, replicates: 128 };
+
     #[test]
     fn nothing_settles_a_reading_on_its_very_limit() {
         let on_limit = |statistical: f64, geometric: f64| {
             let reading = Reading { value: 1.0, statistical, geometric };
-            let noise =
-                Noise { ray_cd: 0.0, hidden: 0.0, counted: 0.0, other: statistical * statistical, replicates: 128 };
+            let noise = Noise { other: statistical * statistical, ..NONE };
             Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0, noise }
                 .what_settles(1000, Some(0.1))
         };
@@ -229,7 +231,7 @@ mod tests {
                 .what_settles(1000, None)
                 .map(|settles| settles.rays as f64 / 1000.0)
         };
-        let spread = Noise { ray_cd: 0.0, hidden: 0.0, counted: 4.0, other: 0.0, replicates: 128 };
+        let spread = Noise { counted: 4.0, ..NONE };
         assert!((rays(spread).unwrap() / 36.0 - 1.0).abs() < 2e-3);
         let dark = Noise { ray_cd: 4.0, counted: 0.0, ..spread };
         assert!((rays(dark).unwrap() / 27.0 - 1.0).abs() < 0.01, "{:?}", rays(dark));

@@ -221,7 +221,8 @@ impl IntensityMap {
     pub(super) fn noise(&self, measurement: &Measurement, sign: f64, margin: f64, sigmas: f64) -> Noise {
         let replicates = self.landed.as_ref().map_or(u32::MAX, |landed| landed.sample.replicates);
         let mut light = 0.0;
-        let mut noise = Noise { ray_cd: 0.0, hidden: 0.0, counted: 0.0, other: 0.0, replicates };
+        let mut noise =
+            Noise { ray_cd: 0.0, hidden: 0.0, hidden_ray_cd: 0.0, counted: 0.0, other: 0.0, replicates };
         for (&cell, &weight) in &measurement.weights {
             let [value, error, _] = self.cells[cell];
             let variance = (weight * self.spread(value, error)).powi(2);
@@ -230,7 +231,9 @@ impl IntensityMap {
                 Some(landed) if sign * weight > 0.0 => {
                     let ray = landed.landing_ray(cell, margin, sigmas);
                     noise.counted += variance;
-                    noise.ray_cd = noise.ray_cd.max(weight.abs() * ray.flux / self.solid_angle(cell));
+                    let candela = |flux: f64| weight.abs() * flux / self.solid_angle(cell);
+                    noise.ray_cd = noise.ray_cd.max(candela(ray.flux));
+                    noise.hidden_ray_cd = noise.hidden_ray_cd.max(candela(ray.heaviest));
                     noise.hidden += weight.abs() * ray.hidden;
                 }
                 _ => noise.other += variance,
