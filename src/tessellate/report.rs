@@ -163,7 +163,7 @@ impl std::fmt::Display for FailureCause {
             Self::NothingToMesh => f.write_str("nothing can be made of its border and its surface"),
             Self::TooManyFacets(count) => write!(
                 f,
-                "it needs more than {count:.0e} facets, beyond what a model may have: ask for a larger tolerance, or check the file's unit"
+                "it needs more than {count:.0e} facets, with which the model would have more than it may: ask for a larger tolerance, or check the file's unit"
             ),
             Self::TooManySteps => f.write_str("its surface is too wild to be proved: ask for a larger tolerance"),
         }
