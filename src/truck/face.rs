@@ -202,13 +202,3 @@ fn move_end(u: &mut EdgeUse, start: bool, to: Uv) {
     let p = &mut u.uv.points[if start != u.reversed { 0 } else { last }];
     *p = ControlPoint::weighted(to, p.weight());
 }
-
-/// Returns sixteen points along a use in the loop's direction, its end left out.
-pub(super) fn points_of_use(u: &EdgeUse) -> impl Iterator<Item = Uv> + '_ {
-    const STEPS: usize = 16;
-    let [t0, t1] = u.uv.domain();
-    (0..STEPS).map(move |k| {
-        let s = k as f64 / STEPS as f64;
-        u.uv.evaluate(t0 + (t1 - t0) * if u.reversed { 1.0 - s } else { s })
-    })
-}

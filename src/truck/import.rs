@@ -1,6 +1,6 @@
 //! Truck solids and shells → [`Model`].
 
-use super::face::{WireEdge, convert_face, points_of_use};
+use super::face::{WireEdge, convert_face};
 use super::geometry::{curve, point};
 use super::modeling;
 use crate::math::polygon::is_inside_polygons;
@@ -185,8 +185,8 @@ fn points_outward(shell: &Shell) -> Option<bool> {
 /// Returns the points inside a face, on a grid, with its normals; places without a normal are left out.
 fn face_samples(face: &Face) -> Vec<(Vector, Vector)> {
     const GRID: usize = 12;
-    let outline: Vec<Vec<Uv>> =
-        face.loops.iter().map(|l| l.uses.iter().flat_map(points_of_use).collect()).collect();
+    const PIECES_OF_SPAN: usize = 16;
+    let outline: Vec<Vec<Uv>> = face.loops.iter().map(|l| l.polygon(|_, _| PIECES_OF_SPAN)).collect();
     let [[u0, u1], [v0, v1]] = face.surface.domain();
     let sign = if face.reversed { -1.0 } else { 1.0 };
     let at = |i: usize, a: f64, b: f64| a + (b - a) * (i as f64 + 0.5) / GRID as f64;
