@@ -12,6 +12,7 @@ pub(crate) mod quadrature;
 mod ray;
 mod roots;
 pub(crate) mod simd;
+mod spread;
 pub mod units;
 
 pub use aabb::Aabb;
@@ -20,6 +21,7 @@ pub use frame::Frame;
 pub(crate) use maximum::error_of_maximum;
 pub use ray::{Departure, Ray, Triangle};
 pub use roots::{quadratic_roots, safe_newton};
+pub(crate) use spread::{error_of_sum, variance_from_residuals, variance_of_sum};
 
 /// A position, mm.
 pub type Point = glam::DVec3;

@@ -8,6 +8,7 @@
 //! replicates, which is honest for random numbers, nets and split rays alike (batch means; with 128 replicates the
 //! error of the error is 6 %).
 
+use crate::math::{variance_from_residuals, variance_of_sum};
 use serde::{Deserialize, Serialize};
 
 /// Quanta of an average ray when it leaves its source: 9.1e-13 of a ray is the finest share of power. Fewer, by a power of two, in runs
@@ -75,18 +76,14 @@ impl Sum {
         self.squares = self.squares.saturating_add(o.squares);
     }
 
-    /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates; fewer than two count as two. The
-    /// total itself where the sum of squares is full and tells nothing.
+    /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates. The total itself of a single one,
+    /// and where the sum of squares is full: both tell nothing of the spread.
     pub fn error(&self, replicates: u32) -> f64 {
         if self.squares == u128::MAX {
             return self.total as f64;
         }
-        let k = f64::from(replicates.max(2));
         let squares = self.squares as f64 * f64::from(1u32 << (2 * CUT));
-        let total = self.total as f64;
-        // The spread of replicates about their mean, and from it the error of the sum of all: k/(k − 1) for the
-        // mean that was taken from the same numbers.
-        ((squares - total * total / k).max(0.0) * k / (k - 1.0)).sqrt()
+        variance_of_sum(squares, self.total as f64, replicates as usize).sqrt()
     }
 }
 
@@ -184,16 +181,19 @@ impl MomentSpread {
     }
 
     /// Returns the standard errors of the two means, then of the two mean squares of [`Moments::means`], as ratios of sums over replicates;
-    /// 1, the half side itself, where a sum is full and tells nothing.
+    /// 1, the half side itself, where a sum is full or there is a single replicate: both tell nothing of the spread.
     pub fn errors(&self, power: &Sum, m: &Moments, replicates: u32) -> [f64; 4] {
-        let k = f64::from(replicates.max(2));
         let total = power.total.max(1) as f64;
         let unit = [f64::from(1u32 << CUT), 2f64.powi(CUT_MOMENT as i32) / GRAIN];
         let squares = power.squares as f64 * unit[0] * unit[0];
         let moments = m.as_list();
         let full = |sum: i128| sum == i128::MAX || sum == i128::MIN;
         std::array::from_fn(|i| {
-            if self.products[i].into_iter().any(full) || power.squares == u128::MAX {
+            // A single replicate's moments are the mean times its power: what is left of them is always 0.
+            if (replicates < 2 && power.total > 0)
+                || self.products[i].into_iter().any(full)
+                || power.squares == u128::MAX
+            {
                 return 1.0;
             }
             let mean = moments[i] as f64 / GRAIN / total;
@@ -201,7 +201,7 @@ impl MomentSpread {
             // First order in the fluctuations of a ratio (the delta method): the moment less the mean times the
             // power.
             let spread = with_self * unit[1] - 2.0 * mean * with_power * unit[0] + mean * mean * squares;
-            (spread.max(0.0) * k / (k - 1.0)).sqrt() / total
+            variance_from_residuals(spread.max(0.0), replicates as usize).sqrt() / total
         })
     }
 }
@@ -246,6 +246,18 @@ mod tests {
             whole.merge(&m);
         }
         assert_eq!(spread.errors(&sum, &whole, 2), [1.0; 4]);
+    }
+
+    /// What a single replicate brought is its mean, whose spread is not known: its power is stated as uncertain as it is large, its place
+    /// as anywhere on the receiver.
+    #[test]
+    fn a_single_replicate_states_no_small_error() {
+        let (mut sum, mut spread, mut whole) = (Sum::default(), MomentSpread::default(), Moments::default());
+        assert_eq!((sum.error(1), spread.errors(&sum, &whole, 1)), (0.0, [0.0; 4]));
+        whole.add(QUANTA, [0.5, 0.25], 0.3125);
+        spread.add_replicate(QUANTA as u128, &whole);
+        sum.add_replicate(QUANTA as u128);
+        assert_eq!((sum.error(1), spread.errors(&sum, &whole, 1)), (QUANTA, [1.0; 4]));
     }
 
     /// Two replicates of equal power, at 0.5 and at 0.25: mean 0.375 ± 0.125, mean square 0.15625 ± 0.09375.

@@ -9,6 +9,7 @@ use super::geometric_error::trace_replicates;
 use super::mesh_source::{FacetTree, MeshSource, with_intersectors};
 use super::timing::Countdown;
 use crate::intersect::{Intersector, NormalMode};
+use crate::math::error_of_sum;
 use crate::simulate::{BoundScene, ReceiverResult, RunSettings, simulate};
 use serde::Serialize;
 use std::time::Instant;
@@ -85,16 +86,12 @@ pub fn compare_power(
                 // Counts are exact integers: their differences are too.
                 .map(|(a, b)| a[k].power as f64 - b[k].power as f64);
             let differences: Vec<f64> = differences.map(|d| d * truth.quantum).collect();
-            let n = differences.len().max(2) as f64;
-            let mean = differences.iter().sum::<f64>() / n;
-            let spread: f64 = differences.iter().map(|d| (d - mean).powi(2)).sum();
             PowerComparison {
                 name: f.name.clone(),
                 power_facets: f.power,
                 power_exact: e.power,
                 difference: differences.iter().sum(),
-                // The variance of a sum of n parts is n times that of one.
-                difference_error: (spread * n / (n - 1.0)).sqrt(),
+                difference_error: error_of_sum(&differences),
                 power_error: e.power_error,
             }
         })

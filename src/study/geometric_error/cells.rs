@@ -3,8 +3,9 @@
 //! The square of a measured difference exceeds that of the true one by its variance, so sums of `d² − s²` over many cells tell a
 //! geometric error that no single cell could.
 
-use super::paired::{Paired, standard_error};
+use super::paired::Paired;
 use super::replicates::{ReplicateSums, ReplicatedRun};
+use crate::math::{error_of_sum, variance_of_sum};
 use crate::simulate::BoundScene;
 use serde::Serialize;
 
@@ -140,22 +141,23 @@ impl<'r> CellPairs<'r> {
     }
 
     /// Returns the square of `side` cells that is brightest by `quanta`, of those side by side from the first corner, and its density; of
-    /// single cells those around a pole are one, as in the figure that is printed.
+    /// single cells those around a pole are one, as in the figure that is printed. Squares wholly off a disc are left out.
     fn brightest(&self, side: usize, quanta: impl Fn(&Cell) -> f64) -> (Block, f64) {
         let corners =
             (0..self.grid[1]).step_by(side).flat_map(|y| (0..self.grid[0]).step_by(side).map(move |x| (x, y)));
         let poles = if side == 1 { self.pole_rows.as_slice() } else { &[] };
         let squares = corners.filter(|(_, y)| !poles.contains(y)).map(|(x, y)| Block::square(x, y, side));
         let rings = poles.iter().map(|&y| Block { x: 0, y, size: [self.grid[0], 1] });
-        let blocks = squares.chain(rings).map(|block| (block, self.density(block, &quanta)));
+        let on_receiver =
+            squares.chain(rings).map(|b| (b, self.measure_of(b))).filter(|(_, measure)| *measure > 0.0);
+        let brought = |block: Block| self.cells_of(block).map(|c| quanta(&self.cells[c])).sum::<f64>();
+        let blocks = on_receiver.map(|(block, measure)| (block, brought(block) / measure));
         blocks.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Block::square(0, 0, side), 0.0))
     }
 
-    /// Returns the quanta of a square over its measure, in the receiver's unit; 0 for an empty one.
-    fn density(&self, block: Block, quanta: impl Fn(&Cell) -> f64) -> f64 {
-        let sum = |of: &dyn Fn(usize) -> f64| self.cells_of(block).map(of).sum::<f64>();
-        let measure = sum(&|c| self.measure[c]);
-        if measure > 0.0 { sum(&|c| quanta(&self.cells[c])) / measure } else { 0.0 }
+    /// Returns what the quanta of a block are divided by for its density in the receiver's unit; 0 where all of it is off a disc.
+    fn measure_of(&self, block: Block) -> f64 {
+        self.cells_of(block).map(|c| self.measure[c]).sum()
     }
 
     /// Finds the brightest place of each run, over the smallest squares of cells that hold [`PEAK_RAYS`] on the spline, and compares them
@@ -171,8 +173,7 @@ impl<'r> CellPairs<'r> {
         }
         // Facets may have their brightest place elsewhere: places are compared by how bright they are.
         let (on_facets, facets) = self.brightest(side, |c| c.facets);
-        let inverse = |block: Block| self.cells_of(block).map(|c| self.measure[c]).sum::<f64>();
-        let measures = [inverse(on_facets), inverse(block)];
+        let measures = [on_facets, block].map(|block| self.measure_of(block));
         let by_replicate = |run: usize, block: Block| {
             let (nx, layer) = (self.grid[0], self.layer);
             let within = move |c: usize| block.contains(c % nx, c / nx);
@@ -181,7 +182,8 @@ impl<'r> CellPairs<'r> {
             };
             self.replicates[run].iter().map(move |s| sum(s) / measures[run])
         };
-        let noise = standard_error(by_replicate(0, on_facets).zip(by_replicate(1, block)).map(|(a, b)| a - b));
+        let differences = by_replicate(0, on_facets).zip(by_replicate(1, block)).map(|(a, b)| a - b);
+        let noise = error_of_sum(&differences.collect::<Vec<_>>());
         // Facets may blur what is finer than the square: counted where it is beyond what noise makes of it.
         let unit = |c: usize| self.unit[c];
         let count = self.cells_of(block).count().max(1) as f64;
@@ -252,12 +254,9 @@ pub(super) fn paired_cells(count: usize, replicates: &[[&[(u32, u64)]; 2]]) -> V
     for [facets, spline] in replicates {
         add_replicate(&mut cells, facets, spline);
     }
-    // At least two, for a variance divides by one less.
-    let n = replicates.len().max(2) as f64;
     for c in &mut cells {
-        let variance = |squares: f64, sum: f64| (squares - sum * sum / n).max(0.0) * n / (n - 1.0);
-        c.difference_variance = variance(c.difference_variance, c.difference());
-        c.spline_variance = variance(c.spline_variance, c.spline);
+        c.difference_variance = variance_of_sum(c.difference_variance, c.difference(), replicates.len());
+        c.spline_variance = variance_of_sum(c.spline_variance, c.spline, replicates.len());
     }
     cells
 }
@@ -279,5 +278,37 @@ fn add_replicate(cells: &mut [Cell], facets: &[(u32, u64)], spline: &[(u32, u64)
         sum.spline += s;
         sum.difference_variance += (f - s) * (f - s);
         sum.spline_variance += s * s;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disc of 4 × 4 cells whose corners lie off it: 300 rays in one cell of the spline, none on facets.
+    #[test]
+    fn a_disc_that_is_dark_on_facets_lacks_all_its_light() {
+        let quanta = 300 * (1u64 << 40);
+        let sums = |cells: Vec<(u32, u64)>| ReplicateSums { layers: vec![cells], ..ReplicateSums::default() };
+        let dark = vec![sums(Vec::new()); 2];
+        let lit = vec![sums(vec![(5, quanta / 2)]), sums(vec![(5, quanta / 2)])];
+        let lists = |sums: &[ReplicateSums]| sums.iter().map(|s| s.layers[0].clone()).collect::<Vec<_>>();
+        let (facets, spline) = (lists(&dark), lists(&lit));
+        let pairs: Vec<_> = facets.iter().zip(&spline).map(|(a, b)| [a.as_slice(), b.as_slice()]).collect();
+        let measure: Vec<f64> = (0..16).map(|c| if [0, 3, 12, 15].contains(&c) { 0.0 } else { 1.0 }).collect();
+        let pairs = CellPairs {
+            grid: [4; 2],
+            pole_rows: Vec::new(),
+            cells: paired_cells(16, &pairs),
+            power: None,
+            ray: (1u64 << 40) as f64,
+            unit: measure.clone(),
+            measure,
+            replicates: [dark.iter().collect(), lit.iter().collect()],
+            layer: 0,
+        };
+        let density = pairs.peak().density;
+        assert_eq!((density.facets, density.spline, density.error), (0.0, quanta as f64, 0.0));
+        assert!(density.is_significant());
     }
 }

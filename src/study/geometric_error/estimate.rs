@@ -2,8 +2,9 @@
 //!
 //! Ratios of sums are taken to first order: the standard error of a mean position is that of what each replicate adds to it.
 
-use super::paired::{Paired, standard_error};
+use super::paired::Paired;
 use super::replicates::{ReplicateSums, ReplicatedRun};
+use crate::math::error_of_sum;
 
 /// A figure of one run, and what each replicate adds to it to first order.
 struct Influence {
@@ -54,31 +55,36 @@ impl Means {
     }
 }
 
-/// Returns both values with the error of their difference, from replicates of the same rays, all times `scale`.
+/// Returns both values with the error of their difference, from replicates of the same rays, all times `scale`; the error of a single
+/// replicate is `scale` itself, as its own mean tells nothing of its spread.
 fn paired_figure(facets: &Influence, spline: &Influence, scale: f64) -> Paired {
     let difference = facets.by_replicate.iter().zip(&spline.by_replicate).map(|(a, b)| a - b);
-    Paired { facets: scale * facets.value, spline: scale * spline.value, error: scale * standard_error(difference) }
+    let difference: Vec<f64> = difference.collect();
+    let error = if difference.len() == 1 { 1.0 } else { error_of_sum(&difference) };
+    Paired { facets: scale * facets.value, spline: scale * spline.value, error: scale * error }
 }
 
 /// Compares the power of a receiver in both runs, facets first.
 pub(super) fn power(runs: [&ReplicatedRun; 2], receiver: usize) -> Paired {
-    let [facets, spline] = runs.map(|run| &run.results.receivers[receiver]);
-    let quanta =
-        |run: &ReplicatedRun| -> Vec<f64> { replicate_sums(run, receiver).map(|s| s.power as f64).collect() };
-    let [a, b] = runs.map(quanta);
-    let error = standard_error(a.iter().zip(&b).map(|(a, b)| a - b)) * runs[1].results.quantum;
-    Paired { facets: facets.power, spline: spline.power, error }
+    let [facets, spline] = runs.map(|run| run.results.receivers[receiver].power);
+    Paired {
+        facets,
+        spline,
+        error: error_of_difference(runs, receiver, |sums| sums.power) * runs[1].results.quantum,
+    }
 }
 
 /// Compares the total of a further channel of a receiver; `worth` is what a quantum of it counts.
 pub(super) fn channel(runs: [&ReplicatedRun; 2], receiver: usize, channel: usize, worth: f64) -> Paired {
     let [facets, spline] = runs.map(|run| run.results.receivers[receiver].channels[channel].total);
-    let quanta = |run: &ReplicatedRun| -> Vec<f64> {
-        replicate_sums(run, receiver).map(|s| s.channels[channel] as f64).collect()
-    };
-    let [a, b] = runs.map(quanta);
-    let error = standard_error(a.iter().zip(&b).map(|(a, b)| a - b)) * runs[1].results.quantum * worth;
-    Paired { facets, spline, error }
+    let error = error_of_difference(runs, receiver, |sums| sums.channels[channel]);
+    Paired { facets, spline, error: error * runs[1].results.quantum * worth }
+}
+
+/// Returns the standard error, in quanta, of the difference of a sum between both runs, from replicate to replicate.
+fn error_of_difference(runs: [&ReplicatedRun; 2], receiver: usize, quanta: impl Fn(&ReplicateSums) -> u128) -> f64 {
+    let [facets, spline] = runs.map(|run| replicate_sums(run, receiver).map(|sums| quanta(sums) as f64));
+    error_of_sum(&facets.zip(spline).map(|(a, b)| a - b).collect::<Vec<_>>())
 }
 
 /// Compares mean position, root mean square about the receiver's centre, and about the mean position, along an axis, in mm or degrees.

@@ -2,6 +2,7 @@
 
 use super::paired::Paired;
 use super::replicates::ReplicatedRun;
+use crate::math::variance_of_sum;
 use rustc_hash::FxHashMap;
 
 /// Quanta that a replicate left in a face, took into its body through it, and out.
@@ -59,22 +60,15 @@ impl PairedSums {
 
     /// Both values, and the standard error of their difference over so many replicates.
     fn paired(&self, replicates: usize, quantum: f64) -> Paired {
-        let error = standard_error(self.squares, self.totals[0] - self.totals[1], replicates) * quantum;
+        let error = variance_of_sum(self.squares, self.totals[0] - self.totals[1], replicates).sqrt() * quantum;
         let [facets, spline] = self.totals.map(|total| total * quantum);
         Paired { facets, spline, error }
     }
 
     /// The standard error of the spline's value.
     fn statistical(&self, replicates: usize, quantum: f64) -> f64 {
-        standard_error(self.spline_squares, self.totals[1], replicates) * quantum
+        variance_of_sum(self.spline_squares, self.totals[1], replicates).sqrt() * quantum
     }
-}
-
-/// Returns the standard error of a sum over so many replicates, those among them that did not reach the face, from the sum of their
-/// squares.
-fn standard_error(squares: f64, sum: f64, replicates: usize) -> f64 {
-    let n = replicates.max(2) as f64;
-    ((squares - sum * sum / n).max(0.0) * n / (n - 1.0)).sqrt()
 }
 
 /// Compares the power at each face that rays of either run met, the first on facets, by rising face.
@@ -104,19 +98,19 @@ pub(super) fn face_errors(runs: [&ReplicatedRun; 2]) -> Vec<FaceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::geometric_error::paired;
+    use crate::math::error_of_sum;
 
     /// The error from sums is that of the replicates' differences.
     #[test]
     fn the_error_of_a_difference_is_that_of_its_replicates() {
-        let brought = [[5, 3], [0, 4], [7, 7], [0, 0], [12, 1]];
+        let brought: [[u32; 2]; 5] = [[5, 3], [0, 4], [7, 7], [0, 0], [12, 1]];
         let mut sums = PairedSums::default();
-        brought.iter().for_each(|[a, b]| sums.add(*a, *b));
+        brought.iter().for_each(|[a, b]| sums.add((*a).into(), (*b).into()));
         let found = sums.paired(brought.len(), 0.5);
-        let expected = 0.5 * paired::standard_error(brought.iter().map(|[a, b]| *a as f64 - *b as f64));
+        let expected = 0.5 * error_of_sum(&brought.map(|[a, b]| f64::from(a) - f64::from(b)));
         assert_eq!((found.facets, found.spline), (12.0, 7.5));
         assert!((found.error / expected - 1.0).abs() < 1e-12, "{} {expected}", found.error);
-        let on_spline = 0.5 * paired::standard_error(brought.iter().map(|[_, b]| *b as f64));
+        let on_spline = 0.5 * error_of_sum(&brought.map(|[_, b]| f64::from(b)));
         assert!((sums.statistical(brought.len(), 0.5) / on_spline - 1.0).abs() < 1e-12);
     }
 }

@@ -14,7 +14,8 @@ pub struct Paired {
 }
 
 impl Paired {
-    /// Returns what the facets change, with how well that is known: one standard error of the figure on facets.
+    /// Returns the geometric error of the figure on facets: its difference from the spline and the standard error of that, added in
+    /// quadrature.
     pub fn geometric(&self) -> f64 {
         // An error that cannot be told from none is still no smaller than its own uncertainty.
         (self.facets - self.spline).hypot(self.error)
@@ -31,12 +32,4 @@ impl Serialize for Paired {
     fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
         [self.facets, self.spline, self.error].serialize(s)
     }
-}
-
-/// Returns the standard error of a sum over replicates, from what each adds to it; 0 for fewer than two equal parts.
-pub(super) fn standard_error(parts: impl Iterator<Item = f64>) -> f64 {
-    let parts: Vec<f64> = parts.collect();
-    let n = parts.len().max(2) as f64;
-    let mean = parts.iter().sum::<f64>() / n;
-    (parts.iter().map(|d| (d - mean).powi(2)).sum::<f64>() * n / (n - 1.0)).sqrt()
 }

@@ -1,0 +1,45 @@
+//! The standard error of a sum of independent parts, from how much the parts differ.
+//!
+//! Convention: a single part counts as two of which the other is 0, so that the sum's error is the sum itself. Its spread is not known,
+//! and 100 % is what nobody takes for an accuracy.
+
+/// Returns the variance of a sum of so many independent parts, from the parts' sum and the sum of their squares, which may leave out
+/// parts of 0.
+pub(crate) fn variance_of_sum(squares: f64, sum: f64, parts: usize) -> f64 {
+    let n = parts.max(2) as f64;
+    variance_from_residuals((squares - sum * sum / n).max(0.0), parts)
+}
+
+/// Returns the variance of a sum of so many independent parts, from the sum of the squares of their distances from the mean: n/(n − 1)
+/// times that, as the mean was taken from the same parts.
+pub(crate) fn variance_from_residuals(residuals: f64, parts: usize) -> f64 {
+    let n = parts.max(2) as f64;
+    residuals * n / (n - 1.0)
+}
+
+/// Returns the standard error of the sum of independent parts; 0 without parts. More exact than [`variance_of_sum`] where the parts
+/// differ by little.
+pub(crate) fn error_of_sum(parts: &[f64]) -> f64 {
+    if let [part] = parts {
+        return part.abs();
+    }
+    let mean = parts.iter().sum::<f64>() / parts.len().max(1) as f64;
+    variance_from_residuals(parts.iter().map(|d| (d - mean).powi(2)).sum::<f64>(), parts.len()).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Parts 10 and 14: their variance is 8, that of the sum 16. A single part is as uncertain as it is large.
+    #[test]
+    fn both_forms_follow_one_convention() {
+        for (parts, expected) in [(vec![10.0, 14.0], 4.0), (vec![7.0], 7.0), (vec![-7.0], 7.0), (vec![3.0; 5], 0.0)]
+        {
+            let squares = parts.iter().map(|p| p * p).sum::<f64>();
+            let from_sums = variance_of_sum(squares, parts.iter().sum(), parts.len()).sqrt();
+            assert_eq!([error_of_sum(&parts), from_sums], [expected; 2], "{parts:?}");
+        }
+        assert_eq!([error_of_sum(&[]), variance_of_sum(0.0, 0.0, 0)], [0.0; 2]);
+    }
+}
