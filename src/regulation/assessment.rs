@@ -3,7 +3,8 @@
 use super::aim::Aim;
 use super::judgement::{Settles, Verdict};
 use super::map::Reading;
-use super::table::{Regulation, Row, Traffic};
+use super::row::Row;
+use super::table::{Regulation, Traffic};
 
 /// A row with what was measured.
 #[derive(Clone, Debug)]

@@ -5,35 +5,21 @@ use super::map::Reading;
 use super::requirement::{Comparison, Photometer, Requirement};
 use crate::math::error_of_maximum;
 
-/// What a row, or a lamp, comes to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a row, or a lamp, comes to, from the best to the worst.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
     /// Met, by more than three combined standard errors; of few rays, by as much as their number may be off at the same confidence.
     Pass,
-    /// Not met, by more than three combined standard errors.
-    Fail,
     /// Nearer to the limit than the errors let one tell, or outside the far field.
     Unsure,
+    /// Not met, by more than three combined standard errors.
+    Fail,
 }
 
 impl Verdict {
-    /// Rises from pass to fail.
-    pub(super) fn severity(self) -> u8 {
-        match self {
-            Self::Pass => 0,
-            Self::Unsure => 1,
-            Self::Fail => 2,
-        }
-    }
-
     /// The verdict of requirements that must all be met: fail if one fails, else unsure if one is; pass without any.
     pub(super) fn all(verdicts: impl IntoIterator<Item = Self>) -> Self {
-        // One failure decides; doubt counts only where nothing fails.
-        verdicts.into_iter().fold(Self::Pass, |sum, v| match (sum, v) {
-            (Self::Fail, _) | (_, Self::Fail) => Self::Fail,
-            (Self::Unsure, _) | (_, Self::Unsure) => Self::Unsure,
-            _ => Self::Pass,
-        })
+        verdicts.into_iter().max().unwrap_or(Self::Pass)
     }
 }
 
@@ -83,8 +69,8 @@ pub(super) struct Decisive {
     noise: Noise,
 }
 
-/// Doublings of the rays by which the search for enough of them is refined: to 0.1 %.
-const HALVINGS: usize = 16;
+/// Bisections of the search for enough rays: 50 doublings over 2¹⁶ leave 0.05 % of them.
+const BISECTIONS: usize = 16;
 
 impl Decisive {
     /// Returns with how many rays in all, never fewer than `traced`, and on facets of which tolerance this margin would be enough.
@@ -109,7 +95,7 @@ impl Decisive {
         // What few rays leave open falls faster than the root of their number: looked for, not worked out. Fewer than traced are no advice.
         let enough = |doublings: f64| self.noise.reach(self.sigmas, doublings.exp2()) <= self.sigmas * room;
         let [mut too_few, mut doublings] = [0.0, if enough(0.0) { 0.0 } else { MOST_DOUBLINGS }];
-        for _ in 0..HALVINGS {
+        for _ in 0..BISECTIONS {
             let middle = 0.5 * (too_few + doublings);
             if enough(middle) {
                 doublings = middle;

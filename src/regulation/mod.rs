@@ -7,11 +7,10 @@
 //! comparisons: what a single lucky one of them could decide is asked for at a confidence that is divided by their number, so that a wrong
 //! pass or fail stays below 0.3 % a row.
 //!
-//! The tables (`tables/*.json`) hold one row a requirement with its source and whether a second source was compared. A verdict repeats
+//! The tables (`tables/*.json`) hold one row per requirement with its source and whether a second source was compared. A verdict repeats
 //! that: it is an engineer's answer about a simulated lamp, not a statement of conformity.
 //!
-//! Layers: `few_rays` ← `map` (intensities with errors, from files by `read`) and `table` (what is asked) ← `aim` ← `requirement` ←
-//! `judgement` ← `assessment` ← `row_verdict` ← `verdict` ← `document`.
+//! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 
 mod aim;
 mod assessment;
@@ -21,6 +20,7 @@ mod judgement;
 mod map;
 mod read;
 mod requirement;
+mod row;
 mod row_verdict;
 mod table;
 mod verdict;
@@ -30,5 +30,6 @@ pub use assessment::{Assessment, Assumptions, RowVerdict};
 pub use few_rays::RaySample;
 pub use judgement::{Settles, Verdict};
 pub use map::{IntensityMap, Reading};
-pub use table::{Function, Regulation, Row, Traffic};
+pub use row::{Row, RowKind};
+pub use table::{Function, Regulation, Traffic};
 pub use verdict::assess;

@@ -2,7 +2,8 @@
 
 use super::aim::Aim;
 use super::map::{IntensityMap, Measurement, Sensor};
-use super::table::{Row, Rules};
+use super::row::{Bound, Row, RowKind};
+use super::table::Rules;
 
 /// One reading compared with one limit.
 #[derive(Clone, Debug)]
@@ -132,21 +133,24 @@ pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, ro
     let point = row.h.zip(row.v).map(|(h, v)| [h, v]);
     let ends = (row.h0.zip(row.v0)).zip(row.h1.zip(row.v1));
     let lenient = rules.tolerance_deg > 0.0;
-    match (row.kind.as_str(), point) {
-        ("point" | "distribution_point", Some(p)) => {
-            limits_at(photometer, row, &photometer.near_directions(p), [lenient; 2])
-        }
-        ("line", _) => {
+    match row.kind {
+        RowKind::Point | RowKind::DistributionPoint => match point {
+            Some(p) => limits_at(photometer, row, &photometer.near_directions(p), [lenient; 2]),
+            None => limits_over(photometer, row, None),
+        },
+        RowKind::Line => {
             let directions =
                 ends.map(|((h0, v0), (h1, v1))| (photometer.line_directions([h0, v0], [h1, v1]), true));
             limits_over(photometer, row, directions)
         }
-        ("zone", _) => limits_over(photometer, row, row.polygon.as_deref().map(|p| photometer.zone_directions(p))),
+        RowKind::Zone => {
+            limits_over(photometer, row, row.polygon.as_deref().map(|p| photometer.zone_directions(p)))
+        }
         // Some direction must reach the least maximum, and none may pass the greatest.
-        ("imax", _) => limits_at(photometer, row, &photometer.all_directions(), [true, false]),
-        ("sum" | "group_sum", _) => sum_requirement(photometer, row).into_iter().collect(),
-        ("relative", _) => relative_requirement(photometer, row, rows).into_iter().collect(),
-        _ => Vec::new(),
+        RowKind::Imax => limits_at(photometer, row, &photometer.all_directions(), [true, false]),
+        RowKind::Sum | RowKind::GroupSum => sum_requirement(photometer, row).into_iter().collect(),
+        RowKind::Relative => relative_requirement(photometer, row, rows).into_iter().collect(),
+        RowKind::Note => Vec::new(),
     }
 }
 
@@ -189,25 +193,22 @@ fn limits_over(photometer: &Photometer, row: &Row, place: Option<(Vec<[f64; 2]>,
 fn sum_requirement(photometer: &Photometer, row: &Row) -> Option<Requirement> {
     let points = row.points.as_deref()?;
     let limit = row.min?;
-    let mut total = Measurement::default();
-    for point in points {
-        match photometer.measure(*point) {
-            Some(measurement) => total = total.plus(1.0, &measurement),
-            // A sum of which a part is unseen is unknown: no part of it may count for the whole.
-            None => {
-                return Some(Requirement { comparisons: Vec::new(), choices: 1, any: false, unseen: points.len() });
-            }
-        }
+    let measured: Vec<Option<Measurement>> = points.iter().map(|point| photometer.measure(*point)).collect();
+    let unseen = measured.iter().filter(|m| m.is_none()).count();
+    // A sum of which a part is unseen is unknown: no part of it may count for the whole.
+    if unseen > 0 {
+        return Some(Requirement { comparisons: Vec::new(), choices: 1, any: false, unseen });
     }
+    let total = measured.iter().flatten().fold(Measurement::default(), |sum, m| sum.plus(1.0, m));
     let comparison = Comparison { measurement: total, limit, at_least: true, direction: points[0] };
     Some(Requirement { comparisons: vec![comparison], choices: 1, any: false, unseen: 0 })
 }
 
 /// The requirement of a reading compared with a multiple of another: the difference is one measurement, so that what both have in common
-/// cancels. `None` where the row names no factor, place or reference that is found.
+/// cancels. `None` where the row names no factor, bound, place or reference that is found.
 fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Option<Requirement> {
     // Without a factor the row is text.
-    let factor = row.factor?;
+    let (factor, bound) = row.factor.zip(row.bound)?;
     let (reference, choices) = match row.of.as_deref()? {
         "imax" => photometer.brightest_direction()?,
         name => (rows.iter().find(|r| r.id == name).and_then(|r| Some([r.h?, r.v?]))?, 1),
@@ -227,7 +228,7 @@ fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Opt
                 // Errors of cells that both readings share would count twice if the two were judged apart.
                 measurement: measurement.plus(-factor, reference),
                 limit: 0.0,
-                at_least: row.bound.as_deref() == Some("min"),
+                at_least: bound == Bound::Min,
                 direction,
             }),
             _ => requirement.unseen += 1,
@@ -272,6 +273,21 @@ mod tests {
         let directions = photometer.line_directions([1.0, 1.5], [90.0, 1.5]);
         assert!(directions.iter().all(|d| photometer.measure(*d).is_some()));
         assert!(directions.last().unwrap()[0] > 87.9);
+    }
+
+    /// A sum of three directions of which one lies beside the far field is not known, for one direction.
+    #[test]
+    fn a_sum_counts_the_directions_that_it_does_not_see() {
+        let edges = |half: f64| (0..=100).map(|k| half * (f64::from(k) / 50.0 - 1.0)).collect::<Vec<f64>>();
+        let map = IntensityMap::new(edges(5.0), edges(5.0), vec![[1.0, 0.0, 0.0]; 10_000]).unwrap();
+        let aim = Aim::unchanged("test");
+        let sensor = Sensor { half_deg: 0.0745, round: false };
+        let photometer = Photometer { map: &map, aim: &aim, sensor, tolerance_deg: 0.0 };
+        let regulation = crate::regulation::Regulation::find("FMVSS 108 stop-1").unwrap();
+        let sum = regulation.function.rows.iter().find(|row| row.kind == RowKind::GroupSum).unwrap();
+        let row = Row { points: Some(vec![[0.0, 0.0], [1.0, 1.0], [20.0, 0.0]]), ..sum.clone() };
+        let requirement = sum_requirement(&photometer, &row).unwrap();
+        assert_eq!((requirement.unseen, requirement.comparisons.len()), (1, 0));
     }
 
     #[test]

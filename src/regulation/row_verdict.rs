@@ -5,7 +5,8 @@ use super::assessment::{Assumptions, RowVerdict};
 use super::judgement::{Judgement, Verdict};
 use super::map::{IntensityMap, Sensor};
 use super::requirement::{Photometer, requirements};
-use super::table::{Regulation, Row};
+use super::row::{Row, RowKind};
+use super::table::Regulation;
 
 /// Judges every row as the map is aimed, points that may lean on their group with that; whether another aim is open is not asked.
 pub(super) fn judge_rows(
@@ -22,8 +23,8 @@ pub(super) fn judge_rows(
     let leaning = regulation.function.point_floor() == Some(0.0);
     if leaning {
         let groups: Vec<(Option<u32>, Option<Verdict>)> =
-            rows.iter().filter(|r| r.row.kind == "group_sum").map(|r| (r.row.group, r.verdict)).collect();
-        let points = rows.iter_mut().filter(|r| r.row.kind == "point" && r.row.group.is_some());
+            rows.iter().filter(|r| r.row.kind == RowKind::GroupSum).map(|r| (r.row.group, r.verdict)).collect();
+        let points = rows.iter_mut().filter(|r| r.row.kind == RowKind::Point && r.row.group.is_some());
         for point in points.filter(|r| r.verdict.is_some_and(|own| own != Verdict::Pass)) {
             let group = groups.iter().find(|g| g.0 == point.row.group).and_then(|g| g.1);
             *point = judge_leaning(&point.row, group, judge);
@@ -46,8 +47,7 @@ fn judge_leaning(point: &Row, group: Option<Verdict>, judge: impl Fn(&Row) -> Ro
     // What passes has nothing left to settle.
     least.settles = least.settles.filter(|_| least.verdict != Some(Verdict::Pass));
     let greatest = judge(&Row { min: None, ..point.clone() });
-    let severity = |judged: &RowVerdict| judged.verdict.map(Verdict::severity);
-    let worst = if severity(&greatest) > severity(&least) { greatest } else { least };
+    let worst = if greatest.verdict > least.verdict { greatest } else { least };
     let mut row = point.clone();
     if is_saved {
         row.add_note("its own minimum is not met beyond doubt, the sum of its group is, which is enough");
@@ -72,7 +72,7 @@ pub(super) fn judge_row(
     // A share of the printed minimum; what is printed stays in the row that is reported.
     let mut asked = row.clone();
     if let Some(floor) = regulation.function.point_floor().filter(|f| *f > 0.0 && row.group.is_some())
-        && row.kind == "point"
+        && row.kind == RowKind::Point
         && let Some(min) = row.min
     {
         asked.min = Some(floor * min);
@@ -82,7 +82,7 @@ pub(super) fn judge_row(
     let requirements = requirements(photometer, &regulation.rules, &asked, &regulation.function.rows);
     let judged: Vec<Judgement> = requirements.iter().map(|r| Judgement::of_requirement(photometer, r)).collect();
     // The requirement that speaks for the row: the worst one.
-    let worst = judged.iter().max_by_key(|j| j.verdict.severity());
+    let worst = judged.iter().max_by_key(|j| j.verdict);
     let Some(worst) = worst else { return verdict };
     verdict.verdict = Some(worst.verdict);
     verdict.unseen = worst.unseen;

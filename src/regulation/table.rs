@@ -1,6 +1,7 @@
 //! The tables of regulations: what is asked, in which direction, and where the figure comes from.
 
-use serde::Deserialize;
+use super::row::{Row, named};
+use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
 /// A file of tables and the name under which its functions are asked for.
@@ -60,7 +61,8 @@ pub struct Function {
     /// What the function is called.
     pub name: String,
     /// How points and groups go together (FMVSS 108).
-    point_rule: Option<String>,
+    #[serde(default, deserialize_with = "point_rule")]
+    point_rule: PointRule,
     /// What is asked.
     pub rows: Vec<Row>,
 }
@@ -69,61 +71,30 @@ impl Function {
     /// The share of its own minimum that each point of a group must reach although the group is judged by its sum, 0 for none; `None` where
     /// each point stands for itself.
     pub(super) fn point_floor(&self) -> Option<f64> {
-        // FMVSS 108 has two ways: each point at least 60 % of its figure, or any share of it when its group's sum
-        // is met.
-        match self.point_rule.as_deref() {
-            Some("floor-60") => Some(0.6),
-            Some("group-alternative") => Some(0.0),
-            _ => None,
+        match self.point_rule {
+            PointRule::Points => None,
+            PointRule::Floor60 => Some(0.6),
+            PointRule::GroupAlternative => Some(0.0),
         }
     }
 }
 
-/// One requirement.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Row {
-    /// What it is: `point`, `line`, `zone`, `sum`, `relative`, `imax`, `distribution_point`, `group_sum` or `note`.
-    pub kind: String,
-    /// Its name in the table.
-    pub id: String,
-    /// Direction, degrees to the right.
-    pub h: Option<f64>,
-    /// Direction, degrees up.
-    pub v: Option<f64>,
-    /// Ends of a line, degrees.
-    pub(super) h0: Option<f64>,
-    pub(super) v0: Option<f64>,
-    pub(super) h1: Option<f64>,
-    pub(super) v1: Option<f64>,
-    /// Corners of a zone, degrees.
-    pub polygon: Option<Vec<[f64; 2]>>,
-    /// Directions of a sum, degrees.
-    pub(super) points: Option<Vec<[f64; 2]>>,
-    /// Least intensity, candela.
-    pub min: Option<f64>,
-    /// Greatest intensity, candela.
-    pub max: Option<f64>,
-    /// Of a relative row: `min` or `max`, the factor, and the row that it is a multiple of, or `imax`.
-    pub(super) bound: Option<String>,
-    pub(super) factor: Option<f64>,
-    pub(super) of: Option<String>,
-    /// Rows of one group are weighed together.
-    pub(super) group: Option<u32>,
-    /// The condition under which the row holds.
-    pub when: Option<String>,
-    /// A remark on the row.
-    pub note: Option<String>,
-    /// Where the figure comes from.
-    pub source: String,
-    /// `two` where a second source was compared, `one` otherwise.
-    pub evidence: String,
+/// How the points of a function and the groups that they are summed in go together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum PointRule {
+    /// Each point stands for itself.
+    #[default]
+    Points,
+    /// Every group's sum is met, and every point reaches 60 % of its own minimum.
+    #[serde(rename = "floor-60")]
+    Floor60,
+    /// Each point's minimum is met, or the sum of its group is.
+    GroupAlternative,
 }
 
-impl Row {
-    /// Adds a remark behind what there is.
-    pub(super) fn add_note(&mut self, remark: &str) {
-        self.note = Some(self.note.take().map_or_else(|| remark.to_owned(), |note| format!("{note}; {remark}")));
-    }
+fn point_rule<'de, D: Deserializer<'de>>(value: D) -> Result<PointRule, D::Error> {
+    named("point_rule", PointRule::deserialize(value))
 }
 
 /// How a file says that its rows are measured.
@@ -132,6 +103,8 @@ pub(super) struct Rules {
     /// Half the opening of the photometer, degrees.
     pub(super) sensor_half_deg: f64,
     pub(super) sensor_round: bool,
+    /// Half the widest opening that coarse cells may be read with, where it is wider than the usual one.
+    pub(super) sensor_widest_half_deg: Option<f64>,
     /// A row is met when it is met within this angle of its direction.
     pub(super) tolerance_deg: f64,
     /// The cut-off is brought to its place before measuring.
@@ -160,16 +133,14 @@ pub(super) struct Realignment {
     pub(super) vertical_deg: f64,
 }
 
-/// Half the smallest opening that R148 allows, 10 minutes of arc, degrees.
-const SIGNAL_SENSOR_DEG: f64 = 10.0 / 60.0 / 2.0;
-
-/// Half the opening where a file names none: that of R112 and R149, 65 mm at 25 m.
-const SENSOR_65MM_DEG: f64 = 0.0745;
-
 impl Regulation {
     /// All functions there are tables of, file by file.
     pub fn all() -> Vec<Self> {
-        FILES.iter().flat_map(|(prefix, text)| read_table(prefix, text)).collect()
+        // The tables are part of the program, and a test reads each of them.
+        let read = |(prefix, text): &(&str, &str)| {
+            read_table(prefix, text).unwrap_or_else(|e| panic!("table of {prefix}: {e}"))
+        };
+        FILES.iter().flat_map(read).collect()
     }
 
     /// Finds a function by its name; upper and lower case, spaces and dashes do not matter, and a name that fits the beginning of others
@@ -218,60 +189,81 @@ struct File {
     aim: Value,
     point_tolerance_deg: Option<f64>,
     driving_tolerance_deg: Option<f64>,
-    functions: Vec<Function>,
+    functions: Vec<Value>,
+}
+
+impl Function {
+    /// Reads a function and checks its rows.
+    ///
+    /// # Errors
+    /// When a word is not known or a row lacks something; the message names function, row and key.
+    fn read(mut value: Value) -> Result<Self, String> {
+        let name = |value: &Value| value["id"].as_str().unwrap_or("without id").to_owned();
+        let id = name(&value);
+        let rows = value["rows"].take();
+        let rows = rows.as_array().ok_or_else(|| format!("function {id}: rows: not a list"))?;
+        let read =
+            |row: &Value| Row::deserialize(row).map_err(|e| format!("function {id}, row {}: {e}", name(row)));
+        let rows = rows.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+        rows.iter().try_for_each(|row| row.check(&rows)).map_err(|e| format!("function {id}, {e}"))?;
+        value["rows"] = Value::Array(Vec::new());
+        let function = Self::deserialize(value).map_err(|e| format!("function {id}: {e}"))?;
+        Ok(Self { rows, ..function })
+    }
 }
 
 /// Returns how far a lamp may be turned, degrees, by a table's `aim`: after the 01 series for the prefix `UN R149-01`, else after R112
 /// and the 00 series of R149.
 ///
-/// # Panics
+/// # Errors
 /// When the table states none.
-fn realignment(prefix: &str, aim: &Value) -> Realignment {
+fn realignment(prefix: &str, aim: &Value) -> Result<Realignment, String> {
     // UN R149 widened the turn to the left with its 01 series; both files state both.
     let series = if prefix == "UN R149-01" { "r149_01" } else { "r112_and_r149_00" };
     Realignment::deserialize(&aim["realign_if_failed"][series])
-        .unwrap_or_else(|e| panic!("table of {prefix}: realign_if_failed, {series}: {e}"))
+        .map_err(|e| format!("aim: realign_if_failed: {series}: {e}"))
 }
 
 /// Reads the regulations of a table of the program, one a lamp function, each called by `prefix` and the function's name.
 ///
-/// # Panics
-/// When the text is no table.
-fn read_table(prefix: &str, text: &str) -> Vec<Regulation> {
-    // The tables are part of the program: a test reads each of them.
-    let file: File = serde_json::from_str(text).unwrap_or_else(|e| panic!("table of {prefix}: {e}"));
+/// # Errors
+/// When the text is no table; the message names function, row and key.
+fn read_table(prefix: &str, text: &str) -> Result<Vec<Regulation>, String> {
+    let file: File = serde_json::from_str(text).map_err(|e| e.to_string())?;
     let number = |v: &Value, path: &str| v.pointer(path).and_then(Value::as_f64);
     file.functions
         .into_iter()
         .map(|function| {
+            let function = Function::read(function)?;
             let driving = function.id.starts_with("driving");
-            let sensor =
-                // Two names for the same figure stand in the tables.
-                number(&file.measurement, "/receiver_half_deg").or(number(&file.measurement, "/sensor_half_deg"));
-            let signal = prefix == "UN R148-01" || file.title.contains("signal lamps");
-            let reaim = number(&file.measurement, "/reaim_deg").or(number(&file.measurement, "/tolerance_deg"));
-            let tolerance = file.point_tolerance_deg.or(file.driving_tolerance_deg.filter(|_| driving)).or(reaim);
+            let sensor = number(&file.measurement, "/sensor_half_deg");
+            let tolerance = (file.point_tolerance_deg.or(file.driving_tolerance_deg.filter(|_| driving)))
+                .or(number(&file.measurement, "/tolerance_deg"));
             let scan = number(&file.aim, "/instrumental_vertical/scan_h_deg");
-            let cut_off = scan.filter(|_| function.id.starts_with("passing")).map(|scan_h_deg| CutOff {
-                scan_h_deg,
-                // What UN R112 and R149 have in common for those files that do not repeat it.
-                line_v_deg: number(&file.aim, "/vertical/line_b_deg").unwrap_or(-0.57),
-                elbow_h_deg: number(&file.aim, "/horizontal_visual/line_a_deg").unwrap_or(0.5),
-                realignment: realignment(prefix, &file.aim),
-            });
+            let cut_off = |scan_h_deg| -> Result<CutOff, String> {
+                let stated = |path: &str| number(&file.aim, path).ok_or_else(|| format!("aim: {path}: no number"));
+                Ok(CutOff {
+                    scan_h_deg,
+                    line_v_deg: stated("/vertical/line_b_deg")?,
+                    elbow_h_deg: stated("/horizontal_visual/line_a_deg")?,
+                    realignment: realignment(prefix, &file.aim)?,
+                })
+            };
+            let cut_off = scan.filter(|_| function.id.starts_with("passing")).map(cut_off).transpose()?;
             let id = match function.id.split_once('-') {
                 // People say `C passing`, the tables `passing-C`.
                 Some((beam @ ("passing" | "driving"), class)) => format!("{prefix} {class} {beam}"),
                 _ => format!("{prefix} {}", function.id),
             };
             let rules = Rules {
-                sensor_half_deg: sensor.unwrap_or(if signal { SIGNAL_SENSOR_DEG } else { SENSOR_65MM_DEG }),
-                sensor_round: prefix == "FMVSS 108",
+                sensor_half_deg: sensor.ok_or("measurement: sensor_half_deg: no number")?,
+                sensor_round: file.measurement["sensor_round"] == true,
+                sensor_widest_half_deg: number(&file.measurement, "/sensor_widest_half_deg"),
                 // Where the text grants no tolerance, a row holds in its very direction.
                 tolerance_deg: tolerance.unwrap_or(0.0),
                 cut_off,
             };
-            Regulation { id, title: file.title.clone(), function, rules }
+            Ok(Regulation { id, title: file.title.clone(), function, rules })
         })
         .collect()
 }
@@ -287,14 +279,52 @@ mod tests {
         assert_eq!(rows, 1868);
         for row in all.iter().flat_map(|r| &r.function.rows) {
             assert!(!row.source.is_empty() && ["one", "two"].contains(&row.evidence.as_str()), "{}", row.id);
-            let asks = row.min.is_some() || row.max.is_some() || row.factor.is_some() || row.kind == "note";
-            assert!(asks, "{} asks nothing", row.id);
         }
         let mut ids: Vec<&str> = all.iter().map(|r| r.id.as_str()).collect();
         ids.sort_unstable();
         let count = ids.len();
         ids.dedup();
         assert_eq!(ids.len(), count, "a name stands twice");
+    }
+
+    /// A mistyped word or a forgotten key would take a requirement away or turn it round.
+    #[test]
+    fn a_table_with_an_unknown_word_or_without_a_key_is_refused() {
+        let read = |row: &str, rule: &str| {
+            let rest = r#""id": "A", "source": "s", "evidence": "one""#;
+            let function = format!(r#"{{"id": "stop", "name": "Stop", {rule} "rows": [{{{row}, {rest}}}]}}"#);
+            let measurement = r#""measurement": {"sensor_half_deg": 0.1}"#;
+            read_table("TEST", &format!(r#"{{"title": "T", {measurement}, "functions": [{function}]}}"#))
+        };
+        let point = r#""kind": "point", "h": 0, "v": 0, "min": 1"#;
+        assert!(read(point, "").is_ok() && read(point, r#""point_rule": "floor-60","#).is_ok());
+        let relative = r#""kind": "relative", "h": 0, "v": 0, "factor": 0.5, "of""#;
+        for (row, rule, words) in [
+            (
+                point,
+                r#""point_rule": "floor60","#,
+                ["function stop: point_rule: unknown variant `floor60`", "`floor-60`"],
+            ),
+            (
+                r#""kind": "ponit""#,
+                "",
+                ["function stop, row A: kind: unknown variant `ponit`", "`distribution_point`"],
+            ),
+            (
+                &format!(r#"{relative}: "imax", "bound": "mim""#),
+                "",
+                ["row A: bound: unknown variant `mim`", "`min`"],
+            ),
+            (&format!(r#"{relative}: "B", "bound": "min""#), "", ["row A: Relative needs", "id of a point"]),
+            (r#""kind": "point", "h": 0, "min": 1"#, "", ["row A: Point needs h, v", "min or max"]),
+            (r#""kind": "line", "h0": 0, "v0": 0, "h1": 0, "max": 1"#, "", ["row A: Line needs", "v1"]),
+            (r#""kind": "zone", "max": 1"#, "", ["row A: Zone needs", "polygon"]),
+            (r#""kind": "sum", "points": [[0, 0]], "max": 1"#, "", ["row A: Sum needs", "no max"]),
+            (r#""kind": "note", "max": 1"#, "", ["row A: Note needs", "nothing"]),
+        ] {
+            let refusal = read(row, rule).unwrap_err();
+            assert!(words.iter().all(|w| refusal.contains(w)), "{refusal}");
+        }
     }
 
     #[test]
@@ -323,5 +353,10 @@ mod tests {
         assert_eq!(rules("UN R149-01 B driving").tolerance_deg, 0.25);
         let federal = rules("FMVSS 108 UB2");
         assert_eq!((federal.sensor_round, federal.tolerance_deg), (true, 0.25));
+        // Signal lamps: from 10' to 1° after UN R148, 10' where FMVSS 108 names none.
+        let [signal, stop] = ["UN R148-01 stop-S1", "FMVSS 108 stop-1"].map(rules);
+        assert_eq!([signal.sensor_half_deg, stop.sensor_half_deg], [10.0 / 60.0 / 2.0; 2]);
+        assert_eq!([signal.sensor_widest_half_deg, stop.sensor_widest_half_deg], [Some(0.5), None]);
+        assert_eq!([signal.sensor_round, stop.sensor_round], [false, true]);
     }
 }

@@ -5,17 +5,15 @@ use super::assessment::{Assessment, Assumptions};
 use super::judgement::Verdict;
 use super::map::{IntensityMap, Sensor};
 use super::requirement::Photometer;
+use super::row::{Row, RowKind};
 use super::row_verdict::{judge_row, judge_rows};
-use super::table::{Realignment, Regulation, Row, Traffic};
+use super::table::{Realignment, Regulation, Traffic};
 
 /// Step in which turns of a lamp are tried, degrees.
 const REALIGN_STEP_DEG: f64 = 0.125;
 
 /// The rounding of edges that were written and read again, as a share of a cell.
 const ROUNDED_EDGES: f64 = 1e-9;
-
-/// Half the widest opening that UN R148 allows, degrees.
-const WIDEST_SIGNAL_SENSOR_DEG: f64 = 0.5;
 
 /// Measures a far field by a regulation: aims it, judges every row, and where one fails looks for a realignment that the regulation allows
 /// and with which none does.
@@ -33,8 +31,8 @@ pub fn assess(
     let map = mirrored.as_ref().unwrap_or(map);
     let mut half = rules.sensor_half_deg;
     // As wide as the cells need and the text allows.
-    if regulation.id.starts_with("UN R148") {
-        half = half.max(0.5 * map.coarsest_deg()).min(WIDEST_SIGNAL_SENSOR_DEG);
+    if let Some(widest) = rules.sensor_widest_half_deg {
+        half = half.max(0.5 * map.coarsest_deg()).min(widest);
     }
     // A photometer finer than the cells would read a precision that is not there.
     if map.coarsest_deg() > 2.0 * half * (1.0 + ROUNDED_EDGES) {
@@ -136,7 +134,7 @@ fn assess_aimed(
     }
     // A group of points counts through its points.
     let leaning = regulation.function.point_floor() == Some(0.0);
-    let counted = rows.iter().filter(|r| !(leaning && r.row.kind == "group_sum"));
+    let counted = rows.iter().filter(|r| !(leaning && r.row.kind == RowKind::GroupSum));
     let verdict = Verdict::all(counted.filter_map(|r| r.verdict));
     Assessment {
         regulation: regulation.clone(),
@@ -200,6 +198,26 @@ mod tests {
         assert!(flat.aim.how.contains("no cut-off"), "{}", flat.aim.how);
     }
 
+    /// UN R112: G = lg E(b) − lg E(b + 0.1°) is largest where the cut-off is, on the scan at 2.5° left, whose place goes to 0.57° down; so
+    /// 0.2° down from right to left for the elbow, which goes to 0.5° right. Light below 1 % of the scan's brightest is darkness.
+    #[test]
+    fn the_aim_is_where_the_beam_itself_is_steepest() {
+        let beam = passing(0.3, -0.2);
+        let steepest = |light: &dyn Fn(f64) -> f64, range: f64, sign: f64| {
+            let places = || (0..20_000).map(|k| range * (f64::from(k) / 10_000.0 - 1.0));
+            let dark = 0.01 * places().map(light).fold(0.0, f64::max);
+            let fall = |a: f64| ((light(a - sign * 0.05) + dark) / (light(a + sign * 0.05) + dark)).log10();
+            places().max_by(|a, b| fall(*a).total_cmp(&fall(*b))).unwrap()
+        };
+        let rule = Regulation::find("UN R112 B passing").unwrap().rules.cut_off.unwrap();
+        let aim = Aim::by_cut_off(&map(&beam, 1e-3, 0.0), rule);
+        let v_deg = steepest(&|v| beam(-2.5, v), 3.0, 1.0) + 0.57;
+        let h_deg = steepest(&|h| beam(h, v_deg - 0.2), 5.0, -1.0) - 0.5;
+        // Within the photometer's half opening, which blurs the edge, and that over the slope of the elbow's shoulder.
+        let [off_h, off_v] = [aim.h_deg - h_deg, aim.v_deg - v_deg];
+        assert!(off_v.abs() < 0.0745 && off_h.abs() < 0.0745 / 15f64.to_radians().tan(), "{off_h} {off_v} {aim:?}");
+    }
+
     #[test]
     fn left_hand_traffic_is_the_mirror() {
         let regulation = Regulation::find("UN R112 B passing").unwrap();
@@ -216,7 +234,7 @@ mod tests {
         }
         // Where a point is said to lie in the far field as placed, its value is.
         let sensor = Sensor { half_deg: 0.5 * left.sensor_deg, round: regulation.rules.sensor_round };
-        let points = left.rows.iter().filter(|r| r.row.kind == "point");
+        let points = left.rows.iter().filter(|r| r.row.kind == RowKind::Point);
         let read: Vec<_> = points.filter_map(|r| Some((r.reading?, r.direction?))).collect();
         assert!(read.len() > 3 && left.aim.h_deg.abs() > 0.1);
         for (reading, direction) in read {
@@ -232,7 +250,7 @@ mod tests {
         // Too bright in H = 0 unless the lamp turns by 0.75° to a side: its edge of light lies 0.6° from there.
         let realigned_h_deg = |id: &str, to_the_right: bool| {
             let mut regulation = Regulation::find(id).unwrap();
-            regulation.function.rows.retain(|r| r.kind == "point");
+            regulation.function.rows.retain(|r| r.kind == RowKind::Point);
             regulation.function.rows.truncate(1);
             let point = &mut regulation.function.rows[0];
             (point.h, point.v, point.min, point.max, point.when) = (Some(0.0), Some(0.0), None, Some(100.0), None);
@@ -291,10 +309,10 @@ mod tests {
         let sensor = Sensor { half_deg: 0.0745, round: false };
         let photometer = Photometer { map: &bright, aim: &aim, sensor, tolerance_deg: 0.0 };
         let table = row(&assess(&bright, &regulation, &Assumptions::default()).unwrap(), "75R").row;
-        for kind in ["line", "zone"] {
-            let nowhere = Row { kind: kind.into(), h: None, v: None, min: Some(1.0), max: None, ..table.clone() };
+        for kind in [RowKind::Point, RowKind::Line, RowKind::Zone] {
+            let nowhere = Row { kind, h: None, v: None, min: Some(1.0), max: None, ..table.clone() };
             let judged = judge_row(&photometer, &regulation, &Assumptions::default(), &nowhere);
-            assert_eq!(judged.verdict, Some(Verdict::Unsure), "{kind}");
+            assert_eq!(judged.verdict, Some(Verdict::Unsure), "{kind:?}");
         }
     }
 

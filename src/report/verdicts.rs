@@ -4,7 +4,7 @@ use super::chart::MapPoint;
 use super::framing::lit_part;
 use super::{Cell, Chart, Section, Table, figures, road};
 use crate::formats::{Grid, file_stem};
-use crate::regulation::{Assessment, RowVerdict, Traffic, Verdict};
+use crate::regulation::{Assessment, RowKind, RowVerdict, Traffic, Verdict};
 
 /// Significant digits of intensities: more than any photometer has.
 const DIGITS: usize = 5;
@@ -38,7 +38,7 @@ pub fn requirement_text(row: &RowVerdict) -> String {
         (Some(min), None) => format!("≥ {}", number(min)),
         (None, Some(max)) => format!("≤ {}", number(max)),
         (None, None) => {
-            let other = if row.row.kind == "relative" { "relative" } else { "–" };
+            let other = if row.row.kind == RowKind::Relative { "relative" } else { "–" };
             row.row.when.clone().unwrap_or_else(|| other.to_owned())
         }
     }

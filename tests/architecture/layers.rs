@@ -59,6 +59,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "regulation",
         &[
+            "row",
             "table",
             "few_rays",
             "map",

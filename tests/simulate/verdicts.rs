@@ -1,7 +1,7 @@
 //! Verdicts of noisy far fields, whose truth is known.
 
 use crate::random::Random;
-use lampyris::regulation::{Assumptions, IntensityMap, RaySample, Regulation, Verdict, assess};
+use lampyris::regulation::{Assumptions, IntensityMap, RaySample, Regulation, RowKind, Verdict, assess};
 
 /// A normal number of mean 0 and variance 1, nearly, that belongs to a cell and a seed: twelve uniform ones less their mean.
 fn noise(cell: usize, seed: u64) -> f64 {
@@ -17,7 +17,7 @@ const DIM_DEG: f64 = 1.0;
 fn the_luckiest_of_many_noisy_directions_fails_no_lamp() {
     // HV needs 80 % of the maximum. Of light that is as bright everywhere it has all.
     let mut regulation = Regulation::find("UN R112 B driving").unwrap();
-    regulation.function.rows.retain(|r| r.kind == "relative");
+    regulation.function.rows.retain(|r| r.kind == RowKind::Relative);
     let edges = |half: i32| (-10 * half..=10 * half).map(|k| f64::from(k) / 10.0).collect::<Vec<_>>();
     let (h, v, light) = (edges(10), edges(6), 60_000.0);
     let mut failed = 0;

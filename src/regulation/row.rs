@@ -1,0 +1,125 @@
+//! One requirement of a regulation: what is asked, where, and where the figure comes from.
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// What a row asks about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RowKind {
+    /// One direction.
+    Point,
+    /// All directions of a line.
+    Line,
+    /// All directions of a zone.
+    Zone,
+    /// The sum of several directions.
+    Sum,
+    /// A direction or zone against a multiple of another reading.
+    Relative,
+    /// The brightest of all directions.
+    Imax,
+    /// A direction whose figure follows from a distribution in per cent.
+    DistributionPoint,
+    /// The sum of a group of points.
+    GroupSum,
+    /// Text: nothing that is measured.
+    Note,
+}
+
+/// Which side of a limit a relative row asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Bound {
+    /// At least so much.
+    Min,
+    /// At most so much.
+    Max,
+}
+
+/// One requirement.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Row {
+    /// What it asks about.
+    #[serde(deserialize_with = "row_kind")]
+    pub kind: RowKind,
+    /// Its name in the table.
+    pub id: String,
+    /// Direction, degrees to the right.
+    pub h: Option<f64>,
+    /// Direction, degrees up.
+    pub v: Option<f64>,
+    /// Ends of a line, degrees.
+    pub(super) h0: Option<f64>,
+    pub(super) v0: Option<f64>,
+    pub(super) h1: Option<f64>,
+    pub(super) v1: Option<f64>,
+    /// Corners of a zone, degrees.
+    pub polygon: Option<Vec<[f64; 2]>>,
+    /// Directions of a sum, degrees.
+    pub(super) points: Option<Vec<[f64; 2]>>,
+    /// Least intensity, candela.
+    pub min: Option<f64>,
+    /// Greatest intensity, candela.
+    pub max: Option<f64>,
+    /// Of a relative row: the side of the limit, the factor, and the row that it is a multiple of, or `imax`.
+    #[serde(default, deserialize_with = "bound")]
+    pub(super) bound: Option<Bound>,
+    pub(super) factor: Option<f64>,
+    pub(super) of: Option<String>,
+    /// Rows of one group are weighed together.
+    pub(super) group: Option<u32>,
+    /// The condition under which the row holds.
+    pub when: Option<String>,
+    /// A remark on the row.
+    pub note: Option<String>,
+    /// Where the figure comes from.
+    pub source: String,
+    /// `two` where a second source was compared, `one` otherwise.
+    pub evidence: String,
+}
+
+fn row_kind<'de, D: Deserializer<'de>>(value: D) -> Result<RowKind, D::Error> {
+    named("kind", RowKind::deserialize(value))
+}
+
+fn bound<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Bound>, D::Error> {
+    named("bound", Option::deserialize(value))
+}
+
+/// Puts the key before a message, which names the known words alone.
+pub(super) fn named<T, E: serde::de::Error>(key: &str, value: Result<T, E>) -> Result<T, E> {
+    value.map_err(|e| E::custom(format!("{key}: {e}")))
+}
+
+impl Row {
+    /// Checks that it says all that its kind needs; `rows` are those of its function.
+    pub(super) fn check(&self, rows: &[Self]) -> Result<(), String> {
+        let has_place = |row: &Self| row.h.is_some() && row.v.is_some();
+        let has_limit = self.min.is_some() || self.max.is_some();
+        let has_ends = [self.h0, self.v0, self.h1, self.v1].iter().all(Option::is_some);
+        let refers = |of: &str| of == "imax" || rows.iter().any(|r| r.id == of && has_place(r));
+        let (complete, needs) = match self.kind {
+            RowKind::Point | RowKind::DistributionPoint => (has_place(self) && has_limit, "h, v and min or max"),
+            RowKind::Line => (has_ends && has_limit, "h0, v0, h1, v1 and min or max"),
+            RowKind::Zone => (self.polygon.is_some() && has_limit, "polygon and min or max"),
+            RowKind::Imax => (has_limit, "min or max"),
+            RowKind::Sum | RowKind::GroupSum => {
+                let has_points = self.points.as_ref().is_some_and(|points| !points.is_empty());
+                (has_points && self.min.is_some() && self.max.is_none(), "points, min and no max")
+            }
+            RowKind::Relative => {
+                let is_placed = self.polygon.is_some() || has_place(self);
+                let compares =
+                    self.bound.is_some() && self.factor.is_some() && self.of.as_deref().is_some_and(refers);
+                (is_placed && compares, "bound, factor, polygon or h and v, and of: imax or the id of a point")
+            }
+            RowKind::Note => (!has_limit && self.factor.is_none(), "nothing that is measured"),
+        };
+        if complete { Ok(()) } else { Err(format!("row {}: {:?} needs {needs}", self.id, self.kind)) }
+    }
+
+    /// Adds a remark behind what there is.
+    pub(super) fn add_note(&mut self, remark: &str) {
+        self.note = Some(self.note.take().map_or_else(|| remark.to_owned(), |note| format!("{note}; {remark}")));
+    }
+}
