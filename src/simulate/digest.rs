@@ -1,4 +1,4 @@
-//! A hash of all tallies, as a fingerprint of a result.
+//! A hash of the sums and counts behind the figures of a run, as a fingerprint of a result.
 
 use super::tallies::Tallies;
 use super::tally::Sum;

@@ -18,6 +18,8 @@ pub enum LostCause {
     TooDeep,
     /// The intersector's answer is of no use: a distance or normal that is not a number, or a face that the scene does not have.
     NotANumber,
+    /// The list that it was to come from could no longer be read: the file was changed or went while it was in use.
+    Unreadable,
 }
 
 impl LostCause {
@@ -29,6 +31,7 @@ impl LostCause {
             Self::InsideSolid => "inside_solid",
             Self::TooDeep => "too_deep",
             Self::NotANumber => "not_a_number",
+            Self::Unreadable => "unreadable",
         }
     }
 }
@@ -113,7 +116,8 @@ pub struct Counts {
     pub rays: u64,
     /// Nearest-hit queries, the last of each path included.
     pub segments: u64,
-    /// Hits whose interpolated normal would have sent the ray through the wrong side, and that used the facet's own instead.
+    /// Times that a ray was kept on its side of a face: by the facet's normal in place of the interpolated one, or by mirroring a scattered
+    /// or emitted ray.
     pub corrected_normals: u64,
     /// Paths that were lost.
     pub lost: u64,
@@ -125,6 +129,10 @@ pub struct Counts {
     pub overlaps: u64,
     /// The two bodies of one of them, those of the lowest numbers; zeros where there are none.
     pub overlapping: [u32; 2],
+    /// Times that light crossed the first of two touching faces alone, as it could be in no body that the second bounds.
+    pub refused_contacts: u64,
+    /// Rays of luminous faces that started on the spline, as the intersector has their face nowhere near.
+    pub misplaced_starts: u64,
 }
 
 impl Counts {
@@ -137,6 +145,8 @@ impl Counts {
         self.cut_off += o.cut_off;
         self.caught += o.caught;
         self.add_overlap(o.overlapping, o.overlaps);
+        self.refused_contacts += o.refused_contacts;
+        self.misplaced_starts += o.misplaced_starts;
     }
 
     /// Adds `times` meetings of two overlapping bodies, and keeps the pair of the lowest numbers; `[0; 2]` is no pair.
@@ -150,11 +160,11 @@ impl Counts {
 
 #[cfg(test)]
 mod tests {
-    use super::LostCause::{self, ImpossibleMedium, InsideSolid, NoExit, NotANumber, TooDeep};
+    use super::LostCause::{self, ImpossibleMedium, InsideSolid, NoExit, NotANumber, TooDeep, Unreadable};
 
     #[test]
     fn names_are_those_of_json() {
-        for cause in [NoExit, ImpossibleMedium, InsideSolid, TooDeep, NotANumber] {
+        for cause in [NoExit, ImpossibleMedium, InsideSolid, TooDeep, NotANumber, Unreadable] {
             assert_eq!(serde_json::to_value(cause).unwrap(), LostCause::name(cause));
         }
     }

@@ -31,7 +31,7 @@ pub struct PartialRun {
 }
 
 /// Begins a file of this version.
-const MAGIC: &[u8] = b"lampyris tally 8\n";
+const MAGIC: &[u8] = b"lampyris tally 9\n";
 
 impl PartialRun {
     /// Makes a part with no replicate done, of a run that does not grow.
@@ -106,9 +106,9 @@ impl PartialRun {
         [&t.entered, &t.left].into_iter().for_each(|s| append_sums(&mut out, s));
         let c = &t.counts;
         let [one, other] = c.overlapping.map(u64::from);
-        [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off, c.caught, c.overlaps, one, other]
-            .iter()
-            .for_each(|x| out.extend(x.to_le_bytes()));
+        let ends = [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off, c.caught];
+        let repairs = [c.overlaps, one, other, c.refused_contacts, c.misplaced_starts];
+        ends.iter().chain(&repairs).for_each(|x| out.extend(x.to_le_bytes()));
         // Numbers of f64 survive as bits: text would round the last one, and has no word for NaN.
         let zero = crate::math::Point::ZERO;
         let bare = |l: &LostRay| LostRay { origin: zero, direction: zero, ..l.clone() };
@@ -182,7 +182,19 @@ impl PartialRun {
         let [rays, segments, corrected_normals] = [r.u64()?, r.u64()?, r.u64()?];
         let [lost, cut_off, caught] = [r.u64()?, r.u64()?, r.u64()?];
         let (overlaps, overlapping) = (r.u64()?, [r.u64()? as u32, r.u64()? as u32]);
-        t.counts = Counts { rays, segments, corrected_normals, lost, cut_off, caught, overlaps, overlapping };
+        let [refused_contacts, misplaced_starts] = [r.u64()?, r.u64()?];
+        t.counts = Counts {
+            rays,
+            segments,
+            corrected_normals,
+            lost,
+            cut_off,
+            caught,
+            overlaps,
+            overlapping,
+            refused_contacts,
+            misplaced_starts,
+        };
         let ledger: Vec<(LostRay, [[u64; 3]; 2])> = r.json()?;
         let mask = r.u64()?;
         let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = r.json()?;

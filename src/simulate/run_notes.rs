@@ -31,6 +31,26 @@ impl BoundScene {
         })
     }
 
+    /// Returns sentences about places where the kernel made do with less than the scene asks for, each where it was more frequent than once
+    /// in [`OVERLAP_SEGMENTS`] segments or rays.
+    pub(crate) fn repair_notes(&self, counts: &Counts) -> impl Iterator<Item = String> + use<> {
+        let contacts = (counts.refused_contacts > counts.segments / OVERLAP_SEGMENTS).then(|| {
+            format!(
+                "{} times light met two touching faces of which the second bounds no body that it was in or could enter, as of an open or \
+                 overlapping part: it crossed the first alone",
+                counts.refused_contacts
+            )
+        });
+        let starts = (counts.misplaced_starts > counts.rays / OVERLAP_SEGMENTS).then(|| {
+            format!(
+                "{} rays of luminous faces started on the spline, as no facet of their face lies within 1 mm: they may have met their own \
+                 face; take a finer tolerance for it",
+                counts.misplaced_starts
+            )
+        });
+        contacts.into_iter().chain(starts)
+    }
+
     /// Returns one sentence about sources so weak beside the others that they send next to no rays; `None` where there are none.
     pub(crate) fn scarce_sources_note(&self, plan: &Plan) -> Option<String> {
         let even_share = plan.emitted / self.emitters.len() as f64;
@@ -91,9 +111,8 @@ impl BoundScene {
                 "it came to a closed opaque solid from inside, as from a source that lies in it"
             }
             LostCause::TooDeep => "more bodies lie in each other than a ray can carry",
-            LostCause::NotANumber => {
-                "its place or direction is no number, or its ray file was changed while it was read"
-            }
+            LostCause::NotANumber => "its place or direction is no number",
+            LostCause::Unreadable => "its ray file was changed or went while it was in use",
         };
         let place = match (self.body(body).filter(|_| body != AMBIENT), at) {
             (Some([name, medium]), _) => format!("in '{name}' ({medium})"),

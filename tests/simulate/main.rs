@@ -26,6 +26,7 @@ mod polished;
 mod random;
 mod ready_meshes;
 mod refusals;
+mod repairs;
 mod scenes;
 mod selectors;
 mod sequences;

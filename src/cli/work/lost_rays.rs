@@ -1,4 +1,4 @@
-//! The lost-ray ledger: one line a lost ray, with all that is needed to trace it again.
+//! The lost-ray ledger: one line per lost ray, of the first of them, with all that is needed to trace it again.
 
 use crate::cli::completion::Completion;
 use crate::cli::console::Console;
@@ -81,10 +81,11 @@ pub(crate) fn report_lost_light(
         return Completion::Complete;
     }
     console.insist(format_args!(
-        "{} % of the energy was lost, more than --max-lost allows: {}; {} names every ray",
+        "{} % of the energy was lost, more than --max-lost allows: {}; {} lists {}",
         figures(100.0 * share, 2),
         loss_reasons(results, prepared),
-        folder.join(LEDGER).display()
+        folder.join(LEDGER).display(),
+        if is_cut(results) { format!("the first {} of them", results.ledger.len()) } else { "them all".into() }
     ));
     Completion::Incomplete
 }
@@ -103,9 +104,13 @@ fn loss_reasons(results: &Results, prepared: &PreparedScene) -> String {
     all.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
     let reasons: Vec<String> =
         all.iter().take(NAMED_REASONS).map(|((why, place), n)| format!("{n} {why} at '{place}'")).collect();
-    // The ledger keeps the first 1000.
-    let counted = if results.lost_rays as usize > results.ledger.len() { "of the first 1000: " } else { "" };
+    let counted = if is_cut(results) { format!("of the first {}: ", results.ledger.len()) } else { String::new() };
     format!("{counted}{}", reasons.join("; "))
+}
+
+/// Whether more rays were lost than the ledger keeps.
+fn is_cut(results: &Results) -> bool {
+    results.lost_rays as usize > results.ledger.len()
 }
 
 /// Returns what happened to rays that were lost so, to follow "rays".
@@ -115,8 +120,9 @@ fn cause_text(cause: LostCause) -> &'static str {
         LostCause::ImpossibleMedium => "met a body from the wrong side, as through a gap or an open shell,",
         LostCause::InsideSolid => "hit an opaque solid from inside, as through a gap,",
         LostCause::TooDeep => {
-            "were in more than 7 bodies at once, as after entering an open shell again and again,"
+            "were in more bodies at once than a ray can carry, as after entering an open shell again and again,"
         }
-        _ => "had a distance or direction that is no number",
+        LostCause::Unreadable => "could not be read, as their ray file was changed or went during the run,",
+        LostCause::NotANumber => "had a distance or direction that is no number",
     }
 }

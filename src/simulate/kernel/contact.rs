@@ -1,7 +1,7 @@
 //! Faces of two solids at one place.
 
 use super::context::Context;
-use super::tolerances::{ALIGNED, rounding_at, way_through_glue};
+use super::tolerances::{ALIGNED, MOST_COINCIDENT_FACES, rounding_at, way_through_glue};
 use crate::intersect::{Cost, Hit};
 use crate::math::{Departure, FaceId, Point, Ray, Vector};
 use crate::simulate::body::AMBIENT;
@@ -64,10 +64,7 @@ fn probe_at(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Ray {
         .with_departure(at.departure())
 }
 
-/// Faces within the glue distance among which the partner is looked for.
-const MOST_FACES: usize = 6;
-
-/// Goes through the faces that a short ray meets, in order, at most [`MOST_FACES`] of them; ends at a face that the scene does not know.
+/// Goes through the faces that a short ray meets, in order, at most [`MOST_COINCIDENT_FACES`] of them; ends at a face that the scene does not know.
 ///
 /// An intersector may give a root once more, moved up to where it is asked from by rounding; it is asked from a little farther on then.
 /// Without that, light that was reflected beside an edge of a touching body was lost on the spline: the face that stands across came six
@@ -75,7 +72,7 @@ const MOST_FACES: usize = 6;
 fn faces_along<'a>(context: &'a Context<'a>, mut probe: Ray) -> impl Iterator<Item = (Hit, FaceOptics)> + 'a {
     let rounding = rounding_at(probe.origin);
     let mut last: Option<(FaceId, f64)> = None;
-    (0..2 * MOST_FACES)
+    (0..2 * MOST_COINCIDENT_FACES)
         .map_while(move |_| {
             let found = context.intersector.intersect(&probe, &mut Cost::default())?;
             // The same face no farther than rounding: it is the root that was just passed.
@@ -86,7 +83,7 @@ fn faces_along<'a>(context: &'a Context<'a>, mut probe: Ray) -> impl Iterator<It
             Some((!repeated).then_some((found, optics)))
         })
         .flatten()
-        .take(MOST_FACES)
+        .take(MOST_COINCIDENT_FACES)
 }
 
 /// Returns how far along `next` the segment starts, mm, of light that has met both of two faces at one place: past all faces along them

@@ -90,8 +90,8 @@ impl<'a> Context<'a> {
         Self { paths: None, ..self }
     }
 
-    /// Whether nothing is asked about a ray but where it ends: no path is recorded, no receiver lets light pass, counts some bounces only
-    /// or asks for the spectrum.
+    /// Whether only where rays end is asked: no path is recorded, no face is tallied, and no receiver lets light pass, selects by
+    /// interactions or has channels.
     pub(crate) fn asks_ends_only(&self) -> bool {
         let extra = |r: &Receiver| r.interactions.is_some() || r.channels.count() > 0;
         self.passing.is_empty()

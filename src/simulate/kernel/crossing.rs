@@ -85,6 +85,8 @@ fn cross_contact<C: RayPayload>(
                     *here = recovered;
                     Some(both)
                 });
+                // The second face has no body to enter or leave here: only the first is crossed, which is counted.
+                at.refused_contact = both.is_none();
                 Some(both.unwrap_or(first))
             }
             // The second face of an interface that was crossed at the first.

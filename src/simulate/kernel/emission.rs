@@ -135,7 +135,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let mut into_contact = None;
         // Luminous faces emit from the spline; the ray starts from the intersector's own idea of that face.
         if let Some((face, normal)) = emission.from {
-            self.tally.counts.corrected_normals += u64::from(start_on_face(context, face, normal, ray));
+            start_on_face(context, face, normal, ray, &mut self.tally.counts);
             // Light into what is glued on the face starts behind the glue; only then is it known to lie in that
             // body.
             into_contact = if C::MEDIA { emit_into_contact(context, face, normal, ray) } else { None };
@@ -144,7 +144,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         self.tally.counts.rays += 1;
         self.tally.ends.emitted += quanta_as_integer(path.quanta);
         if emission.failed {
-            self.lose(path, ray, LostCause::NotANumber, None);
+            self.lose(path, ray, LostCause::Unreadable, None);
             return false;
         }
         let Some(mut payload) = self.payload_at_start(source, into_contact.as_ref(), ray) else {

@@ -25,6 +25,8 @@ pub(super) struct SurfaceInteraction<'a> {
     pub(super) corrected_normals: u32,
     /// Two bodies that are found to overlap here.
     pub(super) overlap: Option<[u32; 2]>,
+    /// Whether another body touches here that light cannot cross into or out of.
+    pub(super) refused_contact: bool,
 }
 
 /// What a face does to light.
@@ -68,7 +70,14 @@ pub(super) struct Division<'s, C> {
 /// A perfect conductor: s keeps its sign, p changes it, in the convention of [`Stokes`].
 pub(super) const CONDUCTOR: Mueller = Mueller { a: 1.0, b: 0.0, c: -1.0, e: 0.0 };
 
-impl SurfaceInteraction<'_> {
+impl<'a> SurfaceInteraction<'a> {
+    /// Makes the meeting of a ray with a face at a point, of which nothing is known yet.
+    #[inline(always)]
+    pub(super) fn new(hit: &'a Hit, face: FaceOptics, entering: bool, point: Point) -> Self {
+        let (skip, corrected_normals) = (0.0, 0);
+        Self { hit, face, entering, point, skip, corrected_normals, overlap: None, refused_contact: false }
+    }
+
     /// Returns the normal to shade with and the cosine of incidence, from 0 to 1. A normal that looks away from the ray is replaced by the
     /// facet's, and counted.
     #[inline(always)]

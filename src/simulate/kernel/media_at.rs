@@ -8,8 +8,8 @@ use crate::math::{Point, Ray, orthonormal_pair};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::surfaces::FaceOptics;
 
-/// Faces on the way out after which it is given up.
-const MOST_FACES: usize = 1000;
+/// Faces on the way out after which it is given up: a few times what stands in one line in any model of the corpus.
+const MOST_FACES_ON_WAY_OUT: usize = 1000;
 
 /// How far a second and a third way out are turned off the first, as slopes along two axes across it: some degrees, far enough to pass
 /// an edge elsewhere, near enough to leave by the same bodies.
@@ -58,14 +58,20 @@ fn media_on_way_out(context: &Context<'_>, ray: &Ray) -> Bodies {
 }
 
 /// Returns the bodies that a ray leaves on its straight way out without having entered them, outermost first, and whether no two of them
-/// touched on it. Given up after [`MOST_FACES`] faces, with what was found so far.
+/// touched on it. Given up after [`MOST_FACES_ON_WAY_OUT`] faces, uncertain, with what was found so far.
 fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
     let mut crossings = Crossings::default();
     let mut certain = true;
     let mut segment = Ray { t_max: f64::INFINITY, ..*ray };
-    for _ in 0..MOST_FACES {
+    let mut faces = 0;
+    loop {
         // Straight out of the scene: what is left without having been entered must have been around the start, whatever the shapes are.
         let Some(hit) = context.intersector.intersect(&segment, &mut Cost::default()) else { break };
+        if faces == MOST_FACES_ON_WAY_OUT {
+            certain = false;
+            break;
+        }
+        faces += 1;
         let point = segment.point_at(hit.t);
         let d = segment.direction;
         segment = Ray::new(point, d).with_departure(hit.departure());

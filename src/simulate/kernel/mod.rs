@@ -5,9 +5,7 @@
 //! them. Everything else is arithmetic behind the `match`. A surface returns what becomes of light ([`interaction::Interaction`]); the
 //! tracer books it.
 //!
-//! Inner modules, each of which sees only those before it: `payload`, `receiver_index`, `context`, `path`, `tolerances`, `contact`,
-//! `interaction`, `media_at`, `crossing`, `start`, `starting_media`, `surface`, `tracer`, `receivers`, `emission`, `step`, `wavefront`,
-//! `simd_dispatch`.
+//! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 
 mod contact;
 mod context;

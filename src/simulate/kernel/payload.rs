@@ -13,8 +13,8 @@ pub(crate) trait RayPayload: Copy + Send {
     const MEDIA: bool;
     /// Whether faces may do more than absorb or reflect a constant share.
     const COATED: bool = true;
-    /// Whether nothing is asked about a ray on its way but where it ends: no paths are recorded, and no receiver lets light pass,
-    /// asks for colours or counts some bounces only.
+    /// Whether only where rays end is asked: no path is recorded, no face is tallied, and no receiver lets light pass, selects by
+    /// interactions or has channels.
     const ENDS_ONLY: bool = false;
     /// Whether it carries a wavelength.
     const COLOURED: bool = false;
@@ -23,7 +23,7 @@ pub(crate) trait RayPayload: Copy + Send {
     /// Makes the payload of a ray that starts inside these bodies, outermost first; empty for the surroundings. `None` when it cannot carry
     /// so many.
     fn inside(bodies: &[u32]) -> Option<Self>;
-    /// Returns the innermost body; 0 in the surroundings.
+    /// Returns the innermost body; [`AMBIENT`] in the surroundings.
     fn body(&self) -> u32;
     /// Returns the same ray on the other side of the boundary of a body. `None` for a crossing that cannot be: out of a body that it is not
     /// in, or into one when it can carry no more.
@@ -153,7 +153,7 @@ impl RayPayload for Clear {
     }
 }
 
-/// Deepest nesting of bodies.
+/// Most bodies around a point that a ray can carry: with the depth a stack of 32 bytes.
 pub(crate) const DEPTH: usize = 7;
 
 /// The bodies that a ray is in, as a stack, the innermost last. A body may be left from below the top: so overlapping and touching solids

@@ -4,19 +4,17 @@ use super::contact::emit_into_contact;
 use super::context::{Bodies, Context, StartingMedia};
 use super::media_at::media_at;
 use super::start::start_on_face;
-use super::tolerances::rounding_at;
+use super::tolerances::{MOST_COINCIDENT_FACES, rounding_at};
 use crate::intersect::{Cost, Intersector};
 use crate::math::{Point, Ray, Vector};
 use crate::simulate::bind::BoundScene;
 use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::{Emitter, Portion, RaySampler};
+use crate::simulate::outcome::Counts;
 use crate::simulate::settings::RunSettings;
 
 /// Rays of a source that are asked before it is believed that all start in the same bodies.
 const PROBED_RAYS: u64 = 64;
-
-/// Faces at one place that the start of a ray is asked about.
-const MOST_FACES: usize = 6;
 
 impl<'a> Context<'a> {
     /// Makes what all replicates of a run share; probes the intersector for what the sources lie in.
@@ -77,7 +75,7 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
             continue;
         }
         if let Some((face, normal)) = emission.from {
-            start_on_face(context, face, normal, &mut ray);
+            start_on_face(context, face, normal, &mut ray, &mut Counts::default());
             if emit_into_contact(context, face, normal, &mut ray).is_some() {
                 return StartingMedia::PerRay;
             }
@@ -112,7 +110,7 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<R
     let mut enters_opaque = false;
     let mut leaves_opaque = false;
     // Of two faces at one place the other comes next, and then the first once more.
-    for _ in 0..MOST_FACES {
+    for _ in 0..MOST_COINCIDENT_FACES {
         let Some(hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { break };
         let face = context.bound.faces.get(hit.face.index())?;
         if face.opaque_solid {

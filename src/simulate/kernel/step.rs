@@ -1,5 +1,5 @@
 //! One step of a path: over its segment, through what it meets, and into the next segment. What a surface or a limit does to its light
-//! is booked here, and nowhere else.
+//! is booked here alone.
 
 use super::contact::{ContactSurface, FaceHit, contact_surface, end_of_contact, opaque_contact};
 use super::interaction::{Division, Interaction, SurfaceInteraction};
@@ -46,8 +46,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             return false;
         };
         let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
-        let mut at =
-            SurfaceInteraction { hit, face, entering, point, skip: 0.0, corrected_normals: 0, overlap: None };
+        let mut at = SurfaceInteraction::new(hit, face, entering, point);
         // Of faces at one place another may say what happens.
         let mut partner = None;
         if C::MEDIA && (face.opaque_solid || face.medium_on_opaque || face.touches_body) {
@@ -158,6 +157,9 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             }
         };
         self.tally.counts.corrected_normals += u64::from(at.corrected_normals);
+        if C::MEDIA {
+            self.tally.counts.refused_contacts += u64::from(at.refused_contact);
+        }
         if let Some(pair) = at.overlap {
             self.tally.counts.add_overlap(pair, 1);
         }
@@ -277,7 +279,12 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     fn scatter_in_body(&mut self, path: &mut Path<C>, ray: &mut Ray) -> bool {
         let context = self.context;
         let body = path.payload.body();
-        let Some(scatter) = &context.bound.bodies[body as usize].scatter else { return false };
+        let Some(scatter) = &context.bound.bodies[body as usize].scatter else {
+            debug_assert!(false, "a segment ends at a scattering in a body that does not scatter");
+            // Its power is booked all the same: the sums must close.
+            self.lose(path, ray, LostCause::NotANumber, None);
+            return false;
+        };
         let point = ray.point_at(ray.t_max);
         let numbers = path.key(context).pair(Purpose::BulkDirection);
         path.length += ray.t_max;

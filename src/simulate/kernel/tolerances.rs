@@ -34,6 +34,9 @@ pub(super) fn way_through_glue(glue_mm: f64, cosine: f64) -> f64 {
 /// Cosine below which the way through a layer grows no further, see [`way_through_glue`].
 const LEAST_COSINE: f64 = 1e-3;
 
+/// Faces at one place among which the next one is looked for: touching faces come in pairs, three pairs at an edge of three bodies.
+pub(super) const MOST_COINCIDENT_FACES: usize = 6;
+
 /// Cosine above which two normals at one place look the same way, and below whose negative they look at each other: 60°, between
 /// faces that lie on each other (0°, facets some degrees) and those that meet at an edge (90°).
 pub(super) const ALIGNED: f64 = 0.5;

@@ -1,4 +1,4 @@
-//! The books of a traced path: everything that is noted about it is noted here.
+//! Books what becomes of a path's power and records its vertices; receivers book their light in `receivers`, sources in `emission`.
 
 use super::context::Context;
 use super::path::Path;
