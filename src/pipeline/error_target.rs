@@ -70,7 +70,8 @@ impl ErrorTarget {
         let names: Vec<&str> = scene.receivers.iter().map(|r| r.name.as_str()).collect();
         if !names.contains(&receiver) {
             let error = about(format!("the scene has no receiver '{receiver}'"));
-            return Err(error.help(suggest::closest_name("its receivers are", receiver, &names)));
+            let otherwise = "it has no receivers: add a [[receiver]]";
+            return Err(error.help(suggest::closest_name("its receivers are", receiver, &names, otherwise)));
         }
         // Rays of its own do not grow with the run: more would be asked for than are ever traced.
         if scene.sources.iter().any(|s| s.rays.is_some()) {

@@ -78,6 +78,7 @@ fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
         "its parts are",
         name,
         &known,
+        "its parts have no names; select faces by the number of their entity, as in --face #17=0.01",
     )))
 }
 
@@ -97,11 +98,12 @@ fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     }
     let known: Vec<&str> = faces().map(|f| f.name.as_str()).filter(|n| !n.is_empty()).collect();
     let error = Error::setting("face", format!("{name}: the model has no face of this name or number"));
-    Err(error.help(if known.is_empty() {
-        "its faces have no names; write the number of the entity in the file, as in #17=0.01".into()
-    } else {
-        suggest::closest_name("its faces are", name, &known)
-    }))
+    Err(error.help(suggest::closest_name(
+        "its faces are",
+        name,
+        &known,
+        "its faces have no names; write the number of the entity in the file, as in #17=0.01",
+    )))
 }
 
 /// Makes the facets of a model in one piece, tells the monitor, and returns them with the seconds they took.

@@ -3,7 +3,11 @@
 use crate::simulate::scene::suggest::edit_distance;
 
 /// Writes a sentence with the closest known name first, and up to twenty of all: `did you mean "cover"? its parts are cover, housing`.
-pub(super) fn closest_name(intro: &str, given: &str, known: &[&str]) -> String {
+/// Without known names it is `otherwise`, what to do instead.
+pub(super) fn closest_name(intro: &str, given: &str, known: &[&str], otherwise: &str) -> String {
+    if known.is_empty() {
+        return otherwise.into();
+    }
     let mut unique: Vec<&str> = Vec::new();
     for name in known {
         if !unique.contains(name) {
@@ -18,7 +22,6 @@ pub(super) fn closest_name(intro: &str, given: &str, known: &[&str]) -> String {
     let rest = if unique.len() > 20 { format!(" and {} more", unique.len() - 20) } else { String::new() };
     match close {
         Some((_, name)) => format!("did you mean \"{name}\"? {intro} {shown}{rest}"),
-        None if unique.is_empty() => "no part of the model has a name".into(),
         None => format!("{intro} {shown}{rest}"),
     }
 }
@@ -30,9 +33,10 @@ mod tests {
     #[test]
     fn the_nearest_name_comes_first() {
         assert_eq!(
-            closest_name("parts:", "huosing", &["cover", "housing", "cover"]),
+            closest_name("parts:", "huosing", &["cover", "housing", "cover"], "use --face"),
             "did you mean \"housing\"? parts: cover, housing"
         );
-        assert_eq!(closest_name("parts:", "xyz", &["cover"]), "parts: cover");
+        assert_eq!(closest_name("parts:", "xyz", &["cover"], "use --face"), "parts: cover");
+        assert_eq!(closest_name("parts:", "xyz", &[], "use --face"), "use --face");
     }
 }

@@ -77,6 +77,8 @@ fn requests_that_cannot_be_met_say_what_to_do() {
     let text = |e: lampyris::pipeline::Error| e.to_string();
     let scene = &prepared.job.scene;
     assert!(text(ErrorTarget::new("1%@fokus", scene).unwrap_err()).contains("did you mean \"focus\"?"));
+    let dark = Scene { receivers: Vec::new(), ..(**scene).clone() };
+    assert!(text(ErrorTarget::new("1%@focus", &dark).unwrap_err()).contains("add a [[receiver]]"));
     let job = |tracing| SceneJob { tracing, ..prepared.job.clone() };
     let none = TracingSettings { threads: Some(0), ..TracingSettings::default() };
     assert!(text(PreparedScene::new(job(none), &Silent).unwrap_err()).contains("threads 0: at least one"));
