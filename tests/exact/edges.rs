@@ -52,7 +52,7 @@ fn through_edges(name: &str, model: &Model, n: usize, ends: bool) -> Found {
     if edges.is_empty() {
         return found;
     }
-    let show = std::env::var("SHOW").is_ok();
+    let show = std::env::var("LAMPYRIS_SHOW").is_ok();
     let mut s = Random(17);
     let reach = 4.0 * bounds(model).diagonal();
     let faces = closed_faces(model);

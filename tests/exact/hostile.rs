@@ -89,7 +89,7 @@ fn surface(s: &mut Random, kind: usize) -> Surface {
     Surface { degree, knots, points }
 }
 
-/// A ray towards the place of `uv`, of one of ten kinds; the ray and whether it starts there.
+/// A ray of one of ten kinds towards the surface point at `uv`.
 fn ray(s: &mut Random, surface: &Surface, size: f64, uv: Uv, kind: usize) -> Ray {
     let at = place_at(surface, uv);
     let (p, du, dv) = (rounded(at.point), rounded(at.du), rounded(at.dv));

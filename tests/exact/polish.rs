@@ -96,7 +96,7 @@ fn polished_hits_are_the_first_hits_of_the_spline() {
         }
         println!("{name}: {hits} hits, {other} elsewhere, {flips} flips, {} fallbacks", cost.fallbacks);
         // At 0.2 mm up to 0.3 % of the rays flip at silhouettes; polishing cannot see those.
-        assert!(other <= hits / 200 && flips <= hits / 100, "{name}: {other} elsewhere, {flips} flips of {hits}");
+        assert!(other <= hits / 200 && flips <= hits / 250, "{name}: {other} elsewhere, {flips} flips of {hits}");
         assert!(cost.fallbacks <= 15, "{name}: {} fallbacks", cost.fallbacks);
     }
 }
@@ -112,7 +112,7 @@ fn a_departure_from_the_spline_is_never_lost() {
         let polished = Polished::new(&facets, &mesh, &exact);
         let b = bounds(&mesh);
         let mut s = Random(9);
-        let (mut asked, mut differ, mut own) = (0, 0, 0);
+        let (mut asked, mut differ, mut own, mut lost) = (0, 0, 0, 0);
         for k in 0..3000 {
             let ray = s.ray(b.center(), 0.4 * b.size());
             let Some(first) = polished.intersect(&ray, &mut Cost::default()) else { continue };
@@ -139,9 +139,10 @@ fn a_departure_from_the_spline_is_never_lost() {
                 (None, None) => true,
                 _ => false,
             };
+            lost += usize::from(a.is_none() && b.hit.is_some());
             if !same {
                 differ += 1;
-                if std::env::var("SHOW").is_ok() {
+                if std::env::var("LAMPYRIS_SHOW").is_ok() {
                     println!(
                         "{name}: sine {:.2e} polished {:?} exact {:?}",
                         d.dot(first.normal),
@@ -151,9 +152,10 @@ fn a_departure_from_the_spline_is_never_lost() {
                 }
             }
         }
-        println!("{name}: {asked} departures, {differ} differ, {own} found their own point");
+        println!("{name}: {asked} departures, {differ} differ, {own} found their own point, {lost} lost");
         assert_eq!(own, 0, "{name}: its own point found");
-        assert!(differ <= asked / 100, "{name}: {differ} of {asked} differ");
+        assert_eq!(lost, 0, "{name}: lost");
+        assert!(asked > 2000 && differ <= asked / 1000, "{name}: {differ} of {asked} differ");
     }
 }
 

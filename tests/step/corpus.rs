@@ -89,7 +89,7 @@ fn row(folder: &Path, name: &str, reference: &Value, with_area: bool) -> Row {
 
 fn rows(with_area: bool) -> Vec<Row> {
     let Some((folder, reference)) = reference() else { return Vec::new() };
-    let only = std::env::var("CORPUS_ONLY").unwrap_or_default();
+    let only = std::env::var("LAMPYRIS_ONLY").unwrap_or_default();
     let mut rows = Vec::new();
     println!(
         "{:44} {:>6} {:>6} {:>6} {:>6} {:>4} {:>6} {:>6} {:>8} {:>9} {:>4}",

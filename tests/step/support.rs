@@ -1,4 +1,5 @@
-//! Area, volume and box of trimmed faces by quadrature in the parameter plane: shares no code with the reader or the mesher.
+//! Areas and volumes of trimmed faces by quadrature in the parameter plane, apart from the reader and the mesher; and the promises of
+//! `model`.
 #![allow(dead_code, clippy::neg_cmp_op_on_partial_ord)]
 
 use lampyris::math::{Point, Uv};

@@ -12,7 +12,7 @@ pub(crate) fn fixture(name: &str) -> PathBuf {
 }
 
 /// The folder of real STEP files: `LAMPYRIS_CORPUS`, by default `../shared/step-corpus` beside the project. The files are not
-/// the project's to ship, so tests that want them are ignored by default and pass where the folder is missing.
+/// the project's to ship: tests that want them say so and pass where the folder is missing.
 pub(crate) fn corpus() -> PathBuf {
     std::env::var_os("LAMPYRIS_CORPUS")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/step-corpus"), PathBuf::from)

@@ -61,9 +61,9 @@ fn fixtures_are_closed_certified_and_mostly_quads() {
 #[ignore = "reads the whole open corpus, minutes"]
 fn corpus_is_meshed() {
     let folder = corpus();
-    let tolerance = std::env::var("TOLERANCE").ok().and_then(|t| t.parse().ok()).unwrap_or(0.1);
-    let only = std::env::var("ONLY").unwrap_or_default();
-    let measure = std::env::var("MEASURE").is_ok();
+    let tolerance = std::env::var("LAMPYRIS_TOLERANCE").ok().and_then(|t| t.parse().ok()).unwrap_or(0.1);
+    let only = std::env::var("LAMPYRIS_ONLY").unwrap_or_default();
+    let measure = std::env::var("LAMPYRIS_MEASURE").is_ok();
     for path in step_files(&folder) {
         if !path.to_string_lossy().contains(&only) {
             continue;
@@ -74,10 +74,10 @@ fn corpus_is_meshed() {
 }
 
 #[test]
-#[ignore = "prints the facets without proof of the files whose name contains ONLY"]
+#[ignore = "prints the facets without proof of the files whose name contains LAMPYRIS_ONLY"]
 fn uncertified() {
-    let only = std::env::var("ONLY").unwrap_or_default();
-    let tolerance: f64 = std::env::var("TOLERANCE").ok().and_then(|t| t.parse().ok()).unwrap_or(0.1);
+    let only = std::env::var("LAMPYRIS_ONLY").unwrap_or_default();
+    let tolerance: f64 = std::env::var("LAMPYRIS_TOLERANCE").ok().and_then(|t| t.parse().ok()).unwrap_or(0.1);
     let mut all = step_files(&fixture("step"));
     all.extend(step_files(&corpus()));
     for path in all {
@@ -85,8 +85,11 @@ fn uncertified() {
             continue;
         }
         let import = step::read(&path, &step::Settings::default()).unwrap();
-        let settings =
-            if std::env::var("TOLERANCE").is_ok() { Settings::uniform(tolerance) } else { Settings::default() };
+        let settings = if std::env::var("LAMPYRIS_TOLERANCE").is_ok() {
+            Settings::uniform(tolerance)
+        } else {
+            Settings::default()
+        };
         let made = tessellate(&import.model, &settings);
         println!("{}", line(&path, &made));
         let faces: Vec<_> = import.model.placed_faces().collect();

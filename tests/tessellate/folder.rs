@@ -1,14 +1,14 @@
-//! Every STEP file under a folder, read, meshed, measured: a row a file and a row of totals; a file that is not read, a face
+//! Every STEP file under a folder, read, meshed, measured: a row per file and one of totals; a file that is not read, a face
 //! without facets, an open shell show there. Fails when a facet that was proved samples over its tolerance.
 //!
 //! ```text
-//! FOLDER=models MEASURE=1 cargo test --release --test tessellate folder -- --ignored --nocapture
+//! LAMPYRIS_CORPUS=models LAMPYRIS_MEASURE=1 cargo test --release --test tessellate folder -- --ignored --nocapture
 //! ```
 //!
-//! `FOLDER` names the folder (default: the corpus, `LAMPYRIS_CORPUS` or `../shared/step-corpus` beside the project; nothing
-//! is done when it is absent), `ONLY` and `SKIP` are parts of paths with commas between, `EVERY` takes each n-th file from
-//! `START` on, `TOLERANCE` is a uniform tolerance in mm (default: the adaptive one, and where the folder has a
-//! `reference.json` its deflection), `MEASURE` samples sags, `DETAIL` names faces and facets.
+//! `LAMPYRIS_CORPUS` names the folder (default: `../shared/step-corpus` beside the project; nothing is done when it is absent),
+//! `LAMPYRIS_ONLY` and `LAMPYRIS_SKIP` are parts of paths with commas between, `LAMPYRIS_EVERY` takes each n-th file from
+//! `LAMPYRIS_START` on, `LAMPYRIS_TOLERANCE` is a uniform tolerance in mm (default: the adaptive one, and where the folder has a
+//! `reference.json` its deflection), `LAMPYRIS_MEASURE` samples sags, `LAMPYRIS_DETAIL` names faces and facets.
 //!
 //! Columns: faces with and without facets and with something given up; shells that the file calls closed, closed and not;
 //! their open and non-manifold edges; facets, the area's share in quads, facets without proof, facets whose samples exceed
@@ -99,7 +99,7 @@ fn one(path: &Path, settings: &Settings, totals: &mut Totals) {
     totals.over += r.over.len();
     totals.over_proved += proved;
     totals.slowest.push((read + seconds, name));
-    if std::env::var("DETAIL").is_ok() {
+    if std::env::var("LAMPYRIS_DETAIL").is_ok() {
         detail(&import.model, &made);
     }
 }
@@ -198,20 +198,20 @@ fn open_edges(model: &Model, made: &Tessellation, show: &dyn Fn(usize) -> String
 #[test]
 #[ignore = "reads a folder of files, minutes"]
 fn folder() {
-    let folder = std::env::var("FOLDER").map(PathBuf::from).unwrap_or_else(|_| corpus());
+    let folder = corpus();
     let reference: serde_json::Value = std::fs::read_to_string(folder.join("reference.json"))
         .ok()
         .and_then(|t| serde_json::from_str(&t).ok())
         .unwrap_or_default();
-    let only = std::env::var("ONLY").unwrap_or_default();
-    let skip = std::env::var("SKIP").unwrap_or_default();
-    let measure = std::env::var("MEASURE").is_ok();
+    let only = std::env::var("LAMPYRIS_ONLY").unwrap_or_default();
+    let skip = std::env::var("LAMPYRIS_SKIP").unwrap_or_default();
+    let measure = std::env::var("LAMPYRIS_MEASURE").is_ok();
     let mut found = Vec::new();
     files(&folder, &mut found);
     found.sort();
-    let every = number("EVERY").unwrap_or(1.0) as usize;
+    let every = number("LAMPYRIS_EVERY").unwrap_or(1.0) as usize;
     let mut totals = Totals::default();
-    for path in found.iter().skip(number("START").unwrap_or(0.0) as usize).step_by(every.max(1)) {
+    for path in found.iter().skip(number("LAMPYRIS_START").unwrap_or(0.0) as usize).step_by(every.max(1)) {
         let text = path.to_string_lossy();
         let skipped = skip.split(',').any(|o| !o.is_empty() && text.contains(o));
         if skipped || !only.split(',').any(|o| text.contains(o)) {
@@ -219,7 +219,7 @@ fn folder() {
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let deflection = reference["files"][&*name]["linear_deflection_mm"].as_f64();
-        let uniform = number("TOLERANCE").or(deflection);
+        let uniform = number("LAMPYRIS_TOLERANCE").or(deflection);
         let settings = uniform.map_or_else(Settings::default, Settings::uniform);
         one(path, &Settings { measure, ..settings }, &mut totals);
     }
