@@ -4,9 +4,7 @@
 //! `--json` prints exactly one document. A reader of stdout that goes away is no failure: files are written all the same. Names out of
 //! files are data: what a terminal would obey in them is written out. Known weakness: on Windows no signal saves a run.
 //!
-//! Inner modules, each of which sees only those before it: `interruption`, `failure`, `console` and `completion` (how a
-//! command is stopped, talks and ends), `arguments` (what is asked), `output` (how answers are shown and written), `work` (from files to
-//! facets, intersectors and runs) and `commands`, which put these together.
+//! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 
 mod arguments;
 mod commands;

@@ -20,7 +20,7 @@ impl Power {
     /// No power reflected.
     pub const NONE: Self = Self { rs: 0.0, rp: 0.0 };
 
-    /// The share of unpolarised light: the mean of both.
+    /// Share of power for unpolarised light: the mean of `rs` and `rp`.
     #[inline]
     pub fn unpolarised(&self) -> f64 {
         0.5 * (self.rs + self.rp)

@@ -4,7 +4,7 @@ use crate::math::Vector;
 
 /// The mirror image of direction `d` in a surface with unit normal `n` (either side).
 ///
-/// The length is brought back to 1 in first order, so that 10⁴ reflections in a light guide do not drift.
+/// The result is renormalised by one Newton step, so that 10⁴ reflections in a light guide do not drift; `d` must be of unit length.
 #[inline]
 pub fn reflect(d: Vector, n: Vector) -> Vector {
     unit(d - n * (2.0 * d.dot(n)))
@@ -44,7 +44,7 @@ pub(super) fn cos_transmitted(cos_i: f64, eta: f64) -> Option<f64> {
     (sin2_t < 1.0).then(|| (1.0 - sin2_t).sqrt())
 }
 
-/// Brings a vector of nearly unit length to unit length by one Newton step: exact to the last bits for lengths within 1e-8 of 1.
+/// Renormalises a vector of nearly unit length by one Newton step: exact to the last bits for lengths within 1e-8 of 1.
 #[inline]
 fn unit(v: Vector) -> Vector {
     v * (1.5 - 0.5 * v.length_squared())

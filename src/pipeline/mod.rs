@@ -16,10 +16,7 @@
 //!
 //! Guarantee: the same scene, files and settings give the same bits, whoever asks and whatever listens.
 //!
-//! Inner modules, each of which sees only those before it: `error`, `suggest`, `settings`, `monitor`, `loading`, `turn`, `cache`,
-//! `expected_facets`, `facets`, `intersectors` and `fingerprint` (the ingredients), `scene_job`, `ray_recorder`, `accuracy_target`,
-//! `default_accuracy` and `prepared_scene` with `scene_results` and `cross_check` (the run), `error_target`, `verdicts` and
-//! `settled_target` (what is made of it).
+//! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 
 mod accuracy_target;
 mod cache;

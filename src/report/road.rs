@@ -45,7 +45,7 @@ fn road_illuminance(grid: &Grid, aim: [f64; 2], aside: f64, ahead: f64) -> f64 {
     candela * LAMP_HEIGHT_M / distance.powi(3)
 }
 
-/// Makes an axis of as many whole cells of this step as come nearest to its range.
+/// Makes an axis over exactly `range`, divided into the whole number of equal cells whose size is nearest to `step`.
 fn axis(label: &str, unit: &str, range: [f64; 2], step: f64) -> Axis {
     Axis { label: label.into(), unit: unit.into(), range, cells: ((range[1] - range[0]) / step).round() as usize }
 }

@@ -5,6 +5,7 @@ mod cache;
 mod check;
 mod cluster;
 mod demo;
+mod documented_keys;
 #[path = "../support/files.rs"]
 mod files;
 mod growing;

@@ -98,7 +98,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let mut run = prepared.trace(request, &monitor).map_err(|_| Failure::running("merge: the run is not whole"))?;
     run.results.seconds.merged = usage.total();
     let result = target.map(|target| target.result(&run.results));
-    let sentences: Vec<String> = result.iter().map(closing::error_sentence).collect();
+    let sentences: Vec<String> = result.iter().map(closing::target_sentence).collect();
     for sentence in &sentences {
         console.say(sentence.replace("**", ""));
     }

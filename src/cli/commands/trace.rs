@@ -205,7 +205,7 @@ fn trace_whole(
 
 /// Says what came of --until-error, and gives the sentence for the page; none where nothing was asked.
 fn say_target(result: Option<&TargetResult>, console: &Console) -> Vec<String> {
-    let sentences: Vec<String> = result.map(closing::error_sentence).into_iter().collect();
+    let sentences: Vec<String> = result.map(closing::target_sentence).into_iter().collect();
     for sentence in &sentences {
         console.say(sentence.replace("**", ""));
     }

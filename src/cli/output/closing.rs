@@ -87,13 +87,13 @@ fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
     files
 }
 
-/// Says in a sentence, with marks of emphasis (`**`), whether an error that was asked for was reached, and how many rays are missing.
-pub(crate) fn error_sentence(result: &TargetResult) -> String {
+/// Says in one Markdown sentence whether the requested statistical error was reached, and about how many more rays it takes if not.
+pub(crate) fn target_sentence(result: &TargetResult) -> String {
     let found = result.found_percent.map_or("nothing arrived".into(), |e| format!("{} %", figures(e, 2)));
     let verdict = if result.reached { "reached" } else { "**not reached**" };
     let missing = match result.missing_rays {
         0 => String::new(),
-        more => format!("; about {} more are missing", grouped(more)),
+        more => format!("; about {} more are needed", grouped(more)),
     };
     format!(
         "Asked for a statistical error of {} % of the {} on {}: {verdict} with {} rays ({found}){missing}.",

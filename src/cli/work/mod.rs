@@ -1,8 +1,6 @@
 //! What commands share: from options and files to runs, and what is made of these.
 //!
-//! Inner modules, each of which sees only those before it: `threads`, `path_file`, `end_file`, `terminal_monitor` and `input_files` (the
-//! ingredients), `output_place`, `input_guard`, `shards`, `lost_rays`, `results_folder`, `tally_file`, `checkpoint`, `paired_receivers` and
-//! `contenders` (what is made of a run).
+//! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 
 pub(super) mod cache_folder;
 pub(super) mod checkpoint;

@@ -273,7 +273,7 @@ impl Exact {
             let ill_scaled = self.linearizations[clipping.index as usize].ill_scaled;
             if clipping.seen.precise {
                 self.settle(query, clipping.index, found, [settlement::LOOSE; 2]);
-            } else if ill_scaled || settlement::is_open(local, margin) {
+            } else if ill_scaled || settlement::needs_settling(local, margin) {
                 // Where its margin reaches over the leaf's border, or the patch has few digits, `f64` cannot say
                 // whose root it is.
                 self.settle(query, clipping.index, found, margin);

@@ -58,7 +58,7 @@ impl Leaf {
         &pool[self.net as usize..self.net as usize + n]
     }
 
-    /// Turns local parameters of the leaf into those of its patch.
+    /// Maps the leaf's parameters, 0 to 1 in each direction, to its patch's, likewise 0 to 1; the inverse of [`Self::leaf_parameters`].
     #[inline]
     pub(super) fn patch_parameters(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.rect;

@@ -26,7 +26,7 @@ const WORK: u32 = 40;
 
 /// Whether the place of a root with this margin, both in parameters of its leaf, must be settled in 32 digits.
 #[inline(always)]
-pub(super) fn is_open(local: [f64; 2], margin: [f64; 2]) -> bool {
+pub(super) fn needs_settling(local: [f64; 2], margin: [f64; 2]) -> bool {
     let open = |x: f64, margin: f64| margin > LOOSE || margin > AMBIGUOUS && !(x > margin && x < 1.0 - margin);
     open(local[0], margin[0]) || open(local[1], margin[1])
 }

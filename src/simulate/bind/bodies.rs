@@ -3,7 +3,7 @@
 use super::bound_scene::BoundScene;
 use super::chosen::ChosenRules;
 use super::nearest::face_bounds;
-use super::notes::is_open;
+use super::notes::belongs_to_open_shell;
 use crate::math::{Aabb, BoxTree};
 use crate::model::Model;
 use crate::optics;
@@ -54,7 +54,7 @@ pub(super) fn find_bodies(
                 bodies.len() - 1
             }
         };
-        bodies[body].open |= is_open(&f, model);
+        bodies[body].open |= belongs_to_open_shell(&f, model);
         bodies[body].bounds = bodies[body].bounds.union(face_bounds(&f));
         of_face[f.id.index()] = body as u32;
     }

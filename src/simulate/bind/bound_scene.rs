@@ -57,12 +57,12 @@ impl BoundScene {
         self.bodies.get(body as usize).map(|b| [b.name.as_str(), b.medium.as_str()])
     }
 
-    /// Returns how many faces the scene has listed, of those that absorb and let out most.
+    /// Returns how many faces are listed in the results, ranked by the power that they absorb and let out.
     pub(crate) fn listed_faces(&self) -> usize {
         self.scene.run.faces as usize
     }
 
-    /// Whether the scene asks what passes each face.
+    /// Whether the run tallies the power that enters and leaves through each face: `run.faces` is above 0.
     pub(crate) fn counts_faces(&self) -> bool {
         self.scene.run.faces > 0
     }

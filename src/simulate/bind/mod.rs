@@ -1,7 +1,6 @@
 //! A scene bound to a model: what every placed face does to light, as tables indexed by [`FaceId`](crate::math::FaceId).
 //!
-//! Inner modules, each of which sees only those before it: `bound_scene`, `nearest`, `contacts`, `role`, `select`, `luminous`,
-//! `face_selectors`, `frames`, `chosen`, `rule_table`, `materials`, `notes`, `bodies`, `wavelengths`, and this file, which binds.
+//! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 
 mod bodies;
 mod bound_scene;

@@ -140,7 +140,7 @@ pub(super) fn replaced_rules_note(rules: &[RuleFaces]) -> Option<String> {
 }
 
 /// Whether a face belongs to no closed shell; `false` for ready meshes, of which that is not known.
-pub(super) fn is_open(f: &PlacedFace<'_>, model: &Model) -> bool {
+pub(super) fn belongs_to_open_shell(f: &PlacedFace<'_>, model: &Model) -> bool {
     f.face.is_some() && f.shell.is_none_or(|s| !model.part(f.part).shells[s].closed)
 }
 
@@ -148,7 +148,8 @@ pub(super) fn is_open(f: &PlacedFace<'_>, model: &Model) -> bool {
 /// where all are closed.
 pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> {
     let open = |f: &PlacedFace<'_>| {
-        is_open(f, model) && bound.faces.get(f.id.index()).is_some_and(|optics| optics.body != AMBIENT)
+        belongs_to_open_shell(f, model)
+            && bound.faces.get(f.id.index()).is_some_and(|optics| optics.body != AMBIENT)
     };
     let faces: Vec<PlacedFace<'_>> = model.placed_faces().filter(open).collect();
     let first = faces.first()?;

@@ -1,7 +1,6 @@
 //! Sources in the form that makes rays.
 //!
-//! Inner modules, each of which sees only those before it: `own_wavelengths`, `ray_list`, `measured`, `stream`, `cover`, `area`, `shape`,
-//! this file with `far`, `packet`, `simd_dispatch`, `sampler`.
+//! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 
 mod area;
 mod cover;

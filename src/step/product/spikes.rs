@@ -164,7 +164,8 @@ impl Spikes<'_, '_, '_> {
         Some(if reversed { [b, a] } else { [a, b] })
     }
 
-    /// Returns the first two uses that follow each other, but for edges without length, of which one runs back along the other.
+    /// Returns the first two successive uses of which one retraces the other; edges of no length are skipped, and the last use precedes
+    /// the first.
     fn find(&self, uses: &[Use]) -> Option<Retraced> {
         let places: Vec<usize> = (0..uses.len()).filter(|&k| self.has_length(uses[k].0)).collect();
         let pairs = (0..places.len()).map(|k| [places[k], places[(k + 1) % places.len()]]);

@@ -65,12 +65,12 @@ impl Styles {
         self.colours.get(&item).copied()
     }
 
-    /// Whether an occurrence shows an item in a colour of its own.
+    /// Whether some occurrence overrides this item's colour (a style by context); elsewhere the item keeps the one of [`Self::colour`].
     pub(crate) fn is_overridden(&self, item: u64) -> bool {
         self.overridden.contains(&item)
     }
 
-    /// Returns the layer on which an item is put itself; `None` for none.
+    /// Returns the name of the layer that an item itself is assigned to, the last in the file if there are several; `None` without one.
     pub(crate) fn layer(&self, item: u64) -> Option<Arc<str>> {
         self.layers.get(&item).cloned()
     }

@@ -30,6 +30,9 @@ pub enum Grade {
     Wrong,
 }
 
+/// Roundings of the ray and of the model that a truth's margin must exceed to be held against an intersector.
+const ROUNDINGS: f64 = 8.0;
+
 /// One line of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
@@ -148,11 +151,11 @@ impl Grader<'_> {
         if self.unsure_miss(ray) { Grade::Flagged } else { Grade::Wrong }
     }
 
-    /// Whether the truth hangs on less than the intersector promises: the last bits of the input, and on the spline the band along trims.
-    fn is_open(&self, truth: &Truth, resolution: f64) -> bool {
+    /// Whether the truth is too close to call: its margin is within the rounding of the input, plus the trim band on a trimmed spline.
+    fn is_undecided(&self, truth: &Truth, resolution: f64) -> bool {
         let trimmed = self.geometry == Geometry::Spline && !self.scene.case.loops.is_empty();
         let band = if trimmed { TRIM_BAND / self.scene.frame.scale } else { 0.0 };
-        truth.margin <= 8.0 * resolution + band
+        truth.margin <= ROUNDINGS * resolution + band
     }
 
     /// Asks a question and grades the answer.
@@ -186,7 +189,7 @@ impl Grader<'_> {
     /// Grades a first hit on the spline: right to the last digits, or flagged where it says that it is not proved.
     fn first_on_spline(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
         let resolution = self.scene.resolution(ray, truth.distance());
-        let open = self.is_open(truth, resolution);
+        let open = self.is_undecided(truth, resolution);
         let right = match (truth.t, hit) {
             (None, None) => true,
             (Some(_), None) => open,

@@ -225,7 +225,9 @@ impl DeviationBounds {
         &self.net
     }
 
-    /// Sets `deviation` to the Bernstein coefficients of A − W·L of the same degree, where all weights are the same; `l` as below.
+    /// Sets `deviation` to the Bernstein coefficients of A − W·L in the patch's own degree; all weights must be equal, and L affine.
+    ///
+    /// `l` are L's values at the rectangle's corners (0,0), (1,0), (0,1), (1,1); the last follows from the others and is not read.
     fn subtract_keeping_degree(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
         let (s, t) = ((l[1] - l[0]) / p as f64, (l[2] - l[0]) / q as f64);
         self.deviation.clear();
@@ -241,7 +243,7 @@ impl DeviationBounds {
         self.deviation.clear();
         self.deviation.resize((p + 2) * (q + 2), Point::ZERO);
         let (pi, qi) = (1.0 / (p + 1) as f64, 1.0 / (q + 1) as f64);
-        // L is bilinear: its product with W has degrees (p + 1, q + 1), to which A is raised on the way.
+        // As a bilinear net L raises W by one degree in each direction; A is raised alongside.
         for i in 0..=p {
             let (before, after) = ((p + 1 - i) as f64 * pi, (i + 1) as f64 * pi);
             for j in 0..=q {

@@ -239,9 +239,9 @@ fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
             chosen.push(c);
         }
     }
-    let is_open = |c: usize, taken: &[bool]| candidates[c].triangles.iter().all(|&t| !taken[t]);
+    let is_free = |c: usize, taken: &[bool]| candidates[c].triangles.iter().all(|&t| !taken[t]);
     let only_mate = |t: usize, taken: &[bool]| {
-        let mut open = of.of(t).filter(|&c| is_open(c, taken));
+        let mut open = of.of(t).filter(|&c| is_free(c, taken));
         open.next().filter(|_| open.next().is_none())
     };
     let mut lonely: Vec<usize> = (0..taken.len()).rev().collect();
@@ -254,7 +254,7 @@ fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
                 Some(c) => c,
                 None => continue,
             },
-            None => match rest.find(|&c| is_open(c, taken)) {
+            None => match rest.find(|&c| is_free(c, taken)) {
                 Some(c) => c,
                 None => return chosen,
             },

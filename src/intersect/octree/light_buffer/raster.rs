@@ -168,7 +168,7 @@ fn least_edge(p: [f64; 2], q: [f64; 2], sign: f64, window: &Window) -> f64 {
     dx * (y - p[1]) - dy * (x - p[0])
 }
 
-/// Whether a triangle and a window have a point in common: neither the window's sides nor the triangle's part them.
+/// Whether a triangle and a window may have a point in common: `false` is certain; a triangle seen edge on is tested by its box alone.
 fn triangle_overlaps(t: [[f64; 2]; 3], window: &Window) -> bool {
     for a in 0..2 {
         let beyond = |past: &dyn Fn(f64) -> bool| t.iter().all(|p| past(p[a]));
