@@ -1,5 +1,6 @@
 //! Where the beam is aimed before it is measured: the cut-off goes to the place that the regulation names.
 
+use super::few_rays::SIGMAS;
 use super::map::{IntensityMap, Measurement, Sensor};
 use super::table::CutOff;
 
@@ -39,8 +40,8 @@ const SCAN_H_DEG: f64 = 5.0;
 /// steepest where the last ray of a simulation fell, not at the edge of the light.
 const DARK_SHARE: f64 = 0.01;
 
-/// Standard errors by which an edge must be steeper than another place to be the edge for sure, and within which its own place lies.
-pub(super) const SIGMAS: f64 = 3.0;
+/// Share of an edge's gradient from which on a place beside it counts to its middle: half of it, as for the width of a peak.
+const SHARE_OF_EDGE: f64 = 0.5;
 
 /// Places nearer than this to an edge are part of it, degrees.
 const SAME_EDGE_DEG: f64 = 2.5 * STEP_DEG;
@@ -121,9 +122,9 @@ impl Aim {
                 )
             }
             Some(elbow) => {
-                format!("{vertical}; no elbow on 0.2° down, sideways as placed{}", doubt(elbow, "elbow"))
+                format!("{vertical}; no elbow at V = {ELBOW_V_DEG}°, sideways as placed{}", doubt(elbow, "elbow"))
             }
-            None => format!("{vertical}; no elbow on 0.2° down, sideways as placed"),
+            None => format!("{vertical}; no elbow at V = {ELBOW_V_DEG}°, sideways as placed"),
         };
         let reach = SIGMAS * edge.position_error;
         rivals.extend([-reach, reach].map(|d| [h_deg, v_deg + d]).into_iter().filter(|_| reach > 0.0));
@@ -201,7 +202,7 @@ impl Scan {
         let is_same = |s: &&Slope| (s.angle - best.angle).abs() < SAME_EDGE_DEG;
         // Neighbours of the steepest place share in it: its centre is the mean of those within a step, weighed by their gradient.
         let near: Vec<&Slope> =
-            slopes.iter().filter(is_same).filter(|s| s.gradient > 0.5 * best.gradient).collect();
+            slopes.iter().filter(is_same).filter(|s| s.gradient > SHARE_OF_EDGE * best.gradient).collect();
         let weight: f64 = near.iter().map(|s| s.gradient).sum();
         let mean = near.iter().map(|s| s.gradient * s.angle).sum::<f64>() / weight;
         let position = if weight > 0.0 { mean } else { best.angle };

@@ -22,6 +22,10 @@ pub struct RaySample {
     pub replicates: u32,
 }
 
+/// Combined standard errors that make sure: between a value and its limit for a verdict, between an edge and another place that might be
+/// it, and around the place of an edge.
+pub(super) const SIGMAS: f64 = 3.0;
+
 /// From so many replicates on an error of three is as good as that of endlessly many: beyond it lie 0.16 % for 0.135 %.
 pub(super) const MANY_REPLICATES: u32 = 100;
 
@@ -77,7 +81,7 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// Returns the distance, cd, that the truth keeps below at the one-sided confidence of so many standard errors, after `growth` times
+    /// Returns the distance, cd, within which the truth lies at the one-sided confidence of so many standard errors, after `growth` times
     /// the rays.
     pub(super) fn reach(&self, sigmas: f64, growth: f64) -> f64 {
         let t = student(sigmas, self.replicates);
@@ -195,8 +199,8 @@ mod tests {
         assert_eq!(student(3.0, 128), 3.0);
     }
 
-    /// Nets of 10⁴ and 10⁶ rays of one weight that bring 1000 cd, with a fifth of the variance of chance: what may be missing falls with the
-    /// root of the rays, and a lone heavy ray may be missing altogether.
+    /// Nets of 10⁴ and 10⁶ rays of one weight that bring 1000 cd, with a fifth of the variance of chance: what may be missing falls with
+    /// the root of the rays, and a lone heavy ray may be missing altogether.
     #[test]
     fn light_that_might_be_missing_falls_with_more_rays() {
         let reach = |rays: f64, growth: f64| {

@@ -1,6 +1,6 @@
 //! When a reading is enough for a verdict, and what would make it so.
 
-use super::few_rays::Noise;
+use super::few_rays::{Noise, SIGMAS};
 use super::map::Reading;
 use super::requirement::{Comparison, Photometer, Requirement};
 use crate::math::error_of_maximum;
@@ -41,9 +41,6 @@ pub struct Settles {
     /// Tolerance of the facets, mm, where the geometric error must come down too.
     pub tolerance_mm: Option<f64>,
 }
-
-/// Combined standard errors between a value and its limit that make a verdict.
-const SIGMAS: f64 = 3.0;
 
 /// Probability beyond three standard errors on one side.
 const ONE_SIDED: f64 = 1.35e-3;

@@ -30,7 +30,9 @@ impl IntensityMap {
         };
         let h = needed(place(&|n| n == "H_deg"), "H_deg")?;
         let v = needed(place(&|n| n == "V_deg"), "V_deg")?;
-        let intensity = needed(place(&|n| n.ends_with("_cd")), "in cd")?;
+        let intensity = place(&|n| n.ends_with("_cd")).ok_or(
+            "no column of candela: set `unit = \"lm\"` in [run], or `channels = \"photometric\"` on the far field",
+        )?;
         // Of a run in watts the intensity is a channel, with errors of its own beside those of the power.
         let own = |error: &str| place(&|n| n.strip_prefix(names[intensity]).is_some_and(|rest| rest == error));
         let of_channel = own("_standard_error");
@@ -62,22 +64,37 @@ impl IntensityMap {
         }
         // A cell that is missing makes the count wrong.
         if cells.len() != columns.len() * rows.len() {
-            return Err(format!("{} cells are no grid of {} × {}", cells.len(), columns.len(), rows.len()));
+            let needed = columns.len() * rows.len();
+            return Err(format!(
+                "the file has {} cells where its {} values of H and {} of V need {needed}: rows are missing, write it anew",
+                cells.len(),
+                columns.len(),
+                rows.len()
+            ));
         }
-        let edges = |centres: BTreeMap<i64, f64>| edges_between(&centres.into_values().collect::<Vec<_>>());
-        let (h_edges, v_edges) = (edges(columns)?, edges(rows)?);
+        let edges =
+            |axis, centres: BTreeMap<i64, f64>| edges_between(axis, &centres.into_values().collect::<Vec<_>>());
+        let (h_edges, v_edges) = (edges("H", columns)?, edges("V", rows)?);
         let map = Self::new(h_edges, v_edges, cells.into_values().collect())?;
         Ok(rays.into_iter().fold(map, Self::with_rays))
     }
 }
 
 /// The edges of cells of equal width from their rising centres, degrees; an error for fewer than two or unequal steps.
-fn edges_between(centres: &[f64]) -> Result<Vec<f64>, String> {
-    let [first, .., last] = centres else { return Err("a far field of one cell is no map".into()) };
+fn edges_between(axis: &str, centres: &[f64]) -> Result<Vec<f64>, String> {
+    let [first, .., last] = centres else {
+        return Err(format!("{axis} has one value: a far field needs at least two cells each way"));
+    };
     // The mean step: single differences carry the rounding of two decimals.
     let step = (last - first) / (centres.len() - 1) as f64;
-    if centres.windows(2).any(|c| (c[1] - c[0] - step).abs() > 10.0 * SAME_CENTRE_DEG) {
-        return Err("its cells are not of equal width".into());
+    if let Some(c) = centres.windows(2).find(|c| (c[1] - c[0] - step).abs() > 10.0 * SAME_CENTRE_DEG) {
+        return Err(format!(
+            "the cells along {axis} are not of equal width: {step:.3}° on average, but {:.3}° from {} to {}; trace a far field with one \
+             width of cells",
+            c[1] - c[0],
+            c[0],
+            c[1]
+        ));
     }
     Ok((0..=centres.len()).map(|k| first + step * (k as f64 - 0.5)).collect())
 }
@@ -126,12 +143,17 @@ mod tests {
             ("", "empty"),
             ("x_mm,y_mm,illuminance_lx,standard_error\n1,2,3,4\n", "H_deg"),
             ("H_deg,V_deg,luminous_intensity_cd,standard_error\n0,0,1,x\n", "line 2"),
-            ("H_deg,V_deg,luminous_intensity_cd,standard_error\n0,0,1,1\n1,0,1,1\n0,1,1,1\n", "no grid"),
+            (
+                "H_deg,V_deg,luminous_intensity_cd,standard_error\n0,0,1,1\n1,0,1,1\n0,1,1,1\n",
+                "3 cells where its 2 values of H and 2 of V need 4",
+            ),
             ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,1,1\n0,1,1,1\n1,1,1,1\n1,0,2,1\n", "line 6"),
             (
                 "H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,1,1\n3,0,1,1\n0,1,1,1\n1,1,1,1\n3,1,1,1\n",
-                "equal width",
+                "along H are not of equal width: 1.500° on average, but 1.000° from 0 to 1",
             ),
+            ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,1,1\n", "V has one value"),
+            ("H_deg,V_deg,radiant_intensity_W_per_sr,standard_error\n0,0,1,1\n", "channels = \"photometric\""),
             ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,NaN,1\n0,1,1,1\n1,1,1,1\n", "finite"),
         ] {
             let error = IntensityMap::from_csv(text, None).unwrap_err();

@@ -1,7 +1,8 @@
 //! A lamp measured by a regulation: aimed, read row by row, realigned where the regulation allows it.
 
-use super::aim::{Aim, SIGMAS};
+use super::aim::Aim;
 use super::assessment::{Assessment, Assumptions};
+use super::few_rays::SIGMAS;
 use super::judgement::Verdict;
 use super::map::{IntensityMap, Sensor};
 use super::requirement::Photometer;

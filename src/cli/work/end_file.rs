@@ -9,7 +9,7 @@ use crate::report::grouped;
 use crate::simulate::{ListedEnd, MOST_LISTED_RAYS, RunSettings, listed_ends, ray_lists};
 use std::path::Path;
 
-/// The arrays of an NPZ file, one row an end.
+/// The arrays of an NPZ file, one row per end.
 const COLUMNS: [Column; 9] = [
     Column { name: "source", numbers: "<u4", bytes: 4, width: 1 },
     Column { name: "ray", numbers: "<u8", bytes: 8, width: 1 },

@@ -6,7 +6,7 @@ use crate::simulate::PathVertex;
 use std::path::Path;
 use std::sync::Mutex;
 
-/// The arrays of the file, one row a vertex.
+/// The arrays of the file, one row per vertex.
 const COLUMNS: [Column; 6] = [
     Column { name: "ray", numbers: "<u8", bytes: 8, width: 1 },
     Column { name: "branch", numbers: "<u4", bytes: 4, width: 1 },

@@ -37,7 +37,7 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     )
 }
 
-/// Makes a table with one row a case, its variants added up: the numbers of right / flagged / wrong answers of every intersector.
+/// Makes a table with one row per case, its variants added up: the numbers of right / flagged / wrong answers of every intersector.
 fn case_table(rows: &[&Value]) -> Table {
     let names = distinct(rows, "intersector");
     let columns: Vec<(&str, &str)> =

@@ -3,7 +3,7 @@
 //! The square of a measured difference exceeds that of the true one by its variance, so sums of `d² − s²` over many cells tell a
 //! geometric error that no single cell could.
 
-use super::paired::Paired;
+use super::paired::{Paired, SIGNIFICANT};
 use super::replicates::{ReplicateSums, ReplicatedRun};
 use crate::math::{error_of_sum, variance_of_sum};
 use crate::simulate::BoundScene;
@@ -190,7 +190,7 @@ impl<'r> CellPairs<'r> {
         let excess: f64 = self.cells_of(block).map(|c| self.cells[c].excess() * unit(c).powi(2)).sum();
         let chance: f64 =
             self.cells_of(block).map(|c| 2.0 * (self.cells[c].difference_variance * unit(c).powi(2)).powi(2)).sum();
-        let blurred = ((excess - 3.0 * chance.sqrt()).max(0.0) / count).sqrt();
+        let blurred = ((excess - SIGNIFICANT * chance.sqrt()).max(0.0) / count).sqrt();
         let variance: f64 = self.cells_of(block).map(|c| self.cells[c].spline_variance * unit(c).powi(2)).sum();
         let density = Paired { facets, spline, error: if side > 1 { noise.hypot(blurred) } else { noise } };
         // A ring about a pole is one place, which is known as well as all its cells together.

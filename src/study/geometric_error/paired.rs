@@ -2,6 +2,9 @@
 
 use serde::{Serialize, Serializer};
 
+/// Standard errors beyond which a difference is one: by chance alone once in 370 times.
+pub(super) const SIGNIFICANT: f64 = 3.0;
+
 /// A figure on facets and on the spline.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Paired {
@@ -23,7 +26,7 @@ impl Paired {
 
     /// Whether rays can tell the difference from none: it is beyond three of its standard errors.
     pub fn is_significant(&self) -> bool {
-        (self.facets - self.spline).abs() > 3.0 * self.error
+        (self.facets - self.spline).abs() > SIGNIFICANT * self.error
     }
 }
 
