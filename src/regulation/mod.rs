@@ -23,6 +23,8 @@ mod requirement;
 mod row;
 mod row_verdict;
 mod table;
+#[cfg(test)]
+mod test_lamps;
 mod verdict;
 
 pub use aim::Aim;

@@ -149,37 +149,9 @@ fn assess_aimed(
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_lamps::{edges, map, passing};
     use super::*;
     use crate::regulation::assessment::RowVerdict;
-
-    fn edges(half: f64, cell: f64) -> Vec<f64> {
-        let cells = (2.0 * half / cell).round() as usize;
-        (0..=cells).map(|k| -half + 2.0 * half * k as f64 / cells as f64).collect()
-    }
-
-    /// A far field of ±10° by ±6° in cells of 0.1°, with relative errors.
-    fn map(intensity: impl Fn(f64, f64) -> f64, statistical: f64, geometric: f64) -> IntensityMap {
-        let (h, v) = (edges(10.0, 0.1), edges(6.0, 0.1));
-        let middles = |e: &[f64]| e.windows(2).map(|e| 0.5 * (e[0] + e[1])).collect::<Vec<_>>();
-        let columns = middles(&h);
-        let cells =
-            middles(&v).into_iter().flat_map(|v| columns.iter().map(|h| intensity(*h, v)).collect::<Vec<_>>());
-        let cells = cells.map(|i| [i, statistical * i, geometric * i]).collect();
-        IntensityMap::new(h, v, cells).unwrap()
-    }
-
-    /// A passing beam for right-hand traffic: a flat cut-off to the left, 15° up to the right of the elbow, brightest below it.
-    fn passing(h0: f64, v0: f64) -> impl Fn(f64, f64) -> f64 {
-        move |h, v| {
-            let (h, v) = (h - h0, v - v0);
-            let cut_off = if h < 0.0 { -0.57 } else { (-0.57 + h * 15f64.to_radians().tan()).min(1.2) };
-            // A soft edge of about 0.1°.
-            let edge = 1.0 / (1.0 + ((v - cut_off) / 0.05).exp());
-            let hot = 30_000.0 * (-(h / 6.0).powi(2) - ((v + 1.0) / 0.9).powi(2)).exp();
-            let wide = 4_500.0 * (-(h / 16.0).powi(2) - ((v + 1.5) / 2.5).powi(2)).exp();
-            200.0 + edge * (hot + wide)
-        }
-    }
 
     fn row(assessment: &Assessment, id: &str) -> RowVerdict {
         assessment.rows.iter().find(|r| r.row.id == id).unwrap().clone()

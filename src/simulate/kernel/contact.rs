@@ -64,7 +64,8 @@ fn probe_at(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Ray {
         .with_departure(at.departure())
 }
 
-/// Goes through the faces that a short ray meets, in order, at most [`MOST_COINCIDENT_FACES`] of them; ends at a face that the scene does not know.
+/// Goes through the faces that a short ray meets, in order, at most [`MOST_COINCIDENT_FACES`] of them; ends at a face that the scene does
+/// not know.
 ///
 /// An intersector may give a root once more, moved up to where it is asked from by rounding; it is asked from a little farther on then.
 /// Without that, light that was reflected beside an edge of a touching body was lost on the spline: the face that stands across came six

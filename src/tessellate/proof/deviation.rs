@@ -225,9 +225,7 @@ impl DeviationBounds {
         &self.net
     }
 
-    /// Sets `deviation` to the Bernstein coefficients of A − W·L in the patch's own degree; all weights must be equal, and L affine.
-    ///
-    /// `l` are L's values at the rectangle's corners (0,0), (1,0), (0,1), (1,1); the last follows from the others and is not read.
+    /// As [`Self::subtract_raising_degree`], in the patch's own degree; all weights must be equal, and L affine: `l[3]` is not read.
     fn subtract_keeping_degree(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
         let (s, t) = ((l[1] - l[0]) / p as f64, (l[2] - l[0]) / q as f64);
         self.deviation.clear();
@@ -238,7 +236,7 @@ impl DeviationBounds {
         }));
     }
 
-    /// Sets `deviation` to those of A − W·L, one degree higher; `l` are L's values at the rectangle's corners (0,0), (1,0), (0,1), (1,1).
+    /// Sets `deviation` to the Bernstein coefficients of A − W·L, one degree higher; `l` are L's values at the rectangle's corners (0,0), (1,0), (0,1), (1,1).
     fn subtract_raising_degree(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
         self.deviation.clear();
         self.deviation.resize((p + 2) * (q + 2), Point::ZERO);
