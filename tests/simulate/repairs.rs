@@ -13,8 +13,8 @@ fn starts_that_are_not_on_their_facets_are_counted() {
             |z: f64| Shape::Rectangle { frame: Frame::translation(Point::new(0.0, 0.0, z)), half: [50.0, 50.0] };
         world.part("led", false, &[("top", at(0.0))]);
         world.shapes[0] = at(height);
-        let text = format!("[run]\nrays = 1000\n[[source]]\nkind = 'lambertian'\non = {{ part = 'led' }}\n");
-        let found = world.run(&text, |_| ());
+        let text = "[run]\nrays = 1000\n[[source]]\nkind = 'lambertian'\non = { part = 'led' }\n";
+        let found = world.run(text, |_| ());
         assert_eq!(found.tallies.counts.misplaced_starts, misplaced);
         assert_eq!(found.notes.iter().any(|note| note.contains("started on the spline")), misplaced > 0);
     }

@@ -64,9 +64,8 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
     let mut certain = true;
     let mut segment = Ray { t_max: f64::INFINITY, ..*ray };
     let mut faces = 0;
-    loop {
-        // Straight out of the scene: what is left without having been entered must have been around the start, whatever the shapes are.
-        let Some(hit) = context.intersector.intersect(&segment, &mut Cost::default()) else { break };
+    // Straight out of the scene: what is left without having been entered must have been around the start, whatever the shapes are.
+    while let Some(hit) = context.intersector.intersect(&segment, &mut Cost::default()) {
         if faces == MOST_FACES_ON_WAY_OUT {
             certain = false;
             break;

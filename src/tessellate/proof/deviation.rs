@@ -236,7 +236,7 @@ impl DeviationBounds {
         }));
     }
 
-    /// Sets `deviation` to the Bernstein coefficients of A − W·L, one degree higher; `l` are L's values at the rectangle's corners (0,0), (1,0), (0,1), (1,1).
+    /// Sets `deviation` to A − W·L in Bernstein form, one degree higher; `l` are L's values at the corners (0,0), (1,0), (0,1), (1,1).
     fn subtract_raising_degree(&mut self, [p, q]: [usize; 2], l: [Point; 4]) {
         self.deviation.clear();
         self.deviation.resize((p + 2) * (q + 2), Point::ZERO);
