@@ -3,7 +3,7 @@
 use crate::support::World;
 use lampyris::formats::{LightRay, write_rays};
 use lampyris::math::{Point, Vector};
-use lampyris::simulate::{Event, ListedEnd, LostCause, RunSettings, Scene, listed_ends, simulate};
+use lampyris::simulate::{Event, ListedEnd, RunSettings, Scene, listed_ends, simulate};
 
 /// The face of the first cuboid that looks down.
 const BLACK: u32 = 4;
@@ -104,22 +104,4 @@ fn parts_of_a_ray_have_rows_of_their_own() {
     for power in [0.04, 0.96 * 0.96] {
         assert!(split.iter().any(|e| (e.power - power).abs() < 1e-9), "{power}: {split:?}");
     }
-}
-
-/// A ray whose file was cut while it was in use is lost for that reason, and for no number of its own.
-#[test]
-fn rays_of_a_file_that_went_are_lost_as_unreadable() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("list.npz");
-    // More than are kept in memory.
-    write_rays(&file, &vec![ray(0.0, Vector::Z, 1.0); (1 << 16) + 1]).unwrap();
-    let text = "[run]\nrays = 64\n[[source]]\nkind = 'rays'\nfile = 'list.npz'\n";
-    let scene = Scene::parse(text, "test.toml", folder.path()).unwrap();
-    let world = World::default();
-    let bound = scene.bind(&world.model).unwrap();
-    std::fs::OpenOptions::new().write(true).open(&file).unwrap().set_len(8).unwrap();
-    let results = simulate(&bound, &world, &RunSettings::from(&scene.run), &|_| true);
-    assert_eq!(results.lost_rays, 64);
-    assert!(results.ledger.iter().all(|lost| lost.cause == LostCause::Unreadable), "{:?}", results.ledger[0]);
-    assert!(results.notes.iter().any(|note| note.contains("its ray file was changed")), "{:?}", results.notes);
 }
