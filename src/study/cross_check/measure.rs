@@ -4,6 +4,7 @@ use super::PerIntersector;
 use crate::intersect::{Cost, Intersector};
 use crate::math::Ray;
 use crate::study::{Rounds, Timing};
+use std::cell::RefCell;
 use std::hint::black_box;
 
 /// One intersector in a race.
@@ -19,21 +20,24 @@ pub struct Competitor<'a> {
 
 /// Times all competitors on the same rays, on this thread, in alternating rounds; returns seconds per pass over the rays, by name.
 pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> Vec<(String, Timing)> {
+    // One after the other they write to the same place.
+    let hits = RefCell::new(vec![None; rays.len()]);
     let mut race = Rounds::default();
     for c in competitors {
         let Competitor { who, batch, .. } = *c;
-        let mut hits = vec![None; rays.len()];
+        let hits = &hits;
         race.add(c.name, move || {
             let mut cost = Cost::default();
+            let hits = &mut *hits.borrow_mut();
             if batch {
-                who.intersect_batch(rays, &mut hits, &mut cost);
+                who.intersect_batch(rays, hits, &mut cost);
             } else {
-                for (ray, hit) in rays.iter().zip(&mut hits) {
+                for (ray, hit) in rays.iter().zip(&mut *hits) {
                     *hit = who.intersect(ray, &mut cost);
                 }
             }
             // Without it the compiler could leave out hits that nobody reads.
-            black_box(&hits);
+            black_box(hits);
         });
     }
     race.run(rounds)
