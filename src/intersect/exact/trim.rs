@@ -4,7 +4,7 @@
 //! answer for every point, however close to a curve. Uses that pass within `band` mm are named.
 
 use super::edge_use::{EdgeUse, edge_uses};
-use super::trim_piece::{TrimPiece, trim_pieces};
+use super::trim_piece::{PieceLists, TrimPiece, trim_pieces};
 use crate::intersect::prefetch;
 use crate::math::Uv;
 use crate::math::quadrature::GAUSS;
@@ -73,9 +73,9 @@ pub(super) struct Trim {
     count: [usize; 2],
     cells: Vec<Region>,
     /// Pieces that touch each row and rise or fall, for the parity.
-    rows: Vec<Vec<u32>>,
+    rows: PieceLists,
     /// Pieces near each border cell, by cell index.
-    near: rustc_hash::FxHashMap<u32, SmallVec<[u32; 6]>>,
+    near: PieceLists,
     /// The state far away: inside when the loops only cut holes.
     outside_is_inside: bool,
     /// Whether the domain is whole: no loops at all.
@@ -109,8 +109,8 @@ impl Trim {
             density: Uv::ONE / cell,
             count: [n, n],
             cells: vec![Region::Inside; n * n],
-            rows: vec![Vec::new(); n],
-            near: Default::default(),
+            rows: PieceLists::default(),
+            near: PieceLists::default(),
             outside_is_inside: false,
             whole: false,
         };
@@ -158,25 +158,32 @@ impl Trim {
 
     /// Decides the cells that no piece of a trim comes within `reach` of, in u and v, and lists the pieces of the others and of rows.
     fn fill_cells(&mut self, reach: Uv) {
-        for (k, piece) in self.pieces.iter().enumerate() {
-            let (lo, hi) = (piece.min - reach, piece.max + reach);
+        let (mut rows, mut near) = (Vec::new(), Vec::new());
+        for (k, piece) in (0u32..).zip(&self.pieces) {
             // Flat pieces cross no half-line towards +u.
-            for j in self.cell_range(lo.y, hi.y, 1) {
-                if piece.v[0] != piece.v[1] {
-                    self.rows[j].push(k as u32);
-                }
-                for i in self.cell_range(lo.x, hi.x, 0) {
-                    let cell = j * self.count[0] + i;
-                    self.cells[cell] = Region::Border;
-                    self.near.entry(cell as u32).or_default().push(k as u32);
+            if piece.v[0] != piece.v[1] {
+                rows.extend(
+                    self.cell_range(piece.min.y - reach.y, piece.max.y + reach.y, 1).map(|j| (j as u32, k)),
+                );
+            }
+            for [min, max] in piece.boxes(Uv::ONE / self.density) {
+                let (lo, hi) = (min - reach, max + reach);
+                for j in self.cell_range(lo.y, hi.y, 1) {
+                    for i in self.cell_range(lo.x, hi.x, 0) {
+                        near.push(((j * self.count[0] + i) as u32, k));
+                    }
                 }
             }
+        }
+        (self.rows, self.near) = (PieceLists::new(rows), PieceLists::new(near));
+        for &cell in &self.near.keys {
+            self.cells[cell as usize] = Region::Border;
         }
         for j in 0..self.count[1] {
             let middle = |i: usize| self.origin + Uv::new(i as f64 + 0.5, j as f64 + 0.5) / self.density;
             // Crossings of the row's middle height, once for all its cells.
             let v = middle(0).y;
-            let spanning = self.rows[j].iter().map(|&k| &self.pieces[k as usize]).filter(|p| p.spans(v));
+            let spanning = self.rows.of(j as u32).iter().map(|&k| &self.pieces[k as usize]).filter(|p| p.spans(v));
             let mut crossings: Vec<f64> = spanning.map(|p| p.u_at(v)).collect();
             crossings.sort_by(f64::total_cmp);
             for i in 0..self.count[0] {
@@ -201,7 +208,7 @@ impl Trim {
 
     /// Whether a point lies inside, by the pieces of its row that the half-line towards +u crosses.
     fn parity(&self, q: Uv, row: usize) -> bool {
-        let crossings = self.rows[row].iter().filter(|&&k| self.pieces[k as usize].crosses(q)).count();
+        let crossings = self.rows.of(row as u32).iter().filter(|&&k| self.pieces[k as usize].crosses(q)).count();
         (crossings % 2 == 1) != self.outside_is_inside
     }
 
@@ -293,7 +300,7 @@ impl Trim {
         let reach = band * Uv::new((metric[2] / determinant).sqrt(), (metric[0] / determinant).sqrt());
         let mut near: SmallVec<[Near; 2]> = SmallVec::new();
         // A box test first: the nearest point takes iterations.
-        for &k in self.near.get(&(cell as u32)).into_iter().flatten() {
+        for &k in self.near.of(cell as u32) {
             let piece = &self.pieces[k as usize];
             let outside = q.x < piece.min.x - reach.x
                 || q.y < piece.min.y - reach.y

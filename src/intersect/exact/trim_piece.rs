@@ -3,7 +3,7 @@
 use crate::math::Uv;
 use crate::model::Face;
 use glam::DVec3;
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
 /// The height of a trim is solved to this step of the piece's parameter, five ulps of its middle.
 const HEIGHT_STEP: f64 = 1e-15;
@@ -70,6 +70,28 @@ impl TrimPiece {
         }
     }
 
+    /// Boxes, by their low and high corners, that together hold the piece, each no longer than `longest` in u and v unless that took too
+    /// many: the hull of a curve, which was cut so short, and those of parts of a line.
+    pub(super) fn boxes(&self, longest: Uv) -> SmallVec<[[Uv; 2]; 1]> {
+        let mut boxes: SmallVec<[[Uv; 2]; 1]> = smallvec![[self.min, self.max]];
+        let [from, to] = self.points[..] else { return boxes };
+        boxes.clear();
+        let mut stack: SmallVec<[(DVec3, DVec3, u32); 16]> = smallvec![(from, to, 0)];
+        while let Some((from, to, depth)) = stack.pop() {
+            let [a, b] = [from, to].map(|p| p.truncate() / p.z);
+            let size = (b - a).abs();
+            if (size.x <= longest.x && size.y <= longest.y) || depth >= SHORTENED {
+                // Its ends may be moved to its neighbours' by rounding.
+                boxes.push([a.min(b).max(self.min), a.max(b).min(self.max)]);
+                continue;
+            }
+            let middle = 0.5 * (from + to);
+            stack.push((middle, to, depth + 1));
+            stack.push((from, middle, depth + 1));
+        }
+        boxes
+    }
+
     /// Surface parameters and their derivative at `t` in `[0, 1]`.
     pub(super) fn evaluate(&self, t: f64) -> (Uv, Uv) {
         let n = self.points.len() - 1;
@@ -89,6 +111,12 @@ impl TrimPiece {
     pub(super) fn u_at(&self, v: f64) -> f64 {
         // Newton's method inside of a bracket, which a monotone piece allows: it ends whatever the slope.
         let (mut lo, mut hi) = (0.0, 1.0);
+        if let [from, to] = self.points[..] {
+            // A line in closed form, by its own ends: those of the piece may be moved to its neighbours' by rounding.
+            let (before, behind) = (v * from.z - from.y, to.y - v * to.z);
+            let t = before / (before + behind);
+            return self.evaluate(if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.5 }).0.x;
+        }
         let rising = self.v[1] > self.v[0];
         let mut t = ((v - self.v[0]) / (self.v[1] - self.v[0])).clamp(0.0, 1.0);
         let mut u = 0.0;
@@ -157,8 +185,8 @@ impl TrimPiece {
     }
 }
 
-/// Cuts all loops of a face into pieces monotone in v and no longer than `longest` in u and v, with bit-equal heights at joints. Pieces
-/// that are not finite or not positive in weight are left out; absurdly long or wild ones stay as they are.
+/// Cuts all loops of a face into pieces monotone in v and, but for straight ones, no longer than `longest` in u and v, with bit-equal
+/// heights at joints. Pieces that are not finite or not positive in weight are left out; absurdly long or wild ones stay as they are.
 pub(super) fn trim_pieces(face: &Face, longest: Uv) -> Vec<TrimPiece> {
     let mut all = Vec::new();
     let mut owner = 0;
@@ -191,6 +219,7 @@ pub(super) fn trim_pieces(face: &Face, longest: Uv) -> Vec<TrimPiece> {
             next.update_hull();
         }
     }
+    all.shrink_to_fit();
     all
 }
 
@@ -222,9 +251,9 @@ fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, side: LoopSide
         let hull = (0..=n).fold((at(0), at(0)), |(lo, hi), k| (lo.min(at(k)), hi.max(at(k))));
         let size = hull.1 - hull.0;
         let flat = size.y < FLAT * (longest.y + hull.1.y.abs());
-        // Curves far longer than the domain, and more pieces than any real trim has, stay as they are: no input may cost
-        // more than this.
-        let short = (size.x <= longest.x && size.y <= longest.y) || depth >= SHORTENED;
+        // Of a line the height and the foot are closed forms at any length. Curves far longer than the domain, and more pieces than any
+        // real trim has, stay as they are: no input may cost more than this.
+        let short = n == 1 || (size.x <= longest.x && size.y <= longest.y) || depth >= SHORTENED;
         if ((monotone || flat) && short) || depth >= DEEPEST || out.len() > first + MOST {
             out.push(TrimPiece::new(points, range, side));
             continue;
@@ -243,5 +272,44 @@ fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, side: LoopSide
         // The low part comes off the stack first, so that parts come out in the order of the curve.
         stack.push(CurvePart { points: high, range: [middle, range[1]], depth: depth + 1 });
         stack.push(CurvePart { points: low, range: [range[0], middle], depth: depth + 1 });
+    }
+}
+
+/// Pieces by what they are near, a row or a cell, one list behind the other: of a thousand small faces hash tables took a fifth of all.
+#[derive(Debug, Default)]
+pub(super) struct PieceLists {
+    /// Rows or cells that have pieces, rising.
+    pub(super) keys: Vec<u32>,
+    /// Where the list of each begins, and the end of the last.
+    starts: Vec<u32>,
+    pieces: Vec<u32>,
+}
+
+impl PieceLists {
+    /// Sorts pairs of a row or cell and a piece, some of which may be there more than once.
+    pub(super) fn new(mut pairs: Vec<(u32, u32)>) -> Self {
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut lists = Self { pieces: pairs.iter().map(|&(_, piece)| piece).collect(), ..Self::default() };
+        let runs = pairs.chunk_by(|a, b| a.0 == b.0);
+        let count = runs.clone().count();
+        (lists.keys, lists.starts) = (Vec::with_capacity(count), Vec::with_capacity(count + 1));
+        lists.starts.push(0);
+        let mut end = 0;
+        for run in runs {
+            end += run.len() as u32;
+            lists.keys.push(run[0].0);
+            lists.starts.push(end);
+        }
+        lists
+    }
+
+    /// The pieces of a row or cell, rising.
+    #[inline]
+    pub(super) fn of(&self, key: u32) -> &[u32] {
+        match self.keys.binary_search(&key) {
+            Ok(k) => &self.pieces[self.starts[k] as usize..self.starts[k + 1] as usize],
+            Err(_) => &[],
+        }
     }
 }
