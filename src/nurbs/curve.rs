@@ -138,7 +138,7 @@ impl<P: ControlPoint> Spline<P> {
     }
 
     /// Homogeneous point at `t`, which is clamped to the domain.
-    pub(super) fn homogeneous_at(&self, t: f64) -> P {
+    pub(crate) fn homogeneous_at(&self, t: f64) -> P {
         self.homogeneous::<0>(t)[0]
     }
 

@@ -47,12 +47,7 @@ impl BezierPatch {
         };
         // columns[j][span][i]: Bézier points in u of every column of control points.
         let columns: Vec<Vec<Vec<Homogeneous>>> = (0..nv).map(|j| column(j).bezier_pieces()).collect();
-        let breaks = |d: usize| {
-            let mut b = surface.knots[d][surface.degree[d]..=[nu, nv][d]].to_vec();
-            b.dedup();
-            b
-        };
-        let (us, vs) = (breaks(0), breaks(1));
+        let (us, vs) = (surface.breakpoints(0), surface.breakpoints(1));
         let mut patches = Vec::with_capacity((us.len() - 1) * (vs.len() - 1));
         // First in u, then each row in v: knot insertion in one direction does not see the other.
         for a in 0..us.len() - 1 {

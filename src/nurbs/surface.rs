@@ -98,10 +98,22 @@ impl Surface {
         Uv::new(uv.x.clamp(u0, u1), uv.y.clamp(v0, v1))
     }
 
+    /// The distinct knots of the domain in `direction`, 0 for u and 1 for v, both ends included.
+    pub fn breakpoints(&self, direction: usize) -> Vec<f64> {
+        let mut breaks = self.knots[direction][self.degree[direction]..=self.counts()[direction]].to_vec();
+        breaks.dedup();
+        breaks
+    }
+
     /// Position at `uv`, which is clamped to the domain.
     pub fn evaluate(&self, uv: Uv) -> Point {
+        self.homogeneous_at(uv).project()
+    }
+
+    /// Homogeneous point at `uv`, which is clamped to the domain.
+    pub(crate) fn homogeneous_at(&self, uv: Uv) -> Homogeneous {
         let [a] = self.sums::<0, 1>(uv);
-        a.project()
+        a
     }
 
     /// Position and first derivatives at `uv`, which is clamped to the domain.

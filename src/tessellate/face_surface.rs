@@ -75,13 +75,7 @@ impl<'a> FaceSurface<'a> {
     /// Lays out a face's surface; `flip` where the face looks against Su × Sv. The tolerance is lowered on small surfaces closed in both
     /// directions, of which it would leave nothing. Gap unknown and steps unlimited, for the caller to set.
     pub(super) fn new(surface: &'a Surface, flip: bool, field: ToleranceField) -> Self {
-        let breaks = [0, 1].map(|d| {
-            let n = surface.counts()[d];
-            let mut b = surface.knots[d][surface.degree[d]..=n].to_vec();
-            // Knots of any multiplicity are one break.
-            b.dedup();
-            b
-        });
+        let breaks = [0, 1].map(|d| surface.breakpoints(d));
         let sharper = |least: f64| [0, 1].map(|d| crease_knots(surface, d, &breaks, least));
         let creases = sharper(BENT);
         // Most surfaces have no creases at all, and need not be looked at twice.

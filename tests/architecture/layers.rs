@@ -365,6 +365,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "curvature",
             "blossom",
             "fit",
+            "interpolation",
             "project",
             "sanitise",
             "sweep",

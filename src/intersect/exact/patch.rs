@@ -42,12 +42,7 @@ impl PatchGrid {
     /// Finds the breaks of a face's surface, and by five points of each side where sides coincide or come to one point.
     pub(super) fn new(face: &Face) -> Self {
         let s = &face.surface;
-        let counts = s.counts();
-        let breaks = [0, 1].map(|d| {
-            let mut b = s.knots[d][s.degree[d]..=counts[d]].to_vec();
-            b.dedup();
-            b
-        });
+        let breaks = [0, 1].map(|d| s.breakpoints(d));
         let domain = s.domain();
         // As near as a file's nine digits put points of one place: a nanometre on a metre.
         let tolerance = SAME_POINT * (1.0 + s.bounds().diagonal());

@@ -42,16 +42,9 @@ pub(super) const GOLDEN_CUT: f64 = 0.381966;
 /// Golden sections: 0.618⁶⁰ of two samples' distance is 3e-13 of it.
 pub(super) const GOLDEN_ROUNDS: usize = 60;
 
-/// Unit normals need derivatives whose product is above this share of theirs.
-pub(super) const PARALLEL_DERIVATIVES: f64 = 1e-12;
-/// A derivative over the whole domain below this share of the other has vanished: of a collapsed row rounding leaves 1e-16 of it.
-pub(super) const VANISHING_RATIO: f64 = 1e-11;
-/// At a pole derivatives are extrapolated from this share of the domain inside, and twice as far: of their curvature 1e-8 is left, of
-/// rounding as much.
-pub(super) const POLE_STEP: f64 = 1e-4;
-/// Derivatives on one side of a knot are taken this share of the domain beside it: they change by as little.
+/// A place of a meridian nearer to the axis than this share of its size is on it.
+pub(super) const AXIS_RADIUS_SHARE: f64 = 1e-9;
+/// Normals on both sides of a knot are taken this share of the span beside it: they change by as little.
 pub(super) const SIDE_SHARE: f64 = 1e-9;
-/// Step of a difference quotient, as a share of the domain: near the cube root of the unit in the last place.
-pub(super) const DIFFERENCE_STEP: f64 = 1e-5;
 /// The worst fit of an offset that is still taken, and said.
 pub(super) const WORST_FIT_MM: f64 = 1e-2;

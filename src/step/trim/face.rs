@@ -115,15 +115,30 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
         built.push(uses);
     }
     let seams = seams.finish();
+    let fitted = matches!(chart.analytic, Analytic::Offset);
     Ok(BuiltFace {
         analytic: chart.analytic,
         reversed: !same_sense,
-        loops: built,
         seams,
         gap,
         repairs,
-        surface: region.surface,
+        surface: if fitted { part_around(&region.surface, &built) } else { region.surface },
+        loops: built,
     })
+}
+
+/// Returns the spans of a surface that hold the loops, and one more on each side, so that no trim comes to run along an end that the
+/// surface did not have: a fit has more spans than its face needs.
+fn part_around(surface: &Surface, loops: &[Vec<FaceUse>]) -> Surface {
+    let points = loops.iter().flatten().flat_map(|u| u.uv.points.iter().map(|p| p.position()));
+    let (lo, hi) = points.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let kept = [0, 1].map(|d: usize| {
+        let breaks = surface.breakpoints(d);
+        let first = breaks.partition_point(|&t| t <= lo[d]).saturating_sub(2);
+        let last = (breaks.partition_point(|&t| t < hi[d]) + 1).min(breaks.len() - 1);
+        [breaks[first.min(last - 1)], breaks[last]]
+    });
+    surface.restricted(kept)
 }
 
 /// Returns the loops with the material on their left in the chart's plane, each closed up to whole periods. `tolerance` is the distance,
