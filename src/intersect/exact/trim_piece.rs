@@ -313,3 +313,43 @@ impl PieceLists {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trim::{Region, Trim};
+    use super::*;
+    use crate::math::Frame;
+    use crate::model::{EdgeUse, TrimLoop};
+    use crate::nurbs::{UvCurve, sweep};
+
+    #[test]
+    fn straight_trims_stay_whole_and_decide_as_their_lines_do() {
+        // A square on its corner: |u − 5| + |v − 5| < 4.5.
+        let mut face = Face::whole(sweep::plane(&Frame::IDENTITY, [[0.0, 10.0]; 2]));
+        let corners = [Uv::new(5.0, 0.5), Uv::new(9.5, 5.0), Uv::new(5.0, 9.5), Uv::new(0.5, 5.0)];
+        let side = |k: usize| UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]);
+        let uses = (0..4).map(|k| EdgeUse { edge: None, reversed: false, uv: side(k) }).collect();
+        face.loops = vec![TrimLoop { uses }];
+        assert_eq!(trim_pieces(&face, Uv::splat(0.1)).len(), 4);
+        let trim = Trim::new(&face, [false; 2], 1e-6, &[]);
+        let mut borders = 0;
+        for (i, j) in (0..=211).flat_map(|i| (0..=197).map(move |j| (i, j))) {
+            let q = Uv::new(10.0 * f64::from(i) / 211.0, 10.0 * f64::from(j) / 197.0);
+            let inside = (q.x - 5.0).abs() + (q.y - 5.0).abs() < 4.5;
+            let region = trim.cell_at(q);
+            let expected = if inside { Region::Inside } else { Region::Outside };
+            assert!(
+                region == expected || region == Region::Border && trim.is_inside(q) == inside,
+                "{q} {region:?}"
+            );
+            borders += usize::from(region == Region::Border);
+        }
+        // Of 24 cells a side the lines pass four or five in each row, not all that lie in the boxes around them.
+        assert!(borders < 212 * 198 / 4, "{borders}");
+        // The nearest points within a band are those of the closed form.
+        let off = Uv::new(7.0, 2.4999999);
+        let place = trim.locate(off, [1.0, 0.0, 1.0], 1e-6);
+        assert!(!place.inside && place.near.len() == 1 && place.near[0].owner == 0);
+        assert!((place.near[0].distance - 1e-7 * std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-14);
+    }
+}
