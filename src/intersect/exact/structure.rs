@@ -27,11 +27,13 @@ pub struct Settings {
     pub budget: u32,
     /// Distance from a trim that is flagged, mm.
     pub trim_band: f64,
+    /// Most leaves: a model that takes more is cut as [`Settings::for_few_rays`] says, with at most eight halvings. `None` for any number.
+    pub most_leaves: Option<usize>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { flatness: 0.25, leaves: 250, depth: 12, budget: 8000, trim_band: 1e-6 }
+        Self { flatness: 0.25, leaves: 250, depth: 12, budget: 8000, trim_band: 1e-6, most_leaves: None }
     }
 }
 
@@ -42,22 +44,24 @@ impl Settings {
         Self { flatness: 1.0, ..Self::default() }
     }
 
-    /// Chooses by the number of rays to come: the default where it makes no more leaves than that, by a hundred to a patch, else
+    /// Chooses by the number of rays to come: the default where it makes a leaf for [`RAYS_OF_LEAF`] of them at most, else
     /// [`Settings::for_few_rays`] with at most eight halvings. On a file of 4,300 patches that is 65 MB instead of 775.
     pub fn for_rays(model: &Model, rays: u64) -> Self {
+        let leaves = rays / RAYS_OF_LEAF;
         let faces = model.placed_faces().filter_map(|f| f.face);
         let patches: u64 = faces.map(|f| patch_count(&f.surface)).sum();
-        if patches.saturating_mul(LEAVES_OF_PATCH) <= rays {
-            return Self::default();
+        // A patch in two leaves is the least that flatness could ask for.
+        if patches.saturating_mul(2) > leaves {
+            return Self { depth: SHALLOW, ..Self::for_few_rays() };
         }
-        Self { depth: SHALLOW, ..Self::for_few_rays() }
+        Self { most_leaves: Some(leaves as usize), ..Self::default() }
     }
 }
 
 /// How often a patch is halved for few rays: beside poles leaves stay as steep as they are however often that is done.
 const SHALLOW: u32 = 8;
-/// Leaves of a patch by default settings: 51 to 200 on the models of four CAD systems.
-const LEAVES_OF_PATCH: u64 = 100;
+/// Rays that a leaf more must be worth: it takes some 10 µs to cut and a kilobyte, and all of them spare a ray half a microsecond.
+const RAYS_OF_LEAF: u64 = 4;
 
 /// Number of Bézier patches of a surface: its knot spans that are not empty.
 fn patch_count(surface: &Surface) -> u64 {
@@ -117,9 +121,8 @@ impl Exact {
         // One more start, so that the end of the last leaf is the start of the one behind it.
         let mut starts: Vec<u32> = leaves.iter().map(|l| l.net).collect();
         starts.push(pool.len() as u32);
+        let tree = Tree::build(&leaves.iter().map(Leaf::bounds).collect::<Vec<Aabb>>());
         let labels = leaves.iter().map(|l| HitLabel::new(l, &geometry)).collect();
-        let boxes: Vec<Aabb> = leaves.iter().map(Leaf::bounds).collect();
-        let tree = Tree::build(&boxes);
         let build_seconds = start.elapsed().as_secs_f64();
         Self { geometry, leaves, linearizations, labels, pool, starts, tree, settings: *settings, build_seconds }
     }
@@ -148,10 +151,15 @@ impl Exact {
     }
 }
 
-/// Cuts all patches into leaves of `settings.flatness`, or of down to [`FLATTEST`] of it while they are fewer than `settings.leaves`.
+/// Cuts all patches into leaves of `settings.flatness`, or of down to [`FLATTEST`] of it while they are fewer than `settings.leaves`, or
+/// as for few rays where there would be more than `settings.most_leaves`.
 fn subdivide(geometry: &Geometry, settings: &Settings) -> PatchLeaves {
     let mut flatness = Flatness { deviation: settings.flatness, depth: settings.depth };
-    let mut cut = subdivision::subdivide_all(geometry, flatness);
+    let most = settings.most_leaves.unwrap_or(usize::MAX);
+    let Some(mut cut) = subdivision::subdivide_up_to(geometry, flatness, most) else {
+        let loose = Flatness { deviation: Settings::for_few_rays().flatness, depth: SHALLOW.min(settings.depth) };
+        return subdivision::subdivide_all(geometry, loose);
+    };
     let flattest = FLATTEST * settings.flatness;
     // Five per cent over the flattest: a further round would change next to nothing.
     while cut.leaves.len() < settings.leaves && flatness.deviation > 1.05 * flattest {
@@ -192,5 +200,26 @@ mod tests {
                 assert!(corner.cmpge(leaf.lo).all() && corner.cmple(leaf.hi).all(), "{corner} in {leaf:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_model_of_too_many_leaves_is_cut_as_for_few_rays() {
+        use crate::intersect::{Cost, Intersector};
+        use crate::math::{Frame, Ray, Vector};
+        use std::f64::consts::{FRAC_PI_2, PI};
+        let ball = crate::nurbs::sweep::sphere(&Frame::IDENTITY, 50.0, [0.0, 2.0 * PI], [-FRAC_PI_2, FRAC_PI_2]);
+        let shells = vec![Shell { faces: vec![Face::whole(ball)], ..Shell::default() }];
+        let model = Model::from_part(Part { shells, ..Part::default() });
+        let fine = Settings { leaves: 0, ..Settings::default() };
+        let build = |most_leaves| Exact::build(&model, &Settings { most_leaves, ..fine });
+        let all = build(None).leaf_count();
+        assert_eq!(build(Some(all)).leaf_count(), all);
+        let few = build(Some(all - 1));
+        let loose = Settings { depth: SHALLOW, leaves: 0, ..Settings::for_few_rays() };
+        assert_eq!(few.leaf_count(), Exact::build(&model, &loose).leaf_count());
+        assert!(2 * few.leaf_count() < all, "{} of {all}", few.leaf_count());
+        let ray = Ray::new(Point::new(-150.0, 3.0, 4.0), Vector::X);
+        let hit = few.intersect(&ray, &mut Cost::default()).unwrap();
+        assert!((hit.t - (150.0 - (2500f64 - 25.0).sqrt())).abs() < 1e-12);
     }
 }

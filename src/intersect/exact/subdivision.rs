@@ -12,6 +12,7 @@ use super::patch::Patch;
 use super::trim::{Region, Trim};
 use crate::math::{Aabb, Uv, Vector};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Share of a part's side that must lie outside the trims for it to be cropped: less is not worth the rounding.
 const WORTH_CROPPING: f64 = 0.05;
@@ -89,10 +90,15 @@ struct Subdivision<'a> {
 }
 
 /// Patches that are cut at a time: their leaves stand in memory twice, 1 kB each, until they are joined to the others.
-const BLOCK: usize = 4096;
+const BLOCK: usize = 256;
 
 /// Cuts every patch into leaves, in parallel, and returns all in the order of the patches; none where all is outside the trims.
 pub(super) fn subdivide_all(geometry: &Geometry, flatness: Flatness) -> PatchLeaves {
+    subdivide_up_to(geometry, flatness, usize::MAX).expect("memory ends before so many leaves")
+}
+
+/// As [`subdivide_all`]; `None` where there would be more than `most` leaves, found out before there are many more.
+pub(super) fn subdivide_up_to(geometry: &Geometry, flatness: Flatness, most: usize) -> Option<PatchLeaves> {
     let cropped = |patch: &Patch| {
         let whole =
             SubPatch { net: patch.net.clone(), rect: [[0.0, 1.0]; 2], depth: 0, crop_roundings: 0, vain: 0 };
@@ -106,19 +112,28 @@ pub(super) fn subdivide_all(geometry: &Geometry, flatness: Flatness) -> PatchLea
     };
     let boxes: Vec<Option<Aabb>> = geometry.patches.par_iter().map(box_of).collect();
     let scene_area = boxes.into_iter().flatten().fold(Aabb::EMPTY, Aabb::union).half_area();
+    let leaves = AtomicUsize::new(0);
     let leaves_of = |(index, patch): (usize, &Patch)| {
         // A patch that lies outside its trims has no leaves.
         let Some(part) = cropped(patch) else { return PatchLeaves::default() };
         let trim = geometry.trim_of(patch);
-        Subdivision { index: index as u32, patch, geometry, trim, flatness, scene_area }.leaves(part)
+        // When there are too many already, the rest is not cut: whether there are does not depend on the order.
+        let left = most.saturating_sub(leaves.load(Ordering::Relaxed));
+        let cut =
+            Subdivision { index: index as u32, patch, geometry, trim, flatness, scene_area }.leaves(part, left);
+        leaves.fetch_add(cut.leaves.len(), Ordering::Relaxed);
+        cut
     };
     let mut all = PatchLeaves::default();
     for (k, block) in geometry.patches.chunks(BLOCK).enumerate() {
         let numbered = block.par_iter().enumerate().map(|(i, patch)| (k * BLOCK + i, patch));
         let cut: Vec<PatchLeaves> = numbered.map(leaves_of).collect();
+        if leaves.load(Ordering::Relaxed) > most {
+            return None;
+        }
         cut.into_iter().for_each(|one| all.append(one));
     }
-    all
+    Some(all)
 }
 
 /// Cuts off from a part's sides what lies outside the trims, where that is worth it; `None` when nothing is left.
@@ -145,12 +160,13 @@ fn crop(trim: &Trim, patch: &Patch, mut part: SubPatch) -> Option<SubPatch> {
 }
 
 impl Subdivision<'_> {
-    /// Cuts `whole`, the patch or what a crop left of it, into leaves; parts that lie outside the trims are dropped.
-    fn leaves(&self, whole: SubPatch) -> PatchLeaves {
+    /// Cuts `whole`, the patch or what a crop left of it, into leaves; parts that lie outside the trims are dropped. Ends when
+    /// there are more than `most` leaves.
+    fn leaves(&self, whole: SubPatch, most: usize) -> PatchLeaves {
         let degree = self.patch.degree;
         let mut out = PatchLeaves::default();
         let mut stack = vec![whole];
-        while let Some(part) = stack.pop() {
+        while let Some(part) = stack.pop().filter(|_| out.leaves.len() <= most) {
             // Cropped anew at each level: halves of a part may lie outside the trims where the part does not.
             let Some(part) = crop(self.trim, self.patch, part) else { continue };
             let region = self.trim.region(in_surface(self.patch, part.rect));

@@ -7,6 +7,7 @@
 
 use crate::math::{Aabb, Vector};
 use smallvec::{SmallVec, smallvec};
+use std::ops::Range;
 
 /// From this depth on splits are at the median, which bounds the depth of any tree.
 const MEDIAN_DEPTH: usize = 40;
@@ -37,13 +38,15 @@ pub(super) struct Tree {
     pub(super) bounds: Aabb,
 }
 
-/// A node of the binary tree: a box with two children side by side, or one leaf.
+/// Boxes of a node of the binary tree that the wide one is collapsed from, with the box around them.
 #[derive(Clone, Copy)]
-struct Binary {
+struct Subtree {
     bounds: Aabb,
-    /// First child, or the leaf.
-    first: u32,
-    is_leaf: bool,
+    /// Where the boxes stand in the order that splits make, from the first to behind the last.
+    start: usize,
+    end: usize,
+    /// Splits above it.
+    depth: usize,
 }
 
 impl Tree {
@@ -52,37 +55,59 @@ impl Tree {
         if boxes.is_empty() {
             return Self { nodes: Vec::new(), center: Vector::ZERO, bounds: Aabb::EMPTY };
         }
-        let binary = binary_tree(boxes);
-        let bounds = binary[0].bounds;
-        let center = bounds.center();
+        // Halves are made where a wide node opens them: no binary tree stands in memory.
+        let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+        let root = Subtree::new(boxes, &order, 0..boxes.len(), 0);
+        let (bounds, center) = (root.bounds, root.bounds.center());
         let mut tree = Self { nodes: vec![Node::EMPTY], center, bounds };
-        let mut stack = vec![(0usize, 0usize)];
+        let mut stack = vec![(0usize, root)];
         while let Some((wide, from)) = stack.pop() {
             // The root may be a leaf by itself. Else the largest child is opened until there are eight: it is met most often, so that
             // opening it spares most visits (Wald, Benthin and Boulos 2008).
-            let mut children: SmallVec<[usize; WIDTH]> = smallvec![from];
+            let mut children: SmallVec<[Subtree; WIDTH]> = smallvec![from];
             while children.len() < WIDTH {
-                let inner = (0..children.len()).filter(|&k| !binary[children[k]].is_leaf);
-                let area = |k: usize| binary[children[k]].bounds.half_area();
+                let inner = (0..children.len()).filter(|&k| !children[k].is_leaf());
+                let area = |k: usize| children[k].bounds.half_area();
                 let Some(open) = inner.max_by(|&a, &b| area(a).total_cmp(&area(b))) else { break };
-                let first = binary[children[open]].first as usize;
-                children[open] = first;
-                children.push(first + 1);
+                let [low, high] = children[open].halves(boxes, &mut order);
+                children[open] = low;
+                children.push(high);
             }
-            for (k, &child) in children.iter().enumerate() {
-                let c = binary[child];
-                tree.nodes[wide].set_child_box(k, c.bounds, center);
-                if c.is_leaf {
-                    tree.nodes[wide].child[k] = c.first | LEAF;
+            for (k, child) in children.iter().enumerate() {
+                tree.nodes[wide].set_child_box(k, child.bounds, center);
+                if child.is_leaf() {
+                    tree.nodes[wide].child[k] = order[child.start] | LEAF;
                 } else {
                     let index = tree.nodes.len();
                     tree.nodes[wide].child[k] = index as u32;
                     tree.nodes.push(Node::EMPTY);
-                    stack.push((index, child));
+                    stack.push((index, *child));
                 }
             }
         }
         tree
+    }
+}
+
+impl Subtree {
+    /// The boxes that `order` lists within a range.
+    fn new(boxes: &[Aabb], order: &[u32], range: Range<usize>, depth: usize) -> Self {
+        let bounds = order[range.clone()].iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
+        Self { bounds, start: range.start, end: range.end, depth }
+    }
+
+    /// Whether it is one box.
+    fn is_leaf(&self) -> bool {
+        self.end - self.start == 1
+    }
+
+    /// Parts at least two boxes, and sorts `order` by that.
+    fn halves(&self, boxes: &[Aabb], order: &mut [u32]) -> [Self; 2] {
+        let slice = &mut order[self.start..self.end];
+        // The heuristic can peel off one box at a time; the median halves what is left.
+        let low = if self.depth < MEDIAN_DEPTH { partition(boxes, slice) } else { slice.len() / 2 };
+        let middle = self.start + low;
+        [self.start..middle, middle..self.end].map(|range| Self::new(boxes, order, range, self.depth + 1))
     }
 }
 
@@ -102,35 +127,10 @@ impl Node {
     }
 }
 
-/// Builds the binary tree over at least one box, root first, from which the wide one is collapsed.
-fn binary_tree(boxes: &[Aabb]) -> Vec<Binary> {
-    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-    let centres: Vec<Vector> = boxes.iter().map(Aabb::center).collect();
-    let empty = Binary { bounds: Aabb::EMPTY, first: 0, is_leaf: true };
-    let mut nodes = vec![empty];
-    let mut stack = vec![(0usize, 0usize, boxes.len(), 0usize)];
-    while let Some((me, start, end, depth)) = stack.pop() {
-        let slice = &mut order[start..end];
-        nodes[me].bounds = slice.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
-        if slice.len() == 1 {
-            nodes[me].first = slice[0];
-            continue;
-        }
-        // The heuristic can peel off one box at a time; the median halves what is left.
-        let middle = if depth < MEDIAN_DEPTH { partition(boxes, &centres, slice) } else { slice.len() / 2 };
-        let first = nodes.len();
-        (nodes[me].first, nodes[me].is_leaf) = (first as u32, false);
-        nodes.extend([empty, empty]);
-        stack.push((first, start, start + middle, depth + 1));
-        stack.push((first + 1, start + middle, end, depth + 1));
-    }
-    nodes
-}
-
 /// Sorts a slice of at least two into two parts by the cheapest of the binned planes; returns the length of the first part, half of it
 /// where no plane parts them.
-fn partition(boxes: &[Aabb], centres: &[Vector], slice: &mut [u32]) -> usize {
-    let centre = |i: u32| centres[i as usize];
+fn partition(boxes: &[Aabb], slice: &mut [u32]) -> usize {
+    let centre = |i: u32| boxes[i as usize].center();
     let (mut lo, mut hi) = (Vector::INFINITY, Vector::NEG_INFINITY);
     for &i in slice.iter() {
         (lo, hi) = (lo.min(centre(i)), hi.max(centre(i)));
