@@ -1,9 +1,9 @@
 //! What became of each ray of a list: ends, faces and powers that can be told by hand.
 
 use crate::support::World;
-use lampyris::formats::{LightRay, write_rays};
+use lampyris::formats::{Flux, LightRay, Tm25, write_rays, write_tm25};
 use lampyris::math::{Point, Vector};
-use lampyris::simulate::{Event, ListedEnd, RunSettings, Scene, listed_ends, simulate};
+use lampyris::simulate::{Event, ListedEnd, LostCause, RunSettings, Scene, listed_ends, simulate};
 
 /// The face of the first cuboid that looks down.
 const BLACK: u32 = 4;
@@ -104,4 +104,23 @@ fn parts_of_a_ray_have_rows_of_their_own() {
     for power in [0.04, 0.96 * 0.96] {
         assert!(split.iter().any(|e| (e.power - power).abs() < 1e-9), "{power}: {split:?}");
     }
+}
+
+/// A ray whose file was cut while it was in use is lost for that reason, and for no number of its own.
+#[test]
+fn rays_of_a_file_that_went_are_lost_as_unreadable() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("list.tm25ray");
+    // More than are kept in memory.
+    let rays = vec![ray(0.0, Vector::Z, 1.0); (1 << 16) + 1];
+    write_tm25(&file, &Tm25::from_rays(&rays, Flux::Radiant)).unwrap();
+    let text = "[run]\nrays = 64\n[[source]]\nkind = 'rays'\nfile = 'list.tm25ray'\n";
+    let scene = Scene::parse(text, "test.toml", folder.path()).unwrap();
+    let world = World::default();
+    let bound = scene.bind(&world.model).unwrap();
+    std::fs::OpenOptions::new().write(true).open(&file).unwrap().set_len(8).unwrap();
+    let results = simulate(&bound, &world, &RunSettings::from(&scene.run), &|_| true);
+    assert_eq!(results.lost_rays, 64);
+    assert!(results.ledger.iter().all(|lost| lost.cause == LostCause::Unreadable), "{:?}", results.ledger[0]);
+    assert!(results.notes.iter().any(|note| note.contains("its ray file was changed")), "{:?}", results.notes);
 }
