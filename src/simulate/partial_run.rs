@@ -179,22 +179,7 @@ impl PartialRun {
         }
         r.sums(&mut t.entered)?;
         r.sums(&mut t.left)?;
-        let [rays, segments, corrected_normals] = [r.u64()?, r.u64()?, r.u64()?];
-        let [lost, cut_off, caught] = [r.u64()?, r.u64()?, r.u64()?];
-        let (overlaps, overlapping) = (r.u64()?, [r.u64()? as u32, r.u64()? as u32]);
-        let [refused_contacts, misplaced_starts] = [r.u64()?, r.u64()?];
-        t.counts = Counts {
-            rays,
-            segments,
-            corrected_normals,
-            lost,
-            cut_off,
-            caught,
-            overlaps,
-            overlapping,
-            refused_contacts,
-            misplaced_starts,
-        };
+        t.counts = r.counts()?;
         let ledger: Vec<(LostRay, [[u64; 3]; 2])> = r.json()?;
         let mask = r.u64()?;
         let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = r.json()?;
@@ -346,6 +331,22 @@ impl<'a> Reader<'a> {
 
     fn u64(&mut self) -> Result<u64, String> {
         self.array().map(u64::from_le_bytes)
+    }
+
+    /// Reads the counts of a run, in the order in which they were written.
+    fn counts(&mut self) -> Result<Counts, String> {
+        Ok(Counts {
+            rays: self.u64()?,
+            segments: self.u64()?,
+            corrected_normals: self.u64()?,
+            lost: self.u64()?,
+            cut_off: self.u64()?,
+            caught: self.u64()?,
+            overlaps: self.u64()?,
+            overlapping: [self.u64()? as u32, self.u64()? as u32],
+            refused_contacts: self.u64()?,
+            misplaced_starts: self.u64()?,
+        })
     }
 
     /// Takes the next block off and parses it as JSON.

@@ -85,10 +85,9 @@ fn mesh_part(
 ) -> PartMesh {
     let part = placed.part;
     let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
-    let with_surface =
+    let laid_out =
         |(k, face)| (face, if too_large(k).is_some() { None } else { placed.surface(settings, k, face) });
-    let faces: Vec<(&Face, Option<FaceSurface<'_>>)> =
-        faces.into_par_iter().enumerate().map(with_surface).collect();
+    let faces: Vec<(&Face, Option<FaceSurface<'_>>)> = faces.into_par_iter().enumerate().map(laid_out).collect();
     let known: Vec<(&Face, &FaceSurface<'_>)> =
         faces.iter().filter_map(|(face, surface)| Some((*face, surface.as_ref()?))).collect();
     let sides = edge_sides(part, &known);
@@ -145,21 +144,35 @@ fn mesh_part(
         }
         before = Some(PreviousRound { divisions, shared: shared.len(), meshes });
     };
-    // Chords that two faces have inside are taken from one of them. Again and again, for a face meshed anew may have chosen another
-    // diagonal that is taken.
-    let mut taken: Vec<TakenChords> = vec![TakenChords::default(); faces.len()];
+    let again = |k: usize, taken: &TakenChords| {
+        let (face, surface) = &faces[k];
+        let (divisions, shared, surface) = (&divisions[..], &shared[..], surface.as_ref()?);
+        mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken })
+    };
+    let taken = take_doubled_chords(part, &mut meshes, &mut budget, again);
+    let causes = exceeded_limits(&faces, too_large);
+    with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken })
+}
+
+/// Takes chords that two faces of a shell have inside from one of them, which is meshed anew by `mesh`; again and again, for it may have
+/// chosen another diagonal that is taken. Returns what was taken from each face.
+fn take_doubled_chords(
+    part: &Part,
+    meshes: &mut [Option<FaceMesh>],
+    budget: &mut RemeshBudget,
+    mesh: impl Fn(usize, &TakenChords) -> Option<FaceMesh>,
+) -> Vec<TakenChords> {
+    let mut taken: Vec<TakenChords> = vec![TakenChords::default(); meshes.len()];
     for _ in 0..MAX_ROUNDS {
         let shells = part.shells.iter().map(|shell| shell.faces.len());
-        for (k, chords) in doubled_chords(shells, &meshes, &taken, |k| budget.is_spent(k)) {
+        for (k, chords) in doubled_chords(shells, meshes, &taken, |k| budget.is_spent(k)) {
             taken[k].extend(chords);
-            let (face, Some(surface)) = &faces[k] else { continue };
-            let (divisions, shared, taken) = (&divisions[..], &shared[..], &taken[k]);
-            meshes[k] = mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken });
+            // A face without a surface has no chords that could be taken.
+            meshes[k] = mesh(k, &taken[k]);
             budget.spend(k, meshes[k].as_ref());
         }
     }
-    let causes = exceeded_limits(&faces, too_large);
-    with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken })
+    taken
 }
 
 /// Returns why faces, by their places, were left without facets: too many cells, of which `too_large` knows the number, or too many steps
