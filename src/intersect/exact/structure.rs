@@ -52,9 +52,14 @@ impl Settings {
         let patches: u64 = faces.map(|f| patch_count(&f.surface)).sum();
         // A patch in two leaves is the least that flatness could ask for.
         if patches.saturating_mul(2) > leaves {
-            return Self { depth: SHALLOW, ..Self::for_few_rays() };
+            return Self::shallow();
         }
         Self { most_leaves: Some(leaves as usize), ..Self::default() }
+    }
+
+    /// [`Settings::for_few_rays`] with at most [`SHALLOW`] halvings.
+    fn shallow() -> Self {
+        Self { depth: SHALLOW, ..Self::for_few_rays() }
     }
 }
 
@@ -65,10 +70,7 @@ const RAYS_OF_LEAF: u64 = 4;
 
 /// Number of Bézier patches of a surface: its knot spans that are not empty.
 fn patch_count(surface: &Surface) -> u64 {
-    let intervals = |d: usize| {
-        let knots = &surface.knots[d][surface.degree[d]..=surface.counts()[d]];
-        knots.windows(2).filter(|k| k[0] < k[1]).count() as u64
-    };
+    let intervals = |d: usize| surface.breakpoints(d).len() as u64 - 1;
     intervals(0) * intervals(1)
 }
 
@@ -157,7 +159,8 @@ fn subdivide(geometry: &Geometry, settings: &Settings) -> PatchLeaves {
     let mut flatness = Flatness { deviation: settings.flatness, depth: settings.depth };
     let most = settings.most_leaves.unwrap_or(usize::MAX);
     let Some(mut cut) = subdivision::subdivide_up_to(geometry, flatness, most) else {
-        let loose = Flatness { deviation: Settings::for_few_rays().flatness, depth: SHALLOW.min(settings.depth) };
+        let shallow = Settings::shallow();
+        let loose = Flatness { deviation: shallow.flatness, depth: shallow.depth.min(settings.depth) };
         return subdivision::subdivide_all(geometry, loose);
     };
     let flattest = FLATTEST * settings.flatness;
@@ -215,7 +218,7 @@ mod tests {
         let all = build(None).leaf_count();
         assert_eq!(build(Some(all)).leaf_count(), all);
         let few = build(Some(all - 1));
-        let loose = Settings { depth: SHALLOW, leaves: 0, ..Settings::for_few_rays() };
+        let loose = Settings { leaves: 0, ..Settings::shallow() };
         assert_eq!(few.leaf_count(), Exact::build(&model, &loose).leaf_count());
         assert!(2 * few.leaf_count() < all, "{} of {all}", few.leaf_count());
         let ray = Ray::new(Point::new(-150.0, 3.0, 4.0), Vector::X);

@@ -325,12 +325,11 @@ impl Tree<'_, '_> {
 /// Returns half of `root` in each direction in which the face comes back to where it began, else infinity. Of a tube thinner than its
 /// tolerance two facets around would have their corners in the same two places: the facets of one side would be those of the other.
 fn half_turn(surface: &FaceSurface<'_>, root: Cell) -> Uv {
-    let domain = surface.spline.domain();
+    let (lengths, whole) = (root.hi - root.lo, surface.extent());
     let half = |d: usize| {
-        let (length, whole) = (root.hi[d] - root.lo[d], domain[d][1] - domain[d][0]);
-        let comes_back = surface.closed[d] && length >= (1.0 - WHOLE_TURN) * whole;
+        let comes_back = surface.closed[d] && lengths[d] >= (1.0 - WHOLE_TURN) * whole[d];
         // A little less, so that rounding leaves no two cells of one half each.
-        if comes_back { (0.5 - WHOLE_TURN) * length } else { f64::INFINITY }
+        if comes_back { (0.5 - WHOLE_TURN) * lengths[d] } else { f64::INFINITY }
     };
     Uv::new(half(0), half(1))
 }
