@@ -36,20 +36,7 @@ pub(crate) fn fit_curve(
 ) -> Option<(Curve, f64)> {
     let mut pieces = Pieces::new(corners, degree);
     loop {
-        let values: Vec<Homogeneous> = pieces.nodes().into_iter().map(&at).collect::<Option<_>>()?;
-        let curve = Curve { degree: pieces.degree, knots: pieces.knots(), points: pieces.interpolate(&values) };
-        let mut error = 0f64;
-        let mut strays = Vec::new();
-        for t in pieces.probes() {
-            let miss = (curve.evaluate(t) - at(t)?.project()).length();
-            if !miss.is_finite() {
-                return None;
-            }
-            error = error.max(miss);
-            if miss > tolerance {
-                strays.push(t);
-            }
-        }
+        let Fitted { curve, strays, error } = pieces.fitted(&at, tolerance)?;
         if strays.is_empty() || !pieces.halve(&strays) {
             return Some((curve, error));
         }
@@ -64,8 +51,8 @@ pub(crate) fn fit_surface(
     tolerance: f64,
 ) -> Option<(Surface, f64)> {
     let mut pieces = [0, 1].map(|d| Pieces::new(corners[d], degree[d]));
-    let mut aim = tolerance;
-    for round in 1.. {
+    let (mut aim, mut round) = (tolerance, 1);
+    loop {
         for d in 0..2 {
             refine_along(&mut pieces, d, &at, aim)?;
         }
@@ -84,8 +71,8 @@ pub(crate) fn fit_surface(
             return Some((surface, error));
         }
         aim *= CLOSER;
+        round += 1;
     }
-    None
 }
 
 /// Halves pieces of direction `d`, 0 for u and 1 for v, until curves along some lines of the other stray no farther than `aim`, mm, or no
@@ -102,19 +89,7 @@ fn refine_along(
     loop {
         let mut strays = Vec::new();
         for &line in &lines {
-            let nodes = pieces[d].nodes();
-            let values: Vec<Homogeneous> = nodes.iter().map(|&t| along(t, line)).collect::<Option<_>>()?;
-            let points = pieces[d].interpolate(&values);
-            let curve = Curve { degree: pieces[d].degree, knots: pieces[d].knots(), points };
-            for t in pieces[d].probes() {
-                let miss = (curve.evaluate(t) - along(t, line)?.project()).length();
-                if !miss.is_finite() {
-                    return None;
-                }
-                if miss > aim {
-                    strays.push(t);
-                }
-            }
+            strays.extend(pieces[d].fitted(|t| along(t, line), aim)?.strays);
         }
         strays.sort_by(f64::total_cmp);
         if strays.is_empty() || !pieces[d].halve(&strays) {
@@ -139,6 +114,15 @@ fn interpolate_surface(pieces: &[Pieces; 2], at: impl Fn(Uv) -> Option<Homogeneo
     }
     let [u, v] = pieces;
     Some(Surface { degree: [u.degree, v.degree], knots: [u.knots(), v.knots()], points })
+}
+
+/// A curve through given points, and how far it strays between them.
+struct Fitted {
+    curve: Curve,
+    /// Places where it strays too far, rising.
+    strays: Vec<f64>,
+    /// The largest distance seen, mm.
+    error: f64,
 }
 
 /// The pieces of a fit in one direction.
@@ -173,6 +157,25 @@ impl Pieces {
     /// The middles between neighbouring nodes, where a fit strays farthest.
     fn probes(&self) -> Vec<f64> {
         self.nodes().windows(2).map(|t| 0.5 * (t[0] + t[1])).collect()
+    }
+
+    /// Takes the points that `at` gives at the nodes, and looks where the curve through them strays farther than `tolerance`, mm; `None`
+    /// where a point is missing or no number.
+    fn fitted(&self, at: impl Fn(f64) -> Option<Homogeneous>, tolerance: f64) -> Option<Fitted> {
+        let values: Vec<Homogeneous> = self.nodes().into_iter().map(&at).collect::<Option<_>>()?;
+        let curve = Curve { degree: self.degree, knots: self.knots(), points: self.interpolate(&values) };
+        let (mut strays, mut error) = (Vec::new(), 0f64);
+        for t in self.probes() {
+            let miss = (curve.evaluate(t) - at(t)?.project()).length();
+            if !miss.is_finite() {
+                return None;
+            }
+            error = error.max(miss);
+            if miss > tolerance {
+                strays.push(t);
+            }
+        }
+        Some(Fitted { curve, strays, error })
     }
 
     /// Knots: as many as leave a corner where blocks meet, one between pieces.
