@@ -153,6 +153,20 @@ mod tests {
     use super::*;
     use crate::regulation::assessment::RowVerdict;
 
+    /// Uniform numbers between 0 and 1, both left out, that follow from a seed.
+    fn uniform(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+        }
+    }
+
+    /// A number of the standard normal distribution, by Box and Muller.
+    fn normal(uniform: &mut impl FnMut() -> f64) -> f64 {
+        (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
+    }
+
     fn row(assessment: &Assessment, id: &str) -> RowVerdict {
         assessment.rows.iter().find(|r| r.row.id == id).unwrap().clone()
     }
@@ -320,16 +334,11 @@ mod tests {
         // The same with too little light to the right of the elbow, and to the left.
         let right_dim = |h: f64, v: f64| beam(h, v) * if h > 2.5 { 0.05 } else { 1.0 };
         let left_dim = |h: f64, v: f64| beam(h, v) * if h < 0.5 { 0.05 } else { 1.0 };
-        let mut state = 20_261_123u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-        };
+        let mut uniform = uniform(20_261_123);
         // Rays of 200 cd in a cell.
         let mut noise = |value: f64| {
-            let normal = (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos();
             let error = (200.0 * value).sqrt();
-            [(value + error * normal).max(0.0), error]
+            [(value + error * normal(&mut uniform)).max(0.0), error]
         };
         let (mut led_astray, mut passed, mut truly_failed) = (0, 0, 0);
         for beam in [&beam as &dyn Fn(f64, f64) -> f64, &right_dim, &left_dim] {
@@ -362,18 +371,13 @@ mod tests {
         let table =
             row(&assess(&map(passing(0.0, 0.0), 1e-3, 0.0), &regulation, &Assumptions::default()).unwrap(), "75R");
         let limit = table.row.min.unwrap();
-        let mut state = 20_261_122u64;
-        let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-        };
+        let mut uniform = uniform(20_261_122);
         let aim = Aim::unchanged("test");
         let error = 0.02 * limit;
         let mut wrong = 0;
         for _ in 0..10_000 {
             let truth = limit + error * (12.0 * uniform() - 6.0);
-            let normal = (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos();
-            let read = truth + error * normal;
+            let read = truth + error * normal(&mut uniform);
             // One cell as large as the sensor holds the reading and its error.
             let cells = vec![[read, error, 0.0]; 1];
             let map = IntensityMap::new(vec![1.0, 1.3], vec![-0.72, -0.42], cells).unwrap();
