@@ -1,7 +1,7 @@
 //! Work that runs without the GIL on a thread of its own, while this one tells how far it is and listens for Ctrl-C.
 
 use crate::errors::Defect;
-use lampyris::pipeline::{Monitor, Stage};
+use lampyris::pipeline::{Monitor, Stage, TracingSettings};
 use lampyris::study;
 use lampyris::study::default_accuracy::Chosen;
 use pyo3::prelude::*;
@@ -139,12 +139,11 @@ pub(crate) fn interruptible<T: Send + 'static>(
     }
 }
 
-/// Most threads of one call, as of the command: more make no machine faster, and millions stop it.
-const MOST_THREADS: usize = 4096;
-
-/// In a pool of so many threads, [`MOST_THREADS`] at most, or in the one that all share.
+/// In a pool of so many threads, one at least and as many at most as the command takes, or in the one that all share.
 pub(crate) fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
-    match threads.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n.clamp(1, MOST_THREADS)).build()) {
+    let count = |n: usize| TracingSettings { threads: Some(n.max(1)), ..TracingSettings::default() }.thread_count();
+    let wanted = threads.and_then(|n| count(n).ok());
+    match wanted.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build()) {
         Some(Ok(pool)) => pool.install(work),
         _ => work(),
     }

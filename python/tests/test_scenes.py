@@ -106,8 +106,8 @@ def test_rays_of_an_array_are_a_source() -> None:
         (lambda s: s.trace(threads=0), ValueError, "at least one thread"),
         (lambda s: s.trace(threads="two"), TypeError, "threads"),
         (lambda s: s.trace(seed=-1), (OverflowError, TypeError, ValueError), "seed"),
-        (lambda s: s.trace(parts={"huosing": 0.1}), ValueError, 'did you mean "housing"'),
-        (lambda s: s.trace(until="1%@fra"), ValueError, 'did you mean "far"'),
+        (lambda s: s.trace(parts={"huosing": 0.1}), ValueError, "did you mean 'housing'"),
+        (lambda s: s.trace(until="1%@fra"), ValueError, "did you mean 'far'"),
         (lambda s: s.trace(resume=True), ValueError, "no trace of this scene was interrupted"),
         (lambda s: s.__setitem__("housing", 0.9), TypeError, r"lampyris.mirror\(0.9\)"),
         (lambda s: s.add("light"), TypeError, "source or a receiver"),
@@ -203,7 +203,7 @@ def test_a_model_accounts_for_itself() -> None:
     mesh = model.tessellate((0.05, 0.2), measure=True)
     assert mesh.report is not None and mesh.report["over_tolerance"] == 0
     assert mesh.sag.max() <= 0.2 and mesh.facets.shape == (len(mesh), 4) and mesh.normals.shape == (len(mesh), 4, 3)
-    with pytest.raises(ValueError, match='did you mean "housing"'):
+    with pytest.raises(ValueError, match="did you mean 'housing'"):
         model.tessellate(parts={"hosing": 0.1})
     with pytest.raises(ValueError, match="unit_mm"):
         lp.read_step(LAMP, unit_mm=-1)

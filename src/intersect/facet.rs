@@ -20,7 +20,7 @@ pub(crate) use super::start_triangle::LONGEST_NUDGE;
 use super::facet_hit::EdgeHit;
 use super::slopes::{LEAST_SINE, Slopes};
 use super::start_triangle::{LIFT, StartTriangle, distance_to_segment};
-use crate::math::{Aabb, Point, Ray, Triangle, Vector};
+use crate::math::{Aabb, Point, QuadHalf, Ray, Vector};
 use crate::mesh::FacetMesh;
 use robust::{Coord, orient2d};
 use std::hint::select_unpredictable;
@@ -101,7 +101,7 @@ pub(crate) struct FacetRay {
     direction: Vector,
     /// The facet that the ray leaves, and which triangle of it where that is known.
     from: Option<u32>,
-    triangle: Option<Triangle>,
+    triangle: Option<QuadHalf>,
 }
 
 impl FacetRay {

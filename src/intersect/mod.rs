@@ -18,7 +18,7 @@ mod slopes;
 pub mod spline_with_meshes;
 mod start_triangle;
 
-use crate::math::{Departure, FaceId, Point, Ray, Triangle, Uv, Vector};
+use crate::math::{Departure, FaceId, Point, QuadHalf, Ray, Uv, Vector};
 pub(crate) use prefetch::prefetch;
 
 /// Finds the nearest hit of a ray.
@@ -122,7 +122,7 @@ pub struct Hit {
     /// The intersector's primitive: a facet of the mesh, or a patch of the spline model.
     pub primitive: u32,
     /// The triangle of the facet; `None` on the spline.
-    pub triangle: Option<Triangle>,
+    pub triangle: Option<QuadHalf>,
     /// Parameters on the face's surface.
     pub uv: Uv,
     /// How sure it is.

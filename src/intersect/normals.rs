@@ -11,7 +11,7 @@
 
 use super::facet::FacetHit;
 use super::{Certainty, Hit, NormalMode};
-use crate::math::{Point, Ray, Triangle, Uv, Vector};
+use crate::math::{Point, QuadHalf, Ray, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use std::hint::select_unpredictable;
 
@@ -53,7 +53,7 @@ pub(crate) fn describe_in_batch(mesh: &FacetMesh, ray: &Ray, hit: &FacetHit, mod
         geometric_normal: flat,
         face: facet.face,
         primitive: hit.facet,
-        triangle: Some(if hit.second { Triangle::Second } else { Triangle::First }),
+        triangle: Some(if hit.second { QuadHalf::Second } else { QuadHalf::First }),
         uv: v0.uv * w0 + v1.uv * w1 + v2.uv * w2 + v3.uv * w3,
         certainty: Certainty::Facet,
     }

@@ -1,6 +1,6 @@
 //! The triangle of its facet from which a ray starts.
 
-use crate::math::{Point, Triangle, Vector};
+use crate::math::{Point, QuadHalf, Vector};
 
 /// Share of the way to the middle of its triangle by which a start on a border is moved inside.
 const NUDGE: f64 = 1.0 / 1048576.0;
@@ -27,10 +27,10 @@ impl StartTriangle {
     ///
     /// On the diagonal rounding puts a start over either: of rays that left a folded quad there at a sine below 1e-3, one in sixteen was
     /// taken to leave the other triangle, under whose plane it passed.
-    pub(super) fn new(corners: &[Point; 4], start: Point, named: Option<Triangle>) -> Self {
+    pub(super) fn new(corners: &[Point; 4], start: Point, named: Option<QuadHalf>) -> Self {
         let [a, b, c, d] = *corners;
         let second =
-            c != d && named.map_or_else(|| is_over_second(corners, start), |triangle| triangle == Triangle::Second);
+            c != d && named.map_or_else(|| is_over_second(corners, start), |triangle| triangle == QuadHalf::Second);
         let [p, q, r] = if second { [a, c, d] } else { [a, b, c] };
         Self { second, normal: (q - p).cross(r - p), corner: p, middle: (p + q + r) / 3.0 }
     }

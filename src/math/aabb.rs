@@ -108,10 +108,13 @@ impl Aabb {
         (0..3).map(|axis| low[axis].max(high[axis])).fold(f64::INFINITY, f64::min)
     }
 
-    /// The range of `t` in which the ray is inside, cut to the ray's own range; `None` for a miss.
+    /// The range of `t` in which the ray is inside, cut to the ray's own range; `None` for a miss, and for an empty box.
     ///
     /// Conservative: the range is widened by a few ulp so that rounding never loses a box that is touched.
     pub fn clip(&self, ray: &Ray) -> Option<(f64, f64)> {
+        if self.is_empty() {
+            return None;
+        }
         let (mut near, mut far) = (ray.t_min, ray.t_max);
         for axis in 0..3 {
             let (o, d) = (ray.origin[axis], ray.direction[axis]);
@@ -152,6 +155,10 @@ mod tests {
         let b = Aabb::from_points([Point::ONE, Point::new(2.0, 0.0, 3.0)]);
         assert_eq!(Aabb::EMPTY.union(b), b);
         assert!(Aabb::EMPTY.is_empty() && Aabb::EMPTY.half_area() == 0.0);
-        assert_eq!(b.corners().len(), 8);
+        let ray = Ray::new(Point::ZERO, Vector::new(0.6, 0.0, 0.8));
+        assert!(Aabb::EMPTY.clip(&ray).is_none());
+        let corners = b.corners();
+        assert_eq!(Aabb::from_points(corners), b);
+        assert!((0..8).all(|i| (0..i).all(|k| corners[i] != corners[k])), "each corner once");
     }
 }

@@ -1,4 +1,4 @@
-//! A tree of boxes: which of very many a ray crosses, nearest first, and which of them another box meets.
+//! A tree of boxes: which of very many a ray crosses, about the nearest first, and which of them another box meets.
 //!
 //! Guarantee: no box is left out that a box meets, or that a ray crosses by more than rounding: whoever looks for what touches a side
 //! grows the boxes first, see [`Aabb::with_room`]. The tree depends on the boxes and their order alone.
@@ -164,7 +164,8 @@ impl Node {
     }
 }
 
-/// The boxes that a ray crosses, those that it enters first before others but where boxes overlap.
+/// The boxes that a ray crosses, in about the order in which it enters them: a farther one may come first where nodes overlap, so that a
+/// search may end at the `end` of what is left alone.
 #[derive(Clone, Debug)]
 pub struct BoxWalk<'t> {
     tree: &'t BoxTree,

@@ -28,6 +28,8 @@ pub struct Frame {
 
 /// Sine below which a hint runs along the axis: its part across is then four digits of rounding.
 const PARALLEL: f64 = 1e-12;
+/// Sine below which the part across a hint loses a digit or more.
+const STEEP: f64 = 0.1;
 
 impl Frame {
     /// Leaves everything where it is.
@@ -47,7 +49,9 @@ impl Frame {
             .and_then(|h| h.try_normalize())
             .map(|h| h - z * h.dot(z))
             .filter(|p| p.length_squared() > PARALLEL * PARALLEL)
-            .and_then(|p| p.try_normalize())
+            .and_then(|p| p.try_normalize().map(|x| (x, p.length_squared() < STEEP * STEEP)))
+            // Of a hint close to the axis little is left but rounding, a part of which lies along the axis: taken away once more.
+            .and_then(|(x, near_axis)| if near_axis { (x - z * x.dot(z)).try_normalize() } else { Some(x) })
             .unwrap_or_else(|| {
                 // Whichever of the two is not nearly along the axis.
                 let pick = if z.x.abs() < 0.9 { Vector::X } else { Vector::Y };
@@ -143,6 +147,29 @@ mod tests {
         let (f, g) = (odd_frame(), Frame::translation(Vector::new(1.0, 0.0, 2.0)));
         let p = Point::new(-4.0, 0.5, 2.0);
         assert!((f.compose(&g).point(p) - f.point(g.point(p))).length() < 1e-12);
+    }
+
+    #[test]
+    fn a_mirrored_and_scaled_frame_is_undone_and_carries_sizes_as_they_are() {
+        let odd = odd_frame();
+        let f = Frame { z: -odd.z, scale: 2.5, ..odd };
+        let p = Point::new(0.3, 11.0, -5.0);
+        assert!(f.is_mirrored() && !odd.is_mirrored());
+        assert!((f.inverse().point(f.point(p)) - p).length() < 1e-13);
+        assert!((f.compose(&odd).point(p) - f.point(odd.point(p))).length() < 1e-12);
+        let carried = f.carry(&odd);
+        assert!((carried.origin - f.point(odd.origin)).length() < 1e-12);
+        assert_eq!(carried.scale, odd.scale);
+    }
+
+    /// At a sine of 1e-11 rounding leaves five digits of the part across: x and z must stay at right angles all the same.
+    #[test]
+    fn a_hint_close_to_the_axis_gives_right_angles() {
+        let axis = Vector::new(0.48, -0.6, 0.64);
+        for across in [Vector::new(1.0, 0.0, 0.0), Vector::new(0.1, 0.7, -0.4)] {
+            let f = Frame::from_axis(Point::ZERO, axis, Some(axis + 1e-11 * across));
+            assert!(f.x.dot(f.z).abs() < 4e-16 && f.x.dot(f.y).abs() < 4e-16, "{}", f.x.dot(f.z));
+        }
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub(crate) fn error_of_maximum(values: &[f64], errors: &[f64]) -> f64 {
     let exceeded = (0..STEPS).map(|k| {
         // The mean of a maximum is what its distribution function lacks to 1, integrated.
         let x = low + (k as f64 + 0.5) * step;
-        let below: f64 = rivals.iter().map(|[v, e]| normal((x - v) / e)).product();
+        let below: f64 = rivals.iter().map(|[v, e]| standard_normal_cdf((x - v) / e)).product();
         (1.0 - below) * step
     });
     let expected = low + exceeded.sum::<f64>();
@@ -35,7 +35,7 @@ pub(crate) fn error_of_maximum(values: &[f64], errors: &[f64]) -> f64 {
 }
 
 /// Returns the distribution function of the standard normal distribution, within 1e-5 (Abramowitz and Stegun, *Handbook*, 26.2.16).
-fn normal(x: f64) -> f64 {
+fn standard_normal_cdf(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.33267 * x.abs());
     let density = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
     let beyond = density * t * (0.436_183_6 + t * (-0.120_167_6 + t * 0.937_298_0));
@@ -49,7 +49,7 @@ mod tests {
     #[test]
     fn the_normal_distribution_is_that_of_the_tables() {
         for (x, expected) in [(0.0, 0.5), (1.0, 0.841_345), (-1.0, 0.158_655), (2.0, 0.977_250), (3.0, 0.998_650)] {
-            assert!((normal(x) - expected).abs() < 2e-5, "{x}");
+            assert!((standard_normal_cdf(x) - expected).abs() < 2e-5, "{x}");
         }
     }
 

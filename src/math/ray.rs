@@ -34,12 +34,12 @@ pub struct Departure {
     /// Surface parameters of the point on its face.
     pub uv: Uv,
     /// The triangle of its facet, where that is known: on the diagonal of a folded quad rounding does not tell.
-    pub triangle: Option<Triangle>,
+    pub triangle: Option<QuadHalf>,
 }
 
 /// Which triangle of a facet: a quad is traced as two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Triangle {
+pub enum QuadHalf {
     /// Of the corners 0, 1, 2.
     First,
     /// Of the corners 0, 2, 3.

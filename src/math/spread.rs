@@ -3,8 +3,8 @@
 //! Convention: a single part counts as two of which the other is 0, so that the sum's error is the sum itself. Its spread is not known,
 //! and 100 % is what nobody takes for an accuracy.
 
-/// Returns the variance of a sum of so many independent parts, from the parts' sum and the sum of their squares, which may leave out
-/// parts of 0.
+/// Returns the variance of a sum of so many independent parts, from the sum of the parts' squares, which may leave out parts of 0, and the
+/// parts' sum.
 pub(crate) fn variance_of_sum(squares: f64, sum: f64, parts: usize) -> f64 {
     let n = parts.max(2) as f64;
     variance_from_residuals((squares - sum * sum / n).max(0.0), parts)

@@ -112,6 +112,7 @@ impl Curve {
     /// `tail` keeps its speed. Where the two do not meet, the end of this one is kept.
     pub fn joined_with(&self, tail: &Self) -> Self {
         let p = self.degree;
+        debug_assert_eq!(p, tail.degree, "curves of unequal degrees are joined after one is raised");
         let (end, start) = (self.domain()[1], tail.domain()[0]);
         // One control point at the joint: weights are scaled to agree there.
         let scale = self.points[self.points.len() - 1].w / tail.points[0].w;

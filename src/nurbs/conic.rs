@@ -51,7 +51,7 @@ pub(super) fn unit_arc(range: [f64; 2]) -> (Vec<f64>, Vec<(f64, f64, f64)>) {
 }
 
 /// Spline parameter of an angle, radians, on the arc over `range`: `τ = tan(φ/2)/tan(h/2)` in each piece of half-angle `h`. Nothing is
-/// clamped: beyond the ends the outer pieces go on.
+/// clamped: beyond the ends the outer pieces go on, which holds to 180° from the middle of an outer piece.
 pub fn parameter_of_angle(range: [f64; 2], angle: f64) -> f64 {
     in_piece(range, angle, |phi, half| half * (0.5 * phi).tan() / (0.5 * half).tan())
 }

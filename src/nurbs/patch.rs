@@ -11,7 +11,7 @@ use crate::math::{Aabb, Homogeneous, Uv};
 /// let patch = &sweep::sphere(&Frame::IDENTITY, 1.0, [0.0, 1.0], [0.0, 1.0]).bezier_patches()[0];
 /// let [low, high] = patch.halves(0);
 /// // Both halves end in the middle.
-/// let [a, b, c] = [(patch, 0.5), (&low, 1.0), (&high, 0.0)].map(|(p, u)| p.homogeneous(Uv::new(u, 0.3))[0]);
+/// let [a, b, c] = [(patch, 0.5), (&low, 1.0), (&high, 0.0)].map(|(p, u)| p.local_jet(Uv::new(u, 0.3))[0]);
 /// assert!((a - b).length() < 1e-14 && (a - c).length() < 1e-14);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +37,7 @@ macro_rules! as_wide_as_needed {
 }
 
 impl BezierPatch {
-    /// All patches of a surface over its knot rectangles that are not empty, those along v in a row, by knot insertion.
+    /// All patches of a surface over its knot rectangles that are not empty, v fastest, by knot insertion.
     pub(super) fn extract(surface: &Surface) -> Vec<Self> {
         let [p, q] = surface.degree;
         let [nu, nv] = surface.counts();
@@ -68,14 +68,14 @@ impl BezierPatch {
         patches
     }
 
-    /// Homogeneous `[S, S_u, S_v]`: the point and its derivatives by the local parameters. These are in `[0, 1]²`; beyond it the polynomial
+    /// Homogeneous `[S, S_u, S_v]`, derivatives by the local parameters, not the surface's. These are in `[0, 1]²`; beyond it the polynomial
     /// goes on.
-    pub fn homogeneous(&self, local: Uv) -> [Homogeneous; 3] {
-        as_wide_as_needed!(self.homogeneous_of_width(local))
+    pub fn local_jet(&self, local: Uv) -> [Homogeneous; 3] {
+        as_wide_as_needed!(self.jet_of_width(local))
     }
 
-    /// As [`BezierPatch::homogeneous`], with room for `W` basis functions, which the degree must stay below.
-    fn homogeneous_of_width<const W: usize>(&self, local: Uv) -> [Homogeneous; 3] {
+    /// As [`BezierPatch::local_jet`], with room for `W` basis functions, which the degree must stay below.
+    fn jet_of_width<const W: usize>(&self, local: Uv) -> [Homogeneous; 3] {
         let [p, q] = self.degree;
         let (bu, du) = bernstein_to_first::<W>(p, local.x);
         let (bv, dv) = bernstein_to_first::<W>(q, local.y);
@@ -95,7 +95,7 @@ impl BezierPatch {
         sums
     }
 
-    /// Homogeneous point at local parameters in `[0, 1]²`: the first of [`BezierPatch::homogeneous`], in a third of its time.
+    /// Homogeneous point at local parameters in `[0, 1]²`: the first of [`BezierPatch::local_jet`], in a third of its time.
     pub fn homogeneous_point(&self, local: Uv) -> Homogeneous {
         as_wide_as_needed!(self.point_of_width(local))
     }
@@ -263,7 +263,7 @@ mod tests {
         let local = Uv::new(0.3, 0.8);
         for patch in &patches {
             let d = s.derivatives(patch.surface_uv(local));
-            let [a, au, _] = patch.homogeneous(local);
+            let [a, au, _] = patch.local_jet(local);
             assert!((a.project() - d.point).length() < 1e-13);
             let du = (au.truncate() - a.project() * au.w) / a.w / (patch.domain[0][1] - patch.domain[0][0]);
             assert!((du - d.du).length() < 1e-12);
@@ -275,7 +275,7 @@ mod tests {
             }
             for half in patch.halves(0).iter().chain(&patch.halves(1)) {
                 let uv = half.surface_uv(local);
-                assert!((half.homogeneous(local)[0].project() - s.evaluate(uv)).length() < 1e-13);
+                assert!((half.local_jet(local)[0].project() - s.evaluate(uv)).length() < 1e-13);
             }
         }
     }

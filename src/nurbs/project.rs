@@ -1,13 +1,13 @@
 //! Nearest points on curves: a sampled start and safeguarded Newton steps.
 //!
-//! Guarantee: the result is a local minimum of the distance, and the global one whenever the distance has a single
-//! dip within every eighth of a Bézier span. Known weakness: a curve that folds more finely than that.
+//! Guarantee: the result is a stationary point of the distance, and the global minimum whenever the distance has a single dip within every
+//! eighth of a Bézier span. Known weakness: a curve that folds more finely than that.
 
 // Negated comparisons refuse NaN together with what is out of range.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 use super::{ControlPoint, Curve};
-use crate::math::Point;
+use crate::math::{Homogeneous, Point};
 
 /// Samples of each Bézier span that seed the search.
 const SEEDS: usize = 8;
@@ -47,6 +47,7 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
     let mut best = (t0, f64::INFINITY);
     let pieces = curve.bezier_pieces();
     let mut seeds = Vec::with_capacity(pieces.len() * SEEDS + 1);
+    let reaches: Vec<f64> = pieces.iter().map(|piece| reach_of_an_eighth(piece, &offset)).collect();
     for (piece, pair) in pieces.iter().zip(curve.breakpoints().windows(2)) {
         let mut work = piece.clone();
         for k in 0..SEEDS {
@@ -65,8 +66,9 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
     for i in 0..seeds.len() {
         let d = seeds[i].1;
         let lower = (i == 0 || d <= seeds[i - 1].1) && (i + 1 == seeds.len() || d <= seeds[i + 1].1);
-        // A dip between samples cannot be much below its samples unless they are near: try the promising ones.
-        if lower && d.sqrt() <= 2.0 * best.1 + f64::MIN_POSITIVE || best.1.is_infinite() {
+        // A dip lies within the eighths at its sample's either side, and cannot be deeper than the longer of them is long.
+        let [before, after] = [i.saturating_sub(1), i.min(seeds.len() - 2)].map(|k| reaches[k / SEEDS]);
+        if lower && d.sqrt() - before.max(after) <= best.1 {
             let found = descend_from(curve, &offset, seeds[i].0);
             if found.1 < best.1 {
                 best = found;
@@ -74,6 +76,16 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
         }
     }
     best
+}
+
+/// Returns a length, after `offset`, that no eighth of a Bézier piece exceeds.
+fn reach_of_an_eighth(piece: &[Homogeneous], offset: &impl Fn(Point) -> Point) -> f64 {
+    let corners: Vec<Point> = piece.iter().map(|p| offset(p.position())).collect();
+    let steps = || corners.windows(2).map(|pair| (pair[1] - pair[0]).length());
+    // Without weights the speed is at most that along the longest side of the control polygon; with them the whole polygon bounds the piece.
+    let is_polynomial = piece.iter().all(|p| p.weight() == piece[0].weight());
+    let by_speed = steps().fold(0.0, f64::max) * (piece.len() - 1) as f64 / SEEDS as f64;
+    if is_polynomial { by_speed } else { steps().sum() }
 }
 
 /// Descends from `start`, clamped to the domain, by Newton steps on the derivative of the squared length, halved while they do not
@@ -132,5 +144,16 @@ mod tests {
             assert!((distance - 1.0).abs() < 1e-12);
             assert!((c.evaluate(t) - 3.0 * direction).length() < 1e-7);
         }
+    }
+
+    /// The near stretch lies between two samples that are far away: each piece is as long as it goes past the point.
+    #[test]
+    fn a_long_piece_that_passes_close_by_is_found() {
+        let points = [[-1.0, 1.0], [1.0, 1.0], [47.0, 0.1], [-53.0, 0.1]].map(|[x, y]| Point::new(x, y, 0.0));
+        let knots = vec![0.0, 0.0, 1.0, 2.0, 3.0, 3.0];
+        let (c, _) = crate::nurbs::sanitise::curve(1, knots, &points, None).unwrap();
+        let (t, distance) = nearest(&c, Point::ZERO);
+        assert!((distance - 0.1).abs() < 1e-12, "{distance} at {t}");
+        assert!((t - 2.47).abs() < 1e-12);
     }
 }

@@ -1,9 +1,9 @@
 //! Makes usable splines of what files hold: unclamped, periodic, with near-equal knots, bad counts or weights.
 //!
-//! Guarantee: what comes out satisfies the invariants of [`Curve`] and [`Surface`] and is the same shape over the
-//! domain `[knots[degree], knots[n]]`, up to knots that are merged because they differ by less than 1e-10 of the
-//! domain. A knot whose multiplicity exceeds the degree inside the domain splits the spline: the multiplicity is cut to
-//! the degree where the pieces meet, and the spline refused where they do not.
+//! Guarantee: what comes out satisfies the invariants of [`Curve`] and [`Surface`] and is the same shape over the domain
+//! `[knots[degree], knots[n]]`, up to knots that are merged because they differ by less than 1e-10 of the domain. A knot whose multiplicity
+//! exceeds the degree inside the domain splits the spline: the multiplicity is cut to the degree where the pieces meet, within 1 µm or a
+//! millionth of a coordinate, and the spline refused where they do not.
 
 // Negated comparisons refuse NaN together with what is out of range.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -11,7 +11,7 @@
 use super::{ControlPoint, Curve, MAX_DEGREE, Spline, Surface};
 use crate::math::{Homogeneous, Point};
 
-/// Most control points in one spline: 2²⁴ would be 0.5 GB.
+/// Most control points in one spline: 134 MB.
 const MAX_POINTS: usize = 1 << 22;
 
 /// Weights below this share of the largest are none: a point of weight 0 lies at infinity.
@@ -41,16 +41,16 @@ pub enum Defect {
     /// Knots decrease or are no numbers.
     #[error("knots decrease or are not finite")]
     Knots,
-    /// The domain is empty.
+    /// The domain is empty, or the knots end before they begin.
     #[error("the knots leave no domain")]
     Domain,
-    /// A weight is not positive.
+    /// A weight is not positive, or nothing beside the largest, or that is not finite.
     #[error("a weight is not positive")]
     Weights,
-    /// A coordinate is no number.
+    /// A coordinate is no number, or 1e15 mm or more from 0.
     #[error("a control point is not finite")]
     Points,
-    /// Pieces lie apart at a knot of full multiplicity.
+    /// Pieces lie apart at a knot of full multiplicity, or their weights there differ from line to line of a surface.
     #[error("it is torn: its pieces lie apart at a knot")]
     Torn,
 }
@@ -227,25 +227,18 @@ fn conform(
         let allowed = if at_end { p + 1 } else { p };
         if run > allowed && lines[0].len() > p + 1 {
             repairs.cut_multiplicity = true;
-            // Of control points that share all their knots with a neighbour, the inner one is redundant.
             let excess = run - allowed;
-            for _ in 0..excess {
-                if lines[0].len() <= p + 1 {
-                    return Err(Defect::Counts);
-                }
-                let drop = if i == 0 { 0 } else { i.min(lines[0].len() - 1) };
-                knots.remove(i);
-                // Inside the domain both points are places of the spline: one piece ends at the first, the next begins at the other.
-                let is_torn = |line: &Vec<Homogeneous>| {
-                    let [a, b] = [line[drop - 1], line[drop]].map(|p| p.position());
-                    (a - b).length() > JOINED_MM + JOINED_SHARE * a.abs().max_element()
-                };
-                if !at_end && lines.iter().any(is_torn) {
-                    return Err(Defect::Torn);
-                }
-                for line in &mut lines {
-                    line.remove(drop);
-                }
+            if lines[0].len() < p + 1 + excess {
+                return Err(Defect::Counts);
+            }
+            if !at_end {
+                join_pieces(&mut lines, i - 1, i - 1 + excess)?;
+            }
+            // Of control points that share all their knots with a neighbour, the inner one is redundant.
+            let first = i.min(lines[0].len() - excess);
+            knots.drain(i..i + excess);
+            for line in &mut lines {
+                line.drain(first..first + excess);
             }
             i += allowed;
         } else {
@@ -268,6 +261,28 @@ fn conform(
         lines.into_iter().map(|points| Spline { degree, knots: knots.clone(), points }.restricted(a, b)).collect();
     let knots = cut[0].knots.clone();
     Ok((cut.into_iter().map(|c| c.points).collect(), knots, repairs))
+}
+
+/// Makes the piece that begins with the control point `begin` go on from the one that ends with `end`, in every line: its weights are
+/// scaled, by one factor for all lines, so that the point that both have has one weight.
+///
+/// # Errors
+/// [`Defect::Torn`] where the two points lie apart in a line, or the lines ask for different factors.
+fn join_pieces(lines: &mut [Vec<Homogeneous>], end: usize, begin: usize) -> Result<(), Defect> {
+    let factor = lines[0][end].weight() / lines[0][begin].weight();
+    let is_torn = |line: &Vec<Homogeneous>| {
+        let [a, b] = [line[end], line[begin]].map(|p| p.position());
+        let is_apart = (a - b).length() > JOINED_MM + JOINED_SHARE * a.abs().max_element();
+        is_apart || (line[end].weight() / line[begin].weight() - factor).abs() > JOINED_SHARE * factor
+    };
+    if lines.iter().any(is_torn) {
+        return Err(Defect::Torn);
+    }
+    // A piece stays what it is where all its homogeneous coordinates are scaled alike; left out where it would only round.
+    if factor != 1.0 {
+        lines.iter_mut().flat_map(|line| &mut line[begin..]).for_each(|p| *p = *p * factor);
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -310,6 +325,43 @@ mod tests {
         assert!(repairs.cut_multiplicity);
         assert_eq!(c.points.len() + c.degree + 1, c.knots.len());
         assert_eq!(c.evaluate(0.0), zigzag(4)[1]);
+    }
+
+    /// Two arcs of one circle whose weights differ by a factor, over knots that part them 3 and 4 times.
+    #[test]
+    fn pieces_of_other_weights_stay_the_same_conics() {
+        let circle = [[5.0, 0.0], [5.0, 5.0], [0.0, 5.0], [0.0, 5.0], [-5.0, 5.0], [-5.0, 0.0]];
+        let points = circle.map(|[x, y]| Point::new(x, y, 0.0));
+        let cosine = std::f64::consts::FRAC_1_SQRT_2;
+        let weights = [1.0, cosine, 1.0, 3.0, 3.0 * cosine, 3.0];
+        let knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0];
+        let (three, repairs) = curve(2, knots, &points, Some(&weights)).unwrap();
+        assert!(repairs.cut_multiplicity);
+        // The further knot has a point that no piece knows.
+        let mut points = points.to_vec();
+        points.insert(3, Point::new(70.0, 80.0, 90.0));
+        let mut weights = weights.to_vec();
+        weights.insert(3, 0.5);
+        let knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0];
+        let (four, _) = curve(2, knots, &points, Some(&weights)).unwrap();
+        for k in 0..=40 {
+            let t = 0.05 * f64::from(k);
+            let places = [three.evaluate(t), four.evaluate(t)];
+            assert!(places.iter().all(|p| (p.length() - 5.0).abs() < 1e-14), "{places:?} at {t}");
+            assert!(places[0].y >= 0.0 && (places[0].x >= -1e-14) == (t <= 1.0));
+        }
+    }
+
+    /// The columns of a surface are scaled together: where they ask for different factors its second patch would change.
+    #[test]
+    fn a_surface_whose_lines_join_by_different_weights_is_torn() {
+        let knots = [vec![0.0, 0.0, 1.0, 1.0, 2.0, 2.0], vec![0.0, 0.0, 1.0, 1.0]];
+        let points: Vec<Point> =
+            [0.0, 1.0, 1.0, 2.0].iter().flat_map(|&x| [0.0, 1.0].map(|y| Point::new(x, y, 0.0))).collect();
+        let joined = [1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0];
+        assert!(surface([1, 1], knots.clone(), [4, 2], &points, Some(&joined)).is_ok());
+        let torn = [1.0, 1.0, 1.0, 1.0, 2.0, 3.0, 2.0, 3.0];
+        assert_eq!(surface([1, 1], knots, [4, 2], &points, Some(&torn)).unwrap_err(), Defect::Torn);
     }
 
     #[test]

@@ -196,10 +196,11 @@ impl Surface {
         self.limit_normal(uv)
     }
 
-    /// The unit normal just inside the domain, seen from a singular point: along the mixed derivative where one partial
+    /// The unit normal just inside the domain, seen from a singular point, clamped to the domain: along the mixed derivative where one partial
     /// derivative vanishes, otherwise at a point moved 1e-4 of the domain towards its centre. `None` where that has none either.
     pub(crate) fn limit_normal(&self, uv: Uv) -> Option<Vector> {
         let [[u0, u1], [v0, v1]] = self.domain();
+        let uv = uv.clamp(Uv::new(u0, v0), Uv::new(u1, v1));
         let d = self.second_derivatives(uv);
         let inward_u = if uv.x > 0.5 * (u0 + u1) { -1.0 } else { 1.0 };
         let inward_v = if uv.y > 0.5 * (v0 + v1) { -1.0 } else { 1.0 };
@@ -294,7 +295,7 @@ impl Surface {
         Self { points, ..self.clone() }
     }
 
-    /// The Bézier patches over the non-empty knot rectangles, row by row in u.
+    /// The Bézier patches over the non-empty knot rectangles, v fastest.
     pub fn bezier_patches(&self) -> Vec<BezierPatch> {
         BezierPatch::extract(self)
     }

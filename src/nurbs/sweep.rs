@@ -1,7 +1,8 @@
 //! Revolution, extrusion and the analytic surfaces, exact as rational B-splines.
 //!
 //! Parametrisations follow ISO 10303-42: u is the angle of a revolution (with knots at angles, see
-//! [`super::conic`]), v the height, latitude or minor angle; the normal `Su × Sv` points away from the axis.
+//! [`super::conic`]), v the height, latitude or minor angle. The normal `Su × Sv` points out of the solid for cylinder, sphere, torus and a
+//! cone before its apex; else it follows the sense of the profile.
 
 use super::{ControlPoint, Curve, Surface, conic};
 use crate::math::{Frame, Homogeneous, Point, Vector};

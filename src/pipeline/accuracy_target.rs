@@ -2,7 +2,7 @@
 
 use super::error::Error;
 use super::intersectors::IntersectorChoice;
-use super::monitor::{Monitor, Stage};
+use super::monitor::{Monitor, Stage, in_stage};
 use super::ray_recorder::RayRecorder;
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
 use crate::intersect::{Cost, Intersector, NormalMode};
@@ -62,22 +62,20 @@ pub fn settings_for_accuracy(
     let mut product = ModelMeshSource::new(model);
     // Faces of two bodies in one place are faceted once, as the run will.
     product.mesher.glue_mm = scene.map_or(product.mesher.glue_mm, |scene| scene.run.glue_mm);
-    monitor.begin(Stage::Aiming);
     let progress = |p: Progress| monitor.study_progress(&p);
-    let found = match scene {
+    let bound = scene.map(|scene| scene.bind(model).map(|bound| (scene, bound))).transpose()?;
+    let found = in_stage(monitor, Stage::Aiming, || match &bound {
         None => meet_target(model, &product, &ask, &progress),
-        Some(scene) => {
-            let bound = scene.bind(model)?;
+        Some((scene, bound)) => {
             let rays = |seed: u64, count: u64| {
                 let settings = RunSettings { rays: count, seed, path_samples: 0, ..RunSettings::from(&scene.run) };
-                scene_rays(&product, model, &settings, &bound)
+                scene_rays(&product, model, &settings, bound)
             };
             let relative_index = |face| bound.entered_body(face).map(|body| bound.relative_index(body));
             let light = JobLight { rays: &rays, relative_index: &relative_index };
             meet_target_for_light(model, &product, &ask, light, &progress)
         }
-    };
-    monitor.end();
+    });
     let found = found.map_err(refused_angle)?;
     monitor.aimed(&found.answer);
     meshing.plan = Some(found.plan.clone());

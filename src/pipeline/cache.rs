@@ -22,6 +22,8 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
+/// The program whose work is kept: another version, or another commit, makes its own.
+pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
 /// First bytes of an entry.
 const MAGIC: &[u8] = b"lampyris cache 2\n";
 /// Bytes of the checksum at the end of an entry.
@@ -32,8 +34,11 @@ const MOST_BYTES: u64 = 20_000_000_000;
 const STALE: Duration = Duration::from_secs(86_400);
 /// Bytes that are gathered before they are written.
 const WRITTEN_AT_ONCE: usize = 1 << 20;
-/// What follows the hash in the names of entries.
-const KINDS: [&str; 3] = [".facets", ".octree", ".choice"];
+/// What follows the hash in the names of entries: of facets, of octrees, and of what was chosen for a run.
+const FACETS: &str = ".facets";
+const OCTREE: &str = ".octree";
+const CHOICE: &str = ".choice";
+const KINDS: [&str; 3] = [FACETS, OCTREE, CHOICE];
 /// What follows in the names of those that are not whole yet.
 const UNFINISHED: &str = ".part";
 
@@ -115,7 +120,8 @@ impl Cache {
         Ok(entries)
     }
 
-    /// Removes all entries, whole or not, and returns their number; other files in the folder stay.
+    /// Removes all entries, whole or not, with the marks of processes that make one, and returns the number of files; others in the folder
+    /// stay. Processes that wait for an entry may then make it twice.
     ///
     /// # Errors
     /// When one cannot be removed.
@@ -232,23 +238,23 @@ impl CachedFacets<'_> {
     /// Reads the facets of a model of so many placed faces; `None` where they are not kept.
     pub(super) fn mesh(&self, faces: usize) -> Option<FacetMesh> {
         let read = |from: &mut ArrayReader| FacetMesh::read_arrays(from, faces);
-        self.cache.fetch(&self.name(KINDS[0]), self.monitor, read)
+        self.cache.fetch(&self.name(FACETS), self.monitor, read)
     }
 
     /// Returns what `fetch` reads where these facets are kept, among others; the turn to make them, which another process may be making,
     /// where they are not.
     pub(super) fn mesh_or_turn<T>(&self, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
-        self.cache.fetch_or_turn(&self.name(KINDS[0]), fetch)
+        self.cache.fetch_or_turn(&self.name(FACETS), fetch)
     }
 
     /// Keeps the facets for a later run; a failure is only told to the monitor.
     pub(super) fn keep_mesh(&self, mesh: &FacetMesh) {
-        self.cache.keep(&self.name(KINDS[0]), self.monitor, |to| mesh.write_arrays(to));
+        self.cache.keep(&self.name(FACETS), self.monitor, |to| mesh.write_arrays(to));
     }
 
     /// Returns the octree of the facets, as it was kept, or built and kept now.
     pub(super) fn octree<'m>(&self, mesh: &'m FacetMesh, settings: &octree::Settings) -> Octree<'m> {
-        let name = self.name(KINDS[1]);
+        let name = self.name(OCTREE);
         let read = |from: &mut ArrayReader| Octree::read_arrays(mesh, settings, from);
         let _turn = match self.cache.fetch_or_turn(&name, || self.cache.fetch(&name, self.monitor, read)) {
             Ok(octree) => return octree,
@@ -267,16 +273,16 @@ impl CachedFacets<'_> {
 
 /// Returns the name of the file that keeps what was chosen for a run.
 fn choice_name(undecided: &Fingerprint) -> String {
-    format!("{}{}", undecided.0, KINDS[2])
+    format!("{}{}", undecided.0, CHOICE)
 }
 
-/// Hashes all that decides facets and octree, the bytes of the models' files among it; `None` where a file can no longer be read.
+/// Hashes all that decides facets and octree but the octree's settings, of which the arrays hold none that is not the program's default;
+/// the bytes of the models' files among it. `None` where a file can no longer be read.
 pub(super) fn facets_key(scene: &Scene, mesher: &tessellate::Settings) -> Option<Fingerprint> {
     // Entries are raw bytes of numbers: machines of the other order must not share them.
     let machine = if cfg!(target_endian = "big") { "big" } else { "little" };
-    let program = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
     // The settings in their debug form: a new field changes the names by itself.
-    let words = format!("{program} {machine} {mesher:?} {:?}", scene.models);
+    let words = format!("{PROGRAM} {machine} {mesher:?} {:?}", scene.models);
     let mut pieces = vec![words.into_bytes()];
     for model in &scene.models {
         // By content, not by date: a file that was replaced must not give the facets of another.

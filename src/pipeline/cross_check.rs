@@ -64,8 +64,8 @@ impl PreparedScene {
     }
 }
 
-/// Asks a sample of the run's rays again, and traces some of them on facets and on the spline where no pilot has; `None` for both where no
-/// ray can be asked again, and for the error of a run on the spline.
+/// Asks a sample of the run's rays again, and traces some of them on facets and on the spline where no pilot has. The check is `None` where
+/// no ray can be asked again; the error too, unless a pilot measured it, and for a run on the spline.
 ///
 /// The rays depend on the run alone, not on how it was divided: a merged or resumed run has the figures of an undivided one.
 fn recheck(

@@ -1,7 +1,8 @@
 //! `P%@RECEIVER`: as many rays as the error asks for.
 //!
 //! Runs of growing length are traced, each from its beginning, until one is good enough; so the result is the very one of
-//! `--rays N`, whatever number of threads found the N. The runs before the last cost about half of it at most.
+//! `--rays N`, whatever number of threads found the N. The runs before the last cost together about as much as it at most, and an octree
+//! each where there is no cache.
 
 use super::error::Error;
 use super::growing_search::{GROWTH_MARGIN, GrowingSearch, most_rays, next_rays};

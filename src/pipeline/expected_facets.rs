@@ -11,12 +11,12 @@ const SAMPLES: usize = 8;
 ///
 /// A square of side s lies up to s² κ / 4 off a sphere of curvature κ; of other surfaces κ is √|κ₁ κ₂|.
 pub(super) fn expected_facets(model: &Model, tolerance_mm: f64) -> f64 {
-    let bent = |face: &Face, scale: f64| scale * total_curvature(face) / (4.0 * tolerance_mm);
+    let bent = |face: &Face, scale: f64| scale * root_curvature_integral(face) / (4.0 * tolerance_mm);
     model.placed_faces().filter_map(|placed| Some(bent(placed.face?, placed.placement.scale))).sum()
 }
 
 /// Returns √|κ₁ κ₂| summed over the area of a face, mm: over the box around its trims in parameters.
-fn total_curvature(face: &Face) -> f64 {
+fn root_curvature_integral(face: &Face) -> f64 {
     let [[mut u0, mut u1], [mut v0, mut v1]] = face.surface.domain();
     let ends: Vec<Uv> =
         face.loops.iter().flat_map(|l| &l.uses).flat_map(|u| [u.start(), middle(u), u.end()]).collect();

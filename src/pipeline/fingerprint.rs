@@ -1,5 +1,6 @@
 //! What decides the bits of a run, as one hash: parts with the same one belong together.
 
+use super::cache::PROGRAM;
 use super::error::Error;
 use super::intersectors::IntersectorChoice;
 use crate::formats::open_file;
@@ -34,8 +35,7 @@ pub(super) fn run_fingerprint(
         path_samples: 0,
         ..asked.clone()
     };
-    let program = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
-    let words = format!("{program} {mesher:?} {choice:?} {settings:?}");
+    let words = format!("{PROGRAM} {mesher:?} {choice:?} {settings:?}");
     let mut hasher = FingerprintHasher::default();
     hasher.add(words.as_bytes());
     // Every value, not the text: a scene that was made or changed by a program has none, or that of another.

@@ -31,7 +31,7 @@ impl RunKeeper for Unkept {
 #[derive(Clone, Copy)]
 pub struct GrowingSearch<'a> {
     /// Rays of the first run, where an earlier search had come so far; `None` for those that a search begins with.
-    pub first_rays: Option<u64>,
+    pub resume_rays: Option<u64>,
     /// Keeps its runs.
     pub keeper: &'a dyn RunKeeper,
 }
@@ -39,14 +39,14 @@ pub struct GrowingSearch<'a> {
 impl Default for GrowingSearch<'_> {
     /// From the beginning; nothing is kept.
     fn default() -> Self {
-        Self { first_rays: None, keeper: &Unkept }
+        Self { resume_rays: None, keeper: &Unkept }
     }
 }
 
 impl GrowingSearch<'_> {
     /// Returns the number of rays of the first run: `usual`, and at most `most`, but what an earlier search had come to is gone on with.
     pub(super) fn first_rays(&self, usual: u64, most: u64) -> u64 {
-        self.first_rays.unwrap_or(usual.min(most))
+        self.resume_rays.unwrap_or(usual.min(most))
     }
 
     /// Traces the run that `prepared` asks for, and returns its sums and its results.

@@ -83,11 +83,12 @@ impl PreparedScene {
         (self.choice.intersector != IntersectorKind::Exact).then(|| self.mesh_settings.range())
     }
 
-    /// Binds the scene (so that its mistakes come before any work), makes the facets, and chooses how to trace where nobody asks: by a
-    /// pilot that traces some of the run's rays.
+    /// Binds the scene, so that its mistakes come before any work, chooses how to trace where nobody asks, and makes the facets of that
+    /// choice. The choice sets tolerance, normals and intersector: that of another part of the run, else of the cache, else of a pilot that
+    /// traces some of the run's rays.
     ///
     /// # Errors
-    /// When the scene does not fit its model, or the settings do not fit the scene.
+    /// When the scene does not fit its model, or the settings do not fit the scene or ask for 0 threads.
     pub fn new(job: SceneJob, monitor: &dyn Monitor) -> Result<Self, Error> {
         // All that can be refused is refused before facets are made, which may take minutes.
         let threads = job.tracing.thread_count()?;
@@ -206,7 +207,7 @@ impl PreparedScene {
         self.chosen = Some(chosen);
     }
 
-    /// Hashes all that decides the bits of a run: program, text of the scene, its files, facets, intersector, settings; of a run that grows
+    /// Hashes all that decides the bits of a run: program, values of the scene, its files, facets, intersector, settings; of a run that grows
     /// not the number of rays.
     ///
     /// # Errors
@@ -223,8 +224,9 @@ impl PreparedScene {
         let model = (&self.job.loaded.model, &surfaces as &dyn Fn() -> _);
         let (mut chosen, finer) = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
         if let Some(expected) = excess {
+            let [finest, loosest] = tessellate::Settings::default().range();
             chosen.because += &format!(
-                "; facets of 0.05 to 0.2 mm would be some {expected:.1e}, so that coarser ones were tried"
+                "; facets of {finest} to {loosest} mm would be some {expected:.1e}, so that coarser ones were tried"
             );
         }
         if let Some(finer) = finer {
@@ -276,7 +278,7 @@ impl PreparedScene {
         settings
     }
 
-    /// Returns the replicates that are asked for: those of the rays from the first up to the last.
+    /// Returns the replicates that the run is to trace: all, or those from the first ray that was asked for on; shards are not heeded.
     pub fn replicate_range(&self) -> Range<u32> {
         replicate_range(&self.bound, &self.run_settings())
     }

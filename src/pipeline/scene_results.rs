@@ -70,7 +70,8 @@ impl SceneResults {
     }
 
     /// Returns for each face that the results list the errors from the facets of what it absorbed, let in and let out, in the unit of the
-    /// sources; `None` where they are not known: facets were not compared, or no ray of the comparison met the face.
+    /// sources; `None` where they are not known: facets were not compared, or no ray of the comparison met the face. The power of lost rays
+    /// is part of each, and all of it on the spline.
     pub fn geometric_face_errors(&self, prepared: &PreparedScene) -> Vec<Option<[f64; 3]>> {
         let lost = self.results.power.lost;
         let error = |face: u32| match (prepared.choice.intersector, &self.geometric) {

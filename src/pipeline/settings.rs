@@ -6,13 +6,13 @@ use crate::study::accuracy_target::TolerancePlan;
 use std::fmt;
 use std::str::FromStr;
 
-/// More threads than any machine has; a typing error beyond it is cut here.
-const MOST_THREADS: usize = 4096;
+/// Most threads for each that the machine runs at once: more make no run faster, and thousands stop all else.
+const MOST_OVERSUBSCRIPTION: usize = 16;
 
 /// How facets are made; what is not said here the scene says, else the defaults of [`crate::tessellate::Settings`].
 #[derive(Clone, Debug, Default)]
 pub struct MeshingSettings {
-    /// Smallest and largest distance from the facets to the surface, mm.
+    /// Tolerance, mm: the finest, where the surface bends most, and the loosest.
     pub tolerance: Option<[f64; 2]>,
     /// Largest angle between facet and surface normal, degrees.
     pub angle_deg: Option<f64>,
@@ -47,16 +47,17 @@ impl TracingSettings {
         self.ray_range.map(|range| range.end)
     }
 
-    /// Returns the number of threads to trace with: as many as the machine has where none are asked for, 4096 at most.
+    /// Returns the number of threads to trace with: as many as the machine has where none are asked for, 16 times these at most.
     ///
     /// # Errors
     /// When 0 are asked for.
     pub fn thread_count(&self) -> Result<usize, Error> {
+        // A machine that does not tell its threads has one at least.
+        let machine = std::thread::available_parallelism().map_or(1, |n| n.get());
         match self.threads {
-            // A machine that does not tell its threads has one at least.
-            None => Ok(std::thread::available_parallelism().map_or(1, |n| n.get())),
+            None => Ok(machine),
             Some(0) => Err(Error::setting("threads", "0: at least one thread is needed")),
-            Some(n) => Ok(n.min(MOST_THREADS)),
+            Some(n) => Ok(n.min(MOST_OVERSUBSCRIPTION * machine)),
         }
     }
 }

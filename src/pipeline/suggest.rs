@@ -1,8 +1,8 @@
 //! Names close to a mistyped one.
 
-use crate::simulate::scene::suggest::edit_distance;
+use crate::simulate::scene::suggest::nearest;
 
-/// Writes a sentence with the closest known name first, and up to twenty of all: `did you mean "cover"? its parts are cover, housing`.
+/// Writes a sentence with the closest known name first, and up to twenty of all: `did you mean 'cover'? its parts are cover, housing`.
 /// Without known names it is `otherwise`, what to do instead.
 pub(super) fn closest_name(intro: &str, given: &str, known: &[&str], otherwise: &str) -> String {
     if known.is_empty() {
@@ -14,14 +14,11 @@ pub(super) fn closest_name(intro: &str, given: &str, known: &[&str], otherwise: 
             unique.push(name);
         }
     }
-    let folded = given.to_lowercase();
-    let distances = unique.iter().map(|n| (edit_distance(&folded, &n.to_lowercase()), *n));
-    let close = distances.min().filter(|(d, n)| *d <= 2 + n.chars().count() / 3);
     // A screen of names; files may have thousands of parts.
     let shown = unique.iter().take(20).copied().collect::<Vec<_>>().join(", ");
     let rest = if unique.len() > 20 { format!(" and {} more", unique.len() - 20) } else { String::new() };
-    match close {
-        Some((_, name)) => format!("did you mean \"{name}\"? {intro} {shown}{rest}"),
+    match nearest(given, unique.iter().copied()) {
+        Some(name) => format!("did you mean '{name}'? {intro} {shown}{rest}"),
         None => format!("{intro} {shown}{rest}"),
     }
 }
@@ -34,7 +31,7 @@ mod tests {
     fn the_nearest_name_comes_first() {
         assert_eq!(
             closest_name("parts:", "huosing", &["cover", "housing", "cover"], "use --face"),
-            "did you mean \"housing\"? parts: cover, housing"
+            "did you mean 'housing'? parts: cover, housing"
         );
         assert_eq!(closest_name("parts:", "xyz", &["cover"], "use --face"), "parts: cover");
         assert_eq!(closest_name("parts:", "xyz", &[], "use --face"), "use --face");

@@ -198,7 +198,7 @@ impl ReceiverResult {
         let means = means.map(|[mean, square]| [mean, square.max(mean * mean)]);
         let of_means = tallies.spreads[i].errors(total, &tallies.moments[i], tallies.replicates);
         let rays = ray_count(total, tallies.replicates, ray);
-        let of_spread = [0, 1].map(|a| spread_errors(means[a], [of_means[a], of_means[2 + a]]));
+        let of_spread = [0, 1].map(|a| mean_and_rms_errors(means[a], [of_means[a], of_means[2 + a]]));
         // Distances are counted in units of the longer half side, in which a circle stays one.
         let largest = half[0].max(half[1]);
         let farthest = tallies.moments[i].farthest();
@@ -286,8 +286,10 @@ fn ray_count(power: &Sum, replicates: u32, heaviest: f64) -> f64 {
     if f64::from(replicates) < TELLING_RAYS { at_least } else { at_least.max(by_spread) }
 }
 
-/// Makes the standard errors of mean place and root mean square along an axis from those of mean and mean square, in half sides.
-fn spread_errors([_, square]: [f64; 2], [of_mean, of_square]: [f64; 2]) -> [f64; 2] {
+/// Returns the standard errors of mean and root mean square about the receiver's middle, to first order, of [mean, mean square] along an
+/// axis and their standard errors, by the spread of replicates; all lengths in half sides. Of a mean square of 0 the second is 0, or beyond
+/// all numbers where that has an error.
+fn mean_and_rms_errors([_, square]: [f64; 2], [of_mean, of_square]: [f64; 2]) -> [f64; 2] {
     // Of a square root, to first order.
     [of_mean, 0.5 * of_square / square.sqrt().max(f64::MIN_POSITIVE)]
 }

@@ -3,7 +3,7 @@
 use super::Random;
 use super::rays::RaySource;
 use crate::intersect::{Cost, Intersector};
-use crate::math::{Departure, Ray, Triangle, Uv, Vector};
+use crate::math::{Departure, QuadHalf, Ray, Uv, Vector};
 use crate::mesh::FacetMesh;
 use std::ops::Range;
 
@@ -76,7 +76,7 @@ impl<'a> SurfacePaths<'a> {
             let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
             // A number exactly between two facets may fall on one that is left out.
             if let Some(normal) = first_normal(self.mesh, facet) {
-                let (face, triangle) = (self.mesh.facets[facet].face, Some(Triangle::First));
+                let (face, triangle) = (self.mesh.facets[facet].face, Some(QuadHalf::First));
                 let departure = Departure { face, primitive: facet as u32, uv: Uv::ZERO, triangle };
                 let direction = cosine_direction(random, normal * side);
                 return Ray::new(a + (b - a) * u + (c - a) * v, direction).with_departure(departure);

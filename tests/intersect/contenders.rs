@@ -40,7 +40,7 @@ trait FacetOfHit {
 
 impl FacetOfHit for Hit {
     fn facet(&self) -> (u32, bool) {
-        (self.primitive, self.triangle == Some(lampyris::math::Triangle::Second))
+        (self.primitive, self.triangle == Some(lampyris::math::QuadHalf::Second))
     }
 }
 

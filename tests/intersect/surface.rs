@@ -4,7 +4,7 @@ use crate::support::Random;
 use lampyris::intersect::bvh::{self, Bvh};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::{Cost, Hit, Intersector};
-use lampyris::math::{Departure, Point, Ray, Triangle, Uv, Vector};
+use lampyris::math::{Departure, Point, QuadHalf, Ray, Uv, Vector};
 use lampyris::mesh::FacetMesh;
 use lampyris::study::arbiter::{Verdict, arbitrate};
 use lampyris::study::rays::RaySource;
@@ -32,9 +32,9 @@ enum Start {
 }
 
 /// The triangle of a facet.
-fn corners(mesh: &FacetMesh, facet: u32, triangle: Option<Triangle>) -> [Point; 3] {
+fn corners(mesh: &FacetMesh, facet: u32, triangle: Option<QuadHalf>) -> [Point; 3] {
     let [a, b, c, d] = mesh.corners(facet as usize);
-    if triangle == Some(Triangle::Second) { [a, c, d] } else { [a, b, c] }
+    if triangle == Some(QuadHalf::Second) { [a, c, d] } else { [a, b, c] }
 }
 
 /// A ray that leaves a random triangle to either side in a cosine-distributed direction.
@@ -43,7 +43,7 @@ fn surface_ray(mesh: &FacetMesh, start: Start, r: &mut Random) -> Ray {
         let primitive = (r.within(0.0, 1.0) * mesh.facets.len() as f64) as u32;
         let facet = mesh.facets[primitive as usize];
         let second = !facet.is_triangle() && r.within(0.0, 1.0) < 0.5;
-        let triangle = Some(if second { Triangle::Second } else { Triangle::First });
+        let triangle = Some(if second { QuadHalf::Second } else { QuadHalf::First });
         let [a, b, c] = corners(mesh, primitive, triangle);
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
         let side = if r.within(0.0, 1.0) < 0.5 { normal } else { -normal };

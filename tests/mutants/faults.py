@@ -58,7 +58,7 @@ FAULTS = [
     ("polish forgets how a face is turned", EXACT + "newton.rs", "let normal = «record.sign» * patch::normal", "1.0", SPLINE + " simulate"),
     ("polish forgets seams", EXACT + "newton.rs", "uv[k] = if «grid.closed[k]» && uv[k]", "false", SPLINE),
     # Facets and the octree: starts, rounding, boxes, sieve.
-    ("the triangle that a ray leaves forgotten", "src/intersect/start_triangle.rs", "«named.map_or_else(|| is_over_second(corners, start), |triangle| triangle == Triangle::Second)»",
+    ("the triangle that a ray leaves forgotten", "src/intersect/start_triangle.rs", "«named.map_or_else(|| is_over_second(corners, start), |triangle| triangle == QuadHalf::Second)»",
      "is_over_second(corners, start)", "intersect"),
     ("starts on borders not moved", "src/intersect/start_triangle.rs", "«start + ((self.middle - start) * NUDGE).clamp_length_max(LONGEST_NUDGE * reach)»", "start", "intersect"),
     ("grazing starts not lifted", "src/intersect/facet.rs", "«Ray { origin: ray.origin + up * (wanted - height), ..*ray }»", "*ray", "intersect"),

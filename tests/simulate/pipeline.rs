@@ -76,7 +76,7 @@ fn requests_that_cannot_be_met_say_what_to_do() {
     let prepared = lens(3000);
     let text = |e: lampyris::pipeline::Error| e.to_string();
     let scene = &prepared.job.scene;
-    assert!(text(ErrorTarget::new("1%@fokus", scene).unwrap_err()).contains("did you mean \"focus\"?"));
+    assert!(text(ErrorTarget::new("1%@fokus", scene).unwrap_err()).contains("did you mean 'focus'?"));
     let dark = Scene { receivers: Vec::new(), ..(**scene).clone() };
     assert!(text(ErrorTarget::new("1%@focus", &dark).unwrap_err()).contains("add a [[receiver]]"));
     let job = |tracing| SceneJob { tracing, ..prepared.job.clone() };

@@ -148,7 +148,7 @@ proptest! {
             let uv = patch.surface_uv(Uv::new(s, r));
             let here = surface_reference(&surface, uv);
             prop_assert!((surface.evaluate(uv) - here).length() < 1e-9);
-            let local = patch.homogeneous(Uv::new(s, r))[0].position();
+            let local = patch.local_jet(Uv::new(s, r))[0].position();
             prop_assert!((local - here).length() < 1e-9);
             prop_assert!((surface.isoline(0, uv.x).evaluate(uv.y) - here).length() < 1e-9);
             prop_assert!((surface.isoline(1, uv.y).evaluate(uv.x) - here).length() < 1e-9);

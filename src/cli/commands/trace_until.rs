@@ -102,9 +102,9 @@ pub(super) fn trace_until(
         verdicts::check_settling(prepared)?;
     }
     let done = if resume { place.saved_run(prepared)? } else { None };
-    let first_rays = done.as_ref().map(|_| prepared.run_settings().rays);
+    let resume_rays = done.as_ref().map(|_| prepared.run_settings().rays);
     let keeper = SavedRuns { place, done: Mutex::new(done) };
-    let search = GrowingSearch { first_rays, keeper: &keeper };
+    let search = GrowingSearch { resume_rays, keeper: &keeper };
     let monitor = TerminalMonitor::of_saveable(place.console, None);
     Ok(match until {
         Until::Error(target) => {

@@ -17,7 +17,7 @@ use super::trim::Region;
 use crate::intersect::prefetch;
 use crate::math::simd::f64x8::{Array, F64x8, LANES};
 #[cfg(target_arch = "x86_64")]
-use crate::math::simd::f64x8::{Avx2Pair, Avx512};
+use crate::math::simd::f64x8::{Avx2Pair, Avx512Register};
 use crate::math::simd::{self, Instructions, Kernel};
 use crate::math::{Ray, Uv, Vector};
 
@@ -74,7 +74,7 @@ impl Kernel for Convergence<'_> {
     fn run<I: Instructions>(self) {
         #[cfg(target_arch = "x86_64")]
         if I::AVX512 {
-            return self.converge::<Avx512>();
+            return self.converge::<Avx512Register>();
         } else if I::AVX2 {
             return self.converge::<Avx2Pair>();
         }

@@ -66,7 +66,7 @@ impl Patch {
     /// Places a patch of the part in the world: its net about its own centre, of weight 1 in the middle. `face` indexes
     /// [`Geometry::faces`].
     pub(super) fn new(patch: &BezierPatch, face: u32, placed: &PlacedFace<'_>) -> Self {
-        let middle = patch.homogeneous(Uv::splat(0.5))[0];
+        let middle = patch.local_jet(Uv::splat(0.5))[0];
         // Shifting to the patch's own centre before placing keeps the shape exact far from the origin.
         let center = middle.project();
         let net: Net = patch

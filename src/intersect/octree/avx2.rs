@@ -11,7 +11,7 @@ use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
 use std::arch::x86_64::*;
 
 /// Eight lanes of f32.
-pub(super) struct Avx2;
+pub(super) struct Avx2Lanes;
 
 /// A row of a node's bounds as numbers.
 #[inline(always)]
@@ -82,7 +82,7 @@ static COMPRESSIONS: [[u8; 8]; 256] = {
     compressions
 };
 
-impl Lanes for Avx2 {
+impl Lanes for Avx2Lanes {
     #[inline(always)]
     fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32 {
         // SAFETY: see the head of the file; `near` is 0..6 by construction.

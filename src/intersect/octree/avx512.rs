@@ -6,7 +6,7 @@
 //! three.
 #![allow(unsafe_code)]
 
-use super::avx2::{Avx2, ORDERS};
+use super::avx2::{Avx2Lanes, ORDERS};
 use super::facet_pair::{Corners, Edges};
 use super::lanes::Lanes;
 use super::node::{Block, Node};
@@ -16,7 +16,7 @@ use crate::intersect::facet::Line;
 use std::arch::x86_64::*;
 
 /// Sixteen lanes of f32.
-pub(super) struct Avx512;
+pub(super) struct Avx512Lanes;
 
 /// By octant: the bytes of a node's bounds along x, then y, then z; of each axis first where a ray enters the children, the farthest
 /// first, then where it leaves them.
@@ -85,7 +85,7 @@ unsafe fn load_pair(corners: [&Corners; 2], axis: usize) -> __m512d {
     }
 }
 
-impl Lanes for Avx512 {
+impl Lanes for Avx512Lanes {
     #[inline(always)]
     fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32 {
         // SAFETY: see the head of the file.
@@ -136,7 +136,7 @@ impl Lanes for Avx512 {
             let (ay, by) = (_mm512_castps512_ps256(y), _mm512_extractf32x8_ps::<1>(y));
             let (at, bt) = (_mm512_castps512_ps256(t), _mm512_extractf32x8_ps::<1>(t));
             let (cx, cy, ct) = (swap_halves(ax), swap_halves(ay), swap_halves(at));
-            // The edge functions of [`Avx2::sift`], with its bounds of error.
+            // The edge functions of [`Avx2Lanes::sift`], with its bounds of error.
             let u = _mm256_fmsub_ps(cx, by, _mm256_mul_ps(cy, bx));
             let v = _mm256_fmsub_ps(ax, cy, _mm256_mul_ps(ay, cx));
             let w = _mm256_fmsub_ps(bx, ay, _mm256_mul_ps(by, ax));
@@ -182,12 +182,12 @@ impl Lanes for Avx512 {
     /// As with AVX2: one facet fills no wider register.
     #[inline(always)]
     fn quad_edges(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
-        Avx2::quad_edges(corners, ray)
+        Avx2Lanes::quad_edges(corners, ray)
     }
 
     /// As with AVX2: loads of 64 bytes would wait for the entries written by halves.
     #[inline(always)]
     fn open(enters: &[f32; 16], t_max: f32) -> u32 {
-        Avx2::open(enters, t_max)
+        Avx2Lanes::open(enters, t_max)
     }
 }

@@ -1,9 +1,9 @@
 //! The walk compiled for each instruction set, with its lanes.
 
 #[cfg(target_arch = "x86_64")]
-use super::avx2::Avx2;
+use super::avx2::Avx2Lanes;
 #[cfg(target_arch = "x86_64")]
-use super::avx512::Avx512;
+use super::avx512::Avx512Lanes;
 use super::light_buffer::LightBuffer;
 use super::portable;
 use super::tree::Tree;
@@ -33,10 +33,10 @@ impl Kernel for Walk<'_, '_> {
         {
             // VBMI, not AVX-512 alone: the order of a node's bounds is a permutation of bytes.
             if I::AVX512_VBMI {
-                return walk::walk::<Avx512>(self.tree, self.light_buffers, self.rays, self.hits, self.cost);
+                return walk::walk::<Avx512Lanes>(self.tree, self.light_buffers, self.rays, self.hits, self.cost);
             }
             if I::AVX2 {
-                return walk::walk::<Avx2>(self.tree, self.light_buffers, self.rays, self.hits, self.cost);
+                return walk::walk::<Avx2Lanes>(self.tree, self.light_buffers, self.rays, self.hits, self.cost);
             }
         }
         walk::walk::<portable::Portable>(self.tree, self.light_buffers, self.rays, self.hits, self.cost);

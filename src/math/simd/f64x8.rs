@@ -125,7 +125,7 @@ impl F64x8 for Array {
 }
 
 #[cfg(target_arch = "x86_64")]
-pub(crate) use registers::{Avx2Pair, Avx512};
+pub(crate) use registers::{Avx2Pair, Avx512Register};
 
 #[cfg(target_arch = "x86_64")]
 mod registers {
@@ -134,7 +134,7 @@ mod registers {
 
     /// Eight numbers in one register of AVX-512; only where that was found.
     #[derive(Clone, Copy)]
-    pub(crate) struct Avx512(__m512d);
+    pub(crate) struct Avx512Register(__m512d);
 
     /// Eight numbers in two registers of AVX2, with FMA; only where these were found.
     #[derive(Clone, Copy)]
@@ -169,7 +169,7 @@ mod registers {
         }
     }
 
-    impl F64x8 for Avx512 {
+    impl F64x8 for Avx512Register {
         #[inline(always)]
         fn splat(x: f64) -> Self {
             Self(unsafe { _mm512_set1_pd(x) })
@@ -352,7 +352,7 @@ mod tests {
         fn run<I: Instructions>(self) -> Vec<u64> {
             #[cfg(target_arch = "x86_64")]
             if I::AVX512 {
-                return operate::<Avx512>();
+                return operate::<Avx512Register>();
             } else if I::AVX2 {
                 return operate::<Avx2Pair>();
             }

@@ -88,8 +88,8 @@ impl SourceQueue {
         }
     }
 
-    /// Writes the next ray that can start to `path` and `ray`; `false` at the end of the replicate. Rays that cannot start are booked as
-    /// lost and passed over.
+    /// Writes the next ray that can start to `path` and `ray`; `false` at the end of the queue, of a replicate or of the one ray asked for:
+    /// both then hold what was tried last. Rays that cannot start are booked as lost and passed over.
     #[inline(always)]
     pub(super) fn start_next<C: RayPayload>(
         &mut self,

@@ -223,7 +223,7 @@ impl SplineChart {
             for a in 0..counts[0] {
                 for b in 0..counts[1] {
                     let local = Uv::new((a as f64 + 0.5) / counts[0] as f64, (b as f64 + 0.5) / counts[1] as f64);
-                    let q = patch.homogeneous(local)[0].position();
+                    let q = patch.local_jet(local)[0].position();
                     seeds.push(((q - p).length(), patch.surface_uv(local)));
                 }
             }

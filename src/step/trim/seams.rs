@@ -33,6 +33,7 @@ struct SeamCurve {
 }
 
 impl<'r, 't, 'e> Seams<'r, 't, 'e> {
+    /// Makes the seams in space, fitted now, of straight lines from end to end in the chart's parameters; seam `k` is that of `lines[k]`.
     pub(super) fn new(region: &'r Region<'t, 'e>, lines: Vec<[Uv; 2]>) -> Self {
         Self { region, curves: lines.into_iter().map(|line| seam_curve(region, line)).collect() }
     }

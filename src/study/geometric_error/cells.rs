@@ -212,7 +212,8 @@ impl<'r> CellPairs<'r> {
     }
 
     /// Returns the estimated geometric error of each cell, row by row and in the unit of the receiver or channel, and the side of the
-    /// largest block of cells that share one, for rays were few. What noise is left after pooling is in it; blocks without rays have 0.
+    /// largest block of cells that share one, for rays were few; a cell whose own rays tell of more has that. What noise is left after
+    /// pooling is in it; blocks without rays have 0.
     pub(super) fn cell_errors(&self) -> (Vec<f64>, usize) {
         let mut layer = vec![0.0; self.cells.len()];
         let mut pooled = 1;
@@ -240,8 +241,11 @@ impl<'r> CellPairs<'r> {
             let mean = quanta(Cell::difference) / count;
             let noise = quanta(|c| c.difference_variance) / (count * count);
             // The mean of a square of cells may say more than their scatter, where all err the same way.
-            let error = (excess.max(mean * mean) + noise).sqrt();
-            self.cells_of(block).for_each(|c| layer[c] = error * self.unit[c]);
+            let shared = excess.max(mean * mean);
+            for c in self.cells_of(block) {
+                // Where facets fold light they move it by whole cells: the few that lose or gain it err by more than their neighbours.
+                layer[c] = (shared.max(self.cells[c].excess()) + noise).sqrt() * self.unit[c];
+            }
         }
         (layer, pooled)
     }

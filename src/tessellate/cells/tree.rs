@@ -30,7 +30,7 @@ const PARALLEL: u32 = 5;
 const MAX_DEPTH: u32 = 60;
 /// Share of a closed direction by which a border may fall short of all of it, and a cell of half of it: far above what parameters are
 /// rounded by.
-const WHOLE_TURN: f64 = 1e-6;
+const TURN_SLACK: f64 = 1e-6;
 /// Share of a cell's size that a preferred cut keeps from its sides.
 const CUT_CLEARANCE: f64 = 1e-3;
 
@@ -51,7 +51,7 @@ struct Tree<'s, 'a> {
     /// Parameters at which cells are cut rather than elsewhere, in u and v.
     preferred: [Vec<f64>; 2],
     /// A cell must be shorter than this, in u and v: half of a direction in which the face comes back to where it began, else infinite.
-    half_turn: Uv,
+    longest: Uv,
     /// Largest angle between a facet and its normals, radians; `None` where none was asked for.
     max_angle: Option<f64>,
 }
@@ -131,9 +131,9 @@ pub(in crate::tessellate) fn split(
     let bands = BorderBands::new(&segments);
     segments.extend(imprinted);
     let resolution = parameter_resolution(lo, hi);
-    let half_turn = half_turn(surface, root);
+    let longest = longest_cells(surface, root);
     let tree =
-        Tree { surface, acceptance, segments, border, bands, poles, resolution, preferred, half_turn, max_angle };
+        Tree { surface, acceptance, segments, border, bands, poles, resolution, preferred, longest, max_angle };
     // Branches have equal shares whatever they need: where one is short while the whole is not, all get twice as much. The last try
     // leaves at most twice the budget.
     let all: Vec<u32> = (0..tree.segments.len() as u32).collect();
@@ -280,7 +280,7 @@ impl Tree<'_, '_> {
 
     /// Returns where a cell that goes halfway round the face is cut, with the parameter that is constant there; `None` for a shorter one.
     fn turn_to_cut(&self, cell: Cell) -> Option<(usize, f64)> {
-        let is_long = |d: &usize| cell.hi[*d] - cell.lo[*d] >= self.half_turn[*d];
+        let is_long = |d: &usize| cell.hi[*d] - cell.lo[*d] >= self.longest[*d];
         (0..2).find(is_long).map(|d| (d, self.cut_parameter(cell, d)))
     }
 
@@ -322,14 +322,15 @@ impl Tree<'_, '_> {
     }
 }
 
-/// Returns half of `root` in each direction in which the face comes back to where it began, else infinity. Of a tube thinner than its
-/// tolerance two facets around would have their corners in the same two places: the facets of one side would be those of the other.
-fn half_turn(surface: &FaceSurface<'_>, root: Cell) -> Uv {
+/// Returns the longest sides that cells may have: a little less than half of `root` in a direction in which the face closes on itself and
+/// `root` holds the whole turn, else infinity. Of a tube thinner than its tolerance two facets around would have their corners in the same
+/// two places: the facets of one side would be those of the other.
+fn longest_cells(surface: &FaceSurface<'_>, root: Cell) -> Uv {
     let (lengths, whole) = (root.hi - root.lo, surface.extent());
     let half = |d: usize| {
-        let comes_back = surface.closed[d] && lengths[d] >= (1.0 - WHOLE_TURN) * whole[d];
+        let comes_back = surface.closed[d] && lengths[d] >= (1.0 - TURN_SLACK) * whole[d];
         // A little less, so that rounding leaves no two cells of one half each.
-        if comes_back { (0.5 - WHOLE_TURN) * lengths[d] } else { f64::INFINITY }
+        if comes_back { (0.5 - TURN_SLACK) * lengths[d] } else { f64::INFINITY }
     };
     Uv::new(half(0), half(1))
 }

@@ -310,7 +310,7 @@ mod tests {
             }
         }
         let at = corners[0] * b[0] + corners[1] * b[1] + corners[2] * b[2];
-        assert!((sum.project() - patch.homogeneous(at)[0].project()).length() < 1e-13);
+        assert!((sum.project() - patch.local_jet(at)[0].project()).length() < 1e-13);
         let mut plain = SimplexNets::default();
         inverse_multinomials::<3>(n, &mut plain.shares);
         plain.expand_plain(patch, corners);
@@ -320,7 +320,7 @@ mod tests {
             s + segment[j] * (factorial(n) / factorial(j) / factorial(n - j) * 0.5f64.powi(n as i32))
         });
         let at = 0.5 * (corners[0] + corners[1]);
-        assert!((middle.project() - patch.homogeneous(at)[0].project()).length() < 1e-13);
+        assert!((middle.project() - patch.local_jet(at)[0].project()).length() < 1e-13);
     }
 
     #[test]

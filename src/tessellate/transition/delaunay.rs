@@ -301,7 +301,8 @@ impl Refinement<'_, '_> {
         [conflicts, crossed]
     }
 
-    /// Makes a segment a constraint and counts it in `border`; false where it would cross another or an end was not inserted.
+    /// Makes the segment between two nodes a constraint, and counts in `border` each of the edges that it is led over. `true`, and nothing
+    /// counted, where both nodes stand in one place; `false` where it would cross another or a node was not inserted.
     fn constrain(&mut self, a: u32, b: u32) -> bool {
         let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else { return false };
         // Both nodes stand in one place; a constraint of no length holds as it is.

@@ -56,7 +56,7 @@ pub(super) fn single_root(patch: &Net) -> Option<(Uv, f64)> {
     let mut at = Uv::splat(0.5);
     // On its way Newton's method may leave the box a little; its root counts only inside.
     for _ in 0..20 {
-        let [s, su, sv] = patch.homogeneous(at);
+        let [s, su, sv] = patch.local_jet(at);
         let j = inverse([[su.x, sv.x], [su.y, sv.y]])?;
         let step = Uv::new(j[0][0] * s.x + j[0][1] * s.y, j[1][0] * s.x + j[1][1] * s.y);
         at -= step;
