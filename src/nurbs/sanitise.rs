@@ -280,7 +280,7 @@ fn join_pieces(lines: &mut [Vec<Homogeneous>], end: usize, begin: usize) -> Resu
     }
     // A piece stays what it is where all its homogeneous coordinates are scaled alike; left out where it would only round.
     if factor != 1.0 {
-        lines.iter_mut().flat_map(|line| &mut line[begin..]).for_each(|p| *p = *p * factor);
+        lines.iter_mut().flat_map(|line| &mut line[begin..]).for_each(|p| *p *= factor);
     }
     Ok(())
 }
