@@ -221,6 +221,7 @@ def test_cells_off_a_disc_are_none_and_dark_ones_have_the_error_of_a_ray(tmp_pat
     scene.add(lp.disc("disc", at=(0, 0, 299), radius=5.0, cells=(8, 8), absorbs=False))
     disc = scene.trace(progress=False)["disc"]
     off = np.isnan(disc.values)
+    assert "nan" not in disc._repr_html_().split("base64,")[0] + disc._repr_html_().split("<figcaption>")[1]
     assert off[0, 0] and off[-1, -1] and not off[4, 4]
     assert (disc.statistical[~off & (disc.values == 0)] > 0).all() and np.isnan(disc.statistical[off]).all()
 
