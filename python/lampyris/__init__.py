@@ -18,10 +18,11 @@ from .examples import write_demo
 from .materials import Material, Selector, coating, diffuse, glass, absorber, interface, metal, mirror, select
 from .mesh import Mesh
 from .model import Account, Model, read_step
+from .part import Interrupted, Part
 from .receivers import Receiver as ReceiverTable
 from .receivers import absorbed, disc, far_field, plane, sphere
 from .results import Ends, Figure, Receiver, Run
-from .scene import Interrupted, Part, Scene, media, scene_schema
+from .scene import Scene, media, scene_schema
 from .sources import Source, collimated, cone, cosine, eulumdat, ies, lambertian, led, point, ray_file, rays
 from .tracers import Bvh, Exact, Octree
 from .verdicts import Assessment, regulations

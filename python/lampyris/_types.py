@@ -13,37 +13,55 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 Path = Union[str, "os.PathLike[str]"]
-Vector = Sequence[float]
-Tolerance = Union[float, Sequence[float]]
+Vector = Union[Sequence[float], npt.NDArray[Any]]
+Cells = Union[Sequence[int], npt.NDArray[Any]]
+Tolerance = Union[float, Sequence[float], npt.NDArray[Any]]
 Tolerances = Mapping[str, Tolerance]
 Table = dict[str, Any]
 
 
 def tolerance_range(tolerance: Tolerance) -> tuple[float, float]:
     """A range of tolerances from one number or two, mm."""
-    if isinstance(tolerance, (int, float)):
-        return (float(tolerance), float(tolerance))
-    if len(tolerance) != 2:
-        raise ValueError(f"tolerance {tolerance!r}: write one number of mm or two, the tighter one first")
-    return (float(tolerance[0]), float(tolerance[1]))
+    advice = f"tolerance {tolerance!r}: write one number of mm or two, the tighter one first"
+    if isinstance(tolerance, str):
+        raise ValueError(advice)
+    try:
+        ends = np.atleast_1d(np.asarray(tolerance, dtype=float))
+    except (TypeError, ValueError):
+        raise ValueError(advice) from None
+    if ends.shape not in ((1,), (2,)):
+        raise ValueError(advice)
+    return (float(ends[0]), float(ends[-1]))
 
 
-def tolerance_list(tolerances: Tolerances | None) -> list[tuple[str, tuple[float, float]]]:
+def tolerance_list(tolerances: Tolerances | None, name: str) -> list[tuple[str, tuple[float, float]]]:
     """Tolerances by name as the extension takes them."""
-    return [(name, tolerance_range(t)) for name, t in (tolerances or {}).items()]
+    if tolerances is None:
+        return []
+    if not isinstance(tolerances, Mapping) or not all(isinstance(key, str) for key in tolerances):
+        raise TypeError(f"{name}: a dict of names and tolerances is needed, as {{'cover': 0.01}}, not {tolerances!r}")
+    return [(key, tolerance_range(t)) for key, t in tolerances.items()]
 
 
 def table_to_json(tables: Table) -> str:
     """Tables as JSON for the extension; a number that is not finite, which JSON has not, stands as text under ``$float``."""
 
-    def finite(value: Any) -> Any:
+    def known(value: Any, place: str) -> Any:
+        value = plain(value)
         if isinstance(value, float) and not math.isfinite(value):
             return {"$float": str(value)}
         if isinstance(value, dict):
-            return {key: finite(x) for key, x in value.items()}
-        return [finite(x) for x in value] if isinstance(value, list) else value
+            return {str(key): known(x, f"{place}.{key}" if place else str(key)) for key, x in value.items()}
+        if isinstance(value, list):
+            return [known(x, f"{place}[{k}]") for k, x in enumerate(value)]
+        if not isinstance(value, (str, int, float)):
+            raise TypeError(f"{place}: a scene holds numbers, texts, lists and tables, not {value!r} ({type(value).__name__})")
+        return value
 
-    return json.dumps(finite(tables), allow_nan=False)
+    try:
+        return json.dumps(known(tables, ""), allow_nan=False)
+    except RecursionError:
+        raise ValueError("the tables of the scene hold themselves; leave that entry out") from None
 
 
 def table_from_json(text: str) -> Table:

@@ -14,8 +14,10 @@ import tempfile
 import threading
 from typing import Any
 
+from .part import Part
 from .results import Run
-from .scene import Part, Scene, Settings, named_files
+from .scene import Scene, named_files
+from .settings import Settings
 
 #: Parts for each thread of the cluster: enough that a slow one or a killed one costs little.
 PARTS_PER_THREAD = 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -27,6 +28,8 @@ def select(
 ) -> Selector:
     """Faces by part, instance, name, colour, ``#id`` in the file, or the face nearest to points (mm)."""
     given = {"part": part, "instance": instance, "face": face, "colour": colour, "entity": entity, "at": at}
+    if all(value is None for value in given.values()):
+        raise ValueError(f"select: say which faces, by one of {', '.join(given)}; all faces of a part are scene[part]")
     return Selector(plain(given))
 
 
@@ -77,6 +80,8 @@ def glass(medium: str | float, **keys: Any) -> Material:
     """A body of a transparent medium: a name of the catalogue (see :func:`media`) or an index; ``keys`` are those of ``[[medium]]``."""
     if isinstance(medium, str) and not keys:
         return Material({"medium": medium})
+    if not isinstance(medium, (str, numbers.Real)) or isinstance(medium, bool):
+        raise TypeError(f"glass: a name of lampyris.media() or an index is needed, as glass(1.49), not {medium!r}")
     # A name that tells it from the catalogue's own, and from every other index.
     own = {"catalogue": medium} if isinstance(medium, str) else {"index": float(medium)}
     name = ", ".join(f"{key} {value}" for key, value in {**own, **keys}.items())

@@ -24,19 +24,23 @@ class Mesh:
     ) -> Mesh:
         """From points (n, 3) in mm and the corners of triangles (m, 3) or quads (m, 4).
 
-        ``normals`` (n, 3) are those of the surface at the points; without, those of the flat facets are taken.
+        ``normals`` (n, 3) are those of the surface at the points; without, and where one has no length, that of the flat facet is taken.
         """
-        given = None if normals is None else np.asarray(normals)
-        return cls(_lampyris.Mesh.from_arrays(np.asarray(positions), np.asarray(facets), given))
+        return cls(_lampyris.Mesh.from_arrays(positions, facets, normals))
 
     @classmethod
     def from_trimesh(cls, mesh: Any) -> Mesh:
         """From a ``trimesh.Trimesh``, with its normals at the vertices."""
+        if not all(hasattr(mesh, name) for name in ("vertices", "faces", "vertex_normals")):
+            raise TypeError(f"from_trimesh takes a trimesh.Trimesh, not {type(mesh).__name__}; arrays go to Mesh.from_arrays")
         return cls.from_arrays(mesh.vertices, mesh.faces, mesh.vertex_normals)
 
     @classmethod
     def from_pyvista(cls, mesh: Any) -> Mesh:
         """From a ``pyvista.PolyData``; faces of more than three corners become triangles."""
+        if not all(hasattr(mesh, name) for name in ("triangulate", "faces", "points")):
+            advice = "extract_surface() makes one of a grid; arrays go to Mesh.from_arrays"
+            raise TypeError(f"from_pyvista takes a pyvista.PolyData, not {type(mesh).__name__}; {advice}")
         surface = mesh.triangulate()
         facets = surface.faces.reshape(-1, 4)[:, 1:]
         return cls.from_arrays(np.asarray(surface.points, dtype=float), facets)

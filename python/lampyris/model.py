@@ -8,6 +8,7 @@ from typing import Any
 from . import _html, _lampyris
 from ._types import Path, Tolerance, Tolerances, tolerance_list, tolerance_range
 from .mesh import Mesh
+from .settings import real_number
 
 
 class Account(dict[str, Any]):
@@ -83,8 +84,9 @@ class Model:
         and ``faces`` overrule it by name. ``measure`` samples the distance too.
         """
         asked = None if tolerance is None else tolerance_range(tolerance)
-        made = self._core.tessellate(asked, angle_deg, tolerance_list(parts), tolerance_list(faces), measure)
-        return Mesh(made)
+        angle = None if angle_deg is None else real_number("angle_deg", angle_deg)
+        of_parts, of_faces = tolerance_list(parts, "parts"), tolerance_list(faces, "faces")
+        return Mesh(self._core.tessellate(asked, angle, of_parts, of_faces, bool(measure)))
 
     def __repr__(self) -> str:
         return repr(self._core)
@@ -98,4 +100,4 @@ def read_step(path: Path, unit_mm: float | None = None) -> Model:
 
     ``unit_mm`` overrules the file's unit of length. Raises :class:`InputError` when the file cannot be read or is not STEP.
     """
-    return Model(_lampyris.read_step(path, unit_mm))
+    return Model(_lampyris.read_step(path, None if unit_mm is None else real_number("unit_mm", unit_mm)))

@@ -60,4 +60,6 @@ def callback(progress: bool | ProgressCallback) -> tuple[ProgressCallback | None
         return shown, shown.close
     if progress is False:
         return None, lambda: None
+    if not callable(progress):
+        raise TypeError(f"progress: True, False or a function (stage, done, total, messages) is needed, not {progress!r}")
     return progress, lambda: None

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ._types import Table, Vector, plain
+import numpy as np
+
+from ._types import Cells, Table, Vector, plain
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ def plane(
     at: Vector,
     normal: Vector = (0.0, 0.0, 1.0),
     size: Vector = (100.0, 100.0),
-    cells: Sequence[int] = (100, 100),
+    cells: Cells = (100, 100),
     **keys: Any,
 ) -> Receiver:
     """A rectangle in space, power per area; light ends there unless ``absorbs=False``."""
@@ -36,7 +38,7 @@ def far_field(
     name: str,
     h_deg: Vector = (-90.0, 90.0),
     v_deg: Vector = (-90.0, 90.0),
-    cells: Sequence[int] | None = None,
+    cells: Cells | None = None,
     step_deg: float | None = None,
     **keys: Any,
 ) -> Receiver:
@@ -44,6 +46,9 @@ def far_field(
     if cells is None and step_deg is not None:
         if not step_deg > 0.0:
             raise ValueError(f"step_deg = {step_deg}: it must be positive")
+        for axis, ends in (("h_deg", h_deg), ("v_deg", v_deg)):
+            if not np.isfinite(np.asarray(ends, dtype=float)).all() or np.shape(ends) != (2,):
+                raise ValueError(f"{axis} = {ends!r}: two finite angles are needed, as (-40, 40)")
         cells = [max(1, round((high - low) / step_deg)) for low, high in (h_deg, v_deg)]
     return _receiver("far_field", name, keys, h_deg=h_deg, v_deg=v_deg, cells=cells)
 
@@ -53,14 +58,14 @@ def disc(
     at: Vector,
     radius: float,
     normal: Vector = (0.0, 0.0, 1.0),
-    cells: Sequence[int] = (100, 100),
+    cells: Cells = (100, 100),
     **keys: Any,
 ) -> Receiver:
     """A round detector in space, power per area; ``cells`` are those of the square around it."""
     return _receiver("disc", name, keys, at=at, normal=normal, radius=radius, cells=cells)
 
 
-def sphere(name: str, at: Vector, radius: float, cells: Sequence[int] = (180, 90), **keys: Any) -> Receiver:
+def sphere(name: str, at: Vector, radius: float, cells: Cells = (180, 90), **keys: Any) -> Receiver:
     """A sphere in space by direction from its centre, power per area."""
     return _receiver("sphere", name, keys, at=at, radius=radius, cells=cells)
 

@@ -48,7 +48,7 @@ class Receiver:
         #: The object of the receiver in ``results.json``.
         self.document = document
         self.name: str = document["name"]
-        #: ``plane``, ``far_field``, ``sphere`` or ``absorbed``.
+        #: ``plane``, ``disc``, ``far_field``, ``sphere`` or ``absorbed``.
         self.kind: str = document["kind"]
         #: Unit of the cells.
         self.unit: str = document["unit"]
@@ -148,7 +148,7 @@ class Receiver:
         rows = [(n, f.value, f.statistical, f.geometric, f.unit) for n, f in self.figures.items()]
         text = _html.table((self.name, "value", "± rays", "± facets", "unit"), rows)
         if self.values.size > 1:
-            text += _html.picture(self.to_png(), f"{self.name}, 0 to {self.values.max():.4g} {self.unit}")
+            text += _html.picture(self.to_png(), f"{self.name}, 0 to {np.nanmax(self.values):.4g} {self.unit}")
         return text
 
 

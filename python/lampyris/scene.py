@@ -13,78 +13,19 @@ from collections.abc import Iterable
 from typing import Any
 
 from . import _lampyris
-from ._types import (
-    Path,
-    Table,
-    Tolerance,
-    Tolerances,
-    plain,
-    table_from_json,
-    table_to_json,
-    tolerance_list,
-    tolerance_range,
-)
+from ._types import Path, Table, Tolerance, Tolerances, plain, table_from_json, table_to_json
 from .materials import Material, Selector
 from .mesh import Mesh
 from .model import Model
+from .part import Interrupted, Part, part_core
 from .progress import ProgressCallback, callback
 from .receivers import Receiver
 from .results import Ends, Run
+from .settings import Settings, trace_settings, whole_number, word
 from .sources import Source
 
-#: Settings of a trace that are none of the scene's own.
-Settings = dict[str, Any]
-
-
-class Part:
-    """What was traced of a run: to be kept, sent, added to other parts, and gone on from with ``trace(resume=part)``."""
-
-    def __init__(self, core: _lampyris.Part) -> None:
-        self._core = core
-
-    @property
-    def rays(self) -> int:
-        """Rays that are done."""
-        return self._core.rays
-
-    @property
-    def done(self) -> int:
-        """Replicates that are done."""
-        return self._core.done
-
-    @property
-    def replicates(self) -> int:
-        """Replicates of the whole run."""
-        return self._core.replicates
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether nothing is left to trace."""
-        return self._core.is_whole
-
-    def merged(self, other: Part) -> Part:
-        """The sum with another part of the same run."""
-        return Part(self._core.merged(other._core))
-
-    def to_bytes(self) -> bytes:
-        """For a file or another machine; :meth:`Scene.read_part` reads them."""
-        return self._core.to_bytes()
-
-    def save(self, path: Path) -> None:
-        """Writes the bytes into a file."""
-        pathlib.Path(path).write_bytes(self.to_bytes())
-
-    def __repr__(self) -> str:
-        return repr(self._core)
-
-
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C stopped a trace; ``part`` is what was done, and the scene keeps it as ``interrupted``."""
-
-    def __init__(self, part: Part) -> None:
-        share = f"{part.done} of {part.replicates} replicates ({part.rays} rays)"
-        super().__init__(f"{share} are kept: scene.trace(..., resume=True) goes on from there")
-        self.part = part
+#: Most parts that a run is divided into; there are never as many replicates.
+MOST_PARTS = 2**32 - 1
 
 
 class Scene:
@@ -112,8 +53,9 @@ class Scene:
         self._prepared: tuple[str, _lampyris.Prepared] | None = None
         #: What an interrupted trace left.
         self.interrupted: Part | None = None
-        given = [models] if isinstance(models, (str, os.PathLike, Model)) else list(models)
-        for model in given:
+        if isinstance(models, (str, os.PathLike, Model)) or not isinstance(models, Iterable):
+            models = [models]
+        for model in models:
             self.add_model(model)
 
     @classmethod
@@ -150,6 +92,8 @@ class Scene:
             self._models.append(model)
             keys = {"unit_mm": model.unit_mm, **keys}
             model = model.path
+        elif not isinstance(model, (str, os.PathLike)):
+            raise TypeError(f"a model is needed, as a path or lampyris.read_step(path), not {type(model).__name__}")
         self.tables.setdefault("model", []).append(plain({"file": os.path.abspath(model), **keys}))
         return self
 
@@ -162,6 +106,8 @@ class Scene:
         """``scene["housing"] = mirror(0.95)``: what the faces of a part, or of a selector, are made of; later rules win."""
         if not isinstance(material, Material):
             raise TypeError(f"a material is needed, as lampyris.mirror(0.9), not {type(material).__name__}")
+        if not isinstance(where, (str, Selector)):
+            raise TypeError(f"a part's name or lampyris.select(…) is needed, not {where!r}; several parts are select(part=[…])")
         selector = where.table if isinstance(where, Selector) else {"part": where}
         if material.medium is not None:
             media = self.tables.setdefault("medium", [])
@@ -216,12 +162,12 @@ class Scene:
 
     def prepare(self, *, progress: bool | ProgressCallback = True, **settings: Any) -> Settings:
         """Reads, binds and facets the scene, and chooses how to trace it; says how. ``settings`` are those of :meth:`trace`."""
-        prepared = self._prepare(_settings(**settings), progress)
+        prepared = self._prepare(trace_settings(settings), progress)
         return dict(json.loads(prepared.summary_json()))
 
     def facets(self, **settings: Any) -> Mesh:
         """The facets that a trace with these settings is about; on the spline those that it is drawn and checked with."""
-        return Mesh(self._prepare(_settings(**settings), False).mesh)
+        return Mesh(self._prepare(trace_settings(settings), False).mesh)
 
     def _prepare(self, settings: Settings, progress: bool | ProgressCallback) -> _lampyris.Prepared:
         text = self.to_toml()
@@ -261,33 +207,30 @@ class Scene:
 
         What is not said the scene says; without tolerance, normals and intersector a pilot of the run's own rays chooses them. The bits
         are those of ``lampyris trace`` with the same settings, for any number of threads. Ctrl-C raises :class:`Interrupted`;
-        ``resume=True`` then goes on, ``resume=part`` from any part of the run. The GIL is free meanwhile.
+        the same call with ``resume=True`` then goes on, ``resume=part`` from any part of the run. The GIL is free meanwhile.
         """
-        settings = _settings(
+        settings = trace_settings(dict(
             rays=rays, seed=seed, threads=threads, tolerance=tolerance, angle_deg=angle_deg, accuracy_deg=accuracy_deg,
             parts=parts, faces=faces, roles=roles, normals=normals, intersector=intersector,
-        )
-        if until is not None and resume is not False:
-            raise ValueError("until and resume exclude each other: give rays with resume")
-        prepared = self._prepare(settings, progress)
-        part = self.interrupted if resume is True else (resume or None)
-        if resume is True and part is None:
+        ))
+        until = None if until is None else word("until", until)
+        part = self.interrupted if resume is True else resume
+        if part is None:
             raise ValueError("resume=True: no trace of this scene was interrupted; leave it out, or give a part")
+        core = None if part is False else part_core(part, "resume")
+        prepared = self._prepare(settings, progress)
         tell, close = callback(progress)
         words = None
         try:
             if until is not None:
-                found, rest, stopped, words = prepared.trace_until(until, tell)
+                found, rest, stopped, words = prepared.trace_until(until, core, tell)
             else:
-                found, rest, stopped = prepared.trace(None if part is None else part._core, None, tell)
+                found, rest, stopped = prepared.trace(core, None, tell)
         finally:
             close()
         if rest is not None:
             self.interrupted = Part(rest)
-            if isinstance(stopped, KeyboardInterrupt):
-                raise Interrupted(self.interrupted) from None
-        if stopped is not None:
-            raise stopped
+            _raise_stopped(stopped, self.interrupted)
         if found is None:
             raise _lampyris.Defect("a trace ended without results; please report it")
         self.interrupted = None
@@ -298,7 +241,7 @@ class Scene:
 
         ``settings`` are those of :meth:`trace`.
         """
-        prepared = self._prepare(_settings(**settings), progress)
+        prepared = self._prepare(trace_settings(settings), progress)
         tell, close = callback(progress)
         try:
             return Ends(*prepared.ends(tell))
@@ -308,22 +251,38 @@ class Scene:
     def trace_part(
         self, index: int, count: int, *, progress: bool | ProgressCallback = False, **settings: Any
     ) -> Part:
-        """Traces part ``index`` (from 0) of ``count`` of the run; ``settings`` are those of :meth:`trace`."""
-        prepared = self._prepare(_settings(**settings), progress)
+        """Traces part ``index`` (from 0) of ``count`` of the run; ``settings`` are those of :meth:`trace`.
+
+        Ctrl-C raises :class:`Interrupted` with what was done of the part.
+        """
+        first, of = whole_number("index", index, 0, MOST_PARTS), whole_number("count", count, 1, MOST_PARTS)
+        prepared = self._prepare(trace_settings(settings), progress)
         tell, close = callback(progress)
         try:
-            _, part, stopped = prepared.trace(None, (index, count), tell)
+            _, core, stopped = prepared.trace(None, (first, of), tell)
         finally:
             close()
-        if stopped is not None:
-            raise stopped
-        if part is None:
+        if core is None:
             raise _lampyris.Defect("a part was traced without sums; please report it")
-        return Part(part)
+        part = Part(core)
+        _raise_stopped(stopped, part)
+        return part
 
     def read_part(self, data: bytes, **settings: Any) -> Part:
         """A part from its bytes; it must be of this scene with the same settings."""
-        return Part(self._prepare(_settings(**settings), False).read_part(data))
+        return Part(self._prepare(trace_settings(settings), False).read_part(data))
+
+    def __copy__(self) -> Scene:
+        """A scene to be changed by itself, with the same models; nothing is prepared for it yet, and nothing interrupted."""
+        made = Scene()
+        for name in ("_text", "_name", "_folder", "_models", "_ray_folder"):
+            setattr(made, name, getattr(self, name))
+        made._models = list(self._models)
+        made._tables = copy.deepcopy(self._tables)
+        return made
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> Scene:
+        return self.__copy__()
 
     def __repr__(self) -> str:
         tables = self._tables
@@ -336,6 +295,14 @@ def named_files(tables: Table) -> list[Table]:
     return [entry for kind in ("model", "source", "medium") for entry in tables.get(kind, []) if "file" in entry]
 
 
+def _raise_stopped(stopped: BaseException | None, part: Part) -> None:
+    """Raises what stopped a trace; what was done goes with Ctrl-C."""
+    if isinstance(stopped, KeyboardInterrupt):
+        raise Interrupted(part) from None
+    if stopped is not None:
+        raise stopped
+
+
 def _state_of(file: str) -> list[int] | None:
     """Size and time of a file; ``None`` where there is none."""
     try:
@@ -343,38 +310,6 @@ def _state_of(file: str) -> list[int] | None:
     except OSError:
         return None
     return [state.st_size, state.st_mtime_ns]
-
-
-def _settings(
-    *,
-    rays: int | None = None,
-    seed: int | None = None,
-    threads: int | None = None,
-    tolerance: Tolerance | None = None,
-    angle_deg: float | None = None,
-    accuracy_deg: float | None = None,
-    parts: Tolerances | None = None,
-    faces: Tolerances | None = None,
-    roles: Tolerances | None = None,
-    normals: str | None = None,
-    intersector: str | None = None,
-) -> Settings:
-    """What is asked beside the scene, as the extension takes it."""
-    if rays is not None and (isinstance(rays, bool) or rays != int(rays) or rays < 1):
-        raise ValueError(f"rays = {rays!r}: a number of rays is whole and at least 1")
-    return {
-        "tolerance": None if tolerance is None else tolerance_range(tolerance),
-        "angle_deg": angle_deg,
-        "accuracy_deg": accuracy_deg,
-        "part": tolerance_list(parts),
-        "face": tolerance_list(faces),
-        "role": tolerance_list(roles),
-        "rays": None if rays is None else (None, int(rays)),
-        "seed": seed,
-        "threads": threads,
-        "intersector": intersector,
-        "normals": normals,
-    }
 
 
 def media() -> list[str]:

@@ -76,7 +76,10 @@ def ray_file(file: Path, at: Vector = (0.0, 0.0, 0.0), **keys: Any) -> Source:
 
 def rays(array: npt.ArrayLike, at: Vector = (0.0, 0.0, 0.0), **keys: Any) -> Source:
     """Rays of an array: (n, 7) of origin (mm), direction and power, or (n, 8) with the wavelength in nm too."""
-    given = np.asarray(array)
+    try:
+        given = np.asarray(array)
+    except ValueError as e:
+        raise ValueError(f"rays: an array of shape (n, 7) or (n, 8) is needed: {e}") from None
     if given.dtype.kind not in "fiu":
         raise TypeError(f"rays: an array of numbers with shape (n, 7) or (n, 8) is needed, not of {given.dtype}")
     if given.ndim != 2 or given.shape[1] not in (7, 8):

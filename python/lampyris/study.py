@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,10 @@ from . import _lampyris
 from ._types import Tolerance, tolerance_range
 from .model import Model
 from .progress import ProgressCallback, callback
+from .settings import LARGEST_SEED, MOST_RAYS, count_of_threads, whole_number
+
+#: Most rounds of a measurement.
+MOST_REPETITIONS = 1_000_000
 
 
 class Study(dict[str, npt.NDArray[Any]]):
@@ -36,7 +41,7 @@ class Study(dict[str, npt.NDArray[Any]]):
         from . import _html
 
         rows = zip(*(column.tolist() for column in self.values()))
-        return f"<p>{self.answer}</p>" + _html.table(list(self), rows)
+        return f"<p>{escape(self.answer)}</p>" + _html.table(list(self), rows)
 
 
 def _column(values: list[Any]) -> npt.NDArray[Any]:
@@ -59,13 +64,16 @@ def _study(
 ) -> dict[str, Any]:
     if not isinstance(model, Model):
         raise TypeError(f"a study takes a Model, not {type(model).__name__}; read one with lampyris.read_step")
+    if not isinstance(tolerances, Iterable):
+        raise TypeError(f"tolerances: a list is needed, as [{tolerances!r}]")
     ranges = [tolerance_range(t) for t in tolerances]
+    names = [normals] if isinstance(normals, str) else None if normals is None else list(normals)
+    count = None if rays is None else whole_number("rays", rays, 1, MOST_RAYS)
+    rounds = None if repetitions is None else whole_number("repetitions", repetitions, 1, MOST_REPETITIONS)
+    key, cores = whole_number("seed", seed, 0, LARGEST_SEED), count_of_threads(threads)
     tell, close = callback(progress)
-    names = None if normals is None else list(normals)
     try:
-        text = _lampyris.study(
-            kind, model._core, model.name, ranges, names, rays, repetitions, seed, threads, tell
-        )
+        text = _lampyris.study(kind, model._core, model.name, ranges, names, count, rounds, key, cores, tell)
     finally:
         close()
     return dict(json.loads(text))

@@ -12,6 +12,7 @@ from . import _lampyris
 from ._lampyris import Hits
 from .mesh import Mesh
 from .model import Model
+from .settings import count_of_threads, real_number
 
 
 class _Tracer:
@@ -30,9 +31,10 @@ class _Tracer:
         """Nearest hits of rays from ``origins`` (n, 3) along ``directions`` (n, 3), in mm.
 
         Arrays of float64 in one piece are read where they lie, read-only ones too; other numbers are converted first. Directions are
-        brought to unit length. ``ValueError`` names the first ray with a number that is not finite.
+        brought to unit length. ``ValueError`` names the first ray that cannot be traced, and why. Ctrl-C ends the call.
         """
-        return self._core.intersect(np.asarray(origins), np.asarray(directions), t_min, t_max, threads)
+        ends = (real_number("t_min", t_min), real_number("t_max", t_max))
+        return self._core.intersect(origins, directions, *ends, count_of_threads(threads))
 
     @property
     def bytes(self) -> int:
@@ -61,8 +63,7 @@ class Octree(_Tracer):
     """
 
     def __init__(self, mesh: Mesh, normals: str = "bilinear", model: Model | None = None) -> None:
-        core = None if model is None else model._core
-        super().__init__(_lampyris.Tracer.of_mesh(_mesh(mesh, "Octree"), "octree", normals, core))
+        super().__init__(_on_facets("Octree", "octree", mesh, normals, model))
 
 
 class Bvh(_Tracer):
@@ -71,9 +72,7 @@ class Bvh(_Tracer):
     def __init__(
         self, mesh: Mesh, normals: str = "bilinear", model: Model | None = None, *, wide: bool = True
     ) -> None:
-        core = None if model is None else model._core
-        kind = "cwbvh" if wide else "bvh2"
-        super().__init__(_lampyris.Tracer.of_mesh(_mesh(mesh, "Bvh"), kind, normals, core))
+        super().__init__(_on_facets("Bvh", "cwbvh" if wide else "bvh2", mesh, normals, model))
 
 
 class Exact(_Tracer):
@@ -85,8 +84,10 @@ class Exact(_Tracer):
         super().__init__(_lampyris.Tracer.from_model(model._core))
 
 
-def _mesh(mesh: Any, what: str) -> _lampyris.Mesh:
+def _on_facets(what: str, kind: str, mesh: Mesh, normals: str, model: Model | None) -> _lampyris.Tracer:
     if not isinstance(mesh, Mesh):
         advice = "make one with model.tessellate(), Mesh.from_arrays, from_trimesh or from_pyvista"
         raise TypeError(f"{what} takes a Mesh, not {type(mesh).__name__}; {advice}")
-    return mesh._core
+    if model is not None and not isinstance(model, Model):
+        raise TypeError(f"model: a Model is needed, not {type(model).__name__}; give the one whose tessellate() made the mesh")
+    return _lampyris.Tracer.of_mesh(mesh._core, kind, normals, None if model is None else model._core)

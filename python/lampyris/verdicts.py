@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 from . import _html, _lampyris
@@ -29,7 +30,7 @@ class Assessment(dict[str, Any]):
     def _repr_html_(self) -> str:
         keys = ("id", "min", "max", "value", "statistical", "geometric", "verdict")
         text = _html.table(keys, ([row[k] for k in keys] for row in self["rows"]))
-        return f"<p>{self['regulation']}: <b>{self.verdict}</b></p>{text}"
+        return f"<p>{escape(self['regulation'])}: <b>{self.verdict}</b></p>{text}"
 
 
 def regulations() -> dict[str, str]:

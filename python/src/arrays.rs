@@ -15,28 +15,44 @@ pub(crate) fn columns<'py>(
     name: &str,
     width: usize,
 ) -> PyResult<PyReadonlyArray2<'py, f64>> {
+    columns_of(given, name, &[width])
+}
+
+/// [`columns`] of an array that may have one of several widths.
+pub(crate) fn columns_of<'py>(
+    given: &Bound<'py, PyAny>,
+    name: &str,
+    widths: &[usize],
+) -> PyResult<PyReadonlyArray2<'py, f64>> {
     let py = given.py();
     let numpy = py.import("numpy")?;
-    let array = numpy.call_method1("asarray", (given,))?;
+    let wanted = widths.iter().map(|width| format!("(n, {width})")).collect::<Vec<_>>().join(" or ");
+    let array = numpy.call_method1("asarray", (given,)).map_err(|e| {
+        PyValueError::new_err(format!("{name}: an array of shape {wanted} is needed: {}", e.value(py)))
+    })?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     if !matches!(kind.as_str(), "f" | "i" | "u") {
         let dtype = array.getattr("dtype")?;
         return Err(PyTypeError::new_err(format!(
-            "{name}: an array of float64 with shape (n, {width}) is needed, not of {dtype}; convert it with numpy.asarray({name}, dtype=float)"
+            "{name}: an array of float64 with shape {wanted} is needed, not of {dtype}; convert it with numpy.asarray({name}, dtype=float)"
         )));
     }
-    if shape.len() != 2 || shape[1] != width {
-        return Err(PyValueError::new_err(format!(
-            "{name}: the shape must be (n, {width}), not {}; a single row is {name}[None, :]",
-            array.getattr("shape")?
-        )));
+    if shape.len() != 2 || !widths.contains(&shape[1]) {
+        let advice = match shape[..] {
+            [n] if widths.contains(&n) => format!("; a single row is {name}[None, :]"),
+            [n, _] if widths.contains(&n) => format!("; rows and columns are exchanged by {name}.T"),
+            [.., n] if shape.len() > 2 && widths.contains(&n) => format!("; its rows are {name}.reshape(-1, {n})"),
+            _ => String::new(),
+        };
+        let shape = array.getattr("shape")?;
+        return Err(PyValueError::new_err(format!("{name}: the shape must be {wanted}, not {shape}{advice}")));
     }
     // Contiguous and aligned: fields of packed records are read by numpy, which copies them.
     let array = numpy.call_method1("require", (array, numpy.getattr("float64")?, ("C", "A")))?;
-    let array = array.cast_into::<PyArray2<f64>>().map_err(|_| {
-        PyTypeError::new_err(format!("{name}: an array of float64 with shape (n, {width}) is needed"))
-    })?;
+    let array = array
+        .cast_into::<PyArray2<f64>>()
+        .map_err(|_| PyTypeError::new_err(format!("{name}: an array of float64 with shape {wanted} is needed")))?;
     array.try_readonly().map_err(|_| {
         PyValueError::new_err(format!("{name}: the array is being written by another thread; wait, or pass a copy"))
     })
@@ -86,6 +102,9 @@ pub(crate) fn require_finite(rows: &[f64], width: usize, name: &str) -> PyResult
         ))),
     }
 }
+
+/// Farthest coordinate of points, mm: there doubles are a tenth of a mm apart, and farther out octree and BVH miss what is hit.
+pub(crate) const FARTHEST: f64 = 1e15;
 
 /// Number of rows of an array.
 pub(crate) fn length(array: &PyReadonlyArray2<'_, f64>) -> usize {

@@ -1,14 +1,16 @@
 //! Work that runs without the GIL on a thread of its own, while this one tells how far it is and listens for Ctrl-C.
 
 use crate::errors::Defect;
-use lampyris::pipeline::{Monitor, Stage, TracingSettings};
+use lampyris::pipeline::{Monitor, Stage};
 use lampyris::study;
 use lampyris::study::default_accuracy::Chosen;
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::process;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+use std::thread;
 use std::time::Duration;
 
 /// How often to look for signals and to tell how far the work is: below what a person notices.
@@ -32,7 +34,7 @@ impl SharedProgress {
     }
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(|e| e.into_inner())
 }
 
@@ -108,7 +110,7 @@ pub(crate) fn interruptible<T: Send + 'static>(
     let shared = Arc::new(SharedProgress::default());
     let (sender, receiver) = mpsc::channel();
     let for_work = shared.clone();
-    std::thread::spawn(move || {
+    thread::spawn(move || {
         let made = catch_unwind(AssertUnwindSafe(|| on_threads(threads, || work(&for_work))));
         // Nobody waits any more where the work was left to itself.
         let _ = sender.send(made);
@@ -119,13 +121,17 @@ pub(crate) fn interruptible<T: Send + 'static>(
         let received = py.detach(|| locked(&receiver).recv_timeout(LOOK_EVERY));
         match received {
             Ok(Ok(made)) => {
-                // What was said at the end is said too.
-                let last = if stopped.is_none() { tell(py, &shared, progress).err() } else { None };
-                return Ok(Outcome { made, stopped: stopped.or(last) });
+                // What was said at the end is said too, and a signal that came at the end is heard here rather than by the caller, who
+                // would lose what was made.
+                let last = || py.check_signals().and_then(|()| tell(py, &shared, progress)).err();
+                return Ok(Outcome { made, stopped: stopped.or_else(last) });
             }
             Ok(Err(panic)) => return Err(defect(panic.as_ref())),
             Err(RecvTimeoutError::Disconnected) => return Err(Defect::new_err("the work ended without a result")),
-            Err(RecvTimeoutError::Timeout) if stopped.is_some() => {}
+            Err(RecvTimeoutError::Timeout) if stopped.is_some() => {
+                // A second Ctrl-C must not cost what the first one keeps.
+                let _ = py.check_signals();
+            }
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(e) = py.check_signals().and_then(|()| tell(py, &shared, progress)) {
                     shared.stops.store(true, Ordering::SeqCst);
@@ -139,14 +145,72 @@ pub(crate) fn interruptible<T: Send + 'static>(
     }
 }
 
-/// In a pool of so many threads, one at least and as many at most as the command takes, or in the one that all share.
+/// Does the work on so many threads without the GIL; a signal sets the flag, at which the work is to end soon.
+///
+/// # Errors
+/// The exception of a signal, or [`Defect`] where the work panics.
+pub(crate) fn stoppable<T: Send>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    work: impl FnOnce(&AtomicBool) -> T + Send,
+) -> PyResult<T> {
+    let stops = AtomicBool::new(false);
+    let listen = |receiver: mpsc::Receiver<thread::Result<T>>| {
+        let mut stopped = None;
+        loop {
+            match receiver.recv_timeout(LOOK_EVERY) {
+                Ok(Ok(made)) => return stopped.map_or(Ok(made), Err),
+                Ok(Err(panic)) => return Err(defect(panic.as_ref())),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(Defect::new_err("the work ended without a result"));
+                }
+                Err(RecvTimeoutError::Timeout) => {
+                    if let Err(e) = Python::attach(|py| py.check_signals()) {
+                        stops.store(true, Ordering::Relaxed);
+                        stopped = Some(e);
+                    }
+                }
+            }
+        }
+    };
+    py.detach(|| {
+        thread::scope(|scope| {
+            let (sender, receiver) = mpsc::channel();
+            let stops = &stops;
+            scope.spawn(move || {
+                let made = catch_unwind(AssertUnwindSafe(|| on_threads(threads, || work(stops))));
+                // The other end waits for it.
+                let _ = sender.send(made);
+            });
+            listen(receiver)
+        })
+    })
+}
+
+/// Threads of one pool on a machine that has fewer: a pool of 64 is made in 3 ms, one of 4096 stands in its own way for most of a minute.
+const MOST_THREADS: usize = 64;
+
+/// In a pool of so many threads, at most [`MOST_THREADS`] or as many as the machine has, or in the one that all share.
 pub(crate) fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
-    let count = |n: usize| TracingSettings { threads: Some(n.max(1)), ..TracingSettings::default() }.thread_count();
-    let wanted = threads.and_then(|n| count(n).ok());
+    let cores = thread::available_parallelism().map_or(1, |n| n.get());
+    let wanted = threads.map(|n| n.clamp(1, cores.max(MOST_THREADS))).or_else(|| is_forked().then_some(cores));
     match wanted.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build()) {
         Some(Ok(pool)) => pool.install(work),
         _ => work(),
     }
+}
+
+/// The process that loaded the module.
+static LOADED_BY: OnceLock<u32> = OnceLock::new();
+
+/// Remembers this process as the one whose shared pool has threads.
+pub(crate) fn remember_process() {
+    LOADED_BY.get_or_init(process::id);
+}
+
+/// Whether this process was forked from the one that loaded the module: the threads of the shared pool stayed there.
+fn is_forked() -> bool {
+    LOADED_BY.get().is_some_and(|id| *id != process::id())
 }
 
 fn tell(py: Python<'_>, shared: &SharedProgress, progress: Option<&Py<PyAny>>) -> PyResult<()> {

@@ -1,7 +1,7 @@
 //! Octree, BVH and spline, asked about arrays of rays.
 
-use crate::arrays::{columns, length, rows, vector};
-use crate::background::{interruptible, on_threads};
+use crate::arrays::{FARTHEST, columns, length, rows, vector};
+use crate::background::{interruptible, on_threads, stoppable};
 use crate::errors::SceneError;
 use crate::hits::{HitArrays, Hits};
 use crate::mesh::Mesh;
@@ -13,19 +13,25 @@ use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
 use lampyris::intersect::{Cost, Footprint};
+use lampyris::math::Vector;
 use lampyris::{FacetMesh, Hit, Intersector, Ray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use self_cell::self_cell;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Rays that are turned into the crate's own at a time: they and their hits stay in the second cache.
 const CHUNK: usize = 2048;
+/// Fewer rays are asked about without a look at signals: they take milliseconds, and a thread that listens some 50 µs.
+const UNHEARD_RAYS: usize = 16 * CHUNK;
 /// How far from 1 the length of a direction may be and keep its bits.
 const UNIT_ROUNDING: f64 = 1e-15;
+/// Lengths whose squares neither overflow nor lose digits.
+const SAFE_LENGTHS: RangeInclusive<f64> = 1e-140..=1e140;
 
 type Tree<'a> = Box<dyn Intersector + Send + 'a>;
 
@@ -78,29 +84,57 @@ pub(crate) struct Tracer {
     name: &'static str,
 }
 
-/// The ray of two rows; `None` where a number is not finite or the direction has no length.
+/// The ray of two rows; `None` where [`fault`] says why.
 fn ray(origin: &[f64], direction: &[f64], range: [f64; 2]) -> Option<Ray> {
-    let (origin, given) = (vector(origin), vector(direction));
-    let length = given.length();
-    let direction = if (length - 1.0).abs() <= UNIT_ROUNDING { given } else { given / length };
-    let is_good = origin.is_finite() && direction.is_finite() && length > 0.0;
-    is_good.then(|| Ray::new(origin, direction).with_range(range[0], range[1]))
+    let origin = vector(origin);
+    let is_near = origin.abs().max_element() <= FARTHEST && !origin.is_nan();
+    let direction = unit(vector(direction)).filter(|_| is_near)?;
+    Some(Ray::new(origin, direction).with_range(range[0], range[1]))
 }
 
-/// Asks about all rays, on the current pool; gives the first ray that is none, where there is one.
+/// The direction at unit length; `None` where it has none or a number is not finite.
+fn unit(given: Vector) -> Option<Vector> {
+    let length = given.length();
+    if (length - 1.0).abs() <= UNIT_ROUNDING {
+        return Some(given);
+    }
+    if SAFE_LENGTHS.contains(&length) {
+        return Some(given / length);
+    }
+    let largest = given.abs().max_element();
+    (given.is_finite() && largest > 0.0).then(|| (given / largest).normalize())
+}
+
+/// Why two rows are no ray, and what to do.
+fn fault(k: usize, origin: &[f64], direction: &[f64]) -> String {
+    let why = if origin.iter().chain(direction).any(|x| !x.is_finite()) {
+        "every number must be finite; leave such rays out"
+    } else if direction.iter().all(|x| *x == 0.0) {
+        "the direction has no length; leave such rays out"
+    } else {
+        "it starts more than 1e15 mm away, where doubles tell no points of a model apart; move its origin along the ray"
+    };
+    format!("ray {k} from {origin:?} along {direction:?} cannot be traced: {why}")
+}
+
+/// Asks about all rays, on the current pool, until told to stop; gives the first ray that is none, where there is one.
 fn ask(
     who: &dyn Intersector,
-    origins: &[f64],
-    directions: &[f64],
+    rays: [&[f64]; 2],
     range: [f64; 2],
     into: &mut HitArrays,
+    stops: &AtomicBool,
 ) -> (Cost, Option<usize>) {
+    let [origins, directions] = rays;
     let bad = AtomicUsize::new(usize::MAX);
     let rows = into.chunks(CHUNK);
     let buffers = || (Vec::with_capacity(CHUNK), vec![None; CHUNK]);
     let cost = rows
         .enumerate()
         .map_init(buffers, |(rays, hits): &mut (Vec<Ray>, Vec<Option<Hit>>), (chunk, mut rows)| {
+            if stops.load(Ordering::Relaxed) {
+                return Cost::default();
+            }
             let first = chunk * CHUNK;
             let count = rows.t.len();
             rays.clear();
@@ -147,7 +181,10 @@ impl Tracer {
                 let message = "normals exact: the spline is needed to move hits to; give model=";
                 return Err(SceneError::new_err(message));
             }
-            (NormalMode::Exact, Some(model)) => Some(model.import.clone()),
+            (NormalMode::Exact, Some(model)) => {
+                mesh.require_model(model)?;
+                Some(model.import.clone())
+            }
             _ => None,
         };
         let mesh = mesh.mesh.clone();
@@ -227,41 +264,49 @@ impl Tracer {
         }
         let (from, along) = (rows(&origins)?, rows(&directions)?);
         let who = self.structure.intersector();
-        let (arrays, cost, bad) = py.detach(|| {
+        let work = |stops: &AtomicBool| {
             let mut arrays = HitArrays::new(n);
-            let (cost, bad) = on_threads(threads, || ask(who, from, along, [t_min, t_max], &mut arrays));
+            let (cost, bad) = ask(who, [from, along], [t_min, t_max], &mut arrays, stops);
             (arrays, cost, bad)
-        });
+        };
+        let (arrays, cost, bad) = if n < UNHEARD_RAYS {
+            py.detach(|| on_threads(threads, || work(&AtomicBool::new(false))))
+        } else {
+            stoppable(py, threads, work)?
+        };
         if let Some(k) = bad {
-            return Err(PyValueError::new_err(format!(
-                "ray {k} is none: from {:?} along {:?}; numbers must be finite, and directions must have a length",
-                &from[3 * k..3 * k + 3],
-                &along[3 * k..3 * k + 3]
-            )));
+            let row = 3 * k..3 * k + 3;
+            return Err(PyValueError::new_err(fault(k, &from[row.clone()], &along[row])));
         }
         arrays.into_hits(py, n, cost)
     }
 
-    /// Seconds of the crate's own call on the same rays, which are its own already, and the number of hits: what `intersect` is measured
-    /// against.
+    /// Seconds of the crate on the same rays, without Python: into the arrays that `intersect` gives, and into hits of its own from rays
+    /// that are its own already; and the number of hits. What `intersect` is measured against.
     fn seconds_of_rust_call(
         &self,
         py: Python<'_>,
         origins: &Bound<'_, PyAny>,
         directions: &Bound<'_, PyAny>,
-    ) -> PyResult<(f64, usize)> {
+    ) -> PyResult<(f64, f64, usize)> {
         let (origins, directions) = (columns(origins, "origins", 3)?, columns(directions, "directions", 3)?);
         let (from, along) = (rows(&origins)?, rows(&directions)?);
         let who = self.structure.intersector();
+        let (n, range) = (length(&origins), [0.0, f64::INFINITY]);
         Ok(py.detach(|| {
+            let start = Instant::now();
+            let mut arrays = HitArrays::new(n);
+            ask(who, [from, along], range, &mut arrays, &AtomicBool::new(false));
+            let into_arrays = start.elapsed().as_secs_f64();
+            drop(arrays);
             let pairs = from.chunks(3).zip(along.chunks(3));
-            let rays: Vec<Ray> = pairs.filter_map(|(o, d)| ray(o, d, [0.0, f64::INFINITY])).collect();
+            let rays: Vec<Ray> = pairs.filter_map(|(o, d)| ray(o, d, range)).collect();
             let start = Instant::now();
             let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
             rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).for_each(|(rays, hits)| {
                 who.intersect_batch(rays, hits, &mut Cost::default());
             });
-            (start.elapsed().as_secs_f64(), hits.iter().flatten().count())
+            (into_arrays, start.elapsed().as_secs_f64(), hits.iter().flatten().count())
         }))
     }
 

@@ -11,6 +11,7 @@ mod intersectors;
 mod mesh;
 mod model;
 mod names;
+mod part;
 mod prepared;
 mod results;
 mod scene;
@@ -32,7 +33,9 @@ mod _lampyris {
     #[pymodule_export]
     use super::model::{Model, demo_files, read_step};
     #[pymodule_export]
-    use super::prepared::{Part, Prepared};
+    use super::part::Part;
+    #[pymodule_export]
+    use super::prepared::Prepared;
     #[pymodule_export]
     use super::results::{Results, assess, regulations, value_map};
     #[pymodule_export]
@@ -43,6 +46,7 @@ mod _lampyris {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::background::remember_process();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

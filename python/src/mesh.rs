@@ -1,14 +1,16 @@
 //! Meshes of quad facets as arrays.
 
-use crate::arrays::{columns, flat, flat_uv, length, require_finite, rows, shaped, vector};
+use crate::arrays::{FARTHEST, columns, columns_of, flat, flat_uv, length, require_finite, rows, shaped, vector};
 use crate::errors::{SceneError, of_format, of_json};
+use crate::model::Model;
 use lampyris::FacetMesh;
 use lampyris::formats::{Facets, write_facets};
 use lampyris::math::{FaceId, Uv, Vector};
 use lampyris::mesh::{Facet, MeshVertex};
-use lampyris::tessellate::Report;
-use numpy::PyArrayDyn;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use lampyris::step::Import;
+use lampyris::tessellate::{Report, Tessellation};
+use numpy::{PyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,22 +20,40 @@ use std::sync::Arc;
 pub(crate) struct Mesh {
     pub(crate) mesh: Arc<FacetMesh>,
     report: Option<Box<Report>>,
+    /// The model that was tessellated, where it is one that Python has.
+    import: Option<Arc<Import>>,
 }
 
 impl Mesh {
-    pub(crate) fn with_report(mesh: FacetMesh, report: Report) -> Self {
-        Self { mesh: Arc::new(mesh), report: Some(Box::new(report)) }
+    pub(crate) fn of_model(made: Tessellation, import: Arc<Import>) -> Self {
+        let Tessellation { mesh, report, .. } = made;
+        Self { mesh: Arc::new(mesh), report: Some(Box::new(report)), import: Some(import) }
     }
 
     pub(crate) fn of_scene(mesh: FacetMesh) -> Self {
-        Self { mesh: Arc::new(mesh), report: None }
+        Self { mesh: Arc::new(mesh), report: None, import: None }
+    }
+
+    /// Refuses to move hits on this mesh to the spline of a model that it does not stand for.
+    pub(crate) fn require_model(&self, model: &Model) -> PyResult<()> {
+        let faces = model.import.model.placed_face_count();
+        let is_other = self.import.as_ref().is_some_and(|import| !Arc::ptr_eq(import, &model.import))
+            || self.mesh.facets.iter().any(|facet| facet.face.0 as usize >= faces);
+        let message = if !self.mesh.facets.is_empty() && self.mesh.sag.is_empty() {
+            "normals exact: a mesh of arrays stands for no spline that hits could be moved to; use another kind of normals"
+        } else if is_other {
+            "normals exact: the mesh is not of this model; give the one whose tessellate() made it"
+        } else {
+            return Ok(());
+        };
+        Err(SceneError::new_err(message))
     }
 }
 
 #[pymethods]
 impl Mesh {
-    /// From points (n, 3) and corners of triangles (m, 3) or quads (m, 4); normals are those of the corners (n, 3), else of the flat
-    /// facets.
+    /// From points (n, 3) and corners of triangles (m, 3) or quads (m, 4); normals are those of the points (n, 3), and of the flat facets
+    /// where none are given or they have no length.
     #[staticmethod]
     #[pyo3(signature = (positions, facets, normals = None))]
     fn from_arrays(
@@ -44,17 +64,20 @@ impl Mesh {
         let positions = columns(positions, "positions", 3)?;
         let points = rows(&positions)?;
         require_finite(points, 3, "positions")?;
+        if let Some(k) = points.iter().position(|x| x.abs() > FARTHEST) {
+            return Err(PyValueError::new_err(format!(
+                "positions[{}, {}] is {}: coordinates are mm, and at most {FARTHEST:e}; check the unit of length",
+                k / 3,
+                k % 3,
+                points[k]
+            )));
+        }
         let count = length(&positions);
         if count > u32::MAX as usize / 4 {
             return Err(PyValueError::new_err("positions: a mesh holds at most a thousand million points"));
         }
-        let shape: Vec<usize> = facets.getattr("shape").and_then(|s| s.extract()).map_err(|_| {
-            PyTypeError::new_err(
-                "facets: an integer array of shape (m, 3) or (m, 4) is needed; use numpy.asarray(facets)",
-            )
-        })?;
-        let width = if shape.get(1) == Some(&4) { 4 } else { 3 };
-        let corners = columns(facets, "facets", width)?;
+        let corners = columns_of(facets, "facets", &[3, 4])?;
+        let width = corners.shape()[1];
         let corners = rows(&corners)?;
         if let Some(k) = corners.iter().position(|x| !(*x >= 0.0 && *x < count as f64 && x.fract() == 0.0)) {
             return Err(PyValueError::new_err(format!(
@@ -77,9 +100,9 @@ impl Mesh {
             let places = [0, 1, 2, 3].map(|i| facet[i.min(width - 1)] as u32);
             let [a, b, c, d] = places.map(|p| mesh.positions[p as usize]);
             let flat = (c - a).cross(d - b) + if c == d { (b - a).cross(c - a) } else { Vector::ZERO };
-            let normal_at = |p: u32| match given {
-                Some(normals) => vector(&normals[3 * p as usize..]).try_normalize(),
-                None => flat.try_normalize(),
+            let normal_at = |p: u32| {
+                let own = given.and_then(|normals| vector(&normals[3 * p as usize..]).try_normalize());
+                own.or_else(|| flat.try_normalize())
             };
             let first = mesh.vertices.len() as u32;
             let used = if places[2] == places[3] { 3 } else { 4 };
@@ -91,7 +114,7 @@ impl Mesh {
             let vertices = [0, 1, 2, 3].map(|i: u32| first + i.min(used as u32 - 1));
             mesh.facets.push(Facet { vertices, face: FaceId(k as u32) });
         }
-        Ok(Self { mesh: Arc::new(mesh), report: None })
+        Ok(Self { mesh: Arc::new(mesh), report: None, import: None })
     }
 
     /// Distinct points, mm, (n, 3).

@@ -109,7 +109,7 @@ impl Model {
         let settings = tessellate::Settings { measure, ..settings };
         let import = self.import.clone();
         let made = interruptible(py, None, None, move |_| tessellate(&import.model, &settings))?.made;
-        Ok(Mesh::with_report(made.mesh, made.report))
+        Ok(Mesh::of_model(made, self.import.clone()))
     }
 
     fn __repr__(&self) -> String {

@@ -1,11 +1,12 @@
-//! Scenes that are bound, faceted and ready to be traced, and the parts of their runs.
+//! Scenes that are bound, faceted and ready to be traced.
 
 use crate::arrays::{flat, shaped};
 use crate::background::{Outcome, interruptible};
-use crate::errors::{Defect, SceneError, of_pipeline, of_scene};
+use crate::errors::{SceneError, of_json, of_pipeline, of_scene};
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::names::{normal_mode, require_tolerance};
+use crate::part::{self, KeptRun, Part, keeping};
 use crate::results::Results;
 use lampyris::pipeline::{
     self, AccurateSettings, ErrorTarget, GrowingSearch, LoadedModel, MeshingSettings, PreparedScene, RayRange,
@@ -16,8 +17,6 @@ use lampyris::step::{self, Import};
 use numpy::PyArrayDyn;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
-use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,7 +24,7 @@ use std::sync::Arc;
 /// Results, or the part that was done, and the exception that stopped it.
 type Traced = (Option<Results>, Option<Part>, Option<PyErr>);
 /// The same with what came of the error that was asked for, as JSON.
-type TracedUntil = (Option<Results>, Option<Part>, Option<PyErr>, String);
+type TracedUntil = (Option<Results>, Option<Part>, Option<PyErr>, Option<String>);
 
 /// An array of whole or real numbers.
 type Array<'py, T> = Bound<'py, PyArrayDyn<T>>;
@@ -36,31 +35,12 @@ type Ends<'py> = (
     Vec<(u8, String)>,
 );
 
-/// What stands at the head of the bytes of a part.
-#[derive(Deserialize, Serialize)]
-struct PartHeader {
-    fingerprint: String,
-    /// What wrote it, for messages.
-    command: String,
-}
-
 /// A scene whose facets are made and whose intersector is chosen.
 #[pyclass(frozen, module = "lampyris")]
 pub(crate) struct Prepared {
     scene: Arc<PreparedScene>,
     fingerprint: String,
     threads: Option<usize>,
-}
-
-/// The replicates of a run that are done, and their sums.
-#[pyclass(frozen, module = "lampyris")]
-pub(crate) struct Part {
-    run: PartialRun,
-    fingerprint: String,
-    /// That of what it was asked of: another one where the number of rays was found by tracing.
-    asked_of: String,
-    /// The scene that it is of, with its number of rays.
-    of: Arc<PreparedScene>,
 }
 
 /// What is asked beside the scene; the Python side gives every key.
@@ -173,62 +153,74 @@ impl Prepared {
         progress: Option<Py<PyAny>>,
         verify: bool,
     ) -> PyResult<Traced> {
-        if let Some(part) = resume.filter(|p| p.asked_of != self.fingerprint) {
-            return Err(PyValueError::new_err(format!(
-                "resume: this part is of another run ({}); trace it with the same scene, files, settings and version",
-                part.fingerprint
-            )));
-        }
+        self.require_own(resume)?;
         if let Some([index, count]) = shard.filter(|[index, count]| index >= count) {
             return Err(PyValueError::new_err(format!(
-                "shard: ({index}, {count}) counts from 0: write (0, {count}) and so on"
+                "part {index} of {count}: the index counts from 0 and is less than the count, as in (0, 4) to (3, 4)"
             )));
         }
         let scene = resume.map_or(&self.scene, |part| &part.of).clone();
         let from = resume.map(|p| p.run.clone());
-        let for_work = scene.clone();
+        let kept = Arc::new(KeptRun::default());
+        let (for_work, keeper) = (scene.clone(), kept.clone());
         let work = move |monitor: &dyn pipeline::Monitor| {
-            let request = TraceRequest { verify_pruning: verify, from, shard, ..TraceRequest::default() };
+            let keep = |run: &PartialRun| keeper.keep(run, &for_work);
+            let request = TraceRequest { verify_pruning: verify, from, shard, ..keeping(&keep) };
             if shard.is_some() {
                 return Err(Box::new(for_work.trace_part(request, monitor)));
             }
             for_work.trace(request, monitor)
         };
-        let Outcome { made, stopped } = interruptible(py, progress.as_ref(), self.threads, move |s| work(s))?;
-        Ok(match made {
-            Ok(found) => (Some(Results::new(scene, found)), None, stopped),
-            Err(run) => (None, Some(self.part(*run, scene)), stopped),
-        })
+        match interruptible(py, progress.as_ref(), self.threads, move |s| work(s)) {
+            Ok(Outcome { made: Ok(found), stopped: None }) => Ok((Some(Results::new(scene, found)), None, None)),
+            Ok(Outcome { made: Err(run), stopped }) => Ok((None, Some(self.part(*run, scene)?), stopped)),
+            Ok(Outcome { made: Ok(_), stopped: Some(e) }) | Err(e) => {
+                let (part, e) = self.kept_part(&kept, e)?;
+                Ok((None, Some(part), Some(e)))
+            }
+        }
     }
 
-    /// Traces as many rays as the error asks for; gives what was found of it as JSON too.
-    #[pyo3(signature = (until, progress = None))]
-    fn trace_until(&self, py: Python<'_>, until: &str, progress: Option<Py<PyAny>>) -> PyResult<TracedUntil> {
+    /// Traces as many rays as the error asks for, from where an earlier search was stopped; gives what was found of it as JSON too.
+    #[pyo3(signature = (until, resume = None, progress = None))]
+    fn trace_until(
+        &self,
+        py: Python<'_>,
+        until: &str,
+        resume: Option<&Part>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<TracedUntil> {
+        self.require_own(resume)?;
         let target = ErrorTarget::new(until, &self.scene.job.scene).map_err(of_pipeline)?;
         let mut scene = PreparedScene::clone(&self.scene);
+        let first_rays = resume.map(|part| part.of.run_settings().rays);
+        let kept = Arc::new(KeptRun::starting_from(resume.map(|part| part.run.clone())));
+        let keeper = kept.clone();
         let work = move |monitor: &dyn pipeline::Monitor| {
-            let (run, result) = target.trace(&mut scene, GrowingSearch::default(), monitor);
+            let (run, result) = target.trace(&mut scene, GrowingSearch { first_rays, keeper: &*keeper }, monitor);
             if !run.is_whole() {
                 return (Err(Box::new(run)), scene, result);
             }
             let request = TraceRequest { from: Some(run), ..TraceRequest::default() };
             (scene.trace(request, monitor), scene, result)
         };
-        let Outcome { made, stopped } = interruptible(py, progress.as_ref(), self.threads, move |s| work(s))?;
-        let (found, scene, result) = made;
-        let (scene, words) = (Arc::new(scene), serde_json::to_string(&result).map_err(crate::errors::of_json)?);
-        Ok(match found {
-            Ok(found) => (Some(Results::new(scene, found)), None, stopped, words),
-            Err(run) => {
-                let fingerprint = hash_of(&scene)?;
-                (
-                    None,
-                    Some(Part { run: *run, fingerprint, asked_of: self.fingerprint.clone(), of: scene }),
-                    stopped,
-                    words,
-                )
+        let outcome = interruptible(py, progress.as_ref(), self.threads, move |s| work(s));
+        let Outcome { made: (found, scene, result), stopped } = match outcome {
+            Ok(outcome) => outcome,
+            Err(e) => {
+                let (part, e) = self.kept_part(&kept, e)?;
+                return Ok((None, Some(part), Some(e), None));
             }
-        })
+        };
+        let (scene, words) = (Arc::new(scene), Some(serde_json::to_string(&result).map_err(of_json)?));
+        match (found, stopped) {
+            (Ok(found), None) => Ok((Some(Results::new(scene, found)), None, None, words)),
+            (Ok(_), Some(e)) => {
+                let (part, e) = self.kept_part(&kept, e)?;
+                Ok((None, Some(part), Some(e), words))
+            }
+            (Err(run), stopped) => Ok((None, Some(self.part(*run, scene)?), stopped, words)),
+        }
     }
 
     /// Where every ray of the scene's lists ended: arrays of source, ray, branch, event, face (-1 for none), bounces, point, direction,
@@ -262,7 +254,7 @@ impl Prepared {
         let mut words: Vec<(u8, String)> = Vec::new();
         for event in ends.iter().map(|end| end.event) {
             if words.iter().all(|(code, _)| *code != event as u8) {
-                let word = serde_json::to_value(event).map_err(crate::errors::of_json)?;
+                let word = serde_json::to_value(event).map_err(of_json)?;
                 words.push((event as u8, word.as_str().unwrap_or("unknown").to_owned()));
             }
         }
@@ -286,18 +278,17 @@ impl Prepared {
     ///
     /// Raises `ValueError` when they are damaged or of another run.
     fn read_part(&self, bytes: &[u8]) -> PyResult<Part> {
-        let check = |header: &PartHeader| {
-            if header.fingerprint == self.fingerprint {
-                return Ok(());
+        let scene = match part::rays_found(bytes)? {
+            // The part of a search for the number of rays knows how far that had come.
+            Some(rays) => {
+                let mut scene = PreparedScene::clone(&self.scene);
+                scene.rays = Some(rays);
+                Arc::new(scene)
             }
-            Err(format!(
-                "it is a part of another run (of {}); the scene, its files, the settings and the version must be the same",
-                header.command
-            ))
+            None => self.scene.clone(),
         };
-        let run = PartialRun::read(bytes, check, &self.scene.bound)
-            .map_err(|e| PyValueError::new_err(format!("the part cannot be used: {e}")))?;
-        Ok(self.part(run, self.scene.clone()))
+        let run = part::read(bytes, &self.fingerprint_of(&scene)?, &scene)?;
+        self.part(run, scene)
     }
 
     /// A hash of all that decides the bits of the run.
@@ -330,85 +321,42 @@ impl Prepared {
             "unit": scene.power_unit(), "chosen": scene.chosen, "notes": scene.bound.notes(),
             "accounts": scene.job.loaded.reports,
         });
-        serde_json::to_string(&summary).map_err(crate::errors::of_json)
+        serde_json::to_string(&summary).map_err(of_json)
     }
 }
 
 impl Prepared {
-    fn part(&self, run: PartialRun, of: Arc<PreparedScene>) -> Part {
-        Part { run, fingerprint: self.fingerprint.clone(), asked_of: self.fingerprint.clone(), of }
-    }
-}
-
-fn hash_of(scene: &PreparedScene) -> PyResult<String> {
-    Ok(scene.fingerprint().map_err(of_pipeline)?.0)
-}
-
-#[pymethods]
-impl Part {
-    /// Adds another part of the same run, and gives the sum.
-    fn merged(&self, other: &Self) -> PyResult<Self> {
-        if self.fingerprint != other.fingerprint {
-            return Err(PyValueError::new_err(
-                "the parts are of different runs; trace them with the same scene and settings",
-            ));
+    /// Refuses a part of another run.
+    fn require_own(&self, part: Option<&Part>) -> PyResult<()> {
+        match part.filter(|part| part.asked_of != self.fingerprint) {
+            None => Ok(()),
+            Some(part) => Err(PyValueError::new_err(format!(
+                "resume: this part is of another run ({}); trace it with the same scene, files, settings and version",
+                part.fingerprint
+            ))),
         }
-        let mut run = self.run.clone();
-        run.merge(&other.run).map_err(PyValueError::new_err)?;
-        Ok(Self {
-            run,
-            fingerprint: self.fingerprint.clone(),
-            asked_of: self.asked_of.clone(),
-            of: self.of.clone(),
-        })
     }
 
-    /// The part as bytes, for a file or another machine.
-    fn to_bytes(&self, py: Python<'_>) -> PyResult<Py<PyBytes>> {
-        let command = format!("lampyris {} in Python", env!("CARGO_PKG_VERSION"));
-        let header = PartHeader { fingerprint: self.fingerprint.clone(), command };
-        let mut bytes = Vec::new();
-        self.run.write(&header, &mut bytes).map_err(|e| Defect::new_err(e.to_string()))?;
-        Ok(PyBytes::new(py, &bytes).unbind())
+    /// The hash of this scene with another number of rays, or with its own.
+    fn fingerprint_of(&self, scene: &Arc<PreparedScene>) -> PyResult<String> {
+        if Arc::ptr_eq(scene, &self.scene) {
+            return Ok(self.fingerprint.clone());
+        }
+        Ok(scene.fingerprint().map_err(of_pipeline)?.0)
     }
 
-    /// Replicates that are done.
-    #[getter]
-    fn done(&self) -> usize {
-        self.run.done.len()
+    /// A part of this run; `of` has the number of rays where it was found by tracing.
+    fn part(&self, run: PartialRun, of: Arc<PreparedScene>) -> PyResult<Part> {
+        Ok(Part { run, fingerprint: self.fingerprint_of(&of)?, asked_of: self.fingerprint.clone(), of })
     }
 
-    /// Replicates of the whole run.
-    #[getter]
-    fn replicates(&self) -> u32 {
-        self.run.replicates
-    }
-
-    /// Rays that are done.
-    #[getter]
-    fn rays(&self) -> u64 {
-        self.run.tallies.counts.rays
-    }
-
-    /// Whether every replicate is done.
-    #[getter]
-    fn is_whole(&self) -> bool {
-        self.run.is_whole()
-    }
-
-    /// A hash of all that decides the bits of the run.
-    #[getter]
-    fn fingerprint(&self) -> &str {
-        &self.fingerprint
-    }
-
-    fn __repr__(&self) -> String {
-        format!(
-            "<lampyris.Part: {} of {} replicates, {} rays>",
-            self.run.done.len(),
-            self.run.replicates,
-            self.rays()
-        )
+    /// What was traced in full before the work was stopped.
+    ///
+    /// # Errors
+    /// The exception that stopped it, where nothing was.
+    fn kept_part(&self, kept: &KeptRun, stopped: PyErr) -> Result<(Part, PyErr), PyErr> {
+        let Some((run, of)) = kept.take() else { return Err(stopped) };
+        Ok((self.part(run, of)?, stopped))
     }
 }
 

@@ -142,7 +142,7 @@ const MOST_PIXELS: usize = 1 << 27;
 
 /// A map of values (rows from below) as the bytes of a PNG file.
 ///
-/// Raises `ValueError` for a picture of more than 134 million pixels.
+/// Raises `ValueError` for a picture of more than 134 million pixels, and for an exponent that is not positive.
 #[pyfunction]
 #[pyo3(signature = (values, zoom = 1, exponent = 1.0))]
 pub(crate) fn value_map(
@@ -151,6 +151,9 @@ pub(crate) fn value_map(
     zoom: u32,
     exponent: f64,
 ) -> PyResult<Py<PyBytes>> {
+    if !(exponent > 0.0 && exponent.is_finite()) {
+        return Err(PyValueError::new_err(format!("exponent = {exponent}: it must be a positive number, as 0.5")));
+    }
     let width = values.getattr("shape")?.extract::<Vec<usize>>()?.get(1).copied().unwrap_or(1);
     let array = columns(values, "values", width)?;
     let numbers = rows(&array)?.to_vec();
@@ -183,6 +186,9 @@ pub(crate) fn regulations() -> Vec<(String, String, usize, String)> {
     all.map(|r| (r.id.to_string(), r.function.name.to_string(), r.function.rows.len(), r.checked())).collect()
 }
 
+/// What the command says of names that it does not know: how to see all of them there.
+const LIST_OF_COMMAND: &str = " … (`assess --list` shows all)";
+
 /// A far field over H and V in candela judged by a regulation, as JSON.
 #[pyfunction]
 #[pyo3(signature = (results, receiver, regulation, left_hand = false, as_placed = false))]
@@ -204,7 +210,9 @@ pub(crate) fn assess(
     }
     let wanted = RegulationUse { id: regulation.into(), receiver: Some(r.name.clone()), left_hand, as_placed };
     let judged = py.detach(|| results.found.verdict(&results.scene, &wanted)).map_err(|e| {
-        SceneError::new_err(format!("{e}; set cells, h_deg and v_deg of the far field and trace again"))
+        let reason = e.trim_end_matches(LIST_OF_COMMAND);
+        let all = if reason.len() < e.len() { "; lampyris.regulations() has all of them" } else { "" };
+        SceneError::new_err(format!("{reason}{all}"))
     })?;
     serde_json::to_string(&judged.assessment.document()).map_err(of_json)
 }

@@ -89,7 +89,7 @@ pub(crate) fn write_ray_file(path: PathBuf, rays: &Bound<'_, PyAny>) -> PyResult
         let direction = Vector::new(row[3], row[4], row[5]);
         if direction == Vector::ZERO || row[6] < 0.0 || row.get(7).is_some_and(|nm| *nm <= 0.0) {
             return Err(PyValueError::new_err(format!(
-                "rays[{k}] is none: the direction must have a length, the power be zero or more, the wavelength positive"
+                "rays[{k}] cannot be traced: the direction must have a length, the power be zero or more, the wavelength positive"
             )));
         }
         let origin = Vector::new(row[0], row[1], row[2]);

@@ -11,8 +11,13 @@ from typing import Any
 
 import pytest
 
+import lampyris as lp
+
 ROOT = pathlib.Path(os.environ.get("LAMPYRIS_SOURCE", pathlib.Path(__file__).parents[2]))
-SCENES = sorted((ROOT / "fixtures" / "scenes").glob("*.toml"))
+#: Every scene of the fixtures, in whatever folder.
+SCENES = sorted((ROOT / "fixtures").rglob("*.toml"))
+
+LAMP = ROOT / "fixtures" / "step" / "lamp_multicavity.stp"
 
 
 def command() -> str:
@@ -35,3 +40,14 @@ def traced(scene: pathlib.Path, folder: pathlib.Path, *options: str) -> dict[str
 @pytest.fixture
 def lens() -> pathlib.Path:
     return ROOT / "fixtures" / "step" / "lens_planoconvex_nurbs.stp"
+
+
+def lamp(rays: int = 20_000) -> lp.Scene:
+    """The demo's lamp, built call by call."""
+    scene = lp.Scene(lp.read_step(LAMP), unit="lm", rays=rays, seed=1)
+    scene["cover_PMMA"] = lp.glass("PMMA")
+    points = [[-95, 30, 12.5], [0, 30, 9.375], [95, 30, 7.5]]
+    scene[lp.select(part="housing", at=points)] = lp.mirror(0.95)
+    scene.add(lp.led(at=(-95, 0, 17.69), direction=(0, 0, -1), power=100))
+    scene.add(lp.far_field("far", h_deg=(-40, 40), v_deg=(-20, 20), step_deg=1.0))
+    return scene

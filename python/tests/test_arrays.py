@@ -83,14 +83,51 @@ def test_arrays_in_one_piece_are_read_where_they_lie_and_no_other_is_changed() -
         (np.array([["a", "b", "c"]]), np.ones((1, 3)), TypeError, "float64"),
         (np.zeros((1, 3), dtype=complex), np.ones((1, 3)), TypeError, "float64"),
         (np.array([[object()] * 3]), np.ones((1, 3)), TypeError, "float64"),
-        (np.array([[0, 0, 0], [0, np.nan, 0]]), np.ones((2, 3)), ValueError, "ray 1 is none"),
-        (np.zeros((1, 3)), np.array([[0, 0, np.inf]]), ValueError, "ray 0 is none"),
-        (np.zeros((1, 3)), np.zeros((1, 3)), ValueError, "a length"),
+        (np.array([[0, 0, 0], [0, np.nan, 0]]), np.ones((2, 3)), ValueError, r"ray 1 from .* cannot be traced: every number must be finite"),
+        (np.zeros((1, 3)), np.array([[0, 0, np.inf]]), ValueError, "cannot be traced: every number must be finite"),
+        (np.zeros((1, 3)), np.zeros((1, 3)), ValueError, "the direction has no length"),
+        (np.full((1, 3), 1e16), np.ones((1, 3)), ValueError, "more than 1e15 mm away"),
+        (np.zeros((3, 4)), np.ones((3, 4)), ValueError, "exchanged by origins.T"),
+        (np.zeros((2, 2, 3)), np.ones((4, 3)), ValueError, r"origins.reshape\(-1, 3\)"),
+        ([[0, 0, 0], [1]], np.ones((2, 3)), ValueError, r"origins: an array of shape \(n, 3\) is needed"),
+        (np.zeros((1, 3)), None, TypeError, "directions: an array of float64"),
     ],
 )
 def test_wrong_rays_are_told_what_to_do(origins: Any, directions: Any, kind: type[Exception], says: str) -> None:
     with pytest.raises(kind, match=says):
         lp.Octree(cube()).intersect(origins, directions)
+
+
+@pytest.mark.parametrize("length", [5e-324, 1e-310, 1e-160, 1e-20, 3.0, 1e160, 1e308])
+def test_directions_of_any_length_mean_the_same(length: float) -> None:
+    origins, directions = np.array([[0.25, 0.5, -5.0]]), np.array([[0.0, 0.0, length]])
+    for tracer in (lp.Octree(cube()), lp.Bvh(cube())):
+        assert tracer.intersect(origins, directions).t.tolist() == [4.0]
+
+
+def test_normals_without_a_length_are_those_of_the_facet() -> None:
+    # A square in x = 2 whose points have no normals, as those of a mesh that nobody gave any.
+    points = np.array([[2.0, 0, 0], [2, 1, 0], [2, 1, 1], [2, 0, 1]])
+    mesh = lp.Mesh.from_arrays(points, [[0, 1, 2, 3]], np.zeros((4, 3)))
+    hits = lp.Octree(mesh).intersect([[0, 0.5, 0.25]], [[1, 0, 0]])
+    assert hits.t.tolist() == [2.0] and np.abs(hits.normal[0]).tolist() == [1.0, 0.0, 0.0]
+
+
+def test_wrong_threads_and_ranges_are_told_what_to_do() -> None:
+    tree, ray = lp.Octree(cube()), np.array([[0.0, 0.0, -5.0]])
+    wrong: list[tuple[dict[str, Any], type[Exception], str]] = [
+        ({"threads": 0}, ValueError, "threads = 0"),
+        ({"threads": -1}, ValueError, "threads = -1"),
+        ({"threads": 2.5}, ValueError, "threads = 2.5"),
+        ({"threads": "all"}, TypeError, "threads: a whole number"),
+        ({"t_min": 5.0, "t_max": 1.0}, ValueError, "t_min = 5 must be at most t_max = 1"),
+        ({"t_max": "far"}, TypeError, "t_max: a number"),
+    ]
+    for keys, kind, says in wrong:
+        with pytest.raises(kind, match=says):
+            tree.intersect(ray, np.array([[0.0, 0.0, 1.0]]), **keys)
+    # More threads than a machine has stop none.
+    assert tree.intersect(ray, np.array([[0.0, 0.0, 1.0]]), threads=10**9).t.tolist() == [4.0]
 
 
 def test_wrong_meshes_are_told_what_to_do() -> None:
@@ -104,6 +141,23 @@ def test_wrong_meshes_are_told_what_to_do() -> None:
         lp.Octree(cube(), normals="round")
     with pytest.raises(ValueError, match="give model="):
         lp.Octree(cube(), normals="exact")
+    with pytest.raises(ValueError, match=r"the shape must be \(n, 3\) or \(n, 4\)"):
+        lp.Mesh.from_arrays(CUBE, np.zeros((2, 5), dtype=int))
+    with pytest.raises(ValueError, match="check the unit of length"):
+        lp.Mesh.from_arrays(1e16 * CUBE, SIDES)
+    for take in (lp.Mesh.from_trimesh, lp.Mesh.from_pyvista):
+        with pytest.raises(TypeError, match="arrays go to Mesh.from_arrays"):
+            take(CUBE)
+
+
+def test_hits_are_moved_to_no_other_model(lens: pathlib.Path) -> None:
+    model, again = lp.read_step(lens), lp.read_step(lens)
+    with pytest.raises(ValueError, match="stands for no spline"):
+        lp.Octree(cube(), normals="exact", model=model)
+    with pytest.raises(ValueError, match="not of this model"):
+        lp.Octree(model.tessellate(), normals="exact", model=again)
+    with pytest.raises(TypeError, match="model: a Model is needed"):
+        lp.Bvh(model.tessellate(), normals="exact", model=str(lens))  # type: ignore[arg-type]
 
 
 def test_hits_that_are_moved_to_the_spline_are_those_of_the_spline(lens: pathlib.Path) -> None:

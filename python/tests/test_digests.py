@@ -13,10 +13,21 @@ import lampyris as lp
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda path: path.stem)
 def test_every_fixture_scene_has_the_digest_of_the_command(scene: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    read = lp.Scene.from_toml(scene)
+    if any("rays" in source for source in read.tables["source"]):
+        # Sources with rays of their own heed no other number: a hundredth of theirs will do.
+        for source in read.tables["source"]:
+            source["rays"] //= 100
+        scene = tmp_path / scene.name
+        read.save(scene)
     expected = traced(scene, tmp_path, "--rays", "20000")
-    run = lp.Scene.from_toml(scene).trace(rays=20_000, progress=False)
+    run = read.trace(rays=20_000, progress=False)
     assert run.digest == expected["digest"]
     assert [r["figures"] for r in run.document["receivers"]] == [r["figures"] for r in expected["receivers"]]
+
+
+def test_no_scene_of_the_fixtures_is_left_out() -> None:
+    assert {"demo", "low_beam", "s1_lens", "s2_lamp", "s3_reflector"} <= {scene.stem for scene in SCENES}
 
 
 def test_settings_mean_what_the_options_mean(tmp_path: pathlib.Path) -> None:

@@ -24,7 +24,8 @@ pub(crate) fn error_of_sum(parts: &[f64]) -> f64 {
         return part.abs();
     }
     let mean = parts.iter().sum::<f64>() / parts.len().max(1) as f64;
-    variance_from_residuals(parts.iter().map(|d| (d - mean).powi(2)).sum::<f64>(), parts.len()).sqrt()
+    // A product, which is rounded the same everywhere: of powers that is not promised.
+    variance_from_residuals(parts.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>(), parts.len()).sqrt()
 }
 
 #[cfg(test)]

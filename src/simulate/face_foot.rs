@@ -45,13 +45,18 @@ pub(crate) fn nearest_on_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> Optio
             start = Some(sample);
         }
     }
-    let foot = foot_from(face, loops, p, start.or(border)?);
+    let foot = foot_from(face, |uv| is_inside_polygons(loops, uv), p, start.or(border)?);
     Some(border.filter(|border| nearer(border, &foot).is_lt()).unwrap_or(foot))
 }
 
-/// Goes from a point of the face towards the foot of the perpendicular from `p` by Gauss–Newton; returns the nearest point inside the trims
-/// that it came by, or the one it began with.
-pub(crate) fn foot_from(face: &Face, loops: &[Vec<Uv>], p: Point, start: NearestOnFace) -> NearestOnFace {
+/// Goes from a point of the face towards the foot of the perpendicular from `p` by Gauss–Newton; returns the nearest point inside the
+/// trims, as `is_inside` tells, that it came by, or the one it began with.
+pub(crate) fn foot_from(
+    face: &Face,
+    is_inside: impl Fn(Uv) -> bool,
+    p: Point,
+    start: NearestOnFace,
+) -> NearestOnFace {
     let s = &face.surface;
     let mut best = start;
     let mut uv = start.uv;
@@ -71,7 +76,7 @@ pub(crate) fn foot_from(face: &Face, loops: &[Vec<Uv>], p: Point, start: Nearest
         }
         uv = next;
         let distance = s.evaluate(uv).distance(p);
-        if distance < best.distance && is_inside_polygons(loops, uv) {
+        if distance < best.distance && is_inside(uv) {
             best = NearestOnFace { distance, uv };
         }
     }

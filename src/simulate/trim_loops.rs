@@ -101,14 +101,14 @@ fn piece_count(curve: &UvCurve, [t0, t1]: [f64; 2], tolerance: Uv) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::math::Frame;
     use crate::nurbs::{ControlPoint, conic, sweep};
     use std::f64::consts::TAU;
 
     /// A plane with a round border, whose parameters are mm.
-    fn disc(radius: f64) -> Face {
+    pub(crate) fn disc(radius: f64) -> Face {
         let arc = conic::arc(&Frame::IDENTITY, radius, [0.0, TAU]);
         let points = arc.points.iter().map(|p| ControlPoint::weighted(p.position().truncate(), p.w)).collect();
         let uv = UvCurve { degree: arc.degree, knots: arc.knots, points };

@@ -5,7 +5,7 @@ use crate::support::*;
 use lampyris::intersect::exact::audit::Audit;
 use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::{Certainty, Cost, Intersector};
-use lampyris::math::Aabb;
+use lampyris::math::{Aabb, Ray};
 use lampyris::model::Model;
 use std::path::{Path, PathBuf};
 
@@ -133,16 +133,46 @@ fn corpus_against_clipping() {
     assert_eq!(all, 0);
 }
 
+/// Of rays: how many, uncertified, tangent, and beside a trim.
+type Flags = [usize; 4];
+
+/// Rays toward a model from all around, and from each place that they meet one to every side.
+fn flags_on_model(exact: &Exact, b: Aabb, rays: u64, seed: u64) -> Flags {
+    let shows = std::env::var("LAMPYRIS_SHOW").is_ok();
+    let (mut s, mut flags) = (Random(seed), Flags::default());
+    for _ in 0..rays.div_ceil(2) {
+        let first = s.ray(b.center(), 0.5 * b.size());
+        let mut next = Some(first);
+        for _ in 0..2 {
+            let Some(ray) = next.take() else { continue };
+            let answer = exact.first(&ray, &mut Cost::default());
+            let is = |certainty| answer.certainty == certainty;
+            let [open, tangent] = [is(Certainty::Uncertified), is(Certainty::Tangent)];
+            let found = [true, open, tangent, answer.near_trim];
+            flags = std::array::from_fn(|k| flags[k] + usize::from(found[k]));
+            if shows && open {
+                println!("   {:?} {ray:?}", answer.hit);
+            }
+            next =
+                answer.hit.map(|hit| Ray::new(ray.point_at(hit.t), s.direction()).with_departure(hit.departure()));
+        }
+    }
+    flags
+}
+
 #[test]
-#[ignore = "minutes: every corpus model that reads, 20,000 rays each"]
+#[ignore = "minutes: every corpus model that reads, LAMPYRIS_RAYS rays each, 20,000 by default, from LAMPYRIS_SEED on"]
 fn corpus_rays_are_certified() {
+    use rayon::prelude::*;
     let folder = corpus();
     if !folder.is_dir() {
         println!("no corpus at {}: nothing tested", folder.display());
         return;
     }
     let only = std::env::var("LAMPYRIS_ONLY").unwrap_or_default();
-    let (mut rays, mut flagged) = (0, 0);
+    let (wanted, seed, chunk) = (number("LAMPYRIS_RAYS", 20_000), number("LAMPYRIS_SEED", 3), 1000);
+    let sum = |a: Flags, b: Flags| std::array::from_fn(|k| a[k] + b[k]);
+    let mut all = Flags::default();
     for path in step_files(&folder).iter().filter(|path| path.to_string_lossy().contains(&only)) {
         let Some(model) = read_model(path) else { continue };
         let exact = Exact::build(&model, &Settings::default());
@@ -151,34 +181,24 @@ fn corpus_rays_are_certified() {
             continue;
         }
         let b = bounds(&model);
-        let mut s = Random(3);
         let start = std::time::Instant::now();
-        let mut cost = Cost::default();
-        let n = 20_000;
-        let mut bad = 0;
-        for _ in 0..n {
-            let ray = s.ray(b.center(), 0.5 * b.size());
-            let answer = exact.first(&ray, &mut cost);
-            if answer.certainty == Certainty::Uncertified {
-                bad += 1;
-                if std::env::var("LAMPYRIS_SHOW").is_ok() && bad < 4 {
-                    println!("   {:?} {ray:?}", answer.hit);
-                }
-            }
-        }
+        let flags = (0..wanted.div_ceil(chunk))
+            .into_par_iter()
+            .map(|k| flags_on_model(&exact, b, chunk, seed + k))
+            .reduce(Flags::default, sum);
+        let [rays, open, tangent, near_trim] = flags;
         println!(
-            "{:44} faces {:6} patches {:6} leaves {:7} build {:6.2} s {:8.0} rays/s tests {:5.2} uncertified {bad}",
+            "{:44} faces {:6} patches {:6} build {:6.2} s {:8.0} rays/s: of {rays} rays {open} uncertified, {tangent} tangent, {near_trim} \
+             beside a trim",
             path.file_name().unwrap().to_string_lossy(),
             model.placed_face_count(),
             exact.patch_count(),
-            exact.leaf_count(),
             exact.footprint().build_seconds,
-            f64::from(n) / start.elapsed().as_secs_f64(),
-            cost.tests as f64 / f64::from(n)
+            rays as f64 / start.elapsed().as_secs_f64(),
         );
-        rays += n;
-        flagged += bad;
+        all = sum(all, flags);
     }
-    println!("{flagged} of {rays} uncertified");
-    assert!(flagged * 100_000 <= rays, "{flagged} of {rays} uncertified");
+    let [rays, open, tangent, near_trim] = all;
+    println!("of {rays} rays {open} uncertified, {tangent} tangent, {near_trim} beside a trim");
+    assert!(open * 100_000 <= rays, "{open} of {rays} uncertified");
 }

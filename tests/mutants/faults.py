@@ -49,7 +49,7 @@ FAULTS = [
     ("weight forgotten", EXACT + "clip.rs", "let s = net::evaluate_inlined(&node.net, degree, u, v).s;\n        let t = «s[2] / s[3]»;", "s[2]", SPLINE),
     ("contacts told as certified", EXACT + "clip.rs", "if regular && sine < TANGENT_SINE { «Certainty::Tangent» }", "Certainty::Certified", SPLINE),
     # Settling in 32 digits.
-    ("open roots not settled", EXACT + "leaf_test.rs", "let open = leaf.ill_scaled || «settlement::is_open([u, v], margins)»;", "false", SPLINE),
+    ("open roots not settled", EXACT + "leaf_test.rs", "let open = leaf.ill_scaled || «settlement::needs_settling([u, v], margins)»;", "false", SPLINE),
     ("settled roots count beyond the face", EXACT + "settlement.rs", "if «!sides.iter().any(|&(k, end)| is_over(k, end))» {", "true", SPLINE),
     ("settled roots of another root kept", EXACT + "settlement.rs", "settled.filter(|root| «near(leaf.leaf_parameters(root.local))»)", "true", "lib:settlement " + SPLINE),
     ("unsettled roots told as certified", EXACT + "settlement.rs", "Candidate { certainty: «Certainty::Uncertified», ..found }", "Certainty::Certified", SPLINE),
@@ -82,7 +82,7 @@ FAULTS = [
     ("squares of other replicates forgotten", "src/simulate/tally.rs", "self.squares = self.squares.saturating_add(«o.squares»);", "0", "lib:tally simulate cli"),
     ("rounding of quanta downward", "src/simulate/tally.rs", "{ «(x + SHIFT) - SHIFT» } else", "x.floor()", "lib:tally simulate"),
     ("a waiting cell is lost", "src/simulate/grid.rs", "pub(crate) fn flush(&mut self, sums: &mut [Sum]) {\n        «self.add_pending();»", "", "lib:grid simulate"),
-    ("error without its correction", "src/simulate/tally.rs", "(squares - total * total / k).max(0.0) * «k» / (k - 1.0)", "1.0", "lib:tally simulate"),
+    ("error without its correction", "src/math/spread.rs", "residuals * «n» / (n - 1.0)", "(n - 1.0)", "lib:spread+tally simulate"),
     # Contacts.
     ("partner looks the same way", KERNEL + "contact.rs", "other.body != at.face.body && opposite && «against»", "!against", "simulate:of_two_coatings simulate"),
     ("coating of the wrong face", KERNEL + "contact.rs", "[false, false] if «entering» => ContactSurface::Partner(partner),", "!entering", "simulate:contacts simulate"),

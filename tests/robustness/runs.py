@@ -3,6 +3,7 @@ import contextlib
 import json
 import os
 import resource
+import signal
 import subprocess
 import tempfile
 import time
@@ -21,13 +22,26 @@ def expect(holds, message):
         raise AssertionError(message)
 
 
+def heed_interrupts():
+    """What a shell starts in the background ignores SIGINT, and so does all that it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 class Run:
     """A process whose messages are kept."""
 
     def __init__(self, command, folder, **environment):
         self.messages = tempfile.TemporaryFile()
         variables = {**os.environ, "NO_COLOR": "1", "COLUMNS": "400", **environment}
-        self.child = subprocess.Popen(command, cwd=folder, env=variables, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self.messages)
+        self.child = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=variables,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=self.messages,
+            preexec_fn=heed_interrupts,
+        )
         self.pid, self.usage, self.is_starved = self.child.pid, None, False
 
     def is_running(self):

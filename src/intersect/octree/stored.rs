@@ -129,6 +129,9 @@ mod tests {
         }
     }
 
+    /// Of how many bytes one is bent: all, but for Miri, which takes most of a second for each; prime, so that all parts of words are hit.
+    const EVERY: usize = if cfg!(miri) { 37 } else { 1 };
+
     /// Bytes that are wrong anywhere are refused or walked to an end; no index leaves its array.
     #[test]
     fn wrong_links_are_refused() {
@@ -136,7 +139,7 @@ mod tests {
         let bytes = stored(&mesh);
         let ray = Ray::new(Point::new(7.25, 0.5, 3.0), -Vector::Z);
         let mut refused = 0;
-        for i in 0..bytes.len() {
+        for i in (0..bytes.len()).step_by(EVERY) {
             let mut bent = bytes.clone();
             bent[i] ^= 0x85;
             let mut from = &bent[..];
@@ -150,6 +153,6 @@ mod tests {
                 Err(_) => refused += 1,
             }
         }
-        assert!(refused > 200, "{refused}");
+        assert!(refused * EVERY > 200, "{refused}");
     }
 }

@@ -1,10 +1,9 @@
 //! Opaque faces that lie against a luminous face: no light gets out between the two.
 
-use crate::math::polygon::is_inside_polygons;
 use crate::math::{Aabb, Frame, Point, Uv, Vector};
 use crate::model::{Face, PlacedFace};
 use crate::simulate::face_foot::{NearestOnFace, foot_from, nearest_on_face};
-use crate::simulate::trim_loops::trim_polygons;
+use crate::simulate::trim_loops::{TrimRegion, trim_polygons};
 
 /// Cosine below which two outward normals look at each other: −60°, as where the kernel asks for faces at one place.
 const AGAINST: f64 = -0.5;
@@ -14,7 +13,7 @@ const AGAINST: f64 = -0.5;
 pub(crate) struct Cover {
     face: Face,
     placement: Frame,
-    loops: Vec<Vec<Uv>>,
+    trims: Trims,
     /// Around the face and what is within the glue distance of it.
     bounds: Aabb,
     /// Whether it has an outside, as faces of closed shells have; a sheet covers what lies on either side.
@@ -22,12 +21,30 @@ pub(crate) struct Cover {
     glue_mm: f64,
 }
 
+/// The trims of a face, as what looks for a foot on it needs them.
+#[derive(Clone, Debug)]
+enum Trims {
+    /// Of a face of first degree, where only insides are asked: bands answer that by a few sides, polygons by all.
+    Plane(TrimRegion),
+    Curved(Vec<Vec<Uv>>),
+}
+
+impl Trims {
+    fn new(face: &Face) -> Self {
+        if face.surface.degree == [1, 1] {
+            Self::Plane(TrimRegion::new(face))
+        } else {
+            Self::Curved(trim_polygons(face))
+        }
+    }
+}
+
 impl Cover {
     /// Prepares a placed face with a box around it, mm; `None` for a ready mesh, which has no spline.
     pub(crate) fn new(placed: &PlacedFace<'_>, one_sided: bool, bounds: Aabb, glue_mm: f64) -> Option<Self> {
         let face = placed.face?;
-        let (loops, bounds) = (trim_polygons(face), bounds.grown(glue_mm));
-        Some(Self { face: face.clone(), placement: *placed.placement, loops, bounds, one_sided, glue_mm })
+        let (trims, bounds) = (Trims::new(face), bounds.grown(glue_mm));
+        Some(Self { face: face.clone(), placement: *placed.placement, trims, bounds, one_sided, glue_mm })
     }
 
     /// Whether it lies against a point (mm, scene coordinates) of a face with this outward normal there.
@@ -37,15 +54,16 @@ impl Cover {
         }
         let surface = &self.face.surface;
         let local = self.placement.local_point(point);
-        let nearest = if surface.degree == [1, 1] {
+        let nearest = match &self.trims {
             // In a plane every way leads to the foot, and no samples are needed to find where to begin.
-            let [[u0, u1], [v0, v1]] = surface.domain();
-            let uv = Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1));
-            let inside = is_inside_polygons(&self.loops, uv);
-            let distance = if inside { surface.evaluate(uv).distance(local) } else { f64::INFINITY };
-            Some(foot_from(&self.face, &self.loops, local, NearestOnFace { distance, uv }))
-        } else {
-            nearest_on_face(&self.face, &self.loops, local)
+            Trims::Plane(region) => {
+                let [[u0, u1], [v0, v1]] = surface.domain();
+                let uv = Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1));
+                let inside = region.contains(uv);
+                let distance = if inside { surface.evaluate(uv).distance(local) } else { f64::INFINITY };
+                Some(foot_from(&self.face, |uv| region.contains(uv), local, NearestOnFace { distance, uv }))
+            }
+            Trims::Curved(loops) => nearest_on_face(&self.face, loops, local),
         };
         let near = nearest.filter(|n| n.distance * self.placement.scale <= self.glue_mm);
         // Faces that meet at an edge are as near to each other there, but do not look at each other.
@@ -61,6 +79,7 @@ mod tests {
     use super::*;
     use crate::model::{Model, Part, Shell};
     use crate::nurbs::sweep;
+    use crate::simulate::trim_loops::tests::disc;
     use std::f64::consts::{FRAC_PI_2, TAU};
 
     #[test]
@@ -83,6 +102,20 @@ mod tests {
                 assert_eq!(covers(10.0, -normal), !one_sided, "the cup's own side");
                 assert!(!cover.covers(centre - normal * 10.0, -normal), "the open half");
             }
+        }
+    }
+
+    #[test]
+    fn a_disc_covers_all_up_to_its_round_border() {
+        let shell = Shell { faces: vec![disc(5.0)], ..Shell::default() };
+        let model = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+        let bounds = Aabb::from_points([Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 0.0)]);
+        let cover = Cover::new(&model.placed_faces().next().unwrap(), false, bounds, 1e-3).unwrap();
+        for k in 0..1000 {
+            let (sin, cos) = f64::from(k).sin_cos();
+            let way = Vector::new(cos, sin, 0.0);
+            assert!(cover.covers(Point::ZERO + way * 4.999, -Vector::Z), "{k}");
+            assert!(!cover.covers(Point::ZERO + way * 5.001, -Vector::Z), "{k}");
         }
     }
 }

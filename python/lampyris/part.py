@@ -1,0 +1,66 @@
+"""Parts of runs, and what Ctrl-C leaves."""
+
+from __future__ import annotations
+
+import pathlib
+
+from . import _lampyris
+from ._types import Path
+
+
+class Part:
+    """What was traced of a run: to be kept, sent, added to other parts, and gone on from with ``trace(resume=part)``."""
+
+    def __init__(self, core: _lampyris.Part) -> None:
+        self._core = core
+
+    @property
+    def rays(self) -> int:
+        """Rays that are done."""
+        return self._core.rays
+
+    @property
+    def done(self) -> int:
+        """Replicates that are done."""
+        return self._core.done
+
+    @property
+    def replicates(self) -> int:
+        """Replicates of the whole run."""
+        return self._core.replicates
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is left to trace."""
+        return self._core.is_whole
+
+    def merged(self, other: Part) -> Part:
+        """The sum with another part of the same run; ``ValueError`` for one of another run, or with what is in this one already."""
+        return Part(self._core.merged(part_core(other, "other")))
+
+    def to_bytes(self) -> bytes:
+        """For a file or another machine; :meth:`Scene.read_part` reads them."""
+        return self._core.to_bytes()
+
+    def save(self, path: Path) -> None:
+        """Writes the bytes into a file."""
+        pathlib.Path(path).write_bytes(self.to_bytes())
+
+    def __repr__(self) -> str:
+        return repr(self._core)
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C stopped a trace; ``part`` is what was done, and the scene keeps it as ``interrupted``."""
+
+    def __init__(self, part: Part) -> None:
+        share = f"{part.done} of {part.replicates} replicates ({part.rays} rays)"
+        super().__init__(f"{share} are kept: the same trace with resume=True goes on from there")
+        self.part = part
+
+
+def part_core(part: object, name: str) -> _lampyris.Part:
+    """The extension's half of a part; ``TypeError`` for anything else."""
+    if not isinstance(part, Part):
+        raise TypeError(f"{name}: a Part is needed, not {type(part).__name__}; scene.read_part(bytes, …) makes one of what was saved")
+    return part._core

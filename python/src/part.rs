@@ -1,0 +1,172 @@
+//! Parts of runs: what was traced of one, to be kept, sent, added up and gone on from.
+
+use crate::background::locked;
+use crate::errors::Defect;
+use lampyris::pipeline::{PreparedScene, RunKeeper, TraceRequest};
+use lampyris::simulate::PartialRun;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
+use std::fmt::Display;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// What stands at the head of the bytes of a part.
+#[derive(Deserialize, Serialize)]
+struct PartHeader {
+    fingerprint: String,
+    /// What wrote it, for messages.
+    command: String,
+    /// The number of rays of the whole run, where it was found by tracing.
+    rays: Option<u64>,
+}
+
+/// The replicates of a run that are done, and their sums.
+#[pyclass(frozen, module = "lampyris")]
+pub(crate) struct Part {
+    pub(crate) run: PartialRun,
+    pub(crate) fingerprint: String,
+    /// That of what it was asked of: another one where the number of rays was found by tracing.
+    pub(crate) asked_of: String,
+    /// The scene that it is of, with its number of rays.
+    pub(crate) of: Arc<PreparedScene>,
+}
+
+/// The number of rays of the run that the bytes are a part of, where it was found by tracing.
+///
+/// # Errors
+/// `ValueError` when the bytes are none of a part.
+pub(crate) fn rays_found(bytes: &[u8]) -> PyResult<Option<u64>> {
+    Ok(PartialRun::header::<PartHeader>(bytes).map_err(unusable)?.rays)
+}
+
+/// The sums in the bytes of a part of the run with this fingerprint.
+///
+/// # Errors
+/// `ValueError` when they are damaged or of another run.
+pub(crate) fn read(bytes: &[u8], fingerprint: &str, scene: &PreparedScene) -> PyResult<PartialRun> {
+    let check = |header: &PartHeader| {
+        if header.fingerprint == fingerprint {
+            return Ok(());
+        }
+        Err(format!(
+            "it is a part of another run (of {}); the scene, its files, the settings and the version must be the same",
+            header.command
+        ))
+    };
+    PartialRun::read(bytes, check, &scene.bound).map_err(unusable)
+}
+
+fn unusable(e: impl Display) -> PyErr {
+    PyValueError::new_err(format!("the part cannot be used: {e}"))
+}
+
+/// The last run that was traced in full, kept while it is checked, so that whatever stops the check loses nothing.
+#[derive(Default)]
+pub(crate) struct KeptRun {
+    whole: Mutex<Option<(PartialRun, Arc<PreparedScene>)>>,
+    /// What is done of the first run of a search.
+    done: Mutex<Option<PartialRun>>,
+}
+
+impl KeptRun {
+    /// For a search that goes on from these sums.
+    pub(crate) fn starting_from(done: Option<PartialRun>) -> Self {
+        Self { done: Mutex::new(done), ..Self::default() }
+    }
+
+    /// Keeps a run of this scene if it is whole.
+    pub(crate) fn keep(&self, run: &PartialRun, scene: &Arc<PreparedScene>) {
+        if run.is_whole() {
+            *locked(&self.whole) = Some((run.clone(), scene.clone()));
+        }
+    }
+
+    /// What was kept.
+    pub(crate) fn take(&self) -> Option<(PartialRun, Arc<PreparedScene>)> {
+        locked(&self.whole).take()
+    }
+}
+
+impl RunKeeper for KeptRun {
+    fn keep(&self, prepared: &PreparedScene, trace: &mut dyn FnMut(TraceRequest<'_>)) {
+        let from = locked(&self.done).take();
+        let scene = Arc::new(prepared.clone());
+        let keep = |run: &PartialRun| self.keep(run, &scene);
+        trace(TraceRequest { from, ..keeping(&keep) });
+    }
+}
+
+/// A request that tells of the run at the end of each thread.
+pub(crate) fn keeping(keep: &(dyn Fn(&PartialRun) + Sync)) -> TraceRequest<'_> {
+    TraceRequest { finished: Some(keep), every: Duration::MAX, ..TraceRequest::default() }
+}
+
+#[pymethods]
+impl Part {
+    /// Adds another part of the same run, and gives the sum.
+    fn merged(&self, other: &Self) -> PyResult<Self> {
+        if self.fingerprint != other.fingerprint {
+            return Err(PyValueError::new_err(
+                "the parts are of different runs; trace them with the same scene and settings",
+            ));
+        }
+        let mut run = self.run.clone();
+        run.merge(&other.run).map_err(PyValueError::new_err)?;
+        Ok(Self {
+            run,
+            fingerprint: self.fingerprint.clone(),
+            asked_of: self.asked_of.clone(),
+            of: self.of.clone(),
+        })
+    }
+
+    /// The part as bytes, for a file or another machine.
+    fn to_bytes(&self, py: Python<'_>) -> PyResult<Py<PyBytes>> {
+        let command = format!("lampyris {} in Python", env!("CARGO_PKG_VERSION"));
+        let header = PartHeader { fingerprint: self.fingerprint.clone(), command, rays: self.of.rays };
+        let mut bytes = Vec::new();
+        self.run.write(&header, &mut bytes).map_err(|e| Defect::new_err(e.to_string()))?;
+        Ok(PyBytes::new(py, &bytes).unbind())
+    }
+
+    /// Replicates that are done.
+    #[getter]
+    fn done(&self) -> usize {
+        self.run.done.len()
+    }
+
+    /// Replicates of the whole run.
+    #[getter]
+    fn replicates(&self) -> u32 {
+        self.run.replicates
+    }
+
+    /// Rays that are done.
+    #[getter]
+    fn rays(&self) -> u64 {
+        self.run.tallies.counts.rays
+    }
+
+    /// Whether every replicate is done.
+    #[getter]
+    fn is_whole(&self) -> bool {
+        self.run.is_whole()
+    }
+
+    /// A hash of all that decides the bits of the run.
+    #[getter]
+    fn fingerprint(&self) -> &str {
+        &self.fingerprint
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<lampyris.Part: {} of {} replicates, {} rays>",
+            self.run.done.len(),
+            self.run.replicates,
+            self.rays()
+        )
+    }
+}

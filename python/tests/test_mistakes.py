@@ -1,0 +1,126 @@
+"""What a wrong setting, scene, array or file is told: what it must be, and what to do."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import LAMP, lamp
+
+import lampyris as lp
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "says"),
+    [
+        (lambda s: s.trace(rays=0), ValueError, "at least 1"),
+        (lambda s: s.trace(tolerance=-1), ValueError, "positive lengths"),
+        (lambda s: s.trace(tolerance=(1, 2, 3)), ValueError, "one number of mm or two"),
+        (lambda s: s.trace(normals="round"), ValueError, "normals"),
+        (lambda s: s.trace(intersector="quadtree"), ValueError, "octree, bvh2, cwbvh, exact"),
+        (lambda s: s.trace(threads=0), ValueError, "threads = 0: .* at least 1"),
+        (lambda s: s.trace(threads="two"), TypeError, "threads"),
+        (lambda s: s.trace(seed=-1), ValueError, "seed = -1: .* at least 0"),
+        (lambda s: s.trace(parts={"huosing": 0.1}), ValueError, 'did you mean "housing"'),
+        (lambda s: s.trace(until="1%@fra"), ValueError, 'did you mean "far"'),
+        (lambda s: s.trace(resume=True), ValueError, "no trace of this scene was interrupted"),
+        (lambda s: s.__setitem__("housing", 0.9), TypeError, r"lampyris.mirror\(0.9\)"),
+        (lambda s: s.add("light"), TypeError, "source or a receiver"),
+        (lambda s: s.trace(rays="1e6"), TypeError, "rays: a whole number is needed, not '1e6'"),
+        (lambda s: s.trace(rays=float("nan")), ValueError, "rays = nan: it must be a whole number"),
+        (lambda s: s.trace(rays=2.5), ValueError, "whole number"),
+        (lambda s: s.trace(rays=10**30), ValueError, "at most 140737488355328"),
+        (lambda s: s.trace(seed=2**70), ValueError, "seed = .* at most 18446744073709551615"),
+        (lambda s: s.trace(threads=-1), ValueError, "threads = -1: .* at least 1"),
+        (lambda s: s.trace(parts=0.1), TypeError, "parts: a dict of names and tolerances"),
+        (lambda s: s.trace(tolerance="fine"), ValueError, "one number of mm or two"),
+        (lambda s: s.trace(normals=3), TypeError, "normals: a text is needed"),
+        (lambda s: s.trace(until=1), TypeError, "until: a text is needed"),
+        (lambda s: s.trace(progress="yes"), TypeError, "True, False or a function"),
+        (lambda s: s.trace(resume="part.bin"), TypeError, r"scene.read_part\(bytes"),
+        (lambda s: s.prepare(until="1%@far"), TypeError, "until is for Scene.trace alone"),
+        (lambda s: s.prepare(ray=5), TypeError, "ray is no setting of a trace; there are rays"),
+        (lambda s: s.trace_part(0, 0), ValueError, "count = 0"),
+        (lambda s: s.trace_part(3, 3), ValueError, "part 3 of 3: the index counts from 0"),
+        (lambda s: s.trace_part(0, 3).merged("x"), TypeError, "other: a Part is needed"),
+        (lambda s: s.__setitem__(3, lp.mirror()), TypeError, r"lampyris.select\(…\) is needed"),
+        (lambda s: s.add_model(3), TypeError, r"lampyris.read_step\(path\)"),
+        (lambda s: s.add(lp.led(colour=1j)).trace(), TypeError, r"source\[1\].colour: a scene holds numbers"),
+        (lambda s: s.add(lp.far_field("f", h_deg=(5,), step_deg=1)), ValueError, r"h_deg = \(5,\): two finite angles"),
+        (lambda s: s.add(lp.led(at=(0, 0, float("nan")))).trace(), ValueError, "not a point"),
+        (lambda s: s.trace(rays=500, progress=False).assess("R1", "far"), ValueError, r"lampyris.regulations\(\) has all"),
+        (lambda s: s.trace(accuracy_deg=0.1, tolerance=0.1), ValueError, "both say how fine"),
+    ],
+)
+def test_wrong_settings_are_told_what_to_do(change: Any, kind: Any, says: str) -> None:
+    scene = lamp(2000)
+    with pytest.raises(kind, match=says):
+        change(scene)
+
+
+def test_wrong_files_are_told_what_to_do(tmp_path: pathlib.Path) -> None:
+    with pytest.raises(OSError, match="check the path"):
+        lp.read_step(tmp_path / "absent.stp")
+    (tmp_path / "no.stp").write_text("solid x")
+    with pytest.raises(lp.InputError, match="not a STEP file"):
+        lp.read_step(tmp_path / "no.stp")
+    with pytest.raises(lp.SceneError, match="a STEP file, where a scene"):
+        lp.Scene.from_toml(LAMP)
+    with pytest.raises(OSError, match="cannot read the scene"):
+        lp.Scene.from_toml(tmp_path / "absent.toml")
+    with pytest.raises(lp.SceneError, match=r"slip:2:1.*rays"):
+        lp.Scene.parse("[run]\nray = 5\n", name="slip")
+    scene = lamp(2000)
+    scene["cover"] = lp.mirror(0.9)
+    with pytest.raises(lp.SceneError, match="cover"):
+        scene.trace(progress=False)
+
+
+@pytest.mark.parametrize("tolerance", [np.float32(0.25), np.array(0.25), np.array([0.25, 0.25]), [0.25, 0.25], (0.25, 0.25)])
+def test_numbers_of_numpy_are_numbers(tolerance: Any, lens: pathlib.Path) -> None:
+    assert len(lp.read_step(lens).tessellate(tolerance)) == len(lp.read_step(lens).tessellate(0.25))
+    scene = lp.Scene(rays=np.int64(500))
+    scene.tables["run"]["seed"] = np.uint8(7)
+    scene.add(lp.point(at=np.zeros(3), power=np.float64(2)), lp.plane("wall", at=(0, 0, 1), cells=np.array([2, 2])))
+    run = scene.trace(np.int32(500), threads=np.int8(1), progress=False)  # type: ignore[arg-type]
+    assert run.power["emitted"] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "says"),
+    [
+        (lambda model: lp.study.accuracy(str(model)), TypeError, "takes a Model"),  # type: ignore[arg-type]
+        (lambda model: lp.study.accuracy(model, 0.1), TypeError, r"as \[0.1\]"),  # type: ignore[arg-type]
+        (lambda model: lp.study.accuracy(model, rays=0), ValueError, "rays = 0"),
+        (lambda model: lp.study.accuracy(model, repetitions=0), ValueError, "repetitions = 0"),
+        (lambda model: lp.study.check(model, threads=0), ValueError, "threads = 0"),
+        (lambda model: lp.study.check(model, seed=-1), ValueError, "seed = -1"),
+    ],
+)
+def test_wrong_studies_are_told_what_to_do(change: Any, kind: Any, says: str, lens: pathlib.Path) -> None:
+    with pytest.raises(kind, match=says):
+        change(lp.read_step(lens))
+
+
+def test_wrong_materials_are_told_what_to_do() -> None:
+    with pytest.raises(ValueError, match="select: say which faces"):
+        lp.select()
+    for medium in (None, [1.49], True):
+        with pytest.raises(TypeError, match="glass: a name of"):
+            lp.glass(medium)  # type: ignore[arg-type]
+    for wrong in (3, None):
+        with pytest.raises(TypeError, match="a model is needed"):
+            lp.Scene(wrong)  # type: ignore[arg-type]
+
+
+def test_a_copy_of_a_scene_goes_its_own_way() -> None:
+    import copy
+
+    scene = lamp(2000)
+    first = scene.trace(progress=False)
+    other = copy.deepcopy(scene)
+    assert other.trace(progress=False).digest == first.digest
+    other.add(lp.plane("wall", at=(0, 0, 300)))
+    assert set(other.trace(progress=False)) == {"far", "wall"} and set(scene.trace(progress=False)) == {"far"}
