@@ -193,11 +193,11 @@ impl Prepared {
         self.require_own(resume)?;
         let target = ErrorTarget::new(until, &self.scene.job.scene).map_err(of_pipeline)?;
         let mut scene = PreparedScene::clone(&self.scene);
-        let first_rays = resume.map(|part| part.of.run_settings().rays);
+        let resume_rays = resume.map(|part| part.of.run_settings().rays);
         let kept = Arc::new(KeptRun::starting_from(resume.map(|part| part.run.clone())));
         let keeper = kept.clone();
         let work = move |monitor: &dyn pipeline::Monitor| {
-            let (run, result) = target.trace(&mut scene, GrowingSearch { first_rays, keeper: &*keeper }, monitor);
+            let (run, result) = target.trace(&mut scene, GrowingSearch { resume_rays, keeper: &*keeper }, monitor);
             if !run.is_whole() {
                 return (Err(Box::new(run)), scene, result);
             }
