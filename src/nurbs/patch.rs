@@ -68,8 +68,8 @@ impl BezierPatch {
         patches
     }
 
-    /// Homogeneous `[S, S_u, S_v]`, derivatives by the local parameters, not the surface's. These are in `[0, 1]²`; beyond it the polynomial
-    /// goes on.
+    /// Homogeneous `[S, S_u, S_v]`, derivatives by the local parameters, not the surface's. These are in `[0, 1]²`; beyond it the
+    /// polynomial goes on.
     pub fn local_jet(&self, local: Uv) -> [Homogeneous; 3] {
         as_wide_as_needed!(self.jet_of_width(local))
     }

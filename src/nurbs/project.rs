@@ -82,7 +82,8 @@ pub fn nearest_by(curve: &Curve, offset: impl Fn(Point) -> Point, start: Option<
 fn reach_of_an_eighth(piece: &[Homogeneous], offset: &impl Fn(Point) -> Point) -> f64 {
     let corners: Vec<Point> = piece.iter().map(|p| offset(p.position())).collect();
     let steps = || corners.windows(2).map(|pair| (pair[1] - pair[0]).length());
-    // Without weights the speed is at most that along the longest side of the control polygon; with them the whole polygon bounds the piece.
+    // Without weights the speed is at most that along the longest side of the control polygon; with them the whole polygon bounds the
+    // piece.
     let is_polynomial = piece.iter().all(|p| p.weight() == piece[0].weight());
     let by_speed = steps().fold(0.0, f64::max) * (piece.len() - 1) as f64 / SEEDS as f64;
     if is_polynomial { by_speed } else { steps().sum() }
