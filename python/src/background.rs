@@ -1,7 +1,7 @@
 //! Work that runs without the GIL on a thread of its own, while this one tells how far it is and listens for Ctrl-C.
 
 use crate::errors::Defect;
-use lampyris::pipeline::{Monitor, Stage};
+use lampyris::pipeline::{Monitor, Stage, TracingSettings};
 use lampyris::study;
 use lampyris::study::default_accuracy::Chosen;
 use pyo3::prelude::*;
@@ -187,16 +187,14 @@ pub(crate) fn stoppable<T: Send>(
     })
 }
 
-/// Threads of one pool on a machine that has fewer: a pool of 64 is made in 3 ms, one of 4096 stands in its own way for most of a minute.
-const MOST_THREADS: usize = 64;
-
-/// In a pool of so many threads, at most [`MOST_THREADS`] or as many as the machine has, or in the one that all share.
+/// In a pool of so many threads, as [`TracingSettings::thread_count`] bounds them, or in the one that all share.
 pub(crate) fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
-    let cores = thread::available_parallelism().map_or(1, |n| n.get());
-    let wanted = threads.map(|n| n.clamp(1, cores.max(MOST_THREADS))).or_else(|| is_forked().then_some(cores));
-    match wanted.map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build()) {
-        Some(Ok(pool)) => pool.install(work),
-        _ => work(),
+    let asked = threads.is_some() || is_forked();
+    let settings = TracingSettings { threads: threads.map(|n| n.max(1)), ..TracingSettings::default() };
+    let pool = || rayon::ThreadPoolBuilder::new().num_threads(settings.thread_count().ok()?).build().ok();
+    match asked.then(pool).flatten() {
+        Some(pool) => pool.install(work),
+        None => work(),
     }
 }
 

@@ -26,8 +26,8 @@ const ROUNDS: usize = 3;
 const CLOSER: f64 = 0.25;
 
 /// Fits a curve to the homogeneous points that `at` gives from the first to the last of `corners`, two or more and rising, where its
-/// derivatives may jump. Weights must be polynomials of `degree` at most between corners. Returns it with the largest distance seen, mm: at most `tolerance`
-/// unless that needs more pieces than are made; `None` where a point is missing or no number.
+/// derivatives may jump. Weights must be polynomials of `degree` at most between corners. Returns it with the largest distance seen, mm: at
+/// most `tolerance` unless that needs more pieces than are made; `None` where a point is missing or no number.
 pub(crate) fn fit_curve(
     corners: &[f64],
     degree: usize,

@@ -196,8 +196,8 @@ impl Surface {
         self.limit_normal(uv)
     }
 
-    /// The unit normal just inside the domain, seen from a singular point, clamped to the domain: along the mixed derivative where one partial
-    /// derivative vanishes, otherwise at a point moved 1e-4 of the domain towards its centre. `None` where that has none either.
+    /// The unit normal just inside the domain, seen from a singular point, clamped to the domain: along the mixed derivative where one
+    /// partial derivative vanishes, otherwise at a point moved 1e-4 of the domain towards its centre. `None` where that has none either.
     pub(crate) fn limit_normal(&self, uv: Uv) -> Option<Vector> {
         let [[u0, u1], [v0, v1]] = self.domain();
         let uv = uv.clamp(Uv::new(u0, v0), Uv::new(u1, v1));

@@ -207,8 +207,8 @@ impl PreparedScene {
         self.chosen = Some(chosen);
     }
 
-    /// Hashes all that decides the bits of a run: program, values of the scene, its files, facets, intersector, settings; of a run that grows
-    /// not the number of rays.
+    /// Hashes all that decides the bits of a run: program, values of the scene, its files, facets, intersector, settings; of a run that
+    /// grows not the number of rays.
     ///
     /// # Errors
     /// When a file of the scene cannot be read.

@@ -176,10 +176,10 @@ impl ShapeItems {
         }
     }
 
-    /// Adds the plan of the shell `id`: its faces, and for each whether an odd number of oriented shells and faces around it turns it. `name`
-    /// is that of the representation item, `owners` are the entities around the shell whose style it inherits, nearest first. `solid`: it
-    /// bounds a solid, is closed whatever it calls itself, and outer until a caller says that it is a void. A missing shell is refused in
-    /// `owner`'s name.
+    /// Adds the plan of the shell `id`: its faces, and for each whether an odd number of oriented shells and faces around it turns it.
+    /// `name` is that of the representation item, `owners` are the entities around the shell whose style it inherits, nearest first.
+    /// `solid`: it bounds a solid, is closed whatever it calls itself, and outer until a caller says that it is a void. A missing shell is
+    /// refused in `owner`'s name.
     fn add_shell(
         &mut self,
         file: &File<'_>,

@@ -243,9 +243,9 @@ impl Grader<'_> {
         t <= true_t || !(1..STEPS).any(through)
     }
 
-    /// Asks for all crossings of a ray, each from the one before, and grades them together against `truths`, by distance: right if each lies
-    /// at its truth and none is missing or too many; on facets each within the band of the sag, and those that the sag may miss in pairs.
-    /// On the spline flagged, right or not, where a hit or the last miss says that it is unsure.
+    /// Asks for all crossings of a ray, each from the one before, and grades them together against `truths`, by distance: right if each
+    /// lies at its truth and none is missing or too many; on facets each within the band of the sag, and those that the sag may miss in
+    /// pairs. On the spline flagged, right or not, where a hit or the last miss says that it is unsure.
     fn grade_all(&self, ray: &Ray, truths: &[Truth]) -> Grade {
         let mut next = self.scene.ray(ray);
         let origin = next.origin;
