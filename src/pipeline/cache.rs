@@ -13,7 +13,8 @@ use super::turn::Turn;
 use crate::intersect::octree::{self, Octree};
 use crate::mesh::FacetMesh;
 use crate::mesh::arrays::{ArrayReader, invalid, write_array};
-use crate::simulate::{Fingerprint, Scene};
+use crate::simulate::{Fingerprint, FingerprintHasher, Scene};
+use crate::step::ImportReport;
 use crate::study::default_accuracy::Chosen;
 use crate::tessellate;
 use std::fs::{self, File};
@@ -277,19 +278,17 @@ fn choice_name(undecided: &Fingerprint) -> String {
 }
 
 /// Hashes all that decides facets and octree but the octree's settings, of which the arrays hold none that is not the program's default;
-/// the bytes of the models' files among it. `None` where a file can no longer be read.
-pub(super) fn facets_key(scene: &Scene, mesher: &tessellate::Settings) -> Option<Fingerprint> {
+/// the bytes of the models' files among it, as `reports` tells of them.
+pub(super) fn facets_key(scene: &Scene, reports: &[ImportReport], mesher: &tessellate::Settings) -> Fingerprint {
     // Entries are raw bytes of numbers: machines of the other order must not share them.
     let machine = if cfg!(target_endian = "big") { "big" } else { "little" };
     // The settings in their debug form: a new field changes the names by itself.
     let words = format!("{PROGRAM} {machine} {mesher:?} {:?}", scene.models);
-    let mut pieces = vec![words.into_bytes()];
-    for model in &scene.models {
-        // By content, not by date: a file that was replaced must not give the facets of another.
-        pieces.push(crate::formats::read_bytes(&scene.resolve(&model.file)).ok()?);
-    }
-    let pieces: Vec<&[u8]> = pieces.iter().map(Vec::as_slice).collect();
-    Some(Fingerprint::new(&pieces))
+    let mut hasher = FingerprintHasher::default();
+    hasher.add(words.as_bytes());
+    // By content, not by date, and as it was read: a file that was replaced, before or after that, must not give the facets of another.
+    reports.iter().for_each(|report| hasher.add(&report.hash.to_le_bytes()));
+    hasher.finish()
 }
 
 /// Returns the cache names of the groups that a model is divided into, by their numbers; a model in one piece keeps its own.

@@ -1,14 +1,13 @@
 //! What is found out about a run beside its results: a sample of its rays asked again of BVH and spline, and what the facets
 //! change of its light.
 
-use super::intersectors::{farthest_start, in_one_scene, true_intersector};
+use super::intersectors::{farthest_start, in_one_scene, octrees_in_one_scene, true_intersector};
 use super::monitor::{Monitor, Stage, in_stage};
 use super::prepared_scene::{PreparedScene, TraceRequest};
 use super::ray_recorder::RayRecorder;
 use super::scene_results::SceneResults;
 use super::settings::IntersectorKind;
 use crate::intersect::bvh::{self, Bvh};
-use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
 use crate::simulate::{PartialRun, Results, RunSettings, replay, verify_pruning};
@@ -124,12 +123,7 @@ fn check_rays(
     let on_octree =
         prepared.choice.intersector == IntersectorKind::Octree && prepared.choice.normals != NormalMode::Exact;
     // A tree of its own where the run had another intersector.
-    let octree = |(group, mesh)| -> Box<dyn Intersector + '_> {
-        let farthest_start = farthest_start(instancing, group);
-        Box::new(Octree::build(mesh, &octree::Settings { normals, farthest_start, ..Default::default() }))
-    };
-    let octrees = || in_one_scene(instancing, prepared.facets.meshes().enumerate().map(octree).collect());
-    let built = (!on_octree).then(octrees);
+    let built = (!on_octree).then(|| octrees_in_one_scene(&prepared.facets, normals));
     let octree = built.as_deref().unwrap_or(intersector);
     monitor.end();
     monitor.begin(Stage::Checking(rays.len() as u64));

@@ -1,11 +1,11 @@
 //! A run that asks for no tolerance, normals or intersector is given them: what a pilot of its own rays finds sufficient.
 
 use super::facets::tessellate_groups;
-use super::intersectors::{IntersectorChoice, TrueSurface, farthest_start, in_one_scene, true_intersector};
+use super::intersectors::{IntersectorChoice, TrueSurface, octrees_in_one_scene, true_intersector};
 use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
 use crate::intersect::Intersector;
-use crate::intersect::octree::{self, Octree};
+use crate::intersect::octree;
 use crate::model::Model;
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::default_accuracy::{self, Chosen, PilotSource, TimedFacets, Undecided};
@@ -47,13 +47,7 @@ impl PilotSource for Source<'_> {
     }
 
     fn octree<'f>(&'f self, facets: &'f GroupedFacets) -> Box<dyn Intersector + 'f> {
-        let instancing = facets.instancing.as_deref();
-        let octree = |(group, mesh)| {
-            let farthest_start = farthest_start(instancing, group);
-            let settings = octree::Settings { farthest_start, ..Default::default() };
-            Box::new(Octree::build(mesh, &settings)) as Box<dyn Intersector>
-        };
-        in_one_scene(instancing, facets.meshes().enumerate().map(octree).collect())
+        octrees_in_one_scene(facets, octree::Settings::default().normals)
     }
 
     fn exact(&self) -> &dyn Intersector {

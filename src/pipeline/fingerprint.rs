@@ -3,20 +3,20 @@
 use super::cache::PROGRAM;
 use super::error::Error;
 use super::intersectors::IntersectorChoice;
+use super::loading::LoadedModel;
 use crate::formats::open_file;
-use crate::model::Model;
 use crate::simulate::scene::Origin;
 use crate::simulate::{BoundScene, Fingerprint, FingerprintHasher, RunSettings, Scene, grows};
 use crate::tessellate;
 use std::fmt::{self, Write};
 
-/// Hashes all that decides the bits of a run of these settings: program, scene, its files, facets, intersector, settings; of a run that
-/// grows not the number of rays. `in_memory` is a model that no file of the scene holds.
+/// Hashes all that decides the bits of a run of these settings: program, scene, its model and other files, facets, intersector, settings; of
+/// a run that grows not the number of rays. A model from files counts by their bytes as they were read, one from memory by its values.
 ///
 /// # Errors
 /// When a file of the scene cannot be read.
 pub(super) fn run_fingerprint(
-    (scene, bound, in_memory): (&Scene, &BoundScene, Option<&Model>),
+    (scene, bound, loaded): (&Scene, &BoundScene, &LoadedModel),
     asked: &RunSettings,
     (mesher, choice): (&tessellate::Settings, &IntersectorChoice),
 ) -> Result<Fingerprint, Error> {
@@ -40,12 +40,14 @@ pub(super) fn run_fingerprint(
     hasher.add(words.as_bytes());
     // Every value, not the text: a scene that was made or changed by a program has none, or that of another.
     hasher.add(format!("{:?}", Scene { origin: Origin::default(), ..Scene::clone(scene) }).as_bytes());
-    if let Some(model) = in_memory {
+    if loaded.is_from_files(scene) {
+        loaded.reports.iter().for_each(|report| hasher.add(&report.hash.to_le_bytes()));
+    } else {
         // Piece by piece: the whole would be many times the model.
-        write!(Pieces(&mut hasher), "{model:?}").map_err(|e| Error::input(e.to_string()))?;
+        write!(Pieces(&mut hasher), "{:?}", loaded.model).map_err(|e| Error::input(e.to_string()))?;
     }
-    // By their bytes: a file that changed changes the run.
-    for file in scene.files() {
+    // By their bytes: a file that changed changes the run. Those of the model come first.
+    for file in scene.files().skip(scene.models.len()) {
         let path = scene.resolve(file);
         let mut read = || {
             let mut file = open_file(&path)?;

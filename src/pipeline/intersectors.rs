@@ -13,6 +13,7 @@ use crate::intersect::{Footprint, Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::{Instancing, Model};
 use crate::simulate::Scene;
+use crate::tessellate::GroupedFacets;
 use std::sync::Arc;
 
 /// What finds the hits, and how the normal there is got.
@@ -159,6 +160,17 @@ pub fn in_one_scene<'a>(
         // A model in one piece has one group.
         None => groups.swap_remove(0),
     }
+}
+
+/// Builds an octree with these normals over the facets of each group, and joins them to one that answers in the scene's coordinates.
+pub(super) fn octrees_in_one_scene(facets: &GroupedFacets, normals: NormalMode) -> Box<dyn Intersector + '_> {
+    let instancing = facets.instancing.as_deref();
+    let build = |(group, mesh)| {
+        let farthest_start = farthest_start(instancing, group);
+        let settings = octree::Settings { normals, farthest_start, ..Default::default() };
+        Box::new(Octree::build(mesh, &settings)) as Box<dyn Intersector>
+    };
+    in_one_scene(instancing, facets.meshes().enumerate().map(build).collect())
 }
 
 /// Returns the largest coordinate, in size, of what is placed from a group, mm; 0 for what has the scene's coordinates.

@@ -20,7 +20,15 @@ pub struct LoadedModel {
     pub seconds: f64,
 }
 
-/// Reads the models of a scene with `read`, which is called with an entry of each file and unit, and puts them together.
+impl LoadedModel {
+    /// Whether the model is what the files of the scene held when they were read, so that they stand for it; one without parts needs none.
+    pub(super) fn is_from_files(&self, scene: &Scene) -> bool {
+        let files = scene.models.len();
+        self.model.instances.is_empty() || (files > 0 && self.reports.len() == files)
+    }
+}
+
+/// Reads the models of a scene with `read`, which is called with an entry of each file, unit and limit, and puts them together.
 ///
 /// # Errors
 /// Those of `read`, and where the models cannot be put together.
@@ -34,7 +42,8 @@ pub fn read_models(scene: &Scene, read: impl Fn(&ModelUse) -> Result<Import, Err
             None => error,
         };
         // Of a file that stands in many places one reading is enough: 4 ms each for a thousand lenses.
-        let same = |e: &ModelUse| (&e.file, e.unit_mm) == (&entry.file, entry.unit_mm);
+        let key = |e: &ModelUse| (e.file.clone(), e.unit_mm, e.max_placed);
+        let same = |e: &ModelUse| key(e) == key(entry);
         let import = match scene.models[..i].iter().position(same) {
             Some(k) => Import { model: Model::clone(&models[k]), report: ImportReport::clone(&reports[k]) },
             None => read(entry).map_err(shown)?,

@@ -7,6 +7,7 @@ use super::expected_facets::expected_facets;
 use super::facets::mesh_settings;
 use super::fingerprint::run_fingerprint;
 use super::intersectors::{self, IntersectorChoice, TrueSurface};
+use super::loading::LoadedModel;
 use super::monitor::{Monitor, Stage};
 use super::scene_job::SceneJob;
 use super::settings::IntersectorKind;
@@ -188,10 +189,9 @@ impl PreparedScene {
         cache.choice(&self.fingerprint().ok()?, monitor)
     }
 
-    /// The scene, bound, and its model where no file of the scene holds it.
-    fn scene_and_model(&self) -> (&Scene, &BoundScene, Option<&Model>) {
-        let in_memory = (!self.job.is_model_from_files()).then_some(&self.job.loaded.model);
-        (&self.job.scene, &self.bound, in_memory)
+    /// The scene, bound, and its model.
+    fn scene_and_model(&self) -> (&Scene, &BoundScene, &LoadedModel) {
+        (&self.job.scene, &self.bound, &self.job.loaded)
     }
 
     /// Returns settings and intersector of a choice.

@@ -67,7 +67,6 @@ impl SceneJob {
     ) -> (GroupedFacets, f64) {
         let (start, model) = (Instant::now(), &self.loaded.model);
         let make = || in_stage(monitor, Stage::Tessellating, || tessellate_groups(model, instancing, settings));
-        // Without a cache, or where a file of the scene has gone since, facets are made anew.
         let Some((cache, key)) = self.cached(settings) else { return make() };
         let groups = instancing.map_or(slice::from_ref(model), |i| &i.groups);
         let keys = group_keys(&key, groups.len());
@@ -92,16 +91,9 @@ impl SceneJob {
         (made, seconds)
     }
 
-    /// Whether the model is what the files of the scene hold, so that they stand for it; one without parts needs none.
-    pub(super) fn is_model_from_files(&self) -> bool {
-        let files = self.scene.models.len();
-        self.loaded.model.instances.is_empty() || (files > 0 && self.loaded.reports.len() == files)
-    }
-
-    /// Returns the cache, and the name that facets of these settings have in it; `None` without a cache, or where the model is from no file
-    /// or a file of the scene is gone.
+    /// Returns the cache, and the name that facets of these settings have in it; `None` without a cache, or where the model is from no file.
     pub(super) fn cached(&self, settings: &tessellate::Settings) -> Option<(&Cache, Fingerprint)> {
-        let cache = self.cache.as_ref().filter(|_| self.is_model_from_files())?;
-        Some((cache, facets_key(&self.scene, settings)?))
+        let cache = self.cache.as_ref().filter(|_| self.loaded.is_from_files(&self.scene))?;
+        Some((cache, facets_key(&self.scene, &self.loaded.reports, settings)))
     }
 }

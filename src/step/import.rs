@@ -12,7 +12,7 @@ use super::product::styles::Styles;
 use super::product::topology::ShapeItems;
 use super::report::{ImportReport, Note, UnitNames};
 use super::{Error, ErrorKind, Settings};
-use crate::formats;
+use crate::formats::{self, Fnv};
 use crate::math::Aabb;
 use crate::model::{Instance, Model, PartId, are_shared};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -56,7 +56,12 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     let start = Instant::now();
     let file = parse(name, bytes)?;
     let parsed = start.elapsed().as_secs_f64();
-    let mut report = ImportReport { file: name.to_string(), bytes: bytes.len() as u64, ..ImportReport::default() };
+    let mut report = ImportReport {
+        file: name.to_string(),
+        bytes: bytes.len() as u64,
+        hash: Fnv::hash(&[bytes]),
+        ..ImportReport::default()
+    };
     report.schema = schema_names(&file);
     for fault in &file.faults {
         let id = fault.id.map_or_else(String::new, |id| format!(" #{id}"));

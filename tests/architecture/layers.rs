@@ -156,6 +156,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "formats",
         &[
             "base64",
+            "fnv",
             "error",
             "file_names",
             "writer",

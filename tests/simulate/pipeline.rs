@@ -163,6 +163,37 @@ fn who_starts_at_once_waits_for_one_pilot() {
     assert!(names.into_iter().all(|name| !name.to_str().unwrap().ends_with(".part")));
 }
 
+/// A file that is saved anew after it was read, as people do beside an open notebook: its facets are not kept as those of the new one.
+#[test]
+fn facets_of_a_file_that_changed_since_are_not_taken_for_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/lens_planoconvex_nurbs.stp");
+    let file = folder.path().join("lens.stp");
+    std::fs::copy(&lens, &file).unwrap();
+    let text = "[run]\nrays = 1000\n[accuracy]\ntolerance_mm = 0.2\n[[model]]\nfile = 'lens.stp'\n[[medium]]\nname = 'glass'\n\
+        index = 1.5\n[[material]]\npart = '*'\nmedium = 'glass'\n[[source]]\nkind = 'collimated'\nat = [0, 0, -3]\n\
+        direction = [0, 0, 1]\nradius = 5\npower = 1\n[[receiver]]\nname = 'wall'\nkind = 'plane'\nat = [0, 0, 99]\n\
+        normal = [0, 0, 1]\nsize = [9, 9]\ncells = [2, 2]\n";
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    let read = || read_scene(&folder.path().join("scene.toml"), &Silent).unwrap();
+    let cache = Some(Cache::new(folder.path().join("kept")));
+    let prepare = |(scene, loaded): (Scene, LoadedModel)| {
+        let prepared =
+            PreparedScene::new(SceneJob { cache: cache.clone(), ..SceneJob::new(scene, loaded) }, &Silent);
+        let prepared = prepared.unwrap();
+        let height = |mesh: &lampyris::mesh::FacetMesh| mesh.bounds().max.z;
+        (prepared.facets.meshes().map(height).fold(f64::NEG_INFINITY, f64::max), prepared.fingerprint().unwrap())
+    };
+    let before = read();
+    // The same lens in metres: every face is there, a thousand times as large.
+    let metres = std::fs::read_to_string(&lens).unwrap().replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT($,.METRE.)");
+    std::fs::write(&file, metres).unwrap();
+    let (height, fingerprint) = prepare(before);
+    let (new_height, new_fingerprint) = prepare(read());
+    assert!((new_height / height - 1000.0).abs() < 1e-6, "{new_height} after {height}");
+    assert_ne!(fingerprint, new_fingerprint);
+}
+
 /// A lens of kilometres, of which facets of the default tolerance are too many to be tried: its choice is cached under the key that
 /// the next run looks up.
 #[test]
