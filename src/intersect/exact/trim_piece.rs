@@ -306,7 +306,7 @@ impl PieceLists {
 
     /// The pieces of a row or cell, rising.
     #[inline]
-    pub(super) fn of(&self, key: u32) -> &[u32] {
+    pub(super) fn pieces_of(&self, key: u32) -> &[u32] {
         match self.keys.binary_search(&key) {
             Ok(k) => &self.pieces[self.starts[k] as usize..self.starts[k + 1] as usize],
             Err(_) => &[],

@@ -127,7 +127,7 @@ impl Limits {
     }
 
     /// Returns how many corners there may be; more if those facets that do not hold become fewer (`falls`).
-    fn most(&self, falls: bool) -> usize {
+    fn most_corners(&self, falls: bool) -> usize {
         if falls { self.budget } else { self.usual + self.usual / 4 }
     }
 }
@@ -197,7 +197,7 @@ pub(in crate::tessellate) fn triangulate(
             || surface.steps.are_too_many()
             || round == MAX_ROUNDS
             || (round + 1) * triangles.len() > MAX_WORK
-            || corners >= limits.most(falls);
+            || corners >= limits.most_corners(falls);
         if ended || !mesh.refine(&failing, chords) {
             return Some(Transition { nodes: mesh.nodes, triangles, conflicts, crossed, holds_imprint });
         }

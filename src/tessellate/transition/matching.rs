@@ -17,24 +17,24 @@ pub(super) struct Candidate {
 }
 
 /// The candidates of each triangle, as it has three sides.
-pub(super) struct CandidatesOf(Vec<[Option<u32>; 3]>);
+pub(super) struct TriangleCandidates(Vec<[Option<u32>; 3]>);
 
-impl CandidatesOf {
+impl TriangleCandidates {
     /// Lists, by triangle, of which there are `triangles`, the candidates that pass `filter`; more than three of a triangle are dropped.
     pub(super) fn new(candidates: &[Candidate], triangles: usize, filter: impl Fn(&Candidate) -> bool) -> Self {
-        let mut of = vec![[None; 3]; triangles];
+        let mut by_triangle = vec![[None; 3]; triangles];
         for (c, candidate) in candidates.iter().enumerate().filter(|(_, c)| filter(c)) {
             for t in candidate.triangles {
-                if let Some(slot) = of[t].iter_mut().find(|s| s.is_none()) {
+                if let Some(slot) = by_triangle[t].iter_mut().find(|s| s.is_none()) {
                     *slot = Some(c as u32);
                 }
             }
         }
-        Self(of)
+        Self(by_triangle)
     }
 
     /// Returns the indices of the candidates of a triangle.
-    pub(super) fn of(&self, triangle: usize) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn of_triangle(&self, triangle: usize) -> impl Iterator<Item = usize> + '_ {
         self.0[triangle].iter().flatten().map(|&c| c as usize)
     }
 }
@@ -46,7 +46,7 @@ const MAX_PATH: u32 = 200;
 struct Matching<'c> {
     candidates: &'c [Candidate],
     /// The candidates of each triangle.
-    of: CandidatesOf,
+    by_triangle: TriangleCandidates,
     /// The candidate that a triangle is paired by.
     pair: Vec<Option<usize>>,
     /// Triangles whose pair stays: one of the two has no area.
@@ -62,7 +62,7 @@ pub(super) fn augment(candidates: &[Candidate], triangles: usize, chosen: &[usiz
     // Triangles that swallow one without area cannot give it up for another.
     let mut matching = Matching {
         candidates,
-        of: CandidatesOf::new(candidates, triangles, |c| c.cosine.is_some()),
+        by_triangle: TriangleCandidates::new(candidates, triangles, |c| c.cosine.is_some()),
         pair: vec![None; triangles],
         fixed: vec![false; triangles],
         reached: vec![None; triangles],
@@ -102,7 +102,7 @@ impl Matching<'_> {
         // A mark that no other search leaves, for each start searches once.
         self.reached[start] = Some(start);
         while let Some((t, depth)) = queue.pop_front() {
-            let open: Vec<usize> = self.of.of(t).collect();
+            let open: Vec<usize> = self.by_triangle.of_triangle(t).collect();
             // Along a free candidate first, back along the chosen pair then: such a path has one free pair more
             // than chosen ones.
             for c in open {

@@ -2,7 +2,7 @@
 
 use super::creases::runs_along_crease;
 use super::delaunay::Transition;
-use super::matching::{Candidate, CandidatesOf, augment};
+use super::matching::{Candidate, TriangleCandidates, augment};
 use crate::math::Uv;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::{Node, Nodes, Position, ProvedFacet, edge_key};
@@ -230,7 +230,7 @@ fn prove_sector_quad(
 /// that have but one mate left, then the rest. Skips triangles that are flagged in `taken`, and flags those it pairs.
 fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
     let mut chosen = Vec::new();
-    let of = CandidatesOf::new(candidates, taken.len(), |_| true);
+    let by_triangle = TriangleCandidates::new(candidates, taken.len(), |_| true);
     for (c, candidate) in candidates.iter().enumerate() {
         let [i, j] = candidate.triangles;
         if candidate.rank() < GOOD && !taken[i] && !taken[j] {
@@ -241,7 +241,7 @@ fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
     }
     let is_free = |c: usize, taken: &[bool]| candidates[c].triangles.iter().all(|&t| !taken[t]);
     let only_mate = |t: usize, taken: &[bool]| {
-        let mut open = of.of(t).filter(|&c| is_free(c, taken));
+        let mut open = by_triangle.of_triangle(t).filter(|&c| is_free(c, taken));
         open.next().filter(|_| open.next().is_none())
     };
     let mut lonely: Vec<usize> = (0..taken.len()).rev().collect();
@@ -263,7 +263,7 @@ fn choose_pairs(candidates: &[Candidate], taken: &mut [bool]) -> Vec<usize> {
         pair.iter().for_each(|&t| taken[t] = true);
         chosen.push(c);
         // Neighbours of a pair just made may have lost all mates but one.
-        for c in pair.iter().flat_map(|&t| of.of(t)) {
+        for c in pair.iter().flat_map(|&t| by_triangle.of_triangle(t)) {
             lonely.extend(candidates[c].triangles.into_iter().filter(|&x| !taken[x]));
         }
     }
