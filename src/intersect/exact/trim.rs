@@ -183,7 +183,7 @@ impl Trim {
             let middle = |i: usize| self.origin + Uv::new(i as f64 + 0.5, j as f64 + 0.5) / self.density;
             // Crossings of the row's middle height, once for all its cells.
             let v = middle(0).y;
-            let spanning = self.rows.of(j as u32).iter().map(|&k| &self.pieces[k as usize]).filter(|p| p.spans(v));
+            let spanning = self.rows.get(j as u32).iter().map(|&k| &self.pieces[k as usize]).filter(|p| p.spans(v));
             let mut crossings: Vec<f64> = spanning.map(|p| p.u_at(v)).collect();
             crossings.sort_by(f64::total_cmp);
             for i in 0..self.count[0] {
@@ -208,7 +208,7 @@ impl Trim {
 
     /// Whether a point lies inside, by the pieces of its row that the half-line towards +u crosses.
     fn parity(&self, q: Uv, row: usize) -> bool {
-        let crossings = self.rows.of(row as u32).iter().filter(|&&k| self.pieces[k as usize].crosses(q)).count();
+        let crossings = self.rows.get(row as u32).iter().filter(|&&k| self.pieces[k as usize].crosses(q)).count();
         (crossings % 2 == 1) != self.outside_is_inside
     }
 
@@ -300,7 +300,7 @@ impl Trim {
         let reach = band * Uv::new((metric[2] / determinant).sqrt(), (metric[0] / determinant).sqrt());
         let mut near: SmallVec<[Near; 2]> = SmallVec::new();
         // A box test first: the nearest point takes iterations.
-        for &k in self.near.of(cell as u32) {
+        for &k in self.near.get(cell as u32) {
             let piece = &self.pieces[k as usize];
             let outside = q.x < piece.min.x - reach.x
                 || q.y < piece.min.y - reach.y
@@ -346,7 +346,7 @@ fn grid_bounds(face: &Face, reach: Uv) -> ([Uv; 2], [[bool; 2]; 2]) {
     ([lo, hi], [0, 1].map(|d| [lo[d] > whole[0][d], hi[d] < whole[1][d]]))
 }
 
-/// How far, in u and v, a cell border must keep from a trimming curve so that the band stays in border cells.
+/// How far, in u and v, a cell border must keep from a trimming curve so that the band, in the units of the part, stays in border cells.
 fn cell_margin(face: &Face, extent: Uv, band: f64) -> Uv {
     let [nu, nv] = face.surface.counts();
     let point = |i: usize, j: usize| face.surface.points[i * nv + j].project();

@@ -304,9 +304,9 @@ impl PieceLists {
         lists
     }
 
-    /// The pieces of a row or cell, rising.
+    /// The pieces of a row or cell, rising; empty where it has none.
     #[inline]
-    pub(super) fn of(&self, key: u32) -> &[u32] {
+    pub(super) fn get(&self, key: u32) -> &[u32] {
         match self.keys.binary_search(&key) {
             Ok(k) => &self.pieces[self.starts[k] as usize..self.starts[k + 1] as usize],
             Err(_) => &[],
