@@ -143,7 +143,8 @@ impl<'a> Instanced<'a> {
         self.groups[self.placement(place).group as usize].escapes(&self.moved(walk, place))
     }
 
-    /// Asks rays where they are next, those of one group together.
+    /// Asks the walks that `open` lists at their next placement, those of one group together, and keeps the hits that are nearer; passes
+    /// over walks without one.
     fn ask(&self, open: &[usize], walks: &mut [Walk], cost: &mut Cost) {
         let question = |&walk: &usize| {
             let place = walks[walk].next?;
@@ -170,7 +171,8 @@ impl<'a> Instanced<'a> {
         self.placement(place).local_ray(&walk.local_ray(Some(place)))
     }
 
-    /// The boxes that a ray may enter once it has been asked what it leaves; `None` where nothing in them can be nearer than its hit.
+    /// The boxes that a ray may enter once it has been asked what it leaves; `None` where it ends, at its hit or its range, inside the box
+    /// of that placement and no other's meets this.
     fn boxes_ahead(&self, walk: &Walk) -> Option<BoxWalk<'_>> {
         let own = walk.departure.and_then(|from| from.place).filter(|&k| self.is_alone(k, &walk.ray));
         let Some(own) = own else { return Some(self.tree.walk(&walk.ray)) };
@@ -203,7 +205,8 @@ impl<'a> Instanced<'a> {
 }
 
 impl Walk<'_> {
-    /// Goes on to the next box that the ray enters before its hit; false where there is none. What the ray leaves has been asked.
+    /// Sets `next` to the placement of the next box that the ray enters before its hit; false where there is none. The placement that the
+    /// ray leaves is passed over, for it was asked first.
     fn advance(&mut self) -> bool {
         let own = self.departure.and_then(|from| from.place);
         let Some(boxes) = &mut self.boxes else { return false };
@@ -220,7 +223,7 @@ impl Walk<'_> {
         Ray { departure: own.map(|from| from.departure), ..self.ray }
     }
 
-    /// Keeps the nearer hit, of equal ones that of the first group or placement.
+    /// Keeps the nearer hit, of equal ones that of the first group or placement, and ends the ray there.
     fn take(&mut self, place: Option<u32>, hit: Option<Hit>) {
         let Some(hit) = hit else { return };
         let is_nearer = self.best.is_none_or(|(other, best)| hit.t < best.t || (hit.t == best.t && place < other));

@@ -28,7 +28,8 @@ pub trait Intersector: Sync {
     /// Rays and hits are in the coordinates of the model or mesh that it was built on, mm.
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit>;
 
-    /// Answers many rays: overwrites every entry of `hits`, which is as long as `rays`. An implementation may reorder them inside.
+    /// Answers many rays: overwrites every entry of `hits`, which is as long as `rays`, and adds the work to `cost`. An implementation may
+    /// reorder them inside.
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         for (ray, hit) in rays.iter().zip(hits) {
             *hit = self.intersect(ray, cost);

@@ -23,7 +23,8 @@ pub(crate) struct Slopes {
 }
 
 impl Slopes {
-    /// Takes the corners of a facet, the last two equal for a triangle. No ray passes the slope of one without area or folded sharply.
+    /// Takes the corners of a facet, the last two equal for a triangle. Of one without area, or folded by more than 120°, [`Self::leaves`]
+    /// says nothing.
     pub(crate) fn new([a, b, c, d]: [Point; 4]) -> Self {
         let first = (b - a).cross(c - a).normalize_or_zero();
         let second = if c == d { first } else { (c - a).cross(d - a).normalize_or_zero() };

@@ -40,19 +40,19 @@ impl StartTriangle {
         distance_to_segment(start, corners[0], corners[2]) <= reach || is_over_second(corners, start) != self.second
     }
 
-    /// The side of the triangle that a ray goes to, along its normal; that of the normal where it runs in the plane.
+    /// Returns 1 for a ray that goes to the side that the normal points to or runs in the plane, −1 for one that goes to the other side.
     pub(super) fn side(&self, direction: Vector) -> f64 {
         if self.normal.dot(direction) < 0.0 { -1.0 } else { 1.0 }
     }
 
-    /// Whether a start that lies `height` times the normal's length over the plane, on the side that the ray goes to, has been lifted: such
-    /// a ray sees what rises before it, by however little. Half of the lift may have been lost to rounding.
+    /// Whether a start has been lifted; `height` is its height over the plane, mm, on the side that the ray goes to, times the length of
+    /// the normal. A lifted ray sees what rises before it, by however little. Half of the lift may have been lost to rounding.
     pub(super) fn is_lifted(&self, height: f64, reach: f64) -> bool {
         let least = 0.5 * LIFT * reach;
         height > 0.0 && height * height > least * least * self.normal.length_squared()
     }
 
-    /// The start, moved towards the middle of the triangle.
+    /// The start, moved a millionth of the way to the middle of the triangle, but by no more than [`LONGEST_NUDGE`] times `reach`, mm.
     pub(super) fn nudge(&self, start: Point, reach: f64) -> Point {
         start + ((self.middle - start) * NUDGE).clamp_length_max(LONGEST_NUDGE * reach)
     }

@@ -43,7 +43,7 @@ impl BHShape<f64, 3> for Triangle {
 }
 
 impl<'m> BinaryBvh<'m> {
-    /// Builds the tree on one thread; facets with corners that are no finite numbers are left out.
+    /// Builds the tree on one thread; facets with corners that are not finite or beyond 1e12 mm are left out.
     pub fn build(mesh: &'m FacetMesh) -> Self {
         let started = Instant::now();
         let mut triangles: Vec<Triangle> = (TriangleCode::enumerate(mesh).into_iter())

@@ -38,7 +38,11 @@ pub struct Embree<'m> {
 }
 
 impl<'m> Embree<'m> {
-    /// Builds the hierarchy on Embree's own threads; facets with corners that are no finite numbers are left out.
+    /// Builds the hierarchy on Embree's own threads; facets with corners that are not finite or beyond 1e12 mm are left out. `path` is that
+    /// of the library, for messages.
+    ///
+    /// # Errors
+    /// When the library lacks a function, or Embree has no memory for the mesh.
     pub fn build(
         library: &Arc<EmbreeLibrary>,
         path: &Path,
@@ -69,7 +73,7 @@ impl<'m> Embree<'m> {
     }
 }
 
-/// Where the corners of a primitive stand among the positions of the mesh.
+/// Where the corners of a primitive, three or four, stand among the positions of the mesh, in the order that Embree splits quads by.
 fn corner_indices(mesh: &FacetMesh, code: TriangleCode, primitives: Primitives) -> Vec<u32> {
     let [a, b, c, d] =
         mesh.facets[code.facet() as usize].vertices.map(|vertex| mesh.vertices[vertex as usize].position);

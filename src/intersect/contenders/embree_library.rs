@@ -101,7 +101,7 @@ unsafe impl Send for EmbreeLibrary {}
 #[allow(unsafe_code)]
 unsafe impl Sync for EmbreeLibrary {}
 
-/// Embree tells here what it takes and gives back.
+/// Adds the bytes that Embree takes, or gives back where negative, to the counter that `held` points at; `true` lets it go on.
 extern "C" fn count_bytes(held: Handle, bytes: isize, _after: bool) -> bool {
     // SAFETY: the pointer is that of `EmbreeLibrary::held`, which outlives the device that calls.
     #[allow(unsafe_code)]
@@ -114,6 +114,9 @@ impl EmbreeLibrary {
     /// Opens a library such as `libembree4.so.4`.
     ///
     /// The library's code runs in this process with all its rights: it is the user's to trust what he names.
+    ///
+    /// # Errors
+    /// When the file cannot be loaded or lacks a function, gives no device, or is not version 4.
     pub fn open(path: &Path) -> Result<Arc<Self>, EmbreeError> {
         let unusable = |source| EmbreeError::Library { path: path.into(), source };
         // SAFETY: the names and arguments are those of Embree's C interface, `rtcore_device.h` of version 4; whether a file that bears
@@ -147,7 +150,8 @@ impl EmbreeLibrary {
         self.held.load(Ordering::Relaxed).max(0) as usize
     }
 
-    /// A committed scene of one mesh: `size` indices a primitive, 3 or 4.
+    /// Builds and commits a scene of one mesh: `size` indices a primitive, 3 or 4, all below the number of positions. `path` is for
+    /// messages. Fails where the library lacks a function or gives no memory.
     pub(super) fn new_scene(
         self: &Arc<Self>,
         path: &Path,
@@ -237,7 +241,7 @@ unsafe impl Send for Scene {}
 unsafe impl Sync for Scene {}
 
 impl Scene {
-    /// Fills in the nearest hit.
+    /// Overwrites `t_far`, weights and ids of the record with the nearest hit of its ray; on a miss leaves them as they are.
     pub(super) fn intersect(&self, ray: &mut RayHit) {
         // SAFETY: the record is aligned and larger than `RTCRayHit`; no arguments, which the null pointer says, are the default ones.
         #[allow(unsafe_code)]

@@ -22,7 +22,7 @@ pub struct Parry<'m> {
 }
 
 impl<'m> Parry<'m> {
-    /// Builds the tree on one thread; facets with corners that are no finite numbers are left out.
+    /// Builds the tree on one thread; facets with corners that are not finite or beyond 1e12 mm are left out.
     pub fn build(mesh: &'m FacetMesh) -> Self {
         let started = Instant::now();
         let codes = TriangleCode::enumerate(mesh);

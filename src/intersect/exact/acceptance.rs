@@ -75,7 +75,7 @@ impl Exact {
         let metric = [su.length_squared(), su.dot(sv), sv.length_squared()];
         let mut place = trim.locate(uv, metric, face.flagged);
         let owner = |n: u32| -> &EdgeUse { &trim.uses[n as usize] };
-        place.near.retain(|n| n.distance <= self.geometry.flagged(owner(n.owner).gap, &face.placement));
+        place.near.retain(|n| n.distance <= self.geometry.flagging_distance(owner(n.owner).gap, &face.placement));
         // Two radii: within the wider one, which grows with the file's gaps, a root is only flagged; within the
         // band the shared edge decides.
         let flagged = !place.near.is_empty();

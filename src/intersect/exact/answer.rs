@@ -50,8 +50,9 @@ const UNIT_ROUNDING: f64 = 1e-5;
 const CORRECTIONS: usize = 4;
 
 impl Exact {
-    /// Finds the first hit with `t` in the range of the ray, in the model's coordinates, and proves it or the miss. A ray that is not
-    /// finite, has no range or no direction of unit length misses, uncertified. The point that the ray leaves does not count.
+    /// Finds the first hit with `t` in the range of the ray, in the model's coordinates, and says whether it or the miss is proved. A ray
+    /// whose origin is not finite, direction not of unit length or range not a number misses, uncertified. The point that the ray leaves
+    /// does not count.
     pub fn first(&self, ray: &Ray, cost: &mut Cost) -> Answer {
         let mut query = Query::IDLE;
         self.restart(&mut query, ray, self.settings.budget);
@@ -186,7 +187,8 @@ impl Exact {
     }
 }
 
-/// Whether a crossing repeats one of `hits`, in order of t: the same face at the same place with the same side towards the ray.
+/// Whether a crossing repeats one of `hits`, in order of t: the same face at the same place with the same side towards the ray; where both
+/// are uncertified they may lie farther apart. `certainty` is that of the crossing's root.
 fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, direction: Vector) -> bool {
     let close = SAME_CROSSING + SAME_CROSSING_FAR * hit.t.abs();
     // At a pole clipping ends on boxes TANGENT wide across the ray, as often as patches meet there: along the ray they differ by
@@ -202,7 +204,7 @@ fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, direction: Vector) -> 
     })
 }
 
-/// Whether a ray has a finite origin, a direction of unit length but for rounding, and a range.
+/// Whether a ray has a finite origin, a direction of unit length but for rounding, and no NaN as an end of its range.
 fn is_sound(ray: &Ray) -> bool {
     // NaN is beyond any bound.
     let is_unit = (ray.direction.length_squared() - 1.0).abs() <= UNIT_ROUNDING;

@@ -265,8 +265,8 @@ impl Exact {
                 && (p[1] - local[1]).abs() <= size_v * (e + moved) + SAME_PARAMETER;
             close || p[0] >= u0 && p[0] <= u1 && p[1] >= v0 && p[1] <= v1
         };
-        let leaving = clipping.departure.is_some_and(is_departure)
-            && query.departure.is_some_and(|own| own.is_unique_root(t));
+        let leaving =
+            clipping.departure.is_some_and(is_departure) && query.departure.is_some_and(|own| own.is_root_at(t));
         if !leaving {
             let found = Candidate { local, t, certainty: Certainty::Certified, settled: None };
             let margin = [0, 1].map(|k: usize| (ROOT_ROUNDING + 2.0 * y.slack[k]) * [size_u, size_v][k]);
@@ -313,20 +313,20 @@ impl Exact {
         let t = s[2] / s[3];
         let reach = POINT_BOX + size_u.max(size_v);
         let leaving = clipping.departure.is_some_and(|p| (0..2).all(|k| (p[k] - local[k]).abs() <= reach))
-            && query.departure.is_some_and(|own| own.is_unique_root(t.abs() - CONTACT_LENGTH * TANGENT));
+            && query.departure.is_some_and(|own| own.is_root_at(t.abs() - CONTACT_LENGTH * TANGENT));
         if leaving {
             return true;
         }
         if !clipping.seen.precise && !clipping.at_pole {
             return false;
         }
-        let certainty = self.contact(clipping.leaf, local, query);
+        let certainty = self.contact_certainty(clipping.leaf, local, query);
         self.offer(query, clipping.index, Candidate { local, t, certainty, settled: None });
         true
     }
 
     /// The certainty of a contact: tangent where the surface is regular and the ray grazes it, else uncertified.
-    fn contact(&self, leaf: &Leaf, [u, v]: [f64; 2], query: &Query) -> Certainty {
+    fn contact_certainty(&self, leaf: &Leaf, [u, v]: [f64; 2], query: &Query) -> Certainty {
         let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, u, v);
         let (_, du, dv) = project(&jet);
         let n = du.cross(dv);
@@ -359,7 +359,8 @@ fn cut(node: Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
     Node { net, rect, near }
 }
 
-/// Halves a node across the side along which it is longer, or moves across the ray alone, and puts the nearer half on top of the stack.
+/// Halves a node across its longer side, but across neither one along which next to nothing moves across the ray nor one of [`FINEST`], and
+/// puts the nearer half on top of the stack.
 #[inline(always)]
 fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
     // The first derivative is as long as its middle and its radius allow: a side is at most that.

@@ -103,8 +103,8 @@ pub(super) fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> (Net
     (net, size)
 }
 
-/// Bound of what halving rounds, as a share of a leaf's largest coordinate: one rounding a degree and level relative to a net that shrinks
-/// with the level, twice the first.
+/// Bound of what halvings round, as a share of a leaf's largest coordinate: at each level one rounding a degree, relative to a net half as
+/// large as the one before, so that all levels together take twice what the first does.
 #[inline(always)]
 pub(super) fn halving_rounding(leaf: &Leaf) -> f64 {
     (SHIFT_ROUNDING + 2.0 * (f64::from(leaf.degree[0]) + f64::from(leaf.degree[1]))) * ROUND
@@ -120,7 +120,8 @@ pub(super) fn tangent_frame(seen: &SeenLeaf, degree: [u8; 2], direction: Vector)
     [along, direction.cross(along)]
 }
 
-/// Inverts the middle Jacobian; `None` where its determinant is zero. A nearly singular one has a deviation that counts its rounding.
+/// Inverts the middle Jacobian of a net in the ray's frame, whose coordinates across are off by up to `margin`, in homogeneous units;
+/// `None` where its determinant is zero. A nearly singular one has a deviation that counts its rounding.
 #[inline(always)]
 pub(super) fn precondition(s: &Slopes, degree: [u8; 2], margin: [f64; 2]) -> Option<Preconditioner> {
     let det = s.u[0] * s.v[1] - s.v[0] * s.u[1];
@@ -136,8 +137,8 @@ pub(super) fn precondition(s: &Slopes, degree: [u8; 2], margin: [f64; 2]) -> Opt
     Some(Preconditioner { inverse: y, deviation: row(0).max(row(1)) + INVERSE_ROUNDING + blur, slack })
 }
 
-/// Ranges of u and v, as shares of the box, that can hold a root: where `u = u − g(u, v)` for the preconditioned net g. They may reach
-/// beyond the box or miss it; rounding is not counted.
+/// Ranges of u and v, as shares of the box, that can hold a root: where `u = u − g(u, v)` for the net g preconditioned by `y`. They may
+/// reach beyond the box or miss it; rounding is not counted.
 #[inline(always)]
 pub(super) fn linear_hull(net: &[V4], degree: [u8; 2], y: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
     by_degree!(degree, linear_hull_of_degree(net, y))

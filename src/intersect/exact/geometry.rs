@@ -28,7 +28,7 @@ pub(super) struct FaceRecord {
     pub(super) sign: f64,
     /// Index into [`Geometry::trims`].
     pub(super) trim: u32,
-    /// First patch; patches of a face lie row by row in u.
+    /// First patch; patches of a face follow each other, v fastest.
     pub(super) first_patch: u32,
     /// Index into [`Geometry::grids`].
     pub(super) grid: u32,
@@ -56,7 +56,8 @@ pub(super) struct Geometry {
     pub(super) surfaces: Vec<Surface>,
     /// Edge curves of each part, in its own coordinates.
     pub(super) edges: Vec<Vec<Curve>>,
-    /// The vertices at their ends, and how far from each its sectors decide, mm: beyond all ends that miss it.
+    /// The vertices at their ends, and how far from each its sectors decide, in the part's coordinates and units: beyond all ends that miss
+    /// it.
     pub(super) ends: Vec<Vec<[(Point, f64); 2]>>,
     /// Smallest distance from a trim that is flagged, mm.
     pub(super) band: f64,
@@ -103,7 +104,7 @@ impl Geometry {
     }
 
     /// Distance from a trim, mm, within which a root is flagged where the faces along it lie `gap`, in the units of the part, off the edge.
-    pub(super) fn flagged(&self, gap: f64, placement: &Frame) -> f64 {
+    pub(super) fn flagging_distance(&self, gap: f64, placement: &Frame) -> f64 {
         self.band.max(FLAGGED_OF_GAP * gap * placement.scale)
     }
 
@@ -122,7 +123,7 @@ impl Geometry {
         let first_patch = self.patches.len() as u32;
         let placement = *placed.placement;
         let band = self.band.max(BAND_OF_GAP * face.gap.min(WIDEST_GAP) * placement.scale);
-        let flagged = self.flagged(self.trims[trim as usize].widest_gap(), &placement);
+        let flagged = self.flagging_distance(self.trims[trim as usize].widest_gap(), &placement);
         let part = placed.part.0;
         self.faces.push(FaceRecord {
             id: placed.id,
@@ -211,8 +212,8 @@ impl Geometry {
     }
 }
 
-/// The vertices at start and end of each of a part's edges, with the radii, mm, within which their sectors decide; where the part has no
-/// such vertex, the end of the curve.
+/// The vertices at start and end of each of a part's edges, with the radii within which their sectors decide, in the units of the part;
+/// where the part has no such vertex, the end of the curve.
 fn edge_ends(part: &Part) -> Vec<[(Point, f64); 2]> {
     let end = |e: &Edge, k: usize| e.curve.evaluate(e.curve.domain()[k]);
     // One radius a vertex, not one an edge: the faces around it must agree on when its sectors decide, or two would

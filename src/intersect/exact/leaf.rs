@@ -76,6 +76,7 @@ impl Leaf {
     }
 }
 
+/// The first three of four numbers: of a homogeneous point not yet divided by its weight.
 pub(super) fn xyz(a: &V4) -> Vector {
     Vector::new(a[0], a[1], a[2])
 }
@@ -114,7 +115,7 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
         // Back to the leaf's own parameters.
         four.iter_mut().for_each(|x| *x /= 1.0 + 2.0 * EXTENSION);
     }
-    let axes = tangent_frame(xyz(&slopes.u), xyz(&slopes.v));
+    let axes = box_axes(xyz(&slopes.u), xyz(&slopes.v));
     let at = |p: &V4| xyz(p) / p[3];
     let size = |net: &[V4]| net.iter().map(|p| at(p).abs().max_element()).fold(0.0, f64::max);
     let radius = size(&centred);
@@ -189,7 +190,7 @@ pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], ba
 }
 
 /// Unit axes of an oriented box: along the longer derivative, across it, and the normal last; any frame that fits where there is none.
-fn tangent_frame(su: Vector, sv: Vector) -> [Vector; 3] {
+fn box_axes(su: Vector, sv: Vector) -> [Vector; 3] {
     let longer = if sv.length() > su.length() { sv } else { su };
     let x = longer.try_normalize().unwrap_or(Vector::X);
     // At a pole one derivative vanishes; any normal to the other serves, since the box needs a frame and not the
@@ -208,18 +209,19 @@ fn tangent_jacobian(leaf: &Leaf, slopes: &Slopes) -> [f64; 4] {
 }
 
 /// How far derivatives of radii `a` stray along `e`; that of the weight counts times the leaf's radius.
-fn measure(a: &V4, e: Vector, radius: f64) -> f64 {
+fn spread_along(a: &V4, e: Vector, radius: f64) -> f64 {
     a[0] * e.x.abs() + a[1] * e.y.abs() + a[2] * e.z.abs() + a[3] * radius
 }
 
-/// Largest row sum of `|J⁻¹| R` for a ray along the normal; infinite where the Jacobian is singular.
+/// Largest row sum of `|J⁻¹| R` for a ray along the normal, with `R` the radii of the derivative boxes; infinite where the middle Jacobian
+/// `J` is singular.
 pub(super) fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
     let [a, b, c, d] = tangent_jacobian(leaf, slopes);
     let det = a * d - b * c;
     if !(det.abs() > 0.0) {
         return f64::INFINITY;
     }
-    let r = |e: Vector| measure(&slopes.ru, e, leaf.radius) + measure(&slopes.rv, e, leaf.radius);
+    let r = |e: Vector| spread_along(&slopes.ru, e, leaf.radius) + spread_along(&slopes.rv, e, leaf.radius);
     let rx = r(leaf.axes[0]);
     let ry = r(leaf.axes[1]);
     ((d.abs() * rx + b.abs() * ry) / det.abs()).max((c.abs() * rx + a.abs() * ry) / det.abs())
@@ -227,7 +229,7 @@ pub(super) fn deviation(leaf: &Leaf, slopes: &Slopes) -> f64 {
 
 /// The direction, 0 for u and 1 for v, whose halving leaves the smaller deviation, predicted from second differences; ties go by the
 /// parity of `depth`.
-pub(super) fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> usize {
+pub(super) fn flattening_direction(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> usize {
     let [p, q] = leaf.degree.map(usize::from);
     let m = q + 1;
     // Bounds of the second derivatives: the first ones stray by half of these over the leaf.
@@ -266,8 +268,8 @@ pub(super) fn steeper(leaf: &Leaf, slopes: &Slopes, net: &[V4], depth: u32) -> u
     }
     let inverse = [[d / det, -b / det], [-c / det, a / det]];
     let g = |x: &V4, row: usize| {
-        inverse[row][0].abs() * measure(x, leaf.axes[0], leaf.radius)
-            + inverse[row][1].abs() * measure(x, leaf.axes[1], leaf.radius)
+        inverse[row][0].abs() * spread_along(x, leaf.axes[0], leaf.radius)
+            + inverse[row][1].abs() * spread_along(x, leaf.axes[1], leaf.radius)
     };
     // Halving u quarters Suu, halves Suv, and doubles u's row of the inverse. Su strays by Suu + Suv and Sv by Suv
     // + Svv, so the two halves of Suv make one.

@@ -37,13 +37,13 @@ const STALLED_STEP: f64 = 1e-6;
 const SMALLEST_COMPONENT: f64 = 1e-200;
 
 impl Exact {
-    /// Bound of the rounding error of a leaf's coordinates across a ray, mm.
+    /// Bound of the rounding error of a leaf's coordinates across a ray, mm. `oc` is the ray's origin less the leaf's centre.
     #[inline(always)]
     pub(super) fn noise(&self, leaf: &Leaf, oc: Vector) -> f64 {
         COORDINATE_ROUNDING * ROUND * (oc.x.abs() + oc.y.abs() + oc.z.abs() + leaf.radius) + leaf.slop
     }
 
-    /// Tests a leaf: excludes it, offers its only root, or hands it to clipping; what comes of it is left in `query`.
+    /// Tests a leaf and counts it: excludes it, offers its only root, or hands it to clipping; what comes of it is left in `query`.
     #[inline(always)]
     pub(super) fn test_leaf(&self, query: &mut Query, index: u32) {
         let leaf = &self.linearizations[index as usize];
@@ -128,7 +128,9 @@ impl Exact {
         None
     }
 
-    /// Offers or settles the only root of the enlarged domain, unless the ray leaves it; outside of the leaf it is another leaf's.
+    /// Offers or settles the only root of the enlarged domain, unless the ray leaves it; outside of the leaf it is another leaf's. `s` is
+    /// the homogeneous point there and `oc` the ray's origin, both about the leaf's centre; rounding moves the root by `margins` along u
+    /// and v, and by `margin` at most.
     #[inline(always)]
     fn offer_only_root(
         &self,
@@ -157,7 +159,7 @@ impl Exact {
             && let Some(left) = own.local_to(&self.leaves[index as usize], query.o, &self.geometry)
             && within(left[0], EXTENSION)
             && within(left[1], EXTENSION)
-            && own.is_unique_root(t)
+            && own.is_root_at(t)
         {
             return;
         }

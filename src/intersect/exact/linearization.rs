@@ -70,13 +70,14 @@ impl Linearization {
         Self { net: self.net + by, ..self }
     }
 
+    /// As [`Leaf::net`].
     #[inline(always)]
     pub(super) fn net<'a>(&self, pool: &'a [V4]) -> &'a [V4] {
         let n = (self.degree[0] as usize + 1) * (self.degree[1] as usize + 1);
         &pool[self.net as usize..self.net as usize + n]
     }
 
-    /// Derivatives by u and v and the value in the middle of the leaf, seen by `n·A − k·W`.
+    /// Derivatives by u and by v, then the value, in the middle of the leaf, seen by `n·A − k·W`.
     #[inline(always)]
     pub(super) fn projected(&self, n: Vector, k: f64) -> [f64; 3] {
         let [x, y, z, w] = &self.rows;
@@ -93,7 +94,7 @@ impl Linearization {
     }
 }
 
-/// Value and derivatives of a jet, seen by `n·A − k·W`.
+/// The value of a jet, then its derivatives by u and by v, seen by `n·A − k·W`.
 #[inline(always)]
 pub(super) fn projected_jet(jet: &Jet, n: Vector, k: f64) -> [f64; 3] {
     let value = |a: &V4| n.x * a[0] + n.y * a[1] + n.z * a[2] - k * a[3];
@@ -101,7 +102,7 @@ pub(super) fn projected_jet(jet: &Jet, n: Vector, k: f64) -> [f64; 3] {
 }
 
 impl HitLabel {
-    /// Takes from a leaf's patch and face what names a hit on it.
+    /// Gathers for the hits on a leaf the numbers of its face and patch, its rectangle of the domain, and the sign and rounding of normals.
     pub(super) fn new(leaf: &Leaf, geometry: &Geometry) -> Self {
         let patch = &geometry.patches[leaf.patch as usize];
         let face = &geometry.faces[leaf.face as usize];

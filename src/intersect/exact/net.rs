@@ -109,11 +109,13 @@ fn bernstein_fixed<const N: usize>(t: f64) -> ([f64; N], [f64; N]) {
     (b, d)
 }
 
+/// Evaluates a net of degrees `N − 1` and `M − 1`, one to three.
 #[inline(always)]
 fn fixed<const N: usize, const M: usize>(net: &[V4], u: f64, v: f64) -> Jet {
     tensor_product(&net[..N * M], bernstein_fixed::<N>(u), bernstein_fixed::<M>(v), [N, M])
 }
 
+/// As [`fixed`] for degrees up to [`MAX_DEGREE`].
 #[inline(always)]
 fn any_degree(net: &[V4], [p, q]: [u8; 2], u: f64, v: f64) -> Jet {
     let [p, q] = [p, q].map(usize::from);
@@ -185,11 +187,13 @@ pub(super) fn halves(net: &[V4], degree: [u8; 2], direction: usize) -> [Net; 2] 
     [low, high]
 }
 
+/// As [`halve`] in u of a net of degrees `p` and `q`.
 #[inline(always)]
 fn halve_u(low: &mut [V4], high: &mut [V4], p: usize, q: usize) {
     halve(low, high, [p, q, 0]);
 }
 
+/// As [`halve`] in v of a net of degrees `p` and `q`.
 #[inline(always)]
 fn halve_v(low: &mut [V4], high: &mut [V4], p: usize, q: usize) {
     halve(low, high, [q, p, 1]);
@@ -223,11 +227,13 @@ pub(super) fn restrict(net: &mut [V4], degree: [u8; 2], direction: usize, range:
     }
 }
 
+/// As [`restrict`] in u of a net of degrees `p` and `q`.
 #[inline(always)]
 fn restrict_u(net: &mut [V4], range: [f64; 2], p: usize, q: usize) {
     restrict_lines(net, [p, q, 0], range);
 }
 
+/// As [`restrict`] in v of a net of degrees `p` and `q`.
 #[inline(always)]
 fn restrict_v(net: &mut [V4], range: [f64; 2], p: usize, q: usize) {
     restrict_lines(net, [q, p, 1], range);

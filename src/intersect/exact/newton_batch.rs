@@ -9,7 +9,7 @@
 use super::geometry::Geometry;
 use super::net::V4;
 use super::newton::{STALLED, SurfacePoint};
-use super::newton_lanes::{Ends, Starts, step, step_fixed};
+use super::newton_lanes::{Ends, Starts, iterate, iterate_fixed};
 use super::patch::TRUSTED;
 use super::structure::Exact;
 use super::tolerances::TANGENT;
@@ -47,8 +47,9 @@ pub(in crate::intersect) struct Seed {
 }
 
 impl Exact {
-    /// Follows Newton's method from each seed on its patch and overwrites `points`, which is as long as `seeds`; `None` where that tells
-    /// nothing, be it that the root lies beyond the patch. The range of a ray does not count.
+    /// Follows Newton's method from each seed on its patch and overwrites `points`, which is as long as `seeds`: `None` where it does not
+    /// converge, ends beyond the patch or at a singular point, or the patch is of a degree above [`LARGEST_DEGREE`]. The range of a ray
+    /// does not count.
     pub(in crate::intersect) fn converge_batch(
         &self,
         rays: &[Ray],
@@ -91,7 +92,7 @@ struct Group {
 }
 
 impl Convergence<'_> {
-    /// Works off all seeds, as many of one degree at a time as a register has lanes.
+    /// Solves for all seeds, as many of one degree at a time as a register has lanes.
     #[inline(always)]
     fn converge<V: F64x8>(self) {
         let mut net = [[V::splat(0.0); 4]; LARGEST_NET];
@@ -117,7 +118,7 @@ impl Convergence<'_> {
                 let Some(ready) = add_seed(&mut groups, &mut next, degree, index as u32) else { continue };
                 ready
             };
-            settle::<V>(&mut net, self.geometry, self.rays, self.seeds, &ready, self.points);
+            solve_group::<V>(&mut net, self.geometry, self.rays, self.seeds, &ready, self.points);
         }
     }
 
@@ -134,7 +135,8 @@ impl Convergence<'_> {
     }
 }
 
-/// Lets a seed wait in the group of its degree; the group that is to be worked off for that, if any.
+/// Lets a seed wait in the group of its degree. Returns the group that is to be solved now: the one that this fills, or that had to make
+/// room for a new degree; `next` is whose turn that is.
 #[inline(always)]
 fn add_seed(groups: &mut [Group; GROUPS], next: &mut usize, degree: [u8; 2], seed: u32) -> Option<Group> {
     let mut k = 0;
@@ -160,9 +162,9 @@ fn add_seed(groups: &mut [Group; GROUPS], next: &mut usize, degree: [u8; 2], see
     Some(full)
 }
 
-/// Works a group off.
+/// Follows Newton's method from all seeds of a group and writes the points at their indices; `net` is room to work in.
 #[inline(always)]
-fn settle<V: F64x8>(
+fn solve_group<V: F64x8>(
     net: &mut [[V; 4]; LARGEST_NET],
     geometry: &Geometry,
     rays: &[Ray],
@@ -212,16 +214,16 @@ fn settle<V: F64x8>(
     // Degrees that are known at compile time need no loops over them; any others share a step written for the
     // largest.
     let ends = match group.degree {
-        [1, 1] => step_fixed::<V, 2, 2>(net, &starts),
-        [2, 2] => step_fixed::<V, 3, 3>(net, &starts),
-        [3, 3] => step_fixed::<V, 4, 4>(net, &starts),
-        [2, 1] => step_fixed::<V, 3, 2>(net, &starts),
-        [1, 2] => step_fixed::<V, 2, 3>(net, &starts),
-        [3, 1] => step_fixed::<V, 4, 2>(net, &starts),
-        [1, 3] => step_fixed::<V, 2, 4>(net, &starts),
-        [2, 3] => step_fixed::<V, 3, 4>(net, &starts),
-        [3, 2] => step_fixed::<V, 4, 3>(net, &starts),
-        degree => step::<V, { LARGEST_DEGREE + 1 }, { LARGEST_DEGREE + 1 }>(net, degree, &starts),
+        [1, 1] => iterate_fixed::<V, 2, 2>(net, &starts),
+        [2, 2] => iterate_fixed::<V, 3, 3>(net, &starts),
+        [3, 3] => iterate_fixed::<V, 4, 4>(net, &starts),
+        [2, 1] => iterate_fixed::<V, 3, 2>(net, &starts),
+        [1, 2] => iterate_fixed::<V, 2, 3>(net, &starts),
+        [3, 1] => iterate_fixed::<V, 4, 2>(net, &starts),
+        [1, 3] => iterate_fixed::<V, 2, 4>(net, &starts),
+        [2, 3] => iterate_fixed::<V, 3, 4>(net, &starts),
+        [3, 2] => iterate_fixed::<V, 4, 3>(net, &starts),
+        degree => iterate::<V, { LARGEST_DEGREE + 1 }, { LARGEST_DEGREE + 1 }>(net, degree, &starts),
     };
     for lane in 0..group.count {
         let index = group.seeds[lane] as usize;

@@ -56,20 +56,22 @@ fn cross<V: F64x8>(a: &Vectors<V>, b: &Vectors<V>) -> Vectors<V> {
     ]
 }
 
+/// The largest coordinate in size in every lane.
 #[inline(always)]
 fn largest<V: F64x8>(v: &Vectors<V>) -> V {
     v[0].abs().max(v[1].abs()).max(v[2].abs())
 }
 
+/// `new` in the lanes of `mask`, `old` in the others.
 #[inline(always)]
 fn select<V: F64x8>(mask: u8, new: &Vectors<V>, old: &Vectors<V>) -> Vectors<V> {
     [new[0].select(mask, old[0]), new[1].select(mask, old[1]), new[2].select(mask, old[2])]
 }
 
-/// [`step`] on nets of degrees `N − 1` and `M − 1`.
+/// [`iterate`] on nets of degrees `N − 1` and `M − 1`.
 #[inline(always)]
-pub(super) fn step_fixed<V: F64x8, const N: usize, const M: usize>(net: &[[V; 4]], starts: &Starts) -> Ends {
-    step::<V, N, M>(&net[..N * M], [N as u8 - 1, M as u8 - 1], starts)
+pub(super) fn iterate_fixed<V: F64x8, const N: usize, const M: usize>(net: &[[V; 4]], starts: &Starts) -> Ends {
+    iterate::<V, N, M>(&net[..N * M], [N as u8 - 1, M as u8 - 1], starts)
 }
 
 /// Takes Newton steps from `starts` until every lane has ended or been given up, and returns where they did. `net` holds the control
@@ -78,7 +80,7 @@ pub(super) fn step_fixed<V: F64x8, const N: usize, const M: usize>(net: &[[V; 4]
 /// With `e` from the point to the ray's origin, `g = e × d` and `n = Su × Sv` a step is `(−g·Sv, g·Su) / n·d`: the two equations
 /// across the ray without a frame around it, and `|g|` is the distance from the ray.
 #[inline(always)]
-pub(super) fn step<V: F64x8, const N: usize, const M: usize>(
+pub(super) fn iterate<V: F64x8, const N: usize, const M: usize>(
     net: &[[V; 4]],
     degree: [u8; 2],
     starts: &Starts,
@@ -157,7 +159,7 @@ pub(super) fn step<V: F64x8, const N: usize, const M: usize>(
     out
 }
 
-/// Points about the centres of eight patches, mm, and derivatives by local parameters.
+/// Points about the centres of eight patches, mm, and their derivatives by the local parameters u, then v.
 #[inline(always)]
 fn evaluate<V: F64x8, const N: usize, const M: usize>(
     net: &[[V; 4]],

@@ -200,8 +200,9 @@ impl DeparturePoint {
         Some(leaf.leaf_parameters(local))
     }
 
-    /// Whether the only root near the departure, at `t` along the ray, is the departure itself.
-    pub(super) fn is_unique_root(&self, t: f64) -> bool {
+    /// Whether a root that is known to be the only one near the departure, `t` mm along the ray, is the departure itself: always where the
+    /// ray starts on it, else within [`NEAR_DEPARTURE`] times the distance by which it starts off it.
+    pub(super) fn is_root_at(&self, t: f64) -> bool {
         // An origin that is not where the departure says can be a facet's; its own root is then as near as it is off.
         self.off <= self.tolerance || t.abs() <= NEAR_DEPARTURE * self.off
     }

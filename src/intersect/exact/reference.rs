@@ -148,12 +148,13 @@ impl ReferencePatch<'_> {
         SeenAlong { axes, value: across(&r, 1.0.into()), derivatives }
     }
 
-    /// The control net of a rectangle of the patch as `frame` sees it along a ray (origin, direction): two coordinates across, one along,
-    /// and the weight. Each is rounded once, when all that cancels has cancelled.
+    /// The control net of a rectangle of the patch, in its local parameters, as `frame` sees it along a ray (origin,
+    /// direction): two coordinates across, one along, and the weight. Each is rounded once, when all that cancels has cancelled.
     pub(super) fn net_along(self, ray: [Vector; 2], frame: [Vector; 2], rect: [[f64; 2]; 2]) -> Net {
         simd::dispatch(NetAlong { patch: self, ray, frame, rect })
     }
 
+    /// Length of the patch's knot span in parameter `d`.
     #[inline(always)]
     fn width(&self, d: usize) -> Number {
         Number::from(self.domain[d][1]) - self.domain[d][0].into()
@@ -261,6 +262,7 @@ fn de_boor(knots: &[f64], degree: usize, span: usize, mut points: SmallVec<[Poin
     [points[degree], slope]
 }
 
+/// The nearest vector in `f64`.
 #[inline(always)]
 fn rounded(x: Point3) -> Vector {
     Vector::from_array(x.map(Number::to_f64))
@@ -276,7 +278,7 @@ pub(super) fn extract(surface: &Surface, patch: &mut BezierPatch) {
     }
 }
 
-/// Bézier control points, row by row in u, over the rectangle `ends` of the surface's domain, of the polynomial in the knot rectangle
+/// Bézier control points, v fastest, over the rectangle `ends` of the surface's domain, of the polynomial in the knot rectangle
 /// `domain`.
 #[inline(always)]
 fn bezier_points(surface: &Surface, domain: [[f64; 2]; 2], ends: [[Number; 2]; 2]) -> Vec<Point4> {

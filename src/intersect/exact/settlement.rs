@@ -41,8 +41,9 @@ enum Place {
 }
 
 impl Exact {
-    /// Finds a root on the leaf `index` again in 32 digits, and offers it if it lies on the leaf; where they find none near, offers it as
-    /// uncertified. Takes [`WORK`] off the ray's budget. `margin` is in parameters of the leaf.
+    /// Finds a root on the leaf `index` again in 32 digits, and offers it if it lies on the leaf; where they find none near, or the budget
+    /// is spent, offers it as uncertified and leaves the ray undecided there. Takes [`WORK`] off the budget. `margin` is in parameters of
+    /// the leaf.
     #[cold]
     pub(super) fn settle(&self, query: &mut Query, index: u32, found: Candidate, margin: [f64; 2]) {
         // Charged to the ray's budget and given up with it, so that a ray along a border, of which every root is open, ends as others do.

@@ -135,8 +135,7 @@ impl RaySlabs {
     }
 }
 
-/// A lower bound of where a ray enters each of a node's boxes, counted from where it enters the scene, and a bit for each box that it may
-/// meet.
+/// A lower bound of where a ray enters each of a node's boxes, mm from where it enters the scene, and a bit for each box that it may meet.
 #[inline(always)]
 pub(super) fn intersect_boxes<I: Instructions>(slabs: &RaySlabs, node: &Node) -> ([f32; WIDTH], u32) {
     #[cfg(target_arch = "x86_64")]

@@ -5,7 +5,7 @@
 //! 10.5 to 2.9, and both to twice the rate; cutting leaves that many rays meet flatter gave the valve another fifth.
 
 use super::geometry::Geometry;
-use super::leaf::{Described, Leaf, border_sides, describe, deviation, steeper, widen, xyz};
+use super::leaf::{Described, Leaf, border_sides, describe, deviation, flattening_direction, widen, xyz};
 use super::linearization::Linearization;
 use super::net::{self, Net, V4};
 use super::patch::Patch;
@@ -192,7 +192,7 @@ impl Subdivision<'_> {
                 // Flatness asks for nothing more: it is halved for its box alone, in the direction that tightens
                 // it.
                 Some(direction) if flat || deepest => direction,
-                _ => steeper(&described.leaf, &described.slopes, &described.net, depth),
+                _ => flattening_direction(&described.leaf, &described.slopes, &described.net, depth),
             };
             let [low, high] = net::halves(&piece, degree, direction);
             let middle = 0.5 * (rect[direction][0] + rect[direction][1]);

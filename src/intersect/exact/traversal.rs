@@ -160,6 +160,7 @@ impl Exact {
         }
     }
 
+    /// Puts a ray on a lane in place of the one before, at the root of the hierarchy.
     #[inline(always)]
     fn begin(&self, lane: &mut Lane, ray: &Ray) {
         self.restart(&mut lane.query, ray, self.settings.budget);

@@ -304,7 +304,7 @@ impl PieceLists {
         lists
     }
 
-    /// The pieces of a row or cell, rising.
+    /// The pieces of a row or cell, rising; empty where it has none.
     #[inline]
     pub(super) fn pieces_of(&self, key: u32) -> &[u32] {
         match self.keys.binary_search(&key) {

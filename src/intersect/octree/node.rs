@@ -76,7 +76,7 @@ impl Link {
         (self.0 >> 31) as usize + usize::from(self == Self::END)
     }
 
-    /// The same link after its target moved up.
+    /// The same link after its target moved up by so many nodes or blocks, whichever it is; not to be asked of [`Self::END`].
     pub(super) fn moved(self, nodes: usize, blocks: usize) -> Self {
         if self.0 & Self::BLOCK == 0 { Self(self.0 + nodes as u32) } else { Self(self.0 + ((blocks as u32) << 2)) }
     }

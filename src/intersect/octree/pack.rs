@@ -137,6 +137,7 @@ impl Packing<'_> {
     }
 }
 
+/// Length of a box along an axis, mm.
 fn extent(b: &Box32, axis: usize) -> f32 {
     b.high[axis] - b.low[axis]
 }

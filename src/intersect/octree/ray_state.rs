@@ -90,7 +90,7 @@ impl RayState {
         self.unmet_facet = tree.unmet_facet(ray);
         let lifted;
         let ray = if ray.departure.is_some() & (self.unmet_facet == u32::MAX) {
-            lifted = grazing(tree, ray);
+            lifted = lift(tree, ray);
             &lifted
         } else {
             ray
@@ -268,6 +268,6 @@ impl Children {
 /// Calls [`crate::intersect::facet::Surroundings::lifted`] out of line, for few rays graze the facet that they leave.
 #[cold]
 #[inline(never)]
-fn grazing(tree: &Tree, ray: &Ray) -> Ray {
+fn lift(tree: &Tree, ray: &Ray) -> Ray {
     tree.surroundings.lifted(ray)
 }

@@ -25,7 +25,7 @@ impl ClearStart {
         expected.beams.iter().filter_map(|(beam, _)| Self::of_beam(beam, mesh, reach)).collect()
     }
 
-    /// The start of a beam's rays; `None` where a facet lies within `reach` mm behind it.
+    /// The start of a beam's rays; `None` where a facet may lie within `reach` mm of its point, or behind its plane.
     fn of_beam(beam: &Beam, mesh: &FacetMesh, reach: f64) -> Option<Self> {
         let start = match beam {
             Beam::Point(origin) => Self::Point(*origin),
@@ -38,7 +38,7 @@ impl ClearStart {
         (0..mesh.facets.len()).all(|f| start.is_clear_of(mesh.corners(f), reach)).then_some(start)
     }
 
-    /// Whether no ray, taken back by `reach` mm behind its start, meets the facet of these corners there.
+    /// Whether it is known that no ray, taken back by `reach` mm behind its start, meets the facet of these corners there.
     fn is_clear_of(&self, corners: [Point; 4], reach: f64) -> bool {
         match self {
             // To the facet's box, which is no farther than the facet: an error here costs a look back, never a hit.

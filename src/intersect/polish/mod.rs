@@ -143,8 +143,8 @@ impl<'a> Polished<'a> {
         (sag > NO_SAG && sine * length < HIDDEN_BELOW * sag).then_some(HIDDEN_LENGTHS * length)
     }
 
-    /// A distance within which a facet of the surface that a ray leaves is its neighbour: twice the facet's size.
-    fn neighbourhood(&self, hit: &Hit) -> f64 {
+    /// The distance along the ray, mm, up to which the facet hit may be a neighbour of the one left: twice its longer diagonal.
+    fn neighbour_distance(&self, hit: &Hit) -> f64 {
         let [a, b, c, d] = self.mesh.corners(hit.primitive as usize);
         2.0 * a.distance(c).max(b.distance(d))
     }
@@ -273,7 +273,7 @@ impl<'a> Polished<'a> {
                 // The exact model has no point there: a facet of the surface being left.
                 Polishing::Lost
                     if ray.departure.is_some_and(|f| {
-                        f.face == facet_hit.face && facet_hit.t < self.neighbourhood(&facet_hit)
+                        f.face == facet_hit.face && facet_hit.t < self.neighbour_distance(&facet_hit)
                     }) => {}
                 Polishing::Lost => {
                     cost.fallbacks += 1;

@@ -160,7 +160,8 @@ impl<'a> PatchClipping<'a> {
         true
     }
 
-    /// Decides a box that has come down to a point, or to a contact, which it adds to `out`; `false` where the box is neither.
+    /// Decides a box that has come down to a point, or to a contact: adds its middle to `out` unless that lies beside the ray; `false`
+    /// where the box is neither.
     fn take_point(&self, piece: &Piece, size: f64, out: &mut SmallVec<[AuditHit; 8]>) -> bool {
         let net = &piece.net;
         let across = net.points.iter().map(|p| (p.truncate().truncate() / p.w).length()).fold(0.0, f64::max);
@@ -179,6 +180,7 @@ impl<'a> PatchClipping<'a> {
         true
     }
 
+    /// Adds a crossing at the point `m`, as the ray sees it, of the patch's local parameters to `out`.
     fn push(&self, m: Homogeneous, local: [f64; 2], doubtful: bool, out: &mut SmallVec<[AuditHit; 8]>) {
         out.push(AuditHit { t: m.z / m.w, face: self.face, uv: self.patch.surface_uv(Uv::from(local)), doubtful });
     }

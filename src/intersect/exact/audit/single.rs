@@ -15,8 +15,8 @@ const DEVIATION: f64 = 0.5;
 /// Newton's method ends at a step this short, the next being its square.
 const LAST_STEP: f64 = 1e-6;
 
-/// Finds the only root over a net as the ray sees it, in shares of its domain, and how far these move with a unit across the ray;
-/// `None` where more than one cannot be ruled out, or none is found inside.
+/// Finds the only root over a net as the ray sees it, in shares of its domain, and a bound of how far, in such shares, a homogeneous unit
+/// across the ray moves it; `None` where more than one cannot be ruled out, or none is found inside.
 pub(super) fn single_root(patch: &Net) -> Option<(Uv, f64)> {
     let q = patch.degree[1];
     // Ranges of ∂x/∂u, ∂x/∂v, ∂y/∂u, ∂y/∂v from the differences of the control points.

@@ -48,14 +48,14 @@ pub(super) fn cosine_of_free_cone(tree: &Tree, facet: usize, axis: Vector, wides
     }
     let sheet = (sag > 0.0).then(|| Sheet::around(mesh, facet));
     if let Some(sheet) = &sheet {
-        limit.lower_angle(sheet.half_angle(facet, axis));
+        limit.lower_half_angle(sheet.half_angle(facet, axis));
     }
     for (base, other) in bases.iter().flatten() {
         // The other triangle of a facet is of its sheet.
         if sheet.is_none() {
             base.narrow_to_avoid(other, &mut limit);
         }
-        base.search(tree, facet, sheet.as_ref(), &mut limit);
+        base.narrow_to_avoid_all(tree, facet, sheet.as_ref(), &mut limit);
     }
     let angle = limit.sine.clamp(0.0, 1.0).asin();
     // Too narrow a cone would catch next to no ray, and its test costs each.
@@ -71,8 +71,9 @@ struct Limit {
 }
 
 impl Limit {
-    fn new(axis: Vector, angle: f64) -> Self {
-        let (sine, cosine) = angle.sin_cos();
+    /// The cone of this half angle, radians.
+    fn new(axis: Vector, half_angle: f64) -> Self {
+        let (sine, cosine) = half_angle.sin_cos();
         Self { axis, sine, cosine }
     }
 
@@ -84,12 +85,12 @@ impl Limit {
         }
     }
 
-    /// Narrows the cone to half this angle, radians; NaN closes it.
-    fn lower_angle(&mut self, angle: f64) {
-        self.lower(if angle > 0.0 { angle.min(FRAC_PI_2).sin() } else { 0.0 });
+    /// Narrows the cone to this half angle, radians; one that is not positive, or NaN, closes it.
+    fn lower_half_angle(&mut self, half_angle: f64) {
+        self.lower(if half_angle > 0.0 { half_angle.min(FRAC_PI_2).sin() } else { 0.0 });
     }
 
-    /// The cone with so many radians more to each side, up to half of all directions.
+    /// The cone with so many radians more of half angle, up to half of all directions.
     fn widened(&self, angle: f64) -> Self {
         Self::new(self.axis, (self.sine.asin() + angle).min(FRAC_PI_2))
     }
@@ -120,14 +121,14 @@ impl Base {
         Some(Self { corners, normal, lines, middle, radius, reach, room })
     }
 
-    /// Height over the plane up to which nothing stands in the way of a ray.
+    /// Height over the plane, mm, up to which nothing stands in the way of a ray: below zero where starts and goals lie off their facets.
     fn floor(&self) -> f64 {
         if self.room > 0.0 { -self.room } else { self.reach }
     }
 
     /// Narrows `limit` until no ray within the cone meets a facet of the tree but `facet`, its own, and what of its `sheet` the normals
     /// exclude; ends early once the cone is of no use.
-    fn search(&self, tree: &Tree, facet: usize, sheet: Option<&Sheet>, limit: &mut Limit) {
+    fn narrow_to_avoid_all(&self, tree: &Tree, facet: usize, sheet: Option<&Sheet>, limit: &mut Limit) {
         let mesh = tree.surroundings.mesh;
         let mut open: Vec<Link> = tree.root.into_iter().collect();
         while let Some(link) = open.pop() {
@@ -151,7 +152,7 @@ impl Base {
                     for k in (0..count).filter(|&k| block.facets[k] as usize != facet) {
                         let other = block.facets[k] as usize;
                         if let Some(sheet) = sheet.filter(|sheet| sheet.holds(other)) {
-                            limit.lower_angle(sheet.half_angle(other, limit.axis));
+                            limit.lower_half_angle(sheet.half_angle(other, limit.axis));
                             continue;
                         }
                         self.narrow_to_avoid(&block.positions[k].map(|p| mesh.positions[p as usize]), limit);
@@ -187,7 +188,7 @@ impl Base {
             for triangle in [[a, b, c], [a, c, d]] {
                 if !self.is_off(&triangle, limit) {
                     let turn = self.turn(&triangle);
-                    limit.lower_angle(self.sine_to(&triangle, limit.axis).min(1.0).asin() - turn);
+                    limit.lower_half_angle(self.sine_to(&triangle, limit.axis).min(1.0).asin() - turn);
                 }
             }
         }
@@ -210,8 +211,8 @@ impl Base {
         }
     }
 
-    /// The angle, radians, by which the room may turn a difference between this triangle and the hull of these points; a right angle where
-    /// they are not seen to be farther apart than that.
+    /// The angle, radians, by which the room may turn a difference between this triangle and the hull of these points: 0 without room, a
+    /// right angle where they are not seen to be farther apart than the room.
     fn turn(&self, points: &[Point]) -> f64 {
         if self.room == 0.0 {
             return 0.0;
