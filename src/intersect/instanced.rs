@@ -6,12 +6,13 @@
 //! A ray that leaves a placement is asked there first: where that one's box meets no other's, a hit in it is the nearest.
 //!
 //! Guarantee: the nearest hit of all groups, of equal ones that of the first group, then of the first placement; the same bits for a
-//! single ray and a batch. A hit depends on ray, part and place alone, not on what else the scene holds. Inside a part nothing changes:
-//! a ray is moved once, so that facets which meet there meet here, and what it leaves is known by part and place.
+//! single ray and a batch. A hit depends on ray, part and place alone, not on what else the scene holds, but for its certainty: none is
+//! certified where another place that the ray was asked of fell back. Inside a part nothing changes: a ray is moved once, so that facets
+//! which meet there meet here, and what it leaves is known by part and place.
 //! Known weakness: nothing is worked out about expected rays of what is placed; and a start that is computed in the scene is rounded there,
 //! so that the structures of parts must know how far away they stand (`farthest_start` of their settings).
 
-use super::{Cost, ExpectedRays, Footprint, Hit, Intersector};
+use super::{Certainty, Cost, ExpectedRays, Footprint, Hit, Intersector};
 use crate::math::{Aabb, BoxTree, BoxWalk, Departure, FaceId, Ray};
 use crate::model::{Instancing, Placement};
 use rayon::prelude::*;
@@ -69,6 +70,8 @@ struct Walk<'t> {
     best: Option<(Option<u32>, Hit)>,
     /// The placement where the ray is asked next; `None` once it has passed all boxes.
     next: Option<u32>,
+    /// Whether some structure fell back on it: what that missed may be nearer.
+    fell_back: bool,
 }
 
 /// A point that a ray leaves, in its group.
@@ -103,12 +106,13 @@ impl<'a> Instanced<'a> {
 
     /// Answers at most [`BATCH`] rays in the scene's coordinates: overwrites `hits` and counts each ray once.
     fn intersect_chunk(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
-        let rays_before = cost.rays;
+        let before = *cost;
         let mut walks: SmallVec<[Walk; BATCH]> = rays.iter().map(|ray| self.departing(ray)).collect();
         if self.has_single {
             let single: SmallVec<[Ray; BATCH]> = walks.iter().map(|walk| walk.local_ray(None)).collect();
-            self.groups[0].intersect_batch(&single, hits, cost);
+            let fell_back = self.ask_group(0, &single, hits, cost);
             walks.iter_mut().zip(hits.iter()).for_each(|(walk, hit)| walk.take(None, *hit));
+            fell_back.iter().for_each(|&k| walks[k].fell_back = true);
         }
         // Light that leaves a surface mostly meets its own part next, and where no other stands in that one's box nothing can be nearer.
         let mut open: SmallVec<[usize; BATCH]> = (0..walks.len()).collect();
@@ -121,10 +125,35 @@ impl<'a> Instanced<'a> {
             }
             self.ask(&open, &mut walks, cost);
         }
-        cost.rays = rays_before + rays.len() as u64;
+        // A ray counts once, wherever it was asked.
+        cost.rays = before.rays + rays.len() as u64;
+        cost.fallbacks = before.fallbacks + walks.iter().filter(|walk| walk.fell_back).count() as u64;
         for (walk, hit) in walks.iter().zip(hits) {
-            *hit = walk.best.map(|(place, found)| self.in_scene(place, found));
+            *hit = walk.best.map(|(place, found)| self.in_scene(place, walk.qualified(found)));
         }
+    }
+
+    /// Asks rays in the coordinates of a group, overwrites `found`, adds to `cost`, and returns the indices of those on which the group
+    /// fell back.
+    fn ask_group(
+        &self,
+        group: usize,
+        rays: &[Ray],
+        found: &mut [Option<Hit>],
+        cost: &mut Cost,
+    ) -> SmallVec<[usize; BATCH]> {
+        let before = cost.fallbacks;
+        self.groups[group].intersect_batch(rays, found, cost);
+        if cost.fallbacks == before {
+            return SmallVec::new();
+        }
+        // Rare, and a miss does not say which ray it was: each is asked once more, by itself.
+        let falls_back = |ray: &Ray| {
+            let mut cost = Cost::default();
+            self.groups[group].intersect(ray, &mut cost);
+            cost.fallbacks > 0
+        };
+        (0..rays.len()).filter(|&k| falls_back(&rays[k])).collect()
     }
 
     /// A ray before it is asked anywhere, with the placement that it leaves as the first to ask, unless it is known to be free of it.
@@ -133,7 +162,7 @@ impl<'a> Instanced<'a> {
             let (place, face) = self.instancing.locate(from.face);
             OwnDeparture { place: place.map(|k| k as u32), departure: Departure { face, ..from } }
         });
-        let mut walk = Walk { ray: *ray, departure, boxes: None, best: None, next: None };
+        let mut walk = Walk { ray: *ray, departure, boxes: None, best: None, next: None, fell_back: false };
         walk.next = departure.and_then(|from| from.place).filter(|&k| !self.is_free_of(&walk, k));
         walk
     }
@@ -159,10 +188,11 @@ impl<'a> Instanced<'a> {
             local.extend(together.iter().map(|q| self.moved(&walks[q.walk], q.place)));
             found.clear();
             found.resize(local.len(), None);
-            self.groups[together[0].group].intersect_batch(&local, &mut found, cost);
+            let fell_back = self.ask_group(together[0].group, &local, &mut found, cost);
             for (question, hit) in together.iter().zip(&found) {
                 walks[question.walk].take(Some(question.place), *hit);
             }
+            fell_back.iter().for_each(|&k| walks[together[k].walk].fell_back = true);
         }
     }
 
@@ -223,6 +253,12 @@ impl Walk<'_> {
         Ray { departure: own.map(|from| from.departure), ..self.ray }
     }
 
+    /// Its hit with the certainty that it has among all structures asked: a miss that is not proved may hide a nearer one.
+    fn qualified(&self, hit: Hit) -> Hit {
+        let is_doubtful = self.fell_back && hit.certainty == Certainty::Certified;
+        Hit { certainty: if is_doubtful { Certainty::Uncertified } else { hit.certainty }, ..hit }
+    }
+
     /// Keeps the nearer hit, of equal ones that of the first group or placement, and ends the ray there.
     fn take(&mut self, place: Option<u32>, hit: Option<Hit>) {
         let Some(hit) = hit else { return };
@@ -279,7 +315,69 @@ impl Intersector for Instanced<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Point, Vector};
+    use crate::math::{Frame, Point, Uv, Vector};
+    use crate::model::{Face, Instance, Model, Part, PartId, Shell};
+    use crate::nurbs::sweep::sphere;
+    use std::f64::consts::{FRAC_PI_2, TAU};
+
+    /// Finds one hit, at so many mm, and is sure of it; without one it misses and is not sure.
+    struct Scripted(Option<f64>);
+
+    impl Intersector for Scripted {
+        fn intersect(&self, _: &Ray, cost: &mut Cost) -> Option<Hit> {
+            cost.rays += 1;
+            cost.fallbacks += u64::from(self.0.is_none());
+            self.0.map(|t| Hit {
+                t,
+                normal: Vector::Z,
+                geometric_normal: Vector::Z,
+                face: FaceId(0),
+                primitive: 0,
+                triangle: None,
+                uv: Uv::ZERO,
+                certainty: Certainty::Certified,
+            })
+        }
+
+        fn footprint(&self) -> Footprint {
+            Footprint::default()
+        }
+    }
+
+    /// A row of balls before the surface of one that stands alone: what the balls cannot prove to be missed may hide it.
+    #[test]
+    fn a_hit_behind_an_unproved_miss_is_not_certified() {
+        let ball = || Part {
+            shells: vec![Shell {
+                faces: vec![Face::whole(sphere(&Frame::IDENTITY, 1.0, [0.0, TAU], [-FRAC_PI_2, FRAC_PI_2]))],
+                ..Shell::default()
+            }],
+            ..Part::default()
+        };
+        let instance = |part: u32, x: f64| Instance {
+            name: String::new(),
+            path: String::new(),
+            part: PartId(part),
+            placement: Frame::translation(x * Vector::X),
+            colour: None,
+        };
+        let row = (0..100).map(|k| instance(0, 3.0 * f64::from(k)));
+        let model = Model {
+            name: String::new(),
+            parts: vec![ball(), ball()],
+            instances: row.chain([instance(1, 400.0)]).collect(),
+        };
+        let instancing = Instancing::new(&model, 0.0).unwrap();
+        let ray = Ray::new(Point::new(-5.0, 0.0, 0.0), Vector::X);
+        let ask = |row: Option<f64>| {
+            let groups: Vec<Box<dyn Intersector>> = vec![Box::new(Scripted(Some(404.0))), Box::new(Scripted(row))];
+            let mut cost = Cost::default();
+            let hit = Instanced::new(&instancing, groups).intersect(&ray, &mut cost).unwrap();
+            (hit.t, hit.certainty, cost.rays, cost.fallbacks)
+        };
+        assert_eq!(ask(None), (404.0, Certainty::Uncertified, 1, 1));
+        assert_eq!(ask(Some(4.0)), (4.0, Certainty::Certified, 1, 0));
+    }
 
     #[test]
     fn nothing_is_met_where_there_are_no_groups() {

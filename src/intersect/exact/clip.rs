@@ -313,7 +313,7 @@ impl Exact {
         let t = s[2] / s[3];
         let reach = POINT_BOX + size_u.max(size_v);
         let leaving = clipping.departure.is_some_and(|p| (0..2).all(|k| (p[k] - local[k]).abs() <= reach))
-            && query.departure.is_some_and(|own| own.is_root_at(t.abs() - CONTACT_LENGTH * TANGENT));
+            && query.departure.is_some_and(|own| own.is_root_at((t.abs() - CONTACT_LENGTH * TANGENT).max(0.0)));
         if leaving {
             return true;
         }

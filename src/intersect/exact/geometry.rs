@@ -3,7 +3,7 @@
 use super::edge_use::edge_gaps;
 use super::patch::{Patch, PatchGrid, is_ill_scaled, project};
 use super::reference::{self, ReferencePatch};
-use super::tolerances::VERTEX_RADIUS;
+use super::tolerances::{FLAGGED_OF_GAP, VERTEX_RADIUS};
 use super::trim::Trim;
 use crate::math::{FaceId, Frame, Point, Uv, Vector};
 use crate::model::{Edge, Face, Model, Part, PlacedFace};
@@ -14,9 +14,6 @@ use rustc_hash::FxHashMap;
 const WIDEST_GAP: f64 = 0.05;
 /// A file's edge may lie off its faces by their gap: each of the two faces must look that far, and as far again for the other's.
 const BAND_OF_GAP: f64 = 2.0;
-/// Roots are flagged as far off as this many gaps: for rays that graze a face the root strays from the edge by the gap over the
-/// sine.
-const FLAGGED_OF_GAP: f64 = 8.0;
 /// A vertex decides by its sectors as far off as this many times the distance by which an edge's end misses it.
 const RADIUS_OF_MISS: f64 = 4.0;
 

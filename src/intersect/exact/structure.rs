@@ -6,6 +6,7 @@ use super::linearization::{HitLabel, Linearization};
 use super::net::V4;
 use super::subdivision::{self, Flatness, PatchLeaves};
 use super::tree::Tree;
+use super::trim::Trim;
 use crate::math::{Aabb, FaceId};
 use crate::model::Model;
 use crate::nurbs::Surface;
@@ -144,12 +145,13 @@ impl Exact {
         self.leaves.len()
     }
 
-    /// Bytes of patches, leaves and hierarchy, without copies of the model's surfaces and trims.
+    /// Bytes of patches, leaves, hierarchy and trims, without copies of the model's surfaces and edges.
     pub(super) fn bytes(&self) -> usize {
         let nets: usize = self.geometry.patches.iter().map(|p| size_of_val(p) + size_of_val(&*p.net)).sum();
         let tested = size_of_val(&*self.linearizations) + size_of_val(&*self.labels);
         let leaves = size_of_val(&*self.leaves) + size_of_val(&*self.pool) + tested;
-        leaves + size_of_val(&*self.tree.nodes) + nets
+        let trims: usize = self.geometry.trims.iter().map(Trim::bytes).sum();
+        leaves + size_of_val(&*self.starts) + size_of_val(&*self.tree.nodes) + nets + trims
     }
 }
 

@@ -41,3 +41,6 @@ pub(super) const SAME_POINT: f64 = 1e-9;
 /// Distance of parameters, as a share of a patch, below which a departure lies on a neighbour's border too: the rounding of
 /// parameters of a knot span of a millionth of the domain.
 pub(super) const SAME_PARAMETER: f64 = 1e-9;
+/// Roots are flagged as far from a trim as this many gaps between the faces along it: for rays that graze a face the root strays from the
+/// edge by the gap over the sine.
+pub(super) const FLAGGED_OF_GAP: f64 = 8.0;

@@ -4,6 +4,7 @@
 //! answer for every point, however close to a curve. Uses that pass within `band` mm are named.
 
 use super::edge_use::{EdgeUse, edge_uses};
+use super::tolerances::FLAGGED_OF_GAP;
 use super::trim_piece::{PieceLists, TrimPiece, trim_pieces};
 use crate::intersect::prefetch;
 use crate::math::Uv;
@@ -15,8 +16,6 @@ use smallvec::SmallVec;
 const CELL_ROUNDING: f64 = 1e-6;
 /// Share of the loops' extent by which the grid is larger than they are.
 const GRID_MARGIN: f64 = 1e-3;
-/// Roots are flagged as far from a trim as this many gaps between the faces along it.
-const BAND_OF_GAP: f64 = 8.0;
 /// Cells keep so many bands off a trim: a ray that grazes a face at a sine down to 1/64 has its root within the band of the edge as
 /// it sees it.
 const REACH_OF_BAND: f64 = 64.0;
@@ -98,7 +97,7 @@ impl Trim {
         };
         let uses = edge_uses(face, closed, gaps);
         let widest = uses.iter().map(|u| u.gap).fold(0.0, f64::max);
-        let reach = cell_margin(face, extent, band.max(BAND_OF_GAP * widest));
+        let reach = cell_margin(face, extent, band.max(FLAGGED_OF_GAP * widest));
         let ([lo, hi], ends) = grid_bounds(face, reach);
         let cell = (hi - lo) / n as f64;
         let mut trim = Self {
@@ -205,6 +204,12 @@ impl Trim {
     #[inline(never)]
     pub(super) fn is_inside(&self, q: Uv) -> bool {
         self.parity(q, *self.cell_range(q.y, q.y, 1).start())
+    }
+
+    /// Bytes that it holds.
+    pub(super) fn bytes(&self) -> usize {
+        let lists = self.rows.bytes() + self.near.bytes();
+        size_of_val(self) + size_of_val(&*self.pieces) + size_of_val(&*self.uses) + self.cells.len() + lists
     }
 
     /// Whether a point lies inside, by the pieces of its row that the half-line towards +u crosses.

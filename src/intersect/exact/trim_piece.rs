@@ -304,6 +304,11 @@ impl PieceLists {
         lists
     }
 
+    /// Bytes that the lists hold.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.keys) + size_of_val(&*self.starts) + size_of_val(&*self.pieces)
+    }
+
     /// The pieces of a row or cell, rising; empty where it has none.
     #[inline]
     pub(super) fn pieces_of(&self, key: u32) -> &[u32] {
