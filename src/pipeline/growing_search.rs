@@ -44,12 +44,12 @@ impl Default for GrowingSearch<'_> {
 }
 
 impl GrowingSearch<'_> {
-    /// Returns the number of rays of the first run: `usual`, and at most `most`, but what an earlier search had come to is gone on with.
+    /// Returns the number of rays of the first run: that of the run at which an earlier search stopped, else `usual`, at most `most`.
     pub(super) fn first_rays(&self, usual: u64, most: u64) -> u64 {
         self.resume_rays.unwrap_or(usual.min(most))
     }
 
-    /// Traces the run that `prepared` asks for, and returns its sums and its results.
+    /// Traces the run that `prepared` asks for, with an intersector built for it, and returns its sums and its results.
     pub(super) fn trace(&self, prepared: &PreparedScene, monitor: &dyn Monitor) -> (PartialRun, Results) {
         let settings = prepared.run_settings();
         prepared.with_intersector(monitor, |intersector, _| {
@@ -68,7 +68,7 @@ pub(super) fn most_rays(prepared: &PreparedScene) -> u64 {
     prepared.job.tracing.rays().unwrap_or(MOST_RAYS)
 }
 
-/// Returns the number of rays of the run after one of so many, by which `growth` times as many would do; at most `most`.
+/// Returns the number of rays of the run after one of `rays`: `growth` times as many, kept within [`GROWTH_RANGE`]; at most `most`.
 pub(super) fn next_rays(rays: u64, growth: f64, most: u64) -> u64 {
     let [least, greatest] = GROWTH_RANGE;
     ((rays as f64 * growth.clamp(least, greatest)) as u64).min(most)
