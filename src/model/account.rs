@@ -94,7 +94,7 @@ const PIECES: usize = 2;
 const MANY_KNOTS: usize = 8;
 
 impl Model {
-    /// Tells of every part its solids and faces, in order; parts without faces are left out, those without an instance are not.
+    /// Returns every part with its solids and faces, in order; parts without faces are left out, those without an instance are not.
     pub fn account(&self) -> Vec<PartAccount> {
         // The first instance stands for all: one place to look at is enough to know a face.
         let mut first: Vec<Option<&Instance>> = vec![None; self.parts.len()];
@@ -116,7 +116,7 @@ impl Model {
 }
 
 impl Part {
-    /// Tells of its solids and sheets where an instance stands, or in its own coordinates without one.
+    /// Returns its solids and sheets with their faces where an instance stands, or in the part's own coordinates without one.
     fn account(&self, instance: Option<&Instance>) -> Vec<SolidAccount> {
         let placement = instance.map_or(Frame::IDENTITY, |i| i.placement);
         let inherited = instance.and_then(|i| i.colour).or(self.colour);
@@ -145,7 +145,8 @@ impl Part {
 }
 
 impl Face {
-    /// Tells its figures where `placement` puts it; `inherited` is the colour that shows where it has none of its own.
+    /// Returns name, colour, kind, area, box and a point of the face where `placement` puts it; `inherited` is the colour that shows where
+    /// it has none of its own.
     fn account(&self, placement: &Frame, inherited: Option<Colour>) -> FaceAccount {
         FaceAccount {
             id: self.entity,
@@ -271,7 +272,8 @@ impl Sweep<'_> {
 }
 
 impl TessellatedFace {
-    /// Tells its figures where `placement` puts it, in the inherited colour where it has none; `at` is that frame's origin without facets.
+    /// Returns name, colour, area, box and a point of the face where `placement` puts it, in the inherited colour where it has none.
+    /// Without facets the point is the placement's origin.
     fn account(&self, placement: &Frame, inherited: Option<Colour>) -> FaceAccount {
         let corner = |k: usize| self.mesh.positions[self.mesh.vertices[k].position as usize];
         // The middle of the first facet.
@@ -294,6 +296,7 @@ impl TessellatedFace {
     }
 }
 
+/// Returns the lower and the upper corner of a box.
 fn corners(b: Aabb) -> [[f64; 3]; 2] {
     [b.min.to_array(), b.max.to_array()]
 }

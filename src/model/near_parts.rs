@@ -59,6 +59,7 @@ fn curved(part: &Part) -> impl Iterator<Item = &Face> {
     faces.filter(|f| !matches!(f.analytic, Analytic::Plane { .. }))
 }
 
+/// Returns a box around a box where a placement puts it.
 fn placed(bounds: &Aabb, placement: &Frame) -> Aabb {
     Aabb::from_points(bounds.corners().map(|p| placement.point(p)))
 }

@@ -201,8 +201,8 @@ impl PreparedScene {
         (mesher, default_accuracy::intersector_choice(chosen))
     }
 
-    /// Takes tolerance, normals and intersector of a choice and tells the monitor. Leaves the facets as they are: those of the choice are for
-    /// the caller to make.
+    /// Takes tolerance, normals and intersector of a choice and tells the monitor. The facets are left as they are: the caller makes
+    /// those of the choice.
     fn take_choice(&mut self, chosen: Chosen, monitor: &dyn Monitor) {
         monitor.chosen(&chosen);
         (self.mesh_settings, self.choice) = self.settings_of(&chosen);

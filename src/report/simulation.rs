@@ -56,8 +56,8 @@ pub struct SimulationReport<'a> {
     pub provenance: Provenance,
 }
 
-/// Makes recorded paths polylines with the power at their start, as a share of an average ray's, and the number of their ray; the second value
-/// is how each of them ends.
+/// Makes recorded paths polylines with the power at their start, as a share of an average ray's, and the number of their ray; the second
+/// value is how each of them ends.
 pub fn path_lines(paths: &[PathVertex]) -> (Polylines, Vec<Event>) {
     let mut lines = Polylines::default();
     let (mut power, mut rays, mut ends) = (Vec::new(), Vec::new(), Vec::new());

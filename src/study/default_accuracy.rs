@@ -295,8 +295,8 @@ impl Undecided<'_> {
         trace_replicates(self.bound, &*self.source.octree(facets), settings)
     }
 
-    /// Returns what to divide the tolerance by, so that facets change no figure by more than its statistical error; `None` where counted work
-    /// foretells that they are no cheaper than the spline, or they would be more than [`MOST_FINER`] times as fine.
+    /// Returns what to divide the tolerance by, so that facets change no figure by more than its statistical error; `None` where counted
+    /// work foretells that they are no cheaper than the spline, or they would be more than [`MOST_FINER`] times as fine.
     fn finer_factor(&self, worst: &Worst, error: &GeometricError) -> Option<f64> {
         let hits = error.segments_per_ray * self.judged_rays() as f64;
         let factor = MARGIN * worst.ratio;
