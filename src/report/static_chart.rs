@@ -121,7 +121,7 @@ fn label(text: String, place: Place, anchor: Anchor) -> Element {
     Element::Text { text, place, anchor, opacity: 1.0, turned: false, ink: Ink::Text }
 }
 
-/// Draws grid lines, marks and titles of both axes; bars have no scale along x.
+/// Draws grid lines, marks and titles of both axes, across to `right`; bars have no scale along x.
 fn axes(elements: &mut Vec<Element>, chart: &Chart, x: Option<&Scale>, y: &Scale, right: f64) {
     let [left, top, _, bottom] = AREA;
     for t in y.ticks() {

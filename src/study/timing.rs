@@ -121,7 +121,7 @@ impl<'a> Countdown<'a> {
         Self::since(Instant::now(), report)
     }
 
-    /// Counts down for work that began at `start`.
+    /// Makes a countdown, without a forecast yet, for work that began at `start`.
     pub(super) fn since(start: Instant, report: &'a (dyn Fn(Progress) + Sync)) -> Self {
         Self { start, report, stage: String::new(), since: start, ahead: None }
     }
