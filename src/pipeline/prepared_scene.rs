@@ -238,7 +238,7 @@ impl PreparedScene {
         chosen
     }
 
-    /// The models of the groups; of a scene in one piece the whole one.
+    /// Returns the models of the groups; of a scene in one piece the whole one.
     pub(super) fn models(&self) -> &[Model] {
         self.facets.instancing.as_ref().map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups)
     }

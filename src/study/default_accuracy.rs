@@ -259,7 +259,7 @@ impl Undecided<'_> {
         self.bound.receivers.iter().any(|r| r.cell_count() > MOST_CELLS)
     }
 
-    /// The faces of all groups, those of a part that is placed often once; `None` for one of a ready mesh.
+    /// Iterates over the faces of all groups, those of a part that is placed often once; `None` for one of a ready mesh.
     fn faces(&self) -> impl Iterator<Item = Option<&Face>> {
         self.models.iter().flat_map(|model| model.placed_faces()).map(|placed| placed.face)
     }

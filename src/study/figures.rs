@@ -123,7 +123,8 @@ pub fn cell_errors(r: &ReceiverResult) -> Vec<f64> {
     (0..r.cells.len()).map(stated).collect()
 }
 
-/// The same of a channel. A ray's lumens or CIE values are those of the mean ray on the receiver.
+/// Returns the standard error of each cell of a channel, as [`cell_errors`], in the channel's unit. A ray's lumens or CIE values are
+/// those of the mean ray on the receiver.
 pub fn channel_cell_errors(r: &ReceiverResult, c: &ChannelResult) -> Vec<f64> {
     let worth = channel_worth(r, c);
     let stated = |k: usize| if c.cells[k] > 0.0 { c.errors[k] } else { worth * r.ray_cells[k] };

@@ -117,7 +117,7 @@ impl Worst {
     }
 }
 
-/// A number with two significant digits: more are noise, as the pilot has a few thousand rays.
+/// Writes a number with two significant digits: more are noise, as the pilot has a few thousand rays.
 fn two_digits(value: f64) -> String {
     if value <= 0.0 || !value.is_finite() {
         return value.to_string();

@@ -136,7 +136,7 @@ impl<'r> CellPairs<'r> {
         rows.flat_map(move |y| (block.x..(block.x + width).min(nx)).map(move |x| y * nx + x))
     }
 
-    /// Returns the side, cells and a power of two, of the smallest such square that covers the grid.
+    /// Returns the side of the smallest square that covers the grid, in cells and of those that are powers of two.
     fn covering_side(&self) -> usize {
         self.grid[0].max(self.grid[1]).next_power_of_two()
     }
