@@ -252,7 +252,8 @@ impl Sweep<'_> {
         pieces
     }
 
-    /// Integral over the swept parameter of the surface's density of area, from its lower end up to a point, at the point's other one.
+    /// Integral of the surface's density of area over the swept parameter, from its lower end up to that of `end`, along the row on which
+    /// `end` lies.
     fn row_area(&self, end: Uv) -> f64 {
         let mut sum = 0.0;
         for span in self.breaks[self.swept].windows(2).filter(|s| s[0] < end[self.swept]) {

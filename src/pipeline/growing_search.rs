@@ -13,7 +13,8 @@ const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 
 /// Keeps a run while it is traced, so that what is done of it outlives its process.
 pub trait RunKeeper {
-    /// Calls `trace` once, for the run that `prepared` asks for, with what is done of it already and with what is told of the rest.
+    /// Calls `trace` once, for the run that `prepared` asks for, with a request that holds what is done of it already and what to call
+    /// with the rest as it is traced.
     fn keep(&self, prepared: &PreparedScene, trace: &mut dyn FnMut(TraceRequest<'_>));
 }
 

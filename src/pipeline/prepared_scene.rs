@@ -219,7 +219,7 @@ impl PreparedScene {
     }
 
     /// Chooses the facets or the spline that a pilot finds sufficient. May put finer facets in place of those that were made. `excess` is
-    /// how many of the default tolerance were too many to be tried.
+    /// the number of facets that the default tolerance would make, where those were too many to be tried.
     fn choose_accuracy(&mut self, run: RunSettings, excess: Option<f64>, monitor: &dyn Monitor) -> Chosen {
         let surfaces = || self.true_surfaces();
         let facets = (&self.facets, &self.mesh_settings);

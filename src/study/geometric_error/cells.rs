@@ -136,7 +136,7 @@ impl<'r> CellPairs<'r> {
         rows.flat_map(move |y| (block.x..(block.x + width).min(nx)).map(move |x| y * nx + x))
     }
 
-    /// Returns the side of the smallest square that covers the grid, in cells and of those that are powers of two.
+    /// Returns the side, cells, of the smallest square that covers the grid and has a power of two of them a side.
     fn covering_side(&self) -> usize {
         self.grid[0].max(self.grid[1]).next_power_of_two()
     }
