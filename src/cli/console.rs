@@ -155,7 +155,8 @@ impl Console {
         spinner
     }
 
-    /// Returns where the numbers of this command come from: command, program and machine. `None` for a command without random numbers.
+    /// Returns where the numbers of this command come from: command, program and machine. `seed` is `None` for a command without random
+    /// numbers.
     pub(crate) fn provenance(&self, seed: Option<u64>, threads: usize) -> Provenance {
         Provenance {
             command: self.command.clone(),

@@ -12,7 +12,7 @@ static REQUESTED: AtomicBool = AtomicBool::new(false);
 pub(crate) struct SaveableRun(());
 
 impl SaveableRun {
-    /// Counts a run that can be saved, until it is dropped.
+    /// Counts a run that can be saved until this value is dropped: meanwhile the first signal asks it to stop and does not end the command.
     pub(crate) fn begin() -> Self {
         SAVEABLE_RUNS.fetch_add(1, Ordering::SeqCst);
         Self(())

@@ -58,7 +58,7 @@ pub(crate) fn name() -> String {
     std::env::var("COMPUTERNAME").unwrap_or_else(|_| "one machine".into())
 }
 
-/// What no other process of any machine of a shared folder is called, safe in a file name.
+/// Returns a name that no other process of any machine of a shared folder has, safe in a file name.
 pub(crate) fn process_name() -> String {
     format!("{}-{}", file_stem(&name()), std::process::id())
 }

@@ -94,7 +94,7 @@ const PIECES: usize = 2;
 const MANY_KNOTS: usize = 8;
 
 impl Model {
-    /// Tells of every part its solids and faces, in order; parts without faces are left out, those without an instance are not.
+    /// Returns every part with its solids and faces, in order; parts without faces are left out, those without an instance are not.
     pub fn account(&self) -> Vec<PartAccount> {
         // The first instance stands for all: one place to look at is enough to know a face.
         let mut first: Vec<Option<&Instance>> = vec![None; self.parts.len()];
@@ -116,7 +116,7 @@ impl Model {
 }
 
 impl Part {
-    /// Tells of its solids and sheets where an instance stands, or in its own coordinates without one.
+    /// Returns its solids and sheets with their faces where an instance stands, or in the part's own coordinates without one.
     fn account(&self, instance: Option<&Instance>) -> Vec<SolidAccount> {
         let placement = instance.map_or(Frame::IDENTITY, |i| i.placement);
         let inherited = instance.and_then(|i| i.colour).or(self.colour);
@@ -145,7 +145,8 @@ impl Part {
 }
 
 impl Face {
-    /// Tells its figures where `placement` puts it; `inherited` is the colour that shows where it has none of its own.
+    /// Returns name, colour, kind, area, box and a point of the face where `placement` puts it; `inherited` is the colour that shows where
+    /// it has none of its own.
     fn account(&self, placement: &Frame, inherited: Option<Colour>) -> FaceAccount {
         FaceAccount {
             id: self.entity,
@@ -251,7 +252,8 @@ impl Sweep<'_> {
         pieces
     }
 
-    /// Integral over the swept parameter of the surface's density of area, from its lower end up to a point, at the point's other one.
+    /// Integral of the surface's density of area over the swept parameter, from its lower end up to that of `end`, along the row on which
+    /// `end` lies.
     fn row_area(&self, end: Uv) -> f64 {
         let mut sum = 0.0;
         for span in self.breaks[self.swept].windows(2).filter(|s| s[0] < end[self.swept]) {
@@ -271,7 +273,8 @@ impl Sweep<'_> {
 }
 
 impl TessellatedFace {
-    /// Tells its figures where `placement` puts it, in the inherited colour where it has none; `at` is that frame's origin without facets.
+    /// Returns name, colour, area, box and a point of the face where `placement` puts it, in the inherited colour where it has none.
+    /// Without facets the point is the placement's origin.
     fn account(&self, placement: &Frame, inherited: Option<Colour>) -> FaceAccount {
         let corner = |k: usize| self.mesh.positions[self.mesh.vertices[k].position as usize];
         // The middle of the first facet.
@@ -294,6 +297,7 @@ impl TessellatedFace {
     }
 }
 
+/// Returns the lower and the upper corner of a box.
 fn corners(b: Aabb) -> [[f64; 3]; 2] {
     [b.min.to_array(), b.max.to_array()]
 }

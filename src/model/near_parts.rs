@@ -22,7 +22,8 @@ struct NearSearch {
     room: f64,
 }
 
-/// Of every instance of a part that is placed often, whether a curved face of another may lie on one of its own.
+/// Returns for every instance whether it is of a part that is placed often and a curved face of another may lie on one of its own.
+/// `often` says of each part whether it is; 0 or less of `glue_mm` finds none.
 pub(super) fn near_another(model: &Model, often: &[bool], glue_mm: f64) -> Vec<bool> {
     if glue_mm <= 0.0 {
         return vec![false; model.instances.len()];
@@ -59,12 +60,13 @@ fn curved(part: &Part) -> impl Iterator<Item = &Face> {
     faces.filter(|f| !matches!(f.analytic, Analytic::Plane { .. }))
 }
 
+/// Returns a box around a box where a placement puts it.
 fn placed(bounds: &Aabb, placement: &Frame) -> Aabb {
     Aabb::from_points(bounds.corners().map(|p| placement.point(p)))
 }
 
 impl NearSearch {
-    /// Marks all that comes near a face.
+    /// Marks the instances that a placed face, which may stray from its edges by its gap, comes near to.
     fn mark_near_face(&mut self, face: &Face, placement: &Frame) {
         let room = face.gap * placement.scale;
         // Before the face is cut: most come near nothing.
@@ -75,7 +77,8 @@ impl NearSearch {
         }
     }
 
-    /// Marks all owners of boxes within `room` of a patch as `place` puts it, halving it so many times for boxes that fit better.
+    /// Marks the instances whose boxes come near to a patch, which is halved so many times for boxes that fit better; `place` is the
+    /// patch's placement and how far, mm, its face may stray.
     fn mark_near_patch(&mut self, patch: &BezierPatch, place: (&Frame, f64), halvings: usize) {
         let (placement, room) = place;
         let bounds = placed(&patch.bounds(), placement).grown(room);

@@ -29,8 +29,8 @@ pub struct AccurateSettings {
     pub plan: Option<AccuracyPlan>,
 }
 
-/// Puts tolerances and normals into the settings that keep a direction error of so many degrees, for random rays, or with a scene for its
-/// own; `None` leaves the settings as they are. Traces on facets and spline to find them, and tells the monitor.
+/// Finds the tolerances and normals that keep the direction error of light within so many degrees, for random rays or, with a scene, for
+/// its own, by tracing on facets and spline, and puts them into the settings; `None` leaves these as they are. Tells the monitor.
 ///
 /// # Errors
 /// When the angle is not above 0 and below 90 degrees, the settings give a tolerance too, ask for the exact intersector, or do not fit the
@@ -83,8 +83,8 @@ pub fn settings_for_accuracy(
     Ok(AccurateSettings { meshing, tracing, plan: Some(found) })
 }
 
-/// Puts local tolerances into the settings that keep a direction error of so many degrees with bilinear normals, for facets whose readers
-/// interpolate those of their corners; `None` leaves the settings as they are, without a plan. Tells the monitor.
+/// Finds the local tolerances that keep the direction error within so many degrees with bilinear normals, for facets whose readers
+/// interpolate those of their corners, and puts them into the settings; `None` leaves these as they are, without a plan. Tells the monitor.
 ///
 /// # Errors
 /// When the angle is not above 0 and below 90 degrees, or the settings give a tolerance too.
@@ -110,7 +110,7 @@ fn refused_angle(message: String) -> Error {
     Error::setting("accuracy", message)
 }
 
-/// Returns what is asked for; `None` without an accuracy.
+/// Returns the target for a direction error, degrees; `None` without one.
 ///
 /// # Errors
 /// When the angle is not above 0 and below 90 degrees, or a tolerance is given too.
@@ -126,7 +126,8 @@ fn target(accuracy_deg: Option<f64>, meshing: &MeshingSettings) -> Result<Option
     Ok(Some(target))
 }
 
-/// Returns rays of the scene's own run on the spline, from the sources and from where they were turned; about as many as it has rays.
+/// Traces the scene's run on the spline and returns a sample of its segments, from the sources and from surfaces, lifted off the latter: at
+/// most as many as the run has rays.
 fn scene_rays(
     product: &ModelMeshSource<'_>,
     model: &Model,

@@ -162,7 +162,8 @@ impl Cache {
         Ok(files)
     }
 
-    /// Reads an entry and marks it as just used; `None` where there is none, or a damaged one, which is removed and told to the monitor.
+    /// Reads an entry and marks it as just used; `None` where there is none, or one that is damaged or cannot be read, which is removed and
+    /// told to the monitor.
     fn fetch<T>(
         &self,
         name: &str,
@@ -266,7 +267,7 @@ impl CachedFacets<'_> {
         built
     }
 
-    /// Returns the name of the file of this kind of entry.
+    /// Returns the name of the file of an entry; `kind` is its ending.
     fn name(&self, kind: &str) -> String {
         format!("{}{kind}", self.key.0)
     }

@@ -56,7 +56,7 @@ impl PilotSource for Source<'_> {
     }
 }
 
-/// Chooses for a run whose facets of the default tolerance are made; with facets finer than these, where such are taken.
+/// Chooses facets or spline for a run whose facets of the default tolerance are made; returns finer facets too, where these are chosen.
 /// `surfaces` builds the true surface of each group, and is asked only where a pilot is traced.
 pub(super) fn choose<'a>(
     (model, surfaces): (&'a Model, &'a dyn Fn() -> &'a [Arc<TrueSurface>]),

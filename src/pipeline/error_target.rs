@@ -82,7 +82,7 @@ impl ErrorTarget {
         Ok(Self { percent, receiver: receiver.into(), cells })
     }
 
-    /// Returns the relative error of a run, percent; `None` where nothing arrived.
+    /// Returns the relative statistical error of the receiver's power or cells, percent; `None` where nothing arrived.
     fn error(&self, results: &Results) -> Option<f64> {
         let r = results.receivers.iter().find(|r| r.name == self.receiver)?;
         // The cells weighted by their light: dark ones have large errors that nobody sees.
@@ -135,14 +135,15 @@ impl ErrorTarget {
         }
     }
 
-    /// Returns how many times as many rays the error asks for: it falls at least as the root of the rays. 16 where nothing arrived.
+    /// Returns how many times as many rays the target asks for, by an error that falls with their root, and a margin more; may be below 1.
+    /// `found` is that error, percent; without one, as nothing arrived, the factor is [`GROWTH_FROM_NOTHING`].
     fn growth(&self, found: Option<f64>) -> f64 {
         // The error falls with the root of the rays, so that they go with the square of what is missing.
         found.map_or(GROWTH_FROM_NOTHING, |e| GROWTH_MARGIN * (e / self.percent).powi(2))
     }
 }
 
-/// Returns the sums over the cells of the light, and of the error, each weighted by the light.
+/// Returns the sums over a receiver's cells of the light and of its standard error, in this order, both weighted by the light.
 fn light_weighted_error(r: &ReceiverResult) -> (f64, f64) {
     let sum = |x: &mut dyn Iterator<Item = f64>| x.sum::<f64>();
     (sum(&mut r.cells.iter().map(|c| c * c)), sum(&mut r.cells.iter().zip(cell_errors(r)).map(|(c, e)| c * e)))

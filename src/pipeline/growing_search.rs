@@ -13,7 +13,8 @@ const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 
 /// Keeps a run while it is traced, so that what is done of it outlives its process.
 pub trait RunKeeper {
-    /// Calls `trace` once, for the run that `prepared` asks for, with what is done of it already and with what is told of the rest.
+    /// Calls `trace` once, for the run that `prepared` asks for, with a request that holds what is done of it already and what to call
+    /// with the rest as it is traced.
     fn keep(&self, prepared: &PreparedScene, trace: &mut dyn FnMut(TraceRequest<'_>));
 }
 
@@ -44,12 +45,12 @@ impl Default for GrowingSearch<'_> {
 }
 
 impl GrowingSearch<'_> {
-    /// Returns the number of rays of the first run: `usual`, and at most `most`, but what an earlier search had come to is gone on with.
+    /// Returns the number of rays of the first run: that of the run at which an earlier search stopped, else `usual`, at most `most`.
     pub(super) fn first_rays(&self, usual: u64, most: u64) -> u64 {
         self.resume_rays.unwrap_or(usual.min(most))
     }
 
-    /// Traces the run that `prepared` asks for, and returns its sums and its results.
+    /// Traces the run that `prepared` asks for, with an intersector built for it, and returns its sums and its results.
     pub(super) fn trace(&self, prepared: &PreparedScene, monitor: &dyn Monitor) -> (PartialRun, Results) {
         let settings = prepared.run_settings();
         prepared.with_intersector(monitor, |intersector, _| {
@@ -68,7 +69,7 @@ pub(super) fn most_rays(prepared: &PreparedScene) -> u64 {
     prepared.job.tracing.rays().unwrap_or(MOST_RAYS)
 }
 
-/// Returns the number of rays of the run after one of so many, by which `growth` times as many would do; at most `most`.
+/// Returns the number of rays of the run after one of `rays`: `growth` times as many, kept within [`GROWTH_RANGE`]; at most `most`.
 pub(super) fn next_rays(rays: u64, growth: f64, most: u64) -> u64 {
     let [least, greatest] = GROWTH_RANGE;
     ((rays as f64 * growth.clamp(least, greatest)) as u64).min(most)

@@ -65,7 +65,7 @@ impl TrueSurface {
         Self { exact, meshes }
     }
 
-    /// Returns what answers rays on it; `farthest_start` is how far, mm, its farthest place is.
+    /// Returns what answers rays on it; `farthest_start`, mm, is that of [`farthest_start`] for its group.
     fn intersector(&self, farthest_start: f64) -> Box<dyn Intersector + '_> {
         if self.meshes.facets.is_empty() {
             return Box::new(&self.exact);

@@ -127,7 +127,7 @@ impl PreparedScene {
 
     /// Makes the tolerance of the settings as much coarser as leaves [`MOST_BEFORE_CHOICE`] facets; returns how many the default would
     /// take, `None`, and nothing changed, where these are not too many.
-    fn bound_facets(&mut self, instancing: Option<&Instancing>) -> Option<f64> {
+    fn coarsen_to_limit(&mut self, instancing: Option<&Instancing>) -> Option<f64> {
         let [_, loosest] = self.mesh_settings.tolerance;
         let models = instancing.map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups);
         let expected: f64 = models.iter().map(|model| expected_facets(model, loosest)).sum();
@@ -142,7 +142,7 @@ impl PreparedScene {
     fn choose_and_make_facets(&mut self, instancing: Option<&Arc<Instancing>>, monitor: &dyn Monitor) {
         // Named by the run before anything of it is decided: that is what others know when they ask.
         let undecided = self.job.cache.as_ref().and(self.fingerprint().ok());
-        let excess = self.bound_facets(instancing.map(Arc::as_ref));
+        let excess = self.coarsen_to_limit(instancing.map(Arc::as_ref));
         self.make_facets(instancing, monitor);
         let run = RunSettings { sequences: false, ..self.run_settings() };
         let facets = (&self.facets, &self.mesh_settings);
@@ -169,12 +169,13 @@ impl PreparedScene {
         self.take_choice(chosen, monitor);
     }
 
-    /// Makes the facets of the settings.
+    /// Makes the facets of the settings, or takes them from the cache, in place of those that are there.
     fn make_facets(&mut self, instancing: Option<&Arc<Instancing>>, monitor: &dyn Monitor) {
         (self.facets, self.tessellation_seconds) = self.job.facets(instancing, &self.mesh_settings, monitor);
     }
 
-    /// Returns what a part of the same run chose, or what the cache keeps of the same choice; `None` where there is neither.
+    /// Takes from the job what a part of the same run chose and returns it, or else what the cache keeps of the same choice; `None` where
+    /// there is neither.
     fn known_choice(&mut self, monitor: &dyn Monitor) -> Option<Chosen> {
         if let Some(part) = self.job.chosen.take() {
             // Program, scene, files and settings are the same: so would be what a pilot of this process finds.
@@ -189,18 +190,19 @@ impl PreparedScene {
         cache.choice(&self.fingerprint().ok()?, monitor)
     }
 
-    /// The scene, bound, and its model.
+    /// Returns the scene, the same bound, and its model.
     fn scene_and_model(&self) -> (&Scene, &BoundScene, &LoadedModel) {
         (&self.job.scene, &self.bound, &self.job.loaded)
     }
 
-    /// Returns settings and intersector of a choice.
+    /// Returns the mesher's settings and the intersector that a choice stands for.
     fn settings_of(&self, chosen: &Chosen) -> (tessellate::Settings, IntersectorChoice) {
         let mesher = tessellate::Settings { tolerance: chosen.tolerance_mm, ..self.mesh_settings.clone() };
         (mesher, default_accuracy::intersector_choice(chosen))
     }
 
-    /// Sets what a choice says; the facets must be made, or be made anew, by it.
+    /// Takes tolerance, normals and intersector of a choice and tells the monitor. The facets are left as they are: the caller makes
+    /// those of the choice.
     fn take_choice(&mut self, chosen: Chosen, monitor: &dyn Monitor) {
         monitor.chosen(&chosen);
         (self.mesh_settings, self.choice) = self.settings_of(&chosen);
@@ -217,7 +219,7 @@ impl PreparedScene {
     }
 
     /// Chooses the facets or the spline that a pilot finds sufficient. May put finer facets in place of those that were made. `excess` is
-    /// how many of the default tolerance were too many to be tried.
+    /// the number of facets that the default tolerance would make, where those were too many to be tried.
     fn choose_accuracy(&mut self, run: RunSettings, excess: Option<f64>, monitor: &dyn Monitor) -> Chosen {
         let surfaces = || self.true_surfaces();
         let facets = (&self.facets, &self.mesh_settings);
@@ -236,7 +238,7 @@ impl PreparedScene {
         chosen
     }
 
-    /// The models of the groups; of a scene in one piece the whole one.
+    /// Returns the models of the groups; of a scene in one piece the whole one.
     pub(super) fn models(&self) -> &[Model] {
         self.facets.instancing.as_ref().map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups)
     }

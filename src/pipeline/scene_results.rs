@@ -35,7 +35,7 @@ impl SceneResults {
         model_figures::absorbed_figures(&self.results, self.surface(prepared), prepared.power_unit())
     }
 
-    /// Where hits were found, with what is known of facets.
+    /// Returns what the run was traced on: the spline, or facets with what they change where that was measured.
     fn surface(&self, prepared: &PreparedScene) -> Surface<'_> {
         match (prepared.choice.intersector, &self.geometric) {
             (IntersectorKind::Exact, _) => Surface::Spline,

@@ -18,7 +18,8 @@ const LONGEST_WAIT: Duration = Duration::from_secs(1800);
 pub(super) struct Turn(Option<(PathBuf, File)>);
 
 impl Turn {
-    /// Waits until no other process has the lock file of this name, in a folder that is made when missing, and takes it.
+    /// Waits until no other process has the lock file of this name, in a folder that is made when missing, and takes it; after
+    /// [`LONGEST_WAIT`], and where nothing can be locked, returns a turn without a lock.
     pub(super) fn wait(lock: &Path) -> Self {
         let made = lock.parent().is_none_or(|folder| fs::create_dir_all(folder).is_ok());
         // Not cut: what it holds means nothing.

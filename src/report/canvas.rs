@@ -41,12 +41,12 @@ impl Canvas {
     /// Number of samples along the width and the height.
     pub(super) const SAMPLES: [usize; 2] = [WIDTH * FINE, HEIGHT * FINE];
 
-    /// Adds a triangle; one seen from its edge covers no sample.
+    /// Adds a triangle, its corners in samples with their depth as z; one seen from its edge covers no sample.
     pub(super) fn triangle(&mut self, corners: [Vec3; 3], colour: [f32; 3], opacity: f32) {
         self.primitives.push(Primitive { shape: PrimitiveShape::Triangle(corners), colour, opacity });
     }
 
-    /// Adds a line as squares of its width, pixels.
+    /// Adds a line between ends in samples, with their depth as z, as squares of its width, pixels.
     pub(super) fn line(&mut self, ends: [Vec3; 2], width: f32, colour: [f32; 3], opacity: f32) {
         let half_width = (width * FINE as f32 / 2.0).max(0.5);
         self.primitives.push(Primitive { shape: PrimitiveShape::Line { ends, half_width }, colour, opacity });
@@ -129,6 +129,7 @@ impl Band {
         self.depth.resize(rows.len() * width, f32::INFINITY);
     }
 
+    /// Draws what of a primitive lies in this band.
     fn draw(&mut self, primitive: &Primitive) {
         match primitive.shape {
             PrimitiveShape::Triangle(corners) => self.triangle(corners, primitive),
@@ -136,7 +137,7 @@ impl Band {
         }
     }
 
-    /// Returns the part of some rows of the picture that lies in this band.
+    /// Returns those of some rows of samples, counted from the top of the picture, that lie in this band.
     fn own_rows(&self, rows: Range<usize>) -> Range<usize> {
         rows.start.max(self.top)..rows.end.min(self.top + self.depth.len() / Canvas::SAMPLES[0])
     }
@@ -198,7 +199,8 @@ impl Band {
         from.min(to).floor().max(0.0) as usize..(from.max(to).ceil().max(-1.0) as usize + 1).min(steps + 1)
     }
 
-    /// Blends a colour into samples of a row, where nothing nearer stands; `depth` is that of the k-th of them.
+    /// Blends a primitive's colour into the samples of row `y` in some columns, where nothing nearer stands, and keeps its depth there if
+    /// it hides what is behind; `depth` returns that at the k-th of them.
     #[inline(always)]
     fn blend(&mut self, y: usize, columns: Range<usize>, depth: impl Fn(usize) -> f32, primitive: &Primitive) {
         if columns.is_empty() {

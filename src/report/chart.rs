@@ -190,14 +190,14 @@ impl Chart {
         }
     }
 
-    /// A picture over two axes.
+    /// Makes a picture in colours over two axes; `name` is the stem of its files.
     pub fn picture(name: &str, title: &str, caption: &str, axes: [Axis; 2], picture: Picture) -> Self {
         let [x, y] = [0, 1].map(|k| AxisStyle::linear(&axes[k].label, &axes[k].unit));
         let content = Content::Picture { axes, picture };
         Self { name: name.into(), title: title.into(), caption: caption.into(), x, y, equal_scales: false, content }
     }
 
-    /// The map with named places and borders of zones.
+    /// Returns the map with these named places and borders of zones in place of any it had; any other chart as it is.
     pub fn with_marks(mut self, points: Vec<MapPoint>, outlines: Vec<Vec<[f64; 2]>>) -> Self {
         if let Content::Map { marks, .. } = &mut self.content {
             (marks.points, marks.outlines) = (points, outlines);

@@ -18,7 +18,7 @@ struct Exposed {
     unit: String,
 }
 
-/// The colours of a grid with layers X, Y and Z, each cell `zoom` pixels wide; `None` for another one, and where all is dark.
+/// Makes the colours of a grid with layers X, Y and Z, each cell `zoom` pixels wide; `None` for another one, and where all is dark.
 ///
 /// One exposure for all cells: the largest of red, green and blue over the picture is full, so that no cell is brighter than the screen.
 /// Colours that a screen has not are cut to the nearest value of each part.
@@ -51,7 +51,7 @@ fn expose(grid: &Grid, zoom: usize) -> Option<Exposed> {
 /// Grey where there is no cell, as in maps.
 const NO_CELL: u8 = 128;
 
-/// The picture of all cells for a file.
+/// Returns the picture of all cells for a file; `None` as [`expose`].
 pub fn colour_picture(grid: &Grid) -> Option<Picture> {
     let longer = grid.axes[0].cells.max(grid.axes[1].cells).max(1);
     expose(grid, FILE_PIXELS.div_ceil(longer)).map(|exposed| exposed.picture)

@@ -15,7 +15,8 @@ pub(super) fn is_all_around(grid: &Grid) -> bool {
     pole_rings(grid).has_poles(grid.values.len())[0]
 }
 
-/// Returns a grid with each ring of cells at a pole (γ 0° and 180°) at its mean.
+/// Returns a grid in which all cells of the ring at a pole (γ 0° and 180°) have the mean of the ring, with the error of that; any other
+/// grid as it is.
 pub(super) fn with_even_poles(grid: &Grid) -> Cow<'_, Grid> {
     let rings = pole_rings(grid);
     if rings.is_empty() {

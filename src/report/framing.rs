@@ -18,7 +18,8 @@ const FEWEST_CELLS: usize = 24;
 const MOST_CELLS: usize = 600;
 
 /// Joins cells of the values to blocks, so that at most [`MOST_CELLS`] remain along each axis, each with the mean of its finite cells;
-/// errors and layers are left out. `None` where there are no more. The last blocks may reach beyond the grid.
+/// errors and layers are left out. Returns the cells of a block along both axes too; `None` where no joining is needed. The last blocks
+/// may reach beyond the grid.
 pub(super) fn joined_cells(grid: &Grid) -> Option<(Grid, [usize; 2])> {
     let cells = grid.axes.each_ref().map(|axis| axis.cells);
     let block = cells.map(|n| n.div_ceil(MOST_CELLS).max(1));
@@ -49,7 +50,7 @@ pub(super) fn joined_cells(grid: &Grid) -> Option<(Grid, [usize; 2])> {
     Some((grid, block))
 }
 
-/// Cuts a grid to the part around all cells that are not dark; `None` where that is most of it, or nothing.
+/// Cuts a grid to the part around all cells that are not dark against the brightest; `None` where that is most of it, or nothing.
 pub(super) fn lit_part(grid: &Grid) -> Option<Grid> {
     let [a, b] = [grid.axes[0].cells, grid.axes[1].cells];
     // A dark receiver has no part that is lit.

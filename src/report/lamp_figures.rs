@@ -132,7 +132,8 @@ fn value_ahead(grid: &Grid) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// The share of the power of a plane or disc within a radius around the mean position of its light.
+/// Draws the share of the power of a plane or disc within a radius around the mean position of its light; `None` for other receivers, and
+/// dark ones.
 pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [a, b] = &grid.axes;
     let total: f64 = grid.values.iter().filter(|v| v.is_finite()).sum();

@@ -18,13 +18,13 @@ pub(super) struct LevelLabel {
     pub(super) at: [f64; 2],
 }
 
-/// Half of the room that a text takes: characters are so wide, lines so high.
+/// Returns half of the width and height of a text; `width` is that of a character, `height` that of a line.
 fn half_size(text: &str, [width, height]: [f64; 2]) -> [f64; 2] {
     [0.5 * width * text.chars().count() as f64, 0.5 * height]
 }
 
-/// The level of the longest line of each that has room for it, from the highest down: the brightest levels are the ones that count.
-/// `place` gives where a point of the map is in the picture, `letter` the width of a character and the height of a line there.
+/// Places the number of each level on its longest line, where it covers no other and no named point; levels without room are left out, the
+/// lowest first. `place` takes a point of the map to the picture, `letter` is the width of a character and the height of a line there.
 pub(super) fn level_labels(
     marks: &Marks,
     place: impl Fn([f64; 2]) -> [f64; 2],
@@ -56,7 +56,7 @@ pub(super) fn level_labels(
     labels
 }
 
-/// The longest line of each level, which bears its name.
+/// Returns the line with most points of each level, which bears its number.
 fn longest_of_levels(lines: &[Isoline]) -> Vec<&Isoline> {
     let mut longest: Vec<&Isoline> = Vec::new();
     for line in lines {

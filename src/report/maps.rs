@@ -44,14 +44,14 @@ pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
     })
 }
 
-/// Returns the numbers of cells, NaN for those off a disc.
+/// Returns the values of a receiver's cells, NaN for those off a disc.
 pub(crate) fn on_receiver(r: &ReceiverResult, cells: &[f64]) -> Vec<f64> {
     let mut values = cells.to_vec();
     r.off.iter().for_each(|&k| values[k] = f64::NAN);
     values
 }
 
-/// A channel over the cells of its receiver.
+/// Makes a layer of a grid from a channel of a receiver: its values with their statistical errors.
 fn layer(r: &ReceiverResult, channel: &ChannelResult) -> Layer {
     Layer {
         quantity: match (channel.name.as_str(), channel.unit) {
@@ -145,7 +145,7 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
     [peak, error, Some(cells)].into_iter().flatten().collect()
 }
 
-/// Returns the relative statistical error of the cells with light, weighted by it; `None` without errors or light.
+/// Returns the sum of the statistical errors of the cells with light over the sum of their light; `None` without errors or light.
 fn lit_error(grid: &Grid) -> Option<f64> {
     let lit = || grid.values.iter().zip(grid.error.iter().flatten()).filter(|(v, _)| **v > 0.0);
     let light: f64 = lit().map(|(v, _)| v).sum();

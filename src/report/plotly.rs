@@ -178,7 +178,7 @@ const MAP_PIXELS: f64 = 260.0;
 /// Width of a digit and height of a line of the labels in the page, pixels.
 const LETTER: [f64; 2] = [6.5, 15.0];
 
-/// The levels of lines, where there is room for them; `same` where a unit has one length along both axes.
+/// Returns plotly's annotations with the levels of lines, where there is room for them; `same` where a unit has one length along both axes.
 fn level_annotations(marks: &Marks, axes: &[Axis; 2], same: bool) -> Vec<Value> {
     let spans = [0, 1].map(|k| axes[k].range[1] - axes[k].range[0]);
     let pixel = |at: [f64; 2]| {
@@ -192,13 +192,13 @@ fn level_annotations(marks: &Marks, axes: &[Axis; 2], same: bool) -> Vec<Value> 
     labels.collect()
 }
 
-/// A picture with its bottom row first.
+/// Returns a picture with its bottom row first.
 fn upside_down(picture: &Picture) -> Picture {
     let rows = picture.rgb.chunks(3 * picture.width.max(1) as usize).rev();
     Picture { rgb: rows.flatten().copied().collect(), ..*picture }
 }
 
-/// A picture over its axes; one that has no pixels leaves them empty.
+/// Returns the trace of a picture over its axes, and the layout; one that has no pixels leaves the axes empty.
 fn picture_trace([a, b]: &[Axis; 2], picture: &Picture) -> (Vec<Value>, Value) {
     // Row after row along the axis, which points up: the other way, with steps downward, plotly draws it upside down.
     let source = upside_down(picture).to_png().map(|bytes| format!("data:image/png;base64,{}", base64(&bytes)));

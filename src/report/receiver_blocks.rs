@@ -30,8 +30,8 @@ pub(super) fn framed_map(r: &ReceiverResult, grid: &Grid) -> Chart {
     }
 }
 
-/// The colours of a receiver that counts them, the polar diagram of a luminaire, the encircled power of a spot, the figures of a lamp:
-/// those that apply.
+/// Returns those that apply of: the colours of a receiver that counts them, the polar diagram of a luminaire, the encircled power of a
+/// spot, the figures of a lamp.
 pub(super) fn trade_figures(
     r: &ReceiverResult,
     grid: &Grid,

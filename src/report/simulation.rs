@@ -56,7 +56,8 @@ pub struct SimulationReport<'a> {
     pub provenance: Provenance,
 }
 
-/// Makes recorded paths polylines with the power at their start and the number of their ray; the second value is how each of them ends.
+/// Makes recorded paths polylines with the power at their start, as a share of an average ray's, and the number of their ray; the second
+/// value is how each of them ends.
 pub fn path_lines(paths: &[PathVertex]) -> (Polylines, Vec<Event>) {
     let mut lines = Polylines::default();
     let (mut power, mut rays, mut ends) = (Vec::new(), Vec::new(), Vec::new());
@@ -71,7 +72,7 @@ pub fn path_lines(paths: &[PathVertex]) -> (Polylines, Vec<Event>) {
     (lines, ends)
 }
 
-/// Keeps at most `most` of the lines that end so, evenly over the run, for rays come source by source.
+/// Keeps at most `most` of the lines whose end is `wanted`, evenly over the run, for rays come source by source; their values are left out.
 fn lines_ending(lines: &Polylines, ends: &[Event], wanted: impl Fn(Event) -> bool, most: usize) -> Polylines {
     let mut kept = Polylines::default();
     let all: Vec<_> = lines.lines().zip(ends).filter(|(_, e)| wanted(**e)).collect();
@@ -230,7 +231,8 @@ impl SimulationReport<'_> {
         section
     }
 
-    /// Returns every receiver's grids, with the receiver's index and the errors of the facets where these are known.
+    /// Returns every receiver's grids, the photometric one of those that have it first, with the receiver's index, and the errors from the
+    /// facets where these are known; receivers without cells have none.
     fn maps(&self) -> Vec<(usize, Grid)> {
         let mut maps = Vec::new();
         for (k, r) in self.results.receivers.iter().enumerate() {

@@ -121,7 +121,7 @@ fn label(text: String, place: Place, anchor: Anchor) -> Element {
     Element::Text { text, place, anchor, opacity: 1.0, turned: false, ink: Ink::Text }
 }
 
-/// Draws grid lines, marks and titles of both axes; bars have no scale along x.
+/// Draws grid lines, marks and titles of both axes, across to `right`; bars have no scale along x.
 fn axes(elements: &mut Vec<Element>, chart: &Chart, x: Option<&Scale>, y: &Scale, right: f64) {
     let [left, top, _, bottom] = AREA;
     for t in y.ticks() {
@@ -227,7 +227,7 @@ fn wrapped_lines(name: &str, width: f64) -> Vec<String> {
     lines
 }
 
-/// Returns what the drawing needs below for names of several lines; 0 but for bars.
+/// Returns the height, units of the drawing, that names of several lines need below it; 0 but for bars.
 fn extra_height(chart: &Chart) -> f64 {
     let Content::Bars { categories, .. } = &chart.content else { return 0.0 };
     let slot = (AREA[2] - AREA[0]) / categories.len().max(1) as f64;
@@ -291,7 +291,7 @@ fn bar_chart(
 /// Room for the colour bar beside a map.
 const BAR_ROOM: f64 = 74.0;
 
-/// A linear scale of exactly this range.
+/// Makes a linear scale of exactly this range of values, from `from` to `to` in the drawing.
 fn linear_scale([low, high]: [f64; 2], [from, to]: [f64; 2]) -> Scale {
     Scale { low, high, log: false, from, to }
 }

@@ -145,7 +145,7 @@ fn triangle_crossing(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
     in_range.then(|| Crossing { t, inside, exact: one_sided(exact), front: det.high > 0.0 })
 }
 
-/// Returns `u · (v × w)`.
+/// Returns the triple product `u · (v × w)`, six times the volume of their tetrahedron.
 fn volume(u: &[DoubleDouble; 3], v: &[DoubleDouble; 3], w: &[DoubleDouble; 3]) -> DoubleDouble {
     let cross = |p: usize, q: usize| v[p] * w[q] - v[q] * w[p];
     u[0] * cross(1, 2) + u[1] * cross(2, 0) + u[2] * cross(0, 1)
@@ -167,7 +167,7 @@ impl DoubleDouble {
         Self { high, low: (a - (high - back)) + (b - back) }
     }
 
-    /// Returns the exact sum of two numbers of which the first is the larger.
+    /// Returns the exact sum of two numbers of which the second is not larger in size than the first.
     fn new(high: f64, low: f64) -> Self {
         // Dekker's quick two-sum: the first is the larger here.
         let sum = high + low;

@@ -116,11 +116,11 @@ pub struct TimedFacets {
 
 /// Makes what a pilot compares.
 pub trait PilotSource {
-    /// Facets within a tolerance `[min, max]`, mm.
+    /// Makes facets within a tolerance `[min, max]`, mm.
     fn facets(&self, tolerance: [f64; 2]) -> TimedFacets;
-    /// The octree over facets, with bilinear normals.
+    /// Builds the octree over facets, with bilinear normals.
     fn octree<'f>(&'f self, facets: &'f GroupedFacets) -> Box<dyn Intersector + 'f>;
-    /// The certified spline, with the facets of ready meshes, which have none.
+    /// Returns the intersector of the certified spline; ready meshes, which have no spline, answer with their facets.
     fn exact(&self) -> &dyn Intersector;
 }
 
@@ -141,7 +141,8 @@ pub struct Undecided<'a> {
     pub tolerance: [f64; 2],
 }
 
-/// Chooses; with the finer facets, where these are taken.
+/// Chooses facets or spline, by a pilot unless [`Undecided::needs_pilot`] says no; returns finer facets too where the choice is
+/// those that it made.
 pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     let start = Instant::now();
     let Undecided { bound, tolerance, .. } = *undecided;
@@ -196,7 +197,8 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     (chosen(ON_SPLINE, tolerance, because, alternatives, None), None)
 }
 
-/// Makes the record of a way to trace the run: its tolerance in mm, its seconds, and the worst that it changes of any figure.
+/// Makes the record of a way to trace the run: its tolerance `[min, max]`, mm, the seconds of the whole run, and the figure that it gets
+/// most wrong.
 fn alternative(
     tolerance_mm: [f64; 2],
     (intersector, normals): (&'static str, NormalMode),
@@ -257,7 +259,7 @@ impl Undecided<'_> {
         self.bound.receivers.iter().any(|r| r.cell_count() > MOST_CELLS)
     }
 
-    /// The faces of all groups, those of a part that is placed often once; `None` for one of a ready mesh.
+    /// Iterates over the faces of all groups, those of a part that is placed often once; `None` for one of a ready mesh.
     fn faces(&self) -> impl Iterator<Item = Option<&Face>> {
         self.models.iter().flat_map(|model| model.placed_faces()).map(|placed| placed.face)
     }
@@ -272,7 +274,7 @@ impl Undecided<'_> {
         if self.run.grows { GROWN_RAYS } else { self.run.rays }
     }
 
-    /// Returns the run's settings with the pilot's few rays, its own replicates and no shard.
+    /// Returns the run's settings with the pilot's number of rays, from the first one on, its own replicates and no shard.
     fn pilot_settings(&self) -> RunSettings {
         // No more rays than the run itself has.
         let rays = (self.judged_rays() / SHARE).clamp(PILOT_RAYS[0], PILOT_RAYS[1]).min(self.judged_rays());
@@ -293,8 +295,8 @@ impl Undecided<'_> {
         trace_replicates(self.bound, &*self.source.octree(facets), settings)
     }
 
-    /// Returns how much finer facets would have to be; `None` where counted work foretells that they are no cheaper than the spline, or
-    /// they would be more than [`MOST_FINER`] times as fine.
+    /// Returns what to divide the tolerance by, so that facets change no figure by more than its statistical error; `None` where counted
+    /// work foretells that they are no cheaper than the spline, or they would be more than [`MOST_FINER`] times as fine.
     fn finer_factor(&self, worst: &Worst, error: &GeometricError) -> Option<f64> {
         let hits = error.segments_per_ray * self.judged_rays() as f64;
         let factor = MARGIN * worst.ratio;

@@ -36,8 +36,8 @@ pub struct Row {
     pub identical: bool,
 }
 
-/// Times every kernel that one of the choices needs, in alternating rounds, and compares their results bit by bit. The first row is the
-/// pruned kernel's, the last the full one's.
+/// Times the kernel pruned for a scene, those with one further effect each, and the full one, in alternating rounds, and compares their
+/// results with the pruned kernel's, bit by bit. Rows come in this order; choices that end at one kernel share its times.
 pub fn effects(
     name: &str,
     bound: &BoundScene,

@@ -123,14 +123,16 @@ pub fn cell_errors(r: &ReceiverResult) -> Vec<f64> {
     (0..r.cells.len()).map(stated).collect()
 }
 
-/// The same of a channel. A ray's lumens or CIE values are those of the mean ray on the receiver.
+/// Returns the standard error of each cell of a channel, as [`cell_errors`], in the channel's unit. A ray's lumens or CIE values are
+/// those of the mean ray on the receiver.
 pub fn channel_cell_errors(r: &ReceiverResult, c: &ChannelResult) -> Vec<f64> {
     let worth = channel_worth(r, c);
     let stated = |k: usize| if c.cells[k] > 0.0 { c.errors[k] } else { worth * r.ray_cells[k] };
     (0..c.cells.len()).map(stated).collect()
 }
 
-/// What a channel counts of the light, as a share of its power: all that falls into a bin.
+/// Returns what a channel counts of a watt on the receiver on average: lumens or CIE values, those of 555 nm on a dark receiver; 1 for a
+/// bin, which counts power.
 fn channel_worth(r: &ReceiverResult, c: &ChannelResult) -> f64 {
     let is_weighted = matches!(c.name.as_str(), "lm" | "X" | "Y" | "Z");
     // Where no light arrived nothing is known of its colour: that of the eye's peak is the most it can be worth.
@@ -199,7 +201,8 @@ impl<'a> Errors<'a> {
         }
     }
 
-    /// Returns the geometric error of a figure, `lost` of which may be missing; `None` where the facets were not judged.
+    /// Returns the geometric error of a figure: `of_facets` and `lost`, what lost rays might add to it, in quadrature; `lost` alone on the
+    /// spline, `None` where the facets were not judged.
     fn geometric(&self, lost: f64, of_facets: impl Fn(&ReceiverError) -> f64) -> Option<f64> {
         match self.surface {
             Surface::Spline => Some(lost),

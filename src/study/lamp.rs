@@ -53,8 +53,8 @@ fn lamp(name: &'static str, cavities: usize, spans: usize, ripple: f64) -> Lamp 
     Lamp { name, model: sample_models::model(name, surfaces), patches: cavities * spans * spans, scene }
 }
 
-/// Makes a rippled paraboloid over a square about a centre (mm), as a bicubic spline: control points on the function at the Greville
-/// abscissae. `focus` is its focal length, mm.
+/// Makes a paraboloid of focal length `focus`, mm, rippled by `ripple` mm, over a square about a centre, mm, as a spline of `spans`²
+/// bicubic patches: control points on the function at the Greville abscissae.
 fn cavity([x0, y0]: [f64; 2], focus: f64, spans: usize, ripple: f64) -> Surface {
     let inner = (0..=spans).map(|i| -HALF + 2.0 * HALF * i as f64 / spans as f64);
     let knots: Vec<f64> = std::iter::repeat_n(-HALF, 3).chain(inner).chain(std::iter::repeat_n(HALF, 3)).collect();

@@ -105,7 +105,7 @@ pub(super) fn answer(who: &dyn Intersector, rays: &[Ray], threads: usize, hits: 
     rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).map(one).reduce(Cost::default, sum)
 }
 
-/// Returns the mirrored direction.
+/// Returns the direction `d` mirrored at a surface with unit normal `n`, which may point to either side.
 pub(super) fn reflect(d: Vector, n: Vector) -> Vector {
     d - n * (2.0 * d.dot(n))
 }

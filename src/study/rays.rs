@@ -96,7 +96,7 @@ impl Uniform {
         Self { bounds: bounds.grown(margin), seed, count }
     }
 
-    /// Makes the ray of a number: through a point of the grown box, evenly spread, from outside.
+    /// Makes the ray of an index: through a point of the grown box, evenly spread, from outside.
     fn ray(&self, index: u64) -> Ray {
         let mut random = Random::new(self.seed, index);
         let size = self.bounds.size();

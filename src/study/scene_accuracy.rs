@@ -99,7 +99,7 @@ impl Pilot {
     }
 
     /// Forecasts the seconds for each of [`KINDS`] at a tolerance, mm: tracing there, and an equal share of making facets, which goes with
-    /// 1/tolerance; `slower` tells how much slower tracing is there than at the middle one, where that is known.
+    /// 1/tolerance; `slower` returns the factor from the tracing time at the middle one to that there, where it was measured.
     fn expected_seconds(&self, tolerance: f64, slower: impl Fn(NormalMode) -> Option<f64>) -> [f64; 4] {
         // Facets go with 1/tolerance, tracing grows by about a tenth per halving.
         let finer = self.middle / tolerance;

@@ -1,7 +1,9 @@
 //! A choice with everything that its pilot found as words of 64 bits, to the last bit, and back: parts of a run take it from each other in
 //! place of a pilot of their own.
 //!
-//! One function goes through all that is kept, for writing and for reading alike, so that neither can leave out what the other has.
+//! One function goes through all that is kept, for writing and for reading alike, so that neither can leave out what the other has. Each
+//! `exchange_` function appends its value's words to a `Writer`, or replaces the value by what the next words of a `Reader` say; `None`
+//! where they end too early or say nothing that the value can be.
 
 use super::default_accuracy::{Alternative, Chosen};
 use super::geometric_error::{
@@ -49,7 +51,7 @@ trait Words {
     /// Writes the word, or puts the next one in its place; `None` where there is none left.
     fn word(&mut self, word: &mut u64) -> Option<()>;
 
-    /// The most words that can still come: a length beyond them asks for no memory.
+    /// Returns the number of words that are left, the most items that a list can have: memory is not asked for more. No limit for a writer.
     fn longest_list(&self) -> usize;
 }
 
@@ -80,7 +82,7 @@ impl Words for Reader<'_> {
     }
 }
 
-/// Goes through a choice.
+/// Writes or reads a choice.
 fn exchange_choice(words: &mut dyn Words, choice: &mut Chosen) -> Option<()> {
     // Taken apart, here and below, so that a new field is not forgotten.
     let Chosen { tolerance_mm, normals, intersector, because, pilot_rays, pilot_seconds, alternatives, geometric } =
@@ -104,7 +106,7 @@ fn exchange_choice(words: &mut dyn Words, choice: &mut Chosen) -> Option<()> {
     exchange_option(words, geometric, &GeometricError::default(), exchange_error)
 }
 
-/// Goes through one way to trace a run.
+/// Writes or reads one way to trace a run.
 fn exchange_alternative(words: &mut dyn Words, alternative: &mut Alternative) -> Option<()> {
     let Alternative {
         tolerance_mm,
@@ -124,7 +126,7 @@ fn exchange_alternative(words: &mut dyn Words, alternative: &mut Alternative) ->
     exchange_text(words, figure)
 }
 
-/// Goes through what facets change of a run.
+/// Writes or reads what facets change of a run.
 fn exchange_error(words: &mut dyn Words, error: &mut GeometricError) -> Option<()> {
     let GeometricError { rays, lost, segments_per_ray, seconds, receivers, absorbed, faces } = error;
     words.word(rays)?;
@@ -136,7 +138,7 @@ fn exchange_error(words: &mut dyn Words, error: &mut GeometricError) -> Option<(
     exchange_list(words, faces, &FaceError::default(), exchange_face)
 }
 
-/// Goes through what they change of the power that a body or medium took.
+/// Writes or reads what facets change of the power that a body or medium took.
 fn exchange_absorbed(words: &mut dyn Words, absorbed: &mut AbsorbedError) -> Option<()> {
     let AbsorbedError { name, r#in, power, statistical, index } = absorbed;
     exchange_text(words, name)?;
@@ -146,7 +148,7 @@ fn exchange_absorbed(words: &mut dyn Words, absorbed: &mut AbsorbedError) -> Opt
     exchange_count(words, index)
 }
 
-/// Goes through what they change of a face.
+/// Writes or reads what facets change of the power at a face.
 fn exchange_face(words: &mut dyn Words, error: &mut FaceError) -> Option<()> {
     let FaceError { face, absorbed, entered, left, statistical } = error;
     let mut word = u64::from(*face);
@@ -156,7 +158,7 @@ fn exchange_face(words: &mut dyn Words, error: &mut FaceError) -> Option<()> {
     exchange_numbers(words, statistical)
 }
 
-/// Goes through what they change of a receiver.
+/// Writes or reads what facets change of a receiver.
 fn exchange_receiver(words: &mut dyn Words, receiver: &mut ReceiverError) -> Option<()> {
     let ReceiverError {
         name,
@@ -188,7 +190,7 @@ fn exchange_receiver(words: &mut dyn Words, receiver: &mut ReceiverError) -> Opt
     exchange_list(words, channels, &ChannelError::default(), exchange_channel)
 }
 
-/// Goes through what they change of a channel.
+/// Writes or reads what facets change of a channel.
 fn exchange_channel(words: &mut dyn Words, channel: &mut ChannelError) -> Option<()> {
     let ChannelError { name, total, statistical, cells } = channel;
     exchange_text(words, name)?;
@@ -197,13 +199,13 @@ fn exchange_channel(words: &mut dyn Words, channel: &mut ChannelError) -> Option
     exchange_list(words, cells, &0.0, exchange_number)
 }
 
-/// Goes through a figure on facets and on the spline.
+/// Writes or reads a figure on facets and on the spline.
 fn exchange_paired(words: &mut dyn Words, paired: &mut Paired) -> Option<()> {
     let Paired { facets, spline, error } = paired;
     exchange_numbers(words, [facets, spline, error])
 }
 
-/// Goes through a number by its bits: text would round the last one.
+/// Writes or reads a number by its bits: text would round the last one.
 fn exchange_number(words: &mut dyn Words, number: &mut f64) -> Option<()> {
     let mut bits = number.to_bits();
     words.word(&mut bits)?;
@@ -211,12 +213,12 @@ fn exchange_number(words: &mut dyn Words, number: &mut f64) -> Option<()> {
     Some(())
 }
 
-/// Goes through numbers in their order.
+/// Writes or reads numbers in their order.
 fn exchange_numbers<'n>(words: &mut dyn Words, numbers: impl IntoIterator<Item = &'n mut f64>) -> Option<()> {
     numbers.into_iter().try_for_each(|number| exchange_number(words, number))
 }
 
-/// Goes through a number of items.
+/// Writes or reads a number of items.
 fn exchange_count(words: &mut dyn Words, count: &mut usize) -> Option<()> {
     let mut word = *count as u64;
     words.word(&mut word)?;
@@ -224,7 +226,7 @@ fn exchange_count(words: &mut dyn Words, count: &mut usize) -> Option<()> {
     Some(())
 }
 
-/// Goes through one of `all`, by its number; `None` where it is none of them.
+/// Writes or reads one of `all`, as its index among them; `None` where it is none of them.
 fn exchange_name<T: Copy + PartialEq>(words: &mut dyn Words, value: &mut T, all: &[T]) -> Option<()> {
     let mut number = all.iter().position(|one| one == value)?;
     exchange_count(words, &mut number)?;
@@ -232,7 +234,7 @@ fn exchange_name<T: Copy + PartialEq>(words: &mut dyn Words, value: &mut T, all:
     Some(())
 }
 
-/// Goes through a text, letter by letter.
+/// Writes or reads a text, a word for each letter.
 fn exchange_text(words: &mut dyn Words, text: &mut String) -> Option<()> {
     let mut letters: Vec<char> = text.chars().collect();
     exchange_list(words, &mut letters, &' ', |words, letter| {
@@ -245,7 +247,7 @@ fn exchange_text(words: &mut dyn Words, text: &mut String) -> Option<()> {
     Some(())
 }
 
-/// Goes through the number of items, then each; `blank` is what an item is read into.
+/// Writes or reads the number of items, then each; `blank` is what an item is read into.
 fn exchange_list<T: Clone>(
     words: &mut dyn Words,
     items: &mut Vec<T>,
@@ -261,7 +263,7 @@ fn exchange_list<T: Clone>(
     items.iter_mut().try_for_each(|item| exchange(words, item))
 }
 
-/// Goes through one item or none, as a list.
+/// Writes or reads one item or none, as a list.
 fn exchange_option<T: Clone>(
     words: &mut dyn Words,
     value: &mut Option<T>,

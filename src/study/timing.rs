@@ -93,6 +93,7 @@ pub(super) struct Clock<'a> {
 }
 
 impl<'a> Clock<'a> {
+    /// Starts the clock.
     pub(super) fn new(report: &'a (dyn Fn(Progress) + Sync)) -> Self {
         Self { start: Instant::now(), report }
     }
@@ -117,11 +118,12 @@ pub(super) struct Countdown<'a> {
 }
 
 impl<'a> Countdown<'a> {
+    /// Makes a countdown, without a forecast yet, for work that begins now.
     pub(super) fn new(report: &'a (dyn Fn(Progress) + Sync)) -> Self {
         Self::since(Instant::now(), report)
     }
 
-    /// Counts down for work that began at `start`.
+    /// Makes a countdown, without a forecast yet, for work that began at `start`.
     pub(super) fn since(start: Instant, report: &'a (dyn Fn(Progress) + Sync)) -> Self {
         Self { start, report, stage: String::new(), since: start, ahead: None }
     }

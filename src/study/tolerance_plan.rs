@@ -54,7 +54,8 @@ impl TolerancePlan {
         }
     }
 
-    /// Returns the tolerances at the ends of the radii, within the bounds, and the radii at which they are reached; all in mm.
+    /// Returns the least and the largest tolerance of a place, those at the ends of its radii kept within the bounds, and the radii at
+    /// which they are reached; all in mm.
     pub(in crate::study) fn range(&self, share: &RelativeTolerance) -> ([f64; 2], [f64; 2]) {
         let clamp = |t: f64| t.clamp(self.finest_mm, self.coarsest_mm);
         let tolerance = share.radii_mm.map(|r| clamp(share.of_radius * r));
@@ -63,7 +64,7 @@ impl TolerancePlan {
         (tolerance, if tolerance[0] == tolerance[1] { share.radii_mm } else { radii })
     }
 
-    /// Returns what the least tolerance would be without the lower bound, mm.
+    /// Returns what the least tolerance would be without the lower bound, mm; of places alone where there are any.
     pub(in crate::study) fn unbounded_mm(&self) -> f64 {
         // Where places have their own, the rest is only a default that no face may use.
         let shares = self.places.iter().chain(self.places.is_empty().then_some(&self.other));
@@ -77,7 +78,7 @@ impl TolerancePlan {
         ends.fold([f64::INFINITY, 0.0], |[a, b], [c, d]| [a.min(c), b.max(d)])
     }
 
-    /// Returns the largest tolerance of any face, mm.
+    /// Returns the largest tolerance, mm, the one for faces without a place among them.
     pub(in crate::study) fn loosest_mm(&self) -> f64 {
         let all = self.places.iter().chain([&self.other]);
         all.map(|share| self.range(share).0[1]).fold(0.0, f64::max)

@@ -65,7 +65,7 @@ fn listed_faces<'e>(bound: &BoundScene, error: &'e GeometricError) -> Vec<&'e Fa
 }
 
 /// Calls `weigh` with every figure of a receiver: its name, its geometric error, the statistical one of the whole run, its value. `sums`
-/// and `cells` are what the errors of both fall to.
+/// and `cells` are the factors from the pilot's statistical errors, of sums and of cells, to those of the whole run.
 fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut(&str, f64, f64, f64)) {
     let s = &r.statistical;
     weigh("power", r.power.geometric(), s.power * sums, r.power.spline);
@@ -89,14 +89,14 @@ fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut
 }
 
 impl Worst {
-    /// Takes the figure `name`, of what and which, in place of the worst so far if it is worse.
+    /// Takes a figure of `of`, with its geometric error, the statistical one of the whole run (`allowed`) and its value, in place of the
+    /// worst so far if it is worse.
     fn weigh(&mut self, [of, figure]: [&str; 2], geometric: f64, allowed: f64, value: f64) {
-        // No figure is asked for beyond a millionth of itself.
         // What facets do not change, or not by a number, is no worst.
         if geometric.is_nan() || geometric <= 0.0 {
             return;
         }
-        // Of a figure that is 0 without an error no multiple is a number to be read.
+        // No figure is asked for beyond a millionth of itself; of one that is 0 without an error no multiple is a number to be read.
         let ratio = (geometric / allowed.max(NEGLIGIBLE * value.abs())).min(LARGEST_RATIO);
         if ratio > self.ratio {
             let share = (value != 0.0).then(|| geometric / value.abs());
@@ -117,7 +117,7 @@ impl Worst {
     }
 }
 
-/// A number with two significant digits: more are noise, as the pilot has a few thousand rays.
+/// Writes a number with two significant digits: more are noise, as the pilot has a few thousand rays.
 fn two_digits(value: f64) -> String {
     if value <= 0.0 || !value.is_finite() {
         return value.to_string();

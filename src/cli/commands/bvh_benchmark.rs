@@ -367,7 +367,8 @@ impl Comparison {
     }
 }
 
-/// Returns the answer of the benchmark in words: rates of octree and CwBvh as shipped on the finest mesh, on one thread, and their ratio.
+/// Returns the answer of the benchmark in words: rates of the octree, asked in batches, and of CwBvh as shipped, asked ray by ray, on the
+/// finest mesh and one thread, and their ratio.
 fn answer_text(rows: &[Value]) -> String {
     let most = rows.iter().filter_map(|r| r["facets"].as_u64()).max().unwrap_or(0);
     let kind = if rows.iter().any(|r| r["rays_kind"] == GIVEN) { GIVEN } else { "incoherent" };

@@ -67,8 +67,8 @@ fn part_selectors(model: &Model) -> Vec<Option<String>> {
     selectors
 }
 
-/// Returns the lines of a part: its name, how often it is placed and as which instances, and its solids. Takes a selector for each of its
-/// faces.
+/// Returns the lines of a part: its name, how often it is placed and as which instances, and its solids with
+/// at most `most` faces each. Takes a selector for each of its faces.
 fn part_text(
     part: &PartAccount,
     places: &[String],

@@ -57,7 +57,7 @@ pub(crate) fn parse_request(words: &[String]) -> Result<ReplayRequest, Failure> 
     Ok(request)
 }
 
-/// Adds the rays of a ledger of lost rays to the request, and its run; a message if it is none or of another run.
+/// Adds the rays of a ledger of lost rays to the request, and its run; fails, with a message, if it is none or of another run.
 fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
     let mut lines = text.lines();
     if lines.next() != Some(COLUMNS) {

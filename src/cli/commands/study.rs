@@ -62,6 +62,7 @@ struct StudyResult {
 }
 
 impl StudyResult {
+    /// Makes the result of rows and the sentence about them; fails where rows have no form as JSON.
     fn new(rows: &impl Serialize, answer: impl Into<String>) -> Result<Self, Failure> {
         let rows = json_value(rows)?;
         Ok(Self { rows, answer: answer.into(), extra_rows: Vec::new(), seed: None })

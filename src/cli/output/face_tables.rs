@@ -16,7 +16,7 @@ const DIGITS: usize = 6;
 /// Digits of sums that stand in a sentence.
 const SAID_DIGITS: usize = 4;
 
-/// The name of a face; its number where the model has too many to be named.
+/// Returns the name of a face; its number where the model has too many to be named.
 fn name(names: &[String], face: &FaceResult) -> String {
     names.get(face.face as usize).cloned().unwrap_or_else(|| format!("face {}", face.face))
 }
@@ -65,7 +65,7 @@ fn face_table(run: &SceneResults, prepared: &PreparedScene) -> Option<Table> {
     Some(table)
 }
 
-/// The section of a page; `None` where the table was not asked for.
+/// Returns the page's section on light by face; `None` where the run did not count it.
 pub(crate) fn face_section(run: &SceneResults, prepared: &PreparedScene) -> Option<Section> {
     Some(Section::new("Light by face").with_block(face_table(run, prepared)?))
 }

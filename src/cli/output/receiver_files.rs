@@ -87,7 +87,7 @@ pub(crate) fn names(receiver: &Receiver) -> Vec<String> {
     common.iter().chain(own).map(|ending| format!("{stem}{ending}")).collect()
 }
 
-/// The sampled rays of a plane or disc as a TM-25 file.
+/// Makes a TM-25 file of the sampled rays of a plane or disc, their powers scaled to carry what the receiver counted in all.
 fn sampled_rays(receiver: &ReceiverResult, rays: &[LightRay]) -> Tm25 {
     let flux = if receiver.unit == "lx" { Flux::Luminous } else { Flux::Radiant };
     let total: f64 = rays.iter().map(|ray| ray.power).sum();
@@ -109,7 +109,7 @@ const ADDITIONAL: usize = 7;
 /// nearest cells, at a pole the mean of its ring. `None` for other receivers, and where its ranges are not those of a whole luminaire.
 ///
 /// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, mostly within a thousandth of
-/// 1, so that their flux is the receiver's.
+/// 1, so that their flux is `lumens`.
 fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Photometry> {
     let half_turn = [-90.0, 90.0];
     // Light of a luminaire may go up or down alone (LM-63-2002, 5.11).

@@ -68,7 +68,8 @@ impl<'a> Checkpoint<'a> {
         self.every.min(LOOK_EVERY)
     }
 
-    /// Reads what an earlier run of the same scene, files, options and program left behind, and what it took; `None` when there is no file.
+    /// Reads what an earlier run of the same scene, files, options and program left behind, and notes what it took for later saves; `None`
+    /// when there is no file.
     ///
     /// # Errors
     /// When the file cannot be read, is damaged or is of another run.
@@ -136,6 +137,7 @@ impl<'a> Checkpoint<'a> {
         Ok(write_atomic(&self.file, |w| sum.write(&header, w))?)
     }
 
+    /// Locks what earlier processes took for this run.
     fn earlier(&self) -> MutexGuard<'_, Usage> {
         self.earlier.lock().unwrap_or_else(|e| e.into_inner())
     }

@@ -52,7 +52,7 @@ pub(crate) struct Contenders<'s> {
 }
 
 impl<'a> Structures<'a> {
-    /// Builds them all, once a part that is placed often; the spline's are cut for so many rays. Shows a sign of life.
+    /// Builds them all, of a part that is placed often once; the spline's patches are cut for as many rays as are asked. Shows a spinner.
     pub(crate) fn build(
         model: &'a Model,
         facets: &'a GroupedFacets,

@@ -76,7 +76,7 @@ pub(crate) fn write(prepared: &PreparedScene, file: Option<&Path>, console: &Con
     Ok(())
 }
 
-/// Returns the number of the face as NPZ holds it.
+/// Returns the number of the face where a ray ended, as both files hold it: [`NO_FACE`] for none.
 fn face(end: &ListedEnd) -> i64 {
     end.face.map_or(NO_FACE, i64::from)
 }

@@ -62,7 +62,8 @@ fn is_inside(input: &Path, folder: &Path, is_written: &impl Fn(&Path) -> bool) -
     places(input).iter().flatten().any(inside)
 }
 
-/// Returns the place of a file without links in its folder, and without any; `None` for what is not there.
+/// Returns the path of a file with the links in its folder followed, and with a link at its own name followed too; `None` where the folder,
+/// or the file, is not there.
 fn places(path: &Path) -> [Option<PathBuf>; 2] {
     let folder = folder_of(path).canonicalize().ok();
     let name = path.file_name();

@@ -82,7 +82,7 @@ impl Drop for OutputPlace {
     }
 }
 
-/// The failure that names the process that stands in the lock file.
+/// Returns the failure that names the process that stands in the lock file.
 fn owned_by_another(folder: &Path, file: &mut File) -> Failure {
     let mut owner = String::new();
     let read = file.rewind().and_then(|()| file.take(LOCK_BYTES).read_to_string(&mut owner));

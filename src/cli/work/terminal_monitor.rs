@@ -38,6 +38,7 @@ impl<'a> TerminalMonitor<'a> {
         Self { is_saveable: true, paths, ..Self::new(console) }
     }
 
+    /// Locks what is on the terminal at present.
     fn shown(&self) -> MutexGuard<'_, Shown> {
         self.shown.lock().unwrap_or_else(|e| e.into_inner())
     }

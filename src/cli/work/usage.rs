@@ -27,7 +27,7 @@ impl Usage {
         Self(BTreeMap::from([(machine::name(), usage)]))
     }
 
-    /// Adds what other parts took, machine by machine: times of threads add up, of the slowest part the longest counts.
+    /// Adds what other parts took, machine by machine: their number and times of threads add up, of their durations the longest counts.
     pub(crate) fn add(&mut self, other: &Self) {
         for (machine, theirs) in &other.0 {
             let Some(mine) = self.0.get_mut(machine) else {
@@ -41,7 +41,8 @@ impl Usage {
         }
     }
 
-    /// Adds what an earlier process took for this same part: on one machine times add up, and the part counts where it ends.
+    /// Returns the usage with what an earlier process took for this same part: on one machine times add up, and the part counts where it
+    /// ends.
     pub(crate) fn continue_from(mut self, other: &Self) -> Self {
         for (machine, theirs) in &other.0 {
             match self.0.get_mut(machine) {

@@ -35,7 +35,7 @@ pub fn accuracy(
     let mut blocks: Vec<(usize, Vec<Row>)> = vec![(0, std::mem::take(&mut study.rows))];
     // One in the middle, which is quick and tells most of the rest, then the finest, whose facets cost most, then coarse to fine.
     let mut order: Vec<usize> = (0..settings.tolerances.len()).collect();
-    order.sort_by(|&a, &b| ahead.fineness(b).total_cmp(&ahead.fineness(a)));
+    order.sort_by(|&a, &b| ahead.log_tolerance(b).total_cmp(&ahead.log_tolerance(a)));
     let first: Vec<usize> = order.get(order.len() / 2).into_iter().chain(order.last()).copied().collect();
     order.retain(|k| !first.contains(k));
     for k in first.iter().copied().take(settings.tolerances.len()).chain(order) {
@@ -71,14 +71,14 @@ struct Forecast {
 
 impl Forecast {
     /// Returns the logarithm of the geometric middle of the `k`-th range of tolerances.
-    fn fineness(&self, k: usize) -> f64 {
+    fn log_tolerance(&self, k: usize) -> f64 {
         0.5 * (self.tolerances[k][0] * self.tolerances[k][1]).ln()
     }
 
     /// Forecasts the seconds of all tolerances to come. Meshing and building go with the facets, that is with 1/tolerance; tracing grows
     /// evenly with its logarithm, by about a tenth per halving where only one tolerance is known.
     fn seconds(&self) -> f64 {
-        let mut known: Vec<(f64, [f64; 2])> = self.known.iter().map(|&(k, s)| (self.fineness(k), s)).collect();
+        let mut known: Vec<(f64, [f64; 2])> = self.known.iter().map(|&(k, s)| (self.log_tolerance(k), s)).collect();
         known.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (Some(&first), Some(&last)) = (known.first(), known.last()) else {
             return self.guess * self.tolerances.len() as f64;
@@ -90,7 +90,7 @@ impl Forecast {
             prepare * (at - x).exp() + trace * slower
         };
         let one = |k: usize| {
-            let x = self.fineness(k);
+            let x = self.log_tolerance(k);
             let i = known.partition_point(|p| p.0 < x);
             // Between two that are known, along the two laws; beyond them, by the laws from the nearest one.
             match (i.checked_sub(1).map(|j| known[j]), known.get(i)) {
@@ -139,6 +139,7 @@ impl Sweep<'_> {
         rounds.run(self.settings.rounds).into_iter().map(|r| r.1).collect()
     }
 
+    /// Makes a structure ready to race, without hits yet.
     fn runner<'a>(&self, who: &'a dyn Intersector) -> Runner<'a> {
         Runner { who, hits: Mutex::new(vec![None; self.rays.len()]) }
     }

@@ -6,7 +6,8 @@ use crate::study::cross_check::angle_deg;
 use crate::study::mesh_source::{reflect, refract};
 
 /// Returns how far off, degrees, light of direction `incoming` leaves its hit on facets, by its hit on the spline; `None` where the two are
-/// on faces that are not in one place, within `apart_mm` along the normal. `relative_index` is that of [`direction_error_deg`] for a face.
+/// on faces that do not touch back to back, within `apart_mm` along the normal. `relative_index` is that of [`direction_error_deg`] for a
+/// face.
 pub(super) fn error_of_hit(
     incoming: Vector,
     [facet, spline]: [&Hit; 2],

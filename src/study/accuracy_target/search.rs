@@ -168,6 +168,7 @@ struct ReferenceRays {
 }
 
 impl ReferenceRays {
+    /// Asks the spline all rays, on the current rayon pool, and keeps its hits.
     fn new(mesh_source: &dyn MeshSource, rays: Vec<Ray>) -> Self {
         let mut truth = vec![None; rays.len()];
         answer(mesh_source.exact(), &rays, rayon::current_num_threads(), &mut truth);
@@ -290,7 +291,8 @@ impl Search<'_> {
         Candidate { normals, plan, order, facets, predicted: m.prepare * ratio + trace }
     }
 
-    /// Returns the most facets that the next mesh may have.
+    /// Returns the most facets that the next mesh may have: those of one mesh, or what is left of those of the whole search; may be
+    /// negative.
     fn affordable(&self) -> f64 {
         let most = self.target.most_facets;
         most.min(LARGEST_MESHES * most - self.made.get())

@@ -114,7 +114,7 @@ impl Survey {
     }
 
     /// Estimates the facets that a plan makes, from those that `other` made (`made`, the face of each): on each face they go with the
-    /// inverse of the tolerance.
+    /// inverse of the tolerance, and are half of those at least.
     pub(super) fn expected_facets(&self, plan: &TolerancePlan, other: &TolerancePlan, made: &[FaceId]) -> f64 {
         let places = self.place_of(plan);
         let mean = |plan: &TolerancePlan, k: Option<usize>| {

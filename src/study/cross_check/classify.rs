@@ -56,7 +56,7 @@ impl<'a> Classifier<'a> {
         self.surfaces[face.index()].get_or_init(|| PlacedSurface::new(placed)).as_ref()
     }
 
-    /// Returns the sag of a facet, mm: proved, or what was asked of the mesher.
+    /// Returns the sag of a facet, mm: the proved one, else the fallback.
     fn sag(&self, facet: u32) -> f64 {
         self.proved_sag(facet).unwrap_or(self.fallback)
     }

@@ -22,7 +22,8 @@ struct Local<'c, 'a> {
 }
 
 impl<'a> Classifiers<'a> {
-    /// Makes a classifier for each group's model and mesh; there is one group, and no `instancing`, for a model in one piece.
+    /// Makes a classifier for each group's model and mesh; there is one group, and no `instancing`, for a model in one piece. `fallback`
+    /// is that of [`Classifier::new`].
     pub(super) fn new(
         groups: &[(&'a Model, &'a FacetMesh)],
         instancing: Option<&'a Instancing>,

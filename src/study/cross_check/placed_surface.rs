@@ -88,8 +88,9 @@ impl PlacedSurface {
         self.size
     }
 
-    /// Returns the point of the surface nearest to `p`, searched from a guess in parameters; where that ends at the end of the domain, from
-    /// the four nearest samples too. Trims are not heeded. `direction` is that along which its curvature is told.
+    /// Returns the point of the surface nearest to `p`, with its parameters, the signed distance of `p` and the curvature along
+    /// `direction`. It is searched from a guess in parameters and, where that ends at the end of the domain, from the four nearest
+    /// samples too. Trims are not heeded.
     pub(super) fn foot(&self, p: Point, guess: Uv, direction: Vector) -> Foot {
         let near = self.project(p, guess);
         let mut best = self.describe(p, near, direction);

@@ -47,11 +47,12 @@ pub(super) struct Cell {
 }
 
 impl Cell {
+    /// Returns how much more the cell got on facets than on the spline, quanta.
     fn difference(&self) -> f64 {
         self.facets - self.spline
     }
 
-    /// Returns the square of the difference less what noise adds to it on average; may be negative.
+    /// Returns the square of the difference less what noise adds to it on average, quanta²; may be negative.
     fn excess(&self) -> f64 {
         self.difference().powi(2) - self.difference_variance
     }
@@ -66,7 +67,7 @@ struct Block {
 }
 
 impl Block {
-    /// Makes a square.
+    /// Makes a square of `side` cells a side whose first cell is in column `x` and row `y`.
     fn square(x: usize, y: usize, side: usize) -> Self {
         Self { x, y, size: [side; 2] }
     }
@@ -135,7 +136,7 @@ impl<'r> CellPairs<'r> {
         rows.flat_map(move |y| (block.x..(block.x + width).min(nx)).map(move |x| y * nx + x))
     }
 
-    /// Returns the side of the smallest square of a power of two that covers the grid.
+    /// Returns the side, cells, of the smallest square that covers the grid and has a power of two of them a side.
     fn covering_side(&self) -> usize {
         self.grid[0].max(self.grid[1]).next_power_of_two()
     }

@@ -21,12 +21,13 @@ struct Means {
     square: f64,
 }
 
-/// Goes through what each replicate brought to a receiver.
+/// Iterates over what each traced replicate brought to a receiver, in their order.
 fn replicate_sums(run: &ReplicatedRun, receiver: usize) -> impl Iterator<Item = &ReplicateSums> {
     run.replicates.iter().filter_map(move |r| r.get(receiver))
 }
 
 impl Means {
+    /// Sums up what all replicates brought to a receiver; a dark one counts as one quantum at its centre.
     fn new(run: &ReplicatedRun, receiver: usize, axis: usize) -> Self {
         let power = replicate_sums(run, receiver).map(|s| s.power as f64).sum::<f64>().max(1.0);
         let mean = replicate_sums(run, receiver).map(|s| s.first[axis]).sum::<f64>() / power;
@@ -64,7 +65,7 @@ fn paired_figure(facets: &Influence, spline: &Influence, scale: f64) -> Paired {
     Paired { facets: scale * facets.value, spline: scale * spline.value, error: scale * error }
 }
 
-/// Compares the power of a receiver in both runs, facets first.
+/// Compares the power of a receiver, in the unit of the sources, in both runs, facets first.
 pub(super) fn power(runs: [&ReplicatedRun; 2], receiver: usize) -> Paired {
     let [facets, spline] = runs.map(|run| run.results.receivers[receiver].power);
     Paired {
@@ -87,7 +88,8 @@ fn error_of_difference(runs: [&ReplicatedRun; 2], receiver: usize, quanta: impl 
     error_of_sum(&facets.zip(spline).map(|(a, b)| a - b).collect::<Vec<_>>())
 }
 
-/// Compares mean position, root mean square about the receiver's centre, and about the mean position, along an axis, in mm or degrees.
+/// Compares, along axis 0 or 1, the mean position, the root mean square distance from the receiver's centre, and that from the mean
+/// position, in this order, in mm or degrees.
 pub(super) fn moments(runs: [&ReplicatedRun; 2], receiver: usize, axis: usize) -> [Paired; 3] {
     let result = &runs[1].results.receivers[receiver];
     let (half, middle) = (result.half[axis], result.middle[axis]);

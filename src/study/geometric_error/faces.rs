@@ -27,12 +27,12 @@ pub struct FaceError {
 }
 
 impl FaceError {
-    /// Returns what the spline has the face absorb and let out: faces are listed by it.
+    /// Returns the power that the face absorbed plus that which left its body through it, on the spline: faces are listed by it.
     pub fn listed_power(&self) -> f64 {
         self.absorbed.spline + self.left.spline
     }
 
-    /// Returns the geometric errors of what is absorbed, enters and leaves; `lost` is power that might have come to any face.
+    /// Returns the geometric errors of what is absorbed, enters and leaves; each contains `lost`, power that might have come to any face.
     pub fn geometric(&self, lost: f64) -> [f64; 3] {
         [self.absorbed, self.entered, self.left].map(|paired| paired.geometric().hypot(lost))
     }
@@ -50,6 +50,7 @@ struct PairedSums {
 }
 
 impl PairedSums {
+    /// Adds what one replicate brought on facets and on the spline, quanta.
     fn add(&mut self, facets: u64, spline: u64) {
         let [facets, spline] = [facets as f64, spline as f64];
         self.totals[0] += facets;
@@ -58,14 +59,14 @@ impl PairedSums {
         self.spline_squares += spline * spline;
     }
 
-    /// Both values, and the standard error of their difference over so many replicates.
+    /// Returns both powers, and the standard error of their difference over so many replicates; `quantum` is the power of one.
     fn paired(&self, replicates: usize, quantum: f64) -> Paired {
         let error = variance_of_sum(self.squares, self.totals[0] - self.totals[1], replicates).sqrt() * quantum;
         let [facets, spline] = self.totals.map(|total| total * quantum);
         Paired { facets, spline, error }
     }
 
-    /// The standard error of the spline's value.
+    /// Returns the standard error of the power on the spline.
     fn statistical(&self, replicates: usize, quantum: f64) -> f64 {
         variance_of_sum(self.spline_squares, self.totals[1], replicates).sqrt() * quantum
     }

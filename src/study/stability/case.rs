@@ -37,7 +37,8 @@ pub(super) struct Truth {
 }
 
 impl Truth {
-    /// Makes a truth: a hit at distance `t`, mm, that stays one while the surface moves by less than `margin`, mm.
+    /// Makes a truth: a hit at distance `t`, mm, that stays one while the surface moves by less than `margin`, mm. `cos` is that of the
+    /// angle of incidence, of either sign.
     pub(super) fn hit(t: f64, cos: f64, margin: f64) -> Self {
         Self { t: Some(t), cos: cos.abs(), margin, normal: None }
     }
@@ -49,6 +50,7 @@ impl Truth {
     pub(super) fn distance(&self) -> f64 {
         self.t.unwrap_or(0.0)
     }
+    /// Returns the truth with this outward unit normal at the hit.
     pub(super) fn with_normal(self, normal: Vector) -> Self {
         Self { normal: Some(normal), ..self }
     }

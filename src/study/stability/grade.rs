@@ -288,7 +288,7 @@ impl Grader<'_> {
     }
 
     /// Asks for a hit inside a sphere and from there for the other end of a chord, and grades that end; wrong, or flagged, where either is
-    /// missed.
+    /// missed; facets may miss a chord that their sag may hide.
     fn grade_chord(&self, toward: &Ray, direction: Vector, radius: f64) -> Grade {
         let frame = &self.scene.frame;
         let first = self.scene.ray(toward);
