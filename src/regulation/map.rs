@@ -154,11 +154,10 @@ impl IntensityMap {
             let to = v + sensor.half_deg * (2.0 * (band + 1) as f64 / bands as f64 - 1.0);
             // The band's width at its middle.
             let offset = 0.5 * (from + to) - v;
-            // Degrees of azimuth are shorter towards the poles.
             let half =
                 if sensor.round { (sensor.half_deg.powi(2) - offset.powi(2)).sqrt() } else { sensor.half_deg };
             // By the elevation of the aim, not of the band: over an opening of a degree they hardly differ.
-            let half = half / v.to_radians().cos().max(LEAST_COSINE);
+            let half = azimuth_deg(half, v);
             let (rows, columns) = (self.v.cells(), self.h.cells());
             let h_parts: Vec<Overlap> = self.h.overlaps(h - half, h + half)?.collect();
             for v_part in self.v.overlaps(from, to)? {
@@ -179,6 +178,13 @@ impl IntensityMap {
             *weight /= total;
         }
         Some(measurement)
+    }
+
+    /// How far a photometer's opening aimed at `(h, v)` reaches beyond the sides of the map, degrees of azimuth.
+    pub(super) fn beyond_sides(&self, sensor: Sensor, [h, v]: [f64; 2]) -> f64 {
+        let [left, right] = self.h.extent();
+        let half = azimuth_deg(sensor.half_deg, v);
+        (left - (h - half)).max(h + half - right).max(0.0)
     }
 
     /// Adds `amount` times how much brighter a cell gets over its width along an axis. On the axis the cell has this place, of so many, and
@@ -256,6 +262,11 @@ impl IntensityMap {
         }
         noise
     }
+}
+
+/// The azimuth that an angle to the side takes at an elevation, degrees: more towards the poles.
+fn azimuth_deg(angle_deg: f64, v_deg: f64) -> f64 {
+    angle_deg / v_deg.to_radians().cos().max(LEAST_COSINE)
 }
 
 #[cfg(test)]
