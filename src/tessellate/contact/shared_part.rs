@@ -53,7 +53,7 @@ impl Union<'_> {
         }
     }
 
-    /// Where a position of one of the meshes is now.
+    /// Returns the position here for one of `mesh`; `None` for one of its own that was not added.
     fn position(&self, mesh: &FaceMesh, position: Position) -> Option<Position> {
         match position {
             Position::Shared(_) => Some(position),
