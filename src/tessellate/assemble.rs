@@ -300,7 +300,7 @@ impl Renumbering {
         edge.is_some_and(|e| self.changed.get(e.0 as usize).is_none_or(|&c| c))
     }
 
-    /// Returns the mesh with its shared positions renumbered. Only for a face none of whose edges has changed.
+    /// Returns the mesh with its shared positions renumbered. That of a face with a changed edge is of no use until it is made anew.
     pub(super) fn renumbered(&self, mut mesh: FaceMesh) -> FaceMesh {
         for corner in &mut mesh.corners {
             if let Position::Shared(p) = &mut corner.position {

@@ -14,7 +14,7 @@ use crate::model::Model;
 const SAMPLE_ROUNDING: [f64; 2] = [1e-9, 1e-10];
 
 /// Returns placed meshes with a report of them filled in, all but the times and the causes of failures; samples are taken only if
-/// [`Settings::measure`] says so.
+/// [`Settings::measure`] says so, but always of what is not certified on repaired faces.
 pub(super) fn evaluate(placed: Placed, model: &Model, settings: &Settings) -> Tessellation {
     let Placed { mut made, failed, repairs, originals } = placed;
     let mut report = std::mem::take(&mut made.report);
