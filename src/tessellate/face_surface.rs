@@ -181,6 +181,7 @@ impl<'a> FaceSurface<'a> {
         patch.second_derivatives(patch_uv(patch, uv))
     }
 
+    /// Returns the fundamental forms at parameters inside the domain; `None` at poles and cusps.
     fn forms(&self, uv: Uv) -> Option<FundamentalForms> {
         FundamentalForms::new(&self.second_derivatives(uv))
     }
