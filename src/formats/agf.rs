@@ -55,7 +55,7 @@ impl AgfGlass {
 pub fn read_agf(path: &Path) -> Result<Vec<AgfGlass>, Error> {
     let bytes = read_bytes(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     let mut glasses: Vec<AgfGlass> = Vec::new();
-    for (number, line) in decoded(&bytes).lines().enumerate() {
+    for (number, line) in decode_text(&bytes).lines().enumerate() {
         let mut words = line.split_whitespace();
         let Some(kind) = words.next() else { continue };
         let fault = |message: String| Error::at_line(path, number + 1, message);
@@ -93,7 +93,7 @@ pub fn read_agf(path: &Path) -> Result<Vec<AgfGlass>, Error> {
 }
 
 /// Decodes a file by its byte order mark, as UTF-8 without one; bytes that are no character become U+FFFD, which stand in comments alone.
-fn decoded(bytes: &[u8]) -> String {
+fn decode_text(bytes: &[u8]) -> String {
     let wide = |unit: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|c| unit([c[0], c[1]])).collect();
         String::from_utf16_lossy(&units)

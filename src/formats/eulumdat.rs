@@ -20,8 +20,8 @@ pub fn read_eulumdat(path: &Path) -> Result<Photometry, Error> {
 /// Lines of a file, from 0, that hold numbers which a luminaire may lack: dimensions, shares of the flux, conversion factor, tilt.
 const OPTIONAL_NUMBERS: Range<usize> = 12..25;
 
-/// Returns the text with 0 in place of the numbers that programs leave blank and the reader needs not.
-fn filled(text: &str) -> String {
+/// Returns the text with 0 on those of its lines of [`OPTIONAL_NUMBERS`] that are blank, as some programs leave them.
+fn fill_blank_numbers(text: &str) -> String {
     let number = |(k, line)| if OPTIONAL_NUMBERS.contains(&k) && str::trim(line).is_empty() { "0" } else { line };
     text.lines().enumerate().map(number).collect::<Vec<_>>().join("\n")
 }
@@ -32,7 +32,7 @@ fn filled(text: &str) -> String {
 /// As [`read_eulumdat`].
 pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
     let malformed = |m: String| Error::new(path, ErrorKind::Malformed(m));
-    let ldt = Eulumdat::parse(&filled(text)).map_err(|e| {
+    let ldt = Eulumdat::parse(&fill_blank_numbers(text)).map_err(|e| {
         // The crate counts lines from 0.
         let message = e.to_string();
         let place = message.strip_prefix("Parse error at line ").and_then(|m| m.split_once(": "));

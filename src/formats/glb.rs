@@ -33,7 +33,7 @@ impl Buffer {
         self.views.len() - 1
     }
 
-    /// Adds vectors of vertices with their bounds, at least one; returns the number of their accessor.
+    /// Adds vectors, at least one, one a vertex, with their bounds; returns the number of their accessor.
     fn add_vectors(&mut self, list: &[[f32; 3]]) -> usize {
         let view = self.add_view(list.iter().flatten().flat_map(|x| x.to_le_bytes()), 34962);
         // The standard asks for the bounds of positions; for normals they do no harm.
@@ -149,13 +149,13 @@ pub(super) fn write(path: &Path, facets: &Facets) -> Result<(), Error> {
         document["bufferViews"] = buffer.views.into();
         document["accessors"] = buffer.accessors.into();
     } else {
-        nodes_without_children(&mut document);
+        remove_children_of_root(&mut document);
     }
     write_container(path, &document, &buffer.bytes)
 }
 
 /// Removes the list of children of the first node, which glTF forbids to be empty.
-fn nodes_without_children(document: &mut Value) {
+fn remove_children_of_root(document: &mut Value) {
     if let Some(node) = document["nodes"][0].as_object_mut() {
         node.remove("children");
     }

@@ -13,8 +13,8 @@ const LONGEST_NUMBER: usize = 24;
 
 /// Reads an IES LM-63 file.
 ///
-/// All multipliers (candela multiplier, ballast factor, ballast-lamp factor) are applied. A tilt table is read and left
-/// out: it holds for tilted lamps alone.
+/// All multipliers are applied: candela multiplier, ballast factor and, before the edition of 2019, ballast-lamp factor. A tilt table is
+/// read and left out: it holds for tilted lamps alone.
 ///
 /// # Errors
 /// When the file cannot be read or is not LM-63; the message names the line.

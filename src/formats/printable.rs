@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 
 /// Whether a terminal or a viewer would act on the character rather than show it: control characters (C0 without line end and
-/// tabulator, DEL, C1), the marks that turn the direction of writing, the separators of lines and paragraphs, and the
-/// invisible tags and shy characters that hide text.
+/// tabulator, DEL, C1), the marks that turn the direction of writing, the separators of lines and paragraphs, byte order
+/// marks, the marks of annotations and invisible tags.
 pub fn is_unprintable(c: char) -> bool {
     match c {
         // Line ends and tabulators lay text out; a viewer that shows them does no harm.
@@ -44,7 +44,8 @@ pub fn printable_line(text: &str) -> Cow<'_, str> {
     printable(text)
 }
 
-/// Replaces every unprintable character by one of as many bytes, so that places in the text stay where they are.
+/// Replaces every unprintable character by a printable one of as many bytes, so that places in the text stay where they are; a text
+/// without any is borrowed.
 pub fn printable_in_place(text: &str) -> Cow<'_, str> {
     if !text.contains(is_unprintable) {
         return Cow::Borrowed(text);

@@ -58,7 +58,8 @@ struct RowReader<'a> {
 }
 
 impl RowReader<'_> {
-    /// Returns the ray of a line, whose number from 1 errors name; `None` for a comment, an empty line or the header.
+    /// Returns the ray of a line, whose number from 1 errors name; `None` for a comment, an empty line or the header. The first line that
+    /// is none of the former two sets the order and number of columns for all others.
     fn ray(&mut self, number: usize, line: &str) -> Result<Option<LightRay>, Error> {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {

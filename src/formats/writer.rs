@@ -32,7 +32,7 @@ impl Writer {
         Self { machine: Some(this_machine()), process: std::process::id() }
     }
 
-    /// The writer whose name a text begins with.
+    /// The writer whose name, or process number alone, a text begins with; `None` where it begins with neither.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let (first, rest) = text.split_once('.')?;
         let number = |text: &str| {
@@ -46,7 +46,8 @@ impl Writer {
         }
     }
 
-    /// Whether it is no more, going by its number where that means anything here, else by how long its file stands still.
+    /// Whether it is no more, going by its number where that means anything here, else by whether its file has stood still for longer than
+    /// [`STILL`].
     pub(super) fn is_gone(&self, still: Option<Duration>) -> bool {
         if self.machine == Some(this_machine())
             && let Some(runs) = runs_here(self.process)
@@ -66,13 +67,13 @@ impl fmt::Display for Writer {
     }
 }
 
-/// Whether a process of this machine runs; only Linux shows processes as folders.
+/// Whether a process of this machine runs; `None` where the system does not tell: only Linux shows processes as folders.
 fn runs_here(process: u32) -> Option<bool> {
     let shows = std::fs::exists("/proc/self").ok()?;
     if shows { std::fs::exists(format!("/proc/{process}")).ok() } else { None }
 }
 
-/// The mark of this machine.
+/// The mark of this machine: a hash of what tells it, its boot and its numbering of processes from others, made once.
 fn this_machine() -> u32 {
     static MARK: OnceLock<u32> = OnceLock::new();
     *MARK.get_or_init(|| {

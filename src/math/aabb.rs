@@ -99,7 +99,8 @@ impl Aabb {
         })
     }
 
-    /// Where a ray that starts inside comes out, rounded by some 1e-16 of the box's coordinates. A side that it runs in is none.
+    /// The `t` at which a ray that starts inside comes out, rounded by some 1e-16 of the box's coordinates; the ray's own range does not
+    /// count. Infinite where it runs along sides alone.
     #[inline]
     pub fn exit(&self, ray: &Ray) -> f64 {
         let inverse = ray.direction.recip();

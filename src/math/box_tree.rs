@@ -40,7 +40,8 @@ impl Default for BoxTree {
 }
 
 impl BoxTree {
-    /// Builds a tree of these boxes, halved and halved again at the middle one along the longest side of their centres; there may be none.
+    /// Builds a tree of these boxes, halved and halved again at the middle one along the longest side of the box around their centres;
+    /// there may be none. Panics for 2³¹ boxes and more.
     ///
     /// ```
     /// use lampyris::math::{Aabb, BoxTree, Point, Ray, Vector};
@@ -62,7 +63,7 @@ impl BoxTree {
         tree
     }
 
-    /// Adds the node of these boxes, at least one, and all below it; returns its index. `leaves` is sorted on the way.
+    /// Adds the node of these boxes, at least one, and all below it; returns its index. `leaves`, the boxes' indices, are reordered.
     fn add_node(&mut self, leaves: &mut [u32], boxes: &[Aabb]) -> u32 {
         let index = self.nodes.len();
         let (zeros, none) = ([[0.0; WIDTH]; 3], [0; WIDTH]);
@@ -129,8 +130,8 @@ fn union(leaves: impl Iterator<Item = u32>, boxes: &[Aabb]) -> Aabb {
     leaves.fold(Aabb::EMPTY, |sum, k| sum.union(boxes[k as usize]))
 }
 
-/// Parts the indices of boxes at the middle one along the longest side of their centres, reordering them in place; the first half of a
-/// single box is empty.
+/// Parts the indices of boxes at the middle one along the longest side of the box around their centres, reordering them in place; the
+/// first half of a single box is empty.
 fn halves<'l>(leaves: &'l mut [u32], boxes: &[Aabb]) -> (&'l mut [u32], &'l mut [u32]) {
     let middle = leaves.len() / 2;
     if middle > 0 {
@@ -165,7 +166,7 @@ impl Node {
 }
 
 /// The boxes that a ray crosses, in about the order in which it enters them: a farther one may come first where nodes overlap, so that a
-/// search may end at the `end` of what is left alone.
+/// search for the nearest goes on, with a nearer `end`, until none is left.
 #[derive(Clone, Debug)]
 pub struct BoxWalk<'t> {
     tree: &'t BoxTree,

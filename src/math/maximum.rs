@@ -5,8 +5,8 @@ const STEPS: usize = 128;
 /// Standard errors beyond which a value is taken as never to be the largest.
 const REACH: f64 = 6.0;
 
-/// Returns the standard error of the largest of many values: its own, and what the largest of noisy ones exceeds the largest true one by. 0
-/// without values.
+/// Returns the error of the largest of `values`, whose standard errors are `errors`: the root of the sum of squares of its own and of what
+/// the largest of noisy values exceeds the largest true one by. 0 without values.
 ///
 /// The excess is that of the largest after the noise is added once more (Efron, *Bootstrap Methods*, 1979), by the integral of the
 /// distribution of a maximum of independent normal values.

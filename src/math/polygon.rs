@@ -7,7 +7,7 @@ pub(crate) fn polygon_sides(polygon: &[Uv]) -> impl Iterator<Item = [Uv; 2]> + C
     (0..polygon.len()).map(move |k| [polygon[k], polygon[(k + 1) % polygon.len()]])
 }
 
-/// Returns the u at which a side crosses the row `v`, which must lie between its ends.
+/// Returns the u at which a side crosses the line of constant `v`, which must lie between its ends.
 pub(crate) fn row_crossing([a, b]: [Uv; 2], v: f64) -> f64 {
     a.x + (v - a.y) / (b.y - a.y) * (b.x - a.x)
 }

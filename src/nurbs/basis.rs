@@ -92,7 +92,8 @@ struct LowerDegrees<const W: usize> {
     widths: [[f64; W]; 2],
 }
 
-/// Cox–de Boor (*The NURBS Book*, A2.2): all terms are positive inside the span, so that nothing cancels.
+/// Evaluates at `t` the functions of a span and of the two degrees below by Cox–de Boor (*The NURBS Book*, A2.2): all terms are positive
+/// inside the span, so that nothing cancels.
 #[inline(always)]
 fn lower_degrees<const W: usize>(knots: &[f64], degree: usize, span: usize, t: f64) -> LowerDegrees<W> {
     assert!(degree < W && span >= degree && span + degree < knots.len());

@@ -281,12 +281,12 @@ impl BandMatrix {
         matrix
     }
 
-    /// The rows below `k`, or columns right of it, within the band.
+    /// Returns the indices of the rows below `k`, which are those of the columns right of it, within the band.
     fn below(&self, k: usize) -> Range<usize> {
         k + 1..(k + 1 + self.half_width).min(self.rows.len())
     }
 
-    /// Solves for as many unknown points as rows.
+    /// Returns the control points whose spline has these values at the nodes, one a row.
     fn solve(&self, values: &[Homogeneous]) -> Vec<Homogeneous> {
         let mut x = values.to_vec();
         let n = self.half_width;

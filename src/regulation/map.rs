@@ -1,7 +1,7 @@
 //! A far field as a photometer reads it: intensities over azimuth and elevation with the errors of every cell.
 
+use super::cell_axis::{CellAxis, Overlap};
 use super::few_rays::{LandedRays, MANY_REPLICATES, Noise, RaySample};
-use std::collections::BTreeMap;
 
 /// Cosine of the elevation that an opening's width is divided by at least: at the poles, where it would be endless, it is wider than
 /// any map and so leaves it.
@@ -10,9 +10,9 @@ const LEAST_COSINE: f64 = 1e-3;
 /// Luminous intensities in cells over azimuth H and elevation V (type A angles: the polar axis is vertical).
 #[derive(Clone, Debug)]
 pub struct IntensityMap {
-    /// Borders of the cells, degrees.
-    h_edges: Vec<f64>,
-    v_edges: Vec<f64>,
+    /// Measured in radians of azimuth, and by the sine of the elevation: their product is a solid angle.
+    h: CellAxis,
+    v: CellAxis,
     /// Row after row, V slow: candela, its statistical and its geometric standard error.
     cells: Vec<[f64; 3]>,
     /// What is known of the rays that made them.
@@ -46,16 +46,28 @@ impl Reading {
 /// What a photometer in one or several directions adds up: cells with weights.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Measurement {
-    /// By index of the cell.
-    // Ordered: sums over cells come in one order, and two runs agree to the last bit.
-    weights: BTreeMap<usize, f64>,
+    /// Cells by their rising index.
+    // Ordered: sums over cells come in one order, and two runs agree to the last bit. A list: most hold a dozen of cells.
+    weights: Vec<(usize, f64)>,
 }
 
 impl Measurement {
+    /// Adds to the weight of a cell.
+    fn add(&mut self, cell: usize, amount: f64) {
+        // Cells come nearly in order.
+        match self.weights.last() {
+            Some(last) if cell <= last.0 => match self.weights.binary_search_by_key(&cell, |w| w.0) {
+                Ok(place) => self.weights[place].1 += amount,
+                Err(place) => self.weights.insert(place, (cell, amount)),
+            },
+            _ => self.weights.push((cell, amount)),
+        }
+    }
+
     /// Adds `factor` times another measurement of the same map; cells that both hold are then counted with their correlation.
     pub(super) fn plus(mut self, factor: f64, other: &Self) -> Self {
         for (cell, weight) in &other.weights {
-            *self.weights.entry(*cell).or_insert(0.0) += factor * weight;
+            self.add(*cell, factor * weight);
         }
         self
     }
@@ -91,7 +103,9 @@ impl IntensityMap {
         if cells.iter().flatten().any(|x| !x.is_finite()) {
             return Err("an intensity or an error is no finite number".into());
         }
-        Ok(Self { h_edges, v_edges, cells, landed: None })
+        let h = CellAxis::new(h_edges, f64::to_radians);
+        let v = CellAxis::new(v_edges, |v| v.to_radians().sin());
+        Ok(Self { h, v, cells, landed: None })
     }
 
     /// Adds what is known of the rays that made the map: a reading of few of them is then judged by what may not have come. Errors of cells
@@ -99,36 +113,29 @@ impl IntensityMap {
     pub fn with_rays(mut self, sample: RaySample) -> Self {
         let cells =
             self.cells.iter().enumerate().map(|(k, [value, error, _])| [*value, *error, self.solid_angle(k)]);
-        self.landed = Some(LandedRays::new(sample, self.h_edges.len() - 1, cells));
+        self.landed = Some(LandedRays::new(sample, self.h.cells(), cells));
         self
     }
 
     /// Solid angle of a cell, sr.
     fn solid_angle(&self, cell: usize) -> f64 {
-        let columns = self.h_edges.len() - 1;
-        let (row, column) = (cell / columns, cell % columns);
-        let width = (self.h_edges[column + 1] - self.h_edges[column]).to_radians();
-        width * (self.v_edges[row + 1].to_radians().sin() - self.v_edges[row].to_radians().sin())
+        self.h.of_cell(cell % self.h.cells()) * self.v.of_cell(cell / self.h.cells())
     }
 
     /// The largest side of a cell, degrees.
     pub(super) fn coarsest_deg(&self) -> f64 {
-        let sides = |edges: &[f64]| edges.windows(2).map(|e| e[1] - e[0]).fold(0.0, f64::max);
-        sides(&self.h_edges).max(sides(&self.v_edges))
+        self.h.coarsest_deg().max(self.v.coarsest_deg())
     }
 
     /// Outer edges of the map, degrees: azimuths from and to, then elevations.
     pub(super) fn extent(&self) -> [[f64; 2]; 2] {
-        [&self.h_edges, &self.v_edges].map(|e| [e[0], e[e.len() - 1]])
+        [self.h.extent(), self.v.extent()]
     }
 
     /// The same light seen in a mirror, left for right.
     pub(super) fn mirrored(&self) -> Self {
-        let columns = self.h_edges.len() - 1;
-        let cells = self.cells.chunks(columns).flat_map(|row| row.iter().rev().copied()).collect();
-        // Edges turn their order with their sign: they must rise again.
-        let h_edges = self.h_edges.iter().rev().map(|h| -h).collect();
-        let map = Self { h_edges, v_edges: self.v_edges.clone(), cells, landed: None };
+        let cells = self.cells.chunks(self.h.cells()).flat_map(|row| row.iter().rev().copied()).collect();
+        let map = Self { h: self.h.mirrored(), v: self.v.clone(), cells, landed: None };
         match &self.landed {
             Some(landed) => map.with_rays(landed.sample),
             None => map,
@@ -147,17 +154,17 @@ impl IntensityMap {
             let to = v + sensor.half_deg * (2.0 * (band + 1) as f64 / bands as f64 - 1.0);
             // The band's width at its middle.
             let offset = 0.5 * (from + to) - v;
-            // Degrees of azimuth are shorter towards the poles.
             let half =
                 if sensor.round { (sensor.half_deg.powi(2) - offset.powi(2)).sqrt() } else { sensor.half_deg };
             // By the elevation of the aim, not of the band: over an opening of a degree they hardly differ.
-            let half = half / v.to_radians().cos().max(LEAST_COSINE);
-            let (rows, columns) = (self.v_edges.len() - 1, self.h_edges.len() - 1);
-            for v_part in overlaps(&self.v_edges, from, to, |v| v.to_radians().sin())? {
-                for h_part in overlaps(&self.h_edges, h - half, h + half, f64::to_radians)? {
+            let half = azimuth_deg(half, v);
+            let (rows, columns) = (self.v.cells(), self.h.cells());
+            let h_parts: Vec<Overlap> = self.h.overlaps(h - half, h + half)?.collect();
+            for v_part in self.v.overlaps(from, to)? {
+                for h_part in &h_parts {
                     let weight = v_part.share * h_part.share;
                     let cell = v_part.cell * columns + h_part.cell;
-                    *measurement.weights.entry(cell).or_insert(0.0) += weight;
+                    measurement.add(cell, weight);
                     total += weight;
                     // A cell is not as bright in the part that is covered as on its mean.
                     let v_place = (v_part.cell, rows, columns);
@@ -167,10 +174,17 @@ impl IntensityMap {
             }
         }
         // By what was met: rounding of edges must not make the mean too large.
-        for weight in measurement.weights.values_mut() {
+        for (_, weight) in &mut measurement.weights {
             *weight /= total;
         }
         Some(measurement)
+    }
+
+    /// How far a photometer's opening aimed at `(h, v)` reaches beyond the sides of the map, degrees of azimuth.
+    pub(super) fn beyond_sides(&self, sensor: Sensor, [h, v]: [f64; 2]) -> f64 {
+        let [left, right] = self.h.extent();
+        let half = azimuth_deg(sensor.half_deg, v);
+        (left - (h - half)).max(h + half - right).max(0.0)
     }
 
     /// Adds `amount` times how much brighter a cell gets over its width along an axis. On the axis the cell has this place, of so many, and
@@ -193,8 +207,8 @@ impl IntensityMap {
             return;
         }
         let [from, to] = if difference(before).abs() < difference(after).abs() { before } else { after };
-        *measurement.weights.entry(to).or_insert(0.0) += amount;
-        *measurement.weights.entry(from).or_insert(0.0) -= amount;
+        measurement.add(to, amount);
+        measurement.add(from, -amount);
     }
 
     /// Reads a measurement, made on a map of these cells: its value and errors, cd. Statistical errors of cells are independent; those of
@@ -223,7 +237,7 @@ impl IntensityMap {
         let mut light = 0.0;
         let mut noise =
             Noise { ray_cd: 0.0, hidden: 0.0, hidden_ray_cd: 0.0, counted: 0.0, other: 0.0, replicates };
-        for (&cell, &weight) in &measurement.weights {
+        for &(cell, weight) in &measurement.weights {
             let [value, error, _] = self.cells[cell];
             let variance = (weight * self.spread(value, error)).powi(2);
             match &self.landed {
@@ -250,36 +264,9 @@ impl IntensityMap {
     }
 }
 
-/// The part of a cell that an interval covers.
-struct Overlap {
-    cell: usize,
-    /// Its measure.
-    share: f64,
-    /// How far its middle is beyond that of the cell, in widths of the cell.
-    offset: f64,
-}
-
-/// Lists the parts of cells that an interval covers, with their measure: the difference of `measure`, an integral up to an angle in
-/// degrees; `None` where the interval leaves the edges.
-fn overlaps(edges: &[f64], from: f64, to: f64, measure: impl Fn(f64) -> f64) -> Option<Vec<Overlap>> {
-    /// Degrees by which an interval may end outside, for edges are rounded in their files.
-    const EDGE_ROUNDING: f64 = 1e-9;
-    if from < edges[0] - EDGE_ROUNDING || to > edges[edges.len() - 1] + EDGE_ROUNDING {
-        return None;
-    }
-    // The cell that holds the start, not the one behind it.
-    let first = edges.partition_point(|e| *e <= from).saturating_sub(1);
-    let cells = edges[first..].windows(2).enumerate().take_while(|(_, e)| e[0] < to);
-    Some(
-        cells
-            .map(|(k, e)| {
-                let [low, high] = [from.max(e[0]), to.min(e[1])];
-                let offset = 0.5 * (low + high - e[0] - e[1]) / (e[1] - e[0]);
-                Overlap { cell: first + k, share: measure(high) - measure(low), offset }
-            })
-            .filter(|part| part.share > 0.0)
-            .collect(),
-    )
+/// The azimuth that an angle to the side takes at an elevation, degrees: more towards the poles.
+fn azimuth_deg(angle_deg: f64, v_deg: f64) -> f64 {
+    angle_deg / v_deg.to_radians().cos().max(LEAST_COSINE)
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@
 
 mod aim;
 mod assessment;
+mod cell_axis;
 mod document;
 mod few_rays;
 mod judgement;

@@ -38,6 +38,9 @@ pub(super) struct Photometer<'a> {
     pub(super) tolerance_deg: f64,
 }
 
+/// A direction of the table, degrees, with what the photometer adds up there; `None` where its opening leaves the far field.
+type Measured = ([f64; 2], Option<Measurement>);
+
 /// Zones and lines end here, degrees from the middle: what the texts leave open to 90° is behind the lamp's own rim.
 const MOST_DEG: f64 = 88.0;
 
@@ -47,7 +50,13 @@ const TOLERANCE_RING: usize = 8;
 impl Photometer<'_> {
     /// What the photometer adds up in a direction of the table, degrees; `None` where its opening leaves the far field.
     fn measure(&self, direction: [f64; 2]) -> Option<Measurement> {
-        self.map.measure(self.sensor, direction[0] + self.aim.h_deg, direction[1] + self.aim.v_deg)
+        let [h, v] = self.turned(direction);
+        self.map.measure(self.sensor, h, v)
+    }
+
+    /// Where a direction of the table is in the map, degrees.
+    fn turned(&self, direction: [f64; 2]) -> [f64; 2] {
+        [direction[0] + self.aim.h_deg, direction[1] + self.aim.v_deg]
     }
 
     /// A point's own direction, then those around it within the tolerance where the regulation lets it be met nearby; degrees of the table.
@@ -76,9 +85,9 @@ impl Photometer<'_> {
         (0..=steps as usize).map(|k| at(k as f64)).filter(held).collect()
     }
 
-    /// Directions in a polygon, rim included, half an opening apart, that the far field holds, degrees of the table; and whether it holds
+    /// What is measured in the directions in a polygon, rim included, half an opening apart, that the far field holds; and whether it holds
     /// all of the polygon.
-    fn zone_directions(&self, polygon: &[[f64; 2]]) -> (Vec<[f64; 2]>, bool) {
+    fn measure_zone(&self, polygon: &[[f64; 2]]) -> (Vec<Measured>, bool) {
         let step = self.sensor.half_deg;
         let shift = [self.aim.h_deg, self.aim.v_deg];
         let mut bounds = [[0.0; 2]; 2];
@@ -97,33 +106,42 @@ impl Photometer<'_> {
         // Both ends count; an empty range has no direction.
         let count = |[low, high]: [f64; 2]| if high < low { 0 } else { ((high - low) / step).ceil() as usize + 1 };
         let place = |[low, high]: [f64; 2], k: usize| (low + step * k as f64).min(high);
-        let mut directions = Vec::new();
+        let mut measured = Vec::new();
         for j in 0..count(v) {
             for i in 0..count(h) {
                 let direction = [place(h, i), place(v, j)];
-                if contains(polygon, direction) {
-                    directions.push(direction);
+                if !contains(polygon, direction) {
+                    continue;
+                }
+                match self.measure(direction) {
+                    Some(measurement) => measured.push((direction, Some(measurement))),
+                    // Towards the poles an opening takes more degrees of azimuth and may end beside the map.
+                    None => complete &= self.map.beyond_sides(self.sensor, self.turned(direction)) <= 2.0 * step,
                 }
             }
         }
-        // Towards the poles an opening takes more degrees of azimuth and may end beside the map.
-        directions.retain(|d| self.measure(*d).is_some());
-        (directions, complete)
+        (measured, complete)
     }
 
-    /// Directions over all of the far field, half an opening apart, degrees of the table.
-    fn all_directions(&self) -> Vec<[f64; 2]> {
+    /// What is measured in each of these directions of the table.
+    fn measure_each(&self, directions: Vec<[f64; 2]>) -> Vec<Measured> {
+        directions.into_iter().map(|direction| (direction, self.measure(direction))).collect()
+    }
+
+    /// What is measured all over the far field, half an opening apart.
+    fn measure_all(&self) -> Vec<Measured> {
         let [h, v] = self.map.extent();
         let (h, v) = (h.map(|x| x - self.aim.h_deg), v.map(|x| x - self.aim.v_deg));
-        self.zone_directions(&[[h[0], v[0]], [h[1], v[0]], [h[1], v[1]], [h[0], v[1]]]).0
+        self.measure_zone(&[[h[0], v[0]], [h[1], v[0]], [h[1], v[1]], [h[0], v[1]]]).0
     }
 
-    /// Returns the direction of the table in which the photometer reads most, and of how many; `None` where the far field holds no opening.
-    fn brightest_direction(&self) -> Option<([f64; 2], usize)> {
-        let read = |d: &[f64; 2]| self.measure(*d).map_or(0.0, |m| self.map.read(&m).value);
-        let all = self.all_directions();
+    /// Returns what is measured in the direction in which the photometer reads most, and of how many; `None` where the far field holds no
+    /// opening.
+    fn measure_brightest(&self) -> Option<(Measurement, usize)> {
+        let all = self.measure_all();
         let choices = all.len();
-        all.into_iter().max_by(|a, b| read(a).total_cmp(&read(b))).map(|brightest| (brightest, choices))
+        let read = all.into_iter().filter_map(|(_, m)| m.map(|m| (self.map.read(&m).value, m)));
+        read.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, brightest)| (brightest, choices))
     }
 }
 
@@ -135,19 +153,16 @@ pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, ro
     let lenient = rules.tolerance_deg > 0.0;
     match row.kind {
         RowKind::Point | RowKind::DistributionPoint => match point {
-            Some(p) => limits_at(photometer, row, &photometer.near_directions(p), [lenient; 2]),
-            None => limits_over(photometer, row, None),
+            Some(p) => limits_at(row, &photometer.measure_each(photometer.near_directions(p)), [lenient; 2]),
+            None => limits_over(row, None),
         },
         RowKind::Line => {
-            let directions =
-                ends.map(|((h0, v0), (h1, v1))| (photometer.line_directions([h0, v0], [h1, v1]), true));
-            limits_over(photometer, row, directions)
+            let directions = ends.map(|((h0, v0), (h1, v1))| photometer.line_directions([h0, v0], [h1, v1]));
+            limits_over(row, directions.map(|directions| (photometer.measure_each(directions), true)))
         }
-        RowKind::Zone => {
-            limits_over(photometer, row, row.polygon.as_deref().map(|p| photometer.zone_directions(p)))
-        }
+        RowKind::Zone => limits_over(row, row.polygon.as_deref().map(|p| photometer.measure_zone(p))),
         // Some direction must reach the least maximum, and none may pass the greatest.
-        RowKind::Imax => limits_at(photometer, row, &photometer.all_directions(), [true, false]),
+        RowKind::Imax => limits_at(row, &photometer.measure_all(), [true, false]),
         RowKind::Sum | RowKind::GroupSum => sum_requirement(photometer, row).into_iter().collect(),
         RowKind::Relative => relative_requirement(photometer, row, rows).into_iter().collect(),
         RowKind::Note => Vec::new(),
@@ -156,35 +171,25 @@ pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, ro
 
 /// A requirement each for a row's least and its greatest value at directions, none for a limit that it has not; `any` says for each
 /// whether one direction is enough.
-fn limits_at(photometer: &Photometer, row: &Row, directions: &[[f64; 2]], any: [bool; 2]) -> Vec<Requirement> {
+fn limits_at(row: &Row, measured: &[Measured], any: [bool; 2]) -> Vec<Requirement> {
     let limits = [(row.min, true, any[0]), (row.max, false, any[1])];
     let requirement = |(limit, at_least, any): (Option<f64>, bool, bool)| {
-        let limit = limit?;
         // A limit that is not given asks for nothing.
-        let mut requirement = Requirement { comparisons: Vec::new(), choices: 1, any, unseen: 0 };
-        for direction in directions {
-            match photometer.measure(*direction) {
-                Some(measurement) => {
-                    requirement.comparisons.push(Comparison {
-                        measurement,
-                        limit,
-                        at_least,
-                        direction: *direction,
-                    });
-                }
-                None => requirement.unseen += 1,
-            }
-        }
-        Some(requirement)
+        let limit = limit?;
+        let seen = measured.iter().filter_map(|(direction, m)| Some((*direction, m.clone()?)));
+        let comparisons: Vec<Comparison> =
+            seen.map(|(direction, measurement)| Comparison { measurement, limit, at_least, direction }).collect();
+        let unseen = measured.len() - comparisons.len();
+        Some(Requirement { comparisons, choices: 1, any, unseen })
     };
     limits.into_iter().filter_map(requirement).collect()
 }
 
 /// The requirements of a row's least and greatest value over all directions of a line or zone, given with whether the far field holds them
 /// all. A row that does not say where counts as not seen: nothing that was read can meet it.
-fn limits_over(photometer: &Photometer, row: &Row, place: Option<(Vec<[f64; 2]>, bool)>) -> Vec<Requirement> {
-    let (directions, complete) = place.unwrap_or((Vec::new(), false));
-    let mut requirements = limits_at(photometer, row, &directions, [false; 2]);
+fn limits_over(row: &Row, place: Option<(Vec<Measured>, bool)>) -> Vec<Requirement> {
+    let (measured, complete) = place.unwrap_or((Vec::new(), false));
+    let mut requirements = limits_at(row, &measured, [false; 2]);
     requirements.iter_mut().for_each(|r| r.unseen += usize::from(!complete));
     requirements
 }
@@ -210,20 +215,22 @@ fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Opt
     // Without a factor the row is text.
     let (factor, bound) = row.factor.zip(row.bound)?;
     let (reference, choices) = match row.of.as_deref()? {
-        "imax" => photometer.brightest_direction()?,
-        name => (rows.iter().find(|r| r.id == name).and_then(|r| Some([r.h?, r.v?]))?, 1),
+        "imax" => photometer.measure_brightest().map(|(brightest, choices)| (Some(brightest), choices))?,
+        name => {
+            let place = rows.iter().find(|r| r.id == name).and_then(|r| Some([r.h?, r.v?]))?;
+            (photometer.measure(place), 1)
+        }
     };
-    let (directions, complete) = match (&row.polygon, row.h.zip(row.v)) {
-        (Some(polygon), _) => photometer.zone_directions(polygon),
-        (None, Some((h, v))) => (photometer.near_directions([h, v]), true),
+    let (measured, complete) = match (&row.polygon, row.h.zip(row.v)) {
+        (Some(polygon), _) => photometer.measure_zone(polygon),
+        (None, Some((h, v))) => (photometer.measure_each(photometer.near_directions([h, v])), true),
         (None, None) => return None,
     };
-    let reference = photometer.measure(reference);
     // For a point near its place any direction will do, in a zone all of them must hold.
     let any = row.polygon.is_none() && photometer.tolerance_deg > 0.0;
     let mut requirement = Requirement { comparisons: Vec::new(), choices, any, unseen: usize::from(!complete) };
-    for direction in directions {
-        match (photometer.measure(direction), &reference) {
+    for (direction, measurement) in measured {
+        match (measurement, &reference) {
             (Some(measurement), Some(reference)) => requirement.comparisons.push(Comparison {
                 // Errors of cells that both readings share would count twice if the two were judged apart.
                 measurement: measurement.plus(-factor, reference),
@@ -288,6 +295,21 @@ mod tests {
         let row = Row { points: Some(vec![[0.0, 0.0], [1.0, 1.0], [20.0, 0.0]]), ..sum.clone() };
         let requirement = sum_requirement(&photometer, &row).unwrap();
         assert_eq!((requirement.unseen, requirement.comparisons.len()), (1, 0));
+    }
+
+    /// At 75° up an opening takes 1/cos 75° = 3.9 times its width of azimuth: one that just fits at the horizon ends beside the field.
+    #[test]
+    fn a_zone_whose_rim_the_opening_leaves_is_not_held() {
+        let edges = |low: f64, high: f64| (0..=100).map(|k| low + (high - low) * f64::from(k) / 100.0).collect();
+        let aim = Aim::unchanged("test");
+        let sensor = Sensor { half_deg: 0.5, round: false };
+        let held = |low: f64| {
+            let cells = vec![[1.0, 0.0, 0.0]; 10_000];
+            let map = IntensityMap::new(edges(-10.0, 10.0), edges(low, low + 10.0), cells).unwrap();
+            let photometer = Photometer { map: &map, aim: &aim, sensor, tolerance_deg: 0.0 };
+            photometer.measure_zone(&[[-9.5, low], [9.5, low], [9.5, low + 10.0], [-9.5, low + 10.0]]).1
+        };
+        assert!(held(-5.0) && !held(70.0));
     }
 
     #[test]

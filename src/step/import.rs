@@ -227,7 +227,7 @@ fn absent_shapes(file: &File<'_>) -> String {
     format!("no face, surface or mesh was found; {commonest}; export solids or surfaces")
 }
 
-/// Fills in the report's counts of parts, instances, shells and placed faces, and the names, each once.
+/// Fills in the report's counts of parts with a face, instances, shells and converted placed faces, and adds the names, each once.
 fn count_model(model: &Model, report: &mut ImportReport) {
     report.parts = model.parts.iter().filter(|p| p.face_count() > 0).count();
     report.instances = model.instances.len();

@@ -75,9 +75,9 @@ pub(super) fn face_with_surface<'m>(
     Some((face, placed.surface(settings, k, face)?))
 }
 
-/// Meshes a part: divides its edges, meshes its faces, and starts again with denser edges while faces ask for them, at most
-/// [`MAX_ROUNDS_OF_REPAIRED`] times; then meshes anew the faces that share an inner chord. `too_large` gives, for a face to be left out,
-/// the cells that it would need.
+/// Meshes a part: divides its edges, meshes its faces, and starts again while faces ask for it: with denser edges, at most
+/// [`MAX_ROUNDS_OF_REPAIRED`] times, then with further samples where chords still cross, up to round [`MAX_ROUNDS_OF_CROSSING`]. Last, it
+/// meshes anew the faces that share an inner chord. `too_large` gives, for a face to be left out, the cells that it would need.
 fn mesh_part(
     placed: &PlacedPart<'_>,
     settings: &Settings,
@@ -154,8 +154,8 @@ fn mesh_part(
     with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken })
 }
 
-/// Takes chords that two faces of a shell have inside from one of them, which is meshed anew by `mesh`; again and again, for it may have
-/// chosen another diagonal that is taken. Returns what was taken from each face.
+/// Replaces, in `meshes`, faces with a diagonal that the shell has as a chord elsewhere too, by what `mesh` makes without it, and counts
+/// that in `budget`; [`MAX_ROUNDS`] times at most, for a new mesh may have another such diagonal. Returns the chords taken from each face.
 fn take_doubled_chords(
     part: &Part,
     meshes: &mut [Option<FaceMesh>],
@@ -300,7 +300,7 @@ impl Renumbering {
         edge.is_some_and(|e| self.changed.get(e.0 as usize).is_none_or(|&c| c))
     }
 
-    /// Returns the mesh with its shared positions renumbered. Only for a face none of whose edges has changed.
+    /// Returns the mesh with its shared positions renumbered. That of a face with a changed edge is of no use until it is made anew.
     pub(super) fn renumbered(&self, mut mesh: FaceMesh) -> FaceMesh {
         for corner in &mut mesh.corners {
             if let Position::Shared(p) = &mut corner.position {

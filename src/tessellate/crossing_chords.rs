@@ -25,7 +25,9 @@ const CLEAR_OF_ENDS: f64 = 0.02;
 /// Steps by a third that find the nearest place on a chord's arc: to a millionth of it.
 const NEAREST_STEPS: usize = 34;
 
-/// For chords of different edges that cross, the parameters at which each faces the other's ends.
+/// Returns, for each chord in `conflicts` and chord in `crossed` that cross, the parameters of both edges nearest to the ends of the
+/// other's chord, its own ends left out. Only pairs of different edges count that cross no farther than both chords sag, and the first
+/// [`MAX_PAIRS`] of them.
 pub(super) fn facing_samples(
     part: &Part,
     nodes: &Nodes,
@@ -67,7 +69,7 @@ fn do_cross([a, b]: [Uv; 2], [c, d]: [Uv; 2]) -> bool {
     side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
 }
 
-/// The parameter of the place nearest to `p` on a short piece of a curve; `None` where that is an end.
+/// Returns the parameter of the place nearest to `p` on a short piece of a curve; `None` within [`CLEAR_OF_ENDS`] of an end.
 fn place_between(curve: &Curve, [t0, t1]: [f64; 2], p: Point) -> Option<f64> {
     let off = |t: f64| (curve.evaluate(t) - p).length();
     let (mut lo, mut hi) = (t0.min(t1), t0.max(t1));

@@ -24,10 +24,12 @@ enum CreaseSide {
 }
 
 impl<'e, 's, 'a> Emission<'e, 's, 'a> {
+    /// Begins the facets of a face, none so far; `nodes` are those that facets will name.
     pub(super) fn new(surface: &'s FaceSurface<'a>, nodes: &'e Nodes) -> Self {
         Self { surface, nodes, corners: FxHashMap::default(), made: FaceMesh::default() }
     }
 
+    /// Returns the corners and facets made; what else a face's mesh holds is left empty for the caller.
     pub(super) fn finish(self) -> FaceMesh {
         self.made
     }

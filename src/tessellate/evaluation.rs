@@ -14,7 +14,7 @@ use crate::model::Model;
 const SAMPLE_ROUNDING: [f64; 2] = [1e-9, 1e-10];
 
 /// Returns placed meshes with a report of them filled in, all but the times and the causes of failures; samples are taken only if
-/// [`Settings::measure`] says so.
+/// [`Settings::measure`] says so, but always of what is not certified on repaired faces.
 pub(super) fn evaluate(placed: Placed, model: &Model, settings: &Settings) -> Tessellation {
     let Placed { mut made, failed, repairs, originals } = placed;
     let mut report = std::mem::take(&mut made.report);
@@ -82,8 +82,9 @@ fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
     }
 }
 
-/// Counts open and closed shells and the edges that are open, shared by more than two facets, or turned; returns whether every shell of the
-/// model is closed. Shells that the file calls open are not counted and not examined; a ready mesh counts as not closed.
+/// Adds to the report the numbers of open and closed shells and of edges that are open, touch, are turned, or are shared by more than two
+/// facets; returns whether every shell of the model is closed. Shells that the file calls open are not examined; they, and ready meshes,
+/// count as not closed only in what is returned.
 fn count_shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
     let facets = &made.mesh.facets;
     let mut all = true;

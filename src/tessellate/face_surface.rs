@@ -181,6 +181,7 @@ impl<'a> FaceSurface<'a> {
         patch.second_derivatives(patch_uv(patch, uv))
     }
 
+    /// Returns the fundamental forms at parameters inside the domain; `None` at poles and cusps.
     fn forms(&self, uv: Uv) -> Option<FundamentalForms> {
         FundamentalForms::new(&self.second_derivatives(uv))
     }
@@ -197,7 +198,7 @@ impl<'a> FaceSurface<'a> {
         self.creases.iter().any(|c| !c.is_empty())
     }
 
-    /// Whether some of them are sharp.
+    /// Whether one of the surface's creases is sharp.
     pub(super) fn is_sharp(&self) -> bool {
         self.sharp.iter().any(|c| !c.is_empty())
     }
@@ -253,8 +254,8 @@ impl<'a> FaceSurface<'a> {
     }
 }
 
-/// Returns how far, in its own lengths, control points of the side at the start (`end` 0) or end (1) of direction `d` stray from the first
-/// of them.
+/// Returns the largest distance, in the surface's lengths, of a control point from the first one on the side at the start (`end` 0) or end
+/// (1) of direction `d`: next to nothing at a pole.
 fn side_size(s: &Surface, d: usize, end: usize) -> f64 {
     let counts = s.counts();
     let fixed = if end == 0 { 0 } else { counts[d] - 1 };
@@ -281,7 +282,8 @@ pub(super) fn patch_uv(patch: &BezierPatch, uv: Uv) -> Uv {
     Uv::new((uv.x - u0) / (u1 - u0), (uv.y - v0) / (v1 - v0))
 }
 
-/// Whether all control points lie on one affine image of their Greville abscissas, with equal weights; `size` is the surface's.
+/// Whether the surface is an affine map of its parameters: all control points lie on one affine image of their Greville abscissas, with
+/// equal weights, within [`AFFINE`]. `size` is the diagonal of the surface's box.
 fn is_affine(s: &Surface, size: f64) -> bool {
     let [nu, nv] = s.counts();
     // A spline whose control points lie on an affine map at their Greville abscissas is that map.

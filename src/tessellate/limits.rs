@@ -53,7 +53,8 @@ const CELLS_OF_LARGE_FACE: f64 = 50_000.0;
 /// How many times the cells that a face is expected to need it may have: [`expected_cells`] estimates from below.
 const TIMES_EXPECTED: f64 = 4.0;
 
-/// Returns the cells that a face may have of those that the settings grant each: of a large one by its control points and its curvature.
+/// Returns the cells that a face may have, at most those that the settings grant each: of a large one by its control points and its
+/// curvature. All of them where an angle is asked for, few where the tolerance is within the rounding of coordinates.
 ///
 /// Where no facet fits, as along a fold that a damaged coordinate makes, cells are halved until the budget ends, however few the curvature
 /// of the rest foretells. A small face with a fold may be a real one, and keeps its budget.

@@ -23,6 +23,7 @@ impl<'m> PlacedPart<'m> {
         Self { part: model.part(part), firsts: uses.map(|i| model.first_face(i).0).collect(), scale }
     }
 
+    /// Whether the part has an instance.
     pub(super) fn is_placed(&self) -> bool {
         !self.firsts.is_empty()
     }

@@ -10,7 +10,7 @@ pub(super) struct ProofSteps {
 }
 
 impl ProofSteps {
-    /// None so far, and so many at most.
+    /// Starts at none; a face may take `most`.
     pub(super) fn new(most: u64) -> Self {
         Self { taken: AtomicU64::new(0), most }
     }
@@ -21,7 +21,7 @@ impl ProofSteps {
         self.taken.fetch_add(steps, Ordering::Relaxed);
     }
 
-    /// Whether they are more than a face may take.
+    /// Whether the face has taken more than it may.
     pub(super) fn are_too_many(&self) -> bool {
         self.taken.load(Ordering::Relaxed) > self.most
     }

@@ -16,7 +16,7 @@ pub(super) struct RemeshBudget {
 }
 
 impl RemeshBudget {
-    /// Nothing is spent yet of any of so many faces.
+    /// Makes the budget of so many faces, of which nothing is spent yet.
     pub(super) fn new(faces: usize, settings: &Settings) -> Self {
         Self { made: vec![0; faces], most: settings.most_steps / STEPS_OF_FACET }
     }
@@ -26,7 +26,7 @@ impl RemeshBudget {
         self.made[face] += mesh.map_or(0, |m| m.facets.len() as u64);
     }
 
-    /// Whether a face is not to be meshed anew.
+    /// Whether a face has used up its budget and is not to be meshed anew.
     pub(super) fn is_spent(&self, face: usize) -> bool {
         self.made[face] > self.most
     }

@@ -33,7 +33,7 @@ struct FaceWork {
 }
 
 impl FaceWork {
-    /// The work of all facets.
+    /// Returns the work of all facets, in control points visited.
     fn sum(&self) -> f64 {
         self.each * self.facets.len() as f64
     }
@@ -53,7 +53,7 @@ impl MeshSamples {
         self.sampled[self.places[facet] as usize].as_ref()
     }
 
-    /// All errors of normals, radians, each with the number of facets that have it.
+    /// Returns the errors of normals of what was sampled, radians, each with the number of facets that have it.
     pub(super) fn normal_errors(&self) -> Vec<(f32, u64)> {
         let mut copies = vec![0; self.sampled.len()];
         self.places.iter().for_each(|&place| copies[place as usize] += 1);
@@ -61,7 +61,7 @@ impl MeshSamples {
         known.flat_map(|(s, n)| s.normal_errors.iter().map(move |&error| (error, n))).collect()
     }
 
-    /// Samples these facets into their places.
+    /// Samples these facets and keeps what was found.
     fn fill(&mut self, mesh: &FacetMesh, model: &Model, facets: Vec<usize>) {
         let made = sample_facets(mesh, model, &facets);
         facets.into_iter().zip(made).for_each(|(f, s)| self.sampled[self.places[f] as usize] = Some(s));
@@ -123,7 +123,7 @@ fn spread(facets: Vec<usize>, count: usize) -> Vec<usize> {
     if n <= count { facets } else { (0..count).map(|k| facets[k * n / count]).collect() }
 }
 
-/// Returns what one evaluation of a surface takes, in control points.
+/// Returns the work of one evaluation of a surface, in control points visited, with [`BESIDES`].
 fn points_visited(surface: &Surface) -> f64 {
     let [p, q] = surface.degree;
     BESIDES + ((p + 1) * (q + 1)) as f64

@@ -187,7 +187,7 @@ impl ToleranceField {
 
     /// Returns the sag, mm, at which a chord meets the angle condition where the curvature is `k`, 1/mm: the chord's ends turn by k·L/2 and
     /// it sags k·L²/8. Infinite without a condition.
-    pub(super) fn turning(&self, k: f64) -> f64 {
+    pub(super) fn sag_at_angle(&self, k: f64) -> f64 {
         self.angle.map_or(f64::INFINITY, |a| a * a / (2.0 * k))
     }
 

@@ -34,6 +34,7 @@ impl TakenChords {
         self.0.iter().copied()
     }
 
+    /// Adds chords, each by both positions in ascending order.
     pub(super) fn extend(&mut self, more: impl IntoIterator<Item = [u32; 2]>) {
         self.0.extend(more);
     }

@@ -68,8 +68,8 @@ impl Conic {
         })
     }
 
-    /// Returns the distance from the axis, mm, at which two conics have the same slope, other than on the axis itself; `None` where there
-    /// is none.
+    /// Returns the distance from the axis, mm, at which two conics have the same slope, other than on the axis itself, be it beyond their
+    /// reach; `None` where there is none.
     pub(super) fn equal_slope(&self, other: &Self) -> Option<f64> {
         // From c₁²·(1 − (1+K₂)c₂²h²) = c₂²·(1 − (1+K₁)c₁²h²), for curvatures of one sign.
         let [r1, r2] = [self.radius, other.radius];

@@ -96,7 +96,8 @@ fn check_points(points: &[Homogeneous]) -> Result<(), String> {
     }
 }
 
-/// Makes a surface from rows of control points, one for each u, checked as curves are and clamped to its domain.
+/// Makes a surface from rows of control points, one for each u, clamped to its domain; fails for degrees, control points, weights and
+/// ranges of knots that are of no use.
 pub(super) fn surface(knots: (&KnotVec, &KnotVec), rows: Vec<Vec<Homogeneous>>) -> Result<Surface, String> {
     let knots = [knots.0.iter().copied().collect::<Vec<f64>>(), knots.1.iter().copied().collect()];
     let counts = [rows.len(), rows.first().map_or(0, Vec::len)];
@@ -114,11 +115,13 @@ pub(super) fn surface(knots: (&KnotVec, &KnotVec), rows: Vec<Vec<Homogeneous>>) 
     Ok(s.restricted(domain))
 }
 
+/// Returns a polynomial surface of truck's as ours, with weights of 1; fails as [`surface`].
 pub(super) fn bspline_surface(s: &BSplineSurface<Point3>) -> Result<Surface, String> {
     let rows = s.control_points().iter().map(|r| r.iter().map(|p| Homogeneous::weighted(point(*p), 1.0)).collect());
     surface((s.uknot_vec(), s.vknot_vec()), rows.collect())
 }
 
+/// Returns a rational surface of truck's as ours; fails as [`surface`].
 pub(super) fn nurbs_surface(s: &NurbsSurface<Vector4>) -> Result<Surface, String> {
     let rows = s.control_points().iter().map(|r| r.iter().map(homogeneous).collect());
     surface((s.uknot_vec(), s.vknot_vec()), rows.collect())

@@ -110,7 +110,7 @@ impl Reflector {
     /// Returns part of an ellipsoid of semi-axes `a` (along z) and `b`, with the vertex at the origin and foci at `a ∓ √(a²−b²)`.
     ///
     /// # Errors
-    /// When `b` is not below `a`.
+    /// When `b` is not positive, or not below `a`.
     pub fn ellipsoid(a: f64, b: f64, half_aperture: f64) -> Result<Self, ShapeError> {
         check_value("the semi-axis b", b, b > 0.0 && b < a, "positive and below the semi-axis a")?;
         let shape = Conic { radius: b * b / a, conic: b * b / (a * a) - 1.0 };
@@ -126,7 +126,7 @@ impl Reflector {
     /// Makes the reflector as an open truck shell, mm.
     ///
     /// # Errors
-    /// When the shape does not reach the aperture or the hole is as large.
+    /// When the shape does not reach the aperture, the hole is negative or as large, the radius is zero, or a number is not finite.
     pub fn shell(&self) -> Result<Shell, ShapeError> {
         check_value(
             "the hole",

@@ -111,7 +111,7 @@ impl<'a> Tracer<'a> {
             nodes.iter().zip(ts).map(|(&uv, &t)| self.slope(uv, edge.derivatives(t).first)).collect();
         for (end, inner) in [(0, 1), (ts.len() - 1, ts.len() - 2)] {
             if let Some(k) = self.pole_parameter(nodes[end]) {
-                let (at, slope) = self.leaving_pole(edge, [ts[end], ts[inner]], nodes[inner], k);
+                let (at, slope) = self.extrapolate_to_pole(edge, [ts[end], ts[inner]], nodes[inner], k);
                 nodes[end][k] = at.clamp(self.surface.domain()[k][0], self.surface.domain()[k][1]);
                 slopes[end][k] = slope;
             }
@@ -119,7 +119,7 @@ impl<'a> Tracer<'a> {
         Ok(UvCurve::hermite(ts, &nodes, &slopes))
     }
 
-    /// Returns which parameter moves nothing at a point: 0 for u, 1 for v; `None` off the poles.
+    /// Returns which parameter moves nothing at a point, 0 for u or 1 for v: the one that runs along the pole; `None` off the poles.
     fn pole_parameter(&self, uv: Uv) -> Option<usize> {
         let d = self.surface.derivatives(uv);
         let lengths = [d.du.length() * self.extent.x, d.dv.length() * self.extent.y];
@@ -128,7 +128,7 @@ impl<'a> Tracer<'a> {
 
     /// Returns the parameter `k` and its slope at a pole, where it means nothing: continued from two points further in, `at` and `inwards`
     /// being the edge's parameters at the pole and at `inner`, so that the curve stays smooth.
-    fn leaving_pole(&self, edge: &Curve, [at, inwards]: [f64; 2], inner: Uv, k: usize) -> (f64, f64) {
+    fn extrapolate_to_pole(&self, edge: &Curve, [at, inwards]: [f64; 2], inner: Uv, k: usize) -> (f64, f64) {
         let h = 0.1 * (inwards - at);
         let near = |s: f64| self.refine(edge.evaluate(at + s * h), inner)[k];
         let (one, two) = (near(1.0), near(2.0));

@@ -61,6 +61,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "row",
             "table",
+            "cell_axis",
             "few_rays",
             "map",
             "test_lamps",

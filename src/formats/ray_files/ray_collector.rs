@@ -28,7 +28,7 @@ pub(super) struct RayCollector {
 }
 
 impl RayCollector {
-    /// Begins the rays of the file at `path`.
+    /// Begins the rays of the file at `path`, which is for messages; of more than `most_in_memory` none is kept in memory.
     pub(super) fn new(path: &Path, most_in_memory: u64) -> Self {
         Self {
             path: path.to_owned(),
@@ -43,12 +43,12 @@ impl RayCollector {
         }
     }
 
-    /// The same for rays that stand in rows of `file` from byte `start` on.
+    /// The same for rays that stand in rows of `file` from byte `start` on, where long lists are read again.
     pub(super) fn with_rows(self, file: File, start: u64, layout: RowLayout) -> Self {
         Self { rows: Some((file, start, layout)), ..self }
     }
 
-    /// Takes the next ray.
+    /// Takes the next ray. With the first that is too many for memory all go to a scratch file, unless they stand in rows of the file.
     ///
     /// # Errors
     /// When the folder for temporary files does not take it.
@@ -96,7 +96,7 @@ impl RayCollector {
         })
     }
 
-    /// Ends the list.
+    /// Ends the list and makes the file of its rays, whose powers are `flux`; not scaled and without notes.
     ///
     /// # Errors
     /// As [`Self::add`].

@@ -181,7 +181,8 @@ impl RayFile {
         self.spectral
     }
 
-    /// Puts the rays from `first` on into `block`, at most `most` of them and none behind the last.
+    /// Puts the rays from `first`, counted from 0, on into `block`, in place of those in it: at most `most`, and none behind the last.
+    /// After an error the block is empty.
     ///
     /// # Errors
     /// When the file cannot be read any more.

@@ -167,6 +167,7 @@ struct TableWavelengths {
 }
 
 impl TableWavelengths {
+    /// Prepares the tables of a header, of which nothing is drawn yet; `place` is the column with the number of a ray's table.
     fn new(header: &Tm25Header, place: Option<usize>) -> Self {
         let tables: Vec<Option<Spectrum>> = header.spectra.iter().map(|t| Spectrum::new(t)).collect();
         Self { drawn: vec![0; tables.len()], tables, place }

@@ -177,8 +177,8 @@ impl Tm25Header {
         };
         let mut wavelengths = [0.0; 3];
         file.read_row(&mut wavelengths, "the wavelengths")?;
-        let tables = bounded(file, "spectral tables")?;
-        let additional = bounded(file, "additional columns")?;
+        let tables = read_count(file, "spectral tables")?;
+        let additional = read_count(file, "additional columns")?;
         let text_bytes = file.read_i32("the size of the additional text")?;
         let text_bytes = u64::try_from(text_bytes)
             .map_err(|_| file.malformed(format!("an additional text of {text_bytes} bytes at byte 84")))?;
@@ -326,8 +326,8 @@ impl Tm25Header {
     }
 }
 
-/// Reads a count of the header that memory depends on, of what `of` says; an error beyond [`MAX_ADDITIONAL`].
-fn bounded(file: &mut ByteReader, of: &str) -> Result<usize, Error> {
+/// Reads a count of the header that memory depends on, of what `of` says; an error if it is negative or beyond [`MAX_ADDITIONAL`].
+fn read_count(file: &mut ByteReader, of: &str) -> Result<usize, Error> {
     let byte = file.position();
     let count = file.read_i32(of)?;
     if !(0..=MAX_ADDITIONAL).contains(&count) {
@@ -355,7 +355,8 @@ fn read_columns(file: &mut ByteReader) -> Result<Tm25Columns, Error> {
     Ok(Tm25Columns { radiant, wavelength, luminous, stokes, tristimulus, spectrum_index })
 }
 
-/// Reads so many tables of wavelength, nm, and weight, and the padding behind them; an error where one is longer than the file.
+/// Reads so many tables of wavelength, nm, and weight, and the padding behind them; an error where one is longer than what is left of the
+/// file.
 fn read_spectra(file: &mut ByteReader, tables: usize) -> Result<Vec<Vec<[f32; 2]>>, Error> {
     let start = file.position();
     let mut spectra = Vec::with_capacity(tables);

@@ -172,7 +172,8 @@ pub(crate) fn dispatch_widest<K: Kernel>(kernel: K) -> K::Output {
     dispatch(kernel)
 }
 
-/// A function like the others, so that without optimisation its variables do not lie on the stack of theirs.
+/// Runs a kernel with the baseline: a function like the others, so that without optimisation its variables do not lie on the stack of
+/// theirs.
 pub(crate) fn run_portable<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Portable>()
 }

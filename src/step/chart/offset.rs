@@ -144,7 +144,7 @@ impl Weights {
         if self.are_equal { 1.0 } else { weight() }
     }
 
-    /// Takes the rounding off weights that are all 1.
+    /// Sets the weights of fitted `points` to 1 for equal weights, which takes the rounding off; others stay.
     fn equalise(self, points: &mut [Homogeneous]) {
         if self.are_equal {
             points.iter_mut().for_each(|p| p.w = 1.0);

@@ -42,7 +42,7 @@ pub(crate) struct Refusal {
 pub(crate) type Outcome<T> = Result<T, Refusal>;
 
 impl Refusal {
-    /// Blames an entity.
+    /// Makes the refusal that blames an entity.
     pub(crate) fn new(entity: Entity<'_, '_>, reason: impl Into<String>) -> Self {
         Self { id: entity.id, entity: entity.name(), reason: reason.into() }
     }
@@ -107,7 +107,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         }
     }
 
-    /// Reads a DIRECTION of two or three components, not normalised; `None` when absent, broken or zero.
+    /// Reads a DIRECTION of two or three components, of any length that can be squared; `None` when absent, broken or zero.
     pub(crate) fn direction(&self, id: Option<u64>) -> Option<Vector> {
         let e = self.file.entity(id?)?;
         let xs = e.attributes("DIRECTION", 1)?.list(0).reals()?;

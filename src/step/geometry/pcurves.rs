@@ -11,8 +11,8 @@ use crate::step::chart::Chart;
 use crate::step::part21::{Args, Entity};
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// Reads an OFFSET_CURVE_3D with attributes `own`: the basis moved along the reference direction × its tangent. Lines and circles stay
-    /// exact, splines are fitted within [`CURVE_ERROR_MM`]; refuses hyperbolas and parabolas.
+    /// Reads an OFFSET_CURVE_3D with attributes `own`: the basis moved along the reference direction × its tangent. Lines, and circles in
+    /// their plane, stay exact, all else is fitted as by [`fit_pieces`]; refuses hyperbolas and parabolas.
     pub(crate) fn offset_curve(
         &self,
         e: Entity<'f, 'a>,
@@ -68,7 +68,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         Ok(DirectedCurve { shape, reversed })
     }
 
-    /// Reads a PCURVE as a curve in space, mm, fitted within [`CURVE_ERROR_MM`]; refuses surfaces whose parameters the chart does not keep.
+    /// Reads a PCURVE as a curve in space, mm, fitted as by [`fit_pieces`]; refuses surfaces whose parameters the chart does not keep.
     pub(crate) fn pcurve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         let own = e.attributes("PCURVE", 1).unwrap_or_else(|| e.args());
         let basis = self.resolve(e, own.id(0), "basis surface")?;
@@ -100,7 +100,8 @@ fn lift_to_surface(e: Entity<'_, '_>, chart: &Chart, curve: &Curve, scale: [f64;
 }
 
 /// Fits cubics to what becomes of `curve`: `at` gives position, mm, and derivative on a piece of it, which ends where a corner may be, at
-/// knots of full multiplicity. Refuses what is not met within [`WORST_CURVE_ERROR_MM`], and pieces that part at a corner.
+/// knots of full multiplicity. They are refined to [`CURVE_ERROR_MM`] where that can be reached; refuses what is not met within
+/// [`WORST_CURVE_ERROR_MM`], and pieces that part at a corner.
 fn fit_pieces(e: Entity<'_, '_>, curve: &Curve, at: impl Fn(&Curve, f64) -> (Point, Vector)) -> Outcome<Curve> {
     let breaks = curve.breakpoints();
     let is_corner = |t: f64| curve.knots.iter().filter(|&&k| k == t).count() >= curve.degree;

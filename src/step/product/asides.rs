@@ -72,7 +72,7 @@ impl HiddenItems {
         Self { items: shown.filter(|id| seen.insert(*id)).collect(), found: FxHashSet::default() }
     }
 
-    /// Notes which of these entities, which the model holds, are hidden.
+    /// Notes that the model holds these entities, of which some may be hidden.
     pub(crate) fn find_among<'i>(&mut self, entities: impl IntoIterator<Item = &'i u64>) {
         if !self.items.is_empty() {
             self.found.extend(entities);

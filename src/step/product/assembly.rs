@@ -263,7 +263,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         if self.visited > limit { Err(self.visited) } else { Ok((std::mem::take(&mut self.placed), self)) }
     }
 
-    /// Places representations that no product reaches, except those of aspects, which are listed in `left_out`.
+    /// Places representations that no product reaches and no item maps, except those of aspects, which are listed in `left_out`.
     fn place_orphans(&mut self) {
         self.in_orphans = true;
         // From here on what products reach is closed: an orphan that leads to it would show it twice.

@@ -290,7 +290,7 @@ fn is_sized_by_edges(file: &File<'_>, surface: u64) -> bool {
     file.entity(surface).is_some_and(|e| !e.keywords().any(known))
 }
 
-/// Refuses a face whose surface reaches farther than numbers tell places apart.
+/// Makes the refusal of a face whose surface reaches farther than numbers tell places apart.
 fn beyond_rounding(geometry: &Geometry<'_, '_>, id: u64, plan: &FacePlan) -> Refusal {
     let surface = geometry.file.entity_name(plan.surface);
     let reason =

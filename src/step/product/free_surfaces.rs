@@ -57,7 +57,7 @@ pub(crate) fn convert_free_surfaces(
     // Meshes hang below each other; the leaves alone are faces.
     let mut leaves = TessellatedItems::default();
     for &id in &items.tessellated {
-        geometry.tessellated(id, 0, &mut leaves);
+        geometry.collect_meshes(id, 0, &mut leaves);
     }
     out.found += leaves.faces.len() + leaves.refused.len();
     out.refused.extend(leaves.refused);

@@ -186,7 +186,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// Refuses a recipe of a kind that is not converted.
+/// Makes the refusal of a recipe of a kind that is not converted.
 fn unsupported(e: Entity<'_, '_>) -> Refusal {
     Refusal::new(e, "this kind of recipe is not converted; export the solid as a boundary representation")
 }

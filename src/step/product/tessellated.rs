@@ -45,9 +45,9 @@ fn leaf_layout(keyword: &str) -> Option<Layout> {
 }
 
 impl<'f, 'a> Geometry<'f, 'a> {
-    /// Collects the triangulated faces of a tessellated item, and refusals of those that are broken, in `into`. A solid, shell or face that
-    /// is linked to an exact shape is only its picture and gives nothing; nor do points and wires.
-    pub(crate) fn tessellated(&self, id: u64, depth: usize, into: &mut TessellatedItems) {
+    /// Collects the triangulated faces of a tessellated item, and refusals of those that are broken, in `into`, each once. A solid, shell
+    /// or face that is linked to an exact shape is only its picture and gives nothing; nor do points and wires.
+    pub(crate) fn collect_meshes(&self, id: u64, depth: usize, into: &mut TessellatedItems) {
         let Ok(e) = self.entity(id) else { return };
         // A kilobyte can list a shell in itself a hundred times to any depth.
         if !into.visited.insert(id) {
@@ -72,7 +72,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
                 into.refused.push(Refusal::new(e, "meshes are nested too deeply"));
             } else if set.entity(1).is_none() {
                 for item in set.list(0).ids() {
-                    self.tessellated(item, depth + 1, into);
+                    self.collect_meshes(item, depth + 1, into);
                 }
             }
         } else if e.keywords().any(|k| k.contains("TRIANGULATED")) {

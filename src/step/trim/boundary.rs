@@ -223,8 +223,8 @@ fn free_start(d: usize, base: f64, period: f64, holes: &[Vec<Uv>]) -> Option<f64
     (best.1 > 0.0).then_some(base + best.0)
 }
 
-/// Closes one loop that winds around: to the pole or natural border on its left, by a seam run both ways. A loop that has nothing there is
-/// turned around if it may be; else fails.
+/// Closes one loop that winds around: to the pole or natural border on its left, by a seam run both ways, and adds what it makes to
+/// `seams`. A loop that has nothing there is turned around if it may be; else fails.
 fn extend_to_border(
     chain: Chain,
     chart: &Chart,
@@ -303,7 +303,8 @@ fn started_at(mut chain: Chain, first: usize, displacement: Uv) -> Chain {
     chain
 }
 
-/// Joins two loops that wind in opposite senses by a seam run both ways, past the holes; fails where no way is found.
+/// Joins two loops that wind in opposite senses by a seam run both ways, past the holes, and adds its pieces to `seams`; fails where no way
+/// is found.
 fn join_winding_pair(
     a: Chain,
     b: Chain,

@@ -43,6 +43,7 @@ impl Piece {
         self.end_point(!self.reversed)
     }
 
+    /// Returns the point half-way in the curve's parameter.
     fn middle(&self) -> Uv {
         let [a, b] = self.curve.domain();
         self.curve.evaluate(0.5 * (a + b))

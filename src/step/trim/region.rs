@@ -15,6 +15,7 @@ pub(super) struct Region<'t, 'e> {
 }
 
 impl<'t, 'e> Region<'t, 'e> {
+    /// Makes the spline over `domain`, a rectangle of the chart's parameters.
     pub(super) fn new(task: &'t FaceTask<'e>, domain: [[f64; 2]; 2]) -> Self {
         Self { task, domain, surface: task.chart.surface(domain) }
     }

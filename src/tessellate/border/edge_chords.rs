@@ -52,7 +52,7 @@ fn chord_tolerance(surface: &FaceSurface<'_>, uv: Uv, along: Vector) -> f64 {
     let direction = Uv::new((g * x - f * y) / det, (e * y - f * x) / det);
     let sag = forms.normal_curvature(direction).abs() * (FACET_REACH * surface.size).powi(2) / 8.0;
     // Where normals must not turn far, that limits the chord as a sag would.
-    let xi = xi.min(surface.field.turning(forms.largest_curvature()));
+    let xi = xi.min(surface.field.sag_at_angle(forms.largest_curvature()));
     xi * (1.0 - (sag / xi).min(0.5))
 }
 
@@ -182,8 +182,8 @@ fn cross_creases(curve: &Curve, sides: &[EdgeSide<'_, '_>], t: &mut Vec<f64>) {
     t.sort_by(f64::total_cmp);
 }
 
-/// Returns the point of the curve over `[a, b]` nearest to `p`, by sampling three times around the best: a distance that is never too
-/// small.
+/// Returns the point of the curve over `[a, b]` nearest to `p`, by sampling three times around the best, so that it is never nearer than
+/// the true one.
 fn nearest_on(at: &impl Fn(f64) -> Point, a: f64, b: f64, p: Point) -> Point {
     /// Steps of one look, and how many looks there are, each around the nearest place of the last.
     const STEPS: i32 = 6;

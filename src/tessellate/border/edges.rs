@@ -33,8 +33,8 @@ pub(in crate::tessellate) struct OwnDivision {
 /// Divides all edges of a part. Returns the divisions by edge, and the shared positions in the part's coordinates: its vertices, then inner
 /// points edge by edge.
 ///
-/// `sides` and `denser` are by edge; an edge without sides is one chord. `own` is read and rewritten: what edges have by themselves, kept
-/// from round to round, empty before the first.
+/// `sides`, `denser` and `further`, parameters to be added in any order, are by edge; an edge without sides is one chord. `own` is read and
+/// rewritten: what edges have by themselves, kept from round to round, empty before the first.
 pub(in crate::tessellate) fn divide(
     part: &Part,
     faces: &[(&Face, &FaceSurface<'_>)],
@@ -58,7 +58,7 @@ pub(in crate::tessellate) fn divide(
     sample_positions(part, with_further(times.into_iter(), further))
 }
 
-/// Each edge's samples and further ones, which may come in any order.
+/// Returns each edge's samples with its further ones, which may come in any order: ascending, each once.
 fn with_further(times: impl Iterator<Item = Vec<f64>>, further: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let merge = |(mut t, further): (Vec<f64>, &Vec<f64>)| {
         t.extend(further);

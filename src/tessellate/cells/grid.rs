@@ -48,7 +48,7 @@ pub(in crate::tessellate) struct GridInput<'g> {
     pub(in crate::tessellate) taken: &'g TakenChords,
 }
 
-/// Makes facets of the cells inside; a cell with nodes on its sides becomes several. Cells of which none holds its tolerance stay open, for
+/// Makes facets of the cells inside; a cell with nodes on its sides becomes several. A cell whose facets do not all hold stays open, for
 /// the transition to fill. Adds nodes to those of the border.
 pub(in crate::tessellate) fn build(prover: &mut Prover<'_, '_>, cells: &Subdivision, input: GridInput<'_>) -> Grid {
     let border = input.nodes.len();

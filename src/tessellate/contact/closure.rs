@@ -18,7 +18,7 @@ impl SideCounts {
         Self(counts)
     }
 
-    /// The sides of a face's facets.
+    /// Counts the sides of a face's facets.
     pub(super) fn of_facets(mesh: &FaceMesh) -> Self {
         let position = |c: u32| mesh.corners[c as usize].position;
         let sides = |f: [u32; 4]| (0..4).map(move |k| [f[k], f[(k + 1) % 4]].map(position));
@@ -34,7 +34,7 @@ impl SideCounts {
             && border.0.keys().all(|side| self.0.contains_key(side))
     }
 
-    /// The sides that one facet alone uses, at other positions; `None` where one of them has none.
+    /// Returns the sides that one facet alone uses, with their positions replaced by what `moved` gives; `None` where it gives none.
     pub(super) fn border(&self, moved: impl Fn(Position) -> Option<Position>) -> Option<Self> {
         let single = self.0.iter().filter(|(_, count)| **count == 1);
         let sides: Option<Vec<[Position; 2]>> = single.map(|([a, b], _)| Some([moved(*a)?, moved(*b)?])).collect();

@@ -38,8 +38,8 @@ struct BoxedFace {
     bounds: Aabb,
 }
 
-/// Finds the faces of one solid that lie wholly on a face of another within [`Settings::glue_mm`]. Returns the contacts in order, and the
-/// faces in them, carriers with a tightened tolerance.
+/// Finds the faces of one solid that lie on a face of another, wholly or in part, within [`Settings::glue_mm`]. Returns the contacts,
+/// sorted, and the faces in them, carriers with a tightened tolerance.
 ///
 /// A face is either carrier or guest, and a guest has one carrier: the rest of a chain is left out. Planes are, for their facets coincide
 /// as they are.
@@ -96,7 +96,8 @@ pub(super) fn contacts<'m>(
     (out, trimmed)
 }
 
-/// One role a face: a guest that carried another would hand on facets that are not its own.
+/// Drops contacts until no face is both guest and carrier, or the guest of two; those in whole come first, and of one in part guest and
+/// carrier may change places. A guest that carried another would hand on facets that are not its own.
 fn with_one_role_each(all: Vec<Contact>) -> Vec<Contact> {
     let mut carriers: FxHashSet<FaceKey> = FxHashSet::default();
     let mut guests: FxHashSet<FaceKey> = FxHashSet::default();

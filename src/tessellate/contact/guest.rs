@@ -70,7 +70,8 @@ impl<'f, 'm> Guest<'f, 'm> {
         }
     }
 
-    /// The border as lines on the carrier, as far as it lies there; corners are counted from `first` on.
+    /// Adds the border to `out` as segments on the carrier: all of it, or of a contact in part the sides that lie there. Corners are
+    /// numbered from `first` on.
     pub(super) fn imprint(&self, carrier: &TrimmedFace<'_>, extent: Extent, first: usize, out: &mut Imprint) {
         let uses: Vec<&EdgeUse> = self.face.loops.iter().flat_map(|l| &l.uses).collect();
         let local = |p: Point| carrier.frame.local_point(self.face.frame.point(p));
@@ -126,8 +127,8 @@ fn choose_seam_side(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
     uv
 }
 
-/// The facets of the carrier that lie in a guest, and the guest's border. `first` is the number of its first corner in the carrier's
-/// imprint.
+/// Makes the guest's facets from those of the carrier that lie in it, each proved on the guest's surface, and returns with them the sides
+/// of its border. `first` is the number of its first corner in the carrier's imprint.
 pub(super) fn taken_facets(
     guest: &Guest<'_, '_>,
     carrier: &TrimmedFace<'_>,

@@ -87,8 +87,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         Some(EdgeSamples { face: self.faces.get(&key)?, divisions: &self.mesh_of(key.instance)?.divisions })
     }
 
-    /// Returns the parameters that edges must have besides their own: where borders cross seams of carriers, and the samples of edges that
-    /// run together.
+    /// Returns the parameters that edges must have besides their own: where they cross seams or borders of the other face, where their
+    /// chords are too long for its facets, and the samples of edges that run together.
     fn further_samples(&self) -> FurtherSamples {
         let glue = self.settings.glue_mm;
         let mut further = FurtherSamples::default();
@@ -111,8 +111,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         further
     }
 
-    /// Meshes of all instances in contact with their edges divided further. Faces beside changed edges are meshed anew; those in contact
-    /// keep the old mesh, renumbered, until their turn.
+    /// Returns the meshes of all instances in contact, by instance, with edges divided further. Faces beside changed edges are meshed anew;
+    /// those in contact keep the old mesh, renumbered, until their turn.
     fn divided_more(&self, further: &FurtherSamples) -> FxHashMap<usize, PartMesh> {
         let mut instances: Vec<usize> =
             self.contacts.iter().flat_map(|c| [c.carrier.instance, c.guest.instance]).collect();
@@ -181,8 +181,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         }
     }
 
-    /// Meshes a carrier, with its guests' borders imprinted, and then its guests, all with a mesh by themselves where that fails; `None`
-    /// where that fails too. The contacts of `group` have one carrier.
+    /// Meshes a carrier with its guests' borders imprinted, and then its guests with its facets. A face for which that fails is meshed as
+    /// without a contact; `None` where that fails too. The contacts of `group` have one carrier.
     fn mesh_group(
         &self,
         group: &[Contact],
@@ -222,7 +222,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         out
     }
 
-    /// The facets of a guest with those of its carrier; `None` where they do not fill its border.
+    /// Meshes a guest with its carrier's facets and, of a contact in part, its own elsewhere; `None` where they do not fill its border, and
+    /// where its own are repaired.
     fn guest_mesh(
         &self,
         member: &Member<'_, 'm>,
@@ -246,7 +247,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
         if is_sound { shared_part::joined(guest, &carrier, &own, &taken, mesh, near) } else { None }
     }
 
-    /// A guest with corners where its seams cross the carrier's.
+    /// Builds the border of a face on the divisions of `mesh`, its part, with corners where its seams cross the carrier's.
     fn guest<'f>(&self, face: &'f TrimmedFace<'m>, carrier: &TrimmedFace<'_>, mesh: &PartMesh) -> Guest<'f, 'm> {
         let near = self.settings.glue_mm;
         let build = |points: &[Point]| {

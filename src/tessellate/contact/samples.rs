@@ -115,7 +115,7 @@ impl EdgeSamples<'_, '_> {
                 for k in 0..CROSSING_PIECES {
                     let [mut lo, mut hi] = [k, k + 1].map(|k| pair[0] + step * k as f64);
                     if k > 0 && at_border(lo) {
-                        self.meet(other, (edge, lo), glue, further);
+                        self.request_crossing(other, (edge, lo), glue, further);
                     }
                     let from = inside(lo);
                     if from == inside(hi) || at_border(lo) || at_border(hi) {
@@ -125,14 +125,15 @@ impl EdgeSamples<'_, '_> {
                         let m = 0.5 * (lo + hi);
                         if inside(m) == from { lo = m } else { hi = m }
                     }
-                    self.meet(other, (edge, 0.5 * (lo + hi)), glue, further);
+                    self.request_crossing(other, (edge, 0.5 * (lo + hi)), glue, further);
                 }
             }
         }
     }
 
-    /// Asks for the common point of an edge, near this parameter, and the nearest of another face.
-    fn meet(
+    /// Asks for a sample on an edge, where it crosses the nearest border edge of another face near this parameter, and one on that edge;
+    /// for none where the two stay more than `glue` mm apart.
+    fn request_crossing(
         &self,
         other: &EdgeSamples<'_, '_>,
         (edge, mut t): (EdgeId, f64),

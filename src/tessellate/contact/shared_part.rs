@@ -46,6 +46,7 @@ struct Union<'s> {
 }
 
 impl Union<'_> {
+    /// Returns the place of a position of `mesh`, in the part's coordinates.
     fn place(&self, mesh: &FaceMesh, position: Position) -> Point {
         match position {
             Position::Shared(p) => self.shared[p as usize],
@@ -53,7 +54,7 @@ impl Union<'_> {
         }
     }
 
-    /// Where a position of one of the meshes is now.
+    /// Returns the position here for one of `mesh`; `None` for one of its own that was not added.
     fn position(&self, mesh: &FaceMesh, position: Position) -> Option<Position> {
         match position {
             Position::Shared(_) => Some(position),
@@ -63,6 +64,7 @@ impl Union<'_> {
         }
     }
 
+    /// Adds facets of `mesh` with the corners that they have; bounds and tolerances stay.
     fn add(&mut self, mesh: &FaceMesh, facets: &[MeshedFacet]) {
         let mut corners: FxHashMap<u32, u32> = FxHashMap::default();
         for facet in facets {

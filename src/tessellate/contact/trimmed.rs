@@ -152,7 +152,7 @@ impl<'m> TrimmedFace<'m> {
         holds(self, other) || holds(other, self)
     }
 
-    /// Whether a place is certainly farther from the surface than this, mm.
+    /// Whether a place is farther from the surface than this, mm, as far as the seeds of the projector tell.
     fn is_beyond(&self, p: Point, mm: f64) -> bool {
         self.projector.is_beyond(self.frame.local_point(p), mm / self.frame.scale.abs())
     }

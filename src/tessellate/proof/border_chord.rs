@@ -107,8 +107,8 @@ impl BorderChord {
         self.sliver = deviation.chord_bound(surface, &self.between, uv, at, limit - off).map(|x| x + off);
     }
 
-    /// Returns what the border adds to the bound of a triangle that has the chord as a side, mm. `xyz` are the triangle's corners; above
-    /// `limit` the value only says that no bound is known.
+    /// Returns a bound, mm, for what lies between the border and a triangle that has the chord as a side; the triangle's whole bound is the
+    /// larger of this and its own. `xyz` are the triangle's corners; above `limit` the value only says that no bound is known.
     pub(in crate::tessellate) fn bound(&self, prover: &mut Prover<'_, '_>, xyz: [Point; 3], limit: f64) -> f64 {
         let mut worst = self.deviation;
         if let Some(sliver) = self.sliver.filter(|&x| x <= limit) {

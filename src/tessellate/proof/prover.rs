@@ -324,8 +324,9 @@ impl<'s, 'a> Prover<'s, 'a> {
         refine((&mut self.nets, &mut self.scalar), patch, at, limit, levels, f)
     }
 
-    /// Returns a bound of a convex distance over a convex piece of surface: the largest at its corners, which holds for all that is flat
-    /// between them, and the deviation from that by second derivatives; `None` above the limit.
+    /// Returns a bound of a convex distance `away` over the piece of surface above a convex polygon or segment of parameters: the largest
+    /// at its corners, which holds for all that is flat between them, and the deviation from that by second derivatives; `None` above the
+    /// limit.
     fn taylor_bound(&self, uv: &[Uv], limit: f64, away: impl Fn(Point) -> f64) -> Option<f64> {
         let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
         let (a, b) = (self.surface.range(0, lo.x, hi.x), self.surface.range(1, lo.y, hi.y));
