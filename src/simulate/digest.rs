@@ -16,12 +16,12 @@ impl Fnv {
         h.0
     }
 
-    /// Of nothing yet.
+    /// Begins a hash that has absorbed nothing.
     pub(super) fn new() -> Self {
         Self(Self::START)
     }
 
-    /// Absorbs a piece.
+    /// Absorbs the length of a piece and then the piece.
     pub(super) fn absorb_piece(&mut self, piece: &[u8]) {
         self.begin_piece(piece.len() as u64);
         self.absorb(piece);
@@ -37,6 +37,7 @@ impl Fnv {
         self.0
     }
 
+    /// Absorbs bytes without their number: two calls hash like one with both.
     pub(super) fn absorb(&mut self, bytes: &[u8]) {
         for &b in bytes {
             self.0 = (self.0 ^ u128::from(b)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013B);
@@ -55,8 +56,9 @@ impl Fnv {
     }
 }
 
-/// Hashes all sums, and the counts of rays, segments, corrected normals, losses and cuts, to 32 hexadecimal digits. Lost rays, paths,
-/// sequences and other counts have no part in it; what instances absorbed is a sum of faces, and needs none.
+/// Hashes the sums of receivers, faces, media and ends with their spreads, and the counts of rays, segments, corrected normals, losses and
+/// cuts, to 32 hexadecimal digits. What passes faces, lost rays, paths, sequences and other counts have no part in it; what instances
+/// absorbed is a sum of faces, and needs none.
 pub(crate) fn digest(t: &Tallies) -> String {
     let mut h = Fnv(Fnv::START);
     t.cells.iter().for_each(|c| h.absorb_sums(c));
