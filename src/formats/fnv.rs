@@ -13,12 +13,12 @@ impl Fnv {
         h.0
     }
 
-    /// Of nothing yet.
+    /// Begins a hash that has absorbed nothing.
     pub(crate) fn new() -> Self {
         Self(Self::START)
     }
 
-    /// Absorbs a piece.
+    /// Absorbs the length of a piece and then the piece.
     pub(crate) fn absorb_piece(&mut self, piece: &[u8]) {
         self.begin_piece(piece.len() as u64);
         self.absorb(piece);

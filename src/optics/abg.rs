@@ -79,7 +79,7 @@ impl Abg {
         self.a / (self.b + r.powf(self.g)) * out.dot(n).max(0.0)
     }
 
-    /// Share that the unbounded plane of β would scatter within radius `r`, at most [`REACH`].
+    /// Returns the share that the plane of β, taken as unbounded, would scatter within radius `r`, which is at most [`REACH`].
     fn share_within(&self, r: f64) -> f64 {
         if self.radii.is_empty() {
             return PI * self.a * (r * r / self.b).ln_1p();

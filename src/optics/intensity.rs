@@ -150,18 +150,18 @@ impl IntensitySampler {
         [0.5 * (self.node(t, i) + self.node(t + 1, i)), 0.5 * (self.node(t, i + 1) + self.node(t + 1, i + 1))]
     }
 
-    /// Integral, cd rad, of an intensity, linear from `low` to `high` over the polar interval `i`, times the sine, from its start up to
-    /// `x`, radians.
+    /// Returns the integral, cd rad, of intensity times the sine of the polar angle, from the start of polar interval `i` up to the polar
+    /// angle `x`, radians; the intensity is linear over the interval, from `low` to `high`.
     fn ring(&self, i: usize, low: f64, high: f64, x: f64) -> f64 {
         let (a, b) = (self.polar[i], self.polar[i + 1]);
         let slope = (high - low) / (b - a);
         // cos a − cos x and sin x − sin a − (x − a) cos x, both by half the sum and half the difference, without cancellation.
         let (mean, half) = (0.5 * (x + a), 0.5 * (x - a));
         let fall = 2.0 * mean.sin() * half.sin();
-        low * fall + slope * 2.0 * (mean.cos() * sine_less_chord(half) + mean.sin() * half * half.sin())
+        low * fall + slope * 2.0 * (mean.cos() * sine_less_h_cosine(half) + mean.sin() * half * half.sin())
     }
 
-    /// The unit direction at an angle from the pole and one about it, radians, by the type's own axes.
+    /// Returns the unit direction at an angle from the pole and one about it, radians, in the axes of [`PhotometricType::direction`].
     fn direction(&self, x: f64, turned: f64) -> Vector {
         let (h, v) = match self.kind {
             PhotometricType::C => (turned.to_degrees(), x.to_degrees()),
@@ -173,7 +173,7 @@ impl IntensitySampler {
 }
 
 /// Returns sin h − h cos h, which begins with h³/3.
-fn sine_less_chord(h: f64) -> f64 {
+fn sine_less_h_cosine(h: f64) -> f64 {
     if h.abs() > 0.1 {
         return h.sin() - h * h.cos();
     }
@@ -231,7 +231,7 @@ mod tests {
         assert!((s.ring(1, 0.0, 1.0, s.polar[2]) * width / exact - 1.0).abs() < 1e-6);
         // Wider ones against the plain form, on both sides of where the series ends.
         for h in [0.05, 0.0999, 0.1001, 0.7] {
-            assert!((sine_less_chord(h) - (f64::sin(h) - h * h.cos())).abs() < 1e-16, "{h}");
+            assert!((sine_less_h_cosine(h) - (f64::sin(h) - h * h.cos())).abs() < 1e-16, "{h}");
         }
     }
 

@@ -138,7 +138,7 @@ fn mirror_image(d: Vector, n: Vector) -> Vector {
     d - n * (2.0 * d.dot(n))
 }
 
-/// `d`, mirrored in the surface if it points below it.
+/// Returns `d`, or its mirror image in the surface where it points away from the side of the unit normal `n`.
 fn fold_to_side(d: Vector, n: Vector) -> Vector {
     if d.dot(n) < 0.0 { mirror_image(d, n) } else { d }
 }

@@ -12,7 +12,7 @@ use crate::math::{Point, Ray, Vector};
 /// Share of its length by which a segment that ends on a receiver may fall short of it: 10^6 times the rounding of its vertices.
 const ROUNDING: f64 = 1e-9;
 
-/// Returns one ray for each time a recorded path crossed a plane or sphere that counts it: the point (mm, scene coordinates), the
+/// Returns one ray for each time a recorded path crossed a plane, disc or sphere that counts it: the point (mm, scene coordinates), the
 /// direction, and a power scaled so that the sum over all recorded paths is what the run emitted: an estimate of what the receiver counted.
 /// Of a receiver that lets light pass the sum is what it counted.
 ///

@@ -19,6 +19,7 @@ pub(crate) enum Channels {
 pub(crate) const CHANNEL_LUMENS: f64 = 2048.0;
 
 impl Channels {
+    /// Takes the channels of a checked receiver of the scene: its bins, else its photometric or colour channels.
     pub(super) fn new(r: &scene::Receiver) -> Self {
         match (&r.channels, &r.bins_nm) {
             (_, Some(bins)) => Self::Bins(bins.clone()),
@@ -38,7 +39,7 @@ impl Channels {
         }
     }
 
-    /// Name of a channel.
+    /// Returns the name of a channel by its index: `lm`, `X`, `Y`, `Z`, or the edges of its bin; empty without channels.
     pub(crate) fn name(&self, channel: usize) -> String {
         match self {
             Self::None => String::new(),
@@ -48,7 +49,8 @@ impl Channels {
         }
     }
 
-    /// Hands out the weight of each channel that counts a wavelength.
+    /// Calls `add` with the index of each channel that counts light of `nm` and the quanta of the channel to a quantum of power. In a bin
+    /// that is 1; in lumens and CIE values it is those of a watt over [`CHANNEL_LUMENS`].
     #[inline]
     pub(crate) fn weigh(&self, nm: f64, mut add: impl FnMut(usize, f64)) {
         match self {
@@ -66,7 +68,7 @@ impl Channels {
         }
     }
 
-    /// What a quantum of a channel is worth, against a quantum of power.
+    /// Returns what a quantum of a channel stands for, as a multiple of a quantum of power: lumens to the watt, or 1 for a bin.
     pub(crate) fn worth(&self) -> f64 {
         match self {
             Self::Photometric | Self::Xyz => CHANNEL_LUMENS,

@@ -15,8 +15,9 @@ fn absorb_sums(h: &mut Fnv, sums: &[Sum]) {
     }
 }
 
-/// Hashes all sums, and the counts of rays, segments, corrected normals, losses and cuts, to 32 hexadecimal digits. Lost rays, paths,
-/// sequences and other counts have no part in it; what instances absorbed is a sum of faces, and needs none.
+/// Hashes the sums of receivers, faces, media and ends with their spreads, and the counts of rays, segments, corrected normals, losses and
+/// cuts, to 32 hexadecimal digits. What passes faces, lost rays, paths, sequences and other counts have no part in it; what instances
+/// absorbed is a sum of faces, and needs none.
 pub(crate) fn digest(t: &Tallies) -> String {
     let mut h = Fnv::new();
     t.cells.iter().for_each(|c| absorb_sums(&mut h, c));

@@ -16,7 +16,7 @@ pub(crate) struct DiscCells {
 }
 
 impl DiscCells {
-    /// Of a square of so many cells along both sides, at most 16 million in all.
+    /// Divides a disc by the square around it, of so many columns and rows, at most 16 million cells in all.
     pub(super) fn new(count: [u32; 2]) -> Self {
         let [columns, rows] = count;
         let edge = |k: u32, n: u32| 2.0 * f64::from(k) / f64::from(n) - 1.0;
@@ -38,7 +38,7 @@ impl DiscCells {
         Self { homes, measures }
     }
 
-    /// The cell that counts the light of a cell of the square.
+    /// Returns the index of the cell that counts the light of a cell of the square: the cell itself where its middle lies on the disc.
     #[inline(always)]
     pub(super) fn home(&self, cell: usize) -> usize {
         self.homes[cell] as usize

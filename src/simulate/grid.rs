@@ -24,6 +24,7 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
+    /// Makes a grid of so many empty cells.
     pub(crate) fn new(cells: usize) -> Self {
         Self { cells: vec![0; cells], touched: vec![0; cells + 1], count: 0, ..Self::default() }
     }
@@ -79,6 +80,7 @@ impl Grid {
         self.touched[..self.count].iter().map(|&c| (c as usize, self.get(c as usize)))
     }
 
+    /// Returns the quanta of a cell, without what [`Self::add_deferred`] has still to add.
     pub(crate) fn get(&self, cell: usize) -> u128 {
         u128::from(self.cells[cell]) + self.carried(cell)
     }

@@ -50,7 +50,8 @@ pub fn ray_lists(bound: &BoundScene) -> Vec<(u32, u64)> {
     lists.filter_map(|(k, e)| Some((k as u32, e.list()?.len()))).collect()
 }
 
-/// Traces every ray of every list; rows in the order of sources, rays and branches.
+/// Traces every ray of every list by itself, with one thread where `threads` is 0; rows in the order of sources, rays and branches. A ray
+/// that cannot be read any more has no row.
 pub fn listed_ends(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings) -> Vec<ListedEnd> {
     // Of each ray alone a wave has one place.
     let single = RunSettings { batch: 1, ..settings.clone() };
@@ -96,13 +97,14 @@ struct ListTracer<'c, 'a> {
 }
 
 impl<'c, 'a> ListTracer<'c, 'a> {
+    /// Makes a tracer of the rays of a source's list; `context` must record every ray.
     fn new(context: &'c Context<'a>, source: u32) -> Self {
         let emitter = &context.bound.emitters[source as usize];
         let scale = emitter.list().map_or(1.0, |list| emitter.power / list.power());
         Self { context, source, tally: ReplicateTally::new(context.bound), scale, cursor: ListCursor::default() }
     }
 
-    /// Where a ray ended, path by path.
+    /// Traces a ray, by its place in the list, and returns where each of its paths ended, by branch; empty where the ray cannot be read.
     fn ends(&mut self, ray: u64) -> Vec<ListedEnd> {
         let kind = kernel_kind(self.context.bound, self.context.settings);
         let selection = RaySelection::Listed { source: self.source, ray };

@@ -97,7 +97,8 @@ impl Receiver {
         }
     }
 
-    /// The same where a placement puts it; of a placement that scales its place alone, as sizes are given in mm.
+    /// Returns the receiver where a placement puts it: turned and moved with it, and its place scaled, but not its size, which is given in
+    /// mm. Faces stay as they are.
     pub(crate) fn placed(mut self, placement: &Frame) -> Self {
         match &mut self.shape {
             Shape::Plane { frame, .. }
@@ -154,7 +155,8 @@ impl Receiver {
         }
     }
 
-    /// Returns the nearest crossing of a plane or sphere in `(after, before)`, mm along a ray; none from behind a one-sided plane.
+    /// Returns the nearest crossing of a plane, disc or sphere in `(after, before)`, mm along a ray; `None` where there is none, from
+    /// behind what is one-sided, and for receivers that do not stand in space.
     #[inline(always)]
     pub(crate) fn crossing(&self, ray: &Ray, after: f64, before: f64) -> Option<f64> {
         match &self.shape {
@@ -184,7 +186,8 @@ impl Receiver {
         }
     }
 
-    /// The cell and coordinates of a point on a receiver that stands in space.
+    /// Returns the cell and coordinates of a point, in scene coordinates, on a plane, disc or sphere; `None` for any other receiver. That
+    /// the point lies on it is not checked.
     #[inline(always)]
     pub(crate) fn spot(&self, p: Point) -> Option<Spot> {
         match &self.shape {
@@ -245,7 +248,8 @@ impl Receiver {
         Spot { cell, at, radius2 }
     }
 
-    /// Area (mm²) or solid angle (sr) of a cell; 0 for one that lies off a disc, where no light is counted.
+    /// Returns the area (mm²) or solid angle (sr) of a cell; 0 for one that lies off a disc, where no light is counted, and 1 for absorbed
+    /// power, which is no density.
     pub(crate) fn measure(&self, column: usize, row: usize) -> f64 {
         let n = self.cells.map(f64::from);
         match &self.shape {
@@ -271,7 +275,8 @@ fn rectangle_bounds(frame: &Frame, half: [f64; 2]) -> Aabb {
     Aabb::from_points(corners.map(|[x, y]| frame.origin + frame.x * (x * half[0]) + frame.y * (y * half[1])))
 }
 
-/// The distance at which a ray crosses the plane of a frame, in `(after, before)`.
+/// Returns the distance along a ray, mm, at which it crosses the x–y plane of a frame, if in `(after, before)`; `None` for a parallel ray
+/// and, where `one_sided`, for one that runs along the frame's z axis and not against it.
 #[inline(always)]
 fn plane_crossing(frame: &Frame, one_sided: bool, ray: &Ray, after: f64, before: f64) -> Option<f64> {
     let along = ray.direction.dot(frame.z);
@@ -284,7 +289,8 @@ fn plane_crossing(frame: &Frame, one_sided: bool, ray: &Ray, after: f64, before:
     (t > after && t < before).then_some(t)
 }
 
-/// Axes of directions: right, up and forward as seen by one who looks along the light.
+/// Returns a frame of right, up and forward, as seen by one who looks along the light: left-handed, with up as near to `up` as `forward`
+/// allows.
 pub(crate) fn far_axes(origin: Point, forward: Vector, up: Vector) -> Frame {
     let side = Frame::from_axis(origin, forward, Some(up));
     // from_axis makes x the upward one; right, up, forward as seen by one who looks along the light is left-handed.

@@ -98,6 +98,7 @@ impl ChannelResult {
     }
 }
 
+/// Writes the letter of a far field's type, or null.
 fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S::Error> {
     a.serialize(s)
 }
@@ -260,12 +261,12 @@ impl ReceiverResult {
         PoleRings::new(self.grid, bounds(0), bounds(1))
     }
 
-    /// The channel of lumens, of a receiver that counts them beside watts.
+    /// Returns the channel in lumens, `lm` or the Y of CIE values; `None` for a receiver that counts power alone or bins.
     pub fn photometric(&self) -> Option<&ChannelResult> {
         self.channels.iter().find(|c| matches!(c.name.as_str(), "lm" | "Y"))
     }
 
-    /// Cell `(i, j)`: the `i`-th along the first side, the `j`-th along the second.
+    /// Returns the value of cell `(i, j)`, in `unit`: the `i`-th along the first side, the `j`-th along the second.
     pub fn cell(&self, i: usize, j: usize) -> f64 {
         self.cells[j * self.grid[0] + i]
     }
@@ -286,9 +287,9 @@ fn ray_count(power: &Sum, replicates: u32, heaviest: f64) -> f64 {
     if f64::from(replicates) < TELLING_RAYS { at_least } else { at_least.max(by_spread) }
 }
 
-/// Returns the standard errors of mean and root mean square about the receiver's middle, to first order, of [mean, mean square] along an
-/// axis and their standard errors, by the spread of replicates; all lengths in half sides. Of a mean square of 0 the second is 0, or beyond
-/// all numbers where that has an error.
+/// Returns the standard errors of mean and root mean square about the receiver's middle, to first order, from [mean, mean square] along an
+/// axis and their standard errors by the spread of replicates; all lengths in half sides. Of a mean square of 0 the second is 0, or
+/// infinite where that has an error.
 fn mean_and_rms_errors([_, square]: [f64; 2], [of_mean, of_square]: [f64; 2]) -> [f64; 2] {
     // Of a square root, to first order.
     [of_mean, 0.5 * of_square / square.sqrt().max(f64::MIN_POSITIVE)]
@@ -325,7 +326,7 @@ fn unit_errors([mean, square]: [f64; 2], farthest: f64) -> [f64; 2] {
     [half_unit, of_rms]
 }
 
-/// The smallest cell but for those off the receiver, rising.
+/// Returns the smallest of `cells` but for those whose indices are in `off`, rising; infinite where none is left.
 fn least_on_receiver(cells: &[f64], off: &[usize]) -> f64 {
     let mut off = off.iter().peekable();
     let on = |k: &usize| off.next_if_eq(&k).is_none();

@@ -114,7 +114,7 @@ impl ReplicateTally {
         }
     }
 
-    /// Hands the vertices gathered so far to `sink`, and keeps those of the sample.
+    /// Hands the vertices gathered so far to `sink`, moves those of the sample to `sample`, and drops the others.
     pub(crate) fn stream_paths(&mut self, sink: PathSink<'_>, plan: &Plan) {
         sink(&self.paths);
         self.sample.extend(self.paths.drain(..).filter(|v| plan.samples(v.ray)));
@@ -333,6 +333,7 @@ impl Tallies {
     }
 }
 
+/// Merges sums into those of the same index; what one list has beyond the other is left out.
 fn merge_sums(into: &mut [Sum], from: &[Sum]) {
     into.iter_mut().zip(from).for_each(|(a, b)| a.merge(b));
 }

@@ -57,7 +57,7 @@ impl TrimRegion {
         region
     }
 
-    /// Returns the band of a height; beyond the loops that at their end.
+    /// Returns the index of the band that holds parameter `v`, the first or last one beyond the loops; for a trimmed face alone.
     fn band(&self, v: f64) -> usize {
         let last = self.bands.len() - 1;
         // The same arithmetic for sides and points, so that a point's band has every side at its height. A cast cuts what is negative.

@@ -49,7 +49,8 @@ pub fn verify_pruning(
     (pruned, verification)
 }
 
-/// Names where two runs differ, twenty places at most; empty when all of these agree.
+/// Names the ends, cells of receivers, absorbed powers of faces and counts that differ between two runs, twenty at most; other sums are not
+/// looked at.
 fn compare(bound: &BoundScene, a: &Results, b: &Results) -> Vec<String> {
     let (a, b) = (&a.tallies, &b.tallies);
     let mut found = Vec::new();

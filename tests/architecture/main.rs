@@ -1,6 +1,7 @@
 //! The architecture: a module uses only modules of lower layers, third-party crates come in through their doors, no circle of
 //! files is larger than one idea, and files stay small.
 
+mod faults;
 mod graph;
 mod layers;
 mod source;

@@ -101,6 +101,30 @@ fn a_truncated_file_is_read_as_far_as_it_goes_and_the_rest_is_named() {
 }
 
 #[test]
+fn a_number_used_twice_is_named_by_every_command_that_reads_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = std::fs::read_to_string(step("lens_planoconvex_analytic.stp")).unwrap();
+    let (data, end) = whole.split_at(whole.rfind("ENDSEC").unwrap());
+    let count = |n: usize| "#10=CARTESIAN_POINT('',(0.,0.,0.));\n".repeat(n);
+    let mut told = Vec::new();
+    for n in [1, 5] {
+        let text = format!("{data}{}{end}", count(n));
+        let file = written(folder.path(), "twice.stp", text.as_bytes()).display().to_string();
+        told.push(["info", "facet", "check"].map(|command| {
+            let (code, out, err) = lampyris(&[command, &file]);
+            assert_eq!(code, 0, "{command}: {err}");
+            out + &err
+        }));
+    }
+    for text in &told[0] {
+        assert_eq!(text.matches("#10 its number stands for an earlier instance already").count(), 1, "{text}");
+    }
+    for text in &told[1][1..] {
+        assert!(text.matches("its number").count() == 3 && text.contains("and 2 more problems"), "{text}");
+    }
+}
+
+#[test]
 fn what_assemblies_place_has_a_limit_that_an_option_raises() {
     let lamp = step("lamp_multicavity.stp");
     for command in ["info", "facet", "check"] {

@@ -3,13 +3,13 @@
 
     tests/mutants/run.py [--list] [--check] [--only TEXT] [--work FOLDER] [--jobs N] [--all-areas] [--table FILE]
 
-`faults.py` lists them: a file, a text that stands there exactly once with the expression or statement between `«` and `»`, what takes its place, and the
-areas of tests that ought to notice, each with an optional filter of names (`exact:certificates`). All of them are compiled into one program, each behind
-a question for `LAMPYRIS_FAULT`, so that the trial of a fault costs no build.
+`faults.toml` lists them: a file, a text that stands there exactly once with the expression or statement between `«` and `»`, what takes its place, and
+the areas of tests that ought to notice, each with an optional filter of names (`exact:certificates`). All of them are compiled into one program, each
+behind a question for `LAMPYRIS_FAULT`, so that the trial of a fault costs no build.
 
 A fault is *killed* when a test fails, and *survived* when all pass; `--all-areas` asks every area about the survivors before it says so. A list whose
 texts no longer stand in the source, that no compiler takes, or whose areas fail without any fault, is an error and kills nothing. The exit code is the
-number of survivors. The copy lies outside of the source; compiled dependencies are taken over from `target`. Nothing but Python 3.9, git and the Rust
+number of survivors. The copy lies outside of the source; compiled dependencies are taken over from `target`. Nothing but Python 3.11, git and the Rust
 toolchain is needed."""
 import argparse
 import json
@@ -19,9 +19,9 @@ import subprocess
 import sys
 import tempfile
 import time
+import tomllib
 from pathlib import Path
-
-from faults import EQUIVALENT, FAULTS
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 AREAS = ["lib", "exact", "intersect", "study", "simulate", "tessellate", "step", "formats", "cli", "hostile", "truck"]
@@ -40,6 +40,27 @@ pub fn has_fault(number: u32) -> bool {
 """
 
 
+class Fault(NamedTuple):
+    """An entry of the list; of one that no test can see, `equivalent` is the reason."""
+    name: str
+    file: str
+    text: str
+    replacement: str
+    areas: list
+    equivalent: str
+
+
+def read_faults():
+    """The list, with the areas that a group stands for in its place."""
+    listed = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf8"))
+    groups = {name: areas.split() for name, areas in listed["groups"].items()}
+    areas = lambda words: [area for word in words.split() for area in groups.get(word, [word])]
+    return [Fault(**{"equivalent": "", **fault, "areas": areas(fault["areas"])}) for fault in listed["fault"]]
+
+
+FAULTS = read_faults()
+
+
 def parts(text):
     """What stands before, within and after the marks of a text."""
     before, rest = text.split("«")
@@ -50,22 +71,22 @@ def parts(text):
 def stale():
     """Names and faults of entries whose text does not stand exactly once in its file."""
     bad = {}
-    for name, file, text, *_ in FAULTS:
-        path = ROOT / file
-        count = path.read_text(encoding="utf8").count("".join(parts(text))) if path.is_file() else 0
+    for fault in FAULTS:
+        path = ROOT / fault.file
+        count = path.read_text(encoding="utf8").count("".join(parts(fault.text))) if path.is_file() else 0
         if count != 1:
-            bad[name] = f"{file} holds its text {count} times"
+            bad[fault.name] = f"{fault.file} holds its text {count} times"
     return bad
 
 
 def with_faults(file, source):
     """The source of a file with every fault of it behind its question."""
     edits = []
-    for number, (_, where, text, replacement, _) in enumerate(FAULTS):
-        if where == file:
-            before, inside, after = parts(text)
+    for number, fault in enumerate(FAULTS):
+        if fault.file == file:
+            before, inside, after = parts(fault.text)
             start = source.index(before + inside + after) + len(before)
-            edits.append((start, start + len(inside), number, replacement))
+            edits.append((start, start + len(inside), number, fault.replacement))
     # Several faults of one place are asked one after another.
     for start, end in sorted({edit[:2] for edit in edits}, reverse=True):
         inside = source[start:end]
@@ -85,7 +106,7 @@ def write_copy(copy):
         if not source.is_file():
             continue
         content = source.read_bytes()
-        if any(fault[1] == file for fault in FAULTS):
+        if any(fault.file == file for fault in FAULTS):
             content = with_faults(file, content.decode("utf8")).encode("utf8")
         if file == "src/lib.rs":
             content += CHOICE.encode("utf8")
@@ -153,9 +174,9 @@ def main():
     parser.add_argument("--no-base", action="store_true", help="skip the run without any fault")
     parser.add_argument("--table", type=Path, help="append a row of a Markdown table for each")
     options = parser.parse_args()
-    chosen = [(n, f) for n, f in enumerate(FAULTS) if any(only in f[0] or only in f[1] for only in options.only.split(","))]
+    chosen = [(n, f) for n, f in enumerate(FAULTS) if any(only in f.name or only in f.file for only in options.only.split(","))]
     if options.list:
-        print("\n".join(f"{f[0]:45} {f[1]}" for _, f in chosen))
+        print("\n".join(f"{f.name:45} {f.file}" for _, f in chosen))
         return 0
     if bad := stale():
         sys.exit("\n".join(f"{name}: {why}" for name, why in bad.items()))
@@ -163,7 +184,7 @@ def main():
     if options.check:
         return 0
     write_copy(options.work)
-    wanted = dict.fromkeys(area for _, f in chosen for area in f[4].split())
+    wanted = dict.fromkeys(area for _, f in chosen for area in f.areas)
     areas = AREAS if options.all_areas else list(dict.fromkeys(area.partition(":")[0] for area in wanted))
     programs = build(options.work, options.jobs, areas)
     if not options.no_base:
@@ -171,19 +192,19 @@ def main():
         if failed:
             sys.exit(f"fails without any fault: {why}")
     survivors = []
-    for number, (name, file, _, _, tests) in chosen:
+    for number, fault in chosen:
         start = time.time()
-        killed, why = ask(programs, options.work, number, tests.split())
-        if not killed and options.all_areas and name not in EQUIVALENT:
+        killed, why = ask(programs, options.work, number, fault.areas)
+        if not killed and options.all_areas and not fault.equivalent:
             killed, why = ask(programs, options.work, number, AREAS)
-        verdict = "killed" if killed else "equivalent" if name in EQUIVALENT else "survived"
-        why = why or EQUIVALENT.get(name, "")
-        print(f"{verdict:10} {time.time() - start:5.0f} s  {name}: {why}", flush=True)
+        verdict = "killed" if killed else "equivalent" if fault.equivalent else "survived"
+        why = why or fault.equivalent
+        print(f"{verdict:10} {time.time() - start:5.0f} s  {fault.name}: {why}", flush=True)
         if options.table:
             with options.table.open("a", encoding="utf8") as table:
-                table.write(f"| {name} | {file.removeprefix('src/')} | {verdict} | {why} |\n")
+                table.write(f"| {fault.name} | {fault.file.removeprefix('src/')} | {verdict} | {why} |\n")
         if verdict == "survived":
-            survivors.append(name)
+            survivors.append(fault.name)
     print(f"{len(survivors)} survivors: {', '.join(survivors) or 'none'}")
     return len(survivors)
 

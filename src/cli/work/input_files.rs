@@ -10,6 +10,9 @@ use crate::step::{self, Import, ImportReport};
 use std::path::Path;
 use std::time::Instant;
 
+/// Problems of files that are said in full; `lampyris info` has all of them.
+const NAMED_PROBLEMS: usize = 3;
+
 /// What a FILE argument turned out to be.
 pub(crate) enum Input {
     /// A CAD model.
@@ -49,9 +52,18 @@ pub(crate) fn scene_or_model(path: &Path, placed: PlacedLimit, console: &Console
     Ok(Input::Step(model_file(path, placed, console)?))
 }
 
-/// Says how many faces were refused and what the files hide, if they do; incomplete where that is a larger share of all than `max_refused`.
+/// Says what could not be read of the files, what they hide and how many faces were refused, if any; incomplete where the refused are a
+/// larger share of all faces than `max_refused`.
 pub(crate) fn report_refusals(reports: &[ImportReport], max_refused: f64, console: &Console) -> Completion {
     let (found, refused) = reports.iter().fold((0, 0), |(f, r), i| (f + i.faces.found, r + i.faces.refused));
+    let problems: Vec<&String> = reports.iter().flat_map(|r| &r.problems).collect();
+    for problem in problems.iter().take(NAMED_PROBLEMS) {
+        console.say(format_args!("problem: {problem}"));
+    }
+    if problems.len() > NAMED_PROBLEMS {
+        console
+            .say(format_args!("and {} more problems; `lampyris info` lists them", problems.len() - NAMED_PROBLEMS));
+    }
     let hidden: usize = reports.iter().map(|r| r.hidden.len()).sum();
     if hidden > 0 {
         console.say(format_args!("light meets {hidden} items that the model hides; `lampyris info` lists them"));

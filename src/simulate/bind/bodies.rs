@@ -14,8 +14,8 @@ use crate::simulate::{Error, ErrorKind};
 use std::collections::HashMap;
 
 /// Makes the bodies, one for each instance, called by its label, and medium, with the surroundings as body 0. Returns them, the body of
-/// each placed face (0 without a medium), and whether any two boxes come within the glue distance: bodies that do not can neither touch
-/// nor nest.
+/// each placed face (0 without a medium), and whether the boxes of any two, each grown by the glue distance, meet: bodies of which none do
+/// can neither touch nor nest.
 ///
 /// # Errors
 /// When a medium is not known, or has no index at the wavelength of the scene.

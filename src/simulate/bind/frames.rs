@@ -6,7 +6,11 @@ use crate::model::Model;
 use crate::simulate::scene::{Key, Scene};
 use crate::simulate::{Error, ErrorKind};
 
-/// The placement of the instance that `frame` names, or of the only instance of a part of this name; that of the scene without a name.
+/// Returns the placement of the instance called `name`, or of the only instance of a part of this name; the identity without a name. `of`
+/// is the place in the scene of whoever has the key `frame`, for messages.
+///
+/// # Errors
+/// When nothing is called so, or several instances are.
 pub(super) fn frame(scene: &Scene, model: &Model, of: [Key<'_>; 2], name: Option<&str>) -> Result<Frame, Error> {
     let Some(name) = name else { return Ok(Frame::IDENTITY) };
     let at = [of[0], of[1], Key::Name("frame")];

@@ -181,8 +181,11 @@ fn bind_faces(
     Ok(Faces { faces, surfaces, touching_pairs })
 }
 
-/// Lets the rays of sources that are far away start beside the scene, which lies in a box. Surroundings that absorb or scatter take a
-/// part in what comes of them on their way; there they start where they are.
+/// Lets the rays of sources that are far away start beside the scene, which lies in a box. Surroundings that absorb or scatter take a part
+/// in what comes of them on their way; there they start where they are. `frames` are those that the sources are given in.
+///
+/// # Errors
+/// When a source is so far away that its rays are not known within the scene.
 fn start_near(
     scene: &Scene,
     emitters: &mut [Emitter],
@@ -205,13 +208,16 @@ fn start_near(
     Ok(())
 }
 
-/// The frame that a source is given in.
+/// Returns the frame, in the scene, that source `index` is given in; an error as of [`frames::frame`].
 fn source_frame(scene: &Scene, model: &Model, index: usize) -> Result<Frame, Error> {
     let of = [Key::Name("source"), Key::Index(index)];
     frames::frame(scene, model, of, scene.sources[index].frame.as_deref())
 }
 
-/// The receivers, with the faces that absorbing ones name.
+/// Makes the receivers, each at its placement and with the faces whose absorbed power it counts.
+///
+/// # Errors
+/// When one selects no face, or its `frame` names no single instance.
 fn bind_receivers(scene: &Scene, model: &Model) -> Result<Vec<Receiver>, Error> {
     let mut receivers = Vec::new();
     for (i, r) in scene.receivers.iter().enumerate() {

@@ -30,7 +30,8 @@ struct Slab {
 }
 
 impl Slab {
-    /// Returns the slab across the diagonals of a surface's net of control points; all of space where these are parallel.
+    /// Returns the slab around a surface's control points whose planes are parallel to both diagonals between its corners; all of space
+    /// where the diagonals are parallel.
     fn new(surface: &Surface) -> Self {
         let points = || surface.points.iter().map(|p| p.project());
         let [[u0, u1], [v0, v1]] = surface.domain();

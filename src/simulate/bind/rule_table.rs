@@ -43,7 +43,7 @@ pub(super) fn rule_table(scene: &Scene, chosen: &ChosenRules) -> Vec<RuleFaces> 
     table
 }
 
-/// Returns a surface in the scene file's word.
+/// Returns the word that the scene file has for a surface.
 fn surface_word(kind: SurfaceKind) -> &'static str {
     match kind {
         SurfaceKind::Absorber => "absorber",

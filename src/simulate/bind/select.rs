@@ -204,7 +204,7 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Res
     Ok(faces)
 }
 
-/// The nearest name, or what names there are.
+/// Returns advice that names the nearest name, or the first twelve in alphabetical order where none is near; sorts out empty ones.
 pub(super) fn advice(word: &str, mut names: Vec<&str>) -> String {
     if let Some(near) = suggest::nearest(word, names.iter().copied().filter(|n| !n.is_empty())) {
         return format!("did you mean '{near}'?");

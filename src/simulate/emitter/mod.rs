@@ -158,7 +158,7 @@ impl Emitter {
         })
     }
 
-    /// The same where a placement puts it.
+    /// Returns the emitter where a placement puts it: turned and moved with it, its place scaled, but not its size.
     pub(crate) fn placed(mut self, placement: &Frame) -> Self {
         self.frame = placement.carry(&self.frame);
         if !placement.is_identity() {
@@ -167,7 +167,7 @@ impl Emitter {
         self
     }
 
-    /// Which pairs of numbers it draws from the net: for the place, the direction, the wavelength.
+    /// Returns which pairs of numbers it draws from the net: for the place, the direction, the wavelength.
     fn needed_pairs(&self) -> [bool; 3] {
         let list = matches!(self.shape, Shape::List(_));
         let collimated = matches!(self.lobe, Lobe::Collimated);
@@ -230,7 +230,7 @@ impl Emitter {
         Some(wavelengths.sample(stream.pair(index, 2)[0]))
     }
 
-    /// The measured rays of this source, where it has a list.
+    /// Returns the measured rays of this source; `None` where it has no list.
     pub(crate) fn list(&self) -> Option<&RayList> {
         match &self.shape {
             Shape::List(list) => Some(list),
@@ -238,7 +238,8 @@ impl Emitter {
         }
     }
 
-    /// A ray of the list of this source, by its place there; one that there is not is left as it was.
+    /// Writes a ray of the list, by its place there, to `ray`, and returns its emission, as [`Self::emit_measured`]; reading may move
+    /// `cursor` to another block.
     fn emit_listed(
         &self,
         stream: &Stream,
@@ -251,7 +252,8 @@ impl Emitter {
         self.emit_measured(measured, self.wavelength(stream, index), ray)
     }
 
-    /// A measured ray, which has its own wavelength where the source draws none; one that could not be read fails where the source is.
+    /// Writes a measured ray, moved to the scene, to `ray`, and returns its emission, with the wavelength that was `drawn`, else its own.
+    /// Of a ray that could not be read the emission is `failed`, and `ray` starts at the source along its axis.
     fn emit_measured(&self, measured: Option<LightRay>, drawn: Option<f64>, ray: &mut Ray) -> Emission {
         let Some(measured) = measured else {
             *ray = Ray::new(self.frame.origin, self.frame.z);
@@ -261,7 +263,8 @@ impl Emitter {
         Emission { from: None, wavelength: drawn.or(measured.wavelength_nm), failed: false }
     }
 
-    /// A ray of this source; `cursor` is for those that have a list.
+    /// Draws the ray with this index, writes its start and direction in the scene to `ray`, and returns its face, wavelength and whether it
+    /// failed. `stream` must hold its numbers; `cursor` is for sources with a list.
     #[inline(never)]
     fn emit(&self, stream: &Stream, index: RayIndex, cursor: &mut ListCursor, ray: &mut Ray) -> Emission {
         let f = &self.frame;

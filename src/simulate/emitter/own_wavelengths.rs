@@ -41,7 +41,7 @@ impl OwnWavelengths {
         self.keep_in_cell(nm);
     }
 
-    /// Keeps the least of each cell, whichever came first.
+    /// Keeps the least wavelength of each cell, in whatever order they come.
     fn keep_in_cell(&mut self, nm: f64) {
         let kept = self.cells.entry(nm.to_bits() >> (64 - CELL_BITS)).or_insert(nm);
         *kept = kept.min(nm);

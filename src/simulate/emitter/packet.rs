@@ -17,6 +17,7 @@ pub(super) struct RayPacket {
 }
 
 impl RayPacket {
+    /// Makes a packet of zeros, to be filled.
     pub(super) fn boxed() -> Box<Self> {
         Box::new(Self { origins: [[0.0; PACKET]; 3], directions: [[0.0; PACKET]; 3] })
     }

@@ -115,7 +115,10 @@ impl RayList {
         Ok(list)
     }
 
-    /// Adds up the powers and notes where the rays start and which wavelengths they have.
+    /// Reads the whole list once: adds up its powers, and notes where the rays start and which wavelengths they have.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
     fn survey(&mut self) -> Result<(), Fault> {
         let changed = |e: formats::Error| Fault::new(e.to_string(), "leave the file as it is while it is in use");
         let mut sums = Vec::new();
@@ -142,6 +145,7 @@ impl RayList {
         self.file.len()
     }
 
+    /// Returns the power of all rays, in the unit of the run.
     pub(crate) fn power(&self) -> f64 {
         self.sums.last().copied().unwrap_or(0.0)
     }

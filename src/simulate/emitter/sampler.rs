@@ -35,7 +35,7 @@ impl RaySampler {
         self.choose_packets(emitter);
     }
 
-    /// Takes packets where they pay.
+    /// Makes room for a packet where rays are to be made many at a time, and drops it where they are made singly.
     fn choose_packets(&mut self, emitter: &Emitter) {
         // Packets need the net's numbers, a plain source, and enough rays to pay for one.
         let packed = self.stream.sampling() == Sampling::Sobol
@@ -67,7 +67,8 @@ impl RaySampler {
         (index, Emission { from: None, wavelength: emitter.wavelength(&self.stream, index), failed: false })
     }
 
-    /// Writes the ray with this index in its source and replicate to `ray`, without those before it; the same bits as [`Self::next_ray`].
+    /// Writes the ray with this index in its source and replicate to `ray`, without those before it, and returns its numbers and emission:
+    /// the same bits as [`Self::next_ray`], which must not be called after it without a restart.
     pub(crate) fn single_ray(&mut self, emitter: &Emitter, index: u32, ray: &mut Ray) -> (RayIndex, Emission) {
         self.stream.prepare_single(index);
         let index = self.index(index);
@@ -76,7 +77,7 @@ impl RaySampler {
         (index, emission)
     }
 
-    /// Puts a ray of the emitter's list, by its place there, into `ray`.
+    /// Writes a ray of the emitter's list, by its place there, to `ray`, and returns its emission; its number in the run is that place.
     pub(crate) fn listed_ray(&mut self, emitter: &Emitter, listed: u64, ray: &mut Ray) -> (RayIndex, Emission) {
         self.stream.prepare_single(0);
         let index = RayIndex { in_run: listed, in_stream: 0 };
@@ -85,6 +86,7 @@ impl RaySampler {
         (index, emission)
     }
 
+    /// Returns both numbers of a ray, by that in its source and replicate.
     #[inline(always)]
     fn index(&self, in_stream: u32) -> RayIndex {
         RayIndex { in_run: self.first + u64::from(in_stream), in_stream }

@@ -65,11 +65,13 @@ pub(super) fn versine_in_cone(rim: f64, u: f64) -> f64 {
     u * rim
 }
 
+/// Returns the sine of an angle from 0 to π by its `1 − cos`.
 #[inline(always)]
 pub(super) fn sine_from_versine(versine: f64) -> f64 {
     (versine * (2.0 - versine)).max(0.0).sqrt()
 }
 
+/// Returns the sine of an angle from 0 to π by its cosine.
 #[inline(always)]
 pub(super) fn sine_from_cosine(cosine: f64) -> f64 {
     ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt()

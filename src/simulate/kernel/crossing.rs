@@ -17,7 +17,7 @@ pub(super) struct Crossing<C> {
 }
 
 /// Returns the payload of a ray on both sides of the face at `at`. Where two faces are crossed at once, sets `at.skip` to the glue
-/// distance.
+/// distance; notes in `at.refused_contact` where the second of them could not be.
 ///
 /// # Errors
 /// The cause of loss, when a ray with these media, or those found anew from geometry, cannot be on the other side.
@@ -59,8 +59,9 @@ pub(super) fn cross_face<C: RayPayload>(
     }
 }
 
-/// Crosses both faces at once where the face lies on one of another body, whichever the ray met first: sets `across` to the payload behind
-/// both, `here` where its media had to be found anew, and `at.skip`. Changes nothing where no other face lies there.
+/// Crosses both faces at once where the face lies on one of another body, against it or, where bodies overlap, looking the same way,
+/// whichever the ray met first. Sets `across` to the payload behind both, `here` where its media had to be found anew, `at.skip`, and
+/// `at.refused_contact` where only the first can be crossed. Changes nothing where no other face lies there.
 #[inline(always)]
 fn cross_contact<C: RayPayload>(
     context: &Context<'_>,

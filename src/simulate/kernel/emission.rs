@@ -33,7 +33,8 @@ pub(super) struct SourceQueue {
 }
 
 impl SourceQueue {
-    /// Makes the queue of a replicate, or of a single ray that is traced again; empty for a ray that the run does not have.
+    /// Makes the queue of a replicate, of a single ray that is traced again, or of one ray of a source's list; empty for a ray that the run
+    /// does not have.
     pub(super) fn new(context: &Context<'_>, rays: RaySelection) -> Self {
         let last = context.plan.shares.len();
         let single = !matches!(rays, RaySelection::Replicate(_));
@@ -67,7 +68,8 @@ impl SourceQueue {
         queue
     }
 
-    /// Turns to the rays of a source in this replicate, from the first on, and makes its sampler; does nothing past the last source.
+    /// Turns to the rays of a source in this replicate, from the first on, and makes or restarts the sampler; past the last source only
+    /// notes that it is there, which ends the queue.
     fn enter_source(&mut self, context: &Context<'_>, source: usize) {
         self.source = source;
         let Some(emitter) = context.bound.emitters.get(source) else { return };

@@ -13,7 +13,8 @@ use crate::simulate::receiver::{Receiver, Spot};
 use crate::simulate::sequence::DepositPlace;
 use crate::simulate::tally::{quanta_as_integer, round_quanta};
 
-/// Returns how far in front of a face a receiver that lies in it is met, mm, at distance `t` of a ray: more than both are off by rounding.
+/// Returns how far in front of a face, mm, a receiver that lies in it is taken to be, at distance `t` of a ray: the rounding of a place
+/// there.
 #[inline(always)]
 fn in_front(ray: &Ray, t: f64) -> f64 {
     rounding(t + ray.origin.abs().max_element())
@@ -98,8 +99,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
     }
 
-    /// Counts so many quanta of a path that meets receiver `r`, a plane or sphere, at a point; not after another number of bounces than the
-    /// receiver asks for.
+    /// Adds so many quanta of a path to receiver `r`, a plane, disc or sphere, which it meets at a point; nothing after another number of
+    /// bounces than the receiver asks for.
     #[inline(always)]
     pub(super) fn count_at(&mut self, path: &Path<C>, quanta: f64, r: u32, point: Point) {
         let receiver = &self.context.bound.receivers[r as usize];

@@ -37,8 +37,9 @@ fn starts_clear(context: &Context<'_>, emitter: &Emitter) -> bool {
     !solids.any_meeting(&starts.grown(room), |_| true)
 }
 
-/// Decides what the rays of one source start in, from [`PROBED_RAYS`] of its rays, of as many replicates as there are: the same bodies
-/// where all agree and none starts on a face.
+/// Decides what the rays of one source start in, by [`PROBED_RAYS`] of its rays from all replicates. The bodies that the scene states, else
+/// the same bodies where all agree; ray by ray where they do not, or where a luminous face shines into a body glued on it; `OnFace` as soon
+/// as one starts on a face that it does not shine from.
 fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_media: bool) -> StartingMedia {
     if starts_clear(context, emitter) {
         return StartingMedia::Same(emitter.inside.clone());

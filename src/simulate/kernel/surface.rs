@@ -12,8 +12,8 @@ use crate::simulate::body::AMBIENT;
 use crate::simulate::surfaces::{Coated, Surface};
 use crate::simulate::tally::round_quanta;
 
-/// Returns what the surface of a face does to the light that meets it; books nothing. Notes in `at` the normals that it corrected and
-/// whether two faces were crossed at once.
+/// Returns what the surface of a face does to the light that meets it; books nothing. Notes in `at` corrected normals, overlaps and refused
+/// contacts, and, where two faces are crossed at once, how far to skip.
 #[inline(always)]
 pub(super) fn interact<'s, C: RayPayload>(
     context: &'s Context<'_>,
@@ -32,8 +32,8 @@ pub(super) fn interact<'s, C: RayPayload>(
     }
 }
 
-/// Reflects a constant share of the path's quanta, rounded to whole ones, and turns its polarisation as a conductor does; the face absorbs
-/// the rest.
+/// Returns the reflection of a constant share of the path's quanta, rounded to whole ones, with the polarisation turned as by a conductor;
+/// the face is to absorb the rest. Counts corrected normals in `at`.
 #[inline(always)]
 fn mirror_interaction<'s, C: RayPayload>(
     context: &Context<'_>,
@@ -53,7 +53,8 @@ fn mirror_interaction<'s, C: RayPayload>(
 /// Returns what the bare boundary of a body does to light: both ways on with their shares; nothing is drawn or booked.
 ///
 /// Light passes unchanged where its innermost body stays the same. After too long by total reflection alone it is trapped, and it is lost
-/// where its media cannot be on the other side even when found anew. Writes `skip`, `overlap` and `corrected_normals` of `at`.
+/// where its media cannot be on the other side even when found anew. Writes `skip`, `overlap`, `refused_contact` and `corrected_normals` of
+/// `at`.
 #[inline(always)]
 fn interface_interaction<'s, C: RayPayload>(
     context: &Context<'_>,
@@ -123,8 +124,9 @@ fn overlapping_bodies<C: RayPayload>(
         .then(|| [left.min(here), left.max(here)])
 }
 
-/// Reflects, transmits and scatters light at a surface with a coating, scatter or both; what the coating takes is not kept. A face without
-/// a medium, or an opaque one, needs no body behind it.
+/// Returns what a surface with a coating, scatter or both does to light: both ways on with their shares, without what the coating takes;
+/// absorbed where less than half a quantum is left, lost as at a bare boundary. Nothing is drawn or booked. A face without a medium, or an
+/// opaque one, needs no body behind it.
 fn coating_interaction<'s, C: RayPayload>(
     context: &Context<'_>,
     coated: &'s Coated,
@@ -198,8 +200,9 @@ fn polarised_share<C: RayPayload>(
     }
 }
 
-/// Returns the normal, the cosine of incidence, and the refracted direction on the far side of the facet with its cosine; `None` for these
-/// at total reflection. `eta` is the index before the face over that behind it.
+/// Returns the normal to refract about, the cosine of incidence, and the refracted direction on the far side of the facet with its cosine;
+/// `None` for these two at total reflection. `eta` is the index before the face over that behind it. Counts in `at` where the facet's
+/// normal was taken.
 #[inline(always)]
 fn refracted(d: Vector, eta: f64, at: &mut SurfaceInteraction<'_>) -> (Vector, f64, Option<(Vector, f64)>) {
     let flat = at.hit.geometric_normal;

@@ -148,7 +148,8 @@ impl Receiver {
         }
     }
 
-    /// Returns how many sums it keeps: its cells for power and once more for each channel or bin.
+    /// Returns how many sums it keeps at most: its cells for power and once more for each channel or bin. A receiver of absorbed power
+    /// keeps one, whatever its cells.
     pub(super) fn sums(&self) -> u64 {
         let channels = match (self.channels, &self.bins_nm) {
             // A bin has a sum, and power one beside them: as many sums as edges.

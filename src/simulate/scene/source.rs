@@ -147,7 +147,8 @@ impl Source {
         }
     }
 
-    /// Returns what is wrong with the file of a source, or the first key that a source with a file has not; `None` where nothing is.
+    /// Returns the key and fault where a file is missing or given in vain, or where `on`, `frame`, `radius` or `size` does not go with such
+    /// a source or with each other; `None` where nothing is wrong.
     fn file_fault(&self) -> Fault {
         let list = matches!(self.kind, SourceKind::Rays | SourceKind::Data1);
         let measured = list || matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);

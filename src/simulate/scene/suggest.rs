@@ -1,6 +1,7 @@
 //! The name that was probably meant.
 
-/// Returns the candidate nearest to a word, in any case of letters; `None` where a third of the letters and more differ.
+/// Returns the candidate nearest to a word, in any case of letters; `None` where all differ in more than a third of the longer one's bytes
+/// and one letter more.
 pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = word.to_lowercase();
     candidates

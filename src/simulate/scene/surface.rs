@@ -149,7 +149,8 @@ fn coating_from_grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Co
     CoatingTable::new(angles, nm, cells).map(Coating::Table).map_err(|e| e.to_string())
 }
 
-/// Refuses materials that say nothing, select twice, have values that do not go together or name a medium that is not known.
+/// Refuses surroundings of a medium that is not known, and materials that say nothing, select twice, have values that do not go together,
+/// or name a medium or a colour that is not known.
 pub(super) fn check(scene: &Scene) -> Result<(), Error> {
     if let Some(name) = &scene.ambient {
         medium::find(scene, name, &[Key::Name("ambient")])?;
