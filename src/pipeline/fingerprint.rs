@@ -10,8 +10,8 @@ use crate::simulate::{BoundScene, Fingerprint, FingerprintHasher, RunSettings, S
 use crate::tessellate;
 use std::fmt::{self, Write};
 
-/// Hashes all that decides the bits of a run of these settings: program, scene, its model and other files, facets, intersector, settings; of
-/// a run that grows not the number of rays. A model from files counts by their bytes as they were read, one from memory by its values.
+/// Hashes all that decides the bits of a run of these settings: program, scene, its model and other files, facets, intersector, settings;
+/// of a run that grows not the number of rays. A model from files counts by their bytes as they were read, one from memory by its values.
 ///
 /// # Errors
 /// When a file of the scene cannot be read.

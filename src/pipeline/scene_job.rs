@@ -91,7 +91,7 @@ impl SceneJob {
         (made, seconds)
     }
 
-    /// Returns the cache, and the name that facets of these settings have in it; `None` without a cache, or where the model is from no file.
+    /// Returns the cache, and the name that facets of these settings have in it; `None` without a cache or for a model from no file.
     pub(super) fn cached(&self, settings: &tessellate::Settings) -> Option<(&Cache, Fingerprint)> {
         let cache = self.cache.as_ref().filter(|_| self.loaded.is_from_files(&self.scene))?;
         Some((cache, facets_key(&self.scene, &self.loaded.reports, settings)))

@@ -51,13 +51,13 @@ fn expose(grid: &Grid, zoom: usize) -> Option<Exposed> {
 /// Grey where there is no cell, as in maps.
 const NO_CELL: u8 = 128;
 
-/// Returns the picture of all cells for a file; `None` as [`expose`].
+/// Returns the picture of all cells for a file; `None` without layers X, Y and Z, and where all is dark.
 pub fn colour_picture(grid: &Grid) -> Option<Picture> {
     let longer = grid.axes[0].cells.max(grid.axes[1].cells).max(1);
     expose(grid, FILE_PIXELS.div_ceil(longer)).map(|exposed| exposed.picture)
 }
 
-/// Returns the picture as a chart, framed around its light; `None` as [`expose`].
+/// Returns the picture as a chart, framed around its light; `None` without layers X, Y and Z, and where all is dark.
 pub(super) fn colour_chart(grid: &Grid) -> Option<Chart> {
     let framed = lit_part(grid);
     let grid = framed.as_ref().unwrap_or(grid);

@@ -8,10 +8,11 @@ use super::dispatch::{self, kernel_kind};
 use super::emitter::ListCursor;
 use super::kernel::{Context, RaySelection};
 use super::outcome::{Event, PathVertex};
+use super::run::thread_count;
 use super::settings::RunSettings;
 use super::tallies::ReplicateTally;
 use crate::intersect::Intersector;
-use crate::math::{Point, Vector};
+use crate::math::{Point, Ray, Vector};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -50,7 +51,7 @@ pub fn ray_lists(bound: &BoundScene) -> Vec<(u32, u64)> {
     lists.filter_map(|(k, e)| Some((k as u32, e.list()?.len()))).collect()
 }
 
-/// Traces every ray of every list by itself, with one thread where `threads` is 0; rows in the order of sources, rays and branches. A ray
+/// Traces every ray of every list by itself; rows in the order of sources, rays and branches. A ray
 /// that cannot be read any more has no row.
 pub fn listed_ends(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings) -> Vec<ListedEnd> {
     // Of each ray alone a wave has one place.
@@ -73,7 +74,7 @@ pub fn listed_ends(bound: &BoundScene, intersector: &dyn Intersector, settings: 
             }
         };
         std::thread::scope(|scope| {
-            for _ in 1..settings.threads.max(1) {
+            for _ in 1..thread_count(settings) {
                 scope.spawn(work);
             }
             work();
@@ -121,7 +122,7 @@ impl<'c, 'a> ListTracer<'c, 'a> {
         let Some(emitted) = vertices.first().map(|v| v.power) else {
             // It could not start: nothing is known but where it should have.
             let event = Event::Lost;
-            let (point, direction) = (measured.origin, measured.direction);
+            let Ray { origin: point, direction, .. } = emitter.in_scene(&measured);
             let source = self.source;
             return vec![ListedEnd {
                 source,

@@ -180,7 +180,7 @@ pub(crate) fn prepare(bound: &BoundScene, intersector: &dyn Intersector, setting
 }
 
 /// Returns the threads that are asked for; for 0, as many as the machine has.
-fn thread_count(settings: &RunSettings) -> usize {
+pub(super) fn thread_count(settings: &RunSettings) -> usize {
     match settings.threads {
         0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
         n => n,

@@ -49,8 +49,8 @@ pub fn verify_pruning(
     (pruned, verification)
 }
 
-/// Names the ends, cells of receivers, absorbed powers of faces and counts that differ between two runs, twenty at most; other sums are not
-/// looked at.
+/// Names the ends, cells of receivers, absorbed powers of faces and counts that differ between two runs, twenty at most; where it is
+/// none of these, that others differ.
 fn compare(bound: &BoundScene, a: &Results, b: &Results) -> Vec<String> {
     let (a, b) = (&a.tallies, &b.tallies);
     let mut found = Vec::new();
@@ -67,6 +67,9 @@ fn compare(bound: &BoundScene, a: &Results, b: &Results) -> Vec<String> {
     found.extend(faces.take(5).map(|i| format!("absorbed on face {i}")));
     if a.counts != b.counts {
         found.push(format!("counts: {:?} and {:?}", a.counts, b.counts));
+    }
+    if found.is_empty() && a != b {
+        found.push("sums beside these: of media, moments, channels, sequences or paths".into());
     }
     found.truncate(20);
     found

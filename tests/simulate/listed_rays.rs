@@ -82,6 +82,30 @@ fn every_ray_of_a_list_tells_where_it_ended() {
     assert!((mirror.power - 2.0).abs() < 0.6, "{}", mirror.power);
 }
 
+/// A ray that cannot start, for it is in more bodies than it can carry, is told of where it stands in the scene.
+#[test]
+fn a_ray_that_cannot_start_is_placed_in_the_scene() {
+    let mut world = World::default();
+    let mut text =
+        "[run]\nrays = 64\n[[source]]\nkind = 'rays'\nfile = 'list.csv'\nat = [100, 0, 0]\ndirection = [0, 1, 0]\n\
+        [[medium]]\nname = 'glass'\nindex = 1.5\n"
+            .to_owned();
+    for k in 0..40 {
+        let (name, half) = (format!("shell{k}"), Vector::splat(1.0 + 0.1 * f64::from(k)));
+        let middle = Point::new(100.0, 0.0, 0.0);
+        world.cuboid(&name, middle - half, middle + half);
+        text += &format!("[[material]]\npart = '{name}'\nmedium = 'glass'\n");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_rays(&folder.path().join("list.csv"), &[ray(0.0, Vector::Z, 1.0)]).unwrap();
+    let scene = Scene::parse(&text, "test.toml", folder.path()).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    // As many threads as the machine has.
+    let found = listed_ends(&bound, &world, &RunSettings { threads: 0, ..RunSettings::from(&scene.run) });
+    assert_eq!((found.len(), found[0].event), (1, Event::Lost));
+    assert_eq!((found[0].point, found[0].direction), (Point::new(100.0, 0.0, 0.0), Vector::Y));
+}
+
 /// A ray that is split has a row for each of its parts, and their powers add up.
 #[test]
 fn parts_of_a_ray_have_rows_of_their_own() {

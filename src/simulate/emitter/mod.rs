@@ -259,8 +259,13 @@ impl Emitter {
             *ray = Ray::new(self.frame.origin, self.frame.z);
             return Emission { from: None, wavelength: drawn, failed: true };
         };
-        *ray = Ray::new(self.frame.point(measured.origin), self.frame.direction(measured.direction));
+        *ray = self.in_scene(&measured);
         Emission { from: None, wavelength: drawn.or(measured.wavelength_nm), failed: false }
+    }
+
+    /// Returns a measured ray, whose coordinates are the source's, in those of the scene.
+    pub(crate) fn in_scene(&self, measured: &LightRay) -> Ray {
+        Ray::new(self.frame.point(measured.origin), self.frame.direction(measured.direction))
     }
 
     /// Draws the ray with this index, writes its start and direction in the scene to `ray`, and returns its face, wavelength and whether it

@@ -151,6 +151,10 @@ impl Receiver {
     /// Returns how many sums it keeps at most: its cells for power and once more for each channel or bin. A receiver of absorbed power
     /// keeps one, whatever its cells.
     pub(super) fn sums(&self) -> u64 {
+        let cells = match self.kind {
+            ReceiverKind::Absorbed => 1,
+            _ => u64::from(self.cells[0]) * u64::from(self.cells[1]),
+        };
         let channels = match (self.channels, &self.bins_nm) {
             // A bin has a sum, and power one beside them: as many sums as edges.
             (_, Some(edges)) => edges.len() as u64,
@@ -159,7 +163,7 @@ impl Receiver {
             (Some(Channels::Photometric), None) => 2,
             (None, None) => 1,
         };
-        u64::from(self.cells[0]) * u64::from(self.cells[1]) * channels
+        cells * channels
     }
 
     /// Returns a key that is given and means nothing for this kind, and the kinds it belongs to; `None` where there is none.
@@ -267,5 +271,18 @@ impl Receiver {
             }
             ReceiverKind::Absorbed => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_receiver_keeps_a_sum_for_each_cell_and_channel_but_of_absorbed_power_one() {
+        let sums = |kind, channels| Receiver { kind, channels, cells: [30, 20], ..Receiver::default() }.sums();
+        assert_eq!(sums(ReceiverKind::Plane, None), 600);
+        assert_eq!(sums(ReceiverKind::Sphere, Some(Channels::Xyz)), 2400);
+        assert_eq!(sums(ReceiverKind::Absorbed, None), 1);
     }
 }

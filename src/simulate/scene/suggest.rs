@@ -1,14 +1,15 @@
 //! The name that was probably meant.
 
-/// Returns the candidate nearest to a word, in any case of letters; `None` where all differ in more than a third of the longer one's bytes
-/// and one letter more.
+/// Returns the candidate nearest to a word, in any case of letters; `None` for no word, and where all differ in more than a third of the
+/// longer one's letters and one more.
 pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = word.to_lowercase();
+    let longer = |c: &str| c.chars().count().max(word.chars().count());
     candidates
         .into_iter()
         .map(|c| (edit_distance(&word, &c.to_lowercase()), c))
         // A third of the letters, and one more for short words: what differs more is another word.
-        .filter(|(d, c)| *d <= 1 + c.len().max(word.len()) / 3)
+        .filter(|(d, c)| !word.is_empty() && *d <= 1 + longer(c) / 3)
         .min_by_key(|(d, _)| *d)
         .map(|(_, c)| c)
 }
@@ -49,6 +50,9 @@ mod tests {
         assert_eq!(nearest("reflectence", keys), Some("reflectance"));
         assert_eq!(nearest("Medum", keys), Some("medium"));
         assert_eq!(nearest("wavelength", keys), None);
+        // No word is like any; and letters count, of which some take two bytes.
+        assert_eq!(nearest("", ["A"]), None);
+        assert_eq!(nearest("änäöü", ["äbcdü"]), None);
         assert_eq!(edit_distance("kitten", "sitting"), 3);
     }
 }
