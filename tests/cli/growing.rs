@@ -213,3 +213,16 @@ fn in_parts(rays: &str, count: usize) {
     merge(path, &sums.iter().rev().map(String::as_str).collect::<Vec<_>>(), "tree");
     assert_same(path, "whole", "tree");
 }
+
+/// What is written under `.TALLY` is a tally for everybody who looks for one.
+#[test]
+fn the_case_of_an_extension_does_not_hide_a_part() {
+    let folder = lens("20_000");
+    let path = folder.path();
+    std::fs::create_dir(path.join("parts")).unwrap();
+    trace(path, &["--shard", "1/2", "-o", "parts/1.TALLY"]);
+    trace(path, &["--shard", "2/2", "-o", "parts/2.Tally"]);
+    merge(path, &["parts"], "merged");
+    trace(path, &["-o", "whole"]);
+    assert_same(path, "whole", "merged");
+}

@@ -209,7 +209,7 @@ fn part_files(arguments: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         let entries = std::fs::read_dir(argument).map_err(|e| input_failure(argument, e))?;
         let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
         // A checkpoint is of a run that is still traced.
-        inside.retain(|path| path.extension().is_some_and(|e| e == "tally") && !path.ends_with(CHECKPOINT));
+        inside.retain(|path| is_tally(path) && !path.ends_with(CHECKPOINT));
         inside.sort();
         files.extend(inside);
     }
