@@ -144,6 +144,8 @@ fn merged_ranges_grow_until_the_error_is_reached() {
             ["merge", "parts", "-o", "out", "--until-error", "0.5%@focus:cells", "--no-report", "--json"];
         let (code, out, err) = lampyris_in(path, &arguments);
         let answer: Value = serde_json::from_str(&out).unwrap();
+        let written = std::fs::read_to_string(path.join("out/results.json")).unwrap();
+        assert_eq!(serde_json::from_str::<Value>(&written).unwrap(), answer, "the file is what --json prints");
         let answer = &answer["until_error"];
         assert_eq!(answer["rays"], rays);
         if answer["reached"] == true {
