@@ -9,8 +9,8 @@ use super::growing_search::{GROWTH_MARGIN, GrowingSearch, most_rays, next_rays};
 use super::monitor::Monitor;
 use super::prepared_scene::PreparedScene;
 use super::suggest;
-use crate::simulate::{GROWING_REPLICATE, PartialRun, ReceiverResult, Results, Scene};
-use crate::study::figures::cell_errors;
+use crate::simulate::{GROWING_REPLICATE, PartialRun, Results, Scene};
+use crate::study::figures::{cell_errors, light_weighted_error};
 use serde::Serialize;
 
 /// Rays of the first run.
@@ -27,7 +27,7 @@ pub struct ErrorTarget {
     pub percent: f64,
     /// Name of the receiver.
     pub receiver: String,
-    /// Whether it is the error of the cells, each weighted by its light, and not that of the power.
+    /// Whether it is the error of the cells, weighted by their light ([`light_weighted_error`]), and not that of the power.
     pub cells: bool,
 }
 
@@ -85,9 +85,12 @@ impl ErrorTarget {
     /// Returns the relative statistical error of the receiver's power or cells, percent; `None` where nothing arrived.
     fn error(&self, results: &Results) -> Option<f64> {
         let r = results.receivers.iter().find(|r| r.name == self.receiver)?;
-        // The cells weighted by their light: dark ones have large errors that nobody sees.
-        let (power, error) = if self.cells { light_weighted_error(r) } else { (r.power, r.power_error) };
-        (power > 0.0).then(|| 100.0 * error / power)
+        let share = if self.cells {
+            light_weighted_error(&r.cells, &cell_errors(r))
+        } else {
+            (r.power > 0.0).then(|| r.power_error / r.power)
+        };
+        share.map(|share| 100.0 * share)
     }
 
     /// Traces runs of growing length, each from its first ray, until the error is small enough, the most rays are traced, or the monitor
@@ -141,12 +144,6 @@ impl ErrorTarget {
         // The error falls with the root of the rays, so that they go with the square of what is missing.
         found.map_or(GROWTH_FROM_NOTHING, |e| GROWTH_MARGIN * (e / self.percent).powi(2))
     }
-}
-
-/// Returns the sums over a receiver's cells of the light and of its standard error, in this order, both weighted by the light.
-fn light_weighted_error(r: &ReceiverResult) -> (f64, f64) {
-    let sum = |x: &mut dyn Iterator<Item = f64>| x.sum::<f64>();
-    (sum(&mut r.cells.iter().map(|c| c * c)), sum(&mut r.cells.iter().zip(cell_errors(r)).map(|(c, e)| c * e)))
 }
 
 #[cfg(test)]

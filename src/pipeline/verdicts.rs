@@ -16,11 +16,11 @@ pub struct ReceiverVerdict {
     pub assessment: Assessment,
 }
 
-/// Makes the map of intensities, cd, of a far field over H and V, with both errors as they are printed; geometric ones are zero for `None`.
-/// `rays` are those of the run.
+/// Makes the map of intensities, cd, of a far field over H and V, with both errors as they are printed; geometric ones are zero for `None`,
+/// and not known where there is not one for every cell. `rays` are those of the run.
 ///
 /// # Errors
-/// When `geometric` has not an error for every cell, or a value or an error is no finite number.
+/// When a value or an error is no finite number.
 fn intensities(
     receiver: &ReceiverResult,
     geometric: Option<&[f64]>,
@@ -30,13 +30,13 @@ fn intensities(
         let step = 2.0 * receiver.half[k] / receiver.grid[k] as f64;
         (0..=receiver.grid[k]).map(|i| receiver.middle[k] - receiver.half[k] + step * i as f64).collect()
     };
-    let error = |k: usize| geometric.map_or(Some(0.0), |g| g.get(k).copied());
-    let cells: Option<Vec<[f64; 3]>> = (receiver.cells.iter().zip(cell_errors(receiver)).enumerate())
-        .map(|(k, (value, statistical))| Some([*value, statistical, error(k)?]))
+    let known = geometric.filter(|errors| errors.len() == receiver.cells.len());
+    let cells = (receiver.cells.iter().zip(cell_errors(receiver)).enumerate())
+        .map(|(k, (value, statistical))| [*value, statistical, known.map_or(0.0, |errors| errors[k])])
         .collect();
-    // A map that was not compared cell by cell cannot be judged with both errors.
-    let cells = cells.ok_or("its cells have no errors from the facets")?;
-    Ok(IntensityMap::new(edges(0), edges(1), cells)?.with_rays(rays))
+    let map = IntensityMap::new(edges(0), edges(1), cells)?.with_rays(rays);
+    // Where cells were too many to be compared one by one, only rays are known to be enough or not.
+    Ok(if geometric.is_some() && known.is_none() { map.without_geometric_errors() } else { map })
 }
 
 /// Judges a run's results by one regulation; `geometric` returns the errors of a receiver's cells from the facets.

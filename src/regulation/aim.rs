@@ -210,7 +210,7 @@ impl Scan {
         let moved = near.iter().fold(Measurement::default(), |sum, s| {
             sum.plus((s.angle - position) / weight.max(f64::MIN_POSITIVE), &s.linear)
         });
-        let error = |m: &Measurement| map.read(m).error();
+        let error = |m: &Measurement| map.read(m).known_error();
         let reach = |s: &Slope| SIGMAS * error(&s.linear);
         // Places that may be steeper, and an edge, but for noise; the steepest first, each with all around it.
         let mut open: Vec<&Slope> = (slopes.iter().filter(|s| !is_same(s)))

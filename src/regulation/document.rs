@@ -15,7 +15,7 @@ impl Assessment {
                 "min": r.row.min, "max": r.row.max,
                 "value": r.reading.map(|x| x.value),
                 "statistical": r.reading.map(|x| x.statistical),
-                "geometric": r.reading.map(|x| x.geometric),
+                "geometric": r.reading.and_then(|x| x.geometric),
                 "verdict": r.verdict.map(|v| v.to_string()),
                 "settles": settles, "unseen": r.unseen, "when": r.row.when, "note": r.row.note,
                 "source": r.row.source, "evidence": r.row.evidence,

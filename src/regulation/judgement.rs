@@ -73,7 +73,7 @@ impl Decisive {
     /// Returns with how many rays in all, never fewer than `traced`, and on facets of which tolerance this margin would be enough.
     ///
     /// `tolerance_mm` is the run's own, `None` where it traced no facets; the answer's is `None` where facets need not be finer. `None`
-    /// where 10¹⁵ rays or more would be needed.
+    /// where 10¹⁵ rays or more would be needed, and where it is not known what facets change.
     pub(super) fn what_settles(&self, traced: u64, tolerance_mm: Option<f64>) -> Option<Settles> {
         /// Runs beyond this are no advice.
         const MOST_RAYS: f64 = 1e15;
@@ -84,7 +84,7 @@ impl Decisive {
         if wanted == 0.0 {
             return None;
         }
-        let geometric = self.reading.geometric;
+        let geometric = self.reading.geometric?;
         // Where the facets leave no room, both errors get half of the square.
         let finer = geometric > 0.5f64.sqrt() * wanted;
         // Otherwise the geometric error stays as it is, and the statistical one gets what it leaves of the square.
@@ -135,7 +135,9 @@ impl Judgement {
             // The truth would be on the other side of the limit: more light than was read below it, less above.
             let sign = if reading.value < comparison.limit { 1.0 } else { -1.0 };
             let noise = photometer.map.noise(&comparison.measurement, sign, margin, sigmas);
-            let reach = noise.reach(sigmas, 1.0).hypot(sigmas * reading.geometric);
+            // What nobody knows of the facets may be more than any margin.
+            let geometric = reading.geometric.unwrap_or(f64::INFINITY);
+            let reach = noise.reach(sigmas, 1.0).hypot(sigmas * geometric);
             let enough = margin.abs() >= reach;
             // A limit that is just reached is met, where there is no error.
             passing += usize::from(enough && margin >= 0.0);
@@ -194,7 +196,7 @@ mod tests {
     #[test]
     fn nothing_settles_a_reading_on_its_very_limit() {
         let on_limit = |statistical: f64, geometric: f64| {
-            let reading = Reading { value: 1.0, statistical, geometric };
+            let reading = Reading { value: 1.0, statistical, geometric: Some(geometric) };
             let noise = Noise { other: statistical * statistical, ..NONE };
             Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0, noise }
                 .what_settles(1000, Some(0.1))
@@ -209,7 +211,7 @@ mod tests {
     #[test]
     fn what_settles_follows_from_what_few_rays_leave_open() {
         let rays = |noise: Noise| {
-            let reading = Reading { value: 1.0, statistical: 1.0, geometric: 0.0 };
+            let reading = Reading { value: 1.0, statistical: 1.0, geometric: Some(0.0) };
             Decisive { reading, direction: [0.0, 0.0], margin: 1.0, sigmas: 3.0, noise }
                 .what_settles(1000, None)
                 .map(|settles| settles.rays as f64 / 1000.0)

@@ -15,6 +15,8 @@ pub struct IntensityMap {
     v: CellAxis,
     /// Row after row, V slow: candela, its statistical and its geometric standard error.
     cells: Vec<[f64; 3]>,
+    /// Whether the geometric errors are those of the cells; else nothing is known of what facets change.
+    knows_facets: bool,
     /// What is known of the rays that made them.
     landed: Option<LandedRays>,
 }
@@ -23,8 +25,8 @@ pub struct IntensityMap {
 ///
 /// ```
 /// // Errors of different causes add as squares.
-/// let reading = lampyris::regulation::Reading { value: 1000.0, statistical: 3.0, geometric: 4.0 };
-/// assert_eq!(reading.error(), 5.0);
+/// let reading = lampyris::regulation::Reading { value: 1000.0, statistical: 3.0, geometric: Some(4.0) };
+/// assert_eq!(reading.known_error(), 5.0);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
@@ -32,14 +34,14 @@ pub struct Reading {
     pub value: f64,
     /// Standard error of the sampling.
     pub statistical: f64,
-    /// Standard error of what facets change.
-    pub geometric: f64,
+    /// Standard error of what facets change; `None` where that is not known.
+    pub geometric: Option<f64>,
 }
 
 impl Reading {
-    /// Root of the sum of squares of the statistical and the geometric standard error.
-    pub fn error(&self) -> f64 {
-        self.statistical.hypot(self.geometric)
+    /// Root of the sum of squares of the statistical and, where it is known, the geometric standard error.
+    pub fn known_error(&self) -> f64 {
+        self.geometric.map_or(self.statistical, |geometric| self.statistical.hypot(geometric))
     }
 }
 
@@ -105,7 +107,19 @@ impl IntensityMap {
         }
         let h = CellAxis::new(h_edges, f64::to_radians);
         let v = CellAxis::new(v_edges, |v| v.to_radians().sin());
-        Ok(Self { h, v, cells, landed: None })
+        Ok(Self { h, v, cells, knows_facets: true, landed: None })
+    }
+
+    /// Forgets the geometric errors: the cells are of facets that were not compared with the spline, and no verdict on them is sure.
+    pub fn without_geometric_errors(mut self) -> Self {
+        self.cells.iter_mut().for_each(|[_, _, geometric]| *geometric = 0.0);
+        self.knows_facets = false;
+        self
+    }
+
+    /// Whether it is known what facets change of the cells.
+    pub(super) fn knows_facets(&self) -> bool {
+        self.knows_facets
     }
 
     /// Adds what is known of the rays that made the map: a reading of few of them is then judged by what may not have come. Errors of cells
@@ -135,7 +149,8 @@ impl IntensityMap {
     /// The same light seen in a mirror, left for right.
     pub(super) fn mirrored(&self) -> Self {
         let cells = self.cells.chunks(self.h.cells()).flat_map(|row| row.iter().rev().copied()).collect();
-        let map = Self { h: self.h.mirrored(), v: self.v.clone(), cells, landed: None };
+        let knows_facets = self.knows_facets;
+        let map = Self { h: self.h.mirrored(), v: self.v.clone(), cells, knows_facets, landed: None };
         match &self.landed {
             Some(landed) => map.with_rays(landed.sample),
             None => map,
@@ -223,7 +238,7 @@ impl IntensityMap {
             variance += (weight * self.spread(i, s)).powi(2);
             geometric += (weight * g).abs();
         }
-        Reading { value, statistical: variance.sqrt(), geometric }
+        Reading { value, statistical: variance.sqrt(), geometric: self.knows_facets.then_some(geometric) }
     }
 
     /// The error of a cell as far as rays made it: none of a dark one, whose stated error is what one ray would make.
@@ -331,7 +346,7 @@ mod tests {
                 assert!((reading.value - (100.0 + 10.0 * h + v)).abs() < 1e-3, "{reading:?}");
                 // Slopes between neighbours have errors of their own.
                 assert!(
-                    reading.statistical < 2.0 && (0.5 - 1e-12..0.8).contains(&reading.geometric),
+                    reading.statistical < 2.0 && (0.5 - 1e-12..0.8).contains(&reading.geometric.unwrap()),
                     "{reading:?}"
                 );
             }

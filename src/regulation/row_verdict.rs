@@ -8,6 +8,10 @@ use super::requirement::{Photometer, requirements};
 use super::row::{Row, RowKind};
 use super::table::Regulation;
 
+/// What is remarked on rows whose readings have no geometric error.
+const UNKNOWN_FACETS: &str = "it is not known what facets change here, as the cells are too many to be compared with the spline: trace \
+    with fewer, or with --intersector exact";
+
 /// Judges every row as the map is aimed, points that may lean on their group with that; whether another aim is open is not asked.
 pub(super) fn judge_rows(
     map: &IntensityMap,
@@ -85,6 +89,9 @@ pub(super) fn judge_row(
     let worst = judged.iter().max_by_key(|j| j.verdict);
     let Some(worst) = worst else { return verdict };
     verdict.verdict = Some(worst.verdict);
+    if !photometer.map.knows_facets() {
+        verdict.row.add_note(UNKNOWN_FACETS);
+    }
     verdict.unseen = worst.unseen;
     if let Some(decisive) = &worst.decisive {
         verdict.reading = Some(decisive.reading);

@@ -223,6 +223,24 @@ impl Chart {
 mod tests {
     use super::*;
     use crate::formats::Axis;
+    use crate::report::drawing::Element;
+
+    /// Bars reach to the ends that they stand for, and on a logarithmic axis down to its end where they reach to nothing.
+    #[test]
+    fn bars_of_errors_stay_in_the_plot() {
+        let linear = AxisStyle::linear("value", "");
+        for (y, error) in [(linear.clone(), 30.0), (AxisStyle::log("value", ""), 30.0), (linear, f64::INFINITY)] {
+            let series =
+                Series { points: vec![[0.0, 10.0], [1.0, 12.0]], errors: vec![error, 1.0], ..Series::default() };
+            let chart = Chart::series("bars", "", "", [AxisStyle::linear("x", ""), y.clone()], vec![series]);
+            let drawing = super::super::static_chart::draw(&chart);
+            for element in &drawing.elements {
+                let Element::Line { points, .. } = element else { continue };
+                // The axis of x and its numbers stand below 410 of 470.
+                assert!(points.iter().all(|p| (0.0..=410.0).contains(&p[1])), "{y:?} ± {error}: {points:?}");
+            }
+        }
+    }
 
     #[test]
     fn a_map_names_the_levels_that_it_draws() {

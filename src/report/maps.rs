@@ -6,7 +6,7 @@ use crate::formats::file_stem;
 use crate::formats::{Axis, Grid, Layer};
 use crate::simulate::scene::FarFieldType;
 use crate::simulate::{ChannelResult, ReceiverResult};
-use crate::study::figures::{cell_errors, channel_cell_errors};
+use crate::study::figures::{cell_errors, channel_cell_errors, light_weighted_error};
 
 /// Returns the cells of a receiver with their axes, mm or degrees; `None` for a receiver that has one number only.
 pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
@@ -136,7 +136,7 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
             grid.axes[1].unit
         )
     });
-    let error = lit_error(grid).map(|share| {
+    let error = grid.error.as_ref().and_then(|errors| light_weighted_error(&grid.values, errors)).map(|share| {
         format!("Statistical error of a cell, weighted by its light: {} %. ", figures(100.0 * share, 2))
     });
     let steps = grid.axes.each_ref().map(|axis| format!("{} {}", figures(axis.step(), 3), axis.unit));
@@ -145,38 +145,7 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
     [peak, error, Some(cells)].into_iter().flatten().collect()
 }
 
-/// Returns the sum of the statistical errors of the cells with light over the sum of their light; `None` without errors or light.
-fn lit_error(grid: &Grid) -> Option<f64> {
-    let lit = || grid.values.iter().zip(grid.error.iter().flatten()).filter(|(v, _)| **v > 0.0);
-    let light: f64 = lit().map(|(v, _)| v).sum();
-    // A dark cell's error is what one ray would add: of many such it would be all there is.
-    (light > 0.0).then(|| lit().map(|(_, error)| error).sum::<f64>() / light)
-}
-
 /// Returns a name as words: with spaces in place of underscores.
 pub(super) fn spoken(name: &str) -> String {
     name.replace('_', " ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dark_cells_add_nothing_to_the_noise_of_the_light() {
-        let axis = crate::formats::Axis { label: "x".into(), unit: "mm".into(), range: [0.0, 1.0], cells: 4 };
-        let grid = Grid {
-            name: "dark".into(),
-            quantity: String::new(),
-            unit: "W".into(),
-            axes: [axis.clone(), crate::formats::Axis { cells: 1, ..axis }],
-            values: vec![3.0, 1.0, 0.0, f64::NAN],
-            // Where no ray arrived, what one would bring.
-            error: Some(vec![0.3, 0.1, 5.0, 5.0]),
-            geometric: None,
-            layers: Vec::new(),
-        };
-        assert_eq!(lit_error(&grid), Some(0.1));
-        assert_eq!(lit_error(&Grid { values: vec![0.0; 4], ..grid }), None);
-    }
 }

@@ -164,9 +164,10 @@ fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)]) {
 /// Draws lines and points with axes and legend; faint and nameless series are not in the legend.
 fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
     let [left, top, right, bottom] = AREA;
-    let all = || series.iter().flat_map(|s| &s.points);
-    let mut x = Scale::new(all().map(|p| p[0]), &chart.x, [left, right], false);
-    let mut y = Scale::new(all().map(|p| p[1]), &chart.y, [bottom, top], false);
+    let all = |k: usize| series.iter().flat_map(|s| &s.points).map(move |p| p[k]);
+    let mut x = Scale::new(all(0), &chart.x, [left, right], false);
+    let bars = series.iter().flat_map(|s| s.points.iter().zip(&s.errors)).flat_map(|(p, e)| [p[1] - e, p[1] + e]);
+    let mut y = Scale::new(all(1).chain(bars), &chart.y, [bottom, top], false);
     if chart.equal_scales {
         equalise_units(&mut x, &mut y);
     }
@@ -192,7 +193,7 @@ fn equalise_units(x: &mut Scale, y: &mut Scale) {
     }
 }
 
-/// Draws the line of a series, then its error bars, then its points on top; points without a place are left out.
+/// Draws the line of a series, its error bars as far as the plot goes, and its points on top; points without a place are left out.
 fn one_series(elements: &mut Vec<Element>, s: &Series, ink: Ink, [x, y]: [&Scale; 2]) {
     let place = |p: &[f64; 2]| (x.shows(p[0]) && y.shows(p[1])).then(|| [x.position(p[0]), y.position(p[1])]);
     let points: Vec<Place> = s.points.iter().filter_map(place).collect();
@@ -201,7 +202,8 @@ fn one_series(elements: &mut Vec<Element>, s: &Series, ink: Ink, [x, y]: [&Scale
         elements.push(Element::Line { points: points.clone(), ink, width: 2.0, opacity: 1.0, dashed });
     }
     for (p, e) in s.points.iter().zip(&s.errors).filter(|(p, _)| place(p).is_some()) {
-        let points = [p[1] - e, p[1] + e].map(|end| [x.position(p[0]), y.position(end)]).to_vec();
+        let end = |value: f64| [x.position(p[0]), y.position(value.clamp(y.low, y.high))];
+        let points = vec![end(p[1] - e), end(p[1] + e)];
         elements.push(Element::Line { points, ink, width: 1.0, opacity: 1.0, dashed: false });
     }
     if matches!(s.style, SeriesStyle::LineAndPoints | SeriesStyle::Points | SeriesStyle::Faint) {

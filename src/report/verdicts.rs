@@ -131,7 +131,7 @@ fn table(a: &Assessment, name: &str) -> Table {
             requirement_text(row).into(),
             number(row.reading.map(|r| r.value), DIGITS),
             number(row.reading.map(|r| r.statistical), 2),
-            number(row.reading.map(|r| r.geometric), 2),
+            number(row.reading.and_then(|r| r.geometric), 2),
             row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
             settling_text(row).into(),
             judged_note(row).unwrap_or("").into(),

@@ -239,6 +239,13 @@ impl ReceiverResult {
         result
     }
 
+    /// The area or solid angle of a cell that counted light, with those parts of its neighbours that it counts for: what its density is
+    /// multiplied by to be its power.
+    pub(crate) fn lit_measure(&self, cell: usize) -> f64 {
+        // A ray adds the same power everywhere.
+        self.ray_power / self.ray_cells[cell]
+    }
+
     /// Returns the cells and their errors with each ring of cells at a pole (γ 0° and 180°) at its mean, where planes C go all around:
     /// these are slivers of one direction. The error of a ring stands at its last cell, the others, which are no rivals of it, have none.
     pub fn cells_with_even_poles(&self) -> [Cow<'_, [f64]>; 2] {

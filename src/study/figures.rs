@@ -123,6 +123,14 @@ pub fn cell_errors(r: &ReceiverResult) -> Vec<f64> {
     (0..r.cells.len()).map(stated).collect()
 }
 
+/// Returns the error of cells relative to their light, both weighted by that light: Σ cσ / Σ c² over the cells with light. `None` without
+/// light. Dark cells add nothing, for their error is what one ray would bring, and of many such it would be all there is.
+pub fn light_weighted_error(cells: &[f64], errors: &[f64]) -> Option<f64> {
+    let lit = || cells.iter().zip(errors).filter(|(light, _)| **light > 0.0);
+    let weight: f64 = lit().map(|(light, _)| light * light).sum();
+    (weight > 0.0).then(|| lit().map(|(light, error)| light * error).sum::<f64>() / weight)
+}
+
 /// Returns the standard error of each cell of a channel, as [`cell_errors`], in the channel's unit. A ray's lumens or CIE values are
 /// those of the mean ray on the receiver.
 pub fn channel_cell_errors(r: &ReceiverResult, c: &ChannelResult) -> Vec<f64> {
@@ -272,5 +280,19 @@ impl<'a> Errors<'a> {
             ChannelFigure { name: c.name.clone(), figure: Figure::new(c.total, unit, statistical, geometric) }
         };
         r.channels.iter().enumerate().map(of_channel).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn brighter_cells_count_for_more_and_dark_ones_for_nothing() {
+        let cells = [3.0, 1.0, 0.0, f64::NAN];
+        // Where no ray arrived, what one would bring; by hand (3 · 0.3 + 1 · 0.3) / (3² + 1²).
+        let found = light_weighted_error(&cells, &[0.3, 0.3, 5.0, 5.0]).unwrap();
+        assert!((found - 0.12).abs() < 1e-15, "{found}");
+        assert_eq!(light_weighted_error(&[0.0; 4], &[5.0; 4]), None);
     }
 }

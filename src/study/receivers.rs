@@ -36,17 +36,17 @@ pub struct Row {
     pub seconds_trace_exact: f64,
     /// Power on the receiver.
     pub power: f64,
-    /// What facets change of it, relative.
-    pub power_geometric: f64,
+    /// What facets change of it, relative; `None` where the receiver is dark on the spline, as for the next three.
+    pub power_geometric: Option<f64>,
     /// Its standard error, relative.
-    pub power_statistical: f64,
+    pub power_statistical: Option<f64>,
     /// Root mean square of the cells' differences over that of the cells.
-    pub map_geometric: f64,
+    pub map_geometric: Option<f64>,
     /// Root mean square of the cells' standard errors over that of the cells.
-    pub map_statistical: f64,
-    /// Relative change of the spot's rms size along both sides.
-    pub spot_geometric: [f64; 2],
-    /// `geometry`, `statistics` or `balanced`: what to spend on next.
+    pub map_statistical: Option<f64>,
+    /// Relative change of the spot's rms size along both sides; `None` along one of which it has no size on the spline.
+    pub spot_geometric: [Option<f64>; 2],
+    /// `geometry`, `statistics` or `balanced`: what to spend on next; `dark` where there is nothing to compare with.
     pub limited_by: String,
 }
 
@@ -168,28 +168,66 @@ pub(super) fn receivers(
 /// empty.
 fn split_errors(found: &ReceiverResult, truth: &ReceiverResult) -> Row {
     let norm = |x: &mut dyn Iterator<Item = f64>| x.map(|v| v * v).sum::<f64>().sqrt();
-    let scale = norm(&mut truth.cells.iter().copied()).max(f64::MIN_POSITIVE);
-    let geometric = norm(&mut found.cells.iter().zip(&truth.cells).map(|(a, b)| a - b)) / scale;
-    let statistical = norm(&mut truth.errors.iter().copied()) / scale;
-    // A spot of no width has no share of it to lose.
-    let relative = |a: f64, b: f64| if b == 0.0 { a.abs() } else { (a / b - 1.0).abs() };
+    // Of darkness, and of a spot without width, there is no share to lose.
+    let share = |x: f64, of: f64| (of > 0.0).then(|| x / of);
+    let scale = norm(&mut truth.cells.iter().copied());
+    let geometric = share(norm(&mut found.cells.iter().zip(&truth.cells).map(|(a, b)| a - b)), scale);
+    let statistical = share(norm(&mut truth.errors.iter().copied()), scale);
+    let relative = |a: f64, b: f64| share((a - b).abs(), b);
     // Within a factor of two neither is worth mending alone.
-    let limited_by = if geometric > 2.0 * statistical {
-        "geometry"
-    } else if statistical > 2.0 * geometric {
-        "statistics"
-    } else {
-        "balanced"
+    let limited_by = match geometric.zip(statistical) {
+        None => "dark",
+        Some((geometric, statistical)) if geometric > 2.0 * statistical => "geometry",
+        Some((geometric, statistical)) if statistical > 2.0 * geometric => "statistics",
+        Some(_) => "balanced",
     };
     Row {
         receiver: found.name.clone(),
         power: found.power,
         power_geometric: relative(found.power, truth.power),
-        power_statistical: truth.power_error / truth.power.max(f64::MIN_POSITIVE),
+        power_statistical: share(truth.power_error, truth.power),
         map_geometric: geometric,
         map_statistical: statistical,
         spot_geometric: [0, 1].map(|a| relative(found.rms[a], truth.rms[a])),
         limited_by: limited_by.into(),
         ..Row::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::octree::{self, Octree};
+    use crate::mesh::FacetMesh;
+    use crate::model::Model;
+    use crate::simulate::Scene;
+    use std::path::Path;
+
+    /// A receiver that only facets light has no figures on the spline to be a share of; a point of light has no width.
+    #[test]
+    fn errors_of_nothing_are_no_numbers() {
+        let text = "[run]\nrays = 2000\n[[source]]\nkind = 'collimated'\ndirection = [0, 0, -1]\n\
+            [[receiver]]\nname = 'lit'\nat = [0, 0, -1]\nsize = [2, 2]\ncells = [2, 2]\n\
+            [[receiver]]\nname = 'dark'\nat = [0, 0, 1]\nsize = [2, 2]\ncells = [2, 2]\n";
+        let scene = Scene::parse(text, "dark.toml", Path::new(".")).unwrap();
+        let bound = scene.bind(&Model::default()).unwrap();
+        let mesh = FacetMesh::default();
+        let nothing = Octree::build(&mesh, &octree::Settings::default());
+        let results = simulate(&bound, &nothing, &RunSettings::from(&scene.run), &|_| true);
+        let [lit, dark] = &results.receivers[..] else { panic!("two receivers") };
+        assert!(lit.power == 1.0 && dark.power == 0.0);
+        let row = serde_json::to_value(split_errors(lit, dark)).unwrap();
+        for key in ["power_geometric", "power_statistical", "map_geometric", "map_statistical"] {
+            assert!(row[key].is_null(), "{key}: {}", row[key]);
+        }
+        assert_eq!(row["limited_by"], "dark");
+        // The beam meets one point: its rms size is none.
+        let row = serde_json::to_value(split_errors(dark, lit)).unwrap();
+        assert_eq!(row["power_geometric"], 1.0);
+        assert!(
+            row["spot_geometric"][0].is_null() && row["spot_geometric"][1].is_null(),
+            "{}",
+            row["spot_geometric"]
+        );
     }
 }

@@ -144,6 +144,8 @@ fn merged_ranges_grow_until_the_error_is_reached() {
             ["merge", "parts", "-o", "out", "--until-error", "0.5%@focus:cells", "--no-report", "--json"];
         let (code, out, err) = lampyris_in(path, &arguments);
         let answer: Value = serde_json::from_str(&out).unwrap();
+        let written = std::fs::read_to_string(path.join("out/results.json")).unwrap();
+        assert_eq!(serde_json::from_str::<Value>(&written).unwrap(), answer, "the file is what --json prints");
         let answer = &answer["until_error"];
         assert_eq!(answer["rays"], rays);
         if answer["reached"] == true {
@@ -212,4 +214,17 @@ fn in_parts(rays: &str, count: usize) {
     }
     merge(path, &sums.iter().rev().map(String::as_str).collect::<Vec<_>>(), "tree");
     assert_same(path, "whole", "tree");
+}
+
+/// What is written under `.TALLY` is a tally for everybody who looks for one.
+#[test]
+fn the_case_of_an_extension_does_not_hide_a_part() {
+    let folder = lens("20_000");
+    let path = folder.path();
+    std::fs::create_dir(path.join("parts")).unwrap();
+    trace(path, &["--shard", "1/2", "-o", "parts/1.TALLY"]);
+    trace(path, &["--shard", "2/2", "-o", "parts/2.Tally"]);
+    merge(path, &["parts"], "merged");
+    trace(path, &["-o", "whole"]);
+    assert_same(path, "whole", "merged");
 }

@@ -191,3 +191,39 @@ fn a_signal_saves_a_run_that_is_traced_until_it_is_settled() {
     assert!(said.contains("replicates are saved in") && said.contains("the same command with --resume"), "{said}");
     assert!(folder.path().join("out/checkpoint.tally").is_file());
 }
+
+/// Facets are compared with the spline up to 2²² cells: beyond that nothing is known of what they change, and the results say so.
+#[test]
+fn a_far_field_of_millions_of_cells_has_results_and_no_sure_verdict() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fs::copy(fixture("step/lens_planoconvex_nurbs.stp"), path.join("model.stp")).unwrap();
+    let scene = "[run]\nrays = 1000\nunit = 'lm'\n[[model]]\nfile = 'model.stp'\n[[medium]]\nname = 'glass'\nindex = 1.5\n\
+        [[material]]\npart = '*'\nmedium = 'glass'\n\
+        [[source]]\nkind = 'cone'\nat = [0, 0, -50]\ndirection = [0, 0, 1]\nhalf_angle_deg = 8\npower = 100\n\
+        [[receiver]]\nname = 'road'\nkind = 'far_field'\nnormal = [0, 0, 1]\nh_deg = [-10.5, 10.5]\nv_deg = [-10.5, 10.5]\n\
+        cells = [2100, 2100]\n[[regulation]]\nid = 'UN R112 A passing'\n";
+    fs::write(path.join("lamp.toml"), scene).unwrap();
+    let arguments = ["trace", "lamp.toml", "--tolerance", "0.1", "-o", "out", "--no-report", "--json"];
+    let (code, out, err) = lampyris_in(path, &arguments);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    let is_unsure = |found: &Value| {
+        assert_eq!(found["verdict"], "unsure");
+        let rows = found["rows"].as_array().unwrap();
+        let judged: Vec<&Value> = rows.iter().filter(|row| !row["verdict"].is_null()).collect();
+        assert!(!judged.is_empty() && judged.iter().all(|row| row["verdict"] == "unsure"), "{judged:?}");
+        let read: Vec<&&Value> = judged.iter().filter(|row| !row["value"].is_null()).collect();
+        assert!(!read.is_empty() && read.iter().all(|row| row["geometric"].is_null()), "{read:?}");
+        assert!(
+            judged.iter().all(|row| row["note"].as_str().unwrap().contains("what facets change")),
+            "{judged:?}"
+        );
+    };
+    is_unsure(&found["regulations"][0]);
+    // From the files alone nobody is surer.
+    let arguments = ["assess", "out", "--regulation", "UN R112 A passing", "--json"];
+    let (code, out, err) = lampyris_in(path, &arguments);
+    assert_eq!(code, 0, "{err}");
+    is_unsure(&serde_json::from_str(&out).unwrap());
+}

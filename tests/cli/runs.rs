@@ -265,6 +265,8 @@ fn a_run_goes_on_until_its_error_is_small_enough() {
     let found = document(path, &["trace", "scene.toml", "-o", "out", "--until-error", "0.05%@focus", "--json"], 0);
     let answer = &found["until_error"];
     assert_eq!(answer["reached"], true);
+    let written = std::fs::read_to_string(path.join("out/results.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&written).unwrap(), found, "the file is what --json prints");
     let (power, error) = (&found["receivers"][0]["power"], &found["receivers"][0]["power_error"]);
     assert!(error.as_f64().unwrap() <= 0.0005 * power.as_f64().unwrap());
     // The very run with so many rays.

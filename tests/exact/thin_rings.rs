@@ -2,8 +2,11 @@
 
 use lampyris::intersect::exact::audit::Audit;
 use lampyris::intersect::exact::{Exact, Settings};
-use lampyris::intersect::{Certainty, Cost};
-use lampyris::math::{Frame, Point, Ray, Uv, Vector};
+use lampyris::intersect::octree::{self, Octree};
+use lampyris::intersect::polish::Polished;
+use lampyris::intersect::{Certainty, Cost, Intersector};
+use lampyris::math::{FaceId, Frame, Point, Ray, Uv, Vector};
+use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
 use lampyris::model::{EdgeUse, Face, Model, Part, Shell, TrimLoop};
 use lampyris::nurbs::{UvCurve, conic, sweep};
 use std::f64::consts::TAU;
@@ -64,4 +67,26 @@ fn a_hole_alone_leaves_the_rest_of_the_domain() {
     let places = [Uv::new(5.0, 5.0), Uv::new(1.0, 9.0)];
     assert_eq!(found(&plane(vec![circle(2.0, 3, true)]), &places), [[false; 2], [true; 2]]);
     assert_eq!(found(&plane(vec![circle(2.0, 3, false)]), &places), [[true; 2], [false; 2]]);
+}
+
+/// A facet that stands over the hole of a ring leads to no root; whatever is looked for behind it, it was one ray.
+#[test]
+fn a_ray_past_a_hole_is_polished_as_one_ray() {
+    let mut model = plane(vec![circle(4.0, 4, false), circle(2.0, 4, true)]);
+    // Of a solid, so that coming out of it from nowhere is in doubt.
+    model.parts[0].shells[0].closed = true;
+    let exact = Exact::build(&model, &Settings::default());
+    let corners = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]].map(|[x, y]| Uv::new(x, y));
+    let positions: Vec<Point> = corners.iter().map(|uv| Point::new(uv.x, uv.y, 0.0)).collect();
+    let vertices = (0..4).map(|k| MeshVertex { position: k, normal: Vector::Z, uv: corners[k as usize] }).collect();
+    let facets = vec![Facet { vertices: [0, 1, 2, 3], face: FaceId(0) }];
+    let mesh = FacetMesh { positions, vertices, facets, sag: vec![0.0] };
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let polished = Polished::new(&octree, &mesh, &exact);
+    let asked = |x: f64| {
+        let mut cost = Cost::default();
+        polished.intersect(&Ray::new(Point::new(x, 5.0, -3.0), Vector::Z), &mut cost);
+        cost.rays
+    };
+    assert_eq!([asked(5.0), asked(8.0)], [1, 1]);
 }

@@ -385,8 +385,8 @@ fn answer_text(rows: &[Value]) -> String {
     };
     let (octree, cwbvh) = (rate("octree", "T = 128", "batch"), rate("cwbvh as shipped", "medium", "single"));
     format!(
-        "With {} facets and {kind} rays on one thread the octree answers **{} million rays/s**, obvhs' CwBvh as shipped {}: \
-         **{} ×** (medians of {ROUNDS} alternating rounds).",
+        "With {} facets and {kind} rays on one thread the octree, asked in batches, answers **{} million rays/s**, obvhs' CwBvh as \
+         shipped, asked ray by ray, {}: **{} ×** (medians of {ROUNDS} alternating rounds).",
         grouped(most),
         figures(octree, 3),
         figures(cwbvh, 3),

@@ -4,7 +4,7 @@ use crate::cli::arguments::command::PageOption;
 use crate::cli::console::Console;
 use crate::cli::output::closing;
 use crate::cli::work::output_place::OutputPlace;
-use crate::cli::work::results_folder;
+use crate::cli::work::results_folder::{self, RunRemarks};
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::{completion::Completion, failure::Failure};
@@ -78,9 +78,9 @@ pub(crate) fn run(
         // What is left of the time of both.
         say_step("check", what, both - s.build - s.trace);
     }
-    let comparison = reference_comparison(r);
+    let remarks = RunRemarks { sentences: reference_comparison(r), target: None };
     let start = std::time::Instant::now();
-    let (document, answer) = results_folder::write(&prepared, folder, &mut run, comparison, with_page, console)?;
+    let (document, answer) = results_folder::write(&prepared, folder, &mut run, &remarks, with_page, console)?;
     write_atomic(&folder.join(MODEL_NAME), |w| w.write_all(LAMP))?;
     // The scene beside its model, as a user would keep them.
     write_atomic(&folder.join(SCENE_NAME), |w| w.write_all(scene_text.as_bytes()))?;

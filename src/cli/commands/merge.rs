@@ -6,11 +6,12 @@ use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
-use crate::cli::output::json::{json_text, json_value};
+use crate::cli::output::json::json_text;
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::OutputPlace;
+use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::shards::{is_tally, replicates_of_shard};
 use crate::cli::work::tally_file::TallyHeader;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
@@ -97,31 +98,23 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let request = TraceRequest { from: Some(whole), ..TraceRequest::default() };
     let mut run = prepared.trace(request, &monitor).map_err(|_| Failure::running("merge: the run is not whole"))?;
     run.results.seconds.merged = usage.total();
-    let result = target.map(|target| target.result(&run.results));
-    let sentences: Vec<String> = result.iter().map(closing::target_sentence).collect();
-    for sentence in &sentences {
-        console.say(sentence.replace("**", ""));
-    }
-    let written =
-        results_folder::write(&prepared, command.folder, &mut run, sentences.clone(), command.with_page, console);
-    let (mut document, answer) = match written {
+    let remarks = RunRemarks::say_target(target.map(|target| target.result(&run.results)), console);
+    let written = results_folder::write(&prepared, command.folder, &mut run, &remarks, command.with_page, console);
+    let (document, answer) = match written {
         Ok(written) => written,
         Err(failure) => {
-            let place = results_folder::write_anywhere(&prepared, &mut run, &sentences, command.with_page, console);
+            let place = results_folder::write_anywhere(&prepared, &mut run, &remarks, command.with_page, console);
             let saved = place.map(|folder| format!("nothing is lost: the results are in {}", folder.display()));
             return Err(failure.with_help(saved.unwrap_or("nothing is lost: the parts are as they were".into())));
         }
     };
-    if let Some(result) = &result {
-        document["until_error"] = json_value(result)?;
-    }
     closing::print_listings(&run, &prepared, console)?;
     closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
     let refused = input_files::report_refusals(&prepared.job.loaded.reports, command.limits.max_refused, console)
         .and(input_files::report_bare_faces(&prepared, command.limits.max_refused, console));
     Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)
         .and(refused)
-        .and(Completion::incomplete_if(result.is_some_and(|result| !result.reached))))
+        .and(Completion::incomplete_if(remarks.target.is_some_and(|result| !result.reached))))
 }
 
 /// Writes the sum of the parts, whole or not, as a tally for a merge of merges, and says so, or with `--json` prints what it holds.
@@ -209,7 +202,7 @@ fn part_files(arguments: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         let entries = std::fs::read_dir(argument).map_err(|e| input_failure(argument, e))?;
         let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
         // A checkpoint is of a run that is still traced.
-        inside.retain(|path| path.extension().is_some_and(|e| e == "tally") && !path.ends_with(CHECKPOINT));
+        inside.retain(|path| is_tally(path) && !path.ends_with(CHECKPOINT));
         inside.sort();
         files.extend(inside);
     }

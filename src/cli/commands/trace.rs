@@ -7,18 +7,19 @@ use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
-use crate::cli::output::json::{json_text, json_value};
+use crate::cli::output::json::json_text;
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::{OutputPlace, folder_of, require_space, try_file};
 use crate::cli::work::path_file::PathFile;
+use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards, tally_file};
 use crate::pipeline::{
-    AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, SceneJob, SceneResults, TargetResult,
-    TraceRequest, TracingSettings, read_scene, settings_for_accuracy,
+    AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, SceneJob, SceneResults, TraceRequest,
+    TracingSettings, read_scene, settings_for_accuracy,
 };
 use crate::report::{grouped, seconds};
 use crate::simulate::{PartialRun, PathSink, PathVertex, Scene};
@@ -175,21 +176,18 @@ fn trace_whole(
         _ => Ok(()),
     };
     say_verification(&run, console)?;
-    let sentences = say_target(result.as_ref(), console);
-    let written = results_folder::write(prepared, folder, &mut run, sentences.clone(), with_page, console);
-    let (mut document, answer) = match written {
+    let remarks = RunRemarks::say_target(result, console);
+    let written = results_folder::write(prepared, folder, &mut run, &remarks, with_page, console);
+    let (document, answer) = match written {
         Ok(written) => written,
-        Err(failure) => return Err(rescue_results(&mut run, &sentences, &checkpoint, with_page, failure)),
+        Err(failure) => return Err(rescue_results(&mut run, &remarks, &checkpoint, with_page, failure)),
     };
     // Rays that cannot be traced again for their paths alone are not lost with these.
     paths_written?;
-    if let Some(result) = &result {
-        document["until_error"] = json_value(result)?;
-    }
     // What was missed comes before what was found.
     let unsettled = extra.until_settled && verdicts::are_unsettled(&document);
-    let missed = result.as_ref().is_some_and(|result| !result.reached) || unsettled;
-    let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { sentences };
+    let missed = remarks.target.as_ref().is_some_and(|result| !result.reached) || unsettled;
+    let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { remarks.sentences };
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     verdicts::say_verdicts(&run, prepared, console)?;
     closing::print_listings(&run, prepared, console)?;
@@ -201,15 +199,6 @@ fn trace_whole(
     ends_written?;
     let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
     Ok(lost.and(Completion::incomplete_if(missed)))
-}
-
-/// Says what came of --until-error, and gives the sentence for the page; none where nothing was asked.
-fn say_target(result: Option<&TargetResult>, console: &Console) -> Vec<String> {
-    let sentences: Vec<String> = result.map(closing::target_sentence).into_iter().collect();
-    for sentence in &sentences {
-        console.say(sentence.replace("**", ""));
-    }
-    sentences
 }
 
 /// Tries all that is to be written, and begins the file of paths if one is wanted, else `None`. Fails, before anything is traced, where a
@@ -241,13 +230,13 @@ fn say_paths(paths: PathFile, file: &Path, console: &Console) -> Result<(), Fail
 /// are.
 fn rescue_results(
     run: &mut SceneResults,
-    sentences: &[String],
+    remarks: &RunRemarks,
     checkpoint: &Checkpoint,
     with_page: bool,
     failure: Failure,
 ) -> Failure {
     let (prepared, console) = (checkpoint.prepared, checkpoint.console);
-    if let Some(folder) = results_folder::write_anywhere(prepared, run, sentences, with_page, console) {
+    if let Some(folder) = results_folder::write_anywhere(prepared, run, remarks, with_page, console) {
         return failure.with_help(format!("nothing is lost: the results are in {}", folder.display()));
     }
     let Some(sums) = &run.sums else { return failure };

@@ -55,15 +55,15 @@ fn notes(a: &Assessment) -> Vec<(&str, Vec<&str>)> {
 
 /// Returns the eight cells of a row of the table; a dash where nothing was read.
 fn row_cells(row: &RowVerdict) -> [String; 8] {
-    let read = |value: fn(crate::regulation::Reading) -> f64| {
-        row.reading.map_or("–".to_owned(), |r| figures(value(r), DIGITS))
+    let read = |value: fn(crate::regulation::Reading) -> Option<f64>| {
+        row.reading.and_then(value).map_or("–".to_owned(), |x| figures(x, DIGITS))
     };
     [
         row.row.id.clone(),
         row.direction.map_or(String::new(), direction_text),
         requirement_text(row),
-        read(|r| r.value),
-        read(|r| r.statistical),
+        read(|r| Some(r.value)),
+        read(|r| Some(r.statistical)),
         read(|r| r.geometric),
         row.verdict.map_or("not judged".to_owned(), |v| v.to_string()),
         settling_text(row),

@@ -44,15 +44,15 @@ pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
     let mut table = Table::new("receivers", "What facets change of the light", &columns)
         .caption("The same rays are traced on facets and on the spline, so that most of the noise cancels in the difference.");
     for p in pairs {
-        let percent = |x: f64| Cell::Number(100.0 * x / p.power_exact.abs().max(f64::MIN_POSITIVE), 2);
-        let power = Cell::Number(p.power_exact, 5);
-        table.row([
-            p.name.as_str().into(),
-            power,
-            percent(p.difference),
-            percent(p.difference_error),
-            percent(p.power_error),
-        ]);
+        let mut row = vec![p.name.as_str().into(), Cell::Number(p.power_exact, 5)];
+        if p.power_exact > 0.0 {
+            let shares = [p.difference, p.difference_error, p.power_error].map(|x| x / p.power_exact);
+            row.extend(shares.map(|share| Cell::Number(100.0 * share, 2)));
+        } else {
+            // A share of darkness is no share.
+            row.extend(["dark".into(), Cell::Empty, Cell::Empty]);
+        }
+        table.row(row);
     }
     table
 }
@@ -60,7 +60,6 @@ pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
 /// Returns what facets change of every receiver, a line each; dark receivers are left out.
 pub(crate) fn summary(pairs: &[PowerComparison]) -> String {
     let mut text = String::new();
-    // A share of darkness is no share.
     for p in pairs.iter().filter(|p| p.power_exact > 0.0) {
         let percent = |x: f64| figures(100.0 * x / p.power_exact, 2);
         text += &format!(
@@ -72,4 +71,21 @@ pub(crate) fn summary(pairs: &[PowerComparison]) -> String {
         );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn darkness_on_the_spline_has_no_share() {
+        let lit_by_facets_alone = PowerComparison {
+            name: "wall".into(),
+            power_facets: 1e-3,
+            difference: 1e-3,
+            ..PowerComparison::default()
+        };
+        let table = table(&[lit_by_facets_alone]);
+        assert_eq!(table.rows[0][2..], [Cell::Text("dark".into()), Cell::Empty, Cell::Empty]);
+    }
 }

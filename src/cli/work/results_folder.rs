@@ -6,14 +6,14 @@ use super::output_place::{make_folder, require_space, rescue_folders};
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::machine;
-use crate::cli::output::closing::LEDGER;
+use crate::cli::output::closing::{LEDGER, target_sentence};
 use crate::cli::output::face_tables;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table, sequence_tables};
 use crate::formats::{ColourMap, Facets, Polylines, read_text, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
 use crate::mesh::FacetMesh;
-use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults};
+use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults, TargetResult};
 use crate::regulation::Assessment;
 use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, grouped, path_lines};
 use crate::simulate::{Scene, arrivals};
@@ -102,19 +102,39 @@ fn remove_earlier(prepared: &PreparedScene, folder: &Path) {
     }
 }
 
+/// What is said of a run beside its figures.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RunRemarks {
+    /// Sentences of the page that compare the run with what was asked for or others found, in Markdown.
+    pub(crate) sentences: Vec<String>,
+    /// What came of the error that was asked for, if one was.
+    pub(crate) target: Option<TargetResult>,
+}
+
+impl RunRemarks {
+    /// Puts what came of an error that was asked for into a sentence, and says it; nothing where nothing was asked.
+    pub(crate) fn say_target(target: Option<TargetResult>, console: &Console) -> Self {
+        let sentences: Vec<String> = target.iter().map(target_sentence).collect();
+        for sentence in &sentences {
+            console.say(sentence.replace("**", ""));
+        }
+        Self { sentences, target }
+    }
+}
+
 /// Writes the results into a new folder wherever one can be, when they cannot be written where they should; returns the folder, `None` if
 /// nowhere.
 pub(crate) fn write_anywhere(
     prepared: &PreparedScene,
     run: &mut SceneResults,
-    sentences: &[String],
+    remarks: &RunRemarks,
     with_page: bool,
     console: &Console,
 ) -> Option<PathBuf> {
     let name = format!("lampyris-rescued-{}", machine::process_name());
     let mut places = rescue_folders().into_iter().map(|folder| folder.join(&name));
     places.find(|folder| {
-        let written = write(prepared, folder, run, sentences.to_vec(), with_page, console);
+        let written = write(prepared, folder, run, remarks, with_page, console);
         if written.is_err() {
             // Half of the results tells nobody anything.
             let _ = std::fs::remove_dir_all(folder);
@@ -132,7 +152,7 @@ pub(crate) fn write(
     prepared: &PreparedScene,
     folder: &Path,
     run: &mut SceneResults,
-    sentences: Vec<String>,
+    remarks: &RunRemarks,
     with_page: bool,
     console: &Console,
 ) -> Result<(Value, String), Failure> {
@@ -170,6 +190,9 @@ pub(crate) fn write(
         document["regulations"] = verdicts.iter().map(|v| v.assessment.document()).collect();
     }
     let verdicts: Vec<(usize, Assessment)> = verdicts.into_iter().map(|v| (v.receiver, v.assessment)).collect();
+    if let Some(target) = &remarks.target {
+        document["until_error"] = json_value(target)?;
+    }
     if has_lost_rays {
         document["ledger"] = LEDGER.into();
     }
@@ -180,7 +203,7 @@ pub(crate) fn write(
         facets.labels = rule_table::face_labels(&prepared.job.loaded.model);
     }
     let found = (all_figures.as_slice(), absorbed.as_slice(), verdicts.as_slice());
-    let report = report_page(prepared, run, found, &facets, sentences, provenance);
+    let report = report_page(prepared, run, found, &facets, remarks.sentences.clone(), provenance);
     let answer = report.answer();
     if with_page {
         report.with_views(facet_views(prepared, &facets)).report().write(folder)?;

@@ -158,7 +158,7 @@ impl TallyHeader {
 pub(crate) fn choice_of_parts(output: &Path) -> Option<PartChoice> {
     let folder = if is_tally(output) { folder_of(output) } else { output.to_path_buf() };
     let files = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
-    let tallies = files.filter(|path| path.extension().is_some_and(|e| e == "tally"));
+    let tallies = files.filter(|path| is_tally(path));
     let mut tallies: Vec<(u64, PathBuf)> =
         tallies.filter_map(|path| Some((std::fs::metadata(&path).ok()?.len(), path))).collect();
     // Any of them will do, and all of a file is read to know that it is whole.

@@ -201,9 +201,10 @@ impl<'a> Polished<'a> {
     }
 
     /// The nearest root of a ray that leaves no face. Where it would first come out of a closed solid the spline is asked, and then up to
-    /// [`MOST_OUTSIDE`] facets are passed; `None` for a miss or after these.
+    /// [`MOST_OUTSIDE`] facets are passed; `None` for a miss or after these. Counts one ray.
     fn search_from_outside(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         let mut answer = self.search_by_facets(ray, None, cost);
+        let counted = cost.rays;
         if !self.comes_out(ray, answer.as_ref()) {
             return answer;
         }
@@ -215,6 +216,8 @@ impl<'a> Polished<'a> {
             // Just past the facet, or it would be found again.
             let behind = ray.with_range(answer?.t.next_up(), ray.t_max);
             answer = self.search_by_facets(&behind, None, cost);
+            // However often facets were asked, it was one ray.
+            cost.rays = counted;
             if !self.comes_out(ray, answer.as_ref()) {
                 return answer;
             }

@@ -162,8 +162,8 @@ impl Grader<'_> {
     fn grade(&self, question: &Question) -> Grade {
         match question {
             Question::First { ray, truth } => {
-                let hit = self.ask(&self.scene.ray(ray));
-                self.grade_first(ray, truth, hit.as_ref())
+                let asked = self.scene.ray(ray);
+                self.grade_first([ray, &asked], truth, self.ask(&asked).as_ref())
             }
             Question::All { ray, truths } => self.grade_all(ray, truths),
             Question::Chord { toward, direction, radius } => self.grade_chord(toward, *direction, *radius),
@@ -177,17 +177,18 @@ impl Grader<'_> {
         hit.t / self.scene.frame.scale
     }
 
-    /// Grades a first hit, by what is promised on the spline or on facets.
-    fn grade_first(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
+    /// Grades a first hit of a ray, given in the case and as it was asked, by what is promised on the spline or on facets.
+    fn grade_first(&self, [ray, asked]: [&Ray; 2], truth: &Truth, hit: Option<&Hit>) -> Grade {
         match self.geometry {
-            Geometry::Spline => self.first_on_spline(ray, truth, hit),
+            Geometry::Spline => self.first_on_spline([ray, asked], truth, hit),
             Geometry::Facets if self.right_within_sag(ray, truth, hit) => Grade::Right,
             Geometry::Facets => Grade::Wrong,
         }
     }
 
-    /// Grades a first hit on the spline: right to the last digits, or flagged where it says that it is not proved.
-    fn first_on_spline(&self, ray: &Ray, truth: &Truth, hit: Option<&Hit>) -> Grade {
+    /// Grades a first hit on the spline of a ray, given in the case and as it was asked: right to the last digits, or flagged where it says
+    /// that it is not proved.
+    fn first_on_spline(&self, [ray, asked]: [&Ray; 2], truth: &Truth, hit: Option<&Hit>) -> Grade {
         let resolution = self.scene.resolution(ray, truth.distance());
         let open = self.is_undecided(truth, resolution);
         let right = match (truth.t, hit) {
@@ -209,7 +210,7 @@ impl Grader<'_> {
             (_, Some(h)) if is_flagged(h) && !open => Grade::Flagged,
             (true, _) => Grade::Right,
             (false, Some(h)) if is_flagged(h) => Grade::Flagged,
-            (false, None) if self.unsure_miss(&self.scene.ray(ray)) => Grade::Flagged,
+            (false, None) if self.unsure_miss(asked) => Grade::Flagged,
             _ => Grade::Wrong,
         }
     }
@@ -302,22 +303,16 @@ impl Grader<'_> {
         let cos = (origin.dot(direction) / radius).abs();
         let truth = Truth::hit(true_t, cos, radius * cos * cos * 0.5);
         let answer = self.ask(&second);
-        let Some(a) = answer else {
-            return if self.geometry == Geometry::Facets && truth.margin <= self.band {
-                Grade::Right
-            } else {
-                self.grade_miss(&second)
-            };
-        };
         match self.geometry {
             // From a hit that is not the one aimed at, a chord may run another way.
             Geometry::Spline if is_flagged(&h) => Grade::Flagged,
-            Geometry::Spline => self.first_on_spline(&local, &truth, Some(&a)),
+            Geometry::Spline => self.first_on_spline([&local, &second], &truth, answer.as_ref()),
             Geometry::Facets => {
-                let t = self.local_t(&a);
-                // From inside, a chord is missed only if the ray got out of the band on the far side.
-                let right =
-                    self.in_band(&local, t) && t > AT_START * true_t && t <= true_t + self.band_reach(&truth);
+                let right = answer.as_ref().map_or(truth.margin <= self.band, |a| {
+                    let t = self.local_t(a);
+                    // From inside, a chord is missed only if the ray got out of the band on the far side.
+                    self.in_band(&local, t) && t > AT_START * true_t && t <= true_t + self.band_reach(&truth)
+                });
                 if right { Grade::Right } else { Grade::Wrong }
             }
         }
@@ -340,7 +335,7 @@ impl Grader<'_> {
         // Over the wall that it leaves the ray has risen by this when it meets the next.
         let margin = direction.abs().min_element() * ways[axis];
         let truth = Truth::hit(ways[axis], direction[axis], margin);
-        self.grade_first(&local, &truth, self.ask(&next).as_ref())
+        self.grade_first([&local, &next], &truth, self.ask(&next).as_ref())
     }
 
     /// Returns how far along the ray the sag band stretches behind a hit, mm.

@@ -55,3 +55,54 @@ pub fn cases() -> Vec<Case> {
     all.extend(practice::cases());
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::case::Question;
+    use super::*;
+    use crate::intersect::{Certainty, Cost, Footprint, Hit, Intersector, exact};
+    use crate::math::{Frame, Point, Ray, Vector};
+    use crate::nurbs::sweep;
+    use std::f64::consts::{FRAC_PI_2, TAU};
+
+    /// Finds what a ray from nowhere meets, with this certainty, and loses what leaves it in silence.
+    struct Blind(exact::Exact, Certainty);
+
+    impl Intersector for Blind {
+        fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+            let hit = self.0.intersect(ray, cost).filter(|_| ray.departure.is_none())?;
+            Some(Hit { certainty: self.1, ..hit })
+        }
+
+        fn footprint(&self) -> Footprint {
+            Footprint::default()
+        }
+    }
+
+    /// Grades a chord of a ball of 1 mm, at this sine to the surface that it leaves, for whoever finds its start and loses its end.
+    fn grade_of_lost_chord(sine: f64, certainty: Certainty) -> Grade {
+        let toward = Ray::new(Point::ZERO, Vector::X);
+        let direction = Vector::new(-sine, (1.0 - sine * sine).sqrt(), 0.0);
+        let case = Case {
+            name: "chord",
+            surfaces: vec![sweep::sphere(&Frame::IDENTITY, 1.0, [0.0, TAU], [-FRAC_PI_2, FRAC_PI_2])],
+            loops: Vec::new(),
+            divisions: 4,
+            slack: 0.0,
+            distance: Box::new(|p| p.length() - 1.0),
+            questions: vec![Question::Chord { toward, direction, radius: 1.0 }],
+        };
+        let scene = case.scene(Variant::Home);
+        let who = Blind(exact::Exact::build(&scene.model, &exact::Settings::default()), certainty);
+        scene.grades(&who, Geometry::Spline)[0]
+    }
+
+    #[test]
+    fn a_lost_end_is_graded_by_its_start_and_by_its_truth() {
+        assert_eq!(grade_of_lost_chord(0.5, Certainty::Certified), Grade::Wrong);
+        // From a hit that is not sure the chord may run another way, whether it is met or lost.
+        assert_eq!(grade_of_lost_chord(0.5, Certainty::Uncertified), Grade::Flagged);
+        // So flat that the surface would hide it by a move of 5e-19 mm: nobody knows.
+        assert_eq!(grade_of_lost_chord(1e-9, Certainty::Certified), Grade::Right);
+    }
+}
