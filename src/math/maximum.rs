@@ -5,6 +5,12 @@ const STEPS: usize = 128;
 /// Standard errors beyond which a value is taken as never to be the largest.
 const REACH: f64 = 6.0;
 
+/// Returns the largest of distances, 0 without any, and NaN where one is no number: `f64::max` would drop it, and take a curve without a
+/// place for a perfect fit.
+pub(crate) fn largest_distance(distances: impl Iterator<Item = f64>) -> f64 {
+    distances.fold(0.0, |largest, d| if d > largest || d.is_nan() { d } else { largest })
+}
+
 /// Returns the error of the largest of `values`, whose standard errors are `errors`: the root of the sum of squares of its own and of what
 /// the largest of noisy values exceeds the largest true one by. 0 without values.
 ///
@@ -51,6 +57,13 @@ mod tests {
         for (x, expected) in [(0.0, 0.5), (1.0, 0.841_345), (-1.0, 0.158_655), (2.0, 0.977_250), (3.0, 0.998_650)] {
             assert!((standard_normal_cdf(x) - expected).abs() < 2e-5, "{x}");
         }
+    }
+
+    #[test]
+    fn a_distance_that_is_no_number_is_not_dropped() {
+        assert_eq!(largest_distance([1.0, 3.0, 2.0].into_iter()), 3.0);
+        assert_eq!(largest_distance(std::iter::empty()), 0.0);
+        assert!(largest_distance([1.0, f64::NAN, 2.0].into_iter()).is_nan());
     }
 
     /// The mean of the largest of two equal normal values is 1/√π of their standard error above each.
