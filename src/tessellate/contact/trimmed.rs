@@ -3,12 +3,13 @@
 use super::projector::Projector;
 use crate::math::polygon::is_inside_sides;
 use crate::math::{Frame, Point, Uv};
-use crate::model::{EdgeId, Face, Instance, Model, Part, TrimLoop};
+use crate::model::{EdgeId, Face, Instance, Part, TrimLoop};
 use crate::nurbs::project;
 use crate::tessellate::assemble::{PartMesh, face_with_surface};
 use crate::tessellate::border::polygons::{self, BorderPolygons, ImprintedPoints, PolygonVertex};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
+use crate::tessellate::placed_part::PlacedPart;
 use crate::tessellate::settings::{Settings, ToleranceField};
 
 /// Steps of the grid over a face whose places inside it are looked at.
@@ -41,11 +42,17 @@ pub(super) struct TrimmedFace<'m> {
 }
 
 impl<'m> TrimmedFace<'m> {
-    /// Builds the face's border on the divisions of `mesh` and samples it; `None` where it is no face or its surface cannot be used.
-    pub(super) fn new(model: &'m Model, settings: &Settings, mesh: &PartMesh, key: FaceKey) -> Option<Self> {
-        let instance: &'m Instance = &model.instances[key.instance];
-        let part = model.part(instance.part);
-        let (face, surface) = face_with_surface(model, settings, instance.part, key.face)?;
+    /// Builds the face's border on the divisions of `mesh` and samples it; `None` where it is no face or its surface cannot be used. `mesh`
+    /// and `placed` are of the instance's part.
+    pub(super) fn new(
+        instance: &'m Instance,
+        placed: &PlacedPart<'m>,
+        settings: &Settings,
+        mesh: &PartMesh,
+        key: FaceKey,
+    ) -> Option<Self> {
+        let part = placed.part;
+        let (face, surface) = face_with_surface(placed, settings, key.face)?;
         let loops = polygons::loops(face);
         let polygons = polygons::build(part, &loops, &surface, &mesh.divisions, &ImprintedPoints::NONE);
         let mut out = Self {
