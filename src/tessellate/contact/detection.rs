@@ -91,7 +91,9 @@ pub(super) fn contacts<'m>(
         if let Some(field) = trimmed.get(&c.guest).map(|guest| guest.surface.field)
             && let Some(carrier) = trimmed.get_mut(&c.carrier)
         {
-            carrier.surface.field = carrier.asked.tighter(&field, CARRIER_SHARE);
+            // Of all its guests: each proves its own.
+            let own_share = carrier.surface.field.tighter(&carrier.asked, CARRIER_SHARE);
+            carrier.surface.field = own_share.tighter(&field, CARRIER_SHARE);
         }
     }
     let concerned: FxHashSet<FaceKey> = out.iter().flat_map(|c| [c.carrier, c.guest]).collect();

@@ -32,7 +32,7 @@ use super::taken_chords::TakenChords;
 use crate::math::Point;
 use crate::model::{Face, Model};
 use closure::SideCounts;
-use detection::{CARRIER_SHARE, Contact, Extent};
+use detection::{Contact, Extent};
 use guest::Guest;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -210,7 +210,9 @@ impl<'j, 'm> Joiner<'j, 'm> {
             Ok((mut mesh, facets)) if facets.holds_imprint => {
                 // The facets were made tighter for the guests' sake; what was asked of this face is what they are
                 // measured by.
-                mesh.facets.iter_mut().for_each(|f| f.tolerance /= CARRIER_SHARE);
+                for f in &mut mesh.facets {
+                    f.tolerance = carrier.asked_tolerance(f, &mesh.corners);
+                }
                 (Some(mesh), facets)
             }
             // Each by itself, as without a contact.

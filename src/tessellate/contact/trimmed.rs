@@ -1,5 +1,6 @@
 //! One placed face, as contacts see it: its trimmed region, and places on it in the model's coordinates.
 
+use super::detection::CARRIER_SHARE;
 use super::projector::Projector;
 use crate::math::polygon::is_inside_sides;
 use crate::math::{Frame, Point, Uv};
@@ -7,6 +8,7 @@ use crate::model::{EdgeId, Face, Instance, Part, TrimLoop};
 use crate::nurbs::project;
 use crate::tessellate::assemble::{PartMesh, face_with_surface};
 use crate::tessellate::border::polygons::{self, BorderPolygons, ImprintedPoints, PolygonVertex};
+use crate::tessellate::face_mesh::{Corner, MeshedFacet};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
 use crate::tessellate::placed_part::PlacedPart;
@@ -79,6 +81,22 @@ impl<'m> TrimmedFace<'m> {
         out.samples = samples;
         out.border_samples = border_samples;
         Some(out)
+    }
+
+    /// Returns the tolerance, mm of the part, that was asked where a facet of this face lies, whatever contacts held it to. `corners` are
+    /// those of its mesh.
+    pub(super) fn asked_tolerance(&self, facet: &MeshedFacet, corners: &[Corner]) -> f64 {
+        let own_share = self.asked.tighter(&self.asked, CARRIER_SHARE);
+        if self.surface.field.has_range_of(&own_share) {
+            return facet.tolerance / CARRIER_SHARE;
+        }
+        // The tightest of its corners and its middle, as where facets are proved.
+        let [a, b, c, d] = facet.corners.map(|k| corners[k as usize].uv);
+        let middle = if facet.corners[2] == facet.corners[3] { (a + b + c) / 3.0 } else { (a + b + c + d) / 4.0 };
+        [a, b, c, d, middle]
+            .map(|uv| self.surface.tolerance_in(&self.asked, uv))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Returns all corners of the border.
