@@ -3,7 +3,7 @@
 //! costs at most 1e-7 of its size.
 
 use super::facets::Facets;
-use super::{Error, write_atomic};
+use super::{Error, ErrorKind, write_atomic};
 use crate::math::{Point, Vector};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -161,6 +161,18 @@ fn remove_children_of_root(document: &mut Value) {
     }
 }
 
+/// Bytes of the head of a GLB file: its name, version and size.
+const HEAD: usize = 12;
+/// Bytes in front of each chunk: its length and kind.
+const CHUNK_HEAD: usize = 8;
+
+/// Returns the size of a file whose chunks have these lengths, bytes; an error, for people, where 32 bits do not hold it.
+fn container_size(lengths: impl Iterator<Item = usize>) -> Result<u32, String> {
+    let size = lengths.fold(HEAD, |size, length| size.saturating_add(CHUNK_HEAD).saturating_add(length));
+    u32::try_from(size)
+        .map_err(|_| format!("{size} bytes; a GLB file holds at most {}: export fewer facets, or as VTU", u32::MAX))
+}
+
 /// Writes a GLB file: the document, padded here to four bytes, and the binary chunk, which the caller has padded and which is left out when
 /// empty.
 fn write_container(path: &Path, document: &Value, binary: &[u8]) -> Result<(), Error> {
@@ -170,16 +182,32 @@ fn write_container(path: &Path, document: &Value, binary: &[u8]) -> Result<(), E
     }
     let chunks: &[(&[u8], &[u8; 4])] =
         if binary.is_empty() { &[(&text, b"JSON")] } else { &[(&text, b"JSON"), (binary, b"BIN\0")] };
-    let total = 12 + chunks.iter().map(|(c, _)| 8 + c.len()).sum::<usize>();
+    let total = container_size(chunks.iter().map(|(chunk, _)| chunk.len()))
+        .map_err(|m| Error::new(path, ErrorKind::Malformed(m)))?;
     write_atomic(path, |w| {
         w.write_all(b"glTF")?;
         w.write_all(&2u32.to_le_bytes())?;
-        w.write_all(&(total as u32).to_le_bytes())?;
+        w.write_all(&total.to_le_bytes())?;
         for (chunk, kind) in chunks {
+            // A chunk is shorter than the file.
             w.write_all(&(chunk.len() as u32).to_le_bytes())?;
             w.write_all(*kind)?;
             w.write_all(chunk)?;
         }
         Ok(())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_beyond_their_own_size_field_are_refused() {
+        assert_eq!(container_size([100, 200].into_iter()), Ok(12 + 108 + 208));
+        let largest = u32::MAX as usize - 12 - 108 - 8;
+        assert_eq!(container_size([100, largest].into_iter()), Ok(u32::MAX));
+        assert!(container_size([100, largest + 1].into_iter()).unwrap_err().contains("4294967296 bytes"));
+        assert!(container_size([100, usize::MAX].into_iter()).is_err());
+    }
 }

@@ -216,10 +216,12 @@ fn ies_text(p: &Photometry) -> Result<String, String> {
     let mut out = Lines::default();
     out.line("IESNA:LM-63-2002");
     for (name, value) in &p.keywords {
-        // A keyword is one line; what follows stands under MORE.
-        for (i, part) in value.lines().enumerate() {
+        // A bracket would end the name, a line end begin a line of the format.
+        let name: String = name.chars().filter(|c| !c.is_control() && !matches!(c, '[' | ']')).collect();
+        // A keyword is one line; what follows stands under MORE. One without a value stands there too.
+        for (i, part) in value.split('\n').enumerate() {
             let clean: String = part.chars().filter(|c| !c.is_control()).collect();
-            out.line(&format!("[{}] {clean}", if i == 0 { name } else { "MORE" }));
+            out.line(&format!("[{}] {clean}", if i == 0 { &name } else { "MORE" }));
         }
     }
     out.line("TILT=NONE");
@@ -315,6 +317,16 @@ mod tests {
             let text = std::fs::read_to_string(&path).unwrap();
             assert!(text.lines().all(|l| l.len() < 132) && text.ends_with("\r\n"));
         }
+    }
+
+    #[test]
+    fn keywords_stay_keywords() {
+        let mut p = photometry_of(PhotometricType::C, &[0.0], &[0.0, 90.0], |_, _| 1.0);
+        let keywords = [("TEST", ""), ("MANUFAC", "A,\nand B\n"), ("LA]MP\r\nTILT=NONE\r\n[", "one\u{1b}")];
+        p.keywords = keywords.map(|(name, value)| (name.into(), value.into())).to_vec();
+        let read = parse(&ies_text(&p).unwrap()).unwrap().keywords;
+        let expected = [("TEST", ""), ("MANUFAC", "A,\nand B\n"), ("LAMPTILT=NONE", "one")];
+        assert_eq!(read, expected.map(|(name, value)| (name.to_owned(), value.to_owned())));
     }
 
     #[test]

@@ -99,6 +99,10 @@ pub fn write_png(path: &Path, picture: &Picture) -> Result<(), Error> {
 /// When the grid is empty, when values do not fill it and when the file cannot be written.
 pub fn write_grid_png(path: &Path, grid: &Grid) -> Result<(), Error> {
     grid.check_filled(path)?;
-    let longer = grid.axes[0].cells.max(grid.axes[1].cells).max(1) as u32;
+    let cells = grid.axes[0].cells.max(grid.axes[1].cells).max(1);
+    let too_many = || {
+        ErrorKind::Malformed(format!("a grid of {cells} cells along one side has more than a picture has pixels"))
+    };
+    let longer = u32::try_from(cells).map_err(|_| Error::new(path, too_many()))?;
     write_png(path, &Picture::of_grid(grid, ColourMap::Inferno, 800u32.div_ceil(longer), 1.0))
 }

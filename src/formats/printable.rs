@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 /// Whether a terminal or a viewer would act on the character rather than show it: control characters (C0 without line end and
 /// tabulator, DEL, C1), the marks that turn the direction of writing, the separators of lines and paragraphs, byte order
-/// marks, the marks of annotations and invisible tags.
+/// marks, the marks of annotations, invisible tags, and what has no width: soft hyphens, joiners and the like.
 pub fn is_unprintable(c: char) -> bool {
     match c {
         // Line ends and tabulators lay text out; a viewer that shows them does no harm.
@@ -13,6 +13,9 @@ pub fn is_unprintable(c: char) -> bool {
         '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
         // Line and paragraph separators, the byte order mark, interlinear annotations, tags.
         '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}' => true,
+        // Nothing is seen of them, so that two names that differ by them look alike: the soft hyphen, the Mongolian vowel separator, blanks
+        // without width, joiners, invisible operators.
+        '\u{ad}' | '\u{180e}' | '\u{200b}'..='\u{200d}' | '\u{2060}'..='\u{2064}' => true,
         c => c.is_control(),
     }
 }
@@ -122,6 +125,15 @@ mod tests {
         assert_eq!(printable("Straße\u{202f}µ\tok\n"), "Straße\u{202f}µ\tok\n");
         assert_eq!(printable_line("a\r\nb"), "a\\u{d} b");
         assert_eq!(printable_in_place(HOSTILE).len(), HOSTILE.len());
+    }
+
+    /// Names that differ by what nobody sees are one name to a reader.
+    #[test]
+    fn what_is_not_seen_is_written_out() {
+        for c in ['\u{ad}', '\u{180e}', '\u{200b}', '\u{200c}', '\u{200d}', '\u{2060}', '\u{2064}'] {
+            assert_eq!(printable(&format!("le{c}ns")), format!("le\\u{{{:x}}}ns", u32::from(c)));
+            assert_eq!(printable_in_place(&format!("le{c}ns")).len(), 4 + c.len_utf8());
+        }
     }
 
     #[test]

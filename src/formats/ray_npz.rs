@@ -63,7 +63,7 @@ pub(super) fn read_npz(path: &Path, mut add: impl FnMut(LightRay) -> Result<(), 
             array.read_row(row).map_err(|m| malformed(format!("array '{name}': {m}")))?;
             place += array.width;
         }
-        add(LightRay::from_numbers(&numbers[..place]).map_err(|m| malformed(format!("ray {ray}: {m}")))?)?;
+        add(LightRay::from_numbers(&numbers[..place]).map_err(|m| malformed(format!("ray {}: {m}", ray + 1)))?)?;
     }
     for (name, array) in &mut arrays {
         // The sum of an entry's bytes is compared where it ends.
@@ -137,7 +137,8 @@ impl<'a> ArrayReader<'a> {
             self.entry.read_exact(&mut raw[..self.bytes as usize]).map_err(|e| {
                 format!(
                     "it ends or is damaged within row {} of the {} that its head tells: {e}",
-                    self.done, self.rows
+                    self.done + 1,
+                    self.rows
                 )
             })?;
             *number = match self.bytes {
@@ -153,6 +154,19 @@ impl<'a> ArrayReader<'a> {
 #[cfg(test)]
 mod tests {
     use super::super::{NpyArray, read_rays, write_npz};
+
+    /// Rays count from 1, as lines of other files do.
+    #[test]
+    fn refusals_count_rays_from_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        let array = |name, width: usize, data| NpyArray { name, shape: [2, width][..width.min(2)].to_vec(), data };
+        let power = array("power", 1, &[1.0, -1.0]);
+        let direction = array("direction", 3, &[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+        write_npz(&path, &[array("origin", 3, &[0.0; 6]), direction, power]).unwrap();
+        let refusal = read_rays(&path).unwrap_err().to_string();
+        assert!(refusal.contains("ray 2: a power of -1"), "{refusal}");
+    }
 
     #[test]
     fn what_is_no_list_of_rays_is_refused() {

@@ -58,20 +58,31 @@ impl LightRay {
     }
 }
 
-/// Writes a list of rays as NPZ (`.npz`) or CSV (`.csv`, `.txt`); wavelengths when the first ray has one, then NaN for rays without.
+/// Returns the wavelengths of a list, nm, none where no ray has one; an error, for people, where only some do.
+fn listed_wavelengths(rays: &[LightRay]) -> Result<Vec<f64>, String> {
+    let known: Vec<f64> = rays.iter().filter_map(|r| r.wavelength_nm).collect();
+    match rays.iter().position(|r| r.wavelength_nm.is_none()) {
+        Some(ray) if !known.is_empty() => Err(format!(
+            "ray {} has no wavelength, where others have one; a list tells it for all of its rays or for none",
+            ray + 1
+        )),
+        _ => Ok(known),
+    }
+}
+
+/// Writes a list of rays as NPZ (`.npz`) or CSV (`.csv`, `.txt`), with wavelengths where the rays have them.
 ///
 /// # Errors
-/// When the extension is another, or the file cannot be written.
+/// When the extension is another, only some rays have a wavelength, or the file cannot be written.
 pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
-    // Lists have a wavelength for all rays or for none; the first tells.
-    let spectral = rays.first().is_some_and(|r| r.wavelength_nm.is_some());
+    let wavelengths = listed_wavelengths(rays).map_err(|m| Error::new(path, ErrorKind::Malformed(m)))?;
+    let spectral = !wavelengths.is_empty();
     let extension = lower_extension(path);
     match extension.as_str() {
         "npz" => {
             let origin: Vec<f64> = rays.iter().flat_map(|r| r.origin.to_array()).collect();
             let direction: Vec<f64> = rays.iter().flat_map(|r| r.direction.to_array()).collect();
             let power: Vec<f64> = rays.iter().map(|r| r.power).collect();
-            let wavelength: Vec<f64> = rays.iter().map(|r| r.wavelength_nm.unwrap_or(f64::NAN)).collect();
             let n = rays.len();
             let mut arrays = vec![
                 NpyArray { name: "origin", shape: vec![n, 3], data: &origin },
@@ -79,27 +90,27 @@ pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
                 NpyArray { name: "power", shape: vec![n], data: &power },
             ];
             if spectral {
-                arrays.push(NpyArray { name: "wavelength_nm", shape: vec![n], data: &wavelength });
+                arrays.push(NpyArray { name: "wavelength_nm", shape: vec![n], data: &wavelengths });
             }
             write_npz(path, &arrays)
         }
         "csv" | "txt" => write_atomic(path, |w| {
             writeln!(w, "{}", COLUMNS[..if spectral { 8 } else { 7 }].join(","))?;
             let mut line = String::new();
-            for ray in rays {
+            for (k, ray) in rays.iter().enumerate() {
                 line.clear();
                 for (i, x) in ray.numbers().iter().enumerate() {
                     // Writing to a string cannot fail.
                     let _ = write!(line, "{}{x}", if i > 0 { "," } else { "" });
                 }
-                if spectral {
-                    let _ = write!(line, ",{}", ray.wavelength_nm.unwrap_or(f64::NAN));
+                if let Some(wavelength) = wavelengths.get(k) {
+                    let _ = write!(line, ",{wavelength}");
                 }
                 writeln!(w, "{line}")?;
             }
             Ok(())
         }),
-        _ => Err(Error::new(path, ErrorKind::Extension { given: extension, known: ".csv, .npz" })),
+        _ => Err(Error::new(path, ErrorKind::Extension { given: extension, known: ".csv, .npz, .txt" })),
     }
 }
 
@@ -137,6 +148,23 @@ pub(super) mod tests {
                 }
             }
         }
-        assert!(write_rays(&folder.path().join("a.ray"), &[]).unwrap_err().to_string().contains(".csv, .npz"));
+        assert!(
+            write_rays(&folder.path().join("a.ray"), &[]).unwrap_err().to_string().contains(".csv, .npz, .txt")
+        );
+    }
+
+    /// A list in which only some rays have a wavelength could not be read back, or would lose those that are there.
+    #[test]
+    fn wavelengths_of_some_rays_alone_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        for first in [true, false] {
+            let rays = [some_rays(2, first), some_rays(1, !first)].concat();
+            for name in ["a.csv", "a.txt", "a.npz"] {
+                let path = folder.path().join(name);
+                let refusal = write_rays(&path, &rays).unwrap_err().to_string();
+                let ray = if first { "ray 3 has no wavelength" } else { "ray 1 has no wavelength" };
+                assert!(refusal.contains(ray) && !path.exists(), "{refusal}");
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 
 use super::base64::base64;
 use super::facets::Facets;
-use super::{Error, Grid, Polylines, printable_line, write_atomic};
+use super::{Error, ErrorKind, Grid, Polylines, printable_line, write_atomic};
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -96,8 +96,12 @@ pub(super) fn write_vtu(path: &Path, facets: &Facets) -> Result<(), Error> {
 /// Writes polylines as VTP, their values as cell data, of which there must be one a line.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// When there are not as many values as lines, and when the file cannot be written.
 pub fn write_vtp(path: &Path, lines: &Polylines) -> Result<(), Error> {
+    if let Some((name, values)) = lines.values.iter().find(|(_, values)| values.len() != lines.ends.len()) {
+        let message = format!("{} values of {name} for {} lines", values.len(), lines.ends.len());
+        return Err(Error::new(path, ErrorKind::Malformed(message)));
+    }
     let points: Vec<f64> = lines.points.iter().flat_map(|p| p.to_array()).collect();
     let connectivity: Vec<i64> = (0..lines.points.len() as i64).collect();
     let offsets: Vec<i64> = lines.ends.iter().map(|&e| e as i64).collect();

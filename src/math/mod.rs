@@ -18,7 +18,7 @@ pub mod units;
 pub use aabb::Aabb;
 pub use box_tree::{BoxTree, BoxWalk};
 pub use frame::Frame;
-pub(crate) use maximum::error_of_maximum;
+pub(crate) use maximum::{error_of_maximum, largest_distance};
 pub use ray::{Departure, QuadHalf, Ray};
 pub use roots::{quadratic_roots, safe_newton};
 pub(crate) use spread::{error_of_sum, variance_from_residuals, variance_of_sum};

@@ -1,7 +1,7 @@
 //! Cubic curves through what can be evaluated.
 
 use super::Curve;
-use crate::math::{Point, Vector};
+use crate::math::{Point, Vector, largest_distance};
 
 /// Most pieces of a fitted curve.
 const MAX_PIECES: u32 = 4096;
@@ -19,8 +19,7 @@ pub(crate) fn fit_cubic([a, b]: [f64; 2], at: impl Fn(f64) -> (Point, Vector), t
         // the middle.
         let middles = (0..n).map(|i| t(f64::from(i) + 0.5));
         let errors = middles.map(|t| (curve.evaluate(t) - at(t).0).length());
-        // `max` would drop what is no number, and take a curve without a place for a perfect fit.
-        let error = errors.fold(0f64, |worst, e| if e > worst || e.is_nan() { e } else { worst });
+        let error = largest_distance(errors);
         // More pieces do not bring back a place that is no number.
         if error < tolerance || error.is_nan() || n >= MAX_PIECES {
             return (curve, error);

@@ -161,8 +161,7 @@ impl Judgement {
         if let Some(brightest) =
             decisive.as_mut().filter(|_| requirement.any && requirement.comparisons.iter().all(|c| c.at_least))
         {
-            let [values, errors] = [0, 1].map(|k| read.iter().map(|r| r[k]).collect::<Vec<_>>());
-            brightest.reading.statistical = error_of_maximum(&values, &errors);
+            brightest.reading.statistical = error_of_maximum(&read);
         }
         let all = requirement.comparisons.len();
         // A direction outside the far field may hide anything: only what one reading alone decides is still known.

@@ -257,7 +257,9 @@ impl<'a> Errors<'a> {
         let largest = if is_dark {
             r.ray_cells.iter().copied().fold(0.0, f64::max)
         } else {
-            error_of_maximum(&cells, &errors)
+            let values: Vec<[f64; 2]> =
+                cells.iter().zip(errors.iter()).map(|(&cell, &error)| [cell, error]).collect();
+            error_of_maximum(&values)
         };
         ReceiverFigures {
             power,

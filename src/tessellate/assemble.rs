@@ -15,7 +15,7 @@ use super::settings::Settings;
 use super::taken_chords::{NO_CHORDS, TakenChords, doubled_chords};
 use super::triangulator::catch_panic;
 use crate::math::Point;
-use crate::model::{EdgeId, Face, Model, Part, PartId};
+use crate::model::{EdgeId, Face, Part};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -45,17 +45,8 @@ const FEW_CHORDS: usize = 500;
 
 /// Meshes every part once, for the largest scale at which it is placed. `None` for a part without an instance; faces that fail are `None`
 /// within their part.
-pub(super) fn mesh_parts(model: &Model, settings: &Settings) -> Vec<Option<PartMesh>> {
-    let mut placed: Vec<PlacedPart<'_>> =
-        model.parts.iter().map(|part| PlacedPart { part, firsts: Vec::new(), scale: 0.0 }).collect();
-    for (i, instance) in model.instances.iter().enumerate() {
-        let part = &mut placed[instance.part.0 as usize];
-        part.firsts.push(model.first_face(i).0);
-        // A part is meshed once for all of its places: for the largest of them, or its facets there would be too
-        // coarse.
-        part.scale = part.scale.max(instance.placement.scale.abs());
-    }
-    let too_large = limits::faces_beyond(&placed, settings);
+pub(super) fn mesh_parts(placed: &[PlacedPart<'_>], settings: &Settings) -> Vec<Option<PartMesh>> {
+    let too_large = limits::faces_beyond(placed, settings);
     let mesh = |(i, part): (usize, &PlacedPart<'_>)| {
         part.is_placed().then(|| mesh_part(part, settings, |k| too_large.get(&(i, k)).copied()))
     };
@@ -65,12 +56,10 @@ pub(super) fn mesh_parts(model: &Model, settings: &Settings) -> Vec<Option<PartM
 /// Returns the `k`-th face of a part, counted through its shells, with its surface; `None` when there is no such face or its surface cannot
 /// be used.
 pub(super) fn face_with_surface<'m>(
-    model: &'m Model,
+    placed: &PlacedPart<'m>,
     settings: &Settings,
-    part: PartId,
     k: usize,
 ) -> Option<(&'m Face, FaceSurface<'m>)> {
-    let placed = PlacedPart::new(model, part);
     let face = placed.part.shells.iter().flat_map(|s| &s.faces).nth(k)?;
     Some((face, placed.surface(settings, k, face)?))
 }

@@ -88,8 +88,8 @@ fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
 fn count_shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
     let facets = &made.mesh.facets;
     let mut all = true;
-    for (i, instance) in model.instances.iter().enumerate() {
-        let mut face = model.first_face(i).0;
+    for (instance, first) in model.instances.iter().zip(model.first_faces()) {
+        let mut face = first.0;
         let part = model.part(instance.part);
         for shell in &part.shells {
             let next = face + shell.faces.len() as u32;

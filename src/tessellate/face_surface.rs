@@ -240,9 +240,14 @@ impl<'a> FaceSurface<'a> {
 
     /// Returns the tolerance at `uv`, mm of the part, by the curvature there; at a pole by that just beside it.
     pub(super) fn tolerance(&self, uv: Uv) -> f64 {
+        self.tolerance_in(&self.field, uv)
+    }
+
+    /// As [`FaceSurface::tolerance`], of another field than the surface's own.
+    pub(super) fn tolerance_in(&self, field: &ToleranceField, uv: Uv) -> f64 {
         // With one tolerance everywhere no curvature is asked for, which would cost second derivatives.
-        if self.affine || self.field.tightest() == self.field.loosest() {
-            return self.field.loosest();
+        if self.affine || field.tightest() == field.loosest() {
+            return field.loosest();
         }
         let [[u0, u1], [v0, v1]] = self.spline.domain();
         let forms = self.forms(uv).or_else(|| {
@@ -250,7 +255,7 @@ impl<'a> FaceSurface<'a> {
             let center = Uv::new(0.5 * (u0 + u1), 0.5 * (v0 + v1));
             self.forms(uv.lerp(center, BESIDE_POLE))
         });
-        self.field.tolerance_at(forms.map_or(f64::INFINITY, |f| f.largest_curvature()))
+        field.tolerance_at(forms.map_or(f64::INFINITY, |f| f.largest_curvature()))
     }
 }
 

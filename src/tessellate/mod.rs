@@ -51,6 +51,7 @@ use crate::model::Model;
 pub use angles::SteepFace;
 pub use evaluation::sampled_sag;
 pub use grouped::GroupedFacets;
+use placed_part::PlacedPart;
 pub use report::{
     FaceCounts, FailedFace, FailureCause, NotCertified, Percentiles, Repair, RepairedFace, Report, Sag,
     ShellCounts, ToleranceRange,
@@ -84,8 +85,9 @@ pub fn tessellate(model: &Model, settings: &Settings) -> Tessellation {
     let start = std::time::Instant::now();
     let settings = &limits::within_size(model, settings);
     // Parts first, each once; then faces that touch, which need the placed model; then copies for all instances.
-    let parts = assemble::mesh_parts(model, settings);
-    let joined = contact::mesh_contacts(model, settings, &parts);
+    let places = PlacedPart::all(model);
+    let parts = assemble::mesh_parts(&places, settings);
+    let joined = contact::mesh_contacts(model, &places, settings, &parts);
     let mut placed = placement::place_instances(model, &parts, &joined);
     placed.made.report.seconds.tessellate = start.elapsed().as_secs_f64();
     let mut made = evaluation::evaluate(placed, model, settings);

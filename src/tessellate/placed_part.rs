@@ -4,7 +4,7 @@ use super::face_surface::FaceSurface;
 use super::proof_steps::ProofSteps;
 use super::settings::{FaceSelector, Settings, ToleranceField};
 use crate::math::FaceId;
-use crate::model::{Face, Model, Part, PartId};
+use crate::model::{Face, Model, Part};
 
 /// A part with the places at which its instances stand.
 pub(super) struct PlacedPart<'m> {
@@ -16,11 +16,18 @@ pub(super) struct PlacedPart<'m> {
 }
 
 impl<'m> PlacedPart<'m> {
-    /// Looks up the instances of a part; without one it has no places and scale 0.
-    pub(super) fn new(model: &'m Model, part: PartId) -> Self {
-        let uses = (0..model.instances.len()).filter(|&i| model.instances[i].part == part);
-        let scale = uses.clone().map(|i| model.instances[i].placement.scale.abs()).fold(0.0, f64::max);
-        Self { part: model.part(part), firsts: uses.map(|i| model.first_face(i).0).collect(), scale }
+    /// Looks up the instances of all parts, by part; one without any has no places and scale 0.
+    pub(super) fn all(model: &'m Model) -> Vec<Self> {
+        let mut placed: Vec<Self> =
+            model.parts.iter().map(|part| Self { part, firsts: Vec::new(), scale: 0.0 }).collect();
+        for (instance, first) in model.instances.iter().zip(model.first_faces()) {
+            let part = &mut placed[instance.part.0 as usize];
+            part.firsts.push(first.0);
+            // A part is meshed once for all of its places: for the largest of them, or its facets there would be too
+            // coarse.
+            part.scale = part.scale.max(instance.placement.scale.abs());
+        }
+        placed
     }
 
     /// Whether the part has an instance.
@@ -28,11 +35,18 @@ impl<'m> PlacedPart<'m> {
         !self.firsts.is_empty()
     }
 
-    /// Returns the tolerance (mm of the scene, tightest and loosest as given) and radii of the `k`-th face; an override for any of its
-    /// places holds for all.
+    /// Returns the tolerance (mm of the scene, tightest and loosest as given) and radii, mm, of the `k`-th face, by the last override that
+    /// matches, else those of the settings; an override for any of its places holds for all.
     fn tolerance(&self, settings: &Settings, k: usize, face: &Face) -> ([f64; 2], [f64; 2]) {
-        let placed: Vec<FaceId> = self.firsts.iter().map(|first| FaceId(first + k as u32)).collect();
-        placed_tolerance(settings, self.part, face, &placed)
+        let matches = |place: &FaceSelector| match place {
+            FaceSelector::Part(name) => *name == self.part.name,
+            FaceSelector::Face(name) => *name == face.name,
+            FaceSelector::Entity(id) => face.entity == Some(*id),
+            FaceSelector::Placed(ids) => self.firsts.iter().any(|first| ids.contains(&FaceId(first + k as u32))),
+        };
+        // The last override that matches counts, as with rules in a style sheet.
+        let last = settings.overrides.iter().rev().find(|o| matches(&o.place));
+        last.map_or((settings.tolerance, settings.radii), |o| (o.tolerance, o.radii.unwrap_or(settings.radii)))
     }
 
     /// Returns the tightest tolerance of the `k`-th face in the part's own lengths, angles not considered.
@@ -63,17 +77,4 @@ fn is_finite(face: &Face) -> bool {
     let [[u0, u1], [v0, v1]] = s.domain();
     let points = s.points.iter().all(|p| p.is_finite() && p.w > 0.0);
     points && u0 < u1 && v0 < v1 && (u1 - u0).is_finite() && (v1 - v0).is_finite()
-}
-
-/// Returns the tolerances and radii, mm, of a face at its places by the last override that matches, else those of the settings.
-fn placed_tolerance(settings: &Settings, part: &Part, face: &Face, placed: &[FaceId]) -> ([f64; 2], [f64; 2]) {
-    let matches = |place: &FaceSelector| match place {
-        FaceSelector::Part(name) => *name == part.name,
-        FaceSelector::Face(name) => *name == face.name,
-        FaceSelector::Entity(id) => face.entity == Some(*id),
-        FaceSelector::Placed(ids) => placed.iter().any(|f| ids.contains(f)),
-    };
-    // The last override that matches counts, as with rules in a style sheet.
-    let last = settings.overrides.iter().rev().find(|o| matches(&o.place));
-    last.map_or((settings.tolerance, settings.radii), |o| (o.tolerance, o.radii.unwrap_or(settings.radii)))
 }

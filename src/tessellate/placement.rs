@@ -32,8 +32,7 @@ pub(super) fn place_instances(
     let mut out = Placed { made: Tessellation::default(), failed: Vec::new(), repairs: Vec::new(), originals };
     // Turned and moved facets are as far from the spline as they were; scaled ones are not, and mirrored ones have other corners first.
     let mut first_copies: FxHashMap<(PartId, u64, bool), FaceId> = FxHashMap::default();
-    for (i, instance) in model.instances.iter().enumerate() {
-        let first = model.first_face(i);
+    for (i, (instance, first)) in model.instances.iter().zip(model.first_faces()).enumerate() {
         let part = model.part(instance.part);
         let Some(mesh) = joined.get(&i).or(parts[instance.part.0 as usize].as_ref()) else { continue };
         if !joined.contains_key(&i) {

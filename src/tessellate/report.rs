@@ -206,6 +206,7 @@ pub struct RepairedFace {
     pub entity: Option<u64>,
     /// What was given up.
     pub how: Repair,
-    /// The largest distance to its spline: proved for certified facets, sampled for the others, mm.
+    /// The largest distance to its spline: proved for certified facets, sampled for the others or, where that would take too long, for a
+    /// share of them, mm.
     pub reached_mm: f64,
 }

@@ -92,8 +92,7 @@ pub(super) fn sample_within_budget(
     }
     let first: Vec<usize> = ranges.iter().flat_map(|r| spread(r.clone().collect(), FIRST_LOOK)).collect();
     samples.fill(mesh, model, first);
-    let visited: Vec<f64> =
-        model.placed_faces().map(|f| f.face.map_or(0.0, |face| points_visited(&face.surface))).collect();
+    let visited = points_visited_of_faces(model);
     let work = |facets: Range<usize>| {
         let looked: Vec<u64> = facets.clone().filter_map(|f| Some(samples.facet(f)?.evaluations)).collect();
         let evaluations = looked.iter().sum::<u64>() as f64 / looked.len() as f64;
@@ -101,8 +100,7 @@ pub(super) fn sample_within_budget(
         FaceWork { facets, each: evaluations * visited[face] }
     };
     let faces: Vec<FaceWork> = ranges.into_iter().map(work).collect();
-    let most_work = MOST_WORK.min(WORK_OF_ANY + WORK_OF_FACE * faces.len() as f64);
-    let limit = common_limit(faces.iter().map(FaceWork::sum).collect(), most_work);
+    let limit = common_limit(faces.iter().map(FaceWork::sum).collect(), most_work(faces.len()));
     let chosen = faces.iter().flat_map(|face| {
         let left: Vec<usize> = face.facets.clone().filter(|&f| samples.facet(f).is_none()).collect();
         let count = if face.sum() <= limit { left.len() } else { (limit / face.each) as usize };
@@ -115,6 +113,47 @@ pub(super) fn sample_within_budget(
     let chosen: Vec<usize> = chosen.collect();
     samples.fill(mesh, model, chosen);
     samples
+}
+
+/// Samples facets, each list of one face, evenly spread over a list whose facets all together would take more than a model of so many
+/// faces may; returns what was sampled, by list.
+pub(super) fn sample_lists(mesh: &FacetMesh, model: &Model, lists: &[Vec<usize>]) -> Vec<Vec<Sampled>> {
+    sample_lists_within(mesh, model, lists, most_work(lists.len()))
+}
+
+/// As [`sample_lists`], with the work, in control points, that the lists share after the first look.
+fn sample_lists_within(mesh: &FacetMesh, model: &Model, lists: &[Vec<usize>], most: f64) -> Vec<Vec<Sampled>> {
+    let visited = points_visited_of_faces(model);
+    let mut sampled: Vec<Vec<Sampled>> =
+        lists.iter().map(|list| sample_facets(mesh, model, &spread(list.clone(), FIRST_LOOK))).collect();
+    let each: Vec<f64> = (lists.iter().zip(&sampled))
+        .map(|(list, looked)| {
+            let evaluations: u64 = looked.iter().map(|s| s.evaluations).sum();
+            list.first().map_or(0.0, |&f| visited[mesh.facets[f].face.index()]) * evaluations as f64
+                / looked.len().max(1) as f64
+        })
+        .collect();
+    let sum = |(list, each): (&Vec<usize>, &f64)| list.len() as f64 * each;
+    let limit = common_limit(lists.iter().zip(&each).map(sum).collect(), most);
+    for ((list, each), sampled) in lists.iter().zip(&each).zip(&mut sampled) {
+        // The first look has all of a short list.
+        if list.len() > FIRST_LOOK {
+            let all = list.len() as f64 * each <= limit;
+            let count = if all { list.len() } else { (limit / each) as usize };
+            sampled.extend(sample_facets(mesh, model, &spread(list.clone(), count)));
+        }
+    }
+    sampled
+}
+
+/// Returns the most work for a model of so many faces.
+fn most_work(faces: usize) -> f64 {
+    MOST_WORK.min(WORK_OF_ANY + WORK_OF_FACE * faces as f64)
+}
+
+/// Returns what one evaluation of each placed face takes, in control points; 0 for ready meshes.
+fn points_visited_of_faces(model: &Model) -> Vec<f64> {
+    model.placed_faces().map(|f| f.face.map_or(0.0, |face| points_visited(&face.surface))).collect()
 }
 
 /// Returns `count` of the facets, evenly spread over them; all where there are no more.
@@ -175,6 +214,26 @@ mod tests {
         );
         let copies = |n: u64| samples.normal_errors().iter().filter(|e| e.1 == n).count();
         assert!(copies(1) > 0 && copies(2) > 0 && copies(1) + copies(2) == samples.normal_errors().len());
+    }
+
+    /// Two lists of a tube's facets: within the budget all are sampled, beyond it the first look and what the budget leaves.
+    #[test]
+    fn lists_of_facets_share_a_budget() {
+        let tube = Face::whole(sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, 3.0], [0.0, 20.0]));
+        let shells = vec![Shell { faces: vec![tube], ..Shell::default() }];
+        let model = Model::from_part(Part { shells, ..Part::default() });
+        let mesh = tessellate(&model, &Settings::uniform(0.001)).mesh;
+        let all: Vec<usize> = (0..mesh.facets.len()).collect();
+        assert!(all.len() > 2 * FIRST_LOOK, "{}", all.len());
+        let lists = [all[..FIRST_LOOK / 2].to_vec(), all.clone()];
+        let largest = |sampled: &[Sampled]| sampled.iter().map(|s| s.sag).fold(0.0, f64::max);
+        let whole = sample_lists(&mesh, &model, &lists);
+        let by_themselves = [0, 1].map(|k| largest(&sample_facets(&mesh, &model, &lists[k])));
+        assert_eq!([0, 1].map(|k| largest(&whole[k])), by_themselves);
+        let cut = sample_lists_within(&mesh, &model, &lists, 0.0);
+        assert_eq!([cut[0].len(), cut[1].len()], [FIRST_LOOK / 2, FIRST_LOOK]);
+        let nothing = sample_lists(&mesh, &model, &[Vec::new()]);
+        assert!(nothing[0].is_empty());
     }
 
     #[test]

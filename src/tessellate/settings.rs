@@ -169,10 +169,15 @@ impl ToleranceField {
         }
     }
 
-    /// Returns the smaller tolerances of both, times `share`; radii and law are those of `self`.
+    /// Returns the same with no tolerance above that share of the other's; radii and law are those of `self`.
     pub(super) fn tighter(self, other: &Self, share: f64) -> Self {
-        let range = [0, 1].map(|k| share * self.range[k].min(other.range[k]));
+        let range = [0, 1].map(|k| self.range[k].min(share * other.range[k]));
         Self { range, ..self }
+    }
+
+    /// Whether both have the same tolerances; radii, law and angle are not compared.
+    pub(super) fn has_range_of(&self, other: &Self) -> bool {
+        self.range == other.range
     }
 
     /// Returns the same field with no tolerance above `most`.

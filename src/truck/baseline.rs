@@ -45,9 +45,8 @@ pub fn mesh(model: &Model, tolerance: f64) -> Baseline {
     let mut out = Baseline { mesh: FacetMesh::default(), seconds: 0.0, failed: Vec::new() };
     let mut positions = FxHashMap::default();
     let begun = Instant::now();
-    for (i, instance) in model.instances.iter().enumerate() {
+    for (instance, FaceId(first)) in model.instances.iter().zip(model.first_faces()) {
         let part = model.part(instance.part);
-        let first = model.first_face(i).0;
         // Where the faces of each shell start among those of the part.
         let starts: Vec<u32> = part
             .shells

@@ -5,12 +5,10 @@ use super::modeling::{
     Vector3, Vector4,
 };
 use crate::math::{Homogeneous, Point, Vector};
-use crate::nurbs::{ControlPoint, Curve, MAX_DEGREE, Spline, Surface};
+use crate::nurbs::{ControlPoint, Curve, MAX_DEGREE, Spline, Surface, fit_cubic};
 
 /// Largest distance between an intersection curve and the spline that stands for it, mm.
 const FIT: f64 = 1e-7;
-/// Most pieces of such a spline.
-const MAX_PIECES: usize = 1024;
 
 pub(super) fn point(p: Point3) -> Point {
     Point::new(p.x, p.y, p.z)
@@ -48,26 +46,17 @@ pub(super) fn curve(c: &TruckCurve) -> Result<Curve, String> {
     checked_curve(spline)
 }
 
-/// Returns a cubic Hermite spline of a curve that is not a spline, halved until the middle of each piece lies within [`FIT`] of it; fails
-/// beyond [`MAX_PIECES`].
+/// Returns a cubic spline of a curve that is not a spline, the middle of each piece within [`FIT`] of it; fails where that takes too many
+/// pieces, or a place is no number.
 fn fit_curve(c: &impl BoundedCurve<Point = Point3, Vector = Vector3>) -> Result<Curve, String> {
     let (t0, t1) = c.range_tuple();
-    let mut pieces = 8;
-    while pieces <= MAX_PIECES {
-        let at = |i: usize, n: usize| t0 + (t1 - t0) * i as f64 / n as f64;
-        let ts: Vec<f64> = (0..=pieces).map(|i| at(i, pieces)).collect();
-        let points: Vec<Point> = ts.iter().map(|&t| point(c.subs(t))).collect();
-        let slopes: Vec<Vector> = ts.iter().map(|&t| vector(c.der(t))).collect();
-        let spline = Curve::hermite(&ts, &points, &slopes);
-        let error = (0..pieces)
-            .map(|i| at(2 * i + 1, 2 * pieces))
-            .map(|t| (spline.evaluate(t) - point(c.subs(t))).length());
-        if error.fold(0.0, f64::max) <= FIT {
-            return Ok(spline);
-        }
-        pieces *= 2;
+    let (spline, error) = fit_cubic([t0, t1], |t| (point(c.subs(t)), vector(c.der(t))), FIT);
+    // An error that is no number is none within the limit.
+    if error <= FIT {
+        Ok(spline)
+    } else {
+        Err(format!("an intersection curve that cubic pieces follow to {error:.1e} mm alone, not to {FIT:e} mm"))
     }
-    Err(format!("an intersection curve that {MAX_PIECES} cubic pieces do not follow within {FIT} mm"))
 }
 
 /// Returns a curve clamped to its domain; fails for degrees, control points, weights and knots that are of no use. Truck itself checks
@@ -78,11 +67,16 @@ fn checked_curve(c: Curve) -> Result<Curve, String> {
     }
     check_points(&c.points)?;
     let [a, b] = c.domain();
-    if !(a < b && c.knots.iter().all(|k| k.is_finite())) {
+    if !is_interval([a, b], &c.knots) {
         return Err("a curve over an empty parameter interval".into());
     }
     // Cut to its domain a spline is clamped, as all our curves are.
     Ok(c.restricted(a, b))
+}
+
+/// Whether a range of parameters has a length and all knots are finite numbers.
+fn is_interval([a, b]: [f64; 2], knots: &[f64]) -> bool {
+    a < b && knots.iter().all(|k| k.is_finite())
 }
 
 /// Refuses control points that are not finite and weights that are not positive.
@@ -109,7 +103,7 @@ pub(super) fn surface(knots: (&KnotVec, &KnotVec), rows: Vec<Vec<Homogeneous>>) 
     let s = Surface { degree, knots, points: rows.into_iter().flatten().collect() };
     check_points(&s.points)?;
     let domain = s.domain();
-    if domain.iter().any(|[a, b]| a >= b) {
+    if !(0..2).all(|k| is_interval(domain[k], &s.knots[k])) {
         return Err("a surface over an empty parameter range".into());
     }
     Ok(s.restricted(domain))
@@ -150,4 +144,22 @@ pub fn surface_to_truck(s: &Surface) -> Result<NurbsSurface<Vector4>, String> {
     BSplineSurface::try_new(knots, rows)
         .map(NurbsSurface::new)
         .map_err(|e| format!("truck refuses the surface: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What truck was given without a check is refused, not passed on: a fit to places that are no numbers, an endless range.
+    #[test]
+    fn geometry_without_numbers_is_refused() {
+        let knots = |end: f64| KnotVec::from(vec![0.0, 0.0, end, end]);
+        let torn = BSplineCurve::new(knots(1.0), vec![Point3::new(0.0, 0.0, 0.0), Point3::new(f64::NAN, 0.0, 0.0)]);
+        assert!(fit_curve(&torn).is_err());
+        let corner = |x, y| Homogeneous::weighted(Point::new(x, y, 0.0), 1.0);
+        let rows = || vec![vec![corner(0.0, 0.0), corner(0.0, 1.0)], vec![corner(1.0, 0.0), corner(1.0, 1.0)]];
+        assert!(surface((&knots(1.0), &knots(1.0)), rows()).is_ok());
+        assert!(surface((&knots(f64::INFINITY), &knots(1.0)), rows()).is_err());
+        assert!(surface((&knots(1.0), &knots(f64::INFINITY)), rows()).is_err());
+    }
 }

@@ -1,7 +1,7 @@
 //! The uv curve of an edge on a surface: a closest point to start from, Newton steps along the edge, a cubic Hermite spline
 //! through the answers, refined until it is right.
 
-use crate::math::{Point, Uv, Vector};
+use crate::math::{Point, Uv, Vector, largest_distance};
 use crate::nurbs::{Curve, Surface, UvCurve};
 
 /// Wanted distance between the edge and its uv curve on the surface, mm, and the largest that is accepted.
@@ -84,14 +84,12 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Returns the largest distance of a trim from its edge, mm, sampled between the points at `ts`.
+    /// Returns the largest distance of a trim from its edge, mm, sampled between the points at `ts`; NaN where one is no number.
     fn largest_gap(&self, edge: &Curve, uv: &UvCurve, ts: &[f64]) -> f64 {
         let off = |t: f64| (self.surface.evaluate(uv.evaluate(t)) - edge.evaluate(t)).length();
-        ts.windows(2)
-            // At the middles, where Hermite pieces are worst, and on both sides of them.
-            .flat_map(|p| [0.25, 0.5, 0.75, 1.0].map(|s| p[0] + s * (p[1] - p[0])))
-            .map(off)
-            .fold(off(ts[0]), f64::max)
+        // At the middles, where Hermite pieces are worst, and on both sides of them.
+        let places = ts.windows(2).flat_map(|p| [0.25, 0.5, 0.75, 1.0].map(|s| p[0] + s * (p[1] - p[0])));
+        largest_distance(std::iter::once(ts[0]).chain(places).map(off))
     }
 
     /// Returns the uv curve through the feet of an edge's points at `ts`, with slopes that follow the edge; fails where its middle is not

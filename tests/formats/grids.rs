@@ -55,6 +55,29 @@ fn npz_opens_in_npyz() {
     assert_eq!(array("V_deg_edges.npy"), (vec![3], vec![0.0, 0.5, 1.0]));
 }
 
+/// Readers of VTK take a value that is missing for damage, or the next array for this one.
+#[test]
+fn vtp_refuses_values_that_are_not_one_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.vtp");
+    let mut lines = Polylines::default();
+    lines.push([Point::ZERO, Point::X]);
+    lines.push([Point::ZERO, Point::Y]);
+    lines.values.push(("power_lm".into(), vec![1.0]));
+    let refusal = write_vtp(&path, &lines).unwrap_err().to_string();
+    assert!(refusal.contains("1 values of power_lm for 2 lines") && !path.exists(), "{refusal}");
+}
+
+/// A picture has at most as many pixels as 32 bits count, whatever the axes claim.
+#[test]
+fn png_refuses_axes_of_more_cells_than_it_has_pixels() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut empty = Grid { values: vec![], error: None, ..grid() };
+    (empty.axes[0].cells, empty.axes[1].cells) = (1 << 32, 0);
+    let refusal = write_grid_png(&folder.path().join("g.png"), &empty).unwrap_err().to_string();
+    assert!(refusal.contains("pixels"), "{refusal}");
+}
+
 #[test]
 fn npz_refuses_a_shape_that_does_not_hold_its_data() {
     let folder = tempfile::tempdir().unwrap();

@@ -8,13 +8,18 @@ use std::f64::consts::{PI, TAU};
 
 /// Common points, directions and placements, and one solid #900.
 fn import(data: &str) -> Import {
+    import_with(data, &Settings::default())
+}
+
+/// The same with other settings.
+fn import_with(data: &str, settings: &Settings) -> Import {
     let text = part21(&format!(
         "{MILLIMETRES}\
          #6=SHAPE_REPRESENTATION('',(#900),#1);\n\
          #10=CARTESIAN_POINT('',(1.,2.,3.));\n#11=DIRECTION('',(0.,0.6,0.8));\n#12=DIRECTION('',(1.,0.,0.));\n\
          #13=AXIS2_PLACEMENT_3D('',#10,#11,#12);\n#14=AXIS1_PLACEMENT('',#10,#11);\n{data}"
     ));
-    read_bytes("recipe.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
+    read_bytes("recipe.stp", text.as_bytes(), settings).expect("Part 21")
 }
 
 /// Area and volume of the only solid, whose every edge is used twice, once each way.
@@ -168,5 +173,15 @@ fn walls_of_tubes_may_be_thinner_than_the_sag_of_their_circles_arcs() {
             "{outer} and {inner} edges: {area} mm²"
         );
         assert!((volume / (20.0 * ends) - 1.0).abs() < 1e-3, "{outer} and {inner} edges: {volume} mm³");
+    }
+}
+
+/// A tolerance above that of vertices, or one that is no number, is a setting like any other.
+#[test]
+fn no_tolerance_of_uv_curves_makes_reading_panic() {
+    for uv_tolerance in [1e-6, 0.01, f64::NAN, f64::INFINITY, 0.0, -1.0] {
+        let settings = Settings { uv_tolerance, face_budget: 10_000, ..Settings::default() };
+        let import = import_with("#900=BLOCK('',#13,2.,3.,4.);\n", &settings);
+        assert_eq!(import.report.faces.found, if import.model.parts.is_empty() { 1 } else { 6 }, "{uv_tolerance}");
     }
 }

@@ -172,6 +172,29 @@ fn a_mesh_that_is_listed_again_is_no_second_one() {
     close(area(&import), 50.0, 1e-12);
 }
 
+/// A triangle that cannot be read would be a hole through which light passes; in a strip it would turn the others around.
+#[test]
+fn a_mesh_with_a_broken_triangle_is_refused() {
+    let corners = "#50=COORDINATES_LIST('',4,((0.,0.,0.),(10.,0.,0.),(0.,10.,0.),(10.,10.,0.)));\n";
+    let set = |kind: &str, lists: &str| {
+        format!("{corners}#900=TESSELLATED_SHELL('',(#51),$);\n#51={kind}('',#50,4,((0.,0.,1.)),$,(),{lists});\n")
+    };
+    let listed = |rows: &str| set("TRIANGULATED_FACE", rows);
+    close(area(&read(&listed("((1,2,3),(2,4,3))"))), 100.0, 1e-12);
+    for rows in ["((1,2,3),(2,4))", "((1,2,3),(2,4,3,1))", "((1,2,3),(2,$,3))", "((1,2,3),$)", "((1,2,3),(2,-4,3))"]
+    {
+        assert_refused(&listed(rows), "three points");
+    }
+    let unrolled = |strips: &str, fans: &str| set("COMPLEX_TRIANGULATED_FACE", &format!("{strips},{fans}"));
+    close(area(&read(&unrolled("((1,2,3,4))", "()"))), 100.0, 1e-12);
+    close(area(&read(&unrolled("()", "((1,2,4,3))"))), 100.0, 1e-12);
+    for (strips, fans) in
+        [("((1,2,$,3,4))", "()"), ("((1,2,3,4),(2,4))", "()"), ("()", "((1,$,2,4,3))"), ("()", "((1,2,4,3),(1,2))")]
+    {
+        assert_refused(&unrolled(strips, fans), "three points");
+    }
+}
+
 /// A mesh that names the exact face which it shows stands there no second time; one that names a surface bounds it.
 #[test]
 fn a_mesh_linked_to_a_face_is_its_picture() {

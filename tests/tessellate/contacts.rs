@@ -3,7 +3,7 @@
 use crate::turned::{ball_in_cup, doublet, ring_in_groove, rod_in_hole, rod_in_plate};
 use lampyris::math::{FaceId, Point};
 use lampyris::model::Model;
-use lampyris::tessellate::{Settings, Tessellation, tessellate};
+use lampyris::tessellate::{FaceSelector, Settings, Tessellation, ToleranceOverride, tessellate};
 use std::f64::consts::PI;
 
 /// The corners of a facet, each once, in an order that does not depend on where it starts.
@@ -104,4 +104,22 @@ fn faces_that_touch_in_part_have_one_interface_there() {
 fn a_short_rod_does_not_refine_its_hole() {
     let made = tessellate(&rod_in_plate([0.5, 2.5], 0.6), &Settings { glue_mm: 1e-3, ..Settings::default() });
     assert!(facets_of(&made, 6).len() < 200, "{}", facets_of(&made, 6).len());
+}
+
+/// A facet is held against what was asked of its own face, whatever is asked of the one that touches it.
+#[test]
+fn faces_in_contact_keep_the_tolerances_asked_of_them() {
+    for finer in [1, 6] {
+        let place = FaceSelector::Placed(vec![FaceId(finer)]);
+        let overrides = vec![ToleranceOverride { place, tolerance: [0.01; 2], radii: None }];
+        let settings = Settings { glue_mm: 1e-3, overrides, ..Settings::uniform(0.05) };
+        let made = tessellate(&rod_in_hole(0.4), &settings);
+        for (facet, quality) in made.mesh.facets.iter().zip(&made.quality) {
+            let asked = if facet.face == FaceId(finer) { 0.01 } else { 0.05 };
+            assert!((quality.tolerance / asked - 1.0).abs() < 1e-12, "{finer}: {:?} {quality:?}", facet.face);
+            assert!(quality.certified, "{finer}: {:?} {quality:?}", facet.face);
+        }
+        let [on, of] = [1, 6].map(|face| facets_of(&made, face));
+        assert!(of.iter().any(|f| on.iter().any(|g| same(f, g))), "{finer}: nothing is shared");
+    }
 }

@@ -89,7 +89,11 @@ fn decode_escape(rest: &[u8]) -> Option<(String, usize)> {
     Some((text, end + 4))
 }
 
+/// Reads up to eight digits; `None` where one is none, such as the sign that Rust's own reading takes.
 fn parse_hex(digits: &[u8]) -> Option<u32> {
+    if !digits.iter().all(u8::is_ascii_hexdigit) {
+        return None;
+    }
     u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()
 }
 
@@ -110,5 +114,8 @@ mod tests {
         assert_eq!(decode("été".as_bytes()), "été");
         assert_eq!(decode(b"a\\\\b"), "a\\b");
         assert_eq!(decode(b"\\X2\\broken"), "\\X2\\broken");
+        // A sign is no digit.
+        assert_eq!(decode(b"\\X\\+9t"), "\\X\\+9t");
+        assert_eq!(decode(b"\\X2\\+041\\X0\\"), "\u{fffd}");
     }
 }

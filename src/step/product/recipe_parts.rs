@@ -71,11 +71,13 @@ fn trim_faces(
             edges: loops.iter().flatten().map(|&(edge, _)| (edge, &edges[edge])).collect(),
             loops,
             tolerance: settings.uv_tolerance,
+            // No `clamp`, which panics where the one setting is above the other, or no number.
             accuracy: geometry
                 .units
                 .accuracy
                 .unwrap_or(settings.uv_tolerance)
-                .clamp(settings.uv_tolerance, SAME_VERTEX_MM),
+                .min(SAME_VERTEX_MM)
+                .max(settings.uv_tolerance),
             budget: Budget::new(settings.face_budget),
             implicit_outer: false,
         };

@@ -88,7 +88,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 
     /// Returns the triangles of a leaf as a mesh, mm, with the file's normals where it gives them, else flat ones; triangles without area
-    /// are left out, and a leaf without others is refused.
+    /// are left out, and a leaf without others is refused, as is one with a triangle that cannot be read.
     fn triangles(&self, e: Entity<'f, 'a>, layout: &Layout) -> Outcome<FacetMesh> {
         let args = e.args();
         let list = self.resolve(e, args.id(1), "list of coordinates")?;
@@ -104,7 +104,8 @@ impl<'f, 'a> Geometry<'f, 'a> {
             let row = if index.len() == 0 { local } else { index.count(local.checked_sub(1)?)? };
             row.checked_sub(1).filter(|r| *r < rows.len())
         };
-        let corners = corner_numbers(args, layout);
+        let corners = corner_numbers(args, layout)
+            .ok_or_else(|| Refusal::new(e, "a triangle, strip or fan is not a list of three points or more"))?;
         let normals = args.list(3);
         let normal_of = |local: usize| -> Option<Vector> {
             // One normal for all means a flat face.
@@ -143,33 +144,32 @@ impl<'f, 'a> Geometry<'f, 'a> {
     }
 }
 
-/// Returns the local point numbers, from 1, of all triangles: listed, or unrolled from strips and fans. Rows that are not three numbers are
-/// left out.
-fn corner_numbers(args: Args<'_, '_>, layout: &Layout) -> Vec<[usize; 3]> {
-    let numbers = |list: Args<'_, '_>| -> Vec<usize> { (0..list.len()).filter_map(|i| list.count(i)).collect() };
-    let mut triangles = Vec::new();
+/// Returns the local point numbers, from 1, of all triangles: listed, or unrolled from strips and fans. `None` where a triangle, strip or
+/// fan is broken: what is left out would be a hole, and what follows in a strip would be turned around.
+fn corner_numbers(args: Args<'_, '_>, layout: &Layout) -> Option<Vec<[usize; 3]>> {
+    let numbers = |list: Args<'_, '_>| -> Option<Vec<usize>> {
+        let all: Option<Vec<usize>> = (0..list.len()).map(|i| list.count(i)).collect();
+        // An empty one is no loss.
+        all.filter(|numbers| numbers.is_empty() || numbers.len() >= 3)
+    };
+    let rows = |at: usize| -> Option<Vec<Vec<usize>>> {
+        let list = args.list(at);
+        (0..list.len()).map(|i| numbers(list.list(i))).collect()
+    };
     if !layout.strips {
-        let list = args.list(layout.pnindex + 1);
-        for i in 0..list.len() {
-            if let [a, b, c] = numbers(list.list(i))[..] {
-                triangles.push([a, b, c]);
-            }
-        }
-        return triangles;
+        return rows(layout.pnindex + 1)?.into_iter().map(|row| row.try_into().ok()).collect();
     }
-    let strips = args.list(layout.pnindex + 1);
-    for i in 0..strips.len() {
-        for (k, w) in numbers(strips.list(i)).windows(3).enumerate() {
+    let mut triangles = Vec::new();
+    for strip in rows(layout.pnindex + 1)? {
+        for (k, w) in strip.windows(3).enumerate() {
             // Every other triangle of a strip turns the other way.
             triangles.push(if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] });
         }
     }
-    let fans = args.list(layout.pnindex + 2);
-    for i in 0..fans.len() {
-        let fan = numbers(fans.list(i));
-        for w in fan.get(1..).unwrap_or(&[]).windows(2) {
-            triangles.push([fan[0], w[0], w[1]]);
+    for fan in rows(layout.pnindex + 2)? {
+        if let [hub, rim @ ..] = &fan[..] {
+            triangles.extend(rim.windows(2).map(|w| [*hub, w[0], w[1]]));
         }
     }
-    triangles
+    Some(triangles)
 }

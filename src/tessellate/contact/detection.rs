@@ -4,6 +4,7 @@ use super::trimmed::{FaceKey, TrimmedFace};
 use crate::math::Aabb;
 use crate::model::{Analytic, Model};
 use crate::tessellate::assemble::PartMesh;
+use crate::tessellate::placed_part::PlacedPart;
 use crate::tessellate::settings::Settings;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -45,6 +46,7 @@ struct BoxedFace {
 /// as they are.
 pub(super) fn contacts<'m>(
     model: &'m Model,
+    places: &[PlacedPart<'m>],
     settings: &Settings,
     parts: &[Option<PartMesh>],
 ) -> (Vec<Contact>, FxHashMap<FaceKey, TrimmedFace<'m>>) {
@@ -65,8 +67,9 @@ pub(super) fn contacts<'m>(
     keys.sort_unstable();
     keys.dedup();
     let trimmed = |&key: &FaceKey| {
-        let part = model.instances[key.instance].part;
-        Some((key, TrimmedFace::new(model, settings, parts[part.0 as usize].as_ref()?, key)?))
+        let instance = &model.instances[key.instance];
+        let part = instance.part.0 as usize;
+        Some((key, TrimmedFace::new(instance, &places[part], settings, parts[part].as_ref()?, key)?))
     };
     let mut trimmed: FxHashMap<FaceKey, TrimmedFace<'m>> = keys.par_iter().filter_map(trimmed).collect();
     let carried = |&[a, b]: &[FaceKey; 2]| {
@@ -88,7 +91,9 @@ pub(super) fn contacts<'m>(
         if let Some(field) = trimmed.get(&c.guest).map(|guest| guest.surface.field)
             && let Some(carrier) = trimmed.get_mut(&c.carrier)
         {
-            carrier.surface.field = carrier.asked.tighter(&field, CARRIER_SHARE);
+            // Of all its guests: each proves its own.
+            let own_share = carrier.surface.field.tighter(&carrier.asked, CARRIER_SHARE);
+            carrier.surface.field = own_share.tighter(&field, CARRIER_SHARE);
         }
     }
     let concerned: FxHashSet<FaceKey> = out.iter().flat_map(|c| [c.carrier, c.guest]).collect();

@@ -20,18 +20,19 @@ mod samples;
 mod shared_part;
 mod trimmed;
 
-use super::assemble::{PartMesh, Renumbering, mesh_face, with_coincident_vertices_joined};
+use super::assemble::{PartMesh, Renumbering, face_with_surface, mesh_face, with_coincident_vertices_joined};
 use super::border::edges;
 use super::border::polygons::{self, ImprintedPoints};
 use super::face::{FaceInput, mesh_with_imprint};
 use super::face_mesh::FaceMesh;
 use super::imprint::{CarrierFacets, Imprint};
+use super::placed_part::PlacedPart;
 use super::settings::Settings;
 use super::taken_chords::TakenChords;
 use crate::math::Point;
 use crate::model::{Face, Model};
 use closure::SideCounts;
-use detection::{CARRIER_SHARE, Contact, Extent};
+use detection::{Contact, Extent};
 use guest::Guest;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -42,17 +43,18 @@ use trimmed::{FaceKey, TrimmedFace};
 /// less.
 pub(super) fn mesh_contacts(
     model: &Model,
+    places: &[PlacedPart<'_>],
     settings: &Settings,
     parts: &[Option<PartMesh>],
 ) -> FxHashMap<usize, PartMesh> {
     if settings.glue_mm <= 0.0 {
         return FxHashMap::default();
     }
-    let (contacts, faces) = detection::contacts(model, settings, parts);
+    let (contacts, faces) = detection::contacts(model, places, settings, parts);
     if contacts.is_empty() {
         return FxHashMap::default();
     }
-    let joiner = Joiner { model, settings, parts, contacts: &contacts, faces: &faces };
+    let joiner = Joiner { model, places, settings, parts, contacts: &contacts, faces: &faces };
     let further = joiner.further_samples();
     let mut meshes = joiner.divided_more(&further);
     joiner.mesh_carriers_and_guests(&mut meshes);
@@ -62,6 +64,8 @@ pub(super) fn mesh_contacts(
 /// The parts with the faces that touch.
 struct Joiner<'j, 'm> {
     model: &'m Model,
+    /// By part.
+    places: &'j [PlacedPart<'m>],
     settings: &'j Settings,
     parts: &'j [Option<PartMesh>],
     contacts: &'j [Contact],
@@ -134,8 +138,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
                 if !changed || self.faces.contains_key(&key) {
                     return old.clone().map(|m| renumbering.renumbered(m));
                 }
-                let id = self.model.instances[i].part;
-                let (face, surface) = super::assemble::face_with_surface(self.model, self.settings, id, k)?;
+                let placed = &self.places[self.model.instances[i].part.0 as usize];
+                let (face, surface) = face_with_surface(placed, self.settings, k)?;
                 mesh_face(&FaceInput {
                     part,
                     face,
@@ -206,7 +210,9 @@ impl<'j, 'm> Joiner<'j, 'm> {
             Ok((mut mesh, facets)) if facets.holds_imprint => {
                 // The facets were made tighter for the guests' sake; what was asked of this face is what they are
                 // measured by.
-                mesh.facets.iter_mut().for_each(|f| f.tolerance /= CARRIER_SHARE);
+                for f in &mut mesh.facets {
+                    f.tolerance = carrier.asked_tolerance(f, &mesh.corners);
+                }
                 (Some(mesh), facets)
             }
             // Each by itself, as without a contact.

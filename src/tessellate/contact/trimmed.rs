@@ -1,14 +1,17 @@
 //! One placed face, as contacts see it: its trimmed region, and places on it in the model's coordinates.
 
+use super::detection::CARRIER_SHARE;
 use super::projector::Projector;
 use crate::math::polygon::is_inside_sides;
 use crate::math::{Frame, Point, Uv};
-use crate::model::{EdgeId, Face, Instance, Model, Part, TrimLoop};
+use crate::model::{EdgeId, Face, Instance, Part, TrimLoop};
 use crate::nurbs::project;
 use crate::tessellate::assemble::{PartMesh, face_with_surface};
 use crate::tessellate::border::polygons::{self, BorderPolygons, ImprintedPoints, PolygonVertex};
+use crate::tessellate::face_mesh::{Corner, MeshedFacet};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
+use crate::tessellate::placed_part::PlacedPart;
 use crate::tessellate::settings::{Settings, ToleranceField};
 
 /// Steps of the grid over a face whose places inside it are looked at.
@@ -41,11 +44,17 @@ pub(super) struct TrimmedFace<'m> {
 }
 
 impl<'m> TrimmedFace<'m> {
-    /// Builds the face's border on the divisions of `mesh` and samples it; `None` where it is no face or its surface cannot be used.
-    pub(super) fn new(model: &'m Model, settings: &Settings, mesh: &PartMesh, key: FaceKey) -> Option<Self> {
-        let instance: &'m Instance = &model.instances[key.instance];
-        let part = model.part(instance.part);
-        let (face, surface) = face_with_surface(model, settings, instance.part, key.face)?;
+    /// Builds the face's border on the divisions of `mesh` and samples it; `None` where it is no face or its surface cannot be used. `mesh`
+    /// and `placed` are of the instance's part.
+    pub(super) fn new(
+        instance: &'m Instance,
+        placed: &PlacedPart<'m>,
+        settings: &Settings,
+        mesh: &PartMesh,
+        key: FaceKey,
+    ) -> Option<Self> {
+        let part = placed.part;
+        let (face, surface) = face_with_surface(placed, settings, key.face)?;
         let loops = polygons::loops(face);
         let polygons = polygons::build(part, &loops, &surface, &mesh.divisions, &ImprintedPoints::NONE);
         let mut out = Self {
@@ -72,6 +81,22 @@ impl<'m> TrimmedFace<'m> {
         out.samples = samples;
         out.border_samples = border_samples;
         Some(out)
+    }
+
+    /// Returns the tolerance, mm of the part, that was asked where a facet of this face lies, whatever contacts held it to. `corners` are
+    /// those of its mesh.
+    pub(super) fn asked_tolerance(&self, facet: &MeshedFacet, corners: &[Corner]) -> f64 {
+        let own_share = self.asked.tighter(&self.asked, CARRIER_SHARE);
+        if self.surface.field.has_range_of(&own_share) {
+            return facet.tolerance / CARRIER_SHARE;
+        }
+        // The tightest of its corners and its middle, as where facets are proved.
+        let [a, b, c, d] = facet.corners.map(|k| corners[k as usize].uv);
+        let middle = if facet.corners[2] == facet.corners[3] { (a + b + c) / 3.0 } else { (a + b + c + d) / 4.0 };
+        [a, b, c, d, middle]
+            .map(|uv| self.surface.tolerance_in(&self.asked, uv))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Returns all corners of the border.
