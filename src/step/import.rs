@@ -276,14 +276,19 @@ impl Reader<'_, '_, '_> {
         let ConvertedPart { mut part, found, refused, repaired } = converted;
         part.name = if placed.product.is_empty() { placed.name.clone() } else { placed.product.clone() };
         part.colour = self.styles.colour(placed.representation);
-        // The colour of an occurrence stands above the part's alone: where some have one, the only shell's is its part's.
-        let mut owners = items.shells.iter().flat_map(|plan| &plan.owners).chain(ids);
-        if let [shell] = &mut part.shells[..]
-            && owners.any(|owner| self.styles.is_overridden(*owner))
+        // The colour of an occurrence stands above the part's alone: where some have one, that of all its shells is the part's.
+        let mut owners =
+            items.shells.iter().flat_map(|plan| &plan.owners).chain(ids).chain([&placed.representation]);
+        let of_first = part.shells.first().and_then(|shell| shell.colour);
+        if owners.any(|owner| self.styles.is_overridden(*owner))
+            && part.shells.iter().all(|shell| shell.colour == of_first)
         {
-            part.colour = shell.colour.take().or(part.colour);
-            // Faces of a recipe, which have no entities, hold its colour themselves.
-            shell.faces.iter_mut().filter(|face| face.entity.is_none()).for_each(|face| face.colour = None);
+            part.colour = of_first.or(part.colour);
+            for shell in &mut part.shells {
+                shell.colour = None;
+                // Faces of a recipe, which have no entities, hold its colour themselves.
+                shell.faces.iter_mut().filter(|face| face.entity.is_none()).for_each(|face| face.colour = None);
+            }
         }
 
         let report = &mut *self.report;
@@ -314,7 +319,7 @@ impl Reader<'_, '_, '_> {
             return;
         }
         let name = if p.name.is_empty() { self.model.part(part).name.clone() } else { p.name };
-        let colour = p.owners.iter().rev().find_map(|o| self.styles.colour(*o));
+        let colour = self.styles.occurrence_colour(&p.owners);
         let path = if p.path.is_empty() { name.clone() } else { p.path };
         self.model.instances.push(Instance { name, path, part, placement: p.placement, colour });
     }

@@ -1,12 +1,15 @@
 //! The cross-check with intersectors that are obviously right, and with defects planted in them.
 
 use crate::support::{Balls, Brute, Changed};
-use lampyris::intersect::Hit;
-use lampyris::math::{Frame, Point, Ray};
+use lampyris::intersect::instanced::Instanced;
+use lampyris::intersect::{Hit, Intersector};
+use lampyris::math::{Aabb, FaceId, Frame, Point, Ray};
 use lampyris::mesh::FacetMesh;
-use lampyris::model::Model;
+use lampyris::model::{Instancing, Model, Placement};
 use lampyris::nurbs::sweep;
-use lampyris::study::cross_check::{Cause, CrossCheck, Defect, Intersectors, Settings, cross_check};
+use lampyris::study::cross_check::{
+    Cause, CrossCheck, Defect, GroupedIntersectors, Intersectors, Settings, cross_check, cross_check_groups,
+};
 use lampyris::study::rays::{Camera, Chain, RaySource, Uniform};
 use lampyris::study::{records, sample_models};
 use std::f64::consts::PI;
@@ -62,6 +65,39 @@ fn two_balls_that_touch_within_their_sag_swap_as_coincident() {
     let (facets, exact) = (Brute(&mesh), Balls(at.to_vec()));
     let subjects = Intersectors { model: &model, mesh: &mesh, octree: &facets, bvh: &facets, exact: &exact };
     let found = run(&subjects, &rays(&mesh, 4_000)).facets_vs_exact;
+    assert_eq!(found.unexplained, 0, "{found:?}");
+    assert!(found.other_face > 100 && found.explained.coincident > 100, "{found:?}");
+}
+
+#[test]
+fn balls_of_two_placements_that_touch_swap_as_coincident() {
+    // As above, but each ball is a part of its own coordinates, which is placed.
+    let at = [Point::ZERO, Point::new(0.01, 0.0, 0.0)];
+    let ball = |first: f64| {
+        let surface = sweep::sphere(&Frame::IDENTITY, 50.0, [first, first + 2.0 * PI], [-PI / 2.0, PI / 2.0]);
+        sample_models::model("ball", [surface])
+    };
+    let groups = vec![Model::default(), ball(0.0), ball(PI / 32.0)];
+    let meshes: Vec<FacetMesh> = groups.iter().map(|group| sample_models::grid_mesh(group, 8)).collect();
+    let place = |(k, p): (usize, &Point)| Placement {
+        group: k as u32 + 1,
+        frame: Frame::translation(*p),
+        bounds: Aabb::from_points([*p]).grown(51.0),
+        first_face: FaceId(k as u32),
+    };
+    let placements = at.iter().enumerate().map(place).collect();
+    let instancing = Instancing::from_placements(groups.clone(), placements);
+    let structures = meshes.iter().map(|mesh| Box::new(Brute(mesh)) as Box<dyn Intersector>).collect();
+    let (facets, exact) = (Instanced::new(&instancing, structures), Balls(at.map(|p| (p, 50.0)).to_vec()));
+    let subjects = GroupedIntersectors {
+        groups: groups.iter().zip(&meshes).collect(),
+        instancing: Some(&instancing),
+        octree: &facets,
+        bvh: &facets,
+        exact: &exact,
+    };
+    let found = cross_check_groups(&subjects, &rays(&meshes[1], 4_000), &Settings::default(), &|_| ());
+    let found = found.facets_vs_exact;
     assert_eq!(found.unexplained, 0, "{found:?}");
     assert!(found.other_face > 100 && found.explained.coincident > 100, "{found:?}");
 }

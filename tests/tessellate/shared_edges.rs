@@ -146,3 +146,21 @@ fn a_trim_a_rounding_beside_a_crease_leaves_no_folded_facets() {
         assert!(smallest > 1e-6, "{tolerance}: a facet of {smallest} mm²");
     }
 }
+
+/// A trim that slants by one to two hundred-millionths of its face beside the end of a cell: no cell takes in what lies beyond it.
+#[test]
+fn no_cell_reaches_beyond_a_trim_that_slants_a_little() {
+    let wall = sweep::cylinder(&Frame::IDENTITY, 5.0, [0.0, 1.0], [0.0, 20.0]);
+    // In units of the height; the other end is that of the box around the trims.
+    for slant in [0.5e-7, 1.2e-7, 1.6e-7, 1.9e-7, 2.5e-7] {
+        let high = 10.0 * slant;
+        let c = [[0.1, 0.0], [0.5, 0.45 * high], [0.9, high], [0.9, 10.0], [0.1, 10.0]].map(Uv::from);
+        let sides: Vec<Vec<Uv>> = (0..5).map(|k| chain(64, |f| c[k].lerp(c[(k + 1) % 5], f))).collect();
+        for tolerance in TOLERANCES {
+            let mesh =
+                tessellate(&face(wall.clone(), std::slice::from_ref(&sides)), &Settings::uniform(tolerance)).mesh;
+            let topology = mesh.topology(0..mesh.facets.len());
+            assert_eq!((topology.nonmanifold_edges, topology.turned_edges), (0, 0), "{slant} {tolerance}");
+        }
+    }
+}

@@ -1,6 +1,11 @@
-//! Colours and layers: STYLED_ITEM and OVER_RIDING_STYLED_ITEM down to a COLOUR_RGB, and PRESENTATION_LAYER_ASSIGNMENT.
+//! Colours and layers: STYLED_ITEM, OVER_RIDING_STYLED_ITEM and CONTEXT_DEPENDENT_OVER_RIDING_STYLED_ITEM down to a COLOUR_RGB, and
+//! PRESENTATION_LAYER_ASSIGNMENT.
 
-use super::relations::{property_attributes, shape_definition_attributes, usage_attributes};
+use super::purpose::is_shape_representation;
+use super::relations::{
+    WITH_TRANSFORMATION, property_attributes, related_representations, shape_definition_attributes,
+    usage_attributes,
+};
 use crate::model::Colour;
 use crate::step::part21::{Entity, File};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -16,6 +21,16 @@ pub(crate) struct Styles {
     layers: FxHashMap<u64, Arc<str>>,
     /// Items that one occurrence or more shows in another colour than the rest.
     overridden: FxHashSet<u64>,
+    /// Colours of occurrences, by the innermost usage of the path that each is limited to.
+    occurrences: FxHashMap<u64, Vec<OccurrenceColour>>,
+}
+
+/// The colour of what stands below a path of usages.
+#[derive(Debug)]
+struct OccurrenceColour {
+    /// All of these are around it, in any order.
+    path: Vec<u64>,
+    colour: Colour,
 }
 
 impl Styles {
@@ -57,7 +72,47 @@ impl Styles {
         }
         // Last, for an overriding style stands above the plain one wherever the file has it.
         plain.extend(over);
-        Self { colours: plain, layers, overridden }
+        let mut styles = Self { colours: plain, layers, overridden, occurrences: FxHashMap::default() };
+        styles.add_paths(file, &usages);
+        styles
+    }
+
+    /// Adds the colours that hold for a representation in one of its places alone, which a path of relationships names.
+    fn add_paths(&mut self, file: &File<'_>, usages: &FxHashMap<u64, u64>) {
+        for e in file.entities_named(&["CONTEXT_DEPENDENT_OVER_RIDING_STYLED_ITEM"]) {
+            let overriding = e.attributes("CONTEXT_DEPENDENT_OVER_RIDING_STYLED_ITEM", 4);
+            let styled = e
+                .attributes("STYLED_ITEM", 1)
+                .or_else(|| e.attributes("CONTEXT_DEPENDENT_OVER_RIDING_STYLED_ITEM", 1));
+            let (Some(overriding), Some(styled)) = (overriding, styled) else { continue };
+            let Some(item) = styled.id(1).filter(|item| is_representation(file, *item)) else { continue };
+            let Some(colour) = styled.list(0).ids().into_iter().find_map(|style| colour(file, style)) else {
+                continue;
+            };
+            let path: Vec<u64> =
+                overriding.list(0).ids().into_iter().map(|id| usages.get(&id).copied().unwrap_or(id)).collect();
+            // From the outside in.
+            let Some(innermost) = path.last().copied() else { continue };
+            self.overridden.insert(item);
+            self.occurrences.entry(innermost).or_default().push(OccurrenceColour { path, colour });
+        }
+        // Shapes stand in representations that are related to the product's own.
+        for e in file.entities_named(&["SHAPE_REPRESENTATION_RELATIONSHIP"]) {
+            if let Some(pair) = related_representations(e).filter(|_| !e.is_a(WITH_TRANSFORMATION))
+                && pair.iter().any(|id| self.overridden.contains(id))
+            {
+                self.overridden.extend(pair);
+            }
+        }
+    }
+
+    /// Returns the colour of an occurrence by what is around it, from the outside in; `None` where nothing around it has one.
+    pub(crate) fn occurrence_colour(&self, owners: &[u64]) -> Option<Colour> {
+        let limited = |owner: &u64| {
+            let all = self.occurrences.get(owner)?;
+            all.iter().rev().find(|o| o.path.iter().all(|usage| owners.contains(usage))).map(|o| o.colour)
+        };
+        owners.iter().rev().find_map(|owner| limited(owner).or_else(|| self.colour(*owner)))
     }
 
     /// Returns the colour given to an item itself; `None` where it has none of its own.
@@ -76,20 +131,26 @@ impl Styles {
     }
 }
 
-/// Returns the usages of products by what styles name them by: their shapes, and the entities that place them.
+/// Whether an entity is a representation, to which a colour may be given as a whole.
+fn is_representation(file: &File<'_>, id: u64) -> bool {
+    file.entity(id).is_some_and(|e| is_shape_representation(e.keyword()))
+}
+
+/// Returns the usages of products by what styles name them by: their shapes, the entities that place them, and the relationships that
+/// those name.
 fn usages_by_shape(file: &File<'_>) -> FxHashMap<u64, u64> {
     let mut usages = FxHashMap::default();
     for e in file.entities_named(&["SHAPE_DEFINITION_REPRESENTATION", "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION"]) {
-        let (shape, definition) = if let Some(a) = shape_definition_attributes(e) {
-            (a.id(1), a.entity(0))
+        let (names, definition) = if let Some(a) = shape_definition_attributes(e) {
+            ([a.id(1), None], a.entity(0))
         } else if let Some(a) = e.attributes("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION", 0) {
-            (Some(e.id), a.entity(1))
+            ([Some(e.id), a.id(0)], a.entity(1))
         } else {
             continue;
         };
         let target = definition.and_then(|d| property_attributes(d).entity(2));
-        if let (Some(shape), Some(usage)) = (shape, target.filter(|t| usage_attributes(*t).is_some())) {
-            usages.insert(shape, usage.id);
+        if let Some(usage) = target.filter(|t| usage_attributes(*t).is_some()) {
+            usages.extend(names.into_iter().flatten().map(|name| (name, usage.id)));
         }
     }
     usages

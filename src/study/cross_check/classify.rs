@@ -19,6 +19,15 @@ const SAME_NORMAL: f64 = 1e-9;
 /// |cos| of the incidence below which normals are no longer held to more digits.
 const GRAZING_NORMAL: f64 = 1e-6;
 
+/// The later of two hits on different faces, as far as the cause of the earlier one depends on it.
+#[derive(Clone, Copy)]
+pub(super) struct LaterHit {
+    /// mm along the ray.
+    pub(super) t: f64,
+    /// As [`Classifier::band`] of its face, mm.
+    pub(super) band: f64,
+}
+
 /// Decides why facets and spline differ: geometry of its own, none of the intersectors'.
 pub(super) struct Classifier<'a> {
     mesh: &'a FacetMesh,
@@ -66,9 +75,14 @@ impl<'a> Classifier<'a> {
         self.mesh.sag.get(facet as usize).copied().filter(|s| s.is_finite())
     }
 
+    /// Returns the gap of a face of the model between its edges and its surface, mm; 0 where it has no surface.
+    pub(super) fn gap(&self, face: FaceId) -> f64 {
+        self.surface(face).map_or(0.0, |s| s.gap)
+    }
+
     /// Returns the largest sag, mm, of those facets of a face that the ray's line passes within their own sag and `gap`; of all when it
     /// passes none, as beside a border or over a hole.
-    fn band(&self, face: FaceId, ray: &Ray, gap: f64) -> f64 {
+    pub(super) fn band(&self, face: FaceId, ray: &Ray, gap: f64) -> f64 {
         let near = |&i: &u32| {
             let sag = self.sag(i);
             let bounds = Aabb::from_points(self.mesh.corners(i as usize)).grown(sag + gap + self.rounding);
@@ -96,12 +110,12 @@ impl<'a> Classifier<'a> {
         let (f, e) = match (facet, exact) {
             (None, None) => return None,
             (Some(f), Some(e)) if f.face == e.face => (f, e),
-            _ => return Some(self.explain(ray, facet, exact)),
+            _ => return Some(self.explain(ray, facet, exact, None)),
         };
         let apart = (f.t - e.t).abs();
         // Beyond rounding and its own sag the facet has to be explained by what is around it.
         if apart > self.rounding + self.sag(f.primitive) {
-            return Some(self.explain(ray, facet, exact));
+            return Some(self.explain(ray, facet, exact, None));
         }
         // The spline passes within `apart` of the facet's hit, so the hit lies within the sag. Only at grazing incidence may facets
         // turn their backs within it.
@@ -112,8 +126,15 @@ impl<'a> Classifier<'a> {
         (apart > self.rounding).then_some(Cause::WithinSag)
     }
 
-    /// Finds the cause of a difference, from the earlier of the two hits: why did the other not see it?
-    fn explain(&self, ray: &Ray, facet: Option<&Hit>, exact: Option<&Hit>) -> Cause {
+    /// Finds the cause of a difference, from the earlier of the two hits: why did the other not see it? `elsewhere` is the later one where
+    /// it lies on another model.
+    pub(super) fn explain(
+        &self,
+        ray: &Ray,
+        facet: Option<&Hit>,
+        exact: Option<&Hit>,
+        elsewhere: Option<LaterHit>,
+    ) -> Cause {
         // A touch is no crossing: rounding decides who sees it.
         if exact.is_some_and(|e| e.certainty == Certainty::Tangent) {
             return Cause::Tangent;
@@ -131,13 +152,17 @@ impl<'a> Classifier<'a> {
         }
         let Some(surface) = self.surface(first.face) else { return Cause::NoSurface };
         let sag = self.band(first.face, ray, surface.gap);
-        let cause = self.cause(ray, first, other, surface, sag);
+        let same_face = other.filter(|o| o.face == first.face).map(|o| o.t);
+        let later = |o: &Hit| LaterHit { t: o.t, band: self.band(o.face, ray, surface.gap) };
+        let other_face = other.filter(|o| o.face != first.face).map(later).or(elsewhere);
+        let cause = self.cause(ray, first, (same_face, other_face), surface, sag);
         // A facet that the mesher itself does not vouch for, and that strays farther than was asked: so much is measured here.
         if let (Cause::Unexplained(_), Some(f)) = (cause, facet.filter(|f| self.proved_sag(f.primitive).is_none()))
             && let Some(its) = self.surface(f.face)
         {
             let measured = self.measured_sag(f, its, ray);
-            let again = if measured > sag { self.cause(ray, first, other, surface, measured) } else { cause };
+            let others = (same_face, other_face);
+            let again = if measured > sag { self.cause(ray, first, others, surface, measured) } else { cause };
             if !matches!(again, Cause::Unexplained(_)) {
                 return Cause::Unproved;
             }
@@ -145,14 +170,23 @@ impl<'a> Classifier<'a> {
         cause
     }
 
-    /// Finds the cause when facets may stray from the first hit's face by `sag`, mm, by following the ray through that band.
-    fn cause(&self, ray: &Ray, first: &Hit, other: Option<&Hit>, surface: &PlacedSurface, sag: f64) -> Cause {
+    /// Finds the cause when facets may stray from the first hit's face by `sag`, mm, by following the ray through that band. The other hit
+    /// is known by its distance where it lies on the same face, mm, or else as a later one.
+    fn cause(
+        &self,
+        ray: &Ray,
+        first: &Hit,
+        (same_face, other_face): (Option<f64>, Option<LaterHit>),
+        surface: &PlacedSurface,
+        sag: f64,
+    ) -> Cause {
         let band = sag + surface.gap + self.rounding + FOOT_POINT * surface.size();
         let Some(stretch) = surface.stretch(ray, first.t, first.uv, band) else {
-            return Cause::Unexplained(Defect::OffTheSurface);
+            let is_beyond = surface.is_beyond_border(ray, first.t, first.uv, band);
+            return if is_beyond { Cause::TrimEdge } else { Cause::Unexplained(Defect::OffTheSurface) };
         };
         let [begin, end] = stretch.range;
-        let same_crossing = other.is_some_and(|o| o.face == first.face && (begin..=end).contains(&o.t));
+        let same_crossing = same_face.is_some_and(|t| (begin..=end).contains(&t));
         // A side of 0: the ray begins or ends while it is near the surface.
         if same_crossing || stretch.sides.contains(&0) {
             return Cause::WithinSag;
@@ -167,12 +201,10 @@ impl<'a> Classifier<'a> {
         if stretch.sides[0] == stretch.sides[1] {
             return Cause::Silhouette;
         }
-        if let Some(o) = other.filter(|o| o.face != first.face) {
-            // The other face lies within the band too: which of the two comes first is a matter of sag.
-            let both = band + self.band(o.face, ray, surface.gap);
-            if surface.foot(ray.point_at(o.t), first.uv, ray.direction).offset.abs() <= both {
-                return Cause::Coincident;
-            }
+        // The other face lies within the band too: which of the two comes first is a matter of sag.
+        let offset = |o: LaterHit| surface.foot(ray.point_at(o.t), first.uv, ray.direction).offset.abs();
+        if other_face.is_some_and(|o| offset(o) <= band + o.band) {
+            return Cause::Coincident;
         }
         Cause::Unexplained(Defect::MissedCrossing)
     }

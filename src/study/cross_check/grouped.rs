@@ -1,7 +1,7 @@
 //! Differences between facets and spline in a model whose parts that are placed often have coordinates of their own: each is explained
 //! where the first hit is, in that part's.
 
-use super::classify::Classifier;
+use super::classify::{Classifier, LaterHit};
 use super::verdict::Cause;
 use crate::intersect::Hit;
 use crate::math::Ray;
@@ -34,17 +34,26 @@ impl<'a> Classifiers<'a> {
     }
 
     /// Returns why facets and spline differ, as [`Classifier::compare`], for hits in scene coordinates. Of hits in two placements the
-    /// earlier is explained alone.
+    /// earlier is explained where it is; the later may lie as near as its own sag.
     pub(super) fn compare(&self, ray: &Ray, facet: Option<&Hit>, exact: Option<&Hit>) -> Option<Cause> {
-        let (mut facet, mut exact) = (facet, exact);
         if let (Some(f), Some(e)) = (facet, exact)
             && self.placement_of(f) != self.placement_of(e)
         {
-            // Why the other did not see the earlier one does not depend on what it saw elsewhere.
-            if f.t < e.t { exact = None } else { facet = None }
+            let facet_first = f.t < e.t;
+            let (first, later) = if facet_first { ([Some(f), None], e) } else { ([None, Some(e)], f) };
+            let Local { classifier, ray: local_ray, hits: [facet, exact] } = self.in_group(ray, first);
+            let gap = facet.or(exact).map_or(0.0, |hit| classifier.gap(hit.face));
+            let elsewhere = self.later_hit(ray, later, gap);
+            return Some(classifier.explain(&local_ray, facet.as_ref(), exact.as_ref(), elsewhere));
         }
         let Local { classifier, ray, hits: [facet, exact] } = self.in_group(ray, [facet, exact]);
         classifier.compare(&ray, facet.as_ref(), exact.as_ref())
+    }
+
+    /// Returns a hit in scene coordinates as the later one of two; `gap`, mm, is that of the earlier one's face.
+    fn later_hit(&self, ray: &Ray, hit: &Hit, gap: f64) -> Option<LaterHit> {
+        let Local { classifier, ray, hits: [hit, _] } = self.in_group(ray, [Some(hit), None]);
+        hit.map(|hit| LaterHit { t: hit.t, band: classifier.band(hit.face, &ray, gap) })
     }
 
     /// Compares octree and BVH as [`Classifier::same_facets`], for hits in scene coordinates; hits in two placements are a defect.

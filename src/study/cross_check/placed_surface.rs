@@ -63,6 +63,8 @@ pub(super) struct BandInterval {
 
 /// Steps in which a ray is followed through the band; longer ones from the half on.
 const STEPS: usize = 1000;
+/// Steps towards where a ray passes a border: each leaves the share cos² of the way, of the angle between ray and border.
+const APPROACHES: usize = 32;
 
 impl PlacedSurface {
     /// Makes the surface of a placed face in scene coordinates (mm), with its border; `None` for a ready mesh.
@@ -187,6 +189,24 @@ impl PlacedSurface {
             best = best.min(border.distance(&self.surface, p, enough));
         }
         best
+    }
+
+    /// Whether a hit at `t` lies beyond the end of the surface, within `band`, mm, of how it would go on, and the ray passes the face's
+    /// border within the band and twice the gap. Where faces gape the side on which a ray passes their edge decides, and the hit strays
+    /// from the edge by the gap over the sine of the incidence.
+    pub(super) fn is_beyond_border(&self, ray: &Ray, t: f64, guess: Uv, band: f64) -> bool {
+        let hit = ray.point_at(t);
+        let mut foot = self.foot(hit, guess, ray.direction);
+        if !foot.held || (hit - foot.point).dot(foot.normal).abs() > band {
+            return false;
+        }
+        let mut nearest = hit;
+        for _ in 0..APPROACHES {
+            nearest += ray.direction * (foot.point - nearest).dot(ray.direction);
+            foot = self.foot(nearest, foot.uv, ray.direction);
+        }
+        let enough = band + 2.0 * self.gap;
+        self.border_distance(nearest, enough) <= enough
     }
 
     /// Walks along the ray from `t` in both directions for as long as it stays within `band`, mm, of the surface; `None` where it is not
@@ -314,6 +334,22 @@ mod tests {
         let t = 20.0 - (100f64 - 9.0).sqrt();
         assert_eq!(s.stretch(&into, t, Uv::new(PI, 0.3), band).unwrap().sides, [1, -1]);
         assert!(s.stretch(&into, t - 1.0, Uv::new(PI, 0.3), band).is_none());
+    }
+
+    #[test]
+    fn a_hit_beyond_the_border_is_told_by_how_the_ray_passes_it() {
+        let surface = sweep::plane(&Frame::IDENTITY, [[0.0, 10.0], [0.0, 10.0]]);
+        let s = whole(&Face { gap: 0.1, ..Face::whole(surface) });
+        // Through (10.5, 5, 0), half a millimetre beyond the side at x = 10, at slopes of 1:8 and 1:1 to the plane: the ray passes the
+        // side at 0.5 · sin = 0.062 and 0.35. Band and twice the gap are 0.3.
+        for (rise, beyond) in [(0.125, true), (1.0, false)] {
+            let direction = Vector::new(1.0, 0.0, rise).normalize();
+            let ray = Ray::new(Point::new(10.5, 5.0, 0.0) - direction * 20.0, direction);
+            assert_eq!(s.is_beyond_border(&ray, 20.0, Uv::new(0.9, 0.5), 0.1), beyond, "{rise}");
+            // Nor is it told of a hit 0.2 off the plane.
+            let above = Ray { origin: ray.origin + Vector::Z * 0.2, ..ray };
+            assert!(!s.is_beyond_border(&above, 20.0, Uv::new(0.9, 0.5), 0.1));
+        }
     }
 
     #[test]

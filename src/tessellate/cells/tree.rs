@@ -258,8 +258,10 @@ impl Tree<'_, '_> {
                 if (a[d] - b[d]).abs() > eps[d] || self.poles[s as usize] {
                     return false;
                 }
-                let beyond = a[d] < cell.lo[d] - eps[d] || a[d] > cell.hi[d] + eps[d];
-                let on = (a[d] - cell.lo[d]).abs() <= eps[d] || (a[d] - cell.hi[d]).abs() <= eps[d];
+                // Both ends: of a slanting segment one may be a corner of the cell, and the other beside it.
+                let beyond = a[d].max(b[d]) < cell.lo[d] - eps[d] || a[d].min(b[d]) > cell.hi[d] + eps[d];
+                let on = |level: f64| (a[d] - level).abs().max((b[d] - level).abs()) <= eps[d];
+                let on = on(cell.lo[d]) || on(cell.hi[d]);
                 let (from, to) = (a[e].min(b[e]) + eps[e], a[e].max(b[e]) - eps[e]);
                 let between = |x: f64| from < x && x < to;
                 beyond || on && !between(cell.lo[e]) && !between(cell.hi[e])
