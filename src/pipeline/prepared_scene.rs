@@ -6,7 +6,7 @@ use super::error::Error;
 use super::expected_facets::expected_facets;
 use super::facets::mesh_settings;
 use super::fingerprint::run_fingerprint;
-use super::intersectors::{self, IntersectorChoice, TrueSurface};
+use super::intersectors::{self, IntersectorChoice, TrueSurface, farthest_start};
 use super::loading::LoadedModel;
 use super::monitor::{Monitor, Stage};
 use super::scene_job::SceneJob;
@@ -260,8 +260,12 @@ impl PreparedScene {
 
     /// Builds the true surface of each group.
     fn build_surfaces(&self, settings: &exact::Settings) -> Vec<Arc<TrueSurface>> {
-        let groups = self.models().iter().zip(self.facets.meshes());
-        groups.map(|(model, mesh)| Arc::new(TrueSurface::new(model, mesh, settings))).collect()
+        let groups = self.models().iter().zip(self.facets.meshes()).enumerate();
+        let surface = |(group, (model, mesh)): (usize, (&Model, &FacetMesh))| {
+            let farthest_start = farthest_start(self.facets.instancing.as_deref(), group);
+            Arc::new(TrueSurface::new(model, mesh, &exact::Settings { farthest_start, ..*settings }))
+        };
+        groups.map(surface).collect()
     }
 
     /// Returns the run's settings: the scene's, with what was asked over them; the whole run, no shard.

@@ -2,7 +2,7 @@
 
 use crate::referee;
 use crate::support::*;
-use lampyris::intersect::exact::{Exact, Settings};
+use lampyris::intersect::exact::{Exact, Passage, Settings};
 use lampyris::intersect::{Certainty, Cost};
 use lampyris::math::{Departure, FaceId, Frame, Point, Ray, Uv, Vector};
 use lampyris::nurbs::{Surface, sweep};
@@ -51,7 +51,7 @@ fn what_a_budget_leaves_open_is_flagged() {
     // Without any clipping: at grazing entries and at poles the first crossing stays open, and often a later one is found.
     let exact = Exact::build(&model([sphere(50.0)]), &Settings { budget: 0, ..Settings::default() });
     let mut s = Random(31);
-    let (mut later, mut none, mut passed) = (0, 0, 0);
+    let (mut later, mut none, mut passed, mut unseen) = (0, 0, 0, 0);
     for k in 0..3000 {
         let (ray, truths) = if k % 2 == 0 {
             let depth = 10f64.powf(s.within(-8.0, 1.0));
@@ -72,15 +72,24 @@ fn what_a_budget_leaves_open_is_flagged() {
         let right = answer.hit.is_some_and(|hit| is_right(hit.t, 0));
         assert!(right || answer.certainty != Certainty::Certified, "{answer:?} for {truths:?} by {ray:?}");
         assert!(answer.hit.is_none_or(|hit| hit.certainty == answer.certainty), "{answer:?}");
-        let crossings = exact.crossings(&ray, &mut Cost::default());
+        let Passage { crossings, undecided_from, .. } = exact.passage(&ray, &mut Cost::default());
         passed += usize::from(crossings.first().is_some_and(|hit| is_right(hit.t, 1)));
         for (k, hit) in crossings.iter().enumerate() {
             let right = k < 2 && is_right(hit.t, k);
             assert!(right || hit.certainty != Certainty::Certified, "{crossings:?} for {truths:?} by {ray:?}");
         }
+        // What is missing behind the last one is told by no crossing.
+        for truth in truths.iter().filter(|truth| crossings.iter().all(|hit| (hit.t - **truth).abs() >= 1e-6)) {
+            assert!(
+                undecided_from < truth + 1e-6,
+                "{crossings:?} until {undecided_from} for {truths:?} by {ray:?}"
+            );
+            unseen += usize::from(crossings.iter().all(|hit| hit.certainty == Certainty::Certified));
+        }
     }
-    // Each of the three would be an answer wrong in silence.
-    assert!(later > 20 && none > 20 && passed > 20, "{later} later, {none} none, {passed} passages");
+    // Each of the four would be an answer wrong in silence.
+    let found = [later, none, passed, unseen];
+    assert!(found.iter().all(|&n| n > 20), "later, none, passages, missing in them: {found:?}");
 }
 
 /// A ray that leaves the middle of a plane of a metre, but starts at `height` over it.

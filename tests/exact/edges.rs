@@ -66,7 +66,7 @@ fn through_edges(name: &str, model: &Model, n: usize, ends: bool) -> Found {
         let d = s.direction();
         found.rays += 1;
         let ray = Ray::new(target + off - d * reach, d);
-        let Passage { mut crossings, near_trims } = exact.passage(&ray, &mut Cost::default());
+        let Passage { mut crossings, near_trims, .. } = exact.passage(&ray, &mut Cost::default());
         crossings.retain(|h| faces.contains(&h.face));
         if crossings.len().is_multiple_of(2) {
             continue;
@@ -152,7 +152,7 @@ fn a_gap_that_only_the_neighbour_knows_of_is_flagged() {
         let target: Point =
             place.point(curve.evaluate(s.within(a, b))) + s.direction() * 10f64.powf(s.within(-6.0, -3.0));
         let d = s.direction();
-        let Passage { crossings, near_trims } =
+        let Passage { crossings, near_trims, .. } =
             exact.passage(&Ray::new(target - d * 1000.0, d), &mut Cost::default());
         if crossings.len() % 2 == 1 {
             odd += 1;
@@ -181,7 +181,7 @@ fn what_passes_within_the_band_of_an_edge_is_told_on_either_side() {
         let d = s.direction();
         let ray = Ray::new(target + s.direction() * (2e-7 * s.unit()) - d * 1000.0, d);
         let near = |t: &f64| (t - 1000.0).abs() < 1e-3;
-        let Passage { crossings, near_trims } = exact.passage(&ray, &mut Cost::default());
+        let Passage { crossings, near_trims, .. } = exact.passage(&ray, &mut Cost::default());
         assert!(near_trims.iter().any(near), "not told: {target} {d}, {crossings:?}");
         if !crossings.iter().any(|hit| near(&hit.t)) {
             turned_away += 1;

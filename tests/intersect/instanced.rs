@@ -84,7 +84,11 @@ impl Scene {
     }
 
     fn splines(&self) -> Vec<Exact> {
-        self.instancing.groups.iter().map(|g| Exact::build(g, &exact::Settings::default())).collect()
+        let spline = |(k, group)| {
+            let settings = exact::Settings { farthest_start: self.instancing.reach(k), ..Default::default() };
+            Exact::build(group, &settings)
+        };
+        self.instancing.groups.iter().enumerate().map(spline).collect()
     }
 
     fn instanced<'a, T: Intersector + 'a>(&'a self, groups: impl IntoIterator<Item = T>) -> Instanced<'a> {
@@ -217,34 +221,51 @@ fn splines_and_polished_hits_are_those_of_the_whole_model() {
     assert!(apart <= 7, "{apart}");
 }
 
-/// Rays bounce about inside balls however far these stand, and none gets out or meets the facet that it leaves.
-#[test]
-fn nothing_slips_out_of_instances() {
-    for middle in [Point::ZERO, Point::new(1e6, -3e5, 2e5)] {
-        let scene = Scene::new(middle);
-        let facets = scene.facets();
-        let instanced = scene.instanced(scene.octrees(&facets));
-        let mut r = Random(3);
-        let balls: Vec<usize> = (0..scene.model.instances.len()).filter(|k| k % 2 == 1).collect();
-        let mut rays: Vec<Ray> = (0..1500)
-            .map(|_| {
-                let at = scene.model.instances[balls[r.below(balls.len())]].placement.origin;
-                Ray::new(at + r.direction() * 0.5, r.direction())
-            })
-            .collect();
-        for bounce in 0..6 {
-            let hits = ask(&instanced, &rays);
-            for (ray, hit) in rays.iter_mut().zip(&hits) {
-                let hit = hit.unwrap_or_else(|| panic!("bounce {bounce} of {middle}: {ray:?} slipped out"));
-                assert!(hit.geometric_normal.dot(ray.direction) > 0.0, "bounce {bounce}: {ray:?} is outside");
-                *ray = reflected(ray, &hit);
-                if bounce % 2 == 1 {
-                    // Flat along the facet, at any sine down to 1e-9.
-                    let inward = -hit.geometric_normal;
-                    let along = inward.cross(r.direction()).normalize();
-                    ray.direction = (along + inward * 10f64.powf(-9.0 * r.unit())).normalize();
-                }
+/// Lets rays bounce about inside balls: none gets out or meets the surface that it leaves. Every other time they leave it flat, at any sine
+/// down to `least`.
+fn bounce_inside(scene: &Scene, instanced: &dyn Intersector, least: f64) {
+    let mut r = Random(3);
+    let balls: Vec<usize> = (0..scene.model.instances.len()).filter(|k| k % 2 == 1).collect();
+    let mut rays: Vec<Ray> = (0..1500)
+        .map(|_| {
+            let at = scene.model.instances[balls[r.below(balls.len())]].placement.origin;
+            Ray::new(at + r.direction() * 0.5, r.direction())
+        })
+        .collect();
+    for bounce in 0..6 {
+        let hits = ask(instanced, &rays);
+        for (ray, hit) in rays.iter_mut().zip(&hits) {
+            let hit = hit.unwrap_or_else(|| panic!("bounce {bounce}: {ray:?} slipped out"));
+            assert!(hit.geometric_normal.dot(ray.direction) > 0.0, "bounce {bounce}: {ray:?} is outside");
+            *ray = reflected(ray, &hit);
+            if bounce % 2 == 1 {
+                let inward = -hit.geometric_normal;
+                let along = inward.cross(r.direction()).normalize();
+                ray.direction = (along + inward * least.powf(r.unit())).normalize();
             }
         }
+    }
+}
+
+#[test]
+fn nothing_slips_out_of_instances() {
+    for distance in [0.0, 1e6, 1e9] {
+        let scene = Scene::new(distance * Point::new(1.0, -0.3, 0.2));
+        let facets = scene.facets();
+        bounce_inside(&scene, &scene.instanced(scene.octrees(&facets)), 1e-9);
+    }
+}
+
+#[test]
+fn nothing_slips_out_of_instances_on_the_spline() {
+    for distance in [0.0, 1e6, 1e8, 1e9] {
+        let scene = Scene::new(distance * Point::new(1.0, -0.3, 0.2));
+        let (facets, splines) = (scene.facets(), scene.splines());
+        let octrees = scene.octrees(&facets);
+        // Where a start is rounded by ρ outward, a ball of radius R is truly missed at sines below √(2ρ/R).
+        let least = 10.0 * (f64::EPSILON * (distance + 300.0)).sqrt();
+        bounce_inside(&scene, &scene.instanced(&splines), least);
+        let polished = octrees.iter().zip(facets.meshes()).zip(&splines).map(|((o, m), s)| Polished::new(o, m, s));
+        bounce_inside(&scene, &scene.instanced(polished), least);
     }
 }

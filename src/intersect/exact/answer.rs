@@ -27,6 +27,8 @@ pub struct Passage {
     pub crossings: Vec<Hit>,
     /// The t, in order, of crossings with a trim within its band, and of those that such a trim turned away.
     pub near_trims: Vec<f64>,
+    /// The t from which on other crossings may be missing, for the budget ended or a place stayed undecided; infinite where all are found.
+    pub undecided_from: f64,
 }
 
 /// A search for all crossings may take so many times the budget of one for the first.
@@ -60,13 +62,14 @@ impl Exact {
         self.answer(&query, cost)
     }
 
-    /// Finds every crossing in the range of the ray, in order of t; one found from both sides of a patch border counts once.
+    /// Finds every crossing in the range of the ray, in order of t; one found from both sides of a patch border counts once. Whether any may
+    /// be missing is told by [`Self::passage`] alone.
     pub fn crossings(&self, ray: &Ray, cost: &mut Cost) -> Vec<Hit> {
         self.passage(ray, cost).crossings
     }
 
-    /// Finds every crossing in the range of the ray, in order of t, and where trims were near. Crossings from where on the budget ended or
-    /// a place stayed undecided are [`Certainty::Uncertified`], and others may be missing there: of an empty list that cannot be seen.
+    /// Finds every crossing in the range of the ray, in order of t, and where trims were near. Crossings from
+    /// [`Passage::undecided_from`] on are [`Certainty::Uncertified`].
     pub fn passage(&self, ray: &Ray, cost: &mut Cost) -> Passage {
         let mut query = Query::IDLE;
         self.restart(&mut query, ray, self.settings.budget.saturating_mul(BUDGET_OF_ALL));
@@ -95,7 +98,7 @@ impl Exact {
                 hits.push(hit);
             }
         }
-        Passage { crossings: hits, near_trims }
+        Passage { crossings: hits, near_trims, undecided_from: query.undecided_from }
     }
 
     /// Takes up a ray with this budget of clipping steps; one that is not sound will miss, undecided.

@@ -58,6 +58,8 @@ pub(super) struct Geometry {
     pub(super) ends: Vec<Vec<[(Point, f64); 2]>>,
     /// Smallest distance from a trim that is flagged, mm.
     pub(super) band: f64,
+    /// Largest coordinate that starts were rounded at elsewhere, mm; 0 where they are the model's own.
+    pub(super) farthest_start: f64,
     /// Position in `faces` of each placed face that has a surface.
     pub(super) by_id: FxHashMap<FaceId, u32>,
     /// Placed faces left out: ready meshes, and surfaces with non-finite points or weights that are not positive.
@@ -66,11 +68,12 @@ pub(super) struct Geometry {
 
 impl Geometry {
     /// Prepares all placed faces of a model: surfaces and trims once a part, patches once a place. `band` is the least distance from a trim
-    /// that is flagged, mm.
-    pub(super) fn new(model: &Model, band: f64) -> Self {
+    /// that is flagged, `farthest_start` the largest coordinate that starts were rounded at elsewhere, mm.
+    pub(super) fn new(model: &Model, band: f64, farthest_start: f64) -> Self {
         let curves = |part: &Part| part.edges.iter().map(|e| e.curve.clone()).collect();
         let mut geometry = Self {
             band,
+            farthest_start,
             edges: model.parts.iter().map(curves).collect(),
             ends: model.parts.iter().map(edge_ends).collect(),
             ..Self::default()

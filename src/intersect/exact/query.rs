@@ -172,7 +172,8 @@ impl DeparturePoint {
         let p = &geometry.patches[patch as usize];
         let (s, ..) = project(&p.jet(p.local(uv)));
         let off = (ray.origin - p.center - s).length();
-        let tolerance = TANGENT + ORIGIN_ROUNDING * f64::EPSILON * ray.origin.abs().max_element();
+        let reach = ray.origin.abs().max_element().max(geometry.farthest_start);
+        let tolerance = TANGENT + ORIGIN_ROUNDING * f64::EPSILON * reach;
         Some(Self { face, patch, uv, off, tolerance })
     }
 

@@ -28,13 +28,24 @@ pub struct Settings {
     pub budget: u32,
     /// Distance from a trim that is flagged, mm.
     pub trim_band: f64,
+    /// Largest coordinate that starts were rounded at, mm, where that is not the model's own: of a part in its own coordinates that
+    /// stands far away. 0 otherwise.
+    pub farthest_start: f64,
     /// Most leaves: a model that takes more is cut as [`Settings::for_few_rays`] says, with at most eight halvings. `None` for any number.
     pub most_leaves: Option<usize>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { flatness: 0.25, leaves: 250, depth: 12, budget: 8000, trim_band: 1e-6, most_leaves: None }
+        Self {
+            flatness: 0.25,
+            leaves: 250,
+            depth: 12,
+            budget: 8000,
+            trim_band: 1e-6,
+            farthest_start: 0.0,
+            most_leaves: None,
+        }
     }
 }
 
@@ -119,7 +130,7 @@ impl Exact {
     /// Ready meshes and surfaces that are not finite or not positive in weight are left out: [`Exact::skipped`].
     pub fn build(model: &Model, settings: &Settings) -> Self {
         let start = Instant::now();
-        let geometry = Geometry::new(model, settings.trim_band);
+        let geometry = Geometry::new(model, settings.trim_band, settings.farthest_start);
         let PatchLeaves { leaves, linearizations, pool } = subdivide(&geometry, settings);
         // One more start, so that the end of the last leaf is the start of the one behind it.
         let mut starts: Vec<u32> = leaves.iter().map(|l| l.net).collect();
