@@ -307,4 +307,17 @@ pub(super) mod tests {
         let open = photometry_of(PhotometricType::C, &steps(0.0, 345.0, 23), &[0.0, 90.0], |_, _| 1.0);
         assert_eq!(open.expanded().horizontal_deg.last(), Some(&360.0));
     }
+
+    #[test]
+    fn keywords_of_ies_files_stay_keywords() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ies");
+        let mut p = photometry_of(PhotometricType::C, &[0.0], &[0.0, 90.0], |_, _| 1.0);
+        let keywords = [("TEST", ""), ("MANUFAC", "A,\nand B\n"), ("LA]MP\r\nTILT=NONE\r\n[", "one\u{1b}")];
+        p.keywords = keywords.map(|(name, value)| (name.into(), value.into())).to_vec();
+        crate::formats::write_ies(&path, &p).unwrap();
+        let read = crate::formats::read_ies(&path).unwrap().keywords;
+        let expected = [("TEST", ""), ("MANUFAC", "A,\nand B\n"), ("LAMPTILT=NONE", "one")];
+        assert_eq!(read, expected.map(|(name, value)| (name.to_owned(), value.to_owned())));
+    }
 }

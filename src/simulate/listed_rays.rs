@@ -8,7 +8,6 @@ use super::dispatch::{self, kernel_kind};
 use super::emitter::ListCursor;
 use super::kernel::{Context, RaySelection};
 use super::outcome::{Event, PathVertex};
-use super::run::thread_count;
 use super::settings::RunSettings;
 use super::tallies::ReplicateTally;
 use crate::intersect::Intersector;
@@ -74,7 +73,7 @@ pub fn listed_ends(bound: &BoundScene, intersector: &dyn Intersector, settings: 
             }
         };
         std::thread::scope(|scope| {
-            for _ in 1..thread_count(settings) {
+            for _ in 1..settings.thread_count() {
                 scope.spawn(work);
             }
             work();

@@ -241,7 +241,7 @@ impl ReceiverResult {
 
     /// The area or solid angle of a cell that counted light, with those parts of its neighbours that it counts for: what its density is
     /// multiplied by to be its power.
-    pub(crate) fn lit_measure(&self, cell: usize) -> f64 {
+    pub fn lit_measure(&self, cell: usize) -> f64 {
         // A ray adds the same power everywhere.
         self.ray_power / self.ray_cells[cell]
     }

@@ -66,7 +66,7 @@ pub fn trace(
     }
     let shard = shard_replicates(context.plan.first_replicate..context.plan.replicates, settings.shard);
     let todo: Vec<u32> = shard.clone().filter(|r| before.done.binary_search(r).is_err()).collect();
-    let threads = thread_count(settings);
+    let threads = settings.thread_count();
     announce(&context, threads);
     let work = Work {
         context: &context,
@@ -176,15 +176,7 @@ fn announce(context: &Context<'_>, threads: usize) {
 
 /// Lets the intersector work out beforehand what it will know of a run, so that two runs on it compare.
 pub(crate) fn prepare(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings) {
-    announce(&Context::new(bound, intersector, settings), thread_count(settings));
-}
-
-/// Returns the threads that are asked for; for 0, as many as the machine has.
-pub(super) fn thread_count(settings: &RunSettings) -> usize {
-    match settings.threads {
-        0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
-        n => n,
-    }
+    announce(&Context::new(bound, intersector, settings), settings.thread_count());
 }
 
 /// Traces some rays of a run once more, by their number, and records their whole paths: `paths` and `ledger` of the results are theirs.

@@ -78,6 +78,16 @@ pub enum KernelChoice {
     Full,
 }
 
+impl RunSettings {
+    /// Returns the threads that are asked for; for 0, as many as the machine has.
+    pub(super) fn thread_count(&self) -> usize {
+        match self.threads {
+            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            n => n,
+        }
+    }
+}
+
 impl From<&Run> for RunSettings {
     fn from(r: &Run) -> Self {
         Self {

@@ -62,8 +62,8 @@ impl Exact {
         self.answer(&query, cost)
     }
 
-    /// Finds every crossing in the range of the ray, in order of t; one found from both sides of a patch border counts once. Whether any may
-    /// be missing is told by [`Self::passage`] alone.
+    /// Finds every crossing in the range of the ray, in order of t; one found from both sides of a patch border counts once. Whether any
+    /// may be missing is told by [`Self::passage`] alone.
     pub fn crossings(&self, ray: &Ray, cost: &mut Cost) -> Vec<Hit> {
         self.passage(ray, cost).crossings
     }
