@@ -24,7 +24,7 @@ impl Assessment {
         json!({
             "regulation": self.regulation.id, "title": self.regulation.title, "checked": self.regulation.checked(),
             "traffic": self.traffic.word(), "aim": {"h_deg": self.aim.h_deg, "v_deg": self.aim.v_deg, "gradient": self.aim.gradient,
-                "how": self.aim.how, "rivals_deg": self.aim.rivals},
+                "how": self.aim.how, "rivals_deg": self.aim.rivals, "moved_deg": self.aim.moved},
             "sensor_deg": self.sensor_deg, "rows": rows.collect::<Vec<_>>(), "verdict": self.verdict.to_string(),
         })
     }

@@ -134,7 +134,8 @@ impl Judgement {
             let sigmas = if margin >= 0.0 { to_pass } else { to_fail };
             // The truth would be on the other side of the limit: more light than was read below it, less above.
             let sign = if reading.value < comparison.limit { 1.0 } else { -1.0 };
-            let noise = photometer.map.noise(&comparison.measurement, sign, margin, sigmas);
+            let mut noise = photometer.map.noise(&comparison.measurement, sign, margin, sigmas);
+            noise.other += comparison.by_aim[1].powi(2);
             // What nobody knows of the facets may be more than any margin.
             let geometric = reading.geometric.unwrap_or(f64::INFINITY);
             let reach = noise.reach(sigmas, 1.0).hypot(sigmas * geometric);
@@ -142,8 +143,8 @@ impl Judgement {
             // A limit that is just reached is met, where there is no error.
             passing += usize::from(enough && margin >= 0.0);
             failing += usize::from(enough && margin < 0.0);
-            // Of less than a ray the spread is none.
-            reading.statistical = reading.statistical.max(noise.ray_cd.min(noise.reach(1.0, 1.0)));
+            // Of few rays the spread tells less than three errors of a count reach.
+            reading.statistical = reading.statistical.max(noise.reach(SIGMAS, 1.0) / SIGMAS);
             read.push([reading.value, reading.statistical]);
             // The best of those of which any is enough, the worst of those that must all hold.
             let decides = |d: &Decisive| (margin > d.margin) == requirement.any && margin != d.margin;
@@ -179,7 +180,8 @@ impl Judgement {
 
 /// The reading of a comparison, and by how much it keeps its limit, cd; negative where it does not.
 fn read_margin(photometer: &Photometer, comparison: &Comparison) -> (Reading, f64) {
-    let reading = photometer.map.read(&comparison.measurement);
+    let mut reading = photometer.map.read(&comparison.measurement);
+    reading.statistical = reading.statistical.hypot(comparison.by_aim[0]);
     let margin =
         if comparison.at_least { reading.value - comparison.limit } else { comparison.limit - reading.value };
     (reading, margin)

@@ -2,6 +2,7 @@
 
 use super::cell_axis::{CellAxis, Overlap};
 use super::few_rays::{LandedRays, MANY_REPLICATES, Noise, RaySample};
+use super::opening::{Measurement, OpeningSum, Sensor};
 
 /// Cosine of the elevation that an opening's width is divided by at least: at the poles, where it would be endless, it is wider than
 /// any map and so leaves it.
@@ -43,44 +44,6 @@ impl Reading {
     pub fn known_error(&self) -> f64 {
         self.geometric.map_or(self.statistical, |geometric| self.statistical.hypot(geometric))
     }
-}
-
-/// What a photometer in one or several directions adds up: cells with weights.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Measurement {
-    /// Cells by their rising index.
-    // Ordered: sums over cells come in one order, and two runs agree to the last bit. A list: most hold a dozen of cells.
-    weights: Vec<(usize, f64)>,
-}
-
-impl Measurement {
-    /// Adds to the weight of a cell.
-    fn add(&mut self, cell: usize, amount: f64) {
-        // Cells come nearly in order.
-        match self.weights.last() {
-            Some(last) if cell <= last.0 => match self.weights.binary_search_by_key(&cell, |w| w.0) {
-                Ok(place) => self.weights[place].1 += amount,
-                Err(place) => self.weights.insert(place, (cell, amount)),
-            },
-            _ => self.weights.push((cell, amount)),
-        }
-    }
-
-    /// Adds `factor` times another measurement of the same map; cells that both hold are then counted with their correlation.
-    pub(super) fn plus(mut self, factor: f64, other: &Self) -> Self {
-        for (cell, weight) in &other.weights {
-            self.add(*cell, factor * weight);
-        }
-        self
-    }
-}
-
-/// Form of a photometer's opening.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Sensor {
-    /// Half a side of a square, or the radius of a disc, degrees.
-    pub(super) half_deg: f64,
-    pub(super) round: bool,
 }
 
 /// Bands of elevation in which the cells below a round sensor are weighed; a band's error is its share of the disc's rim, below 1e-3.
@@ -161,8 +124,7 @@ impl IntensityMap {
     /// that the opening covers in part light is taken to rise evenly from neighbour to neighbour. `None` where the opening leaves the map.
     pub(super) fn measure(&self, sensor: Sensor, h: f64, v: f64) -> Option<Measurement> {
         let bands = if sensor.round { DISC_BANDS } else { 1 };
-        let mut measurement = Measurement::default();
-        let mut total = 0.0;
+        let mut sum = OpeningSum::default();
         for band in 0..bands {
             // Bands of equal height; in a square opening all of it is one.
             let from = v + sensor.half_deg * (2.0 * band as f64 / bands as f64 - 1.0);
@@ -173,26 +135,36 @@ impl IntensityMap {
                 if sensor.round { (sensor.half_deg.powi(2) - offset.powi(2)).sqrt() } else { sensor.half_deg };
             // By the elevation of the aim, not of the band: over an opening of a degree they hardly differ.
             let half = azimuth_deg(half, v);
-            let (rows, columns) = (self.v.cells(), self.h.cells());
-            let h_parts: Vec<Overlap> = self.h.overlaps(h - half, h + half)?.collect();
-            for v_part in self.v.overlaps(from, to)? {
-                for h_part in &h_parts {
-                    let weight = v_part.share * h_part.share;
-                    let cell = v_part.cell * columns + h_part.cell;
-                    measurement.add(cell, weight);
-                    total += weight;
-                    // A cell is not as bright in the part that is covered as on its mean.
-                    let v_place = (v_part.cell, rows, columns);
-                    self.add_slope(&mut measurement, cell, v_place, weight * v_part.offset);
-                    self.add_slope(&mut measurement, cell, (h_part.cell, columns, 1), weight * h_part.offset);
-                }
+            self.add_box(&mut sum, [h - half, h + half], [from, to])?;
+        }
+        Some(sum.mean())
+    }
+
+    /// The same of an opening with sides of its own, given by half of each, degrees across and up.
+    pub(super) fn measure_slit(&self, half_deg: [f64; 2], [h, v]: [f64; 2]) -> Option<Measurement> {
+        let mut sum = OpeningSum::default();
+        let half_h = azimuth_deg(half_deg[0], v);
+        self.add_box(&mut sum, [h - half_h, h + half_h], [v - half_deg[1], v + half_deg[1]])?;
+        Some(sum.mean())
+    }
+
+    /// Adds the cells in a box of azimuths and elevations, degrees; `None` where it leaves the map.
+    fn add_box(&self, sum: &mut OpeningSum, h: [f64; 2], v: [f64; 2]) -> Option<()> {
+        let (rows, columns) = (self.v.cells(), self.h.cells());
+        let h_parts: Vec<Overlap> = self.h.overlaps(h[0], h[1])?.collect();
+        for v_part in self.v.overlaps(v[0], v[1])? {
+            for h_part in &h_parts {
+                let weight = v_part.share * h_part.share;
+                let cell = v_part.cell * columns + h_part.cell;
+                sum.measurement.add(cell, weight);
+                sum.total += weight;
+                // A cell is not as bright in the part that is covered as on its mean.
+                let v_place = (v_part.cell, rows, columns);
+                self.add_slope(&mut sum.measurement, cell, v_place, weight * v_part.offset);
+                self.add_slope(&mut sum.measurement, cell, (h_part.cell, columns, 1), weight * h_part.offset);
             }
         }
-        // By what was met: rounding of edges must not make the mean too large.
-        for (_, weight) in &mut measurement.weights {
-            *weight /= total;
-        }
-        Some(measurement)
+        Some(())
     }
 
     /// How far a photometer's opening aimed at `(h, v)` reaches beyond the sides of the map, degrees of azimuth.
@@ -202,9 +174,10 @@ impl IntensityMap {
         (left - (h - half)).max(h + half - right).max(0.0)
     }
 
-    /// Adds `amount` times how much brighter a cell gets over its width along an axis. On the axis the cell has this place, of so many, and
-    /// its neighbours are `step` cells off. Of the differences from both neighbours the smaller counts, none where they have different
-    /// signs or one is missing: so no cell that lies between two others is taken beyond them.
+    /// Adds `amount` times how much brighter a cell gets over its width along an axis. On the axis the cell has this place, of so many,
+    /// and its neighbours are `step` cells off. The rise is the monotonised central difference (van Leer, J. Comput. Phys. 23, 1977):
+    /// half of that between the neighbours, at most twice that from either, and none where a neighbour is missing or both are brighter,
+    /// or darker; so no cell that lies between two others is taken beyond them.
     fn add_slope(
         &self,
         measurement: &mut Measurement,
@@ -215,15 +188,23 @@ impl IntensityMap {
         if place == 0 || place + 1 == count || amount == 0.0 {
             return;
         }
-        let [below, here, above] = [cell - step, cell, cell + step];
-        let [before, after] = [[below, here], [here, above]];
-        let difference = |[from, to]: [usize; 2]| self.cells[to][0] - self.cells[from][0];
-        if difference(before) * difference(after) <= 0.0 {
+        let cells = [cell - step, cell, cell + step];
+        let [below, here, above] = cells.map(|cell| self.cells[cell][0]);
+        let [before, after] = [here - below, above - here];
+        if before * after <= 0.0 {
             return;
         }
-        let [from, to] = if difference(before).abs() < difference(after).abs() { before } else { after };
-        measurement.add(to, amount);
-        measurement.add(from, -amount);
+        let central = 0.5 * (before + after).abs();
+        let shares = if central <= 2.0 * before.abs().min(after.abs()) {
+            [-0.5, 0.0, 0.5]
+        } else if before.abs() < after.abs() {
+            [-2.0, 2.0, 0.0]
+        } else {
+            [0.0, -2.0, 2.0]
+        };
+        for (cell, share) in cells.into_iter().zip(shares).filter(|(_, share)| *share != 0.0) {
+            measurement.add(cell, amount * share);
+        }
     }
 
     /// Reads a measurement, made on a map of these cells: its value and errors, cd. Statistical errors of cells are independent; those of
@@ -239,6 +220,15 @@ impl IntensityMap {
             geometric += (weight * g).abs();
         }
         Reading { value, statistical: variance.sqrt(), geometric: self.knows_facets.then_some(geometric) }
+    }
+
+    /// Reads the value of a measurement and its known error, cd, to which cells without light add what one ray would make.
+    pub(super) fn read_with_dark(&self, measurement: &Measurement) -> [f64; 2] {
+        let reading = self.read(measurement);
+        let is_dark = |cell: usize| self.cells[cell][0] <= 0.0 && self.landed.is_some();
+        let dark = measurement.weights.iter().filter(|(cell, _)| is_dark(*cell));
+        let variance: f64 = dark.map(|(cell, weight)| (weight * self.cells[*cell][1]).powi(2)).sum();
+        [reading.value, variance.sqrt().hypot(reading.known_error())]
     }
 
     /// The error of a cell as far as rays made it: none of a dark one, whose stated error is what one ray would make.

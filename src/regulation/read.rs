@@ -101,7 +101,7 @@ fn edges_between(axis: &str, centres: &[f64]) -> Result<Vec<f64>, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::map::Sensor;
+    use super::super::opening::Sensor;
     use super::*;
 
     #[test]

@@ -1,7 +1,9 @@
 //! Rows of a table as comparisons of photometer readings with limits.
 
 use super::aim::Aim;
-use super::map::{IntensityMap, Measurement, Sensor};
+use super::few_rays::SIGMAS;
+use super::map::IntensityMap;
+use super::opening::{Measurement, Sensor};
 use super::row::{Bound, Row, RowKind};
 use super::table::Rules;
 
@@ -9,6 +11,8 @@ use super::table::Rules;
 #[derive(Clone, Debug)]
 pub(super) struct Comparison {
     pub(super) measurement: Measurement,
+    /// Standard error of its reading by how far noise may have moved the aim, cd: to either side, and towards the limit.
+    pub(super) by_aim: [f64; 2],
     /// Candela.
     pub(super) limit: f64,
     /// Whether the limit is a least value.
@@ -30,6 +34,7 @@ pub(super) struct Requirement {
 }
 
 /// A map, how it is turned and how it is read.
+#[derive(Clone, Copy)]
 pub(super) struct Photometer<'a> {
     pub(super) map: &'a IntensityMap,
     pub(super) aim: &'a Aim,
@@ -145,9 +150,35 @@ impl Photometer<'_> {
     }
 }
 
-/// Turns what a row asks into requirements that must all be met; empty where it asks nothing that can be measured. `rows` are those of its
-/// function, to which a relative row refers.
+/// Turns what a row asks into requirements that must all be met, with what the errors of the aim change of their readings; empty where it
+/// asks nothing that can be measured. `rows` are those of its function, to which a relative row refers.
 pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, rows: &[Row]) -> Vec<Requirement> {
+    let mut requirements = requirements_as_aimed(photometer, rules, row, rows);
+    let read = |c: &Comparison| photometer.map.read(&c.measurement).value;
+    for ends in &photometer.aim.moved {
+        let ends = ends.map(|end| {
+            let aim = &Aim::at(end);
+            requirements_as_aimed(&Photometer { aim, ..*photometer }, rules, row, rows)
+        });
+        for (k, requirement) in requirements.iter_mut().enumerate() {
+            let count = requirement.comparisons.len();
+            for (j, here) in requirement.comparisons.iter_mut().enumerate() {
+                // Where a direction leaves the field by the turn there is nothing to compare with.
+                let there = ends.iter().map(|end| &end[k].comparisons).filter(|there| there.len() == count);
+                let there: Vec<f64> = there.map(|there| read(&there[j]) - read(here)).collect();
+                let [least, most] =
+                    [there.iter().copied().fold(0.0, f64::min), there.iter().copied().fold(0.0, f64::max)];
+                let towards = if read(here) < here.limit { most } else { -least };
+                let [own, own_towards] = here.by_aim;
+                here.by_aim = [own.hypot(0.5 * (most - least) / SIGMAS), own_towards.hypot(towards / SIGMAS)];
+            }
+        }
+    }
+    requirements
+}
+
+/// The same for the aim as it is, without its errors.
+fn requirements_as_aimed(photometer: &Photometer, rules: &Rules, row: &Row, rows: &[Row]) -> Vec<Requirement> {
     let point = row.h.zip(row.v).map(|(h, v)| [h, v]);
     let ends = (row.h0.zip(row.v0)).zip(row.h1.zip(row.v1));
     let lenient = rules.tolerance_deg > 0.0;
@@ -177,8 +208,15 @@ fn limits_at(row: &Row, measured: &[Measured], any: [bool; 2]) -> Vec<Requiremen
         // A limit that is not given asks for nothing.
         let limit = limit?;
         let seen = measured.iter().filter_map(|(direction, m)| Some((*direction, m.clone()?)));
-        let comparisons: Vec<Comparison> =
-            seen.map(|(direction, measurement)| Comparison { measurement, limit, at_least, direction }).collect();
+        let comparisons: Vec<Comparison> = seen
+            .map(|(direction, measurement)| Comparison {
+                measurement,
+                by_aim: [0.0; 2],
+                limit,
+                at_least,
+                direction,
+            })
+            .collect();
         let unseen = measured.len() - comparisons.len();
         Some(Requirement { comparisons, choices: 1, any, unseen })
     };
@@ -205,7 +243,8 @@ fn sum_requirement(photometer: &Photometer, row: &Row) -> Option<Requirement> {
         return Some(Requirement { comparisons: Vec::new(), choices: 1, any: false, unseen });
     }
     let total = measured.iter().flatten().fold(Measurement::default(), |sum, m| sum.plus(1.0, m));
-    let comparison = Comparison { measurement: total, limit, at_least: true, direction: points[0] };
+    let comparison =
+        Comparison { measurement: total, by_aim: [0.0; 2], limit, at_least: true, direction: points[0] };
     Some(Requirement { comparisons: vec![comparison], choices: 1, any: false, unseen: 0 })
 }
 
@@ -234,6 +273,7 @@ fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Opt
             (Some(measurement), Some(reference)) => requirement.comparisons.push(Comparison {
                 // Errors of cells that both readings share would count twice if the two were judged apart.
                 measurement: measurement.plus(-factor, reference),
+                by_aim: [0.0; 2],
                 limit: 0.0,
                 at_least: bound == Bound::Min,
                 direction,

@@ -118,6 +118,14 @@ impl Row {
         if complete { Ok(()) } else { Err(format!("row {}: {:?} needs {needs}", self.id, self.kind)) }
     }
 
+    /// Whether many directions are measured for it, and not a few.
+    pub(super) fn is_extended(&self) -> bool {
+        match self.kind {
+            RowKind::Line | RowKind::Zone | RowKind::Imax | RowKind::Relative => true,
+            RowKind::Point | RowKind::DistributionPoint | RowKind::Sum | RowKind::GroupSum | RowKind::Note => false,
+        }
+    }
+
     /// Adds a remark behind what there is.
     pub(super) fn add_note(&mut self, remark: &str) {
         self.note = Some(self.note.take().map_or_else(|| remark.to_owned(), |note| format!("{note}; {remark}")));

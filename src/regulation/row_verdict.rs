@@ -3,7 +3,8 @@
 use super::aim::Aim;
 use super::assessment::{Assumptions, RowVerdict};
 use super::judgement::{Judgement, Verdict};
-use super::map::{IntensityMap, Sensor};
+use super::map::IntensityMap;
+use super::opening::Sensor;
 use super::requirement::{Photometer, requirements};
 use super::row::{Row, RowKind};
 use super::table::Regulation;
@@ -20,15 +21,28 @@ pub(super) fn judge_rows(
     sensor: Sensor,
     aim: &Aim,
 ) -> Vec<RowVerdict> {
+    judge_rows_where(map, regulation, assumptions, sensor, aim, |_| true).into_iter().flatten().collect()
+}
+
+/// The same of the rows, by their place in the table, of which `is_asked`; `None` for the others.
+pub(super) fn judge_rows_where(
+    map: &IntensityMap,
+    regulation: &Regulation,
+    assumptions: &Assumptions,
+    sensor: Sensor,
+    aim: &Aim,
+    is_asked: impl Fn(usize) -> bool,
+) -> Vec<Option<RowVerdict>> {
     let photometer = Photometer { map, aim, sensor, tolerance_deg: regulation.rules.tolerance_deg };
     let judge = |row: &Row| judge_row(&photometer, regulation, assumptions, row);
-    let mut rows: Vec<RowVerdict> = regulation.function.rows.iter().map(judge).collect();
+    let all = regulation.function.rows.iter().enumerate();
+    let mut rows: Vec<Option<RowVerdict>> = all.map(|(k, row)| is_asked(k).then(|| judge(row))).collect();
     // Where a point may lean on its group, it does so only if its own minimum is not met.
     let leaning = regulation.function.point_floor() == Some(0.0);
     if leaning {
-        let groups: Vec<(Option<u32>, Option<Verdict>)> =
-            rows.iter().filter(|r| r.row.kind == RowKind::GroupSum).map(|r| (r.row.group, r.verdict)).collect();
-        let points = rows.iter_mut().filter(|r| r.row.kind == RowKind::Point && r.row.group.is_some());
+        let sums = rows.iter().flatten().filter(|r| r.row.kind == RowKind::GroupSum);
+        let groups: Vec<(Option<u32>, Option<Verdict>)> = sums.map(|r| (r.row.group, r.verdict)).collect();
+        let points = rows.iter_mut().flatten().filter(|r| r.row.kind == RowKind::Point && r.row.group.is_some());
         for point in points.filter(|r| r.verdict.is_some_and(|own| own != Verdict::Pass)) {
             let group = groups.iter().find(|g| g.0 == point.row.group).and_then(|g| g.1);
             *point = judge_leaning(&point.row, group, judge);

@@ -18,6 +18,35 @@ pub(super) fn map(intensity: impl Fn(f64, f64) -> f64, statistical: f64, geometr
     IntensityMap::new(h, v, cells).unwrap()
 }
 
+/// The same in cells of any width with their means, by 36 places in each, and without errors.
+pub(super) fn map_of_means(intensity: impl Fn(f64, f64) -> f64, cell: f64) -> IntensityMap {
+    const PLACES: usize = 6;
+    let (h, v) = (edges(10.0, cell), edges(6.0, cell));
+    let places = |e: &[f64]| (0..PLACES).map(|k| e[0] + (e[1] - e[0]) * (k as f64 + 0.5) / PLACES as f64).collect();
+    let places = |edges: &[f64]| edges.windows(2).map(places).collect::<Vec<Vec<f64>>>();
+    let (columns, rows) = (places(&h), places(&v));
+    let mean = |hs: &[f64], vs: &[f64]| {
+        let sum: f64 = vs.iter().flat_map(|v| hs.iter().map(|h| intensity(*h, *v))).sum();
+        sum / (PLACES * PLACES) as f64
+    };
+    let cells = rows.iter().flat_map(|vs| columns.iter().map(|hs| [mean(hs, vs), 0.0, 0.0]));
+    IntensityMap::new(h.clone(), v.clone(), cells.collect()).unwrap()
+}
+
+/// Uniform numbers between 0 and 1, both left out, that follow from a seed.
+pub(super) fn uniform(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+    }
+}
+
+/// A number of the standard normal distribution, by Box and Muller.
+pub(super) fn normal(uniform: &mut impl FnMut() -> f64) -> f64 {
+    (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
+}
+
 /// A passing beam for right-hand traffic: a flat cut-off to the left, 15° up to the right of the elbow, brightest below it.
 pub(super) fn passing(h0: f64, v0: f64) -> impl Fn(f64, f64) -> f64 {
     move |h, v| {

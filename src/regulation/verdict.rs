@@ -2,12 +2,13 @@
 
 use super::aim::Aim;
 use super::assessment::{Assessment, Assumptions};
-use super::few_rays::SIGMAS;
 use super::judgement::Verdict;
-use super::map::{IntensityMap, Sensor};
+use super::map::IntensityMap;
+use super::open_aims::judge_by_open_aims;
+use super::opening::Sensor;
 use super::requirement::Photometer;
 use super::row::{Row, RowKind};
-use super::row_verdict::{judge_row, judge_rows};
+use super::row_verdict::judge_row;
 use super::table::{Realignment, Regulation, Traffic};
 
 /// Step in which turns of a lamp are tried, degrees.
@@ -80,8 +81,10 @@ fn realign(
     // The least turn first: what mends by little is nearer to the lamp as aimed.
     turns.sort_by_key(|(h, v)| h * h + v * v);
     // Rows that failed are asked first: most turns do not mend them.
-    let failed: Vec<&Row> =
+    let mut failed: Vec<&Row> =
         first.rows.iter().filter(|r| r.verdict == Some(Verdict::Fail)).map(|r| &r.row).collect();
+    // Points and sums take least time.
+    failed.sort_by_key(|row| row.is_extended());
     turns.into_iter().find_map(|(h, v)| {
         let aim = first.aim.realigned(REALIGN_STEP_DEG * f64::from(h), REALIGN_STEP_DEG * f64::from(v));
         let photometer = Photometer { map, aim: &aim, sensor, tolerance_deg: regulation.rules.tolerance_deg };
@@ -104,35 +107,7 @@ fn assess_aimed(
     sensor: Sensor,
     aim: Aim,
 ) -> Assessment {
-    let mut rows = judge_rows(map, regulation, assumptions, sensor, &aim);
-    // A lamp that is aimed by noise fails and passes where it should not: a verdict stands where no aim that the errors of the map leave
-    // open has the other one, and what these read beside the aim found is an error of the reading.
-    let mut apart = vec![0.0; rows.len()];
-    for open in aim.open_aims() {
-        if rows.iter().all(|row| matches!(row.verdict, None | Some(Verdict::Unsure))) {
-            break;
-        }
-        let others = judge_rows(map, regulation, assumptions, sensor, &open);
-        for ((row, other), apart) in rows.iter_mut().zip(others).zip(&mut apart) {
-            let stands = match (row.verdict, other.verdict) {
-                // A failure has to be seen at every aim, a pass never to be denied.
-                (Some(Verdict::Fail), other) => other == Some(Verdict::Fail),
-                (Some(Verdict::Pass), other) => other != Some(Verdict::Fail),
-                _ => true,
-            };
-            if !stands {
-                (row.verdict, row.settles) = (Some(Verdict::Unsure), None);
-            }
-            if let (Some(here), Some(there)) = (row.reading, other.reading) {
-                *apart = f64::max(*apart, (there.value - here.value).abs());
-            }
-        }
-    }
-    for (reading, apart) in
-        rows.iter_mut().zip(apart).filter_map(|(row, apart)| Some((row.reading.as_mut()?, apart)))
-    {
-        reading.statistical = reading.statistical.hypot(apart / SIGMAS);
-    }
+    let rows = judge_by_open_aims(map, regulation, assumptions, sensor, &aim);
     // A group of points counts through its points.
     let leaning = regulation.function.point_floor() == Some(0.0);
     let counted = rows.iter().filter(|r| !(leaning && r.row.kind == RowKind::GroupSum));
@@ -149,23 +124,9 @@ fn assess_aimed(
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_lamps::{edges, map, passing};
+    use super::super::test_lamps::{edges, map, normal, passing, uniform};
     use super::*;
     use crate::regulation::assessment::RowVerdict;
-
-    /// Uniform numbers between 0 and 1, both left out, that follow from a seed.
-    fn uniform(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-        }
-    }
-
-    /// A number of the standard normal distribution, by Box and Muller.
-    fn normal(uniform: &mut impl FnMut() -> f64) -> f64 {
-        (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
-    }
 
     fn row(assessment: &Assessment, id: &str) -> RowVerdict {
         assessment.rows.iter().find(|r| r.row.id == id).unwrap().clone()

@@ -177,7 +177,7 @@ mod tests {
         let row = regulation.function.rows.drain(..).next().unwrap();
         let direction = Some([3.5, 0.5]);
         let rows = vec![RowVerdict { row, reading: None, direction, verdict: None, settles: None, unseen: 0 }];
-        let aim = Aim { h_deg: 0.5, v_deg: 0.25, gradient: None, how: String::new(), rivals: vec![] };
+        let aim = Aim { h_deg: 0.5, v_deg: 0.25, ..Aim::default() };
         let (traffic, verdict) = (Traffic::Left, Verdict::Pass);
         let a = Assessment { regulation, traffic, aim, sensor_deg: 0.1, rows, verdict };
         let axis = |half: f64| Axis { label: "H".into(), unit: "deg".into(), range: [-half, half], cells: 40 };
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn verdicts_on_one_far_field_have_names_of_their_own() {
-        let aim = Aim { h_deg: 0.0, v_deg: 0.0, gradient: None, how: "as placed".into(), rivals: vec![] };
+        let aim = Aim { how: "as placed".into(), ..Aim::default() };
         let by = |id: &str| {
             let regulation = Regulation::find(id).unwrap();
             let (traffic, verdict) = (Traffic::Right, Verdict::Pass);

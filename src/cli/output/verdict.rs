@@ -80,7 +80,7 @@ mod tests {
     fn what_tables_remark_stands_below_and_settles_nothing() {
         let mut regulation = Regulation::find("FMVSS 108 stop").unwrap();
         let rows: Vec<RowVerdict> = regulation.function.rows.drain(..).map(passed).collect();
-        let aim = Aim { h_deg: 0.0, v_deg: 0.0, gradient: None, how: String::new(), rivals: vec![] };
+        let aim = Aim::default();
         let (traffic, verdict) = (Traffic::Right, Verdict::Pass);
         let a = Assessment { regulation, traffic, aim, sensor_deg: 0.1, rows, verdict };
         let notes = notes(&a);

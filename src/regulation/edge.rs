@@ -1,0 +1,225 @@
+//! Where light falls off most along a scan: the cut-off of a beam, and its elbow.
+
+use super::few_rays::SIGMAS;
+use super::map::IntensityMap;
+use super::opening::Measurement;
+
+/// Step of the scans, degrees (UN R149, Annex 5, §2.3.1).
+const STEP_DEG: f64 = 0.05;
+
+/// Distance over which the gradient G = log₁₀ E(b) − log₁₀ E(b + 0.1°) is taken, degrees (§2.3.1).
+const GRADIENT_DEG: f64 = 0.1;
+
+/// Half the opening that scans are made with, degrees: a detector of 30 mm at 25 m, however wide the cells are.
+pub(super) const SCAN_HALF_DEG: f64 = 0.0344;
+
+/// Light that a photometer cannot tell from darkness, as a share of the brightest on the scan: without it the gradient would be
+/// steepest where the last ray of a simulation fell, not at the edge of the light.
+const DARK_SHARE: f64 = 0.01;
+
+/// Share of an edge's gradient from which on a place beside it counts to its middle: half of it, as for the width of a peak.
+const SHARE_OF_EDGE: f64 = 0.5;
+
+/// Places nearer than this to an edge are part of it, degrees: as wide as an edge of light is that passes for a cut-off. Their weight falls
+/// towards there, so that no place moves the middle by coming in or leaving.
+const SAME_EDGE_DEG: f64 = 0.25;
+
+/// Rounds of the search for an edge's middle, each of which brings it at least as near again.
+const ROUNDS: usize = 12;
+
+/// The middle of an edge is moved by its places' noise, and its window with it, which adds to that: at most so many times.
+const MOST_FEEDBACK: f64 = 5.0;
+
+/// Open places nearer than this to each other are looked at as one, degrees.
+const SAME_PLACE_DEG: f64 = 2.0 * STEP_DEG;
+
+/// An edge is the border of a bright and a dark area: for half a degree light does not fall again on its one side, nor rise on its
+/// other, so that their means differ by no less than the light right beside it.
+const AREA_DEG: f64 = 0.5;
+
+/// The steepest place of a scan.
+pub(super) struct Edge {
+    /// Its angle, degrees.
+    pub(super) position: f64,
+    /// Standard error of that from the noise of the map, degrees.
+    pub(super) position_error: f64,
+    /// The gradient G there.
+    pub(super) gradient: f64,
+    /// The least gradient of an edge of this kind.
+    least: f64,
+    /// Whether its gradient may be below that but for noise.
+    pub(super) may_be_none: bool,
+    /// Other places, degrees, that the errors of the map leave open: as steep within [`SIGMAS`], and an edge. No open place is farther from
+    /// all of these than [`SAME_PLACE_DEG`].
+    pub(super) rivals: Vec<f64>,
+}
+
+impl Edge {
+    /// Whether it is steep enough to be one.
+    pub(super) fn is_found(&self) -> bool {
+        self.gradient >= self.least
+    }
+}
+
+/// A way along which an edge is looked for.
+pub(super) struct Scan {
+    /// Angles, degrees.
+    pub(super) range: [f64; 2],
+    /// 1 where light falls towards larger angles, −1 towards smaller ones.
+    pub(super) sign: f64,
+    /// Half the opening across and up, degrees.
+    pub(super) half_deg: [f64; 2],
+    /// Least gradient of an edge.
+    pub(super) least: f64,
+}
+
+/// A place of a scan with its gradient.
+struct Slope {
+    angle: f64,
+    gradient: f64,
+    /// A gradient that is reached next to it, and by how much that may be smaller, at [`SIGMAS`].
+    reached: [f64; 2],
+    /// Gradients that it cannot pass, each with how much greater that may be at [`SIGMAS`]: its own, and that between the areas beside it.
+    bounds: [[f64; 2]; 2],
+    /// What the gradient adds up, to first order in the light of the cells: for the error of the edge's middle.
+    linear: Measurement,
+}
+
+impl Slope {
+    /// The gradient that is surely reached next to it.
+    fn sure(&self) -> f64 {
+        self.reached[0] - self.reached[1]
+    }
+
+    /// Whether its gradient may be as great as that, which may itself be smaller by `less`.
+    fn may_reach(&self, [gradient, less]: [f64; 2]) -> bool {
+        self.bounds.iter().all(|[most, more]| most + more.hypot(less) >= gradient)
+    }
+}
+
+/// Light on one side of a place: its value and standard error, cd.
+type Light = [f64; 2];
+
+impl Scan {
+    /// Finds the steepest fall of log₁₀ E along the scan, of those that are sure; `direction` gives H and V of an angle. `None` where
+    /// the map does not hold two steps of it.
+    pub(super) fn steepest_edge(&self, map: &IntensityMap, direction: impl Fn(f64) -> [f64; 2]) -> Option<Edge> {
+        let slopes = self.slopes(map, direction);
+        let sure = slopes.iter().max_by(|a, b| a.sure().total_cmp(&b.sure()))?;
+        let beside = slopes.iter().filter(|s| (s.angle - sure.angle).abs() < SAME_EDGE_DEG);
+        let best = beside.max_by(|a, b| a.gradient.total_cmp(&b.gradient))?;
+        let (position, moved) = middle_of_edge(&slopes, best);
+        // Places that may be steeper, and an edge, but for noise.
+        let open = (slopes.iter().filter(|s| (s.angle - position).abs() >= SAME_EDGE_DEG))
+            .filter(|s| s.may_reach([self.least, 0.0]) && s.may_reach(sure.reached));
+        let mut rivals: Vec<f64> = Vec::new();
+        for place in open.map(|s| s.angle) {
+            if rivals.last().is_none_or(|last| place - last > SAME_PLACE_DEG) {
+                rivals.push(place);
+            }
+        }
+        // Of what is no edge as it stands, but may be one.
+        if best.gradient < self.least && best.may_reach([self.least, 0.0]) {
+            rivals.push(position);
+        }
+        Some(Edge {
+            position,
+            position_error: map.read(&moved).known_error(),
+            gradient: best.gradient,
+            least: self.least,
+            may_be_none: sure.sure() < self.least,
+            rivals,
+        })
+    }
+
+    /// Returns the gradients at all places of the scan that the map holds, by angle.
+    fn slopes(&self, map: &IntensityMap, direction: impl Fn(f64) -> [f64; 2]) -> Vec<Slope> {
+        let steps = ((self.range[1] - self.range[0]) / STEP_DEG).round() as usize;
+        let angles = (0..=steps).map(|k| self.range[0] + STEP_DEG * k as f64);
+        let readings: Vec<(f64, Measurement, f64)> = angles
+            .filter_map(|angle| {
+                // Places outside the far field are left out; fewer than two steps make no edge.
+                let measurement = map.measure_slit(self.half_deg, direction(angle))?;
+                let value = map.read(&measurement).value;
+                Some((angle, measurement, value))
+            })
+            .collect();
+        let brightest = readings.iter().map(|r| r.2).fold(0.0, f64::max);
+        // The dark share bounds the logarithm, which has no end at zero. A scan that meets no light at all is flat.
+        let dark = DARK_SHARE * brightest;
+        let lit = |value: f64| if dark > 0.0 { value.max(0.0) + dark } else { 1.0 };
+        // The fall of log₁₀ E between two lights, and how much less and more it may be.
+        let fall = |bright: Light, faint: Light| {
+            let up = |[value, error]: Light| (lit(value + SIGMAS * error) / lit(value)).log10();
+            let down = |[value, error]: Light| (lit(value) / lit(value - SIGMAS * error)).log10();
+            let decades = (lit(bright[0]) / lit(faint[0])).log10();
+            [decades, down(bright).hypot(up(faint)), up(bright).hypot(down(faint))]
+        };
+        let fall =
+            |[below, above]: [Light; 2]| if self.sign > 0.0 { fall(below, above) } else { fall(above, below) };
+        let lights: Vec<Light> = readings.iter().map(|r| map.read_with_dark(&r.1)).collect();
+        let mean = |places: std::ops::RangeInclusive<usize>| -> Light {
+            let share = 1.0 / places.clone().count() as f64;
+            map.read_with_dark(
+                &readings[places].iter().fold(Measurement::default(), |sum, r| sum.plus(share, &r.1)),
+            )
+        };
+        let span = (GRADIENT_DEG / STEP_DEG).round() as usize;
+        let area = (AREA_DEG / STEP_DEG).round() as usize;
+        let last = readings.len().saturating_sub(1);
+        let slope = |k: usize| {
+            let (low, high) = (k, k + span);
+            let [steepness, _, more] = fall([lights[low], lights[high]]);
+            let [most, _, most_more] =
+                fall([mean(low.saturating_sub(area)..=low), mean(high..=(high + area).min(last))]);
+            // Over several steps light falls as steeply in one of them at least as on the mean of all.
+            let reached = (0..=low.min(last - high).min(area / 2 - 1)).map(|more| {
+                let steps = (span + 2 * more) as f64 / span as f64;
+                let [decades, less, _] = fall([lights[low - more], lights[high + more]]);
+                [decades / steps, less / steps]
+            });
+            let reached = reached
+                .max_by(|a, b| (a[0] - a[1]).total_cmp(&(b[0] - b[1])))
+                .unwrap_or([steepness, f64::INFINITY]);
+            // d log₁₀ E = dE / (E ln 10).
+            let share = |value: f64| self.sign / (lit(value) * std::f64::consts::LN_10);
+            let (first, last) = (&readings[low], &readings[high]);
+            Slope {
+                // The gradient belongs to the middle of its distance.
+                angle: 0.5 * (first.0 + last.0),
+                gradient: steepness,
+                reached,
+                bounds: [[steepness, more], [most, most_more]],
+                linear: Measurement::default().plus(share(first.2), &first.1).plus(-share(last.2), &last.1),
+            }
+        };
+        (0..readings.len().saturating_sub(span)).map(slope).collect()
+    }
+}
+
+/// Returns the middle of the edge around its steepest place, degrees, and what that adds up, to first order: the mean of the places,
+/// weighed by what they have above half the steepest gradient and by how near they are.
+fn middle_of_edge(slopes: &[Slope], best: &Slope) -> (f64, Measurement) {
+    let steep = |s: &Slope| (s.gradient - SHARE_OF_EDGE * best.gradient).max(0.0);
+    let near = |s: &Slope, middle: f64| (1.0 - ((s.angle - middle) / SAME_EDGE_DEG).powi(2)).max(0.0);
+    let mut middle = best.angle;
+    let mut weight = 0.0;
+    for _ in 0..ROUNDS {
+        weight = slopes.iter().map(|s| steep(s) * near(s, middle)).sum();
+        // A flat scan has no middle but where it was taken.
+        if best.gradient <= 0.0 || weight <= 0.0 {
+            return (best.angle, Measurement::default());
+        }
+        middle = slopes.iter().map(|s| steep(s) * near(s, middle) * s.angle).sum::<f64>() / weight;
+    }
+    let mut moved = Measurement::default();
+    let mut follows = 0.0;
+    for s in slopes.iter().filter(|s| steep(s) * near(s, middle) > 0.0) {
+        let lever = (s.angle - middle) / weight;
+        moved = moved.plus(lever * near(s, middle), &s.linear);
+        moved = moved.plus(-lever * near(s, middle) * SHARE_OF_EDGE, &best.linear);
+        follows += steep(s) * 2.0 * lever * (s.angle - middle) / SAME_EDGE_DEG.powi(2);
+    }
+    let feedback = 1.0 / (1.0 - follows).max(1.0 / MOST_FEEDBACK);
+    (middle, Measurement::default().plus(feedback, &moved))
+}

@@ -1,0 +1,80 @@
+//! Rows judged by every aim that the errors of a map leave open.
+
+use super::aim::Aim;
+use super::assessment::{Assumptions, RowVerdict};
+use super::few_rays::SIGMAS;
+use super::judgement::Verdict;
+use super::map::IntensityMap;
+use super::opening::Sensor;
+use super::row_verdict::{judge_rows, judge_rows_where};
+use super::table::Regulation;
+
+/// Most open aims by which rows of many directions are judged, each of which takes as long as a hundred points: of more, so many that lie
+/// among all of them.
+const MOST_FOR_EXTENDED: usize = 30;
+
+/// Judges all rows as the map is aimed, and then by the other aims that its errors leave open. A lamp that is aimed by noise fails and
+/// passes where it should not: a verdict stands where every open aim has it, and what these read is an error of the reading.
+pub(super) fn judge_by_open_aims(
+    map: &IntensityMap,
+    regulation: &Regulation,
+    assumptions: &Assumptions,
+    sensor: Sensor,
+    aim: &Aim,
+) -> Vec<RowVerdict> {
+    let mut rows = judge_rows(map, regulation, assumptions, sensor, aim);
+    // A standard error of which three reach as far as any other aim reads, with three errors of that.
+    let mut spread = vec![0.0; rows.len()];
+    // All of them are asked, for what a row's error is must not hang on which comes first.
+    let every = aim.rivals.len().div_ceil(MOST_FOR_EXTENDED).max(1);
+    for (k, open) in aim.open_aims().enumerate() {
+        let is_asked = |row: usize| k % every == 0 || !regulation.function.rows[row].is_extended();
+        let others = judge_rows_where(map, regulation, assumptions, sensor, &open, is_asked);
+        for ((row, other), spread) in rows.iter_mut().zip(others).zip(&mut spread) {
+            let Some(other) = other else { continue };
+            if row.verdict != other.verdict && row.verdict != Some(Verdict::Unsure) {
+                (row.verdict, row.settles) = (Some(Verdict::Unsure), None);
+            }
+            if let (Some(here), Some(there)) = (row.reading, other.reading) {
+                *spread = f64::max(*spread, (there.value - here.value).abs() / SIGMAS + there.known_error());
+            }
+        }
+    }
+    for (reading, spread) in
+        rows.iter_mut().zip(spread).filter_map(|(row, spread)| Some((row.reading.as_mut()?, spread)))
+    {
+        // What facets change is part of both readings; where nobody knows it, it is in neither.
+        let facets = reading.geometric.map_or(0.0, |geometric| geometric.powi(2));
+        let apart = (spread.powi(2) - facets).max(0.0).sqrt();
+        reading.statistical = reading.statistical.max(apart);
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_lamps::map;
+    use super::*;
+
+    /// Light that falls by 1500 cd a degree reads 10,275 cd where 10,100 cd are the least, and 10,100 cd by an aim that is 7/60° beside.
+    #[test]
+    fn a_verdict_stands_by_every_open_aim_whatever_their_order() {
+        let mut regulation = Regulation::find("UN R112 B passing").unwrap();
+        regulation.function.rows.retain(|row| row.id == "75R");
+        let h = regulation.function.rows[0].h.unwrap();
+        let lamp = map(|at, _| 10_275.0 - 1500.0 * (at - h), 1e-3, 0.0);
+        let sensor = Sensor { half_deg: 0.0745, round: false };
+        let judged = |rivals: &[f64]| {
+            let aim = Aim { rivals: rivals.iter().map(|h| [*h, 0.0]).collect(), ..Aim::default() };
+            let row = judge_by_open_aims(&lamp, &regulation, &Assumptions::default(), sensor, &aim).remove(0);
+            (row.verdict.unwrap(), row.reading.unwrap())
+        };
+        assert_eq!(judged(&[-1.0]).0, Verdict::Pass);
+        let (verdict, reading) = judged(&[7.0 / 60.0]);
+        assert_eq!(verdict, Verdict::Unsure);
+        // What makes it unsure is an error of the reading, three of which reach the limit.
+        assert!((reading.value - 10_275.0).abs() < 1.0 && 3.0 * reading.known_error() >= 175.0, "{reading:?}");
+        assert_eq!(judged(&[7.0 / 60.0, 2.0]).1, judged(&[2.0, 7.0 / 60.0]).1);
+        assert!(judged(&[2.0]).1.known_error() >= 1000.0);
+    }
+}
