@@ -8,7 +8,9 @@ impl Assessment {
     /// in cd, null for what is `None`. For left-hand traffic directions and aim are those of the mirrored lamp, as in the tables.
     pub fn document(&self) -> Value {
         let rows = self.rows.iter().map(|r| {
-            let settles = r.settles.map(|s| json!({"rays": s.rays, "tolerance_mm": s.tolerance_mm}));
+            let settles = r.settles.map(
+                |s| json!({"rays": s.rays, "tolerance_share": s.tolerance_share, "tolerance_mm": s.tolerance_mm}),
+            );
             json!({
                 "id": r.row.id, "kind": r.row.kind,
                 "h_deg": r.direction.map(|d| d[0]), "v_deg": r.direction.map(|d| d[1]),

@@ -38,7 +38,9 @@ impl std::fmt::Display for Verdict {
 pub struct Settles {
     /// Rays in all that bring the statistical error down far enough.
     pub rays: u64,
-    /// Tolerance of the facets, mm, where the geometric error must come down too.
+    /// Share of the facets' tolerance that they may have left, where the geometric error must come down too.
+    pub tolerance_share: Option<f64>,
+    /// That tolerance, mm, where the run's own is known.
     pub tolerance_mm: Option<f64>,
 }
 
@@ -72,8 +74,8 @@ const BISECTIONS: usize = 16;
 impl Decisive {
     /// Returns with how many rays in all, never fewer than `traced`, and on facets of which tolerance this margin would be enough.
     ///
-    /// `tolerance_mm` is the run's own, `None` where it traced no facets; the answer's is `None` where facets need not be finer. `None`
-    /// where 10¹⁵ rays or more would be needed, and where it is not known what facets change.
+    /// `tolerance_mm` is the run's own, `None` where it is not known. `None` where 10¹⁵ rays or more would be needed, and where it is not
+    /// known what facets change.
     pub(super) fn what_settles(&self, traced: u64, tolerance_mm: Option<f64>) -> Option<Settles> {
         /// Runs beyond this are no advice.
         const MOST_RAYS: f64 = 1e15;
@@ -101,8 +103,13 @@ impl Decisive {
             }
         }
         let rays = (traced as f64 * doublings.exp2()).ceil();
-        let tolerance_mm = tolerance_mm.filter(|_| finer).map(|t| t * room / geometric);
-        (rays.is_finite() && rays < MOST_RAYS).then_some(Settles { rays: rays as u64, tolerance_mm })
+        let tolerance_share = finer.then_some(room / geometric);
+        let tolerance_mm = tolerance_mm.zip(tolerance_share).map(|(traced, share)| traced * share);
+        (rays.is_finite() && rays < MOST_RAYS).then_some(Settles {
+            rays: rays as u64,
+            tolerance_share,
+            tolerance_mm,
+        })
     }
 }
 
@@ -205,6 +212,24 @@ mod tests {
         // Without a statistical error, zero by zero must not become the rays already traced and facets of 0 mm.
         for (statistical, geometric) in [(0.0, 0.1), (0.1, 0.0), (0.1, 0.1)] {
             assert_eq!(on_limit(statistical, geometric), None);
+        }
+    }
+
+    /// A geometric error of three times the margin's third leaves no room: it must come down to 1/√2 of that, known tolerance or not.
+    #[test]
+    fn facets_are_asked_to_be_finer_where_their_tolerance_is_not_known() {
+        let reading = Reading { value: 1.0, statistical: 0.1, geometric: Some(1.0) };
+        let unsure = Decisive {
+            reading,
+            direction: [0.0; 2],
+            margin: 1.0,
+            sigmas: 3.0,
+            noise: Noise { other: 0.01, ..NONE },
+        };
+        for (tolerance_mm, finer_mm) in [(None, None), (Some(0.3), Some(0.1 * 0.5f64.sqrt()))] {
+            let settles = unsure.what_settles(1000, tolerance_mm).unwrap();
+            assert!((settles.tolerance_share.unwrap() - 0.5f64.sqrt() / 3.0).abs() < 1e-12);
+            assert_eq!(settles.tolerance_mm.map(|t| (1e9 * t).round()), finer_mm.map(|t| (1e9 * t).round()));
         }
     }
 

@@ -61,7 +61,11 @@ pub fn settling_text(row: &RowVerdict) -> String {
     }
     let Some(settles) = row.settles else { return String::new() };
     let rays = format!("{:.1e} rays", settles.rays as f64);
-    settles.tolerance_mm.map_or(rays.clone(), |t| format!("{rays}, {} mm", figures(t, 2)))
+    match (settles.tolerance_mm, settles.tolerance_share) {
+        (Some(tolerance), _) => format!("{rays}, {} mm", figures(tolerance, 2)),
+        (None, Some(share)) => format!("{rays}, facets {} times as fine", figures(1.0 / share, 2)),
+        (None, None) => rays,
+    }
 }
 
 /// Returns what the table or its rules remark on a row that was judged; `None` where they remark nothing, or nothing was judged.
