@@ -30,6 +30,7 @@ mod table;
 #[cfg(test)]
 mod test_lamps;
 mod verdict;
+mod zone;
 
 pub use aim::Aim;
 pub use assessment::{Assessment, Assumptions, RowVerdict};

@@ -6,6 +6,7 @@ use super::map::IntensityMap;
 use super::opening::{Measurement, Sensor};
 use super::row::{Bound, Row, RowKind};
 use super::table::Rules;
+use super::zone::zone_holds;
 
 /// One reading compared with one limit.
 #[derive(Clone, Debug)]
@@ -49,7 +50,7 @@ type Measured = ([f64; 2], Option<Measurement>);
 /// Zones and lines end here, degrees from the middle: what the texts leave open to 90° is behind the lamp's own rim.
 const MOST_DEG: f64 = 88.0;
 
-/// Directions within which a row may be met: rings of this many.
+/// Directions on a ring around one.
 const TOLERANCE_RING: usize = 8;
 
 impl Photometer<'_> {
@@ -66,18 +67,7 @@ impl Photometer<'_> {
 
     /// A point's own direction, then those around it within the tolerance where the regulation lets it be met nearby; degrees of the table.
     fn near_directions(&self, direction: [f64; 2]) -> Vec<[f64; 2]> {
-        let mut directions = vec![direction];
-        if self.tolerance_deg > 0.0 {
-            // Two rings: a smooth beam is met between them if at all.
-            for ring in [0.5, 1.0] {
-                directions.extend((0..TOLERANCE_RING).map(|k| {
-                    let (sin, cos) = (std::f64::consts::TAU * k as f64 / TOLERANCE_RING as f64).sin_cos();
-                    let radius = ring * self.tolerance_deg;
-                    [direction[0] + radius * cos, direction[1] + radius * sin]
-                }));
-            }
-        }
-        directions
+        if self.tolerance_deg > 0.0 { rings_around(direction, self.tolerance_deg) } else { vec![direction] }
     }
 
     /// Directions along a line, both ends included, at most half an opening apart, degrees of the table; none beyond [`MOST_DEG`].
@@ -115,7 +105,7 @@ impl Photometer<'_> {
         for j in 0..count(v) {
             for i in 0..count(h) {
                 let direction = [place(h, i), place(v, j)];
-                if !contains(polygon, direction) {
+                if !zone_holds(polygon, direction) {
                     continue;
                 }
                 match self.measure(direction) {
@@ -148,6 +138,20 @@ impl Photometer<'_> {
         let read = all.into_iter().filter_map(|(_, m)| m.map(|m| (self.map.read(&m).value, m)));
         read.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, brightest)| (brightest, choices))
     }
+}
+
+/// A direction and those on two rings around it, of this radius and of half of it, degrees: a smooth beam is as bright as is asked there if
+/// anywhere within.
+fn rings_around(direction: [f64; 2], radius_deg: f64) -> Vec<[f64; 2]> {
+    let mut directions = vec![direction];
+    for ring in [0.5, 1.0] {
+        directions.extend((0..TOLERANCE_RING).map(|k| {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / TOLERANCE_RING as f64).sin_cos();
+            let radius = ring * radius_deg;
+            [direction[0] + radius * cos, direction[1] + radius * sin]
+        }));
+    }
+    directions
 }
 
 /// Turns what a row asks into requirements that must all be met, with what the errors of the aim change of their readings; empty where it
@@ -191,9 +195,17 @@ fn requirements_as_aimed(photometer: &Photometer, rules: &Rules, row: &Row, rows
             let directions = ends.map(|((h0, v0), (h1, v1))| photometer.line_directions([h0, v0], [h1, v1]));
             limits_over(row, directions.map(|directions| (photometer.measure_each(directions), true)))
         }
-        RowKind::Zone => limits_over(row, row.polygon.as_deref().map(|p| photometer.measure_zone(p))),
+        RowKind::Zone => match (row.polygon.as_deref().map(|p| photometer.measure_zone(p)), row.spot_radius_deg) {
+            (Some((measured, complete)), Some(radius)) => {
+                counting_unseen(limits_beside_spots(photometer, row, radius, measured, false), complete)
+            }
+            (place, _) => limits_over(row, place),
+        },
         // Some direction must reach the least maximum, and none may pass the greatest.
-        RowKind::Imax => limits_at(row, &photometer.measure_all(), [true, false]),
+        RowKind::Imax => match row.spot_radius_deg {
+            None => limits_at(row, &photometer.measure_all(), [true, false]),
+            Some(radius) => limits_beside_spots(photometer, row, radius, photometer.measure_all(), true),
+        },
         RowKind::Sum | RowKind::GroupSum => sum_requirement(photometer, row).into_iter().collect(),
         RowKind::Relative => relative_requirement(photometer, row, rows).into_iter().collect(),
         RowKind::Note => Vec::new(),
@@ -223,11 +235,38 @@ fn limits_at(row: &Row, measured: &[Measured], any: [bool; 2]) -> Vec<Requiremen
     limits.into_iter().filter_map(requirement).collect()
 }
 
+/// The requirements of directions where a spot of this radius, degrees, may be brighter than the greatest value: around each direction that
+/// is, one is not. `any_least` says whether the least value is enough in one direction.
+fn limits_beside_spots(
+    photometer: &Photometer,
+    row: &Row,
+    radius_deg: f64,
+    all: Vec<Measured>,
+    any_least: bool,
+) -> Vec<Requirement> {
+    let greatest = row.max.unwrap_or(f64::INFINITY);
+    let exceeds = |m: &Option<Measurement>| m.as_ref().is_some_and(|m| photometer.map.read(m).value > greatest);
+    let least = Row { max: None, ..row.clone() };
+    let most = Row { min: None, ..row.clone() };
+    let mut requirements = limits_at(&least, &all, [any_least, false]);
+    let (brighter, others): (Vec<Measured>, Vec<Measured>) = all.into_iter().partition(|(_, m)| exceeds(m));
+    requirements.extend(limits_at(&most, &others, [true, false]));
+    for (direction, _) in brighter {
+        let around = photometer.measure_each(rings_around(direction, radius_deg));
+        requirements.extend(limits_at(&most, &around, [true, true]));
+    }
+    requirements
+}
+
 /// The requirements of a row's least and greatest value over all directions of a line or zone, given with whether the far field holds them
 /// all. A row that does not say where counts as not seen: nothing that was read can meet it.
 fn limits_over(row: &Row, place: Option<(Vec<Measured>, bool)>) -> Vec<Requirement> {
     let (measured, complete) = place.unwrap_or((Vec::new(), false));
-    let mut requirements = limits_at(row, &measured, [false; 2]);
+    counting_unseen(limits_at(row, &measured, [false; 2]), complete)
+}
+
+/// The same requirements with one direction more that is not seen, where the far field does not hold them all.
+fn counting_unseen(mut requirements: Vec<Requirement>, complete: bool) -> Vec<Requirement> {
     requirements.iter_mut().for_each(|r| r.unseen += usize::from(!complete));
     requirements
 }
@@ -284,27 +323,6 @@ fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Opt
     Some(requirement)
 }
 
-/// Whether a point lies in a polygon, by even and odd crossings, or within 1e-4° of its rim.
-fn contains(polygon: &[[f64; 2]], p: [f64; 2]) -> bool {
-    /// Degrees by which a direction may lie outside: a thousandth of the finest sensor.
-    const RIM_DEG: f64 = 1e-4;
-    let mut inside = false;
-    for (k, a) in polygon.iter().enumerate() {
-        let b = polygon[(k + 1) % polygon.len()];
-        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-        // The nearest point of the side: rounding must not throw corners of the zone out.
-        let t = (((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
-        if (p[0] - a[0] - t * dx).hypot(p[1] - a[1] - t * dy) <= RIM_DEG {
-            return true;
-        }
-        // Each side that a ray to the right crosses changes between inside and outside (even–odd).
-        if (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + dx * (p[1] - a[1]) / dy {
-            inside = !inside;
-        }
-    }
-    inside
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -350,24 +368,5 @@ mod tests {
             photometer.measure_zone(&[[-9.5, low], [9.5, low], [9.5, low + 10.0], [-9.5, low + 10.0]]).1
         };
         assert!(held(-5.0) && !held(70.0));
-    }
-
-    #[test]
-    fn a_polygon_holds_its_inside_and_its_rim() {
-        let zone =
-            [[-8.0, 1.0], [-8.0, 4.0], [8.0, 4.0], [8.0, 2.0], [6.0, 1.5], [1.5, 1.5], [0.0, 0.0], [-4.0, 0.0]];
-        for (p, inside) in [
-            ([0.0, 2.0], true),
-            ([0.0, 0.0], true),
-            ([-8.0, 1.0], true),
-            ([7.0, 1.75], true),
-            ([7.0, 1.5], false),
-            ([2.0, 1.0], false),
-            ([-7.0, 0.1], false),
-            ([0.75, 0.75], true),
-            ([9.0, 3.0], false),
-        ] {
-            assert_eq!(contains(&zone, p), inside, "{p:?}");
-        }
     }
 }

@@ -1,5 +1,6 @@
 //! One requirement of a regulation: what is asked, where, and where the figure comes from.
 
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// What a row asks about.
@@ -37,7 +38,9 @@ pub(super) enum Bound {
 }
 
 /// One requirement.
+// A key that nothing here reads would be a rule that is not kept.
 #[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Row {
     /// What it asks about.
     #[serde(deserialize_with = "row_kind")]
@@ -61,6 +64,8 @@ pub struct Row {
     pub min: Option<f64>,
     /// Greatest intensity, candela.
     pub max: Option<f64>,
+    /// Of the greatest intensity of all: the radius of a spot, degrees, that may be brighter.
+    pub(super) spot_radius_deg: Option<f64>,
     /// Of a relative row: the side of the limit, the factor, and the row that it is a multiple of, or `imax`.
     #[serde(default, deserialize_with = "bound")]
     pub(super) bound: Option<Bound>,
@@ -76,6 +81,13 @@ pub struct Row {
     pub source: String,
     /// `two` where a second source was compared, `one` otherwise.
     pub evidence: String,
+    /// How a minimum came about, how a zone is walked and what a note asks: words of the tables of which nothing is measured.
+    #[serde(rename = "percent")]
+    pub(super) _percent: Option<IgnoredAny>,
+    #[serde(rename = "measure")]
+    pub(super) _measure: Option<IgnoredAny>,
+    #[serde(rename = "text")]
+    pub(super) _text: Option<IgnoredAny>,
 }
 
 fn row_kind<'de, D: Deserializer<'de>>(value: D) -> Result<RowKind, D::Error> {
@@ -115,6 +127,13 @@ impl Row {
             }
             RowKind::Note => (!has_limit && self.factor.is_none(), "nothing that is measured"),
         };
+        let may_have_spots = matches!(self.kind, RowKind::Imax | RowKind::Zone) && self.max.is_some();
+        if !self.spot_radius_deg.is_none_or(|radius| may_have_spots && radius > 0.0) {
+            return Err(format!(
+                "row {}: a spot_radius_deg above 0 belongs to the max of a zone or an imax",
+                self.id
+            ));
+        }
         if complete { Ok(()) } else { Err(format!("row {}: {:?} needs {needs}", self.id, self.kind)) }
     }
 

@@ -344,6 +344,15 @@ mod tests {
     }
 
     #[test]
+    fn a_key_that_no_rule_reads_is_refused() {
+        let row =
+            r#"{"kind": "imax", "id": "M", "max": 300, "spot_radius_deg": 0.5, "source": "", "evidence": "one"}"#;
+        assert_eq!(serde_json::from_str::<Row>(row).unwrap().spot_radius_deg, Some(0.5));
+        let misspelt = row.replace("spot_radius_deg", "spot_radius");
+        assert!(serde_json::from_str::<Row>(&misspelt).unwrap_err().to_string().contains("`spot_radius`"));
+    }
+
+    #[test]
     fn each_regulation_measures_in_its_own_way() {
         let rules = |id: &str| Regulation::find(id).unwrap().rules;
         let passing = rules("UN R112 B passing");

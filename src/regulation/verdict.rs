@@ -287,6 +287,23 @@ mod tests {
         assert_eq!(verdicts(assessed(&|_, _| 100.0)), (Verdict::Fail, Verdict::Fail));
     }
 
+    /// A tail lamp's maximum may be passed in a spot of 0.5° radius, not over more.
+    #[test]
+    fn a_spot_may_be_brighter_than_the_maximum_where_the_table_says_so() {
+        let mut regulation = Regulation::find("FMVSS 108 stop-1").unwrap();
+        regulation.function.rows.retain(|row| row.kind == RowKind::Imax);
+        let [maximum] = &regulation.function.rows[..] else { panic!("one maximum") };
+        let (limit, radius) = (maximum.max.unwrap(), maximum.spot_radius_deg.unwrap());
+        assert_eq!((limit, radius), (300.0, 0.5));
+        let verdict = |spot_deg: f64, brightness: f64| {
+            let lamp = |h: f64, v: f64| limit * if (h - 2.0).hypot(v + 1.0) < spot_deg { brightness } else { 0.5 };
+            assess(&map(lamp, 1e-3, 0.0), &regulation, &Assumptions::default()).unwrap().verdict
+        };
+        assert_eq!(verdict(0.3, 2.0), Verdict::Pass);
+        assert_eq!(verdict(1.0, 2.0), Verdict::Fail);
+        assert_eq!(verdict(1.0, 0.9), Verdict::Pass);
+    }
+
     /// Noise of the dark side looks like elbows: a row that fails or passes by one of these alone is unsure.
     #[test]
     fn no_verdict_is_sure_by_an_aim_that_may_be_noise() {

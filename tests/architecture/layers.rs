@@ -69,6 +69,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "read",
             "edge",
             "aim",
+            "zone",
             "requirement",
             "judgement",
             "assessment",
