@@ -109,6 +109,15 @@ const PLAIN_TYPES: [(&str, &str); 6] = [
 /// own types, with an example where a list or table belongs; other messages stay. `key` is that of the value, empty where not known.
 fn type_error(message: &str, key: &str) -> Error {
     let message = message.trim();
+    // A list that is too short is of the right form.
+    let lengths =
+        message.strip_prefix("invalid length ").and_then(|m| m.split_once(", expected an array of length "));
+    if let Some((given, wanted)) = lengths.and_then(|(given, wanted)| Some((given, wanted.parse::<usize>().ok()?)))
+    {
+        let error = Error::new(ErrorKind::Syntax, format!("{given} in a list where {wanted} values belong"));
+        let values = vec!["…"; wanted].join(", ");
+        return if key.is_empty() { error } else { error.help(format!("write {key} = [{values}]")) };
+    }
     // The key is asked first: a list has its own form, which the type does not tell.
     if let Some((_, help)) = LISTS.iter().find(|(list, _)| *list == key) {
         let message = message.replace("a sequence", "a list").replace("an array", "a list");

@@ -48,7 +48,7 @@ pub struct Receiver {
     pub v_deg: [f64; 2],
     /// What is counted besides power.
     pub channels: Option<Channels>,
-    /// Edges of spectral bins, rising, nm: power is counted in each.
+    /// Edges of spectral bins, rising, nm: power is counted in each. Not beside `channels`, which another receiver there may have.
     pub bins_nm: Option<Vec<f64>>,
     /// Part whose absorbed flux is counted.
     pub part: Option<OneOrMany<String>>,
