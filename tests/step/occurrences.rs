@@ -89,20 +89,22 @@ fn a_second_place_of_one_usage_is_told() {
     );
 }
 
+/// A second place of the part, which is green.
+const SECOND_PLACE: &str = "#210=NEXT_ASSEMBLY_USAGE_OCCURRENCE('2','v','',#101,#102,$);\n#211=PRODUCT_DEFINITION_SHAPE('','',#210);\n\
+    #212=ITEM_DEFINED_TRANSFORMATION('','',#20,#22);\n\
+    #209=(REPRESENTATION_RELATIONSHIP('','',#106,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#212)\
+    SHAPE_REPRESENTATION_RELATIONSHIP());\n#213=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#209,#211);\n\
+    #300=STYLED_ITEM('',(#301),#24);\n#301=PRESENTATION_STYLE_ASSIGNMENT((#302));\n#302=COLOUR_RGB('',0.,1.,0.);\n";
+
 /// A green part in two places, the second of which is red: as translators of OpenCASCADE write it.
 #[test]
 fn a_colour_of_one_occurrence_is_not_that_of_all() {
-    let second = "#210=NEXT_ASSEMBLY_USAGE_OCCURRENCE('2','v','',#101,#102,$);\n#211=PRODUCT_DEFINITION_SHAPE('','',#210);\n\
-                  #212=ITEM_DEFINED_TRANSFORMATION('','',#20,#22);\n\
-                  #209=(REPRESENTATION_RELATIONSHIP('','',#106,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#212)\
-                  SHAPE_REPRESENTATION_RELATIONSHIP());\n#213=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#209,#211);\n\
-                  #300=STYLED_ITEM('',(#301),#24);\n#301=PRESENTATION_STYLE_ASSIGNMENT((#302));\n#302=COLOUR_RGB('',0.,1.,0.);\n\
-                  #310=OVER_RIDING_STYLED_ITEM('',(#311),#24,#300);\n#312=COLOUR_RGB('',1.,0.,0.);\n";
+    let second = "#310=OVER_RIDING_STYLED_ITEM('',(#311),#24,#300);\n#312=COLOUR_RGB('',1.,0.,0.);\n";
     let by_shape = "#311=PRESENTATION_STYLE_BY_CONTEXT((#312),#320);\n#320=SHAPE_REPRESENTATION('',(#22),#1);\n\
                     #321=SHAPE_DEFINITION_REPRESENTATION(#211,#320);\n";
     let by_place = "#311=PRESENTATION_STYLE_BY_CONTEXT((#312),#213);\n";
     for context in [by_shape, by_place] {
-        let import = read("", &[SHAPE, USAGE, RELATION, PLACED, second, context].concat());
+        let import = read("", &[SHAPE, USAGE, RELATION, PLACED, SECOND_PLACE, second, context].concat());
         let model = &import.model;
         let colour_at = |x: f64| {
             let here = |f: &lampyris::model::PlacedFace<'_>| f.placement.origin.x == x;
@@ -117,19 +119,14 @@ fn a_colour_of_one_occurrence_is_not_that_of_all() {
 /// the part, #26, stands in a representation that is related to the part's own.
 #[test]
 fn a_colour_of_a_path_is_that_of_one_occurrence() {
-    let second = "#210=NEXT_ASSEMBLY_USAGE_OCCURRENCE('2','v','',#101,#102,$);\n#211=PRODUCT_DEFINITION_SHAPE('','',#210);\n\
-                  #212=ITEM_DEFINED_TRANSFORMATION('','',#20,#22);\n\
-                  #209=(REPRESENTATION_RELATIONSHIP('','',#106,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#212)\
-                  SHAPE_REPRESENTATION_RELATIONSHIP());\n#213=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#209,#211);\n\
-                  #300=STYLED_ITEM('',(#301),#24);\n#301=PRESENTATION_STYLE_ASSIGNMENT((#302));\n#302=COLOUR_RGB('',0.,1.,0.);\n\
-                  #311=PRESENTATION_STYLE_ASSIGNMENT((#312));\n#312=COLOUR_RGB('',1.,0.,0.);\n\
+    let second = "#311=PRESENTATION_STYLE_ASSIGNMENT((#312));\n#312=COLOUR_RGB('',1.,0.,0.);\n\
                   #313=STYLED_ITEM('',(#314),#315);\n#314=PRESENTATION_STYLE_ASSIGNMENT((NULL_STYLE(.NULL.)));\n\
                   #25=BLOCK('',#20,5.,5.,20.);\n#26=CSG_SOLID('',#25);\n#303=STYLED_ITEM('',(#301),#26);\n\
                   #126=CSG_SHAPE_REPRESENTATION('',(#26),#1);\n#127=SHAPE_REPRESENTATION_RELATIONSHIP('','',#106,#126);\n";
     // The path leads to the second place; one through a relationship that is not around it leads nowhere.
     for (path, expected) in [("#209", [1.0, 0.0, 0.0]), ("#109,#209", [0.0, 1.0, 0.0])] {
         let style = format!("#310=CONTEXT_DEPENDENT_OVER_RIDING_STYLED_ITEM('',(#311),#106,#313,({path}));\n");
-        let model = read("", &[SHAPE, USAGE, RELATION, PLACED, second, &style].concat()).model;
+        let model = read("", &[SHAPE, USAGE, RELATION, PLACED, SECOND_PLACE, second, &style].concat()).model;
         for (x, expected) in [(100.0, [0.0, 1.0, 0.0]), (200.0, expected)] {
             let here = model.placed_faces().filter(|f| f.placement.origin.x == x);
             let colours: Vec<_> = here.map(|f| f.colour(&model).map(|c| c.0)).collect();
