@@ -9,6 +9,8 @@ const STEP_DEG: f64 = 0.05;
 
 /// Distance over which the gradient G = log₁₀ E(b) − log₁₀ E(b + 0.1°) is taken, degrees (§2.3.1).
 const GRADIENT_DEG: f64 = 0.1;
+/// The same in steps of the scan.
+const STEPS_OF_GRADIENT: usize = (GRADIENT_DEG / STEP_DEG).round() as usize;
 
 /// Half the opening that scans are made with, degrees: a detector of 30 mm at 25 m, however wide the cells are.
 pub(super) const SCAN_HALF_DEG: f64 = 0.0344;
@@ -36,6 +38,8 @@ const SAME_PLACE_DEG: f64 = 2.0 * STEP_DEG;
 /// An edge is the border of a bright and a dark area: for half a degree light does not fall again on its one side, nor rise on its
 /// other, so that their means differ by no less than the light right beside it.
 const AREA_DEG: f64 = 0.5;
+/// The same in steps of the scan.
+const STEPS_OF_AREA: usize = (AREA_DEG / STEP_DEG).round() as usize;
 
 /// The steepest place of a scan.
 pub(super) struct Edge {
@@ -136,64 +140,86 @@ impl Scan {
     fn slopes(&self, map: &IntensityMap, direction: impl Fn(f64) -> [f64; 2]) -> Vec<Slope> {
         let steps = ((self.range[1] - self.range[0]) / STEP_DEG).round() as usize;
         let angles = (0..=steps).map(|k| self.range[0] + STEP_DEG * k as f64);
-        let readings: Vec<(f64, Measurement, f64)> = angles
+        // Places outside the far field are left out; fewer than two steps make no edge.
+        let places: Vec<Place> = angles
             .filter_map(|angle| {
-                // Places outside the far field are left out; fewer than two steps make no edge.
                 let measurement = map.measure_slit(self.half_deg, direction(angle))?;
-                let value = map.read(&measurement).value;
-                Some((angle, measurement, value))
+                let light = map.read_with_dark(&measurement);
+                Some(Place { angle, measurement, light })
             })
             .collect();
-        let brightest = readings.iter().map(|r| r.2).fold(0.0, f64::max);
-        // The dark share bounds the logarithm, which has no end at zero. A scan that meets no light at all is flat.
-        let dark = DARK_SHARE * brightest;
-        let lit = |value: f64| if dark > 0.0 { value.max(0.0) + dark } else { 1.0 };
-        // The fall of log₁₀ E between two lights, and how much less and more it may be.
-        let fall = |bright: Light, faint: Light| {
-            let up = |[value, error]: Light| (lit(value + SIGMAS * error) / lit(value)).log10();
-            let down = |[value, error]: Light| (lit(value) / lit(value - SIGMAS * error)).log10();
-            let decades = (lit(bright[0]) / lit(faint[0])).log10();
-            [decades, down(bright).hypot(up(faint)), up(bright).hypot(down(faint))]
+        let brightest = places.iter().map(|place| place.light[0]).fold(0.0, f64::max);
+        let decades = Decades { dark: DARK_SHARE * brightest };
+        (0..places.len().saturating_sub(STEPS_OF_GRADIENT)).map(|k| self.slope(map, &places, &decades, k)).collect()
+    }
+
+    /// Returns the gradient from the `low`-th place to the one that [`GRADIENT_DEG`] is taken to.
+    fn slope(&self, map: &IntensityMap, places: &[Place], decades: &Decades, low: usize) -> Slope {
+        let (high, last) = (low + STEPS_OF_GRADIENT, places.len() - 1);
+        let fall = |[below, above]: [Light; 2]| {
+            decades.fall(if self.sign > 0.0 { [below, above] } else { [above, below] })
         };
-        let fall =
-            |[below, above]: [Light; 2]| if self.sign > 0.0 { fall(below, above) } else { fall(above, below) };
-        let lights: Vec<Light> = readings.iter().map(|r| map.read_with_dark(&r.1)).collect();
-        let mean = |places: std::ops::RangeInclusive<usize>| -> Light {
-            let share = 1.0 / places.clone().count() as f64;
-            map.read_with_dark(
-                &readings[places].iter().fold(Measurement::default(), |sum, r| sum.plus(share, &r.1)),
-            )
-        };
-        let span = (GRADIENT_DEG / STEP_DEG).round() as usize;
-        let area = (AREA_DEG / STEP_DEG).round() as usize;
-        let last = readings.len().saturating_sub(1);
-        let slope = |k: usize| {
-            let (low, high) = (k, k + span);
-            let [steepness, _, more] = fall([lights[low], lights[high]]);
-            let [most, _, most_more] =
-                fall([mean(low.saturating_sub(area)..=low), mean(high..=(high + area).min(last))]);
-            // Over several steps light falls as steeply in one of them at least as on the mean of all.
-            let reached = (0..=low.min(last - high).min(area / 2 - 1)).map(|more| {
-                let steps = (span + 2 * more) as f64 / span as f64;
-                let [decades, less, _] = fall([lights[low - more], lights[high + more]]);
-                [decades / steps, less / steps]
-            });
-            let reached = reached
-                .max_by(|a, b| (a[0] - a[1]).total_cmp(&(b[0] - b[1])))
-                .unwrap_or([steepness, f64::INFINITY]);
-            // d log₁₀ E = dE / (E ln 10).
-            let share = |value: f64| self.sign / (lit(value) * std::f64::consts::LN_10);
-            let (first, last) = (&readings[low], &readings[high]);
-            Slope {
-                // The gradient belongs to the middle of its distance.
-                angle: 0.5 * (first.0 + last.0),
-                gradient: steepness,
-                reached,
-                bounds: [[steepness, more], [most, most_more]],
-                linear: Measurement::default().plus(share(first.2), &first.1).plus(-share(last.2), &last.1),
-            }
-        };
-        (0..readings.len().saturating_sub(span)).map(slope).collect()
+        let [steepness, _, more] = fall([places[low].light, places[high].light]);
+        let below = &places[low.saturating_sub(STEPS_OF_AREA)..=low];
+        let above = &places[high..=(high + STEPS_OF_AREA).min(last)];
+        let [most, _, most_more] = fall([mean_light(map, below), mean_light(map, above)]);
+        // Over several steps light falls as steeply in one of them at least as on the mean of all.
+        let wider = 0..=low.min(last - high).min(STEPS_OF_AREA / 2 - 1);
+        let reached = wider.map(|more| {
+            let steps = (STEPS_OF_GRADIENT + 2 * more) as f64 / STEPS_OF_GRADIENT as f64;
+            let [decades, less, _] = fall([places[low - more].light, places[high + more].light]);
+            [decades / steps, less / steps]
+        });
+        let surest = reached.max_by(|a, b| (a[0] - a[1]).total_cmp(&(b[0] - b[1])));
+        // d log₁₀ E = dE / (E ln 10).
+        let share = |light: Light| self.sign / (decades.lit(light[0]) * std::f64::consts::LN_10);
+        let (first, last) = (&places[low], &places[high]);
+        let linear = Measurement::default()
+            .plus(share(first.light), &first.measurement)
+            .plus(-share(last.light), &last.measurement);
+        Slope {
+            // The gradient belongs to the middle of its distance.
+            angle: 0.5 * (first.angle + last.angle),
+            gradient: steepness,
+            reached: surest.unwrap_or([steepness, f64::INFINITY]),
+            bounds: [[steepness, more], [most, most_more]],
+            linear,
+        }
+    }
+}
+
+/// A place of a scan, what the opening adds up there, and the light that it reads.
+struct Place {
+    angle: f64,
+    measurement: Measurement,
+    light: Light,
+}
+
+/// The light that a photometer reads in the mean of places.
+fn mean_light(map: &IntensityMap, places: &[Place]) -> Light {
+    let share = 1.0 / places.len() as f64;
+    map.read_with_dark(
+        &places.iter().fold(Measurement::default(), |sum, place| sum.plus(share, &place.measurement)),
+    )
+}
+
+/// Logarithms of light above a darkness, cd: it bounds the logarithm, which has no end at zero. A scan that meets no light at all is flat.
+struct Decades {
+    dark: f64,
+}
+
+impl Decades {
+    /// Light whose logarithm is taken.
+    fn lit(&self, value: f64) -> f64 {
+        if self.dark > 0.0 { value.max(0.0) + self.dark } else { 1.0 }
+    }
+
+    /// The fall of log₁₀ E from a bright to a faint light, and how much less and more it may be at [`SIGMAS`].
+    fn fall(&self, [bright, faint]: [Light; 2]) -> [f64; 3] {
+        let up = |[value, error]: Light| (self.lit(value + SIGMAS * error) / self.lit(value)).log10();
+        let down = |[value, error]: Light| (self.lit(value) / self.lit(value - SIGMAS * error)).log10();
+        let decades = (self.lit(bright[0]) / self.lit(faint[0])).log10();
+        [decades, down(bright).hypot(up(faint)), up(bright).hypot(down(faint))]
     }
 }
 

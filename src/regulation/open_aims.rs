@@ -1,12 +1,10 @@
 //! Rows judged by every aim that the errors of a map leave open.
 
-use super::aim::Aim;
 use super::assessment::{Assumptions, RowVerdict};
 use super::few_rays::SIGMAS;
 use super::judgement::Verdict;
-use super::map::IntensityMap;
-use super::opening::Sensor;
-use super::row_verdict::{judge_rows, judge_rows_where};
+use super::requirement::Photometer;
+use super::row_verdict::judge_rows;
 use super::table::Regulation;
 
 /// Most open aims by which rows of many directions are judged, each of which takes as long as a hundred points: of more, so many that lie
@@ -16,20 +14,19 @@ const MOST_FOR_EXTENDED: usize = 30;
 /// Judges all rows as the map is aimed, and then by the other aims that its errors leave open. A lamp that is aimed by noise fails and
 /// passes where it should not: a verdict stands where every open aim has it, and what these read is an error of the reading.
 pub(super) fn judge_by_open_aims(
-    map: &IntensityMap,
+    photometer: &Photometer,
     regulation: &Regulation,
     assumptions: &Assumptions,
-    sensor: Sensor,
-    aim: &Aim,
 ) -> Vec<RowVerdict> {
-    let mut rows = judge_rows(map, regulation, assumptions, sensor, aim);
+    let as_aimed = judge_rows(photometer, regulation, assumptions, |_| true);
+    let mut rows: Vec<RowVerdict> = as_aimed.into_iter().flatten().collect();
     // A standard error of which three reach as far as any other aim reads, with three errors of that.
     let mut spread = vec![0.0; rows.len()];
     // All of them are asked, for what a row's error is must not hang on which comes first.
-    let every = aim.rivals.len().div_ceil(MOST_FOR_EXTENDED).max(1);
-    for (k, open) in aim.open_aims().enumerate() {
+    let every = photometer.aim.rivals.len().div_ceil(MOST_FOR_EXTENDED).max(1);
+    for (k, open) in photometer.aim.open_aims().enumerate() {
         let is_asked = |row: usize| k % every == 0 || !regulation.function.rows[row].is_extended();
-        let others = judge_rows_where(map, regulation, assumptions, sensor, &open, is_asked);
+        let others = judge_rows(&Photometer { aim: &open, ..*photometer }, regulation, assumptions, is_asked);
         for ((row, other), spread) in rows.iter_mut().zip(others).zip(&mut spread) {
             let Some(other) = other else { continue };
             if row.verdict != other.verdict && row.verdict != Some(Verdict::Unsure) {
@@ -53,6 +50,8 @@ pub(super) fn judge_by_open_aims(
 
 #[cfg(test)]
 mod tests {
+    use super::super::aim::Aim;
+    use super::super::opening::Sensor;
     use super::super::test_lamps::map;
     use super::*;
 
@@ -66,7 +65,9 @@ mod tests {
         let sensor = Sensor { half_deg: 0.0745, round: false };
         let judged = |rivals: &[f64]| {
             let aim = Aim { rivals: rivals.iter().map(|h| [*h, 0.0]).collect(), ..Aim::default() };
-            let row = judge_by_open_aims(&lamp, &regulation, &Assumptions::default(), sensor, &aim).remove(0);
+            let tolerance_deg = regulation.rules.tolerance_deg;
+            let photometer = Photometer { map: &lamp, aim: &aim, sensor, tolerance_deg };
+            let row = judge_by_open_aims(&photometer, &regulation, &Assumptions::default()).remove(0);
             (row.verdict.unwrap(), row.reading.unwrap())
         };
         assert_eq!(judged(&[-1.0]).0, Verdict::Pass);

@@ -11,18 +11,29 @@ const GEOMETRIC: &str = "geometric";
 /// Digits to which coordinates of cells are one: centres of neighbours differ by far more.
 const SAME_CENTRE_DEG: f64 = 1e-7;
 
-impl IntensityMap {
-    /// Makes a map of the text of a far-field receiver's CSV file: columns `H_deg`, `V_deg`, an intensity in cd and its standard error, and
-    /// if there is one, its geometric error, else 0; a cell a line, in any order.
-    ///
-    /// `rays` are those of the run, where they are known: what few of them leave open.
+/// The lines of a CSV file that hold something, by their number from 0, the header first.
+fn lines_of_cells(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    // Comments are allowed, as in other CSV files that the program reads.
+    text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'))
+}
+
+/// Where the columns of a far field are.
+struct Columns {
+    /// How many the file has.
+    names: usize,
+    h: usize,
+    v: usize,
+    intensity: usize,
+    statistical: usize,
+    geometric: Option<usize>,
+}
+
+impl Columns {
+    /// Finds the columns that a header names.
     ///
     /// # Errors
-    /// When a column is missing, a cell stands twice or the cells make no regular grid; the message names the line where one is at fault.
-    pub fn from_csv(text: &str, rays: Option<RaySample>) -> Result<Self, String> {
-        // Comments are allowed, as in other CSV files that the program reads.
-        let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
-        let (_, header) = lines.next().ok_or("the file is empty")?;
+    /// When one but that of geometric errors is missing.
+    fn new(header: &str) -> Result<Self, String> {
         let names: Vec<&str> = header.split(',').map(str::trim).collect();
         let place = |wanted: &dyn Fn(&str) -> bool| names.iter().position(|n| wanted(n));
         let needed = |place: Option<usize>, name: &str| {
@@ -39,7 +50,28 @@ impl IntensityMap {
         let statistical = of_channel.or_else(|| place(&|n| STATISTICAL.contains(&n)));
         let statistical = needed(statistical, "of standard errors")?;
         let geometric = if of_channel.is_some() { own("_geometric") } else { place(&|n| n == GEOMETRIC) };
+        Ok(Self { names: names.len(), h, v, intensity, statistical, geometric })
+    }
+}
 
+impl IntensityMap {
+    /// Whether the CSV file of a far field holds geometric errors of its intensities; `false` for what [`Self::from_csv`] refuses too.
+    pub fn csv_has_geometric_errors(text: &str) -> bool {
+        let header = lines_of_cells(text).next().map(|(_, header)| Columns::new(header));
+        matches!(header, Some(Ok(Columns { geometric: Some(_), .. })))
+    }
+
+    /// Makes a map of the text of a far-field receiver's CSV file: columns `H_deg`, `V_deg`, an intensity in cd and its standard error, and
+    /// if there is one, its geometric error, else 0; a cell a line, in any order.
+    ///
+    /// `rays` are those of the run, where they are known: what few of them leave open.
+    ///
+    /// # Errors
+    /// When a column is missing, a cell stands twice or the cells make no regular grid; the message names the line where one is at fault.
+    pub fn from_csv(text: &str, rays: Option<RaySample>) -> Result<Self, String> {
+        let mut lines = lines_of_cells(text);
+        let (_, header) = lines.next().ok_or("the file is empty")?;
+        let Columns { names, h, v, intensity, statistical, geometric } = Columns::new(header)?;
         let mut cells: BTreeMap<(i64, i64), [f64; 3]> = BTreeMap::new();
         let [mut columns, mut rows] = [BTreeMap::new(), BTreeMap::new()];
         // Centres as whole numbers: decimals that were written and read must still be equal to be keys.
@@ -48,7 +80,7 @@ impl IntensityMap {
             let values: Vec<&str> = line.split(',').map(str::trim).collect();
             let value = |place: usize| -> Result<f64, String> {
                 let text = values.get(place).ok_or_else(|| {
-                    format!("line {}: {} values, where the header names {}", number + 1, values.len(), names.len())
+                    format!("line {}: {} values, where the header names {}", number + 1, values.len(), names)
                 })?;
                 text.parse().map_err(|_| format!("line {}: '{text}' is not a number", number + 1))
             };

@@ -1,10 +1,7 @@
 //! One row of a regulation judged about a lamp as it is aimed.
 
-use super::aim::Aim;
 use super::assessment::{Assumptions, RowVerdict};
 use super::judgement::{Judgement, Verdict};
-use super::map::IntensityMap;
-use super::opening::Sensor;
 use super::requirement::{Photometer, requirements};
 use super::row::{Row, RowKind};
 use super::table::Regulation;
@@ -13,28 +10,15 @@ use super::table::Regulation;
 const UNKNOWN_FACETS: &str = "it is not known what facets change here, as the cells are too many to be compared with the spline: trace \
     with fewer, or with --intersector exact";
 
-/// Judges every row as the map is aimed, points that may lean on their group with that; whether another aim is open is not asked.
+/// Judges the rows of which `is_asked`, by their place in the table, as the map is aimed, points that may lean on their group with that;
+/// `None` for the others. Whether another aim is open is not asked.
 pub(super) fn judge_rows(
-    map: &IntensityMap,
+    photometer: &Photometer,
     regulation: &Regulation,
     assumptions: &Assumptions,
-    sensor: Sensor,
-    aim: &Aim,
-) -> Vec<RowVerdict> {
-    judge_rows_where(map, regulation, assumptions, sensor, aim, |_| true).into_iter().flatten().collect()
-}
-
-/// The same of the rows, by their place in the table, of which `is_asked`; `None` for the others.
-pub(super) fn judge_rows_where(
-    map: &IntensityMap,
-    regulation: &Regulation,
-    assumptions: &Assumptions,
-    sensor: Sensor,
-    aim: &Aim,
     is_asked: impl Fn(usize) -> bool,
 ) -> Vec<Option<RowVerdict>> {
-    let photometer = Photometer { map, aim, sensor, tolerance_deg: regulation.rules.tolerance_deg };
-    let judge = |row: &Row| judge_row(&photometer, regulation, assumptions, row);
+    let judge = |row: &Row| judge_row(photometer, regulation, assumptions, row);
     let all = regulation.function.rows.iter().enumerate();
     let mut rows: Vec<Option<RowVerdict>> = all.map(|(k, row)| is_asked(k).then(|| judge(row))).collect();
     // Where a point may lean on its group, it does so only if its own minimum is not met.

@@ -51,11 +51,12 @@ pub fn assess(
         (_, true) => Aim::unchanged("as placed, as asked"),
         (None, _) => Aim::unchanged("as placed: this function has no cut-off to aim by"),
     };
-    let first = assess_aimed(map, regulation, assumptions, sensor, aim);
+    let photometer = Photometer { map, aim: &aim, sensor, tolerance_deg: rules.tolerance_deg };
+    let first = assess_aimed(&photometer, regulation, assumptions);
     // Realigning is for beams with a cut-off, and for those that fail by more than doubt.
     let limits = rules.cut_off.map(|rule| rule.realignment);
     match limits.filter(|_| first.verdict == Verdict::Fail && !assumptions.as_placed) {
-        Some(limits) => Ok(realign(map, regulation, assumptions, sensor, &first, limits).unwrap_or(first)),
+        Some(limits) => Ok(realign(&photometer, regulation, assumptions, &first, limits).unwrap_or(first)),
         None => Ok(first),
     }
 }
@@ -63,10 +64,9 @@ pub fn assess(
 /// The assessment with another aim, the nearest to that of `first` within the `limits` of the regulation, with which no row fails; `None`
 /// where there is none.
 fn realign(
-    map: &IntensityMap,
+    photometer: &Photometer,
     regulation: &Regulation,
     assumptions: &Assumptions,
-    sensor: Sensor,
     first: &Assessment,
     limits: Realignment,
 ) -> Option<Assessment> {
@@ -87,27 +87,21 @@ fn realign(
     failed.sort_by_key(|row| row.is_extended());
     turns.into_iter().find_map(|(h, v)| {
         let aim = first.aim.realigned(REALIGN_STEP_DEG * f64::from(h), REALIGN_STEP_DEG * f64::from(v));
-        let photometer = Photometer { map, aim: &aim, sensor, tolerance_deg: regulation.rules.tolerance_deg };
+        let photometer = Photometer { aim: &aim, ..*photometer };
         let mended =
             |row: &&Row| judge_row(&photometer, regulation, assumptions, row).verdict != Some(Verdict::Fail);
         // Then all of them, for a turn that mends one row may break another.
         if !failed.iter().all(mended) {
             return None;
         }
-        let again = assess_aimed(map, regulation, assumptions, sensor, aim.clone());
+        let again = assess_aimed(&photometer, regulation, assumptions);
         (again.verdict != Verdict::Fail).then_some(again)
     })
 }
 
-/// Judges every row for the map as it is aimed, without realigning; `map` is mirrored already for left-hand traffic.
-fn assess_aimed(
-    map: &IntensityMap,
-    regulation: &Regulation,
-    assumptions: &Assumptions,
-    sensor: Sensor,
-    aim: Aim,
-) -> Assessment {
-    let rows = judge_by_open_aims(map, regulation, assumptions, sensor, &aim);
+/// Judges every row for the map as it is aimed, without realigning; the map is mirrored already for left-hand traffic.
+fn assess_aimed(photometer: &Photometer, regulation: &Regulation, assumptions: &Assumptions) -> Assessment {
+    let rows = judge_by_open_aims(photometer, regulation, assumptions);
     // A group of points counts through its points.
     let leaning = regulation.function.point_floor() == Some(0.0);
     let counted = rows.iter().filter(|r| !(leaning && r.row.kind == RowKind::GroupSum));
@@ -115,8 +109,8 @@ fn assess_aimed(
     Assessment {
         regulation: regulation.clone(),
         traffic: assumptions.traffic,
-        sensor_deg: 2.0 * sensor.half_deg,
-        aim,
+        sensor_deg: 2.0 * photometer.sensor.half_deg,
+        aim: photometer.aim.clone(),
         rows,
         verdict,
     }

@@ -61,12 +61,6 @@ pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completi
     Ok(Completion::Complete)
 }
 
-/// Whether the head of a CSV file of cells names a column of geometric errors.
-fn names_geometric_errors(text: &str) -> bool {
-    let head = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or("");
-    head.split(',').any(|name| name.trim().ends_with("geometric"))
-}
-
 /// The results of a run and where they lie.
 struct ResultsFile {
     folder: PathBuf,
@@ -130,7 +124,7 @@ impl ResultsFile {
         let rays = rays.map(|(heaviest_flux, replicates)| RaySample { heaviest_flux, replicates });
         let map = IntensityMap::from_csv(&text, rays).map_err(failure)?;
         // A run on facets writes what they change of every cell, unless the cells were too many to compare.
-        let is_compared = self.results["faceting"].is_null() || names_geometric_errors(&text);
+        let is_compared = self.results["faceting"].is_null() || IntensityMap::csv_has_geometric_errors(&text);
         Ok(if is_compared { map } else { map.without_geometric_errors() })
     }
 
