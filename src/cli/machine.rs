@@ -1,6 +1,7 @@
 //! What the machine is, as far as the system tells: processor, cores, memory, name.
 
 use crate::formats::file_stem;
+use crate::simulate::machine_threads;
 use std::fs;
 use std::time::SystemTime;
 
@@ -9,7 +10,7 @@ const KILOBYTES_PER_GB: f64 = 1_000_000.0;
 
 /// Describes processor, number of cores, memory and system in words, as far as the system tells.
 pub(crate) fn hardware() -> String {
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let cores = machine_threads();
     let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| field_value(&text, "model name"));
     // Not every kernel names its processor: then its architecture is said.
     let cpu = cpu.unwrap_or_else(|| std::env::consts::ARCH.to_owned());

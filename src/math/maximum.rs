@@ -16,12 +16,11 @@ pub(crate) fn largest_distance(distances: impl Iterator<Item = f64>) -> f64 {
 ///
 /// The excess is that of the largest after the noise is added once more (Efron, *Bootstrap Methods*, 1979), by the integral of the
 /// distribution of a maximum of independent normal values.
-pub(crate) fn error_of_maximum(values: &[[f64; 2]]) -> f64 {
-    let Some(&[largest, own]) = values.iter().max_by(|a, b| a[0].total_cmp(&b[0])) else { return 0.0 };
+pub(crate) fn error_of_maximum(values: impl Iterator<Item = [f64; 2]> + Clone) -> f64 {
+    let Some([largest, own]) = values.clone().max_by(|a, b| a[0].total_cmp(&b[0])) else { return 0.0 };
     // Below this the maximum nearly certainly does not lie.
     let low = largest - REACH * own;
-    let rivals: Vec<[f64; 2]> =
-        values.iter().copied().filter(|[v, e]| *e > 0.0 && v + REACH * e > largest).collect();
+    let rivals: Vec<[f64; 2]> = values.filter(|[v, e]| *e > 0.0 && v + REACH * e > largest).collect();
     let high = rivals.iter().map(|[v, e]| v + REACH * e).fold(largest, f64::max);
     if high <= low {
         return own;
@@ -66,10 +65,10 @@ mod tests {
     /// The mean of the largest of two equal normal values is 1/√π of their standard error above each.
     #[test]
     fn the_largest_of_two_equal_values_is_too_large_by_known_noise() {
-        let error = error_of_maximum(&[[10.0, 1.0], [10.0, 1.0]]);
+        let error = error_of_maximum([[10.0, 1.0], [10.0, 1.0]].into_iter());
         let excess = 1.0 / std::f64::consts::PI.sqrt();
         assert!((error - 1f64.hypot(excess)).abs() < 2e-3, "{error}");
-        let alone = error_of_maximum(&[[10.0, 1.0], [1.0, 1.0]]);
+        let alone = error_of_maximum([[10.0, 1.0], [1.0, 1.0]].into_iter());
         assert!((alone - 1.0).abs() < 2e-3, "{alone}");
     }
 }

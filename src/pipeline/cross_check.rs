@@ -1,7 +1,7 @@
 //! What is found out about a run beside its results: a sample of its rays asked again of BVH and spline, and what the facets
 //! change of its light.
 
-use super::intersectors::{farthest_start, in_one_scene, octrees_in_one_scene, true_intersector};
+use super::intersectors::{groups_in_one_scene, octrees_in_one_scene, true_intersector};
 use super::monitor::{Monitor, Stage, in_stage};
 use super::prepared_scene::{PreparedScene, TraceRequest};
 use super::ray_recorder::RayRecorder;
@@ -114,11 +114,9 @@ fn check_rays(
     monitor.begin(Stage::BuildingCheck("BVH"));
     // With the normals of the run: those of facets with others differ without a fault.
     let normals = prepared.choice.normals.on_facets();
-    let bvh = |(group, mesh)| -> Box<dyn Intersector + '_> {
-        let farthest_start = farthest_start(instancing, group);
+    let bvh = groups_in_one_scene(&prepared.facets, |mesh, farthest_start| {
         Box::new(Bvh::build(mesh, &bvh::Settings { normals, farthest_start, ..Default::default() }))
-    };
-    let bvh = in_one_scene(instancing, prepared.facets.meshes().enumerate().map(bvh).collect());
+    });
     // The check is about facets: a run on the spline, or polished to it, says nothing about the octree.
     let on_octree =
         prepared.choice.intersector == IntersectorKind::Octree && prepared.choice.normals != NormalMode::Exact;

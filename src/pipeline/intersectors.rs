@@ -162,15 +162,22 @@ pub fn in_one_scene<'a>(
     }
 }
 
-/// Builds an octree with these normals over the facets of each group, and joins them to one that answers in the scene's coordinates.
-pub(super) fn octrees_in_one_scene(facets: &GroupedFacets, normals: NormalMode) -> Box<dyn Intersector + '_> {
+/// Builds a structure over the facets of each group with `build`, which is given the largest coordinate that starts were rounded at, mm,
+/// and joins them to one that answers in the scene's coordinates.
+pub(super) fn groups_in_one_scene<'f>(
+    facets: &'f GroupedFacets,
+    build: impl Fn(&'f FacetMesh, f64) -> Box<dyn Intersector + 'f>,
+) -> Box<dyn Intersector + 'f> {
     let instancing = facets.instancing.as_deref();
-    let build = |(group, mesh)| {
-        let farthest_start = farthest_start(instancing, group);
-        let settings = octree::Settings { normals, farthest_start, ..Default::default() };
-        Box::new(Octree::build(mesh, &settings)) as Box<dyn Intersector>
-    };
-    in_one_scene(instancing, facets.meshes().enumerate().map(build).collect())
+    let groups = facets.meshes().enumerate().map(|(group, mesh)| build(mesh, farthest_start(instancing, group)));
+    in_one_scene(instancing, groups.collect())
+}
+
+/// Builds an octree with these normals over the facets of each group, joined to one.
+pub(super) fn octrees_in_one_scene(facets: &GroupedFacets, normals: NormalMode) -> Box<dyn Intersector + '_> {
+    groups_in_one_scene(facets, |mesh, farthest_start| {
+        Box::new(Octree::build(mesh, &octree::Settings { normals, farthest_start, ..Default::default() }))
+    })
 }
 
 /// Returns the largest coordinate, in size, of what is placed from a group, mm; 0 for what has the scene's coordinates.

@@ -42,8 +42,8 @@ pub fn read_models(scene: &Scene, read: impl Fn(&ModelUse) -> Result<Import, Err
             None => error,
         };
         // Of a file that stands in many places one reading is enough: 4 ms each for a thousand lenses.
-        let key = |e: &ModelUse| (e.file.clone(), e.unit_mm, e.max_placed);
-        let same = |e: &ModelUse| key(e) == key(entry);
+        let same =
+            |e: &ModelUse| (&e.file, e.unit_mm, e.max_placed) == (&entry.file, entry.unit_mm, entry.max_placed);
         let import = match scene.models[..i].iter().position(same) {
             Some(k) => Import { model: Model::clone(&models[k]), report: ImportReport::clone(&reports[k]) },
             None => read(entry).map_err(shown)?,

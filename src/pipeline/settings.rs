@@ -2,6 +2,7 @@
 
 use super::error::Error;
 use crate::intersect::NormalMode;
+use crate::simulate::machine_threads;
 use crate::study::accuracy_target::TolerancePlan;
 use std::fmt;
 use std::str::FromStr;
@@ -52,8 +53,7 @@ impl TracingSettings {
     /// # Errors
     /// When 0 are asked for.
     pub fn thread_count(&self) -> Result<usize, Error> {
-        // A machine that does not tell its threads has one at least.
-        let machine = std::thread::available_parallelism().map_or(1, |n| n.get());
+        let machine = machine_threads();
         match self.threads {
             None => Ok(machine),
             Some(0) => Err(Error::setting("threads", "0: at least one thread is needed")),

@@ -169,7 +169,7 @@ impl Judgement {
         if let Some(brightest) =
             decisive.as_mut().filter(|_| requirement.any && requirement.comparisons.iter().all(|c| c.at_least))
         {
-            brightest.reading.statistical = error_of_maximum(&read);
+            brightest.reading.statistical = error_of_maximum(read.into_iter());
         }
         let all = requirement.comparisons.len();
         // A direction outside the far field may hide anything: only what one reading alone decides is still known.

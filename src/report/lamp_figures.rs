@@ -58,8 +58,8 @@ fn peak_error(grid: &Grid) -> Cell {
     let cells = grid.axes[0].cells;
     pole_rings(grid).clear_rivals(&mut errors);
     let geometric = grid.geometric.as_ref().map_or(0.0, |geometric| geometric[j * cells + i]);
-    let values: Vec<[f64; 2]> = grid.values.iter().zip(errors).map(|(&value, error)| [value, error]).collect();
-    Cell::Number(error_of_maximum(&values).hypot(geometric), 2)
+    let values = grid.values.iter().zip(&errors).map(|(&value, &error)| [value, error]);
+    Cell::Number(error_of_maximum(values).hypot(geometric), 2)
 }
 
 /// Makes a table of the figures of a far field in candela, with the points of a regulation where it was judged by one.

@@ -79,6 +79,7 @@ pub use scene::Scene;
 pub use seconds::{MergedSeconds, Seconds};
 pub use sequence::{MOST_STEPS, RecordedWay, Sequence, SequenceStep, SequenceSums, recorded_ways};
 pub use sequence_results::{ReceiverSequences, SequenceResult};
+pub(crate) use settings::machine_threads;
 pub use settings::{KernelChoice, RunSettings};
 pub use tallies::{ReplicateTally, Tallies};
 pub use tally::{MomentSpread, Moments, QUANTA, Sum};

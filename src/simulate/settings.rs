@@ -78,11 +78,16 @@ pub enum KernelChoice {
     Full,
 }
 
+/// Returns the threads that this machine has; one where it does not tell.
+pub(crate) fn machine_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, |n| n.get())
+}
+
 impl RunSettings {
     /// Returns the threads that are asked for; for 0, as many as the machine has.
     pub(super) fn thread_count(&self) -> usize {
         match self.threads {
-            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            0 => machine_threads(),
             n => n,
         }
     }

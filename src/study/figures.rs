@@ -257,9 +257,7 @@ impl<'a> Errors<'a> {
         let largest = if is_dark {
             r.ray_cells.iter().copied().fold(0.0, f64::max)
         } else {
-            let values: Vec<[f64; 2]> =
-                cells.iter().zip(errors.iter()).map(|(&cell, &error)| [cell, error]).collect();
-            error_of_maximum(&values)
+            error_of_maximum(cells.iter().zip(errors.iter()).map(|(&cell, &error)| [cell, error]))
         };
         ReceiverFigures {
             power,
