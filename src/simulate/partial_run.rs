@@ -5,12 +5,12 @@
 //! cells, and a checksum. Whole numbers are little-endian.
 
 use super::bind::BoundScene;
+use super::digest::Fnv;
 use super::outcome::{Counts, LostRay, PathVertex};
 use super::path_sample::PathSample;
 use super::sequence::Sequence;
 use super::tallies::{ReplicateTally, Tallies};
 use super::tally::{Moments, Sum};
-use crate::formats::Fnv;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io::{self, Read, Write};

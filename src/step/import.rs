@@ -12,10 +12,11 @@ use super::product::styles::Styles;
 use super::product::topology::ShapeItems;
 use super::report::{ImportReport, Note, UnitNames};
 use super::{Error, ErrorKind, Settings};
-use crate::formats::{self, Fnv};
+use crate::formats;
 use crate::math::Aabb;
 use crate::model::{Instance, Model, PartId, are_shared};
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
+use std::hash::Hasher;
 use std::path::Path;
 use std::time::Instant;
 
@@ -43,6 +44,13 @@ pub fn read(path: &Path, settings: &Settings) -> Result<Import, Error> {
     read_bytes(&name, &bytes, settings)
 }
 
+/// A hash that tells files apart, the same on every machine.
+fn hash_bytes(bytes: &[u8]) -> u64 {
+    let mut hasher = FxHasher::default();
+    hasher.write(bytes);
+    hasher.finish()
+}
+
 /// Reads the bytes of a STEP file; `name` is for messages and the model's name.
 ///
 /// ```
@@ -59,7 +67,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     let mut report = ImportReport {
         file: name.to_string(),
         bytes: bytes.len() as u64,
-        hash: Fnv::hash(&[bytes]),
+        hash: hash_bytes(bytes),
         ..ImportReport::default()
     };
     report.schema = schema_names(&file);

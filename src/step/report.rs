@@ -12,7 +12,7 @@ pub struct ImportReport {
     pub bytes: u64,
     /// A hash of its bytes as they were read: it may have been saved anew since.
     #[serde(skip)]
-    pub hash: u128,
+    pub hash: u64,
     /// The names in its FILE_SCHEMA; empty without one.
     pub schema: Vec<String>,
     /// Units of its contexts, by name.

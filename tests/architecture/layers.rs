@@ -161,7 +161,6 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "formats",
         &[
             "base64",
-            "fnv",
             "error",
             "file_names",
             "writer",
