@@ -10,6 +10,7 @@ mod files;
 mod grazing;
 mod hostile;
 mod models;
+mod own_points;
 mod paths;
 mod polish;
 mod polished_starts;

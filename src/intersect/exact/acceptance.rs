@@ -10,6 +10,11 @@ use super::trim::Region;
 use crate::intersect::Certainty;
 use crate::math::{Uv, Vector};
 
+/// A surface is regular where its normal is longer than this share of its longest derivative's square.
+const REGULAR: f64 = 1e-6;
+/// A contact at a smaller sine is a tangency: a ray that cuts a regular surface steeper than this meets it at a point.
+const TANGENT_SINE: f64 = 1e-3;
+
 /// A root that a leaf's search has found.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
@@ -98,5 +103,15 @@ impl Exact {
             None => place.inside,
         };
         (inside, true)
+    }
+
+    /// The certainty of a contact: tangent where the surface is regular and the ray grazes it, else uncertified.
+    pub(super) fn contact_certainty(&self, leaf: &Leaf, [u, v]: [f64; 2], query: &Query) -> Certainty {
+        let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, u, v);
+        let (_, du, dv) = project(&jet);
+        let n = du.cross(dv);
+        let regular = n.length() > REGULAR * du.length().max(dv.length()).powi(2);
+        let sine = n.dot(query.d).abs() / n.length().max(f64::MIN_POSITIVE);
+        if regular && sine < TANGENT_SINE { Certainty::Tangent } else { Certainty::Uncertified }
     }
 }

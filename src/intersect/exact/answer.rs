@@ -4,7 +4,7 @@ use super::leaf_test;
 use super::patch;
 use super::query::{Query, Root};
 use super::structure::Exact;
-use super::tolerances::{CONTACT_LENGTH, TANGENT};
+use super::tolerances::{CONTACT_LENGTH, contact_distance};
 use super::{net, traversal};
 use crate::intersect::{Certainty, Cost, Footprint, Hit, Intersector};
 use crate::math::{Ray, Uv, Vector};
@@ -33,10 +33,10 @@ pub struct Passage {
 
 /// A search for all crossings may take so many times the budget of one for the first.
 const BUDGET_OF_ALL: u32 = 4;
-/// Crossings of one face this near to each other along the ray are one, mm, and [`SAME_CROSSING_FAR`] of their distance.
-const SAME_CROSSING: f64 = 1e-9;
-/// As [`SAME_CROSSING`], relative to t: 450 ulps.
+/// Crossings of one face are one that lie within a contact of each other along the ray, and this share of their distance: 450 ulps.
 const SAME_CROSSING_FAR: f64 = 1e-13;
+/// And within so many ulps of the origin's largest coordinate: leaves far from the origin of the model are placed to some.
+const SAME_CROSSING_PLACED: f64 = 64.0;
 /// A correction that moves a root farther is not one: where the search went by the net in the ray's frame, rounding may say
 /// otherwise, and its word stands.
 const LARGEST_CORRECTION: f64 = 1e-6;
@@ -94,7 +94,8 @@ impl Exact {
             if hit.t >= query.undecided_from {
                 hit.certainty = Certainty::Uncertified;
             }
-            if !repeats(&hits, &hit, root.certainty, ray.direction) {
+            let contact = contact_distance(self.geometry.patches[hit.primitive as usize].size());
+            if !repeats(&hits, &hit, root.certainty, ray, contact) {
                 hits.push(hit);
             }
         }
@@ -191,13 +192,15 @@ impl Exact {
 }
 
 /// Whether a crossing repeats one of `hits`, in order of t: the same face at the same place with the same side towards the ray; where both
-/// are uncertified they may lie farther apart. `certainty` is that of the crossing's root.
-fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, direction: Vector) -> bool {
-    let close = SAME_CROSSING + SAME_CROSSING_FAR * hit.t.abs();
-    // At a pole clipping ends on boxes TANGENT wide across the ray, as often as patches meet there: along the ray they differ by
+/// are uncertified they may lie farther apart. `certainty` is that of the crossing's root, `contact` the [`contact_distance`] of its patch.
+fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, ray: &Ray, contact: f64) -> bool {
+    let direction = ray.direction;
+    let placed = SAME_CROSSING_PLACED * f64::EPSILON * ray.origin.abs().max_element();
+    let close = contact + SAME_CROSSING_FAR * hit.t.abs() + placed;
+    // At a pole clipping ends on boxes a contact wide across the ray, as often as patches meet there: along the ray they differ by
     // that over the sine.
     let sine = hit.geometric_normal.dot(direction).abs();
-    let smeared = close + (2.0 * TANGENT / sine).min(CONTACT_LENGTH * TANGENT);
+    let smeared = close + (2.0 * contact / sine).min(CONTACT_LENGTH * contact);
     let open = |c: Certainty| c == Certainty::Uncertified;
     let leaves = |h: &Hit| h.geometric_normal.dot(direction) > 0.0;
     hits.iter().rev().take_while(|h| hit.t - h.t <= smeared).any(|h| {

@@ -17,7 +17,7 @@ use super::query::Query;
 use super::settlement;
 use super::structure::Exact;
 use super::tangency;
-use super::tolerances::{CONTACT_LENGTH, SAME_PARAMETER, TANGENT};
+use super::tolerances::{CONTACT_LENGTH, SAME_PARAMETER, TANGENT, contact_distance};
 use crate::intersect::Certainty;
 use crate::math::simd::{self, Instructions, Kernel};
 
@@ -37,10 +37,6 @@ const POINT_BOX: f64 = 1e-7;
 const WORTH_CUTTING: f64 = 0.6;
 /// The least part of a box that a cut leaves, so that it keeps an inside.
 const LEAST_CUT: f64 = 1e-15;
-/// A surface is regular where its normal is longer than this share of its longest derivative's square.
-const REGULAR: f64 = 1e-6;
-/// A contact at a smaller sine is a tangency: a ray that cuts a regular surface steeper than this meets it at a point.
-const TANGENT_SINE: f64 = 1e-3;
 /// A box of this size that still holds more than one root is asked for a tangency: most rays that graze a surface have found theirs.
 const TANGENCY_BOX: f64 = 1.0 / 64.0;
 /// How far beyond its leaf a net from 32 digits is looked at, as a share of the leaf.
@@ -70,6 +66,10 @@ struct Clipping<'a> {
     seen: SeenLeaf,
     /// The point that the ray leaves, in the leaf's parameters.
     departure: Option<[f64; 2]>,
+    /// Distance across the ray below which a box touches it, mm: [`contact_distance`] of the patch.
+    contact: f64,
+    /// Bound of what a coordinate across the ray is off by rounding, mm.
+    noise: f64,
     /// Whether the ray passes a pole: its control points differ by their own rounding, and what 32 digits say of the cracks between them
     /// is not meant.
     at_pole: bool,
@@ -110,8 +110,9 @@ impl Exact {
         let departure = query.departure.and_then(|own| own.local_to(leaf, query.o, &self.geometry));
         let seen = SeenLeaf { net, frame: [query.n1, query.n2], margin, precise: false };
         let patch = &self.geometry.patches[leaf.patch as usize];
-        let at_pole = self.geometry.passes_pole(patch, [query.o, query.d], CONTACT_LENGTH * TANGENT);
-        let clipping = Clipping { index, leaf, seen, departure, at_pole };
+        let contact = contact_distance(patch.size());
+        let at_pole = self.geometry.passes_pole(patch, [query.o, query.d], CONTACT_LENGTH * contact);
+        let clipping = Clipping { index, leaf, seen, departure, contact, noise, at_pole };
         let before = [query.all.len(), query.all_rejected.len()];
         if !self.clip_seen(query, &clipping) {
             // In a search for all, what it found is found again.
@@ -126,8 +127,8 @@ impl Exact {
     #[cold]
     fn clip_precisely(&self, query: &mut Query, clipping: Clipping<'_>) {
         query.budget = query.budget.saturating_sub(PRECISE_WORK);
-        let Clipping { index, leaf, seen, departure, at_pole } = clipping;
-        let frame = tangent_frame(&seen, leaf.degree, query.d);
+        let Clipping { index, leaf, ref seen, .. } = clipping;
+        let frame = tangent_frame(seen, leaf.degree, query.d);
         let reference = self.geometry.reference(&self.geometry.patches[leaf.patch as usize]);
         let net = reference.net_along([query.o, query.d], frame, leaf.rect);
         let largest = |k: usize| net.iter().map(|p| p[k].abs()).fold(0.0, f64::max);
@@ -135,7 +136,7 @@ impl Exact {
         let rounding = PRECISE_ROUNDING * reach * largest(3);
         let margin = [0, 1].map(|k| halving_rounding(leaf) * largest(k) + rounding);
         let seen = SeenLeaf { net, frame, margin, precise: true };
-        self.clip_seen(query, &Clipping { index, leaf, seen, departure, at_pole });
+        self.clip_seen(query, &Clipping { index, seen, ..clipping });
     }
 
     /// Looks for every root in what is seen of a leaf. Returns `false` where `f64` cannot tell: what it offered must then be found again.
@@ -212,11 +213,11 @@ impl Exact {
         // At a contact the Jacobian is singular: no box proves itself there, however small, so a small one is taken as it is. What `f64`
         // takes for one is looked at once more in 32 digits, until it is a point or nothing is left of it.
         let is_short = if clipping.at_pole {
-            hull.far - hull.near < CONTACT_LENGTH * TANGENT || small < POINT_BOX
+            hull.far - hull.near < CONTACT_LENGTH * clipping.contact || small < POINT_BOX
         } else {
-            !seen.precise || hull.far - hull.near < TANGENT || small < POINT_BOX
+            !seen.precise || hull.far - hull.near < clipping.contact || small < POINT_BOX
         };
-        let touches = hull.across < TANGENT && is_short;
+        let touches = hull.across < clipping.contact && is_short;
         if touches || small < FINEST {
             return self.take_contact(query, clipping, &node);
         }
@@ -313,26 +314,31 @@ impl Exact {
         let t = s[2] / s[3];
         let reach = POINT_BOX + size_u.max(size_v);
         let leaving = clipping.departure.is_some_and(|p| (0..2).all(|k| (p[k] - local[k]).abs() <= reach))
-            && query.departure.is_some_and(|own| own.is_root_at((t.abs() - CONTACT_LENGTH * TANGENT).max(0.0)));
-        if leaving {
+            && query
+                .departure
+                .is_some_and(|own| own.is_root_at((t.abs() - CONTACT_LENGTH * clipping.contact).max(0.0)));
+        if clipping.seen.precise || clipping.at_pole {
+            if !leaving {
+                let certainty = self.contact_certainty(clipping.leaf, local, query);
+                self.offer(query, clipping.index, Candidate { local, t, certainty, settled: None });
+            }
             return true;
         }
-        if !clipping.seen.precise && !clipping.at_pole {
-            return false;
-        }
-        let certainty = self.contact_certainty(clipping.leaf, local, query);
-        self.offer(query, clipping.index, Candidate { local, t, certainty, settled: None });
-        true
+        // A box that touches in `f64` may be long, and hold another root beside the one that the ray leaves.
+        leaving && self.runs_along(query, clipping, node)
     }
 
-    /// The certainty of a contact: tangent where the surface is regular and the ray grazes it, else uncertified.
-    fn contact_certainty(&self, leaf: &Leaf, [u, v]: [f64; 2], query: &Query) -> Certainty {
-        let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, u, v);
-        let (_, du, dv) = project(&jet);
-        let n = du.cross(dv);
-        let regular = n.length() > REGULAR * du.length().max(dv.length()).powi(2);
-        let sine = n.dot(query.d).abs() / n.length().max(f64::MIN_POSITIVE);
-        if regular && sine < TANGENT_SINE { Certainty::Tangent } else { Certainty::Uncertified }
+    /// Whether the ray, as far as a box reaches, runs along the surface that it leaves: nowhere higher over it than what its start is off
+    /// and rounding. What roots there are it cannot tell from the departure.
+    fn runs_along(&self, query: &Query, clipping: &Clipping<'_>, node: &Node) -> bool {
+        let Some((own, [u, v])) = query.departure.zip(clipping.departure) else { return false };
+        let control = clipping.leaf.net(&self.pool);
+        let (_, du, dv) =
+            project(&net::evaluate(control, clipping.leaf.degree, u.clamp(0.0, 1.0), v.clamp(0.0, 1.0)));
+        let normal = du.cross(dv).normalize_or_zero();
+        let [a, b] = clipping.seen.frame.map(|n| n.dot(normal));
+        let bound = own.off + 2.0 * clipping.noise;
+        node.net.iter().all(|p| (a * p[0] + b * p[1]).abs() <= bound * p[3])
     }
 }
 

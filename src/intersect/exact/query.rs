@@ -4,7 +4,7 @@ use super::geometry::Geometry;
 use super::leaf::Leaf;
 use super::patch::project;
 use super::slabs::RaySlabs;
-use super::tolerances::{SAME_PARAMETER, TANGENT};
+use super::tolerances::{SAME_PARAMETER, SAME_START, TANGENT, contact_distance};
 use super::tree::Tree;
 use crate::intersect::Certainty;
 use crate::math::{Point, Ray, Uv, Vector, orthonormal_pair};
@@ -46,6 +46,10 @@ pub(super) struct DeparturePoint {
     pub(super) off: f64,
     /// Below this, mm, the origin is taken to be that point.
     tolerance: f64,
+    /// Bound of what its origin, rounded where it stands, is off, mm.
+    rounding: f64,
+    /// [`contact_distance`] of the patch that it lies on.
+    contact: f64,
 }
 
 /// A ray with everything that each leaf needs of it.
@@ -173,8 +177,9 @@ impl DeparturePoint {
         let (s, ..) = project(&p.jet(p.local(uv)));
         let off = (ray.origin - p.center - s).length();
         let reach = ray.origin.abs().max_element().max(geometry.farthest_start);
-        let tolerance = TANGENT + ORIGIN_ROUNDING * f64::EPSILON * reach;
-        Some(Self { face, patch, uv, off, tolerance })
+        let rounding = ORIGIN_ROUNDING * f64::EPSILON * reach;
+        let tolerance = TANGENT.min(SAME_START * p.size()) + rounding;
+        Some(Self { face, patch, uv, off, tolerance, rounding, contact: contact_distance(p.size()) })
     }
 
     /// The departure in the leaf's parameters, which may lie far outside of it; `None` on another face, and on another patch unless it lies
@@ -210,7 +215,7 @@ impl DeparturePoint {
 
     /// Whether a root of a leaf, `t` mm along the ray, is the departure under other parameters: across a seam, or at a pole.
     pub(super) fn is_same_point(&self, leaf: &Leaf, local: [f64; 2], t: f64, geometry: &Geometry) -> bool {
-        if leaf.face != self.face || t.abs() > NEAR_DEPARTURE * (self.tolerance + self.off) {
+        if leaf.face != self.face || t.abs() > NEAR_DEPARTURE * (self.contact + self.rounding + self.off) {
             return false;
         }
         let grid = &geometry.grids[geometry.faces[self.face as usize].grid as usize];

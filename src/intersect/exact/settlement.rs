@@ -10,7 +10,7 @@ use super::patch::Patch;
 use super::query::Query;
 use super::reference::SettledRoot;
 use super::structure::Exact;
-use super::tolerances::TANGENT;
+use super::tolerances::{COORDINATE_ROUNDING, ROUND, contact_distance};
 use crate::intersect::Certainty;
 use crate::math::Uv;
 
@@ -76,11 +76,16 @@ impl Exact {
             Place::OnLeaf => self.offer(query, index, found),
             Place::InCrack => self.leave_open(query, index, found),
             // The parameters of a pole are any: beside it they say nothing of where the face ends.
-            Place::Beside if self.geometry.is_pole(patch, query.o + query.d * root.t, TANGENT) => {
-                self.leave_open(query, index, found);
-            }
+            Place::Beside if self.is_at_pole(query, patch, root.t) => self.leave_open(query, index, found),
             Place::Beside => {}
         }
+    }
+
+    /// Whether the ray's point at `t` is a pole of the patch's surface: within a contact, and what rounds the point.
+    fn is_at_pole(&self, query: &Query, patch: &Patch, t: f64) -> bool {
+        let reach = query.o.abs().max_element() + t.abs();
+        let distance = contact_distance(patch.size()) + COORDINATE_ROUNDING * ROUND * reach;
+        self.geometry.is_pole(patch, query.o + query.d * t, distance)
     }
 
     /// Tells whether a root in 32 digits lies on the leaf that found it.
@@ -88,7 +93,7 @@ impl Exact {
     /// Over an inner border the surface goes on, and in its own numbers without a gap: de Boor's points of two spans agree on their knot to
     /// 30 digits. So a ray that meets the face meets it on a leaf by that leaf's own polynomial, and that leaf's test in `f64`, which
     /// excludes nothing within its margin, finds it there; a root of the polynomial beyond its leaf need not count, and over a crease it is
-    /// no point of the face. What the change to the leaf's parameters rounds is worth far less than [`TANGENT`] along the surface, and
+    /// no point of the face. What the change to the leaf's parameters rounds is worth far less than a contact along the surface, and
     /// within that of a leaf is on the face to the accuracy that a hit promises.
     ///
     /// Over a seam the surface comes back with control points of its own, rounded on their own: between both lies a crack as high as their
@@ -117,7 +122,7 @@ impl Exact {
             grid.closed[k] && leaf.rect[k][end] == end as f64 && patch.domain[k][end] == ends[end]
         };
         let within_margin = sides.iter().all(|&(k, end)| beyond[k][end] <= margin[k].min(LOOSE));
-        if way(0) + way(1) <= TANGENT && within_margin {
+        if way(0) + way(1) <= contact_distance(patch.size()) && within_margin {
             Place::OnLeaf
         } else if within_margin && sides.iter().any(|&(k, end)| is_over(k, end) && is_seam(k, end)) {
             Place::InCrack

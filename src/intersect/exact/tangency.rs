@@ -21,7 +21,7 @@ use super::net::{self, Net, Slopes, V4};
 use super::query::Query;
 use super::reference::{ReferencePatch, SettledRoot};
 use super::structure::Exact;
-use super::tolerances::TANGENT;
+use super::tolerances::contact_distance;
 use crate::math::Vector;
 use crate::math::simd::{self, Instructions, Kernel};
 use smallvec::SmallVec;
@@ -100,11 +100,12 @@ pub(super) fn roots(
     let bend = Bend::new(&net, leaf.degree, margin)?;
     let from = leaf.patch_parameters(wide.map(|[low, _]| low));
     let extent = [0, 1].map(|k: usize| (leaf.rect[k][1] - leaf.rect[k][0]) * (wide[k][1] - wide[k][0]));
-    let near = NEAR_CONTACTS * TANGENT + NEAR_MARGINS * margin[0].max(margin[1]);
+    let patch = &exact.geometry.patches[leaf.patch as usize];
+    let near = NEAR_CONTACTS * contact_distance(patch.size()) + NEAR_MARGINS * margin[0].max(margin[1]);
     if !(bend.lowest(&net, leaf.degree).abs() <= near) {
         return None;
     }
-    let reference = exact.geometry.reference(&exact.geometry.patches[leaf.patch as usize]);
+    let reference = exact.geometry.reference(patch);
     query.budget = query.budget.saturating_sub(WORK);
     simd::dispatch(Search { reference, query, leaf, frame: seen.frame, net: &net, bend: &bend, from, extent })
 }

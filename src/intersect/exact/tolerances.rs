@@ -6,11 +6,25 @@
 /// Half an ulp of 1: the relative error of one rounded operation.
 pub(super) const ROUND: f64 = 0.5 * f64::EPSILON;
 
-/// Contact closer than this is a matter of rounding, mm: ten thousand half ulps of 1000 mm.
+/// Contact closer than this is a matter of rounding, mm: ten thousand half ulps of 1000 mm. On small patches less is, see
+/// [`contact_distance`].
 pub(super) const TANGENT: f64 = 1e-9;
-/// Along the ray a contact smears over this many times [`TANGENT`]: a circle of radius 0.5 mm rises 1e-9 mm over a chord of 6e-5 mm,
-/// and boxes that are shorter than 1e-6 mm can hold no second contact that would be told from the first.
+/// The same as a share of a patch: its own coordinates, and those of rays from a thousand times its size away, are rounded by less. Patches
+/// of a millimetre and more have [`TANGENT`].
+const TANGENT_SHARE: f64 = 1e-9;
+/// Along the ray a contact smears over this many times [`contact_distance`]: a circle whose radius is half the size of a patch rises 1e-9
+/// of that over a chord of 6e-5, and boxes that are shorter than 1e-6 of it can hold no second contact that would be told from the first.
 pub(super) const CONTACT_LENGTH: f64 = 1e3;
+
+/// Share of a patch's size by which a start may miss the point that it says it leaves: of a start that is rounded on its way from a source
+/// four hundred million sizes off it is what is lost. Larger patches, of 10 µm and more, have [`TANGENT`].
+pub(super) const SAME_START: f64 = 1e-7;
+
+/// Distance, mm, below which contact with a patch of this `size`, mm, is a matter of rounding.
+#[inline]
+pub(super) fn contact_distance(size: f64) -> f64 {
+    TANGENT.min(TANGENT_SHARE * size)
+}
 
 /// Half ulps of `|o − c| + radius` by which a leaf's coordinates across a ray are off: 2 for the shifted origin, 4 for the
 /// frame's departure from perpendicular, 12 for the products, 10 for the value in the middle, 4 for what is left out.

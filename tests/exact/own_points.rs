@@ -1,0 +1,119 @@
+//! Rays that leave a face at a small sine and meet it again nearby, on parts of a micrometre, of 100 mm and of 10 km.
+
+use crate::support::*;
+use lampyris::intersect::exact::{Exact, Settings};
+use lampyris::intersect::{Certainty, Cost};
+use lampyris::math::{Departure, FaceId, Homogeneous, Point, Ray, Uv, Vector};
+use lampyris::nurbs::Surface;
+
+/// The bowl `z = (x² + y²) / 2` over the square of ±0.5, times `size` and moved by `shift`. The weights of its rows and columns grow by
+/// `speed` from one to the next: a place of the plane keeps its height, and parameters run unevenly.
+struct Bowl {
+    size: f64,
+    shift: Vector,
+    speed: [f64; 2],
+}
+
+impl Bowl {
+    fn surface(&self) -> Surface {
+        // Control points of x and of x² over [−0.5, 0.5].
+        let (x, square) = ([-0.5, 0.0, 0.5], [0.25, -0.25, 0.25]);
+        let mut points = Vec::new();
+        for i in 0..3 {
+            for j in 0..3 {
+                let p = self.size * Point::new(x[i], x[j], 0.5 * (square[i] + square[j])) + self.shift;
+                let weight = self.speed[0].powi(i as i32) * self.speed[1].powi(j as i32);
+                points.push(Homogeneous::from((p * weight, weight)));
+            }
+        }
+        let knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+        Surface { degree: [2, 2], knots: [knots.clone(), knots], points }
+    }
+
+    /// The parameter, in direction `d`, of a place that is a share `x` of the way through.
+    fn parameter(&self, d: usize, x: f64) -> f64 {
+        // B₁/B₀-weights of w^i: the projective map of the unit interval that takes s to w·s / (1 − s + w·s).
+        x / (x + self.speed[d] * (1.0 - x))
+    }
+}
+
+/// How many chords were asked for, flagged and lost.
+#[derive(Debug, Default, PartialEq)]
+struct Count {
+    asked: usize,
+    flagged: usize,
+    wrong: Vec<String>,
+}
+
+/// Leaves a bowl inward and outward at sines down to 1e-7: inward the ray meets it again after twice the sine over the curvature.
+fn leave(bowl: &Bowl, rays: usize, seed: u64) -> Count {
+    let surface = bowl.surface();
+    let exact = Exact::build(&model([surface.clone()]), &Settings::default());
+    let mut s = Random(seed);
+    let mut count = Count::default();
+    for _ in 0..rays {
+        let share = [s.within(0.1, 0.9), s.within(0.1, 0.9)];
+        let uv = Uv::new(bowl.parameter(0, share[0]), bowl.parameter(1, share[1]));
+        let origin = surface.evaluate(uv);
+        let at = (origin - bowl.shift) / bowl.size;
+        let (x, y) = (at.x, at.y);
+        let normal = Vector::new(-x, -y, 1.0).normalize();
+        let tangent = normal.cross(s.direction()).normalize();
+        let sine = 10f64.powf(s.within(-7.0, -1.0)) * if s.unit() < 0.2 { -1.0 } else { 1.0 };
+        let d = (tangent + normal * sine).normalize();
+        let ray =
+            Ray::new(origin, d).with_departure(Departure { face: FaceId(0), primitive: 0, uv, triangle: None });
+        // The height over the bowl, τ·rise − τ²·bend/2, vanishes at the start and once more.
+        let (rise, bend) = (d.z - x * d.x - y * d.y, d.x * d.x + d.y * d.y);
+        let chord = 2.0 * rise / bend;
+        let end = [x + chord * d.x, y + chord * d.y];
+        let meets = chord > 0.0 && end.iter().all(|x| x.abs() < 0.499);
+        // Shorter chords are the own point to the ninth digit and some; beside the rim nothing is asked.
+        if chord.abs() < 2e-6 || chord > 0.0 && !meets && end.iter().all(|x| x.abs() < 0.501) {
+            continue;
+        }
+        count.asked += 1;
+        let answer = exact.first(&ray, &mut Cost::default());
+        if answer.certainty != Certainty::Certified {
+            count.flagged += 1;
+            continue;
+        }
+        // The start is rounded where it stands, and strays along the ray by that over the sine.
+        let reach = bowl.size + bowl.shift.abs().max_element();
+        let tolerance = 1e-9 * bowl.size + 64.0 * f64::EPSILON * reach / sine.abs();
+        let t = chord * bowl.size;
+        if chord.abs() * bowl.size < 8.0 * tolerance {
+            continue;
+        }
+        let right = answer.hit.map_or(!meets, |hit| meets && (hit.t - t).abs() <= tolerance);
+        if !right {
+            count.wrong.push(format!("{:?} for {t} at {sine:e}, {uv}", answer.hit.map(|h| h.t)));
+        }
+    }
+    count
+}
+
+#[test]
+fn a_chord_is_found_whatever_the_size_of_its_part() {
+    for (seed, size) in (1u64..).zip([1e-3, 0.05, 100.0, 1e7]) {
+        for speed in [[1.0, 1.0], [7.0, 0.3], [0.02, 9.0]] {
+            let bowl = Bowl { size, shift: Vector::ZERO, speed };
+            let count = leave(&bowl, 3000, seed);
+            let Count { asked, flagged, wrong } = &count;
+            assert!(
+                wrong.is_empty(),
+                "{} of {asked} on {size} mm: {:?}",
+                wrong.len(),
+                &wrong[..wrong.len().min(5)]
+            );
+            assert!(*asked > 1500 && flagged * 50 < *asked, "{flagged} of {asked} flagged on {size} mm");
+        }
+    }
+}
+
+#[test]
+fn a_chord_is_found_far_from_the_origin() {
+    let shift = Vector::new(3e5, -2e5, 1e5);
+    let count = leave(&Bowl { size: 100.0, shift, speed: [3.0, 0.5] }, 3000, 9);
+    assert!(count.wrong.is_empty() && count.asked > 1500 && count.flagged * 20 < count.asked, "{count:?}");
+}
