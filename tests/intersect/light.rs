@@ -121,3 +121,38 @@ fn rays_along_a_direction() {
         }
     }
 }
+
+/// Many sources, each with too few rays for a buffer of its own, that shine along one direction from one plane, or from one point.
+#[test]
+fn sources_with_rays_in_common_share_what_is_known() {
+    let mut dice = Random(13);
+    let mesh = ball(12, |d| Point::ZERO + d * 20.0);
+    let direction = dice.direction();
+    let (x, y) = lampyris::math::orthonormal_pair(direction);
+    let beside: Vec<Point> = (0..500)
+        .map(|_| direction * -60.0 + x * (20.0 * dice.unit() - 10.0) + y * (20.0 * dice.unit() - 10.0))
+        .collect();
+    let along = |origin: &Point| (Beam::Collimated { origin: *origin, direction }, 1000);
+    let beams: Vec<(Beam, u64)> = beside.iter().map(along).collect();
+    let rays: Vec<Ray> = beside.iter().map(|origin| Ray::new(*origin, direction)).collect();
+    shared(&mesh, &beams, &rays);
+    let point = Point::new(3.0, -40.0, 7.0);
+    let beams = vec![(Beam::Point(point), 1000); 500];
+    let rays: Vec<Ray> = (0..500).filter_map(|_| Ray::from_points(point, place(&mesh, &mut dice))).collect();
+    shared(&mesh, &beams, &rays);
+}
+
+/// Asks a tree that expects the beams, and one that expects the first of them alone, which does not pay.
+fn shared(mesh: &FacetMesh, beams: &[(Beam, u64)], rays: &[Ray]) {
+    let [all, one] = [(); 2].map(|()| Octree::build(mesh, &octree::Settings::default()));
+    all.prepare_for(&ExpectedRays { rays: 500_000, threads: 1, beams, sag: 0.0 });
+    one.prepare_for(&ExpectedRays { rays: 1000, threads: 1, beams: &beams[..1], sag: 0.0 });
+    let ask = |tree: &Octree<'_>| {
+        let (mut hits, mut cost) = (vec![None; rays.len()], Cost::default());
+        tree.intersect_batch(rays, &mut hits, &mut cost);
+        (hits, cost.nodes)
+    };
+    let ((known, less), (walked, more)) = (ask(&all), ask(&one));
+    assert_eq!(known, walked);
+    assert!(more > 500 && less == 0, "{less} nodes against {more}");
+}

@@ -4,7 +4,7 @@ use super::View;
 use crate::intersect::facet::{FacetRay, Line, Nearest};
 use crate::intersect::octree::facet_pair::Corners;
 use crate::intersect::octree::huge_pages;
-use crate::math::Ray;
+use crate::math::{Point, Ray};
 use crate::mesh::FacetMesh;
 
 /// A facet with its corners, axis by axis in the order of the rays' axes: two lines of the cache hold all that a test asks for, where
@@ -56,7 +56,7 @@ impl View {
     pub(super) fn axes(&self, side: usize) -> [usize; 3] {
         match self {
             Self::Point(_) => [[1, 2, 0], [2, 0, 1], [0, 1, 2]][side / 2 % 3],
-            Self::Along { origin, direction, .. } => FacetRay::new(&Ray::new(*origin, *direction)).axes(),
+            Self::Along { direction, .. } => FacetRay::new(&Ray::new(Point::ZERO, *direction)).axes(),
         }
     }
 }

@@ -21,8 +21,9 @@ use super::tree::Tree;
 use crate::intersect::facet::{FacetHit, FacetRay, Line, Nearest};
 use crate::intersect::prefetch::prefetch;
 use crate::intersect::{Beam, Cost, ExpectedRays};
-use crate::math::{Point, Ray, Vector, orthonormal_pair};
+use crate::math::{Ray, Vector, orthonormal_pair};
 use buffer_facet::BufferFacet;
+use std::cmp::{Ordering, Reverse};
 use std::hint::select_unpredictable;
 
 /// Rays for each facet from which on a light buffer pays: a facet costs some 5 µs to draw, and a ray that need not walk saves 0.06 µs.
@@ -68,7 +69,7 @@ enum View {
     Point([f64; 3]),
     /// Along a direction, in units of half the side of a square around all facets, from a plane at the depth `start`, which rays
     /// may miss by `stray`.
-    Along { origin: Point, direction: Vector, across: [Vector; 2], middle: [f64; 2], start: f64, stray: f64 },
+    Along { direction: Vector, across: [Vector; 2], middle: [f64; 2], start: f64, stray: f64 },
 }
 
 /// The buffers of one source.
@@ -145,7 +146,6 @@ impl View {
                 let stray = PLANE_ROOM * (start.abs() + half);
                 let (across, middle) = ([x / half, y / half], [a / half, b / half]);
                 (fits && origin.is_finite()).then_some(Self::Along {
-                    origin: *origin,
                     direction: *direction,
                     across,
                     middle,
@@ -154,6 +154,28 @@ impl View {
                 })
             }
         }
+    }
+
+    /// Whether it shows the rays of `other` too, whose starts may lie in their plane to within rounding.
+    fn serves(&self, other: &Self) -> bool {
+        match (self, other) {
+            // The half of its room that is not for the starts of one source is for the planes of others.
+            (
+                Self::Along { direction, start, stray, .. },
+                Self::Along { direction: other_direction, start: other_start, .. },
+            ) => direction == other_direction && (start - other_start).abs() <= 0.5 * stray,
+            _ => self == other,
+        }
+    }
+
+    /// By point or direction, and then by depth: views that share a buffer follow one another.
+    fn order(&self, other: &Self) -> Ordering {
+        let key = |view: &Self| match view {
+            Self::Point(origin) => (0, origin.map(f64::to_bits), 0.0),
+            Self::Along { direction, start, .. } => (1, direction.to_array().map(f64::to_bits), *start),
+        };
+        let ((a, a_bits, a_start), (b, b_bits, b_start)) = (key(self), key(other));
+        (a, a_bits).cmp(&(b, b_bits)).then(a_start.total_cmp(&b_start))
     }
 
     /// Number of grids: the six sides of a cube, or one.
@@ -173,6 +195,23 @@ impl View {
     }
 }
 
+/// Returns the views of the beams, each with the number of its rays: one for all beams that share a point, or a direction and a plane. The
+/// one with most rays comes first.
+fn shared_views(tree: &Tree, beams: &[(Beam, u64)]) -> Vec<(View, u64)> {
+    let view = |(beam, rays): &(Beam, u64)| Some((View::from_beam(beam, tree)?, *rays));
+    let mut views: Vec<_> = beams.iter().filter_map(view).collect();
+    views.sort_by(|(a, _), (b, _)| a.order(b));
+    views.dedup_by(|(next, rays), (first, all)| {
+        let shared = first.serves(next);
+        if shared {
+            *all = all.saturating_add(*rays);
+        }
+        shared
+    });
+    views.sort_by_key(|(_, rays)| Reverse(*rays));
+    views
+}
+
 /// Draws light buffers for the expected beams for which they pay, at most [`MOST_BUFFERS`]; takes those that `kept` has already, and
 /// drops the rest of it.
 pub(super) fn draw_expected(
@@ -182,15 +221,14 @@ pub(super) fn draw_expected(
 ) -> Vec<LightBuffer> {
     let mut buffers: Vec<LightBuffer> = Vec::new();
     let facets = tree.surroundings.mesh.facets.len();
-    let worth = |rays: u64| facets <= MOST_FACETS && rays / LEAST_RAYS_PER_FACET >= facets as u64;
-    let views =
-        expected.beams.iter().filter(|(_, rays)| worth(*rays)).filter_map(|(beam, _)| View::from_beam(beam, tree));
-    for view in views {
-        // Two beams from one place share their buffer; drawing costs too much to do it twice.
-        if buffers.len() < MOST_BUFFERS && buffers.iter().all(|m| m.view != view) {
-            let drawn = kept.iter().position(|m| m.view == view).map(|k| kept.swap_remove(k));
-            buffers.push(drawn.unwrap_or_else(|| raster::draw(tree.surroundings.mesh, view, expected.threads)));
-        }
+    if facets > MOST_FACETS {
+        return buffers;
+    }
+    let views = shared_views(tree, expected.beams);
+    let worth = views.into_iter().filter(|(_, rays)| rays / LEAST_RAYS_PER_FACET >= facets as u64);
+    for (view, _) in worth.take(MOST_BUFFERS) {
+        let drawn = kept.iter().position(|m| m.view == view).map(|k| kept.swap_remove(k));
+        buffers.push(drawn.unwrap_or_else(|| raster::draw(tree.surroundings.mesh, view, expected.threads)));
     }
     buffers
 }
