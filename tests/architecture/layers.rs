@@ -595,6 +595,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "shape",
             "far mod",
             "packet",
+            "mixed_packet",
             "simd_dispatch",
             "sampler",
         ],

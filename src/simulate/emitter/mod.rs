@@ -6,6 +6,7 @@ mod area;
 mod cover;
 mod far;
 mod measured;
+mod mixed_packet;
 mod own_wavelengths;
 mod packet;
 mod ray_list;
@@ -28,6 +29,7 @@ pub(crate) use area::{Area, CoveredArea};
 pub(crate) use cover::Cover;
 use far::NearStart;
 pub(crate) use measured::{Loaded, load};
+pub(crate) use mixed_packet::MixedPacket;
 pub(crate) use ray_list::{ListCursor, RayList};
 pub(crate) use sampler::RaySampler;
 use shape::{
@@ -268,32 +270,68 @@ impl Emitter {
         Ray::new(self.frame.point(measured.origin), self.frame.direction(measured.direction))
     }
 
+    /// Returns where a ray starts, mm in scene coordinates, for the uniform numbers that `pair` draws: on a point, disc or rectangle,
+    /// else at the source's `at`. `sin_cos` takes turns.
+    #[inline(always)]
+    fn start(&self, pair: impl FnOnce() -> [f64; 2], sin_cos: impl FnOnce(f64) -> (f64, f64)) -> Point {
+        let f = &self.frame;
+        match self.shape {
+            Shape::Disc(radius) => {
+                let [u, v] = pair();
+                let r = radius_on_disc(radius, u);
+                let (sin, cos) = sin_cos(v);
+                f.origin + f.x * (r * cos) + f.y * (r * sin)
+            }
+            Shape::Rectangle(half) => {
+                let [x, y] = point_on_rectangle(half, pair());
+                f.origin + f.x * x + f.y * y
+            }
+            Shape::Point | Shape::Faces(_) | Shape::List(_) => f.origin,
+        }
+    }
+
+    /// Returns the unit direction of a ray in the scene about the last of three axes, for the uniform numbers that `pair` draws; of a
+    /// measured lobe about the source's own. `sin_cos` takes turns.
+    #[inline(always)]
+    fn direction(
+        &self,
+        axes: [Vector; 3],
+        pair: impl FnOnce() -> [f64; 2],
+        sin_cos: impl FnOnce(f64) -> (f64, f64),
+    ) -> Vector {
+        match &self.lobe {
+            Lobe::Collimated => axes[2],
+            Lobe::Cone(rim) => {
+                let [u, v] = pair();
+                let versine = versine_in_cone(*rim, u);
+                direction_about_axis(axes, [1.0 - versine, sine_from_versine(versine)], sin_cos(v))
+            }
+            Lobe::Cosine(exponent) => {
+                let [u, v] = pair();
+                // From (0, 1], as the power of zero would be grazing light; for a Lambertian source cos θ is √u (Malley).
+                let u = 1.0 - u;
+                let cosine = if *exponent == LAMBERTIAN { u.sqrt() } else { u.powf(*exponent) };
+                direction_about_axis(axes, [cosine, sine_from_cosine(cosine)], sin_cos(v))
+            }
+            Lobe::Measured(sampler) => self.frame.direction(sampler.sample(pair())),
+        }
+    }
+
     /// Draws the ray with this index, writes its start and direction in the scene to `ray`, and returns its face, wavelength and whether it
     /// failed. `stream` must hold its numbers; `cursor` is for sources with a list.
     #[inline(never)]
     fn emit(&self, stream: &Stream, index: RayIndex, cursor: &mut ListCursor, ray: &mut Ray) -> Emission {
         let f = &self.frame;
         let mut emission = Emission { from: None, wavelength: self.wavelength(stream, index), failed: false };
-        *ray = Ray::new(f.origin, f.z);
-        let mut axes = [f.x, f.y, f.z];
-        match &self.shape {
-            Shape::Point => {}
-            Shape::Disc(radius) => {
-                let [u, v] = stream.pair(index, 0);
-                let r = radius_on_disc(*radius, u);
-                let (sin, cos) = sin_cos_turns(v);
-                ray.origin = f.origin + f.x * (r * cos) + f.y * (r * sin);
-            }
-            Shape::Rectangle(half) => {
-                let [x, y] = point_on_rectangle(*half, stream.pair(index, 0));
-                ray.origin = f.origin + f.x * x + f.y * y;
+        let (origin, axes) = match &self.shape {
+            Shape::Point | Shape::Disc(_) | Shape::Rectangle(_) => {
+                (self.start(|| stream.pair(index, 0), sin_cos_turns), [f.x, f.y, f.z])
             }
             Shape::Faces(area) => {
                 let (point, normal, face) = area.point(stream, index);
                 let (x, y) = orthonormal_pair(normal);
-                ray.origin = point;
                 emission.from = Some((face, normal));
-                axes = [x, y, normal];
+                (point, [x, y, normal])
             }
             // A measured ray has a place and a direction of its own, and perhaps a wavelength. Systematic sampling: shares evenly
             // spaced over the list take from every part what it has.
@@ -301,23 +339,8 @@ impl Emitter {
                 let measured = list.ray_at_share(stream.systematic(index), cursor);
                 return self.emit_measured(measured, emission.wavelength, ray);
             }
-        }
-        ray.direction = match &self.lobe {
-            Lobe::Collimated => axes[2],
-            Lobe::Cone(rim) => {
-                let [u, v] = stream.pair(index, 1);
-                let versine = versine_in_cone(*rim, u);
-                direction_about_axis(axes, [1.0 - versine, sine_from_versine(versine)], v)
-            }
-            Lobe::Cosine(exponent) => {
-                let [u, v] = stream.pair(index, 1);
-                // From (0, 1], as the power of zero would be grazing light; for a Lambertian source cos θ is √u (Malley).
-                let u = 1.0 - u;
-                let cosine = if *exponent == LAMBERTIAN { u.sqrt() } else { u.powf(*exponent) };
-                direction_about_axis(axes, [cosine, sine_from_cosine(cosine)], v)
-            }
-            Lobe::Measured(sampler) => f.direction(sampler.sample(stream.pair(index, 1))),
         };
+        *ray = Ray::new(origin, self.direction(axes, || stream.pair(index, 1), sin_cos_turns));
         emission
     }
 }

@@ -4,7 +4,6 @@ use super::area::Area;
 use super::ray_list::RayList;
 use crate::math::Vector;
 use crate::optics::IntensitySampler;
-use crate::optics::sampling::sin_cos_turns;
 
 /// Where the rays of a source start.
 #[derive(Clone, Debug)]
@@ -77,9 +76,13 @@ pub(super) fn sine_from_cosine(cosine: f64) -> f64 {
     ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt()
 }
 
-/// Returns the direction at an angle to the last of three axes, given by its cosine and sine, and at azimuth `v`, in whole turns, from the
-/// first towards the second.
-pub(super) fn direction_about_axis(axes: [Vector; 3], [cos_theta, sin_theta]: [f64; 2], v: f64) -> Vector {
-    let (sin, cos) = sin_cos_turns(v);
-    axes[0] * (sin_theta * cos) + axes[1] * (sin_theta * sin) + axes[2] * cos_theta
+/// Returns the direction at an angle to the last of three axes, given by its cosine and sine, and at an azimuth, given by its sine and
+/// cosine, from the first towards the second.
+#[inline(always)]
+pub(super) fn direction_about_axis(
+    axes: [Vector; 3],
+    [cos_theta, sin_theta]: [f64; 2],
+    (sin_phi, cos_phi): (f64, f64),
+) -> Vector {
+    axes[0] * (sin_theta * cos_phi) + axes[1] * (sin_theta * sin_phi) + axes[2] * cos_theta
 }

@@ -36,7 +36,7 @@ const STEP: f64 = 1.0 / 4_294_967_296.0;
 
 /// Returns the middle of a step of the unit interval: never 0 and never 1.
 #[inline(always)]
-fn unit(number: u32) -> f64 {
+pub(super) fn unit(number: u32) -> f64 {
     // The middle of a step, which is neither 0 nor 1: inversions have no end to fall off.
     (f64::from(number) + 0.5) * STEP
 }

@@ -11,7 +11,7 @@ use super::starting_media::{start_behind_glue, start_clear_of_faces};
 use super::tracer::Tracer;
 use crate::math::Ray;
 use crate::optics::polarised::Stokes;
-use crate::simulate::emitter::{Emission, Portion, RaySampler};
+use crate::simulate::emitter::{Emission, MixedPacket, Portion, RaySampler};
 use crate::simulate::outcome::{Event, LostCause};
 use crate::simulate::scene::Sampling;
 use crate::simulate::tally::quanta_as_integer;
@@ -24,6 +24,10 @@ pub(super) struct SourceQueue {
     next: u64,
     range: [u64; 2],
     sampler: Option<RaySampler>,
+    /// The rays that start next, where many sources have few in this replicate.
+    mixed: Option<Box<MixedPacket>>,
+    /// Whether the rays of the present source belong there.
+    mixes: bool,
     /// The source at which the queue ends: one past the last, or 0 for a single ray, which no other follows.
     last: usize,
     /// Whether one ray alone is asked for, by its number.
@@ -39,7 +43,9 @@ impl SourceQueue {
         let last = context.plan.shares.len();
         let single = !matches!(rays, RaySelection::Replicate(_));
         let (range, sampler, listed) = ([0, 0], None, None);
-        let mut queue = Self { replicate: 0, source: 0, next: 0, range, sampler, last, single, listed };
+        let (mixed, mixes) = (None, false);
+        let mut queue =
+            Self { replicate: 0, source: 0, next: 0, range, sampler, mixed, mixes, last, single, listed };
         match rays {
             RaySelection::Replicate(replicate) => {
                 queue.replicate = replicate;
@@ -68,19 +74,51 @@ impl SourceQueue {
         queue
     }
 
-    /// Turns to the rays of a source in this replicate, from the first on, and makes or restarts the sampler; past the last source only
-    /// notes that it is there, which ends the queue.
+    /// Turns to the rays of a source in this replicate, from the first on, and makes or restarts the sampler, unless they are to be mixed
+    /// with those of other sources; past the last source only notes that it is there, which ends the queue.
+    #[inline(always)]
     fn enter_source(&mut self, context: &Context<'_>, source: usize) {
         self.source = source;
         let Some(emitter) = context.bound.emitters.get(source) else { return };
         self.range = context.plan.range(source, self.replicate);
         self.next = self.range[0];
-        let portion = Portion {
+        let portion = self.portion(context);
+        self.mixes = !self.single && MixedPacket::takes(emitter, context.settings.sampling, portion.rays);
+        if !self.mixes {
+            self.make_sampler(context, portion);
+        }
+    }
+
+    /// Returns the rays of the present source in this replicate.
+    #[inline(always)]
+    fn portion(&self, context: &Context<'_>) -> Portion {
+        Portion {
             replicate: self.replicate,
-            source: source as u32,
+            source: self.source as u32,
             rays: self.range[1] - self.range[0],
             lattice: context.plan.lattice(self.replicate),
-        };
+        }
+    }
+
+    /// Fills the mixed packet with rays of the present source and of those after it that belong there.
+    #[inline(never)]
+    fn mix(&mut self, context: &Context<'_>) {
+        let mut mixed = self.mixed.take().unwrap_or_else(|| MixedPacket::boxed(context.settings.seed));
+        mixed.clear();
+        while self.mixes && !mixed.is_full() && self.source < self.last {
+            let emitter = &context.bound.emitters[self.source];
+            mixed.add(emitter, self.portion(context), self.range[0], &mut self.next);
+            if self.next >= self.range[1] {
+                self.enter_source(context, self.source + 1);
+            }
+        }
+        mixed.draw(self.replicate);
+        self.mixed = Some(mixed);
+    }
+
+    /// Makes or restarts the sampler of the present source.
+    fn make_sampler(&mut self, context: &Context<'_>, portion: Portion) {
+        let emitter = &context.bound.emitters[self.source];
         match &mut self.sampler {
             Some(sampler) => sampler.restart(emitter, portion, self.range[0]),
             None => {
@@ -101,12 +139,25 @@ impl SourceQueue {
     ) -> bool {
         let context = tracer.context;
         loop {
+            if let Some(mixed) = &mut self.mixed
+                && let Some((source, number, emission)) = mixed.next_ray(&context.bound.emitters, ray)
+            {
+                *path = Path::at_source(number, context.plan.shares[source].quanta, C::in_surroundings());
+                if tracer.start_path(source, &emission, path, ray) {
+                    return true;
+                }
+                continue;
+            }
             // A source may have no ray in this replicate.
             while self.next >= self.range[1] {
                 if self.source >= self.last {
                     return false;
                 }
                 self.enter_source(context, self.source + 1);
+            }
+            if self.mixes {
+                self.mix(context);
+                continue;
             }
             let Some(sampler) = &mut self.sampler else { return false };
             let emitter = &context.bound.emitters[self.source];

@@ -12,6 +12,7 @@ mod sobol;
 
 pub use philox::philox4x32;
 pub use sobol::{BLOCK, DIMENSIONS, scrambled, scrambled_block};
+pub(crate) use sobol::{LOW_INDICES, scrambled_low};
 
 /// What a random number is for; part of its key, so that adding an effect shifts no other number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -65,9 +66,23 @@ impl Key {
     /// Returns 128 random bits, a function of key and purpose alone.
     #[inline]
     pub fn words(&self, purpose: Purpose) -> [u32; 4] {
+        let (counter, key) = self.of_philox(purpose);
+        philox4x32(counter, key)
+    }
+
+    /// Returns [`Key::words`], compiled with the caller's instruction set: for loops that run in vectors.
+    #[inline(always)]
+    pub(crate) fn words_in_loop(&self, purpose: Purpose) -> [u32; 4] {
+        let (counter, key) = self.of_philox(purpose);
+        philox::ten_rounds(counter, key)
+    }
+
+    /// Returns counter and key of the generator.
+    #[inline(always)]
+    fn of_philox(&self, purpose: Purpose) -> ([u32; 4], [u32; 2]) {
         // 48 bits of the ray and 16 of the purpose share two words of the counter.
         let high = (self.ray >> 32) as u32 & 0xffff | (purpose as u32) << 16;
-        philox4x32([self.ray as u32, high, self.bounce, self.branch], [self.seed as u32, (self.seed >> 32) as u32])
+        ([self.ray as u32, high, self.bounce, self.branch], [self.seed as u32, (self.seed >> 32) as u32])
     }
 }
 

@@ -5,7 +5,13 @@
 /// Salmon, Moraes, Dror, Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC 2011. Passes BigCrush; stateless, so any number of any ray
 /// can be had in any order on any thread.
 #[inline]
-pub fn philox4x32(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
+pub fn philox4x32(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
+    ten_rounds(counter, key)
+}
+
+/// Returns [`philox4x32`], compiled with the caller's instruction set: for loops that run in vectors.
+#[inline(always)]
+pub(super) fn ten_rounds(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     const M: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
     const W: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
     for round in 0..10 {

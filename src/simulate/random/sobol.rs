@@ -91,6 +91,27 @@ pub fn scrambled_block(first: u32, dimension: usize, seed: u32, numbers: &mut [u
     }
 }
 
+/// Indices from 0 that [`scrambled_low`] takes.
+pub(crate) const LOW_INDICES: u32 = 256;
+
+/// Returns [`scrambled`] of indices below [`LOW_INDICES`], each with a seed of its own, in a loop that runs in vectors.
+///
+/// # Panics
+/// For other indices, and for a dimension that does not exist.
+#[inline(always)]
+pub(crate) fn scrambled_low<const N: usize>(indices: &[u32; N], dimension: usize, seeds: &[u32; N]) -> [u32; N] {
+    // Bytes above the lowest are 0, and so is what they contribute.
+    let low = &TABLES[dimension][0];
+    let mut numbers = [0; N];
+    for k in 0..N {
+        numbers[k] = low[indices[k] as usize];
+    }
+    for k in 0..N {
+        numbers[k] = scramble(numbers[k], seeds[k]);
+    }
+    numbers
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -121,6 +142,16 @@ mod tests {
             for (index, number) in (first..).zip(numbers) {
                 assert_eq!(number, scrambled(index, dimension, seed));
             }
+        }
+    }
+
+    #[test]
+    fn low_indices_have_their_numbers_under_any_seed() {
+        let indices: [u32; 256] = std::array::from_fn(|k| 255 - k as u32);
+        let seeds = std::array::from_fn(|k| 0x9e37_79b9u32.wrapping_mul(k as u32));
+        for dimension in 0..DIMENSIONS {
+            let expected: [u32; 256] = std::array::from_fn(|k| scrambled(indices[k], dimension, seeds[k]));
+            assert_eq!(scrambled_low(&indices, dimension, &seeds), expected);
         }
     }
 
