@@ -17,5 +17,6 @@ mod polished_starts;
 #[path = "../support/random.rs"]
 mod random;
 mod referee;
+mod scaled;
 mod support;
 mod thin_rings;

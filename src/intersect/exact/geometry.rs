@@ -3,15 +3,15 @@
 use super::edge_use::edge_gaps;
 use super::patch::{Patch, PatchGrid, is_ill_scaled, project};
 use super::reference::{self, ReferencePatch};
-use super::tolerances::{FLAGGED_OF_GAP, VERTEX_RADIUS};
+use super::tolerances::FLAGGED_OF_GAP;
 use super::trim::Trim;
 use crate::math::{FaceId, Frame, Point, Uv, Vector};
 use crate::model::{Edge, Face, Model, Part, PlacedFace};
 use crate::nurbs::{Curve, Surface};
 use rustc_hash::FxHashMap;
 
-/// Gaps of a file wider than this are not bridged, but flagged, mm: solids with wider ones are not closed to any reader.
-const WIDEST_GAP: f64 = 0.05;
+/// Gaps wider than this where the part stands are not bridged, but flagged, mm: solids with wider ones are not closed to any reader.
+pub(super) const WIDEST_GAP: f64 = 0.05;
 /// A file's edge may lie off its faces by their gap: each of the two faces must look that far, and as far again for the other's.
 const BAND_OF_GAP: f64 = 2.0;
 /// A vertex decides by its sectors as far off as this many times the distance by which an edge's end misses it.
@@ -53,8 +53,7 @@ pub(super) struct Geometry {
     pub(super) surfaces: Vec<Surface>,
     /// Edge curves of each part, in its own coordinates.
     pub(super) edges: Vec<Vec<Curve>>,
-    /// The vertices at their ends, and how far from each its sectors decide, in the part's coordinates and units: beyond all ends that miss
-    /// it.
+    /// The vertices at their ends, and [`RADIUS_OF_MISS`] times the farthest that an end misses each, in the part's coordinates and units.
     pub(super) ends: Vec<Vec<[(Point, f64); 2]>>,
     /// Smallest distance from a trim that is flagged, mm.
     pub(super) band: f64,
@@ -79,6 +78,12 @@ impl Geometry {
             ..Self::default()
         };
         let gaps: Vec<Vec<f64>> = model.parts.iter().map(edge_gaps).collect();
+        // A band is a length of the world: in the units of a part that is made smaller it is longer.
+        let mut least_scale = vec![f64::INFINITY; model.parts.len()];
+        for instance in &model.instances {
+            let least = &mut least_scale[instance.part.0 as usize];
+            *least = least.min(instance.placement.scale);
+        }
         // Instances share the trims and break lines of their part: found by the face's address, which names it for as long as the model
         // is borrowed.
         let mut shared: FxHashMap<*const Face, (u32, u32)> = FxHashMap::default();
@@ -88,7 +93,8 @@ impl Geometry {
                     let (trim, grid) = *shared.entry(face as *const Face).or_insert_with(|| {
                         let grid = PatchGrid::new(face);
                         let gaps = &gaps[placed.part.0 as usize];
-                        geometry.trims.push(Trim::new(face, grid.closed, band, gaps));
+                        let widest_band = band / least_scale[placed.part.0 as usize];
+                        geometry.trims.push(Trim::new(face, grid.closed, widest_band, gaps));
                         geometry.grids.push(grid);
                         geometry.surfaces.push(face.surface.clone());
                         (geometry.trims.len() as u32 - 1, geometry.grids.len() as u32 - 1)
@@ -122,7 +128,7 @@ impl Geometry {
         self.by_id.insert(placed.id, record);
         let first_patch = self.patches.len() as u32;
         let placement = *placed.placement;
-        let band = self.band.max(BAND_OF_GAP * face.gap.min(WIDEST_GAP) * placement.scale);
+        let band = self.band.max(BAND_OF_GAP * (face.gap * placement.scale).min(WIDEST_GAP));
         let flagged = self.flagging_distance(self.trims[trim as usize].widest_gap(), &placement);
         let part = placed.part.0;
         self.faces.push(FaceRecord {
@@ -212,22 +218,22 @@ impl Geometry {
     }
 }
 
-/// The vertices at start and end of each of a part's edges, with the radii within which their sectors decide, in the units of the part;
-/// where the part has no such vertex, the end of the curve.
+/// The vertices at start and end of each of a part's edges, with [`RADIUS_OF_MISS`] times what edges miss them by, in the units of the
+/// part; where the part has no such vertex, the end of the curve.
 fn edge_ends(part: &Part) -> Vec<[(Point, f64); 2]> {
     let end = |e: &Edge, k: usize| e.curve.evaluate(e.curve.domain()[k]);
     // One radius a vertex, not one an edge: the faces around it must agree on when its sectors decide, or two would
     // claim a ray.
-    let mut radii = vec![VERTEX_RADIUS; part.vertices.len()];
+    let mut radii = vec![0f64; part.vertices.len()];
     for (e, k) in part.edges.iter().flat_map(|e| [(e, 0), (e, 1)]) {
         let vertex = e.vertices[k].0 as usize;
         if let (Some(radius), Some(place)) = (radii.get_mut(vertex), part.vertices.get(vertex)) {
-            *radius = radius.max((RADIUS_OF_MISS * end(e, k).distance(*place)).min(WIDEST_GAP));
+            *radius = radius.max(RADIUS_OF_MISS * end(e, k).distance(*place));
         }
     }
     let place = |e: &Edge, k: usize| {
         let vertex = e.vertices[k].0 as usize;
-        part.vertices.get(vertex).map_or((end(e, k), VERTEX_RADIUS), |p| (*p, radii[vertex]))
+        part.vertices.get(vertex).map_or((end(e, k), 0.0), |p| (*p, radii[vertex]))
     };
     part.edges.iter().map(|e| [place(e, 0), place(e, 1)]).collect()
 }
@@ -244,4 +250,25 @@ fn is_usable(face: &Face) -> bool {
         && u0 < u1
         && v0 < v1
         && s.points.iter().all(|p| p.is_finite() && p.w > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Instance, PartId, Shell};
+    use crate::nurbs::sweep;
+
+    #[test]
+    fn gaps_are_as_wide_as_where_their_part_stands() {
+        let plane = sweep::plane(&Frame::IDENTITY, [[0.0, 10.0]; 2]);
+        let face = Face { gap: 0.5, ..Face::whole(plane) };
+        let part = Part { shells: vec![Shell { faces: vec![face], ..Shell::default() }], ..Part::default() };
+        let mut model = Model::from_part(part);
+        let smaller = Frame { scale: 0.01, ..Frame::IDENTITY };
+        model.instances.push(Instance { part: PartId(0), placement: smaller, ..model.instances[0].clone() });
+        let geometry = Geometry::new(&model, 1e-6, 0.0);
+        // Half a unit is wider than what is bridged, and 5 µm where a unit is 10 µm.
+        let bands: Vec<f64> = geometry.faces.iter().map(|f| f.band).collect();
+        assert_eq!(bands, [2.0 * WIDEST_GAP, 2.0 * 0.005]);
+    }
 }

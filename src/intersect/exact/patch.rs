@@ -9,6 +9,11 @@ use crate::nurbs::BezierPatch;
 /// Ulps by which a patch's control points are off, of its size: extraction, shift and placement round each less than ten times.
 const NET_ROUNDING: f64 = 16.0;
 
+/// A file's ninth decimal counts up to a millionth of the face: [`SAME_POINT`] times this.
+const LARGEST_DECIMAL: f64 = 1e3;
+/// Ulps of the largest coordinate by which control points of one place differ: each is rounded by half of one, and weighted by three.
+const PLACED_ULPS: f64 = 8.0;
+
 /// Break lines of a surface's patches.
 #[derive(Debug)]
 pub(super) struct PatchGrid {
@@ -44,8 +49,12 @@ impl PatchGrid {
         let s = &face.surface;
         let breaks = [0, 1].map(|d| s.breakpoints(d));
         let domain = s.domain();
-        // As near as a file's nine digits put points of one place: a nanometre on a metre.
-        let tolerance = SAME_POINT * (1.0 + s.bounds().diagonal());
+        // As near as a file's nine digits put points of one place, a nanometre on a metre, or its ninth decimal; and as `f64` rounds them
+        // far from the origin.
+        let bounds = s.bounds();
+        let (size, farthest) = (bounds.diagonal(), bounds.min.abs().max(bounds.max.abs()).max_element());
+        let decimals = (LARGEST_DECIMAL * size).min(1.0);
+        let tolerance = SAME_POINT * (decimals + size) + PLACED_ULPS * f64::EPSILON * farthest;
         // Five points along the side at the low or high end of a parameter.
         let side = |d: usize, end: usize| -> [Point; 5] {
             std::array::from_fn(|k| {

@@ -7,7 +7,8 @@
 //! faces compute the same bits. A ray through a vertex itself falls into one of the sectors between its edges' directions.
 
 use super::edge_use;
-use super::geometry::{FaceRecord, Geometry};
+use super::geometry::{FaceRecord, Geometry, WIDEST_GAP};
+use super::tolerances::VERTEX_RADIUS;
 use super::trim::{Near, Trim};
 use crate::math::{Point, Vector};
 use crate::nurbs::Curve;
@@ -163,8 +164,10 @@ impl Geometry {
                 let here = &trim.uses[owner as usize];
                 let Some(edge) = here.edge else { continue };
                 let end = usize::from(forward != here.reversed);
-                let (place, radius) = self.ends[face.part as usize][edge.0 as usize][end];
+                let (place, missed) = self.ends[face.part as usize][edge.0 as usize][end];
                 let vertex = flat(place - o);
+                let radius =
+                    (missed * face.placement.scale).clamp(VERTEX_RADIUS, WIDEST_GAP) / face.placement.scale;
                 if !(vertex[0].hypot(vertex[1]) <= radius.max(rounding)) {
                     continue;
                 }

@@ -82,8 +82,8 @@ pub(super) struct Trim {
 }
 
 impl Trim {
-    /// Prepares the trims of a face: `band` in mm, in which directions its surface is `closed`, and the gap of each edge of its part, in
-    /// the units of the part. Without loops the face is whole.
+    /// Prepares the trims of a face: the widest `band` of any place where its part stands, in which directions its surface is `closed`, and
+    /// the gap of each edge of its part, lengths in the units of the part. Without loops the face is whole.
     pub(super) fn new(face: &Face, closed: [bool; 2], band: f64, gaps: &[f64]) -> Self {
         let [[u0, u1], [v0, v1]] = face.surface.domain();
         let extent = Uv::new(u1 - u0, v1 - v0);
