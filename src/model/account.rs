@@ -191,7 +191,8 @@ impl Face {
             // The sign tells which way the loops run; an area has none.
             return sides.map(|side| sweep.area_beside(&side)).sum::<f64>().abs();
         }
-        let uses = self.loops.iter().flat_map(|l| &l.uses);
+        let loops = self.bounding_loops();
+        let uses = loops.iter().flat_map(|l| &l.uses);
         uses.map(|u| if u.reversed { -sweep.area_beside(&u.uv) } else { sweep.area_beside(&u.uv) })
             .sum::<f64>()
             .abs()

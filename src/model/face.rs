@@ -5,6 +5,7 @@ use crate::math::{Frame, Uv};
 use crate::mesh::FacetMesh;
 use crate::nurbs::{Surface, UvCurve, area_within};
 use serde::Serialize;
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
@@ -185,7 +186,8 @@ pub struct Face {
     pub analytic: Analytic,
     /// Whether the outward normal is `-(Su × Sv)`.
     pub reversed: bool,
-    /// Trimming loops; without any, the face is the whole domain of its surface.
+    /// Trimming loops, within the domain of the surface: outer ones counter-clockwise in its parameters, holes clockwise. Without any the
+    /// face is the whole domain, and where there are holes alone it goes on to the border of that.
     pub loops: Vec<TrimLoop>,
     /// Largest measured distance between an edge in space and its uv curve on the surface, mm in the part's coordinates.
     pub gap: f64,
@@ -206,7 +208,41 @@ impl Face {
             gap: 0.0,
         }
     }
+
+    /// Returns the loops that bound the face: its own, and behind holes alone the border of the domain. Without loops none: the face is the
+    /// whole domain.
+    pub(crate) fn bounding_loops(&self) -> Cow<'_, [TrimLoop]> {
+        if !self.has_holes_alone() {
+            return Cow::Borrowed(&self.loops);
+        }
+        Cow::Owned(self.loops.iter().cloned().chain([self.domain_border()]).collect())
+    }
+
+    /// Whether it has loops that only cut holes: all in all they run clockwise.
+    pub(crate) fn has_holes_alone(&self) -> bool {
+        // The area of a loop like an eight is rounding, whose sign says nothing.
+        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        self.loops.iter().map(TrimLoop::signed_area).sum::<f64>() < -NO_AREA * (u1 - u0) * (v1 - v0)
+    }
+
+    /// Returns a loop counter-clockwise around the domain of the surface, of four uses without edges. On a surface that closes on itself
+    /// two of them are the sides of a seam, along which the face goes on; one at a pole is a point in space.
+    pub(crate) fn domain_border(&self) -> TrimLoop {
+        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
+        let side = |k: usize| {
+            let (a, b) = (corners[k], corners[(k + 1) % 4]);
+            let t = if k.is_multiple_of(2) { [u0, u1] } else { [v0, v1] };
+            // Opposite sides run over the same parameters, so that a seam's two sides have the same samples.
+            let uv = if k < 2 { UvCurve::line(a, b, t) } else { UvCurve::line(b, a, t) };
+            EdgeUse { edge: None, reversed: k >= 2, uv }
+        };
+        TrimLoop { uses: (0..4).map(side).collect() }
+    }
 }
+
+/// Share of the domain below which the area within loops is rounding.
+const NO_AREA: f64 = 1e-12;
 
 /// A closed chain of edge uses in the parameter plane.
 #[derive(Clone, Debug, Default)]

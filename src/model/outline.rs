@@ -27,7 +27,10 @@ impl Outline {
             1 => 1,
             _ => POINTS_PER_USE.div_ceil(curve.breakpoints().len() - 1).max(POINTS_PER_SPAN),
         };
-        Self { polygons: face.loops.iter().map(|l| l.polygon(pieces)).collect(), domain: face.surface.domain() }
+        Self {
+            polygons: face.bounding_loops().iter().map(|l| l.polygon(pieces)).collect(),
+            domain: face.surface.domain(),
+        }
     }
 
     /// Lower and upper corner of the polygons, or of the domain without any, in surface parameters.

@@ -39,7 +39,8 @@ impl Face {
     /// they reach beyond it.
     fn trim_range(&self) -> [[f64; 2]; 2] {
         let domain = self.surface.domain();
-        let uses = self.loops.iter().flat_map(|l| &l.uses);
+        let loops = self.bounding_loops();
+        let uses = loops.iter().flat_map(|l| &l.uses);
         let points = uses.flat_map(|u| &u.uv.points).map(|p| Uv::new(p.x, p.y) / p.z);
         let (low, high) = points.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
         [0, 1].map(|d: usize| {
@@ -91,5 +92,15 @@ mod tests {
         let (low, radius) = (20.0 * 1f64.sin(), 20.0 * 1f64.cos());
         assert!(bounds.min.z <= low && bounds.min.z > low - 4.0 && bounds.max.z >= 20.0, "{bounds:?}");
         assert!(bounds.max.x >= radius && bounds.max.x < 1.3 * radius, "{bounds:?}");
+    }
+
+    #[test]
+    fn a_hole_alone_takes_nothing_off_the_box() {
+        let corners = [Uv::new(-1.0, -1.0), Uv::new(-1.0, 1.0), Uv::new(1.0, 1.0), Uv::new(1.0, -1.0)];
+        let side = |k: usize| UvCurve::line(corners[k], corners[(k + 1) % 4], [0.0, 1.0]);
+        let uses = (0..4).map(|k| EdgeUse { edge: None, reversed: false, uv: side(k) }).collect();
+        let plane = sweep::plane(&Frame::IDENTITY, [[-5.0, 5.0]; 2]);
+        let face = Face { loops: vec![TrimLoop { uses }], ..Face::whole(plane) };
+        assert_eq!(face.tight_box(), Aabb { min: Point::new(-5.0, -5.0, 0.0), max: Point::new(5.0, 5.0, 0.0) });
     }
 }

@@ -18,8 +18,8 @@ pub(super) fn expected_facets(model: &Model, tolerance_mm: f64) -> f64 {
 /// Returns √|κ₁ κ₂| summed over the area of a face, mm: over the box around its trims in parameters.
 fn root_curvature_integral(face: &Face) -> f64 {
     let [[mut u0, mut u1], [mut v0, mut v1]] = face.surface.domain();
-    let ends: Vec<Uv> =
-        face.loops.iter().flat_map(|l| &l.uses).flat_map(|u| [u.start(), middle(u), u.end()]).collect();
+    let loops = face.bounding_loops();
+    let ends: Vec<Uv> = loops.iter().flat_map(|l| &l.uses).flat_map(|u| [u.start(), middle(u), u.end()]).collect();
     // A file's sphere of a kilometre may be there for a lens of 20 mm.
     if !ends.is_empty() {
         let [low, high] =

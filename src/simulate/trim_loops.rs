@@ -21,7 +21,7 @@ pub(crate) fn trim_polygons(face: &Face) -> Vec<Vec<Uv>> {
             .map(|t| u.uv.evaluate(t))
             .collect::<Vec<_>>()
     };
-    face.loops.iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
+    face.bounding_loops().iter().map(|l| l.uses.iter().flat_map(points).collect()).collect()
 }
 
 /// How far the polygons of a [`TrimRegion`] may be beside their loops, as a share of a loop's extent: of a disc 2e-6 of the area is missed.
@@ -43,7 +43,7 @@ pub(crate) struct TrimRegion {
 impl TrimRegion {
     /// Divides the loops of a face into polygons and these into bands; an untrimmed face gets none.
     pub(crate) fn new(face: &Face) -> Self {
-        let polygons: Vec<Vec<Uv>> = face.loops.iter().map(fine_polygon).collect();
+        let polygons: Vec<Vec<Uv>> = face.bounding_loops().iter().map(fine_polygon).collect();
         let sides = || polygons.iter().flat_map(|polygon| polygon_sides(polygon));
         let count = sides().count();
         let (low, high) = (polygons.iter().flatten())
@@ -104,6 +104,7 @@ fn piece_count(curve: &UvCurve, [t0, t1]: [f64; 2], tolerance: Uv) -> usize {
 pub(crate) mod tests {
     use super::*;
     use crate::math::Frame;
+    use crate::math::polygon::is_inside_polygons;
     use crate::nurbs::{ControlPoint, conic, sweep};
     use std::f64::consts::TAU;
 
@@ -130,5 +131,22 @@ pub(crate) mod tests {
                 && !region.contains(Uv::new(0.0, 11.0))
                 && !region.contains(Uv::new(0.0, -11.0))
         );
+    }
+
+    #[test]
+    fn a_hole_alone_leaves_the_rest_of_the_domain() {
+        let mut face = disc(10.0);
+        face.surface = sweep::plane(&Frame::IDENTITY, [[-20.0, 20.0]; 2]);
+        face.loops[0].uses[0].reversed = true;
+        let region = TrimRegion::new(&face);
+        let polygons = trim_polygons(&face);
+        for (place, inside) in [(Uv::ZERO, false), (Uv::new(9.99, 0.0), false), (Uv::new(0.0, -10.01), true)] {
+            assert_eq!(region.contains(place), inside, "{place}");
+        }
+        for (place, inside) in [(Uv::new(15.0, 0.0), true), (Uv::new(19.9, 19.9), true), (Uv::new(1.0, 2.0), false)]
+        {
+            assert_eq!(region.contains(place), inside, "{place}");
+            assert_eq!(is_inside_polygons(&polygons, place), inside, "{place}");
+        }
     }
 }

@@ -145,7 +145,7 @@ fn the_mean_sag_of_strips_is_that_of_a_parabola() {
 #[test]
 fn a_face_between_two_chords_gets_a_facet() {
     let plane = sweep::plane(&Frame::IDENTITY, [[-1.0, 1.0], [2.0, 4.0]]);
-    let arc = chain(32, |f| Uv::new(f - 0.5, 3.0 + 0.02 * (1.0 - (2.0 * f - 1.0).powi(2))));
+    let arc = chain(32, |f| Uv::new(0.5 - f, 3.0 + 0.02 * (1.0 - (2.0 * f - 1.0).powi(2))));
     let (a, b) = (arc[0], arc[32]);
     let made = tessellate(&face(plane, &[vec![chain(1, |f| b.lerp(a, f)), arc]]), &measured(0.1));
     assert_proved(&made);

@@ -39,14 +39,13 @@ fn pillow([above, below]: [Surface; 2]) -> Model {
         vertices: ends.map(|k| VertexId(k as u32)),
         entity: None,
     });
-    let uses = |k: usize, backwards: bool| EdgeUse {
+    let uses = |k: usize| EdgeUse {
         edge: Some(EdgeId(k as u32)),
-        reversed: (k >= 2) != backwards,
+        reversed: k >= 2,
         uv: UvCurve::line(corners[sides[k].2[0]], corners[sides[k].2[1]], [0.0, 1.0]),
     };
     let face = |surface: &Surface, reversed: bool| {
-        let order = if reversed { [3, 2, 1, 0] } else { [0, 1, 2, 3] };
-        let rim = TrimLoop { uses: order.map(|k| uses(k, reversed)).into() };
+        let rim = TrimLoop { uses: [0, 1, 2, 3].map(uses).into() };
         Face { reversed, loops: vec![rim], ..Face::whole(surface.clone()) }
     };
     let shell = Shell { faces: vec![face(&above, false), face(&below, true)], closed: true, ..Shell::default() };

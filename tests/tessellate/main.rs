@@ -9,6 +9,7 @@ mod field;
 mod files;
 mod fixtures;
 mod folder;
+mod holes_alone;
 mod limits;
 mod poles;
 mod promises;

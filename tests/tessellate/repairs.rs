@@ -176,7 +176,7 @@ fn trims_that_touch_themselves_need_no_repair() {
             ],
             100.0 - 8.0,
         ),
-        (vec![flat(&[[0.0, 0.0], [5.0, 5.0], [0.0, 10.0], [10.0, 10.0], [5.0, 5.0], [10.0, 0.0]])], 50.0),
+        (vec![flat(&[[0.0, 0.0], [10.0, 0.0], [5.0, 5.0], [10.0, 10.0], [0.0, 10.0], [5.0, 5.0]])], 50.0),
     ];
     for (loops, area) in touching {
         let made = tessellate(&face(plane(), &loops), &measured(0.1));

@@ -105,9 +105,10 @@ fn with_short_chords(samples: Vec<(f64, Point)>, at: impl Fn(f64) -> Point) -> V
     out
 }
 
-/// Returns the uv curves that bound a face in space, seams and poles left out; for a face without loops the sides of its domain. `size`,
-/// mm, is that of the surface.
+/// Returns the uv curves that bound a face in space, seams and poles left out; for a face without loops, or with holes alone, the sides of
+/// its domain too. `size`, mm, is that of the surface.
 pub(super) fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<UvCurve> {
+    let mut border = Vec::new();
     if !face.loops.is_empty() {
         let mut uses = FxHashMap::default();
         for u in face.loops.iter().flat_map(|l| &l.uses) {
@@ -118,7 +119,10 @@ pub(super) fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<Uv
         // An edge that the face uses twice is a seam.
         let is_border = |edge| uses.get(&edge) == Some(&1);
         let all = face.loops.iter().flat_map(|l| &l.uses);
-        return all.filter(|u| u.edge.is_some_and(is_border)).map(|u| u.uv.clone()).collect();
+        border.extend(all.filter(|u| u.edge.is_some_and(is_border)).map(|u| u.uv.clone()));
+        if !face.has_holes_alone() {
+            return border;
+        }
     }
     let [[u0, u1], [v0, v1]] = surface.domain();
     let side = |a: Uv, b: Uv| UvCurve::line(a, b, [0.0, 1.0]);
@@ -137,7 +141,9 @@ pub(super) fn border_curves(face: &Face, surface: &Surface, size: f64) -> Vec<Uv
     // Opposite sides that coincide are a seam, a side that is one point is a pole.
     let close = |a: &[Point], b: &[Point]| a.iter().zip(b).all(|(p, q)| p.distance(*q) < COINCIDENT * size);
     let pole = |a: &[Point]| a.iter().all(|p| p.distance(a[0]) < COINCIDENT * size);
-    (0..4).filter(|&i| !close(&traced[i], &traced[i ^ 1]) && !pole(&traced[i])).map(|i| sides[i].clone()).collect()
+    let bounds = |i: &usize| !close(&traced[*i], &traced[*i ^ 1]) && !pole(&traced[*i]);
+    border.extend((0..4).filter(bounds).map(|i| sides[i].clone()));
+    border
 }
 
 #[cfg(test)]

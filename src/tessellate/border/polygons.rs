@@ -4,7 +4,6 @@ use super::curve_chords;
 use super::edges::Division;
 use crate::math::{Point, Uv};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
-use crate::nurbs::UvCurve;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
 
@@ -91,24 +90,10 @@ pub(in crate::tessellate) fn edges_of_collapsed_loops(
     found
 }
 
-/// Returns the loops of a face; for a face without any, one loop counter-clockwise around the domain of its surface, of four uses without
-/// edges.
+/// Returns the loops that bound a face, with the border of its surface's domain where the face reaches it: of a face without loops, or with
+/// holes alone.
 pub(in crate::tessellate) fn loops(face: &Face) -> Vec<TrimLoop> {
-    if !face.loops.is_empty() {
-        return face.loops.clone();
-    }
-    let [[u0, u1], [v0, v1]] = face.surface.domain();
-    let corners = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
-    let uses = (0..4)
-        .map(|k| {
-            let (a, b) = (corners[k], corners[(k + 1) % 4]);
-            let t = if k % 2 == 0 { [u0, u1] } else { [v0, v1] };
-            // Opposite sides run over the same parameters, so that a seam's two sides have the same samples.
-            let uv = if k < 2 { UvCurve::line(a, b, t) } else { UvCurve::line(b, a, t) };
-            EdgeUse { edge: None, reversed: k >= 2, uv }
-        })
-        .collect();
-    vec![TrimLoop { uses }]
+    if face.loops.is_empty() { vec![face.domain_border()] } else { face.bounding_loops().into_owned() }
 }
 
 /// Builds a polygon for each loop, its corners at the part's shared positions. Sides without an edge get samples of their own, the same on

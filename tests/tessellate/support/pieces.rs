@@ -99,7 +99,11 @@ pub(crate) fn pieces(
     made: &Tessellation,
     facets: std::ops::Range<usize>,
 ) -> Result<Vec<Vec<[Uv; 3]>>, String> {
-    let (outlines, poles) = (outlines(face), Poles::new(&face.surface));
+    let (mut outlines, poles) = (outlines(face), Poles::new(&face.surface));
+    // Facets run about the outward normal.
+    if face.reversed {
+        outlines.iter_mut().for_each(|o| o.reverse());
+    }
     let domain = face.surface.domain().map(|[a, b]| b - a);
     let polar = poles.at.as_flattened().contains(&true);
     let extent = Uv::from_array(domain);

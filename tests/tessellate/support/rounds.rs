@@ -144,15 +144,8 @@ impl Round {
             lids.push(vec![TrimLoop { uses: vec![used(Some(e), false, &uv)] }]);
         }
         lids.push(loops);
-        let turned = |mut l: TrimLoop| {
-            if self.reversed {
-                l.uses.reverse();
-                l.uses.iter_mut().for_each(|u| u.reversed = !u.reversed);
-            }
-            l
-        };
         let faces = lids.into_iter().map(|loops| Face {
-            loops: loops.into_iter().map(turned).collect(),
+            loops,
             reversed: self.reversed,
             analytic: if self.analytic { analytic } else { Analytic::Other },
             ..Face::whole(surface.clone())

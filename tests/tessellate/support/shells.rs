@@ -167,11 +167,12 @@ pub(crate) fn pillow([above, below]: &[Surface; 2], cuts: &Cuts, gap: f64) -> (M
             hole,
         ),
     }
-    let mut back: Vec<EdgeUse> = left.iter().map(|e| uses(e, false)).collect();
-    back.push(uses(&top[0], false));
-    back.extend(right.iter().rev().map(|e| uses(e, true)));
-    back.push(uses(&bottom[0], true));
-    let lower = Face { reversed: true, loops: vec![TrimLoop { uses: back }], ..Face::whole(below.clone()) };
+    // Counter-clockwise in the parameters of its own surface, whichever way its normal looks.
+    let mut rim = vec![uses(&bottom[0], false)];
+    rim.extend(right.iter().map(|e| uses(e, false)));
+    rim.push(uses(&top[0], true));
+    rim.extend(left.iter().rev().map(|e| uses(e, true)));
+    let lower = Face { reversed: true, loops: vec![TrimLoop { uses: rim }], ..Face::whole(below.clone()) };
     faces.push(lower);
     b.part.shells = vec![Shell { faces, closed: true, ..Shell::default() }];
     (Model::from_part(b.part), strays)
