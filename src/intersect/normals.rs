@@ -73,10 +73,10 @@ fn cubic(mesh: &FacetMesh, facet: &Facet, ray: &Ray, hit: &FacetHit, flat: Vecto
     let corners = vertices.map(|v| mesh.positions[v.position as usize]);
     if facet.is_triangle() {
         let net = TriangleNet::new(&corners, &vertices);
-        normal_on_ray(|p| net.evaluate(p), Uv::new(hit.b[1], hit.b[2]), ray, flat)
+        normal_on_ray((|p| net.evaluate(p), beyond_triangle), Uv::new(hit.b[1], hit.b[2]), ray, flat)
     } else {
         let net = QuadNet::new(&corners, &vertices);
-        normal_on_ray(|p| net.evaluate(p), parameters(hit), ray, flat)
+        normal_on_ray((|p| net.evaluate(p), beyond_square), parameters(hit), ray, flat)
     }
 }
 
@@ -129,9 +129,25 @@ const STEPS: usize = 2;
 /// The farthest that steps may lead from the facet hit, as a share of the facet.
 const FARTHEST: f64 = 0.5;
 
-/// Returns the normal, not of unit length, of a patch where a ray meets it near the parameters `start`, found by two Newton steps.
-/// Where these lead away, as for rays that graze it, or to a normal against `flat`, that of `start` itself.
-fn normal_on_ray(patch: impl Fn(Uv) -> PatchPoint, start: Uv, ray: &Ray, flat: Vector) -> Vector {
+/// By how much parameters lie outside of the unit square, in the larger of both.
+fn beyond_square(p: Uv) -> f64 {
+    (p - p.clamp(Uv::ZERO, Uv::ONE)).abs().max_element()
+}
+
+/// By how much weights of the second and third corner lie outside of their triangle: as far as the smallest of all three is negative.
+fn beyond_triangle(p: Uv) -> f64 {
+    -p.min_element().min(1.0 - p.x - p.y).min(0.0)
+}
+
+/// Returns the normal, not of unit length, of a patch where a ray meets it near the parameters `start`, found by two Newton steps; `beyond`
+/// says how far parameters are outside of it. Where steps lead away, as for rays that graze it, or to a normal against `flat`, that of
+/// `start` itself.
+fn normal_on_ray(
+    (patch, beyond): (impl Fn(Uv) -> PatchPoint, impl Fn(Uv) -> f64),
+    start: Uv,
+    ray: &Ray,
+    flat: Vector,
+) -> Vector {
     let mut p = start;
     let mut local = patch(p);
     let normal = local.du.cross(local.dv);
@@ -147,8 +163,7 @@ fn normal_on_ray(patch: impl Fn(Uv) -> PatchPoint, start: Uv, ray: &Ray, flat: V
         let square = n.length_squared();
         let d = Uv::new(step.cross(local.dv).dot(n), local.du.cross(step).dot(n)) / square;
         p += d;
-        let outside = (p - p.clamp(Uv::ZERO, Uv::ONE)).abs().max_element();
-        if !d.is_finite() || outside > BEYOND || (p - start).abs().max_element() > FARTHEST {
+        if !d.is_finite() || beyond(p) > BEYOND || (p - start).abs().max_element() > FARTHEST {
             return normal;
         }
         local = patch(p);
@@ -250,5 +265,30 @@ impl TriangleNet {
             + p003 * (w * w)
             + (p111 * (u * v) + p102 * (u * w) + p012 * (v * w)) * 2.0;
         PatchPoint { point: d_u * u + d_v * v + d_w * w, du: (d_v - d_u) * 3.0, dv: (d_w - d_u) * 3.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_root_far_beyond_a_triangle_is_not_on_its_patch() {
+        // The bowl z = (u² + v²) / 4 over its parameters, in which a ray along z is found in one step.
+        let bowl = |p: Uv| PatchPoint {
+            point: Point::new(p.x, p.y, 0.25 * p.length_squared()),
+            du: Vector::new(1.0, 0.0, 0.5 * p.x),
+            dv: Vector::new(0.0, 1.0, 0.5 * p.y),
+        };
+        let start = Uv::splat(0.45);
+        for (root, in_square, in_triangle) in [(0.48, true, true), (0.6, true, true), (0.8, true, false)] {
+            let ray = Ray::new(Point::new(root, root, 5.0), -Vector::Z);
+            let normal = |p: Uv| Vector::new(-0.5 * p.x, -0.5 * p.y, 1.0);
+            let expected = |on: bool| normal(if on { Uv::splat(root) } else { start });
+            let square = normal_on_ray((bowl, beyond_square), start, &ray, Vector::Z);
+            let triangle = normal_on_ray((bowl, beyond_triangle), start, &ray, Vector::Z);
+            assert!((square - expected(in_square)).length() < 1e-12, "{root}: {square}");
+            assert!((triangle - expected(in_triangle)).length() < 1e-12, "{root}: {triangle}");
+        }
     }
 }

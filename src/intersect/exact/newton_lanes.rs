@@ -28,6 +28,7 @@ pub(super) struct Ends {
     pub(super) local: [[f64; LANES]; 2],
     /// Along `Su × Sv`, of unit length.
     pub(super) normal: [[f64; LANES]; 3],
+    /// Distance from the ray, mm, of the point before the last step: what that leaves is less.
     pub(super) residual: [f64; LANES],
     /// One bit for each lane that ended at a root with a normal; what the others hold is of no meaning.
     pub(super) regular: u8,
