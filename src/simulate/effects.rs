@@ -100,7 +100,8 @@ fn required(bound: &BoundScene) -> Required {
     let lets_in = |f: &&FaceOptics| f.body != AMBIENT && !bound.surfaces[f.surface as usize].is_opaque();
     let interfaces = bound.faces.iter().filter(lets_in).count();
     // A bare face counts where it bounds a medium: without one it is not there for light.
-    let bare = used(&|s| matches!(s, Surface::Interface)).min(interfaces) + coated(&|c| c.coating == Coating::Bare);
+    let is_bare = |f: &&FaceOptics| f.body != AMBIENT && bound.surfaces[f.surface as usize] == Surface::Interface;
+    let bare = bound.faces.iter().filter(is_bare).count() + coated(&|c| c.coating == Coating::Bare);
     let metals = coated(&|c| matches!(c.coating, Coating::Metal { .. }));
     let in_medium =
         |wanted: &dyn Fn(&Body) -> bool| bound.bodies.iter().find(|b| wanted(b)).map(|b| b.medium.as_str());

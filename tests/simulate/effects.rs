@@ -295,3 +295,22 @@ fn only_what_happens_is_said_to_be_simulated() {
         assert_eq!(effects(material), expected, "{material}");
     }
 }
+
+/// Bare faces count where they bound a medium: not those of a sheet in air beside a body that is coated all around.
+#[test]
+fn bare_faces_without_a_medium_are_none_for_light() {
+    let mut world = World::default();
+    world.cuboid("box", Point::splat(-1.0), Point::splat(1.0));
+    world.cuboid("frame", Point::splat(5.0), Point::splat(6.0));
+    for (coated, expected) in [("reflectance = 0.5\ntransmittance = 0.5\n", false), ("", true)] {
+        let surface = if expected { "interface" } else { "coating" };
+        let text = format!(
+            "default_surface = 'interface'\n[[source]]\nat = [5, 4, 3]
+            [[material]]\npart = 'box'\nmedium = 'PMMA'\nsurface = '{surface}'\n{coated}"
+        );
+        let scene = Scene::parse(&text, "test.toml", std::path::Path::new(".")).unwrap();
+        let required = Required::new(&scene.bind(&world.model).unwrap());
+        let fresnel = required.simulated.iter().find(|b| format!("{:?}", b.effect) == "Fresnel");
+        assert_eq!(fresnel.map(|b| b.because.as_str()), expected.then_some("6 bare or metal faces"));
+    }
+}
