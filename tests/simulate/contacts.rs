@@ -188,10 +188,16 @@ fn a_replicate_never_overflows() {
     assert!(1e10 / f64::from(replicates) * (1u64 << 40) as f64 * 1.1 < 2f64.powi(63), "{replicates}");
 }
 
-/// Two slabs of one glass, glued, the coating given to the face of either or of both: it is met once, whichever face rounding puts
-/// first. Light to and fro between three partly reflecting planes adds up as power.
+/// Two slabs of one glass, glued, two parts or two solids of one, the coating given to the face of either or of both: it is met once,
+/// whichever face rounding puts first. Light to and fro between three partly reflecting planes adds up as power.
 #[test]
 fn a_coating_between_glued_bodies_is_met_once_whosever_face_it_is_on() {
+    for in_one_part in [false, true] {
+        coat_between(in_one_part);
+    }
+}
+
+fn coat_between(in_one_part: bool) {
     let along_z = |from: f64, to: f64| [Point::new(-50.0, -50.0, from), Point::new(50.0, 50.0, to)];
     for (surface, r, t) in [
         ("surface = 'coating'\nreflectance = 0.3\ntransmittance = 0.6", 0.3, 0.6),
@@ -213,11 +219,20 @@ fn a_coating_between_glued_bodies_is_met_once_whosever_face_it_is_on() {
                 let mut world = World::default();
                 let ([a, b], [c, d]) = (along_z(0.0, 3.3), along_z(3.3 + gap, 7.7));
                 world.cuboid("low", a, b).cuboid("high", c, d);
+                if in_one_part {
+                    let second = world.model.parts[1].shells.remove(0);
+                    world.model.parts[0].shells.push(second);
+                    world.model.parts.truncate(1);
+                    world.model.instances.truncate(1);
+                }
                 let mut text = format!("[run]\nrays = 500\ninterfaces = 'split'\nsplit_floor = 0\n{MEDIA}");
-                for (part, face) in [("low", "z1"), ("high", "z0")] {
-                    text += &format!("[[material]]\npart = '{part}'\nmedium = 'glass'\n");
+                for (solid, (part, face)) in [("low", "z1"), ("high", "z0")].into_iter().enumerate() {
+                    let body = if in_one_part { format!("solid = {solid}") } else { format!("part = '{part}'") };
+                    if !in_one_part || solid == 0 {
+                        text += &format!("[[material]]\npart = '{part}'\nmedium = 'glass'\n");
+                    }
                     if on.contains(&part) {
-                        text += &format!("[[material]]\npart = '{part}'\nface = '{face}'\n{surface}\n");
+                        text += &format!("[[material]]\non = {{ {body}, face = '{face}' }}\n{surface}\n");
                     }
                 }
                 text += &format!(
@@ -233,7 +248,7 @@ fn a_coating_between_glued_bodies_is_met_once_whosever_face_it_is_on() {
                 for (found, expected) in found.into_iter().zip(expected) {
                     assert!(
                         (found - expected).abs() < 3e-5,
-                        "{surface} on {on:?}, {gap} {direction}: {found} {expected}"
+                        "{surface} on {on:?}, one part {in_one_part}, {gap} {direction}: {found} {expected}"
                     );
                 }
                 assert_eq!(results.lost_rays, 0);

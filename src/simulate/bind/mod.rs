@@ -61,8 +61,9 @@ impl Scene {
         // Faces, from the rules that give surfaces and from what lies against what.
         let Faces { faces, surfaces, touching_pairs } = bind_faces(self, model, &chosen, &body_of_face, nested)?;
         bodies::set_trapped_lengths(self, &mut bodies, &touching_pairs);
-        let is_coated_contact =
-            |f: &FaceOptics| f.touches_body && surfaces[f.surface as usize] != Surface::Interface;
+        let is_coated_contact = |f: &FaceOptics| {
+            (f.touches_body || f.touches_sibling) && surfaces[f.surface as usize] != Surface::Interface
+        };
         let coated_contacts = faces.iter().any(is_coated_contact);
         // Sources and receivers.
         let source_frames: Vec<Frame> =

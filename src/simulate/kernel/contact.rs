@@ -27,7 +27,17 @@ impl FaceHit {
 /// Found by asking for the nearest face from just before the hit, this face left out: so a face at the very same place is found whether
 /// rounding puts it before or behind.
 pub(super) fn touching_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<u32> {
-    touching_face(context, ray, at).map(|other| other.face.body)
+    touching_face(context, ray, at, |other| touches_other(&at.face, other)).map(|other| other.face.body)
+}
+
+/// Whether two faces are of different bodies, of which this one touches others.
+fn touches_other(face: &FaceOptics, other: &FaceOptics) -> bool {
+    other.touches_body && other.body != face.body
+}
+
+/// Whether two faces are of one body, of two of its solids that may touch.
+fn may_be_siblings(face: &FaceOptics, other: &FaceOptics) -> bool {
+    face.touches_sibling && other.touches_sibling && other.body == face.body
 }
 
 /// Whether another solid of the same body lies against the face within the glue distance, looking the other way: between them there is no
@@ -36,7 +46,7 @@ pub(super) fn touching_body(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> O
 pub(super) fn touches_sibling(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> bool {
     faces_along(context, probe_at(context, ray, at)).any(|(found, other)| {
         let against = found.geometric_normal.dot(at.hit.geometric_normal) < -ALIGNED;
-        other.touches_sibling && other.body == at.face.body && against
+        may_be_siblings(&at.face, &other) && against
     })
 }
 
@@ -110,15 +120,20 @@ pub(super) fn end_of_contact(context: &Context<'_>, next: &Ray, normal: Vector, 
     reach
 }
 
-/// Returns the face of another body that lies against this one within the glue distance; `None` where there is none.
-fn touching_face(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> Option<FaceHit> {
+/// Returns the face of those that `counts` that lies against this one within the glue distance; `None` where there is none.
+fn touching_face(
+    context: &Context<'_>,
+    ray: &Ray,
+    at: &FaceHit,
+    counts: impl Fn(&FaceOptics) -> bool,
+) -> Option<FaceHit> {
     let along = ray.direction.dot(at.hit.geometric_normal);
     let probe = probe_at(context, ray, at);
     // Near an edge others come in between.
     let (hit, face) = faces_along(context, probe).find(|(found, other)| {
         let opposite = (ray.direction.dot(found.geometric_normal) < 0.0) != (along < 0.0);
         let against = found.geometric_normal.dot(at.hit.geometric_normal) < -ALIGNED;
-        other.touches_body && other.body != at.face.body && opposite && against
+        counts(other) && opposite && against
     })?;
     Some(FaceHit { hit, face, point: probe.point_at(hit.t) })
 }
@@ -133,11 +148,12 @@ pub(super) enum ContactSurface {
     Partner(FaceHit),
 }
 
-/// Decides which of two faces at one place says what happens there: the one that is not bare, of two such the one that the light is
-/// leaving; so it does not depend on which of them rounding puts first.
+/// Decides which of two faces at one place, of two bodies or of two solids of one, says what happens there: the one that is not bare, of
+/// two such the one that the light is leaving; so it does not depend on which of them rounding puts first.
 #[inline(never)]
 pub(super) fn contact_surface(context: &Context<'_>, ray: &Ray, at: &FaceHit) -> ContactSurface {
-    let Some(partner) = touching_face(context, ray, at) else { return ContactSurface::Bare };
+    let counts = |other: &FaceOptics| touches_other(&at.face, other) || may_be_siblings(&at.face, other);
+    let Some(partner) = touching_face(context, ray, at, counts) else { return ContactSurface::Bare };
     // Bare: what happens follows from the two media alone, and from whichever face it is told the same.
     let is_bare = |f: &FaceOptics| context.bound.surfaces[f.surface as usize] == Surface::Interface;
     let entering = ray.direction.dot(at.hit.geometric_normal) < 0.0;

@@ -28,8 +28,9 @@ pub(super) fn cross_face<C: RayPayload>(
     ray: &Ray,
     at: &mut SurfaceInteraction<'_>,
 ) -> Result<Crossing<C>, LostCause> {
-    // Two solids of one part have one medium: the boundary between them is drawn in the file and absent in the glass.
-    // Only when the ray is in that body: from outside the other solid is entered as usual.
+    // Two solids of one part have one medium: a bare boundary between them is drawn in the file and absent in the glass, and a coated one,
+    // as of a beam splitter cemented of two prisms, has that medium on both sides. Only when the ray is in that body: from outside the
+    // other solid is entered as usual.
     let leaves_sibling = at.face.touches_sibling && payload.cross(at.face.body, false).is_some();
     if leaves_sibling && touches_sibling(context, ray, &at.face_hit()) {
         // From one solid of a part into the next.

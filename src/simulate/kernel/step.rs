@@ -49,7 +49,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let mut at = SurfaceInteraction::new(hit, face, entering, point);
         // Of faces at one place another may say what happens.
         let mut partner = None;
-        if C::MEDIA && (face.opaque_solid || face.medium_on_opaque || face.touches_body) {
+        if C::MEDIA && (face.opaque_solid || face.medium_on_opaque || face.touches_body || face.touches_sibling) {
             partner = self.resolve_contact(ray, &mut at);
         }
         if let Some(partner) = &partner {
@@ -91,7 +91,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     #[inline(always)]
     fn resolve_contact(&self, ray: &Ray, at: &mut SurfaceInteraction<'_>) -> Option<FaceHit> {
         let context = self.context;
-        let FaceOptics { opaque_solid, medium_on_opaque, touches_body, body, .. } = at.face;
+        let FaceOptics { opaque_solid, medium_on_opaque, touches_body, touches_sibling, body, .. } = at.face;
         // Light that leaves its body into an opaque face on it meets that face. Light that comes from outside meets the opaque one in
         // any case.
         if !at.entering && (opaque_solid || medium_on_opaque && body != AMBIENT) {
@@ -101,8 +101,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
                 return opaque;
             }
         }
-        // Of two touching bodies the one with a surface of its own says what happens.
-        if context.bound.coated_contacts && touches_body {
+        // Of two touching bodies, or solids of one, the one with a surface of its own says what happens.
+        if context.bound.coated_contacts && (touches_body || touches_sibling) {
             match contact_surface(context, ray, &at.face_hit()) {
                 ContactSurface::Bare => {}
                 ContactSurface::Own => at.skip = context.glue_mm(),

@@ -62,7 +62,7 @@ fn interface_interaction<'s, C: RayPayload>(
     ray: &Ray,
     at: &mut SurfaceInteraction<'_>,
 ) -> Interaction<'s, C> {
-    // Media first: between two parts of one body there is no surface, whatever its face is made of.
+    // Media first: between two solids of one body there is no surface where both are bare.
     let Crossing { here: mut payload, across } = match cross_face(context, path.payload, ray, at) {
         Ok(crossing) => crossing,
         Err(cause) => return Interaction::Lose(cause),
