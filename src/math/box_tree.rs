@@ -117,11 +117,15 @@ impl BoxTree {
     /// not count.
     #[inline]
     pub fn walk(&self, ray: &Ray) -> BoxWalk<'_> {
-        let mut open = SmallVec::new();
-        if !self.nodes.is_empty() {
-            open.push((ray.t_min, 0));
-        }
-        BoxWalk { tree: self, origin: ray.origin, inverse: ray.direction.recip(), least: ray.t_min, open }
+        let mut walk = self.ended_walk();
+        walk.restart(ray);
+        walk
+    }
+
+    /// Makes a walk that has passed all boxes, to be restarted.
+    #[inline]
+    pub fn ended_walk(&self) -> BoxWalk<'_> {
+        BoxWalk { tree: self, origin: Vector::ZERO, inverse: Vector::ZERO, least: 0.0, open: SmallVec::new() }
     }
 }
 
@@ -179,9 +183,25 @@ pub struct BoxWalk<'t> {
 }
 
 impl BoxWalk<'_> {
+    /// Turns to another ray, as [`BoxTree::walk`], in its place: a walk takes half a kilobyte, which would take longer to move.
+    #[inline]
+    pub fn restart(&mut self, ray: &Ray) {
+        self.end();
+        (self.origin, self.inverse, self.least) = (ray.origin, ray.direction.recip(), ray.t_min);
+        if !self.tree.nodes.is_empty() {
+            self.open.push((ray.t_min, 0));
+        }
+    }
+
+    /// Ends it: no box is next.
+    #[inline]
+    pub fn end(&mut self) {
+        self.open.clear();
+    }
+
     /// The index of the next box that is entered at `end` or before; `None` when there is none left. `end` must not grow from call to call:
     /// what lay beyond it is forgotten.
-    #[inline]
+    #[inline(always)]
     pub fn next(&mut self, end: f64) -> Option<u32> {
         while let Some((near, link)) = self.open.pop() {
             if near > end {

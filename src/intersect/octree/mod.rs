@@ -61,6 +61,9 @@ use std::time::Instant;
 use tree::Tree;
 use walk::BATCH;
 
+/// Rays of a batch for which room is made separately.
+const SMALL_BATCH: usize = 32;
+
 /// An octree over the facets of a mesh.
 ///
 /// ```
@@ -203,6 +206,22 @@ impl<'m> Octree<'m> {
             + buffers.iter().map(LightBuffer::bytes).sum::<usize>()
     }
 
+    /// Finds the nearest hit of each ray, `ROOM` of them at a time, with its normals, and overwrites `hits`.
+    fn intersect_batches<const ROOM: usize>(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        let mut found = [None; ROOM];
+        let light_buffers = self.light_buffers.read().unwrap_or_else(PoisonError::into_inner);
+        for (rays, hits) in rays.chunks(ROOM).zip(hits.chunks_mut(ROOM)) {
+            let found = &mut found[..rays.len()];
+            self.walk(&light_buffers, rays, found, cost);
+            for (i, hit) in hits.iter_mut().enumerate() {
+                self.prefetch_description(found, i);
+                *hit = found[i].map(|hit| {
+                    normals::describe_in_batch(self.tree.surroundings.mesh, &rays[i], &hit, self.settings.normals)
+                });
+            }
+        }
+    }
+
     /// Finds the nearest hit of each ray with the instructions that were chosen, and overwrites `hits`; `light_buffers`, which may be
     /// empty, answer some of them.
     fn walk(&self, light_buffers: &[LightBuffer], rays: &[Ray], hits: &mut [Option<FacetHit>], cost: &mut Cost) {
@@ -218,17 +237,11 @@ impl Intersector for Octree<'_> {
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
-        let mut found = [None; BATCH];
-        let light_buffers = self.light_buffers.read().unwrap_or_else(PoisonError::into_inner);
-        for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            let found = &mut found[..rays.len()];
-            self.walk(&light_buffers, rays, found, cost);
-            for (i, hit) in hits.iter_mut().enumerate() {
-                self.prefetch_description(found, i);
-                *hit = found[i].map(|hit| {
-                    normals::describe_in_batch(self.tree.surroundings.mesh, &rays[i], &hit, self.settings.normals)
-                });
-            }
+        // Emptying room for a whole batch takes as long as a few rays, which are often all that come to a part in its place.
+        if rays.len() <= SMALL_BATCH {
+            self.intersect_batches::<SMALL_BATCH>(rays, hits, cost);
+        } else {
+            self.intersect_batches::<BATCH>(rays, hits, cost);
         }
     }
 

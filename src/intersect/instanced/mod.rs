@@ -12,15 +12,19 @@
 //! Known weakness: nothing is worked out about expected rays of what is placed; and a start that is computed in the scene is rounded there,
 //! so that the structures of parts must know how far away they stand (`farthest_start` of their settings).
 
-use super::{Certainty, Cost, ExpectedRays, Footprint, Hit, Intersector};
-use crate::math::{Aabb, BoxTree, BoxWalk, Departure, FaceId, Ray};
+mod walk;
+
+use super::{Cost, ExpectedRays, Footprint, Hit, Intersector};
+use crate::math::{Aabb, BoxTree, Departure, FaceId, Ray};
 use crate::model::{Instancing, Placement};
 use rayon::prelude::*;
 use smallvec::SmallVec;
 use std::time::Instant;
+use walk::{OwnDeparture, Question, Walk, Workspace, leaving};
 
-/// Rays that are under way at a time: as many as their walks take half of the first cache.
-const BATCH: usize = 32;
+/// Rays that are under way at a time: with as many the structures of parts have enough to interleave, and their walks stay in the second
+/// cache.
+const BATCH: usize = 512;
 
 /// The structures of all groups of a model, in their places.
 ///
@@ -58,39 +62,6 @@ pub struct Instanced<'a> {
     build_seconds: f64,
 }
 
-/// A ray under way.
-struct Walk<'t> {
-    /// The ray, up to the nearest hit so far.
-    ray: Ray,
-    /// What the ray leaves, as its owner knows it.
-    departure: Option<OwnDeparture>,
-    /// The boxes still to be entered; none where the hit so far is known to be the nearest.
-    boxes: Option<BoxWalk<'t>>,
-    /// Of the first group, or of a placement.
-    best: Option<(Option<u32>, Hit)>,
-    /// The placement where the ray is asked next; `None` once it has passed all boxes.
-    next: Option<u32>,
-    /// Whether some structure fell back on it: what that missed may be nearer.
-    fell_back: bool,
-}
-
-/// A point that a ray leaves, in its group.
-#[derive(Clone, Copy)]
-struct OwnDeparture {
-    /// `None` for the first group.
-    place: Option<u32>,
-    /// With the face's number in the group.
-    departure: Departure,
-}
-
-/// A ray that is asked of a placement.
-struct Question {
-    group: usize,
-    place: u32,
-    /// Index of the ray's walk.
-    walk: usize,
-}
-
 impl<'a> Instanced<'a> {
     /// Wraps one structure for each of `instancing.groups`, in that order, each built in its group's own coordinates.
     pub fn new(instancing: &'a Instancing, groups: Vec<Box<dyn Intersector + 'a>>) -> Self {
@@ -104,28 +75,39 @@ impl<'a> Instanced<'a> {
         Self { instancing, groups, tree, stands_alone, has_single, build_seconds }
     }
 
-    /// Answers at most [`BATCH`] rays in the scene's coordinates: overwrites `hits` and counts each ray once.
-    fn intersect_chunk(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+    /// Answers rays in the scene's coordinates, at most as many as `work` has room for: overwrites `hits` and counts each ray once.
+    fn intersect_chunk<'t>(
+        &'t self,
+        rays: &[Ray],
+        hits: &mut [Option<Hit>],
+        work: &mut Workspace<'t>,
+        cost: &mut Cost,
+    ) {
         let before = *cost;
-        let mut walks: SmallVec<[Walk; BATCH]> = rays.iter().map(|ray| self.departing(ray)).collect();
+        let Workspace { walks, open, .. } = work;
+        let walks = &mut walks[..rays.len()];
+        walks.iter_mut().zip(rays).for_each(|(walk, ray)| self.depart(walk, ray));
         if self.has_single {
-            let single: SmallVec<[Ray; BATCH]> = walks.iter().map(|walk| walk.local_ray(None)).collect();
-            let fell_back = self.ask_group(0, &single, hits, cost);
+            work.local.clear();
+            work.local.extend(walks.iter().map(|walk| walk.local_ray(None)));
+            let fell_back = self.ask_group(0, &work.local, hits, cost);
             walks.iter_mut().zip(hits.iter()).for_each(|(walk, hit)| walk.take(None, *hit));
             fell_back.iter().for_each(|&k| walks[k].fell_back = true);
         }
         // Light that leaves a surface mostly meets its own part next, and where no other stands in that one's box nothing can be nearer.
-        let mut open: SmallVec<[usize; BATCH]> = (0..walks.len()).collect();
-        self.ask(&open, &mut walks, cost);
-        walks.iter_mut().for_each(|walk| walk.boxes = self.boxes_ahead(walk));
+        open.clear();
+        open.extend(0..rays.len());
+        self.ask(work, cost);
+        work.walks[..rays.len()].iter_mut().for_each(|walk| self.enter_boxes(walk));
         loop {
-            open.retain(|i| walks[*i].advance());
-            if open.is_empty() {
+            work.advance();
+            if work.open.is_empty() {
                 break;
             }
-            self.ask(&open, &mut walks, cost);
+            self.ask(work, cost);
         }
         // A ray counts once, wherever it was asked.
+        let walks = &work.walks[..rays.len()];
         cost.rays = before.rays + rays.len() as u64;
         cost.fallbacks = before.fallbacks + walks.iter().filter(|walk| walk.fell_back).count() as u64;
         for (walk, hit) in walks.iter().zip(hits) {
@@ -156,40 +138,47 @@ impl<'a> Instanced<'a> {
         (0..rays.len()).filter(|&k| falls_back(&rays[k])).collect()
     }
 
-    /// A ray before it is asked anywhere, with the placement that it leaves as the first to ask, unless it is known to be free of it.
-    fn departing(&self, ray: &Ray) -> Walk<'_> {
-        let departure = ray.departure.map(|from| {
+    /// What a ray leaves, as its owner knows it.
+    fn own_departure(&self, ray: &Ray) -> Option<OwnDeparture> {
+        ray.departure.map(|from| {
             let (place, face) = self.instancing.locate(from.face);
             OwnDeparture { place: place.map(|k| k as u32), departure: Departure { face, ..from } }
-        });
-        let mut walk = Walk { ray: *ray, departure, boxes: None, best: None, next: None, fell_back: false };
-        walk.next = departure.and_then(|from| from.place).filter(|&k| !self.is_free_of(&walk, k));
-        walk
+        })
+    }
+
+    /// Turns a walk to a ray before it is asked anywhere, with the placement that it leaves as the first to ask, unless it is known to be
+    /// free of it.
+    fn depart(&self, walk: &mut Walk, ray: &Ray) {
+        (walk.ray, walk.departure, walk.best, walk.fell_back) = (*ray, self.own_departure(ray), None, false);
+        walk.boxes.end();
+        let own = walk.departure.and_then(|from| from.place);
+        walk.next = own.filter(|&k| !self.is_free_of(ray, walk.departure, k));
     }
 
     /// Whether a ray is known to meet nothing of the placement that it leaves.
-    fn is_free_of(&self, walk: &Walk, place: u32) -> bool {
-        self.groups[self.placement(place).group as usize].escapes(&self.moved(walk, place))
+    fn is_free_of(&self, ray: &Ray, departure: Option<OwnDeparture>, place: u32) -> bool {
+        let placement = self.placement(place);
+        self.groups[placement.group as usize].escapes(&placement.local_ray(&leaving(ray, departure, Some(place))))
     }
 
-    /// Asks the walks that `open` lists at their next placement, those of one group together, and keeps the hits that are nearer; passes
-    /// over walks without one.
-    fn ask(&self, open: &[usize], walks: &mut [Walk], cost: &mut Cost) {
+    /// Asks the open walks at their next placement, those of one group together, and keeps the hits that are nearer; passes over walks
+    /// without one.
+    fn ask(&self, work: &mut Workspace<'_>, cost: &mut Cost) {
+        let Workspace { walks, open, asked, local, found } = work;
         let question = |&walk: &usize| {
             let place = walks[walk].next?;
             Some(Question { group: self.placement(place).group as usize, place, walk })
         };
-        let mut asked: SmallVec<[Question; BATCH]> = open.iter().filter_map(question).collect();
+        asked.clear();
+        asked.extend(open.iter().filter_map(question));
         asked.sort_by_key(|question| question.group);
-        let mut local: SmallVec<[Ray; BATCH]> = SmallVec::new();
-        let mut found: SmallVec<[Option<Hit>; BATCH]> = SmallVec::new();
         for together in asked.chunk_by(|a, b| a.group == b.group) {
             local.clear();
             local.extend(together.iter().map(|q| self.moved(&walks[q.walk], q.place)));
             found.clear();
             found.resize(local.len(), None);
-            let fell_back = self.ask_group(together[0].group, &local, &mut found, cost);
-            for (question, hit) in together.iter().zip(&found) {
+            let fell_back = self.ask_group(together[0].group, local, found, cost);
+            for (question, hit) in together.iter().zip(found.iter()) {
                 walks[question.walk].take(Some(question.place), *hit);
             }
             fell_back.iter().for_each(|&k| walks[together[k].walk].fell_back = true);
@@ -201,15 +190,18 @@ impl<'a> Instanced<'a> {
         self.placement(place).local_ray(&walk.local_ray(Some(place)))
     }
 
-    /// The boxes that a ray may enter once it has been asked what it leaves; `None` where it ends, at its hit or its range, inside the box
-    /// of that placement and no other's meets this.
-    fn boxes_ahead(&self, walk: &Walk) -> Option<BoxWalk<'_>> {
-        let own = walk.departure.and_then(|from| from.place).filter(|&k| self.is_alone(k, &walk.ray));
-        let Some(own) = own else { return Some(self.tree.walk(&walk.ray)) };
+    /// Begins with the boxes that a ray may enter once it has been asked what it leaves; with none where it ends, at its hit or its range,
+    /// inside the box of that placement and no other's meets this.
+    fn enter_boxes(&self, walk: &mut Walk) {
+        let Some(own) = walk.departure.and_then(|from| from.place).filter(|&k| self.is_alone(k, &walk.ray)) else {
+            walk.boxes.restart(&walk.ray);
+            return;
+        };
         // Boxes have room: nothing of others is found before the ray is out of a box that meets none of theirs, nor at its very end.
         let end = self.placement(own).bounds.exit(&walk.ray);
-        (walk.ray.t_max > end)
-            .then(|| self.tree.walk(&Ray { t_min: walk.ray.t_min.max(end.next_up()), ..walk.ray }))
+        if walk.ray.t_max > end {
+            walk.boxes.restart(&Ray { t_min: walk.ray.t_min.max(end.next_up()), ..walk.ray });
+        }
     }
 
     /// Whether a ray starts in the box of a placement that meets no other's.
@@ -234,52 +226,17 @@ impl<'a> Instanced<'a> {
     }
 }
 
-impl Walk<'_> {
-    /// Sets `next` to the placement of the next box that the ray enters before its hit; false where there is none. The placement that the
-    /// ray leaves is passed over, for it was asked first.
-    fn advance(&mut self) -> bool {
-        let own = self.departure.and_then(|from| from.place);
-        let Some(boxes) = &mut self.boxes else { return false };
-        self.next = boxes.next(self.ray.t_max);
-        if own.is_some() && self.next == own {
-            self.next = boxes.next(self.ray.t_max);
-        }
-        self.next.is_some()
-    }
-
-    /// The ray as it leaves the first group or one placement: where its face is of another, it leaves none.
-    fn local_ray(&self, place: Option<u32>) -> Ray {
-        let own = self.departure.filter(|from| from.place == place);
-        Ray { departure: own.map(|from| from.departure), ..self.ray }
-    }
-
-    /// Its hit with the certainty that it has among all structures asked: a miss that is not proved may hide a nearer one.
-    fn qualified(&self, hit: Hit) -> Hit {
-        let is_doubtful = self.fell_back && hit.certainty == Certainty::Certified;
-        Hit { certainty: if is_doubtful { Certainty::Uncertified } else { hit.certainty }, ..hit }
-    }
-
-    /// Keeps the nearer hit, of equal ones that of the first group or placement, and ends the ray there.
-    fn take(&mut self, place: Option<u32>, hit: Option<Hit>) {
-        let Some(hit) = hit else { return };
-        let is_nearer = self.best.is_none_or(|(other, best)| hit.t < best.t || (hit.t == best.t && place < other));
-        if is_nearer {
-            self.ray.t_max = hit.t;
-            self.best = Some((place, hit));
-        }
-    }
-}
-
 impl Intersector for Instanced<'_> {
     fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
         let mut hit = [None];
-        self.intersect_chunk(std::slice::from_ref(ray), &mut hit, cost);
+        self.intersect_batch(std::slice::from_ref(ray), &mut hit, cost);
         hit[0]
     }
 
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        let mut work = Workspace::new(&self.tree, rays.len().min(BATCH));
         for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            self.intersect_chunk(rays, hits, cost);
+            self.intersect_chunk(rays, hits, &mut work, cost);
         }
     }
 
@@ -295,10 +252,11 @@ impl Intersector for Instanced<'_> {
         if self.has_single {
             return false;
         }
-        let walk = self.departing(ray);
-        let own = walk.departure.and_then(|from| from.place).filter(|_| walk.next.is_none());
-        own.is_some_and(|k| {
-            self.is_alone(k, ray) && self.placement(k).bounds.exit(ray) >= self.tree.bounds().exit(ray)
+        let departure = self.own_departure(ray);
+        departure.and_then(|from| from.place).is_some_and(|k| {
+            self.is_free_of(ray, departure, k)
+                && self.is_alone(k, ray)
+                && self.placement(k).bounds.exit(ray) >= self.tree.bounds().exit(ray)
         })
     }
 
@@ -315,6 +273,7 @@ impl Intersector for Instanced<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::intersect::Certainty;
     use crate::math::{Frame, Point, Uv, Vector};
     use crate::model::{Face, Instance, Model, Part, PartId, Shell};
     use crate::nurbs::sweep::sphere;
