@@ -3,6 +3,7 @@
 use crate::formats::Grid;
 use crate::simulate::PoleRings;
 use std::borrow::Cow;
+use std::iter::once;
 
 /// Returns the rings of cells at the poles of a grid over planes C; none for any other.
 pub(super) fn pole_rings(grid: &Grid) -> PoleRings {
@@ -15,21 +16,27 @@ pub(super) fn is_all_around(grid: &Grid) -> bool {
     pole_rings(grid).has_poles(grid.values.len())[0]
 }
 
-/// Returns a grid in which all cells of the ring at a pole (γ 0° and 180°) have the mean of the ring, with the error of that; any other
-/// grid as it is.
-pub(super) fn with_even_poles(grid: &Grid) -> Cow<'_, Grid> {
+/// Returns a grid in which all cells of the ring at a pole (γ 0° and 180°) have the mean of the ring, with the error of that, in its
+/// layers too; any other grid as it is.
+pub(crate) fn with_even_poles(grid: &Grid) -> Cow<'_, Grid> {
     let rings = pole_rings(grid);
     if rings.is_empty() {
         return Cow::Borrowed(grid);
     }
     let mut even = grid.clone();
-    rings.level(&mut even.values);
-    if let Some(errors) = &mut even.error {
-        rings.level_errors(errors);
-    }
-    if let Some(geometric) = &mut even.geometric {
-        // What facets change they change alike in all cells of a ring.
-        rings.level(geometric);
+    let layers =
+        even.layers.iter_mut().map(|layer| (&mut layer.values, Some(&mut layer.error), &mut layer.geometric));
+    for (values, errors, geometric) in
+        once((&mut even.values, even.error.as_mut(), &mut even.geometric)).chain(layers)
+    {
+        rings.level(values);
+        if let Some(errors) = errors {
+            rings.level_errors(errors);
+        }
+        if let Some(geometric) = geometric {
+            // What facets change they change alike in all cells of a ring.
+            rings.level(geometric);
+        }
     }
     Cow::Owned(even)
 }

@@ -1,6 +1,6 @@
 //! Figures of a lamp in the words of the trade: Imax, HV, widths at half, flux and efficiency; where the light of a spot lies.
 
-use super::even_poles::{is_all_around, pole_rings, with_even_poles};
+use super::even_poles::{is_all_around, pole_rings};
 use super::number::figures;
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
@@ -51,8 +51,8 @@ fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
     Some([plane(i), plane(i + a.cells / 4)])
 }
 
-/// Returns both errors of the brightest cell together, one standard error; empty where none was estimated. `grid` is that of
-/// [`with_even_poles`].
+/// Returns both errors of the brightest cell together, one standard error; empty where none was estimated. At a pole `grid` has the same
+/// in all cells of the ring.
 fn peak_error(grid: &Grid) -> Cell {
     let (Some((i, j)), Some(mut errors)) = (grid.peak_cell(), grid.error.clone()) else { return Cell::Empty };
     let cells = grid.axes[0].cells;
@@ -72,7 +72,6 @@ pub(super) fn lamp_table(
     let title = format!("{}: figures of the lamp", super::maps::spoken(&receiver.name));
     let name = format!("{}-lamp", crate::formats::file_stem(&receiver.name));
     let mut table = Table::new(&name, &title, &[("", ""), ("value", ""), ("±", ""), ("unit", ""), ("where", "")]);
-    let grid = &with_even_poles(grid);
     let degrees = |[h, v]: [f64; 2]| {
         format!("{} {}°, {} {}°", grid.axes[0].label, figures(h, 3), grid.axes[1].label, figures(v, 3))
     };
@@ -193,7 +192,6 @@ pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     if !is_all_around(grid) {
         return None;
     }
-    let grid = &with_even_poles(grid);
     let [c, gamma] = &grid.axes;
     let half_plane = |angle: f64| {
         let column = ((angle - c.range[0]) / c.step()).rem_euclid(c.cells as f64);
@@ -226,6 +224,7 @@ mod tests {
     use crate::mesh::FacetMesh;
     use crate::model::Model;
     use crate::report::chart::Content;
+    use crate::report::even_poles::with_even_poles;
     use crate::simulate::{RunSettings, Scene, simulate};
     use std::f64::consts::PI;
     use std::path::Path;

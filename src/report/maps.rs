@@ -1,6 +1,5 @@
 //! What a receiver counted as maps: the grid for files and pictures, its cuts, and what stands below them.
 
-use super::even_poles::with_even_poles;
 use super::{AxisStyle, Chart, Series, SeriesStyle, figures};
 use crate::formats::file_stem;
 use crate::formats::{Axis, Grid, Layer};
@@ -123,7 +122,7 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
 
 /// Writes what a map shows: its peak, its noise and its cells.
 pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
-    let peak = with_even_poles(grid).peak().map(|([x, y], value)| {
+    let peak = grid.peak().map(|([x, y], value)| {
         format!(
             "Peak {} {} at {} {} {}, {} {} {}. ",
             figures(value, 3),

@@ -44,6 +44,8 @@ pub use contour::Isoline;
 pub use cross_check::{CheckReport, verdict};
 pub use document::{Block, Report, Section};
 #[cfg(feature = "cli")]
+pub(crate) use even_poles::with_even_poles;
+#[cfg(feature = "cli")]
 pub(crate) use maps::on_receiver;
 pub use maps::{photometric_grid, receiver_grid};
 pub use number::{bytes, figures, grouped, seconds};

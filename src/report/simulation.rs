@@ -211,6 +211,7 @@ impl SimulationReport<'_> {
         );
         for (k, grid) in maps {
             let r = &self.results.receivers[k];
+            let grid = with_even_poles(&grid);
             section = section.with_block(receiver_blocks::framed_map(r, &grid));
             // The map that matters most stands beside the facets and has its cuts drawn.
             if let Some(view) = view.take() {

@@ -6,7 +6,7 @@ use crate::formats::{
     Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_eulumdat,
     write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_png, write_tm25, write_vti,
 };
-use crate::report::{colour_picture, file_stem, on_receiver, photometric_grid, receiver_grid};
+use crate::report::{colour_picture, file_stem, on_receiver, photometric_grid, receiver_grid, with_even_poles};
 use crate::simulate::ReceiverResult;
 use crate::simulate::scene::{FarFieldType, Receiver, ReceiverKind};
 use std::path::Path;
@@ -35,14 +35,20 @@ pub(crate) fn write(
     }
     let stem = file_stem(&receiver.name);
     type Writer = fn(&Path, &Grid) -> Result<(), crate::formats::Error>;
-    let writers: [(&str, Writer); 4] =
-        [("csv", write_grid_csv), ("npz", write_grid_npz), ("png", write_grid_png), ("vti", write_vti)];
+    // A sliver at a pole would outshine a picture by the luck of its few rays.
+    let pictured = with_even_poles(&grid);
+    let writers: [(&str, Writer, &Grid); 4] = [
+        ("csv", write_grid_csv, &grid),
+        ("npz", write_grid_npz, &grid),
+        ("png", write_grid_png, &pictured),
+        ("vti", write_vti, &grid),
+    ];
     let mut names = Vec::new();
-    for (extension, write) in writers {
+    for (extension, write, grid) in writers {
         names.push(format!("{stem}.{extension}"));
-        write(&folder.join(format!("{stem}.{extension}")), &grid)?;
+        write(&folder.join(format!("{stem}.{extension}")), grid)?;
     }
-    if let Some(picture) = colour_picture(&grid) {
+    if let Some(picture) = colour_picture(&pictured) {
         names.push(format!("{stem}-colours.png"));
         write_png(&folder.join(format!("{stem}-colours.png")), &picture)?;
     }
@@ -63,7 +69,8 @@ pub(crate) fn write(
         _ => photometric_grid(receiver).zip(receiver.photometric().map(|c| c.total)),
     };
     // Both formats hold whole distributions alone, and those of half a sphere.
-    if let Some(photometry) = candela.and_then(|(grid, lumens)| photometry(receiver, &grid, lumens)) {
+    let photometry = candela.and_then(|(grid, lumens)| photometry(receiver, &with_even_poles(&grid), lumens));
+    if let Some(photometry) = photometry {
         names.push(format!("{stem}.ies"));
         write_ies(&folder.join(format!("{stem}.ies")), &photometry)?;
         if photometry.kind == PhotometricType::C {
@@ -106,7 +113,7 @@ const SOFTWARE: usize = 4;
 const ADDITIONAL: usize = 7;
 
 /// Returns a far field as LM-63 has it, in candela over all its directions, with the ends of both ranges: values there are those of the
-/// nearest cells, at a pole the mean of its ring. `None` for other receivers, and where its ranges are not those of a whole luminaire.
+/// nearest cells, at a pole the mean of its ring, which `grid` has in all cells of the ring. `None` for other receivers, and where its ranges are not those of a whole luminaire.
 ///
 /// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, mostly within a thousandth of
 /// 1, so that their flux is `lumens`.
