@@ -18,30 +18,30 @@ pub struct Aim {
     pub how: String,
     /// Other aims that the errors of the map leave open, to the right and up, degrees: a row is sure where it is so by all of them.
     pub rivals: Vec<[f64; 2]>,
-    /// How far the noise of the map may have moved the aim: where its independent errors bring it at three standard errors of each to
+    /// How far the errors of the map may have moved the aim: where each of its independent causes brings it at three standard errors to
     /// either side, degrees to the right and up. What a row reads there is an error of its reading.
     pub moved: Vec<[[f64; 2]; 2]>,
 }
 
-/// Least gradient of a cut-off that the vertical scan may go by (§2.2.2) and of an elbow (§2.3.2).
-const LEAST_GRADIENT: f64 = 0.13;
+/// Least gradient of an elbow, per 0.1° (UN R149 00, Annex 5, §2.3.2).
 const LEAST_ELBOW_GRADIENT: f64 = 0.08;
 
 /// Vertical scans look this far from the horizon, degrees: farther than a lamp is ever mounted askew.
 const SCAN_V_DEG: f64 = 3.0;
 
-/// Half the width of the opening of the vertical scan, degrees: the cut-off is level within 0.2° from 1.5° to 3.5° left (§2.2.3), and
-/// more of it tells its height with less noise.
+/// Half the width of the opening of the vertical scan, degrees: the cut-off is level within 0.2° from 1.5° to 3.5° left (there, §2.2.3),
+/// and more of it tells its height with less noise.
 const LEVEL_HALF_DEG: f64 = 0.5;
 
-/// The horizontal scan: 0.2° down, 5° to both sides (§2.3.2, a).
+/// V of the horizontal scan, degrees (there, §2.3.2, a).
 const ELBOW_V_DEG: f64 = -0.2;
+/// It goes this far to both sides, degrees.
 const SCAN_H_DEG: f64 = 5.0;
 
 /// Most aims that rows are asked by. Where more are open nearly all of the map is noise: those asked lie as far apart as it takes.
 const MOST_RIVALS: usize = 150;
 
-/// Turns of less are no other aim, degrees: they move a reading on the steepest cut-off, of G = 1, by 1 %.
+/// Smaller turns count as the same aim, degrees: they move a reading on the steepest cut-off, of G = 1, by 1 %.
 const LEAST_TURN_DEG: f64 = 5e-4;
 
 /// Scans for elbows that lie nearer to each other than this are one, degrees: the width of their opening.
@@ -61,7 +61,7 @@ impl Aim {
             range: [-SCAN_V_DEG, SCAN_V_DEG],
             sign: 1.0,
             half_deg: [LEVEL_HALF_DEG, SCAN_HALF_DEG],
-            least: LEAST_GRADIENT,
+            least: rule.least_gradient,
         };
         let Some(edge) = scan.steepest_edge(map, |b| [rule.scan_h_deg, b]) else {
             return Self::unchanged("as placed: the far field does not hold the scan for the cut-off");
@@ -75,9 +75,10 @@ impl Aim {
         // What has no edge cannot be aimed by it; to turn the lamp by noise would be worse.
         if !edge.is_found() {
             let how = format!(
-                "as placed: the steepest place at {}° is G = {:.3}, no cut-off (G of {LEAST_GRADIENT} and more){}",
+                "as placed: the steepest place at {}° is G = {:.3}, no cut-off (G of {} and more){}",
                 rule.scan_h_deg,
                 edge.gradient,
+                rule.least_gradient,
                 doubt(&edge, "cut-off")
             );
             return Self { gradient, rivals: thinned(open), ..Self::unchanged(&how) };
@@ -111,7 +112,8 @@ impl Aim {
         Self { h_deg: sideways.h_deg, v_deg, gradient, how, rivals: thinned(open), moved }
     }
 
-    /// The same aim with every direction read `h_deg` farther right and `v_deg` farther up, as a regulation allows where a row fails.
+    /// The same aim, what it leaves open turned with it, with every direction read `h_deg` farther right and `v_deg` farther up, as a
+    /// regulation allows where a row fails.
     pub(super) fn realigned(&self, h_deg: f64, v_deg: f64) -> Self {
         let how = format!("{}; realigned by {h_deg}° and {v_deg}°", self.how);
         let turned = |[h, v]: [f64; 2]| [h + h_deg, v + v_deg];
@@ -127,11 +129,11 @@ impl Aim {
 
     /// Returns the aims that the errors of the map leave open besides this one, without rivals and errors of their own.
     pub(super) fn open_aims(&self) -> impl Iterator<Item = Self> {
-        self.rivals.iter().copied().map(Self::at)
+        self.rivals.iter().copied().map(Self::turned_by)
     }
 
     /// Turns that far to the right and up, degrees, and no farther.
-    pub(super) fn at([h_deg, v_deg]: [f64; 2]) -> Self {
+    pub(super) fn turned_by([h_deg, v_deg]: [f64; 2]) -> Self {
         Self { h_deg, v_deg, ..Self::default() }
     }
 }
@@ -168,6 +170,9 @@ struct Sideways {
 impl Sideways {
     /// Looks for the elbow below a cut-off that is read `v_deg` farther up than it stands.
     fn below(map: &IntensityMap, rule: CutOff, v_deg: f64) -> Self {
+        let Some(elbow_h_deg) = rule.elbow_h_deg else {
+            return Self { h_deg: 0.0, v_deg, others: Vec::new(), moved: None, how: "sideways as placed".into() };
+        };
         // To the right of the elbow the light reaches higher: the scan goes from light to dark towards the left.
         let scan = Scan {
             range: [-SCAN_H_DEG, SCAN_H_DEG],
@@ -179,18 +184,18 @@ impl Sideways {
         let Some(elbow) = scan.steepest_edge(map, |h| [h, ELBOW_V_DEG + v_deg]) else {
             return Self { h_deg: 0.0, v_deg, others: Vec::new(), moved: None, how: none };
         };
-        let mut others: Vec<f64> = elbow.rivals.iter().map(|place| place - rule.elbow_h_deg).collect();
+        let mut others: Vec<f64> = elbow.rivals.iter().map(|place| place - elbow_h_deg).collect();
         if !elbow.is_found() {
             return Self { h_deg: 0.0, v_deg, others, moved: None, how: none + &doubt(&elbow, "elbow") };
         }
         if elbow.may_be_none {
             others.push(0.0);
         }
-        let h_deg = elbow.position - rule.elbow_h_deg;
+        let h_deg = elbow.position - elbow_h_deg;
         let reach = SIGMAS * elbow.position_error;
         let moved = (reach > LEAST_TURN_DEG).then_some([h_deg - reach, h_deg + reach]);
         let doubt = doubt(&elbow, "elbow");
-        let how = format!("elbow found at {:.2}° and read as {}°{doubt}", elbow.position, rule.elbow_h_deg);
+        let how = format!("elbow found at {:.2}° and read as {}°{doubt}", elbow.position, elbow_h_deg);
         Self { h_deg, v_deg, others, moved, how }
     }
 
@@ -207,7 +212,7 @@ mod tests {
     use super::*;
 
     fn rule() -> CutOff {
-        Regulation::find("UN R112 B passing").unwrap().rules.cut_off.unwrap()
+        Regulation::find("UN R112 B passing").unwrap().function.cut_off.unwrap()
     }
 
     /// Cells of 0.149° are the widest that UN R112 allows, those of 0.025° half as wide as the edge is soft.

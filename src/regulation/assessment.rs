@@ -13,13 +13,14 @@ pub struct RowVerdict {
     pub row: Row,
     /// The reading that decides; for a relative row, its difference from the multiple of the other. `None` outside the far field.
     pub reading: Option<Reading>,
-    /// Where it was read, degrees of the table.
+    /// Where it was read, degrees of the table; of a sum the first of its points.
     pub direction: Option<[f64; 2]>,
     /// `None` where the row asks nothing that is measured here: notes, and rows under a condition.
     pub verdict: Option<Verdict>,
-    /// What would settle it, if it is unsure.
+    /// What would settle it, if it is unsure by every aim that the errors leave open.
     pub settles: Option<Settles>,
-    /// How many of the directions that it asks about lie outside the far field: with any, no rays settle it.
+    /// Directions that it asks about and that lie outside the far field, 1 for a zone of which any part does, and for a brightest direction
+    /// that may: with any, no rays settle it.
     pub unseen: usize,
 }
 
@@ -37,7 +38,7 @@ pub struct Assessment {
     pub sensor_deg: f64,
     /// Row by row.
     pub rows: Vec<RowVerdict>,
-    /// Of all rows together; pass where no row has a verdict.
+    /// The worst of all rows, without sums of groups that stand in for their points; pass where no row has a verdict.
     pub verdict: Verdict,
 }
 
@@ -65,7 +66,7 @@ pub struct Assumptions {
     pub traffic: Traffic,
     /// Measure the lamp as it was placed, whatever the regulation says of aiming.
     pub as_placed: bool,
-    /// Rays of the run.
+    /// Rays of the run; 0 where they are not known: then nothing says what settles a row.
     pub rays: u64,
     /// Tolerance of the run's facets, mm, where it had any.
     pub tolerance_mm: Option<f64>,

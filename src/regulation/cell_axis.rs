@@ -18,13 +18,13 @@ pub(super) struct CellAxis {
 /// The part of a cell that an interval covers.
 pub(super) struct Overlap {
     pub(super) cell: usize,
-    /// Its measure.
-    pub(super) share: f64,
+    pub(super) measure: f64,
     /// How far its middle is beyond that of the cell, in widths of the cell.
     pub(super) offset: f64,
 }
 
 impl CellAxis {
+    /// Takes edges that rise, degrees, at least two.
     pub(super) fn new(edges: Vec<f64>, measure: fn(f64) -> f64) -> Self {
         let measures = edges.iter().map(|edge| measure(*edge)).collect();
         Self { edges, measures, measure }
@@ -46,7 +46,7 @@ impl CellAxis {
     }
 
     /// The measure of a cell.
-    pub(super) fn of_cell(&self, cell: usize) -> f64 {
+    pub(super) fn cell_measure(&self, cell: usize) -> f64 {
         self.measures[cell + 1] - self.measures[cell]
     }
 
@@ -55,7 +55,7 @@ impl CellAxis {
         Self::new(self.edges.iter().rev().map(|edge| -edge).collect(), self.measure)
     }
 
-    /// Lists the parts of cells that an interval covers, degrees; `None` where it leaves the borders.
+    /// Lists the parts of cells that an interval covers, degrees, `from` below `to`; `None` where it leaves the borders.
     pub(super) fn overlaps(&self, from: f64, to: f64) -> Option<impl Iterator<Item = Overlap>> {
         let [low, high] = self.extent();
         if from < low - EDGE_ROUNDING_DEG || to > high + EDGE_ROUNDING_DEG {
@@ -70,8 +70,8 @@ impl CellAxis {
             let (low, below) = if from > left { (from, ends[0]) } else { (left, self.measures[k]) };
             let (high, above) = if to < right { (to, ends[1]) } else { (right, self.measures[k + 1]) };
             let offset = 0.5 * (low + high - left - right) / (right - left);
-            Overlap { cell: k, share: above - below, offset }
+            Overlap { cell: k, measure: above - below, offset }
         };
-        Some(cells.map(part).filter(|part| part.share > 0.0))
+        Some(cells.map(part).filter(|part| part.measure > 0.0))
     }
 }

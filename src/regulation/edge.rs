@@ -2,7 +2,7 @@
 
 use super::few_rays::SIGMAS;
 use super::map::IntensityMap;
-use super::opening::Measurement;
+use super::opening::CellWeights;
 
 /// Step of the scans, degrees (UN R149, Annex 5, §2.3.1).
 const STEP_DEG: f64 = 0.05;
@@ -45,7 +45,7 @@ const STEPS_OF_AREA: usize = (AREA_DEG / STEP_DEG).round() as usize;
 pub(super) struct Edge {
     /// Its angle, degrees.
     pub(super) position: f64,
-    /// Standard error of that from the noise of the map, degrees.
+    /// Standard error of that by both errors of the map, degrees; that of facets where it is known.
     pub(super) position_error: f64,
     /// The gradient G there.
     pub(super) gradient: f64,
@@ -86,7 +86,7 @@ struct Slope {
     /// Gradients that it cannot pass, each with how much greater that may be at [`SIGMAS`]: its own, and that between the areas beside it.
     bounds: [[f64; 2]; 2],
     /// What the gradient adds up, to first order in the light of the cells: for the error of the edge's middle.
-    linear: Measurement,
+    linear: CellWeights,
 }
 
 impl Slope {
@@ -143,9 +143,9 @@ impl Scan {
         // Places outside the far field are left out; fewer than two steps make no edge.
         let places: Vec<Place> = angles
             .filter_map(|angle| {
-                let measurement = map.measure_slit(self.half_deg, direction(angle))?;
-                let light = map.read_with_dark(&measurement);
-                Some(Place { angle, measurement, light })
+                let weights = map.measure_slit(self.half_deg, direction(angle))?;
+                let light = map.read_with_dark(&weights);
+                Some(Place { angle, weights, light })
             })
             .collect();
         let brightest = places.iter().map(|place| place.light[0]).fold(0.0, f64::max);
@@ -165,18 +165,17 @@ impl Scan {
         let [most, _, most_more] = fall([mean_light(map, below), mean_light(map, above)]);
         // Over several steps light falls as steeply in one of them at least as on the mean of all.
         let wider = 0..=low.min(last - high).min(STEPS_OF_AREA / 2 - 1);
-        let reached = wider.map(|more| {
-            let steps = (STEPS_OF_GRADIENT + 2 * more) as f64 / STEPS_OF_GRADIENT as f64;
-            let [decades, less, _] = fall([places[low - more].light, places[high + more].light]);
-            [decades / steps, less / steps]
+        let reached = wider.map(|beyond| {
+            let steps = (STEPS_OF_GRADIENT + 2 * beyond) as f64 / STEPS_OF_GRADIENT as f64;
+            let [gradient, less, _] = fall([places[low - beyond].light, places[high + beyond].light]);
+            [gradient / steps, less / steps]
         });
         let surest = reached.max_by(|a, b| (a[0] - a[1]).total_cmp(&(b[0] - b[1])));
         // d log₁₀ E = dE / (E ln 10).
-        let share = |light: Light| self.sign / (decades.lit(light[0]) * std::f64::consts::LN_10);
+        let share = |light: Light| self.sign / (decades.above_dark(light[0]) * std::f64::consts::LN_10);
         let (first, last) = (&places[low], &places[high]);
-        let linear = Measurement::default()
-            .plus(share(first.light), &first.measurement)
-            .plus(-share(last.light), &last.measurement);
+        let linear =
+            CellWeights::default().plus(share(first.light), &first.weights).plus(-share(last.light), &last.weights);
         Slope {
             // The gradient belongs to the middle of its distance.
             angle: 0.5 * (first.angle + last.angle),
@@ -191,16 +190,14 @@ impl Scan {
 /// A place of a scan, what the opening adds up there, and the light that it reads.
 struct Place {
     angle: f64,
-    measurement: Measurement,
+    weights: CellWeights,
     light: Light,
 }
 
 /// The light that a photometer reads in the mean of places.
 fn mean_light(map: &IntensityMap, places: &[Place]) -> Light {
     let share = 1.0 / places.len() as f64;
-    map.read_with_dark(
-        &places.iter().fold(Measurement::default(), |sum, place| sum.plus(share, &place.measurement)),
-    )
+    map.read_with_dark(&places.iter().fold(CellWeights::default(), |sum, place| sum.plus(share, &place.weights)))
 }
 
 /// Logarithms of light above a darkness, cd: it bounds the logarithm, which has no end at zero. A scan that meets no light at all is flat.
@@ -209,23 +206,24 @@ struct Decades {
 }
 
 impl Decades {
-    /// Light whose logarithm is taken.
-    fn lit(&self, value: f64) -> f64 {
+    /// Light above the darkness, whose logarithm is taken.
+    fn above_dark(&self, value: f64) -> f64 {
         if self.dark > 0.0 { value.max(0.0) + self.dark } else { 1.0 }
     }
 
     /// The fall of log₁₀ E from a bright to a faint light, and how much less and more it may be at [`SIGMAS`].
     fn fall(&self, [bright, faint]: [Light; 2]) -> [f64; 3] {
-        let up = |[value, error]: Light| (self.lit(value + SIGMAS * error) / self.lit(value)).log10();
-        let down = |[value, error]: Light| (self.lit(value) / self.lit(value - SIGMAS * error)).log10();
-        let decades = (self.lit(bright[0]) / self.lit(faint[0])).log10();
+        let up = |[value, error]: Light| (self.above_dark(value + SIGMAS * error) / self.above_dark(value)).log10();
+        let down =
+            |[value, error]: Light| (self.above_dark(value) / self.above_dark(value - SIGMAS * error)).log10();
+        let decades = (self.above_dark(bright[0]) / self.above_dark(faint[0])).log10();
         [decades, down(bright).hypot(up(faint)), up(bright).hypot(down(faint))]
     }
 }
 
 /// Returns the middle of the edge around its steepest place, degrees, and what that adds up, to first order: the mean of the places,
 /// weighed by what they have above half the steepest gradient and by how near they are.
-fn middle_of_edge(slopes: &[Slope], best: &Slope) -> (f64, Measurement) {
+fn middle_of_edge(slopes: &[Slope], best: &Slope) -> (f64, CellWeights) {
     let steep = |s: &Slope| (s.gradient - SHARE_OF_EDGE * best.gradient).max(0.0);
     let near = |s: &Slope, middle: f64| (1.0 - ((s.angle - middle) / SAME_EDGE_DEG).powi(2)).max(0.0);
     let mut middle = best.angle;
@@ -234,11 +232,11 @@ fn middle_of_edge(slopes: &[Slope], best: &Slope) -> (f64, Measurement) {
         weight = slopes.iter().map(|s| steep(s) * near(s, middle)).sum();
         // A flat scan has no middle but where it was taken.
         if best.gradient <= 0.0 || weight <= 0.0 {
-            return (best.angle, Measurement::default());
+            return (best.angle, CellWeights::default());
         }
         middle = slopes.iter().map(|s| steep(s) * near(s, middle) * s.angle).sum::<f64>() / weight;
     }
-    let mut moved = Measurement::default();
+    let mut moved = CellWeights::default();
     let mut follows = 0.0;
     for s in slopes.iter().filter(|s| steep(s) * near(s, middle) > 0.0) {
         let lever = (s.angle - middle) / weight;
@@ -247,5 +245,5 @@ fn middle_of_edge(slopes: &[Slope], best: &Slope) -> (f64, Measurement) {
         follows += steep(s) * 2.0 * lever * (s.angle - middle) / SAME_EDGE_DEG.powi(2);
     }
     let feedback = 1.0 / (1.0 - follows).max(1.0 / MOST_FEEDBACK);
-    (middle, Measurement::default().plus(feedback, &moved))
+    (middle, CellWeights::default().plus(feedback, &moved))
 }

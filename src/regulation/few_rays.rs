@@ -13,12 +13,12 @@
 //! this trusts the rays of each weight to be no denser in the opening than on the mean of the window. Where the window is dark, or larger
 //! than the map, `A` itself is taken.
 
-/// Rays of a run, as far as they decide what few of them prove.
+/// What is known of a run's rays where few of them landed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RaySample {
     /// Flux of a ray of the source whose rays carry most, lm.
     pub heaviest_flux: f64,
-    /// Replicates whose spread the errors are.
+    /// Number of replicates from which the errors were estimated.
     pub replicates: u32,
 }
 
@@ -43,7 +43,7 @@ pub(super) fn upper_count(count: f64, sigmas: f64) -> f64 {
 
 /// Returns Student's t that is exceeded as seldom as so many normal standard errors, for the spread of so many replicates (Wallace, Ann.
 /// Math. Stat. 30, 1959, turned round): 4.1 for 3 of ten, never too small.
-pub(super) fn student(sigmas: f64, replicates: u32) -> f64 {
+pub(super) fn student_t(sigmas: f64, replicates: u32) -> f64 {
     if replicates >= MANY_REPLICATES {
         return sigmas;
     }
@@ -84,7 +84,7 @@ impl Noise {
     /// Returns the distance, cd, within which the truth lies at the one-sided confidence of so many standard errors, after `growth` times
     /// the rays.
     pub(super) fn reach(&self, sigmas: f64, growth: f64) -> f64 {
-        let t = student(sigmas, self.replicates);
+        let t = student_t(sigmas, self.replicates);
         let [counted, other] = [self.counted, self.other].map(|variance| (variance / growth).sqrt());
         let mut reach = t * counted;
         if self.ray_cd > 0.0 {
@@ -192,11 +192,11 @@ mod tests {
     fn few_replicates_ask_for_more_errors() {
         // Student's t at 99.865 % one-sided, from tables.
         for (replicates, exact) in [(3, 19.21), (10, 4.09), (31, 3.27), (64, 3.119)] {
-            let found = student(3.0, replicates);
+            let found = student_t(3.0, replicates);
             assert!(found >= exact * 0.999 && found < exact * 1.25, "{replicates}: {found}");
         }
-        assert!(student(3.0, 2) > 235.0 && student(3.0, 2).is_finite());
-        assert_eq!(student(3.0, 128), 3.0);
+        assert!(student_t(3.0, 2) > 235.0 && student_t(3.0, 2).is_finite());
+        assert_eq!(student_t(3.0, 128), 3.0);
     }
 
     /// Nets of 10⁴ and 10⁶ rays of one weight that bring 1000 cd, with a fifth of the variance of chance: what may be missing falls with

@@ -2,7 +2,8 @@
 
 use super::few_rays::{Noise, SIGMAS};
 use super::map::Reading;
-use super::requirement::{Comparison, Photometer, Requirement};
+use super::photometer::Photometer;
+use super::requirement::{Comparison, Requirement};
 use crate::math::error_of_maximum;
 
 /// What a row, or a lamp, comes to, from the best to the worst.
@@ -18,7 +19,7 @@ pub enum Verdict {
 
 impl Verdict {
     /// The verdict of requirements that must all be met: fail if one fails, else unsure if one is; pass without any.
-    pub(super) fn all(verdicts: impl IntoIterator<Item = Self>) -> Self {
+    pub(super) fn worst(verdicts: impl IntoIterator<Item = Self>) -> Self {
         verdicts.into_iter().max().unwrap_or(Self::Pass)
     }
 }
@@ -65,6 +66,8 @@ pub(super) struct Decisive {
     margin: f64,
     /// Standard errors that the margin must have.
     sigmas: f64,
+    /// The margin over what it must be: sure from 1 on, or from −1 down.
+    surety: f64,
     noise: Noise,
 }
 
@@ -74,16 +77,16 @@ const BISECTIONS: usize = 16;
 impl Decisive {
     /// Returns with how many rays in all, never fewer than `traced`, and on facets of which tolerance this margin would be enough.
     ///
-    /// `tolerance_mm` is the run's own, `None` where it is not known. `None` where 10¹⁵ rays or more would be needed, and where it is not
-    /// known what facets change.
+    /// `tolerance_mm` is the run's own, `None` where it is not known. `None` where `traced` is 0, that is not known, where 10¹⁵ rays or
+    /// more would be needed, and where it is not known what facets change.
     pub(super) fn what_settles(&self, traced: u64, tolerance_mm: Option<f64>) -> Option<Settles> {
         /// Runs beyond this are no advice.
         const MOST_RAYS: f64 = 1e15;
         const MOST_DOUBLINGS: f64 = 50.0;
-        // At most so large may the whole error be.
+        // The largest combined error that settles it.
         let wanted = self.margin.abs() / self.sigmas;
-        // On its very limit a reading stays unsure with any error.
-        if wanted == 0.0 {
+        // On its very limit a reading stays unsure with any error, and from an unknown number of rays nothing follows.
+        if wanted == 0.0 || traced == 0 {
             return None;
         }
         let geometric = self.reading.geometric?;
@@ -114,34 +117,59 @@ impl Decisive {
 }
 
 impl Judgement {
+    /// Returns how far the reading that decides is on the good side of its limit, over what makes it sure; least of all where none was
+    /// read.
+    fn surety(&self) -> f64 {
+        self.decisive.map_or(f64::NEG_INFINITY, |decisive| decisive.surety)
+    }
+
+    /// Returns the judgement that speaks for all: of the worst verdict, and the least sure of those; `None` of none.
+    pub(super) fn worst(judged: &[Self]) -> Option<&Self> {
+        judged.iter().max_by(|a, b| a.verdict.cmp(&b.verdict).then(b.surety().total_cmp(&a.surety())))
+    }
+
+    /// Returns what settles all that are unsure, from so many rays traced and the run's tolerance, mm, where it is known; `None` where one
+    /// has nothing that settles it, as outside of the far field, and where none is unsure.
+    pub(super) fn what_settles_all(judged: &[Self], traced: u64, tolerance_mm: Option<f64>) -> Option<Settles> {
+        let unsure = judged.iter().filter(|j| j.verdict == Verdict::Unsure);
+        let settles = unsure.map(|j| {
+            // Outside the field no number of rays helps.
+            let decisive = j.decisive.filter(|_| j.unseen == 0);
+            decisive.and_then(|decisive| decisive.what_settles(traced, tolerance_mm))
+        });
+        let finer = |a: Option<f64>, b: Option<f64>| [a, b].into_iter().flatten().reduce(f64::min);
+        settles.reduce(|a, b| {
+            let (a, b) = (a?, b?);
+            Some(Settles {
+                rays: a.rays.max(b.rays),
+                tolerance_share: finer(a.tolerance_share, b.tolerance_share),
+                tolerance_mm: finer(a.tolerance_mm, b.tolerance_mm),
+            })
+        })?
+    }
+
     /// Reads all comparisons of a requirement and judges it: pass or fail only beyond the errors of the readings, else unsure, also where
     /// there are no comparisons.
     pub(super) fn of_requirement(photometer: &Photometer, requirement: &Requirement) -> Self {
-        // Of many comparisons one may be lucky: what one alone may decide is asked for at a confidence divided by their number. For a
-        // normal error P(Z > z) ≤ exp(−z²/2)/2, so that z = √(2 ln(n / 2p)) is enough.
-        let count = (requirement.comparisons.len().max(1) * requirement.choices) as f64;
-        let many = if count > 1.0 { (2.0 * (count / (2.0 * ONE_SIDED)).ln()).sqrt().max(SIGMAS) } else { SIGMAS };
-        // Luck helps where one reading is enough: to pass where any will do, to fail where all must hold.
-        let (to_pass, to_fail) = if requirement.choices > 1 {
-            // What all are compared with is the luckiest of many, which may help either way.
-            (many, many)
-        } else if requirement.any {
-            (many, SIGMAS)
-        } else {
-            (SIGMAS, many)
-        };
+        // Luck helps where one reading is enough: to pass where any will do, to fail where all must hold. A reading that all are compared
+        // with is the luckiest of many, which may help either way, and a turn of the lamp that was looked for helps it to pass.
+        let Requirement { choices, any, .. } = *requirement;
+        let count = requirement.comparisons.len().max(1);
+        let looks = |alone: bool| if alone || choices > 1 { count * choices } else { 1 };
+        let (to_pass, to_fail) =
+            (sigmas_of_luckiest(looks(any) * photometer.turns), sigmas_of_luckiest(looks(!any)));
 
         let mut passing = 0;
         let mut failing = 0;
         let mut decisive: Option<Decisive> = None;
-        let mut doubtful: Option<(f64, Decisive)> = None;
+        let mut doubtful: Option<Decisive> = None;
         let mut read = Vec::with_capacity(requirement.comparisons.len());
         for comparison in &requirement.comparisons {
             let (mut reading, margin) = read_margin(photometer, comparison);
             let sigmas = if margin >= 0.0 { to_pass } else { to_fail };
             // The truth would be on the other side of the limit: more light than was read below it, less above.
             let sign = if reading.value < comparison.limit { 1.0 } else { -1.0 };
-            let mut noise = photometer.map.noise(&comparison.measurement, sign, margin, sigmas);
+            let mut noise = photometer.map.noise(&comparison.weights, sign, margin, sigmas);
             noise.other += comparison.by_aim[1].powi(2);
             // What nobody knows of the facets may be more than any margin.
             let geometric = reading.geometric.unwrap_or(f64::INFINITY);
@@ -155,14 +183,20 @@ impl Judgement {
             read.push([reading.value, reading.statistical]);
             // The best of those of which any is enough, the worst of those that must all hold.
             let decides = |d: &Decisive| (margin > d.margin) == requirement.any && margin != d.margin;
-            let this = Decisive { reading, direction: comparison.direction, margin, sigmas, noise };
+            let this = Decisive {
+                reading,
+                direction: comparison.direction,
+                margin,
+                sigmas,
+                surety: margin / reach,
+                noise,
+            };
             if decisive.as_ref().is_none_or(decides) {
                 decisive = Some(this);
             }
             // Where all must hold, the least sure of those in doubt is what the row waits for.
-            let share = margin / reach;
-            if !requirement.any && !enough && doubtful.as_ref().is_none_or(|(least, _)| share < *least) {
-                doubtful = Some((share, this));
+            if !any && !enough && doubtful.as_ref().is_none_or(|least| this.surety < least.surety) {
+                doubtful = Some(this);
             }
         }
         // The brightest of many readings is too bright by their noise, which its own error does not hold.
@@ -180,14 +214,21 @@ impl Judgement {
             ((failing > 0).then_some(Verdict::Fail), (passing == all && complete).then_some(Verdict::Pass))
         };
         let verdict = alone.or(together).unwrap_or(Verdict::Unsure);
-        let in_doubt = doubtful.filter(|_| verdict == Verdict::Unsure).map(|(_, in_doubt)| in_doubt);
+        let in_doubt = doubtful.filter(|_| verdict == Verdict::Unsure);
         Self { verdict, decisive: in_doubt.or(decisive), unseen: requirement.unseen }
     }
 }
 
+/// Returns the standard errors by which the luckiest of so many readings is beyond its limit as seldom as a single one beyond [`SIGMAS`].
+fn sigmas_of_luckiest(readings: usize) -> f64 {
+    // Asked for at a confidence divided by their number: for a normal error P(Z > z) ≤ exp(−z²/2)/2, so that z = √(2 ln(n / 2p)) is enough.
+    let bound = (2.0 * (readings as f64 / (2.0 * ONE_SIDED)).ln()).sqrt();
+    if readings > 1 { bound.max(SIGMAS) } else { SIGMAS }
+}
+
 /// The reading of a comparison, and by how much it keeps its limit, cd; negative where it does not.
 fn read_margin(photometer: &Photometer, comparison: &Comparison) -> (Reading, f64) {
-    let mut reading = photometer.map.read(&comparison.measurement);
+    let mut reading = photometer.map.read(&comparison.weights);
     reading.statistical = reading.statistical.hypot(comparison.by_aim[0]);
     let margin =
         if comparison.at_least { reading.value - comparison.limit } else { comparison.limit - reading.value };
@@ -206,13 +247,34 @@ mod tests {
         let on_limit = |statistical: f64, geometric: f64| {
             let reading = Reading { value: 1.0, statistical, geometric: Some(geometric) };
             let noise = Noise { other: statistical * statistical, ..NONE };
-            Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0, noise }
+            Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0, surety: 0.0, noise }
                 .what_settles(1000, Some(0.1))
         };
         // Without a statistical error, zero by zero must not become the rays already traced and facets of 0 mm.
         for (statistical, geometric) in [(0.0, 0.1), (0.1, 0.0), (0.1, 0.1)] {
             assert_eq!(on_limit(statistical, geometric), None);
         }
+    }
+
+    /// Margins of 1 and 0.5 cd with errors of 1 cd at 3 standard errors: 9 and 36 times the rays, so that both take 36 times.
+    #[test]
+    fn all_that_is_unsure_must_be_settled() {
+        let judged = |margin: f64, unseen: usize, verdict: Verdict| {
+            let reading = Reading { value: 1.0, statistical: 1.0, geometric: Some(0.0) };
+            let noise = Noise { other: 1.0, ..NONE };
+            let surety = margin / 3.0;
+            let decisive = Decisive { reading, direction: [margin, 0.0], margin, sigmas: 3.0, surety, noise };
+            Judgement { verdict, decisive: Some(decisive), unseen }
+        };
+        let unsure =
+            [judged(0.5, 0, Verdict::Unsure), judged(1.0, 0, Verdict::Unsure), judged(9.0, 0, Verdict::Pass)];
+        let rays = Judgement::what_settles_all(&unsure, 1000, None).unwrap().rays as f64;
+        assert!((rays / 36_000.0 - 1.0).abs() < 2e-3, "{rays}");
+        assert_eq!(Judgement::worst(&unsure).unwrap().decisive.unwrap().margin, 0.5);
+        // Of an unknown number of rays nothing follows, and none settles what lies beyond the field.
+        assert_eq!(Judgement::what_settles_all(&unsure, 0, None), None);
+        let beyond = [judged(0.5, 0, Verdict::Unsure), judged(1.0, 1, Verdict::Unsure)];
+        assert_eq!(Judgement::what_settles_all(&beyond, 1000, None), None);
     }
 
     /// A geometric error of three times the margin's third leaves no room: it must come down to 1/√2 of that, known tolerance or not.
@@ -224,6 +286,7 @@ mod tests {
             direction: [0.0; 2],
             margin: 1.0,
             sigmas: 3.0,
+            surety: 0.0,
             noise: Noise { other: 0.01, ..NONE },
         };
         for (tolerance_mm, finer_mm) in [(None, None), (Some(0.3), Some(0.1 * 0.5f64.sqrt()))] {
@@ -238,7 +301,7 @@ mod tests {
     fn what_settles_follows_from_what_few_rays_leave_open() {
         let rays = |noise: Noise| {
             let reading = Reading { value: 1.0, statistical: 1.0, geometric: Some(0.0) };
-            Decisive { reading, direction: [0.0, 0.0], margin: 1.0, sigmas: 3.0, noise }
+            Decisive { reading, direction: [0.0, 0.0], margin: 1.0, sigmas: 3.0, surety: 0.0, noise }
                 .what_settles(1000, None)
                 .map(|settles| settles.rays as f64 / 1000.0)
         };

@@ -2,7 +2,7 @@
 
 use super::cell_axis::{CellAxis, Overlap};
 use super::few_rays::{LandedRays, MANY_REPLICATES, Noise, RaySample};
-use super::opening::{Measurement, OpeningSum, Sensor};
+use super::opening::{CellWeights, OpeningSum, Sensor};
 
 /// Cosine of the elevation that an opening's width is divided by at least: at the poles, where it would be endless, it is wider than
 /// any map and so leaves it.
@@ -80,6 +80,12 @@ impl IntensityMap {
         self
     }
 
+    /// Declares that the light was traced on the spline, so that facets change nothing of cells whose geometric errors were not known.
+    pub fn of_spline(mut self) -> Self {
+        self.knows_facets = true;
+        self
+    }
+
     /// Whether it is known what facets change of the cells.
     pub(super) fn knows_facets(&self) -> bool {
         self.knows_facets
@@ -96,7 +102,7 @@ impl IntensityMap {
 
     /// Solid angle of a cell, sr.
     fn solid_angle(&self, cell: usize) -> f64 {
-        self.h.of_cell(cell % self.h.cells()) * self.v.of_cell(cell / self.h.cells())
+        self.h.cell_measure(cell % self.h.cells()) * self.v.cell_measure(cell / self.h.cells())
     }
 
     /// The largest side of a cell, degrees.
@@ -122,7 +128,7 @@ impl IntensityMap {
 
     /// What a photometer aimed at `(h, v)`, degrees of the map, adds up: the mean over its opening, weighed by solid angle; within a cell
     /// that the opening covers in part light is taken to rise evenly from neighbour to neighbour. `None` where the opening leaves the map.
-    pub(super) fn measure(&self, sensor: Sensor, h: f64, v: f64) -> Option<Measurement> {
+    pub(super) fn measure(&self, sensor: Sensor, h: f64, v: f64) -> Option<CellWeights> {
         let bands = if sensor.round { DISC_BANDS } else { 1 };
         let mut sum = OpeningSum::default();
         for band in 0..bands {
@@ -141,7 +147,7 @@ impl IntensityMap {
     }
 
     /// The same of an opening with sides of its own, given by half of each, degrees across and up.
-    pub(super) fn measure_slit(&self, half_deg: [f64; 2], [h, v]: [f64; 2]) -> Option<Measurement> {
+    pub(super) fn measure_slit(&self, half_deg: [f64; 2], [h, v]: [f64; 2]) -> Option<CellWeights> {
         let mut sum = OpeningSum::default();
         let half_h = azimuth_deg(half_deg[0], v);
         self.add_box(&mut sum, [h - half_h, h + half_h], [v - half_deg[1], v + half_deg[1]])?;
@@ -154,14 +160,14 @@ impl IntensityMap {
         let h_parts: Vec<Overlap> = self.h.overlaps(h[0], h[1])?.collect();
         for v_part in self.v.overlaps(v[0], v[1])? {
             for h_part in &h_parts {
-                let weight = v_part.share * h_part.share;
+                let weight = v_part.measure * h_part.measure;
                 let cell = v_part.cell * columns + h_part.cell;
-                sum.measurement.add(cell, weight);
+                sum.weights.add(cell, weight);
                 sum.total += weight;
                 // A cell is not as bright in the part that is covered as on its mean.
                 let v_place = (v_part.cell, rows, columns);
-                self.add_slope(&mut sum.measurement, cell, v_place, weight * v_part.offset);
-                self.add_slope(&mut sum.measurement, cell, (h_part.cell, columns, 1), weight * h_part.offset);
+                self.add_slope(&mut sum.weights, cell, v_place, weight * v_part.offset);
+                self.add_slope(&mut sum.weights, cell, (h_part.cell, columns, 1), weight * h_part.offset);
             }
         }
         Some(())
@@ -180,7 +186,7 @@ impl IntensityMap {
     /// or darker; so no cell that lies between two others is taken beyond them.
     fn add_slope(
         &self,
-        measurement: &mut Measurement,
+        weights: &mut CellWeights,
         cell: usize,
         (place, count, step): (usize, usize, usize),
         amount: f64,
@@ -203,17 +209,17 @@ impl IntensityMap {
             [0.0, -2.0, 2.0]
         };
         for (cell, share) in cells.into_iter().zip(shares).filter(|(_, share)| *share != 0.0) {
-            measurement.add(cell, amount * share);
+            weights.add(cell, amount * share);
         }
     }
 
-    /// Reads a measurement, made on a map of these cells: its value and errors, cd. Statistical errors of cells are independent; those of
+    /// Reads cells of this map by their weights: its value and errors, cd. Statistical errors of cells are independent; those of
     /// the geometry push neighbours the same way, so that they add without sign.
-    pub(super) fn read(&self, measurement: &Measurement) -> Reading {
+    pub(super) fn read(&self, weights: &CellWeights) -> Reading {
         let mut value = 0.0;
         let mut variance = 0.0;
         let mut geometric = 0.0;
-        for (cell, weight) in &measurement.weights {
+        for (cell, weight) in &weights.by_cell {
             let [i, s, g] = self.cells[*cell];
             value += weight * i;
             variance += (weight * self.spread(i, s)).powi(2);
@@ -222,11 +228,11 @@ impl IntensityMap {
         Reading { value, statistical: variance.sqrt(), geometric: self.knows_facets.then_some(geometric) }
     }
 
-    /// Reads the value of a measurement and its known error, cd, to which cells without light add what one ray would make.
-    pub(super) fn read_with_dark(&self, measurement: &Measurement) -> [f64; 2] {
-        let reading = self.read(measurement);
+    /// Reads the value of cells by their weights and its known error, cd, to which cells without light add what one ray would make.
+    pub(super) fn read_with_dark(&self, weights: &CellWeights) -> [f64; 2] {
+        let reading = self.read(weights);
         let is_dark = |cell: usize| self.cells[cell][0] <= 0.0 && self.landed.is_some();
-        let dark = measurement.weights.iter().filter(|(cell, _)| is_dark(*cell));
+        let dark = weights.by_cell.iter().filter(|(cell, _)| is_dark(*cell));
         let variance: f64 = dark.map(|(cell, weight)| (weight * self.cells[*cell][1]).powi(2)).sum();
         [reading.value, variance.sqrt().hypot(reading.known_error())]
     }
@@ -237,12 +243,12 @@ impl IntensityMap {
     }
 
     /// Returns how far the truth may lie from a reading that is `margin` cd from its limit: above it for a `sign` of 1, below for −1.
-    pub(super) fn noise(&self, measurement: &Measurement, sign: f64, margin: f64, sigmas: f64) -> Noise {
+    pub(super) fn noise(&self, weights: &CellWeights, sign: f64, margin: f64, sigmas: f64) -> Noise {
         let replicates = self.landed.as_ref().map_or(u32::MAX, |landed| landed.sample.replicates);
         let mut light = 0.0;
         let mut noise =
             Noise { ray_cd: 0.0, hidden: 0.0, hidden_ray_cd: 0.0, counted: 0.0, other: 0.0, replicates };
-        for &(cell, weight) in &measurement.weights {
+        for &(cell, weight) in &weights.by_cell {
             let [value, error, _] = self.cells[cell];
             let variance = (weight * self.spread(value, error)).powi(2);
             match &self.landed {

@@ -1,4 +1,5 @@
-//! Verdicts of lamp regulations: each row of a table measured on a far field with the regulation's aim and sensor, and judged with both
+//! Verdicts of lamp regulations: each row of a table measured on a far field with the regulation's aim, where it is a scan
+//! for a cut-off, and sensor, and judged with both
 //! errors of the simulation.
 //!
 //! A verdict is *pass* or *fail* only where the value is farther from its limit than three combined standard errors (statistical and
@@ -22,10 +23,12 @@ mod judgement;
 mod map;
 mod open_aims;
 mod opening;
+mod photometer;
 mod read;
 mod requirement;
 mod row;
 mod row_verdict;
+mod spots;
 mod table;
 #[cfg(test)]
 mod test_lamps;

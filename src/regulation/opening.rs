@@ -1,29 +1,29 @@
 //! What a photometer's opening adds up of the cells below it.
 
-/// What a photometer in one or several directions adds up: cells with weights.
+/// The cells that a photometer in one or several directions adds up, and by which weights.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Measurement {
-    /// Cells by their rising index.
+pub(super) struct CellWeights {
+    /// Cells by their rising index, each with its weight.
     // Ordered: sums over cells come in one order, and two runs agree to the last bit. A list: most hold a dozen of cells.
-    pub(super) weights: Vec<(usize, f64)>,
+    pub(super) by_cell: Vec<(usize, f64)>,
 }
 
-impl Measurement {
+impl CellWeights {
     /// Adds to the weight of a cell.
     pub(super) fn add(&mut self, cell: usize, amount: f64) {
         // Cells come nearly in order.
-        match self.weights.last() {
-            Some(last) if cell <= last.0 => match self.weights.binary_search_by_key(&cell, |w| w.0) {
-                Ok(place) => self.weights[place].1 += amount,
-                Err(place) => self.weights.insert(place, (cell, amount)),
+        match self.by_cell.last() {
+            Some(last) if cell <= last.0 => match self.by_cell.binary_search_by_key(&cell, |w| w.0) {
+                Ok(place) => self.by_cell[place].1 += amount,
+                Err(place) => self.by_cell.insert(place, (cell, amount)),
             },
-            _ => self.weights.push((cell, amount)),
+            _ => self.by_cell.push((cell, amount)),
         }
     }
 
-    /// Adds `factor` times another measurement of the same map; cells that both hold are then counted with their correlation.
+    /// Adds `factor` times weights of the same map; cells that both hold are then counted with their correlation.
     pub(super) fn plus(mut self, factor: f64, other: &Self) -> Self {
-        for (cell, weight) in &other.weights {
+        for (cell, weight) in &other.by_cell {
             self.add(*cell, factor * weight);
         }
         self
@@ -33,18 +33,19 @@ impl Measurement {
 /// What an opening adds up of cells, not yet divided by its measure.
 #[derive(Default)]
 pub(super) struct OpeningSum {
-    pub(super) measurement: Measurement,
+    pub(super) weights: CellWeights,
     /// Measure of what was added.
     pub(super) total: f64,
 }
 
 impl OpeningSum {
-    pub(super) fn mean(mut self) -> Measurement {
+    /// Divides by the measure that was added, which is not 0.
+    pub(super) fn mean(mut self) -> CellWeights {
         // By what was met: rounding of edges must not make the mean too large.
-        for (_, weight) in &mut self.measurement.weights {
+        for (_, weight) in &mut self.weights.by_cell {
             *weight /= self.total;
         }
-        self.measurement
+        self.weights
     }
 }
 

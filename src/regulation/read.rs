@@ -41,9 +41,8 @@ impl Columns {
         };
         let h = needed(place(&|n| n == "H_deg"), "H_deg")?;
         let v = needed(place(&|n| n == "V_deg"), "V_deg")?;
-        let intensity = place(&|n| n.ends_with("_cd")).ok_or(
-            "no column of candela: set `unit = \"lm\"` in [run], or `channels = \"photometric\"` on the far field",
-        )?;
+        let intensity = place(&|n| n.ends_with("_cd"))
+            .ok_or("no column of candela: set `unit = \"lm\"` in [run] and trace again")?;
         // Of a run in watts the intensity is a channel, with errors of its own beside those of the power.
         let own = |error: &str| place(&|n| n.strip_prefix(names[intensity]).is_some_and(|rest| rest == error));
         let of_channel = own("_standard_error");
@@ -55,14 +54,9 @@ impl Columns {
 }
 
 impl IntensityMap {
-    /// Whether the CSV file of a far field holds geometric errors of its intensities; `false` for what [`Self::from_csv`] refuses too.
-    pub fn csv_has_geometric_errors(text: &str) -> bool {
-        let header = lines_of_cells(text).next().map(|(_, header)| Columns::new(header));
-        matches!(header, Some(Ok(Columns { geometric: Some(_), .. })))
-    }
-
     /// Makes a map of the text of a far-field receiver's CSV file: columns `H_deg`, `V_deg`, an intensity in cd and its standard error, and
-    /// if there is one, its geometric error, else 0; a cell a line, in any order.
+    /// if there is one, its geometric error; a cell a line, in any order. Without that column nothing is known of what facets change: see
+    /// [`Self::of_spline`].
     ///
     /// `rays` are those of the run, where they are known: what few of them leave open.
     ///
@@ -87,12 +81,15 @@ impl IntensityMap {
             let (centre_h, centre_v) = (value(h)?, value(v)?);
             columns.insert(key(centre_h), centre_h);
             rows.insert(key(centre_v), centre_v);
-            let geometric = geometric.map_or(Ok(0.0), value)?;
-            let cell = [value(intensity)?, value(statistical)?, geometric];
+            let of_facets = geometric.map_or(Ok(0.0), value)?;
+            let cell = [value(intensity)?, value(statistical)?, of_facets];
             // Which of two values holds, the file does not say.
             if cells.insert((key(centre_v), key(centre_h)), cell).is_some() {
                 return Err(format!("line {}: the cell at H {centre_h}, V {centre_v} stands twice", number + 1));
             }
+        }
+        if cells.is_empty() {
+            return Err("the file has a header and no cells".into());
         }
         // A cell that is missing makes the count wrong.
         if cells.len() != columns.len() * rows.len() {
@@ -108,6 +105,7 @@ impl IntensityMap {
             |axis, centres: BTreeMap<i64, f64>| edges_between(axis, &centres.into_values().collect::<Vec<_>>());
         let (h_edges, v_edges) = (edges("H", columns)?, edges("V", rows)?);
         let map = Self::new(h_edges, v_edges, cells.into_values().collect())?;
+        let map = if geometric.is_some() { map } else { map.without_geometric_errors() };
         Ok(rays.into_iter().fold(map, Self::with_rays))
     }
 }
@@ -146,14 +144,21 @@ mod tests {
             (cell(0.05, -0.05).value, cell(-0.05, 0.05).statistical, cell(0.05, 0.05).geometric),
             (2.0, 0.3, Some(0.04))
         );
+        // Without their column nothing is known of what facets change, but on the spline.
+        let unknown: String = text.lines().map(|l| l.rsplit_once(',').unwrap().0.to_owned() + "\n").collect();
+        let unknown = IntensityMap::from_csv(&unknown, None).unwrap();
+        let geometric = |map: IntensityMap| {
+            map.read(&map.measure(Sensor { half_deg: 0.04, round: false }, 0.05, 0.05).unwrap()).geometric
+        };
+        assert_eq!((geometric(unknown.clone()), geometric(unknown.of_spline())), (None, Some(0.0)));
         // A ray of 1e-6 lm is 0.33 cd in a cell of (0.1°)², of which 6.7 may not have come.
         let dark = text.replace("-0.05,-0.05,1,0.1", "-0.05,-0.05,0,0.4");
         let rays = RaySample { heaviest_flux: 1e-6, replicates: 200 };
         let dark = IntensityMap::from_csv(&dark, Some(rays)).unwrap();
-        let measurement = dark.measure(Sensor { half_deg: 0.04, round: false }, -0.05, -0.05).unwrap();
-        let reach = dark.noise(&measurement, 1.0, 1e-3, 3.0).reach(3.0, 1.0);
+        let weights = dark.measure(Sensor { half_deg: 0.04, round: false }, -0.05, -0.05).unwrap();
+        let reach = dark.noise(&weights, 1.0, 1e-3, 3.0).reach(3.0, 1.0);
         assert!((reach / (6.74 * 1e-6 / 0.1f64.to_radians().powi(2)) - 1.0).abs() < 1e-2, "{reach}");
-        assert_eq!(dark.read(&measurement).statistical, 0.0);
+        assert_eq!(dark.read(&weights).statistical, 0.0);
     }
 
     #[test]
@@ -185,7 +190,8 @@ mod tests {
                 "along H are not of equal width: 1.500° on average, but 1.000° from 0 to 1",
             ),
             ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,1,1\n", "V has one value"),
-            ("H_deg,V_deg,radiant_intensity_W_per_sr,standard_error\n0,0,1,1\n", "channels = \"photometric\""),
+            ("H_deg,V_deg,radiant_intensity_W_per_sr,standard_error\n0,0,1,1\n", "unit = \"lm\""),
+            ("H_deg,V_deg,i_cd,standard_error\n", "no cells"),
             ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,NaN,1\n0,1,1,1\n1,1,1,1\n", "finite"),
         ] {
             let error = IntensityMap::from_csv(text, None).unwrap_err();

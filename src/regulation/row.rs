@@ -17,7 +17,7 @@ pub enum RowKind {
     Sum,
     /// A direction or zone against a multiple of another reading.
     Relative,
-    /// The brightest of all directions.
+    /// The brightest direction of the lamp, which the far field must hold: its rim is darker than half of its brightest.
     Imax,
     /// A direction whose figure follows from a distribution in per cent.
     DistributionPoint,
@@ -64,7 +64,7 @@ pub struct Row {
     pub min: Option<f64>,
     /// Greatest intensity, candela.
     pub max: Option<f64>,
-    /// Of the greatest intensity of all: the radius of a spot, degrees, that may be brighter.
+    /// Of the greatest intensity of a zone: the radius of a spot, degrees, that may be brighter.
     pub(super) spot_radius_deg: Option<f64>,
     /// Of a relative row: the side of the limit, the factor, and the row that it is a multiple of, or `imax`.
     #[serde(default, deserialize_with = "bound")]
@@ -91,15 +91,15 @@ pub struct Row {
 }
 
 fn row_kind<'de, D: Deserializer<'de>>(value: D) -> Result<RowKind, D::Error> {
-    named("kind", RowKind::deserialize(value))
+    with_key("kind", RowKind::deserialize(value))
 }
 
 fn bound<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Bound>, D::Error> {
-    named("bound", Option::deserialize(value))
+    with_key("bound", Option::deserialize(value))
 }
 
 /// Puts the key before a message, which names the known words alone.
-pub(super) fn named<T, E: serde::de::Error>(key: &str, value: Result<T, E>) -> Result<T, E> {
+pub(super) fn with_key<T, E: serde::de::Error>(key: &str, value: Result<T, E>) -> Result<T, E> {
     value.map_err(|e| E::custom(format!("{key}: {e}")))
 }
 
@@ -127,12 +127,9 @@ impl Row {
             }
             RowKind::Note => (!has_limit && self.factor.is_none(), "nothing that is measured"),
         };
-        let may_have_spots = matches!(self.kind, RowKind::Imax | RowKind::Zone) && self.max.is_some();
+        let may_have_spots = self.kind == RowKind::Zone && self.max.is_some();
         if !self.spot_radius_deg.is_none_or(|radius| may_have_spots && radius > 0.0) {
-            return Err(format!(
-                "row {}: a spot_radius_deg above 0 belongs to the max of a zone or an imax",
-                self.id
-            ));
+            return Err(format!("row {}: a spot_radius_deg above 0 belongs to the max of a zone", self.id));
         }
         if complete { Ok(()) } else { Err(format!("row {}: {:?} needs {needs}", self.id, self.kind)) }
     }

@@ -2,7 +2,8 @@
 
 use super::assessment::{Assumptions, RowVerdict};
 use super::judgement::{Judgement, Verdict};
-use super::requirement::{Photometer, requirements};
+use super::photometer::Photometer;
+use super::requirement::requirements;
 use super::row::{Row, RowKind};
 use super::table::Regulation;
 
@@ -10,8 +11,8 @@ use super::table::Regulation;
 const UNKNOWN_FACETS: &str = "it is not known what facets change here, as the cells are too many to be compared with the spline: trace \
     with fewer, or with --intersector exact";
 
-/// Judges the rows of which `is_asked`, by their place in the table, as the map is aimed, points that may lean on their group with that;
-/// `None` for the others. Whether another aim is open is not asked.
+/// Judges the rows of which `is_asked`, by their place in the table, as the map is aimed, points that the sum of their group may save with
+/// that; `None` for the others. Whether another aim is open is not asked.
 pub(super) fn judge_rows(
     photometer: &Photometer,
     regulation: &Regulation,
@@ -21,22 +22,21 @@ pub(super) fn judge_rows(
     let judge = |row: &Row| judge_row(photometer, regulation, assumptions, row);
     let all = regulation.function.rows.iter().enumerate();
     let mut rows: Vec<Option<RowVerdict>> = all.map(|(k, row)| is_asked(k).then(|| judge(row))).collect();
-    // Where a point may lean on its group, it does so only if its own minimum is not met.
-    let leaning = regulation.function.point_floor() == Some(0.0);
-    if leaning {
+    // The group is asked only where a point's own minimum is not met.
+    if regulation.function.has_group_alternative() {
         let sums = rows.iter().flatten().filter(|r| r.row.kind == RowKind::GroupSum);
         let groups: Vec<(Option<u32>, Option<Verdict>)> = sums.map(|r| (r.row.group, r.verdict)).collect();
         let points = rows.iter_mut().flatten().filter(|r| r.row.kind == RowKind::Point && r.row.group.is_some());
         for point in points.filter(|r| r.verdict.is_some_and(|own| own != Verdict::Pass)) {
             let group = groups.iter().find(|g| g.0 == point.row.group).and_then(|g| g.1);
-            *point = judge_leaning(&point.row, group, judge);
+            *point = judge_with_group(&point.row, group, judge);
         }
     }
     rows
 }
 
 /// Judges a point whose minimum its group may save; its maximum holds whatever the group reaches. `judge` judges a row by itself.
-fn judge_leaning(point: &Row, group: Option<Verdict>, judge: impl Fn(&Row) -> RowVerdict) -> RowVerdict {
+fn judge_with_group(point: &Row, group: Option<Verdict>, judge: impl Fn(&Row) -> RowVerdict) -> RowVerdict {
     let mut least = judge(&Row { max: None, ..point.clone() });
     let own = least.verdict;
     least.verdict = least.verdict.map(|own| match (own, group) {
@@ -73,7 +73,7 @@ pub(super) fn judge_row(
     }
     // A share of the printed minimum; what is printed stays in the row that is reported.
     let mut asked = row.clone();
-    if let Some(floor) = regulation.function.point_floor().filter(|f| *f > 0.0 && row.group.is_some())
+    if let Some(floor) = regulation.function.point_floor().filter(|_| row.group.is_some())
         && row.kind == RowKind::Point
         && let Some(min) = row.min
     {
@@ -83,21 +83,17 @@ pub(super) fn judge_row(
     }
     let requirements = requirements(photometer, &regulation.rules, &asked, &regulation.function.rows);
     let judged: Vec<Judgement> = requirements.iter().map(|r| Judgement::of_requirement(photometer, r)).collect();
-    // The requirement that speaks for the row: the worst one.
-    let worst = judged.iter().max_by_key(|j| j.verdict);
-    let Some(worst) = worst else { return verdict };
+    let Some(worst) = Judgement::worst(&judged) else { return verdict };
     verdict.verdict = Some(worst.verdict);
     if !photometer.map.knows_facets() {
         verdict.row.add_note(UNKNOWN_FACETS);
     }
     verdict.unseen = worst.unseen;
-    if let Some(decisive) = &worst.decisive {
-        verdict.reading = Some(decisive.reading);
-        verdict.direction = Some(decisive.direction);
-        // Outside the field no number of rays helps.
-        if worst.verdict == Verdict::Unsure && worst.unseen == 0 {
-            verdict.settles = decisive.what_settles(assumptions.rays, assumptions.tolerance_mm);
-        }
+    verdict.reading = worst.decisive.map(|decisive| decisive.reading);
+    verdict.direction = worst.decisive.map(|decisive| decisive.direction);
+    // What fails is not mended by rays.
+    if worst.verdict == Verdict::Unsure {
+        verdict.settles = Judgement::what_settles_all(&judged, assumptions.rays, assumptions.tolerance_mm);
     }
     verdict
 }

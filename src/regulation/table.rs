@@ -1,6 +1,6 @@
 //! The tables of regulations: what is asked, in which direction, and where the figure comes from.
 
-use super::row::{Row, named};
+use super::row::{Row, with_key};
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
@@ -63,19 +63,21 @@ pub struct Function {
     /// How points and groups go together (FMVSS 108).
     #[serde(default, deserialize_with = "point_rule")]
     point_rule: PointRule,
+    /// The cut-off that is brought to its place before measuring; `None` for what is measured as placed.
+    pub(super) cut_off: Option<CutOff>,
     /// What is asked.
     pub rows: Vec<Row>,
 }
 
 impl Function {
-    /// The share of its own minimum that each point of a group must reach although the group is judged by its sum, 0 for none; `None` where
-    /// each point stands for itself.
+    /// The share of its own minimum that each point of a group must reach beside the group's sum; `None` where all of it is asked.
     pub(super) fn point_floor(&self) -> Option<f64> {
-        match self.point_rule {
-            PointRule::Points => None,
-            PointRule::Floor60 => Some(0.6),
-            PointRule::GroupAlternative => Some(0.0),
-        }
+        (self.point_rule == PointRule::Floor60).then_some(0.6)
+    }
+
+    /// Whether the sum of its group may stand for a point's own minimum.
+    pub(super) fn has_group_alternative(&self) -> bool {
+        self.point_rule == PointRule::GroupAlternative
     }
 }
 
@@ -94,7 +96,7 @@ enum PointRule {
 }
 
 fn point_rule<'de, D: Deserializer<'de>>(value: D) -> Result<PointRule, D::Error> {
-    named("point_rule", PointRule::deserialize(value))
+    with_key("point_rule", PointRule::deserialize(value))
 }
 
 /// How a file says that its rows are measured.
@@ -105,21 +107,22 @@ pub(super) struct Rules {
     pub(super) sensor_round: bool,
     /// Half the widest opening that coarse cells may be read with, where it is wider than the usual one.
     pub(super) sensor_widest_half_deg: Option<f64>,
-    /// A row is met when it is met within this angle of its direction.
+    /// A point is met when it is met within this angle of its direction, degrees; a relative row's point too.
     pub(super) tolerance_deg: f64,
-    /// The cut-off is brought to its place before measuring.
-    pub(super) cut_off: Option<CutOff>,
 }
 
 /// How a beam with a cut-off is aimed.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct CutOff {
-    /// The vertical scan, degrees to the left.
+    /// H of the vertical scan, degrees: negative to the left.
     pub(super) scan_h_deg: f64,
-    /// Where its sharpest place goes.
+    /// V that its steepest place is brought to, degrees.
     pub(super) line_v_deg: f64,
-    /// The line that the elbow is brought to.
-    pub(super) elbow_h_deg: f64,
+    /// H that the elbow is brought to (line A), degrees; `None` for beams without an elbow, which stay sideways as placed.
+    pub(super) elbow_h_deg: Option<f64>,
+    /// Least gradient G, per 0.1°, of what passes for a cut-off.
+    pub(super) least_gradient: f64,
     /// How far the lamp may be turned from there where a row fails.
     pub(super) realignment: Realignment,
 }
@@ -147,7 +150,7 @@ impl Regulation {
     /// means the first of them (`FMVSS 108 stop` is one lighted section).
     ///
     /// # Errors
-    /// When there is none; the message names those that come nearest.
+    /// When there is none; the message names up to twelve that begin alike.
     pub fn find(id: &str) -> Result<Self, String> {
         let plain = |s: &str| -> String {
             // Spaces and dashes are written in many ways.
@@ -185,8 +188,6 @@ struct File {
     title: String,
     #[serde(default)]
     measurement: Value,
-    #[serde(default)]
-    aim: Value,
     point_tolerance_deg: Option<f64>,
     driving_tolerance_deg: Option<f64>,
     functions: Vec<Value>,
@@ -212,18 +213,6 @@ impl Function {
     }
 }
 
-/// Returns how far a lamp may be turned, degrees, by a table's `aim`: after the 01 series for the prefix `UN R149-01`, else after R112
-/// and the 00 series of R149.
-///
-/// # Errors
-/// When the table states none.
-fn realignment(prefix: &str, aim: &Value) -> Result<Realignment, String> {
-    // UN R149 widened the turn to the left with its 01 series; both files state both.
-    let series = if prefix == "UN R149-01" { "r149_01" } else { "r112_and_r149_00" };
-    Realignment::deserialize(&aim["realign_if_failed"][series])
-        .map_err(|e| format!("aim: realign_if_failed: {series}: {e}"))
-}
-
 /// Reads the regulations of a table of the program, one a lamp function, each called by `prefix` and the function's name.
 ///
 /// # Errors
@@ -239,17 +228,6 @@ fn read_table(prefix: &str, text: &str) -> Result<Vec<Regulation>, String> {
             let sensor = number(&file.measurement, "/sensor_half_deg");
             let tolerance = (file.point_tolerance_deg.or(file.driving_tolerance_deg.filter(|_| driving)))
                 .or(number(&file.measurement, "/tolerance_deg"));
-            let scan = number(&file.aim, "/instrumental_vertical/scan_h_deg");
-            let cut_off = |scan_h_deg| -> Result<CutOff, String> {
-                let stated = |path: &str| number(&file.aim, path).ok_or_else(|| format!("aim: {path}: no number"));
-                Ok(CutOff {
-                    scan_h_deg,
-                    line_v_deg: stated("/vertical/line_b_deg")?,
-                    elbow_h_deg: stated("/horizontal_visual/line_a_deg")?,
-                    realignment: realignment(prefix, &file.aim)?,
-                })
-            };
-            let cut_off = scan.filter(|_| function.id.starts_with("passing")).map(cut_off).transpose()?;
             let id = match function.id.split_once('-') {
                 // People say `C passing`, the tables `passing-C`.
                 Some((beam @ ("passing" | "driving"), class)) => format!("{prefix} {class} {beam}"),
@@ -261,7 +239,6 @@ fn read_table(prefix: &str, text: &str) -> Result<Vec<Regulation>, String> {
                 sensor_widest_half_deg: number(&file.measurement, "/sensor_widest_half_deg"),
                 // Where the text grants no tolerance, a row holds in its very direction.
                 tolerance_deg: tolerance.unwrap_or(0.0),
-                cut_off,
             };
             Ok(Regulation { id, title: file.title.clone(), function, rules })
         })
@@ -357,8 +334,9 @@ mod tests {
         let rules = |id: &str| Regulation::find(id).unwrap().rules;
         let passing = rules("UN R112 B passing");
         assert_eq!((passing.sensor_half_deg, passing.sensor_round, passing.tolerance_deg), (0.0745, false, 0.0));
-        assert_eq!(passing.cut_off.unwrap().line_v_deg, -0.57);
-        assert!(rules("UN R112 B driving").cut_off.is_none());
+        let cut_off = |id: &str| Regulation::find(id).unwrap().function.cut_off;
+        assert_eq!(cut_off("UN R112 B passing").unwrap().line_v_deg, -0.57);
+        assert!(cut_off("UN R112 B driving").is_none());
         assert_eq!(rules("UN R149-01 B driving").tolerance_deg, 0.25);
         let federal = rules("FMVSS 108 UB2");
         assert_eq!((federal.sensor_round, federal.tolerance_deg), (true, 0.25));

@@ -70,6 +70,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "edge",
             "aim",
             "zone",
+            "photometer",
+            "spots",
             "requirement",
             "judgement",
             "assessment",

@@ -123,9 +123,8 @@ impl ResultsFile {
         let rays = heaviest.zip(replicates);
         let rays = rays.map(|(heaviest_flux, replicates)| RaySample { heaviest_flux, replicates });
         let map = IntensityMap::from_csv(&text, rays).map_err(failure)?;
-        // A run on facets writes what they change of every cell, unless the cells were too many to compare.
-        let is_compared = self.results["faceting"].is_null() || IntensityMap::csv_has_geometric_errors(&text);
-        Ok(if is_compared { map } else { map.without_geometric_errors() })
+        // A run on facets writes what they change of every cell, unless the cells were too many to compare; one on the spline has none.
+        Ok(if self.results["faceting"].is_null() { map.of_spline() } else { map })
     }
 
     /// Returns the looser end of the tolerance of the run's facets, mm; `None` where it traced none.

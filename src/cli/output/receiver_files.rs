@@ -113,7 +113,8 @@ const SOFTWARE: usize = 4;
 const ADDITIONAL: usize = 7;
 
 /// Returns a far field as LM-63 has it, in candela over all its directions, with the ends of both ranges: values there are those of the
-/// nearest cells, at a pole the mean of its ring, which `grid` has in all cells of the ring. `None` for other receivers, and where its ranges are not those of a whole luminaire.
+/// nearest cells, at a pole the mean of its ring, which `grid` has in all cells of the ring. `None` for other receivers, and where its
+/// ranges are not those of a whole luminaire.
 ///
 /// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, mostly within a thousandth of
 /// 1, so that their flux is `lumens`.

@@ -1,7 +1,7 @@
 //! The key `[[regulation]]`: by which tables a far field of the run is judged.
 
 use super::{FarFieldType, Key, PowerUnit, Receiver, ReceiverKind, Scene};
-use crate::regulation::{Assumptions, IntensityMap, Regulation, assess};
+use crate::regulation::Regulation;
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
@@ -34,33 +34,16 @@ impl RegulationUse {
         if found.next().is_some() { None } else { first }
     }
 
-    /// Judges a far field without light: what the regulation wants of its cells is known before anything is traced.
-    ///
-    /// # Errors
-    /// When the cells cannot answer the regulation, or it is not known.
-    fn try_assess(&self, receiver: &Receiver) -> Result<(), String> {
-        let (h, v) = receiver.angles_deg();
-        let edges = |[low, high]: [f64; 2], cells: u32| -> Vec<f64> {
-            (0..=cells).map(|k| low + (high - low) * f64::from(k) / f64::from(cells)).collect()
-        };
-        let [columns, rows] = receiver.cells;
-        // No light at all: the verdict does not count, only whether the cells can give one.
-        let dark = vec![[0.0; 3]; columns as usize * rows as usize];
-        let map = IntensityMap::new(edges(h, columns), edges(v, rows), dark)?;
-        // Aiming needs a cut-off, and a dark map has none.
-        let assumptions = Assumptions { as_placed: true, ..Assumptions::default() };
-        assess(&map, &Regulation::find(&self.id)?, &assumptions).map(|_| ())
-    }
-
     /// Refuses a regulation that is not known, or that has no far field which could answer it.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fail = |key: &str, message: String, help: &str| {
             let at = [Key::Name("regulation"), Key::Index(index), Key::Name(key)];
             Err(scene.error(ErrorKind::Value, &at, message).help(help))
         };
-        if let Err(message) = Regulation::find(&self.id) {
-            return fail("id", message, "`lampyris assess --list` shows what there is");
-        }
+        let regulation = match Regulation::find(&self.id) {
+            Ok(regulation) => regulation,
+            Err(message) => return fail("id", message, "`lampyris assess --list` shows what there is"),
+        };
         if scene.run.unit != PowerUnit::Lumen {
             let message = "a regulation asks for candela, but the run counts watts".into();
             return fail("id", message, "set `unit = \"lm\"` in [run]");
@@ -77,7 +60,9 @@ impl RegulationUse {
             let message = format!("'{}' is no far field over H and V", receiver.name);
             return fail("receiver", message, "a verdict needs `kind = \"far_field\"` with `angles = \"A\"`");
         }
-        if let Err(message) = self.try_assess(receiver) {
+        let (h, v) = receiver.angles_deg();
+        let [columns, rows] = receiver.cells.map(f64::from);
+        if let Err(message) = regulation.check_cells(f64::max((h[1] - h[0]) / columns, (v[1] - v[0]) / rows)) {
             return fail("receiver", message, "set `cells`, `h_deg` and `v_deg` of the far field");
         }
         Ok(())
