@@ -58,20 +58,20 @@ impl Photometer<'_> {
         (0..=steps as usize).map(|k| at(k as f64)).filter(held).collect()
     }
 
-    /// What is measured in a polygon in directions half an opening apart that the far field holds: on a grid from its lowest H and V, then
-    /// along its sides; and whether the field holds all of the polygon.
+    /// What is measured in a polygon in directions half an opening apart that the far field holds, and whether it holds all of the polygon.
+    /// The directions are those of a grid from the lowest H and V, so that openings in them reach the rim; along the sides too where
+    /// that makes more, for then it is too narrow for the grid.
     pub(super) fn measure_zone(&self, polygon: &[[f64; 2]]) -> (Vec<Sighting>, bool) {
         let (bounds, within) = self.held_bounds(polygon);
-        let (mut sightings, mut complete) = self.measure_grid(polygon, bounds);
-        complete &= within;
-        // Corners and slanted sides lie between the directions of the grid.
-        for (k, corner) in polygon.iter().enumerate() {
-            let is_held = |d: &[f64; 2]| (0..2).all(|axis| (bounds[axis][0]..=bounds[axis][1]).contains(&d[axis]));
-            let side = self.line_directions(*corner, polygon[(k + 1) % polygon.len()]);
-            let sides = self.measure_each(side.into_iter().filter(is_held).collect());
-            sightings.extend(sides.into_iter().filter(|(_, weights)| weights.is_some()));
+        let (mut sightings, complete) = self.measure_grid(polygon, bounds);
+        let is_held = |d: &[f64; 2]| (0..2).all(|axis| (bounds[axis][0]..=bounds[axis][1]).contains(&d[axis]));
+        let corners = polygon.iter().zip(polygon.iter().cycle().skip(1));
+        let sides = corners.flat_map(|(from, to)| self.line_directions(*from, *to)).filter(is_held);
+        let sides: Vec<[f64; 2]> = sides.collect();
+        if sightings.len() < sides.len() {
+            sightings.extend(self.measure_each(sides));
         }
-        (sightings, complete)
+        (sightings, complete && within)
     }
 
     /// The bounds of a polygon as far as openings in them lie in the far field, degrees of the table, and whether that is all of it.
@@ -194,5 +194,19 @@ mod tests {
             photometer.measure_zone(&[[-9.5, low], [9.5, low], [9.5, low + 10.0], [-9.5, low + 10.0]]).1
         };
         assert!(held(-5.0) && !held(70.0));
+    }
+
+    /// A sliver along the slanted line V = H/7 from 0.37° on, narrower than an opening, holds no direction of a grid.
+    #[test]
+    fn a_zone_narrower_than_the_grid_is_seen_along_its_sides() {
+        let edges: Vec<f64> = (0..=100).map(|k| 5.0 * (f64::from(k) / 50.0 - 1.0)).collect();
+        let map = IntensityMap::new(edges.clone(), edges, vec![[1.0, 0.0, 0.0]; 10_000]).unwrap();
+        let aim = Aim::unchanged("test");
+        let sensor = Sensor { half_deg: 0.5, round: false };
+        let photometer = Photometer { map: &map, aim: &aim, turns: 1, sensor, tolerance_deg: 0.0 };
+        let at = |h: f64, aside: f64| [h, h / 7.0 + aside];
+        let (sightings, complete) = photometer.measure_zone(&[at(0.37, 0.0), at(3.0, -0.01), at(3.3, 0.01)]);
+        assert!(complete && sightings.len() > 12, "{}", sightings.len());
+        assert!(sightings.iter().all(|([h, v], weights)| (v - h / 7.0).abs() < 0.02 && weights.is_some()));
     }
 }

@@ -27,7 +27,7 @@ pub(super) fn outside_spots(
     let step = photometer.sensor.half_deg;
     let allowed = std::f64::consts::PI * radius_deg * radius_deg;
     let Some(&(corner, _)) = sightings.first() else { return sightings };
-    // Directions that may be brighter, by their place on the grid; those of a zone's sides share the places of others.
+    // Directions that may be brighter, by their place on the grid.
     let mut bright: HashMap<[i64; 2], Place> = HashMap::new();
     for (index, (direction, weights)) in sightings.iter().enumerate() {
         let reading = weights.as_ref().map(|weights| photometer.map.read(weights));
