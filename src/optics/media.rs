@@ -153,12 +153,18 @@ pub enum Absorption {
 }
 
 impl Absorption {
-    /// A constant Napierian coefficient, per mm; refused when it is negative or not finite.
+    /// A constant Napierian coefficient, per mm.
+    ///
+    /// # Errors
+    /// When it is negative or not finite.
     pub fn per_mm(coefficient: f64) -> Result<Self, Error> {
         Ok(Self::Constant(require("an absorption coefficient", coefficient, coefficient >= 0.0, "zero or more")?))
     }
 
-    /// Napierian coefficients per mm at wavelengths in nm, which must ascend; refused when there are none or one is negative.
+    /// Napierian coefficients per mm at wavelengths in nm.
+    ///
+    /// # Errors
+    /// When there are none, the wavelengths do not ascend, or a coefficient is negative.
     pub fn table(points: impl IntoIterator<Item = (f64, f64)>) -> Result<Self, Error> {
         let table = Table::new("absorption", points)?;
         let [low, _] = table.extremes();

@@ -51,7 +51,8 @@ fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
     Some([plane(i), plane(i + a.cells / 4)])
 }
 
-/// Returns both errors of the brightest cell together, one standard error; empty where none was estimated. At a pole `grid` has the same
+/// Returns the standard error of the largest value, in its unit: the statistical one with the upward bias of a noisy maximum
+/// ([`error_of_maximum`]), and the geometric one of its cell, as squares; empty without statistical errors. At a pole `grid` has the same
 /// in all cells of the ring.
 fn peak_error(grid: &Grid) -> Cell {
     let (Some((i, j)), Some(mut errors)) = (grid.peak_cell(), grid.error.clone()) else { return Cell::Empty };

@@ -135,7 +135,7 @@ impl SimulationReport<'_> {
             }
         );
         text += &self.verdicts.iter().map(|(_, a)| verdict_sentence(a)).collect::<String>();
-        text += &self.cut_off();
+        text += &self.cut_off_sentence();
         text.extend(self.geometric.map(|g| errors::facet_limits(g, self.results, self.figures, self.absorbed)));
         text.extend(self.chosen.map(errors::choice_sentence));
         if let Some(check) = self.check {
@@ -144,8 +144,8 @@ impl SimulationReport<'_> {
         text
     }
 
-    /// Writes what limits took away; empty below [`WORTH_A_SENTENCE`].
-    fn cut_off(&self) -> String {
+    /// Returns a sentence in Markdown, a space behind it, on the power that limits of [run] took; empty below [`WORTH_A_SENTENCE`].
+    fn cut_off_sentence(&self) -> String {
         let r = self.results;
         let share = r.power.cut_off / r.power.emitted;
         if share < WORTH_A_SENTENCE {

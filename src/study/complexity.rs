@@ -126,7 +126,7 @@ pub fn complexity(
         }
         let prepare: Vec<Timing> = rounds.run(settings.rounds).into_iter().map(|t| t.1).collect();
         prepare_all(methods, &lamp.model, &[], &mut |ready| {
-            rows.extend(race(lamp, &bound, (ready, &prepare), settings));
+            rows.extend(time_ready(lamp, &bound, (ready, &prepare), settings));
         });
     }
     clock.report("done", 1.0);
@@ -155,7 +155,7 @@ fn prepare_all(methods: &[Method<'_>], model: &Model, ready: &[Ready<'_>], then:
 }
 
 /// Times what is ready on one lamp, and returns a row for each; the traditional method has as many rays as its time allows, at least 1024.
-fn race(
+fn time_ready(
     lamp: &Lamp,
     bound: &BoundScene,
     (ready, prepare): (&[Ready<'_>], &[Timing]),

@@ -15,10 +15,12 @@ use truck_meshalgo::prelude::{Invertible, MeshableShape, PolygonMesh, RobustMesh
 /// Tolerance below which truck's mesher refuses to work, mm.
 const SMALLEST: f64 = 1e-6;
 
-/// Seconds that truck may take for a whole shell, for one face of it alone, and for a model. It does not come to an end on some
-/// poles: of the biconvex lens of the fixtures, at 0.05 mm, there was nothing after 100 s.
+/// Time that truck may take for a whole shell. It does not come to an end on some poles: of the biconvex lens of the fixtures, at 0.05 mm,
+/// there was nothing after 100 s.
 const SHELL: Duration = Duration::from_secs(20);
+/// The same for one face alone.
 const FACE: Duration = Duration::from_secs(2);
+/// The same for a model.
 const MODEL: Duration = Duration::from_secs(60);
 
 /// Name of the threads that truck's mesher runs in: a panic there is a face without triangles and no more.

@@ -621,7 +621,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "tracer",
             "receivers",
             "emission",
-            "step",
+            "advance",
             "wavefront",
             "simd_dispatch",
         ],

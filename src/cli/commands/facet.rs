@@ -22,8 +22,8 @@ use serde::Serialize;
 /// Faces without facets that are named with their cause; `--json` has all of them.
 const NAMED_FAILURES: usize = 10;
 
-/// Meshes a STEP file, writes the facets into all files that were asked for, and prints the report. Incomplete where more faces were
-/// refused or got no facets than `--max-refused` allows.
+/// Meshes a STEP file, writes the facets into all files that were asked for, and prints the report. Incomplete where the share of
+/// refused faces, or the share of placed faces without facets, is above `--max-refused`.
 pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completion, Failure> {
     // A wrong extension is said before any work is done.
     if let Some(path) = command.output.iter().find(|p| !is_facet_file(p)) {

@@ -7,6 +7,7 @@
 //!
 //! The order of the modules, each of which uses only those before it, is in `tests/architecture/layers.rs`.
 
+mod advance;
 mod contact;
 mod context;
 mod crossing;
@@ -20,7 +21,6 @@ mod receivers;
 mod simd_dispatch;
 mod start;
 mod starting_media;
-mod step;
 mod surface;
 mod tolerances;
 mod tracer;

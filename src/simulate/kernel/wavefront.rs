@@ -32,7 +32,7 @@ pub(super) fn trace_rays<C: RayPayload>(
         context.intersector.intersect_batch(&wave.rays, &mut wave.hits, &mut cost);
         tracer.tally.counts.segments += wave.rays.len() as u64;
         for (i, (path, ray)) in wave.paths.iter_mut().zip(&mut wave.rays).enumerate() {
-            let goes_on = tracer.step(path, ray, wave.hits[i].as_ref())
+            let goes_on = tracer.advance(path, ray, wave.hits[i].as_ref())
                 // Most of the light of a reflector escapes by rays that its horizon knows to be free: they are
                 // ended without a walk.
                 && !(context.intersector.escapes(ray) && tracer.finish_escaping(path, ray));

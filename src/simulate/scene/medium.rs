@@ -238,7 +238,8 @@ pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::
     })
 }
 
-/// Refuses media without a name of their own, or whose index at the run's wavelength is not from 0.1 to 10.
+/// Refuses media without a name of their own, without exactly one index, with values that [`Medium::optics`] refuses, or with an index
+/// outside 0.1 to 10 at the run's wavelength.
 pub(super) fn check(scene: &Scene) -> Result<(), Error> {
     for (i, m) in scene.media.iter().enumerate() {
         let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];

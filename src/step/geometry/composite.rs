@@ -2,7 +2,7 @@
 
 use super::curves::{CurveShape, DirectedCurve, MAX_DEPTH, first_pcurve, polyline_lengths};
 use super::tolerances::SEAM_SHARE;
-use super::{Geometry, Outcome, Refusal};
+use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Homogeneous, Point};
 use crate::nurbs::Curve;
 use crate::step::part21::{Args, Entity};
@@ -27,7 +27,7 @@ const AROUND_SEGMENTS: [&str; 12] = [
     "INTERSECTION_CURVE",
 ];
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads a bounded curve, mm, as a spline in its own direction; conics that are closed become one turn. Refuses unbounded curves, and
     /// chains of more than [`MAX_DEPTH`] references, of which `depth` are behind.
     pub(crate) fn bounded_curve(&self, id: u64, depth: usize) -> Outcome<Curve> {

@@ -1,7 +1,7 @@
 //! Curves of the file: closed forms where there is one, rational splines for the rest.
 
 use super::tolerances::{CLOSED_MM, CLOSED_SHARE, CONVERGED_ANGLE, MERGED_POINTS_MM, SEAM_SHARE, SHORTEST_TAIL};
-use super::{Geometry, Outcome, Refusal};
+use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Frame, Homogeneous, Point, Vector};
 use crate::nurbs::{ControlPoint, Curve, conic, project, sanitise};
 use crate::step::part21::Entity;
@@ -165,7 +165,7 @@ pub(crate) fn first_pcurve(e: Entity<'_, '_>) -> Option<u64> {
     curves.find(|c| c.is_one_of(&["PCURVE", "BOUNDED_PCURVE"])).map(|c| c.id)
 }
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads a curve in space with its direction. Trimming is left to the caller's vertices, except where only the cut curve has a meaning
     /// (composite, offset, replica). Refuses kinds that are not supported, and chains of more than [`MAX_DEPTH`] references.
     pub(crate) fn curve(&self, id: u64, depth: usize) -> Outcome<DirectedCurve> {

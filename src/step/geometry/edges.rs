@@ -5,7 +5,7 @@ use super::curves::{CurveShape, DirectedCurve};
 use super::tolerances::{
     EMPTY_EDGE_MM, EMPTY_PARAMETER, EMPTY_SHARE, EQUAL_POINTS_MM, LOOSE_VERTEX_MM, VERTEX_MM, VERTEX_SHARE,
 };
-use super::{Geometry, Outcome, Refusal};
+use super::{GeometryReader, Outcome, Refusal};
 use crate::math::Point;
 use crate::nurbs::Curve;
 
@@ -25,7 +25,7 @@ pub(crate) struct TrimmedEdge {
     pub(crate) repair: Option<&'static str>,
 }
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads an edge's curve between its vertices, mm; that of a SUBEDGE is cut from its parent's. Refuses other kinds of edges. `alone` is
     /// whether a loop has no other edge: of a closed curve it is then the whole, though its vertices are two that lie apart by rounding.
     pub(crate) fn edge(&self, id: u64, alone: bool) -> Outcome<TrimmedEdge> {

@@ -2,7 +2,7 @@
 
 use super::extent::FaceExtent;
 use super::tolerances::{CONE_SLOPE_MARGIN, FLAT_CONE_ANGLE, TORUS_REGION_SHARE};
-use super::{Geometry, Outcome, Refusal};
+use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Frame, Point};
 use crate::model::Analytic;
 use crate::nurbs::{Curve, conic};
@@ -19,11 +19,11 @@ struct Elementary<'f, 'a> {
     first: usize,
 }
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Returns the chart of an elementary surface, or why it is refused; `None` for any other kind. `extent` tells which part of a
     /// self-touching torus is meant.
     pub(super) fn elementary_surface(&self, e: Entity<'f, 'a>, extent: FaceExtent<'_>) -> Option<Outcome<Chart>> {
-        type Reader<'f, 'a> = fn(&Geometry<'f, 'a>, Elementary<'f, 'a>, FaceExtent<'_>) -> Outcome<Chart>;
+        type Reader<'f, 'a> = fn(&GeometryReader<'f, 'a>, Elementary<'f, 'a>, FaceExtent<'_>) -> Outcome<Chart>;
         let readers: [(&str, Reader<'f, 'a>); 6] = [
             ("PLANE", |_, s, _| Ok(Chart::new(Kind::Plane { frame: s.frame }, Analytic::Plane { frame: s.frame }))),
             ("CYLINDRICAL_SURFACE", |g, s, _| g.cylinder(&s)),

@@ -3,7 +3,7 @@
 //! Source: ISO 10303-42. A curve becomes a closed form where there is one and a rational spline else (`curves`, `composite`,
 //! `pcurves`), an edge the part of its curve between its vertices (`edges`), a surface a chart (`surfaces`, `elementary`,
 //! `swept_surfaces`). What cannot be had is a [`Refusal`] that names the entity and the reason. Curves may lie on surfaces and surfaces
-//! be swept from curves: the readers call each other as methods of [`Geometry`], their types do not depend on each other.
+//! be swept from curves: the readers call each other as methods of [`GeometryReader`], their types do not depend on each other.
 
 pub(super) mod composite;
 pub(super) mod curves;
@@ -50,12 +50,12 @@ impl Refusal {
 
 /// Reads geometry in mm and radians.
 #[derive(Clone, Copy)]
-pub(crate) struct Geometry<'f, 'a> {
+pub(crate) struct GeometryReader<'f, 'a> {
     pub(crate) file: &'f File<'a>,
     pub(crate) units: Units,
 }
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Returns the instance with an id, or a refusal that says that the file has none.
     pub(crate) fn entity(&self, id: u64) -> Outcome<Entity<'f, 'a>> {
         self.file.entity(id).ok_or_else(|| Refusal {

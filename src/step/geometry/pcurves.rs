@@ -4,13 +4,13 @@ use super::curves::{CurveShape, DirectedCurve};
 use super::extent::FaceExtent;
 use super::tolerances::{CURVE_ERROR_MM, DIFFERENCE_STEP, PARALLEL_AXIS, WORST_CURVE_ERROR_MM};
 use super::units::Units;
-use super::{Geometry, Outcome, Refusal};
+use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Aabb, Point, Uv, Vector};
 use crate::nurbs::{Curve, fit_cubic};
 use crate::step::chart::Chart;
 use crate::step::part21::{Args, Entity};
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads an OFFSET_CURVE_3D with attributes `own`: the basis moved along the reference direction × its tangent. Lines, and circles in
     /// their plane, stay exact, all else is fitted as by [`fit_pieces`]; refuses hyperbolas and parabolas.
     pub(crate) fn offset_curve(
@@ -77,7 +77,7 @@ impl<'f, 'a> Geometry<'f, 'a> {
         let item = representation.list(1).ids().first().copied();
         let item = self.resolve(definition, item, "curve in the parameter plane")?;
         // Parameters are pure numbers; only angles of conics keep their unit.
-        let plane = Geometry { file: self.file, units: Units { length: 1.0, ..self.units } };
+        let plane = GeometryReader { file: self.file, units: Units { length: 1.0, ..self.units } };
         let curve = plane.bounded_curve(item.id, depth + 1)?;
         let Aabb { min, max } = curve.bounds();
         let ranges =

@@ -3,7 +3,7 @@
 use super::curves::{explicit_knots, knot_form};
 use super::extent::FaceExtent;
 use super::tolerances::EQUAL_WEIGHTS;
-use super::{Geometry, Outcome, Refusal};
+use super::{GeometryReader, Outcome, Refusal};
 use crate::math::Point;
 use crate::model::Analytic;
 use crate::nurbs::sanitise;
@@ -22,7 +22,7 @@ const SPLINES: [&str; 5] = [
     "QUASI_UNIFORM_SURFACE",
 ];
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads a surface as a chart, mm and radians, of as much as a face of this extent needs; trims of the surface itself are passed over.
     /// Refuses kinds that are not supported, and chains of more than [`MAX_DEPTH`] references.
     pub(crate) fn chart(&self, id: u64, extent: FaceExtent<'_>, depth: usize) -> Outcome<Chart> {

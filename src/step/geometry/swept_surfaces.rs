@@ -6,7 +6,7 @@ use super::meridian::keep_face_side_of_axis;
 use super::tolerances::{
     COPLANAR_MM, MERGED_POINTS_MM, PARALLEL_AXIS, REACH_MARGIN, SMALLEST_REACH_MM, STEEP_RADIUS,
 };
-use super::{Geometry, Outcome, Refusal};
+use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Frame, Point, Vector};
 use crate::model::Analytic;
 use crate::nurbs::Curve;
@@ -18,7 +18,7 @@ use std::f64::consts::PI;
 const SPLINES: [&str; 5] =
     ["B_SPLINE_CURVE", "B_SPLINE_CURVE_WITH_KNOTS", "BEZIER_CURVE", "UNIFORM_CURVE", "QUASI_UNIFORM_CURVE"];
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Returns the curve that a surface sweeps, cut to what can matter within the face's extent, as a spline, mm; for a line of a face with
     /// edges, its origin and direction too. Without edges its parameter is the file's, and one without ends is cut to the range of the
     /// surface's parameter `swept`, 0 for u, or refused where there is none.

@@ -11,7 +11,7 @@ use super::relations::{
 use super::usage_names::{Occurrence, ProductNames, Usage, name_in_path, name_usages};
 use crate::math::Frame;
 use crate::step::geometry::units::Units;
-use crate::step::geometry::{FARTHEST_MM, Geometry};
+use crate::step::geometry::{FARTHEST_MM, GeometryReader};
 use crate::step::part21::{Args, Entity, File};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -130,8 +130,9 @@ impl<'f, 'a> Assembly<'f, 'a> {
         context.and_then(|c| self.units.get(&c)).copied().unwrap_or(self.fallback)
     }
 
-    fn geometry(&self, representation: u64) -> Geometry<'f, 'a> {
-        Geometry { file: self.file, units: self.units_of(representation) }
+    /// Returns a reader of geometry in the units of a representation.
+    fn geometry_reader(&self, representation: u64) -> GeometryReader<'f, 'a> {
+        GeometryReader { file: self.file, units: self.units_of(representation) }
     }
 
     /// Returns the ids of the items of a representation; empty when the file does not have it.
@@ -178,7 +179,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let placement = stated.and_then(|t| {
             // An operator takes the first representation into the second by itself (ISO 10303-43, functionally_defined_transformation).
             if t.keywords().any(|k| k.starts_with("CARTESIAN_TRANSFORMATION_OPERATOR")) {
-                return self.geometry(second).transformation(t.id).ok();
+                return self.geometry_reader(second).transformation(t.id).ok();
             }
             let args = t.attributes("ITEM_DEFINED_TRANSFORMATION", 0)?;
             let (from, to) = (args.id(2)?, args.id(3)?);
@@ -187,8 +188,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
             if self.is_item(to, first) && self.is_item(from, second) {
                 (holder_from, holder_to) = (second, first);
             }
-            let from = self.geometry(holder_from).placement(from).ok()?;
-            let to = self.geometry(holder_to).placement(to).ok()?;
+            let from = self.geometry_reader(holder_from).placement(from).ok()?;
+            let to = self.geometry_reader(holder_to).placement(to).ok()?;
             let whole = to.compose(&from.inverse());
             Some(if holder_from == first { whole } else { whole.inverse() })
         });
@@ -364,14 +365,14 @@ impl<'f, 'a> Assembly<'f, 'a> {
             owners: used.owners.to_vec(),
             orphan: self.in_orphans,
         });
-        let geometry = self.geometry(id);
+        let geometry = self.geometry_reader(id);
         for item in self.items(id) {
             let Some(mapped) = self.file.entity(item).and_then(|e| e.attributes("MAPPED_ITEM", 1)) else {
                 continue;
             };
             let Some(map) = mapped.entity(0).and_then(|m| m.attributes("REPRESENTATION_MAP", 0)) else { continue };
             let (Some(origin), Some(to), Some(target)) = (map.id(0), map.id(1), mapped.id(1)) else { continue };
-            let origin = self.geometry(to).placement(origin);
+            let origin = self.geometry_reader(to).placement(origin);
             let target = geometry.transformation(target);
             let (Ok(origin), Ok(target)) = (origin, target) else {
                 self.problems.push(format!("#{item} MAPPED_ITEM: its placement cannot be read"));

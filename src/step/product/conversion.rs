@@ -15,7 +15,7 @@ use crate::nurbs::Curve;
 use crate::step::geometry::edges::TrimmedEdge;
 use crate::step::geometry::extent::FaceExtent;
 use crate::step::geometry::units::Units;
-use crate::step::geometry::{FARTHEST_MM, Geometry, Outcome, Refusal};
+use crate::step::geometry::{FARTHEST_MM, GeometryReader, Outcome, Refusal};
 use crate::step::part21::File;
 use crate::step::settings::Settings;
 use crate::step::trim::face::{BuiltFace, build_face};
@@ -50,7 +50,7 @@ pub(crate) fn convert(
     styles: &Styles,
     settings: &Settings,
 ) -> ConvertedPart {
-    let geometry = Geometry { file, units };
+    let geometry = GeometryReader { file, units };
     let mut out = ConvertedPart { refused: items.refused.clone(), ..ConvertedPart::default() };
     out.found += items.refused.len();
 
@@ -118,7 +118,7 @@ fn repair_note(file: &File<'_>, id: u64, reason: String) -> Refusal {
 /// Moves edges, and the vertices that they share, into the part. Returns the number of each key's edge there, `None` for edges that failed
 /// or have no length. Of the latter the two vertices become one, as `joined` says.
 fn add_edges(
-    geometry: &Geometry<'_, '_>,
+    geometry: &GeometryReader<'_, '_>,
     (keys, joined): (&[EdgeKey], &FxHashMap<u64, u64>),
     edges: Vec<Outcome<TrimmedEdge>>,
     part: &mut Part,
@@ -212,7 +212,7 @@ fn add_shells(
 
 /// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length. `alone` is whether a
 /// loop has no other edge.
-fn edge_curve(geometry: &Geometry<'_, '_>, key: EdgeKey, alone: bool) -> Outcome<TrimmedEdge> {
+fn edge_curve(geometry: &GeometryReader<'_, '_>, key: EdgeKey, alone: bool) -> Outcome<TrimmedEdge> {
     match key {
         // Parts are cut from whole edges, which must be there first.
         EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id, alone),
@@ -291,7 +291,7 @@ fn is_sized_by_edges(file: &File<'_>, surface: u64) -> bool {
 }
 
 /// Makes the refusal of a face whose surface reaches farther than numbers tell places apart.
-fn beyond_rounding(geometry: &Geometry<'_, '_>, id: u64, plan: &FacePlan) -> Refusal {
+fn beyond_rounding(geometry: &GeometryReader<'_, '_>, id: u64, plan: &FacePlan) -> Refusal {
     let surface = geometry.file.entity_name(plan.surface);
     let reason =
         format!("#{} {surface}: reaches beyond {FARTHEST_MM:e} mm, where rounding eats shapes", plan.surface);
@@ -301,7 +301,7 @@ fn beyond_rounding(geometry: &Geometry<'_, '_>, id: u64, plan: &FacePlan) -> Ref
 /// Converts one face of a plan: its edges joined to loops, its chart, and the trims on it. `edges` are all of the part, found by `index`; a
 /// refusal names the face and, in its reason, what below it is to blame.
 fn convert_face(
-    geometry: &Geometry<'_, '_>,
+    geometry: &GeometryReader<'_, '_>,
     id: u64,
     plan: &FacePlan,
     edges: &[Outcome<TrimmedEdge>],

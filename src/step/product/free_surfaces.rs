@@ -9,7 +9,7 @@ use crate::model::{Edge, EdgeId, Part, Shell, VertexId};
 use crate::nurbs::Curve;
 use crate::step::chart::Chart;
 use crate::step::geometry::extent::FaceExtent;
-use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::geometry::{GeometryReader, Outcome, Refusal};
 use crate::step::part21::Entity;
 use crate::step::settings::Settings;
 use crate::step::trim::face::{BuiltFace, build_face};
@@ -32,7 +32,7 @@ type Bounded = (BuiltFace, Vec<Vec<Curve>>);
 /// Converts what is not a face of a shell: each surface becomes a shell of one face in the part, and each mesh a tessellated face. Counts
 /// and refusals go to `out`.
 pub(crate) fn convert_free_surfaces(
-    geometry: &Geometry<'_, '_>,
+    geometry: &GeometryReader<'_, '_>,
     items: &ShapeItems,
     styles: &Styles,
     settings: &Settings,
@@ -86,7 +86,7 @@ fn number_boundaries(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option
 }
 
 /// Builds the face of one surface with its boundaries; without any, of the whole surface or of its rectangle of parameters.
-fn convert_surface(geometry: &Geometry<'_, '_>, id: u64, settings: &Settings) -> Outcome<Bounded> {
+fn convert_surface(geometry: &GeometryReader<'_, '_>, id: u64, settings: &Settings) -> Outcome<Bounded> {
     let e = geometry.entity(id)?;
     let (mut boundaries, mut implicit) = (Vec::new(), false);
     let mut task = if let Some(a) = e.attributes("CURVE_BOUNDED_SURFACE", 1) {
@@ -149,7 +149,7 @@ fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings
 
 /// Returns the parameter rectangle of a RECTANGULAR_TRIMMED_SURFACE in the chart's parameters, ascending; over a seam its end lies beyond
 /// the period.
-fn trim_rectangle(geometry: &Geometry<'_, '_>, e: Entity<'_, '_>, chart: &Chart) -> Outcome<[[f64; 2]; 2]> {
+fn trim_rectangle(geometry: &GeometryReader<'_, '_>, e: Entity<'_, '_>, chart: &Chart) -> Outcome<[[f64; 2]; 2]> {
     let Some(a) = e.attributes("RECTANGULAR_TRIMMED_SURFACE", 1) else {
         return Err(Refusal::new(e, "is not trimmed"));
     };

@@ -7,7 +7,7 @@ use super::topology::ShapeItems;
 use crate::math::Point;
 use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
 use crate::nurbs::Curve;
-use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::geometry::{GeometryReader, Outcome, Refusal};
 use crate::step::settings::Settings;
 use crate::step::trim::face::{BuiltFace, build_face};
 use crate::step::trim::fit::Budget;
@@ -19,7 +19,7 @@ const SAME_VERTEX_MM: f64 = 1e-3;
 
 /// Converts the recipes of a representation: each becomes a closed shell of the part. Counts and refusals go to `out`.
 pub(super) fn convert_recipes(
-    geometry: &Geometry<'_, '_>,
+    geometry: &GeometryReader<'_, '_>,
     items: &ShapeItems,
     styles: &Styles,
     settings: &Settings,
@@ -57,7 +57,7 @@ pub(super) fn convert_recipes(
 
 /// Trims every face of the solid `id`, and returns its edges and faces; one face that cannot be had refuses the solid.
 fn trim_faces(
-    geometry: &Geometry<'_, '_>,
+    geometry: &GeometryReader<'_, '_>,
     id: u64,
     solid: SolidRecipe,
     settings: &Settings,

@@ -9,7 +9,7 @@ use crate::math::{Frame, Homogeneous, Point, Vector};
 use crate::model::Analytic;
 use crate::nurbs::{ControlPoint, Curve, conic};
 use crate::step::chart::{Chart, Kind};
-use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::geometry::{GeometryReader, Outcome, Refusal};
 use crate::step::part21::{Args, Entity};
 use std::f64::consts::TAU;
 
@@ -41,7 +41,7 @@ struct Profile {
     loops: Vec<Vec<Curve>>,
 }
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads the solid of a recipe, mm; booleans, other recipes and sizes that are not positive are refused.
     pub(super) fn solid_recipe(&self, e: Entity<'f, 'a>) -> Outcome<SolidRecipe> {
         if let Some(a) = e.attributes("CSG_SOLID", 1) {

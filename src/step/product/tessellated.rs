@@ -3,7 +3,7 @@
 use crate::math::{FaceId, Point, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::TessellatedFace;
-use crate::step::geometry::{Geometry, Outcome, Refusal};
+use crate::step::geometry::{GeometryReader, Outcome, Refusal};
 use crate::step::part21::{Args, Entity};
 use rustc_hash::FxHashSet;
 
@@ -44,7 +44,7 @@ fn leaf_layout(keyword: &str) -> Option<Layout> {
     })
 }
 
-impl<'f, 'a> Geometry<'f, 'a> {
+impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Collects the triangulated faces of a tessellated item, and refusals of those that are broken, in `into`, each once. A solid, shell
     /// or face that is linked to an exact shape is only its picture and gives nothing; nor do points and wires.
     pub(crate) fn collect_meshes(&self, id: u64, depth: usize, into: &mut TessellatedItems) {

@@ -126,7 +126,7 @@ struct Runner<'a> {
 
 impl Sweep<'_> {
     /// Times the runners on all rays in alternating rounds, in seconds and in their order; each is left with its hits.
-    fn race(&self, runners: &[Runner<'_>], threads: usize) -> Vec<Timing> {
+    fn time_alternating(&self, runners: &[Runner<'_>], threads: usize) -> Vec<Timing> {
         let mut rounds = Rounds::default();
         for runner in runners {
             rounds.add("", || {
@@ -149,7 +149,7 @@ impl Sweep<'_> {
         let who = self.mesh_source.exact();
         let runners = [self.runner(who)];
         for &threads in &self.settings.threads {
-            let timing = self.race(&runners, threads)[0];
+            let timing = self.time_alternating(&runners, threads)[0];
             let footprint = who.footprint();
             let row = Row { facets: footprint.primitives, bytes: footprint.bytes, ..Row::default() };
             let row = Row {
@@ -176,7 +176,7 @@ impl Sweep<'_> {
             // All kinds in one race: a slow phase of the machine meets them alike.
             let runners: Vec<Runner<'_>> = combinations.iter().map(|c| self.runner(c.2)).collect();
             for &threads in &settings.threads {
-                let timings = self.race(&runners, threads);
+                let timings = self.time_alternating(&runners, threads);
                 for ((combination, runner), timing) in combinations.iter().zip(&runners).zip(timings) {
                     // Hits are the same in every round; those of the last one are judged.
                     let hits = runner.hits.lock().unwrap_or_else(|e| e.into_inner()).clone();

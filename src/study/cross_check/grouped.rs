@@ -15,7 +15,7 @@ pub(super) struct Classifiers<'a> {
 }
 
 /// A question in the coordinates of one group.
-struct Local<'c, 'a> {
+struct GroupQuestion<'c, 'a> {
     classifier: &'c Classifier<'a>,
     ray: Ray,
     hits: [Option<Hit>; 2],
@@ -41,18 +41,18 @@ impl<'a> Classifiers<'a> {
         {
             let facet_first = f.t < e.t;
             let (first, later) = if facet_first { ([Some(f), None], e) } else { ([None, Some(e)], f) };
-            let Local { classifier, ray: local_ray, hits: [facet, exact] } = self.in_group(ray, first);
+            let GroupQuestion { classifier, ray: local_ray, hits: [facet, exact] } = self.in_group(ray, first);
             let gap = facet.or(exact).map_or(0.0, |hit| classifier.gap(hit.face));
             let elsewhere = self.later_hit(ray, later, gap);
             return Some(classifier.explain(&local_ray, facet.as_ref(), exact.as_ref(), elsewhere));
         }
-        let Local { classifier, ray, hits: [facet, exact] } = self.in_group(ray, [facet, exact]);
+        let GroupQuestion { classifier, ray, hits: [facet, exact] } = self.in_group(ray, [facet, exact]);
         classifier.compare(&ray, facet.as_ref(), exact.as_ref())
     }
 
     /// Returns a hit in scene coordinates as the later one of two; `gap`, mm, is that of the earlier one's face.
     fn later_hit(&self, ray: &Ray, hit: &Hit, gap: f64) -> Option<LaterHit> {
-        let Local { classifier, ray, hits: [hit, _] } = self.in_group(ray, [Some(hit), None]);
+        let GroupQuestion { classifier, ray, hits: [hit, _] } = self.in_group(ray, [Some(hit), None]);
         hit.map(|hit| LaterHit { t: hit.t, band: classifier.band(hit.face, &ray, gap) })
     }
 
@@ -63,7 +63,7 @@ impl<'a> Classifiers<'a> {
         {
             return Err(());
         }
-        let Local { classifier, ray, hits: [a, b] } = self.in_group(ray, [a, b]);
+        let GroupQuestion { classifier, ray, hits: [a, b] } = self.in_group(ray, [a, b]);
         classifier.same_facets(&ray, a.as_ref(), b.as_ref())
     }
 
@@ -73,12 +73,12 @@ impl<'a> Classifiers<'a> {
     }
 
     /// Moves hits of one placement, and their ray, into the coordinates of its group; the first group's are the scene's.
-    fn in_group(&self, ray: &Ray, hits: [Option<&Hit>; 2]) -> Local<'_, 'a> {
+    fn in_group(&self, ray: &Ray, hits: [Option<&Hit>; 2]) -> GroupQuestion<'_, 'a> {
         let place = hits.into_iter().flatten().next().and_then(|hit| self.placement_of(hit));
         let numbered = |hit: &Hit| Hit { face: self.instancing.map_or(hit.face, |i| i.locate(hit.face).1), ..*hit };
         let hits = hits.map(|hit| hit.map(numbered));
         let Some(place) = place.and_then(|k| Some(&self.instancing?.placements[k])) else {
-            return Local { classifier: &self.groups[0], ray: *ray, hits };
+            return GroupQuestion { classifier: &self.groups[0], ray: *ray, hits };
         };
         let frame = &place.frame;
         let turned = |hit: Hit| Hit {
@@ -86,7 +86,7 @@ impl<'a> Classifiers<'a> {
             geometric_normal: frame.local_direction(hit.geometric_normal),
             ..hit
         };
-        Local {
+        GroupQuestion {
             classifier: &self.groups[place.group as usize],
             ray: place.local_ray(ray),
             hits: hits.map(|hit| hit.map(turned)),

@@ -67,7 +67,7 @@ struct Branch<'s, 'a> {
 }
 
 impl<'s, 'a> Branch<'s, 'a> {
-    /// Begins a branch without cells, held to one tolerance.
+    /// Begins a branch without cells, with slack 1 and room for `budget` cells.
     fn new(tree: &Tree<'s, 'a>, budget: usize) -> Self {
         let prover = Prover::new(tree.surface, tree.acceptance);
         Self { prover, cells: Subdivision::default(), budget, slack: 1.0 }

@@ -153,7 +153,7 @@ pub(in crate::tessellate) fn triangulate(
     };
     // All points first: constraints between points that come later would have to be split.
     mesh.insert_nodes(&segments, &imprinted)?;
-    let [conflicts, crossed] = mesh.constrain_all(&segments);
+    let [conflicts, crossed] = mesh.constrain_border(&segments);
     // Twice: for the flood fill a line that is crossed twice bounds nothing.
     let holds_imprint = imprinted.iter().all(|&[a, b]| mesh.constrain(a, b) && mesh.constrain(a, b));
     for &[a, b] in &creases {
@@ -288,8 +288,9 @@ impl Refinement<'_, '_> {
         })
     }
 
-    /// Makes segments edges of the triangulation. Returns those that could not be, and those that kept them out.
-    fn constrain_all(&mut self, segments: &[[u32; 2]]) -> [Vec<[u32; 2]>; 2] {
+    /// Makes segments of the border constraints, each counted in `border` for the flood fill. Returns those that cannot be made, and the
+    /// constraints that they cross.
+    fn constrain_border(&mut self, segments: &[[u32; 2]]) -> [Vec<[u32; 2]>; 2] {
         let mut conflicts = Vec::new();
         let mut crossed = Vec::new();
         for &[a, b] in segments {

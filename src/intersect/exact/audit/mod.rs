@@ -39,14 +39,14 @@ pub struct Audit {
 struct AuditFace {
     id: FaceId,
     domain: [[f64; 2]; 2],
-    trims: Vec<Trim>,
+    trims: Vec<TrimPiece>,
     /// Whether the loops run clockwise: holes in a domain that counts otherwise.
     holes_alone: bool,
 }
 
 /// A Bézier piece of a uv curve and a box around it.
 #[derive(Debug)]
-struct Trim {
+struct TrimPiece {
     lo: DVec2,
     hi: DVec2,
     points: Vec<DVec3>,
@@ -161,11 +161,11 @@ const DEPTH: u32 = 6;
 
 /// The Bézier pieces of every loop, in homogeneous surface parameters; ends of uses are joined by straight pieces, so that parity has
 /// one meaning.
-fn trims(loops: &[TrimLoop]) -> Vec<Trim> {
+fn trims(loops: &[TrimLoop]) -> Vec<TrimPiece> {
     let mut out = Vec::new();
     let mut add = |points: Vec<DVec3>| {
         let (lo, hi) = hull_corners(&points);
-        out.push(Trim { lo, hi, points });
+        out.push(TrimPiece { lo, hi, points });
     };
     for l in loops {
         let uses: Vec<(bool, Vec<Vec<DVec3>>)> = l

@@ -24,7 +24,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     /// Takes a path over its segment to `hit`, or to where a receiver or scattering ends it, and through what it meets; books what light
     /// loses on the way, and sets `path` and `ray` for the next segment. `false` when the path ends; its light is booked then.
     #[inline(always)]
-    pub(super) fn step(&mut self, path: &mut Path<C>, ray: &mut Ray, hit: Option<&Hit>) -> bool {
+    pub(super) fn advance(&mut self, path: &mut Path<C>, ray: &mut Ray, hit: Option<&Hit>) -> bool {
         let context = self.context;
         let hit = clip_outside(context, path, ray, hit);
         // Receivers that let light through count it, and the medium takes its part, before the surface gets what is left.
