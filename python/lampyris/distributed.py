@@ -16,11 +16,13 @@ from typing import Any
 
 from .part import Part
 from .results import Run
-from .scene import Scene, named_files
-from .settings import Settings
+from .scene import MOST_PARTS, Scene, named_files
+from .settings import Settings, whole_number
 
 #: Parts for each thread of the cluster: enough that a slow one or a killed one costs little.
 PARTS_PER_THREAD = 4
+#: Most times that a part is traced anew: what fails as often fails everywhere.
+MOST_RETRIES = 1000
 
 #: Scenes of this process by the hash of their bundle, with the folder of their files.
 _scenes: dict[str, tuple[Scene, tempfile.TemporaryDirectory[str]]] = {}
@@ -67,6 +69,10 @@ def _prepared_scene(bundle: Bundle) -> Scene:
     return scene
 
 
+def _received(bundle: Bundle) -> Bundle:
+    return bundle
+
+
 def _trace(bundle: Bundle, index: int, count: int) -> bytes:
     return _prepared_scene(bundle).trace_part(index, count, **bundle.settings).to_bytes()
 
@@ -93,8 +99,17 @@ def trace(
     worker dies is traced elsewhere, ``retries`` times at most; the sums are added up as a tree on the workers. Every shard traces on
     ``threads``. The digest is that of a single machine.
     """
-    if shards is not None and shards < 1:
-        raise ValueError(f"shards = {shards}: at least one is needed")
+    from distributed import Client
+
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene: a lampyris.Scene is needed, not {type(scene).__name__}")
+    if not isinstance(client, Client):
+        raise TypeError(f"client: a distributed.Client is needed, not {type(client).__name__}; distributed.Client(cluster) makes one of a cluster")
+    if client.status != "running":
+        raise ValueError(f"client: its status is {client.status!r}; connect a new distributed.Client")
+    shards = None if shards is None else whole_number("shards", shards, 1, MOST_PARTS)
+    retries = whole_number("retries", retries, 0, MOST_RETRIES)
+    threads = whole_number("threads", threads, 1, MOST_PARTS)
     if "until" in settings or "resume" in settings:
         raise ValueError("until and resume are for one machine: give the number of rays")
     # The pilot runs once, here; what it chose is asked of every worker.
@@ -107,8 +122,9 @@ def trace(
         asked = dict(settings)
     bundle = Bundle(scene, {**asked, "threads": threads})
     count = shards or PARTS_PER_THREAD * max(1, sum(client.nthreads().values()))
-    [sent] = client.scatter([bundle], broadcast=True)
     key = f"lampyris-{bundle.key}-{os.urandom(4).hex()}"
+    # A task, not scattered data: where the workers that hold it die, it is made anew.
+    sent = client.submit(_received, bundle, key=f"{key}-scene", retries=retries, pure=False)
     parts = [
         client.submit(_trace, sent, k, count, key=f"{key}-trace-{k}", retries=retries, pure=False)
         for k in range(count)

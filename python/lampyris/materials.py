@@ -20,14 +20,21 @@ class Selector:
 def select(
     *,
     part: str | Sequence[str] | None = None,
+    solid: str | Sequence[str] | None = None,
     instance: str | Sequence[str] | None = None,
     face: str | Sequence[str] | None = None,
     colour: str | Vector | None = None,
+    layer: str | Sequence[str] | None = None,
+    kind: str | Sequence[str] | None = None,
+    radius_mm: float | None = None,
     entity: int | Sequence[int] | None = None,
     at: Vector | Sequence[Vector] | None = None,
 ) -> Selector:
-    """Faces by part, instance, name, colour, ``#id`` in the file, or the face nearest to points (mm)."""
-    given = {"part": part, "instance": instance, "face": face, "colour": colour, "entity": entity, "at": at}
+    """Faces by part, solid, instance, name, colour, layer, kind and radius of surface, ``#id`` in the file, or nearest to points (mm)."""
+    given = {
+        "part": part, "solid": solid, "instance": instance, "face": face, "colour": colour, "layer": layer, "kind": kind,
+        "radius_mm": radius_mm, "entity": entity, "at": at,
+    }
     if all(value is None for value in given.values()):
         raise ValueError(f"select: say which faces, by one of {', '.join(given)}; all faces of a part are scene[part]")
     return Selector(plain(given))

@@ -56,7 +56,12 @@ class Receiver:
         self.figures: dict[str, Figure] = {
             name: Figure(f["value"], f["unit"], f["statistical"], f["geometric"], f["limited_by"])
             for name, f in document["figures"].items()
-            if f is not None
+            if isinstance(f, dict)
+        }
+        #: Totals of the further channels by name.
+        self.channel_totals: dict[str, Figure] = {
+            f["name"]: Figure(f["value"], f["unit"], f["statistical"], f["geometric"], f["limited_by"])
+            for f in document["figures"].get("channels") or ()
         }
 
     @cached_property
@@ -236,8 +241,8 @@ class Run(Mapping[str, Receiver]):
 
     @property
     def notes(self) -> list[str]:
-        """What a reader must know."""
-        return list(self.document["notes"])
+        """What a reader must know, faces that were refused or have no facets first."""
+        return [*self._results.missing_faces(), *self.document["notes"]]
 
     @property
     def chosen(self) -> dict[str, Any] | None:

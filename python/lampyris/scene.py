@@ -9,6 +9,7 @@ import os
 import pathlib
 import shutil
 import tempfile
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
@@ -218,6 +219,8 @@ class Scene:
         if part is None:
             raise ValueError("resume=True: no trace of this scene was interrupted; leave it out, or give a part")
         core = None if part is False else part_core(part, "resume")
+        if core is not None and rays is not None and until is None and core.run_rays != rays:
+            raise ValueError(f"resume: this part is of a run of {core.run_rays} rays, not {rays}; leave `rays` out to go on with it, or trace anew")
         prepared = self._prepare(settings, progress)
         tell, close = callback(progress)
         words = None
@@ -234,6 +237,8 @@ class Scene:
         if found is None:
             raise _lampyris.Defect("a trace ended without results; please report it")
         self.interrupted = None
+        for sentence in found.missing_faces():
+            warnings.warn(sentence, stacklevel=2)
         return Run(found, None if words is None else json.loads(words))
 
     def ends(self, *, progress: bool | ProgressCallback = True, **settings: Any) -> Ends:

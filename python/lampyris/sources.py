@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._types import FloatArray, Path, Table, Vector, plain
+from .materials import Selector
 
 
 @dataclass(frozen=True)
@@ -23,14 +24,33 @@ def _source(kind: str, keys: dict[str, Any], **own: Any) -> Source:
     return Source(plain({"kind": kind, **own, **keys}))
 
 
+def _where(name: str, on: Selector | Table | None, at: Vector | None, direction: Vector | None) -> Table:
+    """Keys of where light starts: on faces, along their normals, or at a place in a direction."""
+    if on is None:
+        if at is None or direction is None:
+            raise TypeError(f"{name}: say where light starts, by `at` and `direction`, or by `on` for faces of the model")
+        return {"at": at, "direction": direction}
+    if at is not None or direction is not None:
+        raise TypeError(f"{name}: light starts on faces, along their normals; leave `at` and `direction` out, or `on`")
+    return {"on": on.table if isinstance(on, Selector) else on}
+
+
 def point(at: Vector, power: float = 1.0, **keys: Any) -> Source:
     """The same in every direction."""
     return _source("point", keys, at=at, power=power)
 
 
-def cone(at: Vector, direction: Vector, half_angle_deg: float, power: float = 1.0, **keys: Any) -> Source:
-    """The same in every direction within an angle of ``direction``."""
-    return _source("cone", keys, at=at, direction=direction, half_angle_deg=half_angle_deg, power=power)
+def cone(
+    at: Vector | None = None,
+    direction: Vector | None = None,
+    half_angle_deg: float | None = None,
+    power: float = 1.0,
+    *,
+    on: Selector | Table | None = None,
+    **keys: Any,
+) -> Source:
+    """The same in every direction within an angle of ``direction``, or of the normals of the faces it is ``on``."""
+    return _source("cone", keys, half_angle_deg=half_angle_deg, power=power, **_where("cone", on, at, direction))
 
 
 def collimated(at: Vector, direction: Vector, radius: float | None = None, power: float = 1.0, **keys: Any) -> Source:
@@ -38,9 +58,16 @@ def collimated(at: Vector, direction: Vector, radius: float | None = None, power
     return _source("collimated", keys, at=at, direction=direction, radius=radius, power=power)
 
 
-def lambertian(at: Vector, direction: Vector, power: float = 1.0, **keys: Any) -> Source:
-    """Intensity proportional to the cosine to ``direction``, from a point, a disc (``radius``) or a rectangle (``size``)."""
-    return _source("lambertian", keys, at=at, direction=direction, power=power)
+def lambertian(
+    at: Vector | None = None,
+    direction: Vector | None = None,
+    power: float = 1.0,
+    *,
+    on: Selector | Table | None = None,
+    **keys: Any,
+) -> Source:
+    """Intensity proportional to the cosine to ``direction``, from a point, a disc (``radius``), a rectangle (``size``), or faces it is ``on``."""
+    return _source("lambertian", keys, power=power, **_where("lambertian", on, at, direction))
 
 
 def cosine(at: Vector, direction: Vector, exponent: float, power: float = 1.0, **keys: Any) -> Source:

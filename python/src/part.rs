@@ -131,6 +131,12 @@ impl Part {
         Ok(PyBytes::new(py, &bytes).unbind())
     }
 
+    /// Rays of the whole run.
+    #[getter]
+    fn run_rays(&self) -> u64 {
+        self.of.run_settings().rays
+    }
+
     /// Replicates that are done.
     #[getter]
     fn done(&self) -> usize {

@@ -64,6 +64,20 @@ impl Results {
         &self.found.results.digest
     }
 
+    /// Sentences on faces of the model that are not in the run; none where all are.
+    fn missing_faces(&self) -> Vec<String> {
+        let [refused, found] = self.scene.job.loaded.refused_faces();
+        let refused = (refused > 0).then(|| {
+            format!(
+                "{refused} of {found} faces were refused, and light passes where they are: read_step(FILE).account() lists them with the reasons"
+            )
+        });
+        let [bare, all] = self.scene.bare_faces();
+        let bare =
+            (bare > 0).then(|| format!("{bare} of {all} faces have no facets, and light passes where they are"));
+        refused.into_iter().chain(bare).collect()
+    }
+
     /// The document of `results.json`, with the selector of each listed face.
     fn document_json(&self) -> PyResult<String> {
         let mut document = self.found.document(&self.scene).map_err(of_json)?;

@@ -18,8 +18,8 @@ distributed = pytest.importorskip("distributed")
 SCENE = next(s for s in SCENES if s.stem == "s1_lens")
 
 
-def cluster() -> Any:
-    return distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None)
+def cluster(number: int = 2) -> Any:
+    return distributed.LocalCluster(n_workers=number, threads_per_worker=1, processes=True, dashboard_address=None)
 
 
 def test_the_digest_is_that_of_one_machine() -> None:
@@ -37,14 +37,35 @@ def test_the_digest_is_that_of_one_machine() -> None:
             trace(scene, client, until="1%@focus")
 
 
-def test_a_killed_worker_costs_time_alone() -> None:
+def test_wrong_arguments_are_told_what_to_do() -> None:
+    from lampyris.distributed import trace
+
+    scene: Any = lp.Scene.from_toml(SCENE)
+    with distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None) as workers:
+        with distributed.Client(workers) as client:
+            for wrong in ({"shards": "4"}, {"shards": True}, {"retries": "a"}):
+                with pytest.raises(TypeError, match=next(iter(wrong))):
+                    trace(scene, client, **wrong)
+            for wrong in ({"shards": 1.5}, {"retries": -1}, {"threads": 0}):
+                with pytest.raises(ValueError, match=next(iter(wrong))):
+                    trace(scene, client, **wrong)
+            with pytest.raises(TypeError, match="Scene is needed"):
+                trace("scene.toml", client)  # type: ignore[arg-type]
+        with pytest.raises(TypeError, match="makes one of a cluster"):
+            trace(scene, workers)
+        with pytest.raises(ValueError, match="connect a new"):
+            trace(scene, client)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_killed_worker_costs_time_alone(number: int) -> None:
     from lampyris.distributed import trace
 
     scene = lp.Scene.from_toml(SCENE)
     settings: dict[str, Any] = {"rays": 2_000_000, "intersector": "exact"}
     expected = scene.trace(progress=False, **settings)
     killed: list[int] = []
-    with cluster() as workers, distributed.Client(workers) as client:
+    with cluster(number) as workers, distributed.Client(workers) as client:
         processes = client.run(os.getpid)
 
         def kill() -> None:

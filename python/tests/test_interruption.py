@@ -119,6 +119,14 @@ def test_what_was_done_of_a_part_goes_with_ctrl_c() -> None:
     assert 0 < stopped.value.part.rays < 25_000_000
 
 
+def test_a_part_goes_on_as_the_run_that_it_is_of() -> None:
+    scene = lamp()
+    part = scene.trace_part(0, 2, rays=1_500_000, intersector="octree")
+    with pytest.raises(ValueError, match="a run of 1500000 rays, not 1000000"):
+        scene.trace(rays=1_000_000, resume=part, intersector="octree", progress=False)
+    assert scene.trace(rays=1_500_000, resume=part, intersector="octree", progress=False).rays == 1_500_000
+
+
 INTERSECTING = """
     import sys, time, numpy as np, lampyris as lp
     tracer = lp.Exact(lp.read_step(sys.argv[1]))

@@ -255,3 +255,47 @@ def test_a_verdict_needs_angles_of_type_a(tmp_path: pathlib.Path) -> None:
     scene.add(lp.far_field("b", angles="B", h_deg=(-40, 40), v_deg=(-20, 20), step_deg=1.0))
     with pytest.raises(lp.SceneError, match="angles B"):
         scene.trace(progress=False).assess(next(iter(lp.regulations())), "b")
+
+
+def beam(rays: int = 3000) -> lp.Scene:
+    """A beam of 5 mm through the plano-convex lens."""
+    scene = lp.Scene(ROOT / "fixtures" / "step" / "lens_planoconvex_nurbs.stp", rays=rays)
+    scene["*"] = lp.glass(1.5)
+    scene.add(lp.collimated(at=(0, 0, -20), direction=(0, 0, 1), radius=5))
+    return scene
+
+
+@pytest.mark.parametrize("channels", [{"channels": "xyz"}, {"channels": "photometric"}, {"bins_nm": [400, 500, 700]}])
+def test_further_channels_leave_a_run_readable(channels: Any) -> None:
+    scene = beam()
+    scene.add(lp.plane("p", at=(0, 0, 100), cells=(4, 3), **channels))
+    run = scene.trace(progress=False)
+    assert len(run) == 1 and "p" in repr(run["p"]) and len(run.to_frame()) > 0
+    receiver = run["p"]
+    assert list(receiver.channels) == list(receiver.channel_totals) and receiver.channels
+    for name, (cells, errors) in receiver.channels.items():
+        assert cells.shape == errors.shape == (3, 4) and receiver.channel_totals[name].statistical is not None
+
+
+def test_refused_faces_are_told(tmp_path: pathlib.Path) -> None:
+    whole = (ROOT / "fixtures" / "step" / "lens_planoconvex_nurbs.stp").read_bytes()
+    cut = tmp_path / "cut.stp"
+    cut.write_bytes(whole[: len(whole) // 2])
+    scene = lp.Scene(cut, rays=2000)
+    scene.add(lp.collimated(at=(0, 0, -20), direction=(0, 0, 1), radius=5), lp.plane("p", at=(0, 0, 100)))
+    with pytest.warns(UserWarning, match="of 3 faces were refused"):
+        run = scene.trace(progress=False)
+    assert "were refused" in run.notes[0]
+    assert not beam().trace(progress=False).notes
+
+
+def test_light_starts_on_faces_and_faces_are_selected_by_their_solid() -> None:
+    scene = beam()
+    solid = lp.select(solid="*")
+    scene.add(lp.cone(on=solid, half_angle_deg=20), lp.lambertian(on={"part": "*"}))
+    assert [source.get("on") for source in scene.tables["source"][1:]] == [{"solid": "*"}, {"part": "*"}]
+    assert lp.select(layer="0", kind="plane", radius_mm=3.0).table == {"layer": "0", "kind": "plane", "radius_mm": 3.0}
+    with pytest.raises(TypeError, match="leave `at` and `direction` out"):
+        lp.cone(at=(0, 0, 0), direction=(0, 0, 1), half_angle_deg=20, on=solid)
+    with pytest.raises(TypeError, match="say where light starts"):
+        lp.lambertian()

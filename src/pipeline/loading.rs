@@ -21,6 +21,12 @@ pub struct LoadedModel {
 }
 
 impl LoadedModel {
+    /// Returns how many faces of the files were refused, and how many they hold.
+    pub fn refused_faces(&self) -> [usize; 2] {
+        let faces = || self.reports.iter().map(|report| &report.faces);
+        [faces().map(|faces| faces.refused).sum(), faces().map(|faces| faces.found).sum()]
+    }
+
     /// Whether the model is what the files of the scene held when they were read, so that they stand for it; one without parts needs none.
     pub(super) fn is_from_files(&self, scene: &Scene) -> bool {
         let files = scene.models.len();

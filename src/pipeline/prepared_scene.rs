@@ -268,6 +268,14 @@ impl PreparedScene {
         groups.map(surface).collect()
     }
 
+    /// Returns how many placed faces of a run on facets have none, and how many there are; on the spline none counts, for it needs no facets.
+    pub fn bare_faces(&self) -> [usize; 2] {
+        let model = &self.job.loaded.model;
+        let is_on_facets = self.choice.intersector != IntersectorKind::Exact;
+        let bare = if is_on_facets { self.facets.faces_without_facets(model) } else { 0 };
+        [bare, model.placed_face_count()]
+    }
+
     /// Returns the run's settings: the scene's, with what was asked over them; the whole run, no shard.
     pub fn run_settings(&self) -> RunSettings {
         let mut settings = RunSettings::from(&self.job.scene.run);

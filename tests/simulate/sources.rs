@@ -66,6 +66,20 @@ fn ray_lists_are_drawn_by_power() {
     }
 }
 
+/// A beam of one ray draws its wavelength alone, neither a place nor a direction, beside a point that draws its direction: half of the power
+/// of two watts goes straight on, and few rays of each are all made together.
+#[test]
+fn rays_that_draw_a_wavelength_alone_are_made() {
+    let beam = "[[source]]\nkind = 'collimated'\nat = [0, 0, 0]\ndirection = [0, 0, 1]\nspectrum = { kind = 'white_led' }\n";
+    let point = "[[source]]\nkind = 'point'\nat = [0, 0, -30]\n";
+    let ahead = "[[receiver]]\nname = 'ahead'\nat = [0, 0, 5]\nsize = [1e-3, 1e-3]\ncells = [1, 1]\n";
+    for rays in [1000, 640_000] {
+        let r = World::default().run(&format!("[run]\nrays = {rays}\n{beam}{point}{ahead}{ALL}"), |_| ());
+        assert!((r.power.emitted - 2.0).abs() < 1e-9);
+        assert!((r.receivers[0].power - 1.0).abs() < 1e-3, "{rays}: {}", r.receivers[0].power);
+    }
+}
+
 /// What goes in as candela comes out as candela: an IES file of cosⁿ about its axis, n = 2, 100 cd at the peak.
 #[test]
 fn an_ies_file_comes_out_as_it_went_in() {

@@ -120,7 +120,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         say_files(command, &found, console);
     }
     // Last, for the answer counts although faces are missing.
-    let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
+    let refused = input_files::report_refusals(loaded, command.limits.max_refused, console);
     Ok(refused.and(report_defects(&found, console)))
 }
 

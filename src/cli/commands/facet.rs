@@ -83,7 +83,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
             print(&b.comparison(&made.report))?;
         }
     }
-    let refused = input_files::report_refusals(&loaded.reports, command.limits.max_refused, console);
+    let refused = input_files::report_refusals(&loaded, command.limits.max_refused, console);
     let placed = made.report.faces.meshed + made.report.faces.failed;
     if made.report.faces.failed > 0 {
         console.say(format_args!("{} of {placed} faces got no facets", made.report.faces.failed));

@@ -110,7 +110,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     };
     closing::print_listings(&run, &prepared, console)?;
     closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
-    let refused = input_files::report_refusals(&prepared.job.loaded.reports, command.limits.max_refused, console)
+    let refused = input_files::report_refusals(&prepared.job.loaded, command.limits.max_refused, console)
         .and(input_files::report_bare_faces(&prepared, command.limits.max_refused, console));
     Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)
         .and(refused)

@@ -96,7 +96,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     if extra.dry_run {
         return dry_run::run(&prepared, folder, console);
     }
-    let refused = input_files::report_refusals(&prepared.job.loaded.reports, extra.limits.max_refused, console)
+    let refused = input_files::report_refusals(&prepared.job.loaded, extra.limits.max_refused, console)
         .and(input_files::report_bare_faces(&prepared, extra.limits.max_refused, console));
     // A replay traces single rays and writes no results.
     if !replay.is_empty() {

@@ -4,9 +4,9 @@ use super::terminal_monitor::TerminalMonitor;
 use crate::cli::arguments::command::PlacedLimit;
 use crate::cli::console::Console;
 use crate::cli::{completion::Completion, failure::Failure};
-use crate::pipeline::{IntersectorKind, LoadedModel, PreparedScene, read_scene};
+use crate::pipeline::{LoadedModel, PreparedScene, read_scene};
 use crate::simulate::Scene;
-use crate::step::{self, Import, ImportReport};
+use crate::step::{self, Import};
 use std::path::Path;
 use std::time::Instant;
 
@@ -54,9 +54,9 @@ pub(crate) fn scene_or_model(path: &Path, placed: PlacedLimit, console: &Console
 
 /// Says what could not be read of the files, what they hide and how many faces were refused, if any; incomplete where the refused are a
 /// larger share of all faces than `max_refused`.
-pub(crate) fn report_refusals(reports: &[ImportReport], max_refused: f64, console: &Console) -> Completion {
-    let (found, refused) = reports.iter().fold((0, 0), |(f, r), i| (f + i.faces.found, r + i.faces.refused));
-    let problems: Vec<&String> = reports.iter().flat_map(|r| &r.problems).collect();
+pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &Console) -> Completion {
+    let [refused, found] = loaded.refused_faces();
+    let problems: Vec<&String> = loaded.reports.iter().flat_map(|r| &r.problems).collect();
     for problem in problems.iter().take(NAMED_PROBLEMS) {
         console.say(format_args!("problem: {problem}"));
     }
@@ -64,7 +64,7 @@ pub(crate) fn report_refusals(reports: &[ImportReport], max_refused: f64, consol
         console
             .say(format_args!("and {} more problems; `lampyris info` lists them", problems.len() - NAMED_PROBLEMS));
     }
-    let hidden: usize = reports.iter().map(|r| r.hidden.len()).sum();
+    let hidden: usize = loaded.reports.iter().map(|r| r.hidden.len()).sum();
     if hidden > 0 {
         console.say(format_args!("light meets {hidden} items that the model hides; `lampyris info` lists them"));
     }
@@ -84,12 +84,7 @@ pub(crate) fn report_refusals(reports: &[ImportReport], max_refused: f64, consol
 /// Says how many faces of a run that is traced on facets have none, if any: light passes where they are. Incomplete where that is a larger
 /// share of all than `max_refused`.
 pub(crate) fn report_bare_faces(prepared: &PreparedScene, max_refused: f64, console: &Console) -> Completion {
-    // The spline needs no facets, nor has a run that is traced on it any that count.
-    if prepared.choice.intersector == IntersectorKind::Exact {
-        return Completion::Complete;
-    }
-    let model = &prepared.job.loaded.model;
-    let (bare, all) = (prepared.facets.faces_without_facets(model), model.placed_face_count());
+    let [bare, all] = prepared.bare_faces();
     if bare == 0 {
         return Completion::Complete;
     }
