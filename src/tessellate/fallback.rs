@@ -8,8 +8,8 @@ use super::border::edges::Division;
 use super::border::polygons;
 use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
 use super::face_surface::FaceSurface;
+use super::foot_search;
 use super::nodes::Position;
-use super::sample;
 use crate::math::polygon::is_inside_sides;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Face, Part};
@@ -53,7 +53,7 @@ pub(super) fn border_alone(
             Position::Own(p) => border.own[p as usize],
         };
         let corner = || {
-            let uv = sample::nearest_parameters(surface.spline, place);
+            let uv = foot_search::nearest_parameters(surface.spline, place);
             BorderCorner { position: v.position, place, uv, at: Point2::new(0.0, 0.0) }
         };
         place.is_finite().then(corner)

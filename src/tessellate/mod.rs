@@ -27,6 +27,7 @@ mod face;
 mod face_mesh;
 mod face_surface;
 mod fallback;
+mod foot_search;
 mod grouped;
 mod imprint;
 mod limits;
@@ -45,6 +46,7 @@ mod settings;
 mod taken_chords;
 mod tessellation;
 mod transition;
+mod triangle_frame;
 mod triangulator;
 
 use crate::model::Model;

@@ -1,13 +1,13 @@
 //! Sag and normal error by dense sampling: evaluates splines by their definition and measures distances its own way, so
 //! that it can judge the bound. Which facets are sampled where all would take too long is decided in `sample_budget.rs`.
 
+use super::foot_search::{CountedSurface, STILL, nearest_from, search_even_pieces, search_pieces};
+use super::triangle_frame::TriangleFrame;
 use crate::math::{Point, Uv, Vector};
 use crate::mesh::FacetMesh;
 use crate::model::Model;
-use crate::nurbs::{Derivatives, Surface};
 use rayon::prelude::*;
 use smallvec::SmallVec;
-use std::cell::Cell;
 
 /// What sampling found on one facet.
 #[derive(Clone, Debug, Default)]
@@ -20,28 +20,6 @@ pub(super) struct Sampled {
     pub(super) normal_errors: Vec<f32>,
     /// How often the spline was evaluated for it.
     pub(super) evaluations: u64,
-}
-
-/// A spline that counts how often it is evaluated.
-struct CountedSurface<'s> {
-    spline: &'s Surface,
-    evaluations: Cell<u64>,
-}
-
-impl<'s> CountedSurface<'s> {
-    fn new(spline: &'s Surface) -> Self {
-        Self { spline, evaluations: Cell::new(0) }
-    }
-
-    fn point(&self, at: Uv) -> Point {
-        self.evaluations.set(self.evaluations.get() + 1);
-        self.spline.evaluate(at)
-    }
-
-    fn derivatives(&self, at: Uv) -> Derivatives {
-        self.evaluations.set(self.evaluations.get() + 1);
-        self.spline.derivatives(at)
-    }
 }
 
 /// Where a triangle's points are measured, with their shares of its mean: D. A. Dunavant, *High degree efficient symmetrical Gaussian
@@ -65,16 +43,10 @@ const POINTS: [(f64, [f64; 3]); 9] = {
     ]
 };
 
+/// Share by which feet are farther than the places of the surface for their spacing alone.
+const UNEVEN: f64 = 0.05;
 /// Surface samples a side of a facet.
 const GRID: usize = 8;
-/// Share of the distance found so far below which a piece of the surface is small enough: a start for [`project`], no more.
-const SMALL_PIECE: f64 = 0.05;
-/// Steps of one projection, and the share of a distance below which nothing is gained.
-const MAX_STEPS: usize = 12;
-const STILL: f64 = 1e-9;
-/// Determinant of the first fundamental form, in shares of the product of its diagonal, at which it cannot be solved for a step.
-const SINGULAR: f64 = 1e-14;
-
 /// Samples every facet, in parallel; facets of ready meshes give zeros. Vertices need their `uv`.
 pub(super) fn sample_mesh(mesh: &FacetMesh, model: &Model) -> Vec<Sampled> {
     let facets: Vec<usize> = (0..mesh.facets.len()).collect();
@@ -178,7 +150,7 @@ fn sample_facet(
             out.normal_errors.push(a.cross(e).length().atan2(a.dot(e)) as f32);
         }
     }
-    out.evaluations = surface.evaluations.get();
+    out.evaluations = surface.evaluations();
     out
 }
 
@@ -191,8 +163,11 @@ fn farthest_foot(surface: &CountedSurface<'_>, feet: &mut [Foot], pieces: &[[Uv;
         if foot.away <= least * (1.0 + STILL) {
             return least.max(foot.away);
         }
-        // A single start may end beside the nearest point: uneven weights bend the parameters.
-        let (other, nearer) = nearest_from(surface, foot.x, search_pieces(surface, foot.x, pieces));
+        // A single start may end beside the nearest point: uneven weights bend the parameters, and steps end where they leave the domain.
+        let is_plain = |&(uv, away): &(Uv, f64)| away <= least * (1.0 + UNEVEN) && surface.is_inside(uv);
+        let (other, nearer) = search_even_pieces(surface, foot.x, pieces, (foot.uv, foot.away))
+            .filter(is_plain)
+            .unwrap_or_else(|| nearest_from(surface, foot.x, search_pieces(surface, foot.x, pieces)));
         if nearer >= foot.away * (1.0 - STILL) {
             return foot.away;
         }
@@ -211,189 +186,87 @@ fn interpolated_normal(single: bool, t: &[usize; 3], b: [f64; 3], n: [Vector; 4]
     n[0] * ((1.0 - u) * (1.0 - v)) + n[1] * (u * (1.0 - v)) + n[2] * (u * v) + n[3] * ((1.0 - u) * v)
 }
 
-/// Pieces that are followed at a time, and how often they are cut into four.
-const FOLLOWED: usize = 8;
-const LEVELS: usize = 40;
-
-/// Returns the parameters of a near point on the part of the surface over the triangles `over`: quarters are followed whose flat triangles
-/// lie nearest to `x`. So none is lost where weights crowd most of the parameters into one place and a step of any length leaps over the
-/// surface.
-fn search_pieces(surface: &CountedSurface<'_>, x: Point, over: &[[Uv; 3]]) -> Uv {
-    let at = |u: Uv| (u, surface.point(u));
-    let off = |p: &[(Uv, Point); 3]| TriangleFrame::new(p.map(|q| q.1)).distance(x);
-    let mut best = (f64::INFINITY, over[0][0]);
-    let mut pieces: Vec<[(Uv, Point); 3]> = over.iter().map(|uv| uv.map(at)).collect();
-    // As many levels as halve the domain down to the spacing of numbers, unless the pieces are small before.
-    for _ in 0..LEVELS {
-        let mut parts = Vec::with_capacity(4 * pieces.len());
-        for [a, b, c] in pieces {
-            let [d, e, f] = [(a, b), (b, c), (c, a)].map(|(p, q)| at(0.5 * (p.0 + q.0)));
-            for (u, p) in [a, b, c, d, e, f] {
-                let away = (p - x).length();
-                if away < best.0 {
-                    best = (away, u);
-                }
-            }
-            let four = [[a, d, f], [d, b, e], [f, e, c], [d, e, f]];
-            parts.extend(four.into_iter().map(|p| (off(&p), p)));
-        }
-        if parts.len() > FOLLOWED {
-            parts.select_nth_unstable_by(FOLLOWED - 1, |p, q| p.0.total_cmp(&q.0));
-            parts.truncate(FOLLOWED);
-        }
-        let small = |[a, b, c]: &[(Uv, Point); 3]| {
-            (a.1 - b.1).length().max((b.1 - c.1).length()).max((c.1 - a.1).length()) <= SMALL_PIECE * best.0
-        };
-        pieces = parts.into_iter().map(|p| p.1).filter(|p| !small(p)).collect();
-        if pieces.is_empty() {
-            break;
-        }
-    }
-    best.1
-}
-
-/// Returns the parameters of a near, mostly the nearest, point of the whole surface.
-pub(super) fn nearest_parameters(surface: &Surface, x: Point) -> Uv {
-    let [[u0, u1], [v0, v1]] = surface.domain();
-    let [a, b, c, d] = [(u0, v0), (u1, v0), (u1, v1), (u0, v1)].map(|(u, v)| Uv::new(u, v));
-    // Both halves of the domain, since a path of nearest triangles may run into a dead end in one.
-    let surface = CountedSurface::new(surface);
-    let search = |half| nearest_from(&surface, x, search_pieces(&surface, x, &[half]));
-    let [first, second] = [[a, b, c], [a, c, d]].map(search);
-    if second.1 < first.1 { second.0 } else { first.0 }
-}
-
-/// Returns the parameters of a near point of the surface by damped Gauss–Newton from `start`, which is clamped to the domain first; never
-/// farther away than it.
-pub(super) fn project(surface: &Surface, x: Point, start: Uv) -> Uv {
-    nearest_from(&CountedSurface::new(surface), x, start).0
-}
-
-/// Returns what [`project`] does, and the distance there.
-fn nearest_from(surface: &CountedSurface<'_>, x: Point, start: Uv) -> (Uv, f64) {
-    let clamp = |u: Uv| surface.spline.clamp(u);
-    let mut best = clamp(start);
-    let mut d = surface.derivatives(best);
-    let mut away = (d.point - x).length();
-    for _ in 0..MAX_STEPS {
-        let e = x - d.point;
-        let (a, b, c) = (d.du.dot(d.du), d.du.dot(d.dv), d.dv.dot(d.dv));
-        let det = a * c - b * b;
-        // At a pole or cusp one derivative is nothing, and steps along it would be anywhere.
-        if det <= SINGULAR * a * c {
-            break;
-        }
-        let (r, s) = (e.dot(d.du), e.dot(d.dv));
-        let step = Uv::new(c * r - b * s, a * s - b * r) / det;
-        // What the step would take off the square of the distance were the surface flat; to try it for less costs more than it gains.
-        if r * step.x + s * step.y <= 2.0 * STILL * away * away {
-            break;
-        }
-        let full = clamp(best + step);
-        let there = surface.derivatives(full);
-        let mut gain = away - (there.point - x).length();
-        if gain > 0.0 {
-            (best, d) = (full, there);
-        } else {
-            // A full step may overshoot where the surface bends; one that comes nearer is enough.
-            let tries = [0.5, 0.25, 0.1].map(|f| clamp(best + step * f));
-            let Some(next) = tries.into_iter().find(|&u| (surface.point(u) - x).length() < away) else {
-                break;
-            };
-            (best, d) = (next, surface.derivatives(next));
-            gain = away - (d.point - x).length();
-        }
-        away -= gain;
-        if gain <= STILL * away {
-            break;
-        }
-    }
-    (best, away)
-}
-
-/// A triangle, which may be degenerate, in its own plane: x along its longest side, y along its height. What is perpendicular to the
-/// longest side is small, so that no digits are lost on needles: by products of lengths, a point over a needle of 500 m that was 0.1 µm
-/// thick seemed to be 0.7 m away.
-struct TriangleFrame {
-    origin: Point,
-    /// Unit vector along the longest side, which starts at the origin; zero where all corners are in one place.
-    along: Vector,
-    base: f64,
-    /// Unit vector along the height; `None` where the triangle is a line.
-    up: Option<Vector>,
-    /// The third corner.
-    top: Uv,
-}
-
-impl TriangleFrame {
-    /// Makes the frame of a triangle; its corners may lie in a line or in one place.
-    fn new(t: [Point; 3]) -> Self {
-        let length = |k: usize| (t[(k + 1) % 3] - t[k]).length_squared();
-        let longest = if length(0) >= length(1).max(length(2)) {
-            0
-        } else if length(1) >= length(2) {
-            1
-        } else {
-            2
-        };
-        let [a, b, c] = [0, 1, 2].map(|k| t[(k + longest) % 3]);
-        let along = (b - a).normalize_or_zero();
-        let top = c - a;
-        let across = top - along * top.dot(along);
-        let height = across.length();
-        let up = (height > 0.0).then(|| across / height);
-        Self { origin: a, along, base: (b - a).length(), up, top: Uv::new(top.dot(along), height) }
-    }
-
-    /// Returns twice its area, but no less than the least number: shares of areas are to have a sum.
-    fn doubled_area(&self) -> f64 {
-        (self.base * self.top.y).max(f64::MIN_POSITIVE)
-    }
-
-    /// Returns the distance of a point.
-    fn distance(&self, p: Point) -> f64 {
-        let q = p - self.origin;
-        let x = q.dot(self.along);
-        let off = q - self.along * x;
-        let Some(up) = self.up else {
-            return (Uv::new(x - x.clamp(0.0, self.base), off.length())).length();
-        };
-        let at = Uv::new(x, off.dot(up));
-        let above = (off - up * at.y).length();
-        let corners = [Uv::ZERO, Uv::new(self.base, 0.0), self.top];
-        let side = |k: usize| [corners[k], corners[(k + 1) % 3]];
-        let is_inside = (0..3).all(|k| (side(k)[1] - side(k)[0]).perp_dot(at - side(k)[0]) >= 0.0);
-        if is_inside {
-            return above;
-        }
-        let to_side = |[m, n]: [Uv; 2]| {
-            let d = n - m;
-            (at - m - d * ((at - m).dot(d) / d.length_squared()).clamp(0.0, 1.0)).length_squared()
-        };
-        let beside = (0..3).map(|k| to_side(side(k))).fold(f64::INFINITY, f64::min);
-        (beside + above * above).sqrt()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Frame;
+    use crate::model::{Face, Part, Shell};
+    use crate::nurbs::{Surface, sweep};
+    use crate::tessellate::{Settings, tessellate};
 
+    const RADIUS: f64 = 10.0;
+
+    /// A piece of a ball around the origin whose parameters crowd: weights that grow by powers of `crowding` move them and no point.
+    fn ball(crowding: f64) -> Model {
+        let mut surface = sweep::sphere(&Frame::IDENTITY, RADIUS, [0.0, 0.8], [-0.3, 0.4]);
+        assert_eq!(surface.counts(), [3, 3]);
+        surface.points.iter_mut().enumerate().for_each(|(k, p)| *p *= crowding.powi((k / 3 + k % 3) as i32));
+        let shells = vec![Shell { faces: vec![Face::whole(surface)], ..Shell::default() }];
+        Model::from_part(Part { shells, ..Part::default() })
+    }
+
+    /// The foot of a point inside a ball lies on the line from its centre, however far from a place of equal shares the weights put it.
     #[test]
-    fn distances_to_needles_keep_their_digits() {
-        // Needles of 500 m and of all widths down to a nanometre, far from the origin; a point 0.01 mm above a place inside.
-        let origin = Point::new(1e5, -2e5, 3e5);
-        let x = Vector::new(1.0, 2.0, 2.0) / 3.0;
-        let y = Vector::new(2.0, 1.0, -2.0) / 3.0;
-        let z = x.cross(y);
-        for width in [1e3, 1.0, 1e-3, 1e-4, 1e-6] {
-            let t = [origin, origin + x * 5e5, origin + x * 2e5 + y * width];
-            for share in [0.1, 0.5, 0.9] {
-                let p = t[0] * (0.4 * share) + t[1] * (0.6 * share) + t[2] * (1.0 - share) + z * 0.01;
-                let found = TriangleFrame::new(t).distance(p);
-                // Coordinates of 5e5 mm are rounded by 1e-10 mm.
-                assert!((found - 0.01).abs() < 1e-8, "{width} {share}: {found}");
+    fn feet_on_a_ball_are_found_however_its_parameters_crowd() {
+        for crowding in [1.0, 30.0, 1e3] {
+            let model = ball(crowding);
+            let surface = CountedSurface::new(&model.parts[0].shells[0].faces[0].surface);
+            let corners = corners(surface.spline);
+            let halves = [[0, 1, 2], [0, 2, 3]];
+            for (half, b) in halves.into_iter().flat_map(|half| POINTS.map(|(_, b)| (half, b))) {
+                // Sides of the flat triangle lie over great circles, which leave the piece.
+                let inside = [0, 1, 2].map(|k| 0.2 + 0.4 * b[k]);
+                let x = (0..3).map(|k| surface.point(corners[half[k]]) * inside[k]).sum::<Point>();
+                let mut feet = [foot(&surface, x, corners[half[0]])];
+                let sag = RADIUS - x.length();
+                let away = farthest_foot(&surface, &mut feet, &halves.map(|t| t.map(|k| corners[k])), 0.99 * sag);
+                // A step and a search each end where less than that share is gained, and a step leaves a seventh of what the last one did.
+                assert!((away - sag).abs() < 3.0 * STILL * sag, "{crowding}, {x}: {away} of {sag}");
             }
         }
+    }
+
+    /// Beside a slanting sheet the foot lies on its border, where a step towards the plane's own foot leads astray.
+    #[test]
+    fn feet_on_a_slanting_border_are_found() {
+        let sheet = |u: f64, v: f64| Point::new(u + 0.8 * v, 0.6 * v, 0.0);
+        let places = [(0.0, 0.0), (0.0, 10.0), (10.0, 0.0), (10.0, 10.0)];
+        let points = places.map(|(u, v)| sheet(u, v).extend(1.0)).to_vec();
+        let knots = || vec![0.0, 0.0, 10.0, 10.0];
+        let surface = Surface { degree: [1, 1], knots: [knots(), knots()], points };
+        let across = Vector::new(-0.6, 0.8, 0.0);
+        let [a, b, c, d] = corners(&surface);
+        for v in [2.0, 4.0, 7.5] {
+            let x = sheet(0.0, v) + across * 0.3 + Vector::Z * 0.4;
+            let surface = CountedSurface::new(&surface);
+            // The nearest place of all others is 1 % nearer to the point than the foot is.
+            let away = farthest_foot(&surface, &mut [foot(&surface, x, b)], &[[a, b, c], [a, c, d]], 0.495);
+            assert!((away - 0.5).abs() < 1e-3, "{v}: {away}");
+        }
+    }
+
+    /// Returns the corners of a surface's domain, in turn.
+    fn corners(surface: &Surface) -> [Uv; 4] {
+        let [[u0, u1], [v0, v1]] = surface.domain();
+        [(u0, v0), (u1, v0), (u1, v1), (u0, v1)].map(|(u, v)| Uv::new(u, v))
+    }
+
+    /// Returns the foot that is found from a place.
+    fn foot(surface: &CountedSurface<'_>, x: Point, start: Uv) -> Foot {
+        let (uv, away) = nearest_from(surface, x, start);
+        Foot { x, uv, away, weight: 1.0, normal: Vector::Z }
+    }
+
+    /// A second search for a foot goes no farther than until parameters are even: it takes less than places and first feet do.
+    #[test]
+    fn even_parameters_are_searched_a_few_times() {
+        let model = ball(1.0);
+        let mesh = tessellate(&model, &Settings::uniform(1e-4)).mesh;
+        let mut evaluations: Vec<u64> = sample_mesh(&mesh, &model).iter().map(|s| s.evaluations).collect();
+        evaluations.sort_unstable();
+        let places = ((GRID + 1) * (GRID + 1) + 4 + 2 * POINTS.len()) as u64;
+        // At the border of the surface it goes on.
+        let median = evaluations[evaluations.len() / 2];
+        assert!(median < 2 * places, "{median} of {places}");
     }
 }

@@ -1,6 +1,6 @@
 //! Which facets are sampled, where all of a model would take too long.
 //!
-//! A facet takes some 250 evaluations of its spline, one of a wild surface ten times as many. A first look at some facets of each face
+//! A facet takes some 150 evaluations of its spline, one of a wild surface ten times as many. A first look at some facets of each face
 //! tells what one of them takes. If all together take more than the model may, faces share it: none gets more than a common limit, and of
 //! the facets of a face that takes more, those without proof come first and the others are spread evenly. Work is counted, not timed, so
 //! that the outcome is the same on any machine.
@@ -14,12 +14,12 @@ use crate::nurbs::Surface;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
-/// Most work for one model, in control points that are visited: some fifteen seconds of one core, half a million bicubic facets.
-const MOST_WORK: f64 = 5e9;
-/// Work for a model of any size, and what each of its faces adds: three seconds, and a hundred facets.
-const WORK_OF_ANY: f64 = 1e9;
+/// Most work for one model, in control points that are visited: some eight seconds of one core, half a million bicubic facets.
+const MOST_WORK: f64 = 2.5e9;
+/// Work for a model of any size, and what each of its faces adds: one and a half seconds, and a hundred facets.
+const WORK_OF_ANY: f64 = 5e8;
 /// See [`WORK_OF_ANY`].
-const WORK_OF_FACE: f64 = 1e6;
+const WORK_OF_FACE: f64 = 5e5;
 /// What an evaluation takes besides its control points, in as many of them: spans and basis functions.
 const BESIDES: f64 = 20.0;
 /// Facets of a face in the first look.

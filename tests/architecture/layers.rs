@@ -461,6 +461,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "tessellate",
         &[
             "nodes",
+            "triangle_frame",
+            "foot_search",
             "sample",
             "settings",
             "second_derivatives",

@@ -2,7 +2,7 @@
 
 use crate::math::{Point, Uv};
 use crate::nurbs::Surface;
-use crate::tessellate::sample;
+use crate::tessellate::foot_search;
 
 /// Seeds a knot interval along each parameter, and fewest and most along the whole.
 const SEEDS: usize = 6;
@@ -71,7 +71,7 @@ impl<'s> Projector<'s> {
         }
         // The nearest seed may lie on a local minimum of its own, as beside a seam.
         let feet = best.map(|(_, start)| {
-            let uv = sample::project(self.spline, p, start);
+            let uv = foot_search::project(self.spline, p, start);
             (uv, (self.spline.evaluate(uv) - p).length())
         });
         let poles = self.poles.iter().map(|&(uv, q)| (uv, (q - p).length()));
