@@ -300,12 +300,14 @@ impl Tree<'_, '_> {
     /// Returns the tightest tolerance, mm, at the cell's corners and middle if the nine samples are within `slack` times as much and, at
     /// slack 1, the normals at the corners within the angle; else `None`. Proves nothing.
     fn sampled_fit(&self, cell: Cell, candidate: &CandidateFacet, slack: f64) -> Option<f64> {
-        let xi = cell
-            .corners()
-            .iter()
-            .fold(self.surface.tolerance(cell.center()), |x, &c| x.min(self.surface.tolerance(c)));
-        if candidate.sag[0].max(candidate.sag[1]) > xi * slack {
-            return None;
+        let sag = candidate.sag[0].max(candidate.sag[1]);
+        let mut xi = f64::INFINITY;
+        // The first place that is too tight decides: half of all cells end there, and curvatures take a tenth of the time.
+        for place in [cell.center()].into_iter().chain(cell.corners()) {
+            xi = xi.min(self.surface.tolerance(place));
+            if sag > xi * slack {
+                return None;
+            }
         }
         // Once tolerances have grown, angles do not matter any more.
         if let Some(max) = self.max_angle.filter(|_| slack == 1.0) {
