@@ -216,7 +216,7 @@ pub(super) struct Refinement<'s, 'a> {
     pub(super) surface: &'s FaceSurface<'a>,
     pub(super) nodes: Nodes,
     /// From parameters to coordinates of the triangulation.
-    scale: Uv,
+    pub(super) scale: Uv,
     pub(super) taken: &'s TakenChords,
     cdt: Cdt,
     /// How often each edge of the triangulation that lies on the outline turns outside into inside; imprinted lines count twice.
@@ -231,23 +231,35 @@ impl Refinement<'_, '_> {
     /// Inserts the nodes of segments and imprinted lines, or all nodes beside more than [`LONG_OUTLINE`] segments; adds to `handles` an
     /// entry for every node, `None` for those left out. Returns `None` where a node has no usable parameters.
     fn insert_nodes(&mut self, segments: &[[u32; 2]], imprinted: &[[u32; 2]]) -> Option<()> {
-        // Nodes inside of whole cells have no part in the transition, but each long constraint clears all that it
-        // crosses.
+        // Nodes inside of whole cells have no part in the transition, but each long constraint clears all that it crosses.
         let mut used = vec![segments.len() > LONG_OUTLINE; self.nodes.len() as usize];
         segments.iter().chain(imprinted).flatten().for_each(|&n| used[n as usize] = true);
-        for (n, used) in (0..).zip(used) {
-            let handle = if used { Some(self.insert_node(n)?) } else { None };
-            self.handles.push(handle);
+        let order: Vec<u32> = (0..self.nodes.len()).filter(|&n| used[n as usize]).collect();
+        let mut ranks: Vec<u32> = (0..order.len() as u32).collect();
+        // One after the other along a border each vertex lies outside of all before it and turns over edges all along it, which takes the
+        // square of a long one: a few far apart go first, then those between them, each beside one that is there.
+        let is_long = order.len() > LONG_OUTLINE;
+        if is_long {
+            ranks.sort_unstable_by_key(|rank| rank.reverse_bits());
+        }
+        self.handles = vec![None; used.len()];
+        for rank in ranks {
+            let [n, coarser] = [rank, rank & rank.saturating_sub(1)].map(|r| order[r as usize] as usize);
+            self.handles[n] = Some(self.insert_node(n as u32, self.handles[coarser].filter(|_| is_long))?);
         }
         Some(())
     }
 
     /// Inserts a node at its scaled parameters and returns its vertex, which is the older one where the place is taken. The caller
-    /// keeps it in `handles`. `None` where scaled parameters are not finite or 1e30 and more; those below 1e-30 become zero.
-    pub(super) fn insert_node(&mut self, n: u32) -> Option<FixedVertexHandle> {
+    /// keeps it in `handles`. `None` where scaled parameters are not finite or 1e30 and more; those below 1e-30 become zero. The search for
+    /// the place begins at `near`, without it at the vertex that came last.
+    pub(super) fn insert_node(&mut self, n: u32, near: Option<FixedVertexHandle>) -> Option<FixedVertexHandle> {
         let at = self.scaled(self.nodes[n].uv)?;
         let before = self.cdt.num_vertices();
-        let handle = self.cdt.insert(Vertex { at, node: n }).ok()?;
+        let vertex = Vertex { at, node: n };
+        let inserted =
+            if let Some(near) = near { self.cdt.insert_with_hint(vertex, near) } else { self.cdt.insert(vertex) };
+        let handle = inserted.ok()?;
         // Two nodes in one place of the parameter plane, as where a trim touches itself.
         if self.cdt.num_vertices() == before {
             // The place was taken: its first owner keeps it.
@@ -268,8 +280,8 @@ impl Refinement<'_, '_> {
     }
 
     /// Whether a point may be inserted: inside the hull, apart from the vertices around it by more than rounding, and on no border or
-    /// imprinted line; creases may be split. False too for parameters that [`Self::scaled`] refuses.
-    pub(super) fn can_insert(&self, uv: Uv) -> bool {
+    /// imprinted line; creases may be split. False too for parameters that [`Self::scaled`] refuses. The search for it begins at `near`.
+    pub(super) fn can_insert(&self, uv: Uv, near: FixedVertexHandle) -> bool {
         use spade::PositionInTriangulation as At;
         // Between corners one rounding apart stood facets without width. Near zero a coordinate's own size says nothing of its rounding.
         let size = self.surface.extent() * self.scale;
@@ -277,7 +289,7 @@ impl Refinement<'_, '_> {
             (p.x - v.x).abs() > SAME_COORDINATE * p.x.abs().max(size.x)
                 || (p.y - v.y).abs() > SAME_COORDINATE * p.y.abs().max(size.y)
         };
-        self.scaled(uv).is_some_and(|p| match self.cdt.locate(p) {
+        self.scaled(uv).is_some_and(|p| match self.cdt.locate_with_hint(p, near) {
             At::OnFace(f) => self.cdt.face(f).vertices().iter().all(|v| apart(p, v.position())),
             At::OnEdge(e) => {
                 let e = self.cdt.directed_edge(e);
@@ -306,7 +318,6 @@ impl Refinement<'_, '_> {
     /// counted, where both nodes stand in one place; `false` where it would cross another or a node was not inserted.
     fn constrain(&mut self, a: u32, b: u32) -> bool {
         let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else { return false };
-        // Both nodes stand in one place; a constraint of no length holds as it is.
         if from == to {
             return true;
         }
