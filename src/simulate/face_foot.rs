@@ -15,6 +15,9 @@ const MOST_STEPS: usize = 100;
 /// apart, where solving would lose all digits.
 const SINGULAR: f64 = 1e-14;
 
+/// Steps shorter than this share of the coordinates are rounding, some fifty of it: over a plane they went to and fro until the last.
+const STILL: f64 = 1e-14;
+
 /// A point of a face.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NearestOnFace {
@@ -71,7 +74,9 @@ pub(crate) fn foot_from(
         let (g, h) = (d.du.dot(r), d.dv.dot(r));
         // A foot beyond the domain is held at its border, where the next step may still move along.
         let next = s.clamp(uv + Uv::new(c * g - b * h, a * h - b * g) / det);
-        if next == uv {
+        let step = next - uv;
+        let rounding = STILL * (p.abs() + d.point.abs() + (d.du * uv.x).abs() + (d.dv * uv.y).abs()).max_element();
+        if (d.du * step.x + d.dv * step.y).abs().max_element() <= rounding {
             break;
         }
         uv = next;
