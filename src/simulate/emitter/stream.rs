@@ -229,8 +229,8 @@ impl Stream {
         let [x, y] = [&self.numbers[along], &self.numbers[along + 1]];
         self.order.clear();
         self.order.extend(0..self.rays);
-        // Rays without a direction or place of their own, as those of a list, have nothing to be ordered by. Stable, as the counting sort of a
-        // chunk is.
+        // Rays without a direction or place of their own, as those of a list, have nothing to be ordered by. Stable, as the counting sort
+        // of a chunk is.
         if self.rays > 1 && self.pairs[along / 2] {
             self.order.sort_by_key(|&k| z_order_cell(x[k as usize], y[k as usize]));
         }

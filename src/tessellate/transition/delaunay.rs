@@ -300,8 +300,7 @@ impl Refinement<'_, '_> {
         })
     }
 
-    /// Makes segments of the border constraints, each counted in `border` for the flood fill. Returns those that cannot be made, and the
-    /// constraints that they cross.
+    /// Makes constraints of border segments, counted in `border` for the flood fill; returns those that fail, and what they cross.
     fn constrain_border(&mut self, segments: &[[u32; 2]]) -> [Vec<[u32; 2]>; 2] {
         let mut conflicts = Vec::new();
         let mut crossed = Vec::new();
