@@ -206,12 +206,14 @@ impl<'m> Octree<'m> {
             + buffers.iter().map(LightBuffer::bytes).sum::<usize>()
     }
 
-    /// Finds the nearest hit of each ray, `ROOM` of them at a time, with its normals, and overwrites `hits`.
-    fn intersect_batches<const ROOM: usize>(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
-        let mut found = [None; ROOM];
+    /// Finds the nearest hit of each ray, as many at a time as there is `room`, with its normals, and overwrites `hits`.
+    // Not made twice: the description of a hit is inlined in it, which a tenth of all tracing hangs on.
+    #[inline(never)]
+    fn intersect_in(&self, room: &mut [Option<FacetHit>], rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         let light_buffers = self.light_buffers.read().unwrap_or_else(PoisonError::into_inner);
-        for (rays, hits) in rays.chunks(ROOM).zip(hits.chunks_mut(ROOM)) {
-            let found = &mut found[..rays.len()];
+        let size = room.len();
+        for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
+            let found = &mut room[..rays.len()];
             self.walk(&light_buffers, rays, found, cost);
             for (i, hit) in hits.iter_mut().enumerate() {
                 self.prefetch_description(found, i);
@@ -239,9 +241,9 @@ impl Intersector for Octree<'_> {
     fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
         // Emptying room for a whole batch takes as long as a few rays, which are often all that come to a part in its place.
         if rays.len() <= SMALL_BATCH {
-            self.intersect_batches::<SMALL_BATCH>(rays, hits, cost);
+            self.intersect_in(&mut [None; SMALL_BATCH], rays, hits, cost);
         } else {
-            self.intersect_batches::<BATCH>(rays, hits, cost);
+            self.intersect_in(&mut [None; BATCH], rays, hits, cost);
         }
     }
 
