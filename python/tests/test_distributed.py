@@ -31,7 +31,7 @@ def test_the_digest_is_that_of_one_machine() -> None:
         run = trace(scene, client, shards=5, rays=40_000, progress=False)
         assert run.digest == expected.digest
         assert run["focus"].figures == expected["focus"].figures
-        with pytest.raises(ValueError, match="at least one"):
+        with pytest.raises(ValueError, match="at least 1"):
             trace(scene, client, shards=0)
         with pytest.raises(ValueError, match="one machine"):
             trace(scene, client, until="1%@focus")
@@ -43,6 +43,7 @@ def test_wrong_arguments_are_told_what_to_do() -> None:
     scene: Any = lp.Scene.from_toml(SCENE)
     with distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None) as workers:
         with distributed.Client(workers) as client:
+            wrong: dict[str, Any]
             for wrong in ({"shards": "4"}, {"shards": True}, {"retries": "a"}):
                 with pytest.raises(TypeError, match=next(iter(wrong))):
                     trace(scene, client, **wrong)

@@ -257,7 +257,7 @@ def test_a_verdict_needs_angles_of_type_a(tmp_path: pathlib.Path) -> None:
         scene.trace(progress=False).assess(next(iter(lp.regulations())), "b")
 
 
-def beam(rays: int = 3000) -> lp.Scene:
+def lens_in_beam(rays: int = 3000) -> lp.Scene:
     """A beam of 5 mm through the plano-convex lens."""
     scene = lp.Scene(ROOT / "fixtures" / "step" / "lens_planoconvex_nurbs.stp", rays=rays)
     scene["*"] = lp.glass(1.5)
@@ -267,7 +267,7 @@ def beam(rays: int = 3000) -> lp.Scene:
 
 @pytest.mark.parametrize("channels", [{"channels": "xyz"}, {"channels": "photometric"}, {"bins_nm": [400, 500, 700]}])
 def test_further_channels_leave_a_run_readable(channels: Any) -> None:
-    scene = beam()
+    scene = lens_in_beam()
     scene.add(lp.plane("p", at=(0, 0, 100), cells=(4, 3), **channels))
     run = scene.trace(progress=False)
     assert len(run) == 1 and "p" in repr(run["p"]) and len(run.to_frame()) > 0
@@ -286,11 +286,11 @@ def test_refused_faces_are_told(tmp_path: pathlib.Path) -> None:
     with pytest.warns(UserWarning, match="of 3 faces were refused"):
         run = scene.trace(progress=False)
     assert "were refused" in run.notes[0]
-    assert not beam().trace(progress=False).notes
+    assert not lens_in_beam().trace(progress=False).notes
 
 
 def test_light_starts_on_faces_and_faces_are_selected_by_their_solid() -> None:
-    scene = beam()
+    scene = lens_in_beam()
     solid = lp.select(solid="*")
     scene.add(lp.cone(on=solid, half_angle_deg=20), lp.lambertian(on={"part": "*"}))
     assert [source.get("on") for source in scene.tables["source"][1:]] == [{"solid": "*"}, {"part": "*"}]
