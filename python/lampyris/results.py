@@ -66,7 +66,12 @@ class Receiver:
 
     @cached_property
     def _layers(self) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-        return self._results.layers(self._index)
+        layers = self._results.layers(self._index)
+        # One array for all who ask: what one writes the others would read.
+        for layer in layers:
+            if layer is not None:
+                layer.setflags(write=False)
+        return layers
 
     @property
     def values(self) -> FloatArray:

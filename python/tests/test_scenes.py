@@ -273,6 +273,8 @@ def test_further_channels_leave_a_run_readable(channels: Any) -> None:
     assert len(run) == 1 and "p" in repr(run["p"]) and len(run.to_frame()) > 0
     receiver = run["p"]
     assert list(receiver.channels) == list(receiver.channel_totals) and receiver.channels
+    with pytest.raises(ValueError, match="read-only"):
+        receiver.values[:] = 0.0
     for name, (cells, errors) in receiver.channels.items():
         assert cells.shape == errors.shape == (3, 4) and receiver.channel_totals[name].statistical is not None
 
