@@ -31,6 +31,11 @@ class Figure:
     #: ``statistics`` or ``geometry``: the larger of the two.
     limited_by: str
 
+    @classmethod
+    def from_document(cls, figure: dict[str, Any]) -> Figure:
+        """From its object in ``results.json``."""
+        return cls(*(figure[key] for key in ("value", "unit", "statistical", "geometric", "limited_by")))
+
     def __str__(self) -> str:
         geometric = "not measured" if self.geometric is None else f"{self.geometric:.2g}"
         return f"{self.value:.6g} ± {self.statistical:.2g} (rays) ± {geometric} (facets) {self.unit}".strip()
@@ -54,14 +59,11 @@ class Receiver:
         self.unit: str = document["unit"]
         #: ``power``, ``max``, ``rms_1``, ``rms_2``, ``centroid_1``, ``centroid_2``.
         self.figures: dict[str, Figure] = {
-            name: Figure(f["value"], f["unit"], f["statistical"], f["geometric"], f["limited_by"])
-            for name, f in document["figures"].items()
-            if isinstance(f, dict)
+            name: Figure.from_document(f) for name, f in document["figures"].items() if isinstance(f, dict)
         }
         #: Totals of the further channels by name.
         self.channel_totals: dict[str, Figure] = {
-            f["name"]: Figure(f["value"], f["unit"], f["statistical"], f["geometric"], f["limited_by"])
-            for f in document["figures"].get("channels") or ()
+            f["name"]: Figure.from_document(f) for f in document["figures"].get("channels") or ()
         }
 
     @cached_property

@@ -182,7 +182,7 @@ impl Judgement {
             reading.statistical = reading.statistical.max(noise.reach(SIGMAS, 1.0) / SIGMAS);
             read.push([reading.value, reading.statistical]);
             // The best of those of which any is enough, the worst of those that must all hold.
-            let decides = |d: &Decisive| (margin > d.margin) == requirement.any && margin != d.margin;
+            let decides = |d: &Decisive| (margin > d.margin) == any && margin != d.margin;
             let this = Decisive {
                 reading,
                 direction: comparison.direction,
@@ -201,14 +201,14 @@ impl Judgement {
         }
         // The brightest of many readings is too bright by their noise, which its own error does not hold.
         if let Some(brightest) =
-            decisive.as_mut().filter(|_| requirement.any && requirement.comparisons.iter().all(|c| c.at_least))
+            decisive.as_mut().filter(|_| any && requirement.comparisons.iter().all(|c| c.at_least))
         {
             brightest.reading.statistical = error_of_maximum(read.into_iter());
         }
         let all = requirement.comparisons.len();
         // A direction outside the far field may hide anything: only what one reading alone decides is still known.
         let complete = requirement.unseen == 0 && all > 0;
-        let (alone, together) = if requirement.any {
+        let (alone, together) = if any {
             ((passing > 0).then_some(Verdict::Pass), (failing == all && complete).then_some(Verdict::Fail))
         } else {
             ((failing > 0).then_some(Verdict::Fail), (passing == all && complete).then_some(Verdict::Pass))

@@ -134,7 +134,8 @@ impl Photometer<'_> {
         let mut most = [0.0f64; 2];
         for (direction, weights) in &sightings {
             let value = weights.as_ref().map_or(0.0, |weights| self.map.read(weights).value);
-            most[usize::from(is_rim(direction))] = most[usize::from(is_rim(direction))].max(value);
+            let most = &mut most[usize::from(is_rim(direction))];
+            *most = most.max(value);
         }
         let [inside, rim] = most;
         (sightings, rim <= RIM_SHARE * inside)

@@ -64,12 +64,13 @@ pub(crate) fn write(
         let data = Data3 { size, results: receiver.cells.clone(), rays };
         write_data3(&folder.join(format!("{stem}.data3")), &data)?;
     }
-    let candela = match receiver.unit {
-        "cd" => Some((grid, receiver.power)),
-        _ => photometric_grid(receiver).zip(receiver.photometric().map(|c| c.total)),
-    };
     // Both formats hold whole distributions alone, and those of half a sphere.
-    let photometry = candela.and_then(|(grid, lumens)| photometry(receiver, &with_even_poles(&grid), lumens));
+    let photometry = match receiver.unit {
+        "cd" => photometry(receiver, &pictured, receiver.power),
+        _ => photometric_grid(receiver)
+            .zip(receiver.photometric())
+            .and_then(|(grid, channel)| photometry(receiver, &with_even_poles(&grid), channel.total)),
+    };
     if let Some(photometry) = photometry {
         names.push(format!("{stem}.ies"));
         write_ies(&folder.join(format!("{stem}.ies")), &photometry)?;
