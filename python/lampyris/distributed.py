@@ -10,11 +10,17 @@ import hashlib
 import json
 import os
 import pathlib
+import signal
 import tempfile
 import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import reduce
 from typing import Any
 
-from .part import Part
+from .part import Interrupted, Part
+from .progress import ProgressCallback, callback
 from .results import Run
 from .scene import MOST_PARTS, Scene, named_files
 from .settings import Settings, whole_number
@@ -23,6 +29,8 @@ from .settings import Settings, whole_number
 PARTS_PER_THREAD = 4
 #: Most times that a part is traced anew: what fails as often fails everywhere.
 MOST_RETRIES = 1000
+#: Seconds in which what is done is gathered after Ctrl-C whatever else is pressed; a further Ctrl-C then gives it up.
+GATHERING_SECONDS = 10.0
 
 #: Scenes of this process by the hash of their bundle, with the folder of their files.
 _scenes: dict[str, tuple[Scene, tempfile.TemporaryDirectory[str]]] = {}
@@ -36,15 +44,18 @@ class Bundle:
     def __init__(self, scene: Scene, settings: Settings) -> None:
         tables = copy.deepcopy(scene._tables)
         self.files: dict[str, bytes] = {}
+        names: dict[str, str] = {}
         for entry in named_files(tables):
             path = pathlib.Path(scene._folder, entry["file"])
-            data = path.read_bytes()
-            name = f"{hashlib.sha256(data).hexdigest()[:16]}-{path.name}"
-            self.files[name] = data
+            # Whatever is one file here is one file there, under its own name.
+            name = names.setdefault(entry["file"], f"{len(names)}/{path.name}")
+            if name not in self.files:
+                self.files[name] = path.read_bytes()
             entry["file"] = name
         self.tables: dict[str, Any] = tables
         self.settings = settings
-        words = json.dumps([tables, sorted(self.files), settings], sort_keys=True, default=str)
+        hashes = {name: hashlib.sha256(data).hexdigest() for name, data in self.files.items()}
+        words = json.dumps([tables, hashes, settings], sort_keys=True, default=str)
         self.key = hashlib.sha256(words.encode()).hexdigest()[:32]
 
     def scene(self) -> Scene:
@@ -54,7 +65,9 @@ class Bundle:
             _scenes.clear()
             folder = tempfile.TemporaryDirectory(prefix="lampyris-scene-")
             for name, data in self.files.items():
-                pathlib.Path(folder.name, name).write_bytes(data)
+                file = pathlib.Path(folder.name, name)
+                file.parent.mkdir()
+                file.write_bytes(data)
             scene = Scene()
             scene._folder = folder.name
             scene._tables = self.tables
@@ -73,14 +86,96 @@ def _received(bundle: Bundle) -> Bundle:
     return bundle
 
 
-def _trace(bundle: Bundle, index: int, count: int) -> bytes:
-    return _prepared_scene(bundle).trace_part(index, count, **bundle.settings).to_bytes()
+def _trace(bundle: Bundle, index: int, count: int, elsewhere: list[int]) -> bytes:
+    return _prepared_scene(bundle)._trace_part((index, count), elsewhere, False, bundle.settings).to_bytes()
 
 
 def _merge(bundle: Bundle, first: bytes, second: bytes) -> bytes:
     scene = _prepared_scene(bundle)
     a, b = (scene.read_part(data, **bundle.settings) for data in (first, second))
     return a.merged(b).to_bytes()
+
+
+class _Tasks:
+    """The tasks of a run: its parts, and sums of two whenever two are done, so that a worker holds little at a time."""
+
+    def __init__(self, client: Any, bundle: Bundle, retries: int) -> None:
+        self._client = client
+        self._key = f"lampyris-{bundle.key}-{os.urandom(4).hex()}"
+        self._retries = retries
+        # A task, not scattered data: where the workers that hold it die, it is made anew.
+        self._bundle = self._submit("scene", _received, bundle)
+        #: What is in the making or done and in no finished sum, with the two of which it is the sum.
+        self._open: dict[Any, tuple[Any, ...]] = {}
+
+    def _submit(self, name: str, function: Any, *given: Any) -> Any:
+        return self._client.submit(function, *given, key=f"{self._key}-{name}", retries=self._retries, pure=False)
+
+    def submit_parts(self, parts: list[tuple[int, list[int]]], count: int) -> None:
+        """Asks for these parts of ``count``, but for the replicates of each that are done elsewhere."""
+        for index, elsewhere in parts:
+            self._open[self._submit(f"trace-{index}", _trace, self._bundle, index, count, elsewhere)] = ()
+
+    def sum(self, tell: ProgressCallback | None, rays: int) -> bytes:
+        """The sum of all parts; ``tell`` is told of these rays as they are done."""
+        from distributed import as_completed
+
+        parts, traced, sums, single = len(self._open), 0, 0, None
+        done = as_completed(list(self._open))
+        for future in done:
+            if future.status in ("error", "cancelled"):
+                future.result()
+            traced += not self._open[future]
+            # A sum is there: what it is of may go.
+            self._open[future] = ()
+            if tell is not None:
+                tell("tracing", rays * traced // parts, rays, [])
+            if single is None:
+                single = future
+                continue
+            both = (single, future)
+            merged = self._submit(f"merge-{sums}", _merge, self._bundle, *both)
+            self._open[merged] = both
+            for part in both:
+                del self._open[part]
+            single, sums = None, sums + 1
+            done.add(merged)
+        return bytes(self._client.gather(single))
+
+    def finished(self) -> list[bytes]:
+        """Whatever parts and sums are done; nothing more is traced."""
+        kept: list[Any] = []
+
+        def keep(future: Any) -> None:
+            if future.status == "finished":
+                kept.append(future)
+            else:
+                for part in self._open.get(future, ()):
+                    keep(part)
+
+        for future in self._open:
+            keep(future)
+        self._client.cancel([future for future in self._open if future.status != "finished"])
+        try:
+            return list(self._client.gather(kept, errors="skip"))
+        except OSError:
+            # The scheduler is gone, and with it all that workers held.
+            return []
+
+
+@contextmanager
+def _unhurried() -> Iterator[None]:
+    """Does not hear Ctrl-C for some seconds: pressed again it must not cost what it is to keep."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    end = time.monotonic() + GATHERING_SECONDS
+    signal.signal(signal.SIGINT, lambda number, frame: before(number, frame) if time.monotonic() > end else None)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def trace(
@@ -90,14 +185,17 @@ def trace(
     *,
     retries: int = 3,
     threads: int = 1,
-    progress: bool = True,
+    resume: bool | Part = False,
+    progress: bool | ProgressCallback = True,
     **settings: Any,
 ) -> Run:
     """Traces a scene on the workers of a ``distributed.Client``; ``settings`` are those of :meth:`Scene.trace` but ``until``.
 
     The run is divided into ``shards`` (four for each thread of the cluster), each a pure function of the scene, so that one whose
-    worker dies is traced elsewhere, ``retries`` times at most; the sums are added up as a tree on the workers. Every shard traces on
-    ``threads``. The digest is that of a single machine.
+    worker dies is traced elsewhere, ``retries`` times at most; sums are added up on the workers. Every shard traces on
+    ``threads``. The digest is that of a single machine. Ctrl-C, or whatever else ends the call, leaves the sum of all shards that are done
+    in ``scene.interrupted``; the same call with ``resume=True`` goes on from it, here or by :meth:`Scene.trace`, and :class:`Interrupted`
+    holds it.
     """
     from distributed import Client
 
@@ -110,34 +208,44 @@ def trace(
     shards = None if shards is None else whole_number("shards", shards, 1, MOST_PARTS)
     retries = whole_number("retries", retries, 0, MOST_RETRIES)
     threads = whole_number("threads", threads, 1, MOST_PARTS)
-    if "until" in settings or "resume" in settings:
-        raise ValueError("until and resume are for one machine: give the number of rays")
+    if "until" in settings:
+        raise ValueError("until is for one machine: give the number of rays")
+    before = scene._part_to_resume(resume, settings.get("rays"))
+    if before is not None:
+        settings["rays"] = before._core.run_rays
     # The pilot runs once, here; what it chose is asked of every worker.
-    local = Bundle(scene, settings).scene()
-    summary = local.prepare(progress=progress, **settings)
+    summary = scene.prepare(progress=progress, **settings)
+    if before is not None:
+        # Refused here if it is of another run; and of this one from now on, whatever its number of rays was found by.
+        before = scene.read_part(before.to_bytes(), **settings)
     if not any(settings.get(k) for k in ("tolerance", "accuracy_deg", "parts", "faces", "roles")) and summary["chosen"]:
         chosen = {k: summary[k] for k in ("intersector", "normals")}
         asked: Settings = {**settings, **chosen, "tolerance": tuple(summary["tolerance_mm"])}
     else:
         asked = dict(settings)
-    bundle = Bundle(scene, {**asked, "threads": threads})
     count = shards or PARTS_PER_THREAD * max(1, sum(client.nthreads().values()))
-    key = f"lampyris-{bundle.key}-{os.urandom(4).hex()}"
-    # A task, not scattered data: where the workers that hold it die, it is made anew.
-    sent = client.submit(_received, bundle, key=f"{key}-scene", retries=retries, pure=False)
-    parts = [
-        client.submit(_trace, sent, k, count, key=f"{key}-trace-{k}", retries=retries, pure=False)
-        for k in range(count)
-    ]
-    level = 0
-    while len(parts) > 1:
-        pairs = range(0, len(parts) - 1, 2)
-        sums = [
-            client.submit(_merge, sent, parts[k], parts[k + 1], key=f"{key}-merge-{level}-{k}", retries=retries, pure=False)
-            for k in pairs
-        ]
-        parts = sums + parts[2 * len(sums) :]
-        level += 1
-    data = client.gather(parts[0])
-    whole: Part = local.read_part(data, **settings)
-    return local.trace(resume=whole, progress=progress, **settings)
+    wanted = [(index, []) for index in range(count)] if before is None else before._core.undone(count)
+    rays = summary["rays"] - (0 if before is None else before.rays)
+    tasks = _Tasks(client, Bundle(scene, {**asked, "threads": threads}), retries)
+    tell, close = callback(progress)
+    try:
+        tasks.submit_parts(wanted, count)
+        parts = [tasks.sum(tell, rays)] if wanted else []
+    except BaseException as stopped:
+        with _unhurried():
+            _keep(scene, tasks.finished(), before, settings)
+        if isinstance(stopped, KeyboardInterrupt) and scene.interrupted is not None:
+            raise Interrupted(scene.interrupted) from None
+        raise
+    finally:
+        close()
+    with _unhurried():
+        _keep(scene, parts, before, settings)
+    return scene.trace(resume=True, progress=progress, **settings)
+
+
+def _keep(scene: Scene, parts: list[bytes], before: Part | None, settings: Settings) -> None:
+    """Gives the scene the sum of these parts and of what was done before; what it has stays where that is nothing."""
+    every = [scene.read_part(data, **settings) for data in parts] + ([] if before is None else [before])
+    if every:
+        scene.interrupted = reduce(Part.merged, every)

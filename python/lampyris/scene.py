@@ -215,12 +215,8 @@ class Scene:
             parts=parts, faces=faces, roles=roles, normals=normals, intersector=intersector,
         ))
         until = None if until is None else word("until", until)
-        part = self.interrupted if resume is True else resume
-        if part is None:
-            raise ValueError("resume=True: no trace of this scene was interrupted; leave it out, or give a part")
-        core = None if part is False else part_core(part, "resume")
-        if core is not None and rays is not None and until is None and core.run_rays != rays:
-            raise ValueError(f"resume: this part is of a run of {core.run_rays} rays, not {rays}; leave `rays` out to go on with it, or trace anew")
+        part = self._part_to_resume(resume, rays if until is None else None)
+        core = None if part is None else part._core
         prepared = self._prepare(settings, progress)
         tell, close = callback(progress)
         words = None
@@ -228,7 +224,7 @@ class Scene:
             if until is not None:
                 found, rest, stopped, words = prepared.trace_until(until, core, tell)
             else:
-                found, rest, stopped = prepared.trace(core, None, tell)
+                found, rest, stopped = prepared.trace(core, tell)
         finally:
             close()
         if rest is not None:
@@ -240,6 +236,19 @@ class Scene:
         for sentence in found.missing_faces():
             warnings.warn(sentence, stacklevel=2)
         return Run(found, None if words is None else json.loads(words))
+
+    def _part_to_resume(self, resume: bool | Part, rays: int | None) -> Part | None:
+        """What is to be gone on from: the part that was left for ``True``, none for ``False``; it must be of a run of so many rays."""
+        if resume is False:
+            return None
+        if resume is True:
+            if self.interrupted is None:
+                raise ValueError("resume=True: no trace of this scene was interrupted; leave it out, or give a part")
+            resume = self.interrupted
+        of = part_core(resume, "resume").run_rays
+        if rays is not None and of != rays:
+            raise ValueError(f"resume: this part is of a run of {of} rays, not {rays}; leave `rays` out to go on with it, or trace anew")
+        return resume
 
     def ends(self, *, progress: bool | ProgressCallback = True, **settings: Any) -> Ends:
         """Where every ray of the scene's lists ended: each is traced once, by itself, with its own power, as ``lampyris trace --ends`` does.
@@ -260,15 +269,19 @@ class Scene:
 
         Ctrl-C raises :class:`Interrupted` with what was done of the part.
         """
-        first, of = whole_number("index", index, 0, MOST_PARTS), whole_number("count", count, 1, MOST_PARTS)
+        place = (whole_number("index", index, 0, MOST_PARTS), whole_number("count", count, 1, MOST_PARTS))
+        return self._trace_part(place, [], progress, settings)
+
+    def _trace_part(
+        self, place: tuple[int, int], elsewhere: list[int], progress: bool | ProgressCallback, settings: Settings
+    ) -> Part:
+        """Traces a part, but for the replicates that are done elsewhere."""
         prepared = self._prepare(trace_settings(settings), progress)
         tell, close = callback(progress)
         try:
-            _, core, stopped = prepared.trace(None, (first, of), tell)
+            core, stopped = prepared.trace_part(*place, elsewhere, tell)
         finally:
             close()
-        if core is None:
-            raise _lampyris.Defect("a part was traced without sums; please report it")
         part = Part(core)
         _raise_stopped(stopped, part)
         return part

@@ -3,7 +3,7 @@
 use crate::background::locked;
 use crate::errors::Defect;
 use lampyris::pipeline::{PreparedScene, RunKeeper, TraceRequest};
-use lampyris::simulate::PartialRun;
+use lampyris::simulate::{PartialRun, shard_replicates};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -159,6 +159,19 @@ impl Part {
     #[getter]
     fn is_whole(&self) -> bool {
         self.run.is_whole()
+    }
+
+    /// Of the parts 0 to `count` - 1 of the run those that are not done: the index, and the replicates of it that are.
+    fn undone(&self, count: u32) -> Vec<(u32, Vec<u32>)> {
+        let parts = (0..count).map(|index| {
+            let range = shard_replicates(0..self.run.replicates, [index, count]);
+            let [first, end] = [range.start, range.end].map(|r| self.run.done.partition_point(|done| *done < r));
+            (index, range.len(), self.run.done[first..end].to_vec())
+        });
+        parts
+            .filter(|(_, replicates, done)| done.len() < *replicates)
+            .map(|(index, _, done)| (index, done))
+            .collect()
     }
 
     /// A hash of all that decides the bits of the run.

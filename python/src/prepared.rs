@@ -143,33 +143,23 @@ impl Prepared {
         Ok(Self { scene: Arc::new(scene), fingerprint, threads })
     }
 
-    /// Traces; gives results, or the part that was done when it was stopped or is one of several, and the exception that stopped it.
-    #[pyo3(signature = (resume = None, shard = None, progress = None, verify = false))]
+    /// Traces; gives results, or the part that was done when it was stopped, and the exception that stopped it.
+    #[pyo3(signature = (resume = None, progress = None, verify = false))]
     fn trace(
         &self,
         py: Python<'_>,
         resume: Option<&Part>,
-        shard: Option<[u32; 2]>,
         progress: Option<Py<PyAny>>,
         verify: bool,
     ) -> PyResult<Traced> {
         self.require_own(resume)?;
-        if let Some([index, count]) = shard.filter(|[index, count]| index >= count) {
-            return Err(PyValueError::new_err(format!(
-                "part {index} of {count}: the index counts from 0 and is less than the count, as in (0, 4) to (3, 4)"
-            )));
-        }
         let scene = resume.map_or(&self.scene, |part| &part.of).clone();
         let from = resume.map(|p| p.run.clone());
         let kept = Arc::new(KeptRun::default());
         let (for_work, keeper) = (scene.clone(), kept.clone());
         let work = move |monitor: &dyn pipeline::Monitor| {
             let keep = |run: &PartialRun| keeper.keep(run, &for_work);
-            let request = TraceRequest { verify_pruning: verify, from, shard, ..keeping(&keep) };
-            if shard.is_some() {
-                return Err(Box::new(for_work.trace_part(request, monitor)));
-            }
-            for_work.trace(request, monitor)
+            for_work.trace(TraceRequest { verify_pruning: verify, from, ..keeping(&keep) }, monitor)
         };
         match interruptible(py, progress.as_ref(), self.threads, move |s| work(s)) {
             Ok(Outcome { made: Ok(found), stopped: None }) => Ok((Some(Results::new(scene, found)), None, None)),
@@ -179,6 +169,35 @@ impl Prepared {
                 Ok((None, Some(part), Some(e)))
             }
         }
+    }
+
+    /// Traces part `index` (from 0) of `count` but for the replicates, rising, that are done elsewhere; gives what was done, and the
+    /// exception that stopped it.
+    #[pyo3(signature = (index, count, elsewhere = Vec::new(), progress = None))]
+    fn trace_part(
+        &self,
+        py: Python<'_>,
+        index: u32,
+        count: u32,
+        elsewhere: Vec<u32>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<(Part, Option<PyErr>)> {
+        if index >= count {
+            return Err(PyValueError::new_err(format!(
+                "part {index} of {count}: the index counts from 0 and is less than the count, as in (0, 4) to (3, 4)"
+            )));
+        }
+        let scene = self.scene.clone();
+        let work = move |monitor: &dyn pipeline::Monitor| {
+            let replicates = scene.replicate_range().end;
+            let from = PartialRun::done_elsewhere(&scene.bound, replicates, elsewhere.clone());
+            let request = TraceRequest { from: Some(from), shard: Some([index, count]), ..TraceRequest::default() };
+            let mut run = scene.trace_part(request, monitor);
+            run.leave_out(&elsewhere);
+            run
+        };
+        let Outcome { made, stopped } = interruptible(py, progress.as_ref(), self.threads, move |s| work(s))?;
+        Ok((self.part(made, self.scene.clone())?, stopped))
     }
 
     /// Traces as many rays as the error asks for, from where an earlier search was stopped; gives what was found of it as JSON too.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import threading
@@ -83,3 +84,62 @@ def test_a_killed_worker_costs_time_alone(number: int) -> None:
         killer.join()
         assert killed and killed[0] not in client.run(os.getpid).values()
     assert run.digest == expected.digest
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_ctrl_c_keeps_the_parts_that_are_done(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    from lampyris.distributed import _Tasks, trace
+
+    settings: dict[str, Any] = {"rays": 1_000_000, "intersector": "exact"}
+    scene = lp.Scene.from_toml(SCENE)
+    digest = scene.trace(progress=False, **settings).digest
+
+    gathered = _Tasks.finished
+
+    def pressed_again(tasks: _Tasks) -> list[bytes]:
+        # As people do.
+        signal.raise_signal(signal.SIGINT)
+        return gathered(tasks)
+
+    monkeypatch.setattr(_Tasks, "finished", pressed_again)
+
+    def tell(stage: str, done: int, total: int, messages: list[str]) -> None:
+        if stage == "tracing" and done > 0.4 * total and not pressed:
+            pressed.append(threading.Thread(target=_thread.interrupt_main))
+            pressed[0].start()
+
+    with cluster(number) as workers, distributed.Client(workers) as client:
+        parts: list[lp.Part] = []
+        for _ in range(2):
+            pressed: list[threading.Thread] = []
+            with pytest.raises(lp.Interrupted, match="resume=True") as stopped:
+                # The second time it goes on from the first, in other shards.
+                trace(scene, client, shards=13 + 4 * len(parts), resume=bool(parts), progress=tell, **settings)
+            pressed[0].join()
+            assert scene.interrupted is stopped.value.part and not scene.interrupted.is_whole
+            parts.append(scene.interrupted)
+        assert 0.3e6 < parts[0].rays < parts[1].rays
+        assert trace(scene, client, shards=5, resume=True, progress=False, **settings).digest == digest
+        assert scene.interrupted is None
+        other = lp.Scene.from_toml(SCENE)
+        with pytest.raises(ValueError, match="part of another run"):
+            trace(other, client, resume=parts[0], seed=5, progress=False, **settings)
+    assert other.trace(resume=other.read_part(parts[0].to_bytes(), **settings), progress=False, **settings).digest == digest
+    assert scene.trace(resume=parts[1], progress=False, **settings).digest == digest
+
+
+def test_a_part_that_fails_leaves_the_others() -> None:
+    from lampyris.distributed import trace
+
+    settings: dict[str, Any] = {"rays": 400_000, "intersector": "octree"}
+    scene = lp.Scene.from_toml(SCENE)
+
+    def stop(stage: str, done: int, total: int, messages: list[str]) -> None:
+        if stage == "tracing" and done > 0.5 * total:
+            raise RuntimeError("enough")
+
+    with cluster(1) as workers, distributed.Client(workers) as client:
+        with pytest.raises(RuntimeError, match="enough"):
+            trace(scene, client, shards=8, progress=stop, **settings)
+    assert scene.interrupted is not None and scene.interrupted.rays >= 200_000
+    assert scene.trace(resume=True, progress=False, **settings).digest == scene.trace(progress=False, **settings).digest

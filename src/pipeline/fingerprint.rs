@@ -4,14 +4,17 @@ use super::cache::PROGRAM;
 use super::error::Error;
 use super::intersectors::IntersectorChoice;
 use super::loading::LoadedModel;
-use crate::formats::open_file;
+use crate::formats::{lower_extension, open_file};
 use crate::simulate::scene::Origin;
 use crate::simulate::{BoundScene, Fingerprint, FingerprintHasher, RunSettings, Scene, grows};
 use crate::tessellate;
+use std::collections::HashMap;
 use std::fmt::{self, Write};
+use std::path::Path;
 
 /// Hashes all that decides the bits of a run of these settings: program, scene, its model and other files, facets, intersector, settings;
-/// of a run that grows not the number of rays. A model from files counts by their bytes as they were read, one from memory by its values.
+/// of a run that grows not the number of rays. A model from files counts by their bytes as they were read, one from memory by its values;
+/// other files by their bytes, and none by its path.
 ///
 /// # Errors
 /// When a file of the scene cannot be read.
@@ -39,7 +42,7 @@ pub(super) fn run_fingerprint(
     let mut hasher = FingerprintHasher::default();
     hasher.add(words.as_bytes());
     // Every value, not the text: a scene that was made or changed by a program has none, or that of another.
-    hasher.add(format!("{:?}", Scene { origin: Origin::default(), ..Scene::clone(scene) }).as_bytes());
+    hasher.add(format!("{:?}", without_paths(scene)).as_bytes());
     if loaded.is_from_files(scene) {
         loaded.reports.iter().for_each(|report| hasher.add(&report.hash.to_le_bytes()));
     } else {
@@ -56,6 +59,25 @@ pub(super) fn run_fingerprint(
         read().map_err(|e| Error::input(format!("{}: {e}", path.display())))?;
     }
     Ok(hasher.finish())
+}
+
+/// The scene with nothing of the paths of its files but what decides how they are read: which of them are one file, and of sources the
+/// extension. A copy of it in another folder, or on another machine, is the same scene.
+fn without_paths(scene: &Scene) -> Scene {
+    let mut bare = Scene { origin: Origin::default(), ..Scene::clone(scene) };
+    let mut numbers = HashMap::new();
+    let mut number = |path: &str| {
+        let next = numbers.len();
+        *numbers.entry(path.to_owned()).or_insert(next)
+    };
+    bare.models.iter_mut().for_each(|model| model.file = number(&model.file).to_string());
+    for file in bare.sources.iter_mut().filter_map(|source| source.file.as_mut()) {
+        *file = format!("{}.{}", number(file), lower_extension(Path::new(file)));
+    }
+    for file in bare.media.iter_mut().filter_map(|medium| medium.file.as_mut()) {
+        *file = number(file).to_string();
+    }
+    bare
 }
 
 /// Hashes what is written to it, each piece by itself.

@@ -39,6 +39,17 @@ impl PartialRun {
         Self { replicates, tallies: Tallies::new(bound), ..Self::default() }
     }
 
+    /// Makes a part without sums that has these replicates, rising, as done: what goes on from it leaves them to another part, and
+    /// [`Self::leave_out`] then takes them from it.
+    pub fn done_elsewhere(bound: &BoundScene, replicates: u32, done: Vec<u32>) -> Self {
+        Self { done, ..Self::empty(bound, replicates) }
+    }
+
+    /// Counts these replicates, rising, as not done; their sums must be none of this part's.
+    pub fn leave_out(&mut self, elsewhere: &[u32]) {
+        self.done.retain(|replicate| elsewhere.binary_search(replicate).is_err());
+    }
+
     /// Adds a whole replicate that is not in it yet, and empties its `tally`.
     pub(crate) fn take(&mut self, replicate: u32, tally: &mut ReplicateTally, bound: &BoundScene) {
         // In order, so that looking for a replicate is a search by halves.

@@ -96,7 +96,7 @@ pub fn trace(
 }
 
 /// Returns the replicates of the `shard`-th, from 0, of `shards`; empty for one too many.
-fn shard_replicates(all: Range<u32>, [shard, shards]: [u32; 2]) -> Range<u32> {
+pub fn shard_replicates(all: Range<u32>, [shard, shards]: [u32; 2]) -> Range<u32> {
     let count = u64::from(all.end.saturating_sub(all.start));
     let first = |k: u32| all.start + (count * u64::from(k) / u64::from(shards.max(1))).min(count) as u32;
     first(shard)..first(shard.saturating_add(1))

@@ -139,6 +139,36 @@ fn parts_of_other_scenes_and_models_are_told_apart_without_text() {
     assert_eq!(first, of(&without_text, &in_memory));
 }
 
+/// Parts that were traced from copies of the files, as on another machine, belong to the run: files count by what they hold.
+#[test]
+fn copies_of_the_files_make_the_same_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/step/lens_planoconvex_nurbs.stp");
+    let rays = "x,y,z,dx,dy,dz,power\n0,0,-9,0,0,1,1\n";
+    let fingerprint = |files: [&str; 3], rays: &str| {
+        let [first, second, list] = files;
+        for file in [first, second] {
+            std::fs::create_dir_all(folder.path().join(file).parent().unwrap()).unwrap();
+            std::fs::copy(&lens, folder.path().join(file)).unwrap();
+        }
+        std::fs::write(folder.path().join(list), rays).unwrap();
+        let text = format!(
+            "[run]\nrays = 1000\n[accuracy]\ntolerance_mm = 0.2\n[[model]]\nfile = '{first}'\n[[model]]\nfile = '{second}'\n\
+            placement = {{ at = [0, 0, 50] }}\n[[source]]\nkind = 'rays'\nfile = '{list}'\n[[receiver]]\nname = 'wall'\n\
+            kind = 'plane'\nat = [0, 0, 99]\nnormal = [0, 0, 1]\nsize = [9, 9]\ncells = [2, 2]\n"
+        );
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, text).unwrap();
+        let (scene, loaded) = read_scene(&file, &Silent).unwrap();
+        PreparedScene::new(SceneJob::new(scene, loaded), &Silent).unwrap().fingerprint().unwrap()
+    };
+    let here = fingerprint(["lens.stp", "lens.stp", "rays.csv"], rays);
+    assert_eq!(here, fingerprint(["there/a.step", "there/a.step", "there/b.csv"], rays));
+    // Another file at the same path; and two files are not one part that is placed twice.
+    assert_ne!(here, fingerprint(["lens.stp", "lens.stp", "rays.csv"], &rays.replace(",1\n", ",2\n")));
+    assert_ne!(here, fingerprint(["lens.stp", "lens2.stp", "rays.csv"], rays));
+}
+
 /// Of four threads that start at once on an empty cache one traces a pilot: the seconds that it took are the same for all, to the bit.
 #[test]
 fn who_starts_at_once_waits_for_one_pilot() {
