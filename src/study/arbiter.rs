@@ -6,12 +6,14 @@
 //!
 //! Guarantee: an answer is called false only when it is a miss though a facet is truly met, a hit where no facet is met even
 //! within 1e-13 of the lengths involved, or a hit behind a nearer true one.
-//! Weakness: every facet is asked, so a verdict costs milliseconds on a million of them. At silhouettes and on the border of
-//! an open mesh both a hit and a miss within that band are true.
+//! Weakness: only distances are judged, to single precision, not which facet was named. Every facet is asked, so a verdict costs
+//! milliseconds on a million of them. At silhouettes, on the border of an open mesh and at the ends of the ray's range both a hit and a
+//! miss within that band are true.
 
 use crate::intersect::Hit;
 use crate::math::{Point, Ray, Vector};
 use crate::mesh::FacetMesh;
+use smallvec::SmallVec;
 use std::ops::{Add, Mul, Sub};
 
 /// Relative to 1 mm plus the distance: single precision (2⁻²⁴ = 6e-8) behind a grazing angle of 1/1700, with room.
@@ -28,6 +30,10 @@ const RANGE_ROUNDING: f64 = 1e-12;
 /// Distance along a ray from which on a crossing of the facet that it leaves is a hit on its other half, mm: starts are rounded to
 /// far less.
 const LEAST_OWN_DISTANCE: f64 = 1e-6;
+/// What an f64 test may be wrong by, in the lengths involved.
+const BAND: f64 = 1e-13;
+/// What these pairs of numbers may be wrong by, in the lengths involved: 2⁻⁹⁰.
+const PAIR_ROUNDING: f64 = 1.0 / (1u128 << 90) as f64;
 
 /// Which of two differing answers is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,26 +57,17 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
     // All of them: a tree here could share the fault of the trees that are judged.
     for f in (0..mesh.facets.len()).filter(|&f| passes_near(ray, &mesh.corners(f))) {
         let [a, b, c, d] = mesh.corners(f);
-        let second = (!mesh.facets[f].is_triangle()).then_some([a, c, d]);
+        let other_half = (!mesh.facets[f].is_triangle()).then_some([a, c, d]);
         // The facet that the ray leaves is met where it starts, which is no hit; its other half may be met farther on.
         let own = ray.departure.is_some_and(|departure| departure.primitive as usize == f);
         met.extend(
             std::iter::once([a, b, c])
-                .chain(second)
+                .chain(other_half)
                 .filter_map(|corners| triangle_crossing(ray, corners))
                 .filter(|hit| !own || hit.t > LEAST_OWN_DISTANCE),
         );
     }
-    // Of a hit within the band, a neighbour that faces the same way makes the surface go on; at a silhouette, where
-    // they face both ways, and on a border the ray may as well pass by.
-    let certain = |hit: &Crossing| {
-        let beside: Vec<bool> = met
-            .iter()
-            .filter(|m| (m.t - hit.t).abs() <= NEIGHBOURS * (1.0 + hit.t.abs()))
-            .map(|m| m.front)
-            .collect();
-        hit.inside || (hit.exact && beside.len() > 1 && beside.iter().all(|&front| front == hit.front))
-    };
+    let certain = |hit: &Crossing| hit.inside || (hit.exact && surface_goes_on(&met, hit));
     let nearest = met.iter().filter(|m| certain(m)).map(|m| m.t).reduce(f64::min);
     let holds = |answer: Option<&Hit>| match answer {
         None => nearest.is_none(),
@@ -87,6 +84,16 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
     }
 }
 
+/// Whether the triangles met where `hit` is surround it: facing the same way, with each edge that the ray passes shared by two of them. At a
+/// silhouette, where they face both ways, and on a border the ray may as well pass by.
+fn surface_goes_on(met: &[Crossing], hit: &Crossing) -> bool {
+    let beside = || met.iter().filter(|m| (m.t - hit.t).abs() <= NEIGHBOURS * (1.0 + hit.t.abs()));
+    let same_edge = |[a, b]: [Point; 2], [c, d]: [Point; 2]| (a == c && b == d) || (a == d && b == c);
+    let edges = || beside().flat_map(|m| m.edges.iter().copied());
+    beside().all(|m| m.front == hit.front)
+        && edges().all(|edge| edges().filter(|&other| same_edge(edge, other)).count() == 2)
+}
+
 /// Whether the whole line of a ray, both ways, comes near a facet at all.
 fn passes_near(ray: &Ray, corners: &[Point; 4]) -> bool {
     let from_corner = corners[0] - ray.origin;
@@ -96,17 +103,16 @@ fn passes_near(ray: &Ray, corners: &[Point; 4]) -> bool {
     aside.length() <= reach * (1.0 + CULL_RELATIVE) + CULL_ROUNDING * (1.0 + from_corner.length())
 }
 
-/// What an f64 test may be wrong by, in the lengths involved.
-const BAND: f64 = 1e-13;
-
 /// A triangle that the ray meets as far as rounding can tell.
 struct Crossing {
     /// Distance, mm.
     t: f64,
-    /// Whether it is met beyond the band of rounding.
+    /// Whether it is met beyond the band of rounding, within the ray's range.
     inside: bool,
-    /// Whether it is met to 2⁻⁹⁰ of the lengths involved.
+    /// Whether it is met to [`PAIR_ROUNDING`], within the ray's range.
     exact: bool,
+    /// The ends of the edges that the ray passes within the band: one on an edge, two at a corner.
+    edges: SmallVec<[[Point; 2]; 2]>,
     /// Whether the ray runs against the normal of its corners' order.
     front: bool,
 }
@@ -115,10 +121,11 @@ struct Crossing {
 fn triangle_crossing(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
     let d = ray.direction.to_array().map(DoubleDouble::from);
     let from = ray.origin.to_array();
+    let opposite = [[corners[1], corners[2]], [corners[2], corners[0]], [corners[0], corners[1]]];
     let [a, b, c] = corners.map(|p| {
         // Differences of coordinates are exact as two numbers; all that follows starts from them.
         let p = p.to_array();
-        std::array::from_fn(|k| DoubleDouble::sum(p[k], -from[k]))
+        std::array::from_fn(|k| DoubleDouble::two_sum(p[k], -from[k]))
     });
     let size = |v: &[DoubleDouble; 3]| v.iter().fold(0.0, |m: f64, x| m.max(x.high.abs()));
     let largest = size(&a).max(size(&b)).max(size(&c));
@@ -128,10 +135,9 @@ fn triangle_crossing(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
         let beyond = |sign: f64| volumes.iter().any(|v| v.high * sign > band * scale);
         !(beyond(1.0) && beyond(-1.0))
     };
-    let exact = 2f64.powi(-90);
     // The line runs within the plane, or past an edge.
     let det = volumes[0] + volumes[1] + volumes[2];
-    if det.high.abs() <= exact * scale || !one_sided(BAND) {
+    if det.high.abs() <= PAIR_ROUNDING * scale || !one_sided(BAND) {
         return None;
     }
     // The weights of the corners are the volumes; the distance is that along the axis on which the direction is longest, where its
@@ -140,9 +146,14 @@ fn triangle_crossing(ray: &Ray, corners: [Point; 3]) -> Option<Crossing> {
     let along = a[main] * volumes[0] + b[main] * volumes[1] + c[main] * volumes[2];
     let t = along.high / det.high / d[main].high;
     let rounding = RANGE_ROUNDING * t.abs() + f64::MIN_POSITIVE;
-    let in_range = t >= ray.t_min - rounding && t <= ray.t_max + rounding;
-    let inside = volumes.iter().all(|v| v.high.abs() > BAND * scale) && one_sided(0.0);
-    in_range.then(|| Crossing { t, inside, exact: one_sided(exact), front: det.high > 0.0 })
+    if t < ray.t_min - rounding || t > ray.t_max + rounding {
+        return None;
+    }
+    let in_range = t >= ray.t_min + rounding && t <= ray.t_max - rounding;
+    let on_edge = volumes.map(|v| v.high.abs() <= BAND * scale);
+    let edges: SmallVec<_> = (0..3).filter(|&k| on_edge[k]).map(|k| opposite[k]).collect();
+    let inside = in_range && edges.is_empty() && one_sided(0.0);
+    Some(Crossing { t, inside, exact: in_range && one_sided(PAIR_ROUNDING), edges, front: det.high > 0.0 })
 }
 
 /// Returns the triple product `u · (v × w)`, six times the volume of their tetrahedron.
@@ -160,7 +171,7 @@ struct DoubleDouble {
 
 impl DoubleDouble {
     /// Returns the exact sum of two numbers.
-    fn sum(a: f64, b: f64) -> Self {
+    fn two_sum(a: f64, b: f64) -> Self {
         // Knuth's two-sum: what rounding took from the sum is recovered, whichever of the two is larger.
         let high = a + b;
         let back = high - a;
@@ -168,7 +179,7 @@ impl DoubleDouble {
     }
 
     /// Returns the exact sum of two numbers of which the second is not larger in size than the first.
-    fn new(high: f64, low: f64) -> Self {
+    fn quick_two_sum(high: f64, low: f64) -> Self {
         // Dekker's quick two-sum: the first is the larger here.
         let sum = high + low;
         Self { high: sum, low: low - (sum - high) }
@@ -184,9 +195,9 @@ impl From<f64> for DoubleDouble {
 impl Add for DoubleDouble {
     type Output = Self;
     fn add(self, o: Self) -> Self {
-        let (high, low) = (Self::sum(self.high, o.high), Self::sum(self.low, o.low));
-        let first = Self::new(high.high, high.low + low.high);
-        Self::new(first.high, first.low + low.low)
+        let (high, low) = (Self::two_sum(self.high, o.high), Self::two_sum(self.low, o.low));
+        let first = Self::quick_two_sum(high.high, high.low + low.high);
+        Self::quick_two_sum(first.high, first.low + low.low)
     }
 }
 
@@ -203,7 +214,7 @@ impl Mul for DoubleDouble {
         // The product's rounding comes out exactly of a fused multiply-add; the product of the low parts lies below the last bit.
         let high = self.high * o.high;
         let low = self.high.mul_add(o.high, -high) + (self.high * o.low + self.low * o.high);
-        Self::new(high, low)
+        Self::quick_two_sum(high, low)
     }
 }
 
@@ -262,14 +273,45 @@ mod tests {
         assert_eq!(arbitrate(&mesh, &diagonal, Some(&hit(2.0)), None), Verdict::First);
         let border = Ray::new(Point::new(1.0 + 1e-15, 0.3, 2.0), -Vector::Z);
         assert_eq!(arbitrate(&mesh, &border, Some(&hit(2.0)), None), Verdict::Undecided);
+        // Both halves of a quad meet at two of its corners, and the border all the same.
+        for (x, y) in [(0.0, 0.0), (1.0, 1.0), (1.0, 0.0)] {
+            let corner = Ray::new(Point::new(x, y, 2.0), -Vector::Z);
+            assert_eq!(arbitrate(&mesh, &corner, None, Some(&hit(2.0))), Verdict::Undecided, "corner ({x}, {y})");
+        }
+    }
+
+    #[test]
+    fn a_ray_on_a_corner_that_facets_surround_is_a_hit() {
+        let mut mesh = FacetMesh::default();
+        for k in 0..9u32 {
+            mesh.positions.push(Point::new(f64::from(k % 3) - 1.0, f64::from(k / 3) - 1.0, 0.0));
+            mesh.vertices.push(MeshVertex { position: k, normal: Vector::Z, uv: Uv::ZERO });
+        }
+        for k in [0, 1, 3, 4] {
+            mesh.facets.push(Facet { vertices: [k, k + 1, k + 4, k + 3], face: FaceId(0) });
+        }
+        let middle = Ray::new(Point::new(0.0, 0.0, 2.0), -Vector::Z);
+        assert_eq!(arbitrate(&mesh, &middle, Some(&hit(2.0)), None), Verdict::First);
+        // With one of the four gone, the corner is on the border.
+        mesh.facets.pop();
+        assert_eq!(arbitrate(&mesh, &middle, Some(&hit(2.0)), None), Verdict::Undecided);
+    }
+
+    #[test]
+    fn a_hit_at_the_end_of_the_range_may_be_a_miss() {
+        let mesh = sheets();
+        for end in [2.0 - 4.0 * f64::EPSILON, 2.0, 2.0 + 4.0 * f64::EPSILON] {
+            let down = Ray::new(Point::new(0.3, 0.4, 2.0), -Vector::Z).with_range(0.0, end);
+            assert_eq!(arbitrate(&mesh, &down, Some(&hit(2.0)), None), Verdict::Undecided, "range to {end}");
+        }
     }
 
     #[test]
     fn products_are_exact_to_twice_the_digits() {
         let tiny = 2f64.powi(-60);
-        let x = DoubleDouble::sum(1.0, tiny);
+        let x = DoubleDouble::two_sum(1.0, tiny);
         let square = x * x - DoubleDouble::from(1.0);
         assert_eq!(square.high, 2.0 * tiny);
-        assert_eq!((DoubleDouble::sum(0.1, 1e17) - DoubleDouble::from(1e17)).high, 0.1);
+        assert_eq!((DoubleDouble::two_sum(0.1, 1e17) - DoubleDouble::from(1e17)).high, 0.1);
     }
 }
