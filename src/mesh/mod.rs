@@ -62,6 +62,11 @@ impl Facet {
     pub fn is_triangle(&self) -> bool {
         self.vertices[2] == self.vertices[3]
     }
+
+    /// Number of triangles that the facet is drawn and traced as: 1 or 2.
+    pub fn triangle_count(&self) -> usize {
+        if self.is_triangle() { 1 } else { 2 }
+    }
 }
 
 impl FacetMesh {

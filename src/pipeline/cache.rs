@@ -243,8 +243,8 @@ impl CachedFacets<'_> {
         self.cache.fetch(&self.name(FACETS), self.monitor, read)
     }
 
-    /// Returns what `fetch` reads where these facets are kept, among others; the turn to make them, which another process may be making,
-    /// where they are not.
+    /// Returns what `fetch` reads where these facets are kept; where another process is making them, waits until it ends and asks `fetch`
+    /// again. An `Err` is the turn: the caller makes them while it holds it.
     pub(super) fn mesh_or_turn<T>(&self, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
         self.cache.fetch_or_turn(&self.name(FACETS), fetch)
     }

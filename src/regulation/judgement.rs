@@ -226,7 +226,8 @@ fn sigmas_of_luckiest(readings: usize) -> f64 {
     if readings > 1 { bound.max(SIGMAS) } else { SIGMAS }
 }
 
-/// The reading of a comparison, and by how much it keeps its limit, cd; negative where it does not.
+/// Returns the reading of a comparison, its statistical error with what the aim adds to it, and by how much it keeps its limit, cd;
+/// negative where it does not.
 fn read_margin(photometer: &Photometer, comparison: &Comparison) -> (Reading, f64) {
     let mut reading = photometer.map.read(&comparison.weights);
     reading.statistical = reading.statistical.hypot(comparison.by_aim[0]);

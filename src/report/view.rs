@@ -79,7 +79,7 @@ impl View {
     pub fn of_facets(name: &str, title: &str, facets: &Facets) -> Self {
         let mut view = Self { name: name.into(), title: title.into(), caption: String::new(), shapes: Vec::new() };
         let mut merged = 0.0f64;
-        let total: usize = facets.mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
+        let total: usize = facets.mesh.facets.iter().map(|f| f.triangle_count()).sum();
         for shown in shown_surfaces(facets) {
             let traced = triangles_of(facets, &shown.facets, !facets.labels.is_empty());
             // Each part by its share of the triangles, but enough to be recognised.
@@ -117,11 +117,11 @@ impl View {
         values: &[f64],
         map: ColourMap,
     ) -> Self {
-        let total: usize = facets.mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
+        let total: usize = facets.mesh.facets.iter().map(|f| f.triangle_count()).sum();
         let step = total.div_ceil(SHOWN).max(1);
         let caption = match step {
             1 => String::new(),
-            _ => format!("Shown: every {step}th triangle of {}.", super::grouped(total as u64)),
+            _ => format!("Shown: one triangle in {step} of {}.", super::grouped(total as u64)),
         };
         let mut view = Self { name: name.into(), title: title.into(), caption, shapes: Vec::new() };
         // Clear parts apart, so that one sees through them.
@@ -130,8 +130,8 @@ impl View {
             let mut per_triangle: Vec<f32> = Vec::with_capacity(triangles.len());
             for &i in &shown.facets {
                 let value = values.get(i).map_or(f32::NAN, |v| *v as f32);
-                let count = if facets.mesh.facets[i].is_triangle() { 1 } else { 2 };
-                per_triangle.extend(std::iter::repeat_n(value, count));
+                // Triangles come facet by facet in this order, as they are not gathered by face.
+                per_triangle.extend(std::iter::repeat_n(value, facets.mesh.facets[i].triangle_count()));
             }
             // Every so many triangles: merging corners would mix the values.
             if step > 1 {

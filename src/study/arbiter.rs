@@ -84,8 +84,8 @@ pub fn arbitrate(mesh: &FacetMesh, ray: &Ray, first: Option<&Hit>, second: Optio
     }
 }
 
-/// Whether the triangles met where `hit` is surround it: facing the same way, with each edge that the ray passes shared by two of them. At a
-/// silhouette, where they face both ways, and on a border the ray may as well pass by.
+/// Whether the triangles met where `hit` is surround it: facing the same way, with each edge that the ray passes shared by two of them. At
+/// a silhouette, where they face both ways, and on a border the ray may as well pass by.
 fn surface_goes_on(met: &[Crossing], hit: &Crossing) -> bool {
     let beside = || met.iter().filter(|m| (m.t - hit.t).abs() <= NEIGHBOURS * (1.0 + hit.t.abs()));
     let same_edge = |[a, b]: [Point; 2], [c, d]: [Point; 2]| (a == c && b == d) || (a == d && b == c);

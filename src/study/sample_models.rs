@@ -169,7 +169,7 @@ mod tests {
         let s = sweep::sphere(&Frame::IDENTITY, 10.0, [0.0, 2.0 * PI], [-PI / 2.0, PI / 2.0]);
         let mesh = grid_mesh(&model("ball", [s]), 8);
         let n = mesh.positions.len() as i64;
-        let triangles: i64 = mesh.facets.iter().map(|f| if f.is_triangle() { 1 } else { 2 }).sum();
+        let triangles: i64 = mesh.facets.iter().map(|f| f.triangle_count() as i64).sum();
         assert_eq!(2 * n - 4, triangles, "Euler's formula of a closed genus-0 surface");
         let worst = mesh.sag.iter().copied().fold(0.0, f64::max);
         let full = 4.0 / 3.0 * PI * 1000.0;

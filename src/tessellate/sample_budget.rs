@@ -146,7 +146,7 @@ fn sample_lists_within(mesh: &FacetMesh, model: &Model, lists: &[Vec<usize>], mo
     sampled
 }
 
-/// Returns the most work for a model of so many faces.
+/// Returns the most work for a model of so many faces, in control points visited.
 fn most_work(faces: usize) -> f64 {
     MOST_WORK.min(WORK_OF_ANY + WORK_OF_FACE * faces as f64)
 }

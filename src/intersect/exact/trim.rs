@@ -353,7 +353,9 @@ fn grid_bounds(face: &Face, reach: Uv) -> ([Uv; 2], [[bool; 2]; 2]) {
     ([lo, hi], [0, 1].map(|d| [lo[d] > whole[0][d], hi[d] < whole[1][d]]))
 }
 
-/// How far, in u and v, a cell border must keep from a trimming curve so that the band stays in border cells.
+/// How far, in u and v, a cell must keep from a trimming curve to be decided: [`REACH_OF_BAND`] bands as if parameters ran evenly along the
+/// longest row of control points, held between [`LEAST_REACH`] and [`LARGEST_REACH`] of the domain. No proof where parameters run more
+/// unevenly than that, or a face is so short that the largest holds.
 fn cell_margin(face: &Face, extent: Uv, band: f64) -> Uv {
     let [nu, nv] = face.surface.counts();
     let point = |i: usize, j: usize| face.surface.points[i * nv + j].project();

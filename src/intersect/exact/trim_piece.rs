@@ -1,11 +1,11 @@
-//! Pieces of trimming curves that are monotone in v: what the in/out test counts.
+//! Pieces of trimming curves that are monotone in v, as far as splitting them may go: what the in/out test counts.
 
 use crate::math::Uv;
 use crate::model::Face;
 use glam::DVec3;
 use smallvec::{SmallVec, smallvec};
 
-/// The height of a trim is solved to this step of the piece's parameter, five ulps of its middle.
+/// The height of a trim is solved to this step of the piece's parameter, nine ulps of its middle.
 const HEIGHT_STEP: f64 = 1e-15;
 /// Steps after which halving alone has come down to an ulp.
 const HEIGHT_STEPS: usize = 60;
@@ -13,7 +13,7 @@ const HEIGHT_STEPS: usize = 60;
 const NEAREST_STEP: f64 = 1e-12;
 /// Steps to the nearest point of a piece, which is monotone and short.
 const NEAREST_STEPS: usize = 8;
-/// A piece that rises by less than this share of a cell is flat: it crosses no height that could be told.
+/// A piece that rises by less than this share of a cell is flat and need not be monotone: to split it would only sort rounding.
 const FLAT: f64 = 1e-11;
 /// How often a piece is halved for being long.
 const SHORTENED: u32 = 8;
@@ -27,7 +27,7 @@ pub(super) struct TrimPiece {
     pub(super) points: SmallVec<[DVec3; 4]>,
     /// v at the two ends in order of the curve's parameter; bit-equal with the neighbours of the loop.
     pub(super) v: [f64; 2],
-    /// Hull of the control points and the ends.
+    /// Bounding box of the control points and the ends.
     pub(super) min: Uv,
     pub(super) max: Uv,
     /// Index of the use it belongs to, in the order of the face's loops.
@@ -55,12 +55,12 @@ impl TrimPiece {
         let v = [at(&points[0]).y, at(&points[points.len() - 1]).y];
         let (min, max) = (Uv::INFINITY, Uv::NEG_INFINITY);
         let mut piece = Self { points, v, min, max, owner, reversed, range };
-        piece.update_hull();
+        piece.update_bounds();
         piece
     }
 
-    /// Sets the hull anew from the control points and the heights of the ends.
-    fn update_hull(&mut self) {
+    /// Sets the bounding box anew from the control points and the heights of the ends.
+    fn update_bounds(&mut self) {
         self.min = Uv::new(f64::INFINITY, self.v[0].min(self.v[1]));
         self.max = Uv::new(f64::NEG_INFINITY, self.v[0].max(self.v[1]));
         for p in &self.points {
@@ -158,9 +158,9 @@ impl TrimPiece {
         q.x < self.min.x || q.x < self.u_at(q.y)
     }
 
-    /// The parameter, in `[0, 1]`, of the piece's point nearest to `q` and the distance there, mm, in the metric of `u`, `v` ↦ `u·du +
-    /// v·dv` given by its products `[du·du, du·dv, dv·dv]`. The nearest from the foot on the chord, which on a short piece is the nearest
-    /// of all.
+    /// The parameter, in `[0, 1]`, of the piece's point nearest to `q` and the distance there, mm, by the first fundamental form with the
+    /// coefficients `[E, F, G]`. By Gauss–Newton steps the nearest from the foot on the chord, which on a short piece is the nearest of
+    /// all.
     pub(super) fn nearest(&self, q: Uv, metric: [f64; 3]) -> (f64, f64) {
         let [e, f, g] = metric;
         let inner = |a: Uv, b: Uv| e * a.x * b.x + f * (a.x * b.y + a.y * b.x) + g * a.y * b.y;
@@ -216,7 +216,7 @@ pub(super) fn trim_pieces(face: &Face, longest: Uv) -> Vec<TrimPiece> {
             };
             let next: &mut TrimPiece = &mut all[first + (k + 1) % n];
             next.v[if next.reversed { 1 } else { 0 }] = end;
-            next.update_hull();
+            next.update_bounds();
         }
     }
     all.shrink_to_fit();

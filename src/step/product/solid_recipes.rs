@@ -1,7 +1,7 @@
 //! Solids that a file gives as a recipe: CSG primitives, and areas or faces swept along a line or around an axis. Their faces are exact.
 //!
-//! Source: ISO 10303-42, 4.5 (solid models). A profile lies in a plane; its loops are turned so that the material is on their left seen
-//! from where the sweep goes, so that every side face looks outward by `tangent × sweep`. Known weakness: the file's sense of loops in
+//! Source: ISO 10303-42, 4.5 (solid models). A profile lies in a plane; a sweep turns its loops so that the material is on their left
+//! seen from where it goes, so that every side face looks outward by `tangent × sweep`. Known weakness: the file's sense of loops in
 //! a profile is believed by area only (the largest loop is the outer one), and booleans of CSG are refused.
 
 use super::topology::{EdgeKey, read_face};
@@ -155,7 +155,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         Err(unsupported(e))
     }
 
-    /// Reads the loops of a CURVE_BOUNDED_SURFACE or a face as a profile, which must be plane and have a border.
+    /// Reads the swept area `id` of the solid `e`, a CURVE_BOUNDED_SURFACE or a face, as a profile, which must be plane and have a border;
+    /// its loops run as the file has them.
     fn profile(&self, e: Entity<'f, 'a>, id: Option<u64>) -> Outcome<Profile> {
         let area = self.resolve(e, id, "swept area")?;
         let (surface, loops) = if let Some(a) = area.attributes("CURVE_BOUNDED_SURFACE", 1) {

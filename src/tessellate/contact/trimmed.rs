@@ -112,7 +112,8 @@ impl<'m> TrimmedFace<'m> {
         }
     }
 
-    /// Whether `uv` lies inside the border.
+    /// Whether `uv` lies inside the polygons of the border's chords: within a chord's sag of the trim it may say either, which
+    /// [`Self::is_at_border`] tells. Periods are not taken into account.
     pub(super) fn contains(&self, uv: Uv) -> bool {
         let sides =
             self.polygons.polygons.iter().flat_map(|p| (0..p.len()).map(|i| [p[i].uv, p[(i + 1) % p.len()].uv]));
@@ -182,7 +183,7 @@ impl<'m> TrimmedFace<'m> {
         self.projector.is_beyond(self.frame.local_point(p), mm / self.frame.scale.abs())
     }
 
-    /// Whether a point lies on one of these edges.
+    /// Whether a point lies on one of these edges; without edges, as of a whole sphere, any point counts as one.
     pub(super) fn is_at_border(&self, edges: &[EdgeId], p: Point, glue: f64) -> bool {
         // A face without edges is whole: its border is a seam or a pole.
         edges.is_empty() || edges.iter().any(|&e| self.nearest_on_edge(e, p).1 <= glue)

@@ -134,8 +134,10 @@ impl<'s, 'a> Prover<'s, 'a> {
         }) + self.margin
     }
 
-    /// Returns a bound as of [`Self::triangle_bound`] of the distance from the surface over a convex parameter polygon to a triangle.
+    /// Returns a bound as of [`Self::triangle_bound`] of the distance from the surface over a convex parameter polygon, of three corners
+    /// at least, to a triangle.
     pub(in crate::tessellate) fn polygon_bound(&mut self, uv: &[Uv], xyz: [Point; 3], limit: f64) -> f64 {
+        debug_assert!(uv.len() > 2, "a polygon of fewer corners would count as proved");
         // As for a triangle: one look at the whole polygon before it is cut into triangles.
         let flat = FlatTriangle::new(&xyz);
         let bounded = !self.surface.affine && self.acceptance == Acceptance::Proved;
@@ -160,8 +162,8 @@ impl<'s, 'a> Prover<'s, 'a> {
     }
 
     /// Returns a bound of the distance from the surface over a parameter triangle to a triangle in space and from its sides to theirs, by
-    /// one quick look; `None` when that does not show it to be within the limit. Above the limit it is a sample of the surface, which no
-    /// bound can be below. `exact`: the corners are known to lie on the surface.
+    /// one quick look; `None` when that does not show it to be within the limit. Above the limit it is what no bound can be below: a sample
+    /// of the surface, or the gap of a corner. `exact`: the corners are known to lie on the surface.
     pub(in crate::tessellate) fn facet_bound(
         &mut self,
         uv: [Uv; 3],
