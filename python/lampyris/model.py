@@ -88,6 +88,13 @@ class Model:
         of_parts, of_faces = tolerance_list(parts, "parts"), tolerance_list(faces, "faces")
         return Mesh(self._core.tessellate(asked, angle, of_parts, of_faces, bool(measure)))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _read_again, (self.path, self.unit_mm, self._core.hash)
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> Model:
+        # Nothing of it can be changed.
+        return self
+
     def __repr__(self) -> str:
         return repr(self._core)
 
@@ -101,3 +108,11 @@ def read_step(path: Path, unit_mm: float | None = None) -> Model:
     ``unit_mm`` overrules the file's unit of length. Raises :class:`InputError` when the file cannot be read or is not STEP.
     """
     return Model(_lampyris.read_step(path, None if unit_mm is None else real_number("unit_mm", unit_mm)))
+
+
+def _read_again(path: str, unit_mm: float | None, known_hash: str) -> Model:
+    """The model of a file that was pickled by its path."""
+    model = read_step(path, unit_mm)
+    if model._core.hash != known_hash:
+        raise _lampyris.InputError(f"{path}: the file is another one since the model was pickled; read it with lampyris.read_step")
+    return model

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+from typing import Any
 
 from . import _lampyris
 from ._types import Path
@@ -13,6 +14,11 @@ class Part:
 
     def __init__(self, core: _lampyris.Part) -> None:
         self._core = core
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Part:
+        """A part from its bytes, of whatever run: it can be added to others, and is gone on from where it belongs; so are pickled ones."""
+        return cls(_lampyris.Part.from_bytes(data))
 
     @property
     def rays(self) -> int:
@@ -39,12 +45,19 @@ class Part:
         return Part(self._core.merged(part_core(other, "other")))
 
     def to_bytes(self) -> bytes:
-        """For a file or another machine; :meth:`Scene.read_part` reads them."""
+        """For a file or another machine; :meth:`Scene.read_part` and :meth:`from_bytes` read them."""
         return self._core.to_bytes()
 
     def save(self, path: Path) -> None:
         """Writes the bytes into a file."""
         pathlib.Path(path).write_bytes(self.to_bytes())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Part.from_bytes, (self.to_bytes(),)
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> Part:
+        # Nothing of it can be changed.
+        return self
 
     def __repr__(self) -> str:
         return repr(self._core)
@@ -57,6 +70,9 @@ class Interrupted(KeyboardInterrupt):
         share = f"{part.done} of {part.replicates} replicates ({part.rays} rays)"
         super().__init__(f"{share} are kept: the same trace with resume=True goes on from there")
         self.part = part
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Interrupted, (self.part,)
 
 
 def part_core(part: object, name: str) -> _lampyris.Part:

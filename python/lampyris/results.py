@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy as np
 
 from . import _html, _lampyris
 from ._types import FloatArray, Path
+from .stored import Cells, StoredCells, StoredResults
 from .verdicts import Assessment
 
 #: Pixels across a picture of a receiver, at least.
@@ -47,7 +49,7 @@ class Figure:
 class Receiver:
     """What one receiver counted. Maps have the shape (cells[1], cells[0]): the second axis runs down the rows."""
 
-    def __init__(self, results: _lampyris.Results, index: int, document: dict[str, Any]) -> None:
+    def __init__(self, results: Cells, index: int, document: dict[str, Any]) -> None:
         self._results = results
         self._index = index
         #: The object of the receiver in ``results.json``.
@@ -153,6 +155,12 @@ class Receiver:
         zoom = max(1, -(-PICTURE_WIDTH // self.values.shape[1]))
         return _lampyris.value_map(self.values, zoom, exponent)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Receiver, (StoredCells(self._results, {self._index: self.document}), self._index, self.document)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Receiver:
+        return Receiver(self._results, self._index, copy.deepcopy(self.document, memo))
+
     def __repr__(self) -> str:
         return f"<lampyris receiver {self.name!r} ({self.kind}): {self.power}>"
 
@@ -209,9 +217,12 @@ class Ends:
 
 
 class Run(Mapping[str, Receiver]):
-    """The results of a traced scene; a mapping of receivers by name."""
+    """The results of a traced scene; a mapping of receivers by name.
 
-    def __init__(self, results: _lampyris.Results, until: dict[str, Any] | None = None) -> None:
+    It can be pickled: figures, arrays and verdicts are kept, and the scene is not, so that :meth:`assess` comes before.
+    """
+
+    def __init__(self, results: _lampyris.Results | StoredResults, until: dict[str, Any] | None = None) -> None:
         self._results = results
         #: What came of an error that was asked for.
         self.until = until
@@ -305,6 +316,8 @@ class Run(Mapping[str, Receiver]):
         self, regulation: str, receiver: str | None = None, *, left_hand: bool = False, as_placed: bool = False
     ) -> Assessment:
         """The verdict of a lamp regulation (see :func:`lampyris.regulations`) about a far field in candela."""
+        if isinstance(self._results, StoredResults):
+            raise ValueError("assess: a run that was pickled is without its scene; assess it before, or trace the scene again")
         names = list(self._receivers)
         if receiver is None:
             fits = [n for n, r in self._receivers.items() if r.kind == "far_field" and r.unit == "cd"]
@@ -346,6 +359,13 @@ class Run(Mapping[str, Receiver]):
 
     def __len__(self) -> int:
         return len(self._receivers)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        kept = self._results
+        return Run, (kept if isinstance(kept, StoredResults) else StoredResults(kept), self.until)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Run:
+        return Run(self._results, copy.deepcopy(self.until, memo))
 
     def __repr__(self) -> str:
         return f"<lampyris.Run: {self.rays} rays, receivers {', '.join(self)}, digest {self.digest}>"

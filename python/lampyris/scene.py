@@ -302,6 +302,25 @@ class Scene:
     def __deepcopy__(self, _memo: dict[int, Any]) -> Scene:
         return self.__copy__()
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Files go by their paths, but those of rays that came as an array, which end with this process.
+        folder = None if self._ray_folder is None else pathlib.Path(self._ray_folder.name)
+        rays = {} if folder is None else {str(file): file.read_bytes() for file in folder.iterdir()}
+        kept = {name: getattr(self, name) for name in ("_text", "_name", "_folder", "_models", "interrupted")}
+        return {**kept, "_tables": copy.deepcopy(self._tables), "rays": rays}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        rays = state.pop("rays")
+        self.__dict__.update(state, _prepared=None, _ray_folder=None)
+        if rays:
+            self._ray_folder = tempfile.TemporaryDirectory(prefix="lampyris-rays-")
+            self._text = None
+        for entry in named_files(self._tables):
+            if self._ray_folder is not None and entry["file"] in rays:
+                file = pathlib.Path(self._ray_folder.name, pathlib.Path(entry["file"]).name)
+                file.write_bytes(rays[entry["file"]])
+                entry["file"] = str(file)
+
     def __repr__(self) -> str:
         tables = self._tables
         counts = ", ".join(f"{len(tables.get(k, []))} {k}s" for k in ("model", "material", "source", "receiver"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,10 @@ from .settings import count_of_threads, real_number
 
 
 class _Tracer:
-    def __init__(self, core: _lampyris.Tracer) -> None:
+    def __init__(self, core: _lampyris.Tracer, made_of: tuple[Any, ...]) -> None:
         self._core = core
+        #: What it is built of anew where it is unpickled.
+        self._made_of = made_of
 
     def intersect(
         self,
@@ -51,6 +54,13 @@ class _Tracer:
         """Seconds that building took."""
         return self._core.build_seconds
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), self._made_of
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> Any:
+        # Nothing of it can be changed.
+        return self
+
     def __repr__(self) -> str:
         return repr(self._core)
 
@@ -63,7 +73,7 @@ class Octree(_Tracer):
     """
 
     def __init__(self, mesh: Mesh, normals: str = "bilinear", model: Model | None = None) -> None:
-        super().__init__(_on_facets("Octree", "octree", mesh, normals, model))
+        super().__init__(_on_facets("Octree", "octree", mesh, normals, model), (mesh, normals, model))
 
 
 class Bvh(_Tracer):
@@ -72,7 +82,11 @@ class Bvh(_Tracer):
     def __init__(
         self, mesh: Mesh, normals: str = "bilinear", model: Model | None = None, *, wide: bool = True
     ) -> None:
-        super().__init__(_on_facets("Bvh", "cwbvh" if wide else "bvh2", mesh, normals, model))
+        super().__init__(_on_facets("Bvh", "cwbvh" if wide else "bvh2", mesh, normals, model), (mesh, normals, model))
+        self._wide = wide
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(Bvh, wide=self._wide), self._made_of
 
 
 class Exact(_Tracer):
@@ -81,7 +95,7 @@ class Exact(_Tracer):
     def __init__(self, model: Model) -> None:
         if not isinstance(model, Model):
             raise TypeError(f"Exact takes a Model, not {type(model).__name__}; read one with lampyris.read_step")
-        super().__init__(_lampyris.Tracer.from_model(model._core))
+        super().__init__(_lampyris.Tracer.from_model(model._core), (model,))
 
 
 def _on_facets(what: str, kind: str, mesh: Mesh, normals: str, model: Model | None) -> _lampyris.Tracer:

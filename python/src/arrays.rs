@@ -5,6 +5,12 @@ use lampyris::math::{Point, Uv, Vector};
 use numpy::{Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use std::ops::RangeInclusive;
+
+/// How far from 1 the length of a direction may be and keep its bits.
+const UNIT_ROUNDING: f64 = 1e-15;
+/// Lengths whose squares neither overflow nor lose digits.
+const SAFE_LENGTHS: RangeInclusive<f64> = 1e-140..=1e140;
 
 /// A float64 array of so many columns as it lies in memory; other numbers are converted by NumPy, which copies.
 ///
@@ -85,6 +91,19 @@ pub(crate) fn flat_uv(points: impl Iterator<Item = Uv>) -> Vec<f64> {
 /// The vector at the beginning of a row.
 pub(crate) fn vector(row: &[f64]) -> Vector {
     Vector::new(row[0], row[1], row[2])
+}
+
+/// The vector at unit length, those of it as they are; `None` where it has none or a number is not finite.
+pub(crate) fn unit(given: Vector) -> Option<Vector> {
+    let length = given.length();
+    if (length - 1.0).abs() <= UNIT_ROUNDING {
+        return Some(given);
+    }
+    if SAFE_LENGTHS.contains(&length) {
+        return Some(given / length);
+    }
+    let largest = given.abs().max_element();
+    (given.is_finite() && largest > 0.0).then(|| (given / largest).normalize())
 }
 
 /// Whether an array is empty or all of its rows are finite.

@@ -3,7 +3,7 @@
 use crate::arrays::shaped;
 use lampyris::Hit;
 use lampyris::intersect::{Certainty, Cost};
-use numpy::PyArrayDyn;
+use numpy::{PyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -37,6 +37,52 @@ pub(crate) struct Hits {
     /// Facets or patches tested, over all rays.
     #[pyo3(get)]
     tests: u64,
+}
+
+/// The arrays of hits, in the order of their fields.
+type Arrays = (
+    Py<PyArrayDyn<f64>>,
+    Py<PyArrayDyn<f64>>,
+    Py<PyArrayDyn<f64>>,
+    Py<PyArrayDyn<i32>>,
+    Py<PyArrayDyn<i32>>,
+    Py<PyArrayDyn<f64>>,
+    Py<PyArrayDyn<u8>>,
+);
+
+#[pymethods]
+impl Hits {
+    /// What pickle and copy make another of.
+    fn __reduce__(&self, py: Python<'_>) -> PyResult<(Py<PyAny>, (Arrays, u64, u64))> {
+        let arrays = (
+            self.t.clone_ref(py),
+            self.normal.clone_ref(py),
+            self.geometric_normal.clone_ref(py),
+            self.face.clone_ref(py),
+            self.primitive.clone_ref(py),
+            self.uv.clone_ref(py),
+            self.certainty.clone_ref(py),
+        );
+        let restore = py.import("lampyris._lampyris")?.getattr("restore_hits")?;
+        Ok((restore.unbind(), (arrays, self.nodes, self.tests)))
+    }
+
+    fn __len__(&self, py: Python<'_>) -> usize {
+        self.t.bind(py).len()
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let numpy = py.import("numpy")?;
+        let met = numpy.call_method1("count_nonzero", (numpy.call_method1("isfinite", (&self.t,))?,))?;
+        Ok(format!("<lampyris.Hits: {met} of {} rays hit>", self.__len__(py)))
+    }
+}
+
+/// Hits of their arrays.
+#[pyfunction]
+pub(crate) fn restore_hits(arrays: Arrays, nodes: u64, tests: u64) -> Hits {
+    let (t, normal, geometric_normal, face, primitive, uv, certainty) = arrays;
+    Hits { t, normal, geometric_normal, face, primitive, uv, certainty, nodes, tests }
 }
 
 /// Arrays of hits in the making.

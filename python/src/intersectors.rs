@@ -1,6 +1,6 @@
 //! Octree, BVH and spline, asked about arrays of rays.
 
-use crate::arrays::{FARTHEST, columns, length, rows, vector};
+use crate::arrays::{FARTHEST, columns, length, rows, unit, vector};
 use crate::background::{interruptible, on_threads, stoppable};
 use crate::errors::SceneError;
 use crate::hits::{HitArrays, Hits};
@@ -13,13 +13,11 @@ use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
 use lampyris::intersect::{Cost, Footprint};
-use lampyris::math::Vector;
 use lampyris::{FacetMesh, Hit, Intersector, Ray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use self_cell::self_cell;
-use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
@@ -28,11 +26,6 @@ use std::time::Instant;
 const CHUNK: usize = 2048;
 /// Fewer rays are asked about without a look at signals: they take milliseconds, and a thread that listens some 50 µs.
 const UNHEARD_RAYS: usize = 16 * CHUNK;
-/// How far from 1 the length of a direction may be and keep its bits.
-const UNIT_ROUNDING: f64 = 1e-15;
-/// Lengths whose squares neither overflow nor lose digits.
-const SAFE_LENGTHS: RangeInclusive<f64> = 1e-140..=1e140;
-
 type Tree<'a> = Box<dyn Intersector + Send + 'a>;
 
 /// What facets are looked up in.
@@ -90,19 +83,6 @@ fn ray(origin: &[f64], direction: &[f64], range: [f64; 2]) -> Option<Ray> {
     let is_near = origin.abs().max_element() <= FARTHEST && !origin.is_nan();
     let direction = unit(vector(direction)).filter(|_| is_near)?;
     Some(Ray::new(origin, direction).with_range(range[0], range[1]))
-}
-
-/// The direction at unit length; `None` where it has none or a number is not finite.
-fn unit(given: Vector) -> Option<Vector> {
-    let length = given.length();
-    if (length - 1.0).abs() <= UNIT_ROUNDING {
-        return Some(given);
-    }
-    if SAFE_LENGTHS.contains(&length) {
-        return Some(given / length);
-    }
-    let largest = given.abs().max_element();
-    (given.is_finite() && largest > 0.0).then(|| (given / largest).normalize())
 }
 
 /// Why two rows are no ray, and what to do.

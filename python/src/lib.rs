@@ -15,6 +15,7 @@ mod part;
 mod prepared;
 mod results;
 mod scene;
+mod settings;
 mod studies;
 
 use pyo3::prelude::*;
@@ -25,7 +26,7 @@ mod _lampyris {
     #[pymodule_export]
     use super::errors::{Defect, InputError, SceneError};
     #[pymodule_export]
-    use super::hits::Hits;
+    use super::hits::{Hits, restore_hits};
     #[pymodule_export]
     use super::intersectors::Tracer;
     #[pymodule_export]

@@ -1,6 +1,8 @@
 //! Meshes of quad facets as arrays.
 
-use crate::arrays::{FARTHEST, columns, columns_of, flat, flat_uv, length, require_finite, rows, shaped, vector};
+use crate::arrays::{
+    FARTHEST, columns, columns_of, flat, flat_uv, length, require_finite, rows, shaped, unit, vector,
+};
 use crate::errors::{SceneError, of_format, of_json};
 use crate::model::Model;
 use lampyris::FacetMesh;
@@ -8,10 +10,11 @@ use lampyris::formats::{Facets, write_facets};
 use lampyris::math::{FaceId, Uv, Vector};
 use lampyris::mesh::{Facet, MeshVertex};
 use lampyris::step::Import;
-use lampyris::tessellate::{Report, Tessellation};
-use numpy::{PyArrayDyn, PyUntypedArrayMethods};
+use lampyris::tessellate::Tessellation;
+use numpy::{PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -19,15 +22,17 @@ use std::sync::Arc;
 #[pyclass(frozen, module = "lampyris")]
 pub(crate) struct Mesh {
     pub(crate) mesh: Arc<FacetMesh>,
-    report: Option<Box<Report>>,
+    /// The mesher's, as JSON.
+    report: Option<String>,
     /// The model that was tessellated, where it is one that Python has.
     import: Option<Arc<Import>>,
 }
 
 impl Mesh {
-    pub(crate) fn of_model(made: Tessellation, import: Arc<Import>) -> Self {
+    pub(crate) fn of_model(made: Tessellation, import: Arc<Import>) -> PyResult<Self> {
         let Tessellation { mesh, report, .. } = made;
-        Self { mesh: Arc::new(mesh), report: Some(Box::new(report)), import: Some(import) }
+        let report = Some(serde_json::to_string(&report).map_err(of_json)?);
+        Ok(Self { mesh: Arc::new(mesh), report, import: Some(import) })
     }
 
     pub(crate) fn of_scene(mesh: FacetMesh) -> Self {
@@ -54,67 +59,68 @@ impl Mesh {
 impl Mesh {
     /// From points (n, 3) and corners of triangles (m, 3) or quads (m, 4); normals are those of the points (n, 3), and of the flat facets
     /// where none are given or they have no length.
+    ///
+    /// `corners` (4 m, 5) are normals and parameters of every corner instead, `faces` (m,) the placed faces, those of one together, `sag`
+    /// (m,) the proved distances from the spline, and `report` is the mesher's account: what a mesh itself gives.
     #[staticmethod]
-    #[pyo3(signature = (positions, facets, normals = None))]
+    #[pyo3(signature = (positions, facets, normals = None, corners = None, faces = None, sag = None, report = None))]
     fn from_arrays(
         positions: &Bound<'_, PyAny>,
         facets: &Bound<'_, PyAny>,
         normals: Option<&Bound<'_, PyAny>>,
+        corners: Option<&Bound<'_, PyAny>>,
+        faces: Option<Vec<u32>>,
+        sag: Option<Vec<f64>>,
+        report: Option<String>,
     ) -> PyResult<Self> {
         let positions = columns(positions, "positions", 3)?;
-        let points = rows(&positions)?;
-        require_finite(points, 3, "positions")?;
-        if let Some(k) = points.iter().position(|x| x.abs() > FARTHEST) {
-            return Err(PyValueError::new_err(format!(
-                "positions[{}, {}] is {}: coordinates are mm, and at most {FARTHEST:e}; check the unit of length",
-                k / 3,
-                k % 3,
-                points[k]
-            )));
-        }
-        let count = length(&positions);
-        if count > u32::MAX as usize / 4 {
-            return Err(PyValueError::new_err("positions: a mesh holds at most a thousand million points"));
-        }
-        let corners = columns_of(facets, "facets", &[3, 4])?;
-        let width = corners.shape()[1];
-        let corners = rows(&corners)?;
-        if let Some(k) = corners.iter().position(|x| !(*x >= 0.0 && *x < count as f64 && x.fract() == 0.0)) {
-            return Err(PyValueError::new_err(format!(
-                "facets[{}, {}] is {}: it must be the number of one of the {count} positions",
-                k / width,
-                k % width,
-                corners[k]
-            )));
-        }
-        let given = normals.map(|n| columns(n, "normals", 3)).transpose()?;
-        let given = given.as_ref().map(rows).transpose()?;
-        if let Some(normals) = given {
-            require_finite(normals, 3, "normals")?;
-            if normals.len() != points.len() {
-                return Err(PyValueError::new_err(format!("normals: there must be {count}, one a position")));
+        let points = checked_points(&positions)?;
+        let numbers = columns_of(facets, "facets", &[3, 4])?;
+        let (count, width) = (length(&positions), numbers.shape()[1]);
+        let numbers = rows(&numbers)?;
+        require_numbers(numbers, width, count)?;
+        let facet_count = numbers.len() / width;
+        let table = |given: Option<&Bound<'_, PyAny>>, name: &str, width: usize, rows_needed: usize| {
+            let Some(array) = given.map(|given| columns(given, name, width)).transpose()? else { return Ok(None) };
+            let values = rows(&array)?.to_vec();
+            require_finite(&values, width, name)?;
+            if values.len() != width * rows_needed {
+                return Err(PyValueError::new_err(format!("{name}: there must be {rows_needed} rows")));
             }
+            Ok(Some(values))
+        };
+        let source = Corners {
+            of_points: table(normals, "normals", 3, count)?,
+            own: table(corners, "corners", 5, 4 * facet_count)?,
+        };
+        let is_short = |length: usize| length != facet_count;
+        if faces.as_ref().is_some_and(|f| is_short(f.len())) || sag.as_ref().is_some_and(|s| is_short(s.len())) {
+            return Err(PyValueError::new_err(format!("faces and sag: there must be {facet_count}, one a facet")));
         }
-        let mut mesh = FacetMesh { positions: points.chunks(3).map(vector).collect(), ..FacetMesh::default() };
-        for (k, facet) in corners.chunks(width).enumerate() {
+        let faces = faces.unwrap_or_else(|| (0..facet_count as u32).collect());
+        require_together(&faces)?;
+        let mut mesh = FacetMesh {
+            positions: points.chunks(3).map(vector).collect(),
+            sag: sag.unwrap_or_default(),
+            ..FacetMesh::default()
+        };
+        let mut known = HashMap::new();
+        for (k, (facet, face)) in numbers.chunks(width).zip(faces).enumerate() {
             let places = [0, 1, 2, 3].map(|i| facet[i.min(width - 1)] as u32);
-            let [a, b, c, d] = places.map(|p| mesh.positions[p as usize]);
-            let flat = (c - a).cross(d - b) + if c == d { (b - a).cross(c - a) } else { Vector::ZERO };
-            let normal_at = |p: u32| {
-                let own = given.and_then(|normals| vector(&normals[3 * p as usize..]).try_normalize());
-                own.or_else(|| flat.try_normalize())
-            };
-            let first = mesh.vertices.len() as u32;
-            let used = if places[2] == places[3] { 3 } else { 4 };
-            for &position in &places[..used] {
-                // A facet without area is never hit; its normal does not matter.
-                let normal = normal_at(position).unwrap_or(Vector::Z);
-                mesh.vertices.push(MeshVertex { position, normal, uv: Uv::ZERO });
-            }
-            let vertices = [0, 1, 2, 3].map(|i: u32| first + i.min(used as u32 - 1));
-            mesh.facets.push(Facet { vertices, face: FaceId(k as u32) });
+            let flat = flat_normal(places.map(|p| mesh.positions[p as usize]));
+            let vertices = [0, 1, 2, 3].map(|i| {
+                let vertex = source.vertex(4 * k + i, places[i], flat);
+                let [x, y, z, u, v] = [vertex.normal.x, vertex.normal.y, vertex.normal.z, vertex.uv.x, vertex.uv.y];
+                // Corners of a face that are alike are one, as the mesher has them.
+                let key = (face, places[i], [x, y, z, u, v].map(f64::to_bits));
+                *known.entry(key).or_insert_with(|| {
+                    mesh.vertices.push(vertex);
+                    mesh.vertices.len() as u32 - 1
+                })
+            });
+            mesh.facets.push(Facet { vertices, face: FaceId(face) });
         }
-        Ok(Self { mesh: Arc::new(mesh), report: None, import: None })
+        Ok(Self { mesh: Arc::new(mesh), report, import: None })
     }
 
     /// Distinct points, mm, (n, 3).
@@ -169,8 +175,8 @@ impl Mesh {
     }
 
     /// The report of the mesher as JSON; none for a mesh that was given.
-    fn report_json(&self) -> PyResult<Option<String>> {
-        self.report.as_ref().map(|r| serde_json::to_string(r).map_err(of_json)).transpose()
+    fn report_json(&self) -> Option<&str> {
+        self.report.as_deref()
     }
 
     /// Writes the facets in the format of the extension: .obj .stl .ply .vtu .glb .data2.
@@ -192,4 +198,77 @@ impl Mesh {
     fn vertices(&self) -> impl Iterator<Item = &MeshVertex> {
         self.mesh.facets.iter().flat_map(|f| f.vertices).map(|v| &self.mesh.vertices[v as usize])
     }
+}
+
+/// Where normals and parameters of corners come from.
+struct Corners {
+    /// Normals of points.
+    of_points: Option<Vec<f64>>,
+    /// Normal and parameters of every corner.
+    own: Option<Vec<f64>>,
+}
+
+impl Corners {
+    /// The corner of this number, of a facet with this flat normal.
+    fn vertex(&self, corner: usize, position: u32, flat: Option<Vector>) -> MeshVertex {
+        let own = self.own.as_ref().map(|own| &own[5 * corner..5 * corner + 5]);
+        let given = own.or(self.of_points.as_ref().map(|all| &all[3 * position as usize..]));
+        // A facet without area is never hit; its normal does not matter.
+        let normal = given.and_then(|row| unit(vector(row))).or(flat).unwrap_or(Vector::Z);
+        MeshVertex { position, normal, uv: own.map_or(Uv::ZERO, |row| Uv::new(row[3], row[4])) }
+    }
+}
+
+/// The normal of the flat facet; `None` without area.
+fn flat_normal([a, b, c, d]: [Vector; 4]) -> Option<Vector> {
+    let flat = (c - a).cross(d - b) + if c == d { (b - a).cross(c - a) } else { Vector::ZERO };
+    flat.try_normalize()
+}
+
+/// The coordinates of points that a mesh may have.
+///
+/// # Errors
+/// `ValueError` that names the first that it may not, or their number.
+fn checked_points<'a>(positions: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [f64]> {
+    let points = rows(positions)?;
+    require_finite(points, 3, "positions")?;
+    if let Some(k) = points.iter().position(|x| x.abs() > FARTHEST) {
+        return Err(PyValueError::new_err(format!(
+            "positions[{}, {}] is {}: coordinates are mm, and at most {FARTHEST:e}; check the unit of length",
+            k / 3,
+            k % 3,
+            points[k]
+        )));
+    }
+    if points.len() / 3 > u32::MAX as usize / 4 {
+        return Err(PyValueError::new_err("positions: a mesh holds at most a thousand million points"));
+    }
+    Ok(points)
+}
+
+/// Refuses corners that are no numbers of positions.
+fn require_numbers(corners: &[f64], width: usize, count: usize) -> PyResult<()> {
+    match corners.iter().position(|x| !(*x >= 0.0 && *x < count as f64 && x.fract() == 0.0)) {
+        None => Ok(()),
+        Some(k) => Err(PyValueError::new_err(format!(
+            "facets[{}, {}] is {}: it must be the number of one of the {count} positions",
+            k / width,
+            k % width,
+            corners[k]
+        ))),
+    }
+}
+
+/// Refuses faces whose facets do not stand together, or whose numbers hits could not tell.
+fn require_together(faces: &[u32]) -> PyResult<()> {
+    let mut seen = HashSet::new();
+    for (k, group) in faces.chunk_by(|a, b| a == b).enumerate() {
+        if !seen.insert(group[0]) || group[0] > i32::MAX as u32 {
+            return Err(PyValueError::new_err(format!(
+                "face: group {k} is of face {}: numbers must be below 2147483648, and the facets of a face stand together, as after facets[numpy.argsort(face, kind='stable')]",
+                group[0]
+            )));
+        }
+    }
+    Ok(())
 }

@@ -65,6 +65,12 @@ impl Model {
         &self.import.model.name
     }
 
+    /// A hash of the bytes that it was read from.
+    #[getter]
+    fn hash(&self) -> String {
+        format!("{:x}", self.import.report.hash)
+    }
+
     /// Names of its parts.
     #[getter]
     fn parts(&self) -> Vec<String> {
@@ -109,7 +115,7 @@ impl Model {
         let settings = tessellate::Settings { measure, ..settings };
         let import = self.import.clone();
         let made = interruptible(py, None, None, move |_| tessellate(&import.model, &settings))?.made;
-        Ok(Mesh::of_model(made, self.import.clone()))
+        Mesh::of_model(made, self.import.clone())
     }
 
     fn __repr__(&self) -> String {

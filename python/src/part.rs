@@ -13,24 +13,48 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// What stands at the head of the bytes of a part.
-#[derive(Deserialize, Serialize)]
-struct PartHeader {
-    fingerprint: String,
+#[derive(Clone, Deserialize, Serialize)]
+pub(crate) struct PartHeader {
+    pub(crate) fingerprint: String,
     /// What wrote it, for messages.
     command: String,
     /// The number of rays of the whole run, where it was found by tracing.
     rays: Option<u64>,
+    /// The number of rays of the whole run.
+    run_rays: u64,
+}
+
+impl PartHeader {
+    pub(crate) fn new(fingerprint: String, scene: &PreparedScene) -> Self {
+        let command = format!("lampyris {} in Python", env!("CARGO_PKG_VERSION"));
+        Self { fingerprint, command, rays: scene.rays, run_rays: scene.run_settings().rays }
+    }
 }
 
 /// The replicates of a run that are done, and their sums.
 #[pyclass(frozen, module = "lampyris")]
 pub(crate) struct Part {
     pub(crate) run: PartialRun,
-    pub(crate) fingerprint: String,
-    /// That of what it was asked of: another one where the number of rays was found by tracing.
-    pub(crate) asked_of: String,
-    /// The scene that it is of, with its number of rays.
-    pub(crate) of: Arc<PreparedScene>,
+    pub(crate) header: PartHeader,
+    /// `None` for one that was read by itself.
+    pub(crate) of: Option<PreparedRun>,
+}
+
+/// The run that a part is of.
+#[derive(Clone)]
+pub(crate) struct PreparedRun {
+    /// With the number of rays, where it was found by tracing.
+    pub(crate) scene: Arc<PreparedScene>,
+    /// The fingerprint of what it was asked of: another one where the number of rays was found by tracing.
+    pub(crate) asked: String,
+}
+
+impl Part {
+    pub(crate) fn bytes(&self) -> PyResult<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.run.write(&self.header, &mut bytes).map_err(|e| Defect::new_err(e.to_string()))?;
+        Ok(bytes)
+    }
 }
 
 /// The number of rays of the run that the bytes are a part of, where it was found by tracing.
@@ -105,36 +129,37 @@ pub(crate) fn keeping(keep: &(dyn Fn(&PartialRun) + Sync)) -> TraceRequest<'_> {
 
 #[pymethods]
 impl Part {
+    /// A part from its bytes, of whatever run.
+    ///
+    /// Raises `ValueError` when they are damaged.
+    #[staticmethod]
+    fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
+        let (header, run) = PartialRun::read_alone(bytes).map_err(unusable)?;
+        Ok(Self { run, header, of: None })
+    }
+
     /// Adds another part of the same run, and gives the sum.
     fn merged(&self, other: &Self) -> PyResult<Self> {
-        if self.fingerprint != other.fingerprint {
+        if self.header.fingerprint != other.header.fingerprint {
             return Err(PyValueError::new_err(
                 "the parts are of different runs; trace them with the same scene and settings",
             ));
         }
         let mut run = self.run.clone();
         run.merge(&other.run).map_err(PyValueError::new_err)?;
-        Ok(Self {
-            run,
-            fingerprint: self.fingerprint.clone(),
-            asked_of: self.asked_of.clone(),
-            of: self.of.clone(),
-        })
+        let of = self.of.as_ref().or(other.of.as_ref()).cloned();
+        Ok(Self { run, header: self.header.clone(), of })
     }
 
     /// The part as bytes, for a file or another machine.
     fn to_bytes(&self, py: Python<'_>) -> PyResult<Py<PyBytes>> {
-        let command = format!("lampyris {} in Python", env!("CARGO_PKG_VERSION"));
-        let header = PartHeader { fingerprint: self.fingerprint.clone(), command, rays: self.of.rays };
-        let mut bytes = Vec::new();
-        self.run.write(&header, &mut bytes).map_err(|e| Defect::new_err(e.to_string()))?;
-        Ok(PyBytes::new(py, &bytes).unbind())
+        Ok(PyBytes::new(py, &self.bytes()?).unbind())
     }
 
     /// Rays of the whole run.
     #[getter]
     fn run_rays(&self) -> u64 {
-        self.of.run_settings().rays
+        self.header.run_rays
     }
 
     /// Replicates that are done.
@@ -177,7 +202,7 @@ impl Part {
     /// A hash of all that decides the bits of the run.
     #[getter]
     fn fingerprint(&self) -> &str {
-        &self.fingerprint
+        &self.header.fingerprint
     }
 
     fn __repr__(&self) -> String {

@@ -2,15 +2,15 @@
 
 use crate::arrays::{flat, shaped};
 use crate::background::{Outcome, interruptible};
-use crate::errors::{SceneError, of_json, of_pipeline, of_scene};
+use crate::errors::{of_json, of_pipeline, of_scene};
 use crate::mesh::Mesh;
 use crate::model::Model;
-use crate::names::{normal_mode, require_tolerance};
-use crate::part::{self, KeptRun, Part, keeping};
+use crate::part::{self, KeptRun, Part, PartHeader, PreparedRun, keeping};
 use crate::results::Results;
+use crate::settings::Settings;
 use lampyris::pipeline::{
-    self, AccurateSettings, ErrorTarget, GrowingSearch, LoadedModel, MeshingSettings, PreparedScene, RayRange,
-    SceneJob, TraceRequest, TracingSettings, read_models, settings_for_accuracy,
+    self, AccurateSettings, ErrorTarget, GrowingSearch, LoadedModel, PreparedScene, SceneJob, TraceRequest,
+    read_models, settings_for_accuracy,
 };
 use lampyris::simulate::{MOST_LISTED_RAYS, PartialRun, RunSettings, Scene, listed_ends, ray_lists};
 use lampyris::step::{self, Import};
@@ -41,69 +41,6 @@ pub(crate) struct Prepared {
     scene: Arc<PreparedScene>,
     fingerprint: String,
     threads: Option<usize>,
-}
-
-/// What is asked beside the scene; the Python side gives every key.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-struct Settings {
-    tolerance: Option<[f64; 2]>,
-    angle_deg: Option<f64>,
-    accuracy_deg: Option<f64>,
-    part: Vec<(String, [f64; 2])>,
-    face: Vec<(String, [f64; 2])>,
-    role: Vec<(String, [f64; 2])>,
-    rays: Option<(Option<u64>, u64)>,
-    seed: Option<u64>,
-    threads: Option<usize>,
-    intersector: Option<String>,
-    normals: Option<String>,
-}
-
-/// Most rays of a run: doubles count singly up to it.
-const MOST_RAYS: u64 = 1 << 47;
-
-impl Settings {
-    fn meshing(&self) -> PyResult<MeshingSettings> {
-        let ranges =
-            self.tolerance.iter().chain([&self.part, &self.face, &self.role].into_iter().flatten().map(|(_, t)| t));
-        for [low, high] in ranges {
-            require_tolerance(*low, *high)?;
-        }
-        for (name, angle) in [("angle_deg", self.angle_deg), ("accuracy_deg", self.accuracy_deg)] {
-            if let Some(angle) = angle.filter(|a| !(*a > 0.0 && *a < 90.0)) {
-                return Err(SceneError::new_err(format!(
-                    "{name} = {angle}: it must be above 0 and below 90 degrees"
-                )));
-            }
-        }
-        Ok(MeshingSettings {
-            tolerance: self.tolerance,
-            angle_deg: self.angle_deg,
-            part: self.part.clone(),
-            face: self.face.clone(),
-            role: self.role.clone(),
-            plan: None,
-        })
-    }
-
-    fn tracing(&self) -> PyResult<TracingSettings> {
-        if let Some((first, end)) = self.rays
-            && !(first.unwrap_or(0)..MOST_RAYS).contains(&end.wrapping_sub(1))
-        {
-            return Err(SceneError::new_err(format!(
-                "rays = {end}: a number of rays is whole, at least 1 and at most 1e14"
-            )));
-        }
-        let intersector = self.intersector.as_ref().map(|name| name.parse().map_err(of_pipeline)).transpose()?;
-        Ok(TracingSettings {
-            ray_range: self.rays.map(|(first, end)| RayRange { first, end }),
-            seed: self.seed,
-            threads: self.threads,
-            intersector,
-            normals: self.normals.as_deref().map(normal_mode).transpose()?,
-        })
-    }
 }
 
 #[pymethods]
@@ -152,9 +89,7 @@ impl Prepared {
         progress: Option<Py<PyAny>>,
         verify: bool,
     ) -> PyResult<Traced> {
-        self.require_own(resume)?;
-        let scene = resume.map_or(&self.scene, |part| &part.of).clone();
-        let from = resume.map(|p| p.run.clone());
+        let (from, scene) = self.start(resume)?;
         let kept = Arc::new(KeptRun::default());
         let (for_work, keeper) = (scene.clone(), kept.clone());
         let work = move |monitor: &dyn pipeline::Monitor| {
@@ -209,11 +144,11 @@ impl Prepared {
         resume: Option<&Part>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<TracedUntil> {
-        self.require_own(resume)?;
+        let (from, start) = self.start(resume)?;
         let target = ErrorTarget::new(until, &self.scene.job.scene).map_err(of_pipeline)?;
         let mut scene = PreparedScene::clone(&self.scene);
-        let resume_rays = resume.map(|part| part.of.run_settings().rays);
-        let kept = Arc::new(KeptRun::starting_from(resume.map(|part| part.run.clone())));
+        let resume_rays = from.as_ref().map(|_| start.run_settings().rays);
+        let kept = Arc::new(KeptRun::starting_from(from));
         let keeper = kept.clone();
         let work = move |monitor: &dyn pipeline::Monitor| {
             let (run, result) = target.trace(&mut scene, GrowingSearch { resume_rays, keeper: &*keeper }, monitor);
@@ -345,15 +280,24 @@ impl Prepared {
 }
 
 impl Prepared {
-    /// Refuses a part of another run.
-    fn require_own(&self, part: Option<&Part>) -> PyResult<()> {
-        match part.filter(|part| part.asked_of != self.fingerprint) {
-            None => Ok(()),
-            Some(part) => Err(PyValueError::new_err(format!(
+    /// What to go on from, and the scene with the number of rays of that run; `None` with this scene where nothing is done.
+    ///
+    /// # Errors
+    /// `ValueError` for a part of another run.
+    fn start(&self, part: Option<&Part>) -> PyResult<(Option<PartialRun>, Arc<PreparedScene>)> {
+        let Some(part) = part else { return Ok((None, self.scene.clone())) };
+        let Some(of) = &part.of else {
+            let own = self.read_part(&part.bytes()?)?;
+            let scene = own.of.map_or_else(|| self.scene.clone(), |of| of.scene);
+            return Ok((Some(own.run), scene));
+        };
+        if of.asked != self.fingerprint {
+            return Err(PyValueError::new_err(format!(
                 "resume: this part is of another run ({}); trace it with the same scene, files, settings and version",
-                part.fingerprint
-            ))),
+                part.header.fingerprint
+            )));
         }
+        Ok((Some(part.run.clone()), of.scene.clone()))
     }
 
     /// The hash of this scene with another number of rays, or with its own.
@@ -364,9 +308,10 @@ impl Prepared {
         Ok(scene.fingerprint().map_err(of_pipeline)?.0)
     }
 
-    /// A part of this run; `of` has the number of rays where it was found by tracing.
-    fn part(&self, run: PartialRun, of: Arc<PreparedScene>) -> PyResult<Part> {
-        Ok(Part { run, fingerprint: self.fingerprint_of(&of)?, asked_of: self.fingerprint.clone(), of })
+    /// A part of this run; `scene` has the number of rays where it was found by tracing.
+    fn part(&self, run: PartialRun, scene: Arc<PreparedScene>) -> PyResult<Part> {
+        let header = PartHeader::new(self.fingerprint_of(&scene)?, &scene);
+        Ok(Part { run, header, of: Some(PreparedRun { scene, asked: self.fingerprint.clone() }) })
     }
 
     /// What was traced in full before the work was stopped.

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 import lampyris as lp
 
@@ -190,3 +191,114 @@ def test_meshes_go_to_trimesh_and_pyvista_and_back(lens: pathlib.Path, tmp_path:
     assert (tmp_path / "lens.stl").stat().st_size > 84
     with pytest.raises(OSError, match="lens.xyz"):
         mesh.save(tmp_path / "lens.xyz")
+
+
+def rays_onto(mesh: lp.Mesh, n: int = 5000) -> tuple[Any, Any]:
+    """Rays from around a mesh to points in its box."""
+    random = np.random.default_rng(11)
+    low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
+    origins = (low + high) / 2 + np.linalg.norm(high - low) * random.normal(size=(n, 3))
+    return origins, random.uniform(low, high, (n, 3)) - origins
+
+
+NAMES = ("t", "normal", "geometric_normal", "face", "primitive", "uv", "certainty")
+
+
+@pytest.mark.parametrize("normals", ["flat", "bilinear", "cubic"])
+def test_a_mesh_is_the_same_after_its_way_through_pyvista(normals: str) -> None:
+    pytest.importorskip("pyvista")
+    mesh = lp.read_step(ROOT / "fixtures" / "step" / "reflector_freeform_trimmed.stp").tessellate(0.5)
+    quads = mesh.facets[:, 2] != mesh.facets[:, 3]
+    assert quads.any() and not quads.all()
+    back = lp.Mesh.from_pyvista(mesh.to_pyvista())
+    assert np.array_equal(back.facets, mesh.facets) and back.area == mesh.area
+    for name in ("positions", "normals", "uv", "face", "sag"):
+        assert np.array_equal(getattr(back, name), getattr(mesh, name)), name
+    given, again = (lp.Octree(m, normals).intersect(*rays_onto(mesh)) for m in (mesh, back))
+    assert np.isfinite(given.t).sum() > 1000
+    assert all(np.array_equal(getattr(given, name), getattr(again, name), equal_nan=True) for name in NAMES)
+
+
+def test_normals_of_points_that_moved_are_not_kept() -> None:
+    pyvista = pytest.importorskip("pyvista")
+    trimesh = pytest.importorskip("trimesh")
+    # Normals 45° off those of the facets.
+    mesh = lp.Mesh.from_arrays(CUBE, SIDES, np.tile([1.0, 1.0, 0.0], (6, 4, 1)), face=[0, 0, 0, 4, 4, 2])
+    assert mesh.face.tolist() == [0, 0, 0, 4, 4, 2] and np.allclose(mesh.normals, [0.5**0.5, 0.5**0.5, 0])
+    ray = (np.array([[0.2, 0.3, -5.0]]), np.array([[0.0, 0.0, 1.0]]))
+    kept = (lp.Mesh.from_pyvista(mesh.to_pyvista()), lp.Mesh.from_trimesh(mesh.to_trimesh()))
+    for same in kept:
+        hits = lp.Octree(same).intersect(*ray)
+        assert hits.t.tolist() == [4.0] and hits.face.tolist() == [4]
+        assert np.allclose(hits.normal, [[0.5**0.5, 0.5**0.5, 0]])
+    moved = mesh.to_pyvista().rotate_x(30)
+    turned = mesh.to_trimesh()
+    turned.apply_transform(trimesh.transformations.rotation_matrix(0.5, [1, 0, 0]))
+    for take, other in ((lp.Mesh.from_pyvista, moved), (lp.Mesh.from_trimesh, turned)):
+        with pytest.warns(UserWarning, match="points or cells are not those"):
+            assert np.abs(take(other).normals - [0.5**0.5, 0.5**0.5, 0]).max() > 0.1
+    # Those that PyVista has at its points are taken.
+    ball = pyvista.Sphere(radius=2.0)
+    hits = lp.Octree(lp.Mesh.from_pyvista(ball)).intersect([[0.3, 0.4, -9.0]], [[0.0, 0.0, 1.0]])
+    point = np.array([0.3, 0.4, -9.0 + hits.t[0]])
+    assert np.degrees(np.arccos(hits.normal[0] @ point / np.linalg.norm(point))) < 0.2
+
+
+def test_trimesh_has_the_triangles_that_are_traced() -> None:
+    pytest.importorskip("trimesh")
+    mesh = lp.read_step(ROOT / "fixtures" / "step" / "reflector_freeform_trimmed.stp").tessellate(0.5)
+    back = lp.Mesh.from_trimesh(mesh.to_trimesh())
+    assert len(back) == len(mesh.triangles) and back.area == pytest.approx(mesh.area, rel=1e-12)
+    given, again = (lp.Octree(m, "flat").intersect(*rays_onto(mesh)) for m in (mesh, back))
+    assert np.isfinite(given.t).sum() > 1000 and np.allclose(given.t, again.t, rtol=0, atol=1e-11)
+    assert (given.face == again.face).mean() > 0.999
+    # Every corner has the normal that the mesh has there on that face, and inside of a triangle they are weighed by the areas opposite.
+    assert corners(back) == corners(mesh)
+    origins, directions = rays_onto(mesh)
+    hits = lp.Octree(back).intersect(origins, directions)
+    met = np.isfinite(hits.t)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    points = (origins + np.where(met, hits.t, 0)[:, None] * directions)[met]
+    triangle = back.positions[back.facets[hits.primitive[met]]][:, :3]
+    opposite = np.cross(triangle[:, [1, 2, 0]] - points[:, None], triangle[:, [2, 0, 1]] - points[:, None])
+    weights = np.linalg.norm(opposite, axis=2)
+    expected = (weights[:, :, None] * back.normals[hits.primitive[met]][:, :3]).sum(axis=1)
+    expected /= np.linalg.norm(expected, axis=1)[:, None]
+    assert np.abs(hits.normal[met] - expected).max() < 1e-9
+
+
+def corners(mesh: lp.Mesh) -> set[tuple[float, ...]]:
+    """Face, point and normal of every corner."""
+    face = np.repeat(mesh.face, 4)[:, None]
+    return set(map(tuple, np.hstack([face, mesh.facets.reshape(-1, 1), mesh.normals.reshape(-1, 3)]).tolist()))
+
+
+def test_polygons_of_pyvista_are_facets() -> None:
+    pyvista = pytest.importorskip("pyvista")
+    points = np.array([[0, 0, 0], [2, 0, 0], [3, 1, 0], [2, 2, 0], [0, 2, 0], [5, 0, 0], [5, 2, 0], [9, 9, 0.0]])
+    # A line before them, a pentagon, a quad whose diagonal counts, a triangle.
+    mesh = pyvista.PolyData(points, [5, 0, 1, 2, 3, 4, 4, 1, 5, 6, 2, 3, 2, 6, 3], lines=[2, 0, 7])
+    made = lp.Mesh.from_pyvista(mesh)
+    assert len(made) == 5 and made.area == pytest.approx(mesh.area) and [1, 5, 6, 2] in made.facets.tolist()
+    strip = pyvista.PolyData(points[:4], strips=[4, 0, 1, 3, 2])
+    assert len(lp.Mesh.from_pyvista(strip)) == 2
+    assert len(lp.Mesh.from_pyvista(pyvista.Cube())) == 6
+    for empty in (pyvista.PolyData(), pyvista.Line(), pyvista.PolyData(points)):
+        with pytest.raises(ValueError, match="has no polygons"):
+            lp.Mesh.from_pyvista(empty)
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"normals": np.zeros((6, 4, 2))}, r"shape \(6, 4, 3\) are needed for the corners"),
+        ({"normals": np.full((6, 4, 3), np.nan)}, "must be finite"),
+        ({"face": [0, 1, 0, 2, 3, 4]}, "stand together"),
+        ({"face": [0, 1, 2]}, "one a facet"),
+        ({"face": [0.5] * 6}, "whole numbers"),
+        ({"face": [-1] * 6}, "whole numbers"),
+    ],
+)
+def test_wrong_corners_and_faces_are_told_what_to_do(keys: Any, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        lp.Mesh.from_arrays(CUBE, SIDES, **keys)

@@ -13,7 +13,7 @@ use super::tallies::{ReplicateTally, Tallies};
 use super::tally::{Moments, Sum};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 
 /// The replicates of a run that are done.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -147,66 +147,20 @@ impl PartialRun {
         check: impl FnOnce(&H) -> Result<(), String>,
         bound: &BoundScene,
     ) -> Result<Self, String> {
-        let (header, mut r) = open_tally_file::<H>(bytes)?;
+        let (header, r) = open_tally_file::<H>(bytes)?;
         check(&header)?;
-        let mut p = Self::empty(bound, r.u32()?);
-        p.grows = r.u32()? != 0;
-        let done = r.u32()?;
-        if done > p.replicates {
-            return Err("it has more replicates than its run".into());
-        }
-        p.done = (0..done).map(|_| r.u32()).collect::<Result<_, _>>()?;
-        // In order and each once, or `merge` would count a replicate twice.
-        if p.done.windows(2).any(|w| w[0] >= w[1]) || p.done.last().is_some_and(|&r| r >= p.replicates) {
-            return Err("its replicates are out of order".into());
-        }
-        p.seconds = f64::from_le_bytes(r.array()?);
-        let t = &mut p.tallies;
-        t.replicates = done;
-        if r.u32()? as usize != t.cells.len() {
-            return Err("it has other receivers than the scene".into());
-        }
-        // Empty cells are not in the file: the sums of the scene are filled where it has something.
-        for cells in &mut t.cells {
-            r.sums(cells)?;
-        }
-        r.sums(&mut t.receivers)?;
-        r.sums(&mut t.faces)?;
-        r.sums(&mut t.instances)?;
-        r.sums(&mut t.bulk)?;
-        r.sums(&mut t.ends)?;
-        for m in &mut t.moments {
-            *m = Moments {
-                first: [i128::from_le_bytes(r.array()?), i128::from_le_bytes(r.array()?)],
-                second: [u128::from_le_bytes(r.array()?), u128::from_le_bytes(r.array()?)],
-                farthest: r.u64()?,
-            };
-        }
-        for x in t.spreads.iter_mut().flat_map(|s| s.products.iter_mut().flatten()) {
-            *x = i128::from_le_bytes(r.array()?);
-        }
-        for channels in &mut t.channels {
-            r.sums(channels)?;
-        }
-        r.sums(&mut t.entered)?;
-        r.sums(&mut t.left)?;
-        t.counts = r.counts()?;
-        let ledger: Vec<(LostRay, [[u64; 3]; 2])> = r.json()?;
-        let mask = r.u64()?;
-        let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = r.json()?;
-        t.sequences = r.json::<Vec<(Sequence, Sum)>>()?.into_iter().collect();
-        // Bits, not decimals: what was written comes back exactly.
-        let point = |bits: [u64; 3]| bits.map(f64::from_bits).into();
-        t.ledger = ledger
-            .into_iter()
-            .map(|(l, [origin, direction])| LostRay { origin: point(origin), direction: point(direction), ..l })
-            .collect();
-        let vertices = paths
-            .into_iter()
-            .map(|(v, [place], power)| PathVertex { point: point(place), power: f64::from_bits(power), ..v })
-            .collect();
-        t.paths = PathSample::new(vertices, mask);
-        Ok(p)
+        r.part(Tallies::new(bound))
+    }
+
+    /// Reads the file with its header for no scene: it has as many cells, faces and bodies as it says, and other parts of the same run can
+    /// be added.
+    ///
+    /// # Errors
+    /// When the bytes are no such file or are damaged, or hold more than any scene has.
+    pub fn read_alone<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Self), String> {
+        let (header, r) = open_tally_file(bytes)?;
+        let r = Reader { sums_left: Some(MOST_SUMS_ALONE), ..r };
+        Ok((header, r.part(Tallies::default())?))
     }
 
     /// Reads the header of a file alone; the checksum of the whole file is tested.
@@ -217,58 +171,6 @@ impl PartialRun {
         open_tally_file(bytes).map(|(header, _)| header)
     }
 }
-
-/// A hash of whatever decides the bits of a run, as 32 hexadecimal digits.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Fingerprint(pub String);
-
-impl Fingerprint {
-    /// Hashes these pieces in this order; where one ends and the next begins counts.
-    pub fn new(pieces: &[&[u8]]) -> Self {
-        Self(format!("{:032x}", Fnv::hash(pieces)))
-    }
-}
-
-/// A fingerprint in the making, of pieces that need not be in memory together.
-pub struct FingerprintHasher(Fnv);
-
-impl Default for FingerprintHasher {
-    fn default() -> Self {
-        Self(Fnv::new())
-    }
-}
-
-impl FingerprintHasher {
-    /// Adds a piece.
-    pub fn add(&mut self, piece: &[u8]) {
-        self.0.absorb_piece(piece);
-    }
-
-    /// Adds a piece of this length that is read block by block: the same as one that is in memory.
-    ///
-    /// # Errors
-    /// When it cannot be read, or ends before this length.
-    pub fn add_read(&mut self, length: u64, from: &mut dyn Read) -> io::Result<()> {
-        self.0.begin_piece(length);
-        let mut block = vec![0; READ_BLOCK];
-        let mut left = length;
-        while left > 0 {
-            let part = &mut block[..left.min(READ_BLOCK as u64) as usize];
-            from.read_exact(part)?;
-            self.0.absorb(part);
-            left -= part.len() as u64;
-        }
-        Ok(())
-    }
-
-    /// The fingerprint of all pieces, in the order in which they were added.
-    pub fn finish(self) -> Fingerprint {
-        Fingerprint(format!("{:032x}", self.0.finish()))
-    }
-}
-
-/// Bytes of a file that are hashed at a time: ray files have gigabytes.
-const READ_BLOCK: usize = 1 << 16;
 
 /// Whether tallies have the same receivers, faces and bodies, cell by cell.
 fn same_shape(a: &Tallies, b: &Tallies) -> bool {
@@ -315,20 +217,27 @@ fn open_tally_file<H: DeserializeOwned>(bytes: &[u8]) -> Result<(H, Reader<'_>),
     if Fnv::hash(&[&bytes[..bytes.len() - 16]]) != u128::from_le_bytes(*sum) {
         return Err("the file is damaged or cut short: its checksum is wrong".into());
     }
-    let mut reader = Reader(rest);
+    let mut reader = Reader { bytes: rest, sums_left: None };
     let header = reader.json()?;
     Ok((header, reader))
 }
 
+/// Most sums of a part that is read for no scene: twice what the receivers of one may have, 2 GB.
+const MOST_SUMS_ALONE: u64 = 1 << 26;
+
 /// What is left of a file.
-struct Reader<'a>(&'a [u8]);
+struct Reader<'a> {
+    bytes: &'a [u8],
+    /// How many more sums there may be where the file says how many; `None` where the scene does.
+    sums_left: Option<u64>,
+}
 
 impl<'a> Reader<'a> {
     /// Takes the next `n` bytes off; an error when there are fewer.
     fn take(&mut self, n: u64) -> Result<&'a [u8], String> {
-        let n = usize::try_from(n).ok().filter(|n| *n <= self.0.len()).ok_or("the file is cut short")?;
-        let (taken, rest) = self.0.split_at(n);
-        self.0 = rest;
+        let n = usize::try_from(n).ok().filter(|n| *n <= self.bytes.len()).ok_or("the file is cut short")?;
+        let (taken, rest) = self.bytes.split_at(n);
+        self.bytes = rest;
         Ok(taken)
     }
 
@@ -342,6 +251,73 @@ impl<'a> Reader<'a> {
 
     fn u64(&mut self) -> Result<u64, String> {
         self.array().map(u64::from_le_bytes)
+    }
+
+    /// Takes a part off into sums that are empty.
+    fn part(mut self, empty: Tallies) -> Result<PartialRun, String> {
+        let mut p = PartialRun { replicates: self.u32()?, tallies: empty, ..PartialRun::default() };
+        p.grows = self.u32()? != 0;
+        let done = self.u32()?;
+        if done > p.replicates {
+            return Err("it has more replicates than its run".into());
+        }
+        p.done = (0..done).map(|_| self.u32()).collect::<Result<_, _>>()?;
+        // In order and each once, or `merge` would count a replicate twice.
+        if p.done.windows(2).any(|w| w[0] >= w[1]) || p.done.last().is_some_and(|&r| r >= p.replicates) {
+            return Err("its replicates are out of order".into());
+        }
+        p.seconds = f64::from_le_bytes(self.array()?);
+        let t = &mut p.tallies;
+        t.replicates = done;
+        let receivers = u64::from(self.u32()?);
+        self.lists(&mut t.cells, receivers)?;
+        self.lists(&mut t.moments, receivers)?;
+        self.lists(&mut t.spreads, receivers)?;
+        self.lists(&mut t.channels, receivers)?;
+        // Empty cells are not in the file: the sums of the scene are filled where it has something.
+        for cells in &mut t.cells {
+            self.sums(cells)?;
+        }
+        self.sums(&mut t.receivers)?;
+        self.sums(&mut t.faces)?;
+        self.sums(&mut t.instances)?;
+        self.sums(&mut t.bulk)?;
+        if self.u64()? != t.ends.len() as u64 {
+            return Err("it has other ends of light".into());
+        }
+        self.filled_sums(&mut t.ends)?;
+        for m in &mut t.moments {
+            *m = Moments {
+                first: [i128::from_le_bytes(self.array()?), i128::from_le_bytes(self.array()?)],
+                second: [u128::from_le_bytes(self.array()?), u128::from_le_bytes(self.array()?)],
+                farthest: self.u64()?,
+            };
+        }
+        for x in t.spreads.iter_mut().flat_map(|s| s.products.iter_mut().flatten()) {
+            *x = i128::from_le_bytes(self.array()?);
+        }
+        for channels in &mut t.channels {
+            self.sums(channels)?;
+        }
+        self.sums(&mut t.entered)?;
+        self.sums(&mut t.left)?;
+        t.counts = self.counts()?;
+        let ledger: Vec<(LostRay, [[u64; 3]; 2])> = self.json()?;
+        let mask = self.u64()?;
+        let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = self.json()?;
+        t.sequences = self.json::<Vec<(Sequence, Sum)>>()?.into_iter().collect();
+        // Bits, not decimals: what was written comes back exactly.
+        let point = |bits: [u64; 3]| bits.map(f64::from_bits).into();
+        t.ledger = ledger
+            .into_iter()
+            .map(|(l, [origin, direction])| LostRay { origin: point(origin), direction: point(direction), ..l })
+            .collect();
+        let vertices = paths
+            .into_iter()
+            .map(|(v, [place], power)| PathVertex { point: point(place), power: f64::from_bits(power), ..v })
+            .collect();
+        t.paths = PathSample::new(vertices, mask);
+        Ok(p)
     }
 
     /// Reads the counts of a run, in the order in which they were written.
@@ -366,11 +342,26 @@ impl<'a> Reader<'a> {
         serde_json::from_slice(self.take(n)?).map_err(|e| format!("not a tally file of this version: {e}"))
     }
 
-    /// Takes sums off and writes those that are not empty into `into`, which must have the length that the file states.
-    fn sums(&mut self, into: &mut [Sum]) -> Result<(), String> {
-        if self.u64()? != into.len() as u64 {
+    /// Takes the number of lists off, which must be that of `into` where the scene says how many there are.
+    fn lists<T: Clone + Default>(&mut self, into: &mut Vec<T>, count: u64) -> Result<(), String> {
+        if let Some(left) = &mut self.sums_left {
+            *left = left.checked_sub(count).ok_or("it has more sums than any scene")?;
+            into.resize(count as usize, T::default());
+        }
+        if count != into.len() as u64 {
             return Err("it has other receivers or faces than the scene".into());
         }
+        Ok(())
+    }
+
+    /// Takes sums off and writes those that are not empty into `into`, which must have the length that the file states.
+    fn sums(&mut self, into: &mut Vec<Sum>) -> Result<(), String> {
+        let count = self.u64()?;
+        self.lists(into, count)?;
+        self.filled_sums(into)
+    }
+
+    fn filled_sums(&mut self, into: &mut [Sum]) -> Result<(), String> {
         for _ in 0..self.u64()? {
             let i = self.u32()? as usize;
             let sum =

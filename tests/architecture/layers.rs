@@ -550,6 +550,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "kernel",
             "dispatch",
             "listed_rays",
+            "fingerprint",
             "partial_run",
             "power_scale",
             "hooks",

@@ -91,6 +91,8 @@ fn counting_by_face_changes_nothing_and_merges() {
         let mut bytes = Vec::new();
         part.write(&(), &mut bytes).unwrap();
         let part = PartialRun::read::<()>(&bytes, |_| Ok(()), &bound).unwrap();
+        // Without the scene too, as in a process that only adds parts up.
+        assert_eq!(PartialRun::read_alone::<()>(&bytes).unwrap().1, part);
         match &mut sum {
             Some(sum) => sum.merge(&part).unwrap(),
             None => sum = Some(part),

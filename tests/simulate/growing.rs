@@ -75,6 +75,40 @@ fn there_may_be_more_shards_than_replicates() {
     assert_eq!(sum.tallies, part([0, 10_000], [0, 1], None).tallies);
 }
 
+/// A shard of which a part was done on another machine is gone on with here, and has nothing of that part.
+#[test]
+fn what_is_done_elsewhere_is_left_out() {
+    let (_, bound) = ball();
+    let whole = part([0, 60_000], [0, 1], None);
+    let mut sum = part([0, 60_000], [1, 5], None);
+    let elsewhere = sum.done.clone();
+    for k in 0..2 {
+        let from = PartialRun::done_elsewhere(&bound, whole.replicates, elsewhere.clone());
+        let mut rest = part([0, 60_000], [k, 2], Some(from));
+        rest.leave_out(&elsewhere);
+        sum.merge(&rest).unwrap();
+    }
+    assert_eq!((sum.is_whole(), &sum.done, &sum.tallies), (true, &whole.done, &whole.tallies));
+}
+
+/// Lengths that no scene has are refused before memory is taken for them.
+#[test]
+fn parts_of_false_lengths_are_refused() {
+    let mut bytes = Vec::new();
+    let huge = PartialRun { replicates: 1, ..PartialRun::default() };
+    huge.write(&(), &mut bytes).unwrap();
+    assert_eq!(PartialRun::read_alone::<()>(&bytes).unwrap().1, huge);
+    // The number of receivers stands behind header, replicates, whether it grows, what is done, and seconds.
+    let receivers = b"lampyris tally 9\n".len() + 8 + "null".len() + 3 * 4 + 8;
+    bytes[receivers..receivers + 4].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert!(PartialRun::read_alone::<()>(&bytes).unwrap_err().contains("checksum"));
+    let body = bytes.len() - 16;
+    let sum = lampyris::simulate::Fingerprint::new(&[&bytes[..body]]).0;
+    let sum = u128::from_str_radix(&sum, 16).unwrap().to_le_bytes();
+    bytes[body..].copy_from_slice(&sum);
+    assert!(PartialRun::read_alone::<()>(&bytes).unwrap_err().contains("more sums than any scene"));
+}
+
 #[test]
 fn a_ray_of_a_run_that_grows_can_be_traced_again() {
     let (world, bound) = ball();

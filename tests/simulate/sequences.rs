@@ -100,7 +100,9 @@ fn parts_of_a_run_have_the_sequences_of_the_whole() {
         // By way of its file.
         let mut bytes = Vec::new();
         partial.write(&"", &mut bytes).unwrap();
-        PartialRun::read::<String>(&bytes, |_| Ok(()), &bound).unwrap()
+        let part = PartialRun::read::<String>(&bytes, |_| Ok(()), &bound).unwrap();
+        assert_eq!(PartialRun::read_alone::<String>(&bytes).unwrap().1, part);
+        part
     };
     let whole = part([0, 1], 3);
     let mut sum = part([2, 3], 1);
