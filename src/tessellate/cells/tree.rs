@@ -7,7 +7,7 @@ use super::candidate_facet::CandidateFacet;
 use super::cell::{Cell, ProvedCell, Subdivision, parameter_resolution};
 use super::preferred_cuts::preferred_cuts;
 use crate::math::Uv;
-use crate::tessellate::border::bands::BorderBands;
+use crate::tessellate::border::enclosure::Enclosure;
 use crate::tessellate::border::polygons::{BorderPolygons, BorderSide};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::proof::pole;
@@ -42,8 +42,8 @@ struct Tree<'s, 'a> {
     segments: Vec<[Uv; 2]>,
     /// How many are the border's.
     border: usize,
-    /// Those, by their place along v.
-    bands: BorderBands,
+    /// What those enclose.
+    enclosure: Enclosure,
     /// Of each border segment, whether it is one point in space.
     poles: Vec<bool>,
     /// Parameters nearer than this are one.
@@ -129,12 +129,12 @@ pub(in crate::tessellate) fn split(
     let preferred = [0, 1].map(|d| preferred_cuts(surface, border, root, d));
     let poles = border.polygons.iter().flatten().map(|v| v.side == BorderSide::Pole).collect();
     let border = segments.len();
-    let bands = BorderBands::new(&segments);
+    let enclosure = Enclosure::new(segments.clone());
     segments.extend(imprinted);
     let resolution = parameter_resolution(lo, hi);
     let longest = longest_cells(surface, root);
     let tree =
-        Tree { surface, acceptance, segments, border, bands, poles, resolution, preferred, longest, max_angle };
+        Tree { surface, acceptance, segments, border, enclosure, poles, resolution, preferred, longest, max_angle };
     // Branches have equal shares whatever they need: where one is short while the whole is not, all get twice as much. The last try
     // leaves at most twice the budget.
     let all: Vec<u32> = (0..tree.segments.len() as u32).collect();
@@ -323,7 +323,7 @@ impl Tree<'_, '_> {
 
     /// Whether `p` lies inside the border's loops, imprinted lines not counted.
     fn contains(&self, p: Uv) -> bool {
-        self.bands.encloses(p)
+        self.enclosure.encloses(p)
     }
 }
 

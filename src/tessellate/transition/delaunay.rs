@@ -3,7 +3,7 @@
 
 use crate::math::Uv;
 use crate::model::EdgeId;
-use crate::tessellate::border::bands::BorderBands;
+use crate::tessellate::border::enclosure::Enclosure;
 use crate::tessellate::crossing_chords::Followed;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};
@@ -161,7 +161,7 @@ pub(in crate::tessellate) fn triangulate(
     }
     // Where constraints are missing, the flood fill would leak through the gap.
     let uv = |s: &[u32; 2]| s.map(|n| mesh.nodes[n].uv);
-    let by_centre = (!conflicts.is_empty()).then(|| BorderBands::new(&segments.iter().map(uv).collect::<Vec<_>>()));
+    let by_centre = (!conflicts.is_empty()).then(|| Enclosure::new(segments.iter().map(uv).collect()));
     // By corners in order, however a triangle is turned.
     let mut known: FxHashMap<[u32; 3], ProvedFacet<3>> = FxHashMap::default();
     let limits = Limits::new(mesh.cdt.num_vertices(), budget);
@@ -351,7 +351,7 @@ impl Refinement<'_, '_> {
     /// constraints are missing; `known` are the triangles that were found inside before.
     fn inner_triangles(
         &self,
-        by_centre: Option<&BorderBands>,
+        by_centre: Option<&Enclosure>,
         known: &FxHashMap<[u32; 3], ProvedFacet<3>>,
     ) -> Vec<[u32; 3]> {
         type Face<'c> = FaceHandle<'c, InnerTag, Vertex, (), spade::CdtEdge<()>, ()>;
