@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import pathlib
+import re
 import sys
 from typing import Any
 
@@ -32,17 +33,40 @@ def members(thing: type) -> list[tuple[str, Any]]:
     return [(n, m) for n, m in public if n in own]
 
 
+def attributes(thing: type) -> list[tuple[str, str]]:
+    """What a class sets below a comment that begins with ``#:``, with the words of that."""
+    found, words = [], []
+    try:
+        lines = inspect.getsource(thing).splitlines()
+    except (OSError, TypeError):
+        # Those of the extension are properties.
+        return []
+    for line in lines:
+        text = line.strip()
+        if text.startswith("#:"):
+            words.append(text.removeprefix("#:").strip())
+            continue
+        name = re.match(r"(?:self\.)?(\w+)\b *[:=]", text)
+        if name and words and not name[1].startswith("_"):
+            found.append((name[1], " ".join(words)))
+        words = []
+    return found
+
+
 def page() -> str:
     lines = ["# Every name", "", "Written by `docs/generate_api.py` from the docstrings.", ""]
     things = [(f"lampyris.{n}", getattr(lampyris, n)) for n in sorted(lampyris.__all__)]
     things = [(n, t) for n, t in things if not isinstance(t, str) and not inspect.ismodule(t)]
     studies = [(f"lampyris.study.{n}", getattr(lampyris.study, n)) for n in ("Study", "accuracy", "check", "interpolation")]
     shared = [("lampyris.distributed.trace", lampyris.distributed.trace)]
+    lines += ["## `lampyris.__version__`", "", "The version, as a text; that of the command.", ""]
     for name, thing in things + studies + shared:
         lines += entry(name, thing, "##")
         if isinstance(thing, type) and thing.__module__.startswith("lampyris"):
-            for member, value in members(thing):
-                lines += entry(f"{name}.{member}", value, "###")
+            set_there = {member: text for base in reversed(thing.__mro__) for member, text in attributes(base)}
+            known = {member: entry(f"{name}.{member}", value, "###") for member, value in members(thing)}
+            known |= {member: [f"### `{name}.{member}`", "", text, ""] for member, text in set_there.items()}
+            lines += [line for member in sorted(known) for line in known[member]]
     return "\n".join(lines).rstrip() + "\n"
 
 

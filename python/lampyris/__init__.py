@@ -14,6 +14,7 @@ Lengths are mm, angles degrees, powers watts (or lumens, where the scene says ``
 
 from . import study
 from ._lampyris import Defect, Hits, InputError, SceneError, __version__
+from .errors import MissingFileError
 from .examples import write_demo
 from .materials import Material, Selector, coating, diffuse, glass, absorber, interface, metal, mirror, select
 from .mesh import Mesh
@@ -29,7 +30,7 @@ from .verdicts import Assessment, regulations
 
 __all__ = [
     "Account", "Assessment", "Bvh", "Defect", "Ends", "Exact", "Figure", "Hits", "InputError", "Interrupted", "Material",
-    "Mesh", "Model", "Octree", "Part", "Receiver", "ReceiverTable", "Run", "Scene", "SceneError", "Selector",
+    "Mesh", "MissingFileError", "Model", "Octree", "Part", "Receiver", "ReceiverTable", "Run", "Scene", "SceneError", "Selector",
     "Source", "__version__", "absorbed", "absorber", "coating", "collimated", "cone", "cosine", "diffuse",
     "disc", "eulumdat", "far_field", "glass", "ies", "interface", "lambertian", "led", "media", "metal", "mirror", "plane",
     "point", "ray_file", "rays", "read_step", "regulations", "scene_schema", "select", "sphere", "study",

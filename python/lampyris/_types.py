@@ -19,17 +19,19 @@ Tolerance = Union[float, Sequence[float], npt.NDArray[Any]]
 Tolerances = Mapping[str, Tolerance]
 Table = dict[str, Any]
 
+#: Whole numbers of TOML have 64 bits with a sign.
+LARGEST_NUMBER = (1 << 63) - 1
+
 
 def tolerance_range(tolerance: Tolerance) -> tuple[float, float]:
     """A range of tolerances from one number or two, mm."""
     advice = f"tolerance {tolerance!r}: write one number of mm or two, the tighter one first"
-    if isinstance(tolerance, str):
-        raise ValueError(advice)
     try:
-        ends = np.atleast_1d(np.asarray(tolerance, dtype=float))
-    except (TypeError, ValueError):
+        ends = np.atleast_1d(np.asarray(tolerance))
+    except ValueError:
         raise ValueError(advice) from None
-    if ends.shape not in ((1,), (2,)):
+    is_bool = isinstance(tolerance, (list, tuple)) and any(isinstance(end, (bool, np.bool_)) for end in tolerance)
+    if ends.shape not in ((1,), (2,)) or ends.dtype.kind not in "iuf" or is_bool:
         raise ValueError(advice)
     return (float(ends[0]), float(ends[-1]))
 
@@ -40,6 +42,8 @@ def tolerance_list(tolerances: Tolerances | None, name: str) -> list[tuple[str, 
         return []
     if not isinstance(tolerances, Mapping) or not all(isinstance(key, str) for key in tolerances):
         raise TypeError(f"{name}: a dict of names and tolerances is needed, as {{'cover': 0.01}}, not {tolerances!r}")
+    if "" in tolerances:
+        raise ValueError(f"{name}: '' is no name: it would stand for all that have none; name them by number, as '#17', or set `tolerance`")
     return [(key, tolerance_range(t)) for key, t in tolerances.items()]
 
 
@@ -54,6 +58,9 @@ def table_to_json(tables: Table) -> str:
             return {str(key): known(x, f"{place}.{key}" if place else str(key)) for key, x in value.items()}
         if isinstance(value, list):
             return [known(x, f"{place}[{k}]") for k, x in enumerate(value)]
+        if isinstance(value, int) and not -LARGEST_NUMBER - 1 <= value <= LARGEST_NUMBER:
+            advice = "; trace(seed=…) takes seeds up to 18446744073709551615" if place == "run.seed" else ""
+            raise ValueError(f"{place} = {value}: whole numbers of a scene file are at most {LARGEST_NUMBER}{advice}")
         if not isinstance(value, (str, int, float)):
             raise TypeError(f"{place}: a scene holds numbers, texts, lists and tables, not {value!r} ({type(value).__name__})")
         return value
@@ -71,6 +78,13 @@ def table_from_json(text: str) -> Table:
         return float(table["$float"]) if set(table) == {"$float"} else table
 
     return dict(json.loads(text, object_hook=number))
+
+
+def require_given(what: str, keys: Table) -> None:
+    """``TypeError`` where a place or direction is ``None``: a scene would take its own."""
+    for name in ("at", "direction", "normal"):
+        if name in keys and keys[name] is None:
+            raise TypeError(f"{what}: {name} = None: three numbers are needed")
 
 
 def plain(value: Any) -> Any:

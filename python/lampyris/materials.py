@@ -14,6 +14,7 @@ from ._types import Table, Vector, plain
 class Selector:
     """Faces of a model: all selectors that are given must hold; ``*`` in a name stands for anything."""
 
+    #: Its keys in the scene file.
     table: Table = field(default_factory=dict)
 
 
@@ -44,7 +45,9 @@ def select(
 class Material:
     """Keys of a rule ``[[material]]``, and the medium that it brings along."""
 
+    #: Its keys in the scene file.
     table: Table
+    #: The table of the medium that it brings along, where it does.
     medium: Table | None = None
 
 
@@ -79,6 +82,8 @@ def coating(
     rows: Sequence[Sequence[float]] | None = None,
 ) -> Material:
     """A coated boundary: shares, or rows ``[angle_deg, nm, R, T]`` over a full grid."""
+    if reflectance is None and transmittance is None and rows is None:
+        raise ValueError("coating: say what it does, by reflectance and transmittance or by rows; what takes all light is absorber()")
     keys = {"surface": "coating", "reflectance": reflectance, "transmittance": transmittance, "coating": rows}
     return Material(plain(keys))
 
@@ -89,6 +94,9 @@ def glass(medium: str | float, **keys: Any) -> Material:
         return Material({"medium": medium})
     if not isinstance(medium, (str, numbers.Real)) or isinstance(medium, bool):
         raise TypeError(f"glass: a name of lampyris.media() or an index is needed, as glass(1.49), not {medium!r}")
+    twice = sorted({"name", "index", "catalogue"} & set(keys))
+    if twice:
+        raise ValueError(f"glass: {medium!r} says which glass it is already; leave {', '.join(twice)} out, or use scene.medium(name, …)")
     # A name that tells it from the catalogue's own, and from every other index.
     own = {"catalogue": medium} if isinstance(medium, str) else {"index": float(medium)}
     name = ", ".join(f"{key} {value}" for key, value in {**own, **keys}.items())

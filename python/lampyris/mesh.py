@@ -12,13 +12,17 @@ import numpy.typing as npt
 
 from . import _lampyris
 from ._types import FloatArray, Path
+from .errors import writable_file
 
 #: Under what the hash of points and facets stands in meshes of others: what holds for other points, as their normals, is told by it.
 GEOMETRY_KEY = "lampyris_geometry"
 
 
 class Mesh:
-    """Quad facets with normals at their corners; a triangle is a quad whose last two corners coincide."""
+    """Quad facets with normals at their corners; a triangle is a quad whose last two corners coincide.
+
+    Its arrays are made anew whenever they are asked for: what is written into them does not change the mesh.
+    """
 
     def __init__(self, core: _lampyris.Mesh) -> None:
         self._core = core
@@ -136,7 +140,7 @@ class Mesh:
 
     def save(self, path: Path) -> None:
         """Writes .obj, .stl, .ply, .vtu, .glb or .data2, by the extension."""
-        self._core.save(path)
+        self._core.save(writable_file(path))
 
     def to_trimesh(self) -> Any:
         """As a ``trimesh.Trimesh`` of the triangles that are traced, with ``face`` and ``corner_normals`` (k, 3, 3) as face attributes.

@@ -7,8 +7,12 @@ from typing import Any
 
 from . import _html, _lampyris
 from ._types import Path, Tolerance, Tolerances, tolerance_list, tolerance_range
+from .errors import existing_file
 from .mesh import Mesh
-from .settings import real_number
+from .settings import flag, real_number
+
+#: Units of length that models are made in: a picometre and a thousand kilometres.
+SMALLEST_UNIT_MM, LARGEST_UNIT_MM = 1e-9, 1e9
 
 
 class Account(dict[str, Any]):
@@ -86,7 +90,7 @@ class Model:
         asked = None if tolerance is None else tolerance_range(tolerance)
         angle = None if angle_deg is None else real_number("angle_deg", angle_deg)
         of_parts, of_faces = tolerance_list(parts, "parts"), tolerance_list(faces, "faces")
-        return Mesh(self._core.tessellate(asked, angle, of_parts, of_faces, bool(measure)))
+        return Mesh(self._core.tessellate(asked, angle, of_parts, of_faces, flag("measure", measure)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _read_again, (self.path, self.unit_mm, self._core.hash)
@@ -107,7 +111,10 @@ def read_step(path: Path, unit_mm: float | None = None) -> Model:
 
     ``unit_mm`` overrules the file's unit of length. Raises :class:`InputError` when the file cannot be read or is not STEP.
     """
-    return Model(_lampyris.read_step(path, None if unit_mm is None else real_number("unit_mm", unit_mm)))
+    unit = None if unit_mm is None else real_number("unit_mm", unit_mm)
+    if unit is not None and not SMALLEST_UNIT_MM <= unit <= LARGEST_UNIT_MM:
+        raise _lampyris.SceneError(f"unit_mm = {unit}: it must be from {SMALLEST_UNIT_MM} to {LARGEST_UNIT_MM} mm, as 25.4 for inches")
+    return Model(_lampyris.read_step(existing_file(path), unit))
 
 
 def _read_again(path: str, unit_mm: float | None, known_hash: str) -> Model:

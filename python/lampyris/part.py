@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import pathlib
 from typing import Any
 
 from . import _lampyris
 from ._types import Path
+from .errors import write_file
 
 
 class Part:
@@ -18,7 +18,7 @@ class Part:
     @classmethod
     def from_bytes(cls, data: bytes) -> Part:
         """A part from its bytes, of whatever run: it can be added to others, and is gone on from where it belongs; so are pickled ones."""
-        return cls(_lampyris.Part.from_bytes(data))
+        return cls(_lampyris.Part.from_bytes(part_bytes(data)))
 
     @property
     def rays(self) -> int:
@@ -50,7 +50,7 @@ class Part:
 
     def save(self, path: Path) -> None:
         """Writes the bytes into a file."""
-        pathlib.Path(path).write_bytes(self.to_bytes())
+        write_file(path, self.to_bytes())
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Part.from_bytes, (self.to_bytes(),)
@@ -69,10 +69,18 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, part: Part) -> None:
         share = f"{part.done} of {part.replicates} replicates ({part.rays} rays)"
         super().__init__(f"{share} are kept: the same trace with resume=True goes on from there")
+        #: What was done.
         self.part = part
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Interrupted, (self.part,)
+
+
+def part_bytes(data: Any) -> bytes:
+    """The bytes of a part; ``TypeError`` for anything else."""
+    if not isinstance(data, (bytes, bytearray, memoryview)):
+        raise TypeError(f"data: the bytes of a part are needed, not {type(data).__name__}; open(path, 'rb').read() gives those of a file")
+    return bytes(data)
 
 
 def part_core(part: object, name: str) -> _lampyris.Part:

@@ -8,17 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from ._types import Cells, Table, Vector, plain
+from ._types import Cells, Table, Vector, plain, require_given
+from .settings import real_number, word
 
 
 @dataclass(frozen=True)
 class Receiver:
     """Keys of a ``[[receiver]]``."""
 
+    #: Its keys in the scene file.
     table: Table
 
 
 def _receiver(kind: str, name: str, keys: dict[str, Any], **own: Any) -> Receiver:
+    word("name", name)
+    require_given(kind, own)
     return Receiver(plain({"name": name, "kind": kind, **own, **keys}))
 
 
@@ -42,9 +46,14 @@ def far_field(
     step_deg: float | None = None,
     **keys: Any,
 ) -> Receiver:
-    """All light that leaves the scene by direction, power per solid angle; ``cells``, or cells of ``step_deg``."""
-    if cells is None and step_deg is not None:
-        if not step_deg > 0.0:
+    """All light that leaves the scene by direction, power per solid angle.
+
+    The map has ``cells``, or whole cells that come closest to ``step_deg``: of 7° over 180° there are 26, of 6.92°.
+    """
+    if step_deg is not None:
+        if cells is not None:
+            raise ValueError(f"far_field: cells = {cells!r} and step_deg = {step_deg!r} both say how fine it is; leave one out")
+        if not real_number("step_deg", step_deg) > 0.0:
             raise ValueError(f"step_deg = {step_deg}: it must be positive")
         for axis, ends in (("h_deg", h_deg), ("v_deg", v_deg)):
             if not np.isfinite(np.asarray(ends, dtype=float)).all() or np.shape(ends) != (2,):

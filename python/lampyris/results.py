@@ -13,6 +13,8 @@ import numpy as np
 
 from . import _html, _lampyris
 from ._types import FloatArray, Path
+from .errors import write_file
+from .settings import real_number
 from .stored import Cells, StoredCells, StoredResults
 from .verdicts import Assessment
 
@@ -24,7 +26,9 @@ PICTURE_WIDTH = 200
 class Figure:
     """A figure with both its errors, one standard error each."""
 
+    #: In :attr:`unit`.
     value: float
+    #: Unit of the value and of both errors.
     unit: str
     #: From the number of rays.
     statistical: float
@@ -54,6 +58,7 @@ class Receiver:
         self._index = index
         #: The object of the receiver in ``results.json``.
         self.document = document
+        #: Its name in the scene.
         self.name: str = document["name"]
         #: ``plane``, ``disc``, ``far_field``, ``sphere`` or ``absorbed``.
         self.kind: str = document["kind"]
@@ -106,6 +111,9 @@ class Receiver:
     @property
     def axis_names(self) -> tuple[str, str]:
         """What runs along the axes, as dimensions of ``to_xarray``."""
+        if self.kind == "absorbed":
+            # One cell for all faces.
+            return "column", "row"
         if self.kind in ("plane", "disc"):
             return "x", "y"
         return ("C", "gamma") if self.document.get("angles") == "C" else ("H", "V")
@@ -153,7 +161,7 @@ class Receiver:
     def to_png(self, exponent: float = 0.5) -> bytes:
         """The map as a picture; an exponent below 1 lifts what is dark."""
         zoom = max(1, -(-PICTURE_WIDTH // self.values.shape[1]))
-        return _lampyris.value_map(self.values, zoom, exponent)
+        return _lampyris.value_map(self.values, zoom, real_number("exponent", exponent))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Receiver, (StoredCells(self._results, {self._index: self.document}), self._index, self.document)
@@ -229,7 +237,7 @@ class Run(Mapping[str, Receiver]):
 
     @cached_property
     def document(self) -> dict[str, Any]:
-        """The document of ``results.json``."""
+        """The document of ``results.json``; what is changed in it the run tells too, so change a ``copy.deepcopy`` of it."""
         return dict(json.loads(self._results.document_json()))
 
     @cached_property
@@ -333,8 +341,7 @@ class Run(Mapping[str, Receiver]):
         """The document as text, written to a file where one is named."""
         text = json.dumps(self.document, indent=2)
         if path is not None:
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(text + "\n")
+            write_file(path, text + "\n")
         return text
 
     def to_frame(self) -> Any:

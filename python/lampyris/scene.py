@@ -15,10 +15,11 @@ from typing import Any
 
 from . import _lampyris
 from ._types import Path, Table, Tolerance, Tolerances, plain, table_from_json, table_to_json
+from .errors import existing_file, file_path, writable_file, write_file
 from .materials import Material, Selector
 from .mesh import Mesh
 from .model import Model
-from .part import Interrupted, Part, part_core
+from .part import Interrupted, Part, part_bytes, part_core
 from .progress import ProgressCallback, callback
 from .receivers import Receiver
 from .results import Ends, Run
@@ -43,8 +44,8 @@ class Scene:
         unit: str = "W",
         **run: Any,
     ) -> None:
-        self._tables: Table = {"run": plain({"unit": unit, **run})}
-        if title:
+        self._tables: Table = {"run": plain({"unit": word("unit", unit), **run})}
+        if word("title", title):
             self._tables["title"] = title
         self._text: str | None = None
         self._name = "scene"
@@ -54,7 +55,7 @@ class Scene:
         self._prepared: tuple[str, _lampyris.Prepared] | None = None
         #: What an interrupted trace left.
         self.interrupted: Part | None = None
-        if isinstance(models, (str, os.PathLike, Model)) or not isinstance(models, Iterable):
+        if isinstance(models, (str, bytes, os.PathLike, Model)) or not isinstance(models, Iterable):
             models = [models]
         for model in models:
             self.add_model(model)
@@ -62,7 +63,7 @@ class Scene:
     @classmethod
     def from_toml(cls, path: Path) -> Scene:
         """Reads a scene file; what it names is relative to its folder."""
-        file = pathlib.Path(path)
+        file = pathlib.Path(existing_file(path, what="the scene file"))
         if file.suffix.lower() in (".stp", ".step", ".p21"):
             raise _lampyris.SceneError(f"{file}: a STEP file, where a scene (.toml) is needed; lampyris.Scene({str(file)!r}) makes one")
         try:
@@ -75,7 +76,7 @@ class Scene:
     def parse(cls, text: str, folder: Path = ".", name: str = "scene") -> Scene:
         """From the text of a scene file."""
         scene = cls()
-        scene._folder = os.path.abspath(folder)
+        scene._folder = os.path.abspath(file_path(folder, "folder"))
         scene._tables = table_from_json(_lampyris.scene_to_json(text, name, scene._folder))
         scene._text = text
         scene._name = name
@@ -93,9 +94,9 @@ class Scene:
             self._models.append(model)
             keys = {"unit_mm": model.unit_mm, **keys}
             model = model.path
-        elif not isinstance(model, (str, os.PathLike)):
+        elif not isinstance(model, (str, bytes, os.PathLike)):
             raise TypeError(f"a model is needed, as a path or lampyris.read_step(path), not {type(model).__name__}")
-        self.tables.setdefault("model", []).append(plain({"file": os.path.abspath(model), **keys}))
+        self.tables.setdefault("model", []).append(plain({"file": os.path.abspath(file_path(model, "model")), **keys}))
         return self
 
     def medium(self, name: str, **keys: Any) -> Scene:
@@ -148,7 +149,7 @@ class Scene:
 
     def save(self, path: Path) -> None:
         """Writes the scene file; what it names stands there by its absolute path, rays that came as an array in files beside it."""
-        scene_file = pathlib.Path(path).absolute()
+        scene_file = pathlib.Path(writable_file(path)).absolute()
         tables = copy.deepcopy(self._tables)
         for entry in named_files(tables):
             file = pathlib.Path(self._folder, entry["file"]).absolute()
@@ -159,7 +160,7 @@ class Scene:
                 entry["file"] = kept.name
             else:
                 entry["file"] = str(file)
-        scene_file.write_text(_lampyris.toml_from_json(table_to_json(tables)), encoding="utf-8")
+        write_file(scene_file, _lampyris.toml_from_json(table_to_json(tables)))
 
     def prepare(self, *, progress: bool | ProgressCallback = True, **settings: Any) -> Settings:
         """Reads, binds and facets the scene, and chooses how to trace it; says how. ``settings`` are those of :meth:`trace`."""
@@ -172,8 +173,13 @@ class Scene:
 
     def _prepare(self, settings: Settings, progress: bool | ProgressCallback) -> _lampyris.Prepared:
         text = self.to_toml()
+        read = {model.path for model in self._models}
+        for entry in named_files(self._tables):
+            file = os.path.join(self._folder, str(entry["file"]))
+            if file not in read:
+                existing_file(file)
         # A file that was written anew makes another scene.
-        files = [_state_of(os.path.join(self._folder, entry["file"])) for entry in named_files(self._tables)]
+        files = [_state_of(os.path.join(self._folder, str(entry["file"]))) for entry in named_files(self._tables)]
         words = json.dumps([text, self._folder, settings, files], default=str)
         key = hashlib.sha256(words.encode()).hexdigest()
         if self._prepared is None or self._prepared[0] != key:
@@ -206,7 +212,7 @@ class Scene:
     ) -> Run:
         """Traces the scene: so many ``rays``, or as many as an error asks for, as ``until="1%@far"``.
 
-        What is not said the scene says; without tolerance, normals and intersector a pilot of the run's own rays chooses them. The bits
+        The % of an error may be left out. What is not said the scene says; without tolerance, normals and intersector a pilot of the run's own rays chooses them. The bits
         are those of ``lampyris trace`` with the same settings, for any number of threads. Ctrl-C raises :class:`Interrupted`;
         the same call with ``resume=True`` then goes on, ``resume=part`` from any part of the run. The GIL is free meanwhile.
         """
@@ -288,7 +294,7 @@ class Scene:
 
     def read_part(self, data: bytes, **settings: Any) -> Part:
         """A part from its bytes; it must be of this scene with the same settings."""
-        return Part(self._prepare(trace_settings(settings), False).read_part(data))
+        return Part(self._prepare(trace_settings(settings), False).read_part(part_bytes(data)))
 
     def __copy__(self) -> Scene:
         """A scene to be changed by itself, with the same models; nothing is prepared for it yet, and nothing interrupted."""

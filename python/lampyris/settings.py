@@ -5,6 +5,8 @@ from __future__ import annotations
 import numbers
 from typing import Any
 
+import numpy as np
+
 from ._types import tolerance_list, tolerance_range
 
 #: Settings of a trace that are none of the scene's own.
@@ -39,6 +41,13 @@ def real_number(name: str, value: Any) -> float:
     if not isinstance(value, numbers.Real) or isinstance(value, bool):
         raise TypeError(f"{name}: a number is needed, not {value!r}")
     return float(value)
+
+
+def flag(name: str, value: Any) -> bool:
+    """``True`` or ``False``."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name}: True or False is needed, not {value!r}")
+    return bool(value)
 
 
 def word(name: str, value: Any) -> str:

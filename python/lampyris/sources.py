@@ -8,19 +8,26 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._types import FloatArray, Path, Table, Vector, plain
+from ._types import FloatArray, Path, Table, Vector, plain, require_given
+from .errors import file_path
 from .materials import Selector
+
+#: Wavelengths of light that a scene may have, nm.
+SHORTEST_NM, LONGEST_NM = 1.0, 1e6
 
 
 @dataclass(frozen=True)
 class Source:
     """Keys of a ``[[source]]``, and its rays where they came as an array."""
 
+    #: Its keys in the scene file.
     table: Table
+    #: Its rays, where they came as an array, (n, 7) or (n, 8).
     rays: FloatArray | None = None
 
 
 def _source(kind: str, keys: dict[str, Any], **own: Any) -> Source:
+    require_given(kind, own)
     return Source(plain({"kind": kind, **own, **keys}))
 
 
@@ -88,17 +95,17 @@ def led(
 
 def ies(file: Path, at: Vector = (0.0, 0.0, 0.0), direction: Vector = (0.0, 0.0, 1.0), **keys: Any) -> Source:
     """The intensity of an IES LM-63 file, in lumens unless ``power`` is given."""
-    return _source("ies", keys, file=file, at=at, direction=direction)
+    return _source("ies", keys, file=file_path(file, "file"), at=at, direction=direction)
 
 
 def eulumdat(file: Path, at: Vector = (0.0, 0.0, 0.0), direction: Vector = (0.0, 0.0, 1.0), **keys: Any) -> Source:
     """The intensity of a EULUMDAT file, in lumens unless ``power`` is given."""
-    return _source("eulumdat", keys, file=file, at=at, direction=direction)
+    return _source("eulumdat", keys, file=file_path(file, "file"), at=at, direction=direction)
 
 
 def ray_file(file: Path, at: Vector = (0.0, 0.0, 0.0), **keys: Any) -> Source:
-    """The rays of a file: TM-25, Zemax, LightTools, CSV or NPZ."""
-    return _source("rays", keys, file=file, at=at)
+    """The rays of a file: TM-25, Zemax, LightTools, NPZ, or CSV with the columns ``x,y,z,dx,dy,dz,power`` and perhaps ``wavelength_nm``."""
+    return _source("rays", keys, file=file_path(file, "file"), at=at)
 
 
 def rays(array: npt.ArrayLike, at: Vector = (0.0, 0.0, 0.0), **keys: Any) -> Source:
@@ -111,8 +118,15 @@ def rays(array: npt.ArrayLike, at: Vector = (0.0, 0.0, 0.0), **keys: Any) -> Sou
         raise TypeError(f"rays: an array of numbers with shape (n, 7) or (n, 8) is needed, not of {given.dtype}")
     if given.ndim != 2 or given.shape[1] not in (7, 8):
         raise ValueError(f"rays: the shape must be (n, 7) or (n, 8), not {given.shape}; the columns are x, y, z, dx, dy, dz, power, nm")
+    if np.ma.is_masked(array):
+        raise ValueError("rays: some numbers are masked; leave such rows out with array[~numpy.ma.getmaskarray(array).any(axis=1)]")
     if not np.isfinite(given).all():
         row = int(np.argwhere(~np.isfinite(given))[0, 0])
         raise ValueError(f"rays[{row}] holds a number that is not finite; leave such rows out")
+    if given.shape[1] == 8 and not ((given[:, 7] >= SHORTEST_NM) & (given[:, 7] <= LONGEST_NM)).all():
+        row = int(np.argmin((given[:, 7] >= SHORTEST_NM) & (given[:, 7] <= LONGEST_NM)))
+        advice = f"it must be from {SHORTEST_NM:g} to {LONGEST_NM:g} nm; one in µm is a thousand times as many nm"
+        raise ValueError(f"rays[{row}] has the wavelength {given[row, 7]:g} nm: {advice}")
+    require_given("rays", {"at": at})
     table = plain({"kind": "rays", "at": at, **keys})
     return Source(table, np.ascontiguousarray(given, dtype=np.float64))

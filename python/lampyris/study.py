@@ -29,6 +29,7 @@ class Study(dict[str, npt.NDArray[Any]]):
         super().__init__({name: _column([row[name] for row in rows]) for name in names})
         #: The whole document, as ``study.json`` has it.
         self.document = document
+        #: A sentence on what came of it.
         self.answer: str = document.get("answer", "").replace("**", "")
 
     def to_frame(self) -> Any:

@@ -13,7 +13,7 @@ from . import _lampyris
 from ._lampyris import Hits
 from .mesh import Mesh
 from .model import Model
-from .settings import count_of_threads, real_number
+from .settings import count_of_threads, flag, real_number, word
 
 
 class _Tracer:
@@ -82,7 +82,7 @@ class Bvh(_Tracer):
     def __init__(
         self, mesh: Mesh, normals: str = "bilinear", model: Model | None = None, *, wide: bool = True
     ) -> None:
-        super().__init__(_on_facets("Bvh", "cwbvh" if wide else "bvh2", mesh, normals, model), (mesh, normals, model))
+        super().__init__(_on_facets("Bvh", "cwbvh" if flag("wide", wide) else "bvh2", mesh, normals, model), (mesh, normals, model))
         self._wide = wide
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -104,4 +104,4 @@ def _on_facets(what: str, kind: str, mesh: Mesh, normals: str, model: Model | No
         raise TypeError(f"{what} takes a Mesh, not {type(mesh).__name__}; {advice}")
     if model is not None and not isinstance(model, Model):
         raise TypeError(f"model: a Model is needed, not {type(model).__name__}; give the one whose tessellate() made the mesh")
-    return _lampyris.Tracer.of_mesh(mesh._core, kind, normals, None if model is None else model._core)
+    return _lampyris.Tracer.of_mesh(mesh._core, kind, word("normals", normals), None if model is None else model._core)

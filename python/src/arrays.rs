@@ -36,12 +36,22 @@ pub(crate) fn columns_of<'py>(
     let array = numpy.call_method1("asarray", (given,)).map_err(|e| {
         PyValueError::new_err(format!("{name}: an array of shape {wanted} is needed: {}", e.value(py)))
     })?;
+    if given.hasattr("mask")? && numpy.getattr("ma")?.call_method1("is_masked", (given,))?.is_truthy()? {
+        return Err(PyValueError::new_err(format!(
+            "{name}: some numbers are masked; leave such rows out with {name}[~numpy.ma.getmaskarray({name}).any(axis=1)]"
+        )));
+    }
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     if !matches!(kind.as_str(), "f" | "i" | "u") {
         let dtype = array.getattr("dtype")?;
+        let advice = match kind.as_str() {
+            "c" => format!("take {name}.real if the imaginary parts mean nothing"),
+            "O" => format!("replace what is no number, as None, and make numpy.asarray({name}, dtype=float) of it"),
+            _ => format!("convert it with numpy.asarray({name}, dtype=float)"),
+        };
         return Err(PyTypeError::new_err(format!(
-            "{name}: an array of float64 with shape {wanted} is needed, not of {dtype}; convert it with numpy.asarray({name}, dtype=float)"
+            "{name}: an array of float64 with shape {wanted} is needed, not of {dtype}; {advice}"
         )));
     }
     if shape.len() != 2 || !widths.contains(&shape[1]) {

@@ -5,7 +5,8 @@ use lampyris::pipeline::{Monitor, Stage, TracingSettings};
 use lampyris::study;
 use lampyris::study::default_accuracy::Chosen;
 use pyo3::prelude::*;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::backtrace::{Backtrace, BacktraceStatus};
+use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -219,8 +220,23 @@ fn tell(py: Python<'_>, shared: &SharedProgress, progress: Option<&Py<PyAny>>) -
     progress.call1(py, (stage, done, total, messages)).map(|_| ())
 }
 
+/// Where the last panic was: its exception says it, and nothing is printed before that.
+static PANIC: Mutex<String> = Mutex::new(String::new());
+
+/// Lets panics tell their place to [`defect`] instead of the terminal, with a backtrace where `RUST_BACKTRACE` asks for one.
+pub(crate) fn keep_panics_from_terminal() {
+    panic::set_hook(Box::new(|info| {
+        let place =
+            info.location().map(|place| format!(" ({}:{})", place.file(), place.line())).unwrap_or_default();
+        let trace = Backtrace::capture();
+        let trace = if trace.status() == BacktraceStatus::Captured { format!("\n{trace}") } else { String::new() };
+        *locked(&PANIC) = place + &trace;
+    }));
+}
+
 fn defect(panic: &(dyn std::any::Any + Send)) -> PyErr {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
-    Defect::new_err(format!("a defect of lampyris: {text}; please report it with the file and the scene"))
+    let place = std::mem::take(&mut *locked(&PANIC));
+    Defect::new_err(format!("a defect of lampyris: {text}; please report it with the file and the scene{place}"))
 }

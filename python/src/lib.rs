@@ -48,6 +48,7 @@ mod _lampyris {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         super::background::remember_process();
+        super::background::keep_panics_from_terminal();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

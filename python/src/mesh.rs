@@ -165,13 +165,14 @@ impl Mesh {
     /// Area as traced, mm².
     #[getter]
     fn area(&self) -> f64 {
-        self.mesh.area()
+        // An empty sum is -0 in Rust.
+        self.mesh.area() + 0.0
     }
 
     /// Enclosed volume, mm³; meaningful for a closed mesh alone.
     #[getter]
     fn volume(&self) -> f64 {
-        self.mesh.volume()
+        self.mesh.volume() + 0.0
     }
 
     /// The report of the mesher as JSON; none for a mesh that was given.
@@ -181,8 +182,7 @@ impl Mesh {
 
     /// Writes the facets in the format of the extension: .obj .stl .ply .vtu .glb .data2.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        write_facets(&path, &Facets::plain(&self.mesh, "facets"))
-            .map_err(|e| if path.extension().is_none() { SceneError::new_err(e.to_string()) } else { of_format(e) })
+        write_facets(&path, &Facets::plain(&self.mesh, "facets")).map_err(of_format)
     }
 
     fn __len__(&self) -> usize {

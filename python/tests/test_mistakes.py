@@ -52,6 +52,25 @@ import lampyris as lp
         (lambda s: s.add(lp.led(at=(0, 0, float("nan")))).trace(), ValueError, "not a point"),
         (lambda s: s.trace(rays=500, progress=False).assess("R1", "far"), ValueError, r"lampyris.regulations\(\) has all"),
         (lambda s: s.trace(accuracy_deg=0.1, tolerance=0.1), ValueError, "both say how fine"),
+        (lambda s: s.trace(tolerance=True), ValueError, "one number of mm or two"),
+        (lambda s: s.trace(tolerance=(0.1, True)), ValueError, "one number of mm or two"),
+        (lambda s: s.trace(tolerance="0.1"), ValueError, "one number of mm or two"),
+        (lambda s: s.trace(parts={"": 0.1}), ValueError, "parts: '' is no name"),
+        (lambda s: s.trace(resume=None), TypeError, "resume: a Part is needed, not NoneType"),
+        (lambda s: s.read_part("part.bin"), TypeError, "data: the bytes of a part are needed, not str"),
+        (lambda s: s.read_part(bytearray(b"part")), ValueError, "the part cannot be used"),
+        (lambda s: lp.Scene(seed=2**63).to_toml(), ValueError, r"run.seed = 9223372036854775808: .* trace\(seed=…\) takes"),
+        (lambda s: lp.Scene(unit=3), TypeError, "unit: a text is needed"),  # type: ignore[arg-type]
+        (lambda s: lp.Scene(title=3), TypeError, "title: a text is needed"),  # type: ignore[arg-type]
+        (lambda s: lp.Scene(b"lamp.stp"), TypeError, r"model: .* not bytes; os.fsdecode\(b'lamp.stp'\)"),  # type: ignore[arg-type]
+        (lambda s: s.add(lp.far_field("f", step_deg="1")), TypeError, "step_deg: a number is needed"),  # type: ignore[arg-type]
+        (lambda s: s.add(lp.far_field("f", step_deg=1, cells=(3, 3))), ValueError, "both say how fine"),
+        (lambda s: s.add(lp.plane(None, at=(0, 0, 1))), TypeError, "name: a text is needed"),  # type: ignore[arg-type]
+        (lambda s: s.add(lp.plane("p", at=None)), TypeError, "plane: at = None: three numbers"),  # type: ignore[arg-type]
+        (lambda s: s.add(lp.point(at=None)), TypeError, "point: at = None: three numbers"),  # type: ignore[arg-type]
+        (lambda s: s.add(lp.collimated(at=(0, 0, 0), direction=None)), TypeError, "collimated: direction = None"),  # type: ignore[arg-type]
+        (lambda s: s.add(lp.ies(None)), TypeError, "file: a str or os.PathLike is needed, not None"),  # type: ignore[arg-type]
+        (lambda s: s.save(b"lamp.toml"), TypeError, r"path: .* not bytes; os.fsdecode\(b'lamp.toml'\)"),
     ],
 )
 def test_wrong_settings_are_told_what_to_do(change: Any, kind: Any, says: str) -> None:
@@ -110,6 +129,11 @@ def test_wrong_materials_are_told_what_to_do() -> None:
     for medium in (None, [1.49], True):
         with pytest.raises(TypeError, match="glass: a name of"):
             lp.glass(medium)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="coating: say what it does"):
+        lp.coating()
+    for key in ("index", "catalogue", "name"):
+        with pytest.raises(ValueError, match=f"leave {key} out"):
+            lp.glass(1.5, **{key: 1.6})
     for wrong in (3, None):
         with pytest.raises(TypeError, match="a model is needed"):
             lp.Scene(wrong)  # type: ignore[arg-type]
@@ -124,3 +148,96 @@ def test_a_copy_of_a_scene_goes_its_own_way() -> None:
     assert other.trace(progress=False).digest == first.digest
     other.add(lp.plane("wall", at=(0, 0, 300)))
     assert set(other.trace(progress=False)) == {"far", "wall"} and set(scene.trace(progress=False)) == {"far"}
+
+
+@pytest.mark.parametrize("wrong", [None, 3, b"lamp.stp"])
+def test_paths_that_are_none_are_told_what_they_must_be(wrong: Any) -> None:
+    run = lamp(500).trace(progress=False)
+    mesh = lp.Mesh.from_arrays(np.eye(3), [[0, 1, 2]])
+    takers: list[Any] = [lp.read_step, lp.Scene.from_toml, mesh.save, lamp().save, lamp().trace_part(0, 1, rays=500).save, lp.write_demo]
+    # None stands for no file there.
+    takers += [run.to_json] if wrong is not None else []
+    for take in takers:
+        with pytest.raises(TypeError, match="a str or os.PathLike is needed, not"):
+            take(wrong)
+
+
+def test_missing_files_are_missing_and_input_errors(tmp_path: pathlib.Path) -> None:
+    gone = tmp_path / "absent"
+    mesh = lp.Mesh.from_arrays(np.eye(3), [[0, 1, 2]])
+    dark = lp.Scene(LAMP).add(lp.ies(gone / "nope.ies"))
+    no_model = lp.Scene(gone / "lamp.stp")
+    part, run = lamp().trace_part(0, 1, rays=500), lamp(500).trace(progress=False)
+    for call in (
+        lambda: lp.read_step(gone / "lamp.stp"),
+        lambda: lp.Scene.from_toml(gone / "lamp.toml"),
+        lambda: dark.trace(progress=False),
+        lambda: no_model.trace(progress=False),
+        lambda: mesh.save(gone / "mesh.stl"),
+        lambda: part.save(gone / "part.bin"),
+        lambda: lamp().save(gone / "lamp.toml"),
+        lambda: run.to_json(gone / "run.json"),
+    ):
+        for kind in (FileNotFoundError, lp.InputError, lp.MissingFileError):
+            with pytest.raises(kind, match="absent.*; (check the path|make it first)") as missing:
+                call()
+            assert missing.value.errno == 2
+    for call in (
+        lambda: lp.read_step(tmp_path),
+        lambda: lp.Scene.from_toml(tmp_path),
+        lambda: mesh.save(tmp_path),
+        lambda: part.save(tmp_path),
+    ):
+        with pytest.raises(lp.InputError, match="it is a folder; name a file in it"):
+            call()
+    for name in ("mesh", "mesh.xyz"):
+        with pytest.raises(lp.InputError, match="names no format; use one of"):
+            mesh.save(tmp_path / name)
+
+
+def test_what_is_no_number_of_a_model_is_refused(lens: pathlib.Path) -> None:
+    model = lp.read_step(lens)
+    wrong: Any
+    for wrong in (True, np.True_):
+        with pytest.raises(ValueError, match="one number of mm or two"):
+            model.tessellate(wrong)
+    for measure in ("yes", 1, None):
+        with pytest.raises(TypeError, match="measure: True or False"):
+            model.tessellate(measure=measure)  # type: ignore[arg-type]
+    mesh = model.tessellate(0.2)
+    with pytest.raises(TypeError, match="wide: True or False"):
+        lp.Bvh(mesh, wide="no")  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="normals: a text is needed, not None"):
+        lp.Octree(mesh, normals=None)  # type: ignore[arg-type]
+    for unit in (1e-300, 1e300):
+        with pytest.raises(ValueError, match="unit_mm = .* it must be from"):
+            lp.read_step(lens, unit_mm=unit)
+    empty = lp.Mesh.from_arrays(np.zeros((0, 3)), np.zeros((0, 3), dtype=int))
+    assert str(empty.area) == "0.0" and str(empty.volume) == "0.0"
+
+
+def test_masked_and_wrong_rays_are_refused() -> None:
+    mesh = lp.Mesh.from_arrays(np.eye(3), [[0, 1, 2]])
+    masked = np.ma.masked_array(np.zeros((2, 3)), mask=[[False] * 3, [True] * 3])
+    for given in ((masked, np.ones((2, 3))), (np.zeros((2, 3)), masked)):
+        with pytest.raises(ValueError, match="some numbers are masked"):
+            lp.Octree(mesh).intersect(*given)
+    # A mask that masks nothing does not matter.
+    assert lp.Octree(mesh).intersect(np.ma.masked_array(np.zeros((2, 3))), np.ones((2, 3))).t.shape == (2,)
+    with pytest.raises(ValueError, match="some numbers are masked"):
+        lp.rays(np.ma.masked_array(np.ones((1, 7)), mask=True))
+    beam = np.array([[0.0, 0, 0, 0, 0, 1, 1, 550], [0, 0, 0, 0, 0, 1, 1, 0.55]])
+    with pytest.raises(ValueError, match=r"rays\[1\] has the wavelength 0.55 nm: .*one in µm"):
+        lp.rays(beam)
+    wrong: Any
+    for wrong, says in ((np.ones((1, 3), dtype=complex), "origins.real"), ([[None] * 3], "replace what is no number")):
+        with pytest.raises(TypeError, match=says):
+            lp.Octree(mesh).intersect(wrong, np.ones((1, 3)))
+    with pytest.raises(TypeError, match="exponent: a number"):
+        lamp(500).trace(progress=False)["far"].to_png("a")  # type: ignore[arg-type]
+
+
+def test_what_faces_absorb_has_no_angles() -> None:
+    scene = lamp(500)
+    scene.add(lp.absorbed("warm", part="housing"))
+    assert scene.trace(progress=False)["warm"].axis_names == ("column", "row")
