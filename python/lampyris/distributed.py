@@ -199,6 +199,8 @@ def trace(
     """
     from distributed import Client
 
+    from .worker_signals import workers_deaf_to_interrupts
+
     if not isinstance(scene, Scene):
         raise TypeError(f"scene: a lampyris.Scene is needed, not {type(scene).__name__}")
     if not isinstance(client, Client):
@@ -228,17 +230,18 @@ def trace(
     rays = summary["rays"] - (0 if before is None else before.rays)
     tasks = _Tasks(client, Bundle(scene, {**asked, "threads": threads}), retries)
     tell, close = callback(progress)
-    try:
-        tasks.submit_parts(wanted, count)
-        parts = [tasks.sum(tell, rays)] if wanted else []
-    except BaseException as stopped:
-        with _unhurried():
-            _keep(scene, tasks.finished(), before, settings)
-        if isinstance(stopped, KeyboardInterrupt) and scene.interrupted is not None:
-            raise Interrupted(scene.interrupted) from None
-        raise
-    finally:
-        close()
+    with workers_deaf_to_interrupts(client):
+        try:
+            tasks.submit_parts(wanted, count)
+            parts = [tasks.sum(tell, rays)] if wanted else []
+        except BaseException as stopped:
+            with _unhurried():
+                _keep(scene, tasks.finished(), before, settings)
+            if isinstance(stopped, KeyboardInterrupt) and scene.interrupted is not None:
+                raise Interrupted(scene.interrupted) from None
+            raise
+        finally:
+            close()
     with _unhurried():
         _keep(scene, parts, before, settings)
     return scene.trace(resume=True, progress=progress, **settings)

@@ -1,9 +1,10 @@
 //! Errors of the crate as Python exceptions that say what to do.
 
 use lampyris::{formats, pipeline, simulate, step};
-use pyo3::PyErr;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use std::io;
 
 create_exception!(lampyris, SceneError, PyValueError, "A scene or a setting asks for what cannot be.");
 create_exception!(lampyris, InputError, PyOSError, "A file cannot be read, or is not what it should be.");
@@ -18,7 +19,7 @@ pub(crate) fn of_pipeline(e: pipeline::Error) -> PyErr {
         text += &format!("\n    {}", line.trim());
     }
     match e.kind() {
-        pipeline::ErrorKind::Input => InputError::new_err(text),
+        pipeline::ErrorKind::Input => unreadable(text),
         _ => SceneError::new_err(text),
     }
 }
@@ -30,13 +31,29 @@ pub(crate) fn of_scene(e: simulate::Error) -> PyErr {
 
 /// The exception of a STEP file that cannot be read.
 pub(crate) fn of_step(e: step::Error) -> PyErr {
-    InputError::new_err(e.to_string())
+    unreadable(e.to_string())
 }
 
 /// The exception of another file.
 pub(crate) fn of_format(e: formats::Error) -> PyErr {
-    InputError::new_err(e.to_string())
+    unreadable(e.to_string())
 }
+
+/// The exception of a file: of one that is not there the one that is a `FileNotFoundError` too.
+fn unreadable(text: String) -> PyErr {
+    // What the system says is all that errors of scenes keep of it.
+    if !text.contains(&io::Error::from_raw_os_error(NO_SUCH_FILE).to_string()) {
+        return InputError::new_err(text);
+    }
+    let missing = |py: Python<'_>| {
+        let kind = py.import("lampyris.errors")?.getattr("MissingFileError")?;
+        Ok(PyErr::from_value(kind.call1((&text,))?))
+    };
+    Python::attach(missing).unwrap_or_else(|e: PyErr| e)
+}
+
+/// The number that Linux, macOS and Windows have for a file that is not there.
+const NO_SUCH_FILE: i32 = 2;
 
 /// The exception of a document that could not be written as JSON.
 pub(crate) fn of_json(e: serde_json::Error) -> PyErr {

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import _thread
 import os
+import pathlib
 import signal
+import subprocess
+import sys
+import textwrap
 import threading
 import time
 from typing import Any
@@ -126,6 +130,45 @@ def test_ctrl_c_keeps_the_parts_that_are_done(number: int, monkeypatch: pytest.M
             trace(other, client, resume=parts[0], seed=5, progress=False, **settings)
     assert other.trace(resume=other.read_part(parts[0].to_bytes(), **settings), progress=False, **settings).digest == digest
     assert scene.trace(resume=parts[1], progress=False, **settings).digest == digest
+
+
+AT_A_TERMINAL = """
+    import sys, lampyris as lp, distributed
+    from lampyris.distributed import trace
+
+    def tell(stage, done, total, messages):
+        if stage == "tracing" and done > 0.3 * total:
+            print("tracing", flush=True)
+
+    if __name__ == "__main__":
+        scene = lp.Scene.from_toml(sys.argv[1])
+        settings = dict(rays=int(sys.argv[2]), intersector="exact")
+        with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+            with distributed.Client(cluster) as client:
+                try:
+                    trace(scene, client, shards=20, progress=tell, **settings)
+                except lp.Interrupted as e:
+                    print("kept", e.part.rays, flush=True)
+                print("digest", trace(scene, client, resume=True, progress=False, **settings).digest, flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no groups of processes")
+def test_ctrl_c_at_a_terminal_goes_to_the_workers_too(tmp_path: pathlib.Path) -> None:
+    rays = 1_000_000
+    program = tmp_path / "program.py"
+    program.write_text(textwrap.dedent(AT_A_TERMINAL))
+    line = [sys.executable, str(program), str(SCENE), str(rays)]
+    path = os.pathsep.join([str(pathlib.Path(lp.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    with subprocess.Popen(
+        line, stdout=subprocess.PIPE, text=True, start_new_session=True, env={**os.environ, "PYTHONPATH": path}
+    ) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "tracing\n"
+        os.killpg(child.pid, signal.SIGINT)
+        kept, digest = (text for text in child.stdout.read().splitlines() if text != "tracing")
+    assert child.returncode == 0 and 0.3 * rays <= int(kept.removeprefix("kept ")) < rays
+    assert digest == f"digest {lp.Scene.from_toml(SCENE).trace(rays=rays, intersector='exact', progress=False).digest}"
 
 
 def test_a_part_that_fails_leaves_the_others() -> None:

@@ -167,19 +167,21 @@ def test_missing_files_are_missing_and_input_errors(tmp_path: pathlib.Path) -> N
     mesh = lp.Mesh.from_arrays(np.eye(3), [[0, 1, 2]])
     dark = lp.Scene(LAMP).add(lp.ies(gone / "nope.ies"))
     no_model = lp.Scene(gone / "lamp.stp")
+    no_catalogue = "[[medium]]\nname = 'a'\ncatalogue = 'N-BK7'\nfile = 'absent.agf'\n"
     part, run = lamp().trace_part(0, 1, rays=500), lamp(500).trace(progress=False)
     for call in (
         lambda: lp.read_step(gone / "lamp.stp"),
         lambda: lp.Scene.from_toml(gone / "lamp.toml"),
         lambda: dark.trace(progress=False),
         lambda: no_model.trace(progress=False),
+        lambda: lp.Scene.parse(no_catalogue, folder=tmp_path),
         lambda: mesh.save(gone / "mesh.stl"),
         lambda: part.save(gone / "part.bin"),
         lambda: lamp().save(gone / "lamp.toml"),
         lambda: run.to_json(gone / "run.json"),
     ):
         for kind in (FileNotFoundError, lp.InputError, lp.MissingFileError):
-            with pytest.raises(kind, match="absent.*; (check the path|make it first)") as missing:
+            with pytest.raises(kind, match="absent.*(check the path|make it first|os error 2)") as missing:
                 call()
             assert missing.value.errno == 2
     for call in (
