@@ -1,10 +1,14 @@
-//! Rays that leave a face at a small sine and meet it again nearby, on parts of a micrometre, of 100 mm and of 10 km.
+//! Rays that leave a face at a small sine and meet it again nearby, on parts of a micrometre, of 100 mm and of 10 km: on the spline, and by
+//! facets that are polished.
 
 use crate::support::*;
 use lampyris::intersect::exact::{Exact, Settings};
-use lampyris::intersect::{Certainty, Cost};
+use lampyris::intersect::octree::{self, Octree};
+use lampyris::intersect::polish::Polished;
+use lampyris::intersect::{Certainty, Cost, Intersector};
 use lampyris::math::{Departure, FaceId, Homogeneous, Point, Ray, Uv, Vector};
 use lampyris::nurbs::Surface;
+use lampyris::tessellate;
 
 /// The bowl `z = (x² + y²) / 2` over the square of ±0.5, times `size` and moved by `shift`. The weights of its rows and columns grow by
 /// `speed` from one to the next: a place of the plane keeps its height, and parameters run unevenly.
@@ -116,4 +120,55 @@ fn a_chord_is_found_far_from_the_origin() {
     let shift = Vector::new(3e5, -2e5, 1e5);
     let count = leave(&Bowl { size: 100.0, shift, speed: [3.0, 0.5] }, 3000, 9);
     assert!(count.wrong.is_empty() && count.asked > 1500 && count.flagged * 20 < count.asked, "{count:?}");
+}
+
+/// Leaves a bowl inward from polished hits, at sines down to 1e-5.
+fn leave_polished(bowl: &Bowl, rays: usize, seed: u64) -> Count {
+    let model = model([bowl.surface()]);
+    let settings = tessellate::Settings { measure: false, ..tessellate::Settings::uniform(1e-5 * bowl.size) };
+    let mesh = tessellate::tessellate(&model, &settings).mesh;
+    let exact = Exact::build(&model, &Settings::default());
+    let facets = Octree::build(&mesh, &octree::Settings::default());
+    let polished = Polished::new(&facets, &mesh, &exact);
+    let mut s = Random(seed);
+    let mut count = Count::default();
+    for _ in 0..rays {
+        let place = Point::new(s.within(-0.4, 0.4), s.within(-0.4, 0.4), 2.0);
+        let down = Ray::new(bowl.size * place, -Vector::Z);
+        let first = polished.intersect(&down, &mut Cost::default()).expect("the bowl lies below");
+        let origin = down.point_at(first.t);
+        let (x, y) = (place.x, place.y);
+        let normal = Vector::new(-x, -y, 1.0).normalize();
+        let sine = 10f64.powf(s.within(-5.0, -1.0));
+        let d = (normal.cross(s.direction()).normalize() + normal * sine).normalize();
+        let (rise, bend) = (d.z - x * d.x - y * d.y, d.x * d.x + d.y * d.y);
+        let chord = 2.0 * rise / bend;
+        if !(2e-6..0.09).contains(&chord) {
+            continue;
+        }
+        // A hit lies within 1e-11 of the patch across its ray, and the next one strays along it by that over the sine.
+        let tolerance = (1e-9 + 2e-11 / sine) * bowl.size;
+        let t = chord * bowl.size;
+        if t < 8.0 * tolerance {
+            continue;
+        }
+        count.asked += 1;
+        let hit = polished.intersect(&Ray::new(origin, d).with_departure(first.departure()), &mut Cost::default());
+        if hit.is_some_and(|h| !matches!(h.certainty, Certainty::Polished | Certainty::Certified)) {
+            count.flagged += 1;
+        } else if hit.is_none_or(|h| (h.t - t).abs() > tolerance) {
+            count.wrong.push(format!("{:?} for {t} at {sine:e}", hit.map(|h| h.t)));
+        }
+    }
+    count
+}
+
+#[test]
+fn a_polished_chord_is_found_whatever_the_size_of_its_part() {
+    for (seed, size) in (1u64..).zip([1e-6, 1e-5, 1e-3, 0.05, 100.0, 1e6]) {
+        let count = leave_polished(&Bowl { size, shift: Vector::ZERO, speed: [1.0, 1.0] }, 3000, seed);
+        let Count { asked, flagged, wrong } = &count;
+        assert!(wrong.is_empty(), "{} of {asked} on {size} mm: {:?}", wrong.len(), &wrong[..wrong.len().min(5)]);
+        assert!(*asked > 1000 && flagged * 50 < *asked, "{flagged} of {asked} flagged on {size} mm");
+    }
 }

@@ -63,7 +63,7 @@ fn every_variant() -> impl Iterator<Item = Variant> {
     Variant::ALL.into_iter().chain(Variant::EXTREME)
 }
 
-signs!(exact_spline, Geometry::Spline, Variant::ALL, |s| Exact::build(&s.model, &exact::Settings::default()));
+signs!(exact_spline, Geometry::Spline, every_variant(), |s| Exact::build(&s.model, &exact::Settings::default()));
 signs!(octree_of_facets, Geometry::Facets, every_variant(), |s| Octree::build(
     &s.mesh,
     &octree::Settings::default()

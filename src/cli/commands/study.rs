@@ -355,6 +355,8 @@ fn study_stability(progress: Report) -> Result<StudyResult, Failure> {
             rows.push(scene.ask("octree", &octree, Geometry::Facets));
             let shipped = Bvh::build(&scene.mesh, &bvh::Settings { cured: false, ..Default::default() });
             rows.push(scene.ask("cwbvh as shipped", &shipped, Geometry::Facets));
+            let exact = Exact::build(&scene.model, &Default::default());
+            rows.push(scene.ask("exact", &exact, Geometry::Spline));
         }
         let done = (k + 1) as f64 / all.len() as f64;
         progress(Progress { stage: case.name.into(), done, remaining_seconds: None });

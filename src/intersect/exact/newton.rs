@@ -124,6 +124,11 @@ impl Exact {
         Some((point - patch.center - project(&jet).0).length())
     }
 
+    /// Largest coordinate, mm, about its own centre, of the patch of a face that holds the parameters; `None` where [`Self::patch_at`] is.
+    pub(in crate::intersect) fn patch_size(&self, face: FaceId, uv: Uv) -> Option<f64> {
+        Some(self.geometry.patches[self.patch_at(face, uv)? as usize].size())
+    }
+
     /// The patch of a face that holds the parameters, the outermost one where they lie beyond the domain; `None` where the face has no
     /// surface that is traced, or they are not finite.
     pub(in crate::intersect) fn patch_at(&self, face: FaceId, uv: Uv) -> Option<u32> {

@@ -7,7 +7,7 @@
 use super::clear_start::ClearStart;
 use super::curved_cells::LOOK_BACK_OF_FLAT;
 use super::facet_record::FacetRecord;
-use super::limits::{LEAST_SLACK_SINE, LEAST_WINDOW, LEAST_WINDOW_SINE, OWN_POINT, SHORT_OF_SAGS, WINDOW_OF_SAGS};
+use super::limits::{LEAST_SLACK_SINE, LEAST_WINDOW_SINE, OWN_POINT, SHORT_OF_SAGS, WINDOW_OF_SAGS, least_window};
 use super::{Polished, is_own};
 use crate::intersect::exact::{Seed, SurfacePoint};
 use crate::intersect::{Certainty, Cost, Hit, prefetch};
@@ -191,8 +191,9 @@ impl Polished<'_> {
         let record = &self.records[facet_hit.primitive as usize];
         let facing = facet_hit.geometric_normal.dot(ray.direction);
         let rising = point.normal.dot(ray.direction);
-        let window = WINDOW_OF_SAGS * f64::from(record.sag) / facing.abs().max(LEAST_WINDOW_SINE);
-        let is_near = point.inside && (point.t - facet_hit.t).abs() <= window.max(LEAST_WINDOW);
+        let sag = f64::from(record.sag);
+        let window = (WINDOW_OF_SAGS * sag / facing.abs().max(LEAST_WINDOW_SINE)).max(least_window(sag));
+        let is_near = point.inside && (point.t - facet_hit.t).abs() <= window;
         let is_own = point.t.abs() <= OWN_POINT
             && ray
                 .departure

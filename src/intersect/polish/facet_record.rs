@@ -1,6 +1,6 @@
 //! What polishing asks of a facet again and again, in half a cache line.
 
-use super::limits::{HIDDEN_BELOW, NO_SAG};
+use super::limits::{HIDDEN_BELOW, no_sag};
 use crate::intersect::exact::Exact;
 use crate::math::{FaceId, Ray, Uv};
 use crate::mesh::FacetMesh;
@@ -46,7 +46,7 @@ impl FacetRecord {
                 let length = a.distance(b).max(b.distance(c)).max(c.distance(d)).max(d.distance(a));
                 // A facet without area gets a normal of zero, and with it a sine that never decides.
                 let normal = (b - a).cross(c - a).normalize_or_zero();
-                let sag = mesh.sag.get(f).copied().filter(|s| s.is_finite()).unwrap_or(sag).max(NO_SAG);
+                let sag = mesh.sag.get(f).copied().filter(|s| s.is_finite()).unwrap_or(sag).max(no_sag(length));
                 let least_sine = (CLEAR_OF_SAGS * sag / length).max(LEAST_CLEAR_SINE);
                 let corners = facet.vertices.map(|v| mesh.vertices[v as usize].uv);
                 let patch = match exact.patch_around(facet.face, &corners) {

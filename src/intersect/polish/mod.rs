@@ -28,8 +28,8 @@ use clear_start::ClearStart;
 use curved_cells::CurvedCells;
 use facet_record::FacetRecord;
 use limits::{
-    HIDDEN_BELOW, LEAST_SLACK_SINE, LEAST_WINDOW, LEAST_WINDOW_SINE, NO_SAG, OWN_POINT, SHORT_OF_SAGS,
-    WINDOW_OF_SAGS,
+    HIDDEN_BELOW, LEAST_SLACK_SINE, LEAST_WINDOW_SINE, OWN_POINT, SHORT_OF_SAGS, WINDOW_OF_SAGS, least_window,
+    no_sag,
 };
 use piece::Piece;
 use std::sync::{PoisonError, RwLock};
@@ -40,10 +40,12 @@ const STEPS: u32 = 6;
 const UNKNOWN_SIZE: f64 = 10.0;
 /// Such a root is sought over so many lengths of the facet.
 const HIDDEN_LENGTHS: f64 = 4.0;
-/// And it is when it lies this near to it, mm, beside [`OWN_ROUNDING`].
+/// And it is when it lies this near to it, mm, or by this share of its patch on smaller ones, beside [`OWN_ROUNDING`].
 const SAME_POINT: f64 = 1e-7;
 /// Ulps of its largest coordinate that a ray's origin may be off.
 const OWN_ROUNDING: f64 = 64.0;
+/// How many times as far along the ray as across it such an origin moves its own root: it leaves at a sine of at least a thousandth.
+const OWN_GRAZING: f64 = 1e3;
 /// Facets without a root that a search passes before it gives up.
 const MOST_FACETS: usize = 64;
 /// Facets that a search from outside passes where the spline has nothing.
@@ -140,7 +142,7 @@ impl<'a> Polished<'a> {
             (UNKNOWN_SIZE * self.sag, self.sag)
         };
         let sine = normal.dot(ray.direction).abs();
-        (sag > NO_SAG && sine * length < HIDDEN_BELOW * sag).then_some(HIDDEN_LENGTHS * length)
+        (sag > no_sag(length) && sine * length < HIDDEN_BELOW * sag).then_some(HIDDEN_LENGTHS * length)
     }
 
     /// The distance along the ray, mm, up to which the facet hit may be a neighbour of the one left: twice its longer diagonal.
@@ -152,10 +154,10 @@ impl<'a> Polished<'a> {
     /// Moves one facet hit to the spline: by Newton steps from its parameters, or where they do not find the root that the facet stands
     /// for, by the exact model in a window around it.
     fn polish(&self, ray: &Ray, facet_hit: &Hit) -> Polishing {
-        let sag = self.sag_of(facet_hit.primitive).max(NO_SAG);
+        let sag = f64::from(self.records[facet_hit.primitive as usize].sag);
         let sine = facet_hit.geometric_normal.dot(ray.direction).abs();
         // A facet lies up to its sag off the spline: along a slanting ray that is sag over sine.
-        let window = (WINDOW_OF_SAGS * sag / sine.max(LEAST_WINDOW_SINE)).max(LEAST_WINDOW);
+        let window = (WINDOW_OF_SAGS * sag / sine.max(LEAST_WINDOW_SINE)).max(least_window(sag));
         let found = self.exact.converge(ray, facet_hit.face, facet_hit.uv, STEPS);
         let nearby = found.filter(|p| (p.t - facet_hit.t).abs() <= window);
         let own = |p: &SurfacePoint| {
@@ -297,12 +299,18 @@ impl<'a> Polished<'a> {
 /// Whether a root on the face that the ray leaves is the very point it leaves: no distance along the ray, the same place. That the
 /// faces are the same is up to the caller.
 fn is_own(exact: &Exact, from: &Departure, ray: &Ray, point: &super::exact::SurfacePoint) -> bool {
+    // Farther away it is another root on patches of any size.
     if point.t.abs() > OWN_POINT {
         return false;
     }
-    let tolerance = SAME_POINT + OWN_ROUNDING * f64::EPSILON * ray.origin.abs().max_element();
+    let Some(size) = exact.patch_size(from.face, from.uv) else { return false };
+    // A chord of a tenth of a micrometre is the width of a part of that size.
+    let share = size.min(1.0);
+    let rounding = OWN_ROUNDING * f64::EPSILON * ray.origin.abs().max_element();
     // By parameters where they are regular, by place across a seam or at a pole.
-    exact.distance_at(from.face, from.uv, ray.point_at(point.t)).is_some_and(|d| d <= tolerance)
+    point.t.abs() <= share * OWN_POINT + OWN_GRAZING * rounding
+        && (exact.distance_at(from.face, from.uv, ray.point_at(point.t)))
+            .is_some_and(|d| d <= share * SAME_POINT + rounding)
 }
 
 impl Polished<'_> {

@@ -93,7 +93,7 @@ pub enum Variant {
 impl Variant {
     /// Those of lamps and their parts.
     pub const ALL: [Self; 5] = [Self::Home, Self::Shifted, Self::Small, Self::Large, Self::Rotated];
-    /// Sizes at which absolute limits show: for facets, since a nanometre is a contact on the spline.
+    /// Sizes at which absolute limits show.
     pub const EXTREME: [Self; 2] = [Self::Tiny, Self::Huge];
 
     /// Returns the word used in tables.
