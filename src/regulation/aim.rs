@@ -1,6 +1,6 @@
 //! Where the beam is aimed before it is measured: the cut-off goes to the place that the regulation names.
 
-use super::edge::{Edge, SCAN_HALF_DEG, Scan};
+use super::edge::{Edge, SCAN_HALF_DEG, Scan, blur_by_cells};
 use super::few_rays::SIGMAS;
 use super::map::IntensityMap;
 use super::table::CutOff;
@@ -21,6 +21,8 @@ pub struct Aim {
     /// How far the errors of the map may have moved the aim: where each of its independent causes brings it at three standard errors to
     /// either side, degrees to the right and up. What a row reads there is an error of its reading.
     pub moved: Vec<[[f64; 2]; 2]>,
+    /// The same by the width of the map's cells, within which nobody knows where light falls off.
+    pub blurred: Vec<[[f64; 2]; 2]>,
 }
 
 /// Least gradient of an elbow, per 0.1° (UN R149 00, Annex 5, §2.3.2).
@@ -37,6 +39,10 @@ const LEVEL_HALF_DEG: f64 = 0.5;
 const ELBOW_V_DEG: f64 = -0.2;
 /// It goes this far to both sides, degrees.
 const SCAN_H_DEG: f64 = 5.0;
+
+/// A shoulder that a level scan meets is as sharp across as the cut-off, and by so much flatter along the scan: at most by the inverse sine
+/// of 10°, where 15° are usual.
+const MOST_SLANT: f64 = 5.76;
 
 /// Most aims that rows are asked by. Where more are open nearly all of the map is noise: those asked lie as far apart as it takes.
 const MOST_RIVALS: usize = 150;
@@ -69,7 +75,7 @@ impl Aim {
         // Where another place may be the cut-off, the lamp is aimed by that too, and then by every elbow that it may have.
         let mut open: Vec<[f64; 2]> = Vec::new();
         for place in &edge.rivals {
-            open.extend(Sideways::below(map, rule, place - rule.line_v_deg).aims());
+            open.extend(Sideways::below(map, rule, place - rule.line_v_deg, edge.gradient).aims());
         }
         let gradient = Some(edge.gradient);
         // What has no edge cannot be aimed by it; to turn the lamp by noise would be worse.
@@ -87,18 +93,24 @@ impl Aim {
             open.push([0.0, 0.0]);
         }
         let v_deg = edge.position - rule.line_v_deg;
-        let sideways = Sideways::below(map, rule, v_deg);
+        let below = |v_deg: f64| Sideways::below(map, rule, v_deg, edge.gradient);
+        let sideways = below(v_deg);
         open.extend(sideways.others.iter().map(|h| [*h, v_deg]));
         // Its place is as sure as noise leaves the middle of the edge.
         let mut moved = Vec::from_iter(sideways.moved.map(|ends| ends.map(|h| [h, v_deg])));
         let reach = SIGMAS * edge.position_error;
         if reach > LEAST_TURN_DEG {
-            let ends = [v_deg - reach, v_deg + reach].map(|v_deg| Sideways::below(map, rule, v_deg));
+            let ends = [v_deg - reach, v_deg + reach].map(below);
             moved.push([0, 1].map(|k| [ends[k].h_deg, ends[k].v_deg]));
             // Other elbows are the same, but where the scan for them goes elsewhere.
             if reach > SAME_SCAN_DEG {
                 open.extend(ends.iter().flat_map(|end| end.others.iter().map(|h| [*h, end.v_deg])));
             }
+        }
+        let mut blurred = Vec::from_iter(sideways.blurred.map(|ends| ends.map(|h| [h, v_deg])));
+        let blur = blur_by_cells(edge.gradient, map.coarsest_deg());
+        if blur > LEAST_TURN_DEG {
+            blurred.push([v_deg - blur, v_deg + blur].map(|v_deg| [below(v_deg).h_deg, v_deg]));
         }
         let how = format!(
             "cut-off found at {:.2}° on H = {}° (G = {:.2}) and read as {}°{}; {}",
@@ -109,7 +121,7 @@ impl Aim {
             doubt(&edge, "cut-off"),
             sideways.how
         );
-        Self { h_deg: sideways.h_deg, v_deg, gradient, how, rivals: thinned(open), moved }
+        Self { h_deg: sideways.h_deg, v_deg, gradient, how, rivals: thinned(open), moved, blurred }
     }
 
     /// The same aim, what it leaves open turned with it, with every direction read `h_deg` farther right and `v_deg` farther up, as a
@@ -124,6 +136,7 @@ impl Aim {
             how,
             rivals: self.rivals.iter().copied().map(turned).collect(),
             moved: self.moved.iter().map(|ends| ends.map(turned)).collect(),
+            blurred: self.blurred.iter().map(|ends| ends.map(turned)).collect(),
         }
     }
 
@@ -163,15 +176,18 @@ struct Sideways {
     others: Vec<f64>,
     /// Where noise may have moved the elbow to, at three standard errors to either side.
     moved: Option<[f64; 2]>,
+    /// The same by the width of the cells.
+    blurred: Option<[f64; 2]>,
     /// For people.
     how: String,
 }
 
 impl Sideways {
-    /// Looks for the elbow below a cut-off that is read `v_deg` farther up than it stands.
-    fn below(map: &IntensityMap, rule: CutOff, v_deg: f64) -> Self {
+    /// Looks for the elbow below a cut-off of this gradient that is read `v_deg` farther up than it stands.
+    fn below(map: &IntensityMap, rule: CutOff, v_deg: f64, gradient: f64) -> Self {
+        let as_placed = |others, how| Self { h_deg: 0.0, v_deg, others, moved: None, blurred: None, how };
         let Some(elbow_h_deg) = rule.elbow_h_deg else {
-            return Self { h_deg: 0.0, v_deg, others: Vec::new(), moved: None, how: "sideways as placed".into() };
+            return as_placed(Vec::new(), "sideways as placed".into());
         };
         // To the right of the elbow the light reaches higher: the scan goes from light to dark towards the left.
         let scan = Scan {
@@ -182,11 +198,11 @@ impl Sideways {
         };
         let none = format!("no elbow at V = {ELBOW_V_DEG}°, sideways as placed");
         let Some(elbow) = scan.steepest_edge(map, |h| [h, ELBOW_V_DEG + v_deg]) else {
-            return Self { h_deg: 0.0, v_deg, others: Vec::new(), moved: None, how: none };
+            return as_placed(Vec::new(), none);
         };
         let mut others: Vec<f64> = elbow.rivals.iter().map(|place| place - elbow_h_deg).collect();
         if !elbow.is_found() {
-            return Self { h_deg: 0.0, v_deg, others, moved: None, how: none + &doubt(&elbow, "elbow") };
+            return as_placed(others, none + &doubt(&elbow, "elbow"));
         }
         if elbow.may_be_none {
             others.push(0.0);
@@ -194,9 +210,13 @@ impl Sideways {
         let h_deg = elbow.position - elbow_h_deg;
         let reach = SIGMAS * elbow.position_error;
         let moved = (reach > LEAST_TURN_DEG).then_some([h_deg - reach, h_deg + reach]);
+        let across = elbow.gradient.max(gradient);
+        let slant = (across / elbow.gradient).min(MOST_SLANT);
+        let blur = slant * blur_by_cells(across, map.coarsest_deg());
+        let blurred = (blur > LEAST_TURN_DEG).then_some([h_deg - blur, h_deg + blur]);
         let doubt = doubt(&elbow, "elbow");
         let how = format!("elbow found at {:.2}° and read as {}°{doubt}", elbow.position, elbow_h_deg);
-        Self { h_deg, v_deg, others, moved, how }
+        Self { h_deg, v_deg, others, moved, blurred, how }
     }
 
     /// All aims, that of the elbow found first.
@@ -228,6 +248,23 @@ mod tests {
                 // The shoulder rises by 15°: what moves the scan up moves the elbow by four times that.
                 assert!((coarse.h_deg - fine.h_deg).abs() < 6.0 * most, "{cell}: {coarse:?} for {fine:?}");
             }
+        }
+    }
+
+    /// Without noise, the aim by cells of any width reaches that by cells of 0.02° within what the width leaves open.
+    #[test]
+    fn what_cells_leave_open_reaches_the_true_aim() {
+        for (k, cell) in [0.05, 0.0625, 0.1, 0.125, 0.148].into_iter().cycle().take(15).enumerate() {
+            let beam = passing(0.137 * k as f64 - 0.9, 0.5 - 0.071 * k as f64);
+            let [coarse, fine] = [cell, 0.02].map(|cell| Aim::by_cut_off(&map_of_means(&beam, cell), rule()));
+            let reach = |axis: usize| -> f64 {
+                let widths = coarse.blurred.iter().map(|[from, to]| 0.5 * (from[axis] - to[axis]));
+                widths.map(|width| width * width).sum::<f64>().sqrt()
+            };
+            let off = [(coarse.h_deg - fine.h_deg).abs(), (coarse.v_deg - fine.v_deg).abs()];
+            // The finer cells are not endlessly fine.
+            assert!((0..2).all(|axis| off[axis] <= reach(axis) + 5e-3), "{cell}: {coarse:?} for {fine:?}");
+            assert!(reach(1) < 0.6 * cell && reach(0) < 5.0 * cell, "{cell}: {coarse:?}");
         }
     }
 

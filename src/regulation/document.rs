@@ -18,6 +18,7 @@ impl Assessment {
                 "value": r.reading.map(|x| x.value),
                 "statistical": r.reading.map(|x| x.statistical),
                 "geometric": r.reading.and_then(|x| x.geometric),
+                "cells": r.reading.map(|x| x.cells),
                 "verdict": r.verdict.map(|v| v.to_string()),
                 "settles": settles, "unseen": r.unseen, "when": r.row.when, "note": r.row.note,
                 "source": r.row.source, "evidence": r.row.evidence,
@@ -26,7 +27,8 @@ impl Assessment {
         json!({
             "regulation": self.regulation.id, "title": self.regulation.title, "checked": self.regulation.checked(),
             "traffic": self.traffic.word(), "aim": {"h_deg": self.aim.h_deg, "v_deg": self.aim.v_deg, "gradient": self.aim.gradient,
-                "how": self.aim.how, "rivals_deg": self.aim.rivals, "moved_deg": self.aim.moved},
+                "how": self.aim.how, "rivals_deg": self.aim.rivals, "moved_deg": self.aim.moved,
+                "blurred_deg": self.aim.blurred},
             "sensor_deg": self.sensor_deg, "rows": rows.collect::<Vec<_>>(), "verdict": self.verdict.to_string(),
         })
     }

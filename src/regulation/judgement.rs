@@ -75,6 +75,11 @@ pub(super) struct Decisive {
 const BISECTIONS: usize = 16;
 
 impl Decisive {
+    /// Whether no other error need be there to leave the verdict open: on its very limit a reading stays unsure with any.
+    pub(super) fn cells_leave_open(&self) -> bool {
+        self.margin.abs() <= self.sigmas * self.reading.cells
+    }
+
     /// Returns with how many rays in all, never fewer than `traced`, and on facets of which tolerance this margin would be enough.
     ///
     /// `tolerance_mm` is the run's own, `None` where it is not known. `None` where `traced` is 0, that is not known, where 10¹⁵ rays or
@@ -83,12 +88,12 @@ impl Decisive {
         /// Runs beyond this are no advice.
         const MOST_RAYS: f64 = 1e15;
         const MOST_DOUBLINGS: f64 = 50.0;
-        // The largest combined error that settles it.
-        let wanted = self.margin.abs() / self.sigmas;
-        // On its very limit a reading stays unsure with any error, and from an unknown number of rays nothing follows.
-        if wanted == 0.0 || traced == 0 {
+        // From an unknown number of rays nothing follows.
+        if traced == 0 || self.cells_leave_open() {
             return None;
         }
+        // The largest error of both kinds that settles it, beside that of the cells.
+        let wanted = ((self.margin / self.sigmas).powi(2) - self.reading.cells.powi(2)).sqrt();
         let geometric = self.reading.geometric?;
         // Where the facets leave no room, both errors get half of the square.
         let finer = geometric > 0.5f64.sqrt() * wanted;
@@ -173,7 +178,8 @@ impl Judgement {
             noise.other += comparison.by_aim[1].powi(2);
             // What nobody knows of the facets may be more than any margin.
             let geometric = reading.geometric.unwrap_or(f64::INFINITY);
-            let reach = noise.reach(sigmas, 1.0).hypot(sigmas * geometric);
+            let cells = comparison.weights.unresolved.hypot(comparison.by_cells[1]);
+            let reach = noise.reach(sigmas, 1.0).hypot(sigmas * geometric).hypot(sigmas * cells);
             let enough = margin.abs() >= reach;
             // A limit that is just reached is met, where there is no error.
             passing += usize::from(enough && margin >= 0.0);
@@ -226,11 +232,12 @@ fn sigmas_of_luckiest(readings: usize) -> f64 {
     if readings > 1 { bound.max(SIGMAS) } else { SIGMAS }
 }
 
-/// Returns the reading of a comparison, its statistical error with what the aim adds to it, and by how much it keeps its limit, cd;
-/// negative where it does not.
+/// Returns the reading of a comparison, its errors with what the aim adds to them, and by how much it keeps its limit, cd; negative where
+/// it does not.
 fn read_margin(photometer: &Photometer, comparison: &Comparison) -> (Reading, f64) {
     let mut reading = photometer.map.read(&comparison.weights);
     reading.statistical = reading.statistical.hypot(comparison.by_aim[0]);
+    reading.cells = reading.cells.hypot(comparison.by_cells[0]);
     let margin =
         if comparison.at_least { reading.value - comparison.limit } else { comparison.limit - reading.value };
     (reading, margin)
@@ -246,7 +253,7 @@ mod tests {
     #[test]
     fn nothing_settles_a_reading_on_its_very_limit() {
         let on_limit = |statistical: f64, geometric: f64| {
-            let reading = Reading { value: 1.0, statistical, geometric: Some(geometric) };
+            let reading = Reading { value: 1.0, statistical, geometric: Some(geometric), cells: 0.0 };
             let noise = Noise { other: statistical * statistical, ..NONE };
             Decisive { reading, direction: [0.0, 0.0], margin: 0.0, sigmas: 3.0, surety: 0.0, noise }
                 .what_settles(1000, Some(0.1))
@@ -261,7 +268,7 @@ mod tests {
     #[test]
     fn all_that_is_unsure_must_be_settled() {
         let judged = |margin: f64, unseen: usize, verdict: Verdict| {
-            let reading = Reading { value: 1.0, statistical: 1.0, geometric: Some(0.0) };
+            let reading = Reading { value: 1.0, statistical: 1.0, geometric: Some(0.0), cells: 0.0 };
             let noise = Noise { other: 1.0, ..NONE };
             let surety = margin / 3.0;
             let decisive = Decisive { reading, direction: [margin, 0.0], margin, sigmas: 3.0, surety, noise };
@@ -281,7 +288,7 @@ mod tests {
     /// A geometric error of three times the margin's third leaves no room: it must come down to 1/√2 of that, known tolerance or not.
     #[test]
     fn facets_are_asked_to_be_finer_where_their_tolerance_is_not_known() {
-        let reading = Reading { value: 1.0, statistical: 0.1, geometric: Some(1.0) };
+        let reading = Reading { value: 1.0, statistical: 0.1, geometric: Some(1.0), cells: 0.0 };
         let unsure = Decisive {
             reading,
             direction: [0.0; 2],
@@ -301,7 +308,7 @@ mod tests {
     #[test]
     fn what_settles_follows_from_what_few_rays_leave_open() {
         let rays = |noise: Noise| {
-            let reading = Reading { value: 1.0, statistical: 1.0, geometric: Some(0.0) };
+            let reading = Reading { value: 1.0, statistical: 1.0, geometric: Some(0.0), cells: 0.0 };
             Decisive { reading, direction: [0.0, 0.0], margin: 1.0, sigmas: 3.0, surety: 0.0, noise }
                 .what_settles(1000, None)
                 .map(|settles| settles.rays as f64 / 1000.0)

@@ -6,6 +6,8 @@ pub(super) struct CellWeights {
     /// Cells by their rising index, each with its weight.
     // Ordered: sums over cells come in one order, and two runs agree to the last bit. A list: most hold a dozen of cells.
     pub(super) by_cell: Vec<(usize, f64)>,
+    /// Standard error of what the width of the cells leaves open, cd.
+    pub(super) unresolved: f64,
 }
 
 impl CellWeights {
@@ -26,6 +28,8 @@ impl CellWeights {
         for (cell, weight) in &other.by_cell {
             self.add(*cell, factor * weight);
         }
+        // One edge of light crosses both: their errors have a common cause.
+        self.unresolved += factor.abs() * other.unresolved;
         self
     }
 }
@@ -45,6 +49,7 @@ impl OpeningSum {
         for (_, weight) in &mut self.weights.by_cell {
             *weight /= self.total;
         }
+        self.weights.unresolved /= self.total;
         self.weights
     }
 }

@@ -15,6 +15,8 @@ pub(super) struct Comparison {
     pub(super) weights: Rc<CellWeights>,
     /// Standard error of its reading by how far noise may have moved the aim, cd: to either side, and towards the limit.
     pub(super) by_aim: [f64; 2],
+    /// The same by how far the width of the cells may have.
+    pub(super) by_cells: [f64; 2],
     /// Candela.
     pub(super) limit: f64,
     /// Whether the limit is a least value.
@@ -41,7 +43,8 @@ pub(super) struct Requirement {
 pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, rows: &[Row]) -> Vec<Requirement> {
     let mut requirements = requirements_as_aimed(photometer, rules, row, rows);
     let read = |c: &Comparison| photometer.map.read(&c.weights).value;
-    for ends in &photometer.aim.moved {
+    let causes = photometer.aim.moved.iter().map(|ends| (ends, false));
+    for (ends, is_of_cells) in causes.chain(photometer.aim.blurred.iter().map(|ends| (ends, true))) {
         let ends = ends.map(|end| {
             let aim = &Aim::turned_by(end);
             requirements_as_aimed(&Photometer { aim, ..*photometer }, rules, row, rows)
@@ -56,8 +59,9 @@ pub(super) fn requirements(photometer: &Photometer, rules: &Rules, row: &Row, ro
                 let [least, most] =
                     [there.iter().copied().fold(0.0, f64::min), there.iter().copied().fold(0.0, f64::max)];
                 let towards = if read(here) < here.limit { most } else { -least };
-                let [own, own_towards] = here.by_aim;
-                here.by_aim = [own.hypot(0.5 * (most - least) / SIGMAS), own_towards.hypot(towards / SIGMAS)];
+                let by_cause = if is_of_cells { &mut here.by_cells } else { &mut here.by_aim };
+                let [own, own_towards] = *by_cause;
+                *by_cause = [own.hypot(0.5 * (most - least) / SIGMAS), own_towards.hypot(towards / SIGMAS)];
             }
         }
     }
@@ -102,7 +106,14 @@ fn limits_at(row: &Row, sightings: &[Sighting], any: [bool; 2]) -> Vec<Requireme
         let limit = limit?;
         let seen = sightings.iter().filter_map(|(direction, m)| Some((*direction, m.clone()?)));
         let comparisons: Vec<Comparison> = seen
-            .map(|(direction, weights)| Comparison { weights, by_aim: [0.0; 2], limit, at_least, direction })
+            .map(|(direction, weights)| Comparison {
+                weights,
+                by_aim: [0.0; 2],
+                by_cells: [0.0; 2],
+                limit,
+                at_least,
+                direction,
+            })
             .collect();
         let unseen = sightings.len() - comparisons.len();
         Some(Requirement { comparisons, choices: 1, any, unseen })
@@ -142,7 +153,8 @@ fn sum_requirement(photometer: &Photometer, row: &Row) -> Option<Requirement> {
         return Some(Requirement { comparisons: Vec::new(), choices: 1, any: false, unseen });
     }
     let weights = Rc::new(seen.iter().fold(CellWeights::default(), |sum, point| sum.plus(1.0, point)));
-    let comparison = Comparison { weights, by_aim: [0.0; 2], limit, at_least: true, direction: points[0] };
+    let comparison =
+        Comparison { weights, by_aim: [0.0; 2], by_cells: [0.0; 2], limit, at_least: true, direction: points[0] };
     Some(Requirement { comparisons: vec![comparison], choices: 1, any: false, unseen: 0 })
 }
 
@@ -176,6 +188,7 @@ fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Opt
                 // Errors of cells that both readings share would count twice if the two were judged apart.
                 weights: Rc::new(CellWeights::clone(&weights).plus(-factor, reference)),
                 by_aim: [0.0; 2],
+                by_cells: [0.0; 2],
                 limit: 0.0,
                 at_least: bound == Bound::Min,
                 direction,

@@ -11,6 +11,10 @@ use super::table::Regulation;
 const UNKNOWN_FACETS: &str = "it is not known what facets change here, as the cells are too many to be compared with the spline: trace \
     with fewer, or with --intersector exact";
 
+/// What is remarked on rows that no rays and no facets make sure.
+const COARSE_CELLS: &str = "the width of the far field's cells alone leaves open more than lies between reading and limit: trace with \
+    narrower ones";
+
 /// Judges the rows of which `is_asked`, by their place in the table, as the map is aimed, points that the sum of their group may save with
 /// that; `None` for the others. Whether another aim is open is not asked.
 pub(super) fn judge_rows(
@@ -94,6 +98,9 @@ pub(super) fn judge_row(
     // What fails is not mended by rays.
     if worst.verdict == Verdict::Unsure {
         verdict.settles = Judgement::what_settles_all(&judged, assumptions.rays, assumptions.tolerance_mm);
+        if worst.decisive.is_some_and(|decisive| decisive.cells_leave_open()) {
+            verdict.row.add_note(COARSE_CELLS);
+        }
     }
     verdict
 }

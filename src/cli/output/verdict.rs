@@ -21,11 +21,21 @@ pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     text += &format!("  sensor  {:.3}° from side to side\n", a.sensor_deg);
     text += &format!("  tables  {}\n", a.regulation.checked());
     let mut table = blank_table(console.width());
-    table.set_header(["", "direction", "asked [cd]", "read [cd]", "± stat.", "± geom.", "verdict", "settled by"]);
+    table.set_header([
+        "",
+        "direction",
+        "asked [cd]",
+        "read [cd]",
+        "± stat.",
+        "± geom.",
+        "± cells",
+        "verdict",
+        "settled by",
+    ]);
     for row in &a.rows {
         table.add_row(row_cells(row));
     }
-    for column in 2..=5 {
+    for column in 2..=6 {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
         }
@@ -53,8 +63,8 @@ fn notes(a: &Assessment) -> Vec<(&str, Vec<&str>)> {
     notes
 }
 
-/// Returns the eight cells of a row of the table; a dash where nothing was read.
-fn row_cells(row: &RowVerdict) -> [String; 8] {
+/// Returns the nine cells of a row of the table; a dash where nothing was read.
+fn row_cells(row: &RowVerdict) -> [String; 9] {
     let read = |value: fn(crate::regulation::Reading) -> Option<f64>| {
         row.reading.and_then(value).map_or("–".to_owned(), |x| figures(x, DIGITS))
     };
@@ -65,6 +75,7 @@ fn row_cells(row: &RowVerdict) -> [String; 8] {
         read(|r| Some(r.value)),
         read(|r| Some(r.statistical)),
         read(|r| r.geometric),
+        read(|r| Some(r.cells)),
         row.verdict.map_or("not judged".to_owned(), |v| v.to_string()),
         settling_text(row),
     ]
@@ -88,7 +99,7 @@ mod tests {
             notes.iter().any(|(note, rows)| note.starts_with("as printed") && rows[..] == ["Group 1", "Group 5"]),
             "{notes:?}"
         );
-        assert!(a.rows.iter().all(|row| row_cells(row)[7].is_empty()));
+        assert!(a.rows.iter().all(|row| row_cells(row)[8].is_empty()));
     }
 
     fn passed(row: crate::regulation::Row) -> RowVerdict {
