@@ -14,7 +14,7 @@ use lampyris::tessellate::Tessellation;
 use numpy::{PyArrayDyn, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -104,19 +104,24 @@ impl Mesh {
             sag: sag.unwrap_or_default(),
             ..FacetMesh::default()
         };
-        let mut known = HashMap::new();
+        // The last vertex at each position: corners of a face that are alike are one, as the mesher has them.
+        let mut last = vec![u32::MAX; mesh.positions.len()];
+        let mut first_of_face = 0;
         for (k, (facet, face)) in numbers.chunks(width).zip(faces).enumerate() {
+            if mesh.facets.last().is_none_or(|before| before.face != FaceId(face)) {
+                first_of_face = mesh.vertices.len();
+            }
             let places = [0, 1, 2, 3].map(|i| facet[i.min(width - 1)] as u32);
             let flat = flat_normal(places.map(|p| mesh.positions[p as usize]));
             let vertices = [0, 1, 2, 3].map(|i| {
                 let vertex = source.vertex(4 * k + i, places[i], flat);
-                let [x, y, z, u, v] = [vertex.normal.x, vertex.normal.y, vertex.normal.z, vertex.uv.x, vertex.uv.y];
-                // Corners of a face that are alike are one, as the mesher has them.
-                let key = (face, places[i], [x, y, z, u, v].map(f64::to_bits));
-                *known.entry(key).or_insert_with(|| {
+                let known = &mut last[places[i] as usize];
+                let is_known = *known as usize >= first_of_face;
+                if !(is_known && mesh.vertices.get(*known as usize).is_some_and(|other| is_same(other, &vertex))) {
+                    *known = mesh.vertices.len() as u32;
                     mesh.vertices.push(vertex);
-                    mesh.vertices.len() as u32 - 1
-                })
+                }
+                *known
             });
             mesh.facets.push(Facet { vertices, face: FaceId(face) });
         }
@@ -219,6 +224,12 @@ impl Corners {
     }
 }
 
+/// Whether two vertices at one position have the same normal and parameters, bit by bit.
+fn is_same(a: &MeshVertex, b: &MeshVertex) -> bool {
+    let bits = |v: &MeshVertex| [v.normal.x, v.normal.y, v.normal.z, v.uv.x, v.uv.y].map(f64::to_bits);
+    bits(a) == bits(b)
+}
+
 /// The normal of the flat facet; `None` without area.
 fn flat_normal([a, b, c, d]: [Vector; 4]) -> Option<Vector> {
     let flat = (c - a).cross(d - b) + if c == d { (b - a).cross(c - a) } else { Vector::ZERO };
@@ -261,6 +272,9 @@ fn require_numbers(corners: &[f64], width: usize, count: usize) -> PyResult<()> 
 
 /// Refuses faces whose facets do not stand together, or whose numbers hits could not tell.
 fn require_together(faces: &[u32]) -> PyResult<()> {
+    if faces.is_sorted() && faces.last().is_none_or(|face| *face <= i32::MAX as u32) {
+        return Ok(());
+    }
     let mut seen = HashSet::new();
     for (k, group) in faces.chunk_by(|a, b| a == b).enumerate() {
         if !seen.insert(group[0]) || group[0] > i32::MAX as u32 {
