@@ -161,10 +161,10 @@ impl Absorption {
         Ok(Self::Constant(require("an absorption coefficient", coefficient, coefficient >= 0.0, "zero or more")?))
     }
 
-    /// Napierian coefficients per mm at wavelengths in nm.
+    /// Napierian coefficients per mm at wavelengths in nm: linear between them, constant beyond the ends.
     ///
     /// # Errors
-    /// When there are none, the wavelengths do not ascend, or a coefficient is negative.
+    /// When there are none, the wavelengths do not increase strictly, a number is not finite, or a coefficient is negative.
     pub fn table(points: impl IntoIterator<Item = (f64, f64)>) -> Result<Self, Error> {
         let table = Table::new("absorption", points)?;
         let [low, _] = table.extremes();

@@ -112,7 +112,7 @@ impl Slope {
     }
 }
 
-/// Light on one side of a place: its value and standard error, cd.
+/// A reading: its value and standard error, cd.
 type Light = [f64; 2];
 
 impl Scan {
@@ -205,7 +205,7 @@ struct Place {
     light: Light,
 }
 
-/// The light that a photometer reads in the mean of places.
+/// Returns the mean reading at places, cd, and its standard error, in which cells that several of them share count once.
 fn mean_light(map: &IntensityMap, places: &[Place]) -> Light {
     let share = 1.0 / places.len() as f64;
     map.read_with_dark(&places.iter().fold(CellWeights::default(), |sum, place| sum.plus(share, &place.weights)))

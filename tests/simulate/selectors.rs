@@ -41,6 +41,20 @@ fn rules(model: &Model, materials: &str) -> Result<Vec<RuleFaces>, Error> {
     bound(model, materials).map(|bound| bound.rules().to_vec())
 }
 
+/// A text that is no colour would else ask for nothing, and so mean every face.
+#[test]
+fn what_is_no_colour_is_refused_in_rules_sources_and_receivers() {
+    let model = twins();
+    for table in [
+        "[[material]]\non = { colour = 'red' }\nsurface = 'mirror'",
+        "[[source]]\nkind = 'lambertian'\non = { colour = 'red' }",
+        "[[receiver]]\nname = 'lit'\nkind = 'absorbed'\non = { colour = 'red' }",
+    ] {
+        let error = bound(&model, table).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(error.contains("not a colour") && error.contains("s.toml:"), "{table}: {error}");
+    }
+}
+
 #[test]
 fn two_solids_of_one_part_are_told_apart() {
     let model = twins();

@@ -3,7 +3,7 @@
 use crate::faces::{import, read, square};
 use crate::files::{MILLIMETRES, part21};
 use lampyris::model::SurfaceKind;
-use lampyris::step::{Settings, read_bytes};
+use lampyris::step::{Import, Settings, read_bytes};
 
 const FORWARD: [&str; 4] = [".T."; 4];
 const IN_ORDER: [usize; 4] = [0, 1, 2, 3];
@@ -79,23 +79,43 @@ fn a_colour_is_found_beside_a_reference_that_leads_nowhere() {
 #[test]
 fn an_operator_places_what_a_relationship_names() {
     for names in ["''", "'',''", "'','',$"] {
-        let operator = format!(
-            "#120=DIRECTION('',(1.,0.,0.));\n#121=DIRECTION('',(0.,-1.,0.));\n#122=DIRECTION('',(0.,0.,1.));\n\
-             #108=CARTESIAN_TRANSFORMATION_OPERATOR_3D({names},#120,#121,#12,2.5,#122);\n\
-             #100=AXIS2_PLACEMENT_3D('',#12,$,$);\n#101=PRODUCT_DEFINITION('','',$,$);\n#102=PRODUCT_DEFINITION('','',$,$);\n\
-             #103=SHAPE_REPRESENTATION('',(#100),#1);\n#104=PRODUCT_DEFINITION_SHAPE('','',#101);\n\
-             #105=PRODUCT_DEFINITION_SHAPE('','',#102);\n#106=SHAPE_DEFINITION_REPRESENTATION(#104,#103);\n\
-             #107=SHAPE_DEFINITION_REPRESENTATION(#105,#6);\n#110=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#101,#102,$);\n\
-             #109=(REPRESENTATION_RELATIONSHIP('','',#6,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#108)\
-             SHAPE_REPRESENTATION_RELATIONSHIP());\n\
-             #111=PRODUCT_DEFINITION_SHAPE('','',#110);\n#112=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#109,#111);\n"
-        );
-        let placed = import(&(square(FORWARD, IN_ORDER) + &operator));
-        assert_eq!(placed.report.problems, Vec::<String>::new());
-        let [lo, hi] = placed.report.bbox_mm.expect("a face");
-        for (got, expected) in lo.into_iter().chain(hi).zip([1.0, -1.5, 0.0, 3.5, 1.0, 0.0]) {
-            assert!((got - expected).abs() < 1e-12, "{names}: {lo:?} {hi:?}");
-        }
+        let axes =
+            "#120=DIRECTION('',(1.,0.,0.));\n#121=DIRECTION('',(0.,-1.,0.));\n#122=DIRECTION('',(0.,0.,1.));\n";
+        let operator = format!("CARTESIAN_TRANSFORMATION_OPERATOR_3D({names},#120,#121,#12,2.5,#122)");
+        assert_square_in_box(&placed_by(axes, &operator), [1.0, -1.5, 0.0, 3.5, 1.0, 0.0]);
+    }
+}
+
+/// ISO 10303-42, `first_proj_axis`: without its first axis an operator takes the space's X, projected, also where the third is nearly along
+/// it. The axes are x = (0.28, −0.96, 0), y = −Z, z = (0.96, 0.28, 0).
+#[test]
+fn an_operator_without_a_first_axis_takes_the_projection_of_x() {
+    let operator = "CARTESIAN_TRANSFORMATION_OPERATOR_3D('',$,$,#12,1.,#122)";
+    let placed = placed_by("#122=DIRECTION('',(0.96,0.28,0.));\n", operator);
+    assert_square_in_box(&placed, [1.0, 0.04, -1.0, 1.28, 1.0, 0.0]);
+}
+
+/// Reads the square as a part that an operator places in an assembly; `axes` are the statements that it names.
+fn placed_by(axes: &str, operator: &str) -> Import {
+    let assembly = format!(
+        "{axes}#108={operator};\n\
+         #100=AXIS2_PLACEMENT_3D('',#12,$,$);\n#101=PRODUCT_DEFINITION('','',$,$);\n#102=PRODUCT_DEFINITION('','',$,$);\n\
+         #103=SHAPE_REPRESENTATION('',(#100),#1);\n#104=PRODUCT_DEFINITION_SHAPE('','',#101);\n\
+         #105=PRODUCT_DEFINITION_SHAPE('','',#102);\n#106=SHAPE_DEFINITION_REPRESENTATION(#104,#103);\n\
+         #107=SHAPE_DEFINITION_REPRESENTATION(#105,#6);\n#110=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#101,#102,$);\n\
+         #109=(REPRESENTATION_RELATIONSHIP('','',#6,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#108)\
+         SHAPE_REPRESENTATION_RELATIONSHIP());\n\
+         #111=PRODUCT_DEFINITION_SHAPE('','',#110);\n#112=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#109,#111);\n"
+    );
+    import(&(square(FORWARD, IN_ORDER) + &assembly))
+}
+
+/// Asserts that the file had no problems, and that its shape fills a box, given by both corners, mm.
+fn assert_square_in_box(placed: &Import, expected: [f64; 6]) {
+    assert_eq!(placed.report.problems, Vec::<String>::new());
+    let [lo, hi] = placed.report.bbox_mm.expect("a face");
+    for (got, expected) in lo.into_iter().chain(hi).zip(expected) {
+        assert!((got - expected).abs() < 1e-12, "{lo:?} {hi:?}");
     }
 }
 

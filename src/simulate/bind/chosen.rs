@@ -20,8 +20,9 @@ pub(super) fn choose_rules(scene: &Scene, model: &Model) -> Result<ChosenRules, 
     let mut chosen: ChosenRules = vec![(None, None); model.placed_face_count()];
     let mut nearest = Nearest::new(model);
     for (i, rule) in scene.materials.iter().enumerate() {
-        let base = [Key::Name("material"), Key::Index(i)];
-        for face in select::select_faces(scene, &base, &rule.faces(), model, &mut nearest)? {
+        let base = [Key::Name("material"), Key::Index(i), Key::Name("on")];
+        let base = if rule.on.is_some() { &base[..] } else { &base[..2] };
+        for face in select::select_faces(scene, base, &rule.faces(), model, &mut nearest)? {
             // A later rule stands above an earlier one, for surfaces and media apart.
             if rule.surface.is_some() || rule.scatter.is_some() {
                 chosen[face].0 = Some(i);

@@ -40,7 +40,9 @@ impl Scene {
     /// Finds what every rule of the scene means in a model (all its models assembled into one, see [`Scene::assemble`]).
     ///
     /// # Errors
-    /// When a rule, a source or a receiver means nothing in the model, a file of a source cannot be read, or a medium has no index.
+    /// When the scene has no source, a rule, a source or a receiver means nothing in the model, values of a rule do not go together, a face
+    /// is an interface of a part without a medium, a file of a source cannot be read, a medium has no index at the light's wavelengths, or
+    /// there are more surfaces or media than the tracer tells apart.
     pub fn bind(&self, model: &Model) -> Result<BoundScene, Error> {
         if self.sources.is_empty() {
             let error = self.error(ErrorKind::Value, &[], "the scene has no source");

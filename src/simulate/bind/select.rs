@@ -68,11 +68,9 @@ fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -
             face.radius().is_some_and(|have| radii.as_slice().iter().any(|wanted| same_radius(wanted, have)))
         })
         && matches_solid(&rule.solid, face, model)
-        && rule
-            .colour
-            .as_ref()
-            .and_then(|c| c.rgb())
-            .is_none_or(|wanted| face.colour(model).is_some_and(|have| same_colour(wanted, have.0)))
+        && rule.colour.as_ref().is_none_or(|wanted| {
+            wanted.rgb().zip(face.colour(model)).is_some_and(|(wanted, have)| same_colour(wanted, have.0))
+        })
 }
 
 /// Returns the indices of the placed faces that a selector means; with points, for each of them the nearest of these, which may repeat.
@@ -107,8 +105,9 @@ pub(super) fn select_faces(
         let distance = nearest.distance(face, Point::from_array(*p));
         // A point that far off is a slip of unit or sign, and not meant for any face.
         if distance > bounds.diagonal() {
-            let message =
-                format!("{p:?} is {distance:.4} mm from the nearest face, farther away than the model is large");
+            let message = format!(
+                "{p:?} is {distance:.4} mm from the nearest face, farther away than the faces meant are large"
+            );
             let error = scene.error(ErrorKind::NoMatch, &path("at"), message);
             let [a, b] = [bounds.min, bounds.max].map(|p| p.to_array().map(|x| (x * DECIMALS).round() / DECIMALS));
             return Err(error.help(format!("the faces that are meant lie between {a:?} and {b:?}, mm")));
@@ -118,16 +117,20 @@ pub(super) fn select_faces(
     Ok(chosen)
 }
 
-/// Checks that every name in a selector fits something in the model.
+/// Checks that the colour of a selector is one, and that every name in it fits something in the model, or of kinds any model.
 ///
 /// # Errors
-/// For the first name that fits nothing, with the nearest name or a list of names.
+/// For a text that is no colour, and for the first name that fits nothing, with the nearest name or a list of names.
 fn each_name_means_something(
     scene: &Scene,
     base: &[Key<'_>],
     rule: &FaceSelector,
     model: &Model,
 ) -> Result<(), Error> {
+    let path = |key| base.iter().copied().chain([Key::Name(key)]).collect::<Vec<_>>();
+    if rule.colour.as_ref().is_some_and(|c| c.rgb().is_none()) {
+        return Err(scene.not_a_colour(&path("colour")));
+    }
     let parts = model.instances.iter().map(|i| model.part(i.part).name.as_str());
     let instances = model.instances.iter().flat_map(Instance::names);
     let faces = model.placed_faces().filter_map(|f| match (f.face, f.tessellated) {
@@ -160,8 +163,7 @@ fn each_name_means_something(
             if names.iter().any(|n| matches_pattern(pattern, n)) {
                 continue;
             }
-            let at: Vec<_> = base.iter().copied().chain([Key::Name(key)]).collect();
-            let error = scene.error(ErrorKind::NoMatch, &at, format!("no {key} is called '{pattern}'"));
+            let error = scene.error(ErrorKind::NoMatch, &path(key), format!("no {key} is called '{pattern}'"));
             return Err(error.help(advice(pattern, names)));
         }
     }

@@ -163,6 +163,11 @@ impl Scene {
         self.origin.folder.join(file)
     }
 
+    /// Returns the error that the colour at a place of the scene is none.
+    pub(super) fn not_a_colour(&self, at: &[Key<'_>]) -> Error {
+        self.error(ErrorKind::Value, at, "not a colour").help("write \"#rrggbb\" or [r, g, b]")
+    }
+
     /// Makes an error about the value at `path`, with its place in the file; without a place for a scene that was not parsed from text.
     pub(crate) fn error(&self, kind: ErrorKind, path: &[Key<'_>], message: impl Into<String>) -> Error {
         let error = Error::new(kind, message);

@@ -170,9 +170,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
             return Err(error.help("put all of them into `on`"));
         }
         if m.colour.as_ref().is_some_and(|c| c.rgb().is_none()) {
-            return Err(scene
-                .error(ErrorKind::Value, &at("colour"), "not a colour")
-                .help("write \"#rrggbb\" or [r, g, b]"));
+            return Err(scene.not_a_colour(&at("colour")));
         }
     }
     Ok(())

@@ -193,7 +193,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let axis2 = self.direction(args.id(1));
         // Without its third axis the operator takes what the other two leave; with fewer, the Z of the space.
         let z = self.direction(axis3).or_else(|| Some(axis1?.cross(axis2?))).unwrap_or(Vector::Z);
-        let mut frame = Frame::from_axis(origin, z, axis1);
+        // As of a placement.
+        let mut frame = Frame::from_axis(origin, z, Some(axis1.unwrap_or(Vector::X)));
         // An operator may mirror; its second axis says so.
         if axis2.is_some_and(|y| y.dot(frame.y) < 0.0) {
             frame.y = -frame.y;

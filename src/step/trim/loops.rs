@@ -272,8 +272,8 @@ impl Connection<'_> {
         shift
     }
 
-    /// Whether a step is so large a part of the loop, in u or v, that ends which meet half way would leave nothing of it: of a ring between
-    /// two half circles on the same two vertices that was all its width.
+    /// Whether a step is more than [`WIDE_STEP`] of the loop's size in u or v: it is then a side of the loop, and not closed by moving both
+    /// ends. Of a ring between two half circles on the same two vertices that left no width.
     fn is_wide(&self, step: Uv) -> bool {
         step.abs().cmpgt(WIDE_STEP * self.extent).any()
     }
