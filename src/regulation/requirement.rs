@@ -25,6 +25,13 @@ pub(super) struct Comparison {
     pub(super) direction: [f64; 2],
 }
 
+impl Comparison {
+    /// Makes a comparison whose reading has no errors of the aim.
+    fn as_aimed(weights: Rc<CellWeights>, limit: f64, at_least: bool, direction: [f64; 2]) -> Self {
+        Self { weights, by_aim: [0.0; 2], by_cells: [0.0; 2], limit, at_least, direction }
+    }
+}
+
 /// Comparisons of which all, or any one, decide a row.
 #[derive(Clone, Debug)]
 pub(super) struct Requirement {
@@ -105,16 +112,8 @@ fn limits_at(row: &Row, sightings: &[Sighting], any: [bool; 2]) -> Vec<Requireme
         // A limit that is not given asks for nothing.
         let limit = limit?;
         let seen = sightings.iter().filter_map(|(direction, m)| Some((*direction, m.clone()?)));
-        let comparisons: Vec<Comparison> = seen
-            .map(|(direction, weights)| Comparison {
-                weights,
-                by_aim: [0.0; 2],
-                by_cells: [0.0; 2],
-                limit,
-                at_least,
-                direction,
-            })
-            .collect();
+        let comparisons: Vec<Comparison> =
+            seen.map(|(direction, weights)| Comparison::as_aimed(weights, limit, at_least, direction)).collect();
         let unseen = sightings.len() - comparisons.len();
         Some(Requirement { comparisons, choices: 1, any, unseen })
     };
@@ -153,8 +152,7 @@ fn sum_requirement(photometer: &Photometer, row: &Row) -> Option<Requirement> {
         return Some(Requirement { comparisons: Vec::new(), choices: 1, any: false, unseen });
     }
     let weights = Rc::new(seen.iter().fold(CellWeights::default(), |sum, point| sum.plus(1.0, point)));
-    let comparison =
-        Comparison { weights, by_aim: [0.0; 2], by_cells: [0.0; 2], limit, at_least: true, direction: points[0] };
+    let comparison = Comparison::as_aimed(weights, limit, true, points[0]);
     Some(Requirement { comparisons: vec![comparison], choices: 1, any: false, unseen: 0 })
 }
 
@@ -184,15 +182,12 @@ fn relative_requirement(photometer: &Photometer, row: &Row, rows: &[Row]) -> Opt
         Requirement { comparisons: Vec::new(), choices, any, unseen: usize::from(!complete || !is_within) };
     for (direction, weights) in sightings {
         match (weights, &reference) {
-            (Some(weights), Some(reference)) => requirement.comparisons.push(Comparison {
+            (Some(weights), Some(reference)) => {
                 // Errors of cells that both readings share would count twice if the two were judged apart.
-                weights: Rc::new(CellWeights::clone(&weights).plus(-factor, reference)),
-                by_aim: [0.0; 2],
-                by_cells: [0.0; 2],
-                limit: 0.0,
-                at_least: bound == Bound::Min,
-                direction,
-            }),
+                let difference = Rc::new(CellWeights::clone(&weights).plus(-factor, reference));
+                let at_least = bound == Bound::Min;
+                requirement.comparisons.push(Comparison::as_aimed(difference, 0.0, at_least, direction));
+            }
             _ => requirement.unseen += 1,
         }
     }
