@@ -20,47 +20,105 @@ pub(super) struct Followed {
 
 /// Pairs of segments that are looked at: faces that cross themselves everywhere gain nothing by more.
 const MAX_PAIRS: usize = 2000;
+/// Crossings that are kept, 72 bytes each: by the first of them an edge is judged that has more.
+const MAX_CROSSINGS: usize = 100_000;
 /// Share of a chord that a further corner keeps from its ends.
 const CLEAR_OF_ENDS: f64 = 0.02;
 /// Steps by a third that find the nearest place on a chord's arc: to a millionth of it.
 const NEAREST_STEPS: usize = 34;
 
-/// Returns, for each chord in `conflicts` and chord in `crossed` that cross, the parameters of both edges nearest to the ends of the
-/// other's chord, its own ends left out. Only pairs of different edges count that cross no farther than both chords sag, and the first
-/// [`MAX_PAIRS`] of them.
-pub(super) fn facing_samples(
-    part: &Part,
-    nodes: &Nodes,
-    followed: &FxHashMap<[u32; 2], Followed>,
-    conflicts: &[[u32; 2]],
-    crossed: &[[u32; 2]],
-) -> Vec<(EdgeId, f64)> {
-    let known = |s: &[u32; 2]| Some((*s, *followed.get(&edge_key(s[0], s[1]))?));
-    let others: Vec<([u32; 2], Followed)> = crossed.iter().filter_map(known).collect();
-    let pairs = conflicts.iter().filter_map(known).flat_map(|a| others.iter().map(move |b| (a, *b)));
-    let uv = |s: [u32; 2]| s.map(|n| nodes[n].uv);
-    let place = |s: [u32; 2]| s.map(|n| nodes[n].place);
-    let sag = |(ends, on): ([u32; 2], Followed)| {
-        let curve = &part.edges[on.edge.0 as usize].curve;
-        distance_to_chord(curve.evaluate(0.5 * (on.t[0] + on.t[1])), &place(ends))
-    };
-    // Edges that cross farther than their chords sag do so themselves: corners in one place would only hide it.
-    let is_for_sag = |a: ([u32; 2], Followed), b: ([u32; 2], Followed)| {
-        let beyond = |ends: [Point; 2], chord: &[Point; 2]| ends.map(|p| distance_to_chord(p, chord));
-        let (p, q) = (place(a.0), place(b.0));
-        let depth = beyond(p, &q).into_iter().chain(beyond(q, &p)).fold(f64::INFINITY, f64::min);
-        depth <= sag(a) + sag(b)
-    };
-    let mut samples = Vec::new();
-    let crossing = pairs.filter(|(a, b)| a.1.edge != b.1.edge && do_cross(uv(a.0), uv(b.0)));
-    for (a, b) in crossing.filter(|(a, b)| is_for_sag(*a, *b)).take(MAX_PAIRS) {
-        for (ends, on) in [(a.0, b.1), (b.0, a.1)] {
+/// A chord, by its nodes, and the edge that it follows.
+type FollowedChord = ([u32; 2], Followed);
+
+/// Two chords of a border that cross in the parameter plane.
+struct Crossing {
+    chords: [FollowedChord; 2],
+    /// Whether they cross no farther than both sag: their edges may not cross at all.
+    is_for_sag: bool,
+}
+
+/// The chords of a face's border that could not all be kept.
+pub(super) struct CrossingChords<'c> {
+    part: &'c Part,
+    nodes: &'c Nodes,
+    crossings: Vec<Crossing>,
+    /// Edges of chords that only touch others.
+    touching: Vec<EdgeId>,
+}
+
+impl<'c> CrossingChords<'c> {
+    /// Finds which of the chords in `conflicts` and in `crossed` cross; `followed` are the edges by chord.
+    pub(super) fn new(
+        part: &'c Part,
+        nodes: &'c Nodes,
+        followed: &FxHashMap<[u32; 2], Followed>,
+        [conflicts, crossed]: [&[[u32; 2]]; 2],
+    ) -> Self {
+        let known = |list: &[[u32; 2]]| -> Vec<FollowedChord> {
+            list.iter().filter_map(|s| Some((*s, *followed.get(&edge_key(s[0], s[1]))?))).collect()
+        };
+        let [conflicts, crossed] = [known(conflicts), known(crossed)];
+        let uv = |s: [u32; 2]| s.map(|n| nodes[n].uv);
+        let place = |s: [u32; 2]| s.map(|n| nodes[n].place);
+        let sag = |(ends, on): FollowedChord| {
             let curve = &part.edges[on.edge.0 as usize].curve;
-            let facing = ends.iter().filter_map(|&n| place_between(curve, on.t, nodes[n].place));
-            samples.extend(facing.map(|t| (on.edge, t)));
+            distance_to_chord(curve.evaluate(0.5 * (on.t[0] + on.t[1])), &place(ends))
+        };
+        // Edges that cross farther than their chords sag do so themselves: corners in one place would only hide it.
+        let is_for_sag = |a: FollowedChord, b: FollowedChord| {
+            let beyond = |ends: [Point; 2], chord: &[Point; 2]| ends.map(|p| distance_to_chord(p, chord));
+            let (p, q) = (place(a.0), place(b.0));
+            let depth = beyond(p, &q).into_iter().chain(beyond(q, &p)).fold(f64::INFINITY, f64::min);
+            depth <= sag(a) + sag(b)
+        };
+        let mut out = Self { part, nodes, crossings: Vec::new(), touching: Vec::new() };
+        let mut crosses = [vec![false; conflicts.len()], vec![false; crossed.len()]];
+        for (i, &a) in conflicts.iter().enumerate() {
+            for (j, &b) in crossed.iter().enumerate() {
+                if do_cross(uv(a.0), uv(b.0)) {
+                    (crosses[0][i], crosses[1][j]) = (true, true);
+                    out.crossings.push(Crossing { chords: [a, b], is_for_sag: is_for_sag(a, b) });
+                    if out.crossings.len() == MAX_CROSSINGS {
+                        return out;
+                    }
+                }
+            }
         }
+        let all = conflicts.iter().chain(&crossed).zip(crosses.iter().flatten());
+        out.touching.extend(all.filter(|(_, crosses)| !**crosses).map(|((_, on), _)| on.edge));
+        out
     }
-    samples
+
+    /// Returns the edges, some more than once, whose chords may cross for being too long: those of chords that only touch others, and those
+    /// of which at least half the crossings are for sag. Where an edge crosses others itself, shorter chords cross as well, and more of
+    /// them.
+    pub(super) fn edges_for_sag(&self) -> Vec<EdgeId> {
+        let mut counts: FxHashMap<EdgeId, [usize; 2]> = FxHashMap::default();
+        for crossing in &self.crossings {
+            for (_, on) in crossing.chords {
+                let [all, for_sag] = counts.entry(on.edge).or_default();
+                (*all, *for_sag) = (*all + 1, *for_sag + usize::from(crossing.is_for_sag));
+            }
+        }
+        let edges = self.crossings.iter().flat_map(|c| c.chords.map(|(_, on)| on.edge));
+        let short_of = |edge: &EdgeId| counts.get(edge).is_some_and(|[all, for_sag]| 2 * for_sag >= *all);
+        edges.filter(short_of).chain(self.touching.iter().copied()).collect()
+    }
+
+    /// Returns, for each two chords that cross, the parameters of both edges nearest to the ends of the other's chord, its own ends left
+    /// out. Only pairs of different edges count that cross no farther than both chords sag, and the first [`MAX_PAIRS`] of them.
+    pub(super) fn facing_samples(&self) -> Vec<(EdgeId, f64)> {
+        let mut samples = Vec::new();
+        let of_two = |c: &&Crossing| c.chords[0].1.edge != c.chords[1].1.edge && c.is_for_sag;
+        for Crossing { chords: [a, b], .. } in self.crossings.iter().filter(of_two).take(MAX_PAIRS) {
+            for (ends, on) in [(a.0, b.1), (b.0, a.1)] {
+                let curve = &self.part.edges[on.edge.0 as usize].curve;
+                let facing = ends.iter().filter_map(|&n| place_between(curve, on.t, self.nodes[n].place));
+                samples.extend(facing.map(|t| (on.edge, t)));
+            }
+        }
+        samples
+    }
 }
 
 /// Whether two segments have a point between the ends of both.

@@ -7,7 +7,7 @@ use super::border_nodes::BorderNodes;
 use super::cells::cell::{Subdivision, parameter_resolution};
 use super::cells::grid::{self, GridInput};
 use super::cells::tree;
-use super::crossing_chords::facing_samples;
+use super::crossing_chords::CrossingChords;
 use super::emission::Emission;
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
@@ -23,7 +23,7 @@ use super::transition::pairing::{self, TransitionFacet};
 use super::triangulator::{GaveUp, catch_panic};
 use crate::math::polygon::{is_inside_sides, polygon_sides};
 use crate::math::{Point, Uv};
-use crate::model::{EdgeId, Face, Part};
+use crate::model::{Face, Part};
 use crate::nurbs::FundamentalForms;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -128,20 +128,19 @@ pub(super) fn mesh_with_imprint(
         return Err(Unmeshed::TooManySteps);
     }
     transition.triangles.extend(&grid.triangles);
-    // What covers more or less than the border bounds proves nothing, however near to the surface each of its facets lies.
-    let is_covered = covers_area_of_border(&transition, &grid.quads, &polygons);
-    if !is_covered {
-        transition.triangles.iter_mut().for_each(|f| f.bound = f64::INFINITY);
-        grid.quads.iter_mut().for_each(|f| f.bound = f64::INFINITY);
-    }
-    let repaired = first_repair(&transition, is_covered, cells.exhausted);
     // Where the budget has ended, shorter chords only cost more.
-    let unproved = if cells.exhausted { Vec::new() } else { transition.unproved_chords(&chords, &followed) };
-    let coarse = transition.conflicts.iter().chain(&transition.crossed).chain(&unproved);
-    let mut coarse: Vec<EdgeId> = coarse.filter_map(|s| Some(followed.get(&edge_key(s[0], s[1]))?.edge)).collect();
+    let unproved = |t: &Transition| if cells.exhausted { vec![] } else { t.unproved_chords(&chords, &followed) };
+    // Where chords cross, the area is off for that: facets that hold ask for no shorter ones.
+    let beside_crossings = (!transition.conflicts.is_empty()).then(|| unproved(&transition));
+    let is_covered = prove_area(&mut transition, &mut grid.quads, &polygons);
+    let repaired = first_repair(&transition, is_covered, cells.exhausted);
+    let unproved = beside_crossings.unwrap_or_else(|| unproved(&transition));
+    let refused = [&transition.conflicts[..], &transition.crossed];
+    let crossing = CrossingChords::new(part, &transition.nodes, &followed, refused);
+    let mut coarse = crossing.edges_for_sag();
+    coarse.extend(unproved.iter().filter_map(|s| Some(followed.get(&edge_key(s[0], s[1]))?.edge)));
     coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
-    let Transition { conflicts, crossed, .. } = &transition;
-    let facing = facing_samples(part, &transition.nodes, &followed, conflicts, crossed);
+    let facing = crossing.facing_samples();
     let whole_cells = grid.quads.iter().map(|&facet| TransitionFacet { facet, pole: None });
     let paired = pairing::pair_triangles(&transition, &fixed, &mut prover);
     let mut emission = Emission::new(surface, &transition.nodes);
@@ -179,6 +178,17 @@ fn unmet_segments(border: &[[u32; 2]], outline: &[[u32; 2]]) -> Vec<[u32; 2]> {
     // A segment of the border that cells already meet is used twice, and nothing of it is left.
     all.clone().for_each(|s| *uses.entry(edge_key(s[0], s[1])).or_insert(0) += 1);
     all.filter(|s| uses[&edge_key(s[0], s[1])] % 2 == 1).copied().collect()
+}
+
+/// Whether facets cover the area that the border bounds, by [`covers_area_of_border`]. Where they do not, none is proved any more: what
+/// covers more or less proves nothing, however near to the surface each facet lies.
+fn prove_area(transition: &mut Transition, quads: &mut [ProvedFacet<4>], polygons: &BorderPolygons) -> bool {
+    let is_covered = covers_area_of_border(transition, quads, polygons);
+    if !is_covered {
+        transition.triangles.iter_mut().for_each(|f| f.bound = f64::INFINITY);
+        quads.iter_mut().for_each(|f| f.bound = f64::INFINITY);
+    }
+    is_covered
 }
 
 /// Whether facets cover as much of the parameter plane as the border bounds, within [`COVERED`]. More is covered where they overlap or the

@@ -31,7 +31,8 @@ pub(super) struct FaceMesh {
     /// Places of the face's own positions, in the part's coordinates.
     pub(super) own: Vec<Point>,
     pub(super) facets: Vec<MeshedFacet>,
-    /// Edges that should have shorter chords: they cross others in the parameter plane, or a facet beside them is not proved.
+    /// Edges that should have shorter chords: theirs cross others in the parameter plane for their sag, or a facet beside them is not
+    /// proved.
     pub(super) coarse: Vec<EdgeId>,
     /// Further samples that edges should have, so that chords of two of them do not cross.
     pub(super) facing: Vec<(EdgeId, f64)>,

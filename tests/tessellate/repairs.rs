@@ -279,6 +279,46 @@ fn chords_of_two_arcs_that_touch_do_not_cross() {
     }
 }
 
+/// Where two sides of a face cross in the file, shorter chords would cross as well: they stay as long as their tolerance lets them be.
+#[test]
+fn sides_that_cross_themselves_are_not_divided_for_it() {
+    // Two parabolas, the second the mirror image of the first, that pass each other by 60 µm in a corner, and the lines between their ends.
+    let bent = |p: [[f64; 2]; 3]| {
+        let points = p.map(|[x, y]| Point::new(x, y, 0.0).extend(1.0)).to_vec();
+        let flat = p.map(|[x, y]| Point::new(x, y, 1.0)).to_vec();
+        let knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+        (Curve { degree: 2, knots: knots.clone(), points }, UvCurve { degree: 2, knots, points: flat })
+    };
+    let straight = |a: [f64; 2], b: [f64; 2]| bent([a, [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])], b]);
+    let corners = [[0.0, 0.0], [10.0, 5.06], [10.0, 4.94], [0.0, 10.0]];
+    let sides = [
+        bent([corners[0], [7.0, 0.5], corners[1]]),
+        straight(corners[1], corners[2]),
+        bent([corners[2], [7.0, 9.5], corners[3]]),
+        straight(corners[3], corners[0]),
+    ];
+    let (mut edges, mut uses) = (Vec::new(), Vec::new());
+    for (k, (curve, uv)) in (0u32..).zip(sides) {
+        edges.push(Edge { curve, vertices: [VertexId(k), VertexId((k + 1) % 4)], entity: None });
+        uses.push(EdgeUse { edge: Some(EdgeId(k)), reversed: false, uv });
+    }
+    let face =
+        Face { loops: vec![TrimLoop { uses }], ..Face::whole(sweep::plane(&Frame::IDENTITY, [[-1.0, 11.0]; 2])) };
+    let part = Part {
+        vertices: corners.map(|[x, y]| Point::new(x, y, 0.0)).to_vec(),
+        edges,
+        shells: vec![Shell { faces: vec![face], ..Shell::default() }],
+        ..Part::default()
+    };
+    let tolerance: f64 = 0.01;
+    let made = tessellate(&Model::from_part(part), &measured(tolerance));
+    assert_eq!(made.report.repaired[0].how, Repair::CrossingBorder);
+    // A parabola of n equal pieces lies |p₀ − 2p₁ + p₂| / 4n² off its chords.
+    let chords = (4.0f64.hypot(4.06) / 4.0 / tolerance).sqrt();
+    let vertices = made.mesh.vertices.len() as f64;
+    assert!(vertices > chords && vertices < 4.0 * chords + 8.0, "{vertices} for two arcs of {chords} chords");
+}
+
 /// A face that has been meshed into as many facets as its work allows keeps the border that it has, and says so.
 #[test]
 fn a_face_is_not_meshed_again_beyond_its_work() {
