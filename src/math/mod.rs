@@ -6,6 +6,7 @@
 mod aabb;
 mod box_tree;
 mod frame;
+pub(crate) mod huge_pages;
 mod maximum;
 pub(crate) mod polygon;
 pub(crate) mod quadrature;

@@ -2,6 +2,7 @@
 //!
 //! Numbers are as this machine has them; whoever keeps them says for which kind of machine.
 
+use crate::math::huge_pages;
 use bytemuck::{AnyBitPattern, NoUninit};
 use std::io::{self, Read, Write};
 
@@ -11,8 +12,9 @@ pub(crate) fn write_array<T: NoUninit>(to: &mut dyn Write, array: &[T]) -> io::R
     to.write_all(bytemuck::cast_slice(array))
 }
 
-/// Records that are made or taken apart at a time: they stay in the cache of a core.
-const RECORDS: usize = 1 << 12;
+/// Bytes that are read, made or taken apart at a time: they stay in the second cache of a core for all that is done with them, hashing
+/// among it.
+const CHUNK_BYTES: usize = 1 << 18;
 
 /// Writes the number of elements as eight bytes, then the record that `record` makes of each, as [`write_array`] would all records at once.
 pub(crate) fn write_records<T, R: NoUninit>(
@@ -22,12 +24,18 @@ pub(crate) fn write_records<T, R: NoUninit>(
 ) -> io::Result<()> {
     to.write_all(&(elements.len() as u64).to_le_bytes())?;
     let mut records = Vec::new();
-    for chunk in elements.chunks(RECORDS) {
+    for chunk in elements.chunks(chunk_length::<R>()) {
         records.clear();
         records.extend(chunk.iter().map(&record));
         to.write_all(bytemuck::cast_slice(&records))?;
     }
     Ok(())
+}
+
+/// Returns how many elements make a chunk.
+const fn chunk_length<T>() -> usize {
+    // Of larger ones, and of those without a size, one at a time.
+    if size_of::<T>() == 0 || size_of::<T>() > CHUNK_BYTES { 1 } else { CHUNK_BYTES / size_of::<T>() }
 }
 
 /// Reads arrays from what holds so many bytes: a length beyond them asks for no memory.
@@ -43,18 +51,23 @@ impl<'a> ArrayReader<'a> {
         Self { from, left }
     }
 
-    /// Reads an array into the empty vector that `make` returns for its number of elements, which it may give room.
+    /// Reads an array into huge pages where it is large, and calls `look` with all its elements, some after the other.
     ///
     /// # Errors
     /// When it is longer than what is left, or cannot be read.
-    pub(crate) fn array_in<T: NoUninit + AnyBitPattern>(
+    pub(crate) fn array_with<T: NoUninit + AnyBitPattern>(
         &mut self,
-        make: impl FnOnce(usize) -> Vec<T>,
+        mut look: impl FnMut(&mut [T]),
     ) -> io::Result<Vec<T>> {
         let length = self.length(size_of::<T>())?;
-        let mut array = make(length);
-        array.resize(length, T::zeroed());
-        self.from.read_exact(bytemuck::cast_slice_mut(&mut array))?;
+        let mut array = huge_pages::with_capacity(length);
+        while array.len() < length {
+            let first = array.len();
+            // Not zeroed as a whole: that took as long as reading it.
+            array.resize(length.min(first + chunk_length::<T>()), T::zeroed());
+            self.from.read_exact(bytemuck::cast_slice_mut(&mut array[first..]))?;
+            look(&mut array[first..]);
+        }
         Ok(array)
     }
 
@@ -72,19 +85,20 @@ impl<'a> ArrayReader<'a> {
     /// Reads what [`write_records`] wrote and makes an element of each record.
     ///
     /// # Errors
-    /// As [`ArrayReader::array_in`].
+    /// As [`ArrayReader::array_with`].
     pub(crate) fn records<R: NoUninit + AnyBitPattern, T>(
         &mut self,
-        element: impl Fn(&R) -> T,
+        mut element: impl FnMut(&R) -> T,
     ) -> io::Result<Vec<T>> {
         let length = self.length(size_of::<R>())?;
-        let mut elements = Vec::with_capacity(length);
+        let mut elements = huge_pages::with_capacity(length);
         // Never all records beside all elements: half of the time was spent on clean pages for both.
-        let mut records = vec![R::zeroed(); length.min(RECORDS)];
+        let mut records = vec![R::zeroed(); length.min(chunk_length::<R>())];
         while elements.len() < length {
-            let some = &mut records[..(length - elements.len()).min(RECORDS)];
+            let left = length - elements.len();
+            let some = &mut records[..left.min(chunk_length::<R>())];
             self.from.read_exact(bytemuck::cast_slice_mut(some))?;
-            elements.extend(some.iter().map(&element));
+            elements.extend(some.iter().map(&mut element));
         }
         Ok(elements)
     }
@@ -92,9 +106,9 @@ impl<'a> ArrayReader<'a> {
     /// Reads an array.
     ///
     /// # Errors
-    /// As [`ArrayReader::array_in`].
+    /// As [`ArrayReader::array_with`].
     pub(crate) fn array<T: NoUninit + AnyBitPattern>(&mut self) -> io::Result<Vec<T>> {
-        self.array_in(Vec::with_capacity)
+        self.array_with(|_| ())
     }
 }
 
@@ -121,5 +135,21 @@ mod tests {
         assert!(reader.array::<u32>().is_err());
         bytes[7] = 1;
         assert!(ArrayReader::new(&mut &bytes[..], length).array::<f64>().is_err());
+    }
+
+    /// No element at the end of a chunk is lost, and each is looked at once.
+    #[test]
+    fn arrays_of_several_chunks_come_back() {
+        let numbers: Vec<u64> = (0..2 * chunk_length::<u64>() as u64 + 3).collect();
+        let mut bytes = Vec::new();
+        write_array(&mut bytes, &numbers).unwrap();
+        write_records(&mut bytes, &numbers, |n| [*n, !n]).unwrap();
+        let length = bytes.len() as u64;
+        let mut from = &bytes[..];
+        let mut reader = ArrayReader::new(&mut from, length);
+        let mut seen = Vec::new();
+        assert_eq!(reader.array_with(|some: &mut [u64]| seen.extend_from_slice(some)).unwrap(), numbers);
+        assert_eq!(seen, numbers);
+        assert_eq!(reader.records(|[n, m]: &[u64; 2]| n & !m).unwrap(), numbers);
     }
 }

@@ -27,19 +27,23 @@ impl FacetMesh {
     /// When it cannot be read, or an index lies outside its array.
     pub(crate) fn read_arrays(from: &mut ArrayReader, faces: usize) -> io::Result<Self> {
         let positions: Vec<Point> = from.array()?;
+        // The largest index of each kind is found while its record is at hand.
+        let (mut last_position, mut last_vertex, mut last_face) = (0, 0, 0);
         let vertices: Vec<MeshVertex> = from.records(|&[x, y, z, s, t, position]: &[u64; 6]| {
+            last_position = position.max(last_position);
             let [x, y, z, s, t] = [x, y, z, s, t].map(f64::from_bits);
             MeshVertex { position: position as u32, normal: Vector::new(x, y, z), uv: Uv::new(s, t) }
         })?;
-        let facets: Vec<Facet> =
-            from.records(|&[a, b, c, d, face]: &[u32; 5]| Facet { vertices: [a, b, c, d], face: FaceId(face) })?;
+        let facets: Vec<Facet> = from.records(|&[a, b, c, d, face]: &[u32; 5]| {
+            last_vertex = a.max(b).max(c).max(d).max(last_vertex);
+            last_face = face.max(last_face);
+            Facet { vertices: [a, b, c, d], face: FaceId(face) }
+        })?;
         let sag: Vec<f64> = from.array()?;
         // Told here once for all who index by these numbers later.
         let is_whole = (sag.is_empty() || sag.len() == facets.len())
-            && vertices.iter().all(|v| (v.position as usize) < positions.len())
-            && facets.iter().all(|facet| {
-                facet.vertices.iter().all(|&v| (v as usize) < vertices.len()) && facet.face.index() < faces
-            });
+            && (vertices.is_empty() || last_position < positions.len() as u64)
+            && (facets.is_empty() || ((last_vertex as usize) < vertices.len() && (last_face as usize) < faces));
         if !is_whole {
             return Err(invalid("no mesh of this model"));
         }

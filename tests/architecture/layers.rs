@@ -263,6 +263,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "math",
         &[
             "mod",
+            "huge_pages",
             "simd",
             "ray",
             "aabb",
@@ -334,7 +335,6 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "intersect/octree",
         &[
-            "huge_pages",
             "statistics",
             "settings",
             "clip",

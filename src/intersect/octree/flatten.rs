@@ -3,8 +3,8 @@
 use super::cell::{Cell, Content};
 use super::clip::Box32;
 use super::node::{Block, Link, Node};
-use super::{Settings, Statistics, huge_pages};
-use crate::math::Point;
+use super::{Settings, Statistics};
+use crate::math::{Point, huge_pages};
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
 

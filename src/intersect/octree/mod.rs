@@ -26,7 +26,6 @@ mod clip;
 mod facet_pair;
 mod flatten;
 mod horizon;
-mod huge_pages;
 mod kernels;
 mod lanes;
 mod light_buffer;

@@ -3,7 +3,8 @@
 
 use super::node::{Block, Link, Node, Target};
 use super::statistics::Statistics;
-use super::{huge_pages, tree::Tree};
+use super::tree::Tree;
+use crate::intersect::facet::Surroundings;
 use crate::intersect::slopes::Slopes;
 use crate::mesh::FacetMesh;
 use crate::mesh::arrays::{ArrayReader, invalid, write_array};
@@ -33,14 +34,18 @@ impl<'m> Tree<'m> {
     pub(super) fn read_arrays(mesh: &'m FacetMesh, from: &mut ArrayReader) -> io::Result<(Self, Statistics)> {
         let statistics = read_statistics(from)?;
         let root = from.array::<u32>()?.first().map(|&link| Link(link));
-        let mut nodes: Vec<Node> = from.array_in(huge_pages::with_capacity)?;
-        nodes.iter_mut().for_each(forget_unused);
-        let blocks: Vec<Block> = from.array_in(huge_pages::with_capacity)?;
-        let slopes: Vec<Slopes> = from.array_in(huge_pages::with_capacity)?;
-        if slopes.len() != mesh.facets.len() || !is_tree(mesh, root, &nodes, &blocks) {
+        let mut links = LinkCheck::default();
+        let nodes: Vec<Node> = from.array_with(|nodes| links.take(nodes))?;
+        let mut corners = CornerCheck::default();
+        let blocks: Vec<Block> = from.array_with(|blocks| corners.take(blocks))?;
+        let slopes: Vec<Slopes> = from.array()?;
+        let is_tree = slopes.len() == mesh.facets.len()
+            && links.hold(root, [nodes.len(), blocks.len()])
+            && corners.hold(mesh);
+        if !is_tree {
             return Err(invalid("no octree of this mesh"));
         }
-        Ok((Self::new(mesh, nodes, blocks, root, slopes), statistics))
+        Ok((Self::new(Surroundings::new(mesh), nodes, blocks, root, slopes), statistics))
     }
 }
 
@@ -54,34 +59,76 @@ fn read_statistics(from: &mut ArrayReader) -> io::Result<Statistics> {
     Ok(Statistics { nodes, blocks, references, left_out, depths, fill })
 }
 
-/// Sets the links of children that are not in use to zero, by which walks that meet their empty boxes tell them.
-fn forget_unused(node: &mut Node) {
-    for (slot, child) in node.children.iter_mut().enumerate() {
-        if node.used >> slot & 1 == 0 {
-            *child = 0;
+/// Whether every link leads to a later node or to a block, so that every walk ends: as far as nodes were taken.
+#[derive(Default)]
+struct LinkCheck {
+    /// Nodes that were taken.
+    count: usize,
+    /// Whether a link leads back or nowhere.
+    is_broken: bool,
+    /// One more than the largest index of the nodes that links lead to, and of the blocks.
+    ends: [usize; 2],
+}
+
+impl LinkCheck {
+    /// Takes further nodes, and sets the links of their children that are not in use to zero, by which walks that meet their empty boxes
+    /// tell them.
+    fn take(&mut self, nodes: &mut [Node]) {
+        for node in nodes {
+            self.count += 1;
+            for (slot, child) in node.children.iter_mut().enumerate() {
+                if node.used >> slot & 1 == 0 {
+                    *child = 0;
+                } else {
+                    self.follow(Link(*child), self.count);
+                }
+            }
         }
+    }
+
+    /// Takes a link, which may lead to nodes from `least` on.
+    fn follow(&mut self, link: Link, least: usize) {
+        match link.target() {
+            Target::Node(index) => {
+                self.is_broken |= index < least;
+                self.ends[0] = self.ends[0].max(index + 1);
+            }
+            Target::Block(index, _) => self.ends[1] = self.ends[1].max(index + 1),
+            Target::End => self.is_broken = true,
+        }
+    }
+
+    /// Whether the links of all nodes, and that to the root, are those of a tree of so many nodes and blocks.
+    fn hold(mut self, root: Option<Link>, [nodes, blocks]: [usize; 2]) -> bool {
+        root.into_iter().for_each(|root| self.follow(root, 0));
+        !self.is_broken && self.ends[0] <= nodes && self.ends[1] <= blocks
     }
 }
 
-/// Whether every link leads to a later node or to a block, and every block to facets and corners of the mesh: then every walk ends.
-fn is_tree(mesh: &FacetMesh, root: Option<Link>, nodes: &[Node], blocks: &[Block]) -> bool {
-    let leads_on = |link: Link, least: usize| match link.target() {
-        Target::Node(index) => (least..nodes.len()).contains(&index),
-        Target::Block(index, _) => index < blocks.len(),
-        Target::End => false,
-    };
-    let children = |(i, node): (usize, &Node)| {
-        (0..8).filter(|slot| node.used >> slot & 1 == 1).all(|slot| leads_on(Link(node.children[slot]), i + 1))
-    };
-    let (facets, positions) = (mesh.facets.len() as u32, mesh.positions.len() as u32);
-    // Lanes without a facet name none.
-    let corners = |block: &Block| {
-        block.facets.iter().all(|&f| f < facets || f == u32::MAX)
-            && block.positions.iter().flatten().all(|&p| p < positions)
-    };
-    root.is_none_or(|root| leads_on(root, 0))
-        && nodes.iter().enumerate().all(children)
-        && blocks.iter().all(corners)
+/// Whether blocks name facets and corners of the mesh alone: as far as they were taken.
+#[derive(Default)]
+struct CornerCheck {
+    /// One more than the largest facet; lanes without a facet name none.
+    facets: u32,
+    /// The largest corner; `None` before the first block.
+    corner: Option<u32>,
+}
+
+impl CornerCheck {
+    /// Takes further blocks.
+    fn take(&mut self, blocks: &[Block]) {
+        for block in blocks {
+            // One more than the name of no facet is zero.
+            let facets = block.facets.map(|f| f.wrapping_add(1));
+            self.facets = facets.into_iter().fold(self.facets, u32::max);
+            self.corner = self.corner.max(block.positions.iter().flatten().copied().max());
+        }
+    }
+
+    /// Whether all indices lie within the mesh.
+    fn hold(&self, mesh: &FacetMesh) -> bool {
+        self.facets as usize <= mesh.facets.len() && self.corner.is_none_or(|p| (p as usize) < mesh.positions.len())
+    }
 }
 
 #[cfg(test)]
@@ -127,6 +174,39 @@ mod tests {
             assert_eq!(a, b);
             assert_eq!(a.is_some(), i < 100);
         }
+    }
+
+    #[test]
+    fn links_that_lead_back_or_out_are_told() {
+        let node = |link: Link| Node { used: 1, children: [link.0, 7, 0, 0, 0, 0, 0, 0], ..Node::EMPTY };
+        let is_held = |first: Link, root: Link| {
+            let mut nodes = [node(first), node(Link::block(0, 1))];
+            let mut links = LinkCheck::default();
+            nodes.iter_mut().for_each(|node| links.take(std::slice::from_mut(node)));
+            assert_eq!(nodes[1].children[1..], [0; 7]);
+            links.hold(Some(root), [2, 1])
+        };
+        assert!(is_held(Link::node(1), Link::node(0)) && is_held(Link::block(0, 4), Link::block(0, 2)));
+        for wrong in [Link::node(0), Link::node(2), Link::block(1, 1), Link::END] {
+            assert!(!is_held(wrong, Link::node(0)), "{wrong:?}");
+        }
+        for wrong in [Link::node(2), Link::block(1, 1), Link::END] {
+            assert!(!is_held(Link::node(1), wrong), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn corners_beyond_the_mesh_are_told() {
+        let mesh = strip(1);
+        let is_held = |facet: u32, corner: u32| {
+            let mut block = Block::new(&mesh, Point::ZERO, &[0]);
+            (block.facets[0], block.positions[0][3]) = (facet, corner);
+            let mut corners = CornerCheck::default();
+            corners.take(&[Block::new(&mesh, Point::ZERO, &[0]), block]);
+            corners.hold(&mesh)
+        };
+        assert!(is_held(0, 3) && is_held(u32::MAX, 3) && CornerCheck::default().hold(&FacetMesh::default()));
+        assert!(!is_held(1, 3) && !is_held(0, 4) && !is_held(u32::MAX - 1, 3));
     }
 
     /// Of how many bytes one is bent: all, but for Miri, which takes most of a second for each; prime, so that all parts of words are hit.

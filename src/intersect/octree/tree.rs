@@ -3,10 +3,10 @@
 use super::mesh_box::MeshBox;
 use super::node::{Block, Link, Node, Target};
 use super::subdivision::subdivide;
-use super::{Settings, Statistics, flatten, huge_pages};
+use super::{Settings, Statistics, flatten};
 use crate::intersect::facet::Surroundings;
 use crate::intersect::slopes::Slopes;
-use crate::math::{Aabb, Point, Ray};
+use crate::math::{Aabb, Point, Ray, huge_pages};
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
 
@@ -31,7 +31,8 @@ pub(super) struct Tree<'m> {
 impl<'m> Tree<'m> {
     /// Builds the tree with the threads of the current rayon pool and overwrites `statistics`.
     pub(super) fn build(mesh: &'m FacetMesh, settings: &Settings, statistics: &mut Statistics) -> Self {
-        let center = middle(&Surroundings::new(mesh));
+        let surroundings = Surroundings::new(mesh);
+        let center = middle(&surroundings);
         let cell = subdivide(mesh, center, settings, statistics);
         let flat = cell.map(|cell| flatten::flatten(mesh, center, cell, settings, statistics));
         let (nodes, blocks, root) = match flat {
@@ -40,19 +41,18 @@ impl<'m> Tree<'m> {
         };
         let mut slopes = huge_pages::with_capacity(mesh.facets.len());
         (0..mesh.facets.len()).into_par_iter().map(|f| Slopes::new(mesh.corners(f))).collect_into_vec(&mut slopes);
-        Self::new(mesh, nodes, blocks, root, slopes)
+        Self::new(surroundings, nodes, blocks, root, slopes)
     }
 
-    /// Joins nodes and blocks, given relative to the middle of the mesh, and the slopes of all facets with what walks need of `mesh`;
+    /// Joins nodes and blocks, given relative to the middle of the mesh, and the slopes of all facets with what walks need of the mesh;
     /// checks nothing.
     pub(super) fn new(
-        mesh: &'m FacetMesh,
+        surroundings: Surroundings<'m>,
         nodes: Vec<Node>,
         blocks: Vec<Block>,
         root: Option<Link>,
         slopes: Vec<Slopes>,
     ) -> Self {
-        let surroundings = Surroundings::new(mesh);
         let (finite, center) = (surroundings.bounds, middle(&surroundings));
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * BOUNDS_ROOM) };
         let mesh_box = MeshBox::new(center, &bounds);

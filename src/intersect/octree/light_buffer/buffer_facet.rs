@@ -3,8 +3,7 @@
 use super::View;
 use crate::intersect::facet::{FacetRay, Line, Nearest};
 use crate::intersect::octree::facet_pair::Corners;
-use crate::intersect::octree::huge_pages;
-use crate::math::{Point, Ray};
+use crate::math::{Point, Ray, huge_pages};
 use crate::mesh::FacetMesh;
 
 /// A facet with its corners, axis by axis in the order of the rays' axes: two lines of the cache hold all that a test asks for, where

@@ -9,7 +9,7 @@
 const SMALLEST: usize = 4 << 20;
 
 /// Allocates an empty vector with room for `count` elements; asks Linux to back 4 MiB and more with huge pages.
-pub(super) fn with_capacity<T>(count: usize) -> Vec<T> {
+pub(crate) fn with_capacity<T>(count: usize) -> Vec<T> {
     let vector = Vec::<T>::with_capacity(count);
     let bytes = vector.capacity() * size_of::<T>();
     if bytes >= SMALLEST {
