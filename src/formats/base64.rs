@@ -8,19 +8,23 @@
 /// ```
 pub fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        // A last chunk of one or two bytes is filled up with zero bits, RFC 4648 §3.5. The first byte of the word stays empty: three bytes
-        // are 24 bits, which four letters of six bits take.
-        let mut bytes = [0; 4];
-        bytes[1..=chunk.len()].copy_from_slice(chunk);
-        let word = u32::from_be_bytes(bytes);
-        for k in 0..4 {
-            let used = k <= chunk.len();
-            text.push(if used { ALPHABET[(word >> (18 - 6 * k) & 63) as usize] as char } else { '=' });
-        }
+    // Three bytes are 24 bits, which four letters of six bits take.
+    let letters = |[a, b, c]: [u8; 3]| {
+        let word = u32::from_be_bytes([0, a, b, c]);
+        [18, 12, 6, 0].map(|shift| ALPHABET[(word >> shift & 63) as usize])
+    };
+    let mut text = Vec::with_capacity(bytes.len().div_ceil(3) * 4);
+    let (whole, rest) = bytes.as_chunks::<3>();
+    whole.iter().for_each(|&chunk| text.extend_from_slice(&letters(chunk)));
+    if !rest.is_empty() {
+        // One or two bytes are filled up with zero bits, RFC 4648 §3.5.
+        let mut chunk = [0; 3];
+        chunk[..rest.len()].copy_from_slice(rest);
+        let used = rest.len() + 1;
+        text.extend_from_slice(&letters(chunk)[..used]);
+        text.resize(text.len() + 4 - used, b'=');
     }
-    text
+    String::from_utf8(text).expect("letters of the alphabet")
 }
 
 #[cfg(test)]

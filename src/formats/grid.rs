@@ -183,33 +183,36 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
         writeln!(w)?;
         // The shortest digits of a number cost more than all else of a dark cell: those of a column are found once.
         let columns: Vec<String> = (0..a.cells).map(|i| a.center(i).to_string()).collect();
-        let mut row = String::new();
-        for (k, value) in grid.values.iter().enumerate() {
-            let (i, j) = (k % a.cells.max(1), k / a.cells.max(1));
-            if i == 0 {
-                row = b.center(j).to_string();
+        let own = [Some(&grid.values), grid.error.as_ref()].into_iter().flatten();
+        let layers = grid.layers.iter().flat_map(|layer| [&layer.values, &layer.error]);
+        let fields: Vec<&Vec<f64>> =
+            own.chain(layers).chain(grid.error_layers().map(|(_, values)| values)).collect();
+        // A row of cells at a time: to hand over each number cost as much as its digits.
+        let mut lines = Vec::new();
+        for j in 0..b.cells {
+            let row = b.center(j).to_string();
+            for (i, column) in columns.iter().enumerate() {
+                write!(lines, "{column},{row}")?;
+                for values in &fields {
+                    lines.push(b',');
+                    write_number(&mut lines, values[j * a.cells + i])?;
+                }
+                lines.push(b'\n');
             }
-            write!(w, "{},{row}", columns[i])?;
-            write_field(w, *value)?;
-            if let Some(error) = &grid.error {
-                write_field(w, error[k])?;
-            }
-            for layer in &grid.layers {
-                write_field(w, layer.values[k])?;
-                write_field(w, layer.error[k])?;
-            }
-            for (_, values) in grid.error_layers() {
-                write_field(w, values[k])?;
-            }
-            writeln!(w)?;
+            w.write_all(&lines)?;
+            lines.clear();
         }
         Ok(())
     })
 }
 
-/// Writes a comma and the shortest digits of a number; those of 0, which most cells of a picture are, without looking for them.
-fn write_field(w: &mut dyn Write, number: f64) -> io::Result<()> {
-    if number.to_bits() == 0 { w.write_all(b",0") } else { write!(w, ",{number}") }
+/// Appends the shortest digits of a number; those of 0, which most cells of a picture are, without looking for them.
+pub(super) fn write_number(text: &mut Vec<u8>, number: f64) -> io::Result<()> {
+    if number.to_bits() == 0 {
+        text.push(b'0');
+        return Ok(());
+    }
+    write!(text, "{number}")
 }
 
 /// Writes a grid as NPZ: `values[j, i]`, `error[j, i]`, the cell edges of both axes, and of each layer an array of its name and one

@@ -28,7 +28,10 @@ pub fn write_npz(path: &Path, arrays: &[NpyArray]) -> Result<(), Error> {
     // Packed in memory: the ZIP writer seeks back to sizes that it learns late, and grids of receivers are small.
     let pack = || -> Result<Vec<u8>, zip::result::ZipError> {
         let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-        let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Deflated);
+        let options = SimpleFileOptions::default()
+            .compression_method(zip::CompressionMethod::Deflated)
+            // The least effort: what is dark shrinks all the same, and the digits of what is lit never do.
+            .compression_level(Some(1));
         for array in arrays {
             zip.start_file(format!("{}.npy", array.name), options)?;
             zip.write_all(&header("<f8", &array.shape))?;

@@ -49,15 +49,21 @@ impl Picture {
         let zoom = zoom.max(1) as usize;
         let mut rgb = Vec::with_capacity(3 * nx * ny * zoom * zoom);
         // Pictures start at the top, the second axis at the bottom.
+        let mut last: Option<(u64, [u8; 3])> = None;
         for j in (0..ny).rev() {
-            let row: Vec<u8> = (0..nx)
-                .flat_map(|i| {
-                    let value = grid.values.get(j * nx + i).copied().unwrap_or(f64::NAN);
-                    let colour = map.colour(((value - low) / (high - low)).powf(exponent));
-                    std::iter::repeat_n(colour, zoom).flatten()
-                })
-                .collect();
-            (0..zoom).for_each(|_| rgb.extend(&row));
+            let start = rgb.len();
+            for i in 0..nx {
+                let value = grid.values.get(j * nx + i).copied().unwrap_or(f64::NAN);
+                // Most cells are as dark as the one before.
+                let colour = match last {
+                    Some((bits, colour)) if bits == value.to_bits() => colour,
+                    _ => map.colour(((value - low) / (high - low)).powf(exponent)),
+                };
+                last = Some((value.to_bits(), colour));
+                (0..zoom).for_each(|_| rgb.extend_from_slice(&colour));
+            }
+            let row = start..rgb.len();
+            (1..zoom).for_each(|_| rgb.extend_from_within(row.clone()));
         }
         Self { width: (nx * zoom) as u32, height: (ny * zoom) as u32, rgb }
     }

@@ -17,19 +17,25 @@ enum Array<'a> {
 
 /// Writes a `DataArray` element, its numbers, `components` to a point or cell, in base64 behind their length in bytes.
 fn write_data_array(w: &mut dyn Write, name: &str, components: usize, data: Array) -> io::Result<()> {
-    let (kind, body): (&str, Vec<u8>) = match data {
-        Array::F64(v) => ("Float64", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
-        Array::U32(v) => ("UInt32", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
-        Array::I64(v) => ("Int64", v.iter().flat_map(|x| x.to_le_bytes()).collect()),
-        Array::U8(v) => ("UInt8", v.to_vec()),
+    let (kind, bytes) = match data {
+        Array::F64(v) => ("Float64", with_length(v, f64::to_le_bytes)),
+        Array::U32(v) => ("UInt32", with_length(v, u32::to_le_bytes)),
+        Array::I64(v) => ("Int64", with_length(v, i64::to_le_bytes)),
+        Array::U8(v) => ("UInt8", with_length(v, u8::to_le_bytes)),
     };
-    // The length in front, of eight bytes as `header_type` says.
-    let mut bytes = (body.len() as u64).to_le_bytes().to_vec();
-    bytes.extend(body);
     let name = escape(name);
     write!(w, r#"<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="binary">"#)?;
     w.write_all(base64(&bytes).as_bytes())?;
     writeln!(w, "</DataArray>")
+}
+
+/// Returns the bytes of numbers behind their length, of eight bytes as `header_type` says.
+fn with_length<T: Copy, const N: usize>(numbers: &[T], bytes_of: impl Fn(T) -> [u8; N]) -> Vec<u8> {
+    let length = N * numbers.len();
+    let mut bytes = Vec::with_capacity(size_of::<u64>() + length);
+    bytes.extend_from_slice(&(length as u64).to_le_bytes());
+    numbers.iter().for_each(|&x| bytes.extend_from_slice(&bytes_of(x)));
+    bytes
 }
 
 /// Text on one line as it may stand in an attribute of XML.
