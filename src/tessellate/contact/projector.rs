@@ -1,6 +1,6 @@
 //! Nearest points on one surface, many times.
 
-use crate::math::{Point, Uv};
+use crate::math::{Aabb, Point, Uv};
 use crate::nurbs::Surface;
 use crate::tessellate::foot_search;
 
@@ -21,6 +21,8 @@ pub(super) struct Projector<'s> {
     poles: Vec<(Uv, Point)>,
     /// Largest distance between neighbouring places: none of the surface is farther from all of them.
     spacing: f64,
+    /// Around the surface.
+    bounds: Aabb,
 }
 
 impl<'s> Projector<'s> {
@@ -38,7 +40,8 @@ impl<'s> Projector<'s> {
             (uv, spline.evaluate(uv))
         };
         // What area a unit square of parameters would have if the surface ran evenly over its domain.
-        let size = spline.bounds().diagonal() / Uv::new(u1 - u0, v1 - v0).max_element();
+        let bounds = spline.bounds();
+        let size = bounds.diagonal() / Uv::new(u1 - u0, v1 - v0).max_element();
         let is_regular = |&(uv, _): &(Uv, Point)| {
             let d = spline.derivatives(uv);
             d.du.cross(d.dv).length() > SINGULAR * size * size
@@ -49,11 +52,15 @@ impl<'s> Projector<'s> {
         // Both diagonals of every cell.
         let spacing = cells.map(|k| apart(k, k + nv + 2).max(apart(k + 1, k + nv + 1))).fold(0.0, f64::max);
         let (seeds, poles) = places.into_iter().partition(is_regular);
-        Self { spline, seeds, poles, spacing }
+        Self { spline, seeds, poles, spacing, bounds }
     }
 
-    /// Whether no place of the surface is within `distance` of `p`, as far as the seeds tell.
+    /// Whether no place of the surface is within `distance` of `p`, as far as its box and the seeds tell.
     pub(super) fn is_beyond(&self, p: Point, distance: f64) -> bool {
+        // Twice the distance off the box, so that no rounding decides.
+        if !self.bounds.grown(2.0 * distance).contains(p) {
+            return true;
+        }
         let reach = distance + self.spacing;
         self.seeds.iter().chain(&self.poles).all(|(_, q)| (*q - p).length_squared() > reach * reach)
     }
