@@ -10,7 +10,7 @@ use super::settings::IntersectorKind;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
-use crate::simulate::{PartialRun, Results, RunSettings, replay, verify_pruning};
+use crate::simulate::{PartialRun, Results, RunSettings, ask_again, verify_pruning};
 use crate::study::Progress;
 use crate::study::cross_check::{self, CrossCheck, GroupedIntersectors, cross_check_groups};
 use crate::study::geometric_error::{GeometricError, geometric_error};
@@ -97,7 +97,7 @@ fn sample_segments(prepared: &PreparedScene, results: &Results, intersector: &dy
     let step = (settings.rays / count.max(1)).max(1);
     let expected = (count as f64 * segments_a_ray) as u64;
     let recorder = RayRecorder::new(intersector, RECHECKED as u64, expected);
-    replay(&prepared.bound, &recorder, &settings, &(0..count).map(|k| k * step).collect::<Vec<_>>());
+    ask_again(&prepared.bound, &recorder, &settings, (step, count));
     let lift = LIFT_IN_TOLERANCES * prepared.mesh_settings.loosest();
     recorder.rays(RECHECKED, &prepared.job.loaded.model, |ray, up| ray.origin + lift * up)
 }

@@ -214,15 +214,17 @@ impl Plan {
         })
     }
 
-    /// Goes through the rays of a replicate that are recorded, by their number in the run; none where nothing is recorded.
-    pub(super) fn recorded_rays(&self, replicate: u32) -> impl Iterator<Item = u64> {
+    /// Returns the rays of a replicate that are recorded, source by source: the number in the run of the first, how far apart they are, and
+    /// how many; none where nothing is recorded.
+    pub(super) fn recorded_rays(&self, replicate: u32) -> impl Iterator<Item = [u64; 3]> {
         let recorded_of = move |source: usize, step: u64| {
             let [from, to] = self.range(source, replicate);
-            (from.next_multiple_of(step)..to).step_by(step as usize)
+            let first = from.next_multiple_of(step);
+            (first < to).then(|| [first, step, (to - first).div_ceil(step)])
         };
         let step = self.record_mask.map(|m| m + 1);
         step.into_iter()
-            .flat_map(move |step| (0..self.shares.len()).flat_map(move |source| recorded_of(source, step)))
+            .flat_map(move |step| (0..self.shares.len()).filter_map(move |source| recorded_of(source, step)))
     }
 
     /// Whether the path of a ray belongs to the sample that is kept; the same as [`Self::records`] but where all are recorded.

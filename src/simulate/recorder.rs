@@ -1,4 +1,4 @@
-//! The recorded paths of a run that records few: each ray is traced once more, by itself.
+//! The recorded paths of a run that records few: their rays are traced once more.
 //!
 //! Random numbers are keyed by ray, so it takes the same path again, bit by bit. The run itself then needs no kernel that can record:
 //! to record 2,000 paths of a reflector cost all its four million rays 5 % of their time.
@@ -24,8 +24,9 @@ impl<'c, 'a> Recorder<'c, 'a> {
 
     /// Traces the recorded rays of a replicate once more and appends their paths to its `tally`; nothing else is added.
     pub(super) fn record(&mut self, replicate: u32, tally: &mut ReplicateTally) {
-        for ray in self.context.plan.recorded_rays(replicate) {
-            dispatch::trace(self.kind, self.context, RaySelection::Ray(ray), &mut self.tally);
+        for [first, step, count] in self.context.plan.recorded_rays(replicate) {
+            let rays = RaySelection::Spread { first, step, count };
+            dispatch::trace(self.kind, self.context, rays, &mut self.tally);
         }
         tally.paths.append(&mut self.tally.paths);
         self.tally.discard();

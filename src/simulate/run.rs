@@ -20,6 +20,9 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
 
+/// Rays that are recorded together: of a replicate of the usual 128 some sixteen are, and room for more would have to be emptied each time.
+const RECORDED_TOGETHER: usize = 16;
+
 /// Simulates a bound scene on any intersector.
 ///
 /// `progress` is called from the worker threads after each replicate; it ends the run early by returning `false`, and the
@@ -46,12 +49,13 @@ pub fn trace(
     let single = RunSettings { batch: 1, ..settings.clone() };
     let mut context = Context::new(bound, intersector, settings);
     context.paths = hooks.paths;
-    // Where few paths are recorded, their rays are traced once more by a kernel that records, one by one.
+    // Where few paths are recorded, their rays are traced once more by a kernel that records.
+    let few = RunSettings { batch: RECORDED_TOGETHER, ..settings.clone() };
     let recording = if hooks.paths.is_some() {
         context.plan.record_all();
         None
     } else {
-        context.plan.take_recording_plan().map(|plan| context.with_plan(plan, &single))
+        context.plan.take_recording_plan().map(|plan| context.with_plan(plan, &few))
     };
     let mut all = context.plan.clone();
     all.record_all();
@@ -201,6 +205,28 @@ pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunS
     partial.tallies.sort_paths();
     partial.seconds = start.elapsed().as_secs_f64();
     Results::new(bound, settings, Traced { partial, cost, threads: 1 })
+}
+
+/// Rays that are traced together where nothing of them is kept: their paths are a few megabytes.
+const ASKED_TOGETHER: u64 = 1024;
+
+/// Traces every `step`-th ray of a run once more, `count` of them from the first on, for what the intersector is asked of them in batches:
+/// the same as in [`replay`]. Nothing else is kept.
+pub fn ask_again(
+    bound: &BoundScene,
+    intersector: &dyn Intersector,
+    settings: &RunSettings,
+    (step, count): (u64, u64),
+) {
+    let mut context = Context::new(bound, intersector, settings);
+    context.plan.record_all();
+    let kind = kernel_kind(bound, settings);
+    let mut tally = ReplicateTally::new(bound);
+    for begin in (0..count).step_by(ASKED_TOGETHER as usize) {
+        let count = ASKED_TOGETHER.min(count - begin);
+        dispatch::trace(kind, &context, RaySelection::Spread { first: begin * step, step, count }, &mut tally);
+        tally.discard();
+    }
 }
 
 /// Returns the number of replicates that a run is divided into, those before its first ray included.

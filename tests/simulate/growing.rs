@@ -1,9 +1,11 @@
 //! Runs that grow: further rays join those that were traced, and the bits are those of one run of all of them.
 
 use crate::support::World;
-use lampyris::math::Point;
-use lampyris::simulate::{BoundScene, Hooks, PartialRun, Results, RunSettings, Scene, replay, trace};
+use lampyris::intersect::{Cost, Footprint, Hit, Intersector};
+use lampyris::math::{Point, Ray};
+use lampyris::simulate::{BoundScene, Hooks, PartialRun, Results, RunSettings, Scene, ask_again, replay, trace};
 use std::path::Path;
+use std::sync::Mutex;
 
 /// A glass ball between two sources of unequal power, one of them weak, and a screen.
 fn ball() -> (World, BoundScene) {
@@ -132,4 +134,51 @@ fn large_round_runs_can_grow() {
     assert!(large.grows && large.replicates == 128);
     assert_eq!(part([0, 640_000], [0, 1], None).tallies, large.tallies);
     assert!(!run(20_000).grows);
+}
+
+/// Notes what is asked in batches, and passes it on.
+struct Noted<'w> {
+    world: &'w World,
+    rays: Mutex<Vec<[u64; 6]>>,
+}
+
+impl Intersector for Noted<'_> {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        self.world.intersect(ray, cost)
+    }
+
+    fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>], cost: &mut Cost) {
+        let bits = |ray: &Ray| {
+            let (o, d) = (ray.origin, ray.direction);
+            [o.x, o.y, o.z, d.x, d.y, d.z].map(f64::to_bits)
+        };
+        self.rays.lock().unwrap().extend(rays.iter().map(bits));
+        self.world.intersect_batch(rays, hits, cost);
+    }
+
+    fn footprint(&self) -> Footprint {
+        self.world.footprint()
+    }
+}
+
+/// Traced once more together, rays of all sources ask what each asks by itself; the run has not the last of them.
+#[test]
+fn rays_that_are_asked_again_ask_the_same() {
+    let (world, bound) = ball();
+    let (step, count, rays) = (7, 3000, 20_000);
+    for grows in [false, true] {
+        let settings = RunSettings { rays, grows, ..RunSettings::default() };
+        let asked = |ask: &dyn Fn(&Noted<'_>)| {
+            let noted = Noted { world: &world, rays: Mutex::default() };
+            ask(&noted);
+            let mut rays = noted.rays.into_inner().unwrap();
+            rays.sort_unstable();
+            rays
+        };
+        let numbers: Vec<u64> = (0..count).map(|k| step * k).collect();
+        let alone = asked(&|noted| drop(replay(&bound, noted, &settings, &numbers)));
+        let together = asked(&|noted| ask_again(&bound, noted, &settings, (step, count)));
+        assert!(numbers.last() > Some(&rays) && alone.len() > numbers.len(), "{}", alone.len());
+        assert_eq!(alone, together);
+    }
 }

@@ -28,38 +28,36 @@ pub(super) struct SourceQueue {
     mixed: Option<Box<MixedPacket>>,
     /// Whether the rays of the present source belong there.
     mixes: bool,
-    /// The source at which the queue ends: one past the last, or 0 for a single ray, which no other follows.
+    /// The source at which the queue ends: one past the last, or 0 for rays asked for by their numbers, after which no source follows.
     last: usize,
-    /// Whether one ray alone is asked for, by its number.
+    /// Whether rays are asked for by their numbers.
     single: bool,
+    /// Number of the next of several such rays, how far apart they are, and how many are left.
+    spread: [u64; 3],
     /// The ray of a list that is asked for.
     listed: Option<u64>,
 }
 
 impl SourceQueue {
-    /// Makes the queue of a replicate, of a single ray that is traced again, or of one ray of a source's list; empty for a ray that the run
-    /// does not have.
+    /// Makes the queue of a replicate, of rays that are traced again, or of one ray of a source's list; rays that the run does not have are
+    /// passed over.
     pub(super) fn new(context: &Context<'_>, rays: RaySelection) -> Self {
         let last = context.plan.shares.len();
         let single = !matches!(rays, RaySelection::Replicate(_));
         let (range, sampler, listed) = ([0, 0], None, None);
-        let (mixed, mixes) = (None, false);
+        let (mixed, mixes, spread) = (None, false, [0; 3]);
         let mut queue =
-            Self { replicate: 0, source: 0, next: 0, range, sampler, mixed, mixes, last, single, listed };
+            Self { replicate: 0, source: 0, next: 0, range, sampler, mixed, mixes, last, single, spread, listed };
         match rays {
             RaySelection::Replicate(replicate) => {
                 queue.replicate = replicate;
                 queue.enter_source(context, 0);
             }
             RaySelection::Ray(ray) => {
-                // A replayed ray is alone: no source follows, and the range is cut to its one index.
                 queue.last = 0;
-                if let Some((source, replicate)) = context.plan.locate(ray) {
-                    queue.replicate = replicate;
-                    queue.enter_source(context, source);
-                    (queue.next, queue.range[1]) = (ray, ray + 1);
-                }
+                queue.seek(context, ray);
             }
+            RaySelection::Spread { first, step, count } => (queue.last, queue.spread) = (0, [first, step, count]),
             RaySelection::Listed { source, ray } => {
                 (queue.last, queue.source, queue.listed) = (0, source as usize, Some(ray));
                 // Independent numbers: by its place in the list a ray has no place in a net.
@@ -72,6 +70,28 @@ impl SourceQueue {
             }
         }
         queue
+    }
+
+    /// Turns to one ray of the run; leaves the queue at its end where the run does not have it.
+    fn seek(&mut self, context: &Context<'_>, ray: u64) {
+        if let Some((source, replicate)) = context.plan.locate(ray) {
+            self.replicate = replicate;
+            self.enter_source(context, source);
+            // It is alone: the range is cut to its one index.
+            (self.next, self.range[1]) = (ray, ray + 1);
+        }
+    }
+
+    /// Turns to the next of the rays that are asked for by their numbers; `false` where none is left.
+    #[cold]
+    fn seek_next(&mut self, context: &Context<'_>) -> bool {
+        let [ray, step, left] = self.spread;
+        if left == 0 {
+            return false;
+        }
+        self.spread = [ray + step, step, left - 1];
+        self.seek(context, ray);
+        true
     }
 
     /// Turns to the rays of a source in this replicate, from the first on, and makes or restarts the sampler, unless they are to be mixed
@@ -128,7 +148,7 @@ impl SourceQueue {
         }
     }
 
-    /// Writes the next ray that can start to `path` and `ray`; `false` at the end of the queue, of a replicate or of the one ray asked for:
+    /// Writes the next ray that can start to `path` and `ray`; `false` at the end of the queue, of a replicate or of the rays asked for:
     /// both then hold what was tried last. Rays that cannot start are booked as lost and passed over.
     #[inline(always)]
     pub(super) fn start_next<C: RayPayload>(
@@ -150,10 +170,11 @@ impl SourceQueue {
             }
             // A source may have no ray in this replicate.
             while self.next >= self.range[1] {
-                if self.source >= self.last {
+                if self.source < self.last {
+                    self.enter_source(context, self.source + 1);
+                } else if !self.seek_next(context) {
                     return false;
                 }
-                self.enter_source(context, self.source + 1);
             }
             if self.mixes {
                 self.mix(context);

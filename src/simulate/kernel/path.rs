@@ -11,6 +11,8 @@ pub(crate) enum RaySelection {
     Replicate(u32),
     /// One ray of the run.
     Ray(u64),
+    /// So many rays of the run from one on, so many numbers apart.
+    Spread { first: u64, step: u64, count: u64 },
     /// One ray of the list of a source, whatever share of the power it has.
     Listed { source: u32, ray: u64 },
 }
