@@ -3,7 +3,7 @@
 //! costs at most 1e-7 of its size.
 
 use super::facets::Facets;
-use super::{Error, ErrorKind, write_atomic};
+use super::{Error, ErrorKind, printable_json, write_atomic};
 use crate::math::{Point, Vector};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -176,7 +176,7 @@ fn container_size(lengths: impl Iterator<Item = usize>) -> Result<u32, String> {
 /// Writes a GLB file: the document, padded here to four bytes, and the binary chunk, which the caller has padded and which is left out when
 /// empty.
 fn write_container(path: &Path, document: &Value, binary: &[u8]) -> Result<(), Error> {
-    let mut text = document.to_string().into_bytes();
+    let mut text = printable_json(document.to_string()).into_bytes();
     while !text.len().is_multiple_of(4) {
         text.push(b' ');
     }

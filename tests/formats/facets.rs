@@ -1,6 +1,6 @@
 //! Every facet file opens in a reader that others wrote, with the numbers that went in.
 
-use lampyris::formats::{Facets, Group, Polylines, is_facet_file, read_data2, write_facets};
+use lampyris::formats::{Facets, Group, Polylines, is_facet_file, is_unprintable, read_data2, write_facets};
 use lampyris::math::{FaceId, Point, Uv, Vector};
 use lampyris::mesh::{Facet, FacetMesh, MeshVertex};
 use std::fs::File;
@@ -155,6 +155,22 @@ fn glb_of_nothing_is_still_a_glb() {
     let mesh = FacetMesh::default();
     let (_folder, path) = written("a.glb", &Facets::plain(&mesh, "empty"));
     assert_eq!(gltf::import(path).unwrap().0.meshes().count(), 0);
+}
+
+/// Names are escaped where JSON lets them stand as they are, and read back unchanged.
+#[test]
+fn names_in_glb_hold_no_terminal_codes() {
+    let mesh = corner_mesh();
+    let mut facets = two_parts(&mesh);
+    facets.groups[0].name = "\u{1b}[31m\u{9b}2J\u{202e}\u{7f}end".into();
+    let (_folder, path) = written("a.glb", &facets);
+    let bytes = std::fs::read(&path).unwrap();
+    // The JSON chunk comes first: its length stands behind the head of 12 bytes.
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let text = std::str::from_utf8(&bytes[20..20 + length]).unwrap();
+    assert_eq!(text.find(is_unprintable), None);
+    let (document, _, _) = gltf::import(path).unwrap();
+    assert_eq!(document.materials().next().unwrap().name(), Some(facets.groups[0].name.as_str()));
 }
 
 #[test]
