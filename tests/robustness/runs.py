@@ -23,8 +23,9 @@ def expect(holds, message):
 
 
 def heed_interrupts():
-    """What a shell starts in the background ignores SIGINT, and so does all that it starts."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """What a shell starts in the background ignores SIGINT, and under nohup SIGHUP, and so does all that it starts."""
+    for name in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(name, signal.SIG_DFL)
 
 
 class Run:
