@@ -41,14 +41,6 @@ fn case(name: &str, model: &Model) -> Case {
     Case { name: name.into(), exact: Exact::build(model, &Settings::default()), rays, seconds: Vec::new() }
 }
 
-/// Seconds this thread has run, so that other work on the machine counts less; wall time where the kernel does not tell.
-fn clock() -> f64 {
-    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
-    let wall = START.get_or_init(Instant::now).elapsed().as_secs_f64();
-    let own = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    own.and_then(|s| s.split(' ').next()?.parse::<f64>().ok()).map_or(wall, |ns| ns * 1e-9)
-}
-
 fn main() {
     let mut cases = vec![
         case("bicubic patch", &model([bicubic()])),
@@ -69,9 +61,9 @@ fn main() {
     let mut hits: Vec<Option<Hit>> = vec![None; RAYS];
     for _ in 0..ROUNDS {
         for case in &mut cases {
-            let start = clock();
+            let start = Instant::now();
             case.exact.intersect_batch(&case.rays, &mut hits, &mut Cost::default());
-            case.seconds.push(clock() - start);
+            case.seconds.push(start.elapsed().as_secs_f64());
         }
     }
     println!(

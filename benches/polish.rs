@@ -25,14 +25,6 @@ use support::*;
 const RAYS: usize = 100_000;
 const ROUNDS: usize = 11;
 
-/// Seconds this thread has run, so that other work on the machine counts less; wall time where the kernel does not tell.
-fn clock() -> f64 {
-    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
-    let wall = START.get_or_init(Instant::now).elapsed().as_secs_f64();
-    let own = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
-    own.and_then(|s| s.split(' ').next()?.parse::<f64>().ok()).map_or(wall, |ns| ns * 1e-9)
-}
-
 fn bench(name: &str, model: &Model) {
     let settings = tessellate::Settings { tolerance: [0.05; 2], measure: false, ..Default::default() };
     let mesh = tessellate(model, &settings).mesh;
@@ -49,9 +41,9 @@ fn bench(name: &str, model: &Model) {
     for _ in 0..ROUNDS {
         for (who, times) in [&octree as &dyn Intersector, &polished].into_iter().zip(&mut seconds) {
             cost = Cost::default();
-            let start = clock();
+            let start = Instant::now();
             who.intersect_batch(&rays, &mut hits, &mut cost);
-            times.push(clock() - start);
+            times.push(start.elapsed().as_secs_f64());
         }
     }
     let [plain, moved] = seconds.map(|mut s| {

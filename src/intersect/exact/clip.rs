@@ -251,7 +251,7 @@ impl Exact {
         if [u, v].iter().any(|x| !(-e..=1.0 + e).contains(x)) {
             return false;
         }
-        let s = net::evaluate_inlined(&node.net, degree, u, v).s;
+        let s = net::evaluate(&node.net, degree, u, v).s;
         let t = s[2] / s[3];
         let [[u0, u1], [v0, v1]] = node.rect;
         let [size_u, size_v] = size(&node.rect);
@@ -308,7 +308,7 @@ impl Exact {
     /// Offers the middle of a box that touches the ray within rounding, unless the ray leaves it; `false` where 32 digits may tell more.
     #[inline(always)]
     fn take_contact(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node) -> bool {
-        let s = net::evaluate_inlined(&node.net, clipping.leaf.degree, 0.5, 0.5).s;
+        let s = net::evaluate(&node.net, clipping.leaf.degree, 0.5, 0.5).s;
         let [size_u, size_v] = size(&node.rect);
         let local = [node.rect[0][0] + 0.5 * size_u, node.rect[1][0] + 0.5 * size_v];
         let t = s[2] / s[3];

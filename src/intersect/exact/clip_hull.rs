@@ -169,7 +169,7 @@ fn linear_hull_of_degree(net: &[V4], y: &[[f64; 2]; 2], p: usize, q: usize) -> [
 pub(super) fn newton(net: &[V4], degree: [u8; 2], [mut u, mut v]: [f64; 2]) -> Option<[f64; 2]> {
     let mut last = f64::INFINITY;
     for _ in 0..STEPS {
-        let j = net::evaluate_inlined(net, degree, u, v);
+        let j = net::evaluate(net, degree, u, v);
         let inv = 1.0 / (j.su[0] * j.sv[1] - j.sv[0] * j.su[1]);
         let du = (j.sv[1] * j.s[0] - j.sv[0] * j.s[1]) * inv;
         let dv = (j.su[0] * j.s[1] - j.su[1] * j.s[0]) * inv;

@@ -68,7 +68,8 @@ pub(super) fn evaluate(net: &[V4], degree: [u8; 2], u: f64, v: f64) -> Jet {
     simd::dispatch(Evaluation { net, degree, u, v })
 }
 
-/// As [`evaluate`], for hot loops that are dispatched as a whole.
+/// As [`evaluate`], for the one hot loop that is dispatched as a whole: each further copy, of all degrees, pushes others out of the
+/// processor's cache of instructions.
 #[inline(always)]
 pub(super) fn evaluate_inlined(net: &[V4], degree: [u8; 2], u: f64, v: f64) -> Jet {
     match degree {
