@@ -60,11 +60,12 @@ pub(super) struct Judgement {
 /// is enough.
 #[derive(Clone, Copy)]
 pub(super) struct Decisive {
+    /// With errors of which [`SIGMAS`] reach as far as the reading may be off: those of the luckiest, where it was chosen from many.
     pub(super) reading: Reading,
     pub(super) direction: [f64; 2],
     /// How far the reading is on the good side of its limit, cd.
     margin: f64,
-    /// Standard errors that the margin must have.
+    /// Standard errors of the reading by itself that the margin must have.
     sigmas: f64,
     /// The margin over what it must be: sure from 1 on, or from −1 down.
     surety: f64,
@@ -77,7 +78,7 @@ const BISECTIONS: usize = 16;
 impl Decisive {
     /// Whether no other error need be there to leave the verdict open: on its very limit a reading stays unsure with any.
     pub(super) fn cells_leave_open(&self) -> bool {
-        self.margin.abs() <= self.sigmas * self.reading.cells
+        self.margin.abs() <= SIGMAS * self.reading.cells
     }
 
     /// Returns with how many rays in all, never fewer than `traced`, and on facets of which tolerance this margin would be enough.
@@ -93,14 +94,14 @@ impl Decisive {
             return None;
         }
         // The largest error of both kinds that settles it, beside that of the cells.
-        let wanted = ((self.margin / self.sigmas).powi(2) - self.reading.cells.powi(2)).sqrt();
+        let wanted = ((self.margin / SIGMAS).powi(2) - self.reading.cells.powi(2)).sqrt();
         let geometric = self.reading.geometric?;
         // Where the facets leave no room, both errors get half of the square.
         let finer = geometric > 0.5f64.sqrt() * wanted;
         // Otherwise the geometric error stays as it is, and the statistical one gets what it leaves of the square.
         let room = if finer { wanted * 0.5f64.sqrt() } else { (wanted * wanted - geometric * geometric).sqrt() };
         // What few rays leave open falls faster than the root of their number: looked for, not worked out. Fewer than traced are no advice.
-        let enough = |doublings: f64| self.noise.reach(self.sigmas, doublings.exp2()) <= self.sigmas * room;
+        let enough = |doublings: f64| self.noise.reach(self.sigmas, doublings.exp2()) <= SIGMAS * room;
         let [mut too_few, mut doublings] = [0.0, if enough(0.0) { 0.0 } else { MOST_DOUBLINGS }];
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (too_few + doublings);
@@ -185,10 +186,11 @@ impl Judgement {
             passing += usize::from(enough && margin >= 0.0);
             failing += usize::from(enough && margin < 0.0);
             // Of few rays the spread tells less than three errors of a count reach.
-            reading.statistical = reading.statistical.max(noise.reach(SIGMAS, 1.0) / SIGMAS);
-            read.push([reading.value, reading.statistical]);
-            // The best of those of which any is enough, the worst of those that must all hold.
-            let decides = |d: &Decisive| (margin > d.margin) == any && margin != d.margin;
+            read.push([reading.value, reading.statistical.max(noise.reach(SIGMAS, 1.0) / SIGMAS)]);
+            let luck = sigmas / SIGMAS;
+            reading.statistical = reading.statistical.max(noise.reach(sigmas, 1.0) / SIGMAS);
+            reading.geometric = reading.geometric.map(|geometric| luck * geometric);
+            reading.cells = luck * reading.cells.max(cells);
             let this = Decisive {
                 reading,
                 direction: comparison.direction,
@@ -197,19 +199,16 @@ impl Judgement {
                 surety: margin / reach,
                 noise,
             };
+            // The best of those of which any is enough, the worst of those that must all hold.
+            let decides = |d: &Decisive| (margin > d.margin) == any && margin != d.margin;
             if decisive.as_ref().is_none_or(decides) {
                 decisive = Some(this);
             }
-            // Where all must hold, the least sure of those in doubt is what the row waits for.
-            if !any && !enough && doubtful.as_ref().is_none_or(|least| this.surety < least.surety) {
+            // What the row waits for: of those in doubt again the best, or the least sure of all that must hold.
+            let waits = |d: &Decisive| if any { margin > d.margin } else { this.surety < d.surety };
+            if !enough && doubtful.as_ref().is_none_or(waits) {
                 doubtful = Some(this);
             }
-        }
-        // The brightest of many readings is too bright by their noise, which its own error does not hold.
-        if let Some(brightest) =
-            decisive.as_mut().filter(|_| any && requirement.comparisons.iter().all(|c| c.at_least))
-        {
-            brightest.reading.statistical = error_of_maximum(read.into_iter());
         }
         let all = requirement.comparisons.len();
         // A direction outside the far field may hide anything: only what one reading alone decides is still known.
@@ -220,8 +219,14 @@ impl Judgement {
             ((failing > 0).then_some(Verdict::Fail), (passing == all && complete).then_some(Verdict::Pass))
         };
         let verdict = alone.or(together).unwrap_or(Verdict::Unsure);
-        let in_doubt = doubtful.filter(|_| verdict == Verdict::Unsure);
-        Self { verdict, decisive: in_doubt.or(decisive), unseen: requirement.unseen }
+        let mut decisive = doubtful.filter(|_| verdict == Verdict::Unsure).or(decisive);
+        // The brightest of many readings is too bright by their noise, which its own error does not hold.
+        if let Some(Decisive { reading, .. }) =
+            decisive.as_mut().filter(|_| any && requirement.comparisons.iter().all(|c| c.at_least))
+        {
+            reading.statistical = reading.statistical.max(error_of_maximum(read.into_iter()));
+        }
+        Self { verdict, decisive, unseen: requirement.unseen }
     }
 }
 
@@ -245,6 +250,10 @@ fn read_margin(photometer: &Photometer, comparison: &Comparison) -> (Reading, f6
 
 #[cfg(test)]
 mod tests {
+    use super::super::assessment::Assumptions;
+    use super::super::table::Regulation;
+    use super::super::test_lamps::map;
+    use super::super::verdict::assess;
     use super::*;
 
     const NONE: Noise =
@@ -317,5 +326,28 @@ mod tests {
         assert!((rays(spread).unwrap() / 36.0 - 1.0).abs() < 2e-3);
         let dark = Noise { ray_cd: 4.0, counted: 0.0, ..spread };
         assert!((rays(dark).unwrap() / 27.0 - 1.0).abs() < 0.01, "{:?}", rays(dark));
+    }
+
+    /// The brightest of the many readings of a zone must lie farther above its limit than three errors of one: what leaves it unsure is an
+    /// error of the reading all the same.
+    #[test]
+    fn a_reading_chosen_from_many_has_the_error_of_the_luckiest() {
+        let mut regulation = Regulation::find("UN R112 B passing").unwrap();
+        regulation.function.rows.retain(|row| row.id == "Zone III");
+        let limit = regulation.function.rows[0].max.unwrap();
+        let assumptions = Assumptions { as_placed: true, ..Assumptions::default() };
+        let judged = |cd: f64| {
+            let lamp = map(|_, _| cd, 0.1, 0.01);
+            let row = assess(&lamp, &regulation, &assumptions).unwrap().rows.remove(0);
+            let reading = row.reading.unwrap();
+            (row.verdict.unwrap(), (limit - reading.value) / reading.known_error().hypot(reading.cells))
+        };
+        let all: Vec<(Verdict, f64)> = (0..200).map(|k| judged(0.01 * f64::from(k) * limit)).collect();
+        for (verdict, errors) in &all {
+            assert!(*verdict != Verdict::Unsure || errors.abs() < SIGMAS, "unsure at {errors} errors");
+        }
+        for wanted in [Verdict::Pass, Verdict::Unsure, Verdict::Fail] {
+            assert!(all.iter().any(|(verdict, _)| *verdict == wanted));
+        }
     }
 }

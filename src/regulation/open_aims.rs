@@ -11,6 +11,9 @@ use super::table::Regulation;
 /// among all of them.
 const MOST_FOR_EXTENDED: usize = 30;
 
+/// What is remarked on rows that errors of their reading do not make unsure.
+const OUTSIDE_BY_AIM: &str = "by an aim that the errors of the map leave open it lies outside the far field";
+
 /// Judges all rows as the map is aimed, and then by the other aims that its errors leave open. A lamp that is aimed by noise fails and
 /// passes where it should not: a verdict stands where every open aim has it, and what these read is an error of the reading.
 pub(super) fn judge_by_open_aims(
@@ -31,19 +34,23 @@ pub(super) fn judge_by_open_aims(
             let Some(other) = other else { continue };
             // What settles it by one aim does not where it is open which one holds.
             if row.verdict != other.verdict {
+                if other.unseen > 0 && row.unseen == 0 && row.verdict != Some(Verdict::Unsure) {
+                    row.row.add_note(OUTSIDE_BY_AIM);
+                }
                 (row.verdict, row.settles) = (Some(Verdict::Unsure), None);
             }
             if let (Some(here), Some(there)) = (row.reading, other.reading) {
-                *spread = f64::max(*spread, (there.value - here.value).abs() / SIGMAS + there.known_error());
+                let error = there.known_error().hypot(there.cells);
+                *spread = f64::max(*spread, (there.value - here.value).abs() / SIGMAS + error);
             }
         }
     }
     for (reading, spread) in
         rows.iter_mut().zip(spread).filter_map(|(row, spread)| Some((row.reading.as_mut()?, spread)))
     {
-        // What facets change is part of both readings; where nobody knows it, it is in neither.
-        let facets = reading.geometric.map_or(0.0, |geometric| geometric.powi(2));
-        let apart = (spread.powi(2) - facets).max(0.0).sqrt();
+        // What facets and cells change is part of both readings; where nobody knows what facets do, it is in neither.
+        let others = reading.geometric.map_or(0.0, |geometric| geometric.powi(2)) + reading.cells.powi(2);
+        let apart = (spread.powi(2) - others).max(0.0).sqrt();
         reading.statistical = reading.statistical.max(apart);
     }
     rows
@@ -81,6 +88,18 @@ mod tests {
         assert!(judged(&[2.0]).1.known_error() >= 1000.0);
     }
 
+    /// Whether a row is unsure although three of its combined errors do not reach its limits, and nothing says why.
+    fn is_unexplained(judged: &RowVerdict) -> bool {
+        let (Some(reading), RowVerdict { row, verdict: Some(Verdict::Unsure), unseen: 0, .. }) =
+            (judged.reading, judged)
+        else {
+            return false;
+        };
+        let reach = SIGMAS * reading.known_error().hypot(reading.cells);
+        let is_outside = row.note.as_ref().is_some_and(|note| note.contains(OUTSIDE_BY_AIM));
+        !is_outside && [row.min, row.max].iter().flatten().all(|limit| (reading.value - limit).abs() > reach)
+    }
+
     /// Noise of the dark side looks like elbows: a row that fails or passes by one of these alone is unsure.
     #[test]
     fn no_verdict_is_sure_by_an_aim_that_may_be_noise() {
@@ -109,6 +128,7 @@ mod tests {
                     let is_sure = matches!(found.verdict, Some(Verdict::Pass | Verdict::Fail));
                     let what = (&found.row.id, found.verdict, found.reading.map(|r| r.value));
                     assert!(!is_sure || truth.verdict == found.verdict, "{what:?}, truly {:?}", truth.verdict);
+                    assert!(!is_unexplained(found), "{what:?}, {:?}", found.reading);
                 }
             }
         }
