@@ -181,9 +181,9 @@ impl Model {
     }
 }
 
-impl PlacedFace<'_> {
+impl<'a> PlacedFace<'a> {
     /// Name of the face, empty when it had none.
-    pub fn name(&self) -> &str {
+    pub fn name(&self) -> &'a str {
         self.face.map(|f| f.name.as_str()).or(self.tessellated.map(|t| t.name.as_str())).unwrap_or("")
     }
 
@@ -193,7 +193,7 @@ impl PlacedFace<'_> {
     }
 
     /// Layer of the face, if it has one.
-    pub fn layer(&self) -> Option<&str> {
+    pub fn layer(&self) -> Option<&'a str> {
         self.face.and_then(|f| f.layer.as_deref()).or(self.tessellated.and_then(|t| t.layer.as_deref()))
     }
 

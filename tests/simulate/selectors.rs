@@ -55,6 +55,28 @@ fn what_is_no_colour_is_refused_in_rules_sources_and_receivers() {
     }
 }
 
+/// Beside one that fits, a number that nothing has would be lost without a word; a part that is placed nowhere has nothing to select.
+#[test]
+fn what_nothing_in_the_model_has_is_refused_beside_what_something_has() {
+    let mut model = twins();
+    let mut spare = model.parts[0].clone();
+    spare.name = "spare".into();
+    spare.shells[1].name = "spare solid".into();
+    spare.shells[1].faces[0].layer = Some("spare layer".into());
+    model.parts.push(spare);
+    for (selector, message) in [
+        ("entity = [7, 99]", "no face is #99"),
+        ("solid = [0, 2]", "no part has a solid 2"),
+        ("radius_mm = [1, 3]", "no face has a radius of 3 mm"),
+        ("solid = ['big', 'spare solid']", "no solid is called 'spare solid'"),
+        ("layer = ['optics', 'spare layer']", "no layer is called 'spare layer'"),
+    ] {
+        let error =
+            rules(&model, &format!("[[material]]\non = {{ {selector} }}\nsurface = 'mirror'\n")).unwrap_err();
+        assert!(error.to_string().contains(message), "{selector}: {error}");
+    }
+}
+
 #[test]
 fn two_solids_of_one_part_are_told_apart() {
     let model = twins();
@@ -124,8 +146,9 @@ fn what_selects_nothing_is_refused_with_what_there_is() {
         ("kind = 'spere'", "did you mean 'sphere'?"),
         ("layer = 'lens'", "there are: optics"),
         ("solid = 'bigg'", "did you mean 'big'?"),
-        ("solid = 5", "matches no face"),
-        ("radius_mm = 1.5", "matches no face"),
+        ("solid = 5", "no part has a solid 5"),
+        ("radius_mm = 1.5", "no face has a radius of 1.5 mm"),
+        ("solid = 0\nradius_mm = 2", "matches no face"),
     ] {
         let error = rules(&twins(), &format!("[[material]]\n{selector}\nsurface = 'mirror'\n")).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");

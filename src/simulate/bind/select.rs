@@ -53,9 +53,13 @@ fn solid_name<'m>(face: &PlacedFace<'_>, model: &'m Model) -> Option<&'m str> {
     shells.iter().rfind(|s| !s.void).or(shells.first()).map(|s| s.name.as_str())
 }
 
+/// Whether a radius is the wanted one, mm, as exactly as reports give it.
+fn is_same_radius(wanted: f64, have: f64) -> bool {
+    (wanted - have).abs() <= RADIUS_ROUNDING * have
+}
+
 /// Whether a face has everything that a selector asks for; points (`at`) are not asked.
 fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -> bool {
-    let same_radius = |wanted: &f64, have: f64| (wanted - have).abs() <= RADIUS_ROUNDING * have;
     let same_colour =
         |wanted: [f64; 3], have: [f64; 3]| have.iter().zip(wanted).all(|(a, b)| (a - b).abs() < COLOUR_STEP);
     matches_any(&rule.part, &model.part(face.part).name)
@@ -65,7 +69,7 @@ fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -
         && rule.entity.as_ref().is_none_or(|e| face.entity().is_some_and(|id| e.as_slice().contains(&id)))
         && (rule.layer.is_none() || face.layer().is_some_and(|layer| matches_any(&rule.layer, layer)))
         && rule.radius_mm.as_ref().is_none_or(|radii| {
-            face.radius().is_some_and(|have| radii.as_slice().iter().any(|wanted| same_radius(wanted, have)))
+            face.radius().is_some_and(|have| radii.as_slice().iter().any(|wanted| is_same_radius(*wanted, have)))
         })
         && matches_solid(&rule.solid, face, model)
         && rule.colour.as_ref().is_none_or(|wanted| {
@@ -77,7 +81,7 @@ fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -
 /// `base` is where the selector stands in the scene, for messages.
 ///
 /// # Errors
-/// When no face fits, a name in it fits nothing in the model, or a point lies farther from the faces than they are large.
+/// When no face fits, a name or number in it fits nothing in the model, or a point lies farther from the faces than they are large.
 pub(super) fn select_faces(
     scene: &Scene,
     base: &[Key<'_>],
@@ -89,19 +93,19 @@ pub(super) fn select_faces(
     let candidates: Vec<usize> =
         model.placed_faces().filter(|f| matches_selector(rule, f, model)).map(|f| f.id.index()).collect();
     // Before the count: a name that nothing has is the better message than that nothing matches.
-    each_name_means_something(scene, base, rule, model)?;
+    refuse_what_nothing_has(scene, base, rule, model)?;
     if candidates.is_empty() {
         let message = "this matches no face of the model";
-        return Err(scene.error(ErrorKind::NoMatch, &path(""), message).help("loosen its selectors, or remove it"));
+        return Err(scene.error(ErrorKind::NoMatch, base, message).help("loosen its selectors, or remove it"));
     }
     let Some(points) = &rule.at else { return Ok(candidates) };
+    let bounds = nearest.bounds(&candidates);
     let mut chosen = Vec::new();
     for p in points.as_slice() {
         let Some(face) = nearest.nearest_face(Point::from_array(*p), &candidates) else {
-            let message = format!("no face is near to {p:?}");
-            return Err(scene.error(ErrorKind::NoMatch, &path("at"), message).help("give a point on a face, mm"));
+            let message = format!("none of the faces that are meant has a shape, so none is near to {p:?}");
+            return Err(scene.error(ErrorKind::NoMatch, &path("at"), message).help("loosen the other selectors"));
         };
-        let bounds = nearest.bounds(&candidates);
         let distance = nearest.distance(face, Point::from_array(*p));
         // A point that far off is a slip of unit or sign, and not meant for any face.
         if distance > bounds.diagonal() {
@@ -117,11 +121,25 @@ pub(super) fn select_faces(
     Ok(chosen)
 }
 
-/// Checks that the colour of a selector is one, and that every name in it fits something in the model, or of kinds any model.
+/// Where the names of a key stand in a model.
+type NamesOf = fn(&Model) -> Vec<&str>;
+
+/// The names that selectors are compared with, by their key: of what is placed, and of all kinds of surfaces.
+const NAMES: [(&str, NamesOf); 6] = [
+    ("part", |model| model.instances.iter().map(|i| model.part(i.part).name.as_str()).collect()),
+    ("instance", |model| model.instances.iter().flat_map(Instance::names).collect()),
+    ("face", |model| model.placed_faces().map(|f| f.name()).collect()),
+    ("layer", |model| model.placed_faces().filter_map(|f| f.layer()).collect()),
+    ("solid", |model| model.placed_faces().filter_map(|f| solid_name(&f, model)).collect()),
+    ("kind", |_| SurfaceKind::ALL.map(SurfaceKind::word).to_vec()),
+];
+
+/// Checks that the colour of a selector is one, and that every name, number and radius in it fits something that is placed in the model; a
+/// kind, any model. A rule of several names must not lose one of them to a slip of the pen while the others match.
 ///
 /// # Errors
-/// For a text that is no colour, and for the first name that fits nothing, with the nearest name or a list of names.
-fn each_name_means_something(
+/// For a text that is no colour, and for the first name or number that fits nothing, with the nearest name or a list of names.
+fn refuse_what_nothing_has(
     scene: &Scene,
     base: &[Key<'_>],
     rule: &FaceSelector,
@@ -131,17 +149,6 @@ fn each_name_means_something(
     if rule.colour.as_ref().is_some_and(|c| c.rgb().is_none()) {
         return Err(scene.not_a_colour(&path("colour")));
     }
-    let parts = model.instances.iter().map(|i| model.part(i.part).name.as_str());
-    let instances = model.instances.iter().flat_map(Instance::names);
-    let faces = model.placed_faces().filter_map(|f| match (f.face, f.tessellated) {
-        (Some(face), _) => Some(face.name.as_str()),
-        (None, ready) => ready.map(|t| t.name.as_str()),
-    });
-    let layers = model.parts.iter().flat_map(|part| {
-        let of_faces = part.shells.iter().flat_map(|s| &s.faces).filter_map(|f| f.layer.as_deref());
-        of_faces.chain(part.tessellated.iter().filter_map(|t| t.layer.as_deref()))
-    });
-    let solids = model.parts.iter().flat_map(|part| part.shells.iter().map(|s| s.name.as_str()));
     let solid_names = rule.solid.as_ref().map(|keys| {
         let names = keys.as_slice().iter().filter_map(|key| match key {
             SolidKey::Name(name) => Some(name.clone()),
@@ -149,22 +156,36 @@ fn each_name_means_something(
         });
         OneOrMany::Many(names.collect())
     });
-    let lists = [
-        ("part", &rule.part, parts.collect::<Vec<_>>()),
-        ("instance", &rule.instance, instances.collect()),
-        ("face", &rule.face, faces.collect()),
-        ("layer", &rule.layer, layers.collect()),
-        ("solid", &solid_names, solids.collect()),
-        ("kind", &rule.kind, SurfaceKind::ALL.map(SurfaceKind::word).to_vec()),
-    ];
-    for (key, patterns, names) in lists {
-        // A rule of several names must not lose one of them to a slip of the pen while the others match.
-        for pattern in patterns.iter().flat_map(|p| p.as_slice()) {
-            if names.iter().any(|n| matches_pattern(pattern, n)) {
-                continue;
-            }
+    let asked = [&rule.part, &rule.instance, &rule.face, &rule.layer, &solid_names, &rule.kind];
+    for ((key, names_of), patterns) in NAMES.into_iter().zip(asked) {
+        let Some(patterns) = patterns else { continue };
+        let names = names_of(model);
+        let fits_nothing = |pattern: &&String| !names.iter().any(|name| matches_pattern(pattern, name));
+        if let Some(pattern) = patterns.as_slice().iter().find(fits_nothing) {
             let error = scene.error(ErrorKind::NoMatch, &path(key), format!("no {key} is called '{pattern}'"));
             return Err(error.help(advice(pattern, names)));
+        }
+    }
+    let refuse = |key: &'static str, message: String| {
+        let error = scene.error(ErrorKind::NoMatch, &path(key), message);
+        Err(error.help("`lampyris info FILE --faces` lists the faces of a model"))
+    };
+    let any = |fits: &dyn Fn(&PlacedFace<'_>) -> bool| model.placed_faces().any(|face| fits(&face));
+    for id in rule.entity.iter().flat_map(OneOrMany::as_slice) {
+        if !any(&|face| face.entity() == Some(*id)) {
+            return refuse("entity", format!("no face is #{id} in its file"));
+        }
+    }
+    for key in rule.solid.iter().flat_map(OneOrMany::as_slice) {
+        if let SolidKey::Number(number) = key
+            && !any(&|face| face.solid == *number)
+        {
+            return refuse("solid", format!("no part has a solid {number}"));
+        }
+    }
+    for radius in rule.radius_mm.iter().flat_map(OneOrMany::as_slice) {
+        if !any(&|face| face.radius().is_some_and(|have| is_same_radius(*radius, have))) {
+            return refuse("radius_mm", format!("no face has a radius of {radius} mm"));
         }
     }
     Ok(())
@@ -190,15 +211,11 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Res
         instance: receiver.instance.clone(),
         ..FaceSelector::default()
     };
-    each_name_means_something(scene, &[Key::Name("receiver"), Key::Index(index)], &rule, model)?;
-    let faces: Vec<u32> = model
-        .placed_faces()
-        .filter(|f| matches_any(&rule.part, &model.part(f.part).name))
-        .filter(|f| model.instances[f.instance].names().any(|name| matches_any(&rule.instance, name)))
-        .map(|f| f.id.0)
-        .collect();
+    let at = [Key::Name("receiver"), Key::Index(index)];
+    refuse_what_nothing_has(scene, &at, &rule, model)?;
+    let faces: Vec<u32> =
+        model.placed_faces().filter(|f| matches_selector(&rule, f, model)).map(|f| f.id.0).collect();
     if faces.is_empty() {
-        let at = [Key::Name("receiver"), Key::Index(index)];
         let error = scene.error(ErrorKind::NoMatch, &at, "this receiver matches no face of the model");
         let names = model.instances.iter().flat_map(|i| [model.part(i.part).name.as_str(), i.name.as_str()]);
         return Err(error.help(advice("", names.collect())));
