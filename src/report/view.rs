@@ -73,6 +73,8 @@ pub struct Values {
 
 /// More triangles than this are simplified for showing: base64 of 60,000 is 3 MB of page.
 const SHOWN: usize = 60_000;
+/// Triangles that a surface keeps in any case, so that it is recognised, unless surfaces are so many that these would pass [`SHOWN`].
+const LEAST_SHOWN: usize = 2000;
 
 impl View {
     /// Draws facets in the colours of their parts, simplified where there are more than 60,000 triangles, which the caption then says.
@@ -80,11 +82,12 @@ impl View {
         let mut view = Self { name: name.into(), title: title.into(), caption: String::new(), shapes: Vec::new() };
         let mut merged = 0.0f64;
         let total: usize = facets.mesh.facets.iter().map(|f| f.triangle_count()).sum();
-        for shown in shown_surfaces(facets) {
-            let traced = triangles_of(facets, &shown.facets, !facets.labels.is_empty());
-            // Each part by its share of the triangles, but enough to be recognised.
-            let limit = (SHOWN * traced.triangles.len()).div_ceil(total.max(1)).max(2000);
-            let (FaceTriangles { points, faces, triangles }, cell) = merge_corners(traced, limit);
+        let surfaces = shown_surfaces(facets);
+        let least = LEAST_SHOWN.min(SHOWN / surfaces.len().max(1));
+        for shown in surfaces {
+            let all = triangles_of(facets, &shown.facets, !facets.labels.is_empty());
+            let limit = (SHOWN * all.triangles.len()).div_ceil(total.max(1)).max(least);
+            let (FaceTriangles { points, faces, triangles }, cell) = merge_corners(all, limit);
             merged = merged.max(cell);
             let labels =
                 run_starts(&faces).filter_map(|(first, f)| Some((first, facets.labels.get(f as usize)?.clone())));
@@ -308,7 +311,7 @@ fn used_points(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Triangles {
 /// Merges corners of a face that lie in one cell of a grid, and enlarges the cells until at most `limit` triangles remain.
 ///
 /// Opens no holes within a face, unlike leaving triangles out; between faces cracks of about a cell may open. Returns the size of the
-/// cells too, mm: 0 where the triangles are returned as they came, being few enough or, after forty enlargements, still too many.
+/// cells too, mm: 0 where the triangles came back as they were: few enough, all in one point or, after forty enlargements, too many.
 fn merge_corners(traced: FaceTriangles, limit: usize) -> (FaceTriangles, f64) {
     if traced.triangles.len() <= limit {
         return (traced, 0.0);
@@ -319,7 +322,7 @@ fn merge_corners(traced: FaceTriangles, limit: usize) -> (FaceTriangles, f64) {
         s.max(hi - lo)
     });
     let mut cell = span / 400.0;
-    for _ in 0..40 {
+    for _ in 0..if span > 0.0 { 40 } else { 0 } {
         let mut index = FxHashMap::default();
         let mut merged: Vec<[f32; 3]> = Vec::new();
         let mut merged_faces = Vec::new();

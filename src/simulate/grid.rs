@@ -4,7 +4,8 @@ use super::tally::{Sum, quanta_as_integer};
 use crate::intersect::prefetch;
 use std::collections::BTreeMap;
 
-/// A cell of a grid that reaches twice this many quanta hands so many over: it never holds 2⁶⁴, and never nothing again.
+/// A cell of a grid that reaches twice this many quanta hands so many over: it never holds 2⁶⁴, as no more are added at once, and never
+/// nothing again.
 const CARRIED: u64 = 1 << 62;
 
 /// Cells ahead of the one that is added whose memory is asked for.
@@ -29,15 +30,16 @@ impl Grid {
         Self { cells: vec![0; cells], touched: vec![0; cells + 1], count: 0, ..Self::default() }
     }
 
-    /// Adds a whole number of quanta, from 0 to below 2⁶³, to a cell. Panics for a cell beyond the grid.
+    /// Adds a whole number of quanta, from 0 to [`CARRIED`], to a cell. Panics for a cell beyond the grid.
     #[inline]
     pub(crate) fn add(&mut self, cell: usize, quanta: f64) {
         self.add_integer(cell, quanta_as_integer(quanta));
     }
 
-    /// Adds quanta below 2⁶³ to a cell.
+    /// Adds at most [`CARRIED`] quanta to a cell.
     #[inline]
     pub(crate) fn add_integer(&mut self, cell: usize, quanta: u64) {
+        debug_assert!(quanta <= CARRIED, "{quanta} quanta at once");
         let c = &mut self.cells[cell];
         self.touched[self.count] = cell as u32;
         // The place is written in any case and kept by the count. With a branch on whether the cell is empty, as half the cells of a

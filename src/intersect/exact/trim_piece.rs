@@ -13,14 +13,16 @@ const HEIGHT_STEPS: usize = 60;
 const NEAREST_STEP: f64 = 1e-12;
 /// Steps to the nearest point of a piece, which is monotone and short.
 const NEAREST_STEPS: usize = 8;
-/// A piece that rises by less than this share of a cell is flat and need not be monotone: to split it would only sort rounding.
+/// A piece that rises by less than this share of a cell and of its height need not be monotone: to split it would only sort rounding.
 const FLAT: f64 = 1e-11;
 /// How often a piece is halved for being long.
 const SHORTENED: u32 = 8;
 /// How often a piece is halved for not being monotone: its turn is then within 6e-8 of the piece.
 const DEEPEST: u32 = 24;
+/// Most pieces that one Bézier piece of a trim is split into.
+const MOST_PIECES: usize = 4096;
 
-/// A rational Bézier piece of a trimming curve in the parameter plane, monotone in v.
+/// A rational Bézier piece of a trimming curve in the parameter plane, monotone in v but where [`split`] met its limits.
 #[derive(Clone, Debug)]
 pub(super) struct TrimPiece {
     /// Homogeneous control points `(w·u, w·v, w)`, weights positive.
@@ -71,7 +73,7 @@ impl TrimPiece {
     }
 
     /// Boxes, by their low and high corners, that together hold the piece, each no longer than `longest` in u and v unless that took too
-    /// many: the hull of a curve, which was cut so short, and those of parts of a line.
+    /// many: the bounding box of a curve, which was cut so short, and those of parts of a line.
     pub(super) fn boxes(&self, longest: Uv) -> SmallVec<[[Uv; 2]; 1]> {
         let mut boxes: SmallVec<[[Uv; 2]; 1]> = smallvec![[self.min, self.max]];
         let [from, to] = self.points[..] else { return boxes };
@@ -81,7 +83,7 @@ impl TrimPiece {
             let [a, b] = [from, to].map(|p| p.truncate() / p.z);
             let size = (b - a).abs();
             if (size.x <= longest.x && size.y <= longest.y) || depth >= SHORTENED {
-                // Its ends may be moved to its neighbours' by rounding.
+                // Joints move by rounding only, which the reach of a query covers.
                 boxes.push([a.min(b).max(self.min), a.max(b).min(self.max)]);
                 continue;
             }
@@ -109,14 +111,14 @@ impl TrimPiece {
 
     /// The u at which the piece crosses the height `v`, which must lie in its range and the piece not be level.
     pub(super) fn u_at(&self, v: f64) -> f64 {
-        // Newton's method inside of a bracket, which a monotone piece allows: it ends whatever the slope.
-        let (mut lo, mut hi) = (0.0, 1.0);
         if let [from, to] = self.points[..] {
             // A line in closed form, by its own ends: those of the piece may be moved to its neighbours' by rounding.
             let (before, behind) = (v * from.z - from.y, to.y - v * to.z);
             let t = before / (before + behind);
             return self.evaluate(if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.5 }).0.x;
         }
+        // Newton's method inside of a bracket, which a monotone piece allows: it ends whatever the slope.
+        let (mut lo, mut hi) = (0.0, 1.0);
         let rising = self.v[1] > self.v[0];
         let mut t = ((v - self.v[0]) / (self.v[1] - self.v[0])).clamp(0.0, 1.0);
         let mut u = 0.0;
@@ -223,9 +225,6 @@ pub(super) fn trim_pieces(face: &Face, longest: Uv) -> Vec<TrimPiece> {
     all
 }
 
-/// Most pieces that one Bézier piece of a trim is split into.
-const MOST: usize = 4096;
-
 /// A part of a Bézier piece of a trim.
 struct CurvePart {
     /// As [`TrimPiece::points`].
@@ -248,13 +247,13 @@ fn split(out: &mut Vec<TrimPiece>, whole: CurvePart, longest: Uv, side: LoopSide
         // A curve changes direction no more often than its control polygon does (variation diminishing), so a monotone polygon proves a
         // monotone piece, of which parity needs the ends alone.
         let monotone = (0..n).all(|k| if rising { at(k + 1).y >= at(k).y } else { at(k + 1).y <= at(k).y });
-        let hull = (0..=n).fold((at(0), at(0)), |(lo, hi), k| (lo.min(at(k)), hi.max(at(k))));
-        let size = hull.1 - hull.0;
-        let flat = size.y < FLAT * (longest.y + hull.1.y.abs());
+        let bounds = (0..=n).fold((at(0), at(0)), |(lo, hi), k| (lo.min(at(k)), hi.max(at(k))));
+        let size = bounds.1 - bounds.0;
+        let flat = size.y < FLAT * (longest.y + bounds.1.y.abs());
         // Of a line the height and the foot are closed forms at any length. Curves far longer than the domain, and more pieces than any
         // real trim has, stay as they are: no input may cost more than this.
         let short = n == 1 || (size.x <= longest.x && size.y <= longest.y) || depth >= SHORTENED;
-        if ((monotone || flat) && short) || depth >= DEEPEST || out.len() > first + MOST {
+        if ((monotone || flat) && short) || depth >= DEEPEST || out.len() > first + MOST_PIECES {
             out.push(TrimPiece::new(points, range, side));
             continue;
         }

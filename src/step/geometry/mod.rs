@@ -46,6 +46,11 @@ impl Refusal {
     pub(crate) fn new(entity: Entity<'_, '_>, reason: impl Into<String>) -> Self {
         Self { id: entity.id, entity: entity.name(), reason: reason.into() }
     }
+
+    /// Makes the refusal of what is referred to but stands nowhere.
+    pub(crate) fn missing(id: u64) -> Self {
+        Self { id, entity: "an instance".into(), reason: "is referred to but is not in the file".into() }
+    }
 }
 
 /// Reads geometry in mm and radians.
@@ -58,11 +63,7 @@ pub(crate) struct GeometryReader<'f, 'a> {
 impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Returns the instance with an id, or a refusal that says that the file has none.
     pub(crate) fn entity(&self, id: u64) -> Outcome<Entity<'f, 'a>> {
-        self.file.entity(id).ok_or_else(|| Refusal {
-            id,
-            entity: String::new(),
-            reason: format!("#{id} is referred to but is not in the file"),
-        })
+        self.file.entity(id).ok_or_else(|| Refusal::missing(id))
     }
 
     /// Returns the instance #`id`, which `from` refers to. Where there is no id, refuses in `from`'s name that `what` is missing; where the
@@ -139,14 +140,11 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     pub(crate) fn placement(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
         let args = ["AXIS2_PLACEMENT_3D", "AXIS1_PLACEMENT", "AXIS2_PLACEMENT_2D"];
-        let Some((name, args)) = args.into_iter().find_map(|n| {
-            let inherited = if e.keyword().is_empty() { 0 } else { 1 };
-            Some((n, e.attributes(n, inherited)?))
-        }) else {
+        let Some((name, args)) = args.into_iter().find_map(|n| Some((n, e.attributes(n, 1)?))) else {
             return Err(Refusal::new(e, "is no placement"));
         };
         // In complex form the location belongs to PLACEMENT.
-        let separate = e.attributes("PLACEMENT", 1).filter(|_| e.keyword().is_empty());
+        let separate = e.attributes("PLACEMENT", 1);
         let location = separate.map_or_else(|| args.id(0), |p| p.id(0));
         let first = if separate.is_some() { 0 } else { 1 };
         let origin = match location {
@@ -166,7 +164,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 
     /// Reads a placement, or a CARTESIAN_TRANSFORMATION_OPERATOR_3D, which may scale and mirror, as a frame, mm: the target of a mapped
-    /// item, or what takes one representation into another.
+    /// item, or what takes one representation into another. An operator of two dimensions is refused.
     pub(crate) fn transformation(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
         let Some(args) = e.attributes("CARTESIAN_TRANSFORMATION_OPERATOR", 1).or_else(|| {
@@ -191,7 +189,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         };
         let axis1 = self.direction(args.id(0));
         let axis2 = self.direction(args.id(1));
-        // Without its third axis the operator takes what the other two leave; with fewer, the Z of the space.
+        // Without its third axis the operator takes what the other two leave, as OpenCASCADE does; with fewer, the Z of the space, which
+        // `base_axis` of ISO 10303-42 would take at once.
         let z = self.direction(axis3).or_else(|| Some(axis1?.cross(axis2?))).unwrap_or(Vector::Z);
         // As of a placement.
         let mut frame = Frame::from_axis(origin, z, Some(axis1.unwrap_or(Vector::X)));

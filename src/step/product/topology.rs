@@ -269,11 +269,7 @@ pub(crate) fn is_surface(e: Entity<'_, '_>) -> bool {
 /// Reads the surface, sense and bounds of a face, without geometry. Refused where a bound, its loop or an edge is missing.
 pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     let Some(e) = file.entity(id) else {
-        return Err(Refusal {
-            id,
-            entity: String::new(),
-            reason: format!("#{id} is referred to but is not in the file"),
-        });
+        return Err(Refusal::missing(id));
     };
     // A complex instance has no place for inherited names before its attributes.
     let complex = e.keyword().is_empty();

@@ -39,8 +39,9 @@ const MAX_PATCHES_TAYLOR: usize = 16;
 const MAX_PATCHES_HULL: usize = 1000;
 /// Share of the limit by which a cubic may differ from a patch of higher degree that it stands for.
 const REDUCTION_SHARE: f64 = 0.02;
-/// Where a triangle is looked at before it is proved.
-const PROBES: [[f64; 3]; 4] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [1.0 / 3.0; 3]];
+/// Where a triangle is looked at before it is proved, as barycentric coordinates: the middles of its sides, and its own.
+const PROBES: [[f64; 3]; 4] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], MIDDLE];
+const MIDDLE: [f64; 3] = [1.0 / 3.0; 3];
 
 /// Bounds facets of one face, all in mm of its part.
 pub(in crate::tessellate) struct Prover<'s, 'a> {
@@ -176,14 +177,14 @@ impl<'s, 'a> Prover<'s, 'a> {
         }
         // Corners that are the border's points may be off the surface: the difference is added in the end.
         let at = if exact { xyz } else { uv.map(|x| self.surface.point(x)) };
-        let off = (0..3).map(|i| (at[i] - xyz[i]).length()).fold(0.0, f64::max) + self.margin;
-        let (lo, hi) = (uv[0].min(uv[1]).min(uv[2]), uv[0].max(uv[1]).max(uv[2]));
+        let gap = (0..3).map(|i| (at[i] - xyz[i]).length()).fold(0.0, f64::max) + self.margin;
+        let (lo, hi) = uv_bounds(&uv);
         let (a, b) = (self.surface.range(0, lo.x, hi.x), self.surface.range(1, lo.y, hi.y));
-        let fits = |x: &f64| x + off <= limit;
+        let fits = |x: &f64| x + gap <= limit;
         let quick = self.surface.curving.linear_deviation(a, b, hi - lo).filter(fits);
         // From cheap to dear: second derivatives of whole regions, of the patches under the facet, samples, and nets at last.
         if let Some(bound) = quick {
-            return Some(bound + off);
+            return Some(bound + gap);
         }
         let surface = self.surface;
         let count = (a[1] - a[0] + 1) * (b[1] - b[0] + 1);
@@ -192,11 +193,11 @@ impl<'s, 'a> Prover<'s, 'a> {
         if count == 1 || count <= MAX_PATCHES_TAYLOR && surface.curving.is_smooth(a, b) {
             let taylor = self.deviation.taylor_bound(patches(), uv, at).filter(fits);
             if let Some(bound) = taylor {
-                return Some(bound + off);
+                return Some(bound + gap);
             }
         }
         // Proofs that must fail are the dearest.
-        let places = if exact { &PROBES[3..] } else { &PROBES[..] };
+        let places: &[_] = if exact { &[MIDDLE] } else { &PROBES };
         let probed = self.probe(&uv, &FlatTriangle::new(&xyz), limit, places);
         if probed > limit {
             return Some(probed);
@@ -204,26 +205,26 @@ impl<'s, 'a> Prover<'s, 'a> {
         // Of several patches the deviation's hull is taken, which needs no smoothness between them.
         if count > 1 {
             let hull = if count <= MAX_PATCHES_HULL {
-                self.deviation.hull_bound(patches(), uv, at, limit - off)
+                self.deviation.hull_bound(patches(), uv, at, limit - gap)
             } else {
                 None
             };
-            return hull.map(|x| x + off);
+            return hull.map(|x| x + gap);
         }
         let patch = surface.patch(a[0], b[0]);
         // The net is measured from the corners' own places, but for what moved them along the facet.
         let net = self.net_bound(patch, uv.map(|x| patch_uv(patch, x)), xyz, limit);
-        net.map(|x| off.max(x + self.margin))
+        net.map(|x| gap.max(x + self.margin))
     }
 
     /// Returns a bound of a triangle and its sides by the hull of one net, whose outer rows are those of the sides; `None` above the limit.
     fn net_bound(&mut self, patch: &BezierPatch, at: [Uv; 3], xyz: [Point; 3], limit: f64) -> Option<f64> {
         let small = self.reduce(patch, &at, limit);
-        let (patch, at, off) = match &small {
-            Some((x, off)) => (&self.reduction.patch, [x[0], x[1], x[2]], *off),
+        let (patch, at, reduction_error) = match &small {
+            Some((x, error)) => (&self.reduction.patch, [x[0], x[1], x[2]], *error),
             None => (patch, at, 0.0),
         };
-        let limit = limit - off;
+        let limit = limit - reduction_error;
         let n = patch.degree[0] + patch.degree[1];
         let low = patch.degree.iter().all(|d| (1..=MAX_HALVED).contains(d));
         // Half of a rectangle, as most facets are, has coefficients with fixed weights; any other triangle is expanded.
@@ -234,8 +235,8 @@ impl<'s, 'a> Prover<'s, 'a> {
                 if small.is_some() {
                     (self.nets.half_of_rectangle(&patch.points, patch.degree, corner), turned)
                 } else {
-                    // The look by second derivatives has left this net, seen from the first corner.
-                    let (lo, hi) = (at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2]));
+                    // The look by second derivatives mostly left this net, seen from the first corner, in the memory of `restrict`.
+                    let (lo, hi) = uv_bounds(&at);
                     let net = self.deviation.restrict(patch, lo, hi, xyz[0]);
                     (self.nets.half_of_rectangle(net, patch.degree, corner), turned.map(|x| x - xyz[0]))
                 }
@@ -256,7 +257,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             let distances = row.map(|i| (distance_to_chord(net[i].project(), &chord), net[i].w));
             worst = worst.max(self.scalar.bound::<2>(distances, n, limit)?);
         }
-        Some(worst + off)
+        Some(worst + reduction_error)
     }
 
     /// Makes `self.reduction` the cubic for a patch of higher degree over the box around `at`. Returns `at` in the cubic's parameters and a
@@ -265,11 +266,11 @@ impl<'s, 'a> Prover<'s, 'a> {
         if !cubic_reduction::is_high(patch) {
             return None;
         }
-        let (lo, hi) = at.iter().fold((at[0], at[0]), |(l, h), &x| (l.min(x), h.max(x)));
+        let (lo, hi) = uv_bounds(at);
         let origin = patch.homogeneous_point(at[0]).project();
-        let off = self.reduction.reduce(self.deviation.restrict(patch, lo, hi, origin), patch.degree, origin);
+        let error = self.reduction.reduce(self.deviation.restrict(patch, lo, hi, origin), patch.degree, origin);
         let share = |x: Uv| Uv::from_array([0, 1].map(|d| share_of_interval(x[d], lo[d], hi[d])));
-        (off <= REDUCTION_SHARE * limit).then(|| (at.map(share), off))
+        (error <= REDUCTION_SHARE * limit).then(|| (at.map(share), error))
     }
 
     /// Returns a bound, mm, of the distance from the curve over a parameter segment to the chord `xyz`, and of its ends from those of the
@@ -278,11 +279,11 @@ impl<'s, 'a> Prover<'s, 'a> {
         // A corner that the file's gap has moved off the piece is that far from it, in whatever direction: along the side the chord itself
         // would not tell.
         let moved = [0, 1].map(|i| (self.surface.point(uv[i]) - xyz[i]).length());
-        let off = moved[0].max(moved[1]) + self.margin;
-        if self.surface.affine || off > limit {
-            return off;
+        let gap = moved[0].max(moved[1]) + self.margin;
+        if self.surface.affine || gap > limit {
+            return gap;
         }
-        off.max(self.curve_bound(uv, xyz, limit))
+        gap.max(self.curve_bound(uv, xyz, limit))
     }
 
     /// Returns a bound, mm, of the distance from the curve over a parameter segment to the chord `xyz`; above `limit` none is known.
@@ -297,9 +298,6 @@ impl<'s, 'a> Prover<'s, 'a> {
         }
         self.max_over_patches(&uv, |this, a, b, polygon| {
             let patch = this.surface.patch(a, b);
-            if polygon.len() < 2 {
-                return 0.0;
-            }
             let ends = [patch_uv(patch, polygon[0]), patch_uv(patch, polygon[1])];
             this.convex_bound(patch, ends, limit, 2 * LEVELS, &|p| distance_to_chord(p, &xyz))
         }) + self.margin
@@ -315,11 +313,11 @@ impl<'s, 'a> Prover<'s, 'a> {
         f: &impl Fn(Point) -> f64,
     ) -> f64 {
         // A patch of high degree first as a cubic: the net of degree p + q costs its fourth power.
-        if let Some((x, off)) = self.reduce(patch, &at, limit) {
-            let bound =
-                off + refine((&mut self.nets, &mut self.scalar), &self.reduction.patch, x, limit - off, levels, f);
+        if let Some((x, error)) = self.reduce(patch, &at, limit) {
+            let bound = error
+                + refine((&mut self.nets, &mut self.scalar), &self.reduction.patch, x, limit - error, levels, f);
             // What the difference may have spoilt is tried on the patch itself.
-            if bound <= limit || bound > limit + 4.0 * off {
+            if bound <= limit || bound > limit + 4.0 * error {
                 return bound;
             }
         }
@@ -330,18 +328,18 @@ impl<'s, 'a> Prover<'s, 'a> {
     /// at its corners, which holds for all that is flat between them, and the deviation from that by second derivatives; `None` above the
     /// limit.
     fn taylor_bound(&self, uv: &[Uv], limit: f64, away: impl Fn(Point) -> f64) -> Option<f64> {
-        let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
+        let (lo, hi) = uv_bounds(uv);
         let (a, b) = (self.surface.range(0, lo.x, hi.x), self.surface.range(1, lo.y, hi.y));
         // The limit is asked for before the corners are evaluated, which costs more.
         let bound = self.surface.curving.linear_deviation(a, b, hi - lo).filter(|&x| x <= limit)?;
-        let off = uv.iter().map(|&x| away(self.surface.point(x))).fold(0.0, f64::max);
-        Some(bound + off + self.margin).filter(|&x| x <= limit)
+        let at_corners = uv.iter().map(|&x| away(self.surface.point(x))).fold(0.0, f64::max);
+        Some(bound + at_corners + self.margin).filter(|&x| x <= limit)
     }
 
     /// Returns the largest result over the knot rectangles that a segment or polygon meets, clipped to each; infinite for more than
     /// [`MAX_PIECES`]: a face of noise, of which nothing is proved.
     fn max_over_patches(&mut self, uv: &[Uv], mut each: impl FnMut(&mut Self, usize, usize, &[Uv]) -> f64) -> f64 {
-        let (lo, hi) = uv.iter().fold((uv[0], uv[0]), |(l, h), &x| (l.min(x), h.max(x)));
+        let (lo, hi) = uv_bounds(uv);
         let range = |d: usize, x: f64, y: f64| {
             let [a, b] = self.surface.range(d, x, y);
             a..=b
@@ -385,4 +383,9 @@ impl<'s, 'a> Prover<'s, 'a> {
 /// Returns where in `[lo, hi]` a parameter lies, as a share clamped to 0 to 1; 0 for an interval without length.
 fn share_of_interval(x: f64, lo: f64, hi: f64) -> f64 {
     if hi > lo { ((x - lo) / (hi - lo)).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// Corners of the box around parameters, of which there is at least one.
+fn uv_bounds(uv: &[Uv]) -> (Uv, Uv) {
+    uv.iter().fold((uv[0], uv[0]), |(lo, hi), &x| (lo.min(x), hi.max(x)))
 }
