@@ -165,6 +165,8 @@ pub struct Cost {
     pub tests: u64,
     /// Rays whose answer could not be certified or polished, and fell back.
     pub fallbacks: u64,
+    /// Rays whose hits were to be moved to the spline, and that it was asked about itself.
+    pub doubtful: u64,
 }
 
 impl std::ops::AddAssign for Cost {
@@ -173,6 +175,7 @@ impl std::ops::AddAssign for Cost {
         self.nodes += o.nodes;
         self.tests += o.tests;
         self.fallbacks += o.fallbacks;
+        self.doubtful += o.doubtful;
     }
 }
 

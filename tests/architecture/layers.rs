@@ -298,6 +298,10 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "intersect/polish",
+        &["limits", "piece", "facet_record", "curved_cells", "slabs", "clear_start", "mod", "start", "batch"],
+    ),
+    (
         "intersect/exact",
         &[
             "tolerances",

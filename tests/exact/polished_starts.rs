@@ -7,6 +7,7 @@ use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
 use lampyris::intersect::{Certainty, Cost, ExpectedRays, Footprint, Hit, Intersector};
 use lampyris::math::{Departure, FaceId, Frame, Point, Ray, Vector};
+use lampyris::model::Model;
 use lampyris::nurbs::sweep;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -123,4 +124,84 @@ fn only_curved_facets_are_looked_for_behind_a_start() {
         assert!(hits[0].is_some_and(|h| (h.t - 0.01).abs() < 1e-9), "{ray:?} {hits:?}");
     }
     assert!(hidden > 100, "{hidden}");
+}
+
+/// A model with its facets, polished; what is asked of it is counted by `ask`.
+fn with_polished<T>(model: &Model, tolerance: f64, ask: impl FnOnce(&Polished<'_>) -> T) -> T {
+    let mesh = mesh(model, tolerance);
+    let exact = Exact::build(model, &Settings::default());
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    ask(&Polished::new(&octree, &mesh, &exact))
+}
+
+/// What a ray goes on from, once it has come to a face.
+fn departure_at(polished: &Polished<'_>, ray: &Ray) -> Departure {
+    polished.intersect(ray, &mut Cost::default()).unwrap().departure()
+}
+
+/// Light that leaves the floor of a bore beside its wall, nearer to it than its facets are, and runs up along it: behind the facets all the
+/// way, and still it meets the wall.
+#[test]
+fn light_that_starts_between_a_wall_and_its_facets_meets_the_wall() {
+    let wall = sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, TAU], [0.0, 40.0]);
+    let floor = sweep::plane(&Frame::IDENTITY, [[-12.0, 12.0], [-12.0, 12.0]]);
+    with_polished(&model([wall, floor]), 0.1, |polished| {
+        let mut s = Random(29);
+        for _ in 0..2000 {
+            let out = Vector::new(s.within(-1.0, 1.0), s.within(-1.0, 1.0), 0.0).normalize();
+            let gap = s.within(0.002, 0.3);
+            let place = out * (10.0 - gap);
+            let from = departure_at(polished, &Ray::new(place + 5.0 * Vector::Z, -Vector::Z));
+            assert_eq!(from.face, FaceId(1));
+            // It has come near the wall by `gap` after `gap / 0.01`.
+            let up = Vector::Z * (1.0f64 - 0.01 * 0.01).sqrt() + out * 0.01;
+            let hit = polished.intersect(&Ray::new(place, up).with_departure(from), &mut Cost::default());
+            let met = hit.filter(|hit| hit.face == FaceId(0) && (hit.t - gap / 0.01).abs() < 1e-7);
+            assert!(met.is_some(), "{gap} mm from the wall: {hit:?}");
+        }
+    });
+}
+
+/// Light that meets a post just below the lid on it: where it comes to the facets of the post, which lie farther in, the lid is already
+/// behind it, and still it meets the post.
+#[test]
+fn light_that_passes_over_the_facets_of_a_post_meets_the_post() {
+    let post = sweep::cylinder(&Frame::IDENTITY, 10.0, [0.0, TAU], [0.0, 40.0]);
+    let lid = sweep::plane(&Frame::translation(40.0 * Vector::Z), [[-12.0, 12.0], [-12.0, 12.0]]);
+    with_polished(&model([post, lid]), 0.1, |polished| {
+        let mut s = Random(37);
+        for _ in 0..2000 {
+            let out = Vector::new(s.within(-1.0, 1.0), s.within(-1.0, 1.0), 0.0).normalize();
+            let met = 10.0 * out + (40.0 - s.within(0.001, 0.05)) * Vector::Z;
+            let way = (Vector::Z - out).normalize();
+            let hit = polished.intersect(&Ray::new(met - 20.0 * way, way), &mut Cost::default());
+            assert!(hit.is_some_and(|h| h.face == FaceId(0) && (h.t - 20.0).abs() < 1e-9), "{met}: {hit:?}");
+        }
+    });
+}
+
+/// Chords inside a rod, whose facets are as long as itself and a millimetre wide: to which side a ray leaves is told across the strip.
+#[test]
+fn chords_of_a_rod_of_long_facets_are_found() {
+    let rod = sweep::cylinder(&Frame::IDENTITY, 3.0, [0.0, TAU], [0.0, 400.0]);
+    with_polished(&model([rod]), 0.05, |polished| {
+        let mut s = Random(31);
+        for _ in 0..20_000 {
+            let (sin, cos) = s.within(0.0, TAU).sin_cos();
+            let (out, along) = (Vector::new(cos, sin, 0.0), Vector::new(-sin, cos, 0.0));
+            let place = Point::new(3.0 * cos, 3.0 * sin, 200.0);
+            let from = departure_at(polished, &Ray::new(place - 3.0 * out, out));
+            let inward = s.within(0.01, 0.9);
+            let across = s.within(0.05, 1.0) * (1.0 - inward * inward).sqrt();
+            let rest = (1.0 - inward * inward - across * across).max(0.0).sqrt();
+            let ray = Ray::new(place, along * across - out * inward + Vector::Z * rest).with_departure(from);
+            // A circle's chord at a sine of `inward` in space, seen along the axis.
+            let chord = 2.0 * 3.0 * inward / (inward * inward + across * across);
+            if chord * rest > 199.0 {
+                continue;
+            }
+            let hit = polished.intersect(&ray, &mut Cost::default());
+            assert!(hit.is_some_and(|hit| (hit.t - chord).abs() < 1e-7), "{chord} mm: {ray:?} {hit:?}");
+        }
+    });
 }

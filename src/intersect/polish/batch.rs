@@ -1,13 +1,13 @@
 //! Polishing of many hits: facets are asked about all rays at once, and Newton's method takes its steps eight at a time.
 //!
-//! What is plain is decided here: a ray that leaves its facet clearly, a root near its facet hit, inside the trims and crossed the same
-//! way, and an answer that the closed shells do not contradict. Where that root is the point that the ray leaves, or lies before its
-//! range, the facets are asked about what is behind it. Every other ray, some in a hundred, is asked alone.
+//! What is plain is decided here: a start on the same side of facets and spline ([`super::start`]), a root near its facet hit, inside the
+//! trims and crossed the same way, and an answer that the closed shells do not contradict. Where that root is the point that the ray
+//! leaves, or lies before its range, the facets are asked about what is behind it. The spline is asked about all other rays, together.
 
 use super::clear_start::ClearStart;
-use super::curved_cells::LOOK_BACK_OF_FLAT;
 use super::facet_record::FacetRecord;
-use super::limits::{LEAST_SLACK_SINE, LEAST_WINDOW_SINE, OWN_POINT, SHORT_OF_SAGS, WINDOW_OF_SAGS, least_window};
+use super::limits::{LEAST_WINDOW_SINE, OWN_POINT, WINDOW_OF_SAGS, least_window};
+use super::start::Side;
 use super::{Polished, is_own};
 use crate::intersect::exact::{Seed, SurfacePoint};
 use crate::intersect::{Certainty, Cost, Hit, prefetch};
@@ -22,19 +22,33 @@ const AHEAD: usize = 8;
 /// Facets whose roots lie behind a ray that it passes in the batch: more than one is rare.
 const MOST_BEHIND: usize = 3;
 
+/// A ray of the batch that the facets are asked about.
+#[derive(Clone, Copy)]
+struct Asked {
+    /// Its index in the batch.
+    place: u32,
+    /// To which side it leaves its surface, if any.
+    side: Option<Side>,
+}
+
 /// Memory of a batch.
 #[derive(Default)]
 struct Workspace {
-    /// What the facets are asked, and the index of the ray that it comes from.
+    /// What the facets are asked, and the ray that it comes from.
     asked: Vec<Ray>,
-    places: Vec<u32>,
+    of: Vec<Asked>,
     /// Of each asked ray.
     facet_hits: Vec<Option<Hit>>,
     /// Of the facet hits that lie on a patch, and the point that each leads to.
     seeds: Vec<Seed>,
     points: Vec<Option<SurfacePoint>>,
     /// The rays that passed a facet, from where on they ask again.
-    again: Vec<(u32, Ray)>,
+    again: Vec<(Asked, Ray)>,
+    /// The rays in doubt, by their index in the batch.
+    doubtful: Vec<u32>,
+    /// What the spline is asked, and what it answers.
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
 }
 
 thread_local! {
@@ -46,8 +60,8 @@ enum Decision {
     Answer(Option<Hit>),
     /// The root of this facet hit is not ahead: the facets are asked again behind it.
     Behind,
-    /// In doubt: [`Polished::intersect_alone`] decides.
-    Alone,
+    /// In doubt: [`Polished::ask_truth`] decides.
+    Doubt,
 }
 
 impl Polished<'_> {
@@ -58,7 +72,7 @@ impl Polished<'_> {
         // panic.
         let mut space = WORKSPACE.take();
         for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            self.start(rays, &clear, hits, &mut space, cost);
+            self.sort_starts(rays, &clear, &mut space);
             for _ in 0..MOST_BEHIND {
                 if space.asked.is_empty() {
                     break;
@@ -66,36 +80,36 @@ impl Polished<'_> {
                 self.ask_facets(&mut space, cost);
                 self.decide_all(rays, hits, &mut space, cost);
             }
-            for &place in &space.places {
-                hits[place as usize] = self.intersect_alone(&rays[place as usize], cost);
+            let Workspace { of, doubtful, rays: asked, hits: found, .. } = &mut space;
+            doubtful.extend(of.iter().map(|asked| asked.place));
+            asked.clear();
+            asked.extend(doubtful.iter().map(|&place| rays[place as usize]));
+            self.ask_truth(asked, found, cost);
+            for (&place, hit) in doubtful.iter().zip(found.iter()) {
+                hits[place as usize] = *hit;
             }
         }
         WORKSPACE.set(space);
     }
 
-    /// Sorts a batch: fills `space.asked` and `space.places` with the rays that the facets are asked about, their ranges widened by the
-    /// slack, and answers all others at once, each alone.
-    fn start(
-        &self,
-        rays: &[Ray],
-        clear: &[ClearStart],
-        hits: &mut [Option<Hit>],
-        space: &mut Workspace,
-        cost: &mut Cost,
-    ) {
+    /// Sorts a batch: fills `space.asked` and `space.of` with the rays that the facets are asked about, their ranges widened by the slack,
+    /// and `space.doubtful` with all others.
+    fn sort_starts(&self, rays: &[Ray], clear: &[ClearStart], space: &mut Workspace) {
         space.asked.clear();
-        space.places.clear();
+        space.of.clear();
+        space.doubtful.clear();
         for (i, ray) in rays.iter().enumerate() {
             if let Some(ahead) = rays.get(i + AHEAD).and_then(|r| r.departure) {
                 prefetch(&self.records, ahead.primitive as usize);
             }
-            if let Some([back, ahead]) = self.slack(ray, clear) {
+            if let Some(start) = self.start(ray, clear) {
                 // A facet may lie before the range and its root in it: they are up to a sag apart across the facet,
                 // and more along a flat ray.
+                let [back, ahead] = start.slack;
                 space.asked.push(ray.with_range(ray.t_min - back, ray.t_max + ahead));
-                space.places.push(i as u32);
+                space.of.push(Asked { place: i as u32, side: start.side });
             } else {
-                hits[i] = self.intersect_alone(ray, cost);
+                space.doubtful.push(i as u32);
             }
         }
     }
@@ -125,69 +139,53 @@ impl Polished<'_> {
         self.exact.converge_batch(asked, seeds, points);
     }
 
-    /// Decides about all rays that were asked and writes their `hits`; those that ask again, from behind the facet they passed, are left in
-    /// `space.asked` and `space.places`.
+    /// Decides about all rays that were asked, and writes the `hits` of those that are plain. Those that ask again, from behind the facet
+    /// they passed, are left in `space.asked` and `space.of`; those in doubt are added to `space.doubtful`.
     fn decide_all(&self, rays: &[Ray], hits: &mut [Option<Hit>], space: &mut Workspace, cost: &mut Cost) {
-        let Workspace { asked, places, facet_hits, seeds, points, again } = space;
+        let Workspace { asked, of, facet_hits, seeds, points, again, doubtful, .. } = space;
         again.clear();
         let mut found = seeds.iter().zip(points.iter()).peekable();
-        for (k, (&place, facet_hit)) in places.iter().zip(facet_hits.iter()).enumerate() {
+        for (k, (&of, facet_hit)) in of.iter().zip(facet_hits.iter()).enumerate() {
             let point = found.next_if(|(seed, _)| seed.ray == k as u32).and_then(|(_, point)| point.as_ref());
-            let ray = &rays[place as usize];
-            match (self.decide(ray, facet_hit.as_ref(), point), facet_hit) {
+            let place = of.place as usize;
+            match (self.decide(&rays[place], of.side, facet_hit.as_ref(), point), facet_hit) {
                 (Decision::Answer(answer), _) => {
                     cost.rays += 1;
-                    hits[place as usize] = answer;
+                    hits[place] = answer;
                 }
                 (Decision::Behind, Some(passed)) => {
                     // Just past the facet, or it would be found again.
-                    again.push((place, asked[k].with_range(passed.t.next_up(), asked[k].t_max)));
+                    again.push((of, asked[k].with_range(passed.t.next_up(), asked[k].t_max)));
                 }
-                _ => hits[place as usize] = self.intersect_alone(ray, cost),
+                _ => doubtful.push(of.place),
             }
         }
         asked.clear();
-        places.clear();
-        for (place, ray) in again.drain(..) {
+        of.clear();
+        for (of_ray, ray) in again.drain(..) {
             asked.push(ray);
-            places.push(place);
+            of.push(of_ray);
         }
     }
 
-    /// How far before and behind its range a ray looks for facets, mm: `None` for one that must be asked alone, as it leaves its facet
-    /// flat, names no facet of its face or is short.
+    /// Decides about a ray, which leaves its surface to this `side`, from its facet hit, `None` for a miss, and the root that Newton's
+    /// method found from there, `None` where it did not converge.
     #[inline(always)]
-    fn slack(&self, ray: &Ray, clear: &[ClearStart]) -> Option<[f64; 2]> {
-        let slack = 2.0 * self.sag;
-        let Some(from) = &ray.departure else {
-            // Where nothing can lie behind the start no look back is needed, and the ray stays one that light
-            // buffers know.
-            let is_clear = ray.t_min == 0.0 && clear.iter().any(|start| start.holds(ray));
-            if is_clear {
-                return Some([0.0, slack]);
-            }
-            let is_near = self.curved.may_be_near(ray.point_at(ray.t_min));
-            return Some([if is_near { slack } else { LOOK_BACK_OF_FLAT }, slack]);
-        };
-        // A departure from the spline alone names no facet, and one that names another face's tells nothing of the
-        // side that is left.
-        let record = self.records.get(from.primitive as usize).filter(|r| r.face == from.face)?;
-        let sine = f64::from(record.decisive_sine(ray)?.abs()).max(LEAST_SLACK_SINE);
-        (ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag).then(|| [slack / sine; 2])
-    }
-
-    /// Decides about a ray from its facet hit, `None` for a miss, and the root that Newton's method found from there, `None` where it did
-    /// not converge.
-    #[inline(always)]
-    fn decide(&self, ray: &Ray, facet_hit: Option<&Hit>, point: Option<&SurfacePoint>) -> Decision {
+    fn decide(
+        &self,
+        ray: &Ray,
+        side: Option<Side>,
+        facet_hit: Option<&Hit>,
+        point: Option<&SurfacePoint>,
+    ) -> Decision {
         let left = ray.departure.map(|from| &self.records[from.primitive as usize]);
-        let inward = left.and_then(|record| record.decisive_sine(ray)).is_some_and(|sine| sine < 0.0);
+        let inward = side == Some(Side::Inward);
         let Some(facet_hit) = facet_hit else {
             // What goes into a closed solid comes out of it.
             let comes_out = inward && ray.t_max == f64::INFINITY && left.is_some_and(FacetRecord::is_of_solid);
-            return if comes_out { Decision::Alone } else { Decision::Answer(None) };
+            return if comes_out { Decision::Doubt } else { Decision::Answer(None) };
         };
-        let Some(point) = point else { return Decision::Alone };
+        let Some(point) = point else { return Decision::Doubt };
         let record = &self.records[facet_hit.primitive as usize];
         let facing = facet_hit.geometric_normal.dot(ray.direction);
         let rising = point.normal.dot(ray.direction);
@@ -200,7 +198,7 @@ impl Polished<'_> {
                 .is_some_and(|from| from.face == facet_hit.face && is_own(self.exact, &from, ray, point));
         // Crossed the other way, it is the other one of two roots close by.
         if !is_near || !(is_own || rising * facing > 0.0) {
-            return Decision::Alone;
+            return Decision::Doubt;
         }
         if is_own || point.t < ray.t_min || point.t > ray.t_max {
             return Decision::Behind;
@@ -214,8 +212,9 @@ impl Polished<'_> {
                 Some(left) if left.shares_solid(record) => inward != out,
                 Some(_) => inward || out,
             };
-        if is_doubtful {
-            return Decision::Alone;
+        // And so may one between another face and that one's facets, which the ray has passed without meeting them.
+        if is_doubtful || self.is_in_slab(facet_hit.primitive, point.uv, ray.point_at(point.t)) {
+            return Decision::Doubt;
         }
         Decision::Answer(Some(Hit {
             t: point.t,

@@ -15,7 +15,7 @@ const CELLS: usize = 64;
 const MOST_MARKED_OF_FACET: usize = 100;
 const MOST_MARKED: usize = 16 * CELLS * CELLS * CELLS;
 /// A facet of no more sag, mm, is flat: ten times what the proof of a plane of 1 m leaves for rounding.
-const FLAT_SAG: f32 = 1e-8;
+pub(super) const FLAT_SAG: f32 = 1e-8;
 /// How far behind its start a ray that is near no curved facet looks, mm: twice [`FLAT_SAG`] at the least sine by which that is lengthened.
 pub(super) const LOOK_BACK_OF_FLAT: f64 = 2.0 * FLAT_SAG as f64 / LEAST_SLACK_SINE;
 

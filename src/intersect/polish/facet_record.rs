@@ -1,14 +1,14 @@
 //! What polishing asks of a facet again and again, in half a cache line.
 
-use super::limits::{HIDDEN_BELOW, no_sag};
+use super::limits::{BEND_OF_SAGS, HIDDEN_BENDS, no_sag};
 use crate::intersect::exact::Exact;
 use crate::math::{FaceId, Ray, Uv};
 use crate::mesh::FacetMesh;
 use rustc_hash::FxHashMap;
 
-/// A ray whose sine to the facet that it leaves, times the facet's length, is above so many sags is told by the facet's own normal, which
-/// is off the spline's by four sags over that length where the curvature does not change: twice what a root may hide below.
-const CLEAR_OF_SAGS: f64 = 2.0 * HIDDEN_BELOW;
+/// A ray whose sine to the facet that it leaves is above so many of the facet's bends is told by the facet's own normal: twice what a root
+/// may hide below.
+const CLEAR_BENDS: f64 = 2.0 * HIDDEN_BENDS;
 /// And it is above this: a hundred times what `f32` rounds.
 const LEAST_CLEAR_SINE: f64 = 1e-5;
 /// In [`FacetRecord::patch`]: the facet lies on several patches.
@@ -47,7 +47,10 @@ impl FacetRecord {
                 // A facet without area gets a normal of zero, and with it a sine that never decides.
                 let normal = (b - a).cross(c - a).normalize_or_zero();
                 let sag = mesh.sag.get(f).copied().filter(|s| s.is_finite()).unwrap_or(sag).max(no_sag(length));
-                let least_sine = (CLEAR_OF_SAGS * sag / length).max(LEAST_CLEAR_SINE);
+                // Of a long strip on a cylinder the normals turn across it, however long it is.
+                let turned = facet.vertices.map(|v| mesh.vertices[v as usize].normal.distance(normal));
+                let bend = turned.into_iter().fold(BEND_OF_SAGS * sag / length, f64::max);
+                let least_sine = (CLEAR_BENDS * bend).max(LEAST_CLEAR_SINE);
                 let corners = facet.vertices.map(|v| mesh.vertices[v as usize].uv);
                 let patch = match exact.patch_around(facet.face, &corners) {
                     None => NO_PATCH,

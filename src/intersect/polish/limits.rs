@@ -1,6 +1,6 @@
 //! The limits that several steps of polishing keep.
 
-/// A ray of no more than so many sags is asked of the spline as well: where it meets a face flat, the facet there lies farther
+/// A ray of no more than so many sags is asked of the spline: where it meets a face flat, the facet there lies farther
 /// away than the ray is long. Of light that grazes a rod glued in a hole the hole's face was not seen.
 pub(super) const SHORT_OF_SAGS: f64 = 4.0;
 /// A facet of less sag lies on the spline, mm: no root hides between them. See [`no_sag`].
@@ -18,9 +18,12 @@ const LEAST_WINDOW: f64 = 1e-6;
 const LEAST_WINDOW_OF_SAGS: f64 = 1e3;
 /// The least sine by which a search begins before the facets.
 pub(super) const LEAST_SLACK_SINE: f64 = 0.05;
-/// A ray whose sine times the facet's length is below so many sags may have its next root between the surface it leaves and the
-/// facets: by `sin²θ / 2κ` and `κL²/8` that is below two, and the rest is room for a curvature that changes.
-pub(super) const HIDDEN_BELOW: f64 = 12.0;
+/// The bend of a facet is by how much the spline's normals on its piece stray from one another, as a sine: where the curvature does not
+/// change, so many sags over the facet's length.
+pub(super) const BEND_OF_SAGS: f64 = 4.0;
+/// A ray that leaves at a sine below so many bends may have its next root between the surface it leaves and the facets: by `sin²θ / 2κ` and
+/// `κL²/8` that is at one, and the rest is room for a curvature that changes.
+pub(super) const HIDDEN_BENDS: f64 = 3.0;
 /// A root within this distance along the ray may be the one that it leaves, mm: a thousand times what starts are off. On patches below a
 /// millimetre it is as many times their size.
 pub(super) const OWN_POINT: f64 = 1e-6;

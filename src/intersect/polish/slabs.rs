@@ -1,0 +1,142 @@
+//! Places on the spline of one face that lie between the spline of another face and its facets.
+//!
+//! Facets leave the spline by up to their sag. A ray that starts between another face and that one's facets is, for these, already behind
+//! the face: beside the wall of a bore light that rises from the mirror below it went on between the wall and its facets, all along it,
+//! and into what stands behind. The facets of the face itself are told by the side to which the ray leaves.
+//!
+//! Guarantee: a start that is in no slab of its facet is on the same side of the facets of all other faces as of their splines, where
+//! the sags are proved.
+
+use super::curved_cells::FLAT_SAG;
+use super::facet_record::FacetRecord;
+use crate::math::{Aabb, BoxTree, Point};
+use crate::mesh::FacetMesh;
+use rayon::prelude::*;
+use smallvec::SmallVec;
+
+/// A facet with more slabs near it, as of a plate with many holes, looks for them in a tree.
+const MOST_LISTED: usize = 12;
+/// Room for what rounds a place, mm, and as a share of its coordinates: a million roundings.
+const ROOM: f64 = 1e-9;
+
+/// What lies within the sag of a facet: a box around it, rounded outward, and that sag, mm.
+#[derive(Clone, Copy, Debug)]
+struct Slab {
+    low: [f32; 3],
+    high: [f32; 3],
+    facet: u32,
+    sag: f32,
+}
+
+/// For each facet the slabs of other faces' facets that its piece of the spline comes near to.
+pub(super) struct Slabs {
+    /// Of all facets that are not flat, and a tree of their boxes.
+    all: Vec<Slab>,
+    tree: BoxTree,
+    /// Of each facet its first slab in `listed`, and one more for the end of the last.
+    starts: Vec<u32>,
+    listed: Vec<Slab>,
+    /// How far from a facet, mm, a place that rays leave by it may lie.
+    reach: f64,
+}
+
+impl Slabs {
+    /// Finds them for all facets of the mesh that `records` are of, for places up to `reach`, mm, off their facet; in the current rayon
+    /// pool.
+    pub(super) fn of_mesh(mesh: &FacetMesh, records: &[FacetRecord], reach: f64) -> Self {
+        let curved = (0..mesh.facets.len() as u32).filter(|&f| records[f as usize].sag > FLAT_SAG);
+        let all: Vec<Slab> = curved.map(|f| Slab::of_facet(mesh, f, records[f as usize].sag)).collect();
+        let tree = BoxTree::new(&all.iter().map(Slab::bounds).collect::<Vec<Aabb>>());
+        let near = |f: usize| {
+            let bounds = Aabb::from_points(mesh.corners(f)).grown(reach);
+            let mut near: SmallVec<[u32; MOST_LISTED]> = SmallVec::new();
+            let is_crowded = tree.any_meeting(&bounds, |k| {
+                let is_foreign = mesh.facets[all[k as usize].facet as usize].face != mesh.facets[f].face;
+                is_foreign && near.len() == MOST_LISTED || {
+                    near.extend(is_foreign.then_some(k));
+                    false
+                }
+            });
+            (near, is_crowded)
+        };
+        let of_facets: Vec<_> = (0..mesh.facets.len()).into_par_iter().map(near).collect();
+        let (mut starts, mut listed) = (vec![0], Vec::new());
+        for (near, is_crowded) in of_facets {
+            if is_crowded {
+                listed.push(Slab::SEARCHED);
+            } else {
+                listed.extend(near.iter().map(|&k| all[k as usize]));
+            }
+            starts.push(listed.len() as u32);
+        }
+        Self { all, tree, starts, listed, reach }
+    }
+
+    /// Whether a place that rays leave by this facet lies in a slab.
+    #[inline(always)]
+    pub(super) fn hold(&self, mesh: &FacetMesh, facet: u32, place: Point) -> bool {
+        let range = self.starts[facet as usize] as usize..self.starts[facet as usize + 1] as usize;
+        self.listed[range].iter().any(|slab| match slab.facet {
+            MANY => self.any_holds(mesh, facet, place),
+            _ => slab.holds(mesh, place),
+        })
+    }
+
+    /// Whether a place lies in a slab of another face than this facet's.
+    fn any_holds(&self, mesh: &FacetMesh, facet: u32, place: Point) -> bool {
+        self.tree.any_meeting(&Aabb { min: place, max: place }, |k| {
+            let slab = &self.all[k as usize];
+            mesh.facets[slab.facet as usize].face != mesh.facets[facet as usize].face && slab.holds(mesh, place)
+        })
+    }
+
+    /// Whether a place is so near to this facet that [`Self::hold`] speaks of it.
+    #[inline]
+    pub(super) fn reach(&self, mesh: &FacetMesh, facet: u32, place: Point) -> bool {
+        Aabb::from_points(mesh.corners(facet as usize)).grown(self.reach).contains(place)
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.all) + self.tree.bytes() + size_of_val(&*self.starts) + size_of_val(&*self.listed)
+    }
+}
+
+/// In [`Slab::facet`]: stands for all of them.
+const MANY: u32 = u32::MAX;
+
+impl Slab {
+    /// In place of the slabs of a facet that are too many to be listed.
+    const SEARCHED: Self = Self { low: [0.0; 3], high: [0.0; 3], facet: MANY, sag: 0.0 };
+
+    /// The slab of a facet of this sag, mm.
+    fn of_facet(mesh: &FacetMesh, facet: u32, sag: f32) -> Self {
+        let corners = mesh.corners(facet as usize);
+        let bounds = Aabb::from_points(corners);
+        let room = ROOM * (1.0 + bounds.min.abs().max(bounds.max.abs()).max_element());
+        let sag = (f64::from(sag) + room) as f32;
+        let Aabb { min, max } = bounds.grown(f64::from(sag));
+        let [low, high] = [min, max].map(|p| p.to_array().map(|x| x as f32));
+        Self { low: low.map(f32::next_down), high: high.map(f32::next_up), facet, sag: sag.next_up() }
+    }
+
+    /// The box around it.
+    fn bounds(&self) -> Aabb {
+        let [min, max] = [self.low, self.high].map(|p| Point::from_array(p.map(f64::from)));
+        Aabb { min, max }
+    }
+
+    /// Whether a place lies in the box and within the sag of the plane of one of the facet's triangles.
+    #[inline(always)]
+    fn holds(&self, mesh: &FacetMesh, place: Point) -> bool {
+        let is_in_box = (0..3).all(|k| place[k] >= f64::from(self.low[k]) && place[k] <= f64::from(self.high[k]));
+        is_in_box && self.is_near_plane(mesh, place)
+    }
+
+    /// Whether a place lies within the sag of the plane of one of the facet's triangles.
+    fn is_near_plane(&self, mesh: &FacetMesh, place: Point) -> bool {
+        let [a, b, c, d] = mesh.corners(self.facet as usize);
+        let is_near = |across: Point| (place - a).dot(across).abs() <= f64::from(self.sag) * across.length();
+        is_near((b - a).cross(c - a)) || is_near((c - a).cross(d - a))
+    }
+}

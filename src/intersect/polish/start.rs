@@ -1,0 +1,85 @@
+//! Which rays facets are asked about: those whose start is on the same side of the facets as of the spline.
+
+use super::Polished;
+use super::clear_start::ClearStart;
+use super::curved_cells::LOOK_BACK_OF_FLAT;
+use super::limits::{BEND_OF_SAGS, HIDDEN_BENDS, LEAST_SLACK_SINE, SHORT_OF_SAGS};
+use crate::math::{Departure, Point, Ray, Uv};
+
+/// To which side of its surface a ray leaves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    Inward,
+    Outward,
+}
+
+/// How facets are asked about a ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// How far before and behind its range it looks for facets, mm.
+    pub(super) slack: [f64; 2],
+    /// `None` for a ray that leaves no surface.
+    pub(super) side: Option<Side>,
+}
+
+impl Polished<'_> {
+    /// How facets are asked about a ray; `None` for one that the spline must be asked about, as it is short, names no facet of its face,
+    /// leaves so flat that its next root may hide from the facets, or starts between another face and that one's facets.
+    #[inline(always)]
+    pub(super) fn start(&self, ray: &Ray, clear: &[ClearStart]) -> Option<Start> {
+        let slack = 2.0 * self.sag;
+        let Some(from) = &ray.departure else {
+            // Where nothing can lie behind the start no look back is needed, and the ray stays one that light
+            // buffers know.
+            let is_clear = ray.t_min == 0.0 && clear.iter().any(|start| start.holds(ray));
+            if is_clear {
+                return Some(Start { slack: [0.0, slack], side: None });
+            }
+            let is_near = self.curved.may_be_near(ray.point_at(ray.t_min));
+            let back = if is_near { slack } else { LOOK_BACK_OF_FLAT };
+            return Some(Start { slack: [back, slack], side: None });
+        };
+        // A departure from the spline alone names no facet, and one that names another face's tells nothing of the
+        // side that is left.
+        let record = self.records.get(from.primitive as usize).filter(|r| r.face == from.face)?;
+        let is_long = ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag;
+        if !is_long || self.is_in_slab(from.primitive, from.uv, ray.point_at(ray.t_min)) {
+            return None;
+        }
+        let sine = match record.decisive_sine(ray) {
+            Some(sine) => f64::from(sine),
+            None => self.sine_of_spline(ray, from)?,
+        };
+        let side = if sine < 0.0 { Side::Inward } else { Side::Outward };
+        Some(Start { slack: [slack / sine.abs().max(LEAST_SLACK_SINE); 2], side: Some(side) })
+    }
+
+    /// Whether a place, mm, of the spline that belongs to this facet, with its parameters, may lie between another face and that one's
+    /// facets.
+    #[inline(always)]
+    pub(super) fn is_in_slab(&self, facet: u32, uv: Uv, place: Point) -> bool {
+        // Of a ray that came in flat the root lies beside the piece of the spline that its facet stands for.
+        let is_told = self.pieces[facet as usize].holds(uv) || self.slabs.reach(self.mesh, facet, place);
+        !is_told || self.slabs.hold(self.mesh, facet, place)
+    }
+
+    /// The sine at which a ray leaves the spline, negative for rays that go in; `None` where its next root may hide between the spline and
+    /// the facet, or nothing is known of the spline.
+    ///
+    /// On the way to such a root the sine to the surface turns from the one at the start to its negative, and it does so within about a
+    /// facet; as far as the normals at the corners tell, it must not.
+    fn sine_of_spline(&self, ray: &Ray, from: &Departure) -> Option<f64> {
+        let normal = self.exact.normal_at(from.face, from.uv)?;
+        let facet = from.primitive as usize;
+        let bend = self.mesh.facets[facet]
+            .vertices
+            .map(|v| (self.mesh.vertices[v as usize].normal - normal).dot(ray.direction).abs())
+            .into_iter()
+            .fold(0.0, f64::max);
+        let [a, b, c, d] = self.mesh.corners(facet);
+        let length = a.distance(b).max(b.distance(c)).max(c.distance(d)).max(d.distance(a));
+        let sag = f64::from(self.records[facet].sag);
+        let sine = normal.dot(ray.direction);
+        (sine.abs() > HIDDEN_BENDS * bend.max(BEND_OF_SAGS * sag / length)).then_some(sine)
+    }
+}
