@@ -1,11 +1,13 @@
 //! A run that asks for no tolerance, normals or intersector is given them: what a pilot of its own rays finds sufficient.
 
 use super::facets::tessellate_groups;
-use super::intersectors::{IntersectorChoice, TrueSurface, octrees_in_one_scene, true_intersector};
-use super::monitor::{Monitor, Stage, in_stage};
+use super::intersectors::{
+    Builders, IntersectorChoice, TrueSurface, octrees_in_one_scene, true_intersector, with_built_intersector,
+};
+use super::monitor::{Monitor, Silent, Stage, in_stage};
 use super::settings::{IntersectorKind, MeshingSettings, TracingSettings};
-use crate::intersect::Intersector;
-use crate::intersect::octree;
+use crate::intersect::octree::{self, Octree};
+use crate::intersect::{Intersector, NormalMode};
 use crate::model::Model;
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::default_accuracy::{self, Chosen, PilotSource, TimedFacets, Undecided};
@@ -48,6 +50,18 @@ impl PilotSource for Source<'_> {
 
     fn octree<'f>(&'f self, facets: &'f GroupedFacets) -> Box<dyn Intersector + 'f> {
         octrees_in_one_scene(facets, octree::Settings::default().normals)
+    }
+
+    fn with_moved_hits(&self, facets: &GroupedFacets, work: &mut dyn FnMut(&dyn Intersector)) {
+        let meshes: Vec<_> = facets.meshes().collect();
+        let builders = Builders {
+            octree: &|group, settings| Octree::build(meshes[group], settings),
+            surfaces: &|| (self.surfaces)().to_vec(),
+        };
+        let choice = IntersectorChoice { intersector: IntersectorKind::Octree, normals: NormalMode::Exact };
+        let groups = (&meshes[..], facets.instancing.as_deref());
+        // A part of choosing, of which alone the monitor is told.
+        with_built_intersector(choice, builders, groups, &Silent, |moved, _| work(moved));
     }
 
     fn exact(&self) -> &dyn Intersector {

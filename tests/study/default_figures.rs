@@ -49,6 +49,11 @@ impl PilotSource for InOnePiece<'_> {
         self.0.build(&facets.groups[0].mesh, FacetTree::Octree, NormalMode::Bilinear)
     }
 
+    fn with_moved_hits(&self, facets: &GroupedFacets, work: &mut dyn FnMut(&dyn Intersector)) {
+        let octree = self.octree(facets);
+        work(&*self.0.polish(&*octree, &facets.groups[0].mesh));
+    }
+
     fn exact(&self) -> &dyn Intersector {
         self.0.exact()
     }

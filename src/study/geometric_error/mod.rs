@@ -117,6 +117,24 @@ impl GeometricError {
             |name: &String| ReceiverError { name: name.clone(), peak_cells: 1, ..ReceiverError::default() };
         Self { receivers: bound.receivers.iter().map(|r| unchanged(&r.name)).collect(), ..Self::default() }
     }
+
+    /// Adds to every figure but those of cells what rays may change of it that are too rare to be among these: hits that are moved to the
+    /// spline are mostly the spline's own, so that replicates without a difference tell of none at all, and yet a ray in so many more may
+    /// pass a silhouette.
+    pub fn with_unseen_rays(mut self) -> Self {
+        let share = 1.0 / self.rays.max(1) as f64;
+        for r in &mut self.receivers {
+            let totals = r.channels.iter_mut().map(|c| &mut c.total);
+            let figures = [&mut r.power, &mut r.peak].into_iter().chain(&mut r.rms).chain(&mut r.width);
+            figures.chain(totals).for_each(|figure| figure.add_unseen(share));
+        }
+        self.absorbed.iter_mut().for_each(|a| a.power.add_unseen(share));
+        for face in &mut self.faces {
+            let powers = [&mut face.absorbed, &mut face.entered, &mut face.left];
+            powers.into_iter().for_each(|figure| figure.add_unseen(share));
+        }
+        self
+    }
 }
 
 /// Traces the run of these settings on facets and on the spline and compares every figure.

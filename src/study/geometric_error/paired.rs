@@ -24,6 +24,11 @@ impl Paired {
         (self.facets - self.spline).hypot(self.error)
     }
 
+    /// Adds what the difference may be by rays that are rarer than `share` of all, each of which takes all its light along.
+    pub(super) fn add_unseen(&mut self, share: f64) {
+        self.error = self.error.hypot(share * self.spline);
+    }
+
     /// Whether rays can tell the difference from none: it is beyond three of its standard errors.
     pub fn is_significant(&self) -> bool {
         (self.facets - self.spline).abs() > SIGNIFICANT * self.error
