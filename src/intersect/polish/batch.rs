@@ -212,8 +212,10 @@ impl Polished<'_> {
                 Some(left) if left.shares_solid(record) => inward != out,
                 Some(_) => inward || out,
             };
-        // And so may one between another face and that one's facets, which the ray has passed without meeting them.
-        if is_doubtful || self.is_in_slab(facet_hit.primitive, point.uv, ray.point_at(point.t)) {
+        // And so may one between another face and that one's facets, or behind both: the facet was met before the other's, and its root
+        // may come after.
+        let way = [ray.point_at(facet_hit.t), ray.point_at(point.t)];
+        if is_doubtful || self.is_in_slab(facet_hit.primitive, point.uv, way) {
             return Decision::Doubt;
         }
         Decision::Answer(Some(Hit {

@@ -175,7 +175,7 @@ impl Intersector for Polished<'_> {
         record.decisive_sine(ray).is_some_and(|sine| sine > 0.0)
             && self.pieces[from.primitive as usize].holds(from.uv)
             && ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag
-            && !self.slabs.hold(self.mesh, from.primitive, ray.point_at(ray.t_min))
+            && !self.slabs.meet(self.mesh, from.primitive, [ray.point_at(ray.t_min); 2])
             && self.facets.escapes_spline(ray, self.sag)
     }
 

@@ -72,25 +72,25 @@ impl Slabs {
         Self { all, tree, starts, listed, reach }
     }
 
-    /// Whether a place that rays leave by this facet lies in a slab.
+    /// Whether the way between two places, of which the second is one of this facet's, touches a slab; both may be the same.
     #[inline(always)]
-    pub(super) fn hold(&self, mesh: &FacetMesh, facet: u32, place: Point) -> bool {
+    pub(super) fn meet(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2]) -> bool {
         let range = self.starts[facet as usize] as usize..self.starts[facet as usize + 1] as usize;
         self.listed[range].iter().any(|slab| match slab.facet {
-            MANY => self.any_holds(mesh, facet, place),
-            _ => slab.holds(mesh, place),
+            MANY => self.any_meets(mesh, facet, way),
+            _ => slab.meets(mesh, way),
         })
     }
 
-    /// Whether a place lies in a slab of another face than this facet's.
-    fn any_holds(&self, mesh: &FacetMesh, facet: u32, place: Point) -> bool {
-        self.tree.any_meeting(&Aabb { min: place, max: place }, |k| {
+    /// Whether a way touches a slab of another face than this facet's.
+    fn any_meets(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2]) -> bool {
+        self.tree.any_meeting(&Aabb::from_points(way), |k| {
             let slab = &self.all[k as usize];
-            mesh.facets[slab.facet as usize].face != mesh.facets[facet as usize].face && slab.holds(mesh, place)
+            mesh.facets[slab.facet as usize].face != mesh.facets[facet as usize].face && slab.meets(mesh, way)
         })
     }
 
-    /// Whether a place is so near to this facet that [`Self::hold`] speaks of it.
+    /// Whether a place is so near to this facet that [`Self::meet`] speaks of it.
     #[inline]
     pub(super) fn reach(&self, mesh: &FacetMesh, facet: u32, place: Point) -> bool {
         Aabb::from_points(mesh.corners(facet as usize)).grown(self.reach).contains(place)
@@ -126,17 +126,23 @@ impl Slab {
         Aabb { min, max }
     }
 
-    /// Whether a place lies in the box and within the sag of the plane of one of the facet's triangles.
+    /// Whether a way touches the box and comes within the sag of the plane of one of the facet's triangles, as far as the box around it
+    /// and its ends tell.
     #[inline(always)]
-    fn holds(&self, mesh: &FacetMesh, place: Point) -> bool {
-        let is_in_box = (0..3).all(|k| place[k] >= f64::from(self.low[k]) && place[k] <= f64::from(self.high[k]));
-        is_in_box && self.is_near_plane(mesh, place)
+    fn meets(&self, mesh: &FacetMesh, [a, b]: [Point; 2]) -> bool {
+        let (low, high) = (a.min(b), a.max(b));
+        let touches = (0..3).all(|k| high[k] >= f64::from(self.low[k]) && low[k] <= f64::from(self.high[k]));
+        touches && self.comes_near_plane(mesh, [a, b])
     }
 
-    /// Whether a place lies within the sag of the plane of one of the facet's triangles.
-    fn is_near_plane(&self, mesh: &FacetMesh, place: Point) -> bool {
+    /// Whether a way comes within the sag of the plane of one of the facet's triangles.
+    fn comes_near_plane(&self, mesh: &FacetMesh, way: [Point; 2]) -> bool {
         let [a, b, c, d] = mesh.corners(self.facet as usize);
-        let is_near = |across: Point| (place - a).dot(across).abs() <= f64::from(self.sag) * across.length();
-        is_near((b - a).cross(c - a)) || is_near((c - a).cross(d - a))
+        let comes_near = |across: Point| {
+            let reach = f64::from(self.sag) * across.length();
+            let [from, to] = way.map(|place| (place - a).dot(across));
+            from.min(to) <= reach && from.max(to) >= -reach
+        };
+        comes_near((b - a).cross(c - a)) || comes_near((c - a).cross(d - a))
     }
 }

@@ -43,7 +43,7 @@ impl Polished<'_> {
         // side that is left.
         let record = self.records.get(from.primitive as usize).filter(|r| r.face == from.face)?;
         let is_long = ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag;
-        if !is_long || self.is_in_slab(from.primitive, from.uv, ray.point_at(ray.t_min)) {
+        if !is_long || self.is_in_slab(from.primitive, from.uv, [ray.point_at(ray.t_min); 2]) {
             return None;
         }
         let sine = match record.decisive_sine(ray) {
@@ -55,12 +55,12 @@ impl Polished<'_> {
     }
 
     /// Whether a place, mm, of the spline that belongs to this facet, with its parameters, may lie between another face and that one's
-    /// facets.
+    /// facets, or the way to it from `before` touch what lies between these.
     #[inline(always)]
-    pub(super) fn is_in_slab(&self, facet: u32, uv: Uv, place: Point) -> bool {
+    pub(super) fn is_in_slab(&self, facet: u32, uv: Uv, [before, place]: [Point; 2]) -> bool {
         // Of a ray that came in flat the root lies beside the piece of the spline that its facet stands for.
         let is_told = self.pieces[facet as usize].holds(uv) || self.slabs.reach(self.mesh, facet, place);
-        !is_told || self.slabs.hold(self.mesh, facet, place)
+        !is_told || self.slabs.meet(self.mesh, facet, [before, place])
     }
 
     /// The sine at which a ray leaves the spline, negative for rays that go in; `None` where its next root may hide between the spline and
