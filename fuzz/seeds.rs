@@ -42,7 +42,7 @@ fn light() -> Vec<LightRay> {
             origin: Point::new(f64::from(k), 0.0, 0.0),
             direction: Vector::Z,
             power: 0.5,
-            wavelength_nm: (k % 2 == 0).then_some(550.0),
+            wavelength_nm: Some(550.0 + f64::from(k)),
         })
         .collect()
 }
@@ -50,7 +50,7 @@ fn light() -> Vec<LightRay> {
 /// The numbers of the rays, a row each: place, direction, flux and wavelength, nm times `nm`.
 fn rows(nm: f64) -> Vec<u8> {
     let row = |ray: &LightRay| {
-        let wavelength = ray.wavelength_nm.unwrap_or(600.0) * nm;
+        let wavelength = ray.wavelength_nm.expect("light of known wavelengths") * nm;
         [&ray.origin.to_array()[..], &ray.direction.to_array(), &[ray.power, wavelength]].concat()
     };
     light().iter().flat_map(row).flat_map(|x| (x as f32).to_le_bytes()).collect()
