@@ -63,7 +63,7 @@ struct Node {
 struct Clipping<'a> {
     index: u32,
     leaf: &'a Leaf,
-    seen: SeenLeaf,
+    seen: &'a SeenLeaf,
     /// The point that the ray leaves, in the leaf's parameters.
     departure: Option<[f64; 2]>,
     /// Distance across the ray below which a box touches it, mm: [`contact_distance`] of the patch.
@@ -108,7 +108,7 @@ impl Exact {
         let noise = self.noise(leaf, oc);
         let margin = size.map(|s| noise + halving_rounding(leaf) * s);
         let departure = query.departure.and_then(|own| own.local_to(leaf, query.o, &self.geometry));
-        let seen = SeenLeaf { net, frame: [query.n1, query.n2], margin, precise: false };
+        let seen = &SeenLeaf { net, frame: [query.n1, query.n2], margin, precise: false };
         let patch = &self.geometry.patches[leaf.patch as usize];
         let contact = contact_distance(patch.size());
         let at_pole = self.geometry.passes_pole(patch, [query.o, query.d], CONTACT_LENGTH * contact);
@@ -127,7 +127,7 @@ impl Exact {
     #[cold]
     fn clip_precisely(&self, query: &mut Query, clipping: Clipping<'_>) {
         query.budget = query.budget.saturating_sub(PRECISE_WORK);
-        let Clipping { index, leaf, ref seen, .. } = clipping;
+        let Clipping { index, leaf, seen, .. } = clipping;
         let frame = tangent_frame(seen, leaf.degree, query.d);
         let reference = self.geometry.reference(&self.geometry.patches[leaf.patch as usize]);
         let net = reference.net_along([query.o, query.d], frame, leaf.rect);
@@ -135,7 +135,7 @@ impl Exact {
         let reach = query.o.abs().max_element() + leaf.center.abs().max_element() + leaf.radius;
         let rounding = PRECISE_ROUNDING * reach * largest(3);
         let margin = [0, 1].map(|k| halving_rounding(leaf) * largest(k) + rounding);
-        let seen = SeenLeaf { net, frame, margin, precise: true };
+        let seen = &SeenLeaf { net, frame, margin, precise: true };
         self.clip_seen(query, &Clipping { index, seen, ..clipping });
     }
 
@@ -144,7 +144,7 @@ impl Exact {
     fn clip_seen(&self, query: &mut Query, clipping: &Clipping<'_>) -> bool {
         let leaf = clipping.leaf;
         let degree = leaf.degree;
-        let mut net = clipping.seen.net.clone();
+        let mut net = Net::from_slice(&clipping.seen.net);
         let mut rect = [[0.0, 1.0]; 2];
         // Only where a trim may run along the border of the surface do roots count beyond the unit square.
         for d in 0..2 {
@@ -162,29 +162,30 @@ impl Exact {
         // A step on a net of many points costs as many of a bicubic one.
         let work = (net.len() * (usize::from(degree[0]) + usize::from(degree[1]))).div_ceil(BICUBIC_WORK) as u32;
         let near = range_along(&net).0;
-        let mut stack = vec![Node { net, rect, near }];
-        while let Some(node) = stack.pop() {
+        let mut node = Node { net, rect, near };
+        // Most leaves are done with the first box, and ask for no memory.
+        let mut stack = Vec::new();
+        loop {
             // Strict, so that a box that starts where the best root lies is not searched again.
-            if node.near >= query.t_max && query.best.is_some() {
-                continue;
-            }
-            // What the budget cuts off is not dropped: from its nearest point on nothing is decided.
-            if query.budget == 0 {
+            let is_behind = node.near >= query.t_max && query.best.is_some();
+            if !is_behind && query.budget == 0 {
+                // What the budget cuts off is not dropped: from its nearest point on nothing is decided.
                 query.undecided_from = query.undecided_from.min(node.near);
-                continue;
+            } else if !is_behind {
+                query.budget = query.budget.saturating_sub(work);
+                if !self.clip_node(query, clipping, &node, &mut stack) {
+                    return false;
+                }
             }
-            query.budget = query.budget.saturating_sub(work);
-            if !self.clip_node(query, clipping, node, &mut stack) {
-                return false;
-            }
+            let Some(next) = stack.pop() else { return true };
+            node = next;
         }
-        true
     }
 
     /// Takes one step: drops a box, offers its root, or puts what is left of it on the stack; `false` where `f64` cannot tell.
     #[inline(always)]
-    fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: Node, stack: &mut Vec<Node>) -> bool {
-        let (degree, seen) = (clipping.leaf.degree, &clipping.seen);
+    fn clip_node(&self, query: &mut Query, clipping: &Clipping<'_>, node: &Node, stack: &mut Vec<Node>) -> bool {
+        let (degree, seen) = (clipping.leaf.degree, clipping.seen);
         let Some(hull) = hull(&node.net, seen.margin) else { return true };
         if hull.near > query.t_max || hull.far < query.t_min - TANGENT {
             return true;
@@ -202,12 +203,12 @@ impl Exact {
                 }
                 keep[k] = [keep[k][0].max(0.0), keep[k][1].min(1.0)];
             }
-            if y.deviation < UNIQUE && self.take_single_root(query, clipping, &node, &y, keep) {
+            if y.deviation < UNIQUE && self.take_single_root(query, clipping, node, &y, keep) {
                 return true;
             }
         }
         let small = size(&node.rect).into_iter().fold(0.0, f64::max);
-        if small <= TANGENCY_BOX && self.take_tangency(query, clipping, &node) {
+        if small <= TANGENCY_BOX && self.take_tangency(query, clipping, node) {
             return true;
         }
         // At a contact the Jacobian is singular: no box proves itself there, however small, so a small one is taken as it is. What `f64`
@@ -219,14 +220,14 @@ impl Exact {
         };
         let touches = hull.across < clipping.contact && is_short;
         if touches || small < FINEST {
-            return self.take_contact(query, clipping, &node);
+            return self.take_contact(query, clipping, node);
         }
         let kept = keep.map(|[a, b]| b - a);
         // A cut that keeps nearly everything costs what a halving costs and parts no two roots.
         if kept[0] < WORTH_CUTTING || kept[1] < WORTH_CUTTING {
             stack.push(cut(node, degree, keep, hull.near));
         } else {
-            halve(&node, degree, &slopes, stack);
+            halve(node, degree, &slopes, stack);
         }
         true
     }
@@ -296,7 +297,7 @@ impl Exact {
         if clipping.at_pole || clipping.departure.is_some_and(is_around) || query.budget < tangency::WORK {
             return false;
         }
-        let Some(roots) = tangency::roots(self, query, clipping.leaf, &clipping.seen, node.rect) else {
+        let Some(roots) = tangency::roots(self, query, clipping.leaf, clipping.seen, node.rect) else {
             return false;
         };
         for root in roots {
@@ -350,8 +351,9 @@ fn size(rect: &[[f64; 2]; 2]) -> [f64; 2] {
 
 /// The part of a node over `keep`, a rectangle in shares of its sides; `near` is its least t.
 #[inline(always)]
-fn cut(node: Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
-    let Node { mut net, mut rect, .. } = node;
+fn cut(node: &Node, degree: [u8; 2], keep: [[f64; 2]; 2], near: f64) -> Node {
+    let mut net = Net::from_slice(&node.net);
+    let mut rect = node.rect;
     for d in 0..2 {
         let [low, high] = keep[d];
         // A side that keeps its length is left alone: de Casteljau would only round it.
@@ -379,19 +381,20 @@ fn halve(node: &Node, degree: [u8; 2], slopes: &Slopes, stack: &mut Vec<Node>) {
     let [size_u, size_v] = size(&node.rect);
     // A side of the finest size stays: its two halves could no longer be told apart.
     let direction = if (u_first && size_u > FINEST) || size_v <= FINEST { 0 } else { 1 };
-    let halves = net::halves(&node.net, degree, direction);
+    let [low, high] = net::halves(&node.net, degree, direction);
+    let nearest = [range_along(&low).0, range_along(&high).0];
     let middle = 0.5 * (node.rect[direction][0] + node.rect[direction][1]);
-    let mut children = halves.map(|net| {
-        let near = range_along(&net).0;
-        Node { net, rect: node.rect, near }
-    });
-    children[0].rect[direction][1] = middle;
-    children[1].rect[direction][0] = middle;
-    let [a, b] = children;
+    let (mut low_rect, mut high_rect) = (node.rect, node.rect);
+    low_rect[direction][1] = middle;
+    high_rect[direction][0] = middle;
+    let low = Node { net: low, rect: low_rect, near: nearest[0] };
+    let high = Node { net: high, rect: high_rect, near: nearest[1] };
     // Taken first, the nearer half may find a root that ends the search of the other.
-    if a.near <= b.near {
-        stack.extend([b, a]);
+    if nearest[0] <= nearest[1] {
+        stack.push(high);
+        stack.push(low);
     } else {
-        stack.extend([a, b]);
+        stack.push(low);
+        stack.push(high);
     }
 }

@@ -91,15 +91,12 @@ pub(super) fn seen_along(query: &Query, control: &[V4], oc: glam::DVec3) -> (Net
     // no further rounding.
     let (k1, k2, kd) = (query.n1.dot(oc), query.n2.dot(oc), query.d.dot(oc));
     let mut size = [0f64; 2];
-    let net = control
-        .iter()
-        .map(|p| {
-            let a = glam::DVec3::new(p[0], p[1], p[2]);
-            let x = [query.n1.dot(a) - k1 * p[3], query.n2.dot(a) - k2 * p[3], query.d.dot(a) - kd * p[3], p[3]];
-            size = [size[0].max(x[0].abs()), size[1].max(x[1].abs())];
-            x
-        })
-        .collect();
+    let mut net = Net::from_slice(control);
+    for p in &mut net {
+        let a = glam::DVec3::new(p[0], p[1], p[2]);
+        *p = [query.n1.dot(a) - k1 * p[3], query.n2.dot(a) - k2 * p[3], query.d.dot(a) - kd * p[3], p[3]];
+        size = [size[0].max(p[0].abs()), size[1].max(p[1].abs())];
+    }
     (net, size)
 }
 

@@ -179,7 +179,7 @@ fn point_index(direction: usize, q: usize, k: usize, line: usize) -> usize {
 /// Halves a net in `direction`, 0 for u and 1 for v, by de Casteljau; the lower half first.
 #[inline]
 pub(super) fn halves(net: &[V4], degree: [u8; 2], direction: usize) -> [Net; 2] {
-    let (mut low, mut high): (Net, Net) = (net.into(), net.into());
+    let (mut low, mut high) = (Net::from_slice(net), Net::from_slice(net));
     if direction == 0 {
         by_degree!(degree, halve_u(&mut low, &mut high));
     } else {
