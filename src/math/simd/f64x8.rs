@@ -1,10 +1,8 @@
 //! Eight numbers at a time: one register of AVX-512, two of AVX2, or an array.
 //!
-//! Every operation rounds once in every lane, and lanes do not see each other: whatever implementation runs, and whatever stands in
-//! the other lanes, a lane has the same bits. Made for kernels of [`super`], which choose an implementation while compiling.
-//!
-//! Sound because the two implementations with registers are only named where their instructions were found, and because loads and stores
-//! stay inside arrays of the size that they read and write.
+//! Every operation rounds once, and lanes do not see each other: whatever implementation runs, and whatever stands in the other lanes, a
+//! lane has the same bits. Kernels of [`super`] choose an implementation while compiling.
+//! Sound because those with registers are only named where their instructions were found, and loads and stores stay inside their arrays.
 #![allow(unsafe_code)]
 
 /// Lanes of an [`F64x8`].
@@ -89,13 +87,15 @@ impl F64x8 for Array {
     fn div(self, other: Self) -> Self {
         self.zip(other, |a, b| a / b)
     }
-    #[inline(always)]
+    // Without an instruction for it each lane is a call: written out at every use they were 350 kB of code.
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
     fn mul_add(self, factor: Self, term: Self) -> Self {
         Self(std::array::from_fn(|k| self.0[k].mul_add(factor.0[k], term.0[k])))
     }
     #[inline(always)]
     fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        Self(std::array::from_fn(|k| (-self.0[k]).mul_add(factor.0[k], term.0[k])))
+        Self(self.0.map(|x| -x)).mul_add(factor, term)
     }
     #[inline(always)]
     fn abs(self) -> Self {
