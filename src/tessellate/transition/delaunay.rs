@@ -1,6 +1,7 @@
 //! Between the whole cells and the border: constrained Delaunay in parameters scaled by curvature, refined where a
 //! triangle cannot be proved.
 
+use super::sides::Sides;
 use crate::math::Uv;
 use crate::model::EdgeId;
 use crate::tessellate::border::enclosure::Enclosure;
@@ -14,7 +15,7 @@ use crate::tessellate::settings::Acceptance;
 use crate::tessellate::taken_chords::TakenChords;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
-use spade::handles::{FaceHandle, FixedVertexHandle, InnerTag};
+use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 /// What is to be triangulated.
@@ -80,9 +81,9 @@ impl Transition {
 
 /// A node in the triangulation, at its scaled parameters.
 #[derive(Clone, Copy)]
-struct Vertex {
+pub(super) struct Vertex {
     at: Point2<f64>,
-    node: u32,
+    pub(super) node: u32,
 }
 
 impl HasPosition for Vertex {
@@ -93,7 +94,7 @@ impl HasPosition for Vertex {
 }
 
 /// The triangulation of the library.
-type Cdt = ConstrainedDelaunayTriangulation<Vertex>;
+pub(super) type Cdt = ConstrainedDelaunayTriangulation<Vertex>;
 
 /// Rounds of refinement.
 const MAX_ROUNDS: usize = 40;
@@ -141,16 +142,7 @@ pub(in crate::tessellate) fn triangulate(
     budget: usize,
 ) -> Option<Transition> {
     let Outline { nodes, segments, creases, imprinted, chords, scale, taken } = outline;
-    let mut mesh = Refinement {
-        surface,
-        nodes,
-        scale,
-        taken,
-        cdt: Cdt::new(),
-        border: FxHashMap::default(),
-        handles: Vec::new(),
-        owners: Vec::new(),
-    };
+    let mut mesh = Refinement::new(surface, nodes, scale, taken);
     // All points first: constraints between points that come later would have to be split.
     mesh.insert_nodes(&segments, &imprinted)?;
     let [conflicts, crossed] = mesh.constrain_border(&segments);
@@ -162,6 +154,7 @@ pub(in crate::tessellate) fn triangulate(
     // Where constraints are missing, the flood fill would leak through the gap.
     let uv = |s: &[u32; 2]| s.map(|n| mesh.nodes[n].uv);
     let by_centre = (!conflicts.is_empty()).then(|| Enclosure::new(segments.iter().map(uv).collect()));
+    let mut sides = Sides::new(&mesh, by_centre);
     // By corners in order, however a triangle is turned.
     let mut known: FxHashMap<[u32; 3], ProvedFacet<3>> = FxHashMap::default();
     let limits = Limits::new(mesh.cdt.num_vertices(), budget);
@@ -169,7 +162,7 @@ pub(in crate::tessellate) fn triangulate(
     let mut round = 0;
     loop {
         // Prove what is new; what was there before stands as it did.
-        let triangles = mesh.inner_triangles(by_centre.as_ref(), &known);
+        let triangles = sides.inner_triangles(&mesh);
         let new: Vec<[u32; 3]> =
             triangles.iter().copied().filter(|&t| !known.contains_key(&sorted_nodes(t))).collect();
         let prove =
@@ -201,6 +194,7 @@ pub(in crate::tessellate) fn triangulate(
         if ended || !mesh.refine(&failing, chords) {
             return Some(Transition { nodes: mesh.nodes, triangles, conflicts, crossed, holds_imprint });
         }
+        sides.update(&mesh);
         round += 1;
     }
 }
@@ -218,7 +212,7 @@ pub(super) struct Refinement<'s, 'a> {
     /// From parameters to coordinates of the triangulation.
     pub(super) scale: Uv,
     pub(super) taken: &'s TakenChords,
-    cdt: Cdt,
+    pub(super) cdt: Cdt,
     /// How often each edge of the triangulation that lies on the outline turns outside into inside; imprinted lines count twice.
     pub(super) border: FxHashMap<[u32; 2], u32>,
     /// Of those nodes that are in the triangulation.
@@ -227,10 +221,16 @@ pub(super) struct Refinement<'s, 'a> {
     owners: Vec<u32>,
 }
 
-impl Refinement<'_, '_> {
+impl<'s, 'a> Refinement<'s, 'a> {
+    /// Begins with an empty triangulation.
+    pub(super) fn new(surface: &'s FaceSurface<'a>, nodes: Nodes, scale: Uv, taken: &'s TakenChords) -> Self {
+        let (border, handles, owners) = (FxHashMap::default(), Vec::new(), Vec::new());
+        Self { surface, nodes, scale, taken, cdt: Cdt::new(), border, handles, owners }
+    }
+
     /// Inserts the nodes of segments and imprinted lines, or all nodes beside more than [`LONG_OUTLINE`] segments; adds to `handles` an
     /// entry for every node, `None` for those left out. Returns `None` where a node has no usable parameters.
-    fn insert_nodes(&mut self, segments: &[[u32; 2]], imprinted: &[[u32; 2]]) -> Option<()> {
+    pub(super) fn insert_nodes(&mut self, segments: &[[u32; 2]], imprinted: &[[u32; 2]]) -> Option<()> {
         // Nodes inside of whole cells have no part in the transition, but each long constraint clears all that it crosses.
         let mut used = vec![segments.len() > LONG_OUTLINE; self.nodes.len() as usize];
         segments.iter().chain(imprinted).flatten().for_each(|&n| used[n as usize] = true);
@@ -301,7 +301,7 @@ impl Refinement<'_, '_> {
     }
 
     /// Makes constraints of border segments, counted in `border` for the flood fill; returns those that fail, and what they cross.
-    fn constrain_border(&mut self, segments: &[[u32; 2]]) -> [Vec<[u32; 2]>; 2] {
+    pub(super) fn constrain_border(&mut self, segments: &[[u32; 2]]) -> [Vec<[u32; 2]>; 2] {
         let mut conflicts = Vec::new();
         let mut crossed = Vec::new();
         for &[a, b] in segments {
@@ -345,56 +345,5 @@ impl Refinement<'_, '_> {
         };
         let edges = self.cdt.get_conflicting_edges_between_vertices(from, to);
         edges.map(|e| [e.from().data().node, e.to().data().node]).collect()
-    }
-
-    /// Returns the nodes of the triangles inside: by crossings of the border from outside, or by their centres within `by_centre` where
-    /// constraints are missing; `known` are the triangles that were found inside before.
-    fn inner_triangles(
-        &self,
-        by_centre: Option<&Enclosure>,
-        known: &FxHashMap<[u32; 3], ProvedFacet<3>>,
-    ) -> Vec<[u32; 3]> {
-        type Face<'c> = FaceHandle<'c, InnerTag, Vertex, (), spade::CdtEdge<()>, ()>;
-        let nodes = |f: Face<'_>| f.vertices().map(|v| v.data().node);
-        if let Some(border) = by_centre {
-            let uv = |n: u32| self.nodes[n].uv;
-            // Most triangles are those of the round before, and a border of thousands of sides is slow to ask.
-            let is_inside = |t: &[u32; 3]| {
-                known.contains_key(&sorted_nodes(*t)) || border.encloses((uv(t[0]) + uv(t[1]) + uv(t[2])) / 3.0)
-            };
-            return self.cdt.inner_faces().map(nodes).filter(is_inside).collect();
-        }
-        let inside = self.sides_of_border();
-        self.cdt.inner_faces().filter(|f| inside[f.index()] == Some(true)).map(nodes).collect()
-    }
-
-    /// Tells for each face of the triangulation, by index, whether it lies inside what the border bounds; `None` where it was not reached.
-    fn sides_of_border(&self) -> Vec<Option<bool>> {
-        // From outside inward; each crossing of the border turns the state.
-        let mut state: Vec<Option<bool>> = vec![None; self.cdt.num_all_faces()];
-        let mut queue = std::collections::VecDeque::from([self.cdt.outer_face().fix()]);
-        state[self.cdt.outer_face().index()] = Some(false);
-        // Breadth first over directed edges; the outer face's are found through the hull.
-        while let Some(face) = queue.pop_front() {
-            let inside = state[face.index()] == Some(true);
-            let edges: Vec<_> = match self.cdt.face(face).as_inner() {
-                Some(inner) => inner.adjacent_edges().to_vec(),
-                None => self.cdt.convex_hull().collect(),
-            };
-            for e in edges {
-                // Hull edges run along the outer face or against it, by version; take the unknown side.
-                for side in [e, e.rev()] {
-                    let next = side.face();
-                    if state[next.index()].is_some() {
-                        continue;
-                    }
-                    let name = edge_key(e.from().data().node, e.to().data().node);
-                    let turns = e.is_constraint_edge() && self.border.get(&name).is_some_and(|n| n % 2 == 1);
-                    state[next.index()] = Some(inside != turns);
-                    queue.push_back(next.fix());
-                }
-            }
-        }
-        state
     }
 }

@@ -6,3 +6,4 @@ pub(in crate::tessellate) mod delaunay;
 mod matching;
 pub(in crate::tessellate) mod pairing;
 mod refinement;
+mod sides;
