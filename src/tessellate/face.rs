@@ -4,9 +4,9 @@ use super::Settings;
 use super::border::edges::Division;
 use super::border::polygons::{self, BorderPolygons, ImprintedPoints};
 use super::border_nodes::BorderNodes;
+use super::cells::branches;
 use super::cells::cell::{Subdivision, parameter_resolution};
 use super::cells::grid::{self, GridInput};
-use super::cells::tree;
 use super::crossing_chords::CrossingChords;
 use super::emission::Emission;
 use super::face_mesh::FaceMesh;
@@ -98,7 +98,7 @@ pub(super) fn mesh_with_imprint(
     let angle = settings.angle_deg.map(f64::to_radians);
     let budget = face_budget(face, surface, settings);
     // The tree is asked for imprinted lines too, which no cell may lie across.
-    let cells = tree::split(surface, settings.acceptance, &polygons, &lines, budget, angle);
+    let cells = branches::split(surface, settings.acceptance, &polygons, &lines, budget, angle);
     let mut prover = Prover::new(surface, settings.acceptance);
     // Pairing must not join triangles across a side that neighbours have.
     let kept = border.segments.iter().chain(&border.imprinted);

@@ -25,4 +25,10 @@ impl ProofSteps {
     pub(super) fn are_too_many(&self) -> bool {
         self.taken.load(Ordering::Relaxed) > self.most
     }
+
+    /// Returns the steps taken so far.
+    #[cfg(test)]
+    pub(super) fn taken(&self) -> u64 {
+        self.taken.load(Ordering::Relaxed)
+    }
 }

@@ -24,8 +24,6 @@ const RESERVE: usize = 16;
 /// Largest such tolerance, in tolerances.
 const COARSEST: f64 = 1e9;
 
-/// Depth down to which the halves are visited in parallel, each with half of the budget.
-const PARALLEL: u32 = 5;
 /// Depth at which splitting ends: parameters have no more digits.
 const MAX_DEPTH: u32 = 60;
 /// Share of a closed direction by which a border may fall short of all of it, and a cell of half of it: far above what parameters are
@@ -35,11 +33,11 @@ const TURN_SLACK: f64 = 1e-6;
 const CUT_CLEARANCE: f64 = 1e-3;
 
 /// What cells of a face are split by.
-struct Tree<'s, 'a> {
+pub(super) struct Tree<'s, 'a> {
     surface: &'s FaceSurface<'a>,
     acceptance: Acceptance,
     /// Those of the border, then those that are imprinted.
-    segments: Vec<[Uv; 2]>,
+    pub(super) segments: Vec<[Uv; 2]>,
     /// How many are the border's.
     border: usize,
     /// What those enclose.
@@ -57,18 +55,18 @@ struct Tree<'s, 'a> {
 }
 
 /// The state of one branch of the tree.
-struct Branch<'s, 'a> {
+pub(super) struct Branch<'s, 'a> {
     prover: Prover<'s, 'a>,
-    cells: Subdivision,
+    pub(super) cells: Subdivision,
     /// Cells that it may have; grows with `slack`.
-    budget: usize,
+    pub(super) budget: usize,
     /// What cells are held to, in tolerances.
     slack: f64,
 }
 
 impl<'s, 'a> Branch<'s, 'a> {
     /// Begins a branch without cells, with slack 1 and room for `budget` cells.
-    fn new(tree: &Tree<'s, 'a>, budget: usize) -> Self {
+    pub(super) fn new(tree: &Tree<'s, 'a>, budget: usize) -> Self {
         let prover = Prover::new(tree.surface, tree.acceptance);
         Self { prover, cells: Subdivision::default(), budget, slack: 1.0 }
     }
@@ -95,74 +93,93 @@ impl<'s, 'a> Branch<'s, 'a> {
 }
 
 /// A cell on its way down the tree.
-struct Visit<'n> {
-    cell: Cell,
+#[derive(Clone, Copy)]
+pub(super) struct Visit<'n> {
+    pub(super) cell: Cell,
     /// Segments of the border that it may meet.
-    near: &'n [u32],
+    pub(super) near: &'n [u32],
     /// Whether it is known to lie inside.
-    inside: bool,
-    depth: u32,
+    pub(super) inside: bool,
+    pub(super) depth: u32,
+    /// How many cells stand before it at its depth.
+    pub(super) place: usize,
 }
 
-/// Splits the box around the border until every cell fits its tolerance or the budget of cells is used up, which the result says; it may
-/// hold up to twice the budget. Empty on a plane and for a border without extent. `max_angle` is in radians; no cell crosses an `imprinted`
-/// line.
-pub(in crate::tessellate) fn split(
-    surface: &FaceSurface<'_>,
-    acceptance: Acceptance,
-    border: &BorderPolygons,
-    imprinted: &[[Uv; 2]],
-    budget: usize,
-    max_angle: Option<f64>,
-) -> Subdivision {
-    let mut segments: Vec<[Uv; 2]> = border
-        .polygons
-        .iter()
-        .flat_map(|p| (0..p.len()).map(move |i| [p[i].uv, p[(i + 1) % p.len()].uv]))
-        .collect();
-    let (lo, hi) = border.bounds();
-    // On a plane the border alone makes the facets.
-    if !(lo.x < hi.x && lo.y < hi.y) || surface.affine {
-        return Subdivision::default();
+/// The halves of a cell, and what is known of both.
+pub(super) struct Halves {
+    cells: [Cell; 2],
+    /// Segments of the border that they may meet.
+    near: Vec<u32>,
+    inside: bool,
+}
+
+impl Halves {
+    /// Returns the visits of the two, one below that of the whole.
+    pub(super) fn visits(&self, whole: &Visit<'_>) -> [Visit<'_>; 2] {
+        let (depth, inside) = (whole.depth + 1, self.inside);
+        [0, 1].map(|k| Visit { cell: self.cells[k], near: &self.near, inside, depth, place: 2 * whole.place + k })
     }
-    let root = Cell { lo, hi };
-    let preferred = [0, 1].map(|d| preferred_cuts(surface, border, root, d));
-    let poles = border.polygons.iter().flatten().map(|v| v.side == BorderSide::Pole).collect();
-    let border = segments.len();
-    let enclosure = Enclosure::new(segments.clone());
-    segments.extend(imprinted);
-    let resolution = parameter_resolution(lo, hi);
-    let longest = longest_cells(surface, root);
-    let tree =
-        Tree { surface, acceptance, segments, border, enclosure, poles, resolution, preferred, longest, max_angle };
-    // Branches have equal shares whatever they need: where one is short while the whole is not, all get twice as much. The last try
-    // leaves at most twice the budget.
-    let all: Vec<u32> = (0..tree.segments.len() as u32).collect();
-    let mut share = budget;
-    loop {
-        let mut branch = Branch::new(&tree, share);
-        tree.visit(&mut branch, Visit { cell: root, near: &all, inside: false, depth: 0 });
-        let cells = branch.cells;
-        if !cells.out_of_share
-            || surface.steps.are_too_many()
-            || cells.len() >= budget
-            || share >> PARALLEL >= budget
-        {
-            return cells;
+}
+
+impl<'s, 'a> Tree<'s, 'a> {
+    /// Prepares the box around a border, and returns it with its segments' indices. `None` on a plane and for a border without extent.
+    pub(super) fn new(
+        surface: &'s FaceSurface<'a>,
+        acceptance: Acceptance,
+        border: &BorderPolygons,
+        imprinted: &[[Uv; 2]],
+        max_angle: Option<f64>,
+    ) -> Option<(Self, Cell)> {
+        let mut segments: Vec<[Uv; 2]> = border
+            .polygons
+            .iter()
+            .flat_map(|p| (0..p.len()).map(move |i| [p[i].uv, p[(i + 1) % p.len()].uv]))
+            .collect();
+        let (lo, hi) = border.bounds();
+        // On a plane the border alone makes the facets.
+        if !(lo.x < hi.x && lo.y < hi.y) || surface.affine {
+            return None;
         }
-        share *= 2;
+        let root = Cell { lo, hi };
+        let preferred = [0, 1].map(|d| preferred_cuts(surface, border, root, d));
+        let poles = border.polygons.iter().flatten().map(|v| v.side == BorderSide::Pole).collect();
+        let border = segments.len();
+        let enclosure = Enclosure::new(segments.clone());
+        segments.extend(imprinted);
+        let resolution = parameter_resolution(lo, hi);
+        let longest = longest_cells(surface, root);
+        let tree = Tree {
+            surface,
+            acceptance,
+            segments,
+            border,
+            enclosure,
+            poles,
+            resolution,
+            preferred,
+            longest,
+            max_angle,
+        };
+        Some((tree, root))
     }
 }
 
 impl Tree<'_, '_> {
+    /// Visits a cell and all below it, one after the other.
+    pub(super) fn visit(&self, branch: &mut Branch<'_, '_>, visit: Visit<'_>) {
+        if let Some(halves) = self.sort_or_halve(branch, &visit) {
+            halves.visits(&visit).into_iter().for_each(|half| self.visit(branch, half));
+        }
+    }
+
     /// Sorts a cell into the branch: inside if it fits whole, to the border if it fits but is cut or splitting ends, dropped if it lies
-    /// outside; else halves it and visits both halves, near the root in parallel.
-    fn visit(&self, branch: &mut Branch<'_, '_>, visit: Visit<'_>) {
-        let Visit { cell, depth, .. } = visit;
-        let Some((near, inside)) = self.border_near(&visit) else { return };
-        if !branch.may_split(depth) {
+    /// outside; else returns its halves.
+    pub(super) fn sort_or_halve(&self, branch: &mut Branch<'_, '_>, visit: &Visit<'_>) -> Option<Halves> {
+        let cell = visit.cell;
+        let (near, inside) = self.border_near(visit)?;
+        if !branch.may_split(visit.depth) {
             branch.cells.border.push(cell);
-            return;
+            return None;
         }
         let candidate = CandidateFacet::new(self.surface, cell);
         let cut = self.crease_to_cut(cell).or_else(|| self.turn_to_cut(cell));
@@ -179,40 +196,22 @@ impl Tree<'_, '_> {
             } else {
                 branch.cells.border.push(cell);
             }
-            return;
+            return None;
         }
         let (direction, at) = cut.unwrap_or_else(|| {
-            let d = candidate.parameter_to_halve(
-                self.surface,
-                cell,
-                self.surface.tolerance(cell.center()) * branch.slack,
-            );
+            let tolerance = self.surface.tolerance(cell.center()) * branch.slack;
+            let d = candidate.parameter_to_halve(self.surface, cell, tolerance);
             (d, self.cut_parameter(cell, d))
         });
         // Parameters have no more digits between the two.
         if !(at > cell.lo[direction] && at < cell.hi[direction]) {
             branch.cells.border.push(cell);
-            return;
+            return None;
         }
         let (mut low, mut high) = (cell, cell);
         low.hi[direction] = at;
         high.lo[direction] = at;
-        let half = |cell: Cell| Visit { cell, near: &near, inside, depth: depth + 1 };
-        if depth >= PARALLEL {
-            self.visit(branch, half(low));
-            self.visit(branch, half(high));
-            return;
-        }
-        // Shared out beforehand: what a branch may use must not depend on which thread comes first.
-        let budget = branch.budget / 2;
-        let apart = |cell: Cell| {
-            let mut branch = Branch::new(self, budget);
-            self.visit(&mut branch, half(cell));
-            branch.cells
-        };
-        let (first, second) = rayon::join(|| apart(low), || apart(high));
-        branch.cells.append(first);
-        branch.cells.append(second);
+        Some(Halves { cells: [low, high], near, inside })
     }
 
     /// Returns the indices of the segments within [`CLEARANCE`] of a cell, and whether the cell is known to lie inside; `None` where it
