@@ -1,8 +1,9 @@
 //! The point of a trimmed face that is nearest to a point.
 
 use crate::math::polygon::is_inside_polygons;
-use crate::math::{Point, Uv};
+use crate::math::{Aabb, Point, Uv};
 use crate::model::Face;
+use crate::nurbs::Surface;
 
 /// Samples across a face in each direction.
 const SAMPLES: usize = 24;
@@ -17,6 +18,38 @@ const SINGULAR: f64 = 1e-14;
 
 /// Steps shorter than this share of the coordinates are rounding, some fifty of it: over a plane they went to and fro until the last.
 const STILL: f64 = 1e-14;
+
+/// Boxes around the pieces of a surface, unless it has more patches: their sides are an eighth of it and less, and they are made in less
+/// time than one foot is found.
+const PIECES: usize = 128;
+
+/// Share of its distance that a rounded box may lie too far away.
+pub(crate) const BOX_ROUNDING: f64 = 1e-9;
+
+/// Boxes around the pieces of a surface: they tell at once of most points, also of those within a reflector, that they are far from it.
+#[derive(Clone, Debug)]
+pub(crate) struct PieceBoxes(Vec<Aabb>);
+
+impl PieceBoxes {
+    /// Makes boxes around the patches of a surface, halved until there are [`PIECES`], in the coordinates of its part.
+    pub(crate) fn new(surface: &Surface) -> Self {
+        let mut patches = surface.bezier_patches();
+        let mut direction = 0;
+        while !patches.is_empty() && 2 * patches.len() <= PIECES {
+            patches = patches.iter().flat_map(|patch| patch.halves(direction)).collect();
+            direction = 1 - direction;
+        }
+        Self(patches.iter().map(|patch| patch.bounds()).collect())
+    }
+
+    /// Whether a box is within `limit` of a point, both in the coordinates of the part; without one the surface is farther away.
+    pub(crate) fn are_within(&self, local: Point, limit: f64) -> bool {
+        self.0.iter().any(|b| {
+            let rounding = BOX_ROUNDING * (local.length() + b.diagonal());
+            b.grown(limit + rounding).contains(local)
+        })
+    }
+}
 
 /// A point of a face.
 #[derive(Clone, Copy, Debug)]

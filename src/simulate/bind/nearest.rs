@@ -3,7 +3,7 @@
 use crate::math::{Aabb, Point, Uv, Vector};
 use crate::model::{Model, PlacedFace};
 use crate::nurbs::Surface;
-use crate::simulate::face_foot::nearest_on_face;
+use crate::simulate::face_foot::{BOX_ROUNDING, PieceBoxes, nearest_on_face};
 use crate::simulate::trim_loops::trim_polygons;
 
 /// Finds the placed face nearest to a point, on the spline itself: samples inside the trimming loops, then Gauss–Newton. Faces are named by
@@ -18,7 +18,7 @@ pub(super) struct Nearest<'a> {
     /// Of each face with a surface that was asked for, in the coordinates of its part.
     slabs: Vec<Option<Slab>>,
     /// Boxes around the pieces of these surfaces.
-    pieces: Vec<Option<Vec<Aabb>>>,
+    pieces: Vec<Option<PieceBoxes>>,
 }
 
 /// The space between two parallel planes around a surface: no more than the face itself where that is plane.
@@ -50,24 +50,6 @@ impl Slab {
         (low - along).max(along - high) - rounding
     }
 }
-
-/// Boxes around the pieces of a surface, unless it has more patches: their sides are an eighth of it and less, and they are made in less
-/// time than one foot is found.
-const PIECES: usize = 128;
-
-/// Returns boxes around the patches of a surface, halved until there are [`PIECES`], in the coordinates of its part.
-fn piece_boxes(surface: &Surface) -> Vec<Aabb> {
-    let mut patches = surface.bezier_patches();
-    let mut direction = 0;
-    while !patches.is_empty() && 2 * patches.len() <= PIECES {
-        patches = patches.iter().flat_map(|patch| patch.halves(direction)).collect();
-        direction = 1 - direction;
-    }
-    patches.iter().map(|patch| patch.bounds()).collect()
-}
-
-/// Share of its distance that a rounded box may lie too far away.
-const BOX_ROUNDING: f64 = 1e-9;
 
 /// Cosine above which two planes count as parallel: 8°. Planes at a larger angle are within a distance of each other on a strip 7 times as
 /// wide at most, which is an edge and no contact.
@@ -119,12 +101,8 @@ impl<'a> Nearest<'a> {
                 return false;
             }
             // Within a reflector planes tell nothing; what lies in no box around a piece is far from all of them.
-            let pieces = self.pieces[index].get_or_insert_with(|| piece_boxes(&face.surface));
-            let near = |b: &Aabb| {
-                let rounding = BOX_ROUNDING * (local.length() + b.diagonal());
-                b.grown(limit / placed.placement.scale + rounding).contains(local)
-            };
-            if !pieces.iter().any(near) {
+            let pieces = self.pieces[index].get_or_insert_with(|| PieceBoxes::new(&face.surface));
+            if !pieces.are_within(local, limit / placed.placement.scale) {
                 return false;
             }
         }

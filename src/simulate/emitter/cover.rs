@@ -2,7 +2,7 @@
 
 use crate::math::{Aabb, Frame, Point, Uv, Vector};
 use crate::model::{Face, PlacedFace};
-use crate::simulate::face_foot::{NearestOnFace, foot_from, nearest_on_face};
+use crate::simulate::face_foot::{NearestOnFace, PieceBoxes, foot_from, nearest_on_face};
 use crate::simulate::trim_loops::{TrimRegion, trim_polygons};
 
 /// Cosine below which two outward normals look at each other: −60°, as where the kernel asks for faces at one place.
@@ -26,7 +26,9 @@ pub(crate) struct Cover {
 enum Trims {
     /// Of a face of first degree, where only insides are asked: bands answer that by a few sides, polygons by all.
     Plane(TrimRegion),
-    Curved(Vec<Vec<Uv>>),
+    /// Of any other, with boxes around its pieces: the box around a reflector holds its lamp, which would else have a foot looked for at
+    /// each ray.
+    Curved(Vec<Vec<Uv>>, PieceBoxes),
 }
 
 impl Trims {
@@ -34,7 +36,7 @@ impl Trims {
         if face.surface.degree == [1, 1] {
             Self::Plane(TrimRegion::new(face))
         } else {
-            Self::Curved(trim_polygons(face))
+            Self::Curved(trim_polygons(face), PieceBoxes::new(&face.surface))
         }
     }
 }
@@ -47,9 +49,22 @@ impl Cover {
         Some(Self { face: face.clone(), placement: *placed.placement, trims, bounds, one_sided, glue_mm })
     }
 
+    /// Whether boxes leave open that it is within the glue distance of a point, mm, in scene coordinates.
+    fn may_touch(&self, point: Point) -> bool {
+        if !self.bounds.contains(point) {
+            return false;
+        }
+        match &self.trims {
+            Trims::Plane(_) => true,
+            Trims::Curved(_, pieces) => {
+                pieces.are_within(self.placement.local_point(point), self.glue_mm / self.placement.scale)
+            }
+        }
+    }
+
     /// Whether it lies against a point (mm, scene coordinates) of a face with this outward normal there.
     pub(crate) fn covers(&self, point: Point, normal: Vector) -> bool {
-        if !self.bounds.contains(point) {
+        if !self.may_touch(point) {
             return false;
         }
         let surface = &self.face.surface;
@@ -63,7 +78,7 @@ impl Cover {
                 let distance = if inside { surface.evaluate(uv).distance(local) } else { f64::INFINITY };
                 Some(foot_from(&self.face, |uv| region.contains(uv), local, NearestOnFace { distance, uv }))
             }
-            Trims::Curved(loops) => nearest_on_face(&self.face, loops, local),
+            Trims::Curved(loops, _) => nearest_on_face(&self.face, loops, local),
         };
         let near = nearest.filter(|n| n.distance * self.placement.scale <= self.glue_mm);
         // Faces that meet at an edge are as near to each other there, but do not look at each other.
@@ -101,6 +116,8 @@ mod tests {
                 assert!(!covers(9.99, normal) && !covers(10.01, normal), "farther than the glue");
                 assert_eq!(covers(10.0, -normal), !one_sided, "the cup's own side");
                 assert!(!cover.covers(centre - normal * 10.0, -normal), "the open half");
+                let lamp = centre + direction.normalize() * 5.0;
+                assert!(!cover.may_touch(lamp), "within the cup, 5 mm from its wall: no foot is looked for");
             }
         }
     }
