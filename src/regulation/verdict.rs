@@ -41,6 +41,11 @@ impl Regulation {
         Ok(Sensor { half_deg, round: sensor_round })
     }
 
+    /// Returns the width, degrees, of the coarsest cells that a far field may be judged by: that of the widest photometer of the text.
+    pub fn coarsest_cells_deg(&self) -> f64 {
+        2.0 * self.rules.sensor_widest_half_deg.unwrap_or(self.rules.sensor_half_deg)
+    }
+
     /// Checks that a far field of such cells, degrees, can be judged.
     ///
     /// # Errors

@@ -87,6 +87,17 @@ fn a_regulation_that_means_nothing_is_refused_before_tracing() {
     }
 }
 
+/// A photometer of 65 mm at 25 m sees 0.149°: 21° and 10.5° in cells of at most that are 141 and 71.
+#[test]
+fn cells_that_are_too_coarse_are_refused_with_those_that_are_enough() {
+    let coarse = low_beam(|scene| scene.replace("cells = [210, 105]", "cells = [60, 30]"));
+    let (code, _, err) = lampyris_in(coarse.path(), &["trace", "low_beam.toml", "-o", "out"]);
+    assert!(code != 0 && err.contains("`cells = [141, 71]`"), "{err}");
+    let fine = low_beam(|scene| scene.replace("cells = [210, 105]", "cells = [141, 71]"));
+    let (code, _, err) = lampyris_in(fine.path(), &["trace", "low_beam.toml", "-o", "out", "--dry-run"]);
+    assert_eq!(code, 0, "{err}");
+}
+
 #[test]
 fn until_settled_traces_on_or_says_what_it_cannot() {
     // Numbers of rays of their own cannot grow.
