@@ -3,7 +3,7 @@
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::json::{json_text, json_value};
-use crate::model::{FaceAccount, Model, PartAccount, PlacedFace, SolidAccount};
+use crate::model::{FaceAccount, Model, PartAccount, PlacedFace, SolidAccount, are_shared};
 use crate::report::{figures, grouped};
 use crate::simulate::face_selectors;
 use serde_json::json;
@@ -35,8 +35,12 @@ pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failur
     }
     let most = if console.verbose > 0 { usize::MAX } else { SHOWN_FACES };
     let places = model.labels_of_parts();
-    let tree: String =
-        parts.iter().zip(&places).map(|(part, places)| part_text(part, places, most, &mut selectors)).collect();
+    let shared = are_shared(parts.iter().map(|part| part.name.as_str()));
+    let tree: String = parts
+        .iter()
+        .zip(places.iter().zip(shared))
+        .map(|(part, (places, shared))| part_text(part, (places, shared), most, &mut selectors))
+        .collect();
     print(&tree)?;
     console.say(console.dim(
         "  behind each face: what selects it in a rule of a scene; rules also take solid, layer, kind, radius_mm, colour and at (a point)",
@@ -67,15 +71,16 @@ fn part_selectors(model: &Model) -> Vec<Option<String>> {
     selectors
 }
 
-/// Returns the lines of a part: its name, how often it is placed and as which instances, and its solids with
-/// at most `most` faces each. Takes a selector for each of its faces.
+/// Returns the lines of a part: its name, how often it is placed and as which instances (also of one place, where other parts share the
+/// name), and its solids with at most `most` faces each. Takes a selector for each of its faces.
 fn part_text(
     part: &PartAccount,
-    places: &[String],
+    (places, is_shared): (&[String], bool),
     most: usize,
     selectors: &mut impl Iterator<Item = Option<String>>,
 ) -> String {
     let placed = match places {
+        [place] if is_shared => format!(", instance = {}", quoted_name(place)),
         [_] => String::new(),
         [] => ", placed nowhere".into(),
         _ => {

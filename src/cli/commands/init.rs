@@ -12,7 +12,7 @@ use crate::model::{Model, PartAccount, SolidAccount};
 use crate::pipeline::LoadedModel;
 use crate::report::figures;
 use serde_json::json;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -88,7 +88,7 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     text += "# A face that no rule names absorbs all light that meets it. Rules select by part, instance, solid, face, entity (the #id\n\
         # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins. `lampyris info FILE --faces`\n\
         # shows what selects each face, `lampyris media` lists the media that have names.\n";
-    let rules = rule_texts(&model.account());
+    let rules = rule_texts(&model.account(), &instance_names(model));
     text.extend(rules.iter().take(MOST_RULES).map(String::as_str));
     text += &places_text(model);
     let rest = rules.len().saturating_sub(MOST_RULES);
@@ -114,38 +114,89 @@ fn places_text(model: &Model) -> String {
     format!("# Of parts that are placed several times each place has a name of its own:\n{lines}\n")
 }
 
+/// Returns for each part the names that select its instances one by one; none where a name selects others too or nothing.
+fn instance_names(model: &Model) -> Vec<Vec<String>> {
+    let mut uses: HashMap<&str, usize> = HashMap::new();
+    for instance in &model.instances {
+        // The path of an instance that stands in no assembly is its name.
+        for name in instance.names().collect::<BTreeSet<_>>() {
+            *uses.entry(name).or_default() += 1;
+        }
+    }
+    let selects_one = |label: &String| !label.contains('*') && uses.get(label.as_str()) == Some(&1);
+    let of_part = |labels: Vec<String>| if labels.iter().all(selects_one) { labels } else { Vec::new() };
+    model.labels_of_parts().into_iter().map(of_part).collect()
+}
+
+/// A part with the names that select its instances one by one.
+type NamedPart<'a> = (&'a PartAccount, &'a [String]);
+
+/// Returns the parts of one name in groups of equal numbers of faces and equal sizes.
+fn looks<'a>(parts: &[NamedPart<'a>]) -> Vec<Vec<NamedPart<'a>>> {
+    let look = |part: &PartAccount| -> Vec<(usize, [String; 3])> {
+        part.solids.iter().map(|s| (s.faces.len(), s.size_mm().map(toml_number))).collect()
+    };
+    let mut found = HashMap::new();
+    let mut groups: Vec<Vec<NamedPart<'a>>> = Vec::new();
+    for &part in parts {
+        let group = *found.entry(look(part.0)).or_insert(groups.len());
+        if group == groups.len() {
+            groups.push(Vec::new());
+        }
+        groups[group].push(part);
+    }
+    groups
+}
+
 /// Returns the rules for all parts that are placed: one for each name, or one for each solid where a part of that name has several; none
-/// for solids without faces.
-fn rule_texts(parts: &[PartAccount]) -> Vec<String> {
+/// for solids without faces. Parts of one name that look different are told apart by their instances, as `instances` has them for each
+/// part.
+fn rule_texts(parts: &[PartAccount], instances: &[Vec<String>]) -> Vec<String> {
     // A selector by name means all parts of that name: what the first one is like is said of all.
-    let mut names: Vec<(&str, Vec<&PartAccount>)> = Vec::new();
-    for part in parts.iter().filter(|part| part.instances > 0) {
-        match names.iter_mut().find(|(name, _)| *name == part.name) {
+    let mut names: Vec<(&str, Vec<NamedPart<'_>>)> = Vec::new();
+    for part in parts.iter().zip(instances.iter().map(Vec::as_slice)).filter(|(part, _)| part.instances > 0) {
+        match names.iter_mut().find(|(name, _)| *name == part.0.name) {
             Some((_, alike)) => alike.push(part),
-            None => names.push((&part.name, vec![part])),
+            None => names.push((&part.0.name, vec![part])),
         }
     }
     // Parts without a name are selected by `*`, which means the others too: these stand below, where they win.
     names.sort_by_key(|(name, _)| !name.is_empty());
     let mut rules = Vec::new();
     for (name, parts) in names {
-        let name = if name.is_empty() { "\"*\"".to_owned() } else { toml_string(name) };
-        let solids = |part: &&PartAccount| part.solids.iter().filter(|s| !s.faces.is_empty()).count();
-        if parts.iter().all(|part| solids(part) < 2) {
-            let first = parts.iter().flat_map(|part| &part.solids).find(|s| !s.faces.is_empty());
-            rules.extend(first.map(|solid| rule_text(&format!("part = {name}"), solid, parts.len())));
+        let looks = looks(&parts);
+        let few = |alike: &Vec<NamedPart<'_>>| {
+            let count: usize = alike.iter().map(|(_, labels)| labels.len()).sum();
+            alike.iter().all(|(_, labels)| !labels.is_empty()) && count <= MOST_PLACES
+        };
+        if looks.len() > 1 && looks.iter().all(few) {
+            for alike in looks {
+                let labels: Vec<String> =
+                    alike.iter().flat_map(|(_, labels)| *labels).map(|l| toml_string(l)).collect();
+                let value = if let [one] = &labels[..] { one.clone() } else { format!("[{}]", labels.join(", ")) };
+                rules.extend(solid_rules(&format!("instance = {value}"), &alike));
+            }
             continue;
         }
-        let mut numbered: BTreeMap<usize, Vec<&SolidAccount>> = BTreeMap::new();
-        for solid in parts.iter().flat_map(|part| &part.solids).filter(|s| !s.faces.is_empty()) {
-            numbered.entry(solid.index).or_default().push(solid);
-        }
-        let rule = |(index, solids): (usize, Vec<&SolidAccount>)| {
-            rule_text(&format!("part = {name}\nsolid = {index}"), solids[0], solids.len())
-        };
-        rules.extend(numbered.into_iter().map(rule));
+        let name = if name.is_empty() { "\"*\"".to_owned() } else { toml_string(name) };
+        rules.extend(solid_rules(&format!("part = {name}"), &parts));
     }
     rules
+}
+
+/// Returns the rules for parts that a selector means: one, or one for each solid where a part has several.
+fn solid_rules(selector: &str, parts: &[NamedPart<'_>]) -> Vec<String> {
+    let mut numbered: BTreeMap<usize, Vec<&SolidAccount>> = BTreeMap::new();
+    let solids = |part: &PartAccount| part.solids.iter().filter(|s| !s.faces.is_empty()).count();
+    let is_whole = parts.iter().all(|(part, _)| solids(part) < 2);
+    for solid in parts.iter().flat_map(|(part, _)| &part.solids).filter(|s| !s.faces.is_empty()) {
+        numbered.entry(if is_whole { 0 } else { solid.index }).or_default().push(solid);
+    }
+    let rule = |(index, solids): (usize, Vec<&SolidAccount>)| {
+        let number = if is_whole { String::new() } else { format!("\nsolid = {index}") };
+        rule_text(&format!("{selector}{number}"), solids[0], if is_whole { parts.len() } else { solids.len() })
+    };
+    numbered.into_iter().map(rule).collect()
 }
 
 /// Returns a rule for one solid, or the first of `alike` that the selector means, with what may be said of it in comments.
@@ -185,9 +236,10 @@ fn light_text(model: &Model) -> String {
         if bounds.is_empty() { [[-1.0; 3], [1.0; 3]] } else { [bounds.min.to_array(), bounds.max.to_array()] };
     let half = [0, 1, 2].map(|k| 0.5 * (high[k] - low[k]));
     let diagonal = 2.0 * half.iter().map(|h| h * h).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-    // A middle that is off by rounding alone stands at 0.
-    let middle =
-        [0, 1, 2].map(|k| 0.5 * (low[k] + high[k])).map(|x| if x.abs() < ROUNDING * diagonal { 0.0 } else { x });
+    // What is off by rounding alone stands at 0.
+    let still = |x: f64| if x.abs() < ROUNDING * diagonal { 0.0 } else { x };
+    let [low, high] = [low, high].map(|corner| corner.map(still));
+    let middle = [0, 1, 2].map(|k| still(0.5 * (low[k] + high[k])));
     let axis = optical_axis(half);
     let across = half[(axis + 1) % 3].hypot(half[(axis + 2) % 3]);
     // A model that is a rod along the axis still gets a beam.
@@ -246,8 +298,8 @@ mod tests {
         assert_eq!(halves.map(optical_axis), [0, 1, 2, 2, 2]);
     }
 
-    #[test]
-    fn parts_of_one_name_get_one_rule_and_those_without_a_name_stand_above() {
+    /// A part of so many solids, each of one face of this width, mm.
+    fn part(name: &str, instances: usize, solids: usize, width: f64) -> PartAccount {
         let face = FaceAccount {
             id: None,
             name: String::new(),
@@ -256,18 +308,31 @@ mod tests {
             kind: SurfaceKind::Plane,
             radius_mm: None,
             area_mm2: 1.0,
-            bbox_mm: [[0.0; 3], [1.0; 3]],
+            bbox_mm: [[0.0; 3], [width, 1.0, 1.0]],
             at: [0.0; 3],
         };
         let solid = |index| SolidAccount { index, name: String::new(), closed: true, faces: vec![face.clone()] };
-        let part = |name: &str, instances: usize, solids: usize| PartAccount {
-            name: name.into(),
-            instances,
-            solids: (0..solids).map(solid).collect(),
+        PartAccount { name: name.into(), instances, solids: (0..solids).map(solid).collect() }
+    }
+
+    #[test]
+    fn parts_of_one_name_that_look_different_are_told_apart_by_their_instances() {
+        let parts = [part("glass", 1, 1, 9.0), part("glass", 1, 1, 2.5), part("glass", 1, 1, 9.0)];
+        let labels = ["a/glass", "a/glass:2", "a/glass:3"].map(|label| vec![label.to_owned()]);
+        let selectors = |labels: &[Vec<String>]| -> Vec<String> {
+            let lines = rule_texts(&parts, labels).into_iter().map(|r| r.lines().nth(1).map(str::to_owned));
+            lines.flatten().map(|line| line.split("  #").next().unwrap_or_default().to_owned()).collect()
         };
+        assert_eq!(selectors(&labels), ["instance = [\"a/glass\", \"a/glass:3\"]", "instance = \"a/glass:2\""]);
+        assert_eq!(selectors(&vec![Vec::new(); 3]), ["part = \"glass\""], "no name selects one alone");
+    }
+
+    #[test]
+    fn parts_of_one_name_get_one_rule_and_those_without_a_name_stand_above() {
+        let part = |name: &str, instances: usize, solids: usize| part(name, instances, solids, 1.0);
         let parts =
             [part("led", 1, 1), part("led", 2, 1), part("", 1, 1), part("board", 1, 2), part("spare", 0, 1)];
-        let rules = rule_texts(&parts);
+        let rules = rule_texts(&parts, &vec![Vec::new(); parts.len()]);
         let selectors: Vec<String> = rules
             .iter()
             .map(|rule| rule.lines().skip(1).take_while(|l| !l.starts_with("surface")).collect())

@@ -64,8 +64,7 @@ impl RegulationUse {
         let [columns, rows] = receiver.cells.map(f64::from);
         if let Err(message) = regulation.check_cells(f64::max((h[1] - h[0]) / columns, (v[1] - v[0]) / rows)) {
             let enough = |[from, to]: [f64; 2]| ((to - from) / regulation.coarsest_cells_deg()).ceil();
-            let help =
-                format!("`cells = [{}, {}]` are enough over these angles", enough(h.into()), enough(v.into()));
+            let help = format!("`cells = [{}, {}]` are enough over these angles", enough(h), enough(v));
             return fail("receiver", message, &help);
         }
         Ok(())
