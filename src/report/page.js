@@ -82,20 +82,20 @@
   };
 
   const keys = (box) => {
-    const start = structuredClone(box.layout.scene.camera);
+    const { camera: start, aspectratio: sides } = structuredClone(box.layout.scene);
     box.addEventListener("keydown", (event) => {
       const camera = structuredClone(box._fullLayout.scene._scene.getCamera());
       const e = camera.eye;
       const far = Math.hypot(e.x, e.y, e.z), flat = Math.atan2(e.y, e.x), high = Math.asin(e.z / far);
       const put = (r, a, b) => { b = Math.max(-1.5, Math.min(1.5, b)); camera.eye = { x: r * Math.cos(b) * Math.cos(a), y: r * Math.cos(b) * Math.sin(a), z: r * Math.sin(b) }; Plotly.relayout(box, { "scene.camera": camera }); event.preventDefault(); };
-      const zoom = (f) => { const s = box.layout.scene.aspectratio || box._fullLayout.scene.aspectratio; Plotly.relayout(box, { "scene.aspectmode": "manual", "scene.aspectratio": { x: s.x * f, y: s.y * f, z: s.z * f } }); event.preventDefault(); };
+      const zoom = (f) => { const s = box.layout.scene.aspectratio; Plotly.relayout(box, { "scene.aspectratio": { x: s.x * f, y: s.y * f, z: s.z * f } }); event.preventDefault(); };
       if (event.key === "ArrowLeft") put(far, flat - 0.15, high);
       else if (event.key === "ArrowRight") put(far, flat + 0.15, high);
       else if (event.key === "ArrowUp") put(far, flat, high + 0.12);
       else if (event.key === "ArrowDown") put(far, flat, high - 0.12);
       else if (event.key === "+" || event.key === "=") zoom(1.15);
       else if (event.key === "-") zoom(1 / 1.15);
-      else if (event.key === "0") Plotly.relayout(box, { "scene.camera": start, "scene.aspectmode": "data" });
+      else if (event.key === "0") Plotly.relayout(box, { "scene.camera": start, "scene.aspectratio": sides });
     });
   };
 

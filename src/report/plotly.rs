@@ -235,18 +235,43 @@ fn trace(colour: &str, s: &Series) -> Value {
     trace
 }
 
+/// Least side of the box of a view over its diagonal: a flat one still has an axis across it.
+const LEAST_SIDE: f64 = 0.01;
+/// Margin on either side of the box, over its side.
+const BOX_MARGIN: f64 = 1.0 / 32.0;
+
+/// Returns the range of each axis of a 3-D view, mm, and the side of its box on the screen: of one scale along all three, its diagonal that
+/// of a unit cube. Plotly's own rule makes the volume that of a unit cube, so that a thin plate grows beyond the picture.
+fn box_in_view(view: &View) -> ([[f64; 2]; 3], [f64; 3]) {
+    let [low, high] = view.bounds().unwrap_or([[-1.0; 3], [1.0; 3]]).map(|corner| corner.map(f64::from));
+    let diagonal = |sides: [f64; 3]| sides.iter().map(|s| s * s).sum::<f64>().sqrt();
+    let extent = diagonal([0, 1, 2].map(|k| high[k] - low[k]));
+    // A single point gets a box of 1 mm.
+    let whole = if extent > 0.0 { extent } else { 1.0 / LEAST_SIDE };
+    let sides = [0, 1, 2].map(|k| (high[k] - low[k]).max(LEAST_SIDE * whole) * (1.0 + 2.0 * BOX_MARGIN));
+    let ranges = [0, 1, 2].map(|k| {
+        let middle = 0.5 * (low[k] + high[k]);
+        [middle - 0.5 * sides[k], middle + 0.5 * sides[k]]
+    });
+    (ranges, sides.map(|side| side * 3f64.sqrt() / diagonal(sides)))
+}
+
 /// Returns a 3-D view as plotly's figure: an object with `data` and `layout`.
 pub(super) fn view(view: &View) -> Value {
     let range = common_range(&view.shapes);
     let mut data: Vec<Value> = view.shapes.iter().map(|s| shape(s, range)).collect();
     // One colour bar for all that is coloured by values.
     data.iter_mut().filter(|s| !s["colorbar"].is_null()).skip(1).for_each(|s| s["showscale"] = json!(false));
-    let quiet = json!({"showbackground": false, "showspikes": false, "zeroline": false, "title": {"text": ""},
-        "ticksuffix": " mm", "nticks": 4, "tickfont": {"size": 11}});
+    let quiet = |range: [f64; 2]| {
+        json!({"showbackground": false, "showspikes": false, "zeroline": false, "title": {"text": ""},
+            "ticksuffix": " mm", "nticks": 4, "tickfont": {"size": 11}, "range": range})
+    };
+    let (ranges, ratios) = box_in_view(view);
     // Nearer than plotly's default, which leaves half of the picture empty.
     let [x, y, z] = EYE.map(|c| 0.78 * c);
     json!({"data": data, "layout": {
-        "scene": {"aspectmode": "data", "xaxis": quiet, "yaxis": quiet, "zaxis": quiet,
+        "scene": {"aspectmode": "manual", "aspectratio": {"x": ratios[0], "y": ratios[1], "z": ratios[2]},
+            "xaxis": quiet(ranges[0]), "yaxis": quiet(ranges[1]), "zaxis": quiet(ranges[2]),
             "camera": {"eye": {"x": x, "y": y, "z": z}, "projection": {"type": "orthographic"}}},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "showlegend": view.shapes.len() > 1,
         "legend": {"orientation": "h", "y": -0.01, "yanchor": "top"}}})
@@ -316,6 +341,32 @@ mod tests {
     use super::*;
 
     /// As a browser shows it: the first row that plotly gets stands at the lower end of the axis.
+    /// A plate of 106 × 106 × 1.5 mm had a box 4.1 wide, of which the middle filled the picture.
+    #[test]
+    fn the_box_of_a_view_has_the_diagonal_of_a_cube_and_one_scale() {
+        let surface = |corner: [f32; 3]| Shape::Surface {
+            name: "plate".into(),
+            points: vec![[0.0; 3], corner, [corner[0], 0.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+            colour: [0.5; 3],
+            opacity: 1.0,
+            values: None,
+            labels: Vec::new(),
+        };
+        let view_of = |shapes| View { name: String::new(), title: String::new(), caption: String::new(), shapes };
+        for corner in [[106.0, 106.0, 1.5], [106.0, 106.0, 0.0], [1e-3, 2e-3, 3e-3], [7.0, 0.0, 0.0], [0.0; 3]] {
+            let (ranges, ratios) = box_in_view(&view_of(vec![surface(corner)]));
+            let diagonal = ratios.iter().map(|r| r * r).sum::<f64>().sqrt();
+            assert!((diagonal - 3f64.sqrt()).abs() < 1e-12, "{ratios:?}");
+            for k in 0..3 {
+                let [low, high] = ranges[k];
+                assert!(low < 0.0 && high > f64::from(corner[k]) && ratios[k] > 0.0, "{corner:?}: {ranges:?}");
+                let scales = ratios[k] / (high - low) * (ranges[0][1] - ranges[0][0]) / ratios[0];
+                assert!((scales - 1.0).abs() < 1e-12, "{corner:?}: {ranges:?} {ratios:?}");
+            }
+        }
+    }
+
     #[test]
     fn pictures_begin_at_the_bottom() {
         let picture = Picture { width: 1, height: 2, rgb: vec![1, 2, 3, 4, 5, 6] };
