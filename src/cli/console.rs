@@ -34,7 +34,8 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    /// Makes a console from the options that every command has and the command line as typed; asks the environment for colours.
+    /// Makes a console from the options that every command has and the command line as typed, and starts the clock of the command. Asks for
+    /// `NO_COLOR`, `TERM` and whether stderr is a terminal.
     pub(crate) fn new(json: bool, quiet: bool, verbose: u8, typed: &[OsString]) -> Self {
         // https://no-color.org: set and not empty, whatever its value.
         let no_colour = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());

@@ -1,6 +1,6 @@
 //! The nearest intersection of a ray with a scene: on facets (octree, BVH) or on the exact spline.
 //!
-//! All intersectors answer through [`Intersector`]; all of them always count what they do in a [`Cost`].
+//! All intersectors answer through [`Intersector`]; all of them count what they do to find hits in a [`Cost`].
 
 pub mod bvh;
 #[cfg(feature = "contenders")]
@@ -39,8 +39,9 @@ pub trait Intersector: Sync {
     /// Says which rays are going to be asked: what helps them all may be worked out now. No answer depends on it.
     fn prepare_for(&self, _expected: &ExpectedRays<'_>) {}
 
-    /// Whether it is known, without looking for a hit, that a ray which leaves a surface meets nothing, however far it goes;
-    /// `false` says nothing.
+    /// Whether it is known, without looking for a hit, that a ray of unit direction which leaves a surface, as its departure says, meets
+    /// nothing, however far it goes; `false` says nothing, and may become `true`. Adds nothing to a [`Cost`]; an intersector may note the
+    /// ray and work out what helps those after it.
     fn escapes(&self, _ray: &Ray) -> bool {
         false
     }

@@ -58,7 +58,8 @@ impl StartTriangle {
     }
 }
 
-/// Whether a start lies on the second triangle's side of the diagonal; on the diagonal itself it does not.
+/// Whether a start lies on the fourth corner's side of the diagonal from the first to the third corner; on the diagonal itself it does not.
+/// Says nothing of a facet whose last two corners coincide.
 fn is_over_second([a, b, c, d]: &[Point; 4], start: Point) -> bool {
     let diagonal = c - a;
     diagonal.cross(start - a).dot(diagonal.cross(d - b)) > 0.0

@@ -60,7 +60,7 @@ struct PartHulls<'m> {
 }
 
 impl Model {
-    /// A box around all placed faces, mm; within about 1e-3 of a face's size. Empty without faces.
+    /// The box of all placed faces, mm, from samples of them: a face may reach beyond it by about 1e-3 of its size. Empty without faces.
     pub fn bounds(&self) -> Aabb {
         let hulls: Vec<PartHulls<'_>> = self.parts.iter().map(PartHulls::new).collect();
         let mut placed_hulls: Vec<(Aabb, usize)> = Vec::with_capacity(self.instances.len());
@@ -90,7 +90,7 @@ impl Model {
 }
 
 impl Face {
-    /// A box around the face where a placement puts it, mm; within about 1e-3 of its size.
+    /// The box of the placed face, mm, from samples of it: the face may reach beyond the box by about 1e-3 of its size.
     pub fn bounds(&self, placement: &Frame) -> Aabb {
         grow_by_face(self, placement, Aabb::EMPTY)
     }
@@ -174,8 +174,8 @@ fn grow_by_face(face: &Face, placement: &Frame, mut bounds: Aabb) -> Aabb {
     for side in SIDES {
         if side.reach(&hull) <= side.reach(&bounds) {
             continue;
-            // The highest samples are the nearest to a summit.
         }
+        // The highest samples are the nearest to a summit.
         samples.sort_unstable_by(|a, b| side.height(b.1).total_cmp(&side.height(a.1)));
         let starts = samples.iter().filter(|s| outline.contains(s.0)).take(STARTS);
         let summits: Vec<Point> =

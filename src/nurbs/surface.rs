@@ -252,8 +252,11 @@ impl Surface {
         }
     }
 
-    /// Applies a change of the curves along one direction, 0 for u and 1 for v (cutting, refining, reversing), to the whole surface. It
-    /// must give all curves the same degree and knots, and as many points.
+    /// Applies a change (cutting, refining, reversing) to the lines of control points along one direction, 0 for u and 1 for v, each given
+    /// as a curve. What it does must depend on degree and knots alone, and give all lines the same degree, knots and number of points.
+    ///
+    /// # Panics
+    /// For another direction; may panic where numbers of points differ, or else gives a wrong surface.
     pub fn map_direction(&self, direction: usize, change: impl Fn(Curve) -> Curve) -> Self {
         let (degree, knots) = (self.degree[direction], &self.knots[direction]);
         let lines: Vec<Curve> = self

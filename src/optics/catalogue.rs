@@ -75,7 +75,8 @@ fn entry(name: &str) -> Option<&'static Entry> {
     ENTRIES.iter().find(|e| e.name.to_lowercase() == wanted || e.aliases.contains(&wanted.as_str()))
 }
 
-/// The clear medium of that name or alias, in any case; `None` where the catalogue has none.
+/// The clear medium of that name or alias, in any case, blanks around it passed over; it has the catalogue's name. `None` where the
+/// catalogue has none. Its formula is evaluated beyond [`range_nm`] too.
 ///
 /// ```
 /// use lampyris::optics::{catalogue, line};

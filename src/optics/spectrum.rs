@@ -144,8 +144,7 @@ enum Kind {
 }
 
 impl Wavelengths {
-    /// The spectrum of lines, each a wavelength in nm and a relative power; refused without power, or with a wavelength that is not
-    /// positive or a negative power.
+    /// The spectrum of lines, each a wavelength, nm, and a relative power; refused unless these are positive, and powers 0 or more.
     fn lines(lines: &[[f64; 2]]) -> Result<Self, Error> {
         let mut sum = 0.0;
         let mut sums = Vec::with_capacity(lines.len());
@@ -199,6 +198,13 @@ impl Wavelengths {
                 x0 + (x1 - x0) * linear_quantile(y0, y1, share)
             }
         }
+    }
+
+    /// Wavelengths, nm, of the lines that have power; `None` for a continuous spectrum.
+    pub(crate) fn lit_lines(&self) -> Option<Vec<f64>> {
+        let Kind::Lines(nm) = &self.kind else { return None };
+        let is_lit = |&i: &usize| self.sums[i] > i.checked_sub(1).map_or(0.0, |before| self.sums[before]);
+        Some((0..nm.len()).filter(is_lit).map(|i| nm[i]).collect())
     }
 
     /// Share of power per nm at a wavelength; zero beyond the table, and for lines, whose density is not a function.

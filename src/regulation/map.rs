@@ -4,8 +4,7 @@ use super::cell_axis::{CellAxis, Overlap};
 use super::few_rays::{LandedRays, MANY_REPLICATES, Noise, RaySample};
 use super::opening::{CellWeights, OpeningSum, Sensor};
 
-/// Cosine of the elevation that an opening's width is divided by at least: at the poles, where it would be endless, it is wider than
-/// any map and so leaves it.
+/// Cosine of the elevation that an opening's width is divided by at least, so that it stays finite at the poles.
 const LEAST_COSINE: f64 = 1e-3;
 
 /// Luminous intensities in cells over azimuth H and elevation V (type A angles: the polar axis is vertical).
@@ -292,7 +291,8 @@ impl IntensityMap {
     }
 }
 
-/// The azimuth that an angle to the side takes at an elevation, degrees: more towards the poles.
+/// The azimuth that a small angle to the side takes at an elevation, degrees: the angle over the cosine of the elevation, which is taken to
+/// be no less than [`LEAST_COSINE`].
 fn azimuth_deg(angle_deg: f64, v_deg: f64) -> f64 {
     angle_deg / v_deg.to_radians().cos().max(LEAST_COSINE)
 }

@@ -49,8 +49,9 @@ pub(super) fn channel_totals(all: &ReceiverFigures) -> String {
     format!(" ({})", told.join(", "))
 }
 
-/// Writes where the facets, not the number of rays, decide the answer: the figures on facets and on the true surfaces; empty where they do
-/// not.
+/// Writes a sentence in Markdown, a space behind it, on what the facets change: of figures whose difference from the true surfaces is
+/// beyond three of its standard errors and whose error from the facets is the larger one. Where a receiver has none, its map may be named
+/// instead. Empty where nothing is. `all` is in the order of `error.receivers`, `absorbed` in that of `results.absorbed`.
 pub(super) fn facet_limits(
     error: &GeometricError,
     results: &Results,
@@ -86,7 +87,8 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
             "light falls where none would".into()
         });
     }
-    if is_limit(&r.peak, f.max.as_ref()) {
+    // Where no light would fall there is no place to compare with.
+    if is_limit(&r.peak, f.max.as_ref()) && r.peak.spline > 0.0 {
         let share = 100.0 * (r.peak.facets / r.peak.spline - 1.0);
         parts.push(format!("its brightest place changes by {} %", figures(share, 2)));
     }
@@ -114,12 +116,13 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
 fn absorbed_sentence(error: &GeometricError, absorbed: &Absorbed, figure: &Figure) -> String {
     let measured = error.absorbed.iter().find(|e| e.index == absorbed.index);
     match measured.filter(|e| e.power.is_significant() && figure.limited_by == Limit::Geometry) {
-        Some(e) => format!(
+        Some(e) if e.power.spline > 0.0 => format!(
             "{} absorbs {} % other power in {}",
             spoken(&e.name),
             figures(100.0 * (e.power.facets / e.power.spline - 1.0), 2),
             e.r#in
         ),
+        Some(e) => format!("{} absorbs power in {} where it would none", spoken(&e.name), e.r#in),
         None => String::new(),
     }
 }

@@ -50,7 +50,8 @@ impl DiscCells {
     }
 }
 
-/// The first cell on the way inwards whose middle lies on the disc; steps go along the axis that brings it nearer to the middle.
+/// Returns the cell itself where its centre lies on the disc, else the first such cell inwards: each step goes along the axis on which the
+/// cell's centre lies farther from that of the disc. `count` is that of columns and rows.
 fn inner_cell(mut cell: [u32; 2], count: [u32; 2]) -> [u32; 2] {
     let middle = |k: usize, at: u32| (2.0 * f64::from(at) + 1.0) / f64::from(count[k]) - 1.0;
     loop {

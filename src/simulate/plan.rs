@@ -248,15 +248,10 @@ impl Plan {
             return Some((self.source_of(ray % size)?, replicate));
         }
         let source = self.source_of(ray)?;
-        let holds = |source: usize, replicate: u32| {
-            let [from, to] = self.range(source, replicate);
-            (from..to).contains(&ray)
-        };
         let share = &self.shares[source];
-        let guess = (u128::from(ray - share.first) * u128::from(self.replicates) / u128::from(share.rays)) as u32;
-        // Rounding puts the replicate next to the guess.
-        let mut near = guess.saturating_sub(1)..=guess.saturating_add(1).min(self.replicates - 1);
-        near.find(|&r| holds(source, r)).map(|r| (source, r))
+        // Ray x of R lies in the first of n replicates r with ⌊R(r + 1)/n⌋ > x: several before it may have no ray of the source.
+        let up_to_it = u128::from(ray - share.first + 1) * u128::from(self.replicates);
+        Some((source, (up_to_it.div_ceil(u128::from(share.rays)) - 1) as u32))
     }
 }
 
@@ -312,6 +307,40 @@ fn rays_of_sources(bound: &BoundScene, rays: u64, emitted: f64) -> Vec<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_ray_is_located_in_the_range_that_has_it_however_few_its_source_has() {
+        for replicates in [2, 3, 16, 62, 128] {
+            for rays in 1..=2 * u64::from(replicates) + 1 {
+                let share = |first| SourceShare { first, rays, quanta: QUANTA };
+                let plan = Plan {
+                    shares: vec![share(0), share(rays)],
+                    replicate_rays: None,
+                    first_replicate: 0,
+                    replicates,
+                    rays: 2 * rays,
+                    quantum: 1.0,
+                    average_ray: QUANTA,
+                    emitted: 1.0,
+                    record_mask: None,
+                    sample_mask: None,
+                    drawn_length: DRAWN_LENGTH,
+                };
+                let mut located = 0;
+                for replicate in 0..replicates {
+                    for (source, ray) in plan.rays_of_replicate(replicate) {
+                        assert_eq!(
+                            plan.locate(ray),
+                            Some((source, replicate)),
+                            "ray {ray} of {rays} in {replicates}"
+                        );
+                        located += 1;
+                    }
+                }
+                assert_eq!((located, plan.locate(2 * rays)), (2 * rays, None));
+            }
+        }
+    }
 
     #[test]
     fn the_heaviest_ray_and_the_squares_of_large_runs_fit_their_words() {

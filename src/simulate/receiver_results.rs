@@ -124,8 +124,8 @@ impl ChannelResult {
     }
 }
 
-/// How the figures of a receiver are told, by its shape.
-struct ShapeFigures {
+/// The units and extents in which the figures of a receiver are stated, by its shape.
+struct ShapeUnits {
     /// As [`ReceiverResult::kind`].
     kind: &'static str,
     /// Unit of the cells.
@@ -140,8 +140,9 @@ struct ShapeFigures {
     angles: Option<FarFieldType>,
 }
 
-impl ShapeFigures {
-    /// Those of a shape, for sources in this unit of power.
+impl ShapeUnits {
+    /// Returns those of a shape, for sources in this unit of power. `half` and `middle` are in mm for a plane and a disc, in degrees for a
+    /// sphere and a far field; absorbed power has half sides of 1.
     fn new(shape: &Shape, unit: PowerUnit) -> Self {
         let is_lumen = unit == PowerUnit::Lumen;
         let per_area = if is_lumen { "lx" } else { "W/m2" };
@@ -178,7 +179,7 @@ impl ReceiverResult {
         unit: PowerUnit,
     ) -> Self {
         let grid = r.cells.map(|n| n as usize);
-        let ShapeFigures { kind, unit, scale, half, middle, angles } = ShapeFigures::new(&r.shape, unit);
+        let ShapeUnits { kind, unit, scale, half, middle, angles } = ShapeUnits::new(&r.shape, unit);
         // Power of a cell to its mean density: per area, or per solid angle for a far field.
         let measure = |k: usize| r.measure(k % grid[0], k / grid[0]);
         let off: Vec<usize> = (0..r.cell_count()).filter(|&k| measure(k) == 0.0).collect();
@@ -259,7 +260,7 @@ impl ReceiverResult {
         even
     }
 
-    /// Returns the rings of cells at the poles of a map of planes C; none of others.
+    /// Returns the rings of cells at γ 0° and 180°, as far as the map reaches them; none where it is not one of planes C all around.
     pub(crate) fn pole_rings(&self) -> PoleRings {
         if self.angles != Some(FarFieldType::C) {
             return PoleRings::default();

@@ -171,6 +171,13 @@ fn rules_that_do_not_fit_the_model_are_refused_with_advice() {
             ),
             "has no index at 395 nm",
         ),
+        // Of a line's power nothing follows for the medium: that of a thousandth must have an index too.
+        (
+            format!(
+                "[[medium]]\nname = 'g'\nsellmeier = [[1.0, 0.25]]\n[[material]]\npart = '{part}'\nmedium = 'g'\n{REST}    spectrum = {{ values = [[600, 1], [500, 0.001], [700, 0.5]] }}\n"
+            ),
+            "has no index at 500 nm",
+        ),
     ] {
         let scene = Scene::parse(&text, "scene.toml", Path::new(".")).expect(&text);
         let e = scene.bind(&model).expect_err(&text);

@@ -89,6 +89,21 @@ fn sequences_add_up_to_their_receiver_and_change_nothing_else() {
     }
 }
 
+/// A ray belongs to a source and a replicate by its number alone, also where a source has a ray in few of the replicates.
+#[test]
+fn sequences_of_sources_of_a_ray_or_ten_add_up_too() {
+    let (world, text) = world();
+    let points: String =
+        (0..90).map(|k| format!("[[source]]\nkind = 'point'\nat = [{}, 20, 0]\n", k % 7)).collect();
+    let faint = "[[source]]\nkind = 'point'\nat = [0, -20, 0]\npower = 1e-6\n";
+    let text = text.replace("rays = 20000\nreplicates = 8", "rays = 1000") + &points + faint;
+    let results = world.run(&text, |_| ());
+    for (k, sum) in results.tallies.receivers.iter().enumerate() {
+        let parts = results.tallies.sequences.iter().filter(|(s, _)| s.receiver == k as u32);
+        assert_eq!(parts.map(|(_, p)| p.total).sum::<u128>(), sum.total, "{}", results.receivers[k].name);
+    }
+}
+
 #[test]
 fn parts_of_a_run_have_the_sequences_of_the_whole() {
     let (world, text) = world();

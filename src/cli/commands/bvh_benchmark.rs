@@ -102,7 +102,10 @@ pub(crate) fn run(
 /// A library of Embree and where it lies.
 type OpenEmbree<'p> = (&'p Path, Arc<EmbreeLibrary>);
 
-/// Opens a library of Embree by its path.
+/// Opens a library of Embree 4 by its path; its code then runs in this process.
+///
+/// # Errors
+/// As a wrong argument, with help, when it cannot be loaded, lacks a function, gives no device, or is not version 4.
 fn open_embree(path: &Path) -> Result<OpenEmbree<'_>, Failure> {
     Ok((path, EmbreeLibrary::open(path).map_err(unusable_embree)?))
 }

@@ -183,24 +183,44 @@ pub(super) fn cross_normal(du: Vector, dv: Vector, shortest: f64) -> Option<Vect
     (trusted && clear).then(|| n.normalize())
 }
 
-/// The limit of the unit normal at a singular point, taken towards the middle of the net; z for a net that has no normal. `rounding` is
-/// the error of the net's points, mm.
+/// The unit normal along `Su × Sv` near a singular point: at the first of [`LIMIT_STEPS`] towards the middle of the net, or else its low
+/// corner, whose derivatives can be trusted, else at the last; z for a net that has none. `u` and `v` are local; `rounding` is the error of
+/// the net's points, mm.
 pub(super) fn limit_normal(net: &[V4], degree: [u8; 2], [u, v]: [f64; 2], rounding: f64) -> Vector {
     let shortest = TRUSTED * rounding;
     let trusted = |du: Vector, dv: Vector| du.length_squared().min(dv.length_squared()) > shortest * shortest;
     // Where a derivative vanishes the normal is the limit, taken as near as derivatives can be trusted.
-    let toward_middle = |step: f64| {
-        let moved = [u, v].map(|x| x + step * (0.5 - x));
+    let normal_toward = |target: f64, step: f64| {
+        let moved = [u, v].map(|x| x + step * (target - x));
         let (_, du, dv) = project(&net::evaluate(net, degree, moved[0], moved[1]));
         let n = du.cross(dv);
         let clear = n.length() > PARALLEL * du.length() * dv.length();
         (clear.then(|| n.normalize()), trusted(du, dv))
     };
-    for step in LIMIT_STEPS {
-        if let (Some(normal), true) = toward_middle(step) {
+    // A cusp along a middle line is not left by going towards the middle.
+    let targets = [0.5, 0.0];
+    for (target, step) in targets.into_iter().flat_map(|target| LIMIT_STEPS.map(|step| (target, step))) {
+        if let (Some(normal), true) = normal_toward(target, step) {
             return normal;
         }
     }
     // The farthest, whatever its derivatives; a net that is a point or a line has no normal, and any does.
-    toward_middle(LIMIT_STEPS[LIMIT_STEPS.len() - 1]).0.unwrap_or(Vector::Z)
+    let farthest = LIMIT_STEPS[LIMIT_STEPS.len() - 1];
+    targets.into_iter().find_map(|target| normal_toward(target, farthest).0).unwrap_or(Vector::Z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cusp_along_a_middle_line_has_the_normal_of_the_surface_beside_it() {
+        // A cubic with its cusp in the middle, extruded along z: (0,0), (1,1), (0,1), (1,0) come to a point at (1/2, 3/4) along y.
+        let profile = [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0]];
+        let net: Vec<V4> = profile.iter().flat_map(|&[x, y]| [[x, y, 0.0, 1.0], [x, y, 1.0, 1.0]]).collect();
+        for v in [0.0, 0.3, 0.5] {
+            let normal = limit_normal(&net, [3, 1], [0.5, v], 1e-16);
+            assert!((normal.x.abs() - 1.0).abs() < 1e-3, "{v}: {normal}");
+        }
+    }
 }

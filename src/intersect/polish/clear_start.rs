@@ -20,7 +20,8 @@ pub(super) enum ClearStart {
 }
 
 impl ClearStart {
-    /// The starts of the expected rays that have no facet within `reach` mm behind them.
+    /// The starts of expected beams that are known to have no facet near: of a point none within `reach` mm on any side, of a collimated
+    /// beam none across its whole plane or within `reach` mm behind it. A beam that is left out may be clear too.
     pub(super) fn of_expected(expected: &ExpectedRays<'_>, mesh: &FacetMesh, reach: f64) -> Vec<Self> {
         expected.beams.iter().filter_map(|(beam, _)| Self::of_beam(beam, mesh, reach)).collect()
     }

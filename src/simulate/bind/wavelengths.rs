@@ -56,13 +56,14 @@ pub(super) fn source_ranges(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<[f6
         .collect()
 }
 
-/// Returns wavelengths, nm, in even steps of power over a whole spectrum, both ends included.
+/// Returns wavelengths, nm, that stand for a spectrum: all lines that have power, or some in even steps of power from end to end.
 fn probes(spectrum: &Wavelengths) -> Vec<f64> {
-    (0..=PROBES).map(|k| spectrum.sample(f64::from(k) / LAST_PROBE)).collect()
+    let even_steps = || (0..=PROBES).map(|k| spectrum.sample(f64::from(k) / LAST_PROBE)).collect();
+    spectrum.lit_lines().unwrap_or_else(even_steps)
 }
 
 /// Checks that every medium in use, the surroundings too, has an index from 0.1 to 10 at every wavelength of the sources; a continuous
-/// spectrum is asked at 65 places.
+/// spectrum is asked at 65 places, in even steps of power, and one that cannot be read is passed over.
 ///
 /// # Errors
 /// For the first wavelength and medium that fail, at the source.

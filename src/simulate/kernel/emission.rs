@@ -82,7 +82,8 @@ impl SourceQueue {
         }
     }
 
-    /// Turns to the next of the rays that are asked for by their numbers; `false` where none is left.
+    /// Turns to the next of the rays that are asked for by their numbers; `false` where none is left. After `true` the queue may still be
+    /// at its end: the run may not have that ray.
     #[cold]
     fn seek_next(&mut self, context: &Context<'_>) -> bool {
         let [ray, step, left] = self.spread;

@@ -93,12 +93,12 @@ impl Medium {
         if self.anisotropy.is_some() && self.scatter_per_mm.is_none() {
             return Err(("anisotropy", "`anisotropy` needs `scatter_per_mm`".into()));
         }
+        // Scattering without a stated preference has none: g = 0 is isotropic.
+        let g = self.anisotropy.unwrap_or(0.0);
+        if !(g > -1.0 && g < 1.0) {
+            return Err(("anisotropy", format!("an `anisotropy` of {g} is not above -1 and below 1")));
+        }
         if let Some(s) = self.scatter_per_mm.filter(|s| *s != 0.0) {
-            // Scattering without a stated preference has none: g = 0 is isotropic.
-            let g = self.anisotropy.unwrap_or(0.0);
-            if !(g > -1.0 && g < 1.0) {
-                return Err(("anisotropy", format!("an `anisotropy` of {g} is not above -1 and below 1")));
-            }
             medium.scatter = Some(BulkScatter::new(s, g).map_err(|e| ("scatter_per_mm", e.to_string()))?);
         }
         Ok(medium)
@@ -239,7 +239,8 @@ pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::
 }
 
 /// Refuses media without a name of their own, without exactly one index, with values that [`Medium::optics`] refuses, or with an index
-/// outside 0.1 to 10 at the run's wavelength.
+/// outside 0.1 to 10 at the run's wavelength. The glasses of catalogue files must have been read: without, their names are looked up in the
+/// built-in catalogue.
 pub(super) fn check(scene: &Scene) -> Result<(), Error> {
     for (i, m) in scene.media.iter().enumerate() {
         let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];

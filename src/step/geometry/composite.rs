@@ -174,7 +174,9 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         Ok(curves)
     }
 
-    /// Reads a composite curve as one spline, of the highest degree of its segments; at gaps each begins where the one before ends.
+    /// Reads a composite curve, mm, as one spline, of the highest degree of its segments. Segments are turned around as in
+    /// [`Self::segments`]; at gaps, however wide, each begins where the one before ends. Refuses a curve without segments, one with more
+    /// than [`MAX_SEGMENTS`], and chains of more than [`MAX_DEPTH`] references, of which `depth` are behind.
     pub(crate) fn composite_curve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         if depth > MAX_DEPTH {
             return Err(Refusal::new(e, "curves refer to each other too deeply"));

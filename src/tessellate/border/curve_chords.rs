@@ -127,9 +127,12 @@ impl Piece {
     /// empty for one chord. Some may still exceed it after [`MAX_SPREADS`] spreads.
     fn spread_within_tolerance(&self, at: &impl Fn(f64) -> Point) -> Vec<f64> {
         let total = self.chords[self.chords.len() - 1];
-        // Samples without length make the sum no number; one chord, and halving, is what is left then.
-        let mut n =
-            if total.is_finite() { (total - CHORD_ROUNDING).ceil().clamp(1.0, MAX_CHORDS as f64) } else { 1.0 };
+        // Samples without length make the sum no number, and those of a line that turns back without bending make it 0: one chord, and
+        // halving, is what is left then.
+        if !(total.is_finite() && total > 0.0) {
+            return Vec::new();
+        }
+        let mut n = (total - CHORD_ROUNDING).ceil().clamp(1.0, MAX_CHORDS as f64);
         let mut inner = self.even_parameters(n);
         // The samples' own chords miss a little of the curve: ask for more while the worst chord is too long.
         for _ in 0..MAX_SPREADS {
@@ -144,7 +147,8 @@ impl Piece {
         inner
     }
 
-    /// Returns the parameters between the `n` chords, a whole number of at least one, that share `chords` evenly; empty for one.
+    /// Returns the parameters that divide `chords`, whose sum is finite and above 0, evenly into `n`, a whole number of at least one; empty
+    /// for one.
     fn even_parameters(&self, n: f64) -> Vec<f64> {
         let (ts, sum) = (&self.samples, &self.chords);
         let steps = ts.len() - 1;
@@ -226,4 +230,19 @@ pub(super) fn bisect_all(t: &mut Vec<f64>) {
     }
     out.extend(t.last());
     *t = out;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_overshoots_its_end_and_turns_back_is_divided_at_numbers() {
+        // x = 4t(1 − t) + t², which ends at 1 and comes to 4/3 on its way: no curvature, and a middle that its chord misses.
+        let at = |t: f64| Point::new(4.0 * t * (1.0 - t) + t * t, 0.0, 0.0);
+        let parameters = chord_parameters(&[0.0, 1.0], at, |_, _| 0.2);
+        assert!(parameters.windows(2).all(|w| w[0] < w[1]), "{parameters:?}");
+        // By hand: the curve lies up to 1/3 beyond the one chord, and within the tolerance of two.
+        assert!(parameters.len() > 2 && parameters.iter().all(|t| (0.0..=1.0).contains(t)), "{parameters:?}");
+    }
 }

@@ -95,8 +95,9 @@ impl Matching<'_> {
         if i == t { j } else { i }
     }
 
-    /// Searches, from a triangle without a mate, a path to another one. Returns the last triangle but one, and the candidate that leads
-    /// from it to the end; `None` where there is none. Leaves the way in `via`.
+    /// Searches breadth first, from a triangle without a mate, a path of at most [`MAX_PATH`] made pairs to another one. Returns the last
+    /// triangle but one, and the candidate that leads from it to the end; `None` where none is found, though one across an odd ring may
+    /// exist. Leaves the way in `via`, which the next search overwrites.
     fn path_from(&mut self, start: usize) -> Option<(usize, usize)> {
         let mut queue = VecDeque::from([(start, 0)]);
         // A mark that no other search leaves, for each start searches once.

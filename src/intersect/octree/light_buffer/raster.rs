@@ -327,7 +327,9 @@ impl Rasterizer<'_> {
         }
     }
 
-    /// Writes the facets of the square at index `place`, or divides it where they are many; `depth` counts the divisions above.
+    /// Writes the facets of the square at index `place`, or divides it where they are more than [`MOST_ENTRIES`]; not after
+    /// [`MOST_DIVISIONS`], of which `depth` are above, nor beyond `room`. `list` holds the projections that the window may see, by index,
+    /// the nearest first.
     fn write_square(&mut self, list: Vec<u32>, window: &Window, place: usize, depth: u32) {
         let tile = &mut self.tile;
         if list.len() <= MOST_ENTRIES
