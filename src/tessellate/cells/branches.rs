@@ -109,13 +109,20 @@ mod tests {
     const SIDE: f64 = 100.0;
     const POINTS: usize = 12;
 
+    fn at(k: usize) -> f64 {
+        SIDE * k as f64 / (POINTS - 1) as f64
+    }
+
     /// A bicubic sheet, bent to a radius of 200 mm everywhere, with a spike of 60 mm near one corner.
     fn spiked_sheet() -> Surface {
-        let at = |k: usize| SIDE * k as f64 / (POINTS - 1) as f64;
-        let height = |i: usize, j: usize| {
+        sheet(|i, j| {
             let bent = (at(i).powi(2) + at(j).powi(2)) / 400.0;
             if [i, j] == [2, 2] { bent + 60.0 } else { bent }
-        };
+        })
+    }
+
+    /// A bicubic sheet of these heights, mm, at its control points, with knots one apart.
+    fn sheet(height: impl Fn(usize, usize) -> f64) -> Surface {
         let points = (0..POINTS * POINTS).map(|k| [k / POINTS, k % POINTS]);
         let points = points.map(|[i, j]| Homogeneous::new(at(i), at(j), height(i, j), 1.0)).collect();
         let spans = POINTS - 3;
@@ -123,11 +130,10 @@ mod tests {
         Surface { degree: [3, 3], knots: [knots.clone(), knots], points }
     }
 
-    /// Splits the sheet within a budget of cells; returns them and the steps of their proofs.
-    fn split_within(budget: usize) -> (Subdivision, u64) {
-        let sheet = spiked_sheet();
+    /// Splits a whole sheet within a budget of cells; returns them and the steps of their proofs.
+    fn split_within(sheet: &Surface, budget: usize) -> (Subdivision, u64) {
         let field = ToleranceField::new([0.005; 2], [1.0, 10.0], Default::default(), 1.0);
-        let surface = FaceSurface::new(&sheet, false, field);
+        let surface = FaceSurface::new(sheet, false, field);
         let [[u0, u1], [v0, v1]] = sheet.domain();
         let corners = [[u0, v0], [u1, v0], [u1, v1], [u0, v1]].map(Uv::from_array);
         let vertex =
@@ -142,11 +148,29 @@ mod tests {
     /// much as the first.
     #[test]
     fn only_branches_that_are_short_are_split_again() {
-        let (once, steps) = split_within(1_000_000);
-        let (again, of_both) = split_within(2 * once.len());
+        let sheet = spiked_sheet();
+        let (once, steps) = split_within(&sheet, 1_000_000);
+        let (again, of_both) = split_within(&sheet, 2 * once.len());
         let all = |s: &Subdivision| -> Vec<(Cell, f64)> { s.inside.iter().map(|c| (c.cell, c.bound)).collect() };
         assert_eq!((all(&again), &again.border), (all(&once), &once.border));
         assert!(!again.exhausted && !again.out_of_share);
         assert!(of_both > steps && of_both < steps + steps / 4, "{steps} {of_both}");
+    }
+
+    /// A wall of kilometres across a thousand-millionth of the sheet: no cell is thinner than what parameters tell apart, and the result
+    /// says that not all fit.
+    #[test]
+    fn cells_are_no_thinner_than_parameters_tell_apart() {
+        let mut wall = sheet(|i, j| if i < POINTS / 2 { 0.0 } else { 1e4 * (1.0 + at(j)) });
+        let middle = wall.knots[0].len() / 2;
+        let gap = 1e-9 * (POINTS - 3) as f64;
+        for (k, knot) in (middle - 2..middle + 2).enumerate() {
+            wall.knots[0][knot] = wall.knots[0][middle] + gap * (k as f64 - 2.0);
+        }
+        let (cells, _) = split_within(&wall, 10_000);
+        let [[u0, u1], _] = wall.domain();
+        let all = cells.inside.iter().map(|c| c.cell).chain(cells.border.iter().copied());
+        let thinnest = all.map(|cell| cell.hi.x - cell.lo.x).fold(f64::INFINITY, f64::min);
+        assert!(thinnest >= 1e-7 * (u1 - u0) && cells.exhausted, "{thinnest}");
     }
 }
