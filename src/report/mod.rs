@@ -21,6 +21,7 @@ mod even_poles;
 mod framing;
 mod html;
 mod lamp_figures;
+mod legend;
 mod level_labels;
 mod maps;
 mod number;

@@ -1,6 +1,7 @@
 //! Charts and views as plotly.js figures. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of decimal text.
 
 use super::chart::{AxisStyle, Chart, Content, Marks, PALETTE, Series, SeriesStyle, colours};
+use super::legend::legend_name;
 use super::level_labels::level_labels;
 use super::raster::{EYE, common_range};
 use super::view::{Shape, View};
@@ -99,9 +100,13 @@ pub(super) fn chart(chart: &Chart) -> Value {
                 "{} %{{x:.4g}} {}<br>{} %{{y:.4g}} {}<br><b>%{{z:.4g}} {}</b><extra></extra>",
                 a.label, a.unit, b.label, b.unit, grid.unit
             );
-            let heat = json!({"type": "heatmap", "z": z, "x0": a.center(0), "dx": a.step(), "y0": b.center(0),
+            let mut heat = json!({"type": "heatmap", "z": z, "x0": a.center(0), "dx": a.step(), "y0": b.center(0),
                 "dy": b.step(), "colorscale": colour_scale(*map), "hovertemplate": hover,
                 "colorbar": {"title": {"text": grid.unit, "side": "right"}, "thickness": 14, "outlinewidth": 0}});
+            // Where no light arrived plotly would centre its scale on 0 and show the colour of half the peak.
+            if grid.values.iter().all(|&v| v == 0.0) {
+                (heat["zmin"], heat["zmax"]) = (json!(0), json!(1));
+            }
             let spans = [a.range[1] - a.range[0], b.range[1] - b.range[0]];
             let ratio = spans[0] / spans[1];
             // Degrees against degrees and mm against mm look as they are, unless that makes a thin stripe.
@@ -281,7 +286,7 @@ pub(super) fn view(view: &View) -> Value {
 fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
     match shape {
         Shape::Surface { name, points, triangles, colour, opacity, values, labels } => {
-            let mut mesh = json!({"type": "mesh3d", "name": plain(name), "showlegend": values.is_none(),
+            let mut mesh = json!({"type": "mesh3d", "name": plain(&legend_name(name)), "showlegend": values.is_none(),
                 "x": singles(points.iter().map(|p| p[0])), "y": singles(points.iter().map(|p| p[1])),
                 "z": singles(points.iter().map(|p| p[2])), "i": indices(triangles.iter().map(|t| t[0])),
                 "j": indices(triangles.iter().map(|t| t[1])), "k": indices(triangles.iter().map(|t| t[2])),
@@ -314,13 +319,13 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
             // A NaN lifts the pen between two lines.
             let along =
                 |k: usize| singles(lines.iter().flat_map(move |l| l.iter().map(move |p| p[k]).chain([f32::NAN])));
-            json!({"type": "scatter3d", "mode": "lines", "name": plain(name), "hoverinfo": "name", "connectgaps": false,
+            json!({"type": "scatter3d", "mode": "lines", "name": plain(&legend_name(name)), "hoverinfo": "name", "connectgaps": false,
                 "x": along(0), "y": along(1), "z": along(2), "opacity": 0.8,
                 "line": {"color": css(*colour), "width": width}})
         }
         Shape::Points { name, points, colour } => {
             let along = |k: usize| singles(points.iter().map(move |p| p[k]));
-            json!({"type": "scatter3d", "mode": "markers", "name": plain(name), "hoverinfo": "name",
+            json!({"type": "scatter3d", "mode": "markers", "name": plain(&legend_name(name)), "hoverinfo": "name",
                 "x": along(0), "y": along(1), "z": along(2), "marker": {"size": 4, "color": css(*colour)}})
         }
     }

@@ -228,6 +228,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "number",
             "contour",
             "chart",
+            "legend",
             "level_labels",
             "even_poles",
             "maps",

@@ -15,6 +15,9 @@ use std::path::{Path, PathBuf};
 /// Longest line of the closing paragraph, characters.
 const LINE_LENGTH: usize = 96;
 
+/// Most columns that paths are padded to.
+const PATH_COLUMNS: usize = LINE_LENGTH / 2;
+
 /// Name of the list of lost rays in a folder of results.
 pub(crate) const LEDGER: &str = "lost_rays.csv";
 
@@ -60,7 +63,9 @@ fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: 
     if !with_page {
         files.remove(0);
     }
-    let widest = files.iter().map(|(p, _)| p.display().to_string().chars().count()).fold(0, usize::max);
+    let lengths = files.iter().map(|(p, _)| p.display().to_string().chars().count());
+    // A long path reaches beyond the column instead of pushing all descriptions out of the window.
+    let widest = lengths.filter(|&length| length <= PATH_COLUMNS).fold(0, usize::max);
     for (k, (path, what)) in files.iter().enumerate() {
         let name = format!("{:<widest$}", path.display().to_string());
         let name = if k == 0 { console.bold(&name) } else { name };
