@@ -19,7 +19,8 @@ static SCRIPT: &[u8] = include_bytes!("plotly-3.0.1.min.js.gz");
 pub(super) fn script() -> String {
     let mut script = String::new();
     flate2::read::GzDecoder::new(SCRIPT).read_to_string(&mut script).expect("the script in the program is whole");
-    script
+    // Strings of it hold signatures of picture formats: control characters, which the escapes stand for as well.
+    script.replace('\u{1a}', r"\x1a").replace('\u{1}', r"\x01")
 }
 
 /// Packs numbers as plotly's typed array of single precision.
@@ -345,7 +346,6 @@ fn merge(into: &mut Value, from: Value) {
 mod tests {
     use super::*;
 
-    /// As a browser shows it: the first row that plotly gets stands at the lower end of the axis.
     /// A plate of 106 × 106 × 1.5 mm had a box 4.1 wide, of which the middle filled the picture.
     #[test]
     fn the_box_of_a_view_has_the_diagonal_of_a_cube_and_one_scale() {
@@ -372,6 +372,7 @@ mod tests {
         }
     }
 
+    /// As a browser shows it: the first row that plotly gets stands at the lower end of the axis.
     #[test]
     fn pictures_begin_at_the_bottom() {
         let picture = Picture { width: 1, height: 2, rgb: vec![1, 2, 3, 4, 5, 6] };
@@ -384,7 +385,8 @@ mod tests {
     #[test]
     fn the_script_is_whole_and_can_stand_in_a_page() {
         let script = script();
-        assert_eq!(script.len(), 4_653_932);
+        assert_eq!(script.len(), 4_653_932 + 2 * 3);
+        assert!(script.chars().all(|c| !c.is_control() || matches!(c, '\n' | '\r' | '\t')));
         assert!(script.contains("plotly.js v3.0.1") && !script.contains("</script"));
     }
 }
