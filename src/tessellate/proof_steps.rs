@@ -28,7 +28,7 @@ impl ProofSteps {
 
     /// Returns the steps taken so far.
     #[cfg(test)]
-    pub(super) fn taken(&self) -> u64 {
+    pub(super) fn count(&self) -> u64 {
         self.taken.load(Ordering::Relaxed)
     }
 }

@@ -141,7 +141,7 @@ mod tests {
         let own = corners.iter().map(|uv| sheet.evaluate(*uv)).collect();
         let border = BorderPolygons { polygons: vec![corners.into_iter().enumerate().map(vertex).collect()], own };
         let cells = split(&surface, Acceptance::Proved, &border, &[], budget, None);
-        (cells, surface.steps.taken())
+        (cells, surface.steps.count())
     }
 
     /// A branch that needs more than its share is split again, and the others are left as they are: where all were, the second try took as

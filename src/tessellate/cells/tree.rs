@@ -122,7 +122,7 @@ impl Halves {
 }
 
 impl<'s, 'a> Tree<'s, 'a> {
-    /// Prepares the box around a border, and returns it with its segments' indices. `None` on a plane and for a border without extent.
+    /// Prepares the box around a border to be split, and returns that cell too. `None` on a plane and for a border without extent.
     pub(super) fn new(
         surface: &'s FaceSurface<'a>,
         acceptance: Acceptance,
