@@ -36,6 +36,7 @@ mod studies;
 mod table;
 mod verdicts;
 mod view;
+mod view_triangles;
 mod write;
 
 pub use crate::formats::file_stem;

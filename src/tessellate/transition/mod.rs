@@ -2,8 +2,9 @@
 //! quads.
 
 pub(in crate::tessellate) mod creases;
-pub(in crate::tessellate) mod delaunay;
+mod delaunay;
 mod matching;
 pub(in crate::tessellate) mod pairing;
 mod refinement;
 mod sides;
+pub(in crate::tessellate) mod triangulate;

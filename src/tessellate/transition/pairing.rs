@@ -1,8 +1,8 @@
 //! Joins pairs of triangles to quads: a facet is two triangles anyway, so the pairs cost nothing and halve the count.
 
 use super::creases::runs_along_crease;
-use super::delaunay::Transition;
 use super::matching::{Candidate, TriangleCandidates, augment};
+use super::triangulate::Transition;
 use crate::math::Uv;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::{Node, Nodes, Position, ProvedFacet, edge_key};

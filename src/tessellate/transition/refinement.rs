@@ -1,6 +1,6 @@
 //! Where the transition's triangles are divided further.
 
-use super::delaunay::Refinement;
+use super::delaunay::DelaunayMesh;
 use crate::math::Uv;
 use crate::tessellate::nodes::{ProvedFacet, edge_key};
 use crate::tessellate::proof::border_chord::BorderChords;
@@ -21,7 +21,7 @@ struct Wish {
     places: [Uv; 2],
 }
 
-impl Refinement<'_, '_> {
+impl DelaunayMesh<'_, '_> {
     /// Returns the index of the side (from corner k to k + 1) for which a triangle is divided even where it is near enough to the surface;
     /// `None` without one.
     pub(super) fn side_to_divide(&self, t: [u32; 3]) -> Option<usize> {

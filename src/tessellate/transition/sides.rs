@@ -1,6 +1,6 @@
 //! Which triangles of the transition lie inside what the border bounds: of all once, then of those that refinement made.
 
-use super::delaunay::{Refinement, Vertex};
+use super::delaunay::{DelaunayMesh, Vertex};
 use crate::tessellate::border::enclosure::Enclosure;
 use crate::tessellate::nodes::edge_key;
 use spade::Triangulation;
@@ -28,7 +28,7 @@ pub(super) struct Sides {
 
 impl Sides {
     /// Asks all faces: by crossings of the border from outside, or by their centres within `by_centre` where constraints are missing.
-    pub(super) fn new(mesh: &Refinement<'_, '_>, by_centre: Option<Enclosure>) -> Self {
+    pub(super) fn new(mesh: &DelaunayMesh<'_, '_>, by_centre: Option<Enclosure>) -> Self {
         let cdt = &mesh.cdt;
         let inside = vec![None; cdt.num_all_faces()];
         let mut sides = Self { by_centre, inside, vertices: cdt.num_vertices(), asked: 0 };
@@ -43,7 +43,7 @@ impl Sides {
     }
 
     /// Asks the faces that have come since. Each has a corner that has come too: a vertex that is inserted changes no others.
-    pub(super) fn update(&mut self, mesh: &Refinement<'_, '_>) {
+    pub(super) fn update(&mut self, mesh: &DelaunayMesh<'_, '_>) {
         let cdt = &mesh.cdt;
         self.inside.resize(cdt.num_all_faces(), None);
         let new = (self.vertices..cdt.num_vertices()).map(FixedVertexHandle::from_index);
@@ -66,20 +66,20 @@ impl Sides {
     }
 
     /// Returns the nodes of the faces inside, in the order of the faces.
-    pub(super) fn inner_triangles(&self, mesh: &Refinement<'_, '_>) -> Vec<[u32; 3]> {
+    pub(super) fn inner_triangles(&self, mesh: &DelaunayMesh<'_, '_>) -> Vec<[u32; 3]> {
         let inner = mesh.cdt.inner_faces().filter(|f| self.inside[f.index()] == Some(true));
         inner.map(nodes_of_face).collect()
     }
 
     /// Asks whether the centre of a face lies inside.
-    fn ask_centre(&mut self, mesh: &Refinement<'_, '_>, face: InnerFace<'_>) {
+    fn ask_centre(&mut self, mesh: &DelaunayMesh<'_, '_>, face: InnerFace<'_>) {
         let [a, b, c] = nodes_of_face(face).map(|n| mesh.nodes[n].uv);
         self.inside[face.index()] = self.by_centre.as_ref().map(|border| border.encloses((a + b + c) / 3.0));
         self.asked += 1;
     }
 
     /// Asks all faces that can be reached from known ones, breadth first; each crossing of the border turns the answer.
-    fn walk(&mut self, mesh: &Refinement<'_, '_>, mut queue: VecDeque<FixedFaceHandle<PossiblyOuterTag>>) {
+    fn walk(&mut self, mesh: &DelaunayMesh<'_, '_>, mut queue: VecDeque<FixedFaceHandle<PossiblyOuterTag>>) {
         let cdt = &mesh.cdt;
         while let Some(face) = queue.pop_front() {
             let inside = self.inside[face.index()] == Some(true);
@@ -149,7 +149,7 @@ mod tests {
                 }
             }
             lines.extend(segments.iter().map(|s| s.map(|n| nodes[n].uv)));
-            let mut mesh = Refinement::new(&surface, nodes, Uv::ONE, &NO_CHORDS);
+            let mut mesh = DelaunayMesh::new(&surface, nodes, Uv::ONE, &NO_CHORDS);
             mesh.insert_nodes(&segments, &[]).expect("parameters of a tube");
             assert_eq!(mesh.constrain_border(&segments), [Vec::<[u32; 2]>::new(), Vec::new()]);
             let by_centre = || centres.then(|| Enclosure::new(lines.clone()));
