@@ -89,13 +89,16 @@ class Scene:
         return self._tables
 
     def add_model(self, model: Path | Model, **keys: Any) -> Scene:
-        """Puts a STEP file, or a model that was read, into the scene; ``keys`` are those of ``[[model]]``, such as ``placement``."""
+        """Puts a STEP file, or a model that was read, into the scene; ``keys`` are those of ``[[model]]``, such as ``placement``, or
+        ``without=[lampyris.select(part="helper*")]`` for what is left out."""
         if isinstance(model, Model):
             self._models.append(model)
             keys = {"unit_mm": model.unit_mm, **keys}
             model = model.path
         elif not isinstance(model, (str, bytes, os.PathLike)):
             raise TypeError(f"a model is needed, as a path or lampyris.read_step(path), not {type(model).__name__}")
+        if "without" in keys:
+            keys = {**keys, "without": [s.table if isinstance(s, Selector) else s for s in keys["without"]]}
         self.tables.setdefault("model", []).append(plain({"file": os.path.abspath(file_path(model, "model")), **keys}))
         return self
 

@@ -54,6 +54,17 @@ def test_the_scene_that_was_saved_is_the_scene(tmp_path: pathlib.Path) -> None:
     assert dataset["value"].attrs["units"] == "cd" and dataset["H"].attrs["units"] == "deg"
 
 
+def test_parts_are_left_out_of_a_model(tmp_path: pathlib.Path) -> None:
+    digests = {}
+    for name, without in (("none", []), ("table", [{"part": "led"}]), ("selector", [lp.select(part="led")])):
+        scene = lp.Scene().add_model(LAMP, without=without)
+        scene.add(lp.collimated(at=(0, 0, 120), direction=(0, 0, -1), radius=140))
+        scene.save(tmp_path / "scene.toml")
+        assert ("led" in (tmp_path / "scene.toml").read_text()) == bool(without)
+        digests[name] = scene.trace(rays=2000, tolerance=0.5, progress=False).digest
+    assert digests["table"] == digests["selector"] != digests["none"]
+
+
 def test_rays_of_an_array_are_a_source() -> None:
     n = 5000
     random = np.random.default_rng(5)

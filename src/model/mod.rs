@@ -17,6 +17,7 @@ mod near_parts;
 mod outline;
 mod part;
 mod placed;
+mod removal;
 mod tight_box;
 
 pub use account::{FaceAccount, PartAccount, SolidAccount};

@@ -103,13 +103,14 @@ impl Model {
         labels
     }
 
-    /// Returns for each part what to call each of its instances: [`Model::labels`] by parts.
+    /// Returns for each part with faces, the parts of [`Model::account`], what to call each of its instances: [`Model::labels`] by parts.
     pub fn labels_of_parts(&self) -> Vec<Vec<String>> {
         let mut places = vec![Vec::new(); self.parts.len()];
         for (instance, label) in self.instances.iter().zip(self.labels()) {
             places[instance.part.0 as usize].push(label);
         }
-        places
+        let with_faces = self.parts.iter().zip(places).filter(|(part, _)| part.face_count() > 0);
+        with_faces.map(|(_, places)| places).collect()
     }
 
     /// What to call an instance, by its index, whatever others are called.

@@ -3,14 +3,14 @@
 use super::error::Error;
 use super::monitor::{Monitor, Stage, in_stage};
 use crate::model::Model;
-use crate::simulate::Scene;
 use crate::simulate::scene::ModelUse;
+use crate::simulate::{LeftOut, Scene};
 use crate::step::{self, Import, ImportReport};
 use std::path::Path;
 use std::time::Instant;
 
 /// A model with the accounts of the files it was read from.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct LoadedModel {
     /// All models of the scene in one.
     pub model: Model,
@@ -18,6 +18,8 @@ pub struct LoadedModel {
     pub reports: Vec<ImportReport>,
     /// Seconds that reading took.
     pub seconds: f64,
+    /// What the scene leaves out of the files.
+    pub left_out: Vec<LeftOut>,
 }
 
 impl LoadedModel {
@@ -57,8 +59,12 @@ pub fn read_models(scene: &Scene, read: impl Fn(&ModelUse) -> Result<Import, Err
         models.push(import.model);
         reports.push(import.report);
     }
+    let mut left_out = Vec::new();
+    for (i, model) in models.iter().enumerate() {
+        left_out.extend(scene.left_out(i, model)?);
+    }
     let model = scene.assemble(models)?;
-    Ok(LoadedModel { model, reports, seconds: start.elapsed().as_secs_f64() })
+    Ok(LoadedModel { model, reports, seconds: start.elapsed().as_secs_f64(), left_out })
 }
 
 /// Reads the models that a scene names, from its folder.

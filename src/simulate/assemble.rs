@@ -1,5 +1,6 @@
 //! Several models in one.
 
+use super::bind::LeftOut;
 use super::scene::{Key, ModelUse, Placement, Scene};
 use super::{Error, ErrorKind};
 use crate::math::{Frame, Point, Vector};
@@ -16,13 +17,15 @@ impl Placement {
 }
 
 impl Scene {
-    /// Makes one model of the scene's models, given in the order of its `[[model]]` entries, each at its placement.
+    /// Makes one model of the scene's models, given in the order of its `[[model]]` entries, each at its placement and without the faces
+    /// that its entry leaves out ([`Scene::left_out`]).
     ///
-    /// Entries with the same file, unit and scale share parts: those of the later model are dropped if their names and numbers of faces
-    /// are those of the first. Instances of an entry with a name are called `entry/instance`.
+    /// Entries with the same file, unit, scale and left-out faces share parts: those of the later model are dropped if their names and
+    /// numbers of faces are those of the first. Instances of an entry with a name are called `entry/instance`.
     ///
     /// # Errors
-    /// Where there are more or fewer models than entries, or a scale is not positive and finite.
+    /// Where there are more or fewer models than entries, a scale is not positive and finite, or a selector of what is left out means no
+    /// face.
     pub fn assemble(&self, models: Vec<Model>) -> Result<Model, Error> {
         if models.len() != self.models.len() {
             let message = format!("{} models for {} [[model]] entries", models.len(), self.models.len());
@@ -36,9 +39,12 @@ impl Scene {
                 let at = [Key::Name("model"), Key::Index(i), Key::Name("placement")];
                 return Err(self.error(ErrorKind::Value, &at, "`scale` must be positive"));
             }
+            let left_out = self.left_out(i, &model)?;
+            remove_left_out(&mut model, &left_out);
             // What stands in several places is one part with several instances: meshed once.
             let same = |e: &ModelUse| {
-                (&e.file, e.unit_mm, e.placement.scale) == (&entry.file, entry.unit_mm, entry.placement.scale)
+                (&e.file, e.unit_mm, e.placement.scale, &e.without)
+                    == (&entry.file, entry.unit_mm, entry.placement.scale, &entry.without)
             };
             let alike = self.models[..i].iter().position(same).map(|k| firsts[k]);
             let like = |(a, b): (&Part, &Part)| (&a.name, a.face_count()) == (&b.name, b.face_count());
@@ -69,6 +75,16 @@ impl Scene {
         }
         Ok(whole)
     }
+}
+
+/// Removes from a model the faces that its entry leaves out.
+fn remove_left_out(model: &mut Model, left_out: &[LeftOut]) {
+    if left_out.is_empty() {
+        return;
+    }
+    let mut is_gone = vec![false; model.placed_face_count()];
+    left_out.iter().flat_map(|entry| &entry.faces).for_each(|face| is_gone[*face as usize] = true);
+    model.remove_faces(&is_gone);
 }
 
 #[cfg(test)]

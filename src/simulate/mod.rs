@@ -59,7 +59,7 @@ mod trim_loops;
 mod verify;
 
 pub use arrivals::arrivals;
-pub use bind::{BoundScene, RuleFaces, face_selectors};
+pub use bind::{BoundScene, LeftOut, RuleFaces, face_selectors};
 pub use dispatch::kernel_name;
 pub use effects::{Because, Required};
 pub use error::{Error, ErrorKind};

@@ -11,6 +11,7 @@ mod files;
 mod growing;
 mod headlamp;
 mod info;
+mod left_out;
 mod mishaps;
 mod names;
 mod newcomer;

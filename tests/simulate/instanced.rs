@@ -32,7 +32,7 @@ fn repeated(mut model: Model, count: usize, pitch: f64) -> Model {
 
 fn prepared(model: &Model, text: &str, intersector: IntersectorKind, normals: NormalMode) -> PreparedScene {
     let scene = Scene::parse(text, "array.toml", Path::new(".")).unwrap();
-    let loaded = LoadedModel { model: model.clone(), reports: Vec::new(), seconds: 0.0 };
+    let loaded = LoadedModel { model: model.clone(), ..LoadedModel::default() };
     let tracing = TracingSettings {
         intersector: Some(intersector),
         normals: Some(normals),
@@ -213,7 +213,7 @@ fn a_pilot_chooses_for_what_is_placed_often() {
         let mut model = repeated(lens.clone(), 8, 45.0);
         model.instances.truncate(8 * columns + 7);
         let scene = Scene::parse(&text, "array.toml", Path::new(".")).unwrap();
-        let loaded = LoadedModel { model, reports: Vec::new(), seconds: 0.0 };
+        let loaded = LoadedModel { model, ..LoadedModel::default() };
         PreparedScene::new(SceneJob::new(scene, loaded), &Silent).unwrap()
     });
     assert!(apart.facets.instancing.is_none() && grouped.facets.instancing.is_some());

@@ -96,7 +96,7 @@ fn a_dark_test_point_is_judged_by_what_one_ray_adds() {
         [[receiver]]\nname = 'road'\nkind = 'far_field'\nnormal = [0, 0, 1]\nh_deg = [-12, 12]\nv_deg = [-6, 6]\n\
         cells = [240, 120]\n[[regulation]]\nid = 'UN R112 B passing'\nas_placed = true\n";
     let scene = Scene::parse(text, "dark.toml", Path::new(".")).unwrap();
-    let loaded = LoadedModel { model: Model::default(), reports: Vec::new(), seconds: 0.0 };
+    let loaded = LoadedModel { model: Model::default(), ..LoadedModel::default() };
     let prepared = PreparedScene::new(SceneJob::new(scene, loaded), &Silent).unwrap();
     let run = prepared.trace(TraceRequest::default(), &Silent).unwrap();
     let verdicts = run.verdicts(&prepared).unwrap();

@@ -51,7 +51,7 @@ fn with_ball() -> World {
 fn run(model: Model, text: &str, intersector: Option<IntersectorKind>) -> (PreparedScene, SceneResults) {
     let scene = Scene::parse(text, "mesh.toml", Path::new(".")).unwrap();
     let tracing = TracingSettings { intersector, threads: Some(2), ..TracingSettings::default() };
-    let loaded = LoadedModel { model, reports: Vec::new(), seconds: 0.0 };
+    let loaded = LoadedModel { model, ..LoadedModel::default() };
     let prepared = PreparedScene::new(SceneJob { tracing, ..SceneJob::new(scene, loaded) }, &Silent).unwrap();
     let traced = prepared.trace(TraceRequest::default(), &Silent).unwrap();
     (prepared, traced)

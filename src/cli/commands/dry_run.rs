@@ -4,8 +4,9 @@ use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
-use crate::cli::output::rule_table::{rule_document, rule_table};
+use crate::cli::output::rule_table::{left_out_document, left_out_table, rule_document, rule_table};
 use crate::cli::output::terminal_tables::table_text;
+use crate::model::Part;
 use crate::pipeline::PreparedScene;
 use crate::report::{bytes, grouped, seconds};
 use serde_json::json;
@@ -16,13 +17,13 @@ pub(super) fn run(prepared: &PreparedScene, folder: &Path, console: &Console) ->
     let settings = prepared.run_settings();
     let facets = &prepared.facets;
     let loaded = &prepared.job.loaded;
-    let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
+    let faces: usize = loaded.model.parts.iter().map(Part::face_count).sum();
     let effects = crate::simulate::Required::new(&prepared.bound);
     if console.json {
         let document = json!({"dry_run": true, "chosen": prepared.chosen, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
             "faces": faces, "facets": facets.facet_count(), "mesh_bytes": facets.bytes(),
             "intersector": prepared.choice.intersector.to_string(), "normals": prepared.choice.normals.to_string(),
-            "rules": rule_document(&prepared.bound, &loaded.model),
+            "rules": rule_document(&prepared.bound, &loaded.model), "left_out": left_out_document(&loaded.left_out),
             "effects": {"simulated": effects.simulated, "not_simulated": effects.not_simulated},
             "seconds": {"read": loaded.seconds, "tessellate": prepared.tessellation_seconds}});
         print(&json_text(&document)?)?;
@@ -44,6 +45,9 @@ pub(super) fn run(prepared: &PreparedScene, folder: &Path, console: &Console) ->
     ))?;
     for because in &effects.simulated {
         print(&format!("simulated: {:?}, because {}\n", because.effect, because.because))?;
+    }
+    if let Some(table) = left_out_table(&loaded.left_out) {
+        print(&table_text(&table, console.width()))?;
     }
     if !prepared.bound.rules().is_empty() {
         print(&table_text(&rule_table(&prepared.bound, &loaded.model), console.width()))?;

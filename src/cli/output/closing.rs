@@ -3,6 +3,7 @@
 use super::face_tables::print_faces;
 use super::json::json_text;
 use super::sequence_tables::print_sequences;
+use super::terminal_tables::wrapped_lines;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::formats::printable_line;
@@ -107,21 +108,4 @@ pub(crate) fn target_sentence(result: &TargetResult) -> String {
         result.receiver,
         grouped(result.rays)
     )
-}
-
-/// Breaks a text into lines of at most `width` characters; a longer word has a line to itself. An empty text is one empty line.
-fn wrapped_lines(text: &str, width: usize) -> Vec<String> {
-    let mut lines: Vec<String> = vec![String::new()];
-    for word in text.split_whitespace() {
-        let line = lines.last_mut().map(|l| (l.chars().count(), l));
-        match line {
-            Some((0, line)) => line.push_str(word),
-            Some((n, line)) if n + 1 + word.chars().count() <= width => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
 }

@@ -3,11 +3,14 @@
 use crate::model::{Model, PlacedFace};
 use crate::report::Table;
 use crate::simulate::scene::FaceSelector;
-use crate::simulate::{BoundScene, face_selectors};
+use crate::simulate::{BoundScene, LeftOut, face_selectors};
 use serde_json::{Value, json};
 
 /// Faces of a rule that are named; `info --faces` lists all.
 const NAMED_FACES: usize = 3;
+
+/// Instances of a selector that are named where it leaves them out.
+const NAMED_INSTANCES: usize = 12;
 
 /// Most faces of a model whose selectors stand in a page: a megabyte of them.
 const MOST_LABELLED: usize = 20_000;
@@ -49,6 +52,27 @@ pub(crate) fn rule_table(bound: &BoundScene, model: &Model) -> Table {
         ]);
     }
     table
+}
+
+/// Returns what the scene leaves out of its models as a table: a row for each selector; `None` where it leaves out nothing.
+pub(crate) fn left_out_table(left_out: &[LeftOut]) -> Option<Table> {
+    let columns = [("[[model]]", ""), ("selects", ""), ("faces", ""), ("of", "")];
+    let caption = "Faces of the files that are no part of the scene: `without` of their [[model]] leaves them out.";
+    let mut table = Table::new("left_out", "Left out", &columns).caption(caption);
+    for entry in left_out {
+        let named = &entry.instances[..entry.instances.len().min(NAMED_INSTANCES)];
+        let more = entry.instances.len() - named.len();
+        let of = named.join(", ");
+        let of = if more > 0 { format!("{of} and {more} more") } else { of };
+        table.row([entry.model.into(), entry.selects.as_str().into(), entry.faces.len().into(), of.into()]);
+    }
+    (!left_out.is_empty()).then_some(table)
+}
+
+/// Returns what the scene leaves out as JSON, with the same rows as [`left_out_table`].
+pub(crate) fn left_out_document(left_out: &[LeftOut]) -> Value {
+    let row = |entry: &LeftOut| json!({"model": entry.model, "selects": entry.selects, "faces": entry.faces.len(), "instances": entry.instances});
+    left_out.iter().map(row).collect()
 }
 
 /// Returns the rules of a scene as JSON, with the same rows as [`rule_table`].

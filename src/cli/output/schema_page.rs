@@ -70,7 +70,8 @@ pub(crate) fn schema_page(schema: &Value) -> String {
         let heading = if property["type"] == "array" { format!("[[{key}]]") } else { format!("[{key}]") };
         let Some(table) = definition(schema, property) else { continue };
         page += &table_section(schema, &heading, table);
-        for (key, property) in table_keys(table).into_iter().flatten() {
+        // A list of tables is explained where a single one is.
+        for (key, property) in table_keys(table).into_iter().flatten().filter(|(_, p)| p["type"] != "array") {
             let found = definition(schema, property).filter(|d| table_keys(d).is_some());
             // A table that several others hold is explained once.
             if let Some(found) = found.filter(|d| inner.iter().all(|(_, known)| known != d)) {

@@ -39,7 +39,7 @@ pub(crate) fn model_file(path: &Path, placed: PlacedLimit, console: &Console) ->
         let failure = Failure::input(format!("{}: the file holds no face that can be traced", path.display()));
         return Err(failure.with_help("run `lampyris info` on it to see what it holds and what was refused"));
     }
-    Ok(LoadedModel { model, reports: vec![report], seconds: start.elapsed().as_secs_f64() })
+    Ok(LoadedModel { model, reports: vec![report], seconds: start.elapsed().as_secs_f64(), left_out: Vec::new() })
 }
 
 /// Reads a scene with its models when the name ends in `.toml`, and a STEP file otherwise; the limit holds for the latter alone.

@@ -193,6 +193,10 @@ pub(crate) fn write(
     if let Some(target) = &remarks.target {
         document["until_error"] = json_value(target)?;
     }
+    let left_out = &prepared.job.loaded.left_out;
+    if !left_out.is_empty() {
+        document["left_out"] = rule_table::left_out_document(left_out);
+    }
     if has_lost_rays {
         document["ledger"] = LEDGER.into();
     }
@@ -252,6 +256,7 @@ fn report_page<'a>(
         tables: [
             (!prepared.bound.rules().is_empty())
                 .then(|| rule_table::rule_table(&prepared.bound, &prepared.job.loaded.model)),
+            rule_table::left_out_table(&prepared.job.loaded.left_out),
             Some(model_table(prepared)),
             Some(facet_table(prepared)),
         ]

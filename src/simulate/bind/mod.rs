@@ -9,6 +9,7 @@ mod contacts;
 mod face_selectors;
 mod flush_receivers;
 mod frames;
+mod left_out;
 mod luminous;
 mod materials;
 mod nearest;
@@ -29,6 +30,7 @@ use crate::model::Model;
 pub use bound_scene::{BoundScene, RuleFaces};
 use chosen::ChosenRules;
 pub use face_selectors::face_selectors;
+pub use left_out::LeftOut;
 
 /// What the box of a scene is grown by, as a share of its diagonal: room for what facets and rounding put outside the splines' boxes.
 const REGION_MARGIN: f64 = 1e-3;

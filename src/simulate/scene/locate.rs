@@ -39,7 +39,7 @@ fn unsupported_effect(word: &str) -> Option<&'static str> {
 }
 
 /// What to write where a list belongs.
-const LISTS: [(&str, &str); 9] = [
+const LISTS: [(&str, &str); 10] = [
     (
         "coating",
         "`coating` takes rows [angle_deg, nm, R, T], as in coating = [[0, 550, 0.1, 0.9], [90, 550, 1, 0]]; for the same shares \
@@ -53,6 +53,7 @@ const LISTS: [(&str, &str); 9] = [
     ("abg", "write A, B and g, as in abg = [0.01, 0.001, 2]"),
     ("metal", "write n and k, as in metal = [1.2, 7.0]"),
     ("tolerance_mm", "write tolerance_mm = [0.05, 0.2]"),
+    ("without", "write a list of selectors, as in without = [{ part = \"helper*\" }]"),
 ];
 
 /// Returns the bytes of the value at a path, or of the deepest table on the way when the value is not written; `None` where not even its

@@ -19,6 +19,9 @@ pub struct ModelUse {
     pub max_placed: Option<u64>,
     /// Where it stands.
     pub placement: Placement,
+    /// Faces that are left out, as if the file did not hold them: a list of selectors, as `[{ part = "helper*" }, { solid = 1 }]`, by the
+    /// names, numbers and places of the file itself, as `lampyris info FILE --faces` shows them.
+    pub without: Vec<FaceSelector>,
 }
 
 /// Farthest coordinate of a placement, mm. There a place is known to 15 nm, and a hit to as much: a thousandth of the finest facets.
