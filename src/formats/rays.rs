@@ -34,12 +34,7 @@ impl LightRay {
             return Err(format!("{bad} is no finite number"));
         }
         let given = triple(3);
-        let length = given.length();
-        if length == 0.0 || !length.is_finite() {
-            return Err("the direction has no length".into());
-        }
-        // A direction that is already of unit length keeps its bits.
-        let direction = if (length - 1.0).abs() < UNIT_ROUNDING { given } else { given / length };
+        let direction = unit_direction(given).ok_or("the direction has no length")?;
         let power = numbers[6];
         if power < 0.0 {
             return Err(format!("a power of {power}; powers must be zero or more"));
@@ -56,6 +51,16 @@ impl LightRay {
         let ([x, y, z], [dx, dy, dz]) = (self.origin.to_array(), self.direction.to_array());
         [x, y, z, dx, dy, dz, self.power]
     }
+}
+
+/// Returns a direction of any length at unit length, as all readers of rays make it; `None` where it has none. One that is of unit length
+/// already keeps its bits.
+pub(super) fn unit_direction(given: Vector) -> Option<Vector> {
+    let length = given.length();
+    if length == 0.0 || !length.is_finite() {
+        return None;
+    }
+    Some(if (length - 1.0).abs() < UNIT_ROUNDING { given } else { given / length })
 }
 
 /// Returns the wavelengths of a list, nm, none where no ray has one; an error, for people, where only some do.

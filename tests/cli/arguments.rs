@@ -49,15 +49,17 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
     }
 }
 
-/// A device that is full takes no help.
+/// A device that is full takes neither help nor results, and the message says what could not be written.
 #[test]
 #[cfg(target_os = "linux")]
-fn help_that_could_not_be_written_is_a_failure() {
-    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
-    let program = assert_cmd::cargo::cargo_bin("lampyris");
-    let ended = std::process::Command::new(program).arg("--help").stdout(full).output().unwrap();
-    assert_eq!(ended.status.code(), Some(1), "{ended:?}");
-    assert!(String::from_utf8_lossy(&ended.stderr).starts_with("error: "), "{ended:?}");
+fn help_and_results_that_could_not_be_written_are_failures() {
+    for (arguments, says) in [(&["--help"][..], "error: "), (&["media", "--json"], "error: standard output")] {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let program = assert_cmd::cargo::cargo_bin("lampyris");
+        let ended = std::process::Command::new(program).args(arguments).stdout(full).output().unwrap();
+        assert_eq!(ended.status.code(), Some(1), "{ended:?}");
+        assert!(String::from_utf8_lossy(&ended.stderr).starts_with(says), "{ended:?}");
+    }
 }
 
 #[test]

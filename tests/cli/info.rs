@@ -185,3 +185,30 @@ fn info_on_a_file_without_shapes_names_what_there_is() {
         "{out}"
     );
 }
+
+/// Parts that lost all of their faces are not listed, and the places of those that are stand beside them: of a file without any face the
+/// list is empty, and with two parts of which the first is lost it is that of the second.
+#[test]
+fn faces_are_listed_with_the_places_of_their_own_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = std::fs::read_to_string(step("lens_planoconvex_nurbs.stp")).unwrap();
+    let broken = lens.replace("-2.094395102393,0.,2.094395102393", "2.094395102393,0.,-2.094395102393");
+    let listed = |name: &str, text: &str| {
+        let path = written(folder.path(), name, text.as_bytes()).display().to_string();
+        let (code, out, err) = lampyris(&["info", &path, "--faces", "--json"]);
+        assert_eq!(code, 4, "{err}");
+        serde_json::from_str::<Value>(&out).unwrap()["parts"].clone()
+    };
+    assert_eq!(listed("none.stp", &broken), serde_json::json!([]));
+    // A part in front whose one shell names no face that exists.
+    let lost = "#9001 = SHAPE_DEFINITION_REPRESENTATION(#9002,#9006);\n#9002 = PRODUCT_DEFINITION_SHAPE('','',#9003);\n\
+        #9003 = PRODUCT_DEFINITION('','',#9004,#9);\n#9004 = PRODUCT_DEFINITION_FORMATION('','',#9005);\n\
+        #9005 = PRODUCT('lost','lost','',(#8));\n#9006 = ADVANCED_BREP_SHAPE_REPRESENTATION('',(#11,#9007),#185);\n\
+        #9007 = MANIFOLD_SOLID_BREP('',#9008);\n#9008 = CLOSED_SHELL('',(#9009));\n#9009 = ADVANCED_FACE('',(#9010),#34,.T.);\n";
+    let parts = listed("second.stp", &lens.replacen("#1 = ", &format!("{lost}#1 = "), 1));
+    let [part] = &parts.as_array().unwrap()[..] else { panic!("{parts}") };
+    assert_eq!(
+        (&part["name"], &part["places"]),
+        (&"Open CASCADE STEP translator 7.8 2".into(), &serde_json::json!(["Open CASCADE STEP translator 7.8 2"]))
+    );
+}

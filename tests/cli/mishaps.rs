@@ -92,6 +92,21 @@ fn results_that_cannot_be_written_where_they_should_are_written_elsewhere() {
     assert_eq!(digest(&path.join(rescued)), digest(&path.join("whole")));
 }
 
+/// A limit of the size of files is met as a full disk is: with a message that names the file, not by the signal that the system sends.
+#[test]
+#[cfg(unix)]
+fn a_limit_of_the_size_of_files_does_not_end_a_run() {
+    let folder = lens(|s| s);
+    let output = Command::new("sh")
+        .current_dir(folder.path())
+        .args(["-c", "ulimit -f 8; exec \"$0\" trace scene.toml -o out"])
+        .arg(assert_cmd::cargo::cargo_bin("lampyris"))
+        .output()
+        .unwrap();
+    let err = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
+    assert!(output.status.code() == Some(1) && err.contains("too large") && err.contains("out"), "{output:?}");
+}
+
 /// Started where nothing can be written: the sums alone are left, with the facets that an accuracy had come to.
 #[test]
 #[cfg(target_os = "linux")]

@@ -74,28 +74,34 @@ fn model_reference(file: &Path, scene_file: &Path) -> Option<String> {
     path.into_os_string().into_string().ok()
 }
 
-/// Returns the whole scene as TOML. `file` is for its heading, `reference` the path of the model in it.
+/// Returns the whole scene as TOML, a line for each thing. `file` is for its heading, `reference` the path of the model in it.
 fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     let model = &loaded.model;
     let name = file_name(file);
-    let mut text = format!(
-        "# A scene for {}: lengths in mm, powers in W. `lampyris schema` says what else may stand here.\n\
-         title = {}\n\n[run]\nrays = 1_000_000\n\n[[model]]\nfile = {}\n\n",
+    let rules = rule_texts(&model.account(), &instance_names(model));
+    let rest = rules.len().saturating_sub(MOST_RULES);
+    let more = if rest > 0 {
+        format!("    # … and {rest} more solids: `lampyris info --faces` names them\n")
+    } else {
+        String::new()
+    };
+    let shown: String = rules.into_iter().take(MOST_RULES).collect();
+    let light = light_text(model);
+    format!(
+        "# A scene for {}: lengths in mm, powers in W. `lampyris schema --text` says what else may stand here.\n\
+         title = {}\n\
+         # Parts are left out by what selects them: {{ file = …, without = [{{ part = \"helper*\" }}] }}.\n\
+         model = [{{ file = {} }}]\n\n\
+         # A face that no rule names absorbs all light that meets it. Rules select by part, instance, solid, face, entity (the #id\n\
+         # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins. `lampyris info FILE --faces`\n\
+         # shows what selects each face. In place of surface = \"absorber\" stands what it is: medium = \"PMMA\" (`lampyris media` lists\n\
+         # the media that have names), or surface = \"mirror\", reflectance = 0.9.\n\
+         material = [\n{shown}{more}]\n{}\n{light}",
         printable_line(&name),
         toml_string(&name),
-        toml_string(reference)
-    );
-    text += "# A face that no rule names absorbs all light that meets it. Rules select by part, instance, solid, face, entity (the #id\n\
-        # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins. `lampyris info FILE --faces`\n\
-        # shows what selects each face, `lampyris media` lists the media that have names.\n";
-    let rules = rule_texts(&model.account(), &instance_names(model));
-    text.extend(rules.iter().take(MOST_RULES).map(String::as_str));
-    text += &places_text(model);
-    let rest = rules.len().saturating_sub(MOST_RULES);
-    if rest > 0 {
-        text += &format!("# … and {rest} more solids: `lampyris info --faces` names them\n\n");
-    }
-    text + &light_text(model)
+        toml_string(reference),
+        places_text(model)
+    )
 }
 
 /// Returns comments that say what selects one place of a part that has several, of the first such parts; empty where no part has.
@@ -111,7 +117,7 @@ fn places_text(model: &Model) -> String {
     if lines.is_empty() {
         return lines;
     }
-    format!("# Of parts that are placed several times each place has a name of its own:\n{lines}\n")
+    format!("# Of parts that are placed several times each place has a name of its own:\n{lines}")
 }
 
 /// Returns for each part the names that select its instances one by one; none where a name selects others too or nothing.
@@ -193,24 +199,20 @@ fn solid_rules(selector: &str, parts: &[NamedPart<'_>]) -> Vec<String> {
         numbered.entry(if is_whole { 0 } else { solid.index }).or_default().push(solid);
     }
     let rule = |(index, solids): (usize, Vec<&SolidAccount>)| {
-        let number = if is_whole { String::new() } else { format!("\nsolid = {index}") };
+        let number = if is_whole { String::new() } else { format!(", solid = {index}") };
         rule_text(&format!("{selector}{number}"), solids[0], if is_whole { parts.len() } else { solids.len() })
     };
     numbered.into_iter().map(rule).collect()
 }
 
-/// Returns a rule for one solid, or the first of `alike` that the selector means, with what may be said of it in comments.
+/// Returns a rule for one solid, or the first of `alike` that the selector means, with what may be said of it in a comment.
 fn rule_text(selector: &str, solid: &SolidAccount, alike: usize) -> String {
     let first = if alike > 1 { format!("the first of {alike} of this name: ") } else { String::new() };
     let closed = if solid.closed { "closed" } else { "open: a medium would have a gap" };
     let size = solid.size_mm().map(toml_number).join(" × ");
     let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
-    format!(
-        "[[material]]\n\
-         {selector}  # {first}{closed}, {} faces, {size} mm{colour}\n\
-         surface = \"absorber\"  # or \"mirror\" with reflectance = 0.9; or, in place of surface: medium = \"PMMA\"\n\n",
-        solid.faces.len()
-    )
+    let faces = solid.faces.len();
+    format!("    {{ {selector}, surface = \"absorber\" }},  # {first}{closed}, {faces} faces, {size} mm{colour}\n")
 }
 
 /// Sides of a box that differ by less than this share are equal: a round part fills its box to the rounding of its splines.
@@ -254,14 +256,16 @@ fn light_text(model: &Model) -> String {
     let width = toml_number(RECEIVER_WIDTHS * radius);
     let parts = model.parts.len();
     format!(
-        "# The model ({parts} part{}) lies within x {} … {}, y {} … {}, z {} … {} mm.\n\n\
-         # A parallel beam along {letter} that covers it. Other kinds: point, cone, lambertian, cosine, ies, eulumdat, rays. A source that\n\
-         # is a face of the model has `on = {{ entity = 17 }}` in place of at, direction and radius: kind = \"lambertian\" is an LED's chip.\n\
-         [[source]]\nkind = \"collimated\"\nat = {}\ndirection = {direction}\nradius = {}\npower = 1\n\n\
-         # What comes out on the other side, cell by cell.\n\
-         [[receiver]]\nname = \"behind\"\nkind = \"plane\"\nat = {}\nnormal = {direction}\nsize = [{width}, {width}]\ncells = [100, 100]\nabsorbs = false\n\n\
-         # The light distribution: intensity by direction, of all that leaves the model, with its polar diagram and IES file.\n\
-         [[receiver]]\nname = \"distribution\"\nkind = \"far_field\"\nnormal = {direction}\nup = {up}\nangles = \"C\"\ncells = [72, 90]\n",
+        "# The model ({parts} part{}) lies within x {} … {}, y {} … {}, z {} … {} mm. A parallel beam along {letter} covers it.\n\
+         # Other kinds: point, cone, lambertian, cosine, ies, eulumdat, rays. Faces of the model that shine, as an LED's chip:\n\
+         # {{ kind = \"lambertian\", on = {{ entity = 17 }}, power = 2.5 }}, without at, direction and radius.\n\
+         source = [\n    {{ kind = \"collimated\", at = {}, direction = {direction}, radius = {} }},\n]\n\n\
+         # What comes out on the other side, cell by cell; and the light distribution: intensity by direction of all that leaves the\n\
+         # model, with its polar diagram and IES file.\n\
+         receiver = [\n    \
+         {{ name = \"behind\", at = {}, normal = {direction}, size = [{width}, {width}], absorbs = false }},\n    \
+         {{ name = \"distribution\", kind = \"far_field\", normal = {direction}, up = {up}, angles = \"C\", cells = [72, 90] }},\n]\n\n\
+         [run]\nrays = 1_000_000  # unit = \"lm\" counts lumens, lux and candela\n",
         if parts == 1 { "" } else { "s" },
         toml_number(low[0]),
         toml_number(high[0]),
@@ -320,8 +324,8 @@ mod tests {
         let parts = [part("glass", 1, 1, 9.0), part("glass", 1, 1, 2.5), part("glass", 1, 1, 9.0)];
         let labels = ["a/glass", "a/glass:2", "a/glass:3"].map(|label| vec![label.to_owned()]);
         let selectors = |labels: &[Vec<String>]| -> Vec<String> {
-            let lines = rule_texts(&parts, labels).into_iter().map(|r| r.lines().nth(1).map(str::to_owned));
-            lines.flatten().map(|line| line.split("  #").next().unwrap_or_default().to_owned()).collect()
+            let selector = |rule: String| Some(rule.split_once("{ ")?.1.split_once(", surface")?.0.to_owned());
+            rule_texts(&parts, labels).into_iter().filter_map(selector).collect()
         };
         assert_eq!(selectors(&labels), ["instance = [\"a/glass\", \"a/glass:3\"]", "instance = \"a/glass:2\""]);
         assert_eq!(selectors(&vec![Vec::new(); 3]), ["part = \"glass\""], "no name selects one alone");
@@ -333,15 +337,11 @@ mod tests {
         let parts =
             [part("led", 1, 1), part("led", 2, 1), part("", 1, 1), part("board", 1, 2), part("spare", 0, 1)];
         let rules = rule_texts(&parts, &vec![Vec::new(); parts.len()]);
-        let selectors: Vec<String> = rules
-            .iter()
-            .map(|rule| rule.lines().skip(1).take_while(|l| !l.starts_with("surface")).collect())
-            .collect();
         assert_eq!(rules.len(), 4, "{rules:?}");
-        assert!(selectors[0].starts_with("part = \"*\""), "{selectors:?}");
-        assert!(selectors[1].starts_with("part = \"led\"") && selectors[1].contains("first of 2"), "{selectors:?}");
+        assert!(rules[0].contains("{ part = \"*\", surface"), "{rules:?}");
+        assert!(rules[1].contains("{ part = \"led\", surface") && rules[1].contains("first of 2"), "{rules:?}");
         for (k, rule) in rules[2..].iter().enumerate() {
-            assert!(rule.contains(&format!("part = \"board\"\nsolid = {k}")), "{rule}");
+            assert!(rule.contains(&format!("{{ part = \"board\", solid = {k}, surface")), "{rule}");
         }
     }
 

@@ -41,6 +41,23 @@ pub(crate) fn study_tables(report: &Report, width: usize) -> String {
     wanted.map(|t| table_text(t, width) + "\n").collect()
 }
 
+/// Breaks a text into lines of at most `width` characters; a longer word has a line to itself. An empty text is one empty line.
+pub(crate) fn wrapped_lines(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last_mut().map(|l| (l.chars().count(), l));
+        match line {
+            Some((0, line)) => line.push_str(word),
+            Some((n, line)) if n + 1 + word.chars().count() <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,6 @@
 //! An assessment on the terminal.
 
-use super::terminal_tables::blank_table;
+use super::terminal_tables::{blank_table, wrapped_lines};
 use crate::cli::console::Console;
 use crate::regulation::{Assessment, RowVerdict};
 use crate::report::{
@@ -14,12 +14,13 @@ const DIGITS: usize = 5;
 /// Describes an assessment in lines and a table: aim, photometer, every row, what is remarked on rows, and the whole.
 pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     let mut text = format!("{}  {}\n", console.bold(&a.regulation.id), a.regulation.function.name);
-    text += &format!("  aim     {}\n", a.aim.how);
-    if !traffic_sentence(a).is_empty() {
-        text += &format!("  traffic {}\n", traffic_sentence(a).trim_end());
+    let sensor = format!("{:.3}° from side to side", a.sensor_deg);
+    let tables = a.regulation.checked();
+    let labels =
+        [("aim", a.aim.how.as_str()), ("traffic", traffic_sentence(a)), ("sensor", &sensor), ("tables", &tables)];
+    for (label, sentence) in labels {
+        text += &labelled_lines(label, sentence, console.width());
     }
-    text += &format!("  sensor  {:.3}° from side to side\n", a.sensor_deg);
-    text += &format!("  tables  {}\n", a.regulation.checked());
     let mut table = blank_table(console.width());
     table.set_header([
         "",
@@ -49,6 +50,19 @@ pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
     text += &format!("  {} pass, {} fail, {} unsure", counts[0], counts[1], counts[2]);
     text += &if unjudged > 0 { format!(", {unjudged} not judged (notes and conditions)") } else { String::new() };
     text + &format!("; the whole: {}\n", console.bold(&a.verdict.to_string()))
+}
+
+/// Columns of the labels above the table, with the blanks around them.
+const LABEL_COLUMNS: usize = 10;
+
+/// Returns a sentence behind its label in lines that fit a terminal of so many columns; nothing for an empty sentence.
+fn labelled_lines(label: &str, sentence: &str, width: usize) -> String {
+    if sentence.trim().is_empty() {
+        return String::new();
+    }
+    let lines = wrapped_lines(sentence, width.saturating_sub(LABEL_COLUMNS).max(LABEL_COLUMNS));
+    let labels = std::iter::once(label).chain(std::iter::repeat(""));
+    labels.zip(lines).map(|(label, line)| format!("  {label:<8}{line}\n")).collect()
 }
 
 /// Returns what is remarked on rows that were judged, in the order of the table, each with the rows that it is remarked on.
@@ -100,6 +114,18 @@ mod tests {
             "{notes:?}"
         );
         assert!(a.rows.iter().all(|row| row_cells(row)[8].is_empty()));
+    }
+
+    #[test]
+    fn sentences_above_the_table_keep_to_the_width() {
+        let how = "turned by H 0.12°, V −0.34°, so that the elbow of its cut-off lies at 0.57° below the horizon";
+        let text = labelled_lines("aim", how, 50);
+        assert!(text.starts_with("  aim     turned by") && text.lines().count() == 3, "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= 50), "{text}");
+        assert!(
+            text.lines().skip(1).all(|line| line.starts_with("          ") && !line.starts_with("           "))
+        );
+        assert_eq!(labelled_lines("traffic", " ", 50), "");
     }
 
     fn passed(row: crate::regulation::Row) -> RowVerdict {

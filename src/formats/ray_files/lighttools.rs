@@ -3,7 +3,9 @@
 use super::bytes::ByteReader;
 use super::ray_collector::RayCollector;
 use super::ray_file::{Flux, RayFile, RowLayout, RowWavelength};
-use crate::formats::Error;
+use crate::formats::{Error, ErrorKind};
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// Length of a unit in mm, by its number; 0 is the unit of the system that wrote the file, which the file does not tell.
@@ -13,8 +15,26 @@ const UNITS_MM: [Option<f64>; 8] =
 /// Version that has a field for polarisation.
 const POLARISED_VERSION: u32 = 3;
 
+/// The key that stands in ray data files of text.
+const TEXT_KEY: &[u8] = b"lt_rdf_version";
+
 /// What stands behind the last ray.
 const END: &[u8; 7] = b"LTRFEND";
+
+/// Bytes in which a text file says that it is one of LightTools': a few lines.
+const TEXT_HEAD: u64 = 4096;
+
+/// Refuses a file whose text is a ray data file of LightTools, which a reader of lists would take for a list without columns; `start` was
+/// read of it already.
+pub(super) fn refuse_text(path: &Path, start: &[u8], rest: &mut File) -> Result<(), Error> {
+    let mut head = start.to_vec();
+    rest.take(TEXT_HEAD).read_to_end(&mut head).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+    if !head.windows(TEXT_KEY.len()).any(|word| word == TEXT_KEY) {
+        return Ok(());
+    }
+    let message = "a LightTools ray data file as text; export it as LightTools binary or IES TM-25, which are read";
+    Err(Error::new(path, ErrorKind::Malformed(message.to_owned())))
+}
 
 /// Reads the rays of a binary ray data file; an error for far-field, tristimulus and polarised data.
 pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
@@ -118,6 +138,17 @@ pub(super) mod tests {
         let set = read_ray_set(&path, Flux::Radiant).unwrap();
         assert_eq!((set.rays[0].wavelength_nm, set.rays[0].power), (Some(550.0), 0.5));
         assert!(set.notes.is_empty());
+    }
+
+    #[test]
+    fn text_files_are_refused_as_what_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("source.ray");
+        let text =
+            "# LightTools 8.7.0\n# Ray Data Export File\nlt_rdf_version: 2.0\nlt_startofdata\n 0 0 0 0 0 1 1\n";
+        std::fs::write(&path, text).unwrap();
+        let error = read_ray_set(&path, Flux::Radiant).unwrap_err().to_string();
+        assert!(error.contains("LightTools") && error.contains("TM-25"), "{error}");
     }
 
     #[test]

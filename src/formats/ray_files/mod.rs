@@ -53,7 +53,8 @@ impl RayFile {
             b"LTRF" if binary => lighttools::read(path, most_in_memory),
             // The identifier of the other binary format is a number, not letters.
             start if binary && i32::from_le_bytes(*start) == zemax::IDENTIFIER => zemax::read(path, most_in_memory),
-            _ => {
+            start => {
+                lighttools::refuse_text(path, start, &mut file)?;
                 let mut rays = RayCollector::new(path, most_in_memory);
                 read_list(path, |ray| rays.add(ray))?;
                 rays.finish(None)

@@ -4,7 +4,9 @@ use super::bytes::ByteReader;
 use super::ray_collector::RayCollector;
 use super::ray_file::{Flux, RayFile, RaySet, RowLayout, RowWavelength};
 use super::tm25_header::{ColumnPlaces, SpectralData, Tm25Columns, Tm25Header};
+use crate::formats::rays::unit_direction;
 use crate::formats::{Error, LightRay, write_atomic};
+use crate::math::Vector;
 use std::path::Path;
 
 /// A TM-25 file in memory.
@@ -30,18 +32,39 @@ impl Tm25 {
         };
         let identifier = if spectral { SpectralData::PerRay } else { SpectralData::None };
         let mut header = Tm25Header::of_simulation(rays.len() as u64, columns, identifier);
-        let total: f64 = rays.iter().map(|r| r.power).sum();
+        // Of the powers as they are written: read and written again, the file states the same.
+        let total: f64 = rays.iter().map(|r| f64::from(r.power as f32)).sum();
         match flux {
             Flux::Radiant => header.radiant_flux = total as f32,
             Flux::Luminous => header.luminous_flux = total as f32,
         }
         let mut rows = Vec::with_capacity(rays.len() * header.places().count);
         for ray in rays {
-            rows.extend(ray.numbers().map(|x| x as f32));
+            let [x, y, z, .., power] = ray.numbers().map(|x| x as f32);
+            let [dx, dy, dz] = stored_direction(ray.direction);
+            rows.extend([x, y, z, dx, dy, dz, power]);
             rows.extend(ray.wavelength_nm.filter(|_| spectral).map(|w| w as f32));
         }
         Self { header, rows }
     }
+}
+
+/// Returns a unit direction in single precision that keeps its bits when it is read and written again: the nearest such one within a unit
+/// in the last place of each component.
+fn stored_direction(direction: Vector) -> [f32; 3] {
+    let nearest = direction.to_array().map(|x| x as f32);
+    // What is read is brought to unit length, in double precision. Of two hundred directions one then rounds to another than was written.
+    let read = |stored: &[f32; 3]| unit_direction(Vector::from_array(stored.map(f64::from)));
+    let keeps_its_bits =
+        |stored: &[f32; 3]| read(stored).is_some_and(|d| d.to_array().map(|x| x as f32) == *stored);
+    if keeps_its_bits(&nearest) {
+        return nearest;
+    }
+    let steps = |x: f32| if x == 0.0 { [x; 3] } else { [x.next_down(), x, x.next_up()] };
+    let [xs, ys, zs] = nearest.map(steps);
+    let neighbours = (0..27).map(|k| [xs[k % 3], ys[k / 3 % 3], zs[k / 9]]);
+    let off = |stored: &[f32; 3]| read(stored).map_or(f64::INFINITY, |d| d.distance_squared(direction));
+    neighbours.filter(keeps_its_bits).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(nearest)
 }
 
 /// Reads a whole TM-25 file.
@@ -309,6 +332,36 @@ mod tests {
                 assert_eq!(b.wavelength_nm, a.wavelength_nm.filter(|_| kept));
             }
         }
+    }
+
+    /// Of directions all around, along axes and next to them, what is read and written again is the same file, and nowhere farther from
+    /// what was traced than single precision makes it.
+    #[test]
+    fn rays_that_are_read_and_written_again_make_the_same_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let [first, second] = ["a.tm25ray", "b.tm25ray"].map(|name| folder.path().join(name));
+        let mut state = 1u64;
+        let mut next = || {
+            // A linear congruential generator (Knuth, MMIX).
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let rays: Vec<LightRay> = (0..200_000)
+            .map(|k| {
+                let flat = [1.0, 1e-3, 1e-9, 0.0][k % 4];
+                let given = Vector::new(next(), flat * next(), if k % 7 == 0 { flat } else { next() });
+                let origin = crate::math::Point::new(1e3 * next(), next(), next());
+                LightRay { origin, direction: given.normalize(), power: next().abs(), wavelength_nm: None }
+            })
+            .collect();
+        write_tm25(&first, &Tm25::from_rays(&rays, Flux::Radiant)).unwrap();
+        let set = read_ray_set(&first, Flux::Radiant).unwrap();
+        // Half a unit in the last place of each component, and one more of where the nearest would not keep its bits.
+        let farthest = rays.iter().zip(&set.rays).map(|(a, b)| (a.direction - b.direction).length());
+        assert!(farthest.fold(0.0, f64::max) < 1.5 * f64::from(f32::EPSILON));
+        write_tm25(&second, &Tm25::from_rays(&set.rays, Flux::Radiant)).unwrap();
+        assert!(std::fs::read(&first).unwrap() == std::fs::read(&second).unwrap(), "the files differ");
+        assert_eq!(read_ray_set(&second, Flux::Radiant).unwrap().rays, set.rays);
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub struct Medium {
     /// Refractive index, the same for every wavelength.
     #[cfg_attr(feature = "schema", schemars(range(min = 0.1, max = 10)))]
     pub index: Option<f64>,
-    /// Name in the catalogue: `N-BK7`, `PMMA`, `PC`, `fused silica`, `silicone`, `water`; or in the one of `file`.
+    /// Name in the catalogue: `N-BK7`, `PMMA`, `PC` and others that `lampyris media` lists; or in the one of `file`.
     pub catalogue: Option<String>,
     /// Glass catalogue in AGF form that `catalogue` is a name in, relative to the scene file; all its dispersion formulas but 4 are read.
     /// The glass absorbs by its internal transmittances there unless `absorption_per_mm` says otherwise.
