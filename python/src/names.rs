@@ -14,10 +14,10 @@ pub(crate) fn normal_mode(name: &str) -> PyResult<NormalMode> {
 
 /// Refuses what is no range of tolerances.
 pub(crate) fn require_tolerance(low: f64, high: f64) -> PyResult<()> {
-    if low > 0.0 && low <= high && high.is_finite() {
+    if low >= lampyris::tessellate::LEAST_TOLERANCE_MM && low <= high && high.is_finite() {
         return Ok(());
     }
     Err(SceneError::new_err(format!(
-        "tolerance ({low}, {high}): it must be two positive lengths in mm, the tighter one first, as in (0.05, 0.2)"
+        "tolerance ({low}, {high}): it must be two lengths in mm from 1e-7 on, the tighter one first, as in (0.05, 0.2)"
     )))
 }

@@ -178,7 +178,8 @@ pub(crate) fn print(text: &str) -> io::Result<()> {
     let written = out.write_all(printable(text).as_bytes()).and_then(|()| out.flush());
     match written {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        other => other,
+        Err(e) => Err(io::Error::new(e.kind(), format!("standard output: cannot be written: {e}"))),
+        Ok(()) => Ok(()),
     }
 }
 

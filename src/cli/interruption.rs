@@ -1,6 +1,9 @@
 //! What SIGINT, SIGTERM and SIGHUP do: a run that can be saved is stopped and saved; anything else ends at once, without
-//! unfinished files left behind.
+//! unfinished files left behind. SIGXFSZ, of a file beyond its limit of size, does nothing: that write fails, and is answered as on a
+//! full disk.
 
+#[cfg(unix)]
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Runs that are being traced and can be saved.
@@ -33,7 +36,9 @@ pub(crate) fn is_requested() -> bool {
 /// Listens to SIGINT, SIGTERM and SIGHUP from now on, in a thread of its own; where the system refuses, they end the command as usual.
 #[cfg(unix)]
 pub(crate) fn watch() {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+    // It would end the command without a word. The flag is for having a handler alone.
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
     let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| !is_ignored(*signal));
     // Without a listener the signals end the command at once, as they do anyway.
     let Ok(mut signals) = signal_hook::iterator::Signals::new(wanted) else { return };

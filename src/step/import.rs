@@ -10,7 +10,7 @@ use super::product::numbering::ConvertedPart;
 use super::product::shared_items::SharedItems;
 use super::product::styles::Styles;
 use super::product::topology::ShapeItems;
-use super::report::{ImportReport, Note, UnitNames};
+use super::report::{ImportReport, Note};
 use super::{Error, ErrorKind, Settings};
 use crate::formats;
 use crate::math::Aabb;
@@ -104,9 +104,10 @@ fn schema_names(file: &File<'_>) -> Vec<String> {
     (0..list.len()).filter_map(|i| list.text(i)).collect()
 }
 
-/// Reads the units of all contexts, and their names into `names`. Returns those by context, and those for a representation without one: the
-/// first that name a length, else mm. [`Settings::length_unit_mm`] replaces all lengths.
-fn read_units(file: &File<'_>, settings: &Settings, names: &mut UnitNames) -> (FxHashMap<u64, Units>, Units) {
+/// Reads the units of all contexts; their names, and units that cannot be read, go into `report`. Returns those by context, and those for a
+/// representation without one: the first that name a length, else mm. [`Settings::length_unit_mm`] replaces all lengths.
+fn read_units(file: &File<'_>, settings: &Settings, report: &mut ImportReport) -> (FxHashMap<u64, Units>, Units) {
+    let ImportReport { units: names, problems, file: name, .. } = report;
     let mut units: FxHashMap<u64, Units> = FxHashMap::default();
     let mut fallback = None;
     let add = |list: &mut Vec<String>, name: Option<String>| {
@@ -123,6 +124,12 @@ fn read_units(file: &File<'_>, settings: &Settings, names: &mut UnitNames) -> (F
             // A shape without a context of its own is taken to be in the unit that the file names first.
             fallback.get_or_insert(assigned.units);
         }
+        for id in assigned.unreadable {
+            let unit = format!("{name}: #{id} {}", file.entity_name(id));
+            problems.push(format!(
+                "{unit} gives no size that a unit could have: mm or radians are taken. unit_mm of a scene's model sets the length"
+            ));
+        }
         add(&mut names.length, assigned.length_name);
         add(&mut names.angle, assigned.angle_name);
     }
@@ -138,7 +145,7 @@ fn convert_assembly(
     settings: &Settings,
     report: &mut ImportReport,
 ) -> Result<Model, Error> {
-    let (units, fallback) = read_units(file, settings, &mut report.units);
+    let (units, fallback) = read_units(file, settings, report);
     let assembly = Assembly::read(file, units, fallback);
     // Thirty kilobytes can place a part 2⁴⁰ times: what is counted first need not be expanded.
     let limit = settings.max_placed;

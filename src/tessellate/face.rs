@@ -18,8 +18,8 @@ use super::proof::prover::Prover;
 use super::report::Repair;
 use super::taken_chords::TakenChords;
 use super::transition::creases::crease_lines;
-use super::transition::delaunay::{self, Outline, Transition};
 use super::transition::pairing::{self, TransitionFacet};
+use super::transition::triangulate::{Outline, Transition, triangulate};
 use super::triangulator::{GaveUp, catch_panic};
 use crate::math::polygon::{is_inside_sides, polygon_sides};
 use crate::math::{Point, Uv};
@@ -121,7 +121,7 @@ pub(super) fn mesh_with_imprint(
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
     let creases = crease_lines(surface, &nodes, &segments);
     let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale, taken };
-    let triangulate = || delaunay::triangulate(surface, settings.acceptance, outline, budget);
+    let triangulate = || triangulate(surface, settings.acceptance, outline, budget);
     let mut transition = catch_panic(triangulate)?.ok_or(Unmeshed::Empty)?;
     // Proofs that were not tried any more say nothing: the face is given up whole, whichever thread came how far.
     if surface.steps.are_too_many() {
@@ -137,7 +137,7 @@ pub(super) fn mesh_with_imprint(
     let unproved = beside_crossings.unwrap_or_else(|| unproved(&transition));
     let refused = [&transition.conflicts[..], &transition.crossed];
     let crossing = CrossingChords::new(part, &transition.nodes, &followed, refused);
-    let mut coarse = crossing.edges_for_sag();
+    let mut coarse = if cells.exhausted { vec![] } else { crossing.edges_for_sag() };
     coarse.extend(unproved.iter().filter_map(|s| Some(followed.get(&edge_key(s[0], s[1]))?.edge)));
     coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
     let facing = crossing.facing_samples();

@@ -2,6 +2,9 @@
 
 use crate::math::FaceId;
 
+/// Least tolerance that scenes and options may ask for, mm: an atom. A picometre lies within the rounding of coordinates, and took minutes.
+pub const LEAST_TOLERANCE_MM: f64 = 1e-7;
+
 /// Tolerance or radius, mm, in place of one that is not positive: less than any machine makes.
 const LEAST_LENGTH: f64 = 1e-9;
 

@@ -22,7 +22,10 @@ fn values_out_of_range_are_refused_by_name() {
     for (head, key) in [
         ("[accuracy]\ntolerance_mm = [-0.1, 0.2]", "tolerance_mm"),
         ("[accuracy]\ntolerance_mm = [0.2, 0.05]", "tolerance_mm"),
+        ("[accuracy]\ntolerance_mm = 1e-160", "1e-7"),
         ("[accuracy]\nangle_deg = 95", "angle_deg"),
+        ("[[receiver]]\nname = 'r'\nsize = [200, 1e-308]", "1e-9"),
+        ("[[receiver]]\nname = 'r'\nkind = 'disc'\nradius = 1e308", "1e12"),
         ("[[model]]\nfile = \"x.stp\"\nunit_mm = 0", "unit_mm"),
         ("[[model]]\nfile = \"x.stp\"\nplacement = { scale = -1 }", "scale"),
         ("[run]\nrays = 0", "rays"),

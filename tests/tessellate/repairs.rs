@@ -244,6 +244,11 @@ fn touching_arc(radius: f64, angle: f64) -> (Curve, UvCurve) {
 
 /// A plane face between two arcs that touch in a corner of it, and a line; its area with chords of both that sag alike.
 fn face_between_touching_arcs() -> (Model, f64) {
+    face_between_touching_arcs_on(sweep::plane(&Frame::IDENTITY, [[-1.0, 40.0], [-1.0, 10.0]]))
+}
+
+/// The same on another surface that has x and y as its parameters.
+fn face_between_touching_arcs_on(surface: Surface) -> (Model, f64) {
     // Circles of 66 and 65 mm: near the cusp they are nearer to each other than any chord to its arc.
     let (radii, angles) = ([66.0, 65.0], [0.5, 0.45]);
     let [(outer, outer_uv), (inner, inner_uv)] = [0, 1].map(|k| touching_arc(radii[k], angles[k]));
@@ -253,7 +258,6 @@ fn face_between_touching_arcs() -> (Model, f64) {
     let edge = |curve, [from, to]: [u32; 2]| Edge { curve, vertices: [VertexId(from), VertexId(to)], entity: None };
     let side = |edge, reversed, uv| EdgeUse { edge: Some(EdgeId(edge)), reversed, uv };
     let uses = vec![side(0, false, outer_uv), side(1, false, line_uv), side(2, true, inner_uv)];
-    let surface = sweep::plane(&Frame::IDENTITY, [[-1.0, 40.0], [-1.0, 10.0]]);
     let face = Face { loops: vec![TrimLoop { uses }], ..Face::whole(surface) };
     let part = Part {
         vertices: vec![Point::ZERO, a, b],
@@ -327,4 +331,24 @@ fn a_face_is_not_meshed_again_beyond_its_work() {
     let made = tessellate(&model, &Settings { most_steps: 10_000, ..measured(0.2) });
     assert_eq!(made.report.faces.failed, 0);
     assert_eq!(made.report.repaired[0].how, Repair::CrossingBorder);
+}
+
+/// On a face whose cells have used up their budget chords that cross get the corners of those across, and no shorter ones: four rounds of
+/// these took a second each on a face of 80,000 facets, and mended nothing.
+#[test]
+fn crossing_chords_are_not_halved_on_a_face_beyond_its_budget() {
+    // Bent by 10 µm, or it would be one plane without cells.
+    let [x, y] = [[-1.0, 40.0], [-1.0, 10.0]];
+    let points = [(x[0], 0.0), (0.5 * (x[0] + x[1]), 0.02), (x[1], 0.0)];
+    let points = points.into_iter().flat_map(|(x, z)| y.map(|y| Point::new(x, y, z).extend(1.0))).collect();
+    let knots = [[[x[0]; 3], [x[1]; 3]].concat(), [[y[0]; 2], [y[1]; 2]].concat()];
+    let (model, _) = face_between_touching_arcs_on(Surface { degree: [2, 1], knots, points });
+    let made = |budget| tessellate(&model, &Settings { budget, ..measured(0.2) });
+    assert_eq!(made(1000).report.repaired, []);
+    let short = made(0);
+    assert_eq!(short.report.repaired[0].how, Repair::CoarserCells);
+    // Arcs of radius r and angle a whose chords sag by 0.2 mm at most.
+    let chords: f64 = [(66.0f64, 0.5), (65.0, 0.45)].map(|(r, a)| (a * (r / 1.6).sqrt()).ceil()).iter().sum();
+    let vertices = short.mesh.vertices.len() as f64;
+    assert!(vertices < 4.0 * chords, "{vertices} for two arcs of {chords} chords");
 }

@@ -3,6 +3,7 @@
 
 use crate::intersect::NormalMode;
 use crate::pipeline::{IntersectorKind, MeshingSettings, RayRange, TracingSettings};
+use crate::tessellate::LEAST_TOLERANCE_MM;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use std::path::PathBuf;
@@ -136,6 +137,11 @@ fn parse_length(text: &str) -> Result<f64, String> {
 fn parse_tolerance(text: &str) -> Result<[f64; 2], String> {
     let (low, high) = text.split_once("..").unwrap_or((text, text));
     let (low, high) = (parse_length(low)?, parse_length(high)?);
+    if low < LEAST_TOLERANCE_MM {
+        return Err(format!(
+            "a tolerance is at least {LEAST_TOLERANCE_MM:e} mm, not {low}: coordinates are rounded by more"
+        ));
+    }
     if low <= high {
         Ok([low, high])
     } else {
@@ -226,6 +232,7 @@ mod tests {
         for (wrong, says) in [
             ("-0.1", "positive"),
             ("0..0.2", "positive"),
+            ("1e-160", "at least 1e-7"),
             ("0.2..0.05", "0.05..0.2"),
             ("a", "number"),
             ("nan", "positive"),

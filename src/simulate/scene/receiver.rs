@@ -4,6 +4,9 @@ use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene};
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
+/// Sizes and radii of receivers, mm: the area of a cell is a number that figures can be divided by, from atoms to the orbit of the moon.
+const LENGTHS_MM: std::ops::RangeInclusive<f64> = 1e-9..=1e12;
+
 /// Where light is counted. Planes, discs and spheres stand in space and are no part of a model.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -239,12 +242,12 @@ impl Receiver {
         }
         match self.kind {
             ReceiverKind::Plane => match self.size {
-                Some(s) if s.iter().all(|x| *x > 0.0 && x.is_finite()) => Ok(()),
-                _ => fail("size", "a plane needs `size`, two positive lengths"),
+                Some(s) if s.iter().all(|x| LENGTHS_MM.contains(x)) => Ok(()),
+                _ => fail("size", "a plane needs `size`, two lengths from 1e-9 to 1e12"),
             },
             ReceiverKind::Disc | ReceiverKind::Sphere => match self.radius {
-                Some(r) if r > 0.0 && r.is_finite() => Ok(()),
-                _ => fail("radius", "a disc or sphere needs a positive `radius`"),
+                Some(r) if LENGTHS_MM.contains(&r) => Ok(()),
+                _ => fail("radius", "a disc or sphere needs a `radius` from 1e-9 to 1e12"),
             },
             ReceiverKind::FarField => {
                 let ([h0, h1], [v0, v1]) = self.angles_deg();

@@ -2,6 +2,7 @@
 
 use super::{Key, Scene, lenient, suggest};
 use crate::simulate::{Error, ErrorKind};
+use crate::tessellate::LEAST_TOLERANCE_MM;
 use serde::{Deserialize, Serialize};
 
 /// The helium d line, at which catalogues give n_d, nm.
@@ -181,8 +182,8 @@ impl Accuracy {
         }
         // Written so that what is no number fails.
         match (self.tolerance_mm, self.angle_deg) {
-            (Some([low, high]), _) if !(low > 0.0 && low <= high && high.is_finite()) => {
-                fail("tolerance_mm", "must be two positive lengths, the tighter one first, as in [0.05, 0.2]")
+            (Some([low, high]), _) if !(low >= LEAST_TOLERANCE_MM && low <= high && high.is_finite()) => {
+                fail("tolerance_mm", "must be two lengths from 1e-7 on, the tighter one first, as in [0.05, 0.2]")
             }
             (_, Some(angle)) if !(angle > 0.0 && angle < 90.0) => fail("angle_deg", "must be above 0 and below 90"),
             _ => Ok(()),

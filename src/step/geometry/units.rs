@@ -6,6 +6,9 @@ use crate::step::part21::{Args, Entity, File};
 /// Deepest chain of conversion-based units.
 const MAX_DEPTH: usize = 8;
 
+/// Least and largest unit, mm or radians: an attometre, an exametre. A damaged definition of 1e-300 took facets a minute.
+const SIZES: [f64; 2] = [1e-15, 1e21];
+
 /// Factors from a context's units to mm and radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Units {
@@ -28,11 +31,14 @@ pub(crate) struct Assigned {
     pub(crate) units: Units,
     pub(crate) length_name: Option<String>,
     pub(crate) angle_name: Option<String>,
+    /// Units of length and angle, by their ids, that the file gives no size which a unit could have.
+    pub(crate) unreadable: Vec<u64>,
 }
 
 /// Reads the units of a representation context; what it does not assign is mm and radians. The accuracy is the smallest uncertainty of all.
 pub(crate) fn read_context(context: Entity<'_, '_>) -> Assigned {
-    let mut assigned = Assigned { units: Units::DEFAULT, length_name: None, angle_name: None };
+    let mut assigned =
+        Assigned { units: Units::DEFAULT, length_name: None, angle_name: None, unreadable: Vec::new() };
     if let Some(args) = context.attributes("GLOBAL_UNIT_ASSIGNED_CONTEXT", 2) {
         let units = args.list(0);
         for i in 0..units.len() {
@@ -46,6 +52,7 @@ pub(crate) fn read_context(context: Entity<'_, '_>) -> Assigned {
                     assigned.units.angle = factor;
                     assigned.angle_name = Some(name);
                 }
+                None if unit.is_one_of(&["LENGTH_UNIT", "PLANE_ANGLE_UNIT"]) => assigned.unreadable.push(unit.id),
                 _ => {}
             }
         }
@@ -103,9 +110,9 @@ fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)
             .attributes("MEASURE_WITH_UNIT", 0)
             .or_else(|| Some(with_unit.args()))
             .filter(|a| a.real(0).is_some())?;
-        let value = args.real(0).filter(|x| *x > 0.0)?;
         let (kind, factor, _) = unit_factor(args.entity(1)?, depth + 1)?;
-        Some((kind, value * factor))
+        let size = args.real(0)? * factor;
+        (SIZES[0]..=SIZES[1]).contains(&size).then_some((kind, size))
     };
     let by_name = || conventional_unit(&name);
     let (kind, factor) = by_measure().or_else(by_name)?;
@@ -165,6 +172,23 @@ mod tests {
             );
             let file = part21::parse("units.stp", text.as_bytes()).unwrap();
             assert_eq!(read_context(file.entity(1).unwrap()).units.accuracy, expected, "{list}");
+        }
+    }
+
+    #[test]
+    fn a_unit_of_no_possible_size_is_unreadable() {
+        for (value, expected, unreadable) in
+            [("25.4", 25.4, vec![]), ("0.", 1.0, vec![2]), ("1E-300", 1.0, vec![2])]
+        {
+            let text = format!(
+                "ISO-10303-21;\nDATA;\n#1=(GLOBAL_UNIT_ASSIGNED_CONTEXT((#2))REPRESENTATION_CONTEXT('',''));\n\
+                 #2=(CONVERSION_BASED_UNIT('own',#3)LENGTH_UNIT()NAMED_UNIT(*));\n\
+                 #3=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE({value}),#4);\n\
+                 #4=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\nENDSEC;\n"
+            );
+            let file = part21::parse("units.stp", text.as_bytes()).unwrap();
+            let assigned = read_context(file.entity(1).unwrap());
+            assert_eq!((assigned.units.length, assigned.unreadable), (expected, unreadable), "{value}");
         }
     }
 }

@@ -51,7 +51,8 @@ pub(crate) fn convert(
     settings: &Settings,
 ) -> ConvertedPart {
     let geometry = GeometryReader { file, units };
-    let mut out = ConvertedPart { refused: items.refused.clone(), ..ConvertedPart::default() };
+    let (refused, repaired) = (items.refused.clone(), items.repaired.clone());
+    let mut out = ConvertedPart { refused, repaired, ..ConvertedPart::default() };
     out.found += items.refused.len();
 
     // What to convert: a face that occurs in several shells, and an edge that bounds several faces, once.

@@ -45,8 +45,10 @@ impl SharedItems {
         for p in placed {
             items.entry(p.representation).or_insert_with(|| {
                 let mut ids = assembly.items(p.representation);
-                // Placements are shared by most representations of a file, and stand for nothing.
-                ids.retain(|&id| is_shape(file, id));
+                // Items are a set: one that is listed again is no other. Placements are shared by most representations of a file, and
+                // stand for nothing.
+                let mut listed = FxHashSet::default();
+                ids.retain(|&id| listed.insert(id) && is_shape(file, id));
                 outermost_items(file, ids)
             });
         }

@@ -32,6 +32,8 @@ const RECIPES: [&str; 22] = [
 
 /// Longest chain of faces that are parts of faces.
 const MAX_PARENTS: usize = 4;
+/// Times that an edge may bound a face: a seam does so from both sides.
+const MAX_USES: u32 = 2;
 
 /// A shell to be converted, with the styles and names around it.
 #[derive(Clone, Debug)]
@@ -76,11 +78,17 @@ pub(crate) struct ShapeItems {
     pub(crate) shells: Vec<ShellPlan>,
     /// Surfaces without a face: CURVE_BOUNDED_SURFACE and bare surfaces of geometric sets.
     pub(crate) surfaces: Vec<u64>,
+    /// The same, to tell what is listed again: a set of 200,000 took seven seconds to search.
+    listed_surfaces: FxHashSet<u64>,
     /// Solids given as a recipe.
     pub(crate) recipes: Vec<u64>,
     /// Tessellated solids, shells and faces.
     pub(crate) tessellated: Vec<u64>,
     pub(crate) refused: Vec<Refusal>,
+    /// What is listed more than once and stands once.
+    pub(crate) repaired: Vec<Refusal>,
+    /// Shells that bound a solid from outside.
+    outer: FxHashSet<u64>,
 }
 
 impl ShapeItems {
@@ -106,6 +114,10 @@ impl ShapeItems {
         let Some(e) = file.entity(id) else { return };
         let name = e.attributes("REPRESENTATION_ITEM", 0).unwrap_or_else(|| e.args()).name(0);
         if let Some(a) = e.attributes("MANIFOLD_SOLID_BREP", 1).or_else(|| e.attributes("FACETED_BREP", 1)) {
+            if a.id(0).is_some_and(|shell| !self.outer.insert(shell)) {
+                self.repaired.push(Refusal::new(e, "its shell bounds another solid already: both are one"));
+                return;
+            }
             self.add_shell(file, a.id(0), &name, &[id], true, e);
             // Of a complex instance the voids are attributes of their own; of a simple one they stand behind the
             // shell.
@@ -140,25 +152,23 @@ impl ShapeItems {
                 owners: vec![],
             });
         } else if let Some(a) = e.attributes("GEOMETRIC_SET", 1) {
-            for element in a.list(0).ids() {
-                self.add_set_element(file, element);
-            }
+            // Elements of other kinds are no shapes.
+            let surfaces = a.list(0).ids().into_iter().filter(|id| file.entity(*id).is_some_and(is_surface));
+            surfaces.for_each(|id| self.add_surface(id));
         } else if e.keywords().any(is_tessellated) {
             self.tessellated.push(id);
         } else if e.is_one_of(&RECIPES) {
             self.recipes.push(id);
         } else if is_surface(e) {
-            if !self.surfaces.contains(&id) {
-                self.surfaces.push(id);
-            }
+            self.add_surface(id);
         } else if e.keywords().any(is_unsupported_shape) {
             self.refused.push(Refusal::new(e, "this kind of shape is not converted"));
         }
     }
 
-    /// Adds a surface that stands in a set without a face, once; elements of other kinds are left out.
-    fn add_set_element(&mut self, file: &File<'_>, id: u64) {
-        if !self.surfaces.contains(&id) && file.entity(id).is_some_and(is_surface) {
+    /// Adds a surface without a face, once.
+    fn add_surface(&mut self, id: u64) {
+        if self.listed_surfaces.insert(id) {
             self.surfaces.push(id);
         }
     }
@@ -213,7 +223,8 @@ impl ShapeItems {
             .attributes("CONNECTED_FACE_SET", 1)
             .or_else(|| Some(e.args()).filter(|_| e.keyword() != ""))
             .map(|a| if e.keyword().is_empty() { a.list(0) } else { e.args().list(1) });
-        let mut faces = Vec::new();
+        let (mut faces, mut listed) = (Vec::new(), FxHashSet::default());
+        let mut repeated = 0usize;
         for face in own.iter().flat_map(|l| l.ids()) {
             let mut turned = flip;
             let mut face = face;
@@ -223,7 +234,11 @@ impl ShapeItems {
                 let Some(inner) = a.id(0) else { break };
                 face = inner;
             }
-            faces.push((face, turned));
+            // Faces of a shell are a set: a list of a million times the same one is that one.
+            if listed.insert(face) { faces.push((face, turned)) } else { repeated += 1 }
+        }
+        if repeated > 0 {
+            self.repaired.push(Refusal::new(e, format!("lists faces again, {repeated} times: each stands once")));
         }
         // A solid is closed whatever its shell calls itself.
         let closed = solid || e.is_a("CLOSED_SHELL");
@@ -291,6 +306,7 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     };
     let Some(surface) = surface else { return Err(Refusal::new(e, "its surface is missing")) };
     let mut loops = Vec::new();
+    let mut uses: FxHashMap<EdgeKey, u32> = FxHashMap::default();
     let listed = bounds.map_or(0, |b| b.len());
     for bound in bounds.iter().flat_map(|b| (0..listed).map(|i| b.entity(i))) {
         // Without it the face would have no hole there, or no end.
@@ -305,6 +321,14 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
         if a.flag(1) == Some(false) {
             edges.reverse();
             edges.iter_mut().for_each(|x| x.1 = !x.1);
+        }
+        // One by one: thousands of bounds may have the same long loop.
+        for (key, _) in &edges {
+            let times = uses.entry(*key).or_insert(0);
+            *times += 1;
+            if *times > MAX_USES {
+                return Err(Refusal::new(e, format!("one of its edges bounds it more than {MAX_USES} times")));
+            }
         }
         if !edges.is_empty() {
             loops.push(edges);

@@ -71,6 +71,11 @@ impl CandidateFacet {
         Self { p, sag: [u, v] }
     }
 
+    /// Returns the larger of the two sags, mm.
+    pub(in crate::tessellate) fn largest_sag(&self) -> f64 {
+        self.sag[0].max(self.sag[1])
+    }
+
     /// Returns which parameter's range to halve where the cell does not fit within `limit`, mm: 0 for u, 1 for v. May evaluate the surface
     /// at four points more.
     pub(in crate::tessellate) fn parameter_to_halve(

@@ -183,8 +183,12 @@ impl Tree<'_, '_> {
         }
         let candidate = CandidateFacet::new(self.surface, cell);
         let cut = self.crease_to_cut(cell).or_else(|| self.turn_to_cut(cell));
+        // No curvature need be asked where the samples are farther off than the loosest tolerance: so are those of most cells above leaves.
+        let loosest = self.surface.field.loosest() * branch.slack;
+        let is_too_large = candidate.largest_sag() > loosest;
         // A crease is cut along before anything is proved: no facet may lie across it.
         if cut.is_none()
+            && !is_too_large
             && let Some((bound, tolerance)) = self.prove_fit(branch, cell, &candidate)
         {
             // At the border the samples' aligned sides let a cell be whole; else the transition takes it, and this
@@ -199,8 +203,8 @@ impl Tree<'_, '_> {
             return None;
         }
         let (direction, at) = cut.unwrap_or_else(|| {
-            let tolerance = self.surface.tolerance(cell.center()) * branch.slack;
-            let d = candidate.parameter_to_halve(self.surface, cell, tolerance);
+            let limit = if is_too_large { loosest } else { self.surface.tolerance(cell.center()) * branch.slack };
+            let d = candidate.parameter_to_halve(self.surface, cell, limit);
             (d, self.cut_parameter(cell, d))
         });
         // Beside a wall that a damaged coordinate makes halves got as thin as the digits of parameters, in stacks of thousands which the
@@ -302,7 +306,7 @@ impl Tree<'_, '_> {
     /// Returns the tightest tolerance, mm, at the cell's corners and middle if the nine samples are within `slack` times as much and, at
     /// slack 1, the normals at the corners within the angle; else `None`. Proves nothing.
     fn sampled_fit(&self, cell: Cell, candidate: &CandidateFacet, slack: f64) -> Option<f64> {
-        let sag = candidate.sag[0].max(candidate.sag[1]);
+        let sag = candidate.largest_sag();
         let mut xi = f64::INFINITY;
         // The first place that is too tight decides: half of all cells end there, and curvatures take a tenth of the time.
         for place in [cell.center()].into_iter().chain(cell.corners()) {
