@@ -17,7 +17,7 @@ use super::query::Query;
 use super::settlement;
 use super::structure::Exact;
 use super::tangency;
-use super::tolerances::{CONTACT_LENGTH, SAME_PARAMETER, TANGENT, contact_distance};
+use super::tolerances::{CONTACT_LENGTH, SAME_PARAMETER, TANGENT};
 use crate::intersect::Certainty;
 use crate::math::simd::{self, Instructions, Kernel};
 
@@ -66,8 +66,6 @@ struct Clipping<'a> {
     seen: &'a SeenLeaf,
     /// The point that the ray leaves, in the leaf's parameters.
     departure: Option<[f64; 2]>,
-    /// Distance across the ray below which a box touches it, mm: [`contact_distance`] of the patch.
-    contact: f64,
     /// Bound of what a coordinate across the ray is off by rounding, mm.
     noise: f64,
     /// Whether the ray passes a pole: its control points differ by their own rounding, and what 32 digits say of the cracks between them
@@ -109,10 +107,10 @@ impl Exact {
         let margin = size.map(|s| noise + halving_rounding(leaf) * s);
         let departure = query.departure.and_then(|own| own.local_to(leaf, query.o, &self.geometry));
         let seen = &SeenLeaf { net, frame: [query.n1, query.n2], margin, precise: false };
-        let patch = &self.geometry.patches[leaf.patch as usize];
-        let contact = contact_distance(patch.size());
-        let at_pole = self.geometry.passes_pole(patch, [query.o, query.d], CONTACT_LENGTH * contact);
-        let clipping = Clipping { index, leaf, seen, departure, contact, noise, at_pole };
+        let patch = || &self.geometry.patches[leaf.patch as usize];
+        let at_pole =
+            leaf.has_pole && self.geometry.passes_pole(patch(), [query.o, query.d], CONTACT_LENGTH * leaf.contact);
+        let clipping = Clipping { index, leaf, seen, departure, noise, at_pole };
         let before = [query.all.len(), query.all_rejected.len()];
         if !self.clip_seen(query, &clipping) {
             // In a search for all, what it found is found again.
@@ -214,11 +212,11 @@ impl Exact {
         // At a contact the Jacobian is singular: no box proves itself there, however small, so a small one is taken as it is. What `f64`
         // takes for one is looked at once more in 32 digits, until it is a point or nothing is left of it.
         let is_short = if clipping.at_pole {
-            hull.far - hull.near < CONTACT_LENGTH * clipping.contact || small < POINT_BOX
+            hull.far - hull.near < CONTACT_LENGTH * clipping.leaf.contact || small < POINT_BOX
         } else {
-            !seen.precise || hull.far - hull.near < clipping.contact || small < POINT_BOX
+            !seen.precise || hull.far - hull.near < clipping.leaf.contact || small < POINT_BOX
         };
-        let touches = hull.across < clipping.contact && is_short;
+        let touches = hull.across < clipping.leaf.contact && is_short;
         if touches || small < FINEST {
             return self.take_contact(query, clipping, node);
         }
@@ -317,7 +315,7 @@ impl Exact {
         let leaving = clipping.departure.is_some_and(|p| (0..2).all(|k| (p[k] - local[k]).abs() <= reach))
             && query
                 .departure
-                .is_some_and(|own| own.is_root_at((t.abs() - CONTACT_LENGTH * clipping.contact).max(0.0)));
+                .is_some_and(|own| own.is_root_at((t.abs() - CONTACT_LENGTH * clipping.leaf.contact).max(0.0)));
         if clipping.seen.precise || clipping.at_pole {
             if !leaving {
                 let certainty = self.contact_certainty(clipping.leaf, local, query);

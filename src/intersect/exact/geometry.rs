@@ -185,6 +185,11 @@ impl Geometry {
         })
     }
 
+    /// Whether a side of the patch is a pole of its surface.
+    pub(super) fn has_pole(&self, patch: &Patch) -> bool {
+        self.pole_sides(patch).as_flattened().contains(&true)
+    }
+
     /// Which sides of a patch, low and high in u and in v, are a pole of its surface.
     fn pole_sides(&self, patch: &Patch) -> [[bool; 2]; 2] {
         let grid = &self.grids[self.faces[patch.face as usize].grid as usize];

@@ -6,7 +6,7 @@
 
 use super::net::{self, Net, Slopes, V4};
 use super::patch::{Patch, PatchGrid};
-use super::tolerances::{EXTENSION, NEWTON_STEP, PARALLEL, REACH, ROUND};
+use super::tolerances::{EXTENSION, NEWTON_STEP, PARALLEL, REACH, ROUND, contact_distance};
 use crate::math::{Aabb, Vector};
 
 /// Rounding operations of the extraction, and of the shift to the leaf's centre, that a control point has behind it beside its
@@ -47,6 +47,11 @@ pub(super) struct Leaf {
     pub(super) degree: [u8; 2],
     /// Whether no trim passes: every root counts.
     pub(super) whole: bool,
+    /// Whether its patch has a pole of the surface.
+    pub(super) has_pole: bool,
+    /// Distance across a ray below which a box of the patch touches it, mm: [`contact_distance`]. Here, since a clipping that read it of
+    /// the patch waited for memory.
+    pub(super) contact: f64,
     /// The rectangle of the patch's local domain.
     pub(super) rect: [[f64; 2]; 2],
 }
@@ -89,7 +94,7 @@ pub(super) struct Described {
 }
 
 /// Describes `piece`, the part of a patch's net over `rect` of its local parameters, as a leaf in the world; `depth` counts the
-/// roundings behind it. The caller fills in `net`, `patch`, `face` and `whole`.
+/// roundings behind it. The caller fills in `net`, `patch`, `face`, `whole` and `has_pole`.
 pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> Described {
     let degree = patch.degree;
     let middle = net::evaluate(piece, degree, 0.5, 0.5).s;
@@ -149,6 +154,8 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
         face: 0,
         degree,
         whole: false,
+        has_pole: false,
+        contact: contact_distance(patch.size()),
         rect,
     };
     Described { leaf, slopes, net: centred }

@@ -221,6 +221,7 @@ impl Subdivision<'_> {
     fn add_leaf(&self, part: Described, region: Region, rect: [[f64; 2]; 2], out: &mut PatchLeaves) {
         let Described { mut leaf, slopes, net: control } = part;
         leaf.whole = region == Region::Inside;
+        leaf.has_pole = self.geometry.has_pole(self.patch);
         leaf.patch = self.index;
         leaf.face = self.patch.face;
         let face = &self.geometry.faces[self.patch.face as usize];
