@@ -73,8 +73,8 @@ pub fn judged_note(row: &RowVerdict) -> Option<&str> {
     row.row.note.as_deref().filter(|_| row.verdict.is_some())
 }
 
-/// Makes the sections of all verdicts, each with the index of its receiver; what has no far field, of those that `grid_of` returns, is left
-/// out. No two sections, tables or charts have one name.
+/// Makes a section of each verdict, given with the index of its receiver; left out where `grid_of` returns no far field for that. Further
+/// verdicts on one far field are numbered from 2, so that no two sections, tables or charts have one name.
 pub(super) fn sections(verdicts: &[(usize, Assessment)], grid_of: impl Fn(usize) -> Option<Grid>) -> Vec<Section> {
     let mut sections = Vec::new();
     for (k, (receiver, assessment)) in verdicts.iter().enumerate() {

@@ -27,7 +27,7 @@ impl ByteReader {
         Ok(Self { path: path.to_owned(), file: BufReader::with_capacity(BUFFER, file), position: 0, length })
     }
 
-    /// Where it is.
+    /// Path of the file, for messages.
     pub(super) fn path(&self) -> &Path {
         &self.path
     }

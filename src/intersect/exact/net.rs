@@ -123,7 +123,8 @@ fn any_degree(net: &[V4], [p, q]: [u8; 2], u: f64, v: f64) -> Jet {
     tensor_product(net, bernstein(p, u), bernstein(q, v), [p + 1, q + 1])
 }
 
-/// Value and derivatives from Bernstein values and derivatives in u and v, each with as many entries as `counts` says.
+/// Homogeneous value and first derivatives of a net of `counts` control points, row after row, from the Bernstein values and derivatives in
+/// u and in v; entries of these beyond `counts` are not read.
 #[inline(always)]
 fn tensor_product<const N: usize, const M: usize>(
     net: &[V4],

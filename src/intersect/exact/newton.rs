@@ -146,7 +146,8 @@ impl Exact {
         Some(corners.iter().all(holds).then_some(patch))
     }
 
-    /// Whether a face has a surface that is traced; ready meshes have none.
+    /// Whether a face is traced: `false` for ready meshes, for surfaces that are not finite or have weights that are not positive, and for
+    /// numbers beyond the model's.
     pub fn traces(&self, face: FaceId) -> bool {
         self.geometry.by_id.contains_key(&face)
     }

@@ -257,8 +257,8 @@ impl Search<'_> {
         measured
     }
 
-    /// Makes the plan by the formulas, or one tolerance for all places where not `local`, corrects it once by what the pilots measure on
-    /// coarse facets, and forecasts its facets and seconds.
+    /// Makes the plan for these normals by the formulas, with one tolerance for all places unless `local`; meshes it, or a coarser one, and
+    /// corrects it once by what pilots on those facets measure; forecasts the facets and the seconds of the run.
     fn candidate(&self, normals: NormalMode, local: bool) -> Candidate {
         let order = if normals == NormalMode::Flat || normals == NormalMode::Nearest { 0.5 } else { 1.0 };
         let epsilon = (MARGIN * self.target.degrees).to_radians();

@@ -197,8 +197,8 @@ fn overshoot(surface: &FaceSurface<'_>, hull: &[Uv], chord: [Uv; 2]) -> f64 {
     height * hull.iter().map(stretch).fold(1.0, f64::max)
 }
 
-/// Returns the convex hull, counter-clockwise, of the chord and the curve over `[a, b]` in the parameter plane; empty where the curve is
-/// the chord itself.
+/// Returns a convex polygon, counter-clockwise in the parameter plane, that holds the chord and the curve over `[a, b]`; empty where the
+/// curve is the chord itself or the interval has no length.
 fn parameter_hull(surface: &FaceSurface<'_>, side: &EdgeUse, [a, b]: [f64; 2], chord: [Uv; 2]) -> Vec<Uv> {
     let [[u0, u1], [v0, v1]] = surface.spline.domain();
     let extent = Uv::new(u1 - u0, v1 - v0);
