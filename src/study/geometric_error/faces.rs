@@ -1,15 +1,9 @@
 //! What facets change of the power that each face absorbs and lets through, from replicates of the same rays.
 
 use super::paired::Paired;
-use super::replicates::ReplicatedRun;
+use super::replicates::{FaceQuanta, ReplicatedRun};
 use crate::math::variance_of_sum;
 use rustc_hash::FxHashMap;
-
-/// Quanta that a replicate left in a face, took into its body through it, and out.
-type FaceQuanta = [u64; 3];
-
-/// What a replicate brought to the faces that it reached, by rising face.
-pub(super) type FaceSums = Vec<(u32, FaceQuanta)>;
 
 /// What facets change of the power at one face, in the unit of the sources.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

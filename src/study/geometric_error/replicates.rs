@@ -1,12 +1,17 @@
 //! A run taken apart into its replicates: what each of them brought to every receiver and every cell.
 
-use super::faces::FaceSums;
 use crate::intersect::Intersector;
 use crate::simulate::{BoundScene, Hooks, Moments, ReplicateTally, Results, RunSettings, replicates, trace};
 use std::sync::Mutex;
 
 /// Cells of a receiver up to which each replicate's are kept apart: 128 MB of sums, and a tenth of a second for all replicates.
 pub(in crate::study) const MOST_CELLS: usize = 1 << 22;
+
+/// Quanta that a replicate left in a face, took into its body through it, and out.
+pub(super) type FaceQuanta = [u64; 3];
+
+/// What a replicate brought to the faces that it reached, by rising face.
+type FaceSums = Vec<(u32, FaceQuanta)>;
 
 /// What one replicate brought to one receiver: quanta, and their moments in half sides.
 #[derive(Clone, Debug, Default)]

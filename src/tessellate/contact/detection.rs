@@ -1,6 +1,6 @@
 //! Which curved face of one solid lies on a face of another, wholly or in part.
 
-use super::trimmed::{FaceKey, TrimmedFace};
+use super::trimmed::{CARRIER_SHARE, FaceKey, TrimmedFace};
 use crate::math::Aabb;
 use crate::model::{Analytic, Model};
 use crate::tessellate::assemble::PartMesh;
@@ -8,9 +8,6 @@ use crate::tessellate::placed_part::PlacedPart;
 use crate::tessellate::settings::Settings;
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
-
-/// Share of the tolerance that a carrier's facets are held to.
-pub(super) const CARRIER_SHARE: f64 = 0.8;
 
 /// How much of a guest lies on its carrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,6 +1,5 @@
 //! One placed face, as contacts see it: its trimmed region, and places on it in the model's coordinates.
 
-use super::detection::CARRIER_SHARE;
 use super::projector::Projector;
 use crate::math::polygon::is_inside_sides;
 use crate::math::{Frame, Point, Uv};
@@ -13,6 +12,9 @@ use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
 use crate::tessellate::placed_part::PlacedPart;
 use crate::tessellate::settings::{Settings, ToleranceField};
+
+/// Share of the tolerance that a carrier's facets are held to: the guest's proof, over other parameters, has the rest.
+pub(super) const CARRIER_SHARE: f64 = 0.8;
 
 /// Steps of the grid over a face whose places inside it are looked at.
 const GRID: usize = 9;
