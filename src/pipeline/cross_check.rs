@@ -15,8 +15,12 @@ use crate::study::Progress;
 use crate::study::cross_check::{self, CrossCheck, GroupedIntersectors, cross_check_groups};
 use crate::study::geometric_error::{GeometricError, geometric_error};
 
-/// Segments of a run that are asked again of BVH and spline.
-const RECHECKED: usize = 10_000;
+/// Segments of a run that are asked again of BVH and spline, at most.
+const MOST_RECHECKED: u64 = 10_000;
+/// The share of their segments that short runs have asked again: a check of 10,000 took a sixth of the time of a run of as many rays.
+const RECHECKED_SHARE: f64 = 0.1;
+/// The fewest, even of the shortest run.
+const FEWEST_RECHECKED: u64 = 2000;
 /// The fewest rays whose segments these are: 2000 paths are as many places, directions and depths, however long each is.
 const FEWEST_REPLAYED: u64 = 2000;
 /// Tolerances above a surface that a ray which left it starts at, so that facets and spline are asked the same question.
@@ -85,21 +89,22 @@ fn recheck(
     (Some(check), pilot.or_else(|| facet_effects(prepared, results, [intersector, &*exact])))
 }
 
-/// Traces some rays of the run once more, spread evenly over it, and returns up to [`RECHECKED`] of their segments, lifted off the surfaces
-/// that they leave.
+/// Traces some rays of the run once more, spread evenly over it, and returns up to [`MOST_RECHECKED`] of their segments, lifted off the
+/// surfaces that they leave.
 fn sample_segments(prepared: &PreparedScene, results: &Results, intersector: &dyn Intersector) -> Vec<Ray> {
     let settings = prepared.run_settings();
     let segments_a_ray = results.segments as f64 / results.rays.max(1) as f64;
     // Twice the segments that are asked again, as rays differ in how many they have; of long paths more, that few rays not stand for all.
-    let rays = (2.0 * RECHECKED as f64 / segments_a_ray.max(1.0)) as u64;
+    let asked = ((RECHECKED_SHARE * results.segments as f64) as u64).clamp(FEWEST_RECHECKED, MOST_RECHECKED);
+    let rays = (2.0 * asked as f64 / segments_a_ray.max(1.0)) as u64;
     // No more than the run has.
-    let count = rays.clamp(FEWEST_REPLAYED, RECHECKED as u64).min(settings.rays);
+    let count = rays.clamp(FEWEST_REPLAYED, MOST_RECHECKED).min(settings.rays);
     let step = (settings.rays / count.max(1)).max(1);
     let expected = (count as f64 * segments_a_ray) as u64;
-    let recorder = RayRecorder::new(intersector, RECHECKED as u64, expected);
+    let recorder = RayRecorder::new(intersector, asked, expected);
     ask_again(&prepared.bound, &recorder, &settings, (step, count));
     let lift = LIFT_IN_TOLERANCES * prepared.mesh_settings.loosest();
-    recorder.rays(RECHECKED, &prepared.job.loaded.model, |ray, up| ray.origin + lift * up)
+    recorder.rays(asked as usize, &prepared.job.loaded.model, |ray, up| ray.origin + lift * up)
 }
 
 /// Builds what the run has not of BVH and octree, and compares both and the spline on these rays.
