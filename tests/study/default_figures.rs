@@ -308,7 +308,7 @@ fn flat_faces_need_no_spline() {
     assert!(answer.figures[0].named().all(|(_, f)| f.geometric == Some(0.0)));
 }
 
-fn random_scene(index: u64) -> KnownScene {
+pub(crate) fn random_scene(index: u64) -> KnownScene {
     let mut random = Random::new(17, index);
     let scale = 0.5 * 10f64.powf(4.0 * random.unit());
     let between = |random: &mut Random, a: f64, b: f64| a + (b - a) * random.unit();

@@ -1,6 +1,8 @@
 //! The studies: the cross-check of intersectors, stability, accuracy and what a run is asked for.
 
 mod accuracy;
+#[cfg(feature = "truck")]
+mod accuracy_claims;
 mod asks;
 #[cfg(feature = "truck")]
 mod axial;
