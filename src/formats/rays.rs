@@ -19,6 +19,8 @@ pub struct LightRay {
     pub wavelength_nm: Option<f64>,
 }
 
+/// Largest components of a direction whose squares neither vanish nor overflow.
+const SQUARABLE: std::ops::Range<f64> = 1e-100..1e100;
 /// A length this near to 1 is 1 but for rounding: a few units in the last place of a double.
 const UNIT_ROUNDING: f64 = 1e-15;
 
@@ -56,10 +58,13 @@ impl LightRay {
 /// Returns a direction of any length at unit length, as all readers of rays make it; `None` where it has none. One that is of unit length
 /// already keeps its bits.
 pub(super) fn unit_direction(given: Vector) -> Option<Vector> {
-    let length = given.length();
-    if length == 0.0 || !length.is_finite() {
+    let largest = given.abs().max_element();
+    if !(largest > 0.0 && given.is_finite()) {
         return None;
     }
+    // Of numbers near the ends of what a double holds the squares would be none.
+    let given = if SQUARABLE.contains(&largest) { given } else { given / largest };
+    let length = given.length();
     Some(if (length - 1.0).abs() < UNIT_ROUNDING { given } else { given / length })
 }
 
@@ -156,6 +161,17 @@ pub(super) mod tests {
         assert!(
             write_rays(&folder.path().join("a.ray"), &[]).unwrap_err().to_string().contains(".csv, .npz, .txt")
         );
+    }
+
+    #[test]
+    fn directions_of_any_length_come_to_unit_length() {
+        for scale in [1e-300, 1e-162, 1e-30, 1.0, 1e30, 1e200, 5e307] {
+            let unit = unit_direction(scale * Vector::new(3.0, 0.0, -2.0)).unwrap();
+            assert!((unit - Vector::new(3.0, 0.0, -2.0) / 13f64.sqrt()).length() < 3e-16, "{scale}: {unit}");
+        }
+        assert_eq!(unit_direction(Vector::ZERO), None);
+        assert_eq!(unit_direction(Vector::new(f64::INFINITY, 0.0, 0.0)), None);
+        assert_eq!(unit_direction(Vector::new(f64::NAN, 0.0, 1.0)), None);
     }
 
     /// A list in which only some rays have a wavelength could not be read back, or would lose those that are there.

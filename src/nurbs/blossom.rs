@@ -54,7 +54,8 @@ impl<P: ControlPoint> Spline<P> {
         if [a, b] == self.domain() && self.is_clamped() {
             return self.clone();
         }
-        let inner = self.knots.iter().copied().filter(|&k| k > a && k < b);
+        let first = self.knots.partition_point(|&k| k <= a);
+        let inner = self.knots[first..].iter().copied().take_while(|&k| k < b);
         let p1 = self.degree + 1;
         let knots = std::iter::repeat_n(a, p1).chain(inner).chain(std::iter::repeat_n(b, p1)).collect();
         self.refined(knots)
@@ -123,6 +124,18 @@ impl Curve {
         let mut knots = self.knots[..self.knots.len() - 1].to_vec();
         knots.extend(tail.knots[p + 1..].iter().map(|k| end + (k - start)));
         Self { degree: p, knots, points }
+    }
+
+    /// Joins curves of one degree, each of which starts where the one before ends, as [`Self::joined_with`] does; `None` of none.
+    pub fn join(mut parts: Vec<Self>) -> Option<Self> {
+        // Neighbours first: joined one by one to the whole, each would copy all before it.
+        while parts.len() > 1 {
+            parts = parts
+                .chunks(2)
+                .map(|pair| pair[1..].iter().fold(pair[0].clone(), |a, b| a.joined_with(b)))
+                .collect();
+        }
+        parts.pop()
     }
 }
 

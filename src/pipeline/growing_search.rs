@@ -50,7 +50,8 @@ impl GrowingSearch<'_> {
         self.resume_rays.unwrap_or(usual.min(most))
     }
 
-    /// Traces the run that `prepared` asks for, with an intersector built for it, and returns its sums and its results.
+    /// Traces what the keeper does not have yet of the run that `prepared` asks for, with an intersector built for it, and returns the sums
+    /// and the results of all of it; fewer rays where the monitor ends it early.
     pub(super) fn trace(&self, prepared: &PreparedScene, monitor: &dyn Monitor) -> (PartialRun, Results) {
         let settings = prepared.run_settings();
         prepared.with_intersector(monitor, |intersector, _| {

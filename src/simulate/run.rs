@@ -71,7 +71,7 @@ pub fn trace(
     let shard = shard_replicates(context.plan.first_replicate..context.plan.replicates, settings.shard);
     let todo: Vec<u32> = shard.clone().filter(|r| before.done.binary_search(r).is_err()).collect();
     let threads = settings.thread_count();
-    announce(&context, threads);
+    announce(&context, todo.len(), threads);
     let work = Work {
         context: &context,
         recording: recording.as_ref(),
@@ -80,7 +80,7 @@ pub fn trace(
         hooks,
         start,
         // Of a shard, its share of the rays: progress is told of what this run traces.
-        total: rays_of_replicates(context.plan.rays, &shard, context.plan.replicates),
+        total: rays_of_replicates(context.plan.rays, shard.len(), context.plan.replicates),
         next: AtomicUsize::new(0),
         stop: AtomicBool::new(false),
         rays_done: AtomicU64::new(before.tallies.counts.rays),
@@ -107,10 +107,9 @@ pub fn shard_replicates(all: Range<u32>, [shard, shards]: [u32; 2]) -> Range<u32
 }
 
 /// Returns the number of rays in some of the `replicates` replicates of a run of so many rays, to within one.
-fn rays_of_replicates(rays: u64, some: &Range<u32>, replicates: u32) -> u64 {
+fn rays_of_replicates(rays: u64, some: usize, replicates: u32) -> u64 {
     // Of a run of 3·10¹¹ rays that grows the product does not fit into 64 bits.
-    let product = u128::from(rays) * u128::from(some.end.saturating_sub(some.start));
-    (product / u128::from(replicates)) as u64
+    (u128::from(rays) * some as u128 / u128::from(replicates.max(1))) as u64
 }
 
 /// What the threads of a run share.
@@ -164,14 +163,15 @@ impl Work<'_, '_> {
     }
 }
 
-/// Tells the intersector how many rays a run is going to ask, and which of them share an origin or direction.
-fn announce(context: &Context<'_>, threads: usize) {
-    // A shard traces its share alone, and what is worked out beforehand must pay for that.
-    let of_shard = |rays: u64| rays / u64::from(context.settings.shard[1].max(1));
-    let beam = |(k, e): (usize, &Emitter)| Some((e.beam()?, of_shard(context.plan.rays_of_source(k))));
+/// Tells the intersector how many rays are to be traced in so many replicates, and which of them share an origin or direction. What pays
+/// for that many it works out at once, on so many threads; the results stay the same.
+fn announce(context: &Context<'_>, replicates: usize, threads: usize) {
+    // Of a shard, a range or a run that is resumed not all rays are left, and what is worked out beforehand must pay for these.
+    let left = |rays: u64| rays_of_replicates(rays, replicates, context.plan.replicates);
+    let beam = |(k, e): (usize, &Emitter)| Some((e.beam()?, left(context.plan.rays_of_source(k))));
     let beams: Vec<_> = context.bound.emitters.iter().enumerate().filter_map(beam).collect();
     context.intersector.prepare_for(&ExpectedRays {
-        rays: of_shard(context.plan.rays),
+        rays: left(context.plan.rays),
         threads,
         beams: &beams,
         sag: 0.0,
@@ -180,7 +180,9 @@ fn announce(context: &Context<'_>, threads: usize) {
 
 /// Lets the intersector work out beforehand what it will know of a run, so that two runs on it compare.
 pub(crate) fn prepare(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings) {
-    announce(&Context::new(bound, intersector, settings), settings.thread_count());
+    let context = Context::new(bound, intersector, settings);
+    let replicates = (context.plan.first_replicate..context.plan.replicates).len();
+    announce(&context, replicates, settings.thread_count());
 }
 
 /// Traces some rays of a run once more, by their number, and records their whole paths: `paths` and `ledger` of the results are theirs.

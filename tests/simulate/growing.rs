@@ -1,7 +1,7 @@
 //! Runs that grow: further rays join those that were traced, and the bits are those of one run of all of them.
 
 use crate::support::World;
-use lampyris::intersect::{Cost, Footprint, Hit, Intersector};
+use lampyris::intersect::{Cost, ExpectedRays, Footprint, Hit, Intersector};
 use lampyris::math::{Point, Ray};
 use lampyris::simulate::{BoundScene, Hooks, PartialRun, Results, RunSettings, Scene, ask_again, replay, trace};
 use std::path::Path;
@@ -181,4 +181,48 @@ fn rays_that_are_asked_again_ask_the_same() {
         assert!(numbers.last() > Some(&rays) && alone.len() > numbers.len(), "{}", alone.len());
         assert_eq!(alone, together);
     }
+}
+
+/// Keeps what it is told to expect: all rays, and those of each beam.
+struct Told<'a>(&'a World, Mutex<Vec<u64>>);
+
+impl Intersector for Told<'_> {
+    fn intersect(&self, ray: &Ray, cost: &mut Cost) -> Option<Hit> {
+        self.0.intersect(ray, cost)
+    }
+
+    fn prepare_for(&self, expected: &ExpectedRays<'_>) {
+        let beams = expected.beams.iter().map(|(_, rays)| *rays);
+        self.1.lock().unwrap().extend(std::iter::once(expected.rays).chain(beams));
+    }
+
+    fn footprint(&self) -> Footprint {
+        self.0.footprint()
+    }
+}
+
+/// What an intersector works out beforehand must pay for the rays that are left, not for those of other ranges, shards and earlier runs.
+#[test]
+fn rays_that_are_announced_are_those_left_to_trace() {
+    let (world, bound) = ball();
+    let told = |rays: [u64; 2], shard, from| {
+        let told = Told(&world, Mutex::default());
+        let settings = RunSettings {
+            rays: rays[1],
+            first_ray: rays[0],
+            grows: true,
+            shard,
+            threads: 2,
+            ..RunSettings::default()
+        };
+        trace(&bound, &told, &settings, from, &Hooks::with_progress(&|_| true));
+        told.1.into_inner().unwrap()
+    };
+    let range = told([40_000, 60_000], [0, 1], None);
+    assert_eq!(range[0], 20_000);
+    // The strong source has all but a few of them, the weak one a ray a replicate.
+    assert!(range.len() == 3 && range[1] + range[2] <= 20_000 && range[1] > 19_000 && range[2] < 100, "{range:?}");
+    assert_eq!(told([0, 60_000], [1, 3], None)[0], 20_000);
+    let done = part([0, 40_000], [0, 1], None);
+    assert_eq!(told([0, 60_000], [0, 1], Some(done))[0], 20_000);
 }

@@ -95,6 +95,18 @@ fn an_operator_without_a_first_axis_takes_the_projection_of_x() {
     assert_square_in_box(&placed, [1.0, 0.04, -1.0, 1.28, 1.0, 0.0]);
 }
 
+#[test]
+fn an_operator_of_two_dimensions_is_refused_in_either_form() {
+    for operator in [
+        "CARTESIAN_TRANSFORMATION_OPERATOR_2D('','',$,$,$,#12,2.)",
+        "(CARTESIAN_TRANSFORMATION_OPERATOR($,$,#12,2.)CARTESIAN_TRANSFORMATION_OPERATOR_2D()\
+         GEOMETRIC_REPRESENTATION_ITEM()REPRESENTATION_ITEM(''))",
+    ] {
+        let problems = placed_by("", operator).report.problems;
+        assert!(problems.iter().any(|p| p.contains("#108") && p.contains("two dimensions")), "{problems:?}");
+    }
+}
+
 /// Reads the square as a part that an operator places in an assembly; `axes` are the statements that it names.
 fn placed_by(axes: &str, operator: &str) -> Import {
     let assembly = format!(

@@ -267,6 +267,10 @@ fn edges_given_only_in_a_parameter_plane_or_as_an_offset_are_converted() {
     for (curve, expected) in [
         (format!("#80=SURFACE_CURVE('',$,(#81),.PCURVE_S1.);\n{arc}"), 1.1),
         (arc.replace("#81=", "#80="), 1.1),
+        // Three corners in the parameter plane, 0.2 and 0.1 below the square: trapezoids and triangles by the rule.
+        ("#80=PCURVE('',#21,#82);\n#82=DEFINITIONAL_REPRESENTATION('',(#83),$);\n#83=POLYLINE('',(#84,#85,#86,#87,#88));\n\
+          #84=CARTESIAN_POINT('',(0.,0.));\n#85=CARTESIAN_POINT('',(0.25,-0.2));\n#86=CARTESIAN_POINT('',(0.5,-0.2));\n\
+          #87=CARTESIAN_POINT('',(0.75,-0.1));\n#88=CARTESIAN_POINT('',(1.,0.));\n".into(), 1.0 + 0.25 * (0.1 + 0.2 + 0.15 + 0.05)),
         (format!("#80=TRIMMED_CURVE('',#89,(0.),(1.),.T.,.PARAMETER.);\n#89=SURFACE_CURVE('',#87,(#81),.CURVE_3D.);\n#87=LINE('',#10,#88);\n#88=VECTOR('',#90,1.);\n#90=DIRECTION('',(1.,0.,0.));\n{plane}"), 1.0),
         // A line 2 mm aside, moved back along reference direction × tangent = z × x = y.
         ("#80=OFFSET_CURVE_3D('',#81,2.,.F.,#82);\n#81=LINE('',#83,#84);\n#82=DIRECTION('',(0.,0.,1.));\n#83=CARTESIAN_POINT('',(0.,-2.,0.));\n\

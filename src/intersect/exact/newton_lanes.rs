@@ -14,7 +14,9 @@ const STEPS: usize = 6;
 pub(super) struct Starts {
     /// The ray's origin about the patch's centre.
     pub(super) origin: [[f64; LANES]; 3],
+    /// Of unit length.
     pub(super) direction: [[f64; LANES]; 3],
+    /// The patch's parameters, 0 to 1.
     pub(super) local: [[f64; LANES]; 2],
     /// Distance from the ray at which steps that no longer help may end, mm.
     pub(super) near: [f64; LANES],
@@ -75,8 +77,9 @@ pub(super) fn iterate_fixed<V: F64x8, const N: usize, const M: usize>(net: &[[V;
     iterate::<V, N, M>(&net[..N * M], [N as u8 - 1, M as u8 - 1], starts)
 }
 
-/// Takes Newton steps from `starts` until every lane has ended or been given up, and returns where they did. `net` holds the control
-/// points of eight patches side by side, and `N` and `M` have room for their degrees.
+/// Takes at most [`STEPS`] Newton steps from `starts` until every lane has ended, and returns where they did, which may be beyond the patch:
+/// parameters are not clamped. `net` holds the control points of eight patches side by side, those along v next to each other; `N` and
+/// `M` exceed its degrees.
 ///
 /// With `e` from the point to the ray's origin, `g = e × d` and `n = Su × Sv` a step is `(−g·Sv, g·Su) / n·d`: the two equations
 /// across the ray without a frame around it, and `|g|` is the distance from the ray.

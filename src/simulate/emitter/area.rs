@@ -5,7 +5,7 @@ use super::stream::{RayIndex, Stream};
 use crate::math::{FaceId, Frame, Point, Uv, Vector};
 use crate::model::{Face, Model};
 use crate::simulate::trim_loops::TrimRegion;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// Cells across a face in each parameter.
@@ -98,6 +98,7 @@ impl Area {
     /// Prepares the chosen faces (indices of placed faces), each with the opaque faces that may lie against it; `None` when none of them
     /// has a spline surface with area. Ready meshes are skipped.
     pub(crate) fn new(model: &Model, chosen: &[usize], covers: &HashMap<usize, Vec<Arc<Cover>>>) -> Option<Self> {
+        let chosen: HashSet<usize> = chosen.iter().copied().collect();
         let mut faces = Vec::new();
         let mut sums = Vec::new();
         let mut sum = 0.0;

@@ -82,8 +82,8 @@ pub(crate) struct RayIndex {
 }
 
 impl Stream {
-    /// Makes the numbers of a portion, of these pairs alone: for the place, the direction and the wavelength. Nothing is drawn before a
-    /// refill.
+    /// Makes the stream of a portion; of the pairs for the place, the direction and the wavelength those alone that are `true` are drawn from
+    /// the net. It has no numbers before [`Self::refill`], [`Self::fill_short`] or [`Self::prepare_single`].
     pub(super) fn new(seed: u64, sampling: Sampling, portion: Portion, pairs: [bool; 3]) -> Self {
         let mut stream = Self {
             seed,
@@ -193,10 +193,13 @@ impl Stream {
         }
         let along = self.sorted_dimension();
         let mut cells = [0u16; CHUNK];
-        for ((cell, x), y) in cells.iter_mut().zip(&self.numbers[along]).zip(&self.numbers[along + 1]) {
-            // Morton order of the directions (or places): rays that start one after another go through the same part of the scene, whose
-            // nodes are still in the cache.
-            *cell = z_order_cell(*x, *y);
+        // Rays without a direction or place of their own, as those of a list, keep their order: what numbers there are is of another source.
+        if self.pairs[along / 2] {
+            for ((cell, x), y) in cells.iter_mut().zip(&self.numbers[along]).zip(&self.numbers[along + 1]) {
+                // Morton order of the directions (or places): rays that start one after another go through the same part of the scene,
+                // whose nodes are still in the cache.
+                *cell = z_order_cell(*x, *y);
+            }
         }
         // Counting sort: most cells hold one ray of a chunk.
         let mut ends = [0u16; CHUNK];
@@ -229,8 +232,7 @@ impl Stream {
         let [x, y] = [&self.numbers[along], &self.numbers[along + 1]];
         self.order.clear();
         self.order.extend(0..self.rays);
-        // Rays without a direction or place of their own, as those of a list, have nothing to be ordered by. Stable, as the counting sort
-        // of a chunk is.
+        // As in a chunk: those of a list keep their order. Stable, as the counting sort is.
         if self.rays > 1 && self.pairs[along / 2] {
             self.order.sort_by_key(|&k| z_order_cell(x[k as usize], y[k as usize]));
         }
@@ -291,5 +293,23 @@ impl Stream {
         let [lattice, lattices] = self.lattice.map(f64::from);
         let step = f64::from(index.in_stream) + (lattice + jitter) / lattices;
         (step / f64::from(self.rays.max(1))).min(1.0 - f64::EPSILON)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rays of a list have a wavelength to draw and nothing to be ordered by, whatever source the numbers before were of.
+    #[test]
+    fn rays_without_place_or_direction_keep_their_order() {
+        let portion = Portion { replicate: 0, source: 0, rays: 200, lattice: [0, 1] };
+        let mut stream = Stream::new(7, Sampling::Sobol, portion, [true, true, false]);
+        stream.refill(0);
+        let order = |stream: &Stream| (0..200).map(|k| stream.index_to_start(k)).collect::<Vec<u32>>();
+        assert!(!order(&stream).is_sorted());
+        stream.restart(Portion { source: 1, ..portion }, [false, false, true]);
+        stream.refill(0);
+        assert!(order(&stream).is_sorted());
     }
 }

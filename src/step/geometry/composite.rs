@@ -183,15 +183,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         }
         let segments = self.segments(e, depth)?;
         let degree = segments.iter().map(|c| c.degree).max().unwrap_or(1);
-        let mut parts: Vec<Curve> = segments.iter().map(|c| elevate_degree(c, degree)).collect();
-        // Neighbours first: joined one by one to the whole, each would copy all before it.
-        while parts.len() > 1 {
-            parts = parts
-                .chunks(2)
-                .map(|pair| pair[1..].iter().fold(pair[0].clone(), |a, b| a.joined_with(b)))
-                .collect();
-        }
-        parts.pop().ok_or_else(|| Refusal::new(e, "composite curve without segments"))
+        let parts = segments.iter().map(|c| elevate_degree(c, degree)).collect();
+        Curve::join(parts).ok_or_else(|| Refusal::new(e, "composite curve without segments"))
     }
 }
 

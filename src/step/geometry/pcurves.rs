@@ -104,21 +104,23 @@ fn lift_to_surface(e: Entity<'_, '_>, chart: &Chart, curve: &Curve, scale: [f64;
 /// [`WORST_CURVE_ERROR_MM`], and pieces that part at a corner.
 fn fit_pieces(e: Entity<'_, '_>, curve: &Curve, at: impl Fn(&Curve, f64) -> (Point, Vector)) -> Outcome<Curve> {
     let breaks = curve.breakpoints();
-    let is_corner = |t: f64| curve.knots.iter().filter(|&&k| k == t).count() >= curve.degree;
+    let multiplicity = |t: f64| curve.knots.partition_point(|&k| k <= t) - curve.knots.partition_point(|&k| k < t);
+    let is_corner = |t: f64| multiplicity(t) >= curve.degree;
     let [start, end] = curve.domain();
     let corners: Vec<f64> = breaks.into_iter().filter(|&t| t == start || t == end || is_corner(t)).collect();
-    let mut whole: Option<Curve> = None;
+    let mut pieces: Vec<Curve> = Vec::with_capacity(corners.len());
     for span in corners.windows(2) {
         let piece = curve.restricted(span[0], span[1]);
         let (fitted, error) = fit_cubic([span[0], span[1]], |t| at(&piece, t), CURVE_ERROR_MM);
         // Of an offset both sides of a corner part, and no one curve joins them.
-        let parted = whole.as_ref().map_or(0.0, |w| (w.points[w.points.len() - 1] - fitted.points[0]).length());
+        let end_before = pieces.last().and_then(|piece| piece.points.last());
+        let parted = end_before.map_or(0.0, |end| (*end - fitted.points[0]).length());
         // An error that is no number stays one.
         let off = if parted > error { parted } else { error };
         if !(off <= WORST_CURVE_ERROR_MM) {
             return Err(Refusal::new(e, format!("no curve follows it to more than {off:.1e} mm")));
         }
-        whole = Some(whole.map_or_else(|| fitted.clone(), |head| head.joined_with(&fitted)));
+        pieces.push(fitted);
     }
-    whole.ok_or_else(|| Refusal::new(e, "it has no length"))
+    Curve::join(pieces).ok_or_else(|| Refusal::new(e, "it has no length"))
 }

@@ -17,8 +17,9 @@ const GRIDS: [usize; 3] = [4, 16, 23];
 /// Points on each edge of a loop.
 const EDGE: usize = 6;
 
-/// Returns the indices of faces, ascending, that look inwards where their neighbours look outwards: of two groups that contradict each
-/// other along all edges between them, the smaller one. Empty where edges give no two groups (a Möbius band) or groups of one size.
+/// Returns the indices of faces, ascending, whose sense contradicts their neighbours'. In each set of faces joined by edges that two of
+/// them use, faces fall into two groups that contradict each other along all edges between them; the smaller one is returned. None of a set
+/// whose edges give no two groups (a Möbius band) or groups of one size. Whether all look inwards is not told.
 pub(crate) fn faces_against_neighbours(faces: &[Face]) -> Vec<usize> {
     // For each edge the faces that use it and whether they run along it.
     let mut uses: FxHashMap<EdgeId, Vec<(usize, bool)>> = FxHashMap::default();

@@ -59,7 +59,7 @@ pub(crate) struct Target<'t> {
 #[derive(Clone, Debug)]
 pub(crate) struct Fit {
     pub(crate) curve: UvCurve,
-    /// Largest distance between the edge and the surface at the fitted parameters, mm.
+    /// Largest distance found between the edge and the surface at the fitted parameters, mm; on a plane a bound of it.
     pub(crate) gap: f64,
 }
 
@@ -313,7 +313,8 @@ fn join_pieces(pieces: &[(Node, Node)]) -> UvCurve {
     UvCurve { degree: 3, knots, points }
 }
 
-/// Returns an edge on a plane, exactly: its control points by `flat`, which gives a point's parameters and height over the plane, mm.
+/// Returns an edge on a plane, exactly: its control points by `flat`, an affine map to parameters and height over the plane, mm. The gap is
+/// the largest height of a control point, a bound of the edge's.
 pub(crate) fn project_to_plane(curve: &Curve, flat: impl Fn(Point) -> (Uv, f64)) -> Fit {
     let mut gap = 0f64;
     let points = curve

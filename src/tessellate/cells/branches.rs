@@ -19,9 +19,10 @@ struct Piece {
     cells: Subdivision,
 }
 
-/// Splits the box around the border until every cell fits its tolerance or the budget of cells is used up, which the result says; it may
-/// hold up to twice the budget. Empty on a plane and for a border without extent. `max_angle` is in radians; no cell crosses an `imprinted`
-/// line.
+/// Splits the parameter box around the border until every cell fits its tolerance. It ends before that, which `exhausted` says, where the
+/// budget of cells, the proof steps of the surface or the digits of its parameters are used up; the result has up to twice the budget.
+/// Empty on a surface that is affine in its parameters and for a border without extent. `max_angle` is in radians; no cell crosses an
+/// `imprinted` line.
 pub(in crate::tessellate) fn split(
     surface: &FaceSurface<'_>,
     acceptance: Acceptance,

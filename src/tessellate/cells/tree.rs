@@ -123,7 +123,7 @@ impl Halves {
 
 impl<'s, 'a> Tree<'s, 'a> {
     /// Makes the tree over the box around a border in surface parameters, and its first cell; no cell is to cross an `imprinted` line, and
-    /// `max_angle` is in radians. `None` on a plane and for a border without extent.
+    /// `max_angle` is in radians. `None` on an affine surface and for a border without extent.
     pub(super) fn new(
         surface: &'s FaceSurface<'a>,
         acceptance: Acceptance,
