@@ -134,8 +134,8 @@ impl Receiver {
         }
     }
 
-    /// Whether it may have a point in common with a box; a `true` in vain costs time alone. Always `false` for far fields and absorbed power,
-    /// which stand nowhere.
+    /// Whether it may have a point in common with a box; a `true` in vain costs time alone. Always `false` for far fields and absorbed
+    /// power, which stand nowhere.
     pub(crate) fn meets(&self, region: &Aabb) -> bool {
         match &self.shape {
             Shape::Plane { frame, .. } | Shape::Disc { frame, .. } => {

@@ -77,9 +77,9 @@ pub(super) fn iterate_fixed<V: F64x8, const N: usize, const M: usize>(net: &[[V;
     iterate::<V, N, M>(&net[..N * M], [N as u8 - 1, M as u8 - 1], starts)
 }
 
-/// Takes at most [`STEPS`] Newton steps from `starts` until every lane has ended, and returns where they did, which may be beyond the patch:
-/// parameters are not clamped. `net` holds the control points of eight patches side by side, those along v next to each other; `N` and
-/// `M` exceed its degrees.
+/// Takes at most [`STEPS`] Newton steps from `starts` until every lane has ended, and returns where they did, which may be beyond the
+/// patch: parameters are not clamped. `net` holds the control points of eight patches side by side, those along v next to each other; `N`
+/// and `M` exceed its degrees.
 ///
 /// With `e` from the point to the ray's origin, `g = e × d` and `n = Su × Sv` a step is `(−g·Sv, g·Su) / n·d`: the two equations
 /// across the ray without a frame around it, and `|g|` is the distance from the ray.

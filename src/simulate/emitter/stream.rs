@@ -82,8 +82,8 @@ pub(crate) struct RayIndex {
 }
 
 impl Stream {
-    /// Makes the stream of a portion; of the pairs for the place, the direction and the wavelength those alone that are `true` are drawn from
-    /// the net. It has no numbers before [`Self::refill`], [`Self::fill_short`] or [`Self::prepare_single`].
+    /// Makes the stream of a portion; of the pairs for the place, the direction and the wavelength those alone that are `true` are drawn
+    /// from the net. It has no numbers before [`Self::refill`], [`Self::fill_short`] or [`Self::prepare_single`].
     pub(super) fn new(seed: u64, sampling: Sampling, portion: Portion, pairs: [bool; 3]) -> Self {
         let mut stream = Self {
             seed,
@@ -193,7 +193,8 @@ impl Stream {
         }
         let along = self.sorted_dimension();
         let mut cells = [0u16; CHUNK];
-        // Rays without a direction or place of their own, as those of a list, keep their order: what numbers there are is of another source.
+        // Rays without a direction or place of their own, as those of a list, keep their order: what numbers there are is of another
+        // source.
         if self.pairs[along / 2] {
             for ((cell, x), y) in cells.iter_mut().zip(&self.numbers[along]).zip(&self.numbers[along + 1]) {
                 // Morton order of the directions (or places): rays that start one after another go through the same part of the scene,

@@ -164,8 +164,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 
     /// Reads a placement, or a CARTESIAN_TRANSFORMATION_OPERATOR_3D, which may scale and mirror, as a frame, mm: the target of a mapped
-    /// item, or what takes one representation into another. A missing origin, scale or axis is that of the space, the third axis the product
-    /// of the first two where both are given. Refuses scales that are not positive and operators of two dimensions.
+    /// item, or what takes one representation into another. A missing origin, scale or axis is that of the space, the third axis the
+    /// product of the first two where both are given. Refuses scales that are not positive and operators of two dimensions.
     pub(crate) fn transformation(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
         if e.is_a("CARTESIAN_TRANSFORMATION_OPERATOR_2D") {

@@ -212,9 +212,9 @@ impl<'r> CellPairs<'r> {
         }
     }
 
-    /// Returns the estimated geometric error of each cell, row by row and in the unit of the receiver or channel, and the side, in cells, of
-    /// the largest square that shares one error because its rays were few; a cell whose own rays show a larger error has that. What noise
-    /// is left after pooling is in it; squares without rays have 0.
+    /// Returns the estimated geometric error of each cell, row by row and in the unit of the receiver or channel, and the side, in cells,
+    /// of the largest square that shares one error because its rays were few; a cell whose own rays show a larger error has that. What
+    /// noise is left after pooling is in it; squares without rays have 0.
     pub(super) fn cell_errors(&self) -> (Vec<f64>, usize) {
         let mut layer = vec![0.0; self.cells.len()];
         let mut pooled = 1;
