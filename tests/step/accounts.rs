@@ -102,13 +102,18 @@ fn an_operator_of_two_dimensions_is_refused_in_either_form() {
         "(CARTESIAN_TRANSFORMATION_OPERATOR($,$,#12,2.)CARTESIAN_TRANSFORMATION_OPERATOR_2D()\
          GEOMETRIC_REPRESENTATION_ITEM()REPRESENTATION_ITEM(''))",
     ] {
-        let problems = placed_by("", operator).report.problems;
-        assert!(problems.iter().any(|p| p.contains("#108") && p.contains("two dimensions")), "{problems:?}");
+        let problems = read(&placed_text("", operator)).report.problems;
+        assert!(problems[0].starts_with("#109: its transformation cannot be read"), "{problems:?}");
     }
 }
 
 /// Reads the square as a part that an operator places in an assembly; `axes` are the statements that it names.
 fn placed_by(axes: &str, operator: &str) -> Import {
+    import(&placed_text(axes, operator))
+}
+
+/// The square as a part that an operator places in an assembly.
+fn placed_text(axes: &str, operator: &str) -> String {
     let assembly = format!(
         "{axes}#108={operator};\n\
          #100=AXIS2_PLACEMENT_3D('',#12,$,$);\n#101=PRODUCT_DEFINITION('','',$,$);\n#102=PRODUCT_DEFINITION('','',$,$);\n\
@@ -119,7 +124,7 @@ fn placed_by(axes: &str, operator: &str) -> Import {
          SHAPE_REPRESENTATION_RELATIONSHIP());\n\
          #111=PRODUCT_DEFINITION_SHAPE('','',#110);\n#112=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#109,#111);\n"
     );
-    import(&(square(FORWARD, IN_ORDER) + &assembly))
+    square(FORWARD, IN_ORDER) + &assembly
 }
 
 /// Asserts that the file had no problems, and that its shape fills a box, given by both corners, mm.
