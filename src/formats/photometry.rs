@@ -141,7 +141,14 @@ impl Photometry {
             horizontal_deg.insert(0, 0.0);
             horizontal_deg.push(360.0);
         }
-        Self { horizontal_deg, candela, ..self.clone() }
+        self.with_intensities(horizontal_deg, self.vertical_deg.clone(), candela)
+    }
+
+    /// The same luminaire with other angles and intensities; nothing of its own is copied, of which fine far fields have much.
+    fn with_intensities(&self, horizontal_deg: Vec<f64>, vertical_deg: Vec<f64>, candela: Vec<f64>) -> Self {
+        let Self { kind, lamp_lumens, watts, opening_mm, .. } = *self;
+        let keywords = self.keywords.clone();
+        Self { kind, horizontal_deg, vertical_deg, candela, lamp_lumens, watts, opening_mm, keywords }
     }
 
     /// Lumens of the whole distribution, exact for intensities bilinear in the angles; symmetry is expanded first.
@@ -194,7 +201,9 @@ impl Photometry {
                 cut.push(plane[below - 1] + share * (plane[below] - plane[below - 1]));
             }
         }
-        Self { vertical_deg, candela: candela.concat(), ..self.clone() }.flux()
+        let below = self.with_intensities(self.horizontal_deg.clone(), vertical_deg, candela.concat());
+        drop(candela);
+        below.flux()
     }
 }
 

@@ -49,12 +49,15 @@ impl PreparedScene {
                 let (results, verification) = verify_pruning(&self.bound, intersector, &settings, &|_| true);
                 (results, Some(verification), None)
             } else {
-                let traced = self.run(intersector, &settings, request, monitor);
+                let mut traced = self.run(intersector, &settings, request, monitor);
                 // A run that was ended early has no results, but sums to go on with.
                 if !traced.partial.is_whole() {
                     return Err(Box::new(traced.partial));
                 }
+                // The results keep the cells.
+                let cells = std::mem::take(&mut traced.partial.tallies.cells);
                 let sums = traced.partial.clone();
+                traced.partial.tallies.cells = cells;
                 (Results::new(&self.bound, &settings, traced), None, Some(sums))
             };
             // What was done before tracing.
@@ -62,7 +65,7 @@ impl PreparedScene {
             results.seconds.tessellate = self.tessellation_seconds;
             results.seconds.build = build_seconds;
             let (check, geometric) = recheck(self, &results, intersector, monitor);
-            Ok(SceneResults { results, check, geometric, verification, sums })
+            Ok(SceneResults { results, check, geometric, verification, sums_without_cells: sums })
         })
     }
 }

@@ -20,11 +20,18 @@ pub struct SceneResults {
     pub geometric: Option<GeometricError>,
     /// The pruned kernel against the full one, when asked for.
     pub verification: Option<Verification>,
-    /// The sums that the results were made of, to be saved where they cannot be written; none of a verified run.
-    pub sums: Option<PartialRun>,
+    /// The sums that the results were made of but for their cells, which the results have; none of a verified run.
+    pub(super) sums_without_cells: Option<PartialRun>,
 }
 
 impl SceneResults {
+    /// Returns the sums that the results were made of, to be saved where the results cannot be written; none of a verified run.
+    pub fn sums(&self) -> Option<PartialRun> {
+        let mut sums = self.sums_without_cells.clone()?;
+        sums.tallies.cells.clone_from(&self.results.tallies.cells);
+        Some(sums)
+    }
+
     /// Returns the figures of every receiver with both their errors; the geometric one is absent where facets were not compared.
     pub fn figures(&self, prepared: &PreparedScene) -> Vec<ReceiverFigures> {
         figures::figures(&self.results, self.surface(prepared), prepared.power_unit())

@@ -30,7 +30,7 @@ pub enum RowKind {
 /// Which side of a limit a relative row asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Bound {
+pub enum Bound {
     /// At least so much.
     Min,
     /// At most so much.
@@ -66,11 +66,13 @@ pub struct Row {
     pub max: Option<f64>,
     /// Of the greatest intensity of a zone: the radius of a spot, degrees, that may be brighter.
     pub(super) spot_radius_deg: Option<f64>,
-    /// Of a relative row: the side of the limit, the factor, and the row that it is a multiple of, or `imax`.
+    /// Of a relative row: which side of its limit is asked for.
     #[serde(default, deserialize_with = "bound")]
-    pub(super) bound: Option<Bound>,
-    pub(super) factor: Option<f64>,
-    pub(super) of: Option<String>,
+    pub bound: Option<Bound>,
+    /// Of a relative row: its limit, as a multiple of the reading of `of`.
+    pub factor: Option<f64>,
+    /// Of a relative row: the id of the row that its limit is a multiple of, or `imax`.
+    pub of: Option<String>,
     /// Rows of one group are weighed together.
     pub(super) group: Option<u32>,
     /// The condition under which the row holds.

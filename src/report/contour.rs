@@ -63,14 +63,16 @@ pub(super) fn isolines(grid: &Grid, levels: &[f64]) -> Vec<Isoline> {
     lines
 }
 
-/// Returns each value averaged with its neighbours, weighed 1-2-1 along both axes; a neighbour beyond the border counts as the cell itself.
+/// Returns each value averaged with its neighbours, weighed 1-2-1 along both axes; a neighbour beyond the border, or where there is no
+/// cell, counts as the cell itself.
 fn averaged_with_neighbours(values: &[f64], columns: usize, rows: usize) -> Vec<f64> {
     let along = |values: &[f64], step: usize, place: &dyn Fn(usize) -> usize, count: usize| -> Vec<f64> {
         (0..values.len())
             .map(|k| {
-                let before = if place(k) > 0 { values[k - step] } else { values[k] };
                 // At the border the missing neighbour is taken to be like the cell itself.
-                let after = if place(k) + 1 < count { values[k + step] } else { values[k] };
+                let neighbour = |is_there: bool, k: usize| is_there.then(|| values[k]).filter(|v| !v.is_nan());
+                let before = neighbour(place(k) > 0, k.wrapping_sub(step)).unwrap_or(values[k]);
+                let after = neighbour(place(k) + 1 < count, k + step).unwrap_or(values[k]);
                 0.25 * (before + 2.0 * values[k] + after)
             })
             .collect()
@@ -168,6 +170,18 @@ mod tests {
         assert!(points.iter().all(|[x, y]| (x.hypot(*y) - 0.5).abs() < 1e-3));
         let length: f64 = points.windows(2).map(|p| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1])).sum();
         assert!((length / std::f64::consts::PI - 1.0).abs() < 2e-3, "{length}");
+    }
+
+    /// On a disc without corners a line goes on into the last cells that there are, where on a square it would.
+    #[test]
+    fn lines_reach_the_rim_of_a_disc() {
+        let disc = isolines(&grid(40, |x, y| if x.hypot(y) > 0.9 { f64::NAN } else { x }), &[0.5]);
+        let [line] = &disc[..] else { panic!("{} lines", disc.len()) };
+        let top = line.points.iter().map(|p| p[1]).fold(0.0, f64::max);
+        // The last cells at x = 0.475 and 0.525 have their centres below √(0.81 − 0.525²) = 0.73: at 0.725.
+        assert!((top - 0.725).abs() < 1e-9, "{top}");
+        // A neighbour that is missing moves the mean of three by a quarter of a cell.
+        assert!(line.points.iter().all(|p| (p[0] - 0.5).abs() < 0.25 * 0.05 + 1e-9));
     }
 
     #[test]

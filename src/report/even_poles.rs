@@ -1,11 +1,11 @@
-//! Grids over planes C all around, whose cells at a pole are slivers of one direction.
+//! Grids over planes C all around, whose cells at a pole are slivers of one direction, and nearly so beside it.
 
 use crate::formats::Grid;
 use crate::simulate::PoleRings;
 use std::borrow::Cow;
 use std::iter::once;
 
-/// Returns the rings of cells at the poles of a grid over planes C; none for any other.
+/// Returns the rings of cells at and beside the poles of a grid over planes C; none for any other.
 pub(super) fn pole_rings(grid: &Grid) -> PoleRings {
     let [c, gamma] = &grid.axes;
     if c.label == "C" { PoleRings::new([c.cells, gamma.cells], c.range, gamma.range) } else { PoleRings::default() }
@@ -19,23 +19,35 @@ pub(super) fn is_all_around(grid: &Grid) -> bool {
 /// Returns a grid in which all cells of the ring at a pole (γ 0° and 180°) have the mean of the ring, with the error of that, in its
 /// layers too; any other grid as it is.
 pub(crate) fn with_even_poles(grid: &Grid) -> Cow<'_, Grid> {
+    with_joined_cells(grid, None)
+}
+
+/// Returns the grid with even poles in which noisy neighbours beside them have their mean too, as the figure of the brightest direction
+/// takes them. For the page alone: files for other programs keep their cells.
+pub(super) fn with_joined_slivers(grid: &Grid) -> Cow<'_, Grid> {
+    with_joined_cells(grid, grid.error.as_deref())
+}
+
+/// Returns a grid whose cells are joined at its poles, and beside them where `errors` ask for it.
+fn with_joined_cells<'g>(grid: &'g Grid, errors: Option<&[f64]>) -> Cow<'g, Grid> {
     let rings = pole_rings(grid);
     if rings.is_empty() {
         return Cow::Borrowed(grid);
     }
+    let joined = rings.joined_cells(&grid.values, errors);
     let mut even = grid.clone();
     let layers =
         even.layers.iter_mut().map(|layer| (&mut layer.values, Some(&mut layer.error), &mut layer.geometric));
     for (values, errors, geometric) in
         once((&mut even.values, even.error.as_mut(), &mut even.geometric)).chain(layers)
     {
-        rings.level(values);
+        joined.level(values);
         if let Some(errors) = errors {
-            rings.level_errors(errors);
+            joined.level_errors(errors);
         }
         if let Some(geometric) = geometric {
             // What facets change they change alike in all cells of a ring.
-            rings.level(geometric);
+            joined.level(geometric);
         }
     }
     Cow::Owned(even)

@@ -198,3 +198,22 @@ fn anchor(title: &str) -> String {
     let lower = title.to_lowercase();
     lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect::<Vec<_>>().join("-")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::{Axis, Grid};
+    use crate::report::Chart;
+    use serde_json::Value;
+
+    /// An evenly lit disc, whose corners have no cells, is evenly bright: its darkest cell is not black.
+    #[test]
+    fn colours_of_a_map_begin_at_darkness() {
+        let axes = [0; 2].map(|_| Axis { label: "x".into(), unit: "mm".into(), range: [-1.0, 1.0], cells: 2 });
+        let (name, quantity, unit) = (String::new(), String::new(), "lx".into());
+        let values = vec![f64::NAN, 1400.0, 1450.0, 1390.0];
+        let grid = Grid { name, quantity, unit, axes, values, error: None, geometric: None, layers: Vec::new() };
+        let heat = &plotly::chart(&Chart::map("disc", "", "", grid))["data"][0];
+        assert_eq!([&heat["zmin"], &heat["zmax"]].map(Value::as_f64), [Some(0.0), Some(1450.0)]);
+    }
+}

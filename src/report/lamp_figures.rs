@@ -2,6 +2,7 @@
 
 use super::even_poles::{is_all_around, pole_rings};
 use super::number::figures;
+use super::verdicts::{multiple_text, without_rounding};
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
 use crate::math::error_of_maximum;
@@ -52,12 +53,11 @@ fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
 }
 
 /// Returns the standard error of the largest value, in its unit: the statistical one with the upward bias of a noisy maximum
-/// ([`error_of_maximum`]), and the geometric one of its cell, as squares; empty without statistical errors. At a pole `grid` has the same
-/// in all cells of the ring.
+/// ([`error_of_maximum`]), and the geometric one of its cell, as squares; empty without statistical errors. `grid` has even poles.
 fn peak_error(grid: &Grid) -> Cell {
     let (Some((i, j)), Some(mut errors)) = (grid.peak_cell(), grid.error.clone()) else { return Cell::Empty };
     let cells = grid.axes[0].cells;
-    pole_rings(grid).clear_rivals(&mut errors);
+    pole_rings(grid).clear_rivals(&grid.values, &mut errors);
     let geometric = grid.geometric.as_ref().map_or(0.0, |geometric| geometric[j * cells + i]);
     let values = grid.values.iter().zip(&errors).map(|(&value, &error)| [value, error]);
     Cell::Number(error_of_maximum(values).hypot(geometric), 2)
@@ -73,8 +73,9 @@ pub(super) fn lamp_table(
     let title = format!("{}: figures of the lamp", super::maps::spoken(&receiver.name));
     let name = format!("{}-lamp", crate::formats::file_stem(&receiver.name));
     let mut table = Table::new(&name, &title, &[("", ""), ("value", ""), ("±", ""), ("unit", ""), ("where", "")]);
-    let degrees = |[h, v]: [f64; 2]| {
-        format!("{} {}°, {} {}°", grid.axes[0].label, figures(h, 3), grid.axes[1].label, figures(v, 3))
+    let degrees = |at: [f64; 2]| {
+        let [h, v] = at.map(|x| figures(without_rounding(x), 3));
+        format!("{} {h}°, {} {v}°", grid.axes[0].label, grid.axes[1].label)
     };
     if let Some((place, value)) = grid.peak() {
         table.row(["Imax".into(), Cell::Number(value, 5), peak_error(grid), "cd".into(), degrees(place).into()]);
@@ -106,16 +107,25 @@ pub(super) fn lamp_table(
         table.row(["HV".into(), Cell::Number(value, 5), Cell::Empty, "cd".into(), place.into()]);
     }
     if let Some(assessment) = assessment {
-        let gradient = assessment.aim.gradient.map_or(Cell::Empty, |g| Cell::Number(g, 3));
-        let how = assessment.aim.how.as_str();
-        table.row(["cut-off and gradient G".into(), gradient, Cell::Empty, "".into(), how.into()]);
-        for row in assessment.rows.iter().filter(|r| r.reading.is_some()) {
-            let value = row.reading.map_or(Cell::Empty, |r| Cell::Number(r.value, 5));
-            let place = row.direction.map_or(String::new(), degrees);
-            table.row([row.row.id.as_str().into(), value, Cell::Empty, "cd".into(), place.into()]);
-        }
+        add_assessment(&mut table, assessment, degrees);
     }
     table
+}
+
+/// Adds the aim and the readings of a regulation to a table of figures; `degrees` writes a direction of the far field as placed.
+fn add_assessment(table: &mut Table, assessment: &Assessment, degrees: impl Fn([f64; 2]) -> String) {
+    let gradient = assessment.aim.gradient.map_or(Cell::Empty, |g| Cell::Number(g, 3));
+    let how = assessment.aim.how.as_str();
+    table.row(["cut-off and gradient G".into(), gradient, Cell::Empty, "".into(), how.into()]);
+    for row in &assessment.rows {
+        let Some(reading) = row.reading else { continue };
+        let (value, error) = (Cell::Number(reading.value, 5), reading.known_error().hypot(reading.cells));
+        // Those of the table are before aiming: beside Imax and HV they would be other places.
+        let place = row.direction.map_or(String::new(), |at| degrees(assessment.placed_direction(at)));
+        // A relative row's reading is a difference of two.
+        let name = multiple_text(&row.row).map_or(row.row.id.clone(), |less| format!("{}, {less}", row.row.id));
+        table.row([name.into(), value, Cell::Number(error, 2), "cd".into(), place.into()]);
+    }
 }
 
 /// Returns the intensity straight ahead: of the cell there, or the mean of those that meet there; `None` where the grid does not reach
@@ -224,6 +234,7 @@ mod tests {
     use crate::intersect::octree::{self, Octree};
     use crate::mesh::FacetMesh;
     use crate::model::Model;
+    use crate::regulation::{Aim, Reading, Regulation, RowKind, RowVerdict, Traffic, Verdict};
     use crate::report::chart::Content;
     use crate::report::even_poles::with_even_poles;
     use crate::simulate::{RunSettings, Scene, simulate};
@@ -248,6 +259,30 @@ mod tests {
         // Of 178,000 rays on the disc a third falls there: 0.11 % if they came by chance, and they are spread more evenly.
         let share = within.iter().copied().fold(0.0, f64::max);
         assert!((share - 100.0 / PI).abs() < 0.4, "{share} {within:?}");
+    }
+
+    /// For left-hand traffic the tables are read in a mirror, and here the lamp was aimed 0.5° aside and 0.25° up.
+    #[test]
+    fn readings_of_a_regulation_stand_where_the_far_field_has_them() {
+        let mut regulation = Regulation::find("UN R112 B driving").unwrap();
+        let row = regulation.function.rows.drain(..).find(|r| r.kind == RowKind::Relative).unwrap();
+        let reading = Some(Reading { value: 120.0, statistical: 3.0, geometric: None, cells: 4.0 });
+        let rows = vec![RowVerdict {
+            row,
+            reading,
+            direction: Some([3.5, -0.25]),
+            verdict: None,
+            settles: None,
+            unseen: 0,
+        }];
+        let aim = Aim { h_deg: 0.5, v_deg: 0.25, ..Aim::default() };
+        let (traffic, verdict) = (Traffic::Left, Verdict::Pass);
+        let assessment = Assessment { regulation, traffic, aim, sensor_deg: 0.1, rows, verdict };
+        let mut table = Table::new("lamp", "", &[("", ""), ("value", ""), ("±", ""), ("unit", ""), ("where", "")]);
+        add_assessment(&mut table, &assessment, |[h, v]| format!("{h} {v}"));
+        let [_, row] = &table.rows[..] else { panic!() };
+        assert_eq!(row[0].shown(), "HV inside the 80 % isocandela, less 0.8 × Imax");
+        assert_eq!((row[2].shown(), row[4].shown()), ("5".into(), "-4 0".into()));
     }
 
     /// A grid over C and γ of 3° cells.

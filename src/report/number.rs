@@ -6,6 +6,9 @@ const KILO: f64 = 1e3;
 const MEGA: f64 = 1e6;
 const GIGA: f64 = 1e9;
 
+/// What three digits round up to the next power of ten, 999.5 of 1000, is at least that power when multiplied by this.
+const ROUNDS_UP: f64 = 1.0 / 0.9995;
+
 /// Sets thousands apart (ISO 80000-1, 7.3.1), without a line breaking there.
 pub(super) const NARROW_SPACE: char = '\u{202f}';
 
@@ -55,11 +58,13 @@ pub fn grouped(value: u64) -> String {
 
 /// Writes a duration given in seconds: `1.23 s`, `45 ms`, `2 min 5 s`; a dash where it is not finite.
 pub fn seconds(value: f64) -> String {
+    // The unit is that of what is printed: 0.9996 s are 1 s, not 1000 ms.
+    let printed = value * ROUNDS_UP;
     match value {
         v if !v.is_finite() => "–".into(),
-        v if v < MILLI => format!("{} µs", figures(v * MEGA, 3)),
-        v if v < 1.0 => format!("{} ms", figures(v * KILO, 3)),
-        v if v < 120.0 => format!("{} s", figures(v, 3)),
+        v if printed < MILLI => format!("{} µs", figures(v * MEGA, 3)),
+        v if printed < 1.0 => format!("{} ms", figures(v * KILO, 3)),
+        v if v.round() < 120.0 => format!("{} s", figures(v, 3)),
         v => {
             // Rounded before it is divided: 59.6 s are a minute more, not 60 s.
             let whole = v.round();
@@ -71,10 +76,12 @@ pub fn seconds(value: f64) -> String {
 /// Writes a size in memory, in powers of 1000: `12.3 MB`.
 pub fn bytes(value: u64) -> String {
     let value = value as f64;
+    let printed = value * ROUNDS_UP;
     match value {
+        // Bytes are whole.
         v if v < KILO => format!("{v} B"),
-        v if v < MEGA => format!("{} kB", figures(v / KILO, 3)),
-        v if v < GIGA => format!("{} MB", figures(v / MEGA, 3)),
+        v if printed < MEGA => format!("{} kB", figures(v / KILO, 3)),
+        v if printed < GIGA => format!("{} MB", figures(v / MEGA, 3)),
         v => format!("{} GB", figures(v / GIGA, 3)),
     }
 }
@@ -126,5 +133,11 @@ mod tests {
         );
         assert_eq!((seconds(179.6), seconds(179.4)), ("3 min 0 s".into(), "2 min 59 s".into()));
         assert_eq!(bytes(12_345_678), "12.3 MB");
+        // A unit is left where rounding reaches the next, and not before.
+        assert_eq!((seconds(0.9996), seconds(0.9994)), ("1 s".into(), "999 ms".into()));
+        assert_eq!((seconds(9.996e-4), seconds(9.994e-4)), ("1 ms".into(), "999 µs".into()));
+        assert_eq!((seconds(119.6), seconds(119.4)), ("2 min 0 s".into(), "119 s".into()));
+        assert_eq!((bytes(999_600), bytes(999_400)), ("1 MB".into(), "999 kB".into()));
+        assert_eq!(bytes(999_600_000), "1 GB");
     }
 }

@@ -69,13 +69,13 @@
     const floor = most * 1e-4, decades = [];
     for (let e = Math.ceil(Math.log10(floor)); e <= Math.log10(most); e++) decades.push(e);
     const logarithmic = linear.map((row) => row.map((value) => Math.log10(Math.max(value, floor))));
-    const hover = box.data[0].hovertemplate;
+    const { hovertemplate: hover, zmin, zmax } = box.data[0];
     const button = Object.assign(document.createElement("button"), { type: "button", className: "scale", textContent: "Logarithmic scale" });
     let log = false;
     button.addEventListener("click", () => {
       log = !log;
       button.textContent = log ? "Linear scale" : "Logarithmic scale";
-      Plotly.restyle(box, { z: [log ? logarithmic : linear], customdata: [linear], hovertemplate: [log ? hover.replace("%{z:", "%{customdata:") : hover],
+      Plotly.restyle(box, { z: [log ? logarithmic : linear], zmin: log ? Math.log10(floor) : zmin, zmax: log ? Math.log10(most) : zmax, customdata: [linear], hovertemplate: [log ? hover.replace("%{z:", "%{customdata:") : hover],
         "colorbar.tickvals": [log ? decades : null], "colorbar.ticktext": [log ? decades.map((e) => (10 ** e).toLocaleString("en", { maximumSignificantDigits: 3 })) : null] }, [0]);
     });
     box.after(button);

@@ -101,13 +101,11 @@ pub(super) fn chart(chart: &Chart) -> Value {
                 "{} %{{x:.4g}} {}<br>{} %{{y:.4g}} {}<br><b>%{{z:.4g}} {}</b><extra></extra>",
                 a.label, a.unit, b.label, b.unit, grid.unit
             );
-            let mut heat = json!({"type": "heatmap", "z": z, "x0": a.center(0), "dx": a.step(), "y0": b.center(0),
-                "dy": b.step(), "colorscale": colour_scale(*map), "hovertemplate": hover,
+            // As in the static picture: plotly's own scale begins at the darkest cell, black however bright that is.
+            let [low, high] = grid.colour_range();
+            let heat = json!({"type": "heatmap", "z": z, "x0": a.center(0), "dx": a.step(), "y0": b.center(0),
+                "dy": b.step(), "colorscale": colour_scale(*map), "zmin": low, "zmax": high, "hovertemplate": hover,
                 "colorbar": {"title": {"text": grid.unit, "side": "right"}, "thickness": 14, "outlinewidth": 0}});
-            // Where no light arrived plotly would centre its scale on 0 and show the colour of half the peak.
-            if grid.values.iter().all(|&v| v == 0.0) {
-                (heat["zmin"], heat["zmax"]) = (json!(0), json!(1));
-            }
             let spans = [a.range[1] - a.range[0], b.range[1] - b.range[0]];
             let ratio = spans[0] / spans[1];
             // Degrees against degrees and mm against mm look as they are, unless that makes a thin stripe.

@@ -1,7 +1,7 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
 use super::cross_check::{self, verdict};
-use super::even_poles::with_even_poles;
+use super::even_poles::with_joined_slivers;
 use super::maps::{cuts, photometric_grid, receiver_grid, spoken};
 use super::verdicts::{self, verdict_sentence};
 use super::{Block, Cell, Provenance, Report, Section, Table, View};
@@ -107,12 +107,17 @@ impl SimulationReport<'_> {
         text += &if parts.is_empty() { "none is counted by a receiver".into() } else { parts.join(", ") };
         text += ". ";
         let directions = r.receivers.iter().zip(self.figures).filter(|(x, _)| x.kind == "far_field");
-        let brightest = directions.filter_map(|(x, f)| Some((receiver_grid(x)?, f.max.as_ref()?)));
+        let brightest: Vec<_> =
+            directions.filter_map(|(x, f)| Some((receiver_grid(x)?, f.max.as_ref()?))).collect();
+        let several = brightest.len() > 1;
         // The largest of many cells that few rays met says nothing of the lamp.
-        for (grid, max) in brightest.filter(|(_, max)| max.statistical < MOST_UNCERTAIN_PEAK * max.value) {
-            if let Some(([h, v], _)) = with_even_poles(&grid).peak() {
+        for (grid, max) in
+            brightest.into_iter().filter(|(_, max)| max.statistical < MOST_UNCERTAIN_PEAK * max.value)
+        {
+            if let Some(([h, v], _)) = with_joined_slivers(&grid).peak() {
+                let of = if several { format!(" of {}", spoken(&grid.name)) } else { String::new() };
                 text += &format!(
-                    "The brightest direction is {} {}°, {} {}° with **{}**. ",
+                    "The brightest direction{of} is {} {}°, {} {}° with **{}**. ",
                     grid.axes[0].label,
                     figures(h, 2),
                     grid.axes[1].label,
@@ -211,7 +216,7 @@ impl SimulationReport<'_> {
         );
         for (k, grid) in maps {
             let r = &self.results.receivers[k];
-            let grid = with_even_poles(&grid);
+            let grid = with_joined_slivers(&grid);
             section = section.with_block(receiver_blocks::framed_map(r, &grid));
             // The map that matters most stands beside the facets and has its cuts drawn.
             if let Some(view) = view.take() {

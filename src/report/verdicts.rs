@@ -4,7 +4,7 @@ use super::chart::MapPoint;
 use super::framing::lit_part;
 use super::{Cell, Chart, Section, Table, figures, road};
 use crate::formats::{Grid, file_stem};
-use crate::regulation::{Assessment, RowKind, RowVerdict, Traffic, Verdict};
+use crate::regulation::{Assessment, Bound, Row, RowVerdict, Traffic, Verdict};
 
 /// Significant digits of intensities: more than any photometer has.
 const DIGITS: usize = 5;
@@ -38,20 +38,36 @@ pub fn requirement_text(row: &RowVerdict) -> String {
         (Some(min), None) => format!("≥ {}", number(min)),
         (None, Some(max)) => format!("≤ {}", number(max)),
         (None, None) => {
-            let other = if row.row.kind == RowKind::Relative { "relative" } else { "–" };
-            row.row.when.clone().unwrap_or_else(|| other.to_owned())
+            let relative = || {
+                let sign = if row.row.bound? == Bound::Min { '≥' } else { '≤' };
+                Some(format!("{} {sign} 0", multiple_text(&row.row)?))
+            };
+            row.row.when.clone().or_else(relative).unwrap_or_else(|| "–".to_owned())
         }
     }
 }
 
+/// Writes what is taken from the reading of a relative row: `less 0.8 × Imax`; `None` for any other row.
+pub(super) fn multiple_text(row: &Row) -> Option<String> {
+    let (factor, of) = row.factor.zip(row.of.as_deref())?;
+    Some(format!("less {} × {}", figures(factor, DIGITS), if of == "imax" { "Imax" } else { of }))
+}
+
 /// Writes a direction, degrees, as the tables do: `3.43L 0.57U`.
 pub fn direction_text([h, v]: [f64; 2]) -> String {
-    let side = |x: f64, positive: char, negative: char| match x {
+    let side = |x: f64, positive: char, negative: char| match without_rounding(x) {
         x if x > 0.0 => format!("{}{positive}", figures(x, 3)),
         x if x < 0.0 => format!("{}{negative}", figures(-x, 3)),
         _ => "0".to_owned(),
     };
     format!("{} {}", side(h, 'R', 'L'), side(v, 'U', 'D'))
+}
+
+/// Returns an angle, degrees, or 0 for what the sums of aiming leave of that.
+pub(super) fn without_rounding(angle_deg: f64) -> f64 {
+    /// Far below what is printed beside other angles, far above the rounding of a full turn.
+    const NO_ANGLE_DEG: f64 = 1e-9;
+    if angle_deg.abs() < NO_ANGLE_DEG { 0.0 } else { angle_deg }
 }
 
 /// Writes what would settle an unsure row; nothing for any other.
@@ -172,8 +188,24 @@ fn picture(a: &Assessment, grid: &Grid, name: &str) -> Chart {
 mod tests {
     use super::*;
     use crate::formats::Axis;
-    use crate::regulation::{Aim, Regulation};
+    use crate::regulation::{Aim, Regulation, RowKind};
     use crate::report::{Block, Content};
+
+    #[test]
+    fn an_angle_that_rounding_left_of_nothing_is_nothing() {
+        assert_eq!(direction_text([1e-15, -3e-17]), "0 0");
+        assert_eq!(direction_text([-2.5, 0.57]), "2.5L 0.57U");
+    }
+
+    /// UN R149 asks 0.8 of the brightest for HV: what is read is what HV has more than that.
+    #[test]
+    fn a_relative_row_says_what_was_taken_from_its_reading() {
+        let regulation = Regulation::find("UN R112 B driving").unwrap();
+        let mut rows = regulation.function.rows.into_iter().filter(|r| r.kind == RowKind::Relative);
+        let row = rows.next().unwrap();
+        let verdict = RowVerdict { row, reading: None, direction: None, verdict: None, settles: None, unseen: 0 };
+        assert_eq!(requirement_text(&verdict), "less 0.8 × Imax ≥ 0");
+    }
 
     /// Of a lamp for left-hand traffic, which is judged in a mirror, a point lies on the other side of the far field as placed, and so
     /// does the aim.

@@ -27,6 +27,7 @@ mod emitter;
 mod error;
 mod face_foot;
 mod face_results;
+mod far_angles;
 mod fingerprint;
 mod gather;
 mod grid;

@@ -2,6 +2,7 @@
 
 use super::channels::Channels;
 use super::disc_cells::DiscCells;
+use super::far_angles::{far_axes, solid_angle, to_angles};
 use super::scene::{self, FarFieldType, ReceiverKind};
 use crate::math::{Aabb, Frame, Point, Ray, Vector};
 use std::f64::consts::TAU;
@@ -44,7 +45,7 @@ pub(crate) enum Shape {
         low: [f64; 2],
         high: [f64; 2],
     },
-    /// Faces whose absorbed power counts.
+    /// Faces whose absorbed power counts, ascending.
     Absorbed {
         faces: Vec<u32>,
     },
@@ -290,34 +291,6 @@ fn plane_crossing(frame: &Frame, one_sided: bool, ray: &Ray, after: f64, before:
     (t > after && t < before).then_some(t)
 }
 
-/// Returns a frame of right, up and forward, as seen by one who looks along the light: left-handed, with up as near to `up` as `forward`
-/// allows.
-pub(crate) fn far_axes(origin: Point, forward: Vector, up: Vector) -> Frame {
-    let side = Frame::from_axis(origin, forward, Some(up));
-    // from_axis makes x the upward one; right, up, forward as seen by one who looks along the light is left-handed.
-    Frame { x: side.y, y: side.x, ..side }
-}
-
-/// Returns both angles, rad, of a unit direction (right, up, forward): H and V, or for type C azimuth in `[0, 2π)` and angle from forward.
-pub(crate) fn to_angles(d: Vector, angles: FarFieldType) -> [f64; 2] {
-    match angles {
-        FarFieldType::A => [d.x.atan2(d.z), d.y.clamp(-1.0, 1.0).asin()],
-        FarFieldType::B => [d.x.clamp(-1.0, 1.0).asin(), d.y.atan2(d.z)],
-        FarFieldType::C => [d.y.atan2(d.x).rem_euclid(TAU), d.z.clamp(-1.0, 1.0).acos()],
-    }
-}
-
-/// Returns the solid angle, sr, of cell (i, j) of a field whose angles, rad, go from `low` to `high`.
-fn solid_angle(angles: FarFieldType, low: [f64; 2], high: [f64; 2], cells: [u32; 2], [i, j]: [usize; 2]) -> f64 {
-    let edge = |axis: usize, k: usize| low[axis] + (high[axis] - low[axis]) * k as f64 / f64::from(cells[axis]);
-    let (h, v) = ([edge(0, i), edge(0, i + 1)], [edge(1, j), edge(1, j + 1)]);
-    match angles {
-        FarFieldType::A => (h[1] - h[0]) * (v[1].sin() - v[0].sin()),
-        FarFieldType::B => (h[1].sin() - h[0].sin()) * (v[1] - v[0]),
-        FarFieldType::C => (h[1] - h[0]) * (v[0].cos() - v[1].cos()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -362,15 +335,6 @@ mod tests {
             let distance = 90.0 * r.direction(to).unwrap().radius2.sqrt();
             assert!((distance - h.hypot(v)).abs() < 1e-9, "{h} {v}: {distance}");
         }
-    }
-
-    #[test]
-    fn types_a_and_b_differ_off_axis() {
-        let d = Vector::new(0.5, 0.5, 0.5f64.sqrt());
-        let [h, v] = to_angles(d, FarFieldType::A);
-        assert!((v - (0.5f64).asin()).abs() < 1e-15 && (h - 0.5f64.sqrt().atan()).abs() < 1e-12 || h > v);
-        let [hb, vb] = to_angles(d, FarFieldType::B);
-        assert!((hb - v).abs() < 1e-15 && (vb - h).abs() < 1e-15);
     }
 
     #[test]

@@ -248,19 +248,24 @@ impl ReceiverResult {
     }
 
     /// Returns the cells and their errors with each ring of cells at a pole (γ 0° and 180°) at its mean, where planes C go all around:
-    /// these are slivers of one direction. The error of a ring stands at its last cell, the others, which are no rivals of it, have none.
+    /// these are slivers of one direction. Beside a pole neighbours of a ring whose standard errors are above 3 % of them are joined to
+    /// their mean too, at most as many as have the solid angle of a cell at γ 90° together. The error of joined cells stands at the last
+    /// of them; the others, which are no rivals of it, have none.
     pub fn cells_with_even_poles(&self) -> [Cow<'_, [f64]>; 2] {
         let mut even = [Cow::Borrowed(self.cells.as_slice()), Cow::Borrowed(self.errors.as_slice())];
         let rings = self.pole_rings();
         if !rings.is_empty() {
-            rings.level(even[0].to_mut());
-            rings.level_errors(even[1].to_mut());
-            rings.clear_rivals(even[1].to_mut());
+            let joined = rings.joined_cells(&self.cells, Some(&self.errors));
+            joined.level(even[0].to_mut());
+            joined.level_errors(even[1].to_mut());
+            let [cells, errors] = &mut even;
+            rings.clear_rivals(cells, errors.to_mut());
         }
         even
     }
 
-    /// Returns the rings of cells at γ 0° and 180°, as far as the map reaches them; none where it is not one of planes C all around.
+    /// Returns the rings of cells at and beside γ 0° and 180°, as far as the map reaches them; none where it is not one of planes C all
+    /// around.
     pub(crate) fn pole_rings(&self) -> PoleRings {
         if self.angles != Some(FarFieldType::C) {
             return PoleRings::default();

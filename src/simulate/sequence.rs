@@ -129,7 +129,7 @@ pub(crate) fn add_ray(
                     steps.push(SequenceStep { face: Some(face), event: Event::Absorbed });
                 }
                 for (r, receiver) in bound.receivers.iter().enumerate() {
-                    if matches!(&receiver.shape, Shape::Absorbed { faces } if faces.contains(&face)) {
+                    if matches!(&receiver.shape, Shape::Absorbed { faces } if faces.binary_search(&face).is_ok()) {
                         add(r as u32, steps.clone());
                     }
                 }

@@ -109,11 +109,11 @@ impl Worst {
         if self.figure.is_empty() {
             return "not at all".into();
         }
-        let by = self.share.map_or_else(|| "where it is 0".into(), |s| format!("by {s:.1e} of it"));
+        let by = self.share.map_or_else(|| "where it is 0".into(), |s| format!("by {} %", two_digits(100.0 * s)));
         if self.ratio >= LARGEST_RATIO {
             return format!("{} {by}, without any standard error", self.figure);
         }
-        format!("{} {by}, {} of its standard error", self.figure, two_digits(self.ratio))
+        format!("{} {by}, {} times its standard error", self.figure, two_digits(self.ratio))
     }
 }
 
@@ -145,5 +145,8 @@ mod tests {
         worst.weigh(["lamp", "absorbed"], 1e-4, 0.0, 0.0);
         assert_eq!(worst.in_words(), "lamp: absorbed where it is 0, without any standard error");
         assert_eq!(worst.ratio, LARGEST_RATIO);
+        let mut worst = Worst::default();
+        worst.weigh(["lamp", "rms_1"], 0.2, 0.05, 2.0);
+        assert_eq!(worst.in_words(), "lamp: rms_1 by 10 %, 4.0 times its standard error");
     }
 }

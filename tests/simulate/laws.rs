@@ -3,6 +3,7 @@
 use crate::support::World;
 use lampyris::math::{Point, Vector};
 use lampyris::simulate::KernelChoice;
+use std::f64::consts::PI;
 
 const GLASS: &str = "
     [[medium]]
@@ -155,20 +156,24 @@ fn bins_of_wavelengths_hold_both_their_ends() {
     }
 }
 
-/// Cells at the poles of planes C are slivers of one direction: together they are one candidate for the brightest, not many lucky ones.
+/// Cells at the poles of planes C, and beside them, are slivers that few rays meet: the brightest is that of the law, Φ/π of Lambert's and
+/// Φ/4π of a point, and not the luckiest of them.
 #[test]
 fn the_brightest_direction_is_no_lucky_sliver_at_a_pole() {
-    let text = "[run]\nrays = 10_000\n[[source]]\nkind = 'point'\n[[receiver]]\nname = 'far'\nkind = 'far_field'
-        angles = 'C'\nh_deg = [0, 360]\nv_deg = [0, 180]\ncells = [72, 90]\n";
-    let r = World::default().run(text, |_| ());
-    let far = &r.receivers[0];
-    let (first, rest) = far.cells.split_at(72);
-    let (between, last) = rest.split_at(rest.len() - 72);
-    let largest = |cells: &[f64]| cells.iter().copied().fold(0.0, f64::max);
-    let mean = |ring: &[f64]| ring.iter().sum::<f64>() / 72.0;
-    assert_eq!(far.max, largest(between).max(mean(first)).max(mean(last)));
-    // A sliver of 5e-5 sr has 0.04 rays: the luckiest has one.
-    assert!(largest(first).max(largest(last)) > far.max);
+    for (source, brightest) in [("lambertian", 1.0 / PI), ("point", 0.25 / PI)] {
+        let text = format!(
+            "[run]\nrays = 1_000_000\n[[source]]\nkind = '{source}'\ndirection = [0, 0, 1]\n[[receiver]]\nname = 'far'
+            kind = 'far_field'\nangles = 'C'\nh_deg = [0, 360]\nv_deg = [0, 180]\ncells = [72, 90]\n"
+        );
+        let r = World::default().run(&text, |_| ());
+        let far = &r.receivers[0];
+        // A cell of 5° × 2° at 90° has 240 rays of the point, 6 %, of which the luckiest of thousands is four standard errors too bright,
+        // 25 %; one of Lambert's near the axis 3 %, the luckiest of a hundred 9 %. Of slivers beside the pole it is 160 % and 70 %.
+        let within = if source == "point" { 0.3 } else { 0.12 };
+        assert!((far.max / brightest - 1.0).abs() < within, "{source}: {} for {brightest}", far.max);
+        let luckiest = far.cells.iter().copied().fold(0.0, f64::max);
+        assert!(luckiest > 1.3 * brightest, "{source}: {luckiest}");
+    }
 }
 
 /// A bar of 1 × 1 × 10 000 mm, rays at 45° to its walls: 10 000 total reflections, nothing lost.

@@ -106,6 +106,32 @@ fn a_ray_that_cannot_start_is_placed_in_the_scene() {
     assert_eq!((found[0].point, found[0].direction), (Point::new(100.0, 0.0, 0.0), Vector::Y));
 }
 
+/// Of light at 100 1/mm nothing is left after a millimetre: it ends in the block, not behind it, and not at the face that it would meet.
+#[test]
+fn light_that_a_medium_swallows_ends_there() {
+    let mut world = World::default();
+    world.cuboid("block", Point::new(-1.0, -1.0, 5.0), Point::new(1.0, 1.0, 6.0));
+    let folder = tempfile::tempdir().unwrap();
+    write_rays(&folder.path().join("list.csv"), &[ray(0.0, Vector::Z, 1.0)]).unwrap();
+    let text = "[run]\nrays = 64\n[[source]]\nkind = 'rays'\nfile = 'list.csv'
+        [[medium]]\nname = 'ink'\nindex = 1\nabsorption_per_mm = 100
+        [[material]]\npart = 'block'\nmedium = 'ink'
+        [[receiver]]\nname = 'wall'\nat = [0, 0, 30]\nsize = [2, 2]\n";
+    let scene = Scene::parse(text, "test.toml", folder.path()).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    let settings = RunSettings { path_samples: 8, ..RunSettings::from(&scene.run) };
+    let [end] = &listed_ends(&bound, &world, &settings)[..] else { panic!("one end") };
+    assert_eq!((end.event, end.face, end.bounces, end.power), (Event::Absorbed, None, 1, 0.0));
+    assert!((end.point - Point::new(0.0, 0.0, 6.0)).length() < 1e-9, "{end:?}");
+    // Paths that are drawn end there too.
+    let run = simulate(&bound, &world, &settings, &|_| true);
+    for path in run.paths.chunk_by(|a, b| a.ray == b.ray) {
+        let events: Vec<Event> = path.iter().map(|v| v.event).collect();
+        assert_eq!(events, [Event::Emitted, Event::Transmitted, Event::Absorbed]);
+    }
+    assert!(!run.paths.is_empty() && run.power.absorbed == run.power.emitted);
+}
+
 /// A ray that is split has a row for each of its parts, and their powers add up.
 #[test]
 fn parts_of_a_ray_have_rows_of_their_own() {

@@ -20,6 +20,21 @@ fn starts_that_are_not_on_their_facets_are_counted() {
     }
 }
 
+/// Facets of a round face end at chords within its border: here at 1.9 of 2 mm from the middle, where a tenth of its light starts beside
+/// them. It is moved onto them, and none of it starts on the surface.
+#[test]
+fn starts_beside_the_border_of_facets_are_moved_onto_them() {
+    let mut world = World::default();
+    let square = |half: f64| Shape::Rectangle { frame: Frame::IDENTITY, half: [half, half] };
+    world.part("led", false, &[("top", square(2.0))]);
+    world.shapes[0] = square(1.9);
+    let text = "[run]\nrays = 1000\n[[source]]\nkind = 'lambertian'\non = { part = 'led' }\n\
+        [[receiver]]\nname = 'all'\nkind = 'disc'\nat = [0, 0, 1]\nnormal = [0, 0, -1]\nradius = 1000\n";
+    let found = world.run(text, |_| ());
+    assert_eq!((found.tallies.counts.misplaced_starts, found.lost_rays), (0, 0));
+    assert!((found.receivers[0].power - 1.0).abs() < 1e-5, "{}", found.receivers[0].power);
+}
+
 /// A sheet of oil that is but one face, glued under glass: light from below comes from no oil, and can only go into the glass.
 #[test]
 fn a_touching_face_that_bounds_no_body_there_is_counted() {

@@ -239,8 +239,8 @@ fn rescue_results(
     if let Some(folder) = results_folder::write_anywhere(prepared, run, remarks, with_page, console) {
         return failure.with_help(format!("nothing is lost: the results are in {}", folder.display()));
     }
-    let Some(sums) = &run.sums else { return failure };
-    match checkpoint.save_anywhere(sums) {
+    let Some(sums) = run.sums() else { return failure };
+    match checkpoint.save_anywhere(&sums) {
         Ok(file) => failure.with_help(format!(
             "nothing is lost: `lampyris merge {} -o DIR` writes the results into another folder",
             file.display()

@@ -71,6 +71,9 @@ pub(crate) fn write(
             .zip(receiver.photometric())
             .and_then(|(grid, channel)| photometry(receiver, &with_even_poles(&grid), channel.total)),
     };
+    // Of millions of cells they take as much memory as what follows.
+    drop(pictured);
+    drop(grid);
     if let Some(photometry) = photometry {
         names.push(format!("{stem}.ies"));
         write_ies(&folder.join(format!("{stem}.ies")), &photometry)?;

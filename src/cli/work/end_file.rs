@@ -68,12 +68,18 @@ pub(crate) fn write(prepared: &PreparedScene, file: Option<&Path>, console: &Con
     } else {
         write_npz(file, &ends)?
     }
-    console.say(format_args!(
-        "wrote where {} rays and their parts ended into {}",
-        grouped(ends.len() as u64),
-        file.display()
-    ));
+    console.say(format_args!("wrote where {} ended into {}", counted(&ends), file.display()));
     Ok(())
+}
+
+/// Counts rays, not rows: a ray that was split has several, which stand together.
+fn counted(ends: &[ListedEnd]) -> String {
+    let rays = ends.chunk_by(|a, b| (a.source, a.ray) == (b.source, b.ray)).count();
+    let rays_text = format!("{} {}", grouped(rays as u64), if rays == 1 { "ray" } else { "rays" });
+    if rays == ends.len() {
+        return rays_text;
+    }
+    format!("{rays_text} and what they were split into ({} rows)", grouped(ends.len() as u64))
 }
 
 /// Returns the number of the face where a ray ended, as both files hold it: [`NO_FACE`] for none.
@@ -120,4 +126,28 @@ fn write_npz(file: &Path, ends: &[ListedEnd]) -> Result<(), Failure> {
     }
     stream.finish()?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Point, Vector};
+    use crate::simulate::Event;
+
+    #[test]
+    fn rays_are_counted_and_not_rows() {
+        let end = |ray: u64, branch: u32| ListedEnd {
+            source: 0,
+            ray,
+            branch,
+            event: Event::Escaped,
+            face: None,
+            bounces: 0,
+            point: Point::ZERO,
+            direction: Vector::Z,
+            power: 1.0,
+        };
+        assert_eq!(counted(&[end(0, 0), end(1, 0)]), "2 rays");
+        assert_eq!(counted(&[end(0, 0), end(0, 1), end(1, 0)]), "2 rays and what they were split into (3 rows)");
+    }
 }

@@ -100,7 +100,8 @@ impl Monitor for TerminalMonitor<'_> {
             (_, NormalMode::Exact) => format!("on facets of {low}..{high} mm with hits moved to the spline"),
             _ => format!("on facets of {low}..{high} mm with {} normals", chosen.normals),
         };
-        self.console.say(format_args!("tracing {how}: {}", chosen.because));
+        // Why is told with the results.
+        self.console.say(format_args!("tracing {how}"));
     }
 
     fn aimed(&self, answer: &str) {

@@ -16,7 +16,7 @@ mod simd_dispatch;
 mod stream;
 
 use super::body::Body;
-use super::receiver::far_axes;
+use super::far_angles::far_axes;
 use super::scene::{self, Scene, SourceKind};
 use super::surfaces::SceneLight;
 use super::{Error, ErrorKind};

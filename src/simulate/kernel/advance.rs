@@ -28,7 +28,9 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let context = self.context;
         let hit = clip_outside(context, path, ray, hit);
         // Receivers that let light through count it, and the medium takes its part, before the surface gets what is left.
-        self.cover_segment(path, ray, hit.map_or(ray.t_max, |h| h.t));
+        if !self.cover_segment(path, ray, hit.map_or(ray.t_max, |h| h.t)) {
+            return false;
+        }
         let Some(hit) = hit else {
             if C::MEDIA && path.receiver == SCATTERS {
                 return self.scatter_in_body(path, ray);
@@ -71,9 +73,9 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     }
 
     /// Counts the light of a segment up to `end`, mm, on receivers that let it pass, then takes from `path` what the body absorbs. An
-    /// endless segment is absorbed in the surroundings alone.
+    /// endless segment is absorbed in the surroundings alone. `false`, and the path ends, where the body took all of it.
     #[inline(always)]
-    fn cover_segment(&mut self, path: &mut Path<C>, ray: &Ray, end: f64) {
+    fn cover_segment(&mut self, path: &mut Path<C>, ray: &Ray, end: f64) -> bool {
         // Endless segments end in the surroundings; of a body they would take all light that only missed a face by
         // an error.
         let absorbed = C::MEDIA && (end.is_finite() || path.payload.body() == AMBIENT);
@@ -81,9 +83,12 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             let absorption = if absorbed { self.absorption(path) } else { 0.0 };
             self.count_passing(path, ray, end, absorption);
         }
-        if absorbed {
-            self.absorb_in_body(path, end);
+        if !absorbed || self.absorb_in_body(path, end) {
+            return true;
         }
+        // Light that is no more meets nothing: without an end here its path would go on through the face, and end nowhere.
+        self.record(path, ray.point_at(end.min(self.context.plan.drawn_length)), Event::Absorbed, None);
+        false
     }
 
     /// Returns the face that says what happens, of several at one place, where that is not the one that was hit; sets `at.entering` and
@@ -309,8 +314,9 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
         self.tally.counts.segments += 1;
         clip_outside(self.context, path, ray, None);
-        self.cover_segment(path, ray, ray.t_max);
-        self.end_without_face(path, ray);
+        if self.cover_segment(path, ray, ray.t_max) {
+            self.end_without_face(path, ray);
+        }
         true
     }
 

@@ -63,16 +63,19 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     }
 
     /// Takes from a path, and books, what its body absorbs over `length`, mm (Beer's law), in whole quanta; nothing in a clear body.
+    /// `false` where nothing is left.
     #[inline(always)]
-    pub(super) fn absorb_in_body(&mut self, path: &mut Path<C>, length: f64) {
+    pub(super) fn absorb_in_body(&mut self, path: &mut Path<C>, length: f64) -> bool {
         let alpha = self.absorption(path);
-        if alpha > 0.0 {
+        if alpha > 0.0 && path.quanta > 0.0 {
             let kept = remaining_quanta(path.quanta, alpha, length);
             let taken = path.quanta - kept;
             self.tally.ends.absorbed += quanta_as_integer(taken);
             self.tally.bulk.add(path.payload.body() as usize, taken);
             path.quanta = kept;
+            return kept > 0.0;
         }
+        true
     }
 
     /// Books the power that is left of a path as cut off by a limit, and ends its record at `point`; nothing for a path without power.
