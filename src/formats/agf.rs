@@ -30,18 +30,25 @@ const NM_PER_UM: f64 = 1e3;
 const STEPS_PER_NM: f64 = 1e6;
 
 impl AgfGlass {
+    /// What a transmittance of 0 counts as: sheets print three decimals, so that 0 is anything below 5e-4, and Beer's law has no
+    /// coefficient for none at all. A millionth is opaque in any figure of a run, and its logarithm not far from that of what can be
+    /// measured.
+    pub const LEAST_TRANSMITTANCE: f64 = 1e-6;
+
     /// Returns the wavelengths that the formula holds for, nm; `None` where the file does not say, or states an empty range.
     pub fn range_nm(&self) -> Option<[f64; 2]> {
         let range = self.range_um?.map(|um| (um * NM_PER_UM * STEPS_PER_NM).round() / STEPS_PER_NM);
         (range[0] < range[1]).then_some(range)
     }
 
-    /// Absorption coefficients by wavelength, `[nm, 1/mm]`, wavelengths rising: Beer's law solved for them. Transmittances of 0, which
-    /// would be an infinite coefficient, are left out; above 1 they count as 1, and of a wavelength that comes twice the first counts.
+    /// Absorption coefficients by wavelength, `[nm, 1/mm]`, wavelengths rising: Beer's law solved for them. Transmittances below
+    /// [`LEAST_TRANSMITTANCE`](Self::LEAST_TRANSMITTANCE), 0 above all, count as that, those above 1 as 1. Of a wavelength that comes
+    /// twice the first counts; one without a thickness tells nothing.
     pub fn absorption(&self) -> Vec<[f64; 2]> {
-        let known = self.transmittance.iter().filter(|[um, share, mm]| *um > 0.0 && *share > 0.0 && *mm > 0.0);
+        let known = self.transmittance.iter().filter(|[um, _, mm]| *um > 0.0 && *mm > 0.0);
+        let coefficient = |share: f64, mm: f64| (-share.clamp(Self::LEAST_TRANSMITTANCE, 1.0).ln() / mm).max(0.0);
         let mut points: Vec<[f64; 2]> =
-            known.map(|[um, share, mm]| [um * NM_PER_UM, (-share.min(1.0).ln() / mm).max(0.0)]).collect();
+            known.map(|[um, share, mm]| [um * NM_PER_UM, coefficient(*share, *mm)]).collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         points.dedup_by(|a, b| a[0] == b[0]);
         points
@@ -51,7 +58,7 @@ impl AgfGlass {
 /// Reads the glasses of a catalogue, in the file's order.
 ///
 /// # Errors
-/// When the file cannot be read, holds no glass, or has a line with a word in place of a number; the message names the line.
+/// When the file cannot be read, holds no glass, or has a line with a word in place of a finite number; the message names the line.
 pub fn read_agf(path: &Path) -> Result<Vec<AgfGlass>, Error> {
     let bytes = read_bytes(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
     let mut glasses: Vec<AgfGlass> = Vec::new();
@@ -77,7 +84,9 @@ pub fn read_agf(path: &Path) -> Result<Vec<AgfGlass>, Error> {
         // A dash stands for a transmittance that was not measured.
         let numbers: Vec<f64> = words
             .filter(|w| *w != "-")
-            .map(|w| w.parse().map_err(|_| fault(format!("'{w}' is no number"))))
+            .map(|w| {
+                w.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| fault(format!("'{w}' is no number")))
+            })
             .collect::<Result<_, _>>()?;
         match (kind, numbers.as_slice()) {
             ("CD", all) => glass.coefficients = all.to_vec(),

@@ -49,6 +49,44 @@ fn a_plate_of_a_catalogue_transmits_what_its_data_sheet_says() {
     }
 }
 
+/// Sheets print 0 for glass that lets nothing through; one line of transmittance holds for all light.
+#[test]
+fn glass_absorbs_by_whatever_its_sheet_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("g.agf");
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-9.0, -9.0, 0.0), Point::new(9.0, 9.0, 10.0));
+    for (lines, inside) in [
+        ("IT 0.4 0 25\nIT 0.7 0 25\n", 0.0),
+        ("IT 0.4 0.9 25\nIT 0.55 0 25\nIT 0.7 0.9 25\n", 0.0),
+        ("IT 0.4 0 25\n", 0.0),
+        // Half of it over 5 mm is a quarter over 10.
+        ("IT 0.4 0.5 5\n", 0.25),
+        ("", 1.0),
+    ] {
+        // n = 1.5 by Conrady's formula of one term.
+        std::fs::write(&file, format!("NM G 5 0 1.5 60\nCD 1.5\n{lines}")).unwrap();
+        let text = format!(
+            "[run]\nrays = 2000\nwavelength_nm = 550\ninterfaces = 'split'\nsplit_floor = 0\n\
+             [[medium]]\nname = 'glass'\nfile = '{}'\ncatalogue = 'G'\n[[material]]\npart = 'plate'\nmedium = 'glass'\n\
+             [[source]]\nkind = 'collimated'\nat = [0, 0, -5]\ndirection = [0, 0, 1]\nradius = 2\n\
+             [[receiver]]\nname = 'behind'\nat = [0, 0, 20]\nsize = [9, 9]\n",
+            file.display()
+        );
+        let power = world.run(&text, |_| ()).receivers[0].power;
+        // Light that is reflected to and fro in the plate sums up as a geometric series.
+        let (r, t): (f64, f64) = (0.04, inside);
+        let expected = (1.0 - r).powi(2) * t / (1.0 - (r * t).powi(2));
+        // A millionth over 25 mm is 4e-3 over 10, which a zero may leave.
+        let slack = if inside == 0.0 { 5e-3 } else { 1e-6 };
+        assert!((power - expected).abs() < slack, "{lines}: {power} for {expected}");
+    }
+    std::fs::write(&file, "NM G 5 0 1.5 60\nCD 1.5\nIT 0.4 nan 25\n").unwrap();
+    let text = format!("[[medium]]\nname = 'g'\nfile = '{}'\ncatalogue = 'G'\n", file.display());
+    let message = Scene::parse(&text, "t.toml", Path::new(".")).unwrap_err().to_string();
+    assert!(message.contains("'nan' is no number"), "{message}");
+}
+
 /// A file's own range counts, its `LD` line: 365 to 1014 nm of the older glass.
 #[test]
 fn light_beyond_the_range_of_a_glass_is_noted() {
@@ -66,6 +104,26 @@ fn light_beyond_the_range_of_a_glass_is_noted() {
     assert!(notes(1000.0).is_empty(), "{:?}", notes(1000.0));
     let beyond = notes(1064.0).join("\n");
     assert!(beyond.contains("'BK7' is known for 365 to 1014 nm") && beyond.contains("1064 nm"), "{beyond}");
+}
+
+/// N-BK7 of the file has its transmittance at 400 and 700 nm, its index from 300 to 2500 nm.
+#[test]
+fn light_beyond_the_transmittances_of_a_glass_is_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("glasses.agf"), CATALOGUE).unwrap();
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-9.0, -9.0, 0.0), Point::new(9.0, 9.0, 10.0));
+    let notes = |nm: f64, absorption: &str| {
+        let text = format!(
+            "[run]\nwavelength_nm = {nm}\n[[medium]]\nname = 'glass'\nfile = 'glasses.agf'\ncatalogue = 'N-BK7'\n{absorption}\n\
+             [[material]]\npart = 'plate'\nmedium = 'glass'\n[[source]]\nkind = 'collimated'\nat = [0, 0, -5]\n"
+        );
+        Scene::parse(&text, "test.toml", folder.path()).unwrap().bind(&world.model).unwrap().notes().join("\n")
+    };
+    let beyond = notes(850.0, "");
+    let said = "the transmittance of 'N-BK7' is known for 400 to 700 nm";
+    assert!(beyond.contains(said) && beyond.contains("850 nm") && beyond.lines().count() == 1, "{beyond}");
+    assert_eq!((notes(650.0, ""), notes(850.0, "absorption_per_mm = 0.001")), (String::new(), String::new()));
 }
 
 #[test]

@@ -81,8 +81,8 @@ fn least_and_greatest<'a>(mut nm: impl Iterator<Item = f64> + 'a) -> Option<[f64
     Some(nm.fold([first, first], |[a, b], x| [a.min(x), b.max(x)]))
 }
 
-/// Returns the wavelengths, nm, between which the catalogue formula and the tables of a medium are known; a table of one point is a
-/// constant and left out.
+/// Returns the wavelengths, nm, between which the catalogue formula, the transmittances of a catalogue file and the tables of a medium are
+/// known; a table of the scene with one point is a constant and left out.
 fn medium_ranges(scene: &Scene, name: &str) -> Vec<KnownRange> {
     let mut known = Vec::new();
     let mut add = |what: String, range: Option<[f64; 2]>, beyond| {
@@ -92,11 +92,17 @@ fn medium_ranges(scene: &Scene, name: &str) -> Vec<KnownRange> {
     let entry = own.map_or(Some(name), |m| m.catalogue.as_deref());
     if let Some(entry) = entry {
         // A catalogue of the user's says itself how far its formulas hold, also of a glass that has a namesake here.
-        let range = match own.and_then(|m| m.glass.as_ref()) {
+        let glass = own.and_then(|m| m.glass.as_ref());
+        let range = match glass {
             Some(glass) => glass.range_nm(),
             None => catalogue::range_nm(entry),
         };
         add(format!("the index of '{entry}'"), range, FORMULA);
+        // What the scene says of absorption stands in place of the file's.
+        if let Some(glass) = glass.filter(|_| own.is_some_and(|m| m.absorption_per_mm.is_none())) {
+            let measured = least_and_greatest(glass.absorption().iter().map(|p| p[0]));
+            add(format!("the transmittance of '{entry}'"), measured, ENDS);
+        }
     }
     if let Some(medium::Medium { index_table, absorption_per_mm, .. }) = own {
         // A single point is a constant.

@@ -160,13 +160,14 @@ fn agf_index(glass: &AgfGlass) -> Result<Index, String> {
     Ok(Index::Sum(Dispersion { is_square, powers, poles }))
 }
 
-/// Returns the absorption of a glass from its transmittances; none where fewer than two are known.
+/// Returns the absorption of a glass from its transmittances: none where none is known, and of a single one the same everywhere.
 fn agf_absorption(glass: &AgfGlass) -> Result<Absorption, String> {
-    let points = glass.absorption();
-    if points.len() < 2 {
-        return Ok(Absorption::None);
-    }
-    Absorption::table(points.iter().map(|p| (p[0], p[1])).collect::<Vec<_>>()).map_err(|e| e.to_string())
+    let absorption = match glass.absorption()[..] {
+        [] => Ok(Absorption::None),
+        [[_, coefficient]] => Absorption::per_mm(coefficient),
+        ref points => Absorption::table(points.iter().map(|p| (p[0], p[1]))),
+    };
+    absorption.map_err(|e| e.to_string())
 }
 
 /// Reads the glass of each medium that names a catalogue file; `None` for the others.
