@@ -307,6 +307,30 @@ fn assemblies_that_multiply_are_counted_before_they_are_expanded() {
     assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
 }
 
+/// Each product has a representation of its own that is related to the one with the shape: each place is looked for once.
+#[test]
+fn many_products_of_one_shape_take_one_look_each() {
+    let start = Instant::now();
+    let mut products = String::new();
+    for k in 0..20_000 {
+        let id = 1000 + 10 * k;
+        products += &format!(
+            "#{id}=PRODUCT_DEFINITION('','',$,$);#{}=PRODUCT_DEFINITION_SHAPE('','',#{id});#{}=SHAPE_REPRESENTATION('',(#2),$);\n\
+             #{}=SHAPE_DEFINITION_REPRESENTATION(#{},#{});#{}=SHAPE_REPRESENTATION_RELATIONSHIP('','',#{},#55);\n",
+            id + 1,
+            id + 2,
+            id + 3,
+            id + 1,
+            id + 2,
+            id + 4,
+            id + 2
+        );
+    }
+    let report = import(&square("").replace("#54=", &(products + "#54="))).report;
+    assert_eq!((report.instances, report.faces_placed.converted), (20_000, 20_000));
+    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
+}
+
 #[test]
 fn what_stands_beyond_all_rounding_is_refused_by_name() {
     let far = square("").replace("CARTESIAN_POINT('',(1,0,0))", "CARTESIAN_POINT('',(1.E30,0,0))");

@@ -239,6 +239,25 @@ fn a_void_that_is_turned_once_too_often_encloses_a_hole() {
     }
 }
 
+/// The void of a solid that the list does not name is told; so is a face, and without it the volume tells nothing of the side.
+#[test]
+fn entries_of_shells_and_solids_that_are_no_references_are_told() {
+    let text = solid_text(&cube_corners(), &CUBE, &[".T."; 6], None);
+    let solid = "#5=MANIFOLD_SOLID_BREP('',#4);";
+    let voids = read(&text.replace(solid, "#5=BREP_WITH_VOIDS('',#4,($));"));
+    let inwards = CUBE.map(|face| face.iter().rev().copied().collect::<Vec<_>>());
+    let inwards: Vec<&[usize]> = inwards.iter().map(|face| face.as_slice()).collect();
+    let text = solid_text(&cube_corners(), &inwards, &[".T."; 6], None);
+    assert_eq!(read(&text).report.repairs.len(), 1, "a whole cube is turned");
+    let open = read(&text.replace("#100056)", "$)"));
+    for (import, faces, entity) in [(voids, 6, "BREP_WITH_VOIDS"), (open, 5, "CLOSED_SHELL")] {
+        let said: Vec<&str> = import.report.refusals.iter().map(|r| r.entity.as_str()).collect();
+        assert_eq!((import.report.faces.converted, said), (faces, vec![entity]), "{:?}", import.report.refusals);
+        assert!(import.report.refusals[0].reason.contains("no reference"), "{:?}", import.report.refusals);
+        assert_eq!(import.report.repairs.len(), 0, "{:?}", import.report.repairs);
+    }
+}
+
 /// A file with short names in place of the long ones is the same solid.
 #[test]
 fn short_names_are_read_as_the_long_ones() {

@@ -279,6 +279,70 @@ fn a_tiny_direction_is_a_direction() {
     }
 }
 
+/// What a list lacks would be a hole, a shape of other corners or a void that is glass.
+#[test]
+fn a_list_with_an_entry_that_is_no_reference_is_refused() {
+    let reason = "an entry of its list is no reference";
+    let whole = plate(0.0);
+    assert_refused(&whole.replace("(#30,#31,#32,#33)", "(#30,#31,$,#32,#33)"), reason);
+    let wall = "#20=SURFACE_OF_LINEAR_EXTRUSION('',#24,#26);\n#21=CARTESIAN_POINT('',(10.,0.,0.));\n#22=CARTESIAN_POINT('',(10.,10.,0.));\n\
+                #26=VECTOR('',#13,3.);\n";
+    for curve in [
+        "POLYLINE('',(#10,$,#21,#22))",
+        "B_SPLINE_CURVE_WITH_KNOTS('',1,(#10,7,#22),.UNSPECIFIED.,.F.,.F.,(2,2),(0.,1.),.UNSPECIFIED.)",
+    ] {
+        assert_refused(&trimmed(&format!("{wall}#24={curve};\n"), "0.,1.,0.,2."), reason);
+    }
+    let bounded = "#30=CARTESIAN_POINT('',(10.,0.,0.));\n#31=CARTESIAN_POINT('',(0.,10.,0.));\n#32=POLYLINE('',(#10,#30,#31,#10));\n\
+                   #40=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#32);\n#81=BOUNDARY_CURVE('',(#40),.F.);\n#71=PLANE('',#14);\n";
+    assert_refused(&format!("{bounded}#900=CURVE_BOUNDED_SURFACE('',#71,(#81,$),.F.);\n"), reason);
+    let area = format!("{bounded}#70=CURVE_BOUNDED_SURFACE('',#71,($,#81),.F.);\n");
+    assert_refused(&format!("{area}#900=EXTRUDED_AREA_SOLID('',#70,#13,5.);\n"), reason);
+    let net = "#20=B_SPLINE_SURFACE_WITH_KNOTS('',1,1,((#10,#30),(#31,$)),.UNSPECIFIED.,.F.,.F.,.F.,(2,2),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED.);\n";
+    assert_refused(&format!("{bounded}{}", trimmed(net, "0.,1.,0.,1.")), reason);
+}
+
+/// Where each entry stands by itself, the others are kept, and the list is named.
+#[test]
+fn what_is_beside_an_entry_that_is_no_reference_stands() {
+    let whole = plate(0.0);
+    let mesh = format!("{TRIANGLE}#51=TRIANGULATED_FACE('',#50,3,((0.,0.,1.)),$,(),((1,2,3)));\n");
+    for (data, entity) in [
+        (whole.replace("('',(#72))", "('',($,#72))"), "OPEN_SHELL"),
+        (whole.replace("('',(#73))", "('',(#73,.T.))"), "SHELL_BASED_SURFACE_MODEL"),
+        (
+            trimmed("#20=SPHERICAL_SURFACE('',#14,5.);\n", "0.,1.,0.,1.").replace("(#901)", "(#901,$)"),
+            "GEOMETRIC_SET",
+        ),
+        (format!("{mesh}#900=TESSELLATED_SHELL('',($,#51),$);\n"), "TESSELLATED_SHELL"),
+    ] {
+        let import = read(&data);
+        let said: Vec<(&str, &str)> =
+            import.report.refusals.iter().map(|r| (r.entity.as_str(), r.reason.as_str())).collect();
+        assert_eq!(said, [(entity, "an entry of its list is no reference")], "{data}");
+        assert_eq!((import.model.placed_face_count(), import.report.faces.refused), (1, 1), "{data}");
+    }
+    let items = read_sections("", "$,#900", &whole);
+    assert_eq!(items.model.placed_face_count(), 1);
+    let problems = &items.report.problems;
+    assert!(problems.len() == 1 && problems[0].contains("#6: an entry of its list of items"), "{problems:?}");
+}
+
+/// As of splines: where doubles are a millimetre apart no triangle has a shape.
+#[test]
+fn a_mesh_with_a_corner_that_is_too_far_is_refused() {
+    let mesh = |x: &str| {
+        format!(
+            "#50=COORDINATES_LIST('',3,((0.,0.,0.),({x},0.,0.),(0.,10.,0.)));\n#900=TESSELLATED_SHELL('',(#51),$);\n\
+             #51=TRIANGULATED_FACE('net',#50,3,((0.,0.,1.)),$,(),((1,2,3)));\n"
+        )
+    };
+    close(area(&read(&mesh("1.E12"))), 5e12, 1e-9);
+    assert_refused(&mesh("1.E13"), "1e12 mm");
+    let refusals = read(&mesh("1.E13")).report.refusals;
+    assert_eq!((refusals[0].id, refusals[0].entity.as_str()), (51, "TRIANGULATED_FACE"));
+}
+
 #[test]
 fn references_that_lead_nowhere_are_told() {
     let import = read(&(plate(0.0) + "#80=PRODUCT('','','',(#9999));\n#81=PRODUCT('','','',(#9998,#9999));\n"));

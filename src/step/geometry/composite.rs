@@ -96,7 +96,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
 
     /// Returns the parameter of our curve for one of the file's: a POLYLINE's counts points, and ours is its arc length, mm.
     fn curve_parameter(&self, basis: Entity<'f, 'a>, x: f64) -> f64 {
-        let points = basis.attributes("POLYLINE", 1).and_then(|a| self.points(a.list(0)).ok());
+        let points = basis.attributes("POLYLINE", 1).and_then(|a| self.points(basis, a.list(0)).ok());
         let Some(lengths) = points.map(|p| polyline_lengths(&p)).filter(|l| l.len() > 1) else { return x };
         let last = (lengths.len() - 1) as f64;
         let x = x.clamp(0.0, last);

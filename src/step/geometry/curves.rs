@@ -244,7 +244,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             return Ok(CurveShape::Parabola { frame, f: positive(a.real(offset), "focal distance")? });
         }
         if let Some(a) = e.attributes("POLYLINE", 1) {
-            return polyline(&self.points(a.list(0))?)
+            return polyline(&self.points(e, a.list(0))?)
                 .map(CurveShape::spline)
                 .ok_or_else(|| Refusal::new(e, "polyline without length"));
         }
@@ -265,7 +265,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let base = e.attributes("B_SPLINE_CURVE", 1).unwrap_or_else(|| e.args());
         let shift = usize::from(!e.keyword().is_empty() && e.keyword() != "B_SPLINE_CURVE");
         let degree = base.count(shift).ok_or_else(|| Refusal::new(e, "its degree is missing"))?;
-        let points = self.points(base.list(shift + 1))?;
+        let points = self.points(e, base.list(shift + 1))?;
         let weights = match e.attributes("RATIONAL_B_SPLINE_CURVE", 6).map(|a| a.list(0).reals()) {
             Some(None) => return Err(Refusal::new(e, "weights are no numbers")),
             Some(weights) => weights,

@@ -47,10 +47,28 @@ impl Refusal {
         Self { id: entity.id, entity: entity.name(), reason: reason.into() }
     }
 
+    /// Makes the refusal of a list of `e` with an entry, as `$`, that refers to nothing.
+    pub(crate) fn no_reference(e: Entity<'_, '_>) -> Self {
+        Self::new(e, "an entry of its list is no reference")
+    }
+
     /// Makes the refusal of what is referred to but stands nowhere.
     pub(crate) fn missing(id: u64) -> Self {
         Self { id, entity: "an instance".into(), reason: "is referred to but is not in the file".into() }
     }
+}
+
+/// Returns the ids of a list of `e`; refuses one with an entry that is no reference.
+pub(crate) fn references(e: Entity<'_, '_>, list: Args<'_, '_>) -> Outcome<Vec<u64>> {
+    list.refs().ok_or_else(|| Refusal::no_reference(e))
+}
+
+/// Refuses a point, mm, of `e` with a coordinate beyond [`FARTHEST_MM`] or that is no number.
+pub(crate) fn within_reach(e: Entity<'_, '_>, point: Point) -> Outcome<Point> {
+    if point.abs().max_element() <= FARTHEST_MM {
+        return Ok(point);
+    }
+    Err(Refusal::new(e, format!("a coordinate is beyond {FARTHEST_MM:e} mm, where rounding eats shapes")))
 }
 
 /// Reads geometry in mm and radians.
@@ -75,9 +93,10 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         }
     }
 
-    /// Reads a list of CARTESIAN_POINTs, mm, as [`point`](Self::point) does.
-    pub(crate) fn points(&self, list: Args<'f, 'a>) -> Outcome<Vec<Point>> {
-        list.ids().into_iter().map(|id| self.point(id)).collect()
+    /// Reads a list of `e` of references to CARTESIAN_POINTs, mm; refuses what [`point`](Self::point) refuses, and an entry that is no
+    /// reference.
+    pub(crate) fn points(&self, e: Entity<'f, 'a>, list: Args<'f, 'a>) -> Outcome<Vec<Point>> {
+        references(e, list)?.into_iter().map(|id| self.point(id)).collect()
     }
 
     /// Reads a CARTESIAN_POINT, mm; z is 0 for two coordinates. Refuses coordinates beyond [`FARTHEST_MM`] and other numbers of them.
@@ -89,13 +108,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             Some([x, y]) => self.units.length * Point::new(*x, *y, 0.0),
             _ => return Err(Refusal::new(e, "is no point of two or three coordinates")),
         };
-        if !(point.abs().max_element() <= FARTHEST_MM) {
-            return Err(Refusal::new(
-                e,
-                format!("a coordinate is beyond {FARTHEST_MM:e} mm, where rounding eats shapes"),
-            ));
-        }
-        Ok(point)
+        within_reach(e, point)
     }
 
     /// Reads the place of a VERTEX_POINT, or of a CARTESIAN_POINT in its place, mm; refuses anything else.

@@ -74,8 +74,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let basis = self.resolve(e, own.id(0), "basis surface")?;
         let definition = self.resolve(e, own.id(1), "curve in the parameter plane")?;
         let representation = definition.attributes("REPRESENTATION", 0).unwrap_or_else(|| definition.args());
-        let item = representation.list(1).ids().first().copied();
-        let item = self.resolve(definition, item, "curve in the parameter plane")?;
+        let item = self.resolve(definition, representation.list(1).id(0), "curve in the parameter plane")?;
         // Parameters are pure numbers; only angles of conics keep their unit.
         let plane = GeometryReader { file: self.file, units: Units { length: 1.0, ..self.units } };
         let curve = plane.bounded_curve(item.id, depth + 1)?;

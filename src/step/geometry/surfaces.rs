@@ -100,13 +100,11 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         // Counts in a file are claims: no more is reserved than a usual surface needs.
         let mut points = Vec::with_capacity(nu.saturating_mul(nv).min(1 << 16));
         for i in 0..nu {
-            let row = rows.list(i).ids();
+            let row = self.points(e, rows.list(i))?;
             if row.len() != nv {
                 return Err(Refusal::new(e, "rows of control points differ in length"));
             }
-            for id in row {
-                points.push(self.point(id)?);
-            }
+            points.extend(row);
         }
         let weights = e.attributes("RATIONAL_B_SPLINE_SURFACE", 7).map(|a| {
             let rows = a.list(0);

@@ -79,7 +79,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads a POLYLINE by the parameter that the file gives it, which counts its points from 0; refused where two of them in a row
     /// coincide.
     fn counted_polyline(&self, e: Entity<'f, 'a>, list: Args<'f, 'a>) -> Outcome<Curve> {
-        let points = self.points(list)?;
+        let points = self.points(e, list)?;
         let coincide = points.windows(2).any(|w| (w[1] - w[0]).length() <= MERGED_POINTS_MM);
         if points.len() < 2 || coincide {
             return Err(Refusal::new(e, "points of it coincide, and its parameter counts them"));

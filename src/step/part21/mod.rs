@@ -326,7 +326,12 @@ impl<'f, 'a> Args<'f, 'a> {
         (0..self.len()).map(|i| self.real(i)).collect()
     }
 
-    /// Returns all ids of the list; what is no reference is left out.
+    /// Returns the ids of all references of the list; `None` when an entry is no reference.
+    pub(super) fn refs(&self) -> Option<Vec<u64>> {
+        (0..self.len()).map(|i| self.id(i)).collect()
+    }
+
+    /// Returns the ids of the references of the list; what is no reference is left out.
     pub(super) fn ids(&self) -> Vec<u64> {
         (0..self.len()).filter_map(|i| self.id(i)).collect()
     }

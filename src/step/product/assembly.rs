@@ -118,6 +118,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 a.read_relationship(e);
             }
         }
+        a.leave_out_links_to_products();
         a
     }
 
@@ -355,7 +356,9 @@ impl<'f, 'a> Assembly<'f, 'a> {
             return;
         }
         around.push(id);
-        self.reached.insert(id);
+        if self.reached.insert(id) && self.item_list(id).is_some_and(|list| list.refs().is_none()) {
+            self.problems.push(format!("#{id}: an entry of its list of items is no reference; it is left out"));
+        }
         self.placed.push(PlacedRepresentation {
             representation: id,
             placement,
@@ -384,9 +387,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
             self.place_representation(to, at, &Occurrence { owners: &owners, ..*used }, around);
         }
         for link in self.links.get(&id).cloned().into_iter().flatten() {
-            // A representation of another product is placed by its own usage.
-            let elsewhere = self.owned.contains(&link.to) && link.placement.is_none_or(|p| p.is_identity());
-            if !around.contains(&link.to) && !elsewhere {
+            // One of another product whose place cannot be read is placed by its own usage.
+            if !around.contains(&link.to) && (link.placement.is_some() || !self.owned.contains(&link.to)) {
                 let (kept, at) = (self.placed.len(), placement.compose(&link.placement.unwrap_or(Frame::IDENTITY)));
                 self.place_representation(link.to, at, used, around);
                 // As for usages.

@@ -191,7 +191,8 @@ fn add_shells(
         }
         // Only a whole shell tells by its volume which way it faces.
         let void = plan.void && enclosed;
-        if (plan.outer || void) && own.len() == plan.faces.len() && is_inside_out(&own, void) {
+        let whole = plan.whole && own.len() == plan.faces.len();
+        if (plan.outer || void) && whole && is_inside_out(&own, void) {
             own.iter_mut().for_each(|face| face.reversed ^= true);
             // Rays would enter where they should leave: one such file lost 857 of 50,000, one with a void 465 of 100,000.
             let reason =

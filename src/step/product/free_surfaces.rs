@@ -9,7 +9,7 @@ use crate::model::{Edge, EdgeId, Part, Shell, VertexId};
 use crate::nurbs::Curve;
 use crate::step::chart::Chart;
 use crate::step::geometry::extent::FaceExtent;
-use crate::step::geometry::{GeometryReader, Outcome, Refusal};
+use crate::step::geometry::{GeometryReader, Outcome, Refusal, references};
 use crate::step::part21::Entity;
 use crate::step::settings::Settings;
 use crate::step::trim::face::{BuiltFace, build_face};
@@ -90,7 +90,7 @@ fn convert_surface(geometry: &GeometryReader<'_, '_>, id: u64, settings: &Settin
     let e = geometry.entity(id)?;
     let (mut boundaries, mut implicit) = (Vec::new(), false);
     let mut task = if let Some(a) = e.attributes("CURVE_BOUNDED_SURFACE", 1) {
-        for boundary in a.list(1).ids() {
+        for boundary in references(e, a.list(1))? {
             boundaries.push(geometry.segments(geometry.entity(boundary)?, 0)?);
         }
         implicit = a.flag(2) == Some(true);

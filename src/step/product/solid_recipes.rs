@@ -9,7 +9,7 @@ use crate::math::{Frame, Homogeneous, Point, Vector};
 use crate::model::Analytic;
 use crate::nurbs::{ControlPoint, Curve, conic};
 use crate::step::chart::{Chart, Kind};
-use crate::step::geometry::{GeometryReader, Outcome, Refusal};
+use crate::step::geometry::{GeometryReader, Outcome, Refusal, references};
 use crate::step::part21::{Args, Entity};
 use std::f64::consts::TAU;
 
@@ -161,7 +161,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let area = self.resolve(e, id, "swept area")?;
         let (surface, loops) = if let Some(a) = area.attributes("CURVE_BOUNDED_SURFACE", 1) {
             let surface = self.resolve(area, a.id(0), "basis surface")?;
-            let boundaries = a.list(1).ids().into_iter();
+            let boundaries = references(area, a.list(1))?.into_iter();
             (surface, boundaries.map(|b| self.segments(self.entity(b)?, 0)).collect::<Outcome<Vec<_>>>()?)
         } else {
             let plan = read_face(self.file, area.id)?;

@@ -3,7 +3,7 @@
 use crate::math::{FaceId, Point, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::model::TessellatedFace;
-use crate::step::geometry::{GeometryReader, Outcome, Refusal};
+use crate::step::geometry::{GeometryReader, Outcome, Refusal, within_reach};
 use crate::step::part21::{Args, Entity};
 use rustc_hash::FxHashSet;
 
@@ -71,7 +71,12 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             if depth >= MAX_DEPTH {
                 into.refused.push(Refusal::new(e, "meshes are nested too deeply"));
             } else if set.entity(1).is_none() {
-                for item in set.list(0).ids() {
+                let list = set.list(0);
+                let items = list.refs().unwrap_or_else(|| {
+                    into.refused.push(Refusal::no_reference(e));
+                    list.ids()
+                });
+                for item in items {
                     self.collect_meshes(item, depth + 1, into);
                 }
             }
@@ -88,7 +93,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 
     /// Returns the triangles of a leaf as a mesh, mm, with the file's normals where it gives them, else flat ones; triangles without area
-    /// are left out, and a leaf without others is refused, as is one with a triangle that cannot be read.
+    /// are left out, and a leaf without others is refused, as is one with a triangle that cannot be read or a corner that is too far away.
     fn triangles(&self, e: Entity<'f, 'a>, layout: &Layout) -> Outcome<FacetMesh> {
         let args = e.args();
         let list = self.resolve(e, args.id(1), "list of coordinates")?;
@@ -122,6 +127,9 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             let [Some(a), Some(b), Some(c)] = found else {
                 return Err(Refusal::new(e, "a triangle refers to a point that is not in the list"));
             };
+            for (_, corner) in [a, b, c] {
+                within_reach(e, corner)?;
+            }
             // A triangle without an area shades nothing and has no normal to give.
             let Some(flat) = (b.1 - a.1).cross(c.1 - a.1).try_normalize() else { continue };
             let first = mesh.vertices.len() as u32;

@@ -1,7 +1,7 @@
 //! Shells, faces and loops of a representation as lists of ids, before any geometry is computed.
 
-use crate::step::geometry::{Outcome, Refusal};
-use crate::step::part21::{Entity, File};
+use crate::step::geometry::{Outcome, Refusal, references};
+use crate::step::part21::{Args, Entity, File};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Names of solids that hold no faces but a recipe.
@@ -36,7 +36,7 @@ const MAX_PARENTS: usize = 4;
 const MAX_USES: u32 = 2;
 
 /// A shell to be converted, with the styles and names around it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct ShellPlan {
     pub(crate) name: String,
     pub(crate) closed: bool,
@@ -46,6 +46,8 @@ pub(crate) struct ShellPlan {
     pub(crate) void: bool,
     /// Faces, and whether the shell turns them around.
     pub(crate) faces: Vec<(u64, bool)>,
+    /// Whether these are all that it lists.
+    pub(crate) whole: bool,
     /// Entities whose style the shell inherits, the nearest first.
     pub(crate) owners: Vec<u64>,
 }
@@ -122,15 +124,15 @@ impl ShapeItems {
             // Of a complex instance the voids are attributes of their own; of a simple one they stand behind the
             // shell.
             if let Some(v) = e.attributes("BREP_WITH_VOIDS", 2) {
-                self.add_voids(file, e, v.list(0).ids(), &name);
+                self.add_voids(file, e, v.list(0), &name);
             }
         } else if let Some(a) = e.attributes("BREP_WITH_VOIDS", 1) {
             self.add_shell(file, a.id(0), &name, &[id], true, e);
-            self.add_voids(file, e, a.list(1).ids(), &name);
+            self.add_voids(file, e, a.list(1), &name);
         } else if let Some(a) =
             e.attributes("SHELL_BASED_SURFACE_MODEL", 1).or_else(|| e.attributes("FACE_BASED_SURFACE_MODEL", 1))
         {
-            for shell in a.list(0).ids() {
+            for shell in self.listed(e, a.list(0)) {
                 self.add_shell(file, Some(shell), &name, &[id], false, e);
             }
         } else if e.is_one_of(&[
@@ -143,18 +145,12 @@ impl ShapeItems {
             self.add_shell(file, Some(id), &name, &[], false, e);
         } else if e.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE", "SUBFACE"]) {
             // A face alone is an open shell of one face.
-            self.shells.push(ShellPlan {
-                name,
-                closed: false,
-                outer: false,
-                void: false,
-                faces: vec![(id, false)],
-                owners: vec![],
-            });
+            let faces = vec![(id, false)];
+            self.shells.push(ShellPlan { name, faces, whole: true, ..ShellPlan::default() });
         } else if let Some(a) = e.attributes("GEOMETRIC_SET", 1) {
             // Elements of other kinds are no shapes.
-            let surfaces = a.list(0).ids().into_iter().filter(|id| file.entity(*id).is_some_and(is_surface));
-            surfaces.for_each(|id| self.add_surface(id));
+            let elements = self.listed(e, a.list(0)).into_iter();
+            elements.filter(|id| file.entity(*id).is_some_and(is_surface)).for_each(|id| self.add_surface(id));
         } else if e.keywords().any(is_tessellated) {
             self.tessellated.push(id);
         } else if e.is_one_of(&RECIPES) {
@@ -166,6 +162,14 @@ impl ShapeItems {
         }
     }
 
+    /// Returns the ids of a list of `e`; entries that are no references are refused once, in `e`'s name.
+    fn listed(&mut self, e: Entity<'_, '_>, list: Args<'_, '_>) -> Vec<u64> {
+        list.refs().unwrap_or_else(|| {
+            self.refused.push(Refusal::no_reference(e));
+            list.ids()
+        })
+    }
+
     /// Adds a surface without a face, once.
     fn add_surface(&mut self, id: u64) {
         if self.listed_surfaces.insert(id) {
@@ -174,8 +178,8 @@ impl ShapeItems {
     }
 
     /// Adds a shell for each void of the solid `e`.
-    fn add_voids(&mut self, file: &File<'_>, e: Entity<'_, '_>, shells: Vec<u64>, name: &str) {
-        for shell in shells {
+    fn add_voids(&mut self, file: &File<'_>, e: Entity<'_, '_>, shells: Args<'_, '_>, name: &str) {
+        for shell in self.listed(e, shells) {
             let before = self.shells.len();
             // An oriented shell may become several plans; what was added now bounds the void.
             self.add_shell(file, Some(shell), name, &[e.id], true, e);
@@ -225,7 +229,9 @@ impl ShapeItems {
             .map(|a| if e.keyword().is_empty() { a.list(0) } else { e.args().list(1) });
         let (mut faces, mut listed) = (Vec::new(), FxHashSet::default());
         let mut repeated = 0usize;
-        for face in own.iter().flat_map(|l| l.ids()) {
+        let ids = own.map_or_else(Vec::new, |list| self.listed(e, list));
+        let whole = own.is_none_or(|list| list.len() == ids.len());
+        for face in ids {
             let mut turned = flip;
             let mut face = face;
             for _ in 0..4 {
@@ -242,7 +248,8 @@ impl ShapeItems {
         }
         // A solid is closed whatever its shell calls itself.
         let closed = solid || e.is_a("CLOSED_SHELL");
-        self.shells.push(ShellPlan { name: name.to_string(), closed, outer: solid, void: false, faces, owners });
+        let name = name.to_string();
+        self.shells.push(ShellPlan { name, closed, outer: solid, void: false, faces, whole, owners });
     }
 }
 
@@ -339,14 +346,14 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     Ok(FacePlan { name, surface, same_sense: sense != Some(false), loops })
 }
 
-/// Returns the edges of a loop in its order, and whether it runs against them; none for a VERTEX_LOOP. Refuses missing edges and other
-/// kinds of loops.
+/// Returns the edges of a loop in its order, and whether it runs against them; none for a VERTEX_LOOP. Refuses missing edges and points,
+/// and other kinds of loops.
 fn edge_loop(e: Entity<'_, '_>) -> Outcome<Vec<(EdgeKey, bool)>> {
     if e.is_a("VERTEX_LOOP") {
         return Ok(Vec::new());
     }
     if let Some(a) = e.attributes("POLY_LOOP", 1) {
-        let points = a.list(0).ids();
+        let points = references(e, a.list(0))?;
         let n = points.len();
         return Ok((0..n)
             .map(|i| (points[i], points[(i + 1) % n]))
