@@ -113,6 +113,21 @@ fn what_means_nothing_is_refused_by_name() {
         ("[[source]]\nkind = 'point'\nspectrum = 'd65'".into(), "spectrum = { kind", 3),
         ("[[source]]\nkind = 'point'\nx = [0, 0, 0]".into(), "x", 3),
         ("[[source]]\nkind = 'ies'\nfile = 'a.ies'".into(), "lumens", 3),
+        ("[[source]]\non = { part = 'led' }\nat = [0, 0, 1]".into(), "leave out `at`", 3),
+        ("[[source]]\non = { part = 'led' }\ndirection = [0, 0, -1]".into(), "leave out `direction`", 3),
+        ("[[source]]\non = { part = 'led' }\nx = [1, 0, 0]".into(), "leave out `x`", 3),
+        (
+            "[[material]]\npart = 'x'\nsurface = 'coating'\ncoating = [[0, 550, 0.1, 0.8]]\nreflectance = 0.5"
+                .into(),
+            "leave out `reflectance`",
+            5,
+        ),
+        (
+            "[[material]]\npart = 'x'\nsurface = 'coating'\ntransmittance = 0.5\ncoating = [[0, 550, 0.1, 0.8]]"
+                .into(),
+            "leave out `transmittance`",
+            4,
+        ),
         ("[[source]]\nkind = 'rays'\nfile = 'a.csv'\nradius = 3".into(), "radius", 4),
         ("[source]\nkind = 'point'".into(), "[[source]]", 1),
         (

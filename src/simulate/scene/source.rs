@@ -26,8 +26,9 @@ pub struct Source {
     /// Long ones stay on the disk; of CSV and NPZ 64 bytes a ray are unpacked into the folder for temporary files (`TMPDIR`). The TILT
     /// table of an IES file, which is for tilted lamps, is left out.
     pub file: Option<String>,
-    /// The faces that shine, outward, instead of `at`, `direction`, `radius` and `size`. Where an opaque face of another solid lies against
-    /// one of them, as a board against a chip, it does not shine: all of the power leaves from the rest, and a note says how much that is.
+    /// The faces that shine, outward, instead of `at`, `direction`, `x`, `radius` and `size`. Where an opaque face of another solid lies
+    /// against one of them, as a board against a chip, it does not shine: all of the power leaves from the rest, and a note says how much
+    /// that is.
     pub on: Option<FaceSelector>,
     /// Instance, or part that is placed once, in whose own coordinates `at`, `direction`, `x` and `polarised` are given, and the rays of a
     /// list: the source goes where it goes.
@@ -147,8 +148,8 @@ impl Source {
         }
     }
 
-    /// Returns the key and fault where a file is missing or given in vain, or where `on`, `frame`, `radius` or `size` does not go with such
-    /// a source or with each other; `None` where nothing is wrong.
+    /// Returns the key and fault where a file is missing or given in vain, or where `on`, `frame`, `radius`, `size` or a place does not go
+    /// with such a source or with each other; `None` where nothing is wrong.
     fn file_fault(&self) -> Fault {
         let list = matches!(self.kind, SourceKind::Rays | SourceKind::Data1);
         let measured = list || matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);
@@ -171,6 +172,12 @@ impl Source {
         if self.on.is_some() && sized {
             return Some(("on", "faces that shine have neither `radius` nor `size`".into()));
         }
+        if let Some(key) = self.on.as_ref().and(self.place_key()) {
+            return Some((
+                key,
+                format!("faces that shine do so outward from where they are: leave out `{key}`, or leave out `on`"),
+            ));
+        }
         if list && sized {
             let key = if self.radius.is_some() { "radius" } else { "size" };
             return Some((
@@ -179,6 +186,13 @@ impl Source {
             ));
         }
         None
+    }
+
+    /// Returns the first key that places or turns the source otherwise than a source without any; `None` where none does.
+    fn place_key(&self) -> Option<&'static str> {
+        let Self { at, direction, .. } = Self::default();
+        let keys = [("at", self.at != at), ("direction", self.direction != direction), ("x", self.x.is_some())];
+        keys.into_iter().find(|(_, is_given)| *is_given).map(|(key, _)| key)
     }
 
     /// Returns the first that is wrong with the place, the directions or the extent; `None` where nothing is.

@@ -55,8 +55,16 @@ impl Material {
             ("metal", self.metal.is_some(), kind == SurfaceKind::Metal, "`surface = \"metal\"`"),
             ("scatter", self.scatter.is_some(), scatters, "a surface that is neither diffuse nor black"),
         ];
-        match keys.into_iter().find(|(_, given, allowed, _)| *given && !allowed) {
-            Some((key, _, _, owner)) => Err((key, format!("`{key}` belongs to {owner}"))),
+        if let Some((key, _, _, owner)) = keys.into_iter().find(|(_, given, allowed, _)| *given && !allowed) {
+            return Err((key, format!("`{key}` belongs to {owner}")));
+        }
+        // The rows tell both shares at every angle and wavelength that they have.
+        let shares = [("reflectance", self.reflectance.is_some()), ("transmittance", self.transmittance.is_some())];
+        match shares.into_iter().find(|(_, given)| *given && self.coating.is_some()) {
+            Some((key, _)) => Err((
+                key,
+                format!("the rows of `coating` say the {key} already: leave out `{key}`, or leave out `coating`"),
+            )),
             None => Ok(()),
         }
     }
