@@ -10,7 +10,7 @@ use super::settings::IntersectorKind;
 use crate::intersect::bvh::{self, Bvh};
 use crate::intersect::{Intersector, NormalMode};
 use crate::math::Ray;
-use crate::simulate::{PartialRun, Results, RunSettings, ask_again, verify_pruning};
+use crate::simulate::{PartialRun, ReceiverResult, Results, RunSettings, ask_again, verify_pruning};
 use crate::study::Progress;
 use crate::study::cross_check::{self, CrossCheck, GroupedIntersectors, cross_check_groups};
 use crate::study::geometric_error::{GeometricError, geometric_error};
@@ -65,9 +65,25 @@ impl PreparedScene {
             results.seconds.tessellate = self.tessellation_seconds;
             results.seconds.build = build_seconds;
             let (check, geometric) = recheck(self, &results, intersector, monitor);
+            results.notes.extend(geometric.iter().flat_map(|error| unknown_cells_notes(error, &results.receivers)));
             Ok(SceneResults { results, check, geometric, verification, sums_without_cells: sums })
         })
     }
+}
+
+/// Returns one sentence for each receiver of so many cells that facets and spline were compared without them.
+fn unknown_cells_notes(error: &GeometricError, receivers: &[ReceiverResult]) -> Vec<String> {
+    let compared = error.receivers.iter().zip(receivers);
+    let without = compared.filter(|(error, receiver)| !error.has_cells() && receiver.kind != "absorbed");
+    let sentence = |(_, receiver): (_, &ReceiverResult)| {
+        format!(
+            "the {} cells of '{}' are too many to compare on facets and spline: what facets change of each, and of the largest, is not known; \
+             take fewer cells, or trace on the spline (`intersector = \"exact\"`)",
+            receiver.cells.len(),
+            receiver.name
+        )
+    };
+    without.map(sentence).collect()
 }
 
 /// Asks a sample of the run's rays again, and traces some of them on facets and on the spline where no pilot has. The check is `None` where

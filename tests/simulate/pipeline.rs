@@ -71,6 +71,30 @@ fn every_figure_has_both_errors_and_the_document_holds_them() {
     assert_eq!(document["receivers"][0]["figures"]["power"]["value"], figures[0].power.value);
 }
 
+/// Of more than 2²² cells facets and spline are compared without them: what has no error says why.
+#[test]
+fn cells_that_are_too_many_to_compare_are_named() {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes/s1_lens.toml");
+    let run = |cells: [u32; 2]| {
+        let (mut scene, loaded) = read_scene(&scene, &Silent).unwrap();
+        scene.receivers.truncate(1);
+        scene.receivers[0].cells = cells;
+        let tracing = TracingSettings {
+            ray_range: Some(RayRange { first: None, end: 1000 }),
+            threads: Some(2),
+            intersector: Some(IntersectorKind::Octree),
+            ..TracingSettings::default()
+        };
+        let prepared = PreparedScene::new(SceneJob { tracing, ..SceneJob::new(scene, loaded) }, &Silent).unwrap();
+        let run = prepared.trace(TraceRequest::default(), &Silent).unwrap();
+        let max = run.figures(&prepared)[0].max.clone().expect("a map");
+        let said = run.results.notes.iter().filter(|note| note.contains("too many to compare")).count();
+        (max.geometric.is_some(), said)
+    };
+    assert_eq!(run([2048, 2049]), (false, 1));
+    assert_eq!(run([64, 64]), (true, 0));
+}
+
 #[test]
 fn requests_that_cannot_be_met_say_what_to_do() {
     let prepared = lens(3000);
