@@ -60,6 +60,7 @@ pub use png::{ColourMap, Picture, write_grid_png, write_png};
 pub use polylines::Polylines;
 pub use printable::{
     csv_quoted_text, csv_text, is_unprintable, printable, printable_in_place, printable_json, printable_line,
+    printable_toml,
 };
 pub use ray_files::{
     Flux, RayBlock, RayFile, RaySet, SpectralData, Tm25, Tm25Columns, Tm25Header, Tm25Reader, read_ray_set,

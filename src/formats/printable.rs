@@ -82,6 +82,23 @@ pub fn printable_json(text: String) -> String {
     shown
 }
 
+/// As [`printable_json`], for a JSON text that TOML takes as it is but for unprintable characters, such as a string, a number or a list.
+pub fn printable_toml(text: String) -> String {
+    if !text.contains(is_unprintable) {
+        return text;
+    }
+    let mut shown = String::with_capacity(text.len() + 64);
+    for c in text.chars() {
+        // TOML takes characters, not units of UTF-16, as escapes, and refuses DEL as it is.
+        match (is_unprintable(c), u32::from(c)) {
+            (false, _) => shown.push(c),
+            (true, code @ ..=0xffff) => shown += &format!("\\u{code:04x}"),
+            (true, code) => shown += &format!("\\U{code:08x}"),
+        }
+    }
+    shown
+}
+
 /// Writes text as a cell of CSV: unprintable characters as by [`printable`], quoted where it must be, and never taken for a formula by a
 /// spreadsheet, which an apostrophe in front prevents.
 ///
@@ -141,6 +158,15 @@ mod tests {
         let text = printable_json(serde_json::to_string(&[HOSTILE, "\u{e0041}"]).unwrap());
         assert!(!text.contains(is_unprintable), "{text:?}");
         assert_eq!(serde_json::from_str::<Vec<String>>(&text).unwrap(), [HOSTILE, "\u{e0041}"]);
+    }
+
+    #[test]
+    fn strings_of_scenes_read_back_the_same() {
+        let text = printable_toml(serde_json::to_string(&[HOSTILE, "a\u{7f}\u{e0041}\n"]).unwrap());
+        assert!(!text.contains(is_unprintable), "{text:?}");
+        let back: toml::Table = format!("x = {text}").parse().unwrap();
+        let back: Vec<&str> = back["x"].as_array().unwrap().iter().filter_map(|v| v.as_str()).collect();
+        assert_eq!(back, [HOSTILE, "a\u{7f}\u{e0041}\n"]);
     }
 
     #[test]

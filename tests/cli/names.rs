@@ -39,16 +39,21 @@ fn terminal_codes_in_names_reach_no_output() {
     let model = fs::read_to_string(fixture("step/lens_planoconvex_nurbs.stp")).unwrap();
     let at = model.find("PRODUCT('").unwrap() + "PRODUCT('".len();
     let end = at + model[at..].find('\'').unwrap();
-    fs::write(path.join("model.stp"), format!("{}{IN_STEP}{}", &model[..at], &model[end..])).unwrap();
+    // Its id and its name are one text.
+    let own = format!("'{}'", &model[at..end]);
+    fs::write(path.join("model.stp"), model.replace(&own, &format!("'{IN_STEP}'"))).unwrap();
     let scene = fs::read_to_string(fixture("scenes/s1_lens.toml")).unwrap();
     let scene = scene.replace("../step/lens_planoconvex_nurbs.stp", "model.stp").replace("1_000_000", "5_000");
     let scene =
         scene.replace("\"focus\"", &format!("\"{IN_TOML}\"")).replace("\"glass\"", &format!("\"{IN_TOML}\""));
     fs::write(path.join("scene.toml"), scene.replace("S1: plano-convex lens", IN_TOML)).unwrap();
     let hostile = "no\u{1b}[31m\u{9b}2J\u{202e}";
-    let commands: [(&[&str], i32); 8] = [
+    let commands: [(&[&str], i32); 11] = [
         (&["info", "model.stp"], 0),
         (&["info", "model.stp", "--json"], 0),
+        (&["info", "model.stp", "--faces"], 0),
+        (&["init", "model.stp", "-o", "out/new.toml"], 0),
+        (&["trace", "out/new.toml", "--dry-run"], 0),
         (&["facet", "model.stp", "-o", "a.ply", "-o", "a.obj", "-v"], 0),
         (&["trace", "scene.toml", "-o", "out"], 0),
         (&["trace", "scene.toml", "-o", "out", "--json"], 0),
@@ -56,6 +61,7 @@ fn terminal_codes_in_names_reach_no_output() {
         (&["info", hostile], 3),
         (&[hostile], 2),
     ];
+    fs::create_dir(path.join("out")).unwrap();
     for (arguments, expected) in commands {
         let (code, out, err) = lampyris_in(path, arguments);
         assert_eq!(code, expected, "{arguments:?}: {err}");

@@ -7,7 +7,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
 use crate::cli::work::input_files;
 use crate::cli::work::output_place::{folder_of, make_folder};
-use crate::formats::{file_name, printable_line, write_atomic};
+use crate::formats::{file_name, printable_line, printable_toml, write_atomic};
 use crate::model::{Model, PartAccount, SolidAccount};
 use crate::pipeline::LoadedModel;
 use crate::report::figures;
@@ -286,9 +286,9 @@ fn toml_number(value: f64) -> String {
     digits.parse::<f64>().map_or_else(|_| value.to_string(), |_| digits)
 }
 
-/// Returns a text as a TOML string.
+/// Returns a text as a TOML string on one line.
 fn toml_string(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
+    printable_toml(serde_json::Value::from(text).to_string())
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Which faces of a model a rule means: by names, numbers, looks, figures and places.
 
+use crate::formats::printable_toml;
 use serde::{Deserialize, Serialize};
 
 /// One value or a list of them.
@@ -106,16 +107,16 @@ impl ColourKey {
 impl std::fmt::Display for FaceSelector {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let keys = [
-            ("part", json_text(&self.part)),
-            ("instance", json_text(&self.instance)),
-            ("solid", json_text(&self.solid)),
-            ("face", json_text(&self.face)),
-            ("layer", json_text(&self.layer)),
-            ("colour", json_text(&self.colour)),
-            ("kind", json_text(&self.kind)),
-            ("radius_mm", json_text(&self.radius_mm)),
-            ("entity", json_text(&self.entity)),
-            ("at", json_text(&self.at)),
+            ("part", toml_text(&self.part)),
+            ("instance", toml_text(&self.instance)),
+            ("solid", toml_text(&self.solid)),
+            ("face", toml_text(&self.face)),
+            ("layer", toml_text(&self.layer)),
+            ("colour", toml_text(&self.colour)),
+            ("kind", toml_text(&self.kind)),
+            ("radius_mm", toml_text(&self.radius_mm)),
+            ("entity", toml_text(&self.entity)),
+            ("at", toml_text(&self.at)),
         ];
         let given: Vec<String> =
             keys.into_iter().filter_map(|(key, text)| Some(format!("{key} = {}", text?))).collect();
@@ -123,7 +124,7 @@ impl std::fmt::Display for FaceSelector {
     }
 }
 
-/// Writes a value as JSON, which strings, numbers and lists of them share with TOML; `None` for none.
-fn json_text<T: Serialize>(value: &Option<T>) -> Option<String> {
-    serde_json::to_string(value.as_ref()?).ok()
+/// Writes a value as TOML takes it; `None` for none.
+fn toml_text<T: Serialize>(value: &Option<T>) -> Option<String> {
+    serde_json::to_string(value.as_ref()?).ok().map(printable_toml)
 }
