@@ -11,7 +11,8 @@ pub(crate) fn variance_of_sum(squares: f64, sum: f64, parts: usize) -> f64 {
 }
 
 /// Returns the variance of a sum of so many independent parts, from the sum of the squares of their distances from the mean: n/(n − 1)
-/// times that, as the mean was taken from the same parts.
+/// times that, as the mean was taken from the same parts. Fewer than two count as two: of one part the residual is 0 and tells nothing,
+/// which callers answer first.
 pub(crate) fn variance_from_residuals(residuals: f64, parts: usize) -> f64 {
     let n = parts.max(2) as f64;
     residuals * n / (n - 1.0)

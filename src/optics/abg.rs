@@ -23,7 +23,7 @@ pub struct Abg {
 const RADIUS_TOLERANCE: f64 = 1e-14;
 /// Largest possible |β − β₀|.
 const REACH: f64 = 2.0;
-/// Rings of the tabulated share: their width grows by a factor of 1.06.
+/// Rings of the tabulated share: their width grows by a factor of 1.01 to 1.09.
 const RINGS: usize = 256;
 /// The first ring, as a share of the radius at which the weight bends: within it the weight is constant to 1e-3^g.
 const FIRST_RING: f64 = 1e-3;

@@ -136,14 +136,15 @@ impl LandedRays {
         Self { sample, columns, rows, sums }
     }
 
-    /// Returns flux, variance and solid angle of the cells of a box, ends excluded.
+    /// Returns flux, variance and solid angle of the cells of a box of half-open ranges: the first cell is in it, the end is not.
     fn box_sums(&self, [left, right]: [usize; 2], [low, high]: [usize; 2]) -> [f64; 3] {
         let at = |row: usize, column: usize| self.sums[row * (self.columns + 1) + column];
         let corners = [at(high, right), at(low, right), at(high, left), at(low, left)];
         [0, 1, 2].map(|k| corners[0][k] - corners[1][k] - corners[2][k] + corners[3][k])
     }
 
-    /// Returns the heaviest rays that may land in a cell beside a reading that is `margin` cd from its limit.
+    /// Returns the heaviest rays that may land, unseen, in a cell (counted row after row) of a reading that is |`margin`| cd from its
+    /// limit, at the one-sided confidence of `sigmas` standard errors; the heaviest of all where the window is dark or larger than the map.
     pub(super) fn landing_ray(&self, cell: usize, margin: f64, sigmas: f64) -> LandingRay {
         let heaviest = self.sample.heaviest_flux;
         let unknown = LandingRay { flux: heaviest, heaviest, hidden: 0.0 };

@@ -7,7 +7,8 @@ use super::settings::{KernelChoice, RunSettings};
 use super::tallies::ReplicateTally;
 use crate::intersect::Cost;
 
-/// Returns the name of the kernel that a run with these settings uses, from "mirror" to "full"; the same name is the same code.
+/// Returns the name of the kernel that a run with these settings uses, from "mirror" to "full". Of one scene, for settings that differ in
+/// `kernel` alone, the same name is the same code; else the smaller kernels have a variant for runs that ask only where rays end.
 pub fn kernel_name(bound: &BoundScene, settings: &RunSettings) -> &'static str {
     kernel_kind(bound, settings).name()
 }

@@ -99,7 +99,8 @@ pub fn trace(
     Traced { partial, cost, threads }
 }
 
-/// Returns the replicates of the `shard`-th, from 0, of `shards`; empty for one too many.
+/// Returns the contiguous part of `all` that shard number `shard`, from 0, of `shards` traces: the parts are disjoint and make up `all`.
+/// Empty from number `shards` on; 0 shards count as one.
 pub fn shard_replicates(all: Range<u32>, [shard, shards]: [u32; 2]) -> Range<u32> {
     let count = u64::from(all.end.saturating_sub(all.start));
     let first = |k: u32| all.start + (count * u64::from(k) / u64::from(shards.max(1))).min(count) as u32;

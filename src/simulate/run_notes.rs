@@ -19,7 +19,8 @@ impl BoundScene {
     /// Returns one sentence about bodies of different media that a run found to overlap; `None` where that was rarer than once in
     /// [`OVERLAP_SEGMENTS`] segments.
     pub(crate) fn overlap_note(&self, counts: &Counts) -> Option<String> {
-        let [[a, medium_a], [b, medium_b]] = [self.body(counts.overlapping[0])?, self.body(counts.overlapping[1])?];
+        let [[a, medium_a], [b, medium_b]] =
+            [self.body_names(counts.overlapping[0])?, self.body_names(counts.overlapping[1])?];
         let times = counts.overlaps;
         // Rare meetings are the rounding of edges, and not worth alarming anybody.
         (times > counts.segments / OVERLAP_SEGMENTS).then(|| {
@@ -114,7 +115,7 @@ impl BoundScene {
             LostCause::NotANumber => "its place or direction is no number",
             LostCause::Unreadable => "its ray file was changed or went while it was in use",
         };
-        let place = match (self.body(body).filter(|_| body != AMBIENT), at) {
+        let place = match (self.body_names(body).filter(|_| body != AMBIENT), at) {
             (Some([name, medium]), _) => format!("in '{name}' ({medium})"),
             (None, Some(name)) => format!("at '{name}'"),
             (None, None) => "outside all bodies".into(),

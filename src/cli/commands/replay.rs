@@ -131,7 +131,7 @@ fn print_paths(prepared: &PreparedScene, found: &Results) -> Result<(), Failure>
             ))?;
         }
         for l in found.ledger.iter().filter(|l| (l.ray, l.branch) == (path[0].ray, path[0].branch)) {
-            let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]);
+            let [instance, medium] = prepared.bound.body_names(l.body).unwrap_or(["", ""]);
             print(&format!("  lost: {}, in {medium} of {instance}\n", l.cause.name().replace('_', " ")))?;
         }
     }

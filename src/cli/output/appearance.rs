@@ -62,7 +62,7 @@ pub(crate) fn grouped_facets<'a>(model: &Model, mesh: &'a FacetMesh, bound: Opti
                 Group::solid(&name(*instance, text.as_deref().unwrap_or_default()), shown)
             }
             Look::Clear(instance, body) => {
-                let medium = bound.and_then(|b| b.body(*body)).map_or("", |[_, medium]| medium);
+                let medium = bound.and_then(|b| b.body_names(*body)).map_or("", |[_, medium]| medium);
                 let index_ratio = bound.map_or(1.0, |b| b.relative_index(*body)).recip();
                 Group { opacity: CLEAR_OPACITY, index_ratio, ..Group::solid(&name(*instance, medium), CLEAR) }
             }

@@ -31,7 +31,7 @@ pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) 
             let (o, d) = (l.origin, l.direction);
             // A name that holds line ends would take several lines.
             let cell = |name: &str| csv_quoted_text(&printable_line(name));
-            let [instance, medium] = prepared.bound.body(l.body).unwrap_or(["", ""]).map(cell);
+            let [instance, medium] = prepared.bound.body_names(l.body).unwrap_or(["", ""]).map(cell);
             // A ray that left the scene was lost at no face: an empty cell.
             let face = l.face.map_or(String::new(), |f| f.to_string());
             let hit = cell(l.face.and_then(|f| prepared.bound.instance(f)).unwrap_or(""));
@@ -96,7 +96,7 @@ fn loss_reasons(results: &Results, prepared: &PreparedScene) -> String {
     let mut count: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     for l in &results.ledger {
         let hit = l.face.and_then(|f| prepared.bound.instance(f));
-        let inside = || prepared.bound.body(l.body).map(|[instance, _]| instance);
+        let inside = || prepared.bound.body_names(l.body).map(|[instance, _]| instance);
         // Where it was hit; a ray that left the scene is told by the body that it was in.
         *count.entry((cause_text(l.cause), hit.or_else(inside).unwrap_or(""))).or_default() += 1;
     }

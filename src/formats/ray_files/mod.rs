@@ -77,7 +77,7 @@ pub fn read_ray_set(path: &Path, preferred: Flux) -> Result<RaySet, Error> {
 /// uses. Lines that start with `#` are comments.
 ///
 /// # Errors
-/// When the file cannot be read or its content makes no rays; the message names the line.
+/// When the file cannot be read or its content makes no rays; the message names the line, or the array or ray of an NPZ.
 pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
     let mut rays = Vec::new();
     read_list(path, |ray| {

@@ -9,9 +9,9 @@ pub(super) type Corners = [[f64; 4]; 3];
 #[derive(Default)]
 #[repr(C, align(64))]
 pub(super) struct Edges {
-    /// From each corner to the one before.
+    /// Of each side, by its first corner k: the edge function from corner k + 1 (mod 4) to corner k.
     pub(super) outline: [f64; 8],
-    /// The same four times.
+    /// That of the diagonal between corners 0 and 2, four times.
     pub(super) diagonal: [f64; 8],
     /// Of the corners, along the main axis.
     pub(super) heights: [f64; 8],
@@ -21,7 +21,7 @@ pub(super) struct Edges {
 }
 
 impl Edges {
-    /// Overwrites all with the edge functions of two facets, in plain Rust.
+    /// Overwrites all with the edge functions of two facets: lanes 0 to 3 are the first facet's, 4 to 7 the second's. In plain Rust.
     #[inline(always)]
     pub(super) fn compute(&mut self, corners: [&Corners; 2], line: &Line) {
         let ([ox, oy, oz], [sx, sy, _]) = (line.origin, line.shear);

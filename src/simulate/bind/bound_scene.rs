@@ -52,8 +52,9 @@ pub struct BoundScene {
 }
 
 impl BoundScene {
-    /// Returns the names of the instance and the medium of a body, by its number in lost rays; `None` where there is no such body.
-    pub fn body(&self, body: u32) -> Option<[&str; 2]> {
+    /// Returns the names of the instance and the medium of a body, by its number in lost rays, 0 for the surroundings; `None` beyond the
+    /// last.
+    pub fn body_names(&self, body: u32) -> Option<[&str; 2]> {
         self.bodies.get(body as usize).map(|b| [b.name.as_str(), b.medium.as_str()])
     }
 

@@ -159,7 +159,7 @@ pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> 
     };
     let faces: Vec<PlacedFace<'_>> = model.placed_faces().filter(open).collect();
     let first = faces.first()?;
-    let [instance, medium] = bound.body(bound.faces[first.id.index()].body)?;
+    let [instance, medium] = bound.body_names(bound.faces[first.id.index()].body)?;
     let bodies: BTreeSet<u32> = faces.iter().map(|f| bound.faces[f.id.index()].body).collect();
     let others = if bodies.len() > 1 { format!(" (and {} more)", bodies.len() - 1) } else { String::new() };
     let sheet = match (first.name(), first.entity()) {
@@ -213,7 +213,7 @@ pub(super) fn thin_body_note(bound: &BoundScene) -> Option<String> {
     // Twice the glue: a body as thin as that has both of its faces within the glue of one place.
     let thin = touching.into_iter().filter(|&k| k != AMBIENT && thickness(k) < 2.0 * glue);
     let film = thin.min_by(|a, b| thickness(*a).total_cmp(&thickness(*b)))?;
-    let [name, medium] = bound.body(film)?;
+    let [name, medium] = bound.body_names(film)?;
     let thick = thickness(film);
     Some(format!(
         "'{name}' ({medium}) is {thick:.1e} mm thick, hardly more than [run] glue_mm = {glue:e}, within which faces of touching bodies \

@@ -16,7 +16,8 @@ pub(super) fn purpose_besides_shape(file: &File<'_>, id: u64) -> Option<&'static
     e.keywords().any(shows).then_some("says how something is shown")
 }
 
-/// Whether a keyword is that of a representation of a shape; of one with parameters too, but of no relationship.
+/// Whether a keyword names a shape representation of any kind (ADVANCED_BREP_…, …_WITH_PARAMETERS), but no …_RELATIONSHIP and nothing that
+/// is CONTEXT_DEPENDENT_….
 pub(super) fn is_shape_representation(keyword: &str) -> bool {
     keyword.contains("SHAPE_REPRESENTATION")
         && !keyword.starts_with("CONTEXT_DEPENDENT_")

@@ -51,7 +51,8 @@ struct Spikes<'t, 'f, 'a> {
 }
 
 /// Takes the spikes out of the plane faces of `plans`, in the order of `ids`, splits edges and has faces use one edge where two coincide;
-/// those of which nothing is left are taken out of `plans`. `joined` maps a vertex to the one in its place.
+/// those of which nothing is left are taken out of `plans`. `joined` maps a vertex one step towards the one
+/// in its place, and `table` has every edge of the plans.
 pub(super) fn remove_spikes(
     file: &File<'_>,
     ids: &[u64],

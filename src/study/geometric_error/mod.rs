@@ -152,7 +152,8 @@ pub fn geometric_error(
     compare(bound, [&facets, &spline])
 }
 
-/// Compares every figure of two runs of the same rays, the first on facets, the second on the spline; receivers are those of the second.
+/// Compares every figure of two runs of the same rays, the first on facets, the second on the spline; rays and
+/// statistical errors are those of the second.
 pub(in crate::study) fn compare(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -> GeometricError {
     let results = runs.map(|run| &run.results);
     GeometricError {

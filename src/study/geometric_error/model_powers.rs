@@ -28,7 +28,7 @@ pub(super) fn absorbed_errors(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -> 
     let places = runs[1].results.tallies.model_sums().count();
     let cells = paired_cells(places, &pairs.collect::<Vec<_>>());
     let instances = bound.instances.iter().map(|name| [name.as_str(), "faces"]);
-    let names = instances.chain((0..).map_while(|body| bound.body(body)));
+    let names = instances.chain((0..).map_while(|body| bound.body_names(body)));
     let lit = names.zip(cells).enumerate().filter(|(_, (_, cell))| cell.facets > 0.0 || cell.spline > 0.0);
     let quantum = runs[1].results.quantum;
     let compared = |(index, ([name, r#in], cell)): (usize, ([&str; 2], Cell))| {
