@@ -55,7 +55,7 @@ pub struct LostRay {
     pub direction: Vector,
     /// The face where it happened, if it was at one.
     pub face: Option<u32>,
-    /// The body it was in, as [`BoundScene::body`](crate::simulate::BoundScene::body) names it; 0 for the surroundings.
+    /// The body it was in, as [`BoundScene::body_names`](crate::simulate::BoundScene::body_names) names it; 0 for the surroundings.
     pub body: u32,
 }
 
