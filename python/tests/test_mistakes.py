@@ -16,7 +16,7 @@ import lampyris as lp
     ("change", "kind", "says"),
     [
         (lambda s: s.trace(rays=0), ValueError, "at least 1"),
-        (lambda s: s.trace(tolerance=-1), ValueError, "positive lengths"),
+        (lambda s: s.trace(tolerance=-1), ValueError, "from 1e-7 on"),
         (lambda s: s.trace(tolerance=(1, 2, 3)), ValueError, "one number of mm or two"),
         (lambda s: s.trace(normals="round"), ValueError, "normals"),
         (lambda s: s.trace(intersector="quadtree"), ValueError, "octree, bvh2, cwbvh, exact"),
