@@ -110,7 +110,7 @@ pub fn shard_replicates(all: Range<u32>, [shard, shards]: [u32; 2]) -> Range<u32
 /// Returns the number of rays in some of the `replicates` replicates of a run of so many rays, to within one.
 fn rays_of_replicates(rays: u64, some: usize, replicates: u32) -> u64 {
     // Of a run of 3·10¹¹ rays that grows the product does not fit into 64 bits.
-    (u128::from(rays) * some as u128 / u128::from(replicates.max(1))) as u64
+    (u128::from(rays) * some as u128 / u128::from(replicates)) as u64
 }
 
 /// What the threads of a run share.

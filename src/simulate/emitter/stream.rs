@@ -191,11 +191,8 @@ impl Stream {
                 random::scrambled_block(first + (block * random::BLOCK) as u32, d, self.scrambles[d], numbers);
             }
         }
-        let along = self.sorted_dimension();
         let mut cells = [0u16; CHUNK];
-        // Rays without a direction or place of their own, as those of a list, keep their order: what numbers there are is of another
-        // source.
-        if self.pairs[along / 2] {
+        if let Some(along) = self.sorted_dimension() {
             for ((cell, x), y) in cells.iter_mut().zip(&self.numbers[along]).zip(&self.numbers[along + 1]) {
                 // Morton order of the directions (or places): rays that start one after another go through the same part of the scene,
                 // whose nodes are still in the cache.
@@ -229,22 +226,21 @@ impl Stream {
                 self.numbers[d].extend((0..self.rays).map(|k| random::scrambled(k, d, self.scrambles[d])));
             }
         }
-        let along = self.sorted_dimension();
-        let [x, y] = [&self.numbers[along], &self.numbers[along + 1]];
         self.order.clear();
         self.order.extend(0..self.rays);
-        // As in a chunk: those of a list keep their order. Stable, as the counting sort is.
-        if self.rays > 1 && self.pairs[along / 2] {
+        // Stable, as the counting sort of a chunk is.
+        if let Some(along) = self.sorted_dimension().filter(|_| self.rays > 1) {
+            let [x, y] = [&self.numbers[along], &self.numbers[along + 1]];
             self.order.sort_by_key(|&k| z_order_cell(x[k as usize], y[k as usize]));
         }
     }
 
     /// Returns the first of the two dimensions by which rays are put in order: of the direction, or of the place where no direction is
-    /// drawn.
+    /// drawn; `None` where neither is, as of a list, whose rays keep their order.
     #[inline(always)]
-    fn sorted_dimension(&self) -> usize {
+    fn sorted_dimension(&self) -> Option<usize> {
         // The direction decides most of what a ray meets; where all have one, the place does.
-        if self.pairs[1] { 2 } else { 0 }
+        if self.pairs[1] { Some(2) } else { self.pairs[0].then_some(0) }
     }
 
     /// Returns the numbers of a pair for the packet of rays that start from the `started`-th on; of no meaning beyond the last ray, and 0
