@@ -43,6 +43,18 @@ impl Nearest {
         Some(FacetHit { t, facet, second, b: edges.map(|e| e / det) })
     }
 
+    /// The facet of the nearest hit so far.
+    #[inline(always)]
+    pub(crate) fn facet(&self) -> Option<u32> {
+        self.hit.map(|hit| hit.facet)
+    }
+
+    /// Keeps a hit that is known to be nearer than the one kept so far.
+    #[inline(always)]
+    pub(crate) fn keep_nearer(&mut self, hit: EdgeHit) {
+        *self = Self { t: hit.t, hit: Some(hit) };
+    }
+
     /// Keeps `hit` if it is nearer than the one kept so far: of equal ones that on the facet of lowest index, there the first triangle's.
     #[inline(always)]
     pub(crate) fn offer(&mut self, hit: EdgeHit) {
@@ -51,7 +63,7 @@ impl Nearest {
             Some(old) => hit.t < old.t || (hit.t == old.t && (hit.facet, hit.second) < (old.facet, old.second)),
         };
         if nearer {
-            *self = Self { t: hit.t, hit: Some(hit) };
+            self.keep_nearer(hit);
         }
     }
 }

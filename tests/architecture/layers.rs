@@ -369,6 +369,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "quad_edges",
             "lanes",
             "portable",
+            "facet_lanes",
+            "step_queues",
             "ray_state",
             "horizon",
             "light_buffer",

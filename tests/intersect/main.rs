@@ -2,6 +2,7 @@
 
 #[cfg(feature = "contenders")]
 mod contenders;
+mod deep;
 mod departures;
 mod facets;
 mod horizon;

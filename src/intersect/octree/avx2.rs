@@ -13,11 +13,11 @@ use std::arch::x86_64::*;
 /// Eight lanes of f32.
 pub(super) struct Avx2Lanes;
 
-/// A row of a node's bounds as numbers.
+/// Half a row of a node's bounds, from the child `first` on, as numbers.
 #[inline(always)]
-unsafe fn load_bounds(node: &Node, row: usize) -> __m256 {
+unsafe fn load_bounds(node: &Node, row: usize, first: usize) -> __m256 {
     unsafe {
-        let bytes = node.bounds.get_unchecked(row).as_ptr().cast();
+        let bytes = node.bounds.get_unchecked(row).as_ptr().add(first).cast();
         _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes)))
     }
 }
@@ -44,10 +44,10 @@ unsafe fn sieve_row(block: &Block, axis: usize, first: usize, step: __m256, to: 
 
 /// By octant: slots of children.
 #[repr(align(64))]
-pub(super) struct Orders(pub(super) [[u32; 8]; 8]);
+struct Orders([[u32; 8]; 8]);
 
 /// By octant: the slots of children in the order in which they are pushed, so that the one met first is popped first.
-pub(super) static ORDERS: Orders = {
+static ORDERS: Orders = {
     let mut orders = [[0; 8]; 8];
     let mut octant = 0;
     while octant < 8 {
@@ -84,56 +84,57 @@ static COMPRESSIONS: [[u8; 8]; 256] = {
 
 impl Lanes for Avx2Lanes {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32 {
-        // SAFETY: see the head of the file; `near` is 0..6 by construction.
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+        // SAFETY: see the head of the file; rows are 0..6 by construction, and eight numbers are written from the eighth place at most.
         unsafe {
             // Bounds are eight-bit steps from the node's corner: crossing = (corner − origin)·inverse +
-            // bound·(step·inverse), so that one fused operation a bound is left for the eight children.
-            let [x, y, z] = [0, 1, 2];
-            let inverse_x = _mm256_load_ps(ray.inverse[0].as_ptr());
-            let inverse_y = _mm256_load_ps(ray.inverse[1].as_ptr());
-            let inverse_z = _mm256_load_ps(ray.inverse[2].as_ptr());
-            let base_x = _mm256_mul_ps(_mm256_set1_ps(node.origin[x] - ray.origin[x]), inverse_x);
-            let base_y = _mm256_mul_ps(_mm256_set1_ps(node.origin[y] - ray.origin[y]), inverse_y);
-            let base_z = _mm256_mul_ps(_mm256_set1_ps(node.origin[z] - ray.origin[z]), inverse_z);
-            let sx = _mm256_mul_ps(_mm256_set1_ps(node.step[x]), inverse_x);
-            let sy = _mm256_mul_ps(_mm256_set1_ps(node.step[y]), inverse_y);
-            let sz = _mm256_mul_ps(_mm256_set1_ps(node.step[z]), inverse_z);
-            let slack_x = _mm256_set1_ps(ray.slack[x]);
-            let slack_y = _mm256_set1_ps(ray.slack[y]);
-            let slack_z = _mm256_set1_ps(ray.slack[z]);
-            // Which of the two rows of an axis is met first depends on the ray's sign alone, so that no minimum and
-            // maximum of both is needed.
-            let [nx, ny, nz] = [ray.entry_row(0), ray.entry_row(1), ray.entry_row(2)];
-            // Entering is made earlier and leaving later by what `f32` may be wrong by: boxes may be met in vain
-            // but never missed.
-            let enter_x = _mm256_fmadd_ps(load_bounds(node, nx), sx, _mm256_sub_ps(base_x, slack_x));
-            let enter_y = _mm256_fmadd_ps(load_bounds(node, ny), sy, _mm256_sub_ps(base_y, slack_y));
-            let enter_z = _mm256_fmadd_ps(load_bounds(node, nz), sz, _mm256_sub_ps(base_z, slack_z));
-            let leave_x = _mm256_fmadd_ps(load_bounds(node, nx ^ 1), sx, _mm256_add_ps(base_x, slack_x));
-            let leave_y = _mm256_fmadd_ps(load_bounds(node, ny ^ 1), sy, _mm256_add_ps(base_y, slack_y));
-            let leave_z = _mm256_fmadd_ps(load_bounds(node, nz ^ 1), sz, _mm256_add_ps(base_z, slack_z));
-            let enter =
-                _mm256_max_ps(_mm256_max_ps(enter_x, enter_y), _mm256_max_ps(enter_z, _mm256_set1_ps(ray.t_min)));
-            let leave =
-                _mm256_min_ps(_mm256_min_ps(leave_x, leave_y), _mm256_min_ps(leave_z, _mm256_set1_ps(ray.t_max)));
-            // Beside the slack the last few roundings scale with the distance itself.
-            let leave = _mm256_mul_ps(leave, _mm256_set1_ps(LEAVE_STRETCH));
+            // bound·(step·inverse), so that one fused operation a bound is left for the children.
+            let mut scale = [_mm256_setzero_ps(); 3];
+            let (mut early, mut late) = (scale, scale);
+            for a in 0..3 {
+                let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a];
+                scale[a] = _mm256_set1_ps(node.step[a] * ray.inverse[a]);
+                // Entering is made earlier and leaving later by what `f32` may be wrong by: boxes may be met in vain
+                // but never missed.
+                early[a] = _mm256_set1_ps(base - ray.slack[a]);
+                late[a] = _mm256_set1_ps(base + ray.slack[a]);
+            }
+            let slot_order = node.slot_order(ray.octant);
             // Farthest first.
-            let order = _mm256_load_si256(ORDERS.0.get_unchecked(usize::from(ray.octant)).as_ptr().cast());
-            let enter = _mm256_permutevar8x32_ps(enter, order);
-            let leave = _mm256_permutevar8x32_ps(leave, order);
-            let children = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(node.children.as_ptr().cast()), order);
-            // An unused child has link zero. Its box is empty, but where the slack is wider than the node even that
-            // is met.
-            let unused = _mm256_castsi256_ps(_mm256_cmpeq_epi32(children, _mm256_setzero_si256()));
-            let met = _mm256_andnot_ps(unused, _mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave));
-            let met = _mm256_movemask_ps(met) as u32;
-            // Met children are packed to the front, so that they are written above the stack in one store each.
-            let packed = _mm_loadl_epi64(COMPRESSIONS.get_unchecked(met as usize & 255).as_ptr().cast());
-            let packed = _mm256_cvtepu8_epi32(packed);
-            _mm256_storeu_ps(enters.as_mut_ptr(), _mm256_permutevar8x32_ps(enter, packed));
-            _mm256_storeu_si256(links.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, packed));
+            let order = _mm256_load_si256(ORDERS.0.get_unchecked(slot_order as usize & 7).as_ptr().cast());
+            let (mut met, mut count) = (0, 0);
+            for half in 0..2 {
+                let first = 8 * (1 ^ half ^ (slot_order as usize >> 3));
+                let mut enter = _mm256_set1_ps(ray.t_min);
+                let mut leave = _mm256_set1_ps(ray.t_max);
+                for a in 0..3 {
+                    // Which of the two rows of an axis is met first depends on the ray's sign alone, so that no minimum
+                    // and maximum of both is needed.
+                    let near = ray.entry_row(a);
+                    let (near, far) = (load_bounds(node, near, first), load_bounds(node, near ^ 1, first));
+                    enter = _mm256_max_ps(enter, _mm256_fmadd_ps(near, scale[a], early[a]));
+                    leave = _mm256_min_ps(leave, _mm256_fmadd_ps(far, scale[a], late[a]));
+                }
+                // Beside the slack the last few roundings scale with the distance itself.
+                let leave = _mm256_mul_ps(leave, _mm256_set1_ps(LEAVE_STRETCH));
+                let enter = _mm256_permutevar8x32_ps(enter, order);
+                let leave = _mm256_permutevar8x32_ps(leave, order);
+                let children = _mm256_loadu_si256(node.children.as_ptr().add(first).cast());
+                let children = _mm256_permutevar8x32_epi32(children, order);
+                // An unused child has link zero. Its box is empty, but where the slack is wider than the node even that
+                // is met.
+                let unused = _mm256_castsi256_ps(_mm256_cmpeq_epi32(children, _mm256_setzero_si256()));
+                let of_half = _mm256_andnot_ps(unused, _mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave));
+                let of_half = _mm256_movemask_ps(of_half) as u32 & 255;
+                // Met children are packed to the front, so that they are written above the stack in one store each.
+                let packed = _mm_loadl_epi64(COMPRESSIONS.get_unchecked(of_half as usize).as_ptr().cast());
+                let packed = _mm256_cvtepu8_epi32(packed);
+                _mm256_storeu_ps(enters.as_mut_ptr().add(count), _mm256_permutevar8x32_ps(enter, packed));
+                let children = _mm256_permutevar8x32_epi32(children, packed);
+                _mm256_storeu_si256(links.as_mut_ptr().add(count).cast(), children);
+                met |= of_half << (8 * half);
+                count = of_half.count_ones() as usize;
+            }
             met
         }
     }

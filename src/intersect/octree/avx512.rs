@@ -2,11 +2,11 @@
 //! register.
 //!
 //! Sound because [`super::kernels`] takes it only where kernels may use the features, because loads stay inside the fixed-size arrays of
-//! [`Node`] (whose first 64 bytes are its bounds and origin), [`Block`] and [`BoxRay`], and because octants are below eight and axes below
+//! [`Node`] [`Block`] and [`BoxRay`], and because octants are below eight and axes below
 //! three.
 #![allow(unsafe_code)]
 
-use super::avx2::{Avx2Lanes, ORDERS};
+use super::avx2::Avx2Lanes;
 use super::facet_pair::{Corners, Edges};
 use super::lanes::Lanes;
 use super::node::{Block, Node};
@@ -18,45 +18,19 @@ use std::arch::x86_64::*;
 /// Sixteen lanes of f32.
 pub(super) struct Avx512Lanes;
 
-/// By octant: the bytes of a node's bounds along x, then y, then z; of each axis first where a ray enters the children, the farthest
-/// first, then where it leaves them.
-static BOUNDS: BoundOrders = {
-    let mut orders = [[0; 64]; 8];
-    let mut octant = 0;
-    while octant < 8 {
-        let mut place = 0;
-        while place < 48 {
-            let axis = place / 16;
-            let side = place / 8 % 2;
-            let row = 2 * axis + (octant >> axis & 1 ^ side);
-            orders[octant][place] = (8 * row + (7 ^ (place % 8) ^ octant)) as u8;
-            place += 1;
-        }
-        octant += 1;
-    }
-    BoundOrders(orders)
-};
-
-/// Aligned to a register, so that an order is one load.
-#[repr(align(64))]
-struct BoundOrders([[u8; 64]; 8]);
-
-/// Bytes as numbers.
+/// A row of a node's bounds as numbers.
 #[inline(always)]
-unsafe fn widen_bytes(bytes: __m128i) -> __m512 {
-    unsafe { _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes)) }
+unsafe fn load_bounds(node: &Node, row: usize) -> __m512 {
+    unsafe {
+        let bytes = _mm_load_si128(node.bounds.get_unchecked(row).as_ptr().cast());
+        _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes))
+    }
 }
 
-/// Distances at which a ray crosses eight bounds into the children along an axis, then eight out of them, which are negated.
+/// A number of a vector, in all lanes.
 #[inline(always)]
-unsafe fn crossings(bytes: __m128i, node: &Node, ray: &BoxRay, axis: usize) -> __m512 {
-    unsafe {
-        let inverse = _mm512_load_ps(ray.inverse[axis].as_ptr());
-        let to = _mm512_sub_ps(_mm512_set1_ps(node.origin[axis]), _mm512_set1_ps(ray.origin[axis]));
-        let base = _mm512_fmsub_ps(to, inverse, _mm512_set1_ps(ray.slack[axis]));
-        let scale = _mm512_mul_ps(_mm512_set1_ps(node.step[axis]), inverse);
-        _mm512_fmadd_ps(widen_bytes(bytes), scale, base)
-    }
+unsafe fn spread(v: __m128, axis: i32) -> __m512 {
+    unsafe { _mm512_permutexvar_ps(_mm512_set1_epi32(axis), _mm512_castps128_ps512(v)) }
 }
 
 /// Exchanges the halves: lanes 4–7, then 0–3.
@@ -87,30 +61,39 @@ unsafe fn load_pair(corners: [&Corners; 2], axis: usize) -> __m512d {
 
 impl Lanes for Avx512Lanes {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32 {
-        // SAFETY: see the head of the file.
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+        // SAFETY: see the head of the file; the load of an origin takes one number of the step.
         unsafe {
-            // Leaving is computed negated, so that the greatest is wanted of both.
-            let octant = usize::from(ray.octant);
-            // One permutation of bytes puts, for each axis, the eight bounds of entry before the eight of exit, all
-            // in order of octant.
-            let order = _mm512_load_si512(BOUNDS.0.get_unchecked(octant).as_ptr().cast());
-            let bytes = _mm512_permutexvar_epi8(order, _mm512_load_si512((node as *const Node).cast()));
-            let x = crossings(_mm512_castsi512_si128(bytes), node, ray, 0);
-            let y = crossings(_mm512_extracti32x4_epi32::<1>(bytes), node, ray, 1);
-            let z = crossings(_mm512_extracti32x4_epi32::<2>(bytes), node, ray, 2);
-            // The range takes part as a fourth axis: near as it is, far negated like every exit.
-            let range = _mm512_mask_blend_ps(0xFF00, _mm512_set1_ps(ray.t_min), _mm512_set1_ps(ray.negated_t_max));
-            let most = _mm512_max_ps(_mm512_max_ps(x, y), _mm512_max_ps(z, range));
-            let enter = _mm512_castps512_ps256(most);
-            let leave = _mm256_mul_ps(_mm512_extractf32x8_ps::<1>(most), _mm256_set1_ps(-LEAVE_STRETCH));
-            let order = _mm256_load_si256(ORDERS.0.get_unchecked(octant).as_ptr().cast());
-            let children = _mm256_permutexvar_epi32(order, _mm256_loadu_si256(node.children.as_ptr().cast()));
+            // As with AVX2, the ray's part for all axes in one register.
+            let inverse = _mm_load_ps(ray.inverse.as_ptr());
+            let slack = _mm_load_ps(ray.slack.as_ptr());
+            let to = _mm_sub_ps(_mm_loadu_ps(node.origin.as_ptr()), _mm_load_ps(ray.origin.as_ptr()));
+            let base = _mm_mul_ps(to, inverse);
+            let scale = _mm_mul_ps(_mm_maskz_loadu_ps(7, node.step.as_ptr()), inverse);
+            let (early, late) = (_mm_sub_ps(base, slack), _mm_add_ps(base, slack));
+            let mut enter = _mm512_set1_ps(ray.t_min);
+            let mut leave = _mm512_set1_ps(ray.t_max);
+            for a in 0..3 {
+                let (near, scale) = (ray.entry_row(a), spread(scale, a as i32));
+                enter =
+                    _mm512_max_ps(enter, _mm512_fmadd_ps(load_bounds(node, near), scale, spread(early, a as i32)));
+                leave = _mm512_min_ps(
+                    leave,
+                    _mm512_fmadd_ps(load_bounds(node, near ^ 1), scale, spread(late, a as i32)),
+                );
+            }
+            let leave = _mm512_mul_ps(leave, _mm512_set1_ps(LEAVE_STRETCH));
+            // Farthest first.
+            let lanes = _mm512_setr_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
+            let order = _mm512_xor_si512(lanes, _mm512_set1_epi32(node.slot_order(ray.octant) as i32));
+            let enter = _mm512_permutexvar_ps(order, enter);
+            let leave = _mm512_permutexvar_ps(order, leave);
+            let children = _mm512_permutexvar_epi32(order, _mm512_loadu_si512(node.children.as_ptr().cast()));
             // An unused child has link zero, and its empty box is met where the slack is wider than the node.
-            let used = _mm256_test_epi32_mask(children, children);
-            let met = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, leave);
-            _mm256_storeu_ps(enters.as_mut_ptr(), _mm256_maskz_compress_ps(met, enter));
-            _mm256_storeu_si256(links.as_mut_ptr().cast(), _mm256_maskz_compress_epi32(met, children));
+            let used = _mm512_test_epi32_mask(children, children);
+            let met = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, leave);
+            _mm512_storeu_ps(enters.as_mut_ptr(), _mm512_maskz_compress_ps(met, enter));
+            _mm512_storeu_si512(links.as_mut_ptr().cast(), _mm512_maskz_compress_epi32(met, children));
             u32::from(met)
         }
     }

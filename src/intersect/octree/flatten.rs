@@ -2,7 +2,7 @@
 
 use super::cell::{Cell, Content};
 use super::clip::Box32;
-use super::node::{Block, Link, Node};
+use super::node::{Block, CHILDREN, Link, Node};
 use super::{Settings, Statistics};
 use crate::math::{Point, huge_pages};
 use crate::mesh::FacetMesh;
@@ -73,7 +73,9 @@ impl Draft {
                 } else {
                     self.add_in_turn(children, collapse, depth)
                 };
-                for ((bounds, link), slot) in boxes.iter().zip(links).zip(octant_slots(&boxes)) {
+                let (long_axis, slots) = slots(&boxes);
+                node.long_axis = long_axis as u32;
+                for ((bounds, link), slot) in boxes.iter().zip(links).zip(slots) {
                     node.set_child(slot, bounds, link);
                 }
                 self.nodes[me] = node;
@@ -131,7 +133,7 @@ impl Draft {
         self.nodes.extend(draft.nodes.into_iter().map(|mut node| {
             // An unused child stays zero, by which vector instructions tell it: where slacks are wider than the node they meet its empty
             // box too, and a moved zero led them back up the tree for ever.
-            for slot in (0..8).filter(|slot| node.used >> slot & 1 == 1) {
+            for slot in node.slots() {
                 node.children[slot] = Link(node.children[slot]).moved(nodes, blocks).0;
             }
             node
@@ -141,13 +143,13 @@ impl Draft {
     }
 }
 
-/// Replaces the largest inner child by its own children, as long as no more than eight come of it.
+/// Replaces the largest inner child by its own children, as long as no more than [`CHILDREN`] come of it.
 fn merge(mut children: Vec<Cell>) -> Vec<Cell> {
     loop {
         let mut best: Option<(f32, usize)> = None;
         for (i, child) in children.iter().enumerate() {
             if let Content::Cells(inner) = &child.content
-                && children.len() - 1 + inner.len() <= 8
+                && children.len() - 1 + inner.len() <= CHILDREN
             // Opening a child takes one place away and adds as many as it has.
             {
                 let area = child.bounds.half_area();
@@ -164,14 +166,35 @@ fn merge(mut children: Vec<Cell>) -> Vec<Cell> {
     }
 }
 
-/// Places for up to eight boxes such that the one at place `p ^ octant` is mostly met before those of larger `p` by rays of an octant:
-/// each box stands at the corner of a cube that it is nearest to, as far as that is free.
+/// Returns the axis along which up to sixteen boxes lie farthest apart, and slots for them: those of the upper half along it, from eight
+/// on, and within each half by octant, so that [`Node::slot_order`] tells the order in which rays mostly meet them.
+fn slots(boxes: &[Box32]) -> (usize, Vec<usize>) {
+    let middles: Vec<[f32; 3]> = boxes.iter().map(|b| std::array::from_fn(|a| b.low[a] + b.high[a])).collect();
+    let spread = |axis: usize| {
+        let along = || middles.iter().map(|m| m[axis]);
+        along().fold(f32::NEG_INFINITY, f32::max) - along().fold(f32::INFINITY, f32::min)
+    };
+    let long_axis = (1..3).fold(0, |longest, a| if spread(a) > spread(longest) { a } else { longest });
+    let mut order: Vec<usize> = (0..middles.len()).collect();
+    order.sort_by(|&i, &k| middles[i][long_axis].total_cmp(&middles[k][long_axis]));
+    let mut slots = vec![0; middles.len()];
+    let (lower, upper) = order.split_at(middles.len() / 2);
+    for (first, half) in [(0, lower), (CHILDREN / 2, upper)] {
+        let middles: Vec<[f32; 3]> = half.iter().map(|&child| middles[child]).collect();
+        for (&child, slot) in half.iter().zip(octant_slots(&middles)) {
+            slots[child] = first + slot;
+        }
+    }
+    (long_axis, slots)
+}
+
+/// Places for up to eight boxes with these middles such that the one at place `p ^ octant` is mostly met before those of larger `p` by
+/// rays of an octant: each box stands at the corner of a cube that it is nearest to, as far as that is free.
 ///
 /// Source: Ylitie, Karras, Laine, HPG 2017, section 3.3, with the greedy choice in place of the auction.
-fn octant_slots(boxes: &[Box32]) -> [usize; 8] {
-    let middles: Vec<[f32; 3]> = boxes.iter().map(|b| std::array::from_fn(|a| b.low[a] + b.high[a])).collect();
+fn octant_slots(middles: &[[f32; 3]]) -> [usize; 8] {
     let mut mean = [0.0; 3];
-    for middle in &middles {
+    for middle in middles {
         for a in 0..3 {
             mean[a] += middle[a] / middles.len() as f32;
         }

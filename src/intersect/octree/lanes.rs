@@ -1,4 +1,4 @@
-//! What the walk does eight lanes at a time, to be written once for each instruction set.
+//! What the walk does eight or sixteen lanes at a time, to be written once for each instruction set.
 
 use super::facet_pair::{Corners, Edges};
 use super::node::{Block, Node};
@@ -9,8 +9,9 @@ use crate::intersect::facet::Line;
 /// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
 pub(super) trait Lanes {
     /// Writes where the ray enters the children that it may meet within its range, and their links, mostly the farthest first; what lies
-    /// beyond their number is of no meaning. Returns which they are, 0 for none: bit `k` for the child at `7 ^ k ^ octant`.
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32;
+    /// beyond their number is of no meaning. Returns which they are, 0 for none: bit `k` for the child in slot `15 ^ k ^ order`, where
+    /// `order` is [`Node::slot_order`] of the ray's octant.
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32;
     /// Returns which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second. Lanes without a facet
     /// have any bit.
     fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32;

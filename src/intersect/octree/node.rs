@@ -1,4 +1,4 @@
-//! What is walked: 128-byte nodes of up to eight children, 192-byte blocks of up to four facets.
+//! What is walked: nodes of up to sixteen children and blocks of up to four facets, three lines of the cache each.
 
 use super::clip::{Box32, round_down};
 use crate::math::{Aabb, Point};
@@ -82,31 +82,48 @@ impl Link {
     }
 }
 
-/// Up to eight children with boxes in eight bits a bound, `origin + bound · step`; an unused child has an empty box.
+/// Children of a node.
+pub(super) const CHILDREN: usize = 16;
+
+/// Up to sixteen children with boxes in eight bits a bound, `origin + bound · step`; an unused child has an empty box.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C, align(128))]
+#[repr(C, align(64))]
 pub(super) struct Node {
     /// Lower and upper bounds along x, y, z.
-    pub(super) bounds: [[u8; 8]; 6],
-    pub(super) origin: [f32; 4],
-    pub(super) step: [f32; 4],
-    /// Links, by slot.
-    pub(super) children: [u32; 8],
+    pub(super) bounds: [[u8; CHILDREN]; 6],
+    pub(super) origin: [f32; 3],
+    pub(super) step: [f32; 3],
     /// One bit for each child in use: a box slack can be wider than the whole node, then even an empty box is met.
     pub(super) used: u32,
-    /// Fills two lines of the cache.
-    pub(super) padding: [u32; 3],
+    /// The axis along which the children of slots from eight on lie above the others.
+    pub(super) long_axis: u32,
+    /// Links, by slot.
+    pub(super) children: [u32; CHILDREN],
 }
 
 impl Node {
     pub(super) const EMPTY: Self = Self {
-        bounds: [[255; 8], [0; 8], [255; 8], [0; 8], [255; 8], [0; 8]],
-        origin: [0.0; 4],
-        step: [0.0; 4],
-        children: [0; 8],
+        bounds: [[255; CHILDREN], [0; CHILDREN], [255; CHILDREN], [0; CHILDREN], [255; CHILDREN], [0; CHILDREN]],
+        origin: [0.0; 3],
+        step: [0.0; 3],
         used: 0,
-        padding: [0; 3],
+        long_axis: 0,
+        children: [0; CHILDREN],
     };
+
+    /// What slots are to be combined with, bit by bit, for the order in which a ray of an octant mostly meets children.
+    #[inline(always)]
+    pub(super) fn slot_order(&self, octant: u8) -> u32 {
+        let octant = u32::from(octant);
+        octant | (octant >> (self.long_axis & 3) & 1) << 3
+    }
+
+    /// The slots in use.
+    #[inline]
+    pub(super) fn slots(&self) -> impl Iterator<Item = usize> + use<> {
+        let used = self.used;
+        (0..CHILDREN).filter(move |slot| used >> slot & 1 == 1)
+    }
 
     /// A node without children whose grid spans the box `all`, relative to the middle of the mesh.
     pub(super) fn bounding(all: &Box32) -> Self {
@@ -121,7 +138,7 @@ impl Node {
         node
     }
 
-    /// Fills a slot, below eight, with a child and its box, rounded outward to the node's grid; the box must lie within the node.
+    /// Fills a slot, below sixteen, with a child and its box, rounded outward to the node's grid; the box must lie within the node.
     pub(super) fn set_child(&mut self, slot: usize, bounds: &Box32, link: Link) {
         for a in 0..3 {
             let (origin, step) = (f64::from(self.origin[a]), f64::from(self.step[a]));
@@ -164,6 +181,14 @@ pub(super) struct Block {
 }
 
 impl Block {
+    /// The triangles of a facet (bits 0 and 1) among those that the sieve left.
+    #[inline(always)]
+    pub(super) fn triangles(&self, facet: usize, candidates: u32) -> u32 {
+        // The second triangle of a triangle is a line: it is never hit, but to see that takes exact arithmetic.
+        let is_quad = u32::from(self.positions[facet][2] != self.positions[facet][3]);
+        candidates >> facet & 1 | candidates >> (facet + 3) & (is_quad << 1)
+    }
+
     /// A block of these facets, one to four, with corners relative to `center`; further ones must not be given.
     pub(super) fn new(mesh: &FacetMesh, center: Point, facets: &[u32]) -> Self {
         let mut corners = [[Point::ZERO; 4]; 4];

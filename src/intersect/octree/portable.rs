@@ -9,23 +9,24 @@ pub(super) struct Portable;
 
 impl Lanes for Portable {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 8], links: &mut [u32; 8]) -> u32 {
-        let mut enter = [ray.t_min; 8];
-        let mut leave = [ray.t_max; 8];
+    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+        let mut enter = [ray.t_min; 16];
+        let mut leave = [ray.t_max; 16];
         for a in 0..3 {
-            let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a][0];
-            let scale = node.step[a] * ray.inverse[a][0];
+            let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a];
+            let scale = node.step[a] * ray.inverse[a];
             let (early, late) = (base - ray.slack[a], base + ray.slack[a]);
             let near = ray.entry_row(a);
-            for k in 0..8 {
+            for k in 0..16 {
                 enter[k] = enter[k].max(f32::from(node.bounds[near][k]) * scale + early);
                 leave[k] = leave[k].min(f32::from(node.bounds[near ^ 1][k]) * scale + late);
             }
         }
+        let order = node.slot_order(ray.octant) as usize;
         let mut met = 0;
         let mut count = 0;
-        for lane in 0..8 {
-            let k = 7 ^ lane ^ usize::from(ray.octant);
+        for lane in 0..16 {
+            let k = 15 ^ lane ^ order;
             if node.used >> k & 1 == 1 && enter[k] <= leave[k] * LEAVE_STRETCH {
                 enters[count] = enter[k];
                 links[count] = node.children[k];

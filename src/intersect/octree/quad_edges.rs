@@ -26,7 +26,9 @@ impl QuadRay {
     #[inline(always)]
     pub(super) fn take_ray(&mut self, ray: &FacetRay, axes: [usize; 3], origin: [f64; 4], reach: f64) {
         let [x, y, z] = axes;
-        self.origin = origin;
+        for (kept, o) in self.origin.iter_mut().zip(origin) {
+            *kept = o;
+        }
         self.ordered_origin = [origin[x], origin[y], origin[z], 0.0];
         self.order = ORDERS[z];
         self.shear = ray.shear();

@@ -11,14 +11,13 @@ const CORNER_ROUNDING: f32 = 6e-7;
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub(super) struct BoxRay {
-    /// By axis the inverse direction eight times, then the same negated.
-    pub(super) inverse: [[f32; 16]; 3],
+    /// The inverse direction.
+    pub(super) inverse: [f32; 4],
     pub(super) origin: [f32; 4],
     /// By how much the distance of a crossing may be wrong, by axis, mm along the ray.
     pub(super) slack: [f32; 4],
     pub(super) t_min: f32,
     pub(super) t_max: f32,
-    pub(super) negated_t_max: f32,
     /// One bit an axis: set where the ray runs against it and enters by upper bounds.
     pub(super) octant: u8,
 }

@@ -1,7 +1,7 @@
 //! A ray on its way through the tree.
 
 use super::lanes::Lanes;
-use super::node::{Link, Node};
+use super::node::{CHILDREN, Link, Node};
 use super::quad_edges::QuadRay;
 use super::ray::{BoxRay, SieveRay};
 use super::tree::Tree;
@@ -9,11 +9,15 @@ use crate::intersect::facet::{FacetRay, Nearest};
 use crate::math::{Point, Ray, Vector};
 use std::hint::select_unpredictable;
 
-/// Places on a stack: seven for each of 32 levels of cells and 30 of packing, eight written beyond the top, and the
-/// ground.
-const STACK: usize = 464;
 /// Places below the first entry, so that sixteen can be looked at at once; all lead to the end of the ray.
 const GROUND: usize = 16;
+
+/// Places on the stack of a ray in a tree of so many levels of nodes: of each level all children of one node and all but one of another
+/// may be left where two are entered at a time; then those written beyond the top, and the ground. With what makes the size of a
+/// [`RayState`] as it should be.
+pub(super) const fn stack_places(levels: usize) -> usize {
+    ((2 * CHILDREN - 1) * levels + CHILDREN + GROUND).next_multiple_of(16) + 8
+}
 
 /// Smallest component of a direction that is divided by: along it a ray moves by less than the room around boxes in 10⁵ scene
 /// sizes, and 1e12 mm times its inverse is still a number in f32.
@@ -27,11 +31,11 @@ const LIMIT_ROOM: f64 = 1e-6;
 /// The least `t_max` of box tests: the lowest bits of a distance are not its own.
 const LEAST_LIMIT: f32 = 1e-30;
 
-/// One ray under way.
+/// One ray under way, with a stack of `STACK` places.
 ///
-/// The size is no multiple of a page, so that the rays under way do not fight for the same sets of the cache.
+/// The size is an odd number of lines of the cache, so that the rays under way do not fight for the same sets of it.
 #[repr(C, align(64))]
-pub(super) struct RayState {
+pub(super) struct RayState<const STACK: usize> {
     pub(super) boxes: BoxRay,
     pub(super) sieve: SieveRay,
     /// Where the ray goes next.
@@ -55,13 +59,12 @@ pub(super) struct RayState {
     top: usize,
     enters: [f32; STACK],
     links: [u32; STACK],
-    /// Makes the size what is said above.
-    spread: [u64; 40],
 }
 
-impl RayState {
+impl<const STACK: usize> RayState<STACK> {
     /// A state without a ray, which is at its end.
     pub(super) fn idle() -> Self {
+        const { assert!(size_of::<Self>() / 64 % 2 == 1, "states of rays would share sets of the cache") };
         let ray = Ray::new(Point::ZERO, Vector::Z);
         Self {
             boxes: BoxRay::default(),
@@ -79,7 +82,6 @@ impl RayState {
             index: usize::MAX,
             enters: [f32::NEG_INFINITY; STACK],
             links: [Link::END.0; STACK],
-            spread: [0; 40],
         }
     }
 
@@ -117,9 +119,7 @@ impl RayState {
             let exact = (origin[a] - mesh_box.center[a]) + direction[a] * self.shift;
             let o = exact as f32;
             b.origin[a] = o;
-            if a < 3 {
-                b.inverse[a] = both_signs(inverse);
-            }
+            b.inverse[a] = inverse;
             b.slack[a] = ((4.0 * o.abs() + mesh_box.reach[a]) * ROUNDING + moved) * inverse.abs();
             self.sieve.high[a] = o;
             self.sieve.low[a] = (exact - f64::from(o)) as f32;
@@ -128,12 +128,14 @@ impl RayState {
         b.octant = octant & 7;
         // Adding zero makes −0.0 positive: distances are sorted by their bits.
         b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0) + 0.0;
-        self.facets = FacetRay::new(ray);
-        let axes = self.facets.axes();
-        self.quads.take_ray(&self.facets, axes, origin, tree.surroundings.reach);
+        // What is asked again is taken before it is written: what was written in parts is read as a whole only after a wait.
+        let facets = FacetRay::new(ray);
+        let (axes, shear) = (facets.axes(), facets.shear());
+        self.quads.take_ray(&facets, axes, origin, tree.surroundings.reach);
         self.departed = ray.departure.map_or(u32::MAX, |departure| departure.primitive);
-        self.sieve.shear = self.facets.shear().map(|s| s as f32);
+        self.sieve.shear = shear.map(|s| s as f32);
         self.sieve.axes = axes.map(|a| a as u8);
+        self.facets = facets;
         self.sieve.slack = moved;
         self.best = Nearest::up_to(ray.t_max);
         self.limit_to_hit();
@@ -149,37 +151,36 @@ impl RayState {
     pub(super) fn limit_to_hit(&mut self) {
         let t_max = (((self.best.t - self.shift) * (1.0 + LIMIT_ROOM)) as f32).max(LEAST_LIMIT);
         self.boxes.t_max = t_max;
-        self.boxes.negated_t_max = -t_max;
     }
 
     /// Writes the children of a node that the ray may meet above the top of the stack, which stays where it is: [`Self::take_nearest`],
     /// [`Self::keep_all`] or [`Self::advance`] takes them.
     #[inline(always)]
     pub(super) fn enter<L: Lanes>(&mut self, node: &Node) -> Children {
-        let base = self.top.min(STACK - 8);
-        let enters = self.enters[base..base + 8].first_chunk_mut();
-        let links = self.links[base..base + 8].first_chunk_mut();
+        let base = self.top.min(STACK - CHILDREN);
+        let enters = self.enters[base..base + CHILDREN].first_chunk_mut();
+        let links = self.links[base..base + CHILDREN].first_chunk_mut();
         let met = match (enters, links) {
             (Some(enters), Some(links)) => L::enter(node, &self.boxes, enters, links),
-            _ => unreachable!("eight places"),
+            _ => unreachable!("sixteen places"),
         };
         // The link of the nearest is read from the node: on the stack it was written just now.
         let lane = met.leading_zeros() ^ 31;
-        let nearest = node.children[((7 ^ lane ^ u32::from(self.boxes.octant)) & 7) as usize];
+        let nearest = node.children[((15 ^ lane ^ node.slot_order(self.boxes.octant)) & 15) as usize];
         Children { count: met.count_ones() as usize, nearest }
     }
 
     /// Returns the nearest of the children that were just written, at least one, and keeps the others on the stack.
     #[inline(always)]
     pub(super) fn take_nearest(&mut self, children: Children) -> Link {
-        self.top = (self.top + children.count - 1).min(STACK - 9);
+        self.top = (self.top + children.count - 1).min(STACK - CHILDREN);
         Link(children.nearest)
     }
 
     /// Keeps all children that were just written on the stack.
     #[inline(always)]
     pub(super) fn keep_all(&mut self, children: Children) {
-        self.top = (self.top + children.count).min(STACK - 9);
+        self.top = (self.top + children.count).min(STACK - CHILDREN);
     }
 
     /// The topmost entry of the stack, which keeps it; the end of the ray where it is empty.
@@ -216,7 +217,7 @@ impl RayState {
     /// beyond the ray's limit, taken off the stack with all above it. No branch depends on which.
     #[inline(always)]
     pub(super) fn advance<L: Lanes>(&mut self, children: Children) -> Link {
-        let mut top = self.top.clamp(GROUND, STACK - 8);
+        let mut top = self.top.clamp(GROUND, STACK - CHILDREN);
         let mut open = self.open_below::<L>(top);
         // The ground is open to all. One test of both: whether there are children cannot be foretold, that there is anything can.
         while open | children.count as u32 == 0 {
@@ -226,7 +227,7 @@ impl RayState {
         let below = top - 1 - ((open | 1) << 16).leading_zeros() as usize;
         let above = top + children.count - 1;
         let older = self.links[below % STACK];
-        self.top = select_unpredictable(children.count > 0, above, below).min(STACK - 9);
+        self.top = select_unpredictable(children.count > 0, above, below).min(STACK - CHILDREN);
         Link(select_unpredictable(children.count > 0, children.nearest, older))
     }
 
@@ -245,12 +246,6 @@ impl RayState {
         self.top += usize::from(self.next != Link::END);
         self.next = self.advance::<L>(Children::NONE);
     }
-}
-
-/// Eight times a number, then eight times the same negated.
-#[inline(always)]
-fn both_signs(x: f32) -> [f32; 16] {
-    [x, x, x, x, x, x, x, x, -x, -x, -x, -x, -x, -x, -x, -x]
 }
 
 /// Children of a node that were written above the top of the stack.

@@ -11,7 +11,7 @@ pub struct Settings {
     pub threshold: usize,
     /// Depth at which splitting ends; more than 32 is taken as 32. Uneven scenes need 20 and more.
     pub max_depth: u32,
-    /// Merge sparse octants into full eight-wide nodes.
+    /// Merge sparse octants into full nodes of sixteen.
     pub collapse: bool,
     /// A box is no longer split once its facets have been duplicated this often on the way to it, so that memory stays bounded.
     pub max_duplication: f64,

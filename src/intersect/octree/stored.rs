@@ -178,12 +178,16 @@ mod tests {
 
     #[test]
     fn links_that_lead_back_or_out_are_told() {
-        let node = |link: Link| Node { used: 1, children: [link.0, 7, 0, 0, 0, 0, 0, 0], ..Node::EMPTY };
+        let node = |link: Link| Node {
+            used: 1,
+            children: std::array::from_fn(|k| if k == 0 { link.0 } else { 7 * u32::from(k == 1) }),
+            ..Node::EMPTY
+        };
         let is_held = |first: Link, root: Link| {
             let mut nodes = [node(first), node(Link::block(0, 1))];
             let mut links = LinkCheck::default();
             nodes.iter_mut().for_each(|node| links.take(std::slice::from_mut(node)));
-            assert_eq!(nodes[1].children[1..], [0; 7]);
+            assert_eq!(nodes[1].children[1..], [0; 15]);
             links.hold(Some(root), [2, 1])
         };
         assert!(is_held(Link::node(1), Link::node(0)) && is_held(Link::block(0, 4), Link::block(0, 2)));

@@ -24,6 +24,8 @@ pub(super) struct Tree<'m> {
     pub(super) blocks: Vec<Block>,
     /// `None` without facets.
     pub(super) root: Option<Link>,
+    /// Nodes on the longest way down.
+    pub(super) levels: usize,
     /// Of all facets.
     pub(super) slopes: Vec<Slopes>,
 }
@@ -56,7 +58,8 @@ impl<'m> Tree<'m> {
         let (finite, center) = (surroundings.bounds, middle(&surroundings));
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * BOUNDS_ROOM) };
         let mesh_box = MeshBox::new(center, &bounds);
-        Self { surroundings, center, mesh_box, nodes, blocks, root, slopes }
+        let levels = levels(&nodes);
+        Self { surroundings, center, mesh_box, nodes, blocks, root, levels, slopes }
     }
 
     /// The facet that a ray leaves where it is known not to meet it again, else `u32::MAX`, which no facet has.
@@ -76,7 +79,7 @@ impl<'m> Tree<'m> {
         while let Some((link, depth)) = open.pop() {
             let Target::Node(index) = link.target() else { continue };
             let node = &self.nodes[index];
-            for slot in (0..8).filter(|k| node.used >> k & 1 == 1) {
+            for slot in node.slots() {
                 let b = node.child(slot);
                 boxes.push((depth, Aabb { min: b.min + self.center, max: b.max + self.center }));
                 open.push((Link(node.children[slot]), depth + 1));
@@ -89,6 +92,22 @@ impl<'m> Tree<'m> {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.blocks) + size_of_val(&*self.slopes)
     }
+}
+
+/// Nodes on the longest way down from the first one, where every link leads to a later node or to a block.
+fn levels(nodes: &[Node]) -> usize {
+    let mut above = vec![0; nodes.len()];
+    let mut levels = 0;
+    for (index, node) in nodes.iter().enumerate() {
+        let level = above[index] + 1;
+        levels = levels.max(level);
+        for slot in node.slots() {
+            if let Target::Node(child) = Link(node.children[slot]).target() {
+                above[child] = above[child].max(level);
+            }
+        }
+    }
+    levels
 }
 
 /// The middle of a mesh; the origin of one without points.

@@ -4,10 +4,12 @@
 //! [`WIDTH`] rays under way and does all steps of one kind in a row, without branches that depend on a ray: what the
 //! processor guesses wrong about a ray costs as much as a whole node. After a step the ray asks for the memory of its next one.
 
+use super::facet_lanes::{FacetLanes, LANES, Verdict};
 use super::lanes::Lanes;
 use super::light_buffer::{self, LightBuffer};
 use super::node::{Block, Link, Node, Target};
-use super::ray_state::{Children, RayState};
+use super::ray_state::{Children, RayState, stack_places};
+use super::step_queues::{BLOCK, CORNERS, END, EXACT, NODE, Queue, StepQueues, WIDTH};
 use super::tree::Tree;
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
@@ -15,9 +17,7 @@ use crate::intersect::prefetch::{prefetch, prefetch_either};
 use crate::math::{Point, Ray};
 use std::cell::RefCell;
 use std::hint::select_unpredictable;
-
-/// Rays under way at a time.
-const WIDTH: usize = 32;
+use std::thread::LocalKey;
 
 /// Rays walked before their hits are described: 16 rays that end late cost 2 % of it.
 pub(super) const BATCH: usize = 512;
@@ -25,62 +25,27 @@ pub(super) const BATCH: usize = 512;
 /// Rays before its start at which what a ray needs of the facet that it leaves is asked for.
 const AHEAD: usize = 8;
 
-/// Kinds of steps; the first three are those of [`Link::kind`].
-const NODE: usize = 0;
-const BLOCK: usize = 1;
-const END: usize = 2;
-/// Asking for the corners of facets that the sieve left, and testing them.
-const CORNERS: usize = 3;
-const EXACT: usize = 4;
-
-/// Rays by the kind of their next step.
-#[derive(Default)]
-struct StepQueues {
-    rays: [[u8; WIDTH]; 8],
-    count: [usize; 8],
-}
-
-impl StepQueues {
-    /// Adds a ray, by its place among those under way, to the queue of a kind.
-    #[inline(always)]
-    fn put(&mut self, kind: usize, ray: u8) {
-        let kind = kind & 7;
-        self.rays[kind][self.count[kind] % WIDTH] = ray;
-        self.count[kind] += 1;
-    }
-
-    /// Empties the queue of a kind and returns what was in it.
-    #[inline(always)]
-    fn take(&mut self, kind: usize) -> Queue {
-        Queue { rays: self.rays[kind], count: std::mem::take(&mut self.count[kind]).min(WIDTH) }
-    }
-}
-
-/// Rays whose next steps are of one kind.
-struct Queue {
-    rays: [u8; WIDTH],
-    count: usize,
-}
-
-impl Queue {
-    #[inline(always)]
-    fn rays(&self) -> &[u8] {
-        &self.rays[..self.count]
-    }
-}
-
 /// Rays under way.
-type States = [RayState; WIDTH];
+type States<const STACK: usize> = [RayState<STACK>; WIDTH];
+
+/// Levels of nodes up to which a tree is shallow, as nearly all are: its stacks take few pages of memory, which a walk is 4 % faster by.
+const SHALLOW: usize = 8;
+/// Levels of nodes that no tree goes beyond: 32 of cells and 30 of packing, less the one that both share.
+const DEEPEST: usize = 64;
+
+/// Where a thread keeps states from one walk to the next.
+type KeptStates<const STACK: usize> = LocalKey<RefCell<Option<Box<States<STACK>>>>>;
 
 thread_local! {
-    static STATES: RefCell<Option<Box<States>>> = const { RefCell::new(None) };
+    static SHALLOW_STATES: RefCell<Option<Box<States<{ stack_places(SHALLOW) }>>>> = const { RefCell::new(None) };
+    static DEEP_STATES: RefCell<Option<Box<States<{ stack_places(DEEPEST) }>>>> = const { RefCell::new(None) };
 }
 
-/// Allocates states without rays. Not inlined: its frame of 150 kB would be probed page by page at each walk.
+/// Allocates states without rays. Not inlined: its frame of 100 kB and more would be probed page by page at each walk.
 #[cold]
 #[inline(never)]
-fn idle_states() -> Box<States> {
-    let states: Vec<RayState> = (0..WIDTH).map(|_| RayState::idle()).collect();
+fn idle_states<const STACK: usize>() -> Box<States<STACK>> {
+    let states: Vec<RayState<STACK>> = (0..WIDTH).map(|_| RayState::idle()).collect();
     match states.try_into() {
         Ok(states) => states,
         Err(_) => unreachable!("as many as asked for"),
@@ -100,12 +65,28 @@ pub(super) fn walk<L: Lanes>(
     cost.rays += rays.len() as u64;
     hits.fill(None);
     let Some(root) = tree.root else { return };
+    if tree.levels <= SHALLOW {
+        walk_with::<L, _>((tree, root), &SHALLOW_STATES, light_buffers, (rays, hits), cost);
+    } else {
+        walk_with::<L, _>((tree, root), &DEEP_STATES, light_buffers, (rays, hits), cost);
+    }
+}
+
+/// As [`walk`], from the root, with the states that a thread keeps.
+#[inline(always)]
+fn walk_with<L: Lanes, const STACK: usize>(
+    (tree, root): (&Tree, Link),
+    kept: &'static KeptStates<STACK>,
+    light_buffers: &[LightBuffer],
+    (rays, hits): (&[Ray], &mut [Option<FacetHit>]),
+    cost: &mut Cost,
+) {
     // Taken out, not borrowed by a closure: a closure would be compiled without the caller's instruction set.
-    let mut states = STATES.take().unwrap_or_else(idle_states);
+    let mut states = kept.take().unwrap_or_else(idle_states);
     if let [ray] = rays {
         let state = &mut states[0];
         state.start(tree, root, ray, 0);
-        walk_one::<L>(tree, state, cost);
+        walk_one::<L, STACK>(tree, state, cost);
         hits[0] = state.best.hit();
     } else {
         for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
@@ -115,10 +96,10 @@ pub(super) fn walk<L: Lanes>(
             } else {
                 light_buffer::answer::<L>(light_buffers, rays, hits, &mut order, cost)
             };
-            walk_batch::<L>(tree, root, &mut states, (rays, &order[..walkers]), hits, cost);
+            walk_batch::<L, STACK>(tree, root, &mut states, (rays, &order[..walkers]), hits, cost);
         }
     }
-    STATES.set(Some(states));
+    kept.set(Some(states));
 }
 
 /// The arrays of a tree. Read once for many rays: that writing the state of a ray leaves where they lie as it was is more than a
@@ -139,7 +120,7 @@ impl<'t> Arrays<'t> {
 
 /// Walks one ray that was started to its end; its hit is in `s.best`.
 #[inline(always)]
-fn walk_one<L: Lanes>(tree: &Tree, s: &mut RayState, cost: &mut Cost) {
+fn walk_one<L: Lanes, const STACK: usize>(tree: &Tree, s: &mut RayState<STACK>, cost: &mut Cost) {
     let arrays = Arrays::new(tree);
     loop {
         match s.next.target() {
@@ -159,9 +140,9 @@ fn walk_one<L: Lanes>(tree: &Tree, s: &mut RayState, cost: &mut Cost) {
             Target::Block(index, count) => {
                 cost.tests += count as u64;
                 s.block = index as u32;
-                s.candidates = sift::<L>(&arrays.blocks[index], s) & used_lanes(count);
+                s.candidates = sift::<L, STACK>(&arrays.blocks[index], s) & used_lanes(count);
                 if s.candidates != 0 {
-                    test_candidates::<L>(tree, arrays, s);
+                    test_candidates::<L, STACK>(tree, arrays, s);
                 }
                 s.next = s.pop(s.boxes.t_max);
             }
@@ -173,16 +154,17 @@ fn walk_one<L: Lanes>(tree: &Tree, s: &mut RayState, cost: &mut Cost) {
 /// Walks the rays of a batch whose places are in `order`, all steps of a kind in a row, and writes their hits; other entries of `hits`
 /// stay.
 #[inline(always)]
-fn walk_batch<L: Lanes>(
+fn walk_batch<L: Lanes, const STACK: usize>(
     tree: &Tree,
     root: Link,
-    states: &mut States,
+    states: &mut States<STACK>,
     (rays, order): (&[Ray], &[u16]),
     hits: &mut [Option<FacetHit>],
     cost: &mut Cost,
 ) {
     let arrays = Arrays::new(tree);
-    let mut queues = StepQueues::default();
+    let mut queues = StepQueues::EMPTY;
+    let mut lanes = FacetLanes::new();
     let mut live = order.len().min(WIDTH);
     let mut next = live;
     // As many as fit are under way; whoever ends hands its place to the next.
@@ -201,33 +183,8 @@ fn walk_batch<L: Lanes>(
             prefetch_step(arrays, s.next);
             queues.put(s.next.kind(), ray);
         }
-        let queue = queues.take(BLOCK);
-        for &ray in queue.rays() {
-            let s = &mut states[usize::from(ray) % WIDTH];
-            // The sieve knows rounded corners only; what it leaves asks for its true ones first.
-            let (index, count) = s.next.as_block();
-            cost.tests += count as u64;
-            s.block = index as u32;
-            s.candidates = sift::<L>(&arrays.blocks[index], s) & used_lanes(count);
-            s.next = s.advance::<L>(Children::NONE);
-            prefetch_step(arrays, s.next);
-            queues.put(select_unpredictable(s.candidates != 0, CORNERS, s.next.kind()), ray);
-        }
-        let queue = queues.take(EXACT);
-        for &ray in queue.rays() {
-            let s = &mut states[usize::from(ray) % WIDTH];
-            test_candidates::<L>(tree, arrays, s);
-            // What was next may lie beyond the new hit.
-            s.recheck_next::<L>();
-            prefetch_step(arrays, s.next);
-            queues.put(s.next.kind(), ray);
-        }
-        let queue = queues.take(CORNERS);
-        for &ray in queue.rays() {
-            let s = &states[usize::from(ray) % WIDTH];
-            prefetch_corners(arrays, s);
-            queues.put(EXACT, ray);
-        }
+        // Here, not last: a ray that is started and at once asked for its first node waits until what was written of it has left the
+        // processor's store buffer, which took an eighth of the walk.
         let queue = queues.take(END);
         for &ray in queue.rays() {
             let s = &mut states[usize::from(ray) % WIDTH];
@@ -245,13 +202,32 @@ fn walk_batch<L: Lanes>(
                 live -= 1;
             }
         }
+        let queue = queues.take(BLOCK);
+        for &ray in queue.rays() {
+            let s = &mut states[usize::from(ray) % WIDTH];
+            // The sieve knows rounded corners only; what it leaves asks for its true ones first.
+            let (index, count) = s.next.as_block();
+            cost.tests += count as u64;
+            s.block = index as u32;
+            s.candidates = sift::<L, STACK>(&arrays.blocks[index], s) & used_lanes(count);
+            s.next = s.advance::<L>(Children::NONE);
+            prefetch_step(arrays, s.next);
+            queues.put(select_unpredictable(s.candidates != 0, CORNERS, s.next.kind()), ray);
+        }
+        test_waiting::<L, STACK>(tree, arrays, states, &mut queues, &mut lanes);
+        let queue = queues.take(CORNERS);
+        for &ray in queue.rays() {
+            let s = &states[usize::from(ray) % WIDTH];
+            prefetch_corners(arrays, s);
+            queues.put(EXACT, ray);
+        }
     }
 }
 
 /// Returns the triangles of a block that the ray may meet, bits as in [`Lanes::sift`], without those of the facet that it leaves and is
 /// known not to meet.
 #[inline(always)]
-fn sift<L: Lanes>(block: &Block, s: &RayState) -> u32 {
+fn sift<L: Lanes, const STACK: usize>(block: &Block, s: &RayState<STACK>) -> u32 {
     let mut own = 0;
     for k in 0..4 {
         own |= u32::from(block.facets[k] == s.unmet_facet) << k;
@@ -274,7 +250,7 @@ fn prefetch_step(arrays: Arrays, link: Link) {
 
 /// Asks for the memory of the corners of the facets that the sieve left, at least one; nearly always it is one.
 #[inline(always)]
-fn prefetch_corners(arrays: Arrays, s: &RayState) {
+fn prefetch_corners<const STACK: usize>(arrays: Arrays, s: &RayState<STACK>) {
     let block = &arrays.blocks[s.block as usize];
     let mut mask = (s.candidates | s.candidates >> 4) & 15;
     loop {
@@ -289,9 +265,77 @@ fn prefetch_corners(arrays: Arrays, s: &RayState) {
     }
 }
 
+/// Does the exact tests of rays that wait for one, eight at once, as long as others have something to do meanwhile, and tells the rays what
+/// is next.
+#[inline(always)]
+fn test_waiting<L: Lanes, const STACK: usize>(
+    tree: &Tree,
+    arrays: Arrays,
+    states: &mut States<STACK>,
+    queues: &mut StepQueues,
+    lanes: &mut FacetLanes,
+) {
+    loop {
+        let waiting = queues.count(EXACT);
+        if waiting < LANES && (waiting == 0 || queues.count(NODE) + queues.count(BLOCK) > 0) {
+            return;
+        }
+        let queue = queues.take_last(EXACT, LANES);
+        test_in_lanes(tree, arrays, states, &queue, lanes);
+        for &ray in queue.rays() {
+            let s = &mut states[usize::from(ray) % WIDTH];
+            s.limit_to_hit();
+            if s.candidates != 0 {
+                queues.put(EXACT, ray);
+                continue;
+            }
+            // What was next may lie beyond the new hit.
+            s.recheck_next::<L>();
+            prefetch_step(arrays, s.next);
+            queues.put(s.next.kind(), ray);
+        }
+    }
+}
+
+/// Tests one facet that the sieve left for each ray of a queue, at most [`LANES`], in f64, and keeps the nearest hits; what is left in the
+/// rays' candidates is still to be tested.
+#[inline(always)]
+fn test_in_lanes<const STACK: usize>(
+    tree: &Tree,
+    arrays: Arrays,
+    states: &mut States<STACK>,
+    queue: &Queue,
+    lanes: &mut FacetLanes,
+) {
+    let mut asked = [(0, 0); LANES];
+    for (lane, &ray) in queue.rays().iter().enumerate().take(LANES) {
+        let s = &mut states[usize::from(ray) % WIDTH];
+        let block = &arrays.blocks[s.block as usize];
+        let k = ((s.candidates | s.candidates >> 4).trailing_zeros() & 3) as usize;
+        let triangles = block.triangles(k, s.candidates);
+        let corners = block.positions[k].map(|p| arrays.positions[p as usize].as_ref());
+        lanes.put(lane, (block.facets[k], triangles, corners), (&s.quads, s.sieve.axes), (s.departed, &s.best));
+        s.candidates &= !(0x11 << k);
+        asked[lane] = (k, triangles);
+    }
+    lanes.test(tree.surroundings.reach);
+    for (lane, &ray) in queue.rays().iter().enumerate().take(LANES) {
+        let s = &mut states[usize::from(ray) % WIDTH];
+        let (k, triangles) = asked[lane];
+        let block = &arrays.blocks[s.block as usize];
+        let verdict = lanes.verdict(lane);
+        if verdict & Verdict::CARE != 0 {
+            let corners = block.positions[k].map(|p| &arrays.positions[p as usize]);
+            test_with_care(tree, s, block.facets[k], triangles, corners);
+        } else if verdict & Verdict::HIT != 0 {
+            s.best.keep_nearer(lanes.hit(lane, block.facets[k]));
+        }
+    }
+}
+
 /// Tests the triangles that the sieve left in f64, keeps the nearest hit and limits the boxes to it. There must be at least one.
 #[inline(always)]
-fn test_candidates<L: Lanes>(tree: &Tree, arrays: Arrays, s: &mut RayState) {
+fn test_candidates<L: Lanes, const STACK: usize>(tree: &Tree, arrays: Arrays, s: &mut RayState<STACK>) {
     let block = &arrays.blocks[s.block as usize];
     let candidates = s.candidates;
     let mut mask = (candidates | candidates >> 4) & 15;
@@ -299,9 +343,7 @@ fn test_candidates<L: Lanes>(tree: &Tree, arrays: Arrays, s: &mut RayState) {
         let k = (mask.trailing_zeros() & 3) as usize;
         mask &= mask.wrapping_sub(1);
         let corners = block.positions[k].map(|p| &arrays.positions[p as usize]);
-        // The second triangle of a triangle is a line: it is never hit, but to see that takes exact arithmetic.
-        let is_quad = u32::from(block.positions[k][2] != block.positions[k][3]);
-        let triangles = candidates >> k & 1 | candidates >> (k + 3) & (is_quad << 1);
+        let triangles = block.triangles(k, candidates);
         let facet = block.facets[k];
         let arrays = [corners[0].as_ref(), corners[1].as_ref(), corners[2].as_ref(), corners[3].as_ref()];
         let edges = L::quad_edges(arrays, &s.quads);
@@ -323,6 +365,12 @@ fn test_candidates<L: Lanes>(tree: &Tree, arrays: Arrays, s: &mut RayState) {
 /// Tests a facet by [`crate::intersect::facet::FacetRay::test`], where more than the signs of its edge functions decides.
 #[cold]
 #[inline(never)]
-fn test_with_care(tree: &Tree, s: &mut RayState, facet: u32, triangles: u32, corners: [&Point; 4]) {
+fn test_with_care<const STACK: usize>(
+    tree: &Tree,
+    s: &mut RayState<STACK>,
+    facet: u32,
+    triangles: u32,
+    corners: [&Point; 4],
+) {
     s.facets.test(facet, triangles, corners, &tree.surroundings, &mut s.best);
 }

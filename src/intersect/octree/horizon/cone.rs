@@ -139,7 +139,7 @@ impl Base {
             match link.target() {
                 Target::Node(index) => {
                     let node = &tree.nodes[index];
-                    for slot in (0..8).filter(|k| node.used >> k & 1 == 1) {
+                    for slot in node.slots() {
                         let b = node.child(slot);
                         if self.may_meet(&b, tree.center, limit) {
                             open.push(Link(node.children[slot]));

@@ -146,7 +146,7 @@ impl Base {
             match link.target() {
                 Target::Node(index) => {
                     let node = &tree.nodes[index];
-                    for slot in (0..8).filter(|k| node.used >> k & 1 == 1) {
+                    for slot in node.slots() {
                         let b = node.child(slot);
                         let b = Aabb { min: b.min + tree.center, max: b.max + tree.center };
                         if higher(&slopes, &self.rise_of_box(&b)) {
