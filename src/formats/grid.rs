@@ -268,3 +268,19 @@ pub fn write_grid_npz(path: &Path, grid: &Grid) -> Result<(), Error> {
     }
     write_npz(path, &arrays)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::NumberWriter;
+
+    /// Equal numbers are the same digits, and signs, zeros and what is no number are kept apart.
+    #[test]
+    fn numbers_are_written_as_they_are() {
+        let (mut text, mut numbers) = (Vec::new(), NumberWriter::default());
+        for x in [0.0, 1.5, 1.5, 0.0, 1.5, -1.5, -0.0, 0.1, f64::NAN, f64::NAN, f64::INFINITY, 1e-7, 0.0] {
+            numbers.append(&mut text, x).unwrap();
+            text.push(b' ');
+        }
+        assert_eq!(String::from_utf8(text).unwrap(), "0 1.5 1.5 0 1.5 -1.5 -0 0.1 NaN NaN inf 0.0000001 0 ");
+    }
+}
