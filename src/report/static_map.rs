@@ -113,8 +113,8 @@ pub(super) fn draw_marks(elements: &mut Vec<Element>, marks: &Marks, unit: &str,
 mod tests {
     use super::*;
 
-    /// Over 4 mm × 2 mm a millimetre is as long along both axes, and a disc is round; over mm and degrees, and in a stripe, the map fills its
-    /// place.
+    /// Over 4 mm × 2 mm a millimetre is as long along both axes, and a disc is round; over mm and degrees, and in a stripe, the map fills
+    /// its place.
     #[test]
     fn a_disc_is_drawn_round() {
         let axis =
