@@ -40,11 +40,13 @@ CONF
 finished() { for _ in $(seq 300); do [ -z "$(squeue -h -j "$1" 2>/dev/null)" ] && return 0; sleep 1; done; return 1; }
 
 run_parallel() { debian parallel parallel || return 9; parallel.sh "$scene" "$1" $parts; }
-# Until the error is a sixth of what it was; then the same rays at once are what it is compared with. Facets and octree are built once.
+# Until the error is a third of what it was; then the same rays at once are what it is compared with, as a range too, which chooses facets
+# or spline as all ranges do. Facets and octree are built once.
 run_until_error() {
   debian parallel parallel || return 9
-  local target; target=$(value 'r=d["receivers"][0]; print(str(100 * r["power_error"] / r["power"] / 6) + "%@" + r["name"])' "$work/once")
-  LAMPYRIS_CACHE=$1/kept until_error.sh "$scene" "$1" $parts "$target" && lampyris trace "$scene" -o "$1/once" -q --rays "$(value 'print(d["rays"])' "$1/result")"
+  local target; target=$(value 'r=d["receivers"][0]; print(str(100 * r["power_error"] / r["power"] / 3) + "%@" + r["name"])' "$work/once")
+  LAMPYRIS_CACHE=$1/kept until_error.sh "$scene" "$1" $parts "$target" || return 1
+  lampyris trace "$scene" -o "$1/all.tally" -q --rays "0..$(value 'print(d["rays"])' "$1/result")" && lampyris merge "$1/all.tally" -q -o "$1/once"
 }
 run_mpi() {
   debian mpirun openmpi-bin || return 9

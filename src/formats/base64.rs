@@ -13,16 +13,16 @@ pub fn base64(bytes: &[u8]) -> String {
         let word = u32::from_be_bytes([0, a, b, c]);
         [18, 12, 6, 0].map(|shift| ALPHABET[(word >> shift & 63) as usize])
     };
-    let mut text = Vec::with_capacity(bytes.len().div_ceil(3) * 4);
+    let mut text = vec![b'='; bytes.len().div_ceil(3) * 4];
+    let (slots, _) = text.as_chunks_mut::<4>();
     let (whole, rest) = bytes.as_chunks::<3>();
-    whole.iter().for_each(|&chunk| text.extend_from_slice(&letters(chunk)));
-    if !rest.is_empty() {
-        // One or two bytes are filled up with zero bits, RFC 4648 §3.5.
+    slots.iter_mut().zip(whole).for_each(|(slot, &chunk)| *slot = letters(chunk));
+    if let (Some(slot), false) = (slots.last_mut(), rest.is_empty()) {
+        // One or two bytes are filled up with zero bits, RFC 4648 §3.5, and their letters with `=`.
         let mut chunk = [0; 3];
         chunk[..rest.len()].copy_from_slice(rest);
         let used = rest.len() + 1;
-        text.extend_from_slice(&letters(chunk)[..used]);
-        text.resize(text.len() + 4 - used, b'=');
+        slot[..used].copy_from_slice(&letters(chunk)[..used]);
     }
     String::from_utf8(text).expect("letters of the alphabet")
 }

@@ -4,7 +4,7 @@
 //! rays and the rays as in Data_1: origin (the point of arrival), direction, power.
 
 use super::data1::{Lines, write_ray_block};
-use super::grid::write_number;
+use super::grid::NumberWriter;
 use super::input::read_text;
 use super::rays::LightRay;
 use super::{Error, ErrorKind, write_atomic};
@@ -33,11 +33,11 @@ pub fn write_data3(path: &Path, data: &Data3) -> Result<(), Error> {
     }
     write_atomic(path, |w| {
         writeln!(w, "{rows} {columns}")?;
-        let mut line = Vec::new();
+        let (mut line, mut numbers) = (Vec::new(), NumberWriter::default());
         for i in 0..rows {
             for (j, x) in data.results[i * columns..(i + 1) * columns].iter().enumerate() {
                 line.extend((j > 0).then_some(b' '));
-                write_number(&mut line, *x)?;
+                numbers.append(&mut line, *x)?;
             }
             line.push(b'\n');
             w.write_all(&line)?;

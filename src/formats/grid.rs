@@ -188,14 +188,16 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
         let fields: Vec<&Vec<f64>> =
             own.chain(layers).chain(grid.error_layers().map(|(_, values)| values)).collect();
         // A row of cells at a time: to hand over each number cost as much as its digits.
-        let mut lines = Vec::new();
+        let (mut lines, mut numbers) = (Vec::new(), NumberWriter::default());
         for j in 0..b.cells {
             let row = b.center(j).to_string();
             for (i, column) in columns.iter().enumerate() {
-                write!(lines, "{column},{row}")?;
+                lines.extend_from_slice(column.as_bytes());
+                lines.push(b',');
+                lines.extend_from_slice(row.as_bytes());
                 for values in &fields {
                     lines.push(b',');
-                    write_number(&mut lines, values[j * a.cells + i])?;
+                    numbers.append(&mut lines, values[j * a.cells + i])?;
                 }
                 lines.push(b'\n');
             }
@@ -206,13 +208,30 @@ pub fn write_grid_csv(path: &Path, grid: &Grid) -> Result<(), Error> {
     })
 }
 
-/// Appends the shortest digits of a number; those of 0, which most cells of a picture are, without looking for them.
-pub(super) fn write_number(text: &mut Vec<u8>, number: f64) -> io::Result<()> {
-    if number.to_bits() == 0 {
-        text.push(b'0');
-        return Ok(());
+/// Writes numbers as their shortest digits. To find them costs more than all else of a cell, and of a short run most cells are 0 and have
+/// the error of one ray: the digits of the last number are kept.
+#[derive(Default)]
+pub(super) struct NumberWriter {
+    bits: u64,
+    digits: Vec<u8>,
+}
+
+impl NumberWriter {
+    /// Appends a number to `text`.
+    pub(super) fn append(&mut self, text: &mut Vec<u8>, number: f64) -> io::Result<()> {
+        let bits = number.to_bits();
+        if bits == 0 {
+            text.push(b'0');
+            return Ok(());
+        }
+        if bits != self.bits {
+            self.bits = bits;
+            self.digits.clear();
+            write!(self.digits, "{number}")?;
+        }
+        text.extend_from_slice(&self.digits);
+        Ok(())
     }
-    write!(text, "{number}")
 }
 
 /// Writes a grid as NPZ: `values[j, i]`, `error[j, i]`, the cell edges of both axes, and of each layer an array of its name and one
@@ -248,4 +267,20 @@ pub fn write_grid_npz(path: &Path, grid: &Grid) -> Result<(), Error> {
         arrays.push(NpyArray { name, shape: shape(), data: values });
     }
     write_npz(path, &arrays)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::NumberWriter;
+
+    /// Equal numbers are the same digits, and signs, zeros and what is no number are kept apart.
+    #[test]
+    fn numbers_are_written_as_they_are() {
+        let (mut text, mut numbers) = (Vec::new(), NumberWriter::default());
+        for x in [0.0, 1.5, 1.5, 0.0, 1.5, -1.5, -0.0, 0.1, f64::NAN, f64::NAN, f64::INFINITY, 1e-7, 0.0] {
+            numbers.append(&mut text, x).unwrap();
+            text.push(b' ');
+        }
+        assert_eq!(String::from_utf8(text).unwrap(), "0 1.5 1.5 0 1.5 -1.5 -0 0.1 NaN NaN inf 0.0000001 0 ");
+    }
 }

@@ -137,6 +137,13 @@ pub(super) fn colours(series: &[Series]) -> Vec<&'static str> {
     series.iter().map(colour).collect()
 }
 
+/// Whether a unit has one length along both axes of a map: degrees against degrees and mm against mm look as they are, unless that makes a
+/// thin stripe.
+pub(super) fn have_equal_units([a, b]: &[Axis; 2]) -> bool {
+    let ratio = (a.range[1] - a.range[0]) / (b.range[1] - b.range[0]);
+    a.unit == b.unit && (0.3..3.4).contains(&ratio)
+}
+
 impl AxisStyle {
     /// Makes a linear axis.
     pub fn linear(label: &str, unit: &str) -> Self {

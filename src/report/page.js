@@ -99,6 +99,11 @@
     });
   };
 
+  // A legend whose rows become fewer as the window widens stays over the plot until it is laid out once more.
+  let settled;
+  const again = (box) => box.querySelector(".legend") && Plotly.relayout(box, { "legend.y": box.layout.legend.y });
+  window.addEventListener("resize", () => { clearTimeout(settled); settled = setTimeout(() => drawn.forEach(again), 400); });
+
   const retheme = () => { for (const box of drawn) Plotly.relayout(box, themed(structuredClone(box.layout))); };
   document.getElementById("theme").addEventListener("click", () => { root.dataset.theme = remember(dark() ? "light" : "dark") || (dark() ? "light" : "dark"); retheme(); });
   system.addEventListener("change", () => root.dataset.theme || retheme());

@@ -1,6 +1,6 @@
 //! Charts and views as plotly.js figures. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of decimal text.
 
-use super::chart::{AxisStyle, Chart, Content, Marks, PALETTE, Series, SeriesStyle, colours};
+use super::chart::{AxisStyle, Chart, Content, Marks, PALETTE, Series, SeriesStyle, colours, have_equal_units};
 use super::legend::legend_name;
 use super::level_labels::level_labels;
 use super::raster::{EYE, common_range};
@@ -106,10 +106,7 @@ pub(super) fn chart(chart: &Chart) -> Value {
             let heat = json!({"type": "heatmap", "z": z, "x0": a.center(0), "dx": a.step(), "y0": b.center(0),
                 "dy": b.step(), "colorscale": colour_scale(*map), "zmin": low, "zmax": high, "hovertemplate": hover,
                 "colorbar": {"title": {"text": grid.unit, "side": "right"}, "thickness": 14, "outlinewidth": 0}});
-            let spans = [a.range[1] - a.range[0], b.range[1] - b.range[0]];
-            let ratio = spans[0] / spans[1];
-            // Degrees against degrees and mm against mm look as they are, unless that makes a thin stripe.
-            let same = a.unit == b.unit && (0.3..3.4).contains(&ratio);
+            let same = have_equal_units(&grid.axes);
             let anchor = if same { json!({"scaleanchor": "x", "constrain": "domain"}) } else { json!({}) };
             let mut data = vec![heat];
             data.extend(mark_traces(marks));
@@ -203,13 +200,14 @@ fn upside_down(picture: &Picture) -> Picture {
 }
 
 /// Returns the trace of a picture over its axes, and the layout; one that has no pixels leaves the axes empty.
-fn picture_trace([a, b]: &[Axis; 2], picture: &Picture) -> (Vec<Value>, Value) {
+fn picture_trace(axes: &[Axis; 2], picture: &Picture) -> (Vec<Value>, Value) {
+    let [a, b] = axes;
     // Row after row along the axis, which points up: the other way, with steps downward, plotly draws it upside down.
     let source = upside_down(picture).to_png().map(|bytes| format!("data:image/png;base64,{}", base64(&bytes)));
     let image = json!({"type": "image", "source": source.ok(), "x0": a.center(0), "dx": a.step(),
         "y0": b.center(0), "dy": b.step(),
         "hovertemplate": format!("{} %{{x:.4g}} {}<br>{} %{{y:.4g}} {}<extra></extra>", a.label, a.unit, b.label, b.unit)});
-    let anchor = if a.unit == b.unit { json!("x") } else { json!(false) };
+    let anchor = if have_equal_units(axes) { json!("x") } else { json!(false) };
     let layout = json!({"yaxis": {"autorange": true, "scaleanchor": anchor, "constrain": "domain"},
         "xaxis": {"constrain": "domain"}, "showlegend": false});
     (vec![image], layout)

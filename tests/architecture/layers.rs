@@ -234,6 +234,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "maps",
             "provenance",
             "drawing",
+            "static_axes",
+            "static_map",
             "static_chart",
             "chart_png",
             "table",

@@ -18,6 +18,8 @@ use std::path::{Path, PathBuf};
 
 /// Solids that get a rule of their own; of more, a comment says how many there are.
 const MOST_RULES: usize = 40;
+/// Rules up to which all stand in the scene; of more the most stay what no rule says too, black, and stand in comments.
+const MOST_LIVE_RULES: usize = 6;
 /// Parts that are placed several times, and places of each, that are named in a comment.
 const MOST_PLACED_PARTS: usize = 10;
 const MOST_PLACES: usize = 6;
@@ -78,14 +80,7 @@ fn model_reference(file: &Path, scene_file: &Path) -> Option<String> {
 fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     let model = &loaded.model;
     let name = file_name(file);
-    let rules = rule_texts(&model.account(), &instance_names(model));
-    let rest = rules.len().saturating_sub(MOST_RULES);
-    let more = if rest > 0 {
-        format!("    # … and {rest} more solids: `lampyris info --faces` names them\n")
-    } else {
-        String::new()
-    };
-    let shown: String = rules.into_iter().take(MOST_RULES).collect();
+    let material = material_text(&rule_texts(&model.account(), &instance_names(model)));
     let light = light_text(model);
     format!(
         "# A scene for {}: lengths in mm, powers in W. `lampyris schema --text` says what else may stand here.\n\
@@ -96,12 +91,29 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
          # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins. `lampyris info FILE --faces`\n\
          # shows what selects each face. In place of surface = \"absorber\" stands what it is: medium = \"PMMA\" (`lampyris media` lists\n\
          # the media that have names), or surface = \"mirror\", reflectance = 0.9.\n\
-         material = [\n{shown}{more}]\n{}\n{light}",
+         {material}{}\n{light}",
         printable_line(&name),
         toml_string(&name),
         toml_string(reference),
         places_text(model)
     )
+}
+
+/// Returns the rules as the list of the scene, which begins a line: those of few parts as they are, those of many in comments.
+fn material_text(rules: &[String]) -> String {
+    let rest = rules.len().saturating_sub(MOST_RULES);
+    let more = if rest > 0 {
+        format!("    # … and {rest} more solids: `lampyris info --faces` names them\n")
+    } else {
+        String::new()
+    };
+    let (mark, hint) = if rules.len() > MOST_LIVE_RULES {
+        ("# ", "# Of so many each begins with a #, which is to be taken from those that are not black.\n")
+    } else {
+        ("", "")
+    };
+    let shown: String = rules.iter().take(MOST_RULES).map(|rule| format!("    {mark}{rule}\n")).collect();
+    format!("{hint}material = [\n{shown}{more}]\n")
 }
 
 /// Returns comments that say what selects one place of a part that has several, of the first such parts; empty where no part has.
@@ -212,7 +224,7 @@ fn rule_text(selector: &str, solid: &SolidAccount, alike: usize) -> String {
     let size = solid.size_mm().map(toml_number).join(" × ");
     let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
     let faces = solid.faces.len();
-    format!("    {{ {selector}, surface = \"absorber\" }},  # {first}{closed}, {faces} faces, {size} mm{colour}\n")
+    format!("{{ {selector}, surface = \"absorber\" }},  # {first}{closed}, {faces} faces, {size} mm{colour}")
 }
 
 /// Sides of a box that differ by less than this share are equal: a round part fills its box to the rounding of its splines.
@@ -343,6 +355,21 @@ mod tests {
         for (k, rule) in rules[2..].iter().enumerate() {
             assert!(rule.contains(&format!("{{ part = \"board\", solid = {k}, surface")), "{rule}");
         }
+    }
+
+    /// Of many parts a scene keeps the lines of those alone that somebody takes the `#` from; TOML reads the comment behind it too.
+    #[test]
+    fn many_rules_stand_in_comments() {
+        let text = |count: usize| {
+            let parts: Vec<PartAccount> = (0..count).map(|k| part(&format!("p{k}"), 1, 1, 1.0)).collect();
+            material_text(&rule_texts(&parts, &vec![Vec::new(); count]))
+        };
+        let rules = |text: &str| text.parse::<toml::Table>().unwrap()["material"].as_array().unwrap().len();
+        assert_eq!(rules(&text(6)), 6);
+        let many = text(50);
+        assert_eq!((rules(&many), many.matches("# { part").count()), (0, 40));
+        assert!(many.contains("and 10 more solids"), "{many}");
+        assert_eq!(rules(&many.replace("    # { part = \"p3\"", "    { part = \"p3\"")), 1);
     }
 
     #[test]

@@ -121,7 +121,10 @@ impl CornerCheck {
             // One more than the name of no facet is zero.
             let facets = block.facets.map(|f| f.wrapping_add(1));
             self.facets = facets.into_iter().fold(self.facets, u32::max);
-            self.corner = self.corner.max(block.positions.iter().flatten().copied().max());
+            // Of whole rows of lanes, which are compared at once: one by one they took a fifth of the instructions of reading a tree.
+            let corners =
+                block.positions.iter().fold([0; 4], |most, row| std::array::from_fn(|k| most[k].max(row[k])));
+            self.corner = self.corner.max(corners.into_iter().max());
         }
     }
 

@@ -9,8 +9,10 @@ use rustc_hash::FxHashMap;
 /// what a CAD system closes (1e-6).
 const COINCIDENT: f64 = 1e-9;
 
-/// Samples of a curve between two of its knots, to begin with.
+/// Samples of a curve or of a side of a surface, to begin with.
 pub(super) const SAMPLES: usize = 16;
+/// Samples of a curve between two of its knots at least: fitted curves have hundreds of spans, whose samples took two thirds of a check.
+const SAMPLES_IN_SPAN: usize = 4;
 /// How often the stretch between two samples is halved.
 const FINEST: u32 = 8;
 
@@ -27,9 +29,11 @@ impl Border {
         let breaks = curve.breakpoints();
         let mut samples = Vec::new();
         // From knot to knot: within a span the curve is smooth, and even samples follow it.
+        let spans = breaks.len().saturating_sub(1).max(1);
+        let count = SAMPLES.div_ceil(spans).max(SAMPLES_IN_SPAN);
         for pair in breaks.windows(2) {
-            for i in 0..SAMPLES {
-                let t = pair[0] + (pair[1] - pair[0]) * i as f64 / SAMPLES as f64;
+            for i in 0..count {
+                let t = pair[0] + (pair[1] - pair[0]) * i as f64 / count as f64;
                 samples.push((t, surface.evaluate(curve.evaluate(t))));
             }
         }

@@ -106,6 +106,18 @@ fn word_of_quanta(quanta: u128) -> u64 {
     u64::try_from(quanta).unwrap_or(u64::MAX)
 }
 
+impl ReplicatedRun {
+    /// Drops the cells of its results, which take 56 bytes each: comparisons read those of the replicates.
+    pub(super) fn without_cells(mut self) -> Self {
+        self.results.tallies.cells = Vec::new();
+        for receiver in &mut self.results.receivers {
+            (receiver.cells, receiver.errors, receiver.ray_cells) = Default::default();
+            receiver.channels.iter_mut().for_each(|c| (c.cells, c.errors) = Default::default());
+        }
+        self
+    }
+}
+
 /// Traces a run and keeps what each replicate brought; replicates that were not traced stay empty.
 pub(in crate::study) fn trace_replicates(
     bound: &BoundScene,
