@@ -11,6 +11,8 @@ const COINCIDENT: f64 = 1e-9;
 
 /// Samples of a curve between two of its knots, to begin with.
 pub(super) const SAMPLES: usize = 16;
+/// Samples of a curve of many knots in all, to begin with, but two between each pair of them: 16 of each of 12,000 took 6 MB.
+const MANY_SAMPLES: usize = 256;
 /// How often the stretch between two samples is halved.
 const FINEST: u32 = 8;
 
@@ -25,11 +27,12 @@ impl Border {
     /// Samples a border curve of a surface so closely that it strays from no chord by more than a quarter of its length.
     pub(super) fn new(curve: UvCurve, surface: &Surface) -> Self {
         let breaks = curve.breakpoints();
+        let in_span = (MANY_SAMPLES / (breaks.len() - 1).max(1)).clamp(2, SAMPLES);
         let mut samples = Vec::new();
         // From knot to knot: within a span the curve is smooth, and even samples follow it.
         for pair in breaks.windows(2) {
-            for i in 0..SAMPLES {
-                let t = pair[0] + (pair[1] - pair[0]) * i as f64 / SAMPLES as f64;
+            for i in 0..in_span {
+                let t = pair[0] + (pair[1] - pair[0]) * i as f64 / in_span as f64;
                 samples.push((t, surface.evaluate(curve.evaluate(t))));
             }
         }
@@ -172,5 +175,21 @@ mod tests {
             });
             assert!(near, "{t}");
         }
+    }
+
+    #[test]
+    fn a_border_of_many_knots_is_sampled_twice_between_them() {
+        // A saw of 2,000 teeth along a plane, 1e-3 high.
+        let surface = sweep::plane(&Frame::IDENTITY, [[0.0, 20.0], [0.0, 1.0]]);
+        let teeth = 2000;
+        let points: Vec<glam::DVec3> =
+            (0..=teeth).map(|k| glam::DVec3::new(0.01 * f64::from(k), 1e-3 * f64::from(k % 2), 1.0)).collect();
+        let ends = [0.0, f64::from(teeth)];
+        let knots = ends[..1].iter().copied().chain((0..=teeth).map(f64::from)).chain([ends[1]]).collect();
+        let border = Border::new(UvCurve { degree: 1, knots, points }, &surface);
+        assert_eq!(border.samples.len(), 2 * teeth as usize + 1);
+        // Half a millimetre above the tip of a tooth, and no sample within what is enough.
+        let found = border.distance(&surface, Point::new(5.01, 0.501, 0.0), 0.499);
+        assert!((found - 0.5).abs() < 1e-9, "{found}");
     }
 }
