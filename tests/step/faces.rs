@@ -282,6 +282,10 @@ fn edges_given_only_in_a_parameter_plane_or_as_an_offset_are_converted() {
         ("#80=OFFSET_CURVE_3D('',#86,1.,.F.,#82);\n#86=COMPOSITE_CURVE('',(#87),.F.);\n#87=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#88);\n\
           #88=TRIMMED_CURVE('',#81,(3.141592653589793),(6.283185307179586),.T.,.PARAMETER.);\n#81=CIRCLE('',#83,1.5);\n#82=DIRECTION('',(0.,0.,1.));\n\
           #83=AXIS2_PLACEMENT_3D('',#84,#82,#85);\n#84=CARTESIAN_POINT('',(0.5,0.,0.));\n#85=DIRECTION('',(1.,0.,0.));\n".into(), 1.0 + PI / 8.0),
+        // A straight line 2 mm aside whose spline begins and ends with its point twice: it stands still there.
+        ("#80=OFFSET_CURVE_3D('',#81,2.,.F.,#82);\n#82=DIRECTION('',(0.,0.,1.));\n\
+          #81=B_SPLINE_CURVE_WITH_KNOTS('',3,(#83,#83,#84,#84),.UNSPECIFIED.,.F.,.F.,(4,4),(0.,1.),.UNSPECIFIED.);\n\
+          #83=CARTESIAN_POINT('',(0.,-2.,0.));\n#84=CARTESIAN_POINT('',(1.,-2.,0.));\n".into(), 1.0),
         // From the second to the fourth point of a polyline, whose parameter counts points: a triangle 0.4 high below the square.
         ("#80=COMPOSITE_CURVE('',(#87),.F.);\n#87=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#88);\n\
           #88=TRIMMED_CURVE('',#81,(PARAMETER_VALUE(1.)),(PARAMETER_VALUE(3.)),.T.,.PARAMETER.);\n#81=POLYLINE('',(#82,#83,#84,#85,#86));\n\

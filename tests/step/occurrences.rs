@@ -122,15 +122,24 @@ fn a_colour_of_a_path_is_that_of_one_occurrence() {
     let second = "#311=PRESENTATION_STYLE_ASSIGNMENT((#312));\n#312=COLOUR_RGB('',1.,0.,0.);\n\
                   #313=STYLED_ITEM('',(#314),#315);\n#314=PRESENTATION_STYLE_ASSIGNMENT((NULL_STYLE(.NULL.)));\n\
                   #25=BLOCK('',#20,5.,5.,20.);\n#26=CSG_SOLID('',#25);\n#303=STYLED_ITEM('',(#301),#26);\n\
-                  #126=CSG_SHAPE_REPRESENTATION('',(#26),#1);\n#127=SHAPE_REPRESENTATION_RELATIONSHIP('','',#106,#126);\n";
-    // The path leads to the second place; one through a relationship that is not around it leads nowhere.
-    for (path, expected) in [("#209", [1.0, 0.0, 0.0]), ("#109,#209", [0.0, 1.0, 0.0])] {
-        let style = format!("#310=CONTEXT_DEPENDENT_OVER_RIDING_STYLED_ITEM('',(#311),#106,#313,({path}));\n");
-        let model = read("", &[SHAPE, USAGE, RELATION, PLACED, SECOND_PLACE, second, &style].concat()).model;
-        for (x, expected) in [(100.0, [0.0, 1.0, 0.0]), (200.0, expected)] {
+                  #127=SHAPE_REPRESENTATION_RELATIONSHIP('','',#106,#126);\n";
+    let simple = "#126=CSG_SHAPE_REPRESENTATION('',(#26),#1);\n";
+    let complex = "#126=(CSG_SHAPE_REPRESENTATION()REPRESENTATION('',(#26),#1)SHAPE_REPRESENTATION());\n";
+    // The path leads to the second place; one through a relationship that is not around it leads nowhere. The style may name either
+    // representation.
+    let (red, green) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+    for (styled, shape, path, expected) in [
+        ("#106", simple, "#209", red),
+        ("#106", simple, "#109,#209", green),
+        ("#126", simple, "#209", red),
+        ("#126", complex, "#209", red),
+    ] {
+        let style = format!("#310=CONTEXT_DEPENDENT_OVER_RIDING_STYLED_ITEM('',(#311),{styled},#313,({path}));\n");
+        let model = read("", &[SHAPE, USAGE, RELATION, PLACED, SECOND_PLACE, second, shape, &style].concat()).model;
+        for (x, expected) in [(100.0, green), (200.0, expected)] {
             let here = model.placed_faces().filter(|f| f.placement.origin.x == x);
             let colours: Vec<_> = here.map(|f| f.colour(&model).map(|c| c.0)).collect();
-            assert_eq!(colours, [Some(expected); 12], "{path} {x}");
+            assert_eq!(colours, [Some(expected); 12], "{styled} {shape} {path} {x}");
         }
     }
 }

@@ -74,10 +74,7 @@ impl<'a> Structures<'a> {
                 bvh2: Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..cwbvh }),
                 cwbvh: Bvh::build(mesh, &cwbvh),
                 cwbvh_as_shipped: Bvh::build(mesh, &bvh::Settings { cured: false, ..cwbvh }),
-                exact: Exact::build(
-                    model,
-                    &exact::Settings { farthest_start, ..exact::Settings::for_rays(model, rays) },
-                ),
+                exact: Exact::build(model, &exact::Settings { farthest_start, ..exact::Settings::for_rays(rays) }),
             }
         });
         let structures = Self { groups: groups.collect(), instancing };

@@ -38,6 +38,7 @@ mod newton;
 mod newton_batch;
 mod newton_lanes;
 mod patch;
+mod piece_lists;
 mod query;
 mod reference;
 mod settlement;
@@ -51,6 +52,7 @@ pub mod traditional;
 mod traversal;
 mod tree;
 mod trim;
+mod trim_cutting;
 mod trim_piece;
 
 #[cfg(doc)]

@@ -4,8 +4,10 @@
 //! answer for every point, however close to a curve. Uses that pass within `band` mm are named.
 
 use super::edge_use::{EdgeUse, edge_uses};
+use super::piece_lists::PieceLists;
 use super::tolerances::FLAGGED_OF_GAP;
-use super::trim_piece::{PieceLists, TrimPiece, trim_pieces};
+use super::trim_cutting::trim_pieces;
+use super::trim_piece::{TrimPiece, TrimPieces};
 use crate::intersect::prefetch;
 use crate::math::Uv;
 use crate::math::quadrature::GAUSS;
@@ -59,7 +61,7 @@ pub(super) struct Near {
 /// The trimming of one face.
 #[derive(Debug)]
 pub(super) struct Trim {
-    pieces: Vec<TrimPiece>,
+    pieces: TrimPieces,
     /// What pieces belong to; they name it by its index.
     pub(super) uses: Vec<EdgeUse>,
     /// Low corner of the grid of cells.
@@ -113,7 +115,7 @@ impl Trim {
             outside_is_inside: false,
             whole: false,
         };
-        if trim.pieces.is_empty() {
+        if trim.pieces.len() == 0 {
             trim.whole = true;
             return trim;
         }
@@ -139,14 +141,14 @@ impl Trim {
     /// two circles of a thin ring may sweep less by the outer one.
     fn signed_area(&self) -> f64 {
         // About the grid's corner: far from the origin of the parameters the products would cancel.
-        let swept = |piece: &TrimPiece| {
+        let swept = |piece: TrimPiece<'_>| {
             let along = |(t, weight): (f64, f64)| {
                 let (place, derivative) = piece.evaluate(t);
                 weight * (place - self.origin).perp_dot(derivative)
             };
             0.5 * GAUSS.map(along).into_iter().sum::<f64>()
         };
-        self.pieces.iter().map(|p| if p.reversed { -swept(p) } else { swept(p) }).sum()
+        self.pieces.iter().map(|p| if p.is_reversed() { -swept(p) } else { swept(p) }).sum()
     }
 
     /// The cells of an axis that an interval meets, held to the grid.
@@ -158,12 +160,11 @@ impl Trim {
     /// Decides the cells that no piece of a trim comes within `reach` of, in u and v, and lists the pieces of the others and of rows.
     fn fill_cells(&mut self, reach: Uv) {
         let (mut rows, mut near) = (Vec::new(), Vec::new());
-        for (k, piece) in (0u32..).zip(&self.pieces) {
+        for (k, piece) in (0u32..).zip(self.pieces.iter()) {
             // Flat pieces cross no half-line towards +u.
-            if piece.v[0] != piece.v[1] {
-                rows.extend(
-                    self.cell_range(piece.min.y - reach.y, piece.max.y + reach.y, 1).map(|j| (j as u32, k)),
-                );
+            if !piece.is_level() {
+                let [low, high] = piece.v_range();
+                rows.extend(self.cell_range(low - reach.y, high + reach.y, 1).map(|j| (j as u32, k)));
             }
             for [min, max] in piece.boxes(Uv::ONE / self.density) {
                 let (lo, hi) = (min - reach, max + reach);
@@ -182,8 +183,7 @@ impl Trim {
             let middle = |i: usize| self.origin + Uv::new(i as f64 + 0.5, j as f64 + 0.5) / self.density;
             // Crossings of the row's middle height, once for all its cells.
             let v = middle(0).y;
-            let spanning =
-                self.rows.pieces_of(j as u32).iter().map(|&k| &self.pieces[k as usize]).filter(|p| p.spans(v));
+            let spanning = self.rows.pieces_of(j as u32).iter().map(|&k| self.pieces.get(k)).filter(|p| p.spans(v));
             let mut crossings: Vec<f64> = spanning.map(|p| p.u_at(v)).collect();
             crossings.sort_by(f64::total_cmp);
             for i in 0..self.count[0] {
@@ -209,13 +209,12 @@ impl Trim {
     /// Bytes that it holds.
     pub(super) fn bytes(&self) -> usize {
         let lists = self.rows.bytes() + self.near.bytes();
-        size_of_val(self) + size_of_val(&*self.pieces) + size_of_val(&*self.uses) + self.cells.len() + lists
+        size_of_val(self) + self.pieces.bytes() + size_of_val(&*self.uses) + self.cells.len() + lists
     }
 
     /// Whether a point lies inside, by the pieces of its row that the half-line towards +u crosses.
     fn parity(&self, q: Uv, row: usize) -> bool {
-        let crossings =
-            self.rows.pieces_of(row as u32).iter().filter(|&&k| self.pieces[k as usize].crosses(q)).count();
+        let crossings = self.rows.pieces_of(row as u32).iter().filter(|&&k| self.pieces.get(k).crosses(q)).count();
         (crossings % 2 == 1) != self.outside_is_inside
     }
 
@@ -308,22 +307,19 @@ impl Trim {
         let mut near: SmallVec<[Near; 2]> = SmallVec::new();
         // A box test first: the nearest point takes iterations.
         for &k in self.near.pieces_of(cell as u32) {
-            let piece = &self.pieces[k as usize];
-            let outside = q.x < piece.min.x - reach.x
-                || q.y < piece.min.y - reach.y
-                || q.x > piece.max.x + reach.x
-                || q.y > piece.max.y + reach.y;
-            if outside {
+            let piece = self.pieces.get(k);
+            let is_beyond = |x: f64, [low, high]: [f64; 2], reach: f64| x < low - reach || x > high + reach;
+            if is_beyond(q.x, piece.u_range(), reach.x) || is_beyond(q.y, piece.v_range(), reach.y) {
                 continue;
             }
             let (t, distance) = piece.nearest(q, metric);
             if distance > band {
                 continue;
             }
-            let parameter = piece.range[0] + (piece.range[1] - piece.range[0]) * t;
-            let found = Near { owner: piece.owner, parameter, uv: piece.evaluate(t).0, distance };
+            let (owner, parameter) = (piece.owner(), piece.edge_parameter(t));
+            let found = Near { owner, parameter, uv: piece.evaluate(t).0, distance };
             // An edge comes in several pieces; its nearest one is where the search on the edge itself begins.
-            match near.iter_mut().find(|n| n.owner == piece.owner) {
+            match near.iter_mut().find(|n| n.owner == owner) {
                 Some(n) if distance < n.distance => *n = found,
                 Some(_) => {}
                 None => near.push(found),

@@ -2,7 +2,9 @@
 
 use super::curves::{CurveShape, DirectedCurve};
 use super::extent::FaceExtent;
-use super::tolerances::{CURVE_ERROR_MM, DIFFERENCE_STEP, PARALLEL_AXIS, WORST_CURVE_ERROR_MM};
+use super::tolerances::{
+    CURVE_ERROR_MM, DIFFERENCE_STEP, LIMIT_STEP, PARALLEL_AXIS, STILL_SHARE, WORST_CURVE_ERROR_MM,
+};
 use super::units::Units;
 use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Aabb, Point, Uv, Vector};
@@ -50,9 +52,9 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
                     other => other.segment(0.0, 2.0 * std::f64::consts::PI),
                 };
                 let moved = |piece: &Curve, t: f64| {
-                    let d = piece.derivatives(t);
-                    // Where the curve stands still, nothing says which way is aside: it stays where it is.
-                    across.cross(d.first).try_normalize().map_or(d.point, |aside| d.point + sign * aside)
+                    let aside = across.cross(direction(piece, t)).try_normalize();
+                    // A curve that stands still throughout stays where it is.
+                    piece.evaluate(t) + sign * aside.unwrap_or(Vector::ZERO)
                 };
                 // The offset's own derivative would need the curve's second one; a quotient is close enough for a
                 // fit.
@@ -87,6 +89,16 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         };
         lift_to_surface(e, &chart, &curve, scale)
     }
+}
+
+/// Returns a vector along a curve at `t`: its derivative or, where that vanishes, the one a little nearer to the middle.
+fn direction(curve: &Curve, t: f64) -> Vector {
+    let [a, b] = curve.domain();
+    let first = curve.derivatives(t).first;
+    if first.length() * (b - a) > STILL_SHARE * curve.bounds().diagonal() {
+        return first;
+    }
+    curve.derivatives(t + LIMIT_STEP * (0.5 * (a + b) - t)).first
 }
 
 /// Returns a curve of a chart's parameter plane as a curve in space, fitted; `scale` turns the curve's u and v into the chart's.

@@ -21,6 +21,11 @@ pub(super) const CURVE_ERROR_MM: f64 = 1e-6;
 pub(super) const WORST_CURVE_ERROR_MM: f64 = 1e-3;
 /// Step of a difference quotient, as a share of the domain: near the cube root of the unit in the last place.
 pub(super) const DIFFERENCE_STEP: f64 = 1e-5;
+/// A derivative that takes a curve this share of its size over its whole domain is rounding: the curve stands still there.
+pub(super) const STILL_SHARE: f64 = 1e-9;
+/// Share of the way to the middle of a curve at which its direction is taken where it stands still: the derivative is a thousand roundings
+/// long again, and the direction right to as much of the angle by which the curve turns.
+pub(super) const LIMIT_STEP: f64 = 1e-6;
 
 /// A vertex this near to a seam of its curve is on it, and as near again for each unit of its coordinates by [`VERTEX_SHARE`].
 pub(super) const VERTEX_MM: f64 = 1e-7;

@@ -133,7 +133,7 @@ impl Styles {
 
 /// Whether an entity is a representation, to which a colour may be given as a whole.
 fn is_representation(file: &File<'_>, id: u64) -> bool {
-    file.entity(id).is_some_and(|e| is_shape_representation(e.keyword()))
+    file.entity(id).is_some_and(|e| e.keywords().any(is_shape_representation))
 }
 
 /// Returns the usages of products by what styles name them by: their shapes, the entities that place them, and the relationships that
