@@ -106,6 +106,14 @@ impl Grid {
         column(&self.quantity, &self.unit)
     }
 
+    /// Returns the error of cell `k` from rays and facets together, from rays alone where that of the facets is not known; `None` where
+    /// none was estimated.
+    pub(crate) fn combined_error(&self, k: usize) -> Option<f64> {
+        let statistical = *self.error.as_ref()?.get(k)?;
+        let geometric = self.geometric.as_ref().and_then(|errors| errors.get(k));
+        Some(geometric.map_or(statistical, |geometric| statistical.hypot(*geometric)))
+    }
+
     /// Lists both errors of the values, where both are known, and the geometric ones of the layers that have them, under the names that
     /// every format gives them.
     pub(super) fn error_layers(&self) -> impl Iterator<Item = (String, &Vec<f64>)> {

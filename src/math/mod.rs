@@ -22,7 +22,7 @@ pub use frame::Frame;
 pub(crate) use maximum::{error_of_maximum, largest_distance};
 pub use ray::{Departure, QuadHalf, Ray};
 pub use roots::{quadratic_roots, safe_newton};
-pub(crate) use spread::{error_of_sum, variance_from_residuals, variance_of_sum};
+pub(crate) use spread::{error_of_mean, error_of_sum, variance_from_residuals, variance_of_sum};
 
 /// A position, mm.
 pub type Point = glam::DVec3;

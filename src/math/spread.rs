@@ -29,6 +29,17 @@ pub(crate) fn error_of_sum(parts: &[f64]) -> f64 {
     variance_from_residuals(parts.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>(), parts.len()).sqrt()
 }
 
+/// Returns the standard error of the mean of parts that count different rays, each `[value, error]`. A part of 0 states as its error what
+/// one ray would bring it: beside others that have light this is no spread of theirs, and where all are 0, one ray in any of them is what
+/// the mean may have missed. 0 without parts.
+pub(crate) fn error_of_mean(parts: impl ExactSizeIterator<Item = [f64; 2]> + Clone) -> f64 {
+    let count = parts.len().max(1) as f64;
+    if parts.clone().all(|[value, _]| value == 0.0) {
+        return parts.fold(0.0, |largest, [_, error]| error.max(largest)) / count;
+    }
+    parts.filter(|[value, _]| *value != 0.0).map(|[_, error]| error * error).sum::<f64>().sqrt() / count
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -43,5 +54,14 @@ mod tests {
             assert_eq!([error_of_sum(&parts), from_sums], [expected; 2], "{parts:?}");
         }
         assert_eq!([error_of_sum(&[]), variance_of_sum(0.0, 0.0, 0)], [0.0; 2]);
+    }
+
+    /// Nine rays of weight 1 in nine of a hundred cells are 9 ± 3 rays in all; without any, one ray may have been missed.
+    #[test]
+    fn dark_parts_are_no_spread_of_a_mean() {
+        let cells = |lit: usize| (0..100).map(move |k| if k < lit { [1.0, 1.0] } else { [0.0, 1.0] });
+        assert!((error_of_mean(cells(9)) - 0.03).abs() < 1e-15);
+        assert!((error_of_mean(cells(0)) - 0.01).abs() < 1e-15);
+        assert_eq!(error_of_mean([].into_iter()), 0.0);
     }
 }

@@ -41,10 +41,10 @@ fn with_joined_cells<'g>(grid: &'g Grid, errors: Option<&[f64]>) -> Cow<'g, Grid
     for (values, errors, geometric) in
         once((&mut even.values, even.error.as_mut(), &mut even.geometric)).chain(layers)
     {
-        joined.level(values);
         if let Some(errors) = errors {
-            joined.level_errors(errors);
+            joined.level_errors(values, errors);
         }
+        joined.level(values);
         if let Some(geometric) = geometric {
             // What facets change they change alike in all cells of a ring.
             joined.level(geometric);

@@ -1,55 +1,59 @@
 //! Figures of a lamp in the words of the trade: Imax, HV, widths at half, flux and efficiency; where the light of a spot lies.
 
 use super::even_poles::{is_all_around, pole_rings};
+use super::half_width::half_width;
 use super::number::figures;
 use super::verdicts::{multiple_text, without_rounding};
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
-use crate::math::error_of_maximum;
+use crate::math::{error_of_maximum, error_of_mean};
 use crate::regulation::Assessment;
 use crate::simulate::{ReceiverResult, Results};
+use crate::study::figures::ReceiverFigures;
 
 /// Share of the power at which the curve of encircled power ends, per cent.
 const FRAMED_PERCENT: f64 = 99.5;
 /// Radii at which the encircled power is drawn.
 const RADII: usize = 200;
 
-/// Returns the width over which values along a line through the peak stay above half of it, in the units of `step`, the length of a cell;
-/// `None` where they are above half up to the end of the grid.
-fn width_at_half(values: &[f64], step: f64) -> Option<f64> {
-    let peak = (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b]))?;
-    let half = 0.5 * values[peak];
-    // Linear between the two cells beside the half.
-    let fraction = |inner: f64, outer: f64| (inner - half) / (inner - outer);
-    let after = (peak + 1..values.len()).find(|&k| values[k] < half)?;
-    let before = (0..peak).rev().find(|&k| values[k] < half)?;
-    let right = (after - 1) as f64 + fraction(values[after - 1], values[after]);
-    let left = (before + 1) as f64 - fraction(values[before + 1], values[before]);
-    Some((right - left) * step)
+/// A line through the brightest cell.
+struct Line {
+    /// What it is called.
+    name: String,
+    /// Distance of two of its cells, degrees.
+    step: f64,
+    /// Its cells, in their order.
+    cells: Vec<usize>,
 }
 
-/// A line of values through the brightest cell: what it is called, the distance of two values in degrees, the values.
-type Line = (String, f64, Vec<f64>);
-
-/// Returns the values along both axes through the brightest cell, or in its plane and the one across where the grid is over planes C all
+/// Returns the lines along both axes through the brightest cell, or in its plane and the one across where the grid is over planes C all
 /// around, in which γ runs to both sides of its pole; `None` for a grid without cells.
 fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
     let [a, b] = &grid.axes;
     let (i, j) = grid.peak_cell()?;
-    let column =
-        |i: usize| -> Vec<f64> { grid.values.iter().skip(i % a.cells).step_by(a.cells).copied().collect() };
+    let column = |i: usize| (0..b.cells).map(move |j| j * a.cells + i % a.cells);
     if !is_all_around(grid) {
-        let row = grid.values[j * a.cells..][..a.cells].to_vec();
+        let row = (j * a.cells..(j + 1) * a.cells).collect();
         return Some([
-            (format!("along {}", a.label), a.step(), row),
-            (format!("along {}", b.label), b.step(), column(i)),
+            Line { name: format!("along {}", a.label), step: a.step(), cells: row },
+            Line { name: format!("along {}", b.label), step: b.step(), cells: column(i).collect() },
         ]);
     }
-    let plane = |i: usize| {
-        let line = column(i + a.cells / 2).into_iter().rev().chain(column(i)).collect();
-        (format!("in the plane C {}°", figures(a.center(i % a.cells), 3)), b.step(), line)
+    let plane = |i: usize| Line {
+        name: format!("in the plane C {}°", figures(a.center(i % a.cells), 3)),
+        step: b.step(),
+        cells: column(i + a.cells / 2).rev().chain(column(i)).collect(),
     };
     Some([plane(i), plane(i + a.cells / 4)])
+}
+
+/// Returns the width at half along a line and its error, both in degrees.
+fn width_along(grid: &Grid, line: &Line) -> [Cell; 2] {
+    let values: Vec<f64> = line.cells.iter().map(|&k| grid.values[k]).collect();
+    let errors: Option<Vec<f64>> = line.cells.iter().map(|&k| grid.combined_error(k)).collect();
+    let Some(width) = half_width(&values, errors.as_deref()) else { return [Cell::Empty, Cell::Empty] };
+    let error = width.error.map_or(Cell::Empty, |error| Cell::Number(error * line.step, 2));
+    [Cell::Number(width.cells * line.step, 3), error]
 }
 
 /// Returns the standard error of the largest value, in its unit: the statistical one with the upward bias of a noisy maximum
@@ -63,13 +67,20 @@ fn peak_error(grid: &Grid) -> Cell {
     Cell::Number(error_of_maximum(values).hypot(geometric), 2)
 }
 
+/// What a receiver counted.
+#[derive(Clone, Copy)]
+pub(super) struct Counted<'a> {
+    /// Its results.
+    pub receiver: &'a ReceiverResult,
+    /// Its figures, with both errors.
+    pub figures: &'a ReceiverFigures,
+    /// Its cells.
+    pub grid: &'a Grid,
+}
+
 /// Makes a table of the figures of a far field in candela, with the points of a regulation where it was judged by one.
-pub(super) fn lamp_table(
-    receiver: &ReceiverResult,
-    grid: &Grid,
-    results: &Results,
-    assessment: Option<&Assessment>,
-) -> Table {
+pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: Option<&Assessment>) -> Table {
+    let Counted { receiver, figures: of_receiver, grid } = *counted;
     let title = format!("{}: figures of the lamp", super::maps::spoken(&receiver.name));
     let name = format!("{}-lamp", crate::formats::file_stem(&receiver.name));
     let mut table = Table::new(&name, &title, &[("", ""), ("value", ""), ("±", ""), ("unit", ""), ("where", "")]);
@@ -80,31 +91,27 @@ pub(super) fn lamp_table(
     if let Some((place, value)) = grid.peak() {
         table.row(["Imax".into(), Cell::Number(value, 5), peak_error(grid), "cd".into(), degrees(place).into()]);
     }
-    let lumens = receiver.photometric().map_or(receiver.power, |channel| channel.total);
-    table.row(["flux".into(), Cell::Number(lumens, 5), Cell::Empty, "lm".into(), "into the far field".into()]);
-    let share = 100.0 * receiver.power / results.power.emitted;
-    table.row([
-        "efficiency".into(),
-        Cell::Number(share, 4),
-        Cell::Empty,
-        "%".into(),
-        "of what the sources emit".into(),
-    ]);
-    if let Some(lines) = lines_through_peak(grid) {
-        for (line, step, values) in &lines {
-            let width = width_at_half(values, *step).map_or(Cell::Empty, |w| Cell::Number(w, 3));
-            table.row([
-                format!("width at half, {line}").into(),
-                width,
-                Cell::Empty,
-                "°".into(),
-                "through Imax".into(),
-            ]);
-        }
+    let power = &of_receiver.power;
+    let seen = receiver.photometric().and_then(|seen| of_receiver.channels.iter().find(|c| c.name == seen.name));
+    let lumens = seen.map_or(power, |channel| &channel.figure);
+    let [value, error] = [Cell::Number(lumens.value, 5), Cell::Number(lumens.combined(), 2)];
+    table.row(["flux".into(), value, error, "lm".into(), "into the far field".into()]);
+    let [share, error] = [power.value, power.combined()].map(|p| 100.0 * p / results.power.emitted);
+    let [value, error] = [Cell::Number(share, 4), Cell::Number(error, 2)];
+    table.row(["efficiency".into(), value, error, "%".into(), "of what the sources emit".into()]);
+    for line in lines_through_peak(grid).iter().flatten() {
+        let [width, error] = width_along(grid, line);
+        table.row([
+            format!("width at half, {}", line.name).into(),
+            width,
+            error,
+            "°".into(),
+            "through Imax".into(),
+        ]);
     }
-    if let Some(value) = value_ahead(grid) {
+    if let Some([value, error]) = value_ahead(grid) {
         let place = if is_all_around(grid) { "γ 0°" } else { "H 0°, V 0° as placed" };
-        table.row(["HV".into(), Cell::Number(value, 5), Cell::Empty, "cd".into(), place.into()]);
+        table.row(["HV".into(), value, error, "cd".into(), place.into()]);
     }
     if let Some(assessment) = assessment {
         add_assessment(&mut table, assessment, degrees);
@@ -128,19 +135,27 @@ fn add_assessment(table: &mut Table, assessment: &Assessment, degrees: impl Fn([
     }
 }
 
-/// Returns the intensity straight ahead: of the cell there, or the mean of those that meet there; `None` where the grid does not reach
-/// there.
-fn value_ahead(grid: &Grid) -> Option<f64> {
+/// Returns the intensity straight ahead and its error: of the cell there, or the mean of those that meet there; `None` where the grid does
+/// not reach there.
+fn value_ahead(grid: &Grid) -> Option<[Cell; 2]> {
     let cells = |axis: &crate::formats::Axis| -> Vec<usize> {
         // An even number of cells has none in the middle: two or four meet there, to rounding.
         (0..axis.cells).filter(|&k| axis.center(k).abs() <= 0.5 * axis.step() * (1.0 + 1e-9)).collect()
     };
     let (columns, rows) = (cells(&grid.axes[0]), cells(&grid.axes[1]));
-    let values: Vec<f64> = (rows.iter())
-        .flat_map(|j| columns.iter().map(move |i| j * grid.axes[0].cells + i))
-        .map(|k| grid.values[k])
-        .collect();
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    let mut meeting: Vec<usize> =
+        rows.iter().flat_map(|j| columns.iter().map(move |i| j * grid.axes[0].cells + i)).collect();
+    if is_all_around(grid) {
+        // The cells at the pole are one.
+        meeting.truncate(1);
+    }
+    let mean = |values: &[f64]| meeting.iter().map(|&k| values[k]).sum::<f64>() / meeting.len() as f64;
+    let error = grid.error.as_ref().map_or(Cell::Empty, |errors| {
+        let rays = error_of_mean(meeting.iter().map(|&k| [grid.values[k], errors[k]]));
+        // What facets change they change alike in neighbouring cells.
+        Cell::Number(rays.hypot(grid.geometric.as_deref().map_or(0.0, mean)), 2)
+    });
+    (!meeting.is_empty()).then(|| [Cell::Number(mean(&grid.values), 5), error])
 }
 
 /// Draws the share of the power of a plane or disc within a radius around the mean position of its light; `None` for other receivers, and
@@ -311,13 +326,26 @@ mod tests {
         let even = with_even_poles(&grid);
         let at_pole = 100.0 * 1.5f64.to_radians().cos();
         assert!((even.peak().unwrap().1 / at_pole - 1.0).abs() < 1e-12);
-        assert!((value_ahead(&even).unwrap() / at_pole - 1.0).abs() < 1e-12);
+        let Some([Cell::Number(ahead, _), Cell::Number(ahead_error, _)]) = value_ahead(&even) else { panic!("HV") };
+        assert!((ahead / at_pole - 1.0).abs() < 1e-12);
         // 60 cells of ±10 % of twice the value, and 60 without light: √60 · 0.2 / 120 of it.
         let Cell::Number(error, _) = peak_error(&even) else { panic!("an error") };
-        assert!((error / at_pole - 0.2 * 60f64.sqrt() / 120.0).abs() < 1e-12, "{error}");
-        for (name, step, values) in lines_through_peak(&even).unwrap() {
-            let width = width_at_half(&values, step).unwrap();
-            assert!((width - 120.0).abs() < 0.1 && name.starts_with("in the plane C"), "{name}: {width}");
+        for error in [error, ahead_error] {
+            assert!((error / at_pole - 0.2 * 60f64.sqrt() / 120.0).abs() < 1e-12, "{error}");
+        }
+        for line in lines_through_peak(&even).unwrap() {
+            let [Cell::Number(width, _), Cell::Number(error, _)] = width_along(&even, &line) else {
+                panic!("a width")
+            };
+            assert!(
+                (width - 120.0).abs() < 0.1 && line.name.starts_with("in the plane C"),
+                "{}: {width}",
+                line.name
+            );
+            // Beside the pole nothing is uncertain, at it the mean by 1.3 %: I = cos γ is half of that much more at γ 60° ∓ 0.43°, and
+            // both ends move.
+            let known = (0.2 * 60f64.sqrt() / 120.0 / 3f64.sqrt()).to_degrees() * 2.0;
+            assert!((error / known - 1.0).abs() < 0.05, "{error} {known}");
         }
     }
 
@@ -332,13 +360,5 @@ mod tests {
         assert_eq!(even.peak_cell(), Some((5, 59)));
         let Cell::Number(error, _) = peak_error(&even) else { panic!("an error") };
         assert!((error - own).abs() < 1e-12, "{error}");
-    }
-
-    #[test]
-    fn widths_at_half_are_those_of_the_curve() {
-        // A triangle of half width 10 steps falls to half after 5.
-        let triangle: Vec<f64> = (0..41).map(|k| 10.0 - (f64::from(k) - 20.0).abs().min(10.0)).collect();
-        assert!((width_at_half(&triangle, 0.1).unwrap() - 1.0).abs() < 1e-12);
-        assert_eq!(width_at_half(&[1.0, 2.0, 1.5], 1.0), None, "no end within the grid");
     }
 }

@@ -4,8 +4,9 @@ use super::{AxisStyle, Chart, Series, SeriesStyle, figures};
 use crate::formats::file_stem;
 use crate::formats::{Axis, Grid, Layer};
 use crate::simulate::scene::FarFieldType;
-use crate::simulate::{ChannelResult, ReceiverResult};
+use crate::simulate::{ChannelResult, ReceiverResult, Results};
 use crate::study::figures::{cell_errors, channel_cell_errors, light_weighted_error};
+use crate::study::geometric_error::GeometricError;
 
 /// Returns the cells of a receiver with their axes, mm or degrees; `None` for a receiver that has one number only.
 pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
@@ -81,6 +82,23 @@ pub fn photometric_grid(r: &ReceiverResult) -> Option<Grid> {
     })
 }
 
+/// Returns every receiver's grids, the photometric one of those that have it first, with the receiver's index, and the errors from the
+/// facets where these are known; receivers without cells have none.
+pub(super) fn grids(results: &Results, error: Option<&GeometricError>) -> Vec<(usize, Grid)> {
+    let mut grids = Vec::new();
+    for (k, r) in results.receivers.iter().enumerate() {
+        let measured = error.and_then(|e| e.receivers.get(k));
+        // Errors of other cells than these are none of them.
+        let of_all = |cells: &Vec<f64>| (cells.len() == r.cells.len()).then(|| cells.clone());
+        let of_seen = r.photometric().and_then(|seen| measured?.channels.iter().find(|c| c.name == seen.name));
+        let geometric = of_seen.and_then(|channel| of_all(&channel.cells));
+        grids.extend(photometric_grid(r).map(|grid| (k, Grid { geometric, ..grid })));
+        let geometric = measured.and_then(|m| of_all(&m.cells));
+        grids.extend(receiver_grid(r).map(|grid| (k, Grid { geometric, ..grid })));
+    }
+    grids
+}
+
 /// Cells of a cut that are drawn: more than a screen has pixels, and 400 kB of the page.
 const MOST_CUT_POINTS: usize = 2000;
 
@@ -96,10 +114,7 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let along = |[axis, fixed]: [&Axis; 2], [peak, at]: [usize; 2], cell: &dyn Fn(usize) -> usize| Series {
         name: format!("along {} at {} = {} {}", axis.label, fixed.label, figures(fixed.center(at), 3), fixed.unit),
         points: shown(axis, peak).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
-        errors: grid.error.as_ref().map_or_else(Vec::new, |e| {
-            let facets = |k: usize| grid.geometric.as_ref().and_then(|g| g.get(cell(k))).copied();
-            shown(axis, peak).map(|k| facets(k).map_or(e[cell(k)], |g| g.hypot(e[cell(k)]))).collect()
-        }),
+        errors: shown(axis, peak).filter_map(|k| grid.combined_error(cell(k))).collect(),
         style: SeriesStyle::Line,
         ..Series::default()
     };

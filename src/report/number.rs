@@ -56,6 +56,13 @@ pub fn grouped(value: u64) -> String {
     in_thousands(&value.to_string())
 }
 
+/// Writes a number of up to four digits with its noun, in the plural with an `s` unless it is written as 1.
+pub(super) fn counted(value: f64, noun: &str) -> String {
+    let number = figures(value, 4);
+    let end = if number == "1" { "" } else { "s" };
+    format!("{number} {noun}{end}")
+}
+
 /// Writes a duration given in seconds: `1.23 s`, `45 ms`, `2 min 5 s`; a dash where it is not finite.
 pub fn seconds(value: f64) -> String {
     // The unit is that of what is printed: 0.9996 s are 1 s, not 1000 ms.

@@ -2,7 +2,7 @@
 
 use super::colour_picture::colour_chart;
 use super::framing::{joined_cells, lit_part};
-use super::lamp_figures::{encircled_power, lamp_table, polar};
+use super::lamp_figures::{Counted, encircled_power, lamp_table, polar};
 use super::maps::{reading, spoken};
 use super::{Block, Chart};
 use crate::formats::{Grid, file_stem};
@@ -32,14 +32,10 @@ pub(super) fn framed_map(r: &ReceiverResult, grid: &Grid) -> Chart {
 
 /// Returns those that apply of: the colours of a receiver that counts them, the polar diagram of a luminaire, the encircled power of a
 /// spot, the figures of a lamp.
-pub(super) fn trade_figures(
-    r: &ReceiverResult,
-    grid: &Grid,
-    results: &Results,
-    judged: Option<&Assessment>,
-) -> Vec<Block> {
+pub(super) fn trade_figures(counted: &Counted<'_>, results: &Results, judged: Option<&Assessment>) -> Vec<Block> {
+    let Counted { receiver: r, grid, .. } = *counted;
     let in_candela = r.kind == "far_field" && grid.unit == "cd";
     let charts =
         [colour_chart(grid), polar(r, grid), encircled_power(r, grid)].into_iter().flatten().map(Block::from);
-    charts.chain(in_candela.then(|| Block::Table(lamp_table(r, grid, results, judged)))).collect()
+    charts.chain(in_candela.then(|| Block::Table(lamp_table(counted, results, judged)))).collect()
 }

@@ -2,11 +2,13 @@
 
 use super::cross_check::{self, verdict};
 use super::even_poles::with_joined_slivers;
-use super::maps::{cuts, photometric_grid, receiver_grid, spoken};
+use super::lamp_figures::Counted;
+use super::maps::{cuts, grids, receiver_grid, spoken};
+use super::number::counted;
 use super::verdicts::{self, verdict_sentence};
 use super::{Block, Cell, Provenance, Report, Section, Table, View};
 use super::{errors, figures, grouped, receiver_blocks, seconds};
-use crate::formats::{Facets, Grid, Polylines};
+use crate::formats::{Facets, Polylines};
 use crate::regulation::Assessment;
 use crate::simulate::{Event, PathVertex, Results};
 use crate::study::figures::{Figure, ReceiverFigures};
@@ -127,11 +129,11 @@ impl SimulationReport<'_> {
             }
         }
         text += &format!(
-            "**{} rays** of {} segments each took **{}** on {} threads, {} million rays/s; {} lost. ",
+            "**{} rays** of {} each took **{}** on {}, {} million rays/s; {} lost. ",
             grouped(r.rays),
-            figures(r.segments as f64 / r.rays.max(1) as f64, 4),
+            counted(r.segments as f64 / r.rays.max(1) as f64, "segment"),
             seconds(r.seconds.trace),
-            r.threads,
+            counted(r.threads as f64, "thread"),
             figures(r.mrays_per_s, 3),
             match r.lost_rays {
                 0 => "none was".into(),
@@ -198,7 +200,7 @@ impl SimulationReport<'_> {
     fn light(&self) -> Section {
         let notes = self.results.notes.iter().map(|note| format!("**Note:** {note}."));
         let mut section = notes.fold(Section::new("Light"), |s, note| s.with_block(note.as_str()));
-        let mut maps = self.maps();
+        let mut maps = grids(self.results, self.geometric);
         // Directions first: what a lamp is judged by.
         maps.sort_by_key(|(k, _)| self.results.receivers[*k].kind != "far_field");
         let (lines, ends) = path_lines(&self.results.paths);
@@ -226,7 +228,8 @@ impl SimulationReport<'_> {
                 }
             }
             let judged = self.verdicts.iter().find(|(receiver, _)| *receiver == k).map(|(_, a)| a);
-            section.blocks.extend(receiver_blocks::trade_figures(r, &grid, self.results, judged));
+            let shown = Counted { receiver: r, figures: &self.figures[k], grid: &grid };
+            section.blocks.extend(receiver_blocks::trade_figures(&shown, self.results, judged));
         }
         if let Some(view) = view {
             section = section.with_block(view);
@@ -235,20 +238,6 @@ impl SimulationReport<'_> {
             section = section.with_block(sentence.as_str());
         }
         section
-    }
-
-    /// Returns every receiver's grids, the photometric one of those that have it first, with the receiver's index, and the errors from the
-    /// facets where these are known; receivers without cells have none.
-    fn maps(&self) -> Vec<(usize, Grid)> {
-        let mut maps = Vec::new();
-        for (k, r) in self.results.receivers.iter().enumerate() {
-            maps.extend(photometric_grid(r).map(|grid| (k, grid)));
-            let geometric = self.geometric.and_then(|g| g.receivers.get(k)).map(|error| error.cells.clone());
-            // Errors of other cells than these are none of them.
-            let geometric = geometric.filter(|cells| cells.len() == r.cells.len());
-            maps.extend(receiver_grid(r).map(|grid| (k, Grid { geometric, ..grid })));
-        }
-        maps
     }
 
     /// Makes the section on where the power went: emitted to lost, each receiver, and all figures with both errors.

@@ -5,6 +5,7 @@
 //! at most as many as have the solid angle of a cell at γ 90° together. So the peak of a smooth distribution is as noisy as far from the
 //! poles, and what rays do tell apart there stays apart.
 
+use crate::math::error_of_mean;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
@@ -93,12 +94,19 @@ impl PoleRings {
     }
 }
 
-/// Returns the standard error of the cells of a ring that have light, as a share of them, weighted by it; 0 without light.
+/// Returns the standard error of the cells of a ring that have light, as a share of them, weighted by it; in the dark infinite where errors
+/// are stated, which are those of one ray, and 0 without any.
 fn noise_share(values: &[f64], errors: &[f64]) -> f64 {
     let lit = || values.iter().zip(errors).filter(|(value, _)| **value > 0.0);
     let light: f64 = lit().map(|(value, _)| value * value).sum();
     let noise: f64 = lit().map(|(_, error)| error * error).sum();
-    if light > 0.0 { (noise / light).sqrt() } else { 0.0 }
+    if light > 0.0 {
+        (noise / light).sqrt()
+    } else if errors.iter().any(|error| *error > 0.0) {
+        f64::INFINITY
+    } else {
+        0.0
+    }
 }
 
 impl JoinedCells {
@@ -110,12 +118,12 @@ impl JoinedCells {
         }
     }
 
-    /// Sets the standard errors of each group to that of its mean.
-    pub(crate) fn level_errors(&self, errors: &mut [f64]) {
+    /// Sets the standard errors of each group to that of its mean; `values` are those of the single cells, not yet levelled.
+    pub(crate) fn level_errors(&self, values: &[f64], errors: &mut [f64]) {
         for group in &self.0 {
             // Cells of a ring count different rays.
-            let squares: f64 = errors[group.clone()].iter().map(|e| e * e).sum();
-            errors[group.clone()].fill(squares.sqrt() / group.len() as f64);
+            let error = error_of_mean(group.clone().map(|k| [values[k], errors[k]]));
+            errors[group.clone()].fill(error);
         }
     }
 }
@@ -137,9 +145,9 @@ mod tests {
         all.joined_cells(&values, None).level(&mut values);
         assert_eq!(values, [3.0, 3.0, 3.0, 3.0, 5.0, 5.0, 5.0, 9.0, 2.0, 2.0, 2.0, 2.0]);
         // Of four independent cells: √(4 · 2²)/4.
-        let mut errors = [2.0; 12];
-        back.joined_cells(&[0.0; 12], Some(&errors.clone())).level_errors(&mut errors);
-        back.clear_rivals(&[0.0; 12], &mut errors);
+        let (lit, mut errors) = ([100.0; 12], [2.0; 12]);
+        back.joined_cells(&lit, Some(&errors.clone())).level_errors(&lit, &mut errors);
+        back.clear_rivals(&lit, &mut errors);
         assert_eq!(errors, [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0, 1.0]);
     }
 
@@ -161,5 +169,15 @@ mod tests {
         assert_eq!(noisy[6..12], [100.5, 100.5, 102.5, 102.5, 104.5, 104.5]);
         assert_eq!(noisy[12..42], values[12..42]);
         assert_eq!(noisy[42..48], noisy[6..12]);
+    }
+
+    /// One ray that adds 6 to a cell adds 3 to two of them and 1 to the six at the pole.
+    #[test]
+    fn what_a_ray_may_add_in_the_dark_is_spread_over_the_joined_cells() {
+        let rings = PoleRings::new([6, 9], [0.0, 360.0], [0.0, 180.0]);
+        let (dark, mut errors) = ([0.0; 54], [6.0; 54]);
+        rings.joined_cells(&dark, Some(&errors.clone())).level_errors(&dark, &mut errors);
+        assert_eq!((errors[..6].to_vec(), errors[6..12].to_vec()), (vec![1.0; 6], vec![3.0; 6]));
+        assert_eq!(errors[24..30], [6.0; 6], "cells of γ 90° are joined with none");
     }
 }

@@ -256,8 +256,8 @@ impl ReceiverResult {
         let rings = self.pole_rings();
         if !rings.is_empty() {
             let joined = rings.joined_cells(&self.cells, Some(&self.errors));
+            joined.level_errors(&self.cells, even[1].to_mut());
             joined.level(even[0].to_mut());
-            joined.level_errors(even[1].to_mut());
             let [cells, errors] = &mut even;
             rings.clear_rivals(cells, errors.to_mut());
         }

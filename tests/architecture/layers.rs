@@ -246,6 +246,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "view",
             "document",
             "verdicts",
+            "half_width",
             "lamp_figures",
             "colour_picture",
             "receiver_blocks",

@@ -9,7 +9,7 @@ use lampyris::model::Model;
 use lampyris::nurbs::{Curve, conic};
 use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
 use lampyris::tessellate::{self, tessellate};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
 
 /// Traces a scene on facets of the default tolerance.
@@ -74,6 +74,18 @@ fn light_passes_a_rod_in_its_hole() {
         "kind = 'cone'\nhalf_angle_deg = 40\nat = [0.3, 0.2, 4]\ndirection = [0, 0, 1]",
     );
     check("rod", &rod_in_hole(0.4), &text);
+}
+
+/// A block turned so that samples of both rims lie nearly, but not quite, together: within the glue distance.
+#[test]
+fn light_passes_a_rod_whose_rims_are_divided_nearly_alike() {
+    let text = scene(
+        [("rod", 1.5), ("block", 1.6)],
+        "kind = 'cone'\nhalf_angle_deg = 40\nat = [0.3, 0.2, 4]\ndirection = [0, 0, 1]",
+    );
+    for parts in [2.0, 3.0, 6.0, 8.0, 12.0] {
+        check("rod", &rod_in_hole(TAU / parts + 1e-4), &text);
+    }
 }
 
 /// A rod that stands in its hole with one end, or not to the ends of the hole: only a part of one or of both faces is shared.

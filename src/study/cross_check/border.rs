@@ -11,12 +11,10 @@ const COINCIDENT: f64 = 1e-9;
 
 /// Samples of a curve or of a side of a surface, to begin with.
 pub(super) const SAMPLES: usize = 16;
-/// Samples of a curve or of a side of a surface, to begin with.
-pub(super) const SAMPLES: usize = 16;
-/// Samples of a curve of many knots, to begin with, but two between each pair of them: fitted curves have hundreds of spans, whose samples took
-/// two thirds of a check, and 16 of each of 12,000 took 6 MB.
+/// Samples of a curve of many knots, to begin with, as far as that leaves two to [`MOST_IN_SPAN`] between each pair of them: fitted curves
+/// have hundreds of spans, whose samples took two thirds of a check, and 16 of each of 12,000 took 6 MB.
 const MANY_SAMPLES: usize = 256;
-/// Samples between two knots, of a curve that has more than these few in all, at the most.
+/// The most samples between two knots of such a curve.
 const MOST_IN_SPAN: usize = 4;
 /// How often the stretch between two samples is halved.
 const FINEST: u32 = 8;

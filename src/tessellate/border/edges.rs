@@ -69,19 +69,9 @@ fn with_further(times: impl Iterator<Item = Vec<f64>>, further: &[Vec<f64>]) -> 
     times.zip(further).map(merge).collect()
 }
 
-/// Adds `further` parameters of each edge, in any order, to its division, and returns the new divisions and shared positions as [`divide`]
-/// does.
-pub(in crate::tessellate) fn divide_more(
-    part: &Part,
-    divisions: &[Division],
-    further: &[Vec<f64>],
-) -> (Vec<Division>, Vec<Point>) {
-    sample_positions(part, with_further(divisions.iter().map(|d| d.t.clone()), further))
-}
-
 /// Returns the divisions at `times`, two or more ascending parameters of each edge, and the shared positions: vertices, then inner points
 /// edge by edge.
-fn sample_positions(part: &Part, times: Vec<Vec<f64>>) -> (Vec<Division>, Vec<Point>) {
+pub(in crate::tessellate) fn sample_positions(part: &Part, times: Vec<Vec<f64>>) -> (Vec<Division>, Vec<Point>) {
     let inner = |(edge, t): (&Edge, &Vec<f64>)| -> Vec<Point> {
         t[1..t.len() - 1].iter().map(|&t| edge.curve.evaluate(t)).collect()
     };

@@ -36,7 +36,7 @@ use detection::{Contact, Extent};
 use guest::Guest;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
-use samples::{EdgeSamples, FurtherSamples};
+use samples::{ContactSamples, EdgeSamples};
 use trimmed::{FaceKey, TrimmedFace};
 
 /// Meshes anew, by index, the instances with faces in contact; all others have the mesh of their part. Empty at a glue distance of 0 or
@@ -55,8 +55,8 @@ pub(super) fn mesh_contacts(
         return FxHashMap::default();
     }
     let joiner = Joiner { model, places, settings, parts, contacts: &contacts, faces: &faces };
-    let further = joiner.further_samples();
-    let mut meshes = joiner.divided_more(&further);
+    let samples = joiner.contact_samples();
+    let mut meshes = joiner.divided_anew(&samples);
     joiner.mesh_carriers_and_guests(&mut meshes);
     meshes.into_iter().map(|(i, mesh)| (i, with_coincident_vertices_joined(mesh))).collect()
 }
@@ -91,33 +91,33 @@ impl<'j, 'm> Joiner<'j, 'm> {
         Some(EdgeSamples { face: self.faces.get(&key)?, divisions: &self.mesh_of(key.instance)?.divisions })
     }
 
-    /// Returns the parameters that edges must have besides their own: where they cross seams or borders of the other face, where their
-    /// chords are too long for its facets, and the samples of edges that run together.
-    fn further_samples(&self) -> FurtherSamples {
+    /// Returns the parameters that edges must have: their own, where they cross seams or borders of the other face, where their chords are
+    /// too long for its facets, and the samples of edges that run together.
+    fn contact_samples(&self) -> ContactSamples {
         let glue = self.settings.glue_mm;
-        let mut further = FurtherSamples::default();
+        let mut samples = ContactSamples::default();
         for c in self.contacts {
             let (Some(carrier), Some(guest)) = (self.edge_samples(c.carrier), self.edge_samples(c.guest)) else {
                 continue;
             };
-            guest.shorten_chords(carrier.face, glue, &mut further);
-            guest.cross_seams(carrier.face, glue, &mut further);
+            guest.shorten_chords(carrier.face, glue, &mut samples);
+            guest.cross_seams(carrier.face, glue, &mut samples);
             if c.extent == Extent::Part {
-                carrier.shorten_chords(guest.face, glue, &mut further);
-                carrier.cross_seams(guest.face, glue, &mut further);
-                guest.cross_edges(&carrier, glue, &mut further);
-                carrier.cross_edges(&guest, glue, &mut further);
+                carrier.shorten_chords(guest.face, glue, &mut samples);
+                carrier.cross_seams(guest.face, glue, &mut samples);
+                guest.cross_edges(&carrier, glue, &mut samples);
+                carrier.cross_edges(&guest, glue, &mut samples);
             }
             // Both ways: after this both edges have the samples of either.
-            carrier.take_over(&guest, glue, &mut further);
-            guest.take_over(&carrier, glue, &mut further);
+            carrier.take_over(&guest, glue, &mut samples);
+            guest.take_over(&carrier, glue, &mut samples);
         }
-        further
+        samples
     }
 
-    /// Returns the meshes of all instances in contact, by instance, with edges divided further. Faces beside changed edges are meshed anew;
-    /// those in contact keep the old mesh, renumbered, until their turn.
-    fn divided_more(&self, further: &FurtherSamples) -> FxHashMap<usize, PartMesh> {
+    /// Returns the meshes of all instances in contact, by instance, with their edges divided at `samples`. Faces beside changed edges are
+    /// meshed anew; those in contact keep the old mesh, renumbered, until their turn.
+    fn divided_anew(&self, samples: &ContactSamples) -> FxHashMap<usize, PartMesh> {
         let mut instances: Vec<usize> =
             self.contacts.iter().flat_map(|c| [c.carrier.instance, c.guest.instance]).collect();
         instances.sort_unstable();
@@ -125,9 +125,8 @@ impl<'j, 'm> Joiner<'j, 'm> {
         let divide = |&i: &usize| {
             let part = self.model.part(self.model.instances[i].part);
             let before = self.mesh_of(i)?;
-            // Edges that nobody asks of keep their division.
-            let none = vec![Vec::new(); part.edges.len()];
-            let (divisions, shared) = edges::divide_more(part, &before.divisions, further.get(&i).unwrap_or(&none));
+            let own = || before.divisions.iter().map(|d| d.t.clone()).collect();
+            let (divisions, shared) = edges::sample_positions(part, samples.get(&i).cloned().unwrap_or_else(own));
             let renumbering = Renumbering::new(part, (&before.divisions, before.shared.len()), &divisions);
             let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
             let taken: Vec<TakenChords> = before.taken.iter().map(|t| renumbering.renumbered_chords(t)).collect();

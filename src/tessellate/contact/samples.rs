@@ -21,8 +21,11 @@ const CROSSING_PIECES: usize = 8;
 /// Steps from one edge to the other and back that find where they cross: each takes the square of the cosine between them.
 const CROSSING_STEPS: usize = 60;
 
-/// Further parameters of edges, by instance.
-pub(super) type FurtherSamples = FxHashMap<usize, Vec<Vec<f64>>>;
+/// Share of the glue distance within which two samples are one place.
+const ONE_PLACE: f64 = 1e-6;
+
+/// The parameters of all edges, both ends included and ascending, of the instances that have others than before contacts.
+pub(super) type ContactSamples = FxHashMap<usize, Vec<Vec<f64>>>;
 
 /// One face's edges with the divisions they have so far.
 pub(super) struct EdgeSamples<'f, 'm> {
@@ -31,12 +34,21 @@ pub(super) struct EdgeSamples<'f, 'm> {
 }
 
 impl EdgeSamples<'_, '_> {
-    /// Returns the parameters of an edge, its own and further ones, ascending.
-    fn parameters(&self, edge: EdgeId, further: &FurtherSamples) -> Vec<f64> {
-        let mut t = self.divisions[edge.0 as usize].t.clone();
-        t.extend(further.get(&self.face.key.instance).map_or(&[][..], |f| &f[edge.0 as usize]));
-        t.sort_by(f64::total_cmp);
-        t
+    /// Returns the parameters of an edge, ascending.
+    fn parameters(&self, edge: EdgeId, samples: &ContactSamples) -> Vec<f64> {
+        match samples.get(&self.face.key.instance) {
+            Some(of_edges) => of_edges[edge.0 as usize].clone(),
+            None => self.divisions[edge.0 as usize].t.clone(),
+        }
+    }
+
+    /// Adds a parameter to an edge, in place of that of `moved` where one is given.
+    fn set_sample(&self, edge: EdgeId, t: f64, moved: Option<f64>, samples: &mut ContactSamples) {
+        let before = || self.divisions.iter().map(|d| d.t.clone()).collect();
+        let of_edge = &mut samples.entry(self.face.key.instance).or_insert_with(before)[edge.0 as usize];
+        of_edge.retain(|&s| Some(s) != moved);
+        let place = of_edge.partition_point(|&s| s < t);
+        of_edge.insert(place, t);
     }
 
     /// Returns the point of an edge at `t`, in the model's coordinates.
@@ -44,40 +56,57 @@ impl EdgeSamples<'_, '_> {
         self.face.frame.point(self.face.part.edges[edge.0 as usize].curve.evaluate(t))
     }
 
-    /// Adds `t` to `further` unless a sample of the edge lies within `glue` mm.
-    fn request_sample(&self, edge: EdgeId, t: f64, glue: f64, further: &mut FurtherSamples) {
+    /// Adds `t` to an edge unless a sample of it lies within `glue` mm.
+    fn request_sample(&self, edge: EdgeId, t: f64, glue: f64, samples: &mut ContactSamples) {
         let p = self.place(edge, t);
-        let known = self.parameters(edge, further);
+        let known = self.parameters(edge, samples);
         if known.iter().all(|&s| (self.place(edge, s) - p).length() > glue) {
-            let all = further
-                .entry(self.face.key.instance)
-                .or_insert_with(|| vec![Vec::new(); self.face.part.edges.len()]);
-            all[edge.0 as usize].push(t);
+            self.set_sample(edge, t, None, samples);
         }
     }
 
-    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges.
-    pub(super) fn take_over(&self, other: &EdgeSamples<'_, '_>, glue: f64, further: &mut FurtherSamples) {
+    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges. A sample of ours that lies so near to one of
+    /// theirs moves there: chords between nearly the same places would leave a sliver between both faces.
+    pub(super) fn take_over(&self, other: &EdgeSamples<'_, '_>, glue: f64, samples: &mut ContactSamples) {
         for theirs in other.face.edges() {
             let places: Vec<Point> =
-                other.parameters(theirs, further).into_iter().map(|t| other.place(theirs, t)).collect();
+                other.parameters(theirs, samples).into_iter().map(|t| other.place(theirs, t)).collect();
             // Every edge of either: two faces may touch along edges that are divided quite differently.
             for ours in self.face.edges() {
                 for &p in &places {
                     let (t, away) = self.face.nearest_on_edge(ours, p);
                     if away <= glue {
-                        self.request_sample(ours, t, glue, further);
+                        self.adopt_sample((ours, t), &places, glue, samples);
                     }
                 }
             }
         }
     }
 
+    /// Adds `t` to an edge, which is where one of `places` lies on it, or moves the nearest sample there where that is within `glue` mm.
+    /// Ends of edges are corners of the face and stay, and so does a sample that another of `places` is nearer to.
+    fn adopt_sample(&self, (edge, t): (EdgeId, f64), places: &[Point], glue: f64, samples: &mut ContactSamples) {
+        let p = self.place(edge, t);
+        let known = self.parameters(edge, samples);
+        let away = |s: f64| (self.place(edge, s) - p).length();
+        let Some(nearest) = known.iter().copied().min_by(|&a, &b| away(a).total_cmp(&away(b))) else { return };
+        if away(nearest) > glue {
+            self.set_sample(edge, t, None, samples);
+            return;
+        }
+        let here = self.place(edge, nearest);
+        let is_end = nearest == known[0] || nearest == known[known.len() - 1];
+        let is_nearest = places.iter().all(|q| (*q - here).length() >= away(nearest));
+        if away(nearest) > ONE_PLACE * glue && !is_end && is_nearest {
+            self.set_sample(edge, t, Some(nearest), samples);
+        }
+    }
+
     /// Asks for samples on edges that run inside another face, so that their chords take no more than a share of its tolerance.
-    pub(super) fn shorten_chords(&self, other: &TrimmedFace<'_>, glue: f64, further: &mut FurtherSamples) {
+    pub(super) fn shorten_chords(&self, other: &TrimmedFace<'_>, glue: f64, samples: &mut ContactSamples) {
         let borders = other.edges();
         for edge in self.face.edges() {
-            for pair in self.parameters(edge, further).windows(2) {
+            for pair in self.parameters(edge, samples).windows(2) {
                 let place = |f: f64| self.place(edge, pair[0] + f * (pair[1] - pair[0]));
                 let middle = place(0.5);
                 let (uv, away) = other.project(middle);
@@ -90,14 +119,14 @@ impl EdgeSamples<'_, '_> {
                 // The sag falls with the square of the number of parts.
                 let parts = (sag / limit).sqrt().ceil();
                 (1..parts as usize).for_each(|k| {
-                    self.request_sample(edge, pair[0] + k as f64 / parts * (pair[1] - pair[0]), glue, further)
+                    self.request_sample(edge, pair[0] + k as f64 / parts * (pair[1] - pair[0]), glue, samples)
                 });
             }
         }
     }
 
     /// Asks for samples on both edges where one of this face crosses one of another into it or out of it.
-    pub(super) fn cross_edges(&self, other: &EdgeSamples<'_, '_>, glue: f64, further: &mut FurtherSamples) {
+    pub(super) fn cross_edges(&self, other: &EdgeSamples<'_, '_>, glue: f64, samples: &mut ContactSamples) {
         // Where seams are crossed is asked for elsewhere.
         let rims = other.face.rims();
         if rims.is_empty() {
@@ -106,7 +135,7 @@ impl EdgeSamples<'_, '_> {
         for edge in self.face.rims() {
             let inside = |t: f64| other.face.holds_inside(&rims, self.place(edge, t), glue);
             let at_border = |t: f64| other.face.is_at_border(&rims, self.place(edge, t), glue);
-            for pair in self.parameters(edge, further).windows(2) {
+            for pair in self.parameters(edge, samples).windows(2) {
                 // What runs along the other border takes its samples over.
                 if at_border(pair[0]) && at_border(pair[1]) {
                     continue;
@@ -115,7 +144,7 @@ impl EdgeSamples<'_, '_> {
                 for k in 0..CROSSING_PIECES {
                     let [mut lo, mut hi] = [k, k + 1].map(|k| pair[0] + step * k as f64);
                     if k > 0 && at_border(lo) {
-                        self.request_crossing(other, (edge, lo), glue, further);
+                        self.request_crossing(other, (edge, lo), glue, samples);
                     }
                     let from = inside(lo);
                     if from == inside(hi) || at_border(lo) || at_border(hi) {
@@ -125,7 +154,7 @@ impl EdgeSamples<'_, '_> {
                         let m = 0.5 * (lo + hi);
                         if inside(m) == from { lo = m } else { hi = m }
                     }
-                    self.request_crossing(other, (edge, 0.5 * (lo + hi)), glue, further);
+                    self.request_crossing(other, (edge, 0.5 * (lo + hi)), glue, samples);
                 }
             }
         }
@@ -138,7 +167,7 @@ impl EdgeSamples<'_, '_> {
         other: &EdgeSamples<'_, '_>,
         (edge, mut t): (EdgeId, f64),
         glue: f64,
-        further: &mut FurtherSamples,
+        samples: &mut ContactSamples,
     ) {
         let p = self.place(edge, t);
         let distance = |e: &EdgeId| other.face.nearest_on_edge(*e, p).1;
@@ -150,20 +179,20 @@ impl EdgeSamples<'_, '_> {
             s = other.face.nearest_on_edge(crossed, self.place(edge, t)).0;
         }
         if (self.place(edge, t) - other.place(crossed, s)).length() <= glue {
-            self.request_sample(edge, t, glue, further);
-            other.request_sample(crossed, s, glue, further);
+            self.request_sample(edge, t, glue, samples);
+            other.request_sample(crossed, s, glue, samples);
         }
     }
 
     /// Asks for samples where edges of this face cross the seam of its carrier.
-    pub(super) fn cross_seams(&self, carrier: &TrimmedFace<'_>, glue: f64, further: &mut FurtherSamples) {
+    pub(super) fn cross_seams(&self, carrier: &TrimmedFace<'_>, glue: f64, samples: &mut ContactSamples) {
         for edge in self.face.edges() {
-            let t = self.parameters(edge, further);
+            let t = self.parameters(edge, samples);
             for pair in t.windows(2) {
                 for d in (0..2).filter(|&d| carrier.surface.closed[d]) {
                     let at = |t: f64| carrier.project(self.place(edge, t)).0;
                     if let Some(crossing) = seam_crossing(carrier, d, [pair[0], pair[1]], at) {
-                        self.request_sample(edge, crossing, glue, further);
+                        self.request_sample(edge, crossing, glue, samples);
                     }
                 }
             }
