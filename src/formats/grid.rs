@@ -108,6 +108,7 @@ impl Grid {
 
     /// Returns the error of cell `k` from rays and facets together, from rays alone where that of the facets is not known; `None` where
     /// none was estimated.
+    #[cfg(feature = "report")]
     pub(crate) fn combined_error(&self, k: usize) -> Option<f64> {
         let statistical = *self.error.as_ref()?.get(k)?;
         let geometric = self.geometric.as_ref().and_then(|errors| errors.get(k));
