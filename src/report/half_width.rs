@@ -12,7 +12,8 @@ pub(super) struct HalfWidth {
     pub error: Option<f64>,
 }
 
-/// Returns the distance of the first value from where the values fall below `level`, linear between two of them; `None` where all are above.
+/// Returns the distance of the first value from where the values fall below `level`, linear between two of them; `None` where all are
+/// above.
 fn distance_to(level: f64, values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut inner = f64::INFINITY;
     for (k, value) in values.enumerate() {

@@ -2,6 +2,7 @@
 //! step, so that hits have the same bits as of a ray alone. Written as one loop over the lanes without branches, which compilers turn into
 //! whole registers; a test that needs more than the signs of edge functions is left to the caller.
 
+use super::mesh_box::{ordered_max, ordered_min};
 use super::quad_edges::QuadRay;
 use crate::intersect::facet::LONGEST_NUDGE;
 use crate::intersect::facet_hit::{EdgeHit, Nearest};
@@ -97,6 +98,7 @@ impl FacetLanes {
     /// Does all tests; a facet is near the start of a ray when its box, grown by `reach` mm, holds it.
     #[inline(always)]
     pub(super) fn test(&mut self, reach: f64) {
+        // As [`QuadRay::margin`] has it.
         let move_size = 2.0 * 2.0 * LONGEST_NUDGE * reach * (2.0 * 4.0);
         for l in 0..LANES {
             let [ox, oy, oz] = [self.origin[0][l], self.origin[1][l], self.origin[2][l]];
@@ -107,8 +109,8 @@ impl FacetLanes {
                 let [cx, cy, cz] =
                     [self.corners[k][0][l] - ox, self.corners[k][1][l] - oy, self.corners[k][2][l] - oz];
                 (low, high) = (
-                    [min(low[0], cx), min(low[1], cy), min(low[2], cz)],
-                    [max(high[0], cx), max(high[1], cy), max(high[2], cz)],
+                    [ordered_min(low[0], cx), ordered_min(low[1], cy), ordered_min(low[2], cz)],
+                    [ordered_max(high[0], cx), ordered_max(high[1], cy), ordered_max(high[2], cz)],
                 );
                 x[k] = cx - sx * cz;
                 y[k] = cy - sy * cz;
@@ -117,11 +119,14 @@ impl FacetLanes {
             let edge = |from: usize, to: usize| x[from] * y[to] - y[from] * x[to];
             let (e0, e1, e2, e3) = (edge(1, 0), edge(2, 1), edge(3, 2), edge(0, 3));
             let diagonal = edge(0, 2);
-            let lowest = max(max(low[0], low[1]), low[2]);
-            let highest = min(min(high[0], high[1]), high[2]);
+            let lowest = ordered_max(ordered_max(low[0], low[1]), low[2]);
+            let highest = ordered_min(ordered_min(high[0], high[1]), high[2]);
             let near = (lowest <= reach) & (highest >= -reach);
             // How far the corners are from the start along an axis, in the larger direction.
-            let farthest = max(max(max(-low[0], high[0]), max(-low[1], high[1])), max(-low[2], high[2]));
+            let farthest = ordered_max(
+                ordered_max(ordered_max(-low[0], high[0]), ordered_max(-low[1], high[1])),
+                ordered_max(-low[2], high[2]),
+            );
             let margin = move_size * farthest;
             let first = Signs::new([e1, diagonal, e0]);
             let second = Signs::new([e2, e3, -diagonal]);
@@ -177,7 +182,11 @@ impl Signs {
     fn new([a, b, c]: [f64; 3]) -> Self {
         // Not equal to itself where it is no number: left to the exact test like a zero.
         let is_zero = |e: f64| !((e < 0.0) | (e > 0.0));
-        Self { least: min(min(a, b), c), most: max(max(a, b), c), has_zero: is_zero(a) | is_zero(b) | is_zero(c) }
+        Self {
+            least: ordered_min(ordered_min(a, b), c),
+            most: ordered_max(ordered_max(a, b), c),
+            has_zero: is_zero(a) | is_zero(b) | is_zero(c),
+        }
     }
 
     /// Whether two have opposite signs and both are larger than a margin.
@@ -191,16 +200,4 @@ impl Signs {
     fn are_one_sided(&self) -> bool {
         !((self.least < 0.0) & (self.most > 0.0))
     }
-}
-
-/// The smaller of two numbers, as one instruction; the second where one is no number.
-#[inline(always)]
-fn min(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-/// The larger of two numbers, as one instruction; the second where one is no number.
-#[inline(always)]
-fn max(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }

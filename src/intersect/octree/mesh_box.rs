@@ -67,14 +67,14 @@ impl MeshBox {
     }
 }
 
-/// The least of two numbers in one instruction: `f64::min` takes three for the sake of NaN, after which nothing is met here.
+/// The least of two numbers in one instruction, the second where one is no number: `f64::min` takes three for the sake of NaN.
 #[inline(always)]
-fn ordered_min(a: f64, b: f64) -> f64 {
+pub(super) fn ordered_min(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
 /// The greatest of two numbers in one instruction.
 #[inline(always)]
-fn ordered_max(a: f64, b: f64) -> f64 {
+pub(super) fn ordered_max(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }

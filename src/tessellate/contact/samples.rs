@@ -65,8 +65,8 @@ impl EdgeSamples<'_, '_> {
         }
     }
 
-    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges. A sample of ours that lies so near to one of
-    /// theirs moves there: chords between nearly the same places would leave a sliver between both faces.
+    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges. A sample of ours that lies so near to one
+    /// of theirs moves there: chords between nearly the same places would leave a sliver between both faces.
     pub(super) fn take_over(&self, other: &EdgeSamples<'_, '_>, glue: f64, samples: &mut ContactSamples) {
         for theirs in other.face.edges() {
             let places: Vec<Point> =
