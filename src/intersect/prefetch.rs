@@ -31,27 +31,17 @@ pub(crate) fn prefetch_range<T>(slice: &[T], first: usize, count: usize) {
     let _ = (slice, first, count);
 }
 
-/// Asks for the cache lines of one element of either slice, without a branch on which. An index out of bounds is harmless.
+/// Asks for so many cache lines from an address on, which may be any.
 #[inline(always)]
-pub(crate) fn prefetch_either<T, U>(choice: bool, yes: (&[T], usize), no: (&[U], usize)) {
+pub(crate) fn prefetch_lines<const LINES: usize>(start: *const u8) {
     #[cfg(target_arch = "x86_64")]
-    {
+    for line in 0..LINES {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        use std::hint::select_unpredictable;
-        let a = yes.0.as_ptr().wrapping_add(yes.1).cast::<i8>();
-        let b = no.0.as_ptr().wrapping_add(no.1).cast::<i8>();
-        let start = select_unpredictable(choice, a, b);
-        let size = select_unpredictable(choice, size_of::<T>(), size_of::<U>());
-        let mut line = 0;
-        while line < size_of::<T>().max(size_of::<U>()) {
-            // SAFETY: see the head of the file.
-            // The smaller element's last line may be asked for twice; one below a line long is asked for at its start.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(line.min(size.saturating_sub(LINE)))) };
-            line += LINE;
-        }
+        // SAFETY: see the head of the file.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(line * LINE).cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = (choice, yes, no);
+    let _ = start;
 }
 
 #[cfg(test)]
@@ -63,10 +53,8 @@ mod tests {
         let small = [1u8, 2, 3];
         let large = [[0u64; 32]; 2];
         // The index may be out of bounds: nothing is read.
-        for choice in [true, false] {
-            prefetch_either(choice, (&small, 2), (&large, 7));
-            prefetch_either(choice, (&large, 1), (&small, 1000));
-        }
-        prefetch(&small, 1);
+        prefetch(&small, 1000);
+        prefetch(&large, 7);
+        prefetch_lines::<3>(std::ptr::null());
     }
 }

@@ -1,7 +1,7 @@
 //! What the walk does in lanes, with AVX2 and FMA.
 //!
 //! Sound because [`super::kernels`] takes it only where kernels may use them, because loads stay inside the
-//! fixed-size arrays of [`Node`], [`Block`] and [`BoxRay`], whose row indices are below six.
+//! fixed-size arrays of [`Node`] and [`Block`], whose row indices are below six.
 #![allow(unsafe_code)]
 
 use super::lanes::Lanes;
@@ -84,45 +84,43 @@ static COMPRESSIONS: [[u8; 8]; 256] = {
 
 impl Lanes for Avx2Lanes {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
-        // SAFETY: see the head of the file; rows are 0..6 by construction, and eight numbers are written from the eighth place at most.
+    fn enter(node: &Node, slot_order: u32, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+        // SAFETY: see the head of the file; eight numbers are written from the eighth place at most.
         unsafe {
             // Bounds are eight-bit steps from the node's corner: crossing = (corner − origin)·inverse +
             // bound·(step·inverse), so that one fused operation a bound is left for the children.
             let mut scale = [_mm256_setzero_ps(); 3];
-            let (mut early, mut late) = (scale, scale);
+            let (mut to_low, mut to_high) = (scale, scale);
             for a in 0..3 {
-                let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a];
-                scale[a] = _mm256_set1_ps(node.step[a] * ray.inverse[a]);
+                let to = _mm256_set1_ps(node.origin[a] - ray.origin[a]);
+                let (inverse, slack) = (_mm256_set1_ps(ray.inverse[a]), _mm256_set1_ps(ray.slack[a]));
+                scale[a] = _mm256_mul_ps(_mm256_set1_ps(node.step[a]), inverse);
                 // Entering is made earlier and leaving later by what `f32` may be wrong by: boxes may be met in vain
                 // but never missed.
-                early[a] = _mm256_set1_ps(base - ray.slack[a]);
-                late[a] = _mm256_set1_ps(base + ray.slack[a]);
+                to_low[a] = _mm256_fmsub_ps(to, inverse, slack);
+                to_high[a] = _mm256_fmadd_ps(to, inverse, slack);
             }
-            let slot_order = node.slot_order(ray.octant);
             // Farthest first.
             let order = _mm256_load_si256(ORDERS.0.get_unchecked(slot_order as usize & 7).as_ptr().cast());
             let (mut met, mut count) = (0, 0);
             for half in 0..2 {
-                let first = 8 * (1 ^ half ^ (slot_order as usize >> 3));
+                let first = 8 * (1 ^ half ^ (slot_order as usize >> 3 & 1));
                 let mut enter = _mm256_set1_ps(ray.t_min);
                 let mut leave = _mm256_set1_ps(ray.t_max);
                 for a in 0..3 {
-                    // Which of the two rows of an axis is met first depends on the ray's sign alone, so that no minimum
-                    // and maximum of both is needed.
-                    let near = ray.entry_row(a);
-                    let (near, far) = (load_bounds(node, near, first), load_bounds(node, near ^ 1, first));
-                    enter = _mm256_max_ps(enter, _mm256_fmadd_ps(near, scale[a], early[a]));
-                    leave = _mm256_min_ps(leave, _mm256_fmadd_ps(far, scale[a], late[a]));
+                    // Which is met first is told by the smaller: cheaper than to choose rows by the ray's signs.
+                    let low = _mm256_fmadd_ps(load_bounds(node, 2 * a, first), scale[a], to_low[a]);
+                    let high = _mm256_fmadd_ps(load_bounds(node, 2 * a + 1, first), scale[a], to_high[a]);
+                    enter = _mm256_max_ps(enter, _mm256_min_ps(low, high));
+                    leave = _mm256_min_ps(leave, _mm256_max_ps(low, high));
                 }
                 // Beside the slack the last few roundings scale with the distance itself.
+                let leave = _mm256_permutevar8x32_ps(leave, order);
                 let leave = _mm256_mul_ps(leave, _mm256_set1_ps(LEAVE_STRETCH));
                 let enter = _mm256_permutevar8x32_ps(enter, order);
-                let leave = _mm256_permutevar8x32_ps(leave, order);
                 let children = _mm256_loadu_si256(node.children.as_ptr().add(first).cast());
                 let children = _mm256_permutevar8x32_epi32(children, order);
-                // An unused child has link zero. Its box is empty, but where the slack is wider than the node even that
-                // is met.
+                // An unused child has link zero; its box means nothing.
                 let unused = _mm256_castsi256_ps(_mm256_cmpeq_epi32(children, _mm256_setzero_si256()));
                 let of_half = _mm256_andnot_ps(unused, _mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave));
                 let of_half = _mm256_movemask_ps(of_half) as u32 & 255;

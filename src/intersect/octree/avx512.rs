@@ -2,8 +2,7 @@
 //! register.
 //!
 //! Sound because [`super::kernels`] takes it only where kernels may use the features, because loads stay inside the fixed-size arrays of
-//! [`Node`] [`Block`] and [`BoxRay`], and because octants are below eight and axes below
-//! three.
+//! [`Node`] and [`Block`], and because axes are below three.
 #![allow(unsafe_code)]
 
 use super::avx2::Avx2Lanes;
@@ -25,12 +24,6 @@ unsafe fn load_bounds(node: &Node, row: usize) -> __m512 {
         let bytes = _mm_load_si128(node.bounds.get_unchecked(row).as_ptr().cast());
         _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes))
     }
-}
-
-/// A number of a vector, in all lanes.
-#[inline(always)]
-unsafe fn spread(v: __m128, axis: i32) -> __m512 {
-    unsafe { _mm512_permutexvar_ps(_mm512_set1_epi32(axis), _mm512_castps128_ps512(v)) }
 }
 
 /// Exchanges the halves: lanes 4–7, then 0–3.
@@ -61,35 +54,31 @@ unsafe fn load_pair(corners: [&Corners; 2], axis: usize) -> __m512d {
 
 impl Lanes for Avx512Lanes {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
-        // SAFETY: see the head of the file; the load of an origin takes one number of the step.
+    fn enter(node: &Node, order: u32, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+        // SAFETY: see the head of the file.
         unsafe {
-            // As with AVX2, the ray's part for all axes in one register.
-            let inverse = _mm_load_ps(ray.inverse.as_ptr());
-            let slack = _mm_load_ps(ray.slack.as_ptr());
-            let to = _mm_sub_ps(_mm_loadu_ps(node.origin.as_ptr()), _mm_load_ps(ray.origin.as_ptr()));
-            let base = _mm_mul_ps(to, inverse);
-            let scale = _mm_mul_ps(_mm_maskz_loadu_ps(7, node.step.as_ptr()), inverse);
-            let (early, late) = (_mm_sub_ps(base, slack), _mm_add_ps(base, slack));
-            let mut enter = _mm512_set1_ps(ray.t_min);
-            let mut leave = _mm512_set1_ps(ray.t_max);
+            // As with AVX2. What is the same for all children is spread over lanes as it is read, not in one register beforehand.
+            let (mut first, mut last) = ([_mm512_setzero_ps(); 3], [_mm512_setzero_ps(); 3]);
             for a in 0..3 {
-                let (near, scale) = (ray.entry_row(a), spread(scale, a as i32));
-                enter =
-                    _mm512_max_ps(enter, _mm512_fmadd_ps(load_bounds(node, near), scale, spread(early, a as i32)));
-                leave = _mm512_min_ps(
-                    leave,
-                    _mm512_fmadd_ps(load_bounds(node, near ^ 1), scale, spread(late, a as i32)),
-                );
+                let to = _mm512_sub_ps(_mm512_set1_ps(node.origin[a]), _mm512_set1_ps(ray.origin[a]));
+                let (inverse, slack) = (_mm512_set1_ps(ray.inverse[a]), _mm512_set1_ps(ray.slack[a]));
+                let scale = _mm512_mul_ps(inverse, _mm512_set1_ps(node.step[a]));
+                let low = _mm512_fmadd_ps(load_bounds(node, 2 * a), scale, _mm512_fmsub_ps(to, inverse, slack));
+                let high =
+                    _mm512_fmadd_ps(load_bounds(node, 2 * a + 1), scale, _mm512_fmadd_ps(to, inverse, slack));
+                first[a] = _mm512_min_ps(low, high);
+                last[a] = _mm512_max_ps(low, high);
             }
-            let leave = _mm512_mul_ps(leave, _mm512_set1_ps(LEAVE_STRETCH));
+            let (t_min, t_max) = (_mm512_set1_ps(ray.t_min), _mm512_set1_ps(ray.t_max));
+            let enter = _mm512_max_ps(_mm512_max_ps(first[0], first[1]), _mm512_max_ps(first[2], t_min));
+            let leave = _mm512_min_ps(_mm512_min_ps(last[0], last[1]), _mm512_min_ps(last[2], t_max));
             // Farthest first.
             let lanes = _mm512_setr_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
-            let order = _mm512_xor_si512(lanes, _mm512_set1_epi32(node.slot_order(ray.octant) as i32));
+            let order = _mm512_xor_si512(lanes, _mm512_set1_epi32(order as i32));
             let enter = _mm512_permutexvar_ps(order, enter);
-            let leave = _mm512_permutexvar_ps(order, leave);
+            let leave = _mm512_mul_ps(_mm512_permutexvar_ps(order, leave), _mm512_set1_ps(LEAVE_STRETCH));
             let children = _mm512_permutexvar_epi32(order, _mm512_loadu_si512(node.children.as_ptr().cast()));
-            // An unused child has link zero, and its empty box is met where the slack is wider than the node.
+            // An unused child has link zero; its box means nothing.
             let used = _mm512_test_epi32_mask(children, children);
             let met = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, leave);
             _mm512_storeu_ps(enters.as_mut_ptr(), _mm512_maskz_compress_ps(met, enter));
@@ -168,9 +157,12 @@ impl Lanes for Avx512Lanes {
         Avx2Lanes::quad_edges(corners, ray)
     }
 
-    /// As with AVX2: loads of 64 bytes would wait for the entries written by halves.
     #[inline(always)]
     fn open(enters: &[f32; 16], t_max: f32) -> u32 {
-        Avx2Lanes::open(enters, t_max)
+        // SAFETY: see the head of the file.
+        unsafe {
+            let enters = _mm512_loadu_ps(enters.as_ptr());
+            u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(enters, _mm512_set1_ps(t_max)))
+        }
     }
 }

@@ -11,7 +11,7 @@ pub(super) trait Lanes {
     /// Writes where the ray enters the children that it may meet within its range, and their links, mostly the farthest first; what lies
     /// beyond their number is of no meaning. Returns which they are, 0 for none: bit `k` for the child in slot `15 ^ k ^ order`, where
     /// `order` is [`Node::slot_order`] of the ray's octant.
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32;
+    fn enter(node: &Node, order: u32, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32;
     /// Returns which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second. Lanes without a facet
     /// have any bit.
     fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32;

@@ -36,6 +36,7 @@ mod pack;
 mod portable;
 mod quad_edges;
 mod ray;
+mod ray_stack;
 mod ray_state;
 mod settings;
 mod statistics;

@@ -29,15 +29,17 @@ pub(super) enum Target {
 }
 
 impl Link {
-    /// The bit that tells blocks from nodes.
-    const BLOCK: u32 = 1 << 31;
-    /// Blocks that a link can tell apart; the last name is taken by [`Self::END`].
-    pub(super) const MOST_BLOCKS: usize = (1 << 29) - 1;
+    /// What the two highest bits say; with none of them a link leads to a node.
+    const BLOCK: u32 = 2 << 30;
+    /// The bits of an index with the number of facets below it.
+    const PLACE: u32 = (1 << 30) - 1;
+    /// Blocks, and nodes, that links can tell apart.
+    pub(super) const MOST_BLOCKS: usize = 1 << 28;
     /// Where a ray goes that has nothing left to visit.
-    pub(super) const END: Self = Self(u32::MAX);
+    pub(super) const END: Self = Self(3 << 30);
 
     pub(super) fn node(index: usize) -> Self {
-        Self(index as u32)
+        Self((index as u32) << 2)
     }
 
     /// Names a block of `count` facets, one to four.
@@ -48,44 +50,46 @@ impl Link {
     /// What the link points at.
     #[inline(always)]
     pub(super) fn target(self) -> Target {
-        if self.0 & Self::BLOCK == 0 {
-            Target::Node(self.0 as usize)
-        } else if self == Self::END {
-            Target::End
-        } else {
-            let (index, count) = self.as_block();
-            Target::Block(index, count)
+        match self.kind() {
+            0 => Target::Node(self.index()),
+            2 => Target::Block(self.index(), self.facets()),
+            _ => Target::End,
         }
     }
 
-    /// The index of a node; of other links it is of no meaning.
     #[inline(always)]
-    pub(super) fn as_node(self) -> usize {
-        self.0 as usize
+    pub(super) fn is_node(self) -> bool {
+        self.kind() == 0
     }
 
-    /// The index of a block and its number of facets; of other links they are of no meaning.
+    /// The index of a node or block; 0 at the end.
     #[inline(always)]
-    pub(super) fn as_block(self) -> (usize, usize) {
-        (((self.0 & !Self::BLOCK) >> 2) as usize, (self.0 & 3) as usize + 1)
+    pub(super) fn index(self) -> usize {
+        ((self.0 & Self::PLACE) >> 2) as usize
     }
 
-    /// 0 for a node, 1 for a block, 2 for the end.
+    /// The number of facets of a block; of other links it is of no meaning.
+    #[inline(always)]
+    pub(super) fn facets(self) -> usize {
+        (self.0 & 3) as usize + 1
+    }
+
+    /// 0 for a node, 2 for a block, 3 for the end.
     #[inline(always)]
     pub(super) fn kind(self) -> usize {
-        (self.0 >> 31) as usize + usize::from(self == Self::END)
+        (self.0 >> 30) as usize
     }
 
     /// The same link after its target moved up by so many nodes or blocks, whichever it is; not to be asked of [`Self::END`].
     pub(super) fn moved(self, nodes: usize, blocks: usize) -> Self {
-        if self.0 & Self::BLOCK == 0 { Self(self.0 + nodes as u32) } else { Self(self.0 + ((blocks as u32) << 2)) }
+        Self(self.0 + ((if self.is_node() { nodes } else { blocks } as u32) << 2))
     }
 }
 
 /// Children of a node.
 pub(super) const CHILDREN: usize = 16;
 
-/// Up to sixteen children with boxes in eight bits a bound, `origin + bound · step`; an unused child has an empty box.
+/// Up to sixteen children with boxes in eight bits a bound, `origin + bound · step`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
@@ -93,7 +97,7 @@ pub(super) struct Node {
     pub(super) bounds: [[u8; CHILDREN]; 6],
     pub(super) origin: [f32; 3],
     pub(super) step: [f32; 3],
-    /// One bit for each child in use: a box slack can be wider than the whole node, then even an empty box is met.
+    /// One bit for each child in use; boxes of others mean nothing.
     pub(super) used: u32,
     /// The axis along which the children of slots from eight on lie above the others.
     pub(super) long_axis: u32,

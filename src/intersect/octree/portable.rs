@@ -9,20 +9,21 @@ pub(super) struct Portable;
 
 impl Lanes for Portable {
     #[inline(always)]
-    fn enter(node: &Node, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+    fn enter(node: &Node, order: u32, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
         let mut enter = [ray.t_min; 16];
         let mut leave = [ray.t_max; 16];
         for a in 0..3 {
             let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a];
             let scale = node.step[a] * ray.inverse[a];
-            let (early, late) = (base - ray.slack[a], base + ray.slack[a]);
-            let near = ray.entry_row(a);
+            let (to_low, to_high) = (base - ray.slack[a], base + ray.slack[a]);
             for k in 0..16 {
-                enter[k] = enter[k].max(f32::from(node.bounds[near][k]) * scale + early);
-                leave[k] = leave[k].min(f32::from(node.bounds[near ^ 1][k]) * scale + late);
+                let low = f32::from(node.bounds[2 * a][k]) * scale + to_low;
+                let high = f32::from(node.bounds[2 * a + 1][k]) * scale + to_high;
+                enter[k] = enter[k].max(low.min(high));
+                leave[k] = leave[k].min(low.max(high));
             }
         }
-        let order = node.slot_order(ray.octant) as usize;
+        let order = order as usize;
         let mut met = 0;
         let mut count = 0;
         for lane in 0..16 {

@@ -14,20 +14,13 @@ pub(super) struct BoxRay {
     /// The inverse direction.
     pub(super) inverse: [f32; 4],
     pub(super) origin: [f32; 4],
-    /// By how much the distance of a crossing may be wrong, by axis, mm along the ray.
+    /// By how much the distance of a crossing may be wrong, by axis, mm along the ray, with the sign of the direction: what is taken from
+    /// the crossing of a lower bound and added to that of an upper one, whichever is met first.
     pub(super) slack: [f32; 4],
     pub(super) t_min: f32,
     pub(super) t_max: f32,
-    /// One bit an axis: set where the ray runs against it and enters by upper bounds.
+    /// One bit an axis: set where the ray runs against it.
     pub(super) octant: u8,
-}
-
-impl BoxRay {
-    /// The row of [`super::node::Node::bounds`] where the ray enters along an axis; the other is where it leaves.
-    #[inline(always)]
-    pub(super) fn entry_row(&self, axis: usize) -> usize {
-        2 * axis + usize::from(self.octant >> axis & 1)
-    }
 }
 
 /// What the sieve of a block needs of a ray.

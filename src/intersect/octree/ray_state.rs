@@ -1,23 +1,14 @@
 //! A ray on its way through the tree.
 
 use super::lanes::Lanes;
-use super::node::{CHILDREN, Link, Node};
+use super::node::{Link, Node};
 use super::quad_edges::QuadRay;
 use super::ray::{BoxRay, SieveRay};
+use super::ray_stack::{Children, RayStack};
 use super::tree::Tree;
 use crate::intersect::facet::{FacetRay, Nearest};
 use crate::math::{Point, Ray, Vector};
 use std::hint::select_unpredictable;
-
-/// Places below the first entry, so that sixteen can be looked at at once; all lead to the end of the ray.
-const GROUND: usize = 16;
-
-/// Places on the stack of a ray in a tree of so many levels of nodes: of each level all children of one node and all but one of another
-/// may be left where two are entered at a time; then those written beyond the top, and the ground. With what makes the size of a
-/// [`RayState`] as it should be.
-pub(super) const fn stack_places(levels: usize) -> usize {
-    ((2 * CHILDREN - 1) * levels + CHILDREN + GROUND).next_multiple_of(16) + 8
-}
 
 /// Smallest component of a direction that is divided by: along it a ray moves by less than the room around boxes in 10⁵ scene
 /// sizes, and 1e12 mm times its inverse is still a number in f32.
@@ -55,10 +46,7 @@ pub(super) struct RayState<const STACK: usize> {
     /// The facet that the ray leaves, else one that no block has.
     pub(super) departed: u32,
     pub(super) best: Nearest,
-    /// Where the stack ends; of each entry, where the ray enters and what is there.
-    top: usize,
-    enters: [f32; STACK],
-    links: [u32; STACK],
+    pub(super) stack: RayStack<STACK>,
 }
 
 impl<const STACK: usize> RayState<STACK> {
@@ -78,10 +66,8 @@ impl<const STACK: usize> RayState<STACK> {
             unmet_facet: u32::MAX,
             candidates: 0,
             block: 0,
-            top: GROUND,
             index: usize::MAX,
-            enters: [f32::NEG_INFINITY; STACK],
-            links: [Link::END.0; STACK],
+            stack: RayStack::EMPTY,
         }
     }
 
@@ -120,7 +106,7 @@ impl<const STACK: usize> RayState<STACK> {
             let o = exact as f32;
             b.origin[a] = o;
             b.inverse[a] = inverse;
-            b.slack[a] = ((4.0 * o.abs() + mesh_box.reach[a]) * ROUNDING + moved) * inverse.abs();
+            b.slack[a] = ((4.0 * o.abs() + mesh_box.reach[a]) * ROUNDING + moved) * inverse;
             self.sieve.high[a] = o;
             self.sieve.low[a] = (exact - f64::from(o)) as f32;
             octant |= u8::from(inverse < 0.0) << a;
@@ -141,7 +127,7 @@ impl<const STACK: usize> RayState<STACK> {
         self.limit_to_hit();
         self.next = Link(select_unpredictable(meets, root.0, Link::END.0));
         self.candidates = 0;
-        self.top = GROUND;
+        self.stack.clear();
         self.index = index;
     }
 
@@ -153,111 +139,24 @@ impl<const STACK: usize> RayState<STACK> {
         self.boxes.t_max = t_max;
     }
 
-    /// Writes the children of a node that the ray may meet above the top of the stack, which stays where it is: [`Self::take_nearest`],
-    /// [`Self::keep_all`] or [`Self::advance`] takes them.
+    /// Writes the children of a node that the ray may meet above the top of its stack.
     #[inline(always)]
     pub(super) fn enter<L: Lanes>(&mut self, node: &Node) -> Children {
-        let base = self.top.min(STACK - CHILDREN);
-        let enters = self.enters[base..base + CHILDREN].first_chunk_mut();
-        let links = self.links[base..base + CHILDREN].first_chunk_mut();
-        let met = match (enters, links) {
-            (Some(enters), Some(links)) => L::enter(node, &self.boxes, enters, links),
-            _ => unreachable!("sixteen places"),
-        };
-        // The link of the nearest is read from the node: on the stack it was written just now.
-        let lane = met.leading_zeros() ^ 31;
-        let nearest = node.children[((15 ^ lane ^ node.slot_order(self.boxes.octant)) & 15) as usize];
-        Children { count: met.count_ones() as usize, nearest }
+        self.stack.enter::<L>(node, &self.boxes)
     }
 
-    /// Returns the nearest of the children that were just written, at least one, and keeps the others on the stack.
+    /// Goes on to the nearest of the children that were just written, or where there are none to what else is nearest.
     #[inline(always)]
-    pub(super) fn take_nearest(&mut self, children: Children) -> Link {
-        self.top = (self.top + children.count - 1).min(STACK - CHILDREN);
-        Link(children.nearest)
+    pub(super) fn advance<L: Lanes>(&mut self, children: Children) {
+        self.next = self.stack.advance::<L>(children, self.boxes.t_max);
     }
 
-    /// Keeps all children that were just written on the stack.
-    #[inline(always)]
-    pub(super) fn keep_all(&mut self, children: Children) {
-        self.top = (self.top + children.count).min(STACK - CHILDREN);
-    }
-
-    /// The topmost entry of the stack, which keeps it; the end of the ray where it is empty.
-    #[inline(always)]
-    pub(super) fn peek(&self) -> Link {
-        Link(self.links[(self.top - 1) % STACK])
-    }
-
-    /// Takes the topmost entry off the stack if it is a node that is not beyond the ray's limit, and returns the node's index; else `None`,
-    /// and the stack stays.
-    #[inline(always)]
-    pub(super) fn take_open_node(&mut self) -> Option<usize> {
-        let (top, link) = ((self.top - 1) % STACK, self.peek());
-        let is_open = (link.kind() == 0) & (self.enters[top] <= self.boxes.t_max);
-        if is_open {
-            self.top = top;
-        }
-        is_open.then(|| link.as_node())
-    }
-
-    /// Takes entries off the stack up to one that is not beyond `t_max`, and returns it; [`Link::END`] when there is none.
-    #[inline(always)]
-    pub(super) fn pop(&mut self, t_max: f32) -> Link {
-        while self.top > GROUND {
-            self.top -= 1;
-            if self.enters[self.top] <= t_max {
-                return Link(self.links[self.top]);
-            }
-        }
-        Link::END
-    }
-
-    /// Returns the nearest of the children that were just written and keeps the others; where there are none, the topmost entry that is not
-    /// beyond the ray's limit, taken off the stack with all above it. No branch depends on which.
-    #[inline(always)]
-    pub(super) fn advance<L: Lanes>(&mut self, children: Children) -> Link {
-        let mut top = self.top.clamp(GROUND, STACK - CHILDREN);
-        let mut open = self.open_below::<L>(top);
-        // The ground is open to all. One test of both: whether there are children cannot be foretold, that there is anything can.
-        while open | children.count as u32 == 0 {
-            top = (top - GROUND).max(GROUND);
-            open = self.open_below::<L>(top);
-        }
-        let below = top - 1 - ((open | 1) << 16).leading_zeros() as usize;
-        let above = top + children.count - 1;
-        let older = self.links[below % STACK];
-        self.top = select_unpredictable(children.count > 0, above, below).min(STACK - CHILDREN);
-        Link(select_unpredictable(children.count > 0, children.nearest, older))
-    }
-
-    /// Which of the sixteen entries below `top` are not beyond the ray's limit, one bit each, the topmost highest.
-    #[inline(always)]
-    fn open_below<L: Lanes>(&self, top: usize) -> u32 {
-        match self.enters[top - GROUND..].first_chunk() {
-            Some(entries) => L::open(entries, self.boxes.t_max),
-            None => 1,
-        }
-    }
-
-    /// Puts `next` back on the stack and takes the topmost entry that is not beyond the limit, which a hit has brought nearer.
+    /// Puts `next`, which came from the stack, back and takes the topmost entry that is not beyond the limit, which a hit has brought nearer.
     #[inline(always)]
     pub(super) fn recheck_next<L: Lanes>(&mut self) {
-        self.top += usize::from(self.next != Link::END);
-        self.next = self.advance::<L>(Children::NONE);
+        self.stack.put_back();
+        self.advance::<L>(Children::NONE);
     }
-}
-
-/// Children of a node that were written above the top of the stack.
-#[derive(Clone, Copy)]
-pub(super) struct Children {
-    pub(super) count: usize,
-    /// The link of the nearest.
-    nearest: u32,
-}
-
-impl Children {
-    pub(super) const NONE: Self = Self { count: 0, nearest: 0 };
 }
 
 /// Calls [`crate::intersect::facet::Surroundings::lifted`] out of line, for few rays graze the facet that they leave.

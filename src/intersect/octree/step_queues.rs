@@ -1,70 +1,93 @@
 //! The rays of a batch under way, by what each does next.
 
-/// Rays under way at a time: a power of two, so that places are cut to it by a mask. With 64 their states leave less of the first cache to
-/// the tree, and a walk takes 5 % longer.
+use super::node::Link;
+
+/// Rays under way at a time, one bit each in a queue. With 64 their states leave less of the first cache to the tree, and a walk takes 5 %
+/// longer.
 pub(super) const WIDTH: usize = 32;
 
-/// Kinds of steps; the first three are those of [`super::node::Link::kind`].
-pub(super) const NODE: usize = 0;
-pub(super) const BLOCK: usize = 1;
-pub(super) const END: usize = 2;
-/// Asking for the corners of facets that the sieve left, and testing them.
-pub(super) const CORNERS: usize = 3;
-pub(super) const EXACT: usize = 4;
+/// Some of the rays under way, one bit each, by their places.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Rays(pub(super) u32);
+
+impl Rays {
+    #[inline(always)]
+    pub(super) fn count(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// Adds a ray where `is_in`.
+    #[inline(always)]
+    pub(super) fn add_if(&mut self, is_in: bool, ray: usize) {
+        self.0 |= u32::from(is_in) << (ray % WIDTH);
+    }
+}
+
+/// Their places, in rising order.
+impl Iterator for Rays {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let ray = self.0.trailing_zeros() as usize % WIDTH;
+        let found = self.0 != 0;
+        self.0 &= self.0.wrapping_sub(1);
+        found.then_some(ray)
+    }
+}
 
 /// Rays by the kind of their next step.
+///
+/// Bits of numbers that stay in registers: a list in memory, to which rays are added by what was just computed of them, makes the processor
+/// wait for each before it can know where the next belongs.
+#[derive(Default)]
 pub(super) struct StepQueues {
-    rays: [[u8; WIDTH]; 8],
-    count: [usize; 8],
+    /// To enter a node.
+    pub(super) node: Rays,
+    /// To sift a block.
+    pub(super) block: Rays,
+    /// To ask for the corners of facets that the sieve left.
+    pub(super) corners: Rays,
+    /// To test them.
+    pub(super) exact: Rays,
+    /// At their ends.
+    pub(super) end: Rays,
 }
 
 impl StepQueues {
-    pub(super) const EMPTY: Self = Self { rays: [[0; WIDTH]; 8], count: [0; 8] };
-
-    /// Adds a ray, by its place among those under way, to the queue of a kind.
+    /// Adds rays by where they go next.
     #[inline(always)]
-    pub(super) fn put(&mut self, kind: usize, ray: u8) {
-        let kind = kind & 7;
-        self.rays[kind][self.count[kind] % WIDTH] = ray;
-        self.count[kind] += 1;
-    }
-
-    /// Rays in the queue of a kind.
-    #[inline(always)]
-    pub(super) fn count(&self, kind: usize) -> usize {
-        self.count[kind]
-    }
-
-    /// Empties the queue of a kind and returns what was in it.
-    #[inline(always)]
-    pub(super) fn take(&mut self, kind: usize) -> Queue {
-        Queue { rays: self.rays[kind], count: std::mem::take(&mut self.count[kind]).min(WIDTH) }
-    }
-
-    /// Takes up to `most` rays out of the queue of a kind, those that came last.
-    #[inline(always)]
-    pub(super) fn take_last(&mut self, kind: usize, most: usize) -> Queue {
-        let count = self.count[kind].min(most);
-        self.count[kind] -= count;
-        let mut rays = [0; WIDTH];
-        for (k, ray) in rays.iter_mut().enumerate().take(count) {
-            *ray = self.rays[kind][(self.count[kind] + k) % WIDTH];
-        }
-        Queue { rays, count }
+    pub(super) fn put(&mut self, ways: &Ways) {
+        let Ways { rays, blocks_or_ends, ends } = *ways;
+        self.node.0 |= rays & !blocks_or_ends;
+        self.block.0 |= rays & blocks_or_ends & !ends;
+        self.end.0 |= rays & ends;
     }
 }
 
-/// Rays whose next steps are of one kind.
-pub(super) struct Queue {
-    rays: [u8; WIDTH],
-    /// How many of them mean something.
-    pub(super) count: usize,
+/// Rays and where they go next.
+#[derive(Default)]
+pub(super) struct Ways {
+    rays: u32,
+    /// Of all that were noted.
+    blocks_or_ends: u32,
+    ends: u32,
 }
 
-impl Queue {
+impl Ways {
+    /// Notes where a ray goes next.
     #[inline(always)]
-    pub(super) fn rays(&self) -> &[u8] {
-        &self.rays[..self.count]
+    pub(super) fn note(&mut self, ray: usize, link: Link) {
+        self.note_if(true, ray, link);
+    }
+
+    /// Notes where a ray goes next if `is_in`.
+    #[inline(always)]
+    pub(super) fn note_if(&mut self, is_in: bool, ray: usize, link: Link) {
+        let ray = ray % WIDTH;
+        self.rays |= u32::from(is_in) << ray;
+        self.blocks_or_ends |= (link.kind() as u32 >> 1) << ray;
+        self.ends |= (link.kind() as u32 & 1) << ray;
     }
 }
 
@@ -73,15 +96,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_are_taken_and_the_others_stay() {
-        let mut queues = StepQueues::EMPTY;
-        (0..11).for_each(|ray| queues.put(EXACT, ray));
-        queues.put(NODE, 31);
-        assert_eq!(queues.take_last(EXACT, 8).rays(), [3, 4, 5, 6, 7, 8, 9, 10]);
-        queues.put(EXACT, 20);
-        assert_eq!(queues.count(EXACT), 4);
-        assert_eq!(queues.take_last(EXACT, 8).rays(), [0, 1, 2, 20]);
-        assert_eq!(queues.take(NODE).rays(), [31]);
-        assert_eq!([EXACT, NODE, END].map(|kind| queues.count(kind)), [0; 3]);
+    fn rays_are_queued_by_where_they_go_next() {
+        let mut ways = Ways::default();
+        let links = [Link::node(7), Link::block(3, 4), Link::END, Link::block(0, 1), Link::node(0), Link::END];
+        for (ray, link) in links.into_iter().enumerate() {
+            ways.note_if(ray != 5, 6 * ray, link);
+        }
+        let mut queues = StepQueues::default();
+        queues.node.add_if(true, 31);
+        queues.node.add_if(false, 1);
+        queues.put(&ways);
+        assert_eq!(queues.node.collect::<Vec<_>>(), [0, 24, 31]);
+        assert_eq!(queues.block.collect::<Vec<_>>(), [6, 18]);
+        assert_eq!(queues.end.collect::<Vec<_>>(), [12]);
+        assert_eq!([queues.node, queues.block, queues.corners].map(Rays::count), [3, 2, 0]);
     }
 }

@@ -8,15 +8,16 @@ use super::facet_lanes::{FacetLanes, LANES, Verdict};
 use super::lanes::Lanes;
 use super::light_buffer::{self, LightBuffer};
 use super::node::{Block, Link, Node, Target};
-use super::ray_state::{Children, RayState, stack_places};
-use super::step_queues::{BLOCK, CORNERS, END, EXACT, NODE, Queue, StepQueues, WIDTH};
+use super::ray_stack::{Children, stack_places};
+use super::ray_state::RayState;
+use super::step_queues::{Rays, StepQueues, WIDTH, Ways};
 use super::tree::Tree;
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
-use crate::intersect::prefetch::{prefetch, prefetch_either};
+use crate::intersect::prefetch::{prefetch, prefetch_lines};
 use crate::math::{Point, Ray};
 use std::cell::RefCell;
-use std::hint::select_unpredictable;
+use std::mem::take;
 use std::thread::LocalKey;
 
 /// Rays walked before their hits are described: 16 rays that end late cost 2 % of it.
@@ -109,12 +110,20 @@ struct Arrays<'t> {
     nodes: &'t [Node],
     blocks: &'t [Block],
     positions: &'t [Point],
+    /// Where the nodes or blocks begin that a link leads to, by its kind; at the end of a ray any.
+    starts: [*const u8; 4],
 }
 
 impl<'t> Arrays<'t> {
     #[inline(always)]
     fn new(tree: &'t Tree) -> Self {
-        Self { nodes: &tree.nodes, blocks: &tree.blocks, positions: &tree.surroundings.mesh.positions }
+        let (nodes, blocks) = (tree.nodes.as_ptr().cast(), tree.blocks.as_ptr().cast());
+        Self {
+            nodes: &tree.nodes,
+            blocks: &tree.blocks,
+            positions: &tree.surroundings.mesh.positions,
+            starts: [nodes, nodes, blocks, nodes],
+        }
     }
 }
 
@@ -127,24 +136,25 @@ fn walk_one<L: Lanes, const STACK: usize>(tree: &Tree, s: &mut RayState<STACK>, 
             Target::Node(index) => {
                 cost.nodes += 1;
                 // Two at a time: one waits for its memory and its own arithmetic most of the time, and the second is mostly needed.
-                if let Some(second) = s.take_open_node() {
+                if let Some(second) = s.stack.take_open_node(s.boxes.t_max) {
                     cost.nodes += 1;
-                    let children = s.enter::<L>(&arrays.nodes[second]);
-                    s.keep_all(children);
+                    let children = s.enter::<L>(&arrays.nodes[second.index()]);
+                    s.stack.keep_all(children);
                 }
                 let children = s.enter::<L>(&arrays.nodes[index]);
-                s.next = if children.count > 0 { s.take_nearest(children) } else { s.pop(s.boxes.t_max) };
-                prefetch_step(arrays, s.next);
-                prefetch_step(arrays, s.peek());
+                s.next =
+                    if children.count > 0 { s.stack.take_nearest(children) } else { s.stack.pop(s.boxes.t_max) };
+                prefetch_step(&arrays, s.next);
+                prefetch_step(&arrays, s.stack.peek());
             }
             Target::Block(index, count) => {
                 cost.tests += count as u64;
                 s.block = index as u32;
                 s.candidates = sift::<L, STACK>(&arrays.blocks[index], s) & used_lanes(count);
                 if s.candidates != 0 {
-                    test_candidates::<L, STACK>(tree, arrays, s);
+                    test_candidates::<L, STACK>(tree, &arrays, s);
                 }
-                s.next = s.pop(s.boxes.t_max);
+                s.next = s.stack.pop(s.boxes.t_max);
             }
             Target::End => return,
         }
@@ -163,31 +173,35 @@ fn walk_batch<L: Lanes, const STACK: usize>(
     cost: &mut Cost,
 ) {
     let arrays = Arrays::new(tree);
-    let mut queues = StepQueues::EMPTY;
+    let mut queues = StepQueues::default();
     let mut lanes = FacetLanes::new();
     let mut live = order.len().min(WIDTH);
     let mut next = live;
     // As many as fit are under way; whoever ends hands its place to the next.
+    let mut ways = Ways::default();
     for (ray, (state, &place)) in states.iter_mut().zip(order).enumerate().take(live) {
         let place = usize::from(place);
         state.start(tree, root, &rays[place], place);
-        queues.put(state.next.kind(), ray as u8);
+        ways.note(ray, state.next);
     }
+    queues.put(&ways);
     while live > 0 {
-        let queue = queues.take(NODE);
-        cost.nodes += queue.count as u64;
-        for &ray in queue.rays() {
-            let s = &mut states[usize::from(ray) % WIDTH];
-            let children = s.enter::<L>(&arrays.nodes[s.next.as_node()]);
-            s.next = s.advance::<L>(children);
-            prefetch_step(arrays, s.next);
-            queues.put(s.next.kind(), ray);
+        let entering = take(&mut queues.node);
+        cost.nodes += entering.count() as u64;
+        let mut ways = Ways::default();
+        for ray in entering {
+            let s = &mut states[ray];
+            let children = s.enter::<L>(&arrays.nodes[s.next.index()]);
+            s.advance::<L>(children);
+            prefetch_step(&arrays, s.next);
+            ways.note(ray, s.next);
         }
+        queues.put(&ways);
         // Here, not last: a ray that is started and at once asked for its first node waits until what was written of it has left the
         // processor's store buffer, which took an eighth of the walk.
-        let queue = queues.take(END);
-        for &ray in queue.rays() {
-            let s = &mut states[usize::from(ray) % WIDTH];
+        let mut ways = Ways::default();
+        for ray in take(&mut queues.end) {
+            let s = &mut states[ray];
             hits[s.index] = s.best.hit();
             if let Some(&place) = order.get(next) {
                 let place = usize::from(place);
@@ -199,30 +213,31 @@ fn walk_batch<L: Lanes, const STACK: usize>(
                     prefetch(&tree.slopes, from.primitive as usize);
                 }
                 s.start(tree, root, &rays[place], place);
-                queues.put(s.next.kind(), ray);
+                ways.note(ray, s.next);
                 next += 1;
             } else {
                 live -= 1;
             }
         }
-        let queue = queues.take(BLOCK);
-        for &ray in queue.rays() {
-            let s = &mut states[usize::from(ray) % WIDTH];
+        queues.put(&ways);
+        let mut ways = Ways::default();
+        for ray in take(&mut queues.block) {
+            let s = &mut states[ray];
             // The sieve knows rounded corners only; what it leaves asks for its true ones first.
-            let (index, count) = s.next.as_block();
+            let (index, count) = (s.next.index(), s.next.facets());
             cost.tests += count as u64;
             s.block = index as u32;
             s.candidates = sift::<L, STACK>(&arrays.blocks[index], s) & used_lanes(count);
-            s.next = s.advance::<L>(Children::NONE);
-            prefetch_step(arrays, s.next);
-            queues.put(select_unpredictable(s.candidates != 0, CORNERS, s.next.kind()), ray);
+            s.advance::<L>(Children::NONE);
+            prefetch_step(&arrays, s.next);
+            queues.corners.add_if(s.candidates != 0, ray);
+            ways.note_if(s.candidates == 0, ray, s.next);
         }
-        test_waiting::<L, STACK>(tree, arrays, states, &mut queues, &mut lanes);
-        let queue = queues.take(CORNERS);
-        for &ray in queue.rays() {
-            let s = &states[usize::from(ray) % WIDTH];
-            prefetch_corners(arrays, s);
-            queues.put(EXACT, ray);
+        queues.put(&ways);
+        test_waiting::<L, STACK>(tree, &arrays, states, &mut queues, &mut lanes);
+        queues.exact.0 |= queues.corners.0;
+        for ray in take(&mut queues.corners) {
+            prefetch_corners(&arrays, &states[ray]);
         }
     }
 }
@@ -244,16 +259,17 @@ fn used_lanes(count: usize) -> u32 {
     ((1 << count) - 1) * 0x11
 }
 
-/// Asks for the memory of a node or block; at the end for the first block.
+/// Asks for the memory of a node or block, three lines of the cache each; at the end for the first node.
 #[inline(always)]
-fn prefetch_step(arrays: Arrays, link: Link) {
-    let block = select_unpredictable(link == Link::END, 0, link.as_block().0);
-    prefetch_either(link.kind() != NODE, (arrays.blocks, block), (arrays.nodes, link.as_node()));
+fn prefetch_step(arrays: &Arrays, link: Link) {
+    const { assert!(size_of::<Node>() == size_of::<Block>(), "one stride for both") };
+    let start = arrays.starts[link.kind()].wrapping_add(link.index() * size_of::<Node>());
+    prefetch_lines::<{ size_of::<Node>() / 64 }>(start);
 }
 
 /// Asks for the memory of the corners of the facets that the sieve left, at least one; nearly always it is one.
 #[inline(always)]
-fn prefetch_corners<const STACK: usize>(arrays: Arrays, s: &RayState<STACK>) {
+fn prefetch_corners<const STACK: usize>(arrays: &Arrays, s: &RayState<STACK>) {
     let block = &arrays.blocks[s.block as usize];
     let mut mask = (s.candidates | s.candidates >> 4) & 15;
     loop {
@@ -273,46 +289,54 @@ fn prefetch_corners<const STACK: usize>(arrays: Arrays, s: &RayState<STACK>) {
 #[inline(always)]
 fn test_waiting<L: Lanes, const STACK: usize>(
     tree: &Tree,
-    arrays: Arrays,
+    arrays: &Arrays,
     states: &mut States<STACK>,
     queues: &mut StepQueues,
     lanes: &mut FacetLanes,
 ) {
     loop {
-        let waiting = queues.count(EXACT);
-        if waiting < LANES && (waiting == 0 || queues.count(NODE) + queues.count(BLOCK) > 0) {
+        let waiting = queues.exact.count();
+        if waiting < LANES && (waiting == 0 || queues.node.0 | queues.block.0 != 0) {
             return;
         }
-        let queue = queues.take_last(EXACT, LANES);
-        test_in_lanes(tree, arrays, states, &queue, lanes);
-        for &ray in queue.rays() {
-            let s = &mut states[usize::from(ray) % WIDTH];
+        // The first eight.
+        let mut later = queues.exact;
+        for _ in 0..LANES {
+            later.next();
+        }
+        let tested = Rays(queues.exact.0 & !later.0);
+        queues.exact = later;
+        test_in_lanes(tree, arrays, states, tested, lanes);
+        let mut ways = Ways::default();
+        for ray in tested {
+            let s = &mut states[ray];
             s.limit_to_hit();
             if s.candidates != 0 {
-                queues.put(EXACT, ray);
+                queues.exact.add_if(true, ray);
                 continue;
             }
             // What was next may lie beyond the new hit.
             s.recheck_next::<L>();
             prefetch_step(arrays, s.next);
-            queues.put(s.next.kind(), ray);
+            ways.note(ray, s.next);
         }
+        queues.put(&ways);
     }
 }
 
-/// Tests one facet that the sieve left for each ray of a queue, at most [`LANES`], in f64, and keeps the nearest hits; what is left in the
+/// Tests one facet that the sieve left for each of some rays, at most [`LANES`], in f64, and keeps the nearest hits; what is left in the
 /// rays' candidates is still to be tested.
 #[inline(always)]
 fn test_in_lanes<const STACK: usize>(
     tree: &Tree,
-    arrays: Arrays,
+    arrays: &Arrays,
     states: &mut States<STACK>,
-    queue: &Queue,
+    tested: Rays,
     lanes: &mut FacetLanes,
 ) {
     let mut asked = [(0, 0); LANES];
-    for (lane, &ray) in queue.rays().iter().enumerate().take(LANES) {
-        let s = &mut states[usize::from(ray) % WIDTH];
+    for (lane, ray) in tested.enumerate().take(LANES) {
+        let s = &mut states[ray];
         let block = &arrays.blocks[s.block as usize];
         let k = ((s.candidates | s.candidates >> 4).trailing_zeros() & 3) as usize;
         let triangles = block.triangles(k, s.candidates);
@@ -322,8 +346,8 @@ fn test_in_lanes<const STACK: usize>(
         asked[lane] = (k, triangles);
     }
     lanes.test(tree.surroundings.reach);
-    for (lane, &ray) in queue.rays().iter().enumerate().take(LANES) {
-        let s = &mut states[usize::from(ray) % WIDTH];
+    for (lane, ray) in tested.enumerate().take(LANES) {
+        let s = &mut states[ray];
         let (k, triangles) = asked[lane];
         let block = &arrays.blocks[s.block as usize];
         let verdict = lanes.verdict(lane);
@@ -338,7 +362,7 @@ fn test_in_lanes<const STACK: usize>(
 
 /// Tests the triangles that the sieve left in f64, keeps the nearest hit and limits the boxes to it. There must be at least one.
 #[inline(always)]
-fn test_candidates<L: Lanes, const STACK: usize>(tree: &Tree, arrays: Arrays, s: &mut RayState<STACK>) {
+fn test_candidates<L: Lanes, const STACK: usize>(tree: &Tree, arrays: &Arrays, s: &mut RayState<STACK>) {
     let block = &arrays.blocks[s.block as usize];
     let candidates = s.candidates;
     let mut mask = (candidates | candidates >> 4) & 15;
