@@ -23,7 +23,7 @@ unsafe fn load_bounds(node: &Node, row: usize, first: usize) -> __m256 {
 }
 
 #[inline(always)]
-unsafe fn broadcast_axis(v: &[f32; 3], axis: usize) -> __m256 {
+unsafe fn broadcast_axis(v: &[f32; 4], axis: usize) -> __m256 {
     unsafe { _mm256_set1_ps(*v.get_unchecked(axis)) }
 }
 
@@ -31,6 +31,27 @@ unsafe fn broadcast_axis(v: &[f32; 3], axis: usize) -> __m256 {
 #[inline(always)]
 unsafe fn ordered(corner: __m256d, order: __m256i) -> __m256d {
     unsafe { _mm256_castps_pd(_mm256_permutevar8x32_ps(_mm256_castpd_ps(corner), order)) }
+}
+
+/// The origin of a block relative to that of the ray, mm, and its step.
+#[inline(always)]
+pub(super) unsafe fn block_from_ray(block: &Block, ray: &SieveRay) -> __m128 {
+    unsafe {
+        // In two parts: of a start far from the block one `f32` would lose the digits that tell the corners apart.
+        let origin_and_step = std::ptr::from_ref(block).byte_add(std::mem::offset_of!(Block, origin));
+        let from_high = _mm_sub_ps(_mm_load_ps(origin_and_step.cast()), _mm_load_ps(ray.high.as_ptr()));
+        _mm_sub_ps(from_high, _mm_load_ps(ray.low.as_ptr()))
+    }
+}
+
+/// The largest size of four numbers.
+#[inline(always)]
+pub(super) unsafe fn largest(v: __m128) -> f32 {
+    unsafe {
+        let sizes = _mm_andnot_ps(_mm_set1_ps(-0.0), v);
+        let pairs = _mm_max_ps(sizes, _mm_movehl_ps(sizes, sizes));
+        _mm_cvtss_f32(_mm_max_ss(pairs, _mm_movehdup_ps(pairs)))
+    }
 }
 
 /// Eight corners of a block along an axis from the lane `first` on, relative to the ray's origin, mm.
@@ -138,14 +159,13 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32 {
-        // SAFETY: see the head of the file; `axes` are 0..3 by construction.
+    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay, unmet: u32) -> u32 {
+        // SAFETY: see the head of the file; `axes` are 0..3 by construction, and after the origin of a block comes its step.
         unsafe {
-            // The origin in two parts: of a start far from the block one `f32` would lose the digits that tell the
-            // corners apart.
-            let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
-            let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
-            let corner = corner_error(block.step, far, ray.slack);
+            let from_ray = block_from_ray(block, ray);
+            let corner = corner_error(block.step, largest(from_ray), ray.slack);
+            let mut to = [0.0; 4];
+            _mm_storeu_ps(to.as_mut_ptr(), from_ray);
             let error = _mm256_set1_ps(edge_error(block.step, corner));
             let step = _mm256_set1_ps(block.step);
             let [kx, ky, kz] = ray.axes.map(usize::from);
@@ -177,8 +197,11 @@ impl Lanes for Avx2Lanes {
             let late = _mm256_cmp_ps::<_CMP_GT_OQ>(first, _mm256_set1_ps(boxes.t_max + 2.0 * corner));
             let early = _mm256_cmp_ps::<_CMP_LT_OQ>(last, _mm256_set1_ps(boxes.t_min - 2.0 * corner));
             let outside = _mm256_or_ps(_mm256_and_ps(below, above), _mm256_or_ps(late, early));
+            let facets = _mm_loadu_si128(block.facets.as_ptr().cast());
+            let own = _mm_cmpeq_epi32(facets, _mm_set1_epi32(unmet as i32));
+            let own = _mm_movemask_ps(_mm_castsi128_ps(own)) as u32;
             // Negated, so that NaN keeps a facet rather than drops it.
-            !(_mm256_movemask_ps(outside) as u32) & 255
+            !(_mm256_movemask_ps(outside) as u32 | own | own << 4) & 255
         }
     }
 

@@ -5,7 +5,7 @@
 //! [`Node`] and [`Block`], and because axes are below three.
 #![allow(unsafe_code)]
 
-use super::avx2::Avx2Lanes;
+use super::avx2::{Avx2Lanes, block_from_ray, largest};
 use super::facet_pair::{Corners, Edges};
 use super::lanes::Lanes;
 use super::node::{Block, Node};
@@ -34,7 +34,7 @@ unsafe fn swap_halves(v: __m256) -> __m256 {
 
 /// The sixteen corners of a block along an axis relative to the ray's origin, mm.
 #[inline(always)]
-unsafe fn sieve_row(block: &Block, axis: u8, step: __m512, to: &[f32; 3]) -> __m512 {
+unsafe fn sieve_row(block: &Block, axis: u8, step: __m512, to: &[f32; 4]) -> __m512 {
     unsafe {
         let axis = usize::from(axis);
         let corners = _mm256_loadu_si256(block.corners.get_unchecked(axis).as_ptr().cast());
@@ -88,21 +88,20 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32 {
-        // SAFETY: see the head of the file.
+    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay, unmet: u32) -> u32 {
+        // SAFETY: see the head of the file; after the origin of a block comes its step.
         unsafe {
-            // The origin in two parts: of a start far from the block one `f32` would lose the digits that tell the
-            // corners apart.
-            let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
-            let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
-            let corner = corner_error(block.step, far, ray.slack);
-            let error = _mm256_set1_ps(edge_error(block.step, corner));
             let step = _mm512_set1_ps(block.step);
+            let to = block_from_ray(block, ray);
+            let corner = corner_error(block.step, largest(to), ray.slack);
+            let error = _mm256_set1_ps(edge_error(block.step, corner));
+            let mut axes_to = [0.0; 4];
+            _mm_storeu_ps(axes_to.as_mut_ptr(), to);
             let [kx, ky, kz] = ray.axes;
             let [sx, sy, sz] = ray.shear;
-            let z = sieve_row(block, kz, step, &to);
-            let x = _mm512_fnmadd_ps(_mm512_set1_ps(sx), z, sieve_row(block, kx, step, &to));
-            let y = _mm512_fnmadd_ps(_mm512_set1_ps(sy), z, sieve_row(block, ky, step, &to));
+            let z = sieve_row(block, kz, step, &axes_to);
+            let x = _mm512_fnmadd_ps(_mm512_set1_ps(sx), z, sieve_row(block, kx, step, &axes_to));
+            let y = _mm512_fnmadd_ps(_mm512_set1_ps(sy), z, sieve_row(block, ky, step, &axes_to));
             let t = _mm512_mul_ps(z, _mm512_set1_ps(sz));
             let (ax, bx) = (_mm512_castps512_ps256(x), _mm512_extractf32x8_ps::<1>(x));
             let (ay, by) = (_mm512_castps512_ps256(y), _mm512_extractf32x8_ps::<1>(y));
@@ -114,13 +113,18 @@ impl Lanes for Avx512Lanes {
             let w = _mm256_fmsub_ps(bx, ay, _mm256_mul_ps(by, ax));
             let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
             let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
-            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(least, _mm256_sub_ps(_mm256_setzero_ps(), error));
-            let above = _mm256_cmp_ps_mask::<_CMP_GT_OQ>(most, error);
             let first = _mm256_min_ps(_mm256_min_ps(at, bt), ct);
             let last = _mm256_max_ps(_mm256_max_ps(at, bt), ct);
-            let late = _mm256_cmp_ps_mask::<_CMP_GT_OQ>(first, _mm256_set1_ps(boxes.t_max + 2.0 * corner));
-            let early = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(last, _mm256_set1_ps(boxes.t_min - 2.0 * corner));
-            u32::from(!(below & above | late | early))
+            // Chains of comparisons, each of what the one before left; not a number is no reason to drop a facet.
+            let (t_min, t_max) = (boxes.t_min - 2.0 * corner, boxes.t_max + 2.0 * corner);
+            let zero = _mm256_setzero_ps();
+            let within = _mm256_cmp_ps_mask::<_CMP_NGT_UQ>(first, _mm256_set1_ps(t_max));
+            let within = _mm256_mask_cmp_ps_mask::<_CMP_NLT_UQ>(within, last, _mm256_set1_ps(t_min));
+            let outside = _mm256_cmp_ps_mask::<_CMP_GT_OQ>(most, error);
+            let outside = _mm256_mask_cmp_ps_mask::<_CMP_LT_OQ>(outside, _mm256_add_ps(least, error), zero);
+            let facets = _mm_loadu_si128(block.facets.as_ptr().cast());
+            let own = u32::from(_mm_cmpeq_epi32_mask(facets, _mm_set1_epi32(unmet as i32)));
+            u32::from(within & !outside) & !(own | own << 4)
         }
     }
 

@@ -12,9 +12,9 @@ pub(super) trait Lanes {
     /// beyond their number is of no meaning. Returns which they are, 0 for none: bit `k` for the child in slot `15 ^ k ^ order`, where
     /// `order` is [`Node::slot_order`] of the ray's octant.
     fn enter(node: &Node, order: u32, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32;
-    /// Returns which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second. Lanes without a facet
-    /// have any bit.
-    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32;
+    /// Returns which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second; without those of the
+    /// facet `unmet`. Lanes without a facet have any bit.
+    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay, unmet: u32) -> u32;
     /// Overwrites `edges` with the edge functions of two facets; every implementation gives the same bits.
     #[inline(always)]
     fn pair_edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {

@@ -39,7 +39,7 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> u32 {
+    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay, unmet: u32) -> u32 {
         let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
         let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
         let corner = corner_error(block.step, far, ray.slack);
@@ -65,7 +65,8 @@ impl Lanes for Portable {
             let outside = u.min(v).min(w) < -error && u.max(v).max(w) > error;
             let late = at[k].min(bt[k]).min(ct) > t_max;
             let early = at[k].max(bt[k]).max(ct) < t_min;
-            mask |= u32::from(!(outside | late | early)) << k;
+            let is_own = block.facets[k & 3] == unmet;
+            mask |= u32::from(!(outside | late | early | is_own)) << k;
         }
         mask
     }

@@ -150,7 +150,7 @@ fn walk_one<L: Lanes, const STACK: usize>(tree: &Tree, s: &mut RayState<STACK>, 
             Target::Block(index, count) => {
                 cost.tests += count as u64;
                 s.block = index as u32;
-                s.candidates = sift::<L, STACK>(&arrays.blocks[index], s) & used_lanes(count);
+                s.candidates = sift::<L, STACK>(&arrays.blocks[index], count, s);
                 if s.candidates != 0 {
                     test_candidates::<L, STACK>(tree, &arrays, s);
                 }
@@ -221,18 +221,20 @@ fn walk_batch<L: Lanes, const STACK: usize>(
         }
         queues.put(&ways);
         let mut ways = Ways::default();
+        let mut tests = 0;
         for ray in take(&mut queues.block) {
             let s = &mut states[ray];
             // The sieve knows rounded corners only; what it leaves asks for its true ones first.
             let (index, count) = (s.next.index(), s.next.facets());
-            cost.tests += count as u64;
+            tests += count as u64;
             s.block = index as u32;
-            s.candidates = sift::<L, STACK>(&arrays.blocks[index], s) & used_lanes(count);
+            s.candidates = sift::<L, STACK>(&arrays.blocks[index], count, s);
             s.advance::<L>(Children::NONE);
             prefetch_step(&arrays, s.next);
             queues.corners.add_if(s.candidates != 0, ray);
             ways.note_if(s.candidates == 0, ray, s.next);
         }
+        cost.tests += tests;
         queues.put(&ways);
         test_waiting::<L, STACK>(tree, &arrays, states, &mut queues, &mut lanes);
         queues.exact.0 |= queues.corners.0;
@@ -242,15 +244,11 @@ fn walk_batch<L: Lanes, const STACK: usize>(
     }
 }
 
-/// Returns the triangles of a block that the ray may meet, bits as in [`Lanes::sift`], without those of the facet that it leaves and is
-/// known not to meet.
+/// Returns the triangles of a block of `count` facets that the ray may meet, bits as in [`Lanes::sift`], without those of the facet that it
+/// leaves and is known not to meet.
 #[inline(always)]
-fn sift<L: Lanes, const STACK: usize>(block: &Block, s: &RayState<STACK>) -> u32 {
-    let mut own = 0;
-    for k in 0..4 {
-        own |= u32::from(block.facets[k] == s.unmet_facet) << k;
-    }
-    L::sift(block, &s.sieve, &s.boxes) & !(own * 0x11)
+fn sift<L: Lanes, const STACK: usize>(block: &Block, count: usize, s: &RayState<STACK>) -> u32 {
+    L::sift(block, &s.sieve, &s.boxes, s.unmet_facet) & used_lanes(count)
 }
 
 /// The bits of both triangles of the first `count` lanes of a block.
