@@ -94,15 +94,18 @@ impl BoxTree {
     }
 
     /// Whether one of the boxes that meet `bounds`, or touch it, is wanted: `is_wanted` is asked by index, in no order, up to the first.
+    #[inline]
     pub fn any_meeting(&self, bounds: &Aabb, mut is_wanted: impl FnMut(u32) -> bool) -> bool {
+        if bounds.is_empty() {
+            return false;
+        }
         let mut open: SmallVec<[u32; STACK]> = self.nodes.first().map(|_| 0).into_iter().collect();
         while let Some(node) = open.pop() {
             let node = &self.nodes[node as usize];
-            for child in 0..node.children as usize {
-                if node.bounds(child).intersection(*bounds).is_empty() {
-                    continue;
-                }
-                let link = node.links[child];
+            let mut met = node.children_meeting(bounds);
+            while met != 0 {
+                let link = node.links[met.trailing_zeros() as usize % WIDTH];
+                met &= met - 1;
                 if link & BOX == 0 {
                     open.push(link);
                 } else if is_wanted(link & !BOX) {
@@ -160,12 +163,18 @@ impl Node {
         self.children += 1;
     }
 
-    /// The box of a child.
-    fn bounds(&self, child: usize) -> Aabb {
-        Aabb {
-            min: Vector::from_array(self.low.map(|side| side[child])),
-            max: Vector::from_array(self.high.map(|side| side[child])),
+    /// Which children's boxes meet `bounds`, which is not empty, one bit each: all four tried at once.
+    #[inline(always)]
+    fn children_meeting(&self, bounds: &Aabb) -> u32 {
+        let mut apart = [false; WIDTH];
+        for axis in 0..3 {
+            for child in 0..WIDTH {
+                apart[child] |=
+                    (self.low[axis][child] > bounds.max[axis]) | (self.high[axis][child] < bounds.min[axis]);
+            }
         }
+        let met = (0..WIDTH).fold(0, |met, child| met | u32::from(!apart[child]) << child);
+        met & ((1 << self.children) - 1)
     }
 }
 

@@ -17,6 +17,7 @@ mod curved_cells;
 mod facet_record;
 mod limits;
 mod piece;
+mod slab_map;
 mod slabs;
 mod start;
 

@@ -9,13 +9,16 @@
 
 use super::curved_cells::FLAT_SAG;
 use super::facet_record::FacetRecord;
+use super::slab_map::SlabMap;
 use crate::math::{Aabb, BoxTree, Point};
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-/// A facet with more slabs near it, as of a plate with many holes, looks for them in a tree.
+/// A facet with more slabs near it, as of a plate with many holes, has a map of them and looks for them in a tree.
 const MOST_LISTED: usize = 12;
+/// Slabs near a facet of which a map is made; one with more, as a long strip across everything, always looks in the tree.
+const MOST_MAPPED: usize = 4096;
 /// Room for what rounds a place, mm, and as a share of its coordinates: a million roundings.
 const ROOM: f64 = 1e-9;
 
@@ -36,6 +39,8 @@ pub(super) struct Slabs {
     /// Of each facet its first slab in `listed`, and one more for the end of the last.
     starts: Vec<u32>,
     listed: Vec<Slab>,
+    /// Of facets with too many to be listed.
+    maps: Vec<SlabMap>,
     /// How far from a facet, mm, a place that rays leave by it may lie.
     reach: f64,
 }
@@ -50,35 +55,40 @@ impl Slabs {
         let near = |f: usize| {
             let bounds = Aabb::from_points(mesh.corners(f)).grown(reach);
             let mut near: SmallVec<[u32; MOST_LISTED]> = SmallVec::new();
-            let is_crowded = tree.any_meeting(&bounds, |k| {
+            let are_too_many = tree.any_meeting(&bounds, |k| {
                 let is_foreign = mesh.facets[all[k as usize].facet as usize].face != mesh.facets[f].face;
-                is_foreign && near.len() == MOST_LISTED || {
-                    near.extend(is_foreign.then_some(k));
-                    false
-                }
+                near.extend(is_foreign.then_some(k));
+                near.len() > MOST_MAPPED
             });
-            (near, is_crowded)
+            let map = (near.len() > MOST_LISTED).then(|| {
+                let mut map = SlabMap::new(bounds);
+                near.iter().for_each(|&k| map.mark(&all[k as usize].bounds()));
+                if are_too_many {
+                    map.mark(&bounds);
+                }
+                near = SmallVec::new();
+                map
+            });
+            (near, map)
         };
         let of_facets: Vec<_> = (0..mesh.facets.len()).into_par_iter().map(near).collect();
-        let (mut starts, mut listed) = (vec![0], Vec::new());
-        for (near, is_crowded) in of_facets {
-            if is_crowded {
-                listed.push(Slab::SEARCHED);
-            } else {
-                listed.extend(near.iter().map(|&k| all[k as usize]));
-            }
+        let (mut starts, mut listed, mut maps) = (vec![0], Vec::new(), Vec::new());
+        for (near, map) in of_facets {
+            listed.extend(near.iter().map(|&k| all[k as usize]));
+            listed.extend(map.is_some().then(|| Slab::mapped(maps.len())));
+            maps.extend(map);
             starts.push(listed.len() as u32);
         }
-        Self { all, tree, starts, listed, reach }
+        Self { all, tree, starts, listed, maps, reach }
     }
 
     /// Whether the way between two places, of which the second is one of this facet's, touches a slab; both may be the same.
     #[inline(always)]
     pub(super) fn meet(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2]) -> bool {
         let range = self.starts[facet as usize] as usize..self.starts[facet as usize + 1] as usize;
-        self.listed[range].iter().any(|slab| match slab.facet {
-            MANY => self.any_meets(mesh, facet, way),
-            _ => slab.meets(mesh, way),
+        self.listed[range].iter().any(|slab| match slab.map() {
+            Some(map) => self.maps[map].may_touch(way) && self.any_meets(mesh, facet, way),
+            None => slab.meets(mesh, way),
         })
     }
 
@@ -98,16 +108,28 @@ impl Slabs {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.all) + self.tree.bytes() + size_of_val(&*self.starts) + size_of_val(&*self.listed)
+        size_of_val(&*self.all)
+            + self.tree.bytes()
+            + size_of_val(&*self.starts)
+            + size_of_val(&*self.listed)
+            + size_of_val(&*self.maps)
     }
 }
 
-/// In [`Slab::facet`]: stands for all of them.
-const MANY: u32 = u32::MAX;
+/// In [`Slab::facet`]: stands for all slabs near a facet, of which the other bits name the map. A mesh has fewer facets.
+const MAPPED: u32 = 1 << 31;
 
 impl Slab {
-    /// In place of the slabs of a facet that are too many to be listed.
-    const SEARCHED: Self = Self { low: [0.0; 3], high: [0.0; 3], facet: MANY, sag: 0.0 };
+    /// What is listed for a facet with too many slabs: its map, by its index.
+    fn mapped(index: usize) -> Self {
+        Self { low: [0.0; 3], high: [0.0; 3], facet: MAPPED | index as u32, sag: 0.0 }
+    }
+
+    /// The map that it stands for, if any.
+    #[inline(always)]
+    fn map(&self) -> Option<usize> {
+        (self.facet & MAPPED != 0).then_some((self.facet & !MAPPED) as usize)
+    }
 
     /// The slab of a facet of this sag, mm.
     fn of_facet(mesh: &FacetMesh, facet: u32, sag: f32) -> Self {

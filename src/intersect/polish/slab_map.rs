@@ -1,0 +1,92 @@
+//! Where slabs are near a facet that has many of them: a grid over its box, in which most places of a large facet are far from all.
+
+use crate::math::{Aabb, Point};
+
+/// Cells a side, one bit each.
+const CELLS: usize = 32;
+
+/// A grid over the two longer sides of a box, with the cells that slabs reach into.
+#[derive(Clone, Debug)]
+pub(super) struct SlabMap {
+    bounds: Aabb,
+    axes: [usize; 2],
+    /// Cells per mm along both axes; none along a side without length.
+    per_mm: [f64; 2],
+    rows: [u32; CELLS],
+}
+
+impl SlabMap {
+    /// A map of what lies within `bounds`, mm, empty so far.
+    pub(super) fn new(bounds: Aabb) -> Self {
+        let size = bounds.size();
+        let shortest = (1..3).fold(0, |shortest, a| if size[a] < size[shortest] { a } else { shortest });
+        let axes = [(shortest + 1) % 3, (shortest + 2) % 3];
+        let per_mm = axes.map(|a| if size[a] > 0.0 { CELLS as f64 / size[a] } else { 0.0 });
+        Self { bounds, axes, per_mm, rows: [0; CELLS] }
+    }
+
+    /// The row and the column of a place. Neither falls where a coordinate rises, so that what lies in a box lies in its cells.
+    #[inline(always)]
+    fn cell(&self, p: Point) -> [usize; 2] {
+        let [a, b] = self.axes;
+        // Casts cut off and saturate.
+        let along =
+            |axis: usize, per_mm: f64| (((p[axis] - self.bounds.min[axis]) * per_mm) as usize).min(CELLS - 1);
+        [along(a, self.per_mm[0]), along(b, self.per_mm[1])]
+    }
+
+    /// Marks the cells that a box reaches into.
+    pub(super) fn mark(&mut self, bounds: &Aabb) {
+        let ([first_row, first], [last_row, last]) = (self.cell(bounds.min), self.cell(bounds.max));
+        let columns = columns(first, last);
+        self.rows[first_row..=last_row].iter_mut().for_each(|row| *row |= columns);
+    }
+
+    /// Whether something that was marked may touch the box around a way; also where the way leaves the map.
+    #[inline(always)]
+    pub(super) fn may_touch(&self, [a, b]: [Point; 2]) -> bool {
+        let (low, high) = (a.min(b), a.max(b));
+        if !(self.bounds.contains(low) && self.bounds.contains(high)) {
+            return true;
+        }
+        let ([first_row, first], [last_row, last]) = (self.cell(low), self.cell(high));
+        let columns = columns(first, last);
+        self.rows[first_row..=last_row].iter().any(|row| row & columns != 0)
+    }
+}
+
+/// The bits of columns, of which the last is not below the first.
+#[inline(always)]
+fn columns(first: usize, last: usize) -> u32 {
+    u32::MAX >> (CELLS - 1 - last) & u32::MAX << first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vector;
+
+    #[test]
+    fn what_touches_a_marked_box_is_told() {
+        let bounds = Aabb { min: Point::new(-3.0, 10.0, 5.0), max: Point::new(13.0, 12.0, 37.0) };
+        let mut map = SlabMap::new(bounds);
+        let slabs = [[0.0, 11.0, 9.0, 0.4], [12.9, 11.5, 36.0, 2.0], [5.0, 10.0, 20.0, 0.0]];
+        let slabs = slabs.map(|[x, y, z, size]| {
+            let min = Point::new(x, y, z);
+            Aabb { min, max: min + Vector::splat(size) }
+        });
+        slabs.iter().for_each(|slab| map.mark(slab));
+        let mut free = 0;
+        for k in 0..20_000u32 {
+            let unit = |m: f64| (f64::from(k) * m).fract();
+            let place = bounds.min + bounds.size() * Vector::new(unit(0.618), unit(0.755), unit(0.569));
+            let way = [place, place + Vector::new(unit(0.31) - 0.5, 0.0, unit(0.57) - 0.5)];
+            let touches = slabs.iter().any(|slab| !slab.intersection(Aabb::from_points(way)).is_empty());
+            let may_touch = map.may_touch(way);
+            assert!(may_touch || !touches, "{way:?}");
+            free += u32::from(!may_touch);
+        }
+        assert!(free > 15_000, "{free}");
+        assert!(map.may_touch([bounds.min - Vector::Y, bounds.min]));
+    }
+}
