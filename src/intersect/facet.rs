@@ -92,12 +92,12 @@ impl<'m> Surroundings<'m> {
 /// A ray prepared for facets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FacetRay {
-    origin: [f64; 3],
+    pub(crate) origin: [f64; 3],
     /// Slopes of the ray against its main axis, and the inverse of the direction along it.
     shear: [f64; 3],
     /// Axes: two lateral ones, then the main one.
     axes: [u8; 3],
-    t_min: f64,
+    pub(crate) t_min: f64,
     direction: Vector,
     /// The facet that the ray leaves, and which triangle of it where that is known.
     from: Option<u32>,

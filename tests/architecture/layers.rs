@@ -315,7 +315,18 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     ),
     (
         "intersect/polish",
-        &["limits", "piece", "facet_record", "curved_cells", "slab_map", "slabs", "clear_start", "mod", "start", "batch"],
+        &[
+            "limits",
+            "piece",
+            "facet_record",
+            "curved_cells",
+            "slab_map",
+            "slabs",
+            "clear_start",
+            "mod",
+            "start",
+            "batch",
+        ],
     ),
     (
         "intersect/exact",

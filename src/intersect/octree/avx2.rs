@@ -6,8 +6,9 @@
 
 use super::lanes::Lanes;
 use super::node::{Block, Node};
-use super::quad_edges::{QuadEdges, QuadRay};
+use super::quad_edges::QuadEdges;
 use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
+use crate::intersect::facet::FacetRay;
 use std::arch::x86_64::*;
 
 /// Eight lanes of f32.
@@ -27,7 +28,14 @@ unsafe fn broadcast_axis(v: &[f32; 4], axis: usize) -> __m256 {
     unsafe { _mm256_set1_ps(*v.get_unchecked(axis)) }
 }
 
-/// The numbers of a corner in another order, which is given by halves as in [`QuadRay::order`].
+/// By main axis: halves of the numbers of a corner in the order of a ray's axes, the main one last but one.
+#[repr(align(32))]
+struct AxisOrders([[u32; 8]; 3]);
+
+static AXIS_ORDERS: AxisOrders =
+    AxisOrders([[2, 3, 4, 5, 0, 1, 6, 7], [4, 5, 0, 1, 2, 3, 6, 7], [0, 1, 2, 3, 4, 5, 6, 7]]);
+
+/// The numbers of a corner in another order, which is given by halves as in [`AXIS_ORDERS`].
 #[inline(always)]
 unsafe fn ordered(corner: __m256d, order: __m256i) -> __m256d {
     unsafe { _mm256_castps_pd(_mm256_permutevar8x32_ps(_mm256_castpd_ps(corner), order)) }
@@ -206,7 +214,7 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    fn quad_edges(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
+    fn quad_edges(corners: [&[f64; 3]; 4], ray: &FacetRay, reach: f64) -> QuadEdges {
         // SAFETY: see the head of the file; a masked load reads three numbers, those of a corner.
         unsafe {
             let three = _mm256_setr_epi64x(-1, -1, -1, 0);
@@ -216,16 +224,17 @@ impl Lanes for Avx2Lanes {
             let d = _mm256_maskload_pd(corners[3].as_ptr(), three);
             let low = _mm256_min_pd(_mm256_min_pd(a, b), _mm256_min_pd(c, d));
             let high = _mm256_max_pd(_mm256_max_pd(a, b), _mm256_max_pd(c, d));
-            let start = _mm256_load_pd(ray.origin.as_ptr());
-            let reach = _mm256_set1_pd(ray.reach);
+            let start = _mm256_maskload_pd(ray.origin.as_ptr(), three);
+            let reach = _mm256_set1_pd(reach);
             // Whether the start may lie on this facet: such a facet is tested with care.
             let near = _mm256_and_pd(
                 _mm256_cmp_pd::<_CMP_GE_OQ>(start, _mm256_sub_pd(low, reach)),
                 _mm256_cmp_pd::<_CMP_LE_OQ>(start, _mm256_add_pd(high, reach)),
             );
             // Corners against the start in the order of the ray's axes, then axis by axis.
-            let order = _mm256_load_si256(ray.order.as_ptr().cast());
-            let origin = _mm256_load_pd(ray.ordered_origin.as_ptr());
+            let order = _mm256_load_si256(AXIS_ORDERS.0[ray.axes()[2]].as_ptr().cast());
+            let origin = ordered(start, order);
+            let [slope_x, slope_y, _] = ray.shear();
             let a = _mm256_sub_pd(ordered(a, order), origin);
             let b = _mm256_sub_pd(ordered(b, order), origin);
             let c = _mm256_sub_pd(ordered(c, order), origin);
@@ -235,8 +244,8 @@ impl Lanes for Avx2Lanes {
             let x = _mm256_permute2f128_pd::<0x20>(ab, cd);
             let y = _mm256_permute2f128_pd::<0x20>(_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d));
             // Not fused, to have the bits of plain Rust.
-            let x = _mm256_sub_pd(x, _mm256_mul_pd(_mm256_set1_pd(ray.shear[0]), z));
-            let y = _mm256_sub_pd(y, _mm256_mul_pd(_mm256_set1_pd(ray.shear[1]), z));
+            let x = _mm256_sub_pd(x, _mm256_mul_pd(_mm256_set1_pd(slope_x), z));
+            let y = _mm256_sub_pd(y, _mm256_mul_pd(_mm256_set1_pd(slope_y), z));
             // Each corner beside the next: lane k then has the edge function from corner k + 1 to k.
             let next_x = _mm256_permute4x64_pd::<0x39>(x);
             let next_y = _mm256_permute4x64_pd::<0x39>(y);

@@ -9,9 +9,9 @@ use super::avx2::{Avx2Lanes, block_from_ray, largest};
 use super::facet_pair::{Corners, Edges};
 use super::lanes::Lanes;
 use super::node::{Block, Node};
-use super::quad_edges::{QuadEdges, QuadRay};
+use super::quad_edges::QuadEdges;
 use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
-use crate::intersect::facet::Line;
+use crate::intersect::facet::{FacetRay, Line};
 use std::arch::x86_64::*;
 
 /// Sixteen lanes of f32.
@@ -157,8 +157,8 @@ impl Lanes for Avx512Lanes {
 
     /// As with AVX2: one facet fills no wider register.
     #[inline(always)]
-    fn quad_edges(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
-        Avx2Lanes::quad_edges(corners, ray)
+    fn quad_edges(corners: [&[f64; 3]; 4], ray: &FacetRay, reach: f64) -> QuadEdges {
+        Avx2Lanes::quad_edges(corners, ray, reach)
     }
 
     #[inline(always)]

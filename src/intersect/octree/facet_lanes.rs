@@ -3,8 +3,8 @@
 //! whole registers; a test that needs more than the signs of edge functions is left to the caller.
 
 use super::mesh_box::{ordered_max, ordered_min};
-use super::quad_edges::QuadRay;
-use crate::intersect::facet::LONGEST_NUDGE;
+use super::quad_edges::margin;
+use crate::intersect::facet::FacetRay;
 use crate::intersect::facet_hit::{EdgeHit, Nearest};
 
 /// Tests done at once.
@@ -68,24 +68,25 @@ impl FacetLanes {
         }
     }
 
-    /// Puts a test in a lane: of these triangles (bits 0 and 1) of a facet with these corners, mm in the order of x, y, z, for a ray with
-    /// its axes, the main one last, and what it has met so far. `departed` is the facet that the ray leaves, else one that none is.
+    /// Puts a test in a lane: of these triangles (bits 0 and 1) of a facet with these corners, mm in the order of x, y, z, for a ray and
+    /// what it has met so far. `departed` is the facet that the ray leaves, else one that none is.
     #[inline(always)]
     pub(super) fn put(
         &mut self,
         lane: usize,
         (facet, triangles, corners): (u32, u32, [&[f64; 3]; 4]),
-        (ray, axes): (&QuadRay, [u8; 3]),
+        ray: &FacetRay,
         (departed, best): (u32, &Nearest),
     ) {
         let lane = lane % LANES;
+        let (axes, shear) = (ray.axes(), ray.shear());
         for a in 0..3 {
-            let axis = usize::from(axes[a] % 3);
+            let axis = axes[a];
             for k in 0..4 {
                 self.corners[k][a][lane] = corners[k][axis];
             }
-            self.origin[a][lane] = ray.ordered_origin[a];
-            self.shear[a][lane] = ray.shear[a];
+            self.origin[a][lane] = ray.origin[axis];
+            self.shear[a][lane] = shear[a];
         }
         self.t_min[lane] = ray.t_min;
         self.t_max[lane] = best.t;
@@ -98,8 +99,6 @@ impl FacetLanes {
     /// Does all tests; a facet is near the start of a ray when its box, grown by `reach` mm, holds it.
     #[inline(always)]
     pub(super) fn test(&mut self, reach: f64) {
-        // As [`QuadRay::margin`] has it.
-        let move_size = 2.0 * 2.0 * LONGEST_NUDGE * reach * (2.0 * 4.0);
         for l in 0..LANES {
             let [ox, oy, oz] = [self.origin[0][l], self.origin[1][l], self.origin[2][l]];
             let [sx, sy, sz] = [self.shear[0][l], self.shear[1][l], self.shear[2][l]];
@@ -127,7 +126,7 @@ impl FacetLanes {
                 ordered_max(ordered_max(-low[0], high[0]), ordered_max(-low[1], high[1])),
                 ordered_max(-low[2], high[2]),
             );
-            let margin = move_size * farthest;
+            let margin = margin(farthest, reach);
             let first = Signs::new([e1, diagonal, e0]);
             let second = Signs::new([e2, e3, -diagonal]);
             let (asks_first, asks_second) = (self.triangles[l] & 1 != 0, self.triangles[l] & 2 != 0);

@@ -2,9 +2,9 @@
 
 use super::facet_pair::{Corners, Edges};
 use super::node::{Block, Node};
-use super::quad_edges::{QuadEdges, QuadRay};
+use super::quad_edges::QuadEdges;
 use super::ray::{BoxRay, SieveRay};
-use crate::intersect::facet::Line;
+use crate::intersect::facet::{FacetRay, Line};
 
 /// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
 pub(super) trait Lanes {
@@ -20,10 +20,10 @@ pub(super) trait Lanes {
     fn pair_edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {
         edges.compute(corners, line);
     }
-    /// Computes the edge functions of a facet with these corners, mm; every implementation gives the same bits.
+    /// Computes the edge functions of a facet with these corners, mm, as [`QuadEdges::new`]; every implementation gives the same bits.
     #[inline(always)]
-    fn quad_edges(corners: [&[f64; 3]; 4], ray: &QuadRay) -> QuadEdges {
-        QuadEdges::new(corners, ray)
+    fn quad_edges(corners: [&[f64; 3]; 4], ray: &FacetRay, reach: f64) -> QuadEdges {
+        QuadEdges::new(corners, ray, reach)
     }
     /// Returns which distances do not lie beyond `t_max`, one bit each.
     fn open(enters: &[f32; 16], t_max: f32) -> u32;

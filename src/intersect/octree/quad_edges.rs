@@ -1,68 +1,19 @@
 //! The f64 edge functions of one facet, for the exact test of what the sieve left: the arithmetic of [`Line::test_quad`] step by step,
 //! so that all instruction sets have its bits, but without the branches and the copies that cost more than the arithmetic.
 
-use crate::intersect::facet::{FacetRay, LONGEST_NUDGE, Line, Nearest};
+use crate::intersect::facet::{FacetRay, LONGEST_NUDGE, Nearest};
 use std::hint::select_unpredictable;
 
-/// What the edge functions need of a ray.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(32))]
-pub(super) struct QuadRay {
-    /// Where the ray starts, in the order of x, y, z; the last means nothing.
-    pub(super) origin: [f64; 4],
-    /// The same in the order of the ray's axes, the main one last but one.
-    pub(super) ordered_origin: [f64; 4],
-    /// Halves of numbers in that order: those of lane `a` are `2a` and `2a + 1`.
-    pub(super) order: [u32; 8],
-    /// Slopes against the main axis, and the inverse of the direction along it.
-    pub(super) shear: [f64; 3],
-    pub(super) t_min: f64,
-    /// A facet is near the start when its box, grown by this, holds it, mm.
-    pub(super) reach: f64,
+/// The size, mm², above which an edge function of a facet whose farthest corner lies so far from the start along an axis, mm, keeps its sign
+/// when the start is moved as [`LONGEST_NUDGE`] allows for this reach of starts, mm.
+///
+/// A move of `δ` an axis shears to `2δ`, since no slope is above one, and changes an edge function by at most that times the sum of
+/// what its corners differ by in both sheared coordinates: each is below four times the farthest corner's distance from the start
+/// along an axis. The sum is doubled, for the rounding and the reach of the start.
+#[inline(always)]
+pub(super) fn margin(farthest: f64, reach: f64) -> f64 {
+    2.0 * 2.0 * LONGEST_NUDGE * reach * (2.0 * 4.0 * farthest)
 }
-
-impl QuadRay {
-    /// Takes a ray with its axes, the main one last, its origin and the reach of starts, mm; overwrites all fields.
-    #[inline(always)]
-    pub(super) fn take_ray(&mut self, ray: &FacetRay, axes: [usize; 3], origin: [f64; 4], reach: f64) {
-        let [x, y, z] = axes;
-        for (kept, o) in self.origin.iter_mut().zip(origin) {
-            *kept = o;
-        }
-        self.ordered_origin = [origin[x], origin[y], origin[z], 0.0];
-        self.order = ORDERS[z];
-        self.shear = ray.shear();
-        self.t_min = ray.line().t_min;
-        self.reach = reach;
-    }
-
-    /// The size, mm², above which an edge function of a facet of these corners keeps its sign when the start is moved as [`LONGEST_NUDGE`]
-    /// allows.
-    ///
-    /// A move of `δ` an axis shears to `2δ`, since no slope is above one, and changes an edge function by at most that times the sum of
-    /// what its corners differ by in both sheared coordinates: each is below four times the farthest corner's distance from the start
-    /// along an axis. The sum is doubled, for the rounding and the reach of the start.
-    #[inline(always)]
-    fn margin(&self, corners: [&[f64; 3]; 4]) -> f64 {
-        let mut farthest = 0.0;
-        for corner in corners {
-            for a in 0..3 {
-                let distance = (corner[a] - self.origin[a]).abs();
-                farthest = if distance > farthest { distance } else { farthest };
-            }
-        }
-        2.0 * 2.0 * LONGEST_NUDGE * self.reach * (2.0 * 4.0 * farthest)
-    }
-
-    /// The ray as [`Line`] has it, in the order of its axes.
-    fn line(&self) -> Line {
-        let [x, y, z, _] = self.ordered_origin;
-        Line { origin: [x, y, z], shear: self.shear, t_min: self.t_min }
-    }
-}
-
-/// [`QuadRay::order`] by main axis.
-static ORDERS: [[u32; 8]; 3] = [[2, 3, 4, 5, 0, 1, 6, 7], [4, 5, 0, 1, 2, 3, 6, 7], [0, 1, 2, 3, 4, 5, 6, 7]];
 
 /// Edge functions of the two triangles of a facet.
 #[derive(Clone, Copy, Debug, Default)]
@@ -82,10 +33,12 @@ pub(super) struct QuadEdges {
 }
 
 impl QuadEdges {
-    /// Computes the edge functions of a facet with these corners, mm in the order of x, y, z, in plain Rust.
+    /// Computes the edge functions of a facet with these corners, mm in the order of x, y, z, in plain Rust. It is near the start when its
+    /// box, grown by `reach` mm, holds it.
     #[inline(always)]
-    pub(super) fn new(corners: [&[f64; 3]; 4], ray: &QuadRay) -> Self {
-        let [sx, sy, _] = ray.shear;
+    pub(super) fn new(corners: [&[f64; 3]; 4], ray: &FacetRay, reach: f64) -> Self {
+        let [sx, sy, _] = ray.shear();
+        let origin = ray.origin;
         let mut edges = Self { near: true, ..Self::default() };
         let mut x = [0.0; 4];
         let mut y = [0.0; 4];
@@ -93,10 +46,10 @@ impl QuadEdges {
             let along = corners.map(|c| c[a]);
             let low = along.into_iter().fold(f64::INFINITY, f64::min);
             let high = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
-            edges.near &= (ray.origin[a] >= low - ray.reach) & (ray.origin[a] <= high + ray.reach);
+            edges.near &= (origin[a] >= low - reach) & (origin[a] <= high + reach);
         }
-        let [kx, ky, kz] = [ray.order[0], ray.order[2], ray.order[4]].map(|half| (half / 2 % 3) as usize);
-        let [ox, oy, oz, _] = ray.ordered_origin;
+        let [kx, ky, kz] = ray.axes();
+        let [ox, oy, oz] = [origin[kx], origin[ky], origin[kz]];
         for k in 0..4 {
             let z = corners[k][kz] - oz;
             x[k] = (corners[k][kx] - ox) - sx * z;
@@ -114,11 +67,24 @@ impl QuadEdges {
         edges
     }
 
-    /// Whether none of these triangles (bits 0 and 1) of a facet is met, wherever within reach of its start the ray begins; `false`
+    /// Whether none of these triangles (bits 0 and 1) of a facet is met, wherever within `reach` mm of its start the ray begins; `false`
     /// says nothing.
     #[inline(always)]
-    pub(super) fn misses_clearly(&self, triangles: u32, corners: [&[f64; 3]; 4], ray: &QuadRay) -> bool {
-        let margin = ray.margin(corners);
+    pub(super) fn misses_clearly(
+        &self,
+        triangles: u32,
+        corners: [&[f64; 3]; 4],
+        ray: &FacetRay,
+        reach: f64,
+    ) -> bool {
+        let mut farthest = 0.0;
+        for corner in corners {
+            for a in 0..3 {
+                let distance = (corner[a] - ray.origin[a]).abs();
+                farthest = if distance > farthest { distance } else { farthest };
+            }
+        }
+        let margin = margin(farthest, reach);
         let [e0, e1, e2, e3] = self.outline;
         let first = has_both_signs([e0, e1, self.diagonal], margin);
         let second = has_both_signs([e2, e3, -self.diagonal], margin);
@@ -128,7 +94,7 @@ impl QuadEdges {
     /// Offers hits on these triangles (bits 0 and 1) of a facet to `best`. Returns `false`, and offers none, where an edge function of one
     /// of them is zero: the exact test must decide.
     #[inline(always)]
-    pub(super) fn keep_hits(&self, facet: u32, triangles: u32, ray: &QuadRay, best: &mut Nearest) -> bool {
+    pub(super) fn keep_hits(&self, facet: u32, triangles: u32, ray: &FacetRay, best: &mut Nearest) -> bool {
         let left = u32::from(self.diagonal < 0.0);
         let right = u32::from(self.diagonal > 0.0);
         let below = any_edge(self.below, left, right);

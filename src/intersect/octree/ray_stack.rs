@@ -9,9 +9,9 @@ const GROUND: usize = 16;
 
 /// Places on the stack of a ray in a tree of so many levels of nodes: of each level all children of one node and all but one of another
 /// may be left where two are entered at a time, a power of two, to which numbers of entries are cut; then those written beyond the top, and
-/// the ground. With what makes the size of a [`super::ray_state::RayState`] as it should be.
+/// the ground.
 pub(super) const fn stack_places(levels: usize) -> usize {
-    ((2 * CHILDREN - 1) * levels).next_power_of_two() + CHILDREN + GROUND + 8
+    ((2 * CHILDREN - 1) * levels).next_power_of_two() + CHILDREN + GROUND
 }
 
 /// A stack of so many places, as [`stack_places`] has it.

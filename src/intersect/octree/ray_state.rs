@@ -2,7 +2,6 @@
 
 use super::lanes::Lanes;
 use super::node::{Link, Node};
-use super::quad_edges::QuadRay;
 use super::ray::{BoxRay, SieveRay};
 use super::ray_stack::{Children, RayStack};
 use super::tree::Tree;
@@ -42,7 +41,6 @@ pub(super) struct RayState<const STACK: usize> {
     /// Which of the batch's rays it is.
     pub(super) index: usize,
     pub(super) facets: FacetRay,
-    pub(super) quads: QuadRay,
     /// The facet that the ray leaves, else one that no block has.
     pub(super) departed: u32,
     pub(super) best: Nearest,
@@ -58,7 +56,6 @@ impl<const STACK: usize> RayState<STACK> {
             boxes: BoxRay::default(),
             sieve: SieveRay::default(),
             facets: FacetRay::new(&ray),
-            quads: QuadRay::default(),
             departed: u32::MAX,
             best: Nearest::up_to(0.0),
             shift: 0.0,
@@ -117,7 +114,6 @@ impl<const STACK: usize> RayState<STACK> {
         // What is asked again is taken before it is written: what was written in parts is read as a whole only after a wait.
         let facets = FacetRay::new(ray);
         let (axes, shear) = (facets.axes(), facets.shear());
-        self.quads.take_ray(&facets, axes, origin, tree.surroundings.reach);
         self.departed = ray.departure.map_or(u32::MAX, |departure| departure.primitive);
         self.sieve.shear = shear.map(|s| s as f32);
         self.sieve.axes = axes.map(|a| a as u8);

@@ -339,7 +339,7 @@ fn test_in_lanes<const STACK: usize>(
         let k = ((s.candidates | s.candidates >> 4).trailing_zeros() & 3) as usize;
         let triangles = block.triangles(k, s.candidates);
         let corners = block.positions[k].map(|p| arrays.positions[p as usize].as_ref());
-        lanes.put(lane, (block.facets[k], triangles, corners), (&s.quads, s.sieve.axes), (s.departed, &s.best));
+        lanes.put(lane, (block.facets[k], triangles, corners), &s.facets, (s.departed, &s.best));
         s.candidates &= !(0x11 << k);
         asked[lane] = (k, triangles);
     }
@@ -362,7 +362,7 @@ fn test_in_lanes<const STACK: usize>(
 #[inline(always)]
 fn test_candidates<L: Lanes, const STACK: usize>(tree: &Tree, arrays: &Arrays, s: &mut RayState<STACK>) {
     let block = &arrays.blocks[s.block as usize];
-    let candidates = s.candidates;
+    let (candidates, reach) = (s.candidates, tree.surroundings.reach);
     let mut mask = (candidates | candidates >> 4) & 15;
     loop {
         let k = (mask.trailing_zeros() & 3) as usize;
@@ -371,13 +371,13 @@ fn test_candidates<L: Lanes, const STACK: usize>(tree: &Tree, arrays: &Arrays, s
         let triangles = block.triangles(k, candidates);
         let facet = block.facets[k];
         let arrays = [corners[0].as_ref(), corners[1].as_ref(), corners[2].as_ref(), corners[3].as_ref()];
-        let edges = L::quad_edges(arrays, &s.quads);
+        let edges = L::quad_edges(arrays, &s.facets, reach);
         // Often the facet is the one that the ray leaves, or a neighbour of it, and passed by far from the start.
         if ((s.departed != u32::MAX) & edges.near) | (s.departed == facet) {
-            if !edges.misses_clearly(triangles, arrays, &s.quads) {
+            if !edges.misses_clearly(triangles, arrays, &s.facets, reach) {
                 test_with_care(tree, s, facet, triangles, corners);
             }
-        } else if !edges.keep_hits(facet, triangles, &s.quads, &mut s.best) {
+        } else if !edges.keep_hits(facet, triangles, &s.facets, &mut s.best) {
             test_with_care(tree, s, facet, triangles, corners);
         }
         if mask == 0 {
