@@ -31,8 +31,7 @@ impl Kernel for Walk<'_, '_> {
     fn run<I: Instructions>(self) {
         #[cfg(target_arch = "x86_64")]
         {
-            // VBMI, not AVX-512 alone: the order of a node's bounds is a permutation of bytes.
-            if I::AVX512_VBMI {
+            if I::AVX512 {
                 return walk::walk::<Avx512Lanes>(self.tree, self.light_buffers, self.rays, self.hits, self.cost);
             }
             if I::AVX2 {

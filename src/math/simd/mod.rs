@@ -21,8 +21,6 @@ pub(crate) trait Instructions {
     const AVX2: bool;
     /// Whether AVX-512 F, DQ and VL may be used as well.
     const AVX512: bool;
-    /// Whether AVX-512 BW and VBMI may be used as well.
-    const AVX512_VBMI: bool;
 }
 
 /// What every processor of the target has.
@@ -31,31 +29,20 @@ pub(crate) struct Portable;
 pub(crate) struct Avx2;
 /// What [`has_avx512`] asks for.
 pub(crate) struct Avx512;
-/// What [`has_avx512_vbmi`] asks for.
-pub(crate) struct Avx512Vbmi;
 
 impl Instructions for Portable {
     const AVX2: bool = false;
     const AVX512: bool = false;
-    const AVX512_VBMI: bool = false;
 }
 
 impl Instructions for Avx2 {
     const AVX2: bool = true;
     const AVX512: bool = false;
-    const AVX512_VBMI: bool = false;
 }
 
 impl Instructions for Avx512 {
     const AVX2: bool = true;
     const AVX512: bool = true;
-    const AVX512_VBMI: bool = false;
-}
-
-impl Instructions for Avx512Vbmi {
-    const AVX2: bool = true;
-    const AVX512: bool = true;
-    const AVX512_VBMI: bool = true;
 }
 
 /// A loop to be compiled for several instruction sets; what it works on is in the fields.
@@ -98,17 +85,6 @@ pub(crate) fn has_avx512() -> bool {
     false
 }
 
-/// Whether this processor has AVX-512 BW and VBMI beside what [`has_avx512`] asks for.
-#[inline(always)]
-pub(crate) fn has_avx512_vbmi() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    {
-        has_avx512() && is_x86_feature_detected!("avx512bw") && is_x86_feature_detected!("avx512vbmi")
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    false
-}
-
 /// An instruction set that this processor was found to have: for kernels so short that asking takes time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Level(Width);
@@ -118,7 +94,7 @@ pub(crate) struct Level(Width);
 enum Width {
     Portable,
     Avx2,
-    Avx512Vbmi,
+    Avx512,
 }
 
 impl Level {
@@ -130,9 +106,9 @@ impl Level {
         Self(if has_avx2() { Width::Avx2 } else { Width::Portable })
     }
 
-    /// AVX-512 with VBMI, else AVX2, where the processor has it, else the baseline.
+    /// AVX-512, else AVX2, where the processor has it, else the baseline.
     pub(crate) fn widest() -> Self {
-        if has_avx512_vbmi() { Self(Width::Avx512Vbmi) } else { Self::avx2() }
+        if has_avx512() { Self(Width::Avx512) } else { Self::avx2() }
     }
 
     /// Runs a kernel with the instructions of this level.
@@ -141,7 +117,7 @@ impl Level {
         match self.0 {
             // SAFETY: such a level is made only where the features were found.
             #[cfg(target_arch = "x86_64")]
-            Width::Avx512Vbmi => unsafe { run_avx512_vbmi(kernel) },
+            Width::Avx512 => unsafe { run_avx512(kernel) },
             // SAFETY: the same.
             #[cfg(target_arch = "x86_64")]
             Width::Avx2 => unsafe { run_avx2(kernel) },
@@ -161,7 +137,7 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     run_portable(kernel)
 }
 
-/// Runs a kernel with AVX-512 (without VBMI), else AVX2, where the processor has it: for loops that gain by registers of 64 bytes.
+/// Runs a kernel with AVX-512, else AVX2, where the processor has it: for loops that gain by registers of 64 bytes.
 #[inline]
 pub(crate) fn dispatch_widest<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
@@ -188,12 +164,6 @@ fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512dq,avx512vl")]
 fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx512>()
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512dq,avx512vl,avx512bw,avx512vbmi")]
-fn run_avx512_vbmi<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Avx512Vbmi>()
 }
 
 #[cfg(test)]
