@@ -21,6 +21,7 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod batch_walk;
 mod cell;
 mod clip;
 mod facet_lanes;
@@ -41,6 +42,7 @@ mod ray_state;
 mod settings;
 mod statistics;
 mod step_queues;
+mod steps;
 mod stored;
 mod subdivision;
 mod tree;

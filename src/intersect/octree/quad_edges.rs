@@ -4,8 +4,8 @@
 use crate::intersect::facet::{FacetRay, LONGEST_NUDGE, Nearest};
 use std::hint::select_unpredictable;
 
-/// The size, mm², above which an edge function of a facet whose farthest corner lies so far from the start along an axis, mm, keeps its sign
-/// when the start is moved as [`LONGEST_NUDGE`] allows for this reach of starts, mm.
+/// The size, mm², above which an edge function of a facet whose farthest corner lies so far from the start along an axis, mm, keeps its
+/// sign when the start is moved as [`LONGEST_NUDGE`] allows for this reach of starts, mm.
 ///
 /// A move of `δ` an axis shears to `2δ`, since no slope is above one, and changes an edge function by at most that times the sum of
 /// what its corners differ by in both sheared coordinates: each is below four times the farthest corner's distance from the start

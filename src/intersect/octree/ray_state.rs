@@ -147,7 +147,8 @@ impl<const STACK: usize> RayState<STACK> {
         self.next = self.stack.advance::<L>(children, self.boxes.t_max);
     }
 
-    /// Puts `next`, which came from the stack, back and takes the topmost entry that is not beyond the limit, which a hit has brought nearer.
+    /// Puts `next`, which came from the stack, back and takes the topmost entry that is not beyond the limit, which a hit has brought
+    /// nearer.
     #[inline(always)]
     pub(super) fn recheck_next<L: Lanes>(&mut self) {
         self.stack.put_back();
