@@ -72,9 +72,9 @@ pub(super) fn most_rays(prepared: &PreparedScene) -> u64 {
 
 /// Returns how many times as many rays to trace as an error asks for that was found from so many replicates, for it has an error itself.
 ///
-/// The square of a standard error, with which the rays go, is spread by √(2 / (n − 1)) of itself when it is found from n replicates. The run
-/// that is asked for finds its error in the same way, from as many replicates at least: the spread of the ratio of both is at most √2 times
-/// that, and the margin covers [`MARGIN_SIGMAS`] of it. A third for 128 replicates, 3 % for the 20,000 of a run of 10⁸ rays.
+/// The square of a standard error, with which the rays go, is spread by √(2 / (n − 1)) of itself when it is found from n replicates. The
+/// run that is asked for finds its error in the same way, from as many replicates at least: the spread of the ratio of both is at most √2
+/// times that, and the margin covers [`MARGIN_SIGMAS`] of it. A third for 128 replicates, 3 % for the 20,000 of a run of 10⁸ rays.
 pub(super) fn growth_margin(replicates: u32) -> f64 {
     // From one replicate no error is found; as of two, where it is asked for.
     1.0 + MARGIN_SIGMAS * 2.0 / f64::from(replicates.max(2) - 1).sqrt()
@@ -90,8 +90,8 @@ pub(super) fn next_rays(rays: u64, growth: f64, most: u64) -> u64 {
 mod tests {
     use super::*;
 
-    /// The ratio of two variances, each of as many normal values, stays below the margin 95.6 to 97.6 times in a hundred: 128 replicates by 1.340
-    /// and 1.429, 1000 by 1.110 and 1.135, 20,000 by 1.0235 and 1.0287 (quantiles 0.95 and 0.9773 of Fisher's F, from SciPy 1.16).
+    /// The ratio of two variances, each of as many normal values, stays below the margin 95.6 to 97.6 times in a hundred: between the
+    /// quantiles 0.95 and 0.9773 of Fisher's F, from SciPy.
     #[test]
     fn the_margin_covers_the_error_of_the_error() {
         for (replicates, quantiles) in [(128, [1.340, 1.429]), (1000, [1.110, 1.135]), (20_000, [1.0235, 1.0287])] {
