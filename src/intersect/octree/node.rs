@@ -128,8 +128,9 @@ impl Node {
     /// The slots in use whose children are nodes, one bit for each.
     #[inline(always)]
     pub(super) fn inner_slots(&self) -> u32 {
-        let blocks = (self.children.iter().enumerate()).fold(0, |bits, (slot, child)| bits | (child >> 31) << slot);
-        self.used & !blocks
+        let nodes = (self.children.iter().enumerate()).fold(0, |bits, (slot, child)| bits | (!child >> 31) << slot);
+        // In this order: of a damaged node more bits may be set than it has slots.
+        nodes & self.used
     }
 
     /// A node without children whose grid spans the box `all`, relative to the middle of the mesh.
