@@ -6,7 +6,7 @@ set -u
 program=$(realpath "$1") scene=$(realpath "$2"); shift 2
 engines=("$@"); [ ${#engines[@]} -gt 0 ] || engines=(parallel until_error mpi dask snakemake slurm srun dask-slurm kubernetes)
 here=$(dirname "$(realpath "$0")"); work=$(mktemp -d); parts=5 failed=0
-trap 'rm -rf "$work"' EXIT
+trap 'stop_slurm; rm -rf "$work"' EXIT
 mkdir "$work/bin"; ln -s "$program" "$work/bin/lampyris"; export PATH=$work/bin:$here:$PATH
 
 debian() { command -v "$1" >/dev/null || apt-get install -y -q "${@:2}" >"$work/apt.log" 2>&1 && command -v "$1" >/dev/null; }
@@ -16,7 +16,9 @@ python() { [ -d "$work/venv" ] || python3 -m venv "$work/venv"; "$work/venv/bin/
 slurm_node() {
   debian sbatch slurm-wlm munge || return 1
   sinfo >/dev/null 2>&1 && return 0
-  pgrep -x munged >/dev/null || { mkdir -p /run/munge; chown munge: /run/munge; runuser -u munge -- munged; }
+  pgrep -x munged >/dev/null || {
+    mkdir -p /run/munge; chown munge: /run/munge; runuser -u munge -- munged && cp /run/munge/munged.pid "$work/"
+  }
   mkdir -p /etc/slurm /var/spool/slurmctld /var/spool/slurmd
   cat >/etc/slurm/slurm.conf <<CONF
 ClusterName=one
@@ -24,6 +26,8 @@ SlurmctldHost=$(hostname -s)
 SlurmUser=root
 SlurmdUser=root
 AuthType=auth/munge
+SlurmctldPidFile=$work/slurmctld.pid
+SlurmdPidFile=$work/slurmd.pid
 StateSaveLocation=/var/spool/slurmctld
 SlurmdSpoolDir=/var/spool/slurmd
 ProctrackType=proctrack/linuxproc
@@ -36,6 +40,14 @@ PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 CONF
   slurmctld && slurmd && for _ in $(seq 30); do sinfo -h -t idle 2>/dev/null | grep -q . && return 0; sleep 1; done
   return 1
+}
+# Stops what slurm_node started, and that alone.
+stop_slurm() {
+  local daemon
+  for daemon in slurmd slurmctld munged; do
+    [ -s "$work/$daemon.pid" ] || continue
+    kill "$(cat "$work/$daemon.pid")" && for _ in $(seq 50); do kill -0 "$(cat "$work/$daemon.pid" 2>/dev/null)" 2>/dev/null || break; sleep 0.2; done
+  done
 }
 finished() { for _ in $(seq 300); do [ -z "$(squeue -h -j "$1" 2>/dev/null)" ] && return 0; sleep 1; done; return 1; }
 
@@ -83,7 +95,7 @@ run_kubernetes() {
 }
 
 # An engine that hangs ends the test of that engine alone.
-wait_for() { ( sleep 300; kill "$1" 2>/dev/null ) & local watch=$!; wait "$1"; local code=$?; kill $watch 2>/dev/null; return $code; }
+wait_for() { ( trap 'kill $nap' TERM; sleep 300 & nap=$!; wait $nap && kill "$1" 2>/dev/null ) & local watch=$!; wait "$1"; local code=$?; kill $watch 2>/dev/null; return $code; }
 
 value() { python3 -c "import json,sys; d=json.load(open(sys.argv[1])); $1" "$2/results.json"; }
 digest() { value 'print(d["digest"])' "$1"; }

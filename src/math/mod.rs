@@ -16,6 +16,8 @@ pub(crate) mod simd;
 mod spread;
 pub mod units;
 
+use bytemuck::{AnyBitPattern, NoUninit};
+
 pub use aabb::Aabb;
 pub use box_tree::{BoxTree, BoxWalk};
 pub use frame::Frame;
@@ -34,7 +36,8 @@ pub type Uv = glam::DVec2;
 pub type Homogeneous = glam::DVec4;
 
 /// Identifies one placed face of a model: its position in [`crate::model::Model::placed_faces`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, NoUninit, AnyBitPattern)]
+#[repr(transparent)]
 pub struct FaceId(pub u32);
 
 impl FaceId {

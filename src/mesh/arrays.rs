@@ -63,12 +63,28 @@ impl<'a> ArrayReader<'a> {
         let mut array = huge_pages::with_capacity(length);
         while array.len() < length {
             let first = array.len();
-            // Not zeroed as a whole: that took as long as reading it.
-            array.resize(length.min(first + chunk_length::<T>()), T::zeroed());
+            // Not zeroed as a whole: that took as long as reading it. By a closure, which is one run of zeros and not a copy for each.
+            array.resize_with(length.min(first + chunk_length::<T>()), T::zeroed);
             self.from.read_exact(bytemuck::cast_slice_mut(&mut array[first..]))?;
             look(&mut array[first..]);
         }
         Ok(array)
+    }
+
+    /// Reads the records that [`write_records`] made of elements whose bytes they are, and calls `look` with all of them, some after the
+    /// other.
+    ///
+    /// # Errors
+    /// As [`ArrayReader::array_with`].
+    ///
+    /// # Panics
+    /// When an element has another size or alignment than its record.
+    pub(crate) fn records_as<R: NoUninit + AnyBitPattern, T: AnyBitPattern>(
+        &mut self,
+        look: impl FnMut(&mut [R]),
+    ) -> io::Result<Vec<T>> {
+        // The same memory under another name: made anew one by one, vertices took a third of the time of reading a mesh.
+        self.array_with(look).map(bytemuck::allocation::cast_vec)
     }
 
     /// Reads the number of elements of an array, each of so many bytes.
@@ -80,27 +96,6 @@ impl<'a> ArrayReader<'a> {
         let bytes = bytes.ok_or(io::ErrorKind::UnexpectedEof)?;
         self.left -= 8 + bytes;
         Ok(length as usize)
-    }
-
-    /// Reads what [`write_records`] wrote and makes an element of each record.
-    ///
-    /// # Errors
-    /// As [`ArrayReader::array_with`].
-    pub(crate) fn records<R: NoUninit + AnyBitPattern, T>(
-        &mut self,
-        mut element: impl FnMut(&R) -> T,
-    ) -> io::Result<Vec<T>> {
-        let length = self.length(size_of::<R>())?;
-        let mut elements = huge_pages::with_capacity(length);
-        // Never all records beside all elements: half of the time was spent on clean pages for both.
-        let mut records = vec![R::zeroed(); length.min(chunk_length::<R>())];
-        while elements.len() < length {
-            let left = length - elements.len();
-            let some = &mut records[..left.min(chunk_length::<R>())];
-            self.from.read_exact(bytemuck::cast_slice_mut(some))?;
-            elements.extend(some.iter().map(&mut element));
-        }
-        Ok(elements)
     }
 
     /// Reads an array.
@@ -150,6 +145,9 @@ mod tests {
         let mut seen = Vec::new();
         assert_eq!(reader.array_with(|some: &mut [u64]| seen.extend_from_slice(some)).unwrap(), numbers);
         assert_eq!(seen, numbers);
-        assert_eq!(reader.records(|[n, m]: &[u64; 2]| n & !m).unwrap(), numbers);
+        let mut looked = 0;
+        let pairs: Vec<[i64; 2]> = reader.records_as(|some: &mut [[u64; 2]]| looked += some.len()).unwrap();
+        assert_eq!(looked, numbers.len());
+        assert!(pairs.iter().zip(&numbers).all(|(&[n, m], &number)| n as u64 == number && m == !n));
     }
 }

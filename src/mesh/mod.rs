@@ -10,6 +10,7 @@ mod stored;
 mod topology;
 
 use crate::math::{Aabb, FaceId, Point, Uv, Vector};
+use bytemuck::{AnyBitPattern, NoUninit};
 pub use topology::Topology;
 
 /// A mesh of quad facets; a triangle is a quad whose last two corners coincide.
@@ -38,7 +39,9 @@ pub struct FacetMesh {
 }
 
 /// A corner of facets: a position with the normal and parameters that one face has there.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, AnyBitPattern)]
+// As it is kept from run to run.
+#[repr(C)]
 pub struct MeshVertex {
     /// Index into [`FacetMesh::positions`].
     pub position: u32,
@@ -49,7 +52,9 @@ pub struct MeshVertex {
 }
 
 /// One quad, counter-clockwise seen from outside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, NoUninit, AnyBitPattern)]
+// As it is kept from run to run.
+#[repr(C)]
 pub struct Facet {
     /// Indices into [`FacetMesh::vertices`]; the traced diagonal runs from the first to the third.
     pub vertices: [u32; 4],

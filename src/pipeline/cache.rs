@@ -26,7 +26,7 @@ use std::time::{Duration, SystemTime};
 /// The program whose work is kept: another version, or another commit, makes its own.
 pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
 /// First bytes of an entry.
-const MAGIC: &[u8] = b"lampyris cache 2\n";
+const MAGIC: &[u8] = b"lampyris cache 3\n";
 /// Bytes of the checksum at the end of an entry.
 const CHECKSUM_BYTES: u64 = 4;
 /// Most bytes of a folder, unless another limit is given: some fifty scenes of a million facets.

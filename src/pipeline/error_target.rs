@@ -5,7 +5,7 @@
 //! each where there is no cache.
 
 use super::error::Error;
-use super::growing_search::{GROWTH_MARGIN, GrowingSearch, most_rays, next_rays};
+use super::growing_search::{GrowingSearch, growth_margin, most_rays, next_rays};
 use super::monitor::Monitor;
 use super::prepared_scene::PreparedScene;
 use super::suggest;
@@ -106,27 +106,19 @@ impl ErrorTarget {
         loop {
             prepared.rays = Some(rays);
             let (portion, results) = search.trace(prepared, monitor);
-            let found = self.error(&results);
-            let result = self.result_of(found, rays);
+            let result = self.result(&results);
             if result.reached || !portion.is_whole() || rays >= most {
                 return (portion, result);
             }
-            rays = next_rays(rays, self.growth(found), most);
-            monitor.grows(found, rays);
+            rays = next_rays(rays, self.growth(result.found_percent, results.replicates), most);
+            monitor.grows(result.found_percent, rays);
         }
     }
 
-    /// Returns what the run of these results has reached of this target.
+    /// Returns what the run of these results has reached of this target, and how many rays are missing.
     pub fn result(&self, results: &Results) -> TargetResult {
-        self.result_of(self.error(results), results.rays)
-    }
-
-    /// Returns what a run of so many rays has reached of this target, `found` percent, and how many rays are missing.
-    fn result_of(&self, found: Option<f64>, rays: u64) -> TargetResult {
+        let (found, rays) = (self.error(results), results.rays);
         let reached = found.is_some_and(|e| e <= self.percent);
-        let wanted = (rays as f64 * self.growth(found)).min(MOST_WANTED) as u64;
-        // A run that grows goes by whole replicates.
-        let missing = wanted.saturating_sub(rays).next_multiple_of(GROWING_REPLICATE).max(GROWING_REPLICATE);
         TargetResult {
             receiver: self.receiver.clone(),
             quantity: if self.cells { "cells" } else { "power" },
@@ -134,15 +126,22 @@ impl ErrorTarget {
             found_percent: found,
             rays,
             reached,
-            missing_rays: if reached { 0 } else { missing },
+            missing_rays: if reached { 0 } else { self.missing_rays(found, rays, results.replicates) },
         }
     }
 
+    /// Returns how many rays a run of so many rays and replicates lacks whose error, `found` percent, is too large.
+    fn missing_rays(&self, found: Option<f64>, rays: u64, replicates: u32) -> u64 {
+        let wanted = (rays as f64 * self.growth(found, replicates)).min(MOST_WANTED) as u64;
+        // A run that grows goes by whole replicates.
+        wanted.saturating_sub(rays).next_multiple_of(GROWING_REPLICATE).max(GROWING_REPLICATE)
+    }
+
     /// Returns how many times as many rays the target asks for, by an error that falls with their root, and a margin more; may be below 1.
-    /// `found` is that error, percent; without one, as nothing arrived, the factor is [`GROWTH_FROM_NOTHING`].
-    fn growth(&self, found: Option<f64>) -> f64 {
+    /// `found` is that error, percent, of so many replicates; without one, as nothing arrived, the factor is [`GROWTH_FROM_NOTHING`].
+    fn growth(&self, found: Option<f64>, replicates: u32) -> f64 {
         // The error falls with the root of the rays, so that they go with the square of what is missing.
-        found.map_or(GROWTH_FROM_NOTHING, |e| GROWTH_MARGIN * (e / self.percent).powi(2))
+        found.map_or(GROWTH_FROM_NOTHING, |e| growth_margin(replicates) * (e / self.percent).powi(2))
     }
 }
 
@@ -151,15 +150,17 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    /// Twice the error asks for four times the rays and a tenth more, in whole replicates.
+    /// Twice the error asks for four times the rays, and a third more where it is of 145 replicates (4/√144), in whole replicates.
     #[test]
     fn missing_rays_follow_from_the_error() {
         let target = ErrorTarget { percent: 1.0, receiver: "wall".into(), cells: false };
-        let missing = |found: Option<f64>| target.result_of(found, 100_000).missing_rays;
-        assert_eq!((missing(Some(2.0)), missing(Some(1.0))), (340_000, 0));
-        assert_eq!((missing(Some(1.000_1)), missing(None)), (15_000, 1_500_000));
-        // However many: 400 times and a tenth more.
-        assert_eq!(missing(Some(20.0)), 43_900_000);
+        let missing = |found: Option<f64>| target.missing_rays(found, 90_000, 145);
+        assert_eq!((missing(Some(2.0)), missing(None)), (390_000, 1_350_000));
+        // At the very error the margin alone, and of many replicates nearly nothing: still one more.
+        let of_many = target.missing_rays(Some(1.001), 90_000, 1_000_001);
+        assert_eq!((missing(Some(1.001)), of_many), (35_000, 5_000));
+        // However many: 400 times and a third more.
+        assert_eq!(missing(Some(20.0)), 47_910_000);
     }
 
     #[test]

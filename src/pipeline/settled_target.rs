@@ -3,7 +3,7 @@
 //! Runs of growing length are traced, each from its beginning, as for [`ErrorTarget`](super::ErrorTarget). While they grow, the errors of
 //! the rays alone are looked at: more rays take nothing from those of the facets, which the last run measures.
 
-use super::growing_search::{GROWTH_MARGIN, GrowingSearch, most_rays, next_rays};
+use super::growing_search::{GrowingSearch, growth_margin, most_rays, next_rays};
 use super::monitor::Monitor;
 use super::prepared_scene::PreparedScene;
 use super::verdicts::verdict;
@@ -30,7 +30,7 @@ pub fn trace_until_settled(
         let Some(&most_wanted) = wanted.iter().max().filter(|_| portion.is_whole() && rays < most) else {
             return (portion, rays);
         };
-        rays = next_rays(rays, GROWTH_MARGIN * most_wanted as f64 / rays as f64, most);
+        rays = next_rays(rays, growth_margin(results.replicates) * most_wanted as f64 / rays as f64, most);
         monitor.unsettled(wanted.len(), rays);
     }
 }

@@ -1,7 +1,8 @@
 //! Names in the legends of 3-D views.
 
-/// Most characters of a name: what does not fit into half of the page is cut at its end, where names differ.
-const MOST_CHARACTERS: usize = 56;
+/// Most characters of a name: of 27, up to 7.5 pixels each, and 46 beside them an entry takes 249 of the 254 pixels that a view has in a
+/// window of 320. What does not fit would be cut at its end, where names differ.
+const MOST_CHARACTERS: usize = 28;
 
 /// Returns a name as a legend shows it: of a long one both ends.
 pub(super) fn legend_name(name: &str) -> String {

@@ -95,6 +95,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "info",
             "media",
             "licences",
+            "material_rules",
             "init",
             "assess",
             "merge",

@@ -1,5 +1,6 @@
 //! `lampyris init`: a commented scene for a STEP file, ready to be traced and to be changed.
 
+use super::material_rules::{MOST_PLACES, instance_names, material_text, rule_texts, toml_number, toml_string};
 use crate::cli::arguments::command::PlacedLimit;
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
@@ -7,22 +8,15 @@ use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
 use crate::cli::work::input_files;
 use crate::cli::work::output_place::{folder_of, make_folder};
-use crate::formats::{file_name, printable_line, printable_toml, write_atomic};
-use crate::model::{Model, PartAccount, SolidAccount};
+use crate::formats::{file_name, printable_line, write_atomic};
+use crate::model::Model;
 use crate::pipeline::LoadedModel;
-use crate::report::figures;
 use serde_json::json;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Solids that get a rule of their own; of more, a comment says how many there are.
-const MOST_RULES: usize = 40;
-/// Rules up to which all stand in the scene; of more the most stay what no rule says too, black, and stand in comments.
-const MOST_LIVE_RULES: usize = 6;
-/// Parts that are placed several times, and places of each, that are named in a comment.
+/// Parts that are placed several times that are named in a comment.
 const MOST_PLACED_PARTS: usize = 10;
-const MOST_PLACES: usize = 6;
 /// Distance of source and receiver from the model, and margin of the beam, as shares of the box' diagonal.
 const DISTANCE: f64 = 0.5;
 const BEAM_MARGIN: f64 = 1.05;
@@ -99,23 +93,6 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
     )
 }
 
-/// Returns the rules as the list of the scene, which begins a line: those of few parts as they are, those of many in comments.
-fn material_text(rules: &[String]) -> String {
-    let rest = rules.len().saturating_sub(MOST_RULES);
-    let more = if rest > 0 {
-        format!("    # … and {rest} more solids: `lampyris info --faces` names them\n")
-    } else {
-        String::new()
-    };
-    let (mark, hint) = if rules.len() > MOST_LIVE_RULES {
-        ("# ", "# Of so many each begins with a #, which is to be taken from those that are not black.\n")
-    } else {
-        ("", "")
-    };
-    let shown: String = rules.iter().take(MOST_RULES).map(|rule| format!("    {mark}{rule}\n")).collect();
-    format!("{hint}material = [\n{shown}{more}]\n")
-}
-
 /// Returns comments that say what selects one place of a part that has several, of the first such parts; empty where no part has.
 fn places_text(model: &Model) -> String {
     let places = model.labels_of_parts();
@@ -130,101 +107,6 @@ fn places_text(model: &Model) -> String {
         return lines;
     }
     format!("# Of parts that are placed several times each place has a name of its own:\n{lines}")
-}
-
-/// Returns for each part the names that select its instances one by one; none where a name selects others too or nothing.
-fn instance_names(model: &Model) -> Vec<Vec<String>> {
-    let mut uses: HashMap<&str, usize> = HashMap::new();
-    for instance in &model.instances {
-        // The path of an instance that stands in no assembly is its name.
-        for name in instance.names().collect::<BTreeSet<_>>() {
-            *uses.entry(name).or_default() += 1;
-        }
-    }
-    let selects_one = |label: &String| !label.contains('*') && uses.get(label.as_str()) == Some(&1);
-    let of_part = |labels: Vec<String>| if labels.iter().all(selects_one) { labels } else { Vec::new() };
-    model.labels_of_parts().into_iter().map(of_part).collect()
-}
-
-/// A part with the names that select its instances one by one.
-type NamedPart<'a> = (&'a PartAccount, &'a [String]);
-
-/// Returns the parts of one name in groups of equal numbers of faces and equal sizes.
-fn looks<'a>(parts: &[NamedPart<'a>]) -> Vec<Vec<NamedPart<'a>>> {
-    let look = |part: &PartAccount| -> Vec<(usize, [String; 3])> {
-        part.solids.iter().map(|s| (s.faces.len(), s.size_mm().map(toml_number))).collect()
-    };
-    let mut found = HashMap::new();
-    let mut groups: Vec<Vec<NamedPart<'a>>> = Vec::new();
-    for &part in parts {
-        let group = *found.entry(look(part.0)).or_insert(groups.len());
-        if group == groups.len() {
-            groups.push(Vec::new());
-        }
-        groups[group].push(part);
-    }
-    groups
-}
-
-/// Returns the rules for all parts that are placed: one for each name, or one for each solid where a part of that name has several; none
-/// for solids without faces. Parts of one name that look different are told apart by their instances, as `instances` has them for each
-/// part.
-fn rule_texts(parts: &[PartAccount], instances: &[Vec<String>]) -> Vec<String> {
-    // A selector by name means all parts of that name: what the first one is like is said of all.
-    let mut names: Vec<(&str, Vec<NamedPart<'_>>)> = Vec::new();
-    for part in parts.iter().zip(instances.iter().map(Vec::as_slice)).filter(|(part, _)| part.instances > 0) {
-        match names.iter_mut().find(|(name, _)| *name == part.0.name) {
-            Some((_, alike)) => alike.push(part),
-            None => names.push((&part.0.name, vec![part])),
-        }
-    }
-    // Parts without a name are selected by `*`, which means the others too: these stand below, where they win.
-    names.sort_by_key(|(name, _)| !name.is_empty());
-    let mut rules = Vec::new();
-    for (name, parts) in names {
-        let looks = looks(&parts);
-        let few = |alike: &Vec<NamedPart<'_>>| {
-            let count: usize = alike.iter().map(|(_, labels)| labels.len()).sum();
-            alike.iter().all(|(_, labels)| !labels.is_empty()) && count <= MOST_PLACES
-        };
-        if looks.len() > 1 && looks.iter().all(few) {
-            for alike in looks {
-                let labels: Vec<String> =
-                    alike.iter().flat_map(|(_, labels)| *labels).map(|l| toml_string(l)).collect();
-                let value = if let [one] = &labels[..] { one.clone() } else { format!("[{}]", labels.join(", ")) };
-                rules.extend(solid_rules(&format!("instance = {value}"), &alike));
-            }
-            continue;
-        }
-        let name = if name.is_empty() { "\"*\"".to_owned() } else { toml_string(name) };
-        rules.extend(solid_rules(&format!("part = {name}"), &parts));
-    }
-    rules
-}
-
-/// Returns the rules for parts that a selector means: one, or one for each solid where a part has several.
-fn solid_rules(selector: &str, parts: &[NamedPart<'_>]) -> Vec<String> {
-    let mut numbered: BTreeMap<usize, Vec<&SolidAccount>> = BTreeMap::new();
-    let solids = |part: &PartAccount| part.solids.iter().filter(|s| !s.faces.is_empty()).count();
-    let is_whole = parts.iter().all(|(part, _)| solids(part) < 2);
-    for solid in parts.iter().flat_map(|(part, _)| &part.solids).filter(|s| !s.faces.is_empty()) {
-        numbered.entry(if is_whole { 0 } else { solid.index }).or_default().push(solid);
-    }
-    let rule = |(index, solids): (usize, Vec<&SolidAccount>)| {
-        let number = if is_whole { String::new() } else { format!(", solid = {index}") };
-        rule_text(&format!("{selector}{number}"), solids[0], if is_whole { parts.len() } else { solids.len() })
-    };
-    numbered.into_iter().map(rule).collect()
-}
-
-/// Returns a rule for one solid, or the first of `alike` that the selector means, with what may be said of it in a comment.
-fn rule_text(selector: &str, solid: &SolidAccount, alike: usize) -> String {
-    let first = if alike > 1 { format!("the first of {alike} of this name: ") } else { String::new() };
-    let closed = if solid.closed { "closed" } else { "open: a medium would have a gap" };
-    let size = solid.size_mm().map(toml_number).join(" × ");
-    let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
-    let faces = solid.faces.len();
-    format!("{{ {selector}, surface = \"absorber\" }},  # {first}{closed}, {faces} faces, {size} mm{colour}")
 }
 
 /// Sides of a box that differ by less than this share are equal: a round part fills its box to the rounding of its splines.
@@ -291,95 +173,13 @@ fn light_text(model: &Model) -> String {
     )
 }
 
-/// Returns a number of five digits as TOML takes it; what has no such form keeps all digits.
-fn toml_number(value: f64) -> String {
-    // As `figures` writes for people: TOML knows neither their minus nor their spaces.
-    let digits = figures(value, 5).replace('−', "-").replace('\u{202f}', "");
-    digits.parse::<f64>().map_or_else(|_| value.to_string(), |_| digits)
-}
-
-/// Returns a text as a TOML string on one line.
-fn toml_string(text: &str) -> String {
-    printable_toml(serde_json::Value::from(text).to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{FaceAccount, SurfaceKind};
 
     #[test]
     fn the_axis_is_that_about_which_the_box_is_square() {
         let halves = [[3.0, 5.0, 5.01], [5.0, 3.0, 5.0], [5.0, 5.0, 3.0], [5.0, 5.0, 5.0], [1.0, 2.0, 3.0]];
         assert_eq!(halves.map(optical_axis), [0, 1, 2, 2, 2]);
-    }
-
-    /// A part of so many solids, each of one face of this width, mm.
-    fn part(name: &str, instances: usize, solids: usize, width: f64) -> PartAccount {
-        let face = FaceAccount {
-            id: None,
-            name: String::new(),
-            colour: None,
-            layer: None,
-            kind: SurfaceKind::Plane,
-            radius_mm: None,
-            area_mm2: 1.0,
-            bbox_mm: [[0.0; 3], [width, 1.0, 1.0]],
-            at: [0.0; 3],
-        };
-        let solid = |index| SolidAccount { index, name: String::new(), closed: true, faces: vec![face.clone()] };
-        PartAccount { name: name.into(), instances, solids: (0..solids).map(solid).collect() }
-    }
-
-    #[test]
-    fn parts_of_one_name_that_look_different_are_told_apart_by_their_instances() {
-        let parts = [part("glass", 1, 1, 9.0), part("glass", 1, 1, 2.5), part("glass", 1, 1, 9.0)];
-        let labels = ["a/glass", "a/glass:2", "a/glass:3"].map(|label| vec![label.to_owned()]);
-        let selectors = |labels: &[Vec<String>]| -> Vec<String> {
-            let selector = |rule: String| Some(rule.split_once("{ ")?.1.split_once(", surface")?.0.to_owned());
-            rule_texts(&parts, labels).into_iter().filter_map(selector).collect()
-        };
-        assert_eq!(selectors(&labels), ["instance = [\"a/glass\", \"a/glass:3\"]", "instance = \"a/glass:2\""]);
-        assert_eq!(selectors(&vec![Vec::new(); 3]), ["part = \"glass\""], "no name selects one alone");
-    }
-
-    #[test]
-    fn parts_of_one_name_get_one_rule_and_those_without_a_name_stand_above() {
-        let part = |name: &str, instances: usize, solids: usize| part(name, instances, solids, 1.0);
-        let parts =
-            [part("led", 1, 1), part("led", 2, 1), part("", 1, 1), part("board", 1, 2), part("spare", 0, 1)];
-        let rules = rule_texts(&parts, &vec![Vec::new(); parts.len()]);
-        assert_eq!(rules.len(), 4, "{rules:?}");
-        assert!(rules[0].contains("{ part = \"*\", surface"), "{rules:?}");
-        assert!(rules[1].contains("{ part = \"led\", surface") && rules[1].contains("first of 2"), "{rules:?}");
-        for (k, rule) in rules[2..].iter().enumerate() {
-            assert!(rule.contains(&format!("{{ part = \"board\", solid = {k}, surface")), "{rule}");
-        }
-    }
-
-    /// Of many parts a scene keeps the lines of those alone that somebody takes the `#` from; TOML reads the comment behind it too.
-    #[test]
-    fn many_rules_stand_in_comments() {
-        let text = |count: usize| {
-            let parts: Vec<PartAccount> = (0..count).map(|k| part(&format!("p{k}"), 1, 1, 1.0)).collect();
-            material_text(&rule_texts(&parts, &vec![Vec::new(); count]))
-        };
-        let rules = |text: &str| text.parse::<toml::Table>().unwrap()["material"].as_array().unwrap().len();
-        assert_eq!(rules(&text(6)), 6);
-        let many = text(50);
-        assert_eq!((rules(&many), many.matches("# { part").count()), (0, 40));
-        assert!(many.contains("and 10 more solids"), "{many}");
-        assert_eq!(rules(&many.replace("    # { part = \"p3\"", "    { part = \"p3\"")), 1);
-    }
-
-    #[test]
-    fn numbers_and_names_are_toml() {
-        assert_eq!(
-            [toml_number(-1234567.0), toml_number(1e-7), toml_number(0.1 + 0.2)],
-            ["-1234567", "1e-7", "0.3"]
-        );
-        let text = "a\"\\\u{1b}\nb";
-        let back: toml::Table = format!("x = {}", toml_string(text)).parse().unwrap();
-        assert_eq!(back["x"].as_str(), Some(text));
     }
 }

@@ -11,6 +11,7 @@ mod facet;
 mod info;
 mod init;
 mod licences;
+mod material_rules;
 mod media;
 mod merge;
 mod meta;

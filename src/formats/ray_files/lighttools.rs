@@ -3,9 +3,7 @@
 use super::bytes::ByteReader;
 use super::ray_collector::RayCollector;
 use super::ray_file::{Flux, RayFile, RowLayout, RowWavelength};
-use crate::formats::{Error, ErrorKind};
-use std::fs::File;
-use std::io::Read;
+use crate::formats::Error;
 use std::path::Path;
 
 /// Length of a unit in mm, by its number; 0 is the unit of the system that wrote the file, which the file does not tell.
@@ -21,19 +19,9 @@ const TEXT_KEY: &[u8] = b"lt_rdf_version";
 /// What stands behind the last ray.
 const END: &[u8; 7] = b"LTRFEND";
 
-/// Bytes in which a text file says that it is one of LightTools': a few lines.
-const TEXT_HEAD: u64 = 4096;
-
-/// Refuses a file whose text is a ray data file of LightTools, which a reader of lists would take for a list without columns; `start` was
-/// read of it already.
-pub(super) fn refuse_text(path: &Path, start: &[u8], rest: &mut File) -> Result<(), Error> {
-    let mut head = start.to_vec();
-    rest.take(TEXT_HEAD).read_to_end(&mut head).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
-    if !head.windows(TEXT_KEY.len()).any(|word| word == TEXT_KEY) {
-        return Ok(());
-    }
-    let message = "a LightTools ray data file as text; export it as LightTools binary or IES TM-25, which are read";
-    Err(Error::new(path, ErrorKind::Malformed(message.to_owned())))
+/// Whether a text that begins so is a ray data file of LightTools.
+pub(super) fn is_text(head: &[u8]) -> bool {
+    head.windows(TEXT_KEY.len()).any(|word| word == TEXT_KEY)
 }
 
 /// Reads the rays of a binary ray data file; an error for far-field, tristimulus and polarised data.

@@ -54,13 +54,31 @@ impl RayFile {
             // The identifier of the other binary format is a number, not letters.
             start if binary && i32::from_le_bytes(*start) == zemax::IDENTIFIER => zemax::read(path, most_in_memory),
             start => {
-                lighttools::refuse_text(path, start, &mut file)?;
+                let mut head = start.to_vec();
+                file.take(TEXT_HEAD).read_to_end(&mut head).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+                refuse_text(path, &head)?;
                 let mut rays = RayCollector::new(path, most_in_memory);
                 read_list(path, |ray| rays.add(ray))?;
                 rays.finish(None)
             }
         }
     }
+}
+
+/// Bytes in which a text file says whose it is: a few lines.
+const TEXT_HEAD: u64 = 4096;
+
+/// Refuses a text that begins so where it is another program's, which a reader of lists would take for a list with wrong columns.
+fn refuse_text(path: &Path, head: &[u8]) -> Result<(), Error> {
+    let (kind, program) = if lighttools::is_text(head) {
+        ("LightTools ray data", "LightTools")
+    } else if zemax::is_text(head) {
+        ("Zemax source", "Zemax")
+    } else {
+        return Ok(());
+    };
+    let message = format!("a {kind} file as text; export it as {program} binary or IES TM-25, which are read");
+    Err(Error::new(path, ErrorKind::Malformed(message)))
 }
 
 /// Reads the rays of a file into memory, in any format that [`RayFile::open`] knows.

@@ -15,6 +15,24 @@ const UNITS_MM: [f64; 5] = [1000.0, 25.4, 10.0, 304.8, 1.0];
 /// Micrometres, in which the format counts wavelengths, in nm.
 const MICROMETRE: f64 = 1000.0;
 
+/// Whether a text that begins so is a source file of Zemax: its first line holds the number of rays, the unit of length, and zeros in the
+/// other columns, which no ray has for its direction.
+pub(super) fn is_text(head: &[u8]) -> bool {
+    let first = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let words = str::from_utf8(first).unwrap_or_default().split_whitespace();
+    let numbers: Result<Vec<f64>, _> = words.map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok([rays, unit, others @ ..]) => {
+            *rays >= 1.0
+                && rays.fract() == 0.0
+                && (0..UNITS_MM.len()).any(|known| *unit == known as f64)
+                && [0, 5, 6].contains(&others.len())
+                && others.iter().all(|number| *number == 0.0)
+        }
+        _ => false,
+    }
+}
+
 /// Reads the rays of a binary source file. Location, rotation and scale of the header are not applied: OpticStudio itself uses only
 /// the number of rays, the unit, the ray format and the flux type.
 pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
@@ -148,5 +166,19 @@ pub(super) mod tests {
             let error = read_ray_set(&path, Flux::Radiant).unwrap_err().to_string();
             assert!(error.contains(message), "{error}");
         }
+    }
+
+    /// The first line of a text file names the number of rays and the unit; a list's first line is a ray.
+    #[test]
+    fn text_files_are_refused_as_what_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("source.dat");
+        for head in ["2 4", "2.0\t4.0\t0 0 0 0 0", "2 4 0 0 0 0 0 0"] {
+            std::fs::write(&path, format!("{head}\n0 0 0 0 0 1 1 0.5\n0 0 0 0 0 1 1 0.5\n")).unwrap();
+            let error = read_ray_set(&path, Flux::Radiant).unwrap_err().to_string();
+            assert!(error.contains("Zemax") && error.contains("TM-25"), "{head}: {error}");
+        }
+        std::fs::write(&path, "2 4 0 0 0 1 1\n").unwrap();
+        assert_eq!(read_ray_set(&path, Flux::Radiant).unwrap().rays.len(), 1);
     }
 }

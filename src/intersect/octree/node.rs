@@ -62,6 +62,11 @@ impl Link {
         self.kind() == 0
     }
 
+    #[inline(always)]
+    pub(super) fn is_block(self) -> bool {
+        self.kind() == 2
+    }
+
     /// The index of a node or block; 0 at the end.
     #[inline(always)]
     pub(super) fn index(self) -> usize {
@@ -127,6 +132,15 @@ impl Node {
     pub(super) fn slots(&self) -> impl Iterator<Item = usize> + use<> {
         let used = self.used;
         (0..CHILDREN).filter(move |slot| used >> slot & 1 == 1)
+    }
+
+    /// The slots in use whose children are nodes, one bit for each.
+    #[inline(always)]
+    pub(super) fn inner_slots(&self) -> u32 {
+        let nodes = (self.children.iter().enumerate())
+            .fold(0, |bits, (slot, &child)| bits | u32::from(Link(child).is_node()) << slot);
+        // In this order: of a damaged node more bits may be set than it has slots.
+        nodes & self.used
     }
 
     /// A node without children whose grid spans the box `all`, relative to the middle of the mesh.

@@ -1,11 +1,12 @@
 //! A tree as bytes and back, to be kept from one run to the next: what is read is walked only where every link leads down and
 //! every index lies within the mesh.
 
-use super::node::{Block, Link, Node, Target};
+use super::node::{Block, Link, Node};
 use super::statistics::Statistics;
 use super::tree::Tree;
 use crate::intersect::facet::Surroundings;
 use crate::intersect::slopes::Slopes;
+use crate::math::simd::{self, Instructions, Kernel};
 use crate::mesh::FacetMesh;
 use crate::mesh::arrays::{ArrayReader, invalid, write_array};
 use std::io::{self, Write};
@@ -63,45 +64,59 @@ fn read_statistics(from: &mut ArrayReader) -> io::Result<Statistics> {
 #[derive(Default)]
 struct LinkCheck {
     /// Nodes that were taken.
-    count: usize,
+    count: u32,
     /// Whether a link leads back or nowhere.
     is_broken: bool,
     /// One more than the largest index of the nodes that links lead to, and of the blocks.
-    ends: [usize; 2],
+    ends: [u32; 2],
 }
 
 impl LinkCheck {
     /// Takes further nodes, and sets the links of their children that are not in use to zero, by which walks that meet their empty boxes
     /// tell them.
     fn take(&mut self, nodes: &mut [Node]) {
-        for node in nodes {
-            self.count += 1;
-            for (slot, child) in node.children.iter_mut().enumerate() {
-                if node.used >> slot & 1 == 0 {
-                    *child = 0;
-                } else {
-                    self.follow(Link(*child), self.count);
-                }
-            }
-        }
+        simd::dispatch(LinkScan { check: self, nodes });
     }
 
     /// Takes a link, which may lead to nodes from `least` on.
-    fn follow(&mut self, link: Link, least: usize) {
-        match link.target() {
-            Target::Node(index) => {
-                self.is_broken |= index < least;
-                self.ends[0] = self.ends[0].max(index + 1);
-            }
-            Target::Block(index, _) => self.ends[1] = self.ends[1].max(index + 1),
-            Target::End => self.is_broken = true,
-        }
+    #[inline(always)]
+    fn follow(&mut self, link: Link, least: u32) {
+        // Without branches, so that the links of a node are followed at once: one by one they took a tenth of reading a tree.
+        let (is_node, is_block, index) = (link.is_node(), link.is_block(), link.index() as u32);
+        self.is_broken |= !(is_node | is_block) | (is_node & (index < least));
+        self.ends[0] = self.ends[0].max(if is_node { index + 1 } else { 0 });
+        self.ends[1] = self.ends[1].max(if is_block { index + 1 } else { 0 });
     }
 
     /// Whether the links of all nodes, and that to the root, are those of a tree of so many nodes and blocks.
     fn hold(mut self, root: Option<Link>, [nodes, blocks]: [usize; 2]) -> bool {
         root.into_iter().for_each(|root| self.follow(root, 0));
-        !self.is_broken && self.ends[0] <= nodes && self.ends[1] <= blocks
+        !self.is_broken && self.ends[0] as usize <= nodes && self.ends[1] as usize <= blocks
+    }
+}
+
+/// What [`LinkCheck::take`] does, for [`simd::dispatch`].
+struct LinkScan<'a> {
+    check: &'a mut LinkCheck,
+    nodes: &'a mut [Node],
+}
+
+impl Kernel for LinkScan<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) {
+        let Self { check, nodes } = self;
+        for node in nodes {
+            check.count += 1;
+            let least = check.count;
+            for (slot, child) in node.children.iter_mut().enumerate() {
+                let is_used = node.used >> slot & 1 != 0;
+                // For a child that is not in use the first block, which every tree with nodes has.
+                check.follow(if is_used { Link(*child) } else { Link::block(0, 1) }, least);
+                *child = if is_used { *child } else { 0 };
+            }
+        }
     }
 }
 
@@ -117,20 +132,42 @@ struct CornerCheck {
 impl CornerCheck {
     /// Takes further blocks.
     fn take(&mut self, blocks: &[Block]) {
-        for block in blocks {
-            // One more than the name of no facet is zero.
-            let facets = block.facets.map(|f| f.wrapping_add(1));
-            self.facets = facets.into_iter().fold(self.facets, u32::max);
-            // Of whole rows of lanes, which are compared at once: one by one they took a fifth of the instructions of reading a tree.
-            let corners =
-                block.positions.iter().fold([0; 4], |most, row| std::array::from_fn(|k| most[k].max(row[k])));
-            self.corner = self.corner.max(corners.into_iter().max());
-        }
+        simd::dispatch(CornerScan { check: self, blocks });
     }
 
     /// Whether all indices lie within the mesh.
     fn hold(&self, mesh: &FacetMesh) -> bool {
         self.facets as usize <= mesh.facets.len() && self.corner.is_none_or(|p| (p as usize) < mesh.positions.len())
+    }
+}
+
+/// What [`CornerCheck::take`] does, for [`simd::dispatch`].
+struct CornerScan<'a> {
+    check: &'a mut CornerCheck,
+    blocks: &'a [Block],
+}
+
+impl Kernel for CornerScan<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) {
+        let Self { check, blocks } = self;
+        // Lane by lane, which are compared at once: one by one they took a fifth of the instructions of reading a tree.
+        let (mut facets, mut corners) = ([0; 4], [[0; 4]; 4]);
+        for block in blocks {
+            for lane in 0..4 {
+                // One more than the name of no facet is zero.
+                facets[lane] = block.facets[lane].wrapping_add(1).max(facets[lane]);
+                for corner in 0..4 {
+                    corners[lane][corner] = block.positions[lane][corner].max(corners[lane][corner]);
+                }
+            }
+        }
+        check.facets = facets.into_iter().fold(check.facets, u32::max);
+        if !blocks.is_empty() {
+            check.corner = check.corner.max(corners.into_iter().flatten().max());
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use super::subdivision::subdivide;
 use super::{Settings, Statistics, flatten};
 use crate::intersect::facet::Surroundings;
 use crate::intersect::slopes::Slopes;
+use crate::math::simd::{self, Instructions, Kernel};
 use crate::math::{Aabb, Point, Ray, huge_pages};
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
@@ -96,18 +97,34 @@ impl<'m> Tree<'m> {
 
 /// Nodes on the longest way down from the first one, where every link leads to a later node or to a block.
 fn levels(nodes: &[Node]) -> usize {
-    let mut above = vec![0; nodes.len()];
-    let mut levels = 0;
-    for (index, node) in nodes.iter().enumerate() {
-        let level = above[index] + 1;
-        levels = levels.max(level);
-        for slot in node.slots() {
-            if let Target::Node(child) = Link(node.children[slot]).target() {
+    simd::dispatch(LevelCount { nodes })
+}
+
+/// What [`levels`] does, for [`simd::dispatch`].
+struct LevelCount<'a> {
+    nodes: &'a [Node],
+}
+
+impl Kernel for LevelCount<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) -> usize {
+        let mut above = vec![0; self.nodes.len()];
+        let mut levels = 0;
+        for (index, node) in self.nodes.iter().enumerate() {
+            let level = above[index] + 1;
+            levels = levels.max(level);
+            // Most nodes have blocks alone.
+            let mut inner = node.inner_slots();
+            while inner != 0 {
+                let child = Link(node.children[inner.trailing_zeros() as usize]).index();
                 above[child] = above[child].max(level);
+                inner &= inner - 1;
             }
         }
+        levels
     }
-    levels
 }
 
 /// The middle of a mesh; the origin of one without points.
