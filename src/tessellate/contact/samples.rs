@@ -65,8 +65,28 @@ impl EdgeSamples<'_, '_> {
         }
     }
 
-    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges. A sample of ours that lies so near to one
-    /// of theirs moves there: chords between nearly the same places would leave a sliver between both faces.
+    /// Returns the parameter of the sample of an edge that is nearest to a place, and how far it is, mm.
+    fn nearest_sample(&self, edge: EdgeId, p: Point, samples: &ContactSamples) -> (f64, f64) {
+        let known = self.parameters(edge, samples).into_iter();
+        let away = known.map(|s| (s, (self.place(edge, s) - p).length()));
+        away.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((f64::NAN, f64::INFINITY))
+    }
+
+    /// Adds `t` to an edge, or moves the nearest sample there where that lies within `glue` mm: chords between nearly the same places would
+    /// leave a sliver between the two faces. The ends of an edge are corners of the face and stay.
+    fn move_sample(&self, edge: EdgeId, t: f64, glue: f64, samples: &mut ContactSamples) {
+        let (nearest, away) = self.nearest_sample(edge, self.place(edge, t), samples);
+        let known = self.parameters(edge, samples);
+        let is_end = [known.first(), known.last()].contains(&Some(&nearest));
+        if away > glue {
+            self.set_sample(edge, t, None, samples);
+        } else if away > ONE_PLACE * glue && !is_end {
+            self.set_sample(edge, t, Some(nearest), samples);
+        }
+    }
+
+    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges; a sample of ours that lies so near to one of
+    /// theirs moves there.
     pub(super) fn take_over(&self, other: &EdgeSamples<'_, '_>, glue: f64, samples: &mut ContactSamples) {
         for theirs in other.face.edges() {
             let places: Vec<Point> =
@@ -75,30 +95,18 @@ impl EdgeSamples<'_, '_> {
             for ours in self.face.edges() {
                 for &p in &places {
                     let (t, away) = self.face.nearest_on_edge(ours, p);
-                    if away <= glue {
-                        self.adopt_sample((ours, t), &places, glue, samples);
+                    if away > glue {
+                        continue;
+                    }
+                    let (nearest, distance) = self.nearest_sample(ours, self.place(ours, t), samples);
+                    let here = self.place(ours, nearest);
+                    // One that another of theirs is nearer to is that one's; `p` itself is as near, to rounding.
+                    let least = distance - ONE_PLACE * glue;
+                    if distance > glue || places.iter().all(|q| (*q - here).length() >= least) {
+                        self.move_sample(ours, t, glue, samples);
                     }
                 }
             }
-        }
-    }
-
-    /// Adds `t` to an edge, which is where one of `places` lies on it, or moves the nearest sample there where that is within `glue` mm.
-    /// Ends of edges are corners of the face and stay, and so does a sample that another of `places` is nearer to.
-    fn adopt_sample(&self, (edge, t): (EdgeId, f64), places: &[Point], glue: f64, samples: &mut ContactSamples) {
-        let p = self.place(edge, t);
-        let known = self.parameters(edge, samples);
-        let away = |s: f64| (self.place(edge, s) - p).length();
-        let Some(nearest) = known.iter().copied().min_by(|&a, &b| away(a).total_cmp(&away(b))) else { return };
-        if away(nearest) > glue {
-            self.set_sample(edge, t, None, samples);
-            return;
-        }
-        let here = self.place(edge, nearest);
-        let is_end = nearest == known[0] || nearest == known[known.len() - 1];
-        let is_nearest = places.iter().all(|q| (*q - here).length() >= away(nearest));
-        if away(nearest) > ONE_PLACE * glue && !is_end && is_nearest {
-            self.set_sample(edge, t, Some(nearest), samples);
         }
     }
 
@@ -179,8 +187,8 @@ impl EdgeSamples<'_, '_> {
             s = other.face.nearest_on_edge(crossed, self.place(edge, t)).0;
         }
         if (self.place(edge, t) - other.place(crossed, s)).length() <= glue {
-            self.request_sample(edge, t, glue, samples);
-            other.request_sample(crossed, s, glue, samples);
+            self.move_sample(edge, t, glue, samples);
+            other.move_sample(crossed, s, glue, samples);
         }
     }
 
@@ -192,7 +200,7 @@ impl EdgeSamples<'_, '_> {
                 for d in (0..2).filter(|&d| carrier.surface.closed[d]) {
                     let at = |t: f64| carrier.project(self.place(edge, t)).0;
                     if let Some(crossing) = seam_crossing(carrier, d, [pair[0], pair[1]], at) {
-                        self.request_sample(edge, crossing, glue, samples);
+                        self.move_sample(edge, crossing, glue, samples);
                     }
                 }
             }
