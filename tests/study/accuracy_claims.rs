@@ -55,8 +55,8 @@ fn refracted(d: Vector, normal: Vector, index_ahead: f64) -> Option<Vector> {
     (along > 0.0).then(|| across + normal * along.sqrt().copysign(d.dot(normal)))
 }
 
-/// The larger angle, degrees, by which a facet's normal misdirects light of direction `d`: mirrored, and refracted where there is an `index`,
-/// that of the medium ahead over that of the medium behind.
+/// The larger angle, degrees, by which a facet's normal misdirects light of direction `d`: mirrored, and refracted where there is an
+/// `index`, that of the medium ahead over that of the medium behind.
 fn misdirected(d: Vector, facet: Vector, spline: Vector, index: Option<f64>) -> f64 {
     let mirrored = |n: Vector| d - n * (2.0 * d.dot(n));
     let error = apart(mirrored(facet), mirrored(spline));

@@ -87,8 +87,8 @@ impl EdgeSamples<'_, '_> {
         }
     }
 
-    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges; a sample of ours that lies so near to one of
-    /// theirs moves there.
+    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges; a sample of ours that lies so near to one
+    /// of theirs moves there.
     pub(super) fn take_over(&self, other: &EdgeSamples<'_, '_>, glue: f64, samples: &mut ContactSamples) {
         let edges = self.face.edges();
         for theirs in other.face.edges() {

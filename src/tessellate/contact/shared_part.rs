@@ -8,8 +8,8 @@ use crate::tessellate::face_mesh::{FaceMesh, MeshedFacet};
 use crate::tessellate::nodes::Position;
 use rustc_hash::FxHashMap;
 
-/// Joins a guest's own facets, which keep to its carriers' borders, with those it takes over from each, in the same order. `None` where they
-/// do not meet side on side.
+/// Joins a guest's own facets, which keep to its carriers' borders, with those it takes over from each, in the same order. `None` where
+/// they do not meet side on side.
 pub(super) fn joined(
     guest: &Guest<'_, '_>,
     carriers: &[Guest<'_, '_>],
