@@ -85,10 +85,10 @@ fn orders(surface: &Surface, normals: NormalMode) -> Vec<f64> {
 }
 
 /// Halving the facets halves the error of flat and nearest normals and quarters that of bilinear ones. The cubic patch has the true
-/// tangent planes at its corners and on its sides errs by h⁴ in height. Inside it takes one twist for all four corners; the true ones
-/// differ from it by h³ where the facet is no parallelogram (as between two circles of latitude) or the surface has third derivatives
-/// (as the waves), and so do heights: h² in the normal, the order of the bilinear rule with a much smaller factor. On coarse facets
-/// terms of higher order still weigh, and the order falls to 2 from above.
+/// tangent planes at its corners and on its sides errs by h⁴ in height. Inside it takes the twists that its corners' normals tell of; the
+/// true ones differ by h³ where the surface has third derivatives (as the waves), and so do heights: h² in the normal, the order of the
+/// bilinear rule with a much smaller factor. On coarse facets terms of higher order still weigh, and the order falls to 2 from above. On
+/// the sphere, without such derivatives, the order is 3 whatever the facets' shape (trapezoids between two circles of latitude).
 #[test]
 fn normals_converge_as_theory_says() {
     for surface in &SURFACES {
@@ -100,7 +100,7 @@ fn normals_converge_as_theory_says() {
             (NormalMode::Flat, 1.0),
             (NormalMode::Nearest, 1.0),
             (NormalMode::Bilinear, 2.0),
-            (NormalMode::Cubic, 2.0),
+            (NormalMode::Cubic, if surface.name == "sphere" { 3.0 } else { 2.0 }),
         ] {
             let reached = orders(surface, mode);
             println!("{} {mode}: orders {reached:.3?}", surface.name);

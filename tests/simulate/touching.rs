@@ -1,9 +1,9 @@
 //! Light through curved faces of two bodies that touch, on facets of the default tolerance: none is lost or misled between them.
 
 use crate::turned::{assembly, ball_in_cup, doublet, lens, ring_in_groove, rod_in_hole, rod_in_plate, turned};
-use lampyris::intersect::Intersector;
 use lampyris::intersect::exact::{self, Exact};
 use lampyris::intersect::octree::{self, Octree};
+use lampyris::intersect::{Intersector, NormalMode};
 use lampyris::math::{Frame, Point, Vector};
 use lampyris::model::Model;
 use lampyris::nurbs::{Curve, conic};
@@ -83,7 +83,7 @@ fn light_passes_a_rod_whose_rims_are_divided_nearly_alike() {
         [("rod", 1.5), ("block", 1.6)],
         "kind = 'cone'\nhalf_angle_deg = 40\nat = [0.3, 0.2, 4]\ndirection = [0, 0, 1]",
     );
-    for parts in [2.0, 3.0, 6.0, 8.0, 12.0] {
+    for parts in [2.0, 3.0, 4.0, 6.0, 8.0, 12.0] {
         check("rod", &rod_in_hole(TAU / parts + 1e-4), &text);
     }
 }
@@ -100,6 +100,38 @@ fn light_passes_a_rod_partly_in_its_hole() {
     }
 }
 
+/// Rods of radius 2 end to end in plates one on the other, between these heights; each is turned by `turn` against the one before, and
+/// each plate is wider than the one before.
+fn stack(rods: &[[f64; 2]], plates: &[[f64; 2]], turn: f64) -> Model {
+    let rod = |&[bottom, top]: &[f64; 2]| profile(&[[0.0, bottom], [2.0, bottom], [2.0, top], [0.0, top]]);
+    let plate = |(k, &[bottom, top]): (i32, &[f64; 2])| {
+        let rim = 6.0 + 0.5 * f64::from(k);
+        profile(&[[2.0, bottom], [rim, bottom], [rim, top], [2.0, top], [2.0, bottom]])
+    };
+    let plates = (0..).zip(plates).map(|p| ("plate", plate(p)));
+    let all = rods.iter().map(|r| ("rod", rod(r))).chain(plates);
+    assembly((0..).zip(all).map(|(k, (name, p))| turned(name, &p, turn * f64::from(k))).collect())
+}
+
+/// Each plate touches two rods, or each rod two plates, or both: a chain in which every face touches the next. Seams lie far apart, nearly
+/// where the other is divided, or nearly, within the glue distance, on each other.
+#[test]
+fn light_passes_bodies_that_touch_in_turn() {
+    let cone = "kind = 'cone'\nhalf_angle_deg = 60\nat = [0.4, 0.3, 1.2]\ndirection = [0, 0, 1]";
+    let text =
+        scene([("rod", 1.5), ("plate", 1.6)], cone).replace("rays = 20000", "rays = 2000\nmax_bounces = 100");
+    for (name, rods, plates) in [
+        ("two plates", vec![[0.0, 8.0]], vec![[0.0, 3.0], [3.0, 8.0]]),
+        ("two rods", vec![[0.0, 3.0], [3.0, 8.0]], vec![[0.0, 8.0]]),
+        ("two by two", vec![[0.0, 5.0], [5.0, 8.0]], vec![[0.0, 3.0], [3.0, 8.0]]),
+        ("in turn", vec![[-1.0, 4.0], [4.0, 8.0]], vec![[0.0, 2.0], [2.0, 6.0], [6.0, 9.0]]),
+    ] {
+        for turn in [0.0, 0.4, TAU / 4.0 + 1e-4, 1e-4] {
+            check(&format!("{name}, {turn}"), &stack(&rods, &plates, turn), &text);
+        }
+    }
+}
+
 #[test]
 fn light_passes_a_ball_in_its_cup() {
     let text = scene(
@@ -107,6 +139,25 @@ fn light_passes_a_ball_in_its_cup() {
         "kind = 'collimated'\nat = [0, 0, -20]\ndirection = [0, 0, 1]\nradius = 7\npower = 1",
     );
     check("ball", &ball_in_cup(1.1), &text);
+}
+
+/// A ball keeps the incidence of light that goes round in it, so that what came in can get out. Bilinear normals do not, and catch some of
+/// it near the critical angle; cubic ones do.
+#[test]
+fn cubic_normals_catch_no_light_in_a_ball() {
+    let text = scene(
+        [("ball", 1.7), ("cup", 1.52)],
+        "kind = 'collimated'\nat = [0, 0, -20]\ndirection = [0.05, 0.02, 1]\nradius = 9\npower = 1",
+    );
+    let model = ball_in_cup(1.1);
+    let (scene, bound) = bind(&model, &text.replace("rays = 20000", "rays = 200000"));
+    let mesh = tessellate(&model, &tessellate::Settings { glue_mm: scene.run.glue_mm, ..Default::default() }).mesh;
+    let [bilinear, cubic] = [NormalMode::Bilinear, NormalMode::Cubic].map(|normals| {
+        run(&scene, &bound, &Octree::build(&mesh, &octree::Settings { normals, ..Default::default() }))
+    });
+    assert_eq!((cubic.caught_rays, cubic.power.lost), (0, 0.0), "{:?}", cubic.power);
+    assert!(bilinear.power.cut_off < 1e-3 && bilinear.power.lost == 0.0, "{:?}", bilinear.power);
+    println!("caught with bilinear normals: {}", bilinear.power.cut_off);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 use crate::default_figures::random_scene;
 use lampyris::intersect::{Cost, ExpectedRays, Footprint, Hit, Intersector, NormalMode};
-use lampyris::math::{FaceId, Ray, Vector};
+use lampyris::math::{Ray, Vector};
 use lampyris::pipeline::{MeshingSettings, Silent, TracingSettings, settings_for_accuracy};
 use lampyris::simulate::{BoundScene, RunSettings, Scene, simulate};
 use lampyris::study::{FacetTree, MeshSource, ModelMeshSource};
@@ -55,28 +55,62 @@ fn refracted(d: Vector, normal: Vector, index_ahead: f64) -> Option<Vector> {
     (along > 0.0).then(|| across + normal * along.sqrt().copysign(d.dot(normal)))
 }
 
-/// The larger angle, degrees, by which a facet's normal misdirects light of direction `d`: mirrored, and refracted where `index` says so.
+/// The larger angle, degrees, by which a facet's normal misdirects light of direction `d`: mirrored, and refracted where there is an
+/// `index`, that of the medium ahead over that of the medium behind.
 fn misdirected(d: Vector, facet: Vector, spline: Vector, index: Option<f64>) -> f64 {
     let mirrored = |n: Vector| d - n * (2.0 * d.dot(n));
     let error = apart(mirrored(facet), mirrored(spline));
-    let ahead = index.map(|n| if d.dot(spline) > 0.0 { 1.0 / n } else { n });
-    let behind = ahead.and_then(|n| Some(apart(refracted(d, facet, n)?, refracted(d, spline, n)?)));
+    let behind = index.and_then(|n| Some(apart(refracted(d, facet, n)?, refracted(d, spline, n)?)));
     behind.map_or(error, |behind| error.max(behind))
 }
 
-/// The 99th percentile of the direction errors of the segments, from a third of their way on, degrees.
-fn referee(bound: &BoundScene, facets: &dyn Intersector, segments: &[(Ray, Hit)]) -> f64 {
-    let index = |face: FaceId| bound.entered_body(face).map(|body| bound.relative_index(body));
+/// Share of the way to a face within which two faces of the spline are in one place, and a place beyond it lies behind both.
+const ONE_PLACE: f64 = 1e-6;
+
+/// The index of the medium at a place, over that of the surroundings: of the body that light leaves at the next face, if it leaves one.
+fn index_at(bound: &BoundScene, spline: &dyn Intersector, place: &Ray, near: f64) -> f64 {
+    let next = |ray: &Ray| spline.intersect(ray, &mut Cost::default());
+    let left = |hit: &Hit| place.direction.dot(hit.geometric_normal) > 0.0;
+    let body = next(place).and_then(|first| {
+        // Of two bodies that touch either face may come first.
+        let second = || next(&place.with_range(first.t.next_up(), first.t + near)).filter(left);
+        if left(&first) { Some(first) } else { second() }
+    });
+    body.and_then(|hit| bound.entered_body(hit.face)).map_or(1.0, |body| bound.relative_index(body))
+}
+
+/// The direction errors of the segments, from a third of their way on, ascending. `apart` is how far, mm, the facets of two bodies may lie
+/// from one another that touch.
+fn errors(
+    bound: &BoundScene,
+    spline: &dyn Intersector,
+    facets: &dyn Intersector,
+    segments: &[(Ray, Hit)],
+    apart: f64,
+) -> Vec<f64> {
     let error = |(ray, true_hit): &(Ray, Hit)| {
         let start = Ray::new(ray.point_at(true_hit.t / 3.0), ray.direction);
         let hit = facets.intersect(&start, &mut Cost::default())?;
-        // Another face is a flip, for which no angle stands.
-        (hit.face == true_hit.face)
-            .then(|| misdirected(ray.direction, hit.normal, true_hit.normal, index(true_hit.face)))
+        let beyond = (hit.t - 2.0 * true_hit.t / 3.0) * ray.direction.dot(true_hit.normal);
+        let normal = if hit.face == true_hit.face {
+            hit.normal
+        } else if hit.normal.dot(true_hit.normal) < 0.0 && beyond.abs() <= apart {
+            // Of two faces in one place.
+            -hit.normal
+        } else {
+            // Another face is a flip, for which no angle stands.
+            return None;
+        };
+        let near = ONE_PLACE * true_hit.t.max(apart);
+        let behind = Ray::new(ray.point_at(true_hit.t + near), ray.direction);
+        let index = bound
+            .entered_body(true_hit.face)
+            .map(|_| index_at(bound, spline, &behind, near) / index_at(bound, spline, &start, near));
+        Some(misdirected(ray.direction, normal, true_hit.normal, index))
     };
     let mut errors: Vec<f64> = segments.iter().filter_map(error).collect();
     errors.sort_by(f64::total_cmp);
-    errors[(0.99 * errors.len() as f64) as usize]
+    errors
 }
 
 /// Twenty-four scenes of 0.5 mm to 5 m, five angles, any normals and cubic ones.
@@ -86,6 +120,9 @@ fn no_claim_of_an_accuracy_is_false() {
     let (mut claims, mut wrong) = (0, Vec::new());
     for index in 0..24 {
         let known = random_scene(index);
+        if std::env::var("LAMPYRIS_ONLY").is_ok_and(|only| !known.name.contains(&only)) {
+            continue;
+        }
         let scene = Scene::parse(&known.text, "known.toml", Path::new(".")).unwrap();
         let bound = scene.bind(&known.model).unwrap();
         let source = ModelMeshSource::new(&known.model);
@@ -102,7 +139,9 @@ fn no_claim_of_an_accuracy_is_false() {
             let mesh = source.mesh_plan(&found.meshing.plan.unwrap()).mesh;
             let octree = source.build(&mesh, FacetTree::Octree, plan.normals.on_facets());
             let polished = (plan.normals == NormalMode::Exact).then(|| source.polish(&*octree, &mesh));
-            let truth = referee(&bound, polished.as_deref().unwrap_or(&*octree), &segments);
+            let facets = polished.as_deref().unwrap_or(&*octree);
+            let found = errors(&bound, source.exact(), facets, &segments, 2.0 * plan.tolerance_mm[1]);
+            let truth = found[(0.99 * found.len() as f64) as usize];
             let claimed = plan.reached_deg.unwrap();
             println!("{:<32} {angle} {:?}: claimed {claimed:.5}, truly {truth:.5}", known.name, plan.normals);
             claims += 1;

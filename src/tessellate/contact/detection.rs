@@ -39,8 +39,8 @@ struct BoxedFace {
 /// Finds the faces of one solid that lie on a face of another, wholly or in part, within [`Settings::glue_mm`]. Returns the contacts,
 /// sorted, and the faces in them, carriers with a tightened tolerance.
 ///
-/// A face is either carrier or guest, and a guest has one carrier: the rest of a chain is left out. Planes are, for their facets coincide
-/// as they are.
+/// A face is either carrier or guest; what lies wholly on its carrier has no other. Of faces that touch in a circle of odd length a pair is
+/// left out. Planes are, for their facets coincide as they are.
 pub(super) fn contacts<'m>(
     model: &'m Model,
     places: &[PlacedPart<'m>],
@@ -98,33 +98,71 @@ pub(super) fn contacts<'m>(
     (out, trimmed)
 }
 
-/// Drops contacts until no face is both guest and carrier, or the guest of two; those in whole come first, and of one in part guest and
-/// carrier may change places. A guest that carried another would hand on facets that are not its own.
-fn with_one_role_each(all: Vec<Contact>) -> Vec<Contact> {
-    let mut carriers: FxHashSet<FaceKey> = FxHashSet::default();
-    let mut guests: FxHashSet<FaceKey> = FxHashSet::default();
-    let mut out = Vec::new();
-    let (whole, part): (Vec<Contact>, Vec<Contact>) = all.into_iter().partition(|c| c.extent == Extent::Whole);
-    let mut contacts_in_part: FxHashMap<FaceKey, usize> = FxHashMap::default();
-    part.iter().flat_map(|c| [c.carrier, c.guest]).for_each(|key| *contacts_in_part.entry(key).or_default() += 1);
-    for c in whole.into_iter().chain(part) {
-        let turned = Contact { carrier: c.guest, guest: c.carrier, ..c };
-        // Of two that share a part either may carry: the one that touches more others, which each can have one carrier only.
-        let prefers_turned = contacts_in_part.get(&c.guest) > contacts_in_part.get(&c.carrier);
-        let ways = match c.extent {
-            Extent::Whole => vec![c],
-            Extent::Part if prefers_turned => vec![turned, c],
-            Extent::Part => vec![c, turned],
-        };
-        let is_free = |c: &Contact| {
-            !guests.contains(&c.carrier) && !carriers.contains(&c.guest) && !guests.contains(&c.guest)
-        };
-        if let Some(c) = ways.into_iter().find(is_free) {
-            guests.insert(c.guest);
-            carriers.insert(c.carrier);
-            out.push(c);
-        }
+/// A face in a tree of contacts, in which carriers and guests take turns.
+#[derive(Clone, Copy)]
+struct Turn {
+    /// The face above it in the tree, or itself.
+    above: usize,
+    /// Whether it has the other role than that.
+    differs: bool,
+    /// Faces of the tree, where it is the root.
+    count: usize,
+}
+
+/// Returns the root of the tree of face `k`, and whether the face has the other role than the root.
+fn root_of(turns: &[Turn], mut k: usize) -> (usize, bool) {
+    let mut differs = false;
+    while turns[k].above != k {
+        differs ^= turns[k].differs;
+        k = turns[k].above;
     }
+    (k, differs)
+}
+
+/// Drops contacts until no face is both carrier and guest, and what lies wholly on its carrier has no other; those in whole come first. A
+/// guest that carried another would hand on facets that are not its own.
+///
+/// Either of two faces may carry: of a chain, where each touches the next, every other one does. What lies wholly on a guest becomes its
+/// carrier, in part.
+fn with_one_role_each(mut all: Vec<Contact>) -> Vec<Contact> {
+    all.sort_unstable_by_key(|c| (c.extent, c.carrier, c.guest));
+    let mut keys: Vec<FaceKey> = all.iter().flat_map(|c| [c.carrier, c.guest]).collect();
+    keys.sort_unstable();
+    keys.dedup();
+    let index: FxHashMap<FaceKey, usize> = keys.iter().enumerate().map(|(k, &key)| (key, k)).collect();
+    let ends = |c: &Contact| [index[&c.carrier], index[&c.guest]];
+    let mut turns: Vec<Turn> = (0..keys.len()).map(|k| Turn { above: k, differs: false, count: 1 }).collect();
+    all.retain(|c| {
+        let [(a, a_differs), (b, b_differs)] = ends(c).map(|k| root_of(&turns, k));
+        if a != b {
+            // The smaller below the larger: no way to a root is long.
+            let (low, high) = if turns[a].count < turns[b].count { (a, b) } else { (b, a) };
+            let count = turns[low].count + turns[high].count;
+            turns[low] = Turn { above: high, differs: a_differs == b_differs, ..turns[low] };
+            turns[high].count = count;
+        }
+        a != b || a_differs != b_differs
+    });
+    let roles: Vec<(usize, bool)> = (0..keys.len()).map(|k| root_of(&turns, k)).collect();
+    // What speaks for the root of each tree as a carrier, less what speaks against: contacts in whole that stay so; then faces that touch
+    // several, for a carrier's facets are made once; then the order of the faces, so that nothing depends on chance.
+    let mut degree = vec![0i64; keys.len()];
+    all.iter().flat_map(ends).for_each(|k| degree[k] += 1);
+    let mut votes = vec![[0i64; 3]; keys.len()];
+    for c in &all {
+        let [carrier, guest] = ends(c);
+        let (root, carrier_differs) = roles[carrier];
+        let sign = if carrier_differs { -1 } else { 1 };
+        votes[root][0] += if c.extent == Extent::Whole { sign } else { 0 };
+        votes[root][1] += sign * (degree[carrier] - degree[guest]);
+        votes[root][2] += sign;
+    }
+    let carries = |k: usize| (votes[roles[k].0] >= [0; 3]) != roles[k].1;
+    let turned = |c: Contact| Contact { carrier: c.guest, guest: c.carrier, extent: Extent::Part };
+    let mut out: Vec<Contact> = all.into_iter().map(|c| if carries(ends(&c)[0]) { c } else { turned(c) }).collect();
+    out.sort_unstable_by_key(|c| (c.extent, c.carrier, c.guest));
+    let mut whole: FxHashSet<FaceKey> = FxHashSet::default();
+    out.retain(|c| if c.extent == Extent::Whole { whole.insert(c.guest) } else { !whole.contains(&c.guest) });
     out
 }
 

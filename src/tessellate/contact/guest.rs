@@ -25,7 +25,7 @@ pub(super) struct Guest<'f, 'm> {
     pub(super) face: &'f TrimmedFace<'m>,
     pub(super) polygons: BorderPolygons,
     /// The corners of all polygons, one after another, in the part's coordinates.
-    places: Vec<Point>,
+    pub(super) places: Vec<Point>,
 }
 
 impl<'f, 'm> Guest<'f, 'm> {
@@ -37,11 +37,6 @@ impl<'f, 'm> Guest<'f, 'm> {
         };
         let places = polygons.polygons.iter().flatten().map(place).collect();
         Self { face, polygons, places }
-    }
-
-    /// Returns how many corners the border has.
-    pub(super) fn len(&self) -> usize {
-        self.places.len()
     }
 
     /// Goes through the border's sides: the numbers of both ends, counted through all polygons, and both ends themselves.
@@ -91,7 +86,7 @@ impl<'f, 'm> Guest<'f, 'm> {
             let (middle, _) = carrier.projector.project(local(middle));
             let end = |vertex: usize, place: Point| {
                 let (uv, _) = carrier.projector.project(place);
-                ImprintEnd { uv: choose_seam_side(carrier, uv, middle), place, vertex: first + vertex }
+                ImprintEnd { uv: choose_seam_side(carrier, uv, middle, out.near), place, vertex: first + vertex }
             };
             out.segments.push(ImprintSegment { ends: [end(i, places[0]), end(j, places[1])] });
         }
@@ -103,13 +98,13 @@ impl<'f, 'm> Guest<'f, 'm> {
     }
 }
 
-/// Share of the domain within which a place lies on a seam.
-const ON_SEAM: f64 = 1e-6;
-
-/// Moves a place on a seam or pole of a closed surface to those of its parameters that lie on the side of `middle`; others stay as they
-/// are.
-fn choose_seam_side(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
+/// Moves a place within `near` mm of a seam, or at a pole, of a closed surface there, and to the side of `middle`; others stay as they are.
+///
+/// All within `near` is one place, so that a corner just beyond the seam is on it: the line that ends there would run round the whole
+/// surface otherwise.
+fn choose_seam_side(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv, near: f64) -> Uv {
     let surface = &face.surface;
+    let place = surface.point(uv);
     if let Some(across) = surface.pole(uv) {
         // The nearest end, for a projected place is only near the pole; all along the pole is one place.
         let [a, b] = surface.spline.domain()[across];
@@ -118,10 +113,13 @@ fn choose_seam_side(face: &TrimmedFace<'_>, mut uv: Uv, middle: Uv) -> Uv {
         return uv;
     }
     for d in 0..2 {
-        let [a, b] = surface.spline.domain()[d];
-        let extent = b - a;
-        if surface.closed[d] && (uv[d] - a).min(b - uv[d]) <= ON_SEAM * extent {
-            uv[d] = if middle[d] - a < 0.5 * extent { a } else { b };
+        if surface.closed[d] {
+            let [a, b] = surface.spline.domain()[d];
+            let mut on_seam = uv;
+            on_seam[d] = if middle[d] - a < 0.5 * (b - a) { a } else { b };
+            if (surface.point(on_seam) - place).length() * face.frame.scale.abs() <= near {
+                uv = on_seam;
+            }
         }
     }
     uv
@@ -253,7 +251,7 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
         glue: f64,
     ) -> Self {
         let own = facets.vertex_nodes.iter().filter_map(|&(node, vertex)| {
-            let vertex = vertex.checked_sub(first).filter(|&v| v < guest.len())?;
+            let vertex = vertex.checked_sub(first).filter(|&v| v < guest.places.len())?;
             Some((facets.nodes[node as usize].position, vertex))
         });
         let vertices = own.collect();
@@ -324,7 +322,7 @@ impl<'b, 'f, 'm, 'c> Builder<'b, 'f, 'm, 'c> {
             return known;
         }
         let (uv, _) = face.projector.project(place);
-        let node = self.border.nodes.push_own(choose_seam_side(face, uv, middle), place);
+        let node = self.border.nodes.push_own(choose_seam_side(face, uv, middle, self.glue), place);
         self.inner.insert(position, node);
         node
     }

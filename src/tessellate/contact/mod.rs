@@ -6,11 +6,11 @@
 //! carrier's facets inside its border, turned around, and each is proved anew on the guest's own surface. Where only a part of the guest
 //! lies there, the carrier's border is imprinted on the guest too, which keeps facets of its own outside of it. Edges that run together get
 //! the samples of both, so that neighbours of either face still meet it, and those that run inside the other face chords short enough for
-//! it.
+//! it. Of a chain of faces, where each touches the next, every other one carries, and a guest may have several carriers.
 //!
 //! Guarantee: where they touch, a guest has the carrier's facets exactly, but for its own border's corners, which may lie off the carrier
-//! by the glue distance; shells stay closed, as a guest whose facets do not fill its border side on side keeps its own. Known weakness: a
-//! face has one carrier, so of three that touch in turn two are faceted apart.
+//! by the glue distance; shells stay closed, as a guest whose facets do not fill its border side on side keeps its own. Known weakness:
+//! where faces touch in a circle of odd length, as where bodies overlap, two of them are faceted apart.
 
 mod closure;
 mod detection;
@@ -29,7 +29,7 @@ use super::imprint::{CarrierFacets, Imprint};
 use super::placed_part::PlacedPart;
 use super::settings::Settings;
 use super::taken_chords::TakenChords;
-use crate::math::Point;
+use crate::math::{Aabb, Point};
 use crate::model::{Face, Model};
 use closure::SideCounts;
 use detection::{Contact, Extent};
@@ -72,13 +72,26 @@ struct Joiner<'j, 'm> {
     faces: &'j FxHashMap<FaceKey, TrimmedFace<'m>>,
 }
 
-/// A guest among those of one carrier.
-struct Member<'f, 'm> {
-    guest: Guest<'f, 'm>,
+/// A meshed carrier.
+struct Carrier {
+    key: FaceKey,
+    mesh: Option<FaceMesh>,
+    facets: CarrierFacets,
+    /// Its guests, and the number of the first corner of each in the carrier's imprint.
+    guests: Vec<(FaceKey, usize)>,
+}
+
+/// A carrier as one of its guests sees it.
+struct Share<'s, 'm> {
+    carrier: &'s TrimmedFace<'m>,
+    facets: &'s CarrierFacets,
     extent: Extent,
-    /// Number of its first corner in the carrier's imprint.
+    /// Number of the guest's first corner in the carrier's imprint.
     first: usize,
 }
+
+/// Rounds in which faces take samples over from each other: what comes from the one goes on to the next.
+const ROUNDS: usize = 4;
 
 impl<'j, 'm> Joiner<'j, 'm> {
     /// Returns the mesh of an instance's part before contacts; `None` if it was not meshed.
@@ -108,11 +121,44 @@ impl<'j, 'm> Joiner<'j, 'm> {
                 guest.cross_edges(&carrier, glue, &mut samples);
                 carrier.cross_edges(&guest, glue, &mut samples);
             }
-            // Both ways: after this both edges have the samples of either.
-            carrier.take_over(&guest, glue, &mut samples);
-            guest.take_over(&carrier, glue, &mut samples);
+        }
+        let pairs = self.neighbours();
+        // A pair that meets no other is done after one round.
+        let rounds = if pairs.len() > self.contacts.len() { ROUNDS } else { 1 };
+        for _ in 0..rounds {
+            let before = samples.clone();
+            for &[a, b] in &pairs {
+                let (Some(a), Some(b)) = (self.edge_samples(a), self.edge_samples(b)) else { continue };
+                // Both ways: after this both edges have the samples of either.
+                a.take_over(&b, glue, &mut samples);
+                b.take_over(&a, glue, &mut samples);
+            }
+            if samples == before {
+                break;
+            }
         }
         samples
+    }
+
+    /// Returns the pairs of faces whose edges may run together: those in contact, and those with a partner in common whose boxes meet.
+    fn neighbours(&self) -> Vec<[FaceKey; 2]> {
+        let mut partners: FxHashMap<FaceKey, Vec<FaceKey>> = FxHashMap::default();
+        for c in self.contacts {
+            partners.entry(c.carrier).or_default().push(c.guest);
+            partners.entry(c.guest).or_default().push(c.carrier);
+        }
+        let bounds = |key: &FaceKey| Aabb::from_points(self.faces[key].samples.iter().copied());
+        let mut siblings: Vec<[FaceKey; 2]> = Vec::new();
+        for around in partners.values().filter(|around| around.len() > 1) {
+            let boxes: Vec<Aabb> = around.iter().map(|key| bounds(key).grown(self.settings.glue_mm)).collect();
+            for (i, a) in around.iter().enumerate() {
+                let meeting = (i + 1..around.len()).filter(|&j| !boxes[i].intersection(boxes[j]).is_empty());
+                siblings.extend(meeting.map(|j| [*a.min(&around[j]), *a.max(&around[j])]));
+            }
+        }
+        siblings.sort_unstable();
+        siblings.dedup();
+        self.contacts.iter().map(|c| [c.carrier, c.guest]).chain(siblings).collect()
     }
 
     /// Returns the meshes of all instances in contact, by instance, with their edges divided at `samples`. Faces beside changed edges are
@@ -171,38 +217,61 @@ impl<'j, 'm> Joiner<'j, 'm> {
         }
     }
 
-    /// Replaces, in `meshes`, the faces in contact: each carrier with its guests is one group, and groups run in parallel.
+    /// Replaces, in `meshes`, the faces in contact: first carriers, then guests, in parallel.
     fn mesh_carriers_and_guests(&self, meshes: &mut FxHashMap<usize, PartMesh>) {
-        let groups: Vec<&[Contact]> = self.contacts.chunk_by(|a, b| a.carrier == b.carrier).collect();
         let now = &*meshes;
-        let made: Vec<Vec<(FaceKey, Option<FaceMesh>)>> =
-            groups.par_iter().map(|group| self.mesh_group(group, now)).collect();
-        for (key, mesh) in made.into_iter().flatten() {
+        let mut guests: FxHashMap<FaceKey, Vec<&Contact>> = FxHashMap::default();
+        self.contacts.iter().for_each(|c| guests.entry(c.guest).or_default().push(c));
+        let border = |(&key, contacts): (&FaceKey, &Vec<&Contact>)| {
+            let carriers: Vec<&TrimmedFace<'_>> = contacts.iter().map(|c| &self.faces[&c.carrier]).collect();
+            (key, self.guest(&self.faces[&key], &carriers, &now[&key.instance]))
+        };
+        let borders: FxHashMap<FaceKey, Guest<'_, '_>> = guests.par_iter().map(border).collect();
+        let groups: Vec<&[Contact]> = self.contacts.chunk_by(|a, b| a.carrier == b.carrier).collect();
+        let carriers: Vec<Carrier> =
+            groups.par_iter().map(|group| self.mesh_carrier(group, &borders, now)).collect();
+        let share = |c: &Contact| {
+            let found = carriers.binary_search_by_key(&c.carrier, |carrier| carrier.key).ok()?;
+            let Carrier { facets, guests, .. } = &carriers[found];
+            let (_, first) = *guests.iter().find(|(key, _)| *key == c.guest)?;
+            Some(Share { carrier: &self.faces[&c.carrier], facets, extent: c.extent, first })
+        };
+        let made = |(key, contacts): (&FaceKey, &Vec<&Contact>)| {
+            let shares: Vec<Share<'_, '_>> = contacts.iter().filter_map(|c| share(c)).collect();
+            let guest = &borders[key];
+            let taken = self.guest_mesh(guest, &shares, now);
+            // Where not all fit together, the first may.
+            let taken =
+                taken.or_else(|| self.guest_mesh(guest, shares.get(..1).filter(|_| shares.len() > 1)?, now));
+            (*key, taken.or_else(|| mesh_face(&self.input(guest.face, &now[&key.instance]))))
+        };
+        let made: Vec<(FaceKey, Option<FaceMesh>)> = guests.par_iter().map(made).collect();
+        let carriers = carriers.into_iter().map(|c| (c.key, c.mesh));
+        for (key, mesh) in carriers.chain(made) {
             if let Some(part) = meshes.get_mut(&key.instance) {
                 part.faces[key.face] = mesh;
             }
         }
     }
 
-    /// Meshes a carrier with its guests' borders imprinted, and then its guests with its facets. A face for which that fails is meshed as
-    /// without a contact; `None` where that fails too. The contacts of `group` have one carrier.
-    fn mesh_group(
+    /// Meshes a carrier with its guests' borders imprinted; one for which that fails as without a contact, without facets for its guests.
+    /// The contacts of `group` have one carrier.
+    fn mesh_carrier(
         &self,
         group: &[Contact],
+        borders: &FxHashMap<FaceKey, Guest<'_, '_>>,
         meshes: &FxHashMap<usize, PartMesh>,
-    ) -> Vec<(FaceKey, Option<FaceMesh>)> {
+    ) -> Carrier {
         let carrier = &self.faces[&group[0].carrier];
         let carrier_mesh = &meshes[&carrier.key.instance];
         let mut imprint = Imprint { segments: Vec::new(), near: self.settings.glue_mm };
-        let mut members: Vec<Member<'_, '_>> = Vec::new();
+        let mut guests: Vec<(FaceKey, usize)> = Vec::new();
         let mut first = 0;
         for c in group {
-            let face = &self.faces[&c.guest];
-            let guest = self.guest(face, carrier, &meshes[&face.key.instance]);
+            let guest = &borders[&c.guest];
             guest.imprint(carrier, c.extent, first, &mut imprint);
-            let next = first + guest.len();
-            members.push(Member { guest, extent: c.extent, first });
-            first = next;
+            guests.push((c.guest, first));
+            first += guest.places.len();
         }
         let made = mesh_with_imprint(&self.input(carrier, carrier_mesh), &imprint);
         let (mesh, facets) = match made {
@@ -217,43 +286,49 @@ impl<'j, 'm> Joiner<'j, 'm> {
             // Each by itself, as without a contact.
             _ => (mesh_face(&self.input(carrier, carrier_mesh)), CarrierFacets::default()),
         };
-        let mut out = vec![(carrier.key, mesh)];
-        for member in &members {
-            let face = member.guest.face;
-            let taken = self.guest_mesh(member, carrier, &facets, meshes);
-            let made = taken.or_else(|| mesh_face(&self.input(face, &meshes[&face.key.instance])));
-            out.push((face.key, made));
-        }
-        out
+        Carrier { key: carrier.key, mesh, facets, guests }
     }
 
-    /// Meshes a guest with its carrier's facets and, of a contact in part, its own elsewhere; `None` where they do not fill its border, and
+    /// Meshes a guest with its carriers' facets and, of a contact in part, its own elsewhere; `None` where they do not fill its border, and
     /// where its own are repaired.
     fn guest_mesh(
         &self,
-        member: &Member<'_, 'm>,
-        carrier: &TrimmedFace<'m>,
-        facets: &CarrierFacets,
+        guest: &Guest<'_, 'm>,
+        shares: &[Share<'_, 'm>],
         meshes: &FxHashMap<usize, PartMesh>,
     ) -> Option<FaceMesh> {
-        let Member { guest, extent, first } = member;
         let mesh = &meshes[&guest.face.key.instance];
-        let (taken, border) = guest::taken_facets(guest, carrier, facets, *first, mesh, self.settings);
-        if *extent == Extent::Whole {
+        let takes =
+            shares.iter().map(|s| guest::taken_facets(guest, s.carrier, s.facets, s.first, mesh, self.settings));
+        let mut takes: Vec<(FaceMesh, SideCounts)> = takes.collect();
+        if shares.iter().any(|s| s.extent == Extent::Whole) {
+            let (taken, border) = takes.pop()?;
             return SideCounts::of_facets(&taken).fill(&border).then_some(taken);
         }
         let near = self.settings.glue_mm;
-        let carrier = self.guest(carrier, guest.face, &meshes[&carrier.key.instance]);
+        let carriers: Vec<Guest<'_, '_>> =
+            shares.iter().map(|s| self.guest(s.carrier, &[guest.face], &meshes[&s.carrier.key.instance])).collect();
         let mut imprint = Imprint { segments: Vec::new(), near };
-        carrier.imprint(guest.face, Extent::Part, 0, &mut imprint);
+        let mut first = 0;
+        for carrier in &carriers {
+            carrier.imprint(guest.face, Extent::Part, first, &mut imprint);
+            first += carrier.places.len();
+        }
         let (own, lines) = mesh_with_imprint(&self.input(guest.face, mesh), &imprint).ok()?;
+        let taken: Vec<FaceMesh> = takes.into_iter().map(|(taken, _)| taken).collect();
         // What was repaired has no facets that others could meet.
-        let is_sound = lines.holds_imprint && own.repaired.is_none() && !taken.facets.is_empty();
-        if is_sound { shared_part::joined(guest, &carrier, &own, &taken, mesh, near) } else { None }
+        let is_sound =
+            lines.holds_imprint && own.repaired.is_none() && taken.iter().all(|taken| !taken.facets.is_empty());
+        if is_sound { shared_part::joined(guest, &carriers, &own, &taken, mesh, near) } else { None }
     }
 
-    /// Builds the border of a face on the divisions of `mesh`, its part, with corners where its seams cross the carrier's.
-    fn guest<'f>(&self, face: &'f TrimmedFace<'m>, carrier: &TrimmedFace<'_>, mesh: &PartMesh) -> Guest<'f, 'm> {
+    /// Builds the border of a face on the divisions of `mesh`, its part, with corners where its seams cross those of its carriers.
+    fn guest<'f>(
+        &self,
+        face: &'f TrimmedFace<'m>,
+        carriers: &[&TrimmedFace<'_>],
+        mesh: &PartMesh,
+    ) -> Guest<'f, 'm> {
         let near = self.settings.glue_mm;
         let build = |points: &[Point]| {
             let imprinted = ImprintedPoints { points, near };
@@ -266,9 +341,11 @@ impl<'j, 'm> Joiner<'j, 'm> {
             for k in (0..p.len()).filter(|&k| p[k].side == polygons::BorderSide::Seam) {
                 let (a, b) = (p[k].uv, p[(k + 1) % p.len()].uv);
                 let place = |f: f64| face.surface.point(a.lerp(b, f));
-                let on_carrier = |f: f64| carrier.project(face.frame.point(place(f))).0;
-                for d in (0..2).filter(|&d| carrier.surface.closed[d]) {
-                    points.extend(samples::seam_crossing(carrier, d, [0.0, 1.0], on_carrier).map(place));
+                for carrier in carriers {
+                    let on_carrier = |f: f64| carrier.project(face.frame.point(place(f))).0;
+                    for d in (0..2).filter(|&d| carrier.surface.closed[d]) {
+                        points.extend(samples::seam_crossing(carrier, d, [0.0, 1.0], on_carrier).map(place));
+                    }
                 }
             }
         }

@@ -35,11 +35,16 @@ pub(super) struct EdgeSamples<'f, 'm> {
 
 impl EdgeSamples<'_, '_> {
     /// Returns the parameters of an edge, ascending.
-    fn parameters(&self, edge: EdgeId, samples: &ContactSamples) -> Vec<f64> {
+    fn parameters<'s>(&'s self, edge: EdgeId, samples: &'s ContactSamples) -> &'s [f64] {
         match samples.get(&self.face.key.instance) {
-            Some(of_edges) => of_edges[edge.0 as usize].clone(),
-            None => self.divisions[edge.0 as usize].t.clone(),
+            Some(of_edges) => &of_edges[edge.0 as usize],
+            None => &self.divisions[edge.0 as usize].t,
         }
+    }
+
+    /// Returns the places of the samples of an edge, in the model's coordinates.
+    fn places(&self, edge: EdgeId, samples: &ContactSamples) -> Vec<Point> {
+        self.parameters(edge, samples).iter().map(|&t| self.place(edge, t)).collect()
     }
 
     /// Adds a parameter to an edge, in place of that of `moved` where one is given.
@@ -58,47 +63,52 @@ impl EdgeSamples<'_, '_> {
 
     /// Adds `t` to an edge unless a sample of it lies within `glue` mm.
     fn request_sample(&self, edge: EdgeId, t: f64, glue: f64, samples: &mut ContactSamples) {
-        let p = self.place(edge, t);
-        let known = self.parameters(edge, samples);
-        if known.iter().all(|&s| (self.place(edge, s) - p).length() > glue) {
+        if self.nearest_sample(edge, self.place(edge, t), samples).1 > glue {
             self.set_sample(edge, t, None, samples);
         }
     }
 
-    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges. A sample of ours that lies so near to one
-    /// of theirs moves there: chords between nearly the same places would leave a sliver between both faces.
+    /// Returns the parameter of the sample of an edge that is nearest to a place, and how far it is, mm.
+    fn nearest_sample(&self, edge: EdgeId, p: Point, samples: &ContactSamples) -> (f64, f64) {
+        let away = self.parameters(edge, samples).iter().map(|&s| (s, (self.place(edge, s) - p).length()));
+        away.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((f64::NAN, f64::INFINITY))
+    }
+
+    /// Adds `t` to an edge, or moves the nearest sample there where that lies within `glue` mm: chords between nearly the same places would
+    /// leave a sliver between the two faces. The ends of an edge are corners of the face and stay.
+    fn move_sample(&self, edge: EdgeId, t: f64, glue: f64, samples: &mut ContactSamples) {
+        let (nearest, away) = self.nearest_sample(edge, self.place(edge, t), samples);
+        let known = self.parameters(edge, samples);
+        let is_end = [known.first(), known.last()].contains(&Some(&nearest));
+        if away > glue {
+            self.set_sample(edge, t, None, samples);
+        } else if away > ONE_PLACE * glue && !is_end {
+            self.set_sample(edge, t, Some(nearest), samples);
+        }
+    }
+
+    /// Adds the samples of another face's edges that lie within `glue` mm of this face's edges; a sample of ours that lies so near to one
+    /// of theirs moves there.
     pub(super) fn take_over(&self, other: &EdgeSamples<'_, '_>, glue: f64, samples: &mut ContactSamples) {
+        let edges = self.face.edges();
         for theirs in other.face.edges() {
-            let places: Vec<Point> =
-                other.parameters(theirs, samples).into_iter().map(|t| other.place(theirs, t)).collect();
+            let places = other.places(theirs, samples);
             // Every edge of either: two faces may touch along edges that are divided quite differently.
-            for ours in self.face.edges() {
+            for &ours in &edges {
                 for &p in &places {
                     let (t, away) = self.face.nearest_on_edge(ours, p);
-                    if away <= glue {
-                        self.adopt_sample((ours, t), &places, glue, samples);
+                    if away > glue {
+                        continue;
+                    }
+                    let (nearest, distance) = self.nearest_sample(ours, self.place(ours, t), samples);
+                    let here = self.place(ours, nearest);
+                    // One that another of theirs is nearer to is that one's; `p` itself is as near, to rounding.
+                    let least = distance - ONE_PLACE * glue;
+                    if distance > glue || places.iter().all(|q| (*q - here).length() >= least) {
+                        self.move_sample(ours, t, glue, samples);
                     }
                 }
             }
-        }
-    }
-
-    /// Adds `t` to an edge, which is where one of `places` lies on it, or moves the nearest sample there where that is within `glue` mm.
-    /// Ends of edges are corners of the face and stay, and so does a sample that another of `places` is nearer to.
-    fn adopt_sample(&self, (edge, t): (EdgeId, f64), places: &[Point], glue: f64, samples: &mut ContactSamples) {
-        let p = self.place(edge, t);
-        let known = self.parameters(edge, samples);
-        let away = |s: f64| (self.place(edge, s) - p).length();
-        let Some(nearest) = known.iter().copied().min_by(|&a, &b| away(a).total_cmp(&away(b))) else { return };
-        if away(nearest) > glue {
-            self.set_sample(edge, t, None, samples);
-            return;
-        }
-        let here = self.place(edge, nearest);
-        let is_end = nearest == known[0] || nearest == known[known.len() - 1];
-        let is_nearest = places.iter().all(|q| (*q - here).length() >= away(nearest));
-        if away(nearest) > ONE_PLACE * glue && !is_end && is_nearest {
-            self.set_sample(edge, t, Some(nearest), samples);
         }
     }
 
@@ -106,7 +116,7 @@ impl EdgeSamples<'_, '_> {
     pub(super) fn shorten_chords(&self, other: &TrimmedFace<'_>, glue: f64, samples: &mut ContactSamples) {
         let borders = other.edges();
         for edge in self.face.edges() {
-            for pair in self.parameters(edge, samples).windows(2) {
+            for pair in self.parameters(edge, samples).to_vec().windows(2) {
                 let place = |f: f64| self.place(edge, pair[0] + f * (pair[1] - pair[0]));
                 let middle = place(0.5);
                 let (uv, away) = other.project(middle);
@@ -135,7 +145,7 @@ impl EdgeSamples<'_, '_> {
         for edge in self.face.rims() {
             let inside = |t: f64| other.face.holds_inside(&rims, self.place(edge, t), glue);
             let at_border = |t: f64| other.face.is_at_border(&rims, self.place(edge, t), glue);
-            for pair in self.parameters(edge, samples).windows(2) {
+            for pair in self.parameters(edge, samples).to_vec().windows(2) {
                 // What runs along the other border takes its samples over.
                 if at_border(pair[0]) && at_border(pair[1]) {
                     continue;
@@ -179,20 +189,19 @@ impl EdgeSamples<'_, '_> {
             s = other.face.nearest_on_edge(crossed, self.place(edge, t)).0;
         }
         if (self.place(edge, t) - other.place(crossed, s)).length() <= glue {
-            self.request_sample(edge, t, glue, samples);
-            other.request_sample(crossed, s, glue, samples);
+            self.move_sample(edge, t, glue, samples);
+            other.move_sample(crossed, s, glue, samples);
         }
     }
 
     /// Asks for samples where edges of this face cross the seam of its carrier.
     pub(super) fn cross_seams(&self, carrier: &TrimmedFace<'_>, glue: f64, samples: &mut ContactSamples) {
         for edge in self.face.edges() {
-            let t = self.parameters(edge, samples);
-            for pair in t.windows(2) {
+            for pair in self.parameters(edge, samples).to_vec().windows(2) {
                 for d in (0..2).filter(|&d| carrier.surface.closed[d]) {
                     let at = |t: f64| carrier.project(self.place(edge, t)).0;
                     if let Some(crossing) = seam_crossing(carrier, d, [pair[0], pair[1]], at) {
-                        self.request_sample(edge, crossing, glue, samples);
+                        self.move_sample(edge, crossing, glue, samples);
                     }
                 }
             }
