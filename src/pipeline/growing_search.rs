@@ -76,8 +76,8 @@ pub(super) fn most_rays(prepared: &PreparedScene) -> u64 {
 ///
 /// The square of a standard error, with which the rays go, is spread by √(2 / (n − 1)) of itself when it is found from n replicates. The
 /// run that is asked for finds its error in the same way, from as many replicates at least: the spread of the ratio of both is at most √2
-/// times that, and the margin covers [`MARGIN_SIGMAS`] of it, up to [`MOST_MARGIN`]. A third for 128 replicates, 3 % for the 20,000 of a run
-/// of 10⁸ rays.
+/// times that, and the margin covers [`MARGIN_SIGMAS`] of it, up to [`MOST_MARGIN`]. A third for 128 replicates, 3 % for the 20,000 of a
+/// run of 10⁸ rays.
 pub(super) fn growth_margin(replicates: u32) -> f64 {
     // From one replicate no error is found; as of two, where it is asked for.
     (1.0 + MARGIN_SIGMAS * 2.0 / f64::from(replicates.max(2) - 1).sqrt()).min(MOST_MARGIN)
