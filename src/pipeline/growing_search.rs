@@ -8,6 +8,8 @@ use crate::simulate::{PartialRun, Results};
 const MOST_RAYS: u64 = 10_000_000_000;
 /// Standard deviations of an error's own error that [`growth_margin`] leaves room for: of 25 searches one traces once more.
 const MARGIN_SIGMAS: f64 = 2.0;
+/// Largest such margin: of few replicates one more run costs less than rays that nobody needs.
+const MOST_MARGIN: f64 = 2.0;
 /// Least and greatest growth of the rays: fewer would be a run for little, more would trust a poor first error too much.
 const GROWTH_RANGE: [f64; 2] = [2.0, 64.0];
 
@@ -74,10 +76,11 @@ pub(super) fn most_rays(prepared: &PreparedScene) -> u64 {
 ///
 /// The square of a standard error, with which the rays go, is spread by √(2 / (n − 1)) of itself when it is found from n replicates. The
 /// run that is asked for finds its error in the same way, from as many replicates at least: the spread of the ratio of both is at most √2
-/// times that, and the margin covers [`MARGIN_SIGMAS`] of it. A third for 128 replicates, 3 % for the 20,000 of a run of 10⁸ rays.
+/// times that, and the margin covers [`MARGIN_SIGMAS`] of it, up to [`MOST_MARGIN`]. A third for 128 replicates, 3 % for the 20,000 of a
+/// run of 10⁸ rays.
 pub(super) fn growth_margin(replicates: u32) -> f64 {
     // From one replicate no error is found; as of two, where it is asked for.
-    1.0 + MARGIN_SIGMAS * 2.0 / f64::from(replicates.max(2) - 1).sqrt()
+    (1.0 + MARGIN_SIGMAS * 2.0 / f64::from(replicates.max(2) - 1).sqrt()).min(MOST_MARGIN)
 }
 
 /// Returns the number of rays of the run after one of `rays`: `growth` times as many, kept within [`GROWTH_RANGE`]; at most `most`.
@@ -98,7 +101,7 @@ mod tests {
             let margin = growth_margin(replicates);
             assert!(quantiles[0] < margin && margin < quantiles[1], "{replicates}: {margin}");
         }
-        assert_eq!((growth_margin(2), growth_margin(1)), (5.0, 5.0));
+        assert_eq!([17, 16, 2, 1].map(growth_margin), [2.0; 4]);
     }
 
     #[test]
