@@ -22,7 +22,7 @@ pub(super) const BATCH: usize = 512;
 
 /// Levels of nodes up to which a tree is shallow, as nearly all are: its stacks take few pages of memory, which a walk is 4 % faster by.
 const SHALLOW: usize = 8;
-/// Levels of nodes that no tree goes beyond: 32 of cells and 30 of packing, less the one that both share.
+/// Levels of nodes that no tree goes beyond: 61, of which cells have 32 and packing 30, with one that both share; rounded up.
 const DEEPEST: usize = 64;
 
 /// Where a thread keeps states from one walk to the next.
