@@ -168,3 +168,59 @@ impl Slab {
         comes_near((b - a).cross(c - a)) || comes_near((c - a).cross(d - a))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::exact::{Exact, Settings};
+    use crate::math::{FaceId, Frame, Uv, Vector};
+    use crate::mesh::{Facet, MeshVertex};
+    use crate::model::{Face, Model, Part, Shell};
+    use crate::nurbs::sweep;
+    use std::f64::consts::TAU;
+
+    /// One facet of 20 × 20 mm, upon which a wall of 40 strips stands in a circle of radius 6 mm.
+    fn plate_with_a_wall() -> FacetMesh {
+        let on_circle = |k: u32, z: f64| {
+            let (y, x) = (TAU * f64::from(k) / 40.0).sin_cos();
+            Point::new(6.0 * x, 6.0 * y, z)
+        };
+        let corners =
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Point::new(x, y, 0.0) * 10.0);
+        let strips =
+            (0..40).map(|k| [(k, 0.0), (k + 1, 0.0), (k + 1, 5.0), (k, 5.0)].map(|(k, z)| on_circle(k, z)));
+        let positions: Vec<Point> = std::iter::once(corners).chain(strips).flatten().collect();
+        let vertex = |position| MeshVertex { position, normal: Vector::Z, uv: Uv::ZERO };
+        let facet = |f: u32| Facet { vertices: [0, 1, 2, 3].map(|k| 4 * f + k), face: FaceId(f.min(1)) };
+        FacetMesh {
+            vertices: (0..positions.len() as u32).map(vertex).collect(),
+            positions,
+            facets: (0..41).map(facet).collect(),
+            sag: vec![],
+        }
+    }
+
+    /// What a map and a tree find is what asking every slab finds.
+    #[test]
+    fn no_slab_is_hidden_by_the_map_of_a_facet() {
+        let plate = sweep::plane(&Frame::IDENTITY, [[-10.0, 10.0]; 2]);
+        let wall = sweep::cylinder(&Frame::IDENTITY, 6.0, [0.0, TAU], [0.0, 5.0]);
+        let faces = [plate, wall].map(Face::whole).into();
+        let model = Model::from_part(Part { shells: vec![Shell { faces, ..Shell::default() }], ..Part::default() });
+        let exact = Exact::build(&model, &Settings::default());
+        let mesh = plate_with_a_wall();
+        let slabs = Slabs::of_mesh(&mesh, &FacetRecord::of_mesh(&mesh, &exact, 0.05), 0.2);
+        assert_eq!(slabs.maps.len(), 1);
+        let mut met = 0;
+        for k in 0..20_000u32 {
+            let unit = |m: f64| (f64::from(k) * m).fract();
+            let place = Point::new(20.0 * unit(0.618) - 10.0, 20.0 * unit(0.755) - 10.0, 0.1 * unit(0.569));
+            let way = [place + 0.2 * Vector::new(unit(0.31) - 0.5, unit(0.57) - 0.5, 0.0), place];
+            let meets = slabs.all.iter().any(|slab| slab.facet != 0 && slab.meets(&mesh, way));
+            assert_eq!(slabs.meet(&mesh, 0, way), meets, "{way:?}");
+            met += u32::from(meets);
+        }
+        // A ring 0.1 mm wide and as much as ways reach beyond, of 400 mm²: some hundreds.
+        assert!((200..2_000).contains(&met), "{met}");
+    }
+}
