@@ -95,8 +95,8 @@ pub(crate) struct FacetRay {
     pub(crate) origin: [f64; 3],
     /// Slopes of the ray against its main axis, and the inverse of the direction along it.
     shear: [f64; 3],
-    /// Axes: two lateral ones, then the main one.
-    axes: [u8; 3],
+    /// The axis that the direction is longest along.
+    main_axis: u8,
     pub(crate) t_min: f64,
     direction: Vector,
     /// The facet that the ray leaves, and which triangle of it where that is known.
@@ -108,19 +108,19 @@ impl FacetRay {
     /// Prepares a ray: chooses its axes and shear. It need not be finite; one without a direction then hits nothing.
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
-        let d = ray.direction.to_array();
+        let d: &[f64; 3] = ray.direction.as_ref();
         let a = ray.direction.abs();
         // The main axis is the longest of the direction: no slope against it is above one, and shearing magnifies
         // nothing.
         let of_yz = select_unpredictable(a.y > a.z, 1, 2);
         let of_xz = select_unpredictable(a.x > a.z, 0, 2);
-        let kz: usize = select_unpredictable(a.x > a.y, of_xz, of_yz);
-        let [kx, ky] = [[1, 2], [2, 0], [0, 1]][kz];
+        let main_axis: u8 = select_unpredictable(a.x > a.y, of_xz, of_yz);
+        let [kx, ky, kz] = axes(main_axis);
         let sz = 1.0 / d[kz];
         Self {
             origin: ray.origin.to_array(),
             shear: [d[kx] * sz, d[ky] * sz, sz],
-            axes: [kx as u8, ky as u8, kz as u8],
+            main_axis,
             t_min: ray.t_min,
             direction: ray.direction,
             from: ray.departure.map(|d| d.primitive),
@@ -133,9 +133,15 @@ impl FacetRay {
         self.shear
     }
 
+    /// The axis that the direction is longest along.
+    pub(crate) fn main_axis(&self) -> u8 {
+        self.main_axis
+    }
+
     /// The two lateral axes and the main one.
+    #[inline(always)]
     pub(crate) fn axes(&self) -> [usize; 3] {
-        self.axes.map(|a| (a % 3) as usize)
+        axes(self.main_axis)
     }
 
     /// The ray with its coordinates in the order of its axes, without its departure.
@@ -290,6 +296,13 @@ impl FacetRay {
         let [a, b, c, d] = *corners;
         [way([a, b, c]), way([a, c, d])]
     }
+}
+
+/// The two axes beside a main one, and it: x, y and z turned on until it is the last.
+#[inline(always)]
+fn axes(main: u8) -> [usize; 3] {
+    static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+    AXES[usize::from(main.min(2))]
 }
 
 /// A ray with its coordinates in the order of its axes, the main one last.

@@ -1,5 +1,7 @@
 //! Hits on facets, and which of them is the nearest.
 
+use std::hint::select_unpredictable;
+
 /// A hit on a facet: which, where on it, and how far along the ray, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FacetHit {
@@ -11,11 +13,18 @@ pub(crate) struct FacetHit {
     pub(crate) b: [f64; 3],
 }
 
-/// The nearest hit so far; `t` is its distance, mm, or without a hit the end of the ray's range.
+/// What no facet is called.
+const NO_FACET: u32 = u32::MAX;
+
+/// The nearest hit so far, with its edge functions.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nearest {
+    /// Its distance, mm, or without a hit the end of the ray's range.
     pub(crate) t: f64,
-    hit: Option<EdgeHit>,
+    /// [`NO_FACET`] without a hit; what follows then means nothing.
+    facet: u32,
+    second: bool,
+    edges: [f64; 3],
 }
 
 /// A hit with its edge functions, which are its corner weights but for their sum.
@@ -31,39 +40,43 @@ pub(crate) struct EdgeHit {
 
 impl Nearest {
     /// Starts without a hit; hits beyond `t_max`, mm, will not be kept.
+    #[inline(always)]
     pub(crate) fn up_to(t_max: f64) -> Self {
-        Self { t: t_max, hit: None }
+        Self { t: t_max, facet: NO_FACET, second: false, edges: [0.0; 3] }
     }
 
     /// Returns the nearest hit offered, with its corner weights; `None` where there was none up to `t_max`.
+    #[inline(always)]
     pub(crate) fn hit(&self) -> Option<FacetHit> {
-        let EdgeHit { t, facet, second, edges } = self.hit?;
+        let Self { t, facet, second, edges } = *self;
         // Divided here once, not at each hit that a nearer one supersedes.
         let det = edges[0] + edges[1] + edges[2];
-        Some(FacetHit { t, facet, second, b: edges.map(|e| e / det) })
+        (facet != NO_FACET).then_some(FacetHit { t, facet, second, b: edges.map(|e| e / det) })
     }
 
-    /// The facet of the nearest hit so far.
+    /// Whether the nearest hit so far is on this facet.
     #[inline(always)]
-    pub(crate) fn facet(&self) -> Option<u32> {
-        self.hit.map(|hit| hit.facet)
+    pub(crate) fn is_on(&self, facet: u32) -> bool {
+        self.facet == facet
     }
 
-    /// Keeps a hit that is known to be nearer than the one kept so far.
+    /// Keeps a hit where it `is_nearer` than the one kept so far. No branch depends on it.
     #[inline(always)]
-    pub(crate) fn keep_nearer(&mut self, hit: EdgeHit) {
-        *self = Self { t: hit.t, hit: Some(hit) };
+    pub(crate) fn keep_if(&mut self, is_nearer: bool, hit: EdgeHit) {
+        self.t = select_unpredictable(is_nearer, hit.t, self.t);
+        self.facet = select_unpredictable(is_nearer, hit.facet, self.facet);
+        self.second = select_unpredictable(is_nearer, hit.second, self.second);
+        for (kept, edge) in self.edges.iter_mut().zip(hit.edges) {
+            *kept = select_unpredictable(is_nearer, edge, *kept);
+        }
     }
 
     /// Keeps `hit` if it is nearer than the one kept so far: of equal ones that on the facet of lowest index, there the first triangle's.
     #[inline(always)]
     pub(crate) fn offer(&mut self, hit: EdgeHit) {
-        let nearer = match self.hit {
-            None => hit.t <= self.t,
-            Some(old) => hit.t < old.t || (hit.t == old.t && (hit.facet, hit.second) < (old.facet, old.second)),
-        };
-        if nearer {
-            self.keep_nearer(hit);
+        // Without a hit so far no facet has a lower index.
+        if hit.t < self.t || (hit.t == self.t && (hit.facet, hit.second) < (self.facet, self.second)) {
+            self.keep_if(true, hit);
         }
     }
 }

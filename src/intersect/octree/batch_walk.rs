@@ -148,14 +148,11 @@ fn test_waiting<L: Lanes, const STACK: usize>(
         for ray in tested {
             let s = &mut states[ray];
             s.limit_to_hit();
-            if s.candidates != 0 {
-                queues.exact.add_if(true, ray);
-                continue;
-            }
-            // What was next may lie beyond the new hit.
+            // What was next may lie beyond the new hit. Where more is to be tested it stays next.
             s.recheck_next::<L>();
             prefetch_step(arrays, s.next);
-            ways.note(ray, s.next);
+            queues.exact.add_if(s.candidates != 0, ray);
+            ways.note_if(s.candidates == 0, ray, s.next);
         }
         queues.put(&ways);
     }
@@ -191,8 +188,8 @@ fn test_in_lanes<const STACK: usize>(
         if verdict & Verdict::CARE != 0 {
             let corners = block.positions[k].map(|p| &arrays.positions[p as usize]);
             test_with_care(tree, s, block.facets[k], triangles, corners);
-        } else if verdict & Verdict::HIT != 0 {
-            s.best.keep_nearer(lanes.hit(lane, block.facets[k]));
+        } else {
+            s.best.keep_if(verdict & Verdict::HIT != 0, lanes.hit(lane, block.facets[k]));
         }
     }
 }

@@ -16,10 +16,12 @@ type Lane = [f64; LANES];
 /// What is known of the tests before, and after.
 #[repr(C, align(64))]
 pub(super) struct FacetLanes {
-    /// Of each corner, along the ray's axes, the main one last, mm.
+    /// Of each corner along x, y and z, mm.
     corners: [[Lane; 3]; 4],
     origin: [Lane; 3],
-    /// As [`crate::intersect::facet::FacetRay::shear`].
+    /// As [`FacetRay::main_axis`].
+    main_axis: [u64; LANES],
+    /// As [`FacetRay::shear`].
     shear: [Lane; 3],
     t_min: Lane,
     /// The nearest hit of the ray so far, or the end of its range.
@@ -55,6 +57,7 @@ impl FacetLanes {
         Self {
             corners: [[[0.0; LANES]; 3]; 4],
             origin: [[0.0; LANES]; 3],
+            main_axis: [0; LANES],
             shear: [[0.0; LANES]; 3],
             t_min: [0.0; LANES],
             t_max: [0.0; LANES],
@@ -79,20 +82,20 @@ impl FacetLanes {
         (departed, best): (u32, &Nearest),
     ) {
         let lane = lane % LANES;
-        let (axes, shear) = (ray.axes(), ray.shear());
+        let shear = ray.shear();
         for a in 0..3 {
-            let axis = axes[a];
             for k in 0..4 {
-                self.corners[k][a][lane] = corners[k][axis];
+                self.corners[k][a][lane] = corners[k][a];
             }
-            self.origin[a][lane] = ray.origin[axis];
+            self.origin[a][lane] = ray.origin[a];
             self.shear[a][lane] = shear[a];
         }
+        self.main_axis[lane] = u64::from(ray.main_axis());
         self.t_min[lane] = ray.t_min;
         self.t_max[lane] = best.t;
         self.departs[lane] = u64::from(departed != u32::MAX);
         self.is_own[lane] = u64::from(departed == facet);
-        self.is_known[lane] = u64::from(best.facet() == Some(facet));
+        self.is_known[lane] = u64::from(best.is_on(facet));
         self.triangles[lane] = u64::from(triangles);
     }
 
@@ -104,9 +107,16 @@ impl FacetLanes {
             let [sx, sy, sz] = [self.shear[0][l], self.shear[1][l], self.shear[2][l]];
             let (mut x, mut y, mut z) = ([0.0; 4], [0.0; 4], [0.0; 4]);
             let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+            let (along_x, along_y) = (self.main_axis[l] == 0, self.main_axis[l] == 1);
             for k in 0..4 {
-                let [cx, cy, cz] =
+                let [dx, dy, dz] =
                     [self.corners[k][0][l] - ox, self.corners[k][1][l] - oy, self.corners[k][2][l] - oz];
+                // In the order of the ray's axes, the main one last.
+                let turned = |by_x: f64, by_y: f64, by_z: f64| {
+                    let others = if along_y { by_y } else { by_z };
+                    if along_x { by_x } else { others }
+                };
+                let [cx, cy, cz] = [turned(dy, dz, dx), turned(dz, dx, dy), turned(dx, dy, dz)];
                 (low, high) = (
                     [ordered_min(low[0], cx), ordered_min(low[1], cy), ordered_min(low[2], cz)],
                     [ordered_max(high[0], cx), ordered_max(high[1], cy), ordered_max(high[2], cz)],
@@ -156,7 +166,7 @@ impl FacetLanes {
         self.verdicts[lane % LANES]
     }
 
-    /// The hit of a lane whose verdict says that there is one.
+    /// The hit of a lane; it means nothing where the verdict says that there is none.
     #[inline(always)]
     pub(super) fn hit(&self, lane: usize, facet: u32) -> EdgeHit {
         let lane = lane % LANES;
