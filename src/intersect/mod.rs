@@ -5,11 +5,16 @@
 pub mod bvh;
 #[cfg(feature = "contenders")]
 pub mod contenders;
+mod corner_normals;
+#[cfg(target_arch = "x86_64")]
+mod corner_normals_avx2;
+mod cubic_patch;
 pub mod exact;
 mod facet;
 mod facet_hit;
 mod facet_triangles;
 pub mod instanced;
+mod line;
 mod normals;
 pub mod octree;
 pub mod polish;

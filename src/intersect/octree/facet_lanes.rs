@@ -1,4 +1,4 @@
-//! The f64 test of one facet each for eight rays at once, with the arithmetic of [`crate::intersect::facet::Line::test_quad`] step by
+//! The f64 test of one facet each for eight rays at once, with the arithmetic of [`crate::intersect::line::Line::test_quad`] step by
 //! step, so that hits have the same bits as of a ray alone. Written as one loop over the lanes without branches, which compilers turn into
 //! whole registers; a test that needs more than the signs of edge functions is left to the caller.
 

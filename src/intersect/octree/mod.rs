@@ -49,8 +49,8 @@ mod tree;
 mod walk;
 
 use super::facet::FacetHit;
+use super::normals::DescribeBatch;
 use super::{Cost, ExpectedRays, Footprint, Hit, Intersector, normals};
-use crate::intersect::prefetch::prefetch;
 use crate::math::simd::Level;
 use crate::math::{Aabb, Ray};
 use crate::mesh::FacetMesh;
@@ -186,22 +186,6 @@ impl<'m> Octree<'m> {
         self.tree.boxes()
     }
 
-    /// Prefetches what the next hits will be described with: the facet of the 12th after the `i`-th, and the vertex records (normal,
-    /// parameters) of the 6th. Positions are in the cache, tested just now. Without it describing took 40 % of the time at 200k facets.
-    #[inline(always)]
-    fn prefetch_description(&self, found: &[Option<FacetHit>], i: usize) {
-        let mesh = self.tree.surroundings.mesh;
-        let facet = |ahead: usize| found.get(i + ahead).copied().flatten().map(|hit| hit.facet as usize);
-        if let Some(facet) = facet(12) {
-            prefetch(&mesh.facets, facet);
-        }
-        if let Some(facet) = facet(6) {
-            for v in mesh.facets[facet].vertices {
-                prefetch(&mesh.vertices, v as usize);
-            }
-        }
-    }
-
     /// Bytes of what was worked out about expected rays.
     fn preparation_bytes(&self) -> usize {
         let buffers = self.light_buffers.read().unwrap_or_else(PoisonError::into_inner);
@@ -219,12 +203,8 @@ impl<'m> Octree<'m> {
         for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
             let found = &mut room[..rays.len()];
             self.walk(&light_buffers, rays, found, cost);
-            for (i, hit) in hits.iter_mut().enumerate() {
-                self.prefetch_description(found, i);
-                *hit = found[i].map(|hit| {
-                    normals::describe_in_batch(self.tree.surroundings.mesh, &rays[i], &hit, self.settings.normals)
-                });
-            }
+            let (mesh, mode) = (self.tree.surroundings.mesh, self.settings.normals);
+            self.level.run(DescribeBatch { mesh, rays, found, hits, mode });
         }
     }
 

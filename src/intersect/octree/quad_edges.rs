@@ -1,5 +1,6 @@
-//! The f64 edge functions of one facet, for the exact test of what the sieve left: the arithmetic of [`Line::test_quad`] step by step,
-//! so that all instruction sets have its bits, but without the branches and the copies that cost more than the arithmetic.
+//! The f64 edge functions of one facet, for the exact test of what the sieve left: the arithmetic of
+//! [`crate::intersect::line::Line::test_quad`] step by step, so that all instruction sets have its bits, but without the branches and the
+//! copies that cost more than the arithmetic.
 
 use crate::intersect::facet::{FacetRay, LONGEST_NUDGE, Nearest};
 use std::hint::select_unpredictable;
