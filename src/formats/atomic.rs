@@ -8,6 +8,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
 
 /// Tells files that one process writes at a time apart.
 static SERIAL: AtomicU32 = AtomicU32::new(0);
@@ -108,19 +109,42 @@ pub(super) fn unfinished(path: &Path) -> PathBuf {
 /// Removes what processes that are no more have left unfinished of this file. Of another machine's, and where the system does not tell
 /// which processes are, that is what has stood still for a day.
 pub(super) fn remove_stale(path: &Path) {
+    static LAST: Mutex<Option<PartListing>> = Mutex::new(None);
     let name = unfinished_prefix(path);
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let Ok(entries) = fs::read_dir(folder) else { return };
-    for entry in entries.flatten() {
-        let file = entry.file_name();
-        let file = file.to_string_lossy();
-        let Some(rest) = file.strip_prefix(&name).filter(|f| f.ends_with(".part")) else { continue };
-        let Some(writer) = Writer::parse(rest) else { continue };
-        let written = entry.metadata().and_then(|m| m.modified());
+    let mut last = LAST.lock().unwrap_or_else(|e| e.into_inner());
+    for file in PartListing::current(&mut last, folder).parts.iter().filter(|file| file.starts_with(&name)) {
+        let Some(writer) = Writer::parse(&file[name.len()..]) else { continue };
+        let file = folder.join(file);
+        let written = fs::metadata(&file).and_then(|m| m.modified());
         if writer.is_gone(written.ok().and_then(|t| t.elapsed().ok())) {
-            // Another process may have been quicker.
-            let _ = fs::remove_file(entry.path());
+            // Another process may have been quicker, or this one a moment ago.
+            let _ = fs::remove_file(file);
         }
+    }
+}
+
+/// How long a listing of a folder is believed: runs of a thousand receivers write thousands of files in a second or two, and reading the
+/// folder anew for each of them took nearly all of their time.
+const LISTING_AGE: Duration = Duration::from_secs(1);
+
+/// The unfinished files of a folder, as they were a moment ago.
+struct PartListing {
+    folder: PathBuf,
+    read: Instant,
+    parts: Vec<String>,
+}
+
+impl PartListing {
+    /// Returns the last listing if it is of this folder and young enough, or else makes a new one of it.
+    fn current<'a>(last: &'a mut Option<Self>, folder: &Path) -> &'a Self {
+        let kept = last.take().filter(|l| l.folder == folder && l.read.elapsed() < LISTING_AGE);
+        last.insert(kept.unwrap_or_else(|| {
+            let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+            let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+            let parts = names.filter(|name| name.ends_with(".part")).collect();
+            Self { folder: folder.to_path_buf(), read: Instant::now(), parts }
+        }))
     }
 }
 
@@ -194,6 +218,23 @@ mod tests {
         let mut kept = [own.as_str(), elsewhere, other.as_str(), "a.csv"];
         kept.sort();
         assert_eq!(left, kept);
+    }
+
+    #[test]
+    fn a_folder_is_not_read_for_each_file_that_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut last = None;
+        let mut listed = |name: &str| {
+            fs::write(folder.path().join(name), b"").unwrap();
+            PartListing::current(&mut last, folder.path()).parts.clone()
+        };
+        assert_eq!(listed(".a.part"), [".a.part"]);
+        assert_eq!(listed(".b.part"), [".a.part"]);
+        last.as_mut().unwrap().read -= LISTING_AGE;
+        let mut anew = PartListing::current(&mut last, folder.path()).parts.clone();
+        anew.sort();
+        assert_eq!(anew, [".a.part", ".b.part"]);
+        assert!(PartListing::current(&mut last, &folder.path().join("none")).parts.is_empty());
     }
 
     /// A terminal is a device that any user has one of; a pipe one that any user can make.

@@ -8,10 +8,12 @@
   const dark = () => (root.dataset.theme || (system.matches ? "dark" : "light")) === "dark";
   const colours = () => { const s = getComputedStyle(root); return { fg: s.getPropertyValue("--fg").trim(), line: s.getPropertyValue("--line").trim(), card: s.getPropertyValue("--card").trim() }; };
 
+  // A window of a phone: titles of axes and bars of colours beside the map would not leave room for it.
+  const narrow = () => innerWidth < 480;
   const themed = (layout) => {
     const c = colours();
     layout.paper_bgcolor = layout.plot_bgcolor = "rgba(0,0,0,0)";
-    layout.font = { color: c.fg, family: "system-ui, sans-serif", size: 13 };
+    layout.font = { color: c.fg, family: "system-ui, sans-serif", size: narrow() ? 11 : 13 };
     layout.hoverlabel = Object.assign(layout.hoverlabel || {}, { bgcolor: c.card, bordercolor: c.line, font: { color: c.fg } });
     for (const key of ["xaxis", "yaxis"]) if (layout[key]) Object.assign(layout[key], { gridcolor: c.line, zerolinecolor: c.line, linecolor: c.line });
     if (layout.scene) for (const key of ["xaxis", "yaxis", "zaxis"]) Object.assign(layout.scene[key], { gridcolor: c.line, color: c.fg });
@@ -29,9 +31,21 @@
     printed.append(...twin);
     box.before(printed);
     figure.data.forEach(label);
+    fit(box, figure);
     return Plotly.newPlot(box, figure.data, themed(figure.layout), { responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: !!figure.layout.scene })
       .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); if (figure.data.some((trace) => trace.meta?.selectors)) pick(box); if (figure.layout.meta?.scales === "both") scales(box); })
       .catch(() => { printed.remove(); box.replaceChildren(...twin); });
+  };
+
+  // Makes room: bars of colours go above what they belong to in a narrow window, and a view grows by the rows that its legend has beyond
+  // three, up to twelve; the library would take up to half of the view for them.
+  const ENTRY = { width: 240, height: 20 };
+  const fit = (box, { data, layout }) => {
+    if (narrow()) for (const { colorbar } of data) if (colorbar) Object.assign(colorbar, { orientation: "h", y: 1, yanchor: "bottom", title: { ...colorbar.title, side: "top" } });
+    if (!layout.scene || !layout.showlegend) return;
+    const entries = data.filter((trace) => trace.showlegend !== false).length;
+    const rows = Math.ceil(entries / Math.max(1, Math.floor(box.clientWidth / ENTRY.width)));
+    if (rows > 3) box.style.height = `${box.clientHeight + ENTRY.height * Math.min(rows - 3, 9)}px`;
   };
 
   // Each point of a mesh belongs to one face, whose selector it shows.

@@ -316,8 +316,9 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
             // A NaN lifts the pen between two lines.
             let along =
                 |k: usize| singles(lines.iter().flat_map(move |l| l.iter().map(move |p| p[k]).chain([f32::NAN])));
+            // Before the parts: of a long legend the end is hidden.
             json!({"type": "scatter3d", "mode": "lines", "name": plain(&legend_name(name)), "hoverinfo": "name", "connectgaps": false,
-                "x": along(0), "y": along(1), "z": along(2), "opacity": 0.8,
+                "x": along(0), "y": along(1), "z": along(2), "opacity": 0.8, "legendrank": 1,
                 "line": {"color": css(*colour), "width": width}})
         }
         Shape::Points { name, points, colour } => {

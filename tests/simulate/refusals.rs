@@ -39,6 +39,17 @@ fn values_out_of_range_are_refused_by_name() {
 }
 
 #[test]
+fn a_key_that_stands_elsewhere_is_told_where() {
+    for (key, meant) in
+        [("wavelength_nm = 550", "spectrum = {"), ("wavelength = 550", "[run]"), ("flux_lm = 5", "unit = \"lm\"")]
+    {
+        let text = format!("{REST}{key}\n{PLANE}");
+        let error = Scene::parse(&text, "scene.toml", Path::new(".")).expect_err(key);
+        assert!(error.to_string().contains(meant), "{key}: {error}");
+    }
+}
+
+#[test]
 fn a_unit_given_by_the_user_replaces_that_of_the_file() {
     let file = fixture("step/lens_planoconvex_nurbs.stp");
     let box_of = |unit: Option<f64>| {

@@ -38,6 +38,18 @@ fn unsupported_effect(word: &str) -> Option<&'static str> {
     REFUSED.iter().find(|(start, _)| word.starts_with(start)).map(|(_, effect)| *effect)
 }
 
+/// What is asked for by a key that does not exist: how such words start, a key that is known where it is meant, and what to write there.
+const ELSEWHERE: [(&str, &str, &str); 3] = [
+    (
+        "wavelength",
+        "spectrum",
+        "write spectrum = { values = [[550, 1]] } for 550 nm; `wavelength_nm` in [run] is that of all sources without a spectrum",
+    ),
+    ("flux", "spectrum", LUMENS),
+    ("lumen", "spectrum", LUMENS),
+];
+const LUMENS: &str = "write `power`: watts, or lumens with unit = \"lm\" in [run]";
+
 /// What to write where a list belongs.
 const LISTS: [(&str, &str); 10] = [
     (
@@ -194,9 +206,12 @@ pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>) -> 
         } else {
             let known: Vec<&str> = words.collect();
             let error = Error::new(ErrorKind::Syntax, format!("unknown key `{word}`"));
-            match suggest::nearest(word, known.iter().copied()) {
-                Some(near) => error.help(format!("did you mean `{near}`?")),
-                None => error.help(format!("known here: {}", known.join(", "))),
+            let meant =
+                ELSEWHERE.iter().find(|(start, beside, _)| word.starts_with(start) && known.contains(beside));
+            match (meant, suggest::nearest(word, known.iter().copied())) {
+                (Some((_, _, help)), _) => error.help(*help),
+                (None, Some(near)) => error.help(format!("did you mean `{near}`?")),
+                (None, None) => error.help(format!("known here: {}", known.join(", "))),
             }
         }
     } else if message.starts_with("unknown variant") {
