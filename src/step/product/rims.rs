@@ -1,4 +1,4 @@
-//! Rims that are whole circles begin beside each other, so that the seams of cylinders and cones between them run straight.
+//! Rims that are whole circles begin beside each other, so that the seams of the round faces between them run straight.
 //!
 //! Where a file gives no seam, one is made from the vertex of the one rim to that of the other. Many files put these anywhere: the seam
 //! then winds around the face, its facets are slivers along it, and faces of other solids that touch it find no sides in common. The vertex
@@ -21,11 +21,17 @@ const CIRCLE_SHARE: f64 = 1e-9;
 const CIRCLE_MM: f64 = 1e-6;
 /// Places at which a curve is asked for it.
 const PLACES: usize = 8;
-/// Surfaces about an axis whose seams are lines of their own.
-const ROUND: [&str; 2] = ["CYLINDRICAL_SURFACE", "CONICAL_SURFACE"];
+/// Surfaces about an axis, and which of their attributes names it.
+const ROUND: [(&str, usize); 5] = [
+    ("CYLINDRICAL_SURFACE", 0),
+    ("CONICAL_SURFACE", 0),
+    ("TOROIDAL_SURFACE", 0),
+    ("SPHERICAL_SURFACE", 0),
+    ("SURFACE_OF_REVOLUTION", 1),
+];
 
-/// Turns rims of cylinders and cones, whole circles about their axis whose vertex is no other edge's, so that those of one face begin at one
-/// azimuth. Returns the places of the vertices that moved, by their ids, mm. `edges` are by the places that `index` gives.
+/// Turns rims of round faces, whole circles about their axis whose vertex is no other edge's, so that those of one face begin at one azimuth;
+/// none that bounds a face of another curved kind too, whose own seam may run from that vertex. Returns the places of the vertices that moved, by their ids, mm. `edges` are by the places that `index` gives.
 pub(super) fn align_rims(
     geometry: &GeometryReader<'_, '_>,
     ids: &[u64],
@@ -34,8 +40,20 @@ pub(super) fn align_rims(
     edges: &mut [Outcome<TrimmedEdge>],
 ) -> FxHashMap<u64, Point> {
     let mut moved: FxHashMap<u64, Point> = FxHashMap::default();
-    let round = ids.iter().filter_map(|id| round_face(geometry, plans[id].as_ref().ok()?, index, edges));
-    let faces: Vec<(Frame, Vec<usize>)> = round.collect();
+    let mut faces: Vec<(Frame, Vec<usize>)> = Vec::new();
+    let mut fixed: Vec<usize> = Vec::new();
+    for plan in ids.iter().filter_map(|id| plans[id].as_ref().ok()) {
+        let rims = plan.loops.iter().filter(|l| l.len() == 1).map(|l| index[&l[0].0]);
+        let rims: Vec<usize> = rims.collect();
+        if rims.len() < 2 {
+            continue;
+        }
+        match round_face(geometry, plan, &rims, edges) {
+            Some(face) => faces.push(face),
+            None if geometry.file.entity(plan.surface).is_some_and(|e| e.is_a("PLANE")) => {}
+            None => fixed.extend(rims),
+        }
+    }
     if faces.is_empty() {
         return moved;
     }
@@ -54,6 +72,7 @@ pub(super) fn align_rims(
     }
     // From rims that cannot move, or have, to those of the same faces: a chain of faces follows its first.
     let mut settled: FxHashSet<usize> = beside.keys().copied().filter(|rim| own_vertex(*rim).is_none()).collect();
+    settled.extend(fixed);
     let is_bound = |face: &usize| faces[*face].1.iter().any(|rim| settled.contains(rim));
     let mut queue: VecDeque<usize> = (0..faces.len()).filter(is_bound).collect();
     let mut rest = 0..faces.len();
@@ -83,26 +102,22 @@ pub(super) fn align_rims(
     moved
 }
 
-/// Returns the axis of a cylinder or cone with two rims or more, and the edges that are its rims: loops of one edge that is a whole circle
-/// about the axis.
+/// Returns the axis of a round face with two rims or more, and those of `single`, the edges that are a loop alone, that are its rims: whole
+/// circles about the axis.
 fn round_face(
     geometry: &GeometryReader<'_, '_>,
     plan: &FacePlan,
-    index: &FxHashMap<EdgeKey, usize>,
+    single: &[usize],
     edges: &[Outcome<TrimmedEdge>],
 ) -> Option<(Frame, Vec<usize>)> {
-    let single = || plan.loops.iter().filter(|l| l.len() == 1).map(|l| index[&l[0].0]);
-    if single().nth(1).is_none() {
-        return None;
-    }
     let surface = geometry.file.entity(plan.surface)?;
-    let args = ROUND.iter().find_map(|kind| surface.attributes(kind, 1))?;
-    let axis = geometry.placement(args.id(0)?).ok()?;
+    let axis = ROUND.iter().find_map(|&(kind, axis)| surface.attributes(kind, 1)?.id(axis))?;
+    let axis = geometry.placement(axis).ok()?;
     let is_rim = |edge: &usize| match &edges[*edge] {
         Ok(TrimmedEdge { curve: Some(curve), .. }) => is_circle(&axis, curve),
         _ => false,
     };
-    let rims: Vec<usize> = single().filter(is_rim).collect();
+    let rims: Vec<usize> = single.iter().copied().filter(is_rim).collect();
     (rims.len() > 1).then_some((axis, rims))
 }
 
