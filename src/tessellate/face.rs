@@ -146,16 +146,20 @@ pub(super) fn mesh_with_imprint(
     let (made, facets) = emit(surface, &transition.nodes, whole_cells.chain(paired));
     // Conflicts may have cost an imprinted line, so that the guests' facets would not be bounded by it.
     let holds_imprint = transition.holds_imprint && transition.conflicts.is_empty();
-    if !cells.exhausted {
-        let turned = turned_chords(&made, &facets, surface.is_flipped(), &transition.nodes, &chords);
-        coarse.extend(unproved.iter().chain(&turned).filter_map(|s| Some(followed.get(s)?.edge)));
-    }
+    let edges_of =
+        |chords: &[[u32; 2]]| chords.iter().filter_map(|s| Some(followed.get(s)?.edge)).collect::<Vec<_>>();
+    let turned = if cells.exhausted {
+        vec![]
+    } else {
+        coarse.extend(edges_of(&unproved));
+        edges_of(&turned_chords(&made, &facets, surface.is_flipped(), &transition.nodes, &chords))
+    };
     let (nodes, own) = transition.nodes.into_parts();
     if made.facets.is_empty() {
         return Err(Unmeshed::Empty);
     }
     let carrier = CarrierFacets { nodes, facets, vertex_nodes, holds_imprint };
-    Ok((FaceMesh { own, coarse, facing, coincident, repaired, ..made }, carrier))
+    Ok((FaceMesh { own, coarse, turned, facing, coincident, repaired, ..made }, carrier))
 }
 
 /// Turns facets of nodes into facets of corners, and returns their nodes too.

@@ -27,7 +27,7 @@ pub(super) fn turned_chords(
             let longest = (q - p).length().max((r - q).length()).max((p - r).length());
             normals.iter().all(|n| n.dot(across) < 0.0) && across.length() > THIN * facet.tolerance * longest
         };
-        // Between two edges that nearly touch, shorter chords of the one would cross those of the other.
+        // Between two edges that nearly touch, shorter chords of the one cross those of the other.
         let has_inner_corner = t.iter().any(|&n| matches!(nodes[n].position, Position::Own(_)));
         if !has_inner_corner || !looks_back([t[0], t[1], t[2]]) && !looks_back([t[0], t[2], t[3]]) {
             continue;
