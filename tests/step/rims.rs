@@ -5,7 +5,8 @@ use lampyris::math::Point;
 use lampyris::step::{Settings, read_bytes};
 use std::fmt::Write;
 
-/// A stepped shaft without seams, as a shell of cylinders and rings: rims at the given heights and radii, each with its vertex at an azimuth.
+/// A stepped shaft without seams, as a shell of cylinders and rings: rims at the given heights and radii, each with its vertex at an
+/// azimuth.
 fn shaft(rims: &[[f64; 3]]) -> String {
     let mut data = String::from(
         "#10=CARTESIAN_POINT('',(0.,0.,0.));#11=DIRECTION('',(0.,0.,1.));#12=DIRECTION('',(1.,0.,0.));\n\

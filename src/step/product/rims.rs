@@ -30,8 +30,9 @@ const ROUND: [(&str, usize); 5] = [
     ("SURFACE_OF_REVOLUTION", 1),
 ];
 
-/// Turns rims of round faces, whole circles about their axis whose vertex is no other edge's, so that those of one face begin at one azimuth;
-/// none that bounds a face of another curved kind too, whose own seam may run from that vertex. Returns the places of the vertices that moved, by their ids, mm. `edges` are by the places that `index` gives.
+/// Turns rims of round faces, whole circles about their axis whose vertex is no other edge's, so that those of one face begin at one
+/// azimuth; none that bounds a face of another curved kind too, whose own seam may run from that vertex. Returns the places of the vertices
+/// that moved, by their ids, mm. `edges` are by the places that `index` gives.
 pub(super) fn align_rims(
     geometry: &GeometryReader<'_, '_>,
     ids: &[u64],

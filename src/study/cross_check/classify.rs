@@ -144,8 +144,8 @@ impl<'a> Classifier<'a> {
         (apart > self.rounding).then_some(Cause::WithinSag)
     }
 
-    /// Whether the spline itself is folded where it is hit, within the facet's sag: its normal there is that of the hit, and all around it is
-    /// on the facet's side.
+    /// Whether the spline itself is folded where it is hit, within the facet's sag: its normal there is that of the hit, and all around it
+    /// is on the facet's side.
     fn is_folded(&self, ray: &Ray, facet: &Hit, exact: &Hit) -> bool {
         self.surface(facet.face).is_some_and(|surface| {
             let band = self.widest(surface, self.band(facet.face, ray, surface.gap));
