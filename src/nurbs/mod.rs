@@ -29,4 +29,4 @@ pub(crate) use fit::fit_cubic;
 pub(crate) use interpolation::{fit_curve, fit_surface};
 pub use patch::BezierPatch;
 pub use surface::{Derivatives, SecondDerivatives, Surface};
-pub(crate) use swept_area::area_within;
+pub(crate) use swept_area::{area_within, least_area_within};

@@ -85,6 +85,45 @@ pub(crate) fn area_within<'a>(curves: impl Iterator<Item = (&'a UvCurve, bool)>)
     0.5 * area
 }
 
+/// Returns a number that the area of [`area_within`] is not below: the polygon of the curves' ends, less what lies between each curve and
+/// its chord at most. A twentieth of the time.
+pub(crate) fn least_area_within<'a>(curves: impl Iterator<Item = (&'a UvCurve, bool)>) -> f64 {
+    let (mut area, mut between) = (0.0, 0.0);
+    let mut corner: Option<Uv> = None;
+    let mut last = Uv::ZERO;
+    for (curve, reversed) in curves {
+        let mut ends = curve.ends();
+        if reversed {
+            ends.swap(0, 1);
+        }
+        let center = *corner.get_or_insert(ends[0]);
+        area += (last - center).perp_dot(ends[0] - center) + (ends[0] - center).perp_dot(ends[1] - center);
+        last = ends[1];
+        between += chord_area(curve);
+    }
+    0.5 * (area - between)
+}
+
+/// Bounds twice the area between a curve and its chord: about the middle of the chord, the control polygon's reach along it times the way
+/// across, and the reach across times the way along.
+fn chord_area(curve: &UvCurve) -> f64 {
+    let [a, b] = curve.ends();
+    if curve.degree == 1 && curve.points.len() == 2 {
+        return 0.0;
+    }
+    let (middle, along) = (0.5 * (a + b), (b - a).try_normalize().unwrap_or(Uv::X));
+    let (mut reach, mut way) = (Uv::ZERO, Uv::ZERO);
+    let mut before = None;
+    for p in &curve.points {
+        let away = p.position() - middle;
+        let local = Uv::new(away.dot(along), along.perp_dot(away));
+        reach = reach.max(local.abs());
+        way += (local - before.unwrap_or(local)).abs();
+        before = Some(local);
+    }
+    reach.x * way.y + reach.y * way.x
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,5 +151,38 @@ mod tests {
         assert_eq!(area_within(sides.iter().map(|side| (side, false))), 1.0);
         assert_eq!(area_within(sides.iter().rev().map(|side| (side, true))), -1.0);
         assert_eq!(area_within(std::iter::empty()), 0.0);
+    }
+
+    #[test]
+    fn the_least_area_is_below_the_area_and_near_it_where_sides_are_nearly_straight() {
+        let curve = |degree: usize, points: &[[f64; 3]]| UvCurve {
+            degree,
+            knots: [vec![0.0; degree + 1], vec![1.0; degree + 1]].concat(),
+            points: points.iter().map(|&[x, y, w]| glam::DVec3::new(x * w, y * w, w)).collect(),
+        };
+        let least = |sides: &[UvCurve]| least_area_within(sides.iter().map(|side| (side, false)));
+        // A disc of quarter arcs: π; its square has 2.
+        let w = 0.5f64.sqrt();
+        let corners = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+        let quarter = |k: usize| {
+            let ([a, b], [c, d]) = (corners[k], corners[(k + 1) % 4]);
+            curve(2, &[[a, b, 1.0], [a + c, b + d, w], [c, d, 1.0]])
+        };
+        let disc: Vec<UvCurve> = (0..4).map(quarter).collect();
+        assert!(least(&disc) <= PI && least(&disc) > -PI, "{}", least(&disc));
+        // Run the other way the area is −π.
+        assert!(least_area_within(disc.iter().rev().map(|side| (side, true))) <= -PI);
+        // Three turns go round more than their hull.
+        let turns: Vec<UvCurve> = (0..12).map(|k| quarter(k % 4)).collect();
+        assert!(least(&turns) <= 3.0 * PI);
+        // Sides of 10 × 1 that bend inwards, parabolas 0.02 high at most.
+        let bent = [
+            curve(2, &[[0.0, 0.0, 1.0], [5.0, 0.04, 1.0], [10.0, 0.0, 1.0]]),
+            UvCurve::line([10.0, 0.0].into(), [10.0, 1.0].into(), [0.0, 1.0]),
+            curve(2, &[[10.0, 1.0, 1.0], [5.0, 0.96, 1.0], [0.0, 1.0, 1.0]]),
+            UvCurve::line([0.0, 1.0].into(), [0.0, 0.0].into(), [0.0, 1.0]),
+        ];
+        let area = 10.0 - 2.0 * (2.0 / 3.0) * 10.0 * 0.02;
+        assert!(least(&bent) <= area && least(&bent) > 9.0, "{}", least(&bent));
     }
 }

@@ -64,14 +64,34 @@ pub(super) fn face_with_surface<'m>(
     Some((face, placed.surface(settings, k, face)?))
 }
 
-/// Meshes a part: divides its edges, meshes its faces, and starts again while faces ask for it: with denser edges, at most
-/// [`MAX_ROUNDS_OF_REPAIRED`] times, then with further samples where chords still cross, up to round [`MAX_ROUNDS_OF_CROSSING`]. Last, it
-/// meshes anew the faces that share an inner chord. `too_large` gives, for a face to be left out, the cells that it would need.
+/// Meshes a part as [`mesh_with_rounds`], with shorter chords beside turned facets; without where borders come to cross with them.
 fn mesh_part(
     placed: &PlacedPart<'_>,
     settings: &Settings,
     too_large: impl Fn(usize) -> Option<f64> + Sync,
 ) -> PartMesh {
+    let (mesh, asked) = mesh_with_rounds(placed, settings, &too_large, true);
+    let crossing = |mesh: &PartMesh| {
+        mesh.faces.iter().flatten().filter(|m| m.repaired == Some(Repair::CrossingBorder)).count()
+    };
+    // Between edges that nearly touch, the chords of the one may cross those of the other for it: a turned facet is the lesser evil.
+    if asked && crossing(&mesh) > 0 {
+        let (without, _) = mesh_with_rounds(placed, settings, &too_large, false);
+        return if crossing(&without) < crossing(&mesh) { without } else { mesh };
+    }
+    mesh
+}
+
+/// Divides the edges of a part, meshes its faces, and starts again while faces ask for it: with denser edges, at most
+/// [`MAX_ROUNDS_OF_REPAIRED`] times, then with further samples where chords still cross, up to round [`MAX_ROUNDS_OF_CROSSING`]. Last, it
+/// meshes anew the faces that share an inner chord. `too_large` gives, for a face to be left out, the cells that it would need;
+/// `mends_turned` is whether edges beside turned facets get shorter chords, and what is returned with the mesh whether any did.
+fn mesh_with_rounds(
+    placed: &PlacedPart<'_>,
+    settings: &Settings,
+    too_large: &(impl Fn(usize) -> Option<f64> + Sync),
+    mends_turned: bool,
+) -> (PartMesh, bool) {
     let part = placed.part;
     let faces: Vec<&Face> = part.shells.iter().flat_map(|s| &s.faces).collect();
     let laid_out =
@@ -86,7 +106,7 @@ fn mesh_part(
     let mut own: Vec<OwnDivision> = Vec::new();
     let mut before: Option<PreviousRound> = None;
     let mut budget = RemeshBudget::new(faces.len(), settings);
-    let mut round = 0;
+    let (mut round, mut asked) = (0, false);
     let (divisions, shared, mut meshes) = loop {
         let (divisions, shared) = edges::divide(part, &known, &sides, (&denser, &further), &mut own);
         let mesh = |(face, surface): &(&Face, Option<FaceSurface<'_>>)| {
@@ -117,6 +137,9 @@ fn mesh_part(
         let settled = budget.edges_of_spent(faces.iter().map(|(face, _)| *face));
         // A last round that asks for more is taken as it is; what does not hold is counted.
         let mut coarse = coarse_edges(&faces, &meshes, &divisions, round);
+        let turned = if mends_turned { turned_edges(&meshes, round) } else { vec![] };
+        asked |= !turned.is_empty();
+        coarse.extend(turned);
         coarse.retain(|e| !settled.contains(e));
         if round < MAX_ROUNDS_OF_REPAIRED && !coarse.is_empty() {
             round += 1;
@@ -140,7 +163,7 @@ fn mesh_part(
     };
     let taken = take_doubled_chords(part, &mut meshes, &mut budget, again);
     let causes = exceeded_limits(&faces, too_large);
-    with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken })
+    (with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken }), asked)
 }
 
 /// Replaces, in `meshes`, faces with a diagonal that the shell has as a chord elsewhere too, by what `mesh` makes without it, and counts
@@ -217,6 +240,14 @@ fn coarse_edges(
         }
     }
     coarse
+}
+
+/// Returns the edges, perhaps twice, beside facets that look the other way than their surface; none from round [`MAX_ROUNDS`] on.
+fn turned_edges(meshes: &[Option<FaceMesh>], round: u32) -> Vec<usize> {
+    if round >= MAX_ROUNDS {
+        return vec![];
+    }
+    meshes.iter().flatten().flat_map(|m| &m.turned).map(|e| e.0 as usize).collect()
 }
 
 /// Gives vertices that a file has twice in one place, where loops of a face touch, the least of their numbers, in all faces of the part.

@@ -13,7 +13,7 @@ use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::imprint::{CarrierFacets, Imprint};
 use super::limits::face_budget;
-use super::nodes::{ProvedFacet, edge_key};
+use super::nodes::{Nodes, ProvedFacet, edge_key};
 use super::proof::prover::Prover;
 use super::report::Repair;
 use super::taken_chords::TakenChords;
@@ -21,6 +21,7 @@ use super::transition::creases::crease_lines;
 use super::transition::pairing::{self, TransitionFacet};
 use super::transition::triangulate::{Outline, Transition, triangulate};
 use super::triangulator::{GaveUp, catch_panic};
+use super::turned_facets::turned_chords;
 use crate::math::polygon::{is_inside_sides, polygon_sides};
 use crate::math::{Point, Uv};
 use crate::model::{Face, Part};
@@ -138,26 +139,42 @@ pub(super) fn mesh_with_imprint(
     let refused = [&transition.conflicts[..], &transition.crossed];
     let crossing = CrossingChords::new(part, &transition.nodes, &followed, refused);
     let mut coarse = if cells.exhausted { vec![] } else { crossing.edges_for_sag() };
-    coarse.extend(unproved.iter().filter_map(|s| Some(followed.get(&edge_key(s[0], s[1]))?.edge)));
     coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
     let facing = crossing.facing_samples();
     let whole_cells = grid.quads.iter().map(|&facet| TransitionFacet { facet, pole: None });
     let paired = pairing::pair_triangles(&transition, &fixed, &mut prover);
-    let mut emission = Emission::new(surface, &transition.nodes);
-    let mut facets = Vec::new();
-    for f in whole_cells.chain(paired) {
-        emission.add_facet(&f.facet, f.pole);
-        facets.push(f.facet.nodes);
-    }
+    let (made, facets) = emit(surface, &transition.nodes, whole_cells.chain(paired));
     // Conflicts may have cost an imprinted line, so that the guests' facets would not be bounded by it.
-    let made = emission.finish();
     let holds_imprint = transition.holds_imprint && transition.conflicts.is_empty();
+    let edges_of =
+        |chords: &[[u32; 2]]| chords.iter().filter_map(|s| Some(followed.get(s)?.edge)).collect::<Vec<_>>();
+    let turned = if cells.exhausted {
+        vec![]
+    } else {
+        coarse.extend(edges_of(&unproved));
+        edges_of(&turned_chords(&made, &facets, surface.is_flipped(), &transition.nodes, &chords))
+    };
     let (nodes, own) = transition.nodes.into_parts();
     if made.facets.is_empty() {
         return Err(Unmeshed::Empty);
     }
     let carrier = CarrierFacets { nodes, facets, vertex_nodes, holds_imprint };
-    Ok((FaceMesh { own, coarse, facing, coincident, repaired, ..made }, carrier))
+    Ok((FaceMesh { own, coarse, turned, facing, coincident, repaired, ..made }, carrier))
+}
+
+/// Turns facets of nodes into facets of corners, and returns their nodes too.
+fn emit(
+    surface: &FaceSurface<'_>,
+    nodes: &Nodes,
+    facets: impl Iterator<Item = TransitionFacet>,
+) -> (FaceMesh, Vec<[u32; 4]>) {
+    let mut emission = Emission::new(surface, nodes);
+    let add = |f: TransitionFacet| {
+        emission.add_facet(&f.facet, f.pole);
+        f.facet.nodes
+    };
+    let facets = facets.map(add).collect();
+    (emission.finish(), facets)
 }
 
 /// Returns the gravest of what was given up: a border that crosses itself, then area, then a budget used up. `None` if nothing was.

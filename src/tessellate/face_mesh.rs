@@ -34,6 +34,8 @@ pub(super) struct FaceMesh {
     /// Edges that should have shorter chords: theirs cross others in the parameter plane for their sag, or a facet beside them is not
     /// proved.
     pub(super) coarse: Vec<EdgeId>,
+    /// Edges that should have shorter chords for facets beside them that look the other way than the surface.
+    pub(super) turned: Vec<EdgeId>,
     /// Further samples that edges should have, so that chords of two of them do not cross.
     pub(super) facing: Vec<(EdgeId, f64)>,
     /// Shared positions that are one: vertices of the file in one place, where loops touch.

@@ -48,6 +48,7 @@ mod tessellation;
 mod transition;
 mod triangle_frame;
 mod triangulator;
+mod turned_facets;
 
 use crate::model::Model;
 pub use angles::SteepFace;

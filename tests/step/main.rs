@@ -12,6 +12,7 @@ mod offsets;
 mod rare_forms;
 mod recipes;
 mod revolved_conics;
+mod rims;
 mod seams;
 mod shells;
 mod silence;

@@ -20,3 +20,4 @@ mod shared_edges;
 mod support;
 #[path = "../support/turned.rs"]
 mod turned;
+mod turned_facets;

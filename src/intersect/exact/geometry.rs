@@ -143,7 +143,9 @@ impl Geometry {
             flagged,
             solid,
         });
-        for mut patch in face.surface.bezier_patches() {
+        let patches = face.surface.bezier_patches();
+        make_room(&mut self.patches, patches.len());
+        for mut patch in patches {
             // Knot insertion in double precision would lose what such a patch's small side has of digits.
             if is_ill_scaled(&patch) {
                 reference::extract(&face.surface, &mut patch);
@@ -220,6 +222,14 @@ impl Geometry {
         let patch = &self.patches[self.patch_at(face, uv) as usize];
         let (_, du, dv) = project(&patch.jet(patch.local(uv)));
         du.cross(dv).dot(direction)
+    }
+}
+
+/// Makes room for `more` items in a list that grows by an eighth at a time: patches and leaves are half a kilobyte each, and of lists that
+/// double in length half would often stay empty.
+pub(super) fn make_room<T>(list: &mut Vec<T>, more: usize) {
+    if list.capacity() - list.len() < more {
+        list.reserve_exact(more.max(list.len() / 8));
     }
 }
 

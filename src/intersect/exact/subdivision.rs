@@ -4,7 +4,7 @@
 //! down to its trims and halving large loose boxes took a valve of 424 patches from 7.0 leaf tests a ray to 1.3, a wing from
 //! 10.5 to 2.9, and both to twice the rate; cutting leaves that many rays meet flatter gave the valve another fifth.
 
-use super::geometry::Geometry;
+use super::geometry::{Geometry, make_room};
 use super::leaf::{Described, Leaf, border_sides, describe, deviation, flattening_direction, widen, xyz};
 use super::linearization::Linearization;
 use super::net::{self, Net, V4};
@@ -50,6 +50,9 @@ impl PatchLeaves {
     /// Appends those of further patches, whose nets come to stand behind its own.
     fn append(&mut self, other: Self) {
         let offset = self.pool.len() as u32;
+        make_room(&mut self.leaves, other.leaves.len());
+        make_room(&mut self.linearizations, other.linearizations.len());
+        make_room(&mut self.pool, other.pool.len());
         self.leaves.extend(other.leaves.into_iter().map(|l| Leaf { net: l.net + offset, ..l }));
         self.linearizations.extend(other.linearizations.into_iter().map(|l| l.moved_in_pool(offset)));
         self.pool.extend(other.pool);

@@ -5,6 +5,7 @@ use super::loop_order::{DirectedUse, drop_opposite_loops, put_in_order};
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::{faces_against_neighbours, is_inside_out};
 use super::recipe_parts::convert_recipes;
+use super::rims::align_rims;
 use super::spikes::{EdgeTable, remove_spikes};
 use super::styles::Styles;
 use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
@@ -80,6 +81,7 @@ pub(crate) fn convert(
     let reason = "its border comes back along itself: what has no width between is left out";
     out.repaired.extend(spiked.trimmed.iter().map(|&id| repair_note(file, id, reason.into())));
     ids.retain(|id| plans.contains_key(id));
+    let moved = align_rims(&geometry, &ids, &plans, (&keys, &index), &mut edges);
     out.found += ids.len();
     let convert_one = |id: &u64| {
         let plan = plans[id].as_ref().map_err(Refusal::clone);
@@ -90,7 +92,7 @@ pub(crate) fn convert(
     // Edges move into the part only now: a second copy of them, and of the faces below, took the peak of a 30 MB file
     // from 103 to 117 MiB.
     let mut part = Part::default();
-    let numbers = add_edges(&geometry, (&keys, &joined), edges, &mut part);
+    let numbers = add_edges(&geometry, (&keys, &joined, &moved), edges, &mut part);
     let mut faces: FxHashMap<u64, Face> = FxHashMap::default();
     for (id, outcome) in built {
         match outcome {
@@ -117,10 +119,10 @@ fn repair_note(file: &File<'_>, id: u64, reason: String) -> Refusal {
 }
 
 /// Moves edges, and the vertices that they share, into the part. Returns the number of each key's edge there, `None` for edges that failed
-/// or have no length. Of the latter the two vertices become one, as `joined` says.
+/// or have no length. Of the latter the two vertices become one, as `joined` says; those in `moved` are where it says.
 fn add_edges(
     geometry: &GeometryReader<'_, '_>,
-    (keys, joined): (&[EdgeKey], &FxHashMap<u64, u64>),
+    (keys, joined, moved): (&[EdgeKey], &FxHashMap<u64, u64>, &FxHashMap<u64, Point>),
     edges: Vec<Outcome<TrimmedEdge>>,
     part: &mut Part,
 ) -> Vec<Option<EdgeId>> {
@@ -136,7 +138,7 @@ fn add_edges(
         let vertices = [(ends[0], a), (ends[1], b)].map(|(id, t)| {
             let mut add = || {
                 // The file's own vertex, where it has one: edges that meet there end at the same bits.
-                let given = id.and_then(|id| geometry.vertex(id).ok());
+                let given = id.and_then(|id| moved.get(&id).copied().or_else(|| geometry.vertex(id).ok()));
                 part.vertices.push(given.unwrap_or_else(|| curve.evaluate(t)));
                 VertexId(part.vertices.len() as u32 - 1)
             };

@@ -18,6 +18,7 @@ mod placed_count;
 mod purpose;
 mod recipe_parts;
 mod relations;
+mod rims;
 pub(super) mod shared_items;
 mod solid_recipes;
 mod spikes;

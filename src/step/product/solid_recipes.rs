@@ -293,11 +293,7 @@ fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
     let profile = profile.turn_to_sweep(axis.z.cross(far - axis.origin))?;
     let whole = angle >= TAU - WHOLE_TURN_SLACK;
     let angle = if whole { TAU } else { angle };
-    let (sin, cos) = angle.sin_cos();
-    let turn = |p: Point| {
-        let q = axis.local_point(p);
-        axis.point(Point::new(cos * q.x - sin * q.y, sin * q.x + cos * q.y, q.z))
-    };
+    let turn = |p: Point| rotated(axis, angle, p);
     let mut solid = SolidRecipe::default();
     let mut starts = Vec::new();
     let mut ends = Vec::new();
@@ -351,8 +347,14 @@ fn axis_distance(axis: &Frame, p: Point) -> f64 {
     q.x.hypot(q.y)
 }
 
+/// Returns a point turned by an angle, radians, about the z axis of a frame.
+pub(super) fn rotated(axis: &Frame, angle: f64, p: Point) -> Point {
+    let (q, (sin, cos)) = (axis.local_point(p), angle.sin_cos());
+    axis.point(Point::new(cos * q.x - sin * q.y, sin * q.x + cos * q.y, q.z))
+}
+
 /// Returns the curve with its control points moved by `place`, which must be affine.
-fn map_control_points(curve: &Curve, place: impl Fn(Point) -> Point) -> Curve {
+pub(super) fn map_control_points(curve: &Curve, place: impl Fn(Point) -> Point) -> Curve {
     let points = curve.points.iter().map(|p| Homogeneous::weighted(place(p.project()), p.w)).collect();
     Curve { points, ..curve.clone() }
 }

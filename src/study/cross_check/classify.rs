@@ -3,7 +3,7 @@
 use super::placed_surface::PlacedSurface;
 use super::verdict::{Cause, Defect};
 use crate::intersect::{Certainty, Hit};
-use crate::math::{Aabb, FaceId, Ray};
+use crate::math::{Aabb, FaceId, Ray, Uv, Vector};
 use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
 use std::sync::OnceLock;
@@ -94,15 +94,32 @@ impl<'a> Classifier<'a> {
         passed.unwrap_or_else(|| all.iter().map(|&i| self.sag(i)).fold(0.0, f64::max))
     }
 
-    /// Measures how far, mm, the facet that was hit strays from the spline: the farthest of 25 of its points.
-    fn measured_sag(&self, hit: &Hit, surface: &PlacedSurface, ray: &Ray) -> f64 {
+    /// Measures how far, mm, facets without a proved sag stray from the spline that may be why a ray was answered differently: the facet
+    /// that was hit, and those of the face that was hit first which the ray's line passes within as much. 0 without any.
+    fn unproved_sag(&self, ray: &Ray, first: &Hit, facet: Option<&Hit>) -> f64 {
+        let everywhere = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
+        let of_hit = facet.map(|f| (f.face, f.primitive, f.uv));
+        let of_face = self.facets.get(first.face.index()).into_iter().flatten();
+        let doubtful = of_hit.into_iter().chain(of_face.map(|&i| (first.face, i, first.uv)));
+        doubtful
+            .filter(|(_, i, _)| self.proved_sag(*i).is_none())
+            .filter_map(|(face, i, guess)| {
+                let sag = self.measured_sag(i, guess, self.surface(face)?, ray.direction);
+                let bounds = Aabb::from_points(self.mesh.corners(i as usize)).grown(sag + self.rounding);
+                bounds.clip(&everywhere).map(|_| sag)
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Measures how far, mm, a facet strays from the spline: the farthest of 25 of its points. `guess` are parameters near it.
+    fn measured_sag(&self, facet: u32, guess: Uv, surface: &PlacedSurface, direction: Vector) -> f64 {
         // A grid over the facet's two triangles, which share the diagonal from a to c.
-        let [a, b, c, d] = self.mesh.corners(hit.primitive as usize);
+        let [a, b, c, d] = self.mesh.corners(facet as usize);
         let points = (0..25).map(|k| {
             let (u, v) = (f64::from(k / 5) / 4.0, f64::from(k % 5) / 4.0);
             if u >= v { a + (b - a) * (u - v) + (c - a) * v } else { a + (d - a) * (v - u) + (c - a) * u }
         });
-        points.map(|p| surface.foot(p, hit.uv, ray.direction).offset.abs()).fold(0.0, f64::max)
+        points.map(|p| surface.foot(p, guess, direction).offset.abs()).fold(0.0, f64::max)
     }
 
     /// Returns why facets and spline answer a ray differently; `None` when the answers agree to rounding. `None` for a hit is a miss.
@@ -120,10 +137,26 @@ impl<'a> Classifier<'a> {
         // The spline passes within `apart` of the facet's hit, so the hit lies within the sag. Only at grazing incidence may facets
         // turn their backs within it.
         let steep = |h: &Hit| h.geometric_normal.dot(ray.direction).abs() > 0.3;
-        if f.geometric_normal.dot(e.geometric_normal) < 0.0 && steep(f) && steep(e) {
+        let opposite = f.geometric_normal.dot(e.geometric_normal) < 0.0 && steep(f) && steep(e);
+        if opposite && !self.is_folded(ray, f, e) {
             return Some(Cause::Unexplained(Defect::Orientation));
         }
         (apart > self.rounding).then_some(Cause::WithinSag)
+    }
+
+    /// Whether the spline itself is folded where it is hit, within the facet's sag: its normal there is that of the hit, and all around it
+    /// is on the facet's side.
+    fn is_folded(&self, ray: &Ray, facet: &Hit, exact: &Hit) -> bool {
+        self.surface(facet.face).is_some_and(|surface| {
+            let band = self.widest(surface, self.band(facet.face, ray, surface.gap));
+            surface.normal(exact.uv).dot(exact.geometric_normal) > 0.0
+                && surface.looks_around(exact.uv, band, facet.geometric_normal)
+        })
+    }
+
+    /// Returns how far from a surface its facets may lie that stray by `sag`: with the file's gap and rounding, mm.
+    fn widest(&self, surface: &PlacedSurface, sag: f64) -> f64 {
+        sag + surface.gap + self.rounding + FOOT_POINT * surface.size()
     }
 
     /// Finds the cause of a difference, from the earlier of the two hits: why did the other not see it? `elsewhere` is the later one where
@@ -156,14 +189,12 @@ impl<'a> Classifier<'a> {
         let later = |o: &Hit| LaterHit { t: o.t, band: self.band(o.face, ray, surface.gap) };
         let other_face = other.filter(|o| o.face != first.face).map(later).or(elsewhere);
         let cause = self.cause(ray, first, (same_face, other_face), surface, sag);
-        // A facet that the mesher itself does not vouch for, and that strays farther than was asked: so much is measured here.
-        if let (Cause::Unexplained(_), Some(f)) = (cause, facet.filter(|f| self.proved_sag(f.primitive).is_none()))
-            && let Some(its) = self.surface(f.face)
-        {
-            let measured = self.measured_sag(f, its, ray);
+        // Facets that the mesher itself does not vouch for, and that stray farther than was asked: so much is measured here.
+        if matches!(cause, Cause::Unexplained(_)) {
+            let measured = self.unproved_sag(ray, first, facet);
             let others = (same_face, other_face);
-            let again = if measured > sag { self.cause(ray, first, others, surface, measured) } else { cause };
-            if !matches!(again, Cause::Unexplained(_)) {
+            if measured > sag && !matches!(self.cause(ray, first, others, surface, measured), Cause::Unexplained(_))
+            {
                 return Cause::Unproved;
             }
         }
@@ -180,7 +211,7 @@ impl<'a> Classifier<'a> {
         surface: &PlacedSurface,
         sag: f64,
     ) -> Cause {
-        let band = sag + surface.gap + self.rounding + FOOT_POINT * surface.size();
+        let band = self.widest(surface, sag);
         let Some(stretch) = surface.stretch(ray, first.t, first.uv, band) else {
             let is_beyond = surface.is_beyond_border(ray, first.t, first.uv, band);
             return if is_beyond { Cause::TrimEdge } else { Cause::Unexplained(Defect::OffTheSurface) };

@@ -24,11 +24,11 @@ const STRAIGHT: f64 = 1e-6;
 
 /// A placed face with a geometry of its own, apart from the intersectors: its surface, and its border in space.
 pub(super) struct PlacedSurface {
-    surface: Surface,
+    pub(super) surface: Surface,
     /// −1 where the outward normal is `-(Su × Sv)`.
     sign: f64,
     size: f64,
-    /// Largest distance between an edge in space and its uv curve, mm.
+    /// Largest distance between an edge in space and its uv curve, or between the ends of edges that follow each other, mm.
     pub(super) gap: f64,
     borders: Vec<Border>,
     seeds: Vec<(Uv, Point)>,
@@ -82,7 +82,11 @@ impl PlacedSurface {
             .map(|uv| (uv, surface.evaluate(uv)))
             .collect();
         let sign = if flips == 1 { -1.0 } else { 1.0 };
-        Some(Self { surface, sign, size, gap: face.gap * placed.placement.scale, borders, seeds })
+        // A joint without an edge that is not one point is a gap between edges that the file left; facets go across it as they may.
+        let joints = face.loops.iter().flat_map(|l| &l.uses).filter(|u| u.edge.is_none());
+        let across = joints.map(|u| surface.evaluate(u.start()).distance(surface.evaluate(u.end())));
+        let gap = across.fold(face.gap * placed.placement.scale, f64::max);
+        Some(Self { surface, sign, size, gap, borders, seeds })
     }
 
     /// Returns the diagonal of the box about the control points, mm.
@@ -115,11 +119,16 @@ impl PlacedSurface {
         best
     }
 
+    /// Returns the face's outward normal at parameters `uv`; zero where it has none.
+    pub(super) fn normal(&self, uv: Uv) -> Vector {
+        self.surface.normal(uv).map_or(Vector::ZERO, |n| n * self.sign)
+    }
+
     /// Returns the surface at parameters `uv` as a foot of `p`, and how it bends along `direction`; at a pole as a sphere of its size
     /// would.
     fn describe(&self, p: Point, uv: Uv, direction: Vector) -> Foot {
         let d = self.surface.second_derivatives(uv);
-        let normal = self.surface.normal(uv).map_or(Vector::ZERO, |n| n * self.sign);
+        let normal = self.normal(uv);
         let away = p - d.point;
         let height = away.dot(normal);
         let offset = if height < 0.0 { -away.length() } else { away.length() };

@@ -6,6 +6,7 @@ use crate::math::{Point, Uv};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
+use std::borrow::Cow;
 
 /// Distance, mm, and share of the surface's size, within which corners that a face makes itself are one: ten times what the readers
 /// of files let the ends of neighbouring trims lie apart.
@@ -92,8 +93,8 @@ pub(in crate::tessellate) fn edges_of_collapsed_loops(
 
 /// Returns the loops that bound a face, with the border of its surface's domain where the face reaches it: of a face without loops, or with
 /// holes alone.
-pub(in crate::tessellate) fn loops(face: &Face) -> Vec<TrimLoop> {
-    if face.loops.is_empty() { vec![face.domain_border()] } else { face.bounding_loops().into_owned() }
+pub(in crate::tessellate) fn loops(face: &Face) -> Cow<'_, [TrimLoop]> {
+    if face.loops.is_empty() { Cow::Owned(vec![face.domain_border()]) } else { face.bounding_loops() }
 }
 
 /// Builds a polygon for each loop, its corners at the part's shared positions. Sides without an edge get samples of their own, the same on

@@ -57,7 +57,7 @@ impl<'m> TrimmedFace<'m> {
     ) -> Option<Self> {
         let part = placed.part;
         let (face, surface) = face_with_surface(placed, settings, key.face)?;
-        let loops = polygons::loops(face);
+        let loops = polygons::loops(face).into_owned();
         let polygons = polygons::build(part, &loops, &surface, &mesh.divisions, &ImprintedPoints::NONE);
         let mut out = Self {
             key,

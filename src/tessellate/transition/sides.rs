@@ -3,6 +3,7 @@
 use super::delaunay::{DelaunayMesh, Vertex};
 use crate::tessellate::border::enclosure::Enclosure;
 use crate::tessellate::nodes::edge_key;
+use rustc_hash::FxHashSet;
 use spade::Triangulation;
 use spade::handles::{
     DirectedEdgeHandle, FaceHandle, FixedFaceHandle, FixedVertexHandle, InnerTag, PossiblyOuterTag,
@@ -22,8 +23,9 @@ pub(super) struct Sides {
     inside: Vec<Option<bool>>,
     /// Vertices that the triangulation had then.
     vertices: usize,
-    /// Faces that were asked, since the beginning.
+    /// Faces that were asked, and sides that were looked at for it, since the beginning.
     asked: usize,
+    looked: usize,
 }
 
 impl Sides {
@@ -31,7 +33,7 @@ impl Sides {
     pub(super) fn new(mesh: &DelaunayMesh<'_, '_>, by_centre: Option<Enclosure>) -> Self {
         let cdt = &mesh.cdt;
         let inside = vec![None; cdt.num_all_faces()];
-        let mut sides = Self { by_centre, inside, vertices: cdt.num_vertices(), asked: 0 };
+        let mut sides = Self { by_centre, inside, vertices: cdt.num_vertices(), asked: 0, looked: 0 };
         if sides.by_centre.is_some() {
             cdt.inner_faces().for_each(|face| sides.ask_centre(mesh, face));
         } else {
@@ -61,7 +63,9 @@ impl Sides {
             return;
         }
         let around = faces.iter().flat_map(|f| f.adjacent_edges()).map(|e| e.rev().face().fix());
-        let known = around.filter(|f| self.inside[f.index()].is_some()).collect();
+        // Each once: of the outer face all sides are looked at, and on a border of thousands all new faces lie beside it.
+        let mut seen = FxHashSet::default();
+        let known = around.filter(|f| self.inside[f.index()].is_some() && seen.insert(f.index())).collect();
         self.walk(mesh, known);
     }
 
@@ -84,6 +88,7 @@ impl Sides {
         while let Some(face) = queue.pop_front() {
             let inside = self.inside[face.index()] == Some(true);
             let mut ask_beyond = |e: Side<'_>| {
+                self.looked += 1;
                 // Hull edges run along the outer face or against it, by version; take the unknown side.
                 for side in [e, e.rev()] {
                     let next = side.face();
@@ -169,6 +174,18 @@ mod tests {
             let around: usize = around.map(|v| mesh.cdt.vertex(v).out_edges().count()).sum();
             assert!(sides.asked - at_first <= 2 * around, "{} of {around}", sides.asked - at_first);
             assert!(2 * around < at_first, "too small to tell");
+            // Points beside as many sides of the outer loop: all its sides are looked at once, not once for each, which makes 16 a corner.
+            let before = sides.looked;
+            let beside = 10;
+            for k in 0..beside {
+                let uv = at(0.446, (f64::from(4 * k) + 0.5) * std::f64::consts::TAU / f64::from(CORNERS));
+                let node = mesh.nodes.push_own(uv, tube.evaluate(uv));
+                let vertex = mesh.insert_node(node, None);
+                mesh.handles.push(vertex);
+            }
+            sides.update(&mesh);
+            let looked = sides.looked - before;
+            assert!(centres || looked > 0 && looked < 12 * CORNERS as usize, "{looked}");
         }
     }
 }

@@ -1,0 +1,103 @@
+//! Rims whose vertices lie anywhere on them: the seams between them run straight.
+
+use crate::files::{MILLIMETRES, part21};
+use lampyris::math::Point;
+use lampyris::step::{Settings, read_bytes};
+use std::fmt::Write;
+
+/// A stepped shaft without seams, as a shell of cylinders and rings: rims at the given heights and radii, each with its vertex at an
+/// azimuth.
+fn shaft(rims: &[[f64; 3]]) -> String {
+    let mut data = String::from(
+        "#10=CARTESIAN_POINT('',(0.,0.,0.));#11=DIRECTION('',(0.,0.,1.));#12=DIRECTION('',(1.,0.,0.));\n\
+         #13=AXIS2_PLACEMENT_3D('',#10,#11,#12);\n",
+    );
+    for (k, &[z, r, azimuth]) in rims.iter().enumerate() {
+        let n = 100 * (k + 1);
+        let (sin, cos) = azimuth.sin_cos();
+        writeln!(
+            data,
+            "#{n}=CARTESIAN_POINT('',(0.,0.,{z:?}));#{}=AXIS2_PLACEMENT_3D('',#{n},#11,#12);#{}=CIRCLE('',#{},{r:?});\n\
+             #{}=CARTESIAN_POINT('',({:?},{:?},{z:?}));#{}=VERTEX_POINT('',#{});#{}=EDGE_CURVE('',#{},#{},#{},.T.);",
+            n + 1,
+            n + 2,
+            n + 1,
+            n + 3,
+            r * cos,
+            r * sin,
+            n + 4,
+            n + 3,
+            n + 5,
+            n + 4,
+            n + 4,
+            n + 2
+        )
+        .unwrap();
+    }
+    let mut faces = Vec::new();
+    for k in 0..rims.len() - 1 {
+        let n = 10_000 + 100 * k;
+        let ([z0, r0, _], [z1, r1, _]) = (rims[k], rims[k + 1]);
+        let surface = if z0 == z1 {
+            format!("#{}=AXIS2_PLACEMENT_3D('',#{},#11,#12);#{n}=PLANE('',#{});", n + 9, 100 * (k + 1), n + 9)
+        } else {
+            assert_eq!(r0, r1);
+            format!("#{n}=CYLINDRICAL_SURFACE('',#13,{r0:?});")
+        };
+        writeln!(data, "{surface}").unwrap();
+        for (i, (rim, sense)) in [(k, ".T."), (k + 1, ".F.")].into_iter().enumerate() {
+            let b = n + 10 * (i + 1);
+            writeln!(
+                data,
+                "#{b}=ORIENTED_EDGE('',*,*,#{},{sense});#{}=EDGE_LOOP('',(#{b}));#{}=FACE_BOUND('',#{},.T.);",
+                100 * (rim + 1) + 5,
+                b + 1,
+                b + 2,
+                b + 1
+            )
+            .unwrap();
+        }
+        // A ring below the wider part looks down.
+        let sense = if z0 == z1 { ".F." } else { ".T." };
+        writeln!(data, "#{}=ADVANCED_FACE('',(#{},#{}),#{n},{sense});", n + 50, n + 12, n + 22).unwrap();
+        faces.push(format!("#{}", n + 50));
+    }
+    writeln!(
+        data,
+        "#90=OPEN_SHELL('',({}));#91=SHELL_BASED_SURFACE_MODEL('',(#90));#92=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#91),#1);",
+        faces.join(",")
+    )
+    .unwrap();
+    part21(&format!("{MILLIMETRES}{data}"))
+}
+
+/// A shaft of two cylinders with a ring between: each cylinder's seam is a line along the axis, and a rim that moved keeps its circle.
+#[test]
+fn seams_between_rims_are_straight() {
+    let rims = [[0.0, 5.0, 0.0], [20.0, 5.0, 3.0], [20.0, 7.0, -1.2], [26.0, 7.0, 2.2]];
+    let import = read_bytes("shaft.stp", shaft(&rims).as_bytes(), &Settings::default()).expect("Part 21");
+    let report = &import.report;
+    assert!(report.refusals.is_empty() && report.repairs.is_empty(), "{:?} {:?}", report.refusals, report.repairs);
+    let part = &import.model.parts[0];
+    let seams: Vec<_> = part.edges.iter().filter(|edge| edge.entity.is_none()).collect();
+    assert_eq!(seams.len(), 2);
+    for (seam, height) in seams.iter().zip([20.0, 6.0]) {
+        let [a, b] = seam.curve.domain();
+        let place = |f: f64| seam.curve.evaluate(a + (b - a) * f);
+        let chord = place(1.0) - place(0.0);
+        assert!((chord.length() - height).abs() < 1e-12 && chord.x.hypot(chord.y) < 1e-12, "{chord}");
+        for f in [0.2, 0.5, 0.9] {
+            let p: Point = place(f);
+            assert!((p.x - place(0.0).x).hypot(p.y - place(0.0).y) < 1e-12, "{p}");
+        }
+    }
+    for edge in part.edges.iter().filter(|edge| edge.entity.is_some()) {
+        let [a, b] = edge.curve.domain();
+        let ends = edge.vertices.map(|v| part.vertices[v.0 as usize]);
+        assert!((ends[0] - edge.curve.evaluate(a)).length() < 1e-12 && ends[0] == ends[1]);
+        let (radius, z) = (ends[0].x.hypot(ends[0].y), ends[0].z);
+        assert!(rims.iter().any(|rim| (rim[0] - z).abs() < 1e-12 && (rim[1] - radius).abs() < 1e-12));
+        let opposite = edge.curve.evaluate(0.5 * (a + b));
+        assert!((opposite - Point::new(-ends[0].x, -ends[0].y, z)).length() < 1e-12);
+    }
+}
