@@ -131,8 +131,8 @@ impl Draft {
         let (nodes, blocks) = (self.nodes.len(), self.blocks.len());
         self.blocks.extend(draft.blocks);
         self.nodes.extend(draft.nodes.into_iter().map(|mut node| {
-            // An unused child stays zero, by which vector instructions tell it: where slacks are wider than the node they meet its empty
-            // box too, and a moved zero led them back up the tree for ever.
+            // An unused child stays zero, by which vector instructions tell it: its box means nothing, and a moved zero led them back up
+            // the tree for ever.
             for slot in node.slots() {
                 node.children[slot] = Link(node.children[slot]).moved(nodes, blocks).0;
             }

@@ -173,7 +173,7 @@ impl Node {
 }
 
 impl Node {
-    /// The box of a child relative to the middle of the mesh, mm; of a slot that is not used it is empty.
+    /// The box of a child relative to the middle of the mesh, mm; of a slot that is not used it means nothing.
     pub(super) fn child(&self, slot: usize) -> Aabb {
         let corner = |row: usize| {
             Point::from_array(std::array::from_fn(|a| {

@@ -72,8 +72,8 @@ struct LinkCheck {
 }
 
 impl LinkCheck {
-    /// Takes further nodes, and sets the links of their children that are not in use to zero, by which walks that meet their empty boxes
-    /// tell them.
+    /// Takes further nodes, and sets the links of their children that are not in use to zero, by which walks tell them: their boxes mean
+    /// nothing.
     fn take(&mut self, nodes: &mut [Node]) {
         simd::dispatch(LinkScan { check: self, nodes });
     }
