@@ -65,6 +65,26 @@ impl Curve {
 /// Returns the area, in parameters, within a loop of curves, each with whether the loop runs against it; positive where the loop runs
 /// counter-clockwise, 0 without curves. Straight steps join those that miss one another.
 pub(crate) fn area_within<'a>(curves: impl Iterator<Item = (&'a UvCurve, bool)>) -> f64 {
+    area_of_loop(curves, |center, curve, _, reversed| {
+        let along = curve.swept_product(center, Uv::perp_dot);
+        if reversed { -along } else { along }
+    })
+}
+
+/// Returns a number that the area of [`area_within`] is not below: the polygon of the curves' ends, less what lies between each curve and
+/// its chord at most. A twentieth of the time.
+pub(crate) fn least_area_within<'a>(curves: impl Iterator<Item = (&'a UvCurve, bool)>) -> f64 {
+    area_of_loop(curves, |center, curve, [start, end], _| {
+        (start - center).perp_dot(end - center) - chord_area(curve)
+    })
+}
+
+/// Adds up the area within a loop of curves, as [`area_within`], of what `along` says that each sweeps twice about a center: it is given
+/// the curve with its ends in the order of the loop, and whether the loop runs against it.
+fn area_of_loop<'a>(
+    curves: impl Iterator<Item = (&'a UvCurve, bool)>,
+    along: impl Fn(Uv, &UvCurve, [Uv; 2], bool) -> f64,
+) -> f64 {
     let mut area = 0.0;
     let mut corner: Option<Uv> = None;
     let mut last = Uv::ZERO;
@@ -75,33 +95,13 @@ pub(crate) fn area_within<'a>(curves: impl Iterator<Item = (&'a UvCurve, bool)>)
         }
         // About the first corner: far from the origin the products would cancel.
         let center = *corner.get_or_insert(ends[0]);
-        let along = curve.swept_product(center, Uv::perp_dot);
-        area += if reversed { -along } else { along };
+        area += along(center, curve, ends, reversed);
         // The step from the curve before; about its own start nothing is swept by the first.
         area += (last - center).perp_dot(ends[0] - center);
         last = ends[1];
     }
     // A last step closes the loop at the corner itself, which sweeps nothing.
     0.5 * area
-}
-
-/// Returns a number that the area of [`area_within`] is not below: the polygon of the curves' ends, less what lies between each curve and
-/// its chord at most. A twentieth of the time.
-pub(crate) fn least_area_within<'a>(curves: impl Iterator<Item = (&'a UvCurve, bool)>) -> f64 {
-    let (mut area, mut between) = (0.0, 0.0);
-    let mut corner: Option<Uv> = None;
-    let mut last = Uv::ZERO;
-    for (curve, reversed) in curves {
-        let mut ends = curve.ends();
-        if reversed {
-            ends.swap(0, 1);
-        }
-        let center = *corner.get_or_insert(ends[0]);
-        area += (last - center).perp_dot(ends[0] - center) + (ends[0] - center).perp_dot(ends[1] - center);
-        last = ends[1];
-        between += chord_area(curve);
-    }
-    0.5 * (area - between)
 }
 
 /// Bounds twice the area between a curve and its chord: about the middle of the chord, the control polygon's reach along it times the way
