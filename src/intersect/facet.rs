@@ -19,8 +19,8 @@ pub(crate) use super::line::Line;
 pub(crate) use super::start_triangle::LONGEST_NUDGE;
 
 use super::slopes::{LEAST_SINE, Slopes};
-use super::start_triangle::{LIFT, StartTriangle, distance_to_segment};
-use crate::math::{Aabb, Point, QuadHalf, Ray, Vector};
+use super::start_triangle::{LIFT, StartTriangle};
+use crate::math::{Aabb, Point, QuadHalf, Ray, Vector, distance_to_segment};
 use crate::mesh::FacetMesh;
 use std::hint::select_unpredictable;
 

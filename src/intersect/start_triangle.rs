@@ -1,6 +1,6 @@
 //! The triangle of its facet from which a ray starts.
 
-use crate::math::{Point, QuadHalf, Vector};
+use crate::math::{Point, QuadHalf, Vector, distance_to_segment};
 
 /// Share of the way to the middle of its triangle by which a start on a border is moved inside.
 const NUDGE: f64 = 1.0 / 1048576.0;
@@ -63,12 +63,4 @@ impl StartTriangle {
 fn is_over_second([a, b, c, d]: &[Point; 4], start: Point) -> bool {
     let diagonal = c - a;
     diagonal.cross(start - a).dot(diagonal.cross(d - b)) > 0.0
-}
-
-/// Distance of `p` from the segment between `a` and `b`, mm; from `a` where they coincide.
-pub(super) fn distance_to_segment(p: Point, a: Point, b: Point) -> f64 {
-    let (ab, ap) = (b - a, p - a);
-    let along = ap.dot(ab) / ab.length_squared();
-    // False as well where the segment is a point and `along` is no number.
-    if along > 0.0 { (ap - ab * along.min(1.0)).length() } else { ap.length() }
 }

@@ -5,6 +5,7 @@
 
 mod aabb;
 mod box_tree;
+mod distance;
 mod frame;
 pub(crate) mod huge_pages;
 mod maximum;
@@ -20,6 +21,7 @@ use bytemuck::{AnyBitPattern, NoUninit};
 
 pub use aabb::Aabb;
 pub use box_tree::{BoxTree, BoxWalk};
+pub(crate) use distance::{distance_to_segment, distance_to_triangle};
 pub use frame::Frame;
 pub(crate) use maximum::{error_of_maximum, largest_distance};
 pub use ray::{Departure, QuadHalf, Ray};

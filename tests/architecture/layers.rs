@@ -289,6 +289,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "roots",
             "quadrature",
             "polygon",
+            "distance",
             "maximum",
             "spread",
             "units",

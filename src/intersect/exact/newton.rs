@@ -136,14 +136,11 @@ impl Exact {
         uv.is_finite().then(|| self.geometry.patch_at(record, uv))
     }
 
-    /// Finds the patch of a face that holds all the corners of a facet, in surface parameters: `None` where the face has no surface that is
-    /// traced, `Some(None)` where they lie on several patches.
-    pub(in crate::intersect) fn patch_around(&self, face: FaceId, corners: &[Uv; 4]) -> Option<Option<u32>> {
-        let middle = 0.25 * corners.iter().sum::<Uv>();
-        let patch = self.patch_at(face, middle)?;
+    /// Whether the parameters lie within a patch, its upper ends excluded, so that [`Self::patch_at`] finds no other.
+    #[inline(always)]
+    pub(in crate::intersect) fn patch_holds(&self, patch: u32, uv: Uv) -> bool {
         let [u, v] = self.geometry.patches[patch as usize].domain;
-        let holds = |uv: &Uv| uv.x >= u[0] && uv.x <= u[1] && uv.y >= v[0] && uv.y <= v[1];
-        Some(corners.iter().all(holds).then_some(patch))
+        (uv.x >= u[0]) & (uv.x < u[1]) & (uv.y >= v[0]) & (uv.y < v[1])
     }
 
     /// Whether a face is traced: `false` for ready meshes, for surfaces that are not finite or have weights that are not positive, and for

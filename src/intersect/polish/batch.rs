@@ -215,7 +215,10 @@ impl Polished<'_> {
         // And so may one between another face and that one's facets, or behind both: the facet was met before the other's, and its root
         // may come after.
         let way = [ray.point_at(facet_hit.t), ray.point_at(point.t)];
-        if is_doubtful || self.is_in_slab(facet_hit.primitive, point.uv, way) {
+        // Nearly all roots are so near to their facet hit that nothing else needs be asked.
+        let is_told = (point.t - facet_hit.t).abs() <= self.slabs.reach()
+            || self.is_told(facet_hit.primitive, point.uv, way[1]);
+        if is_doubtful || !is_told || self.slabs.meet(self.mesh, facet_hit.primitive, way) {
             return Decision::Doubt;
         }
         Decision::Answer(Some(Hit {

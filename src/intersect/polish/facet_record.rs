@@ -11,10 +11,8 @@ use rustc_hash::FxHashMap;
 const CLEAR_BENDS: f64 = 2.0 * HIDDEN_BENDS;
 /// And it is above this: a hundred times what `f32` rounds.
 const LEAST_CLEAR_SINE: f64 = 1e-5;
-/// In [`FacetRecord::patch`]: the facet lies on several patches.
-const SEVERAL_PATCHES: u32 = u32::MAX;
 /// In [`FacetRecord::patch`]: its face has no surface that is traced.
-const NO_PATCH: u32 = u32::MAX - 1;
+const NO_PATCH: u32 = u32::MAX;
 /// In [`FacetRecord::solid`]: its face is part of no closed shell.
 const NO_SOLID: u32 = u32::MAX;
 
@@ -52,11 +50,8 @@ impl FacetRecord {
                 let bend = turned.into_iter().fold(BEND_OF_SAGS * sag / length, f64::max);
                 let least_sine = (CLEAR_BENDS * bend).max(LEAST_CLEAR_SINE);
                 let corners = facet.vertices.map(|v| mesh.vertices[v as usize].uv);
-                let patch = match exact.patch_around(facet.face, &corners) {
-                    None => NO_PATCH,
-                    Some(None) => SEVERAL_PATCHES,
-                    Some(Some(patch)) => patch,
-                };
+                let middle = 0.25 * corners.iter().sum::<Uv>();
+                let patch = exact.patch_at(facet.face, middle).unwrap_or(NO_PATCH);
                 Self {
                     normal: normal.as_vec3().to_array(),
                     least_sine: least_sine as f32,
@@ -81,11 +76,10 @@ impl FacetRecord {
     /// The patch of `exact` that a place of the facet, in the surface's parameters, lies on; `None` where there is none.
     #[inline(always)]
     pub(super) fn patch(&self, exact: &Exact, uv: Uv) -> Option<u32> {
-        match self.patch {
-            NO_PATCH => None,
-            SEVERAL_PATCHES => exact.patch_at(self.face, uv),
-            patch => Some(patch),
+        if self.patch == NO_PATCH {
+            return None;
         }
+        if exact.patch_holds(self.patch, uv) { Some(self.patch) } else { exact.patch_at(self.face, uv) }
     }
 
     /// Whether its face is part of a closed shell.

@@ -3,38 +3,94 @@
 use crate::math::Uv;
 use crate::mesh::FacetMesh;
 
-/// Part of the parameters of a facet's piece: a rectangle, rounded inward; empty where the piece is none.
+/// Roundings of single precision, in units of the largest term, that a side is moved inward by: two for each product, and the sum.
+const ROUNDINGS: f64 = 8.0;
+
+/// The polygon between the parameters of a facet's corners, as far as all its sides can see it, and rounded inward; empty where it has no
+/// area.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
-    low: [f32; 2],
-    high: [f32; 2],
+    /// Of each side the numbers by which u and v are multiplied, and what the sum is above inside.
+    by_u: [f32; 4],
+    by_v: [f32; 4],
+    above: [f32; 4],
 }
 
 impl Piece {
-    const EMPTY: Self = Self { low: [f32::INFINITY; 2], high: [f32::NEG_INFINITY; 2] };
-
-    /// The parameters between the corners of this facet, where they are those of a rectangle.
+    /// Of this facet.
     pub(super) fn of_facet(mesh: &FacetMesh, facet: usize) -> Self {
-        let [a, b, c, d] = mesh.facets[facet].vertices.map(|v| mesh.vertices[v as usize].uv);
-        let (low, high) = (a.min(c), a.max(c));
-        // Opposite corners, and the other two between them.
-        let is_rectangle = [[b, d], [d, b]].contains(&[Uv::new(a.x, c.y), Uv::new(c.x, a.y)]);
-        if !is_rectangle || !low.is_finite() || !high.is_finite() {
-            return Self::EMPTY;
+        let corners = mesh.facets[facet].vertices.map(|v| mesh.vertices[v as usize].uv);
+        Self::between(corners)
+    }
+
+    /// Between four places, in one or the other turn; two may be the same.
+    fn between(corners: [Uv; 4]) -> Self {
+        let [a, b, c, d] = corners;
+        let turn = (c - a).perp_dot(d - b);
+        let mut piece = Self { by_u: [0.0; 4], by_v: [0.0; 4], above: [f32::INFINITY; 4] };
+        if !turn.is_finite() || turn == 0.0 {
+            return piece;
         }
-        Self {
-            low: low.to_array().map(|x| (x as f32).next_up()),
-            high: high.to_array().map(|x| (x as f32).next_down()),
+        let largest = corners.into_iter().fold(Uv::ZERO, |largest, corner| largest.max(corner.abs()));
+        for k in 0..4 {
+            let (from, side) = (corners[k], corners[(k + 1) % 4] - corners[k]);
+            // A side without length bounds nothing.
+            if side == Uv::ZERO {
+                piece.above[k] = f32::NEG_INFINITY;
+                continue;
+            }
+            let inward = side.perp() * turn.signum() / side.abs().max_element();
+            let room = ROUNDINGS * f64::from(f32::EPSILON) * (inward.abs() * largest).element_sum();
+            piece.by_u[k] = inward.x as f32;
+            piece.by_v[k] = inward.y as f32;
+            piece.above[k] = (inward.dot(from) + room) as f32;
         }
+        piece
     }
 
     /// Whether these parameters are known to lie in the piece.
     #[inline(always)]
     pub(super) fn holds(&self, uv: Uv) -> bool {
-        let [u, v] = uv.to_array();
-        (u > f64::from(self.low[0]))
-            & (u < f64::from(self.high[0]))
-            & (v > f64::from(self.low[1]))
-            & (v < f64::from(self.high[1]))
+        let [u, v] = uv.as_vec2().to_array();
+        let mut holds = true;
+        for k in 0..4 {
+            holds &= self.by_u[k] * u + self.by_v[k] * v > self.above[k];
+        }
+        holds
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quads, triangles and slivers of either turn, near the origin and far from it: what is held lies left of all sides, or right, and
+    /// most of what does is held.
+    #[test]
+    fn what_is_held_lies_inside() {
+        let shapes = [
+            [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]],
+            [[0.0, 0.0], [0.1, 1.0], [2.0, 1.0], [1.5, 0.2]],
+            [[0.0, 0.0], [2.0, 0.3], [1.0, 1.0], [1.0, 1.0]],
+            [[0.0, 0.0], [2.0, 1e-3], [2.0, 2e-3], [0.0, 1e-3]],
+        ];
+        for (shape, origin) in shapes.into_iter().flat_map(|shape| [0.0, -7.0, 1e3].map(|origin| (shape, origin))) {
+            let corners = shape.map(|corner| Uv::from_array(corner) + Uv::splat(origin));
+            let piece = Piece::between(corners);
+            let (mut inside, mut held) = (0, 0);
+            for k in 0..20_000u32 {
+                let unit = |m: f64| (f64::from(k) * m).fract();
+                let place = Uv::new(2.0 * unit(0.618_033_988), unit(0.754_877_666)) + Uv::splat(origin);
+                let sides = (0..4).map(|k| [corners[k], corners[(k + 1) % 4]]).filter(|[from, to]| from != to);
+                let sides: Vec<f64> = sides.map(|[from, to]| (to - from).perp_dot(place - from)).collect();
+                let is_inside = sides.iter().all(|&s| s > 0.0) || sides.iter().all(|&s| s < 0.0);
+                inside += u32::from(is_inside);
+                held += u32::from(piece.holds(place));
+                assert!(is_inside || !piece.holds(place), "{shape:?} {place}");
+            }
+            assert!(f64::from(held) > 0.9 * f64::from(inside) || origin == 1e3, "{held} of {inside}");
+        }
+        assert!(!Piece::between([Uv::ONE; 4]).holds(Uv::ONE));
+        assert!(!Piece::between([Uv::ZERO, Uv::NAN, Uv::ONE, Uv::ONE]).holds(Uv::ONE));
     }
 }

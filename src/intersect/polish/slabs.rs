@@ -10,15 +10,17 @@
 use super::curved_cells::FLAT_SAG;
 use super::facet_record::FacetRecord;
 use super::slab_map::SlabMap;
-use crate::math::{Aabb, BoxTree, Point};
+use crate::math::{Aabb, BoxTree, Point, Vector};
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-/// A facet with more slabs near it, as of a plate with many holes, has a map of them and looks for them in a tree.
+/// A facet with more slabs near it has a map of them, which costs as much as asking so many.
+const MOST_WITHOUT_MAP: usize = 2;
+/// One with more, as of a plate with many holes, has no list of them and looks for them in the tree.
 const MOST_LISTED: usize = 12;
-/// Slabs near a facet of which a map is made; one with more, as a long strip across everything, always looks in the tree.
-const MOST_MAPPED: usize = 4096;
+/// Slabs in a facet's box of which a map is made; one with more, as a long strip across everything, always looks in the tree.
+const MOST_ASKED: u32 = 4096;
 /// Room for what rounds a place, mm, and as a share of its coordinates: a million roundings.
 const ROOM: f64 = 1e-9;
 
@@ -39,7 +41,7 @@ pub(super) struct Slabs {
     /// Of each facet its first slab in `listed`, and one more for the end of the last.
     starts: Vec<u32>,
     listed: Vec<Slab>,
-    /// Of facets with too many to be listed.
+    /// Of facets with more than a few, where the first that is listed names the map.
     maps: Vec<SlabMap>,
     /// How far from a facet, mm, a place that rays leave by it may lie.
     reach: f64,
@@ -53,20 +55,26 @@ impl Slabs {
         let all: Vec<Slab> = curved.map(|f| Slab::of_facet(mesh, f, records[f as usize].sag)).collect();
         let tree = BoxTree::new(&all.iter().map(Slab::bounds).collect::<Vec<Aabb>>());
         let near = |f: usize| {
-            let bounds = Aabb::from_points(mesh.corners(f)).grown(reach);
+            let surroundings = Surroundings::of_facet(mesh, f, reach);
+            let bounds = surroundings.bounds;
             let mut near: SmallVec<[u32; MOST_LISTED]> = SmallVec::new();
+            let mut asked = 0;
             let are_too_many = tree.any_meeting(&bounds, |k| {
-                let is_foreign = mesh.facets[all[k as usize].facet as usize].face != mesh.facets[f].face;
-                near.extend(is_foreign.then_some(k));
-                near.len() > MOST_MAPPED
+                let slab = &all[k as usize];
+                let is_foreign = mesh.facets[slab.facet as usize].face != mesh.facets[f].face;
+                asked += u32::from(is_foreign);
+                near.extend((is_foreign && surroundings.may_meet(mesh, slab)).then_some(k));
+                asked > MOST_ASKED
             });
-            let map = (near.len() > MOST_LISTED).then(|| {
+            let map = (are_too_many || near.len() > MOST_WITHOUT_MAP).then(|| {
                 let mut map = SlabMap::new(bounds);
                 near.iter().for_each(|&k| map.mark(&all[k as usize].bounds()));
                 if are_too_many {
                     map.mark(&bounds);
                 }
-                near = SmallVec::new();
+                if are_too_many || near.len() > MOST_LISTED {
+                    near = SmallVec::new();
+                }
                 map
             });
             (near, map)
@@ -74,22 +82,31 @@ impl Slabs {
         let of_facets: Vec<_> = (0..mesh.facets.len()).into_par_iter().map(near).collect();
         let (mut starts, mut listed, mut maps) = (vec![0], Vec::new(), Vec::new());
         for (near, map) in of_facets {
-            listed.extend(near.iter().map(|&k| all[k as usize]));
             listed.extend(map.is_some().then(|| Slab::mapped(maps.len())));
             maps.extend(map);
+            listed.extend(near.iter().map(|&k| all[k as usize]));
             starts.push(listed.len() as u32);
         }
         Self { all, tree, starts, listed, maps, reach }
     }
 
-    /// Whether the way between two places, of which the second is one of this facet's, touches a slab; both may be the same.
+    /// Whether the way between two places within reach of this facet touches a slab; both may be the same.
     #[inline(always)]
     pub(super) fn meet(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2]) -> bool {
         let range = self.starts[facet as usize] as usize..self.starts[facet as usize + 1] as usize;
-        self.listed[range].iter().any(|slab| match slab.map() {
-            Some(map) => self.maps[map].may_touch(way) && self.any_meets(mesh, facet, way),
-            None => slab.meets(mesh, way),
-        })
+        !range.is_empty() && self.any_listed_meets(mesh, facet, way, &self.listed[range])
+    }
+
+    /// [`Self::meet`] of the facet whose slabs these are.
+    fn any_listed_meets(&self, mesh: &FacetMesh, facet: u32, way: [Point; 2], listed: &[Slab]) -> bool {
+        let [first, slabs @ ..] = listed else { return false };
+        let Some(map) = first.map() else { return listed.iter().any(|slab| slab.meets(mesh, way)) };
+        self.maps[map].may_touch(way)
+            && if slabs.is_empty() {
+                self.any_meets(mesh, facet, way)
+            } else {
+                slabs.iter().any(|slab| slab.meets(mesh, way))
+            }
     }
 
     /// Whether a way touches a slab of another face than this facet's.
@@ -100,10 +117,10 @@ impl Slabs {
         })
     }
 
-    /// Whether a place is so near to this facet that [`Self::meet`] speaks of it.
-    #[inline]
-    pub(super) fn reach(&self, mesh: &FacetMesh, facet: u32, place: Point) -> bool {
-        Aabb::from_points(mesh.corners(facet as usize)).grown(self.reach).contains(place)
+    /// How far from its facet, mm, a place may lie of which [`Self::meet`] speaks.
+    #[inline(always)]
+    pub(super) fn reach(&self) -> f64 {
+        self.reach
     }
 
     /// Bytes held.
@@ -116,11 +133,11 @@ impl Slabs {
     }
 }
 
-/// In [`Slab::facet`]: stands for all slabs near a facet, of which the other bits name the map. A mesh has fewer facets.
+/// In [`Slab::facet`]: the other bits name a map of all slabs near a facet. A mesh has fewer facets.
 const MAPPED: u32 = 1 << 31;
 
 impl Slab {
-    /// What is listed for a facet with too many slabs: its map, by its index.
+    /// What is listed first for a facet with a map: which one it is.
     fn mapped(index: usize) -> Self {
         Self { low: [0.0; 3], high: [0.0; 3], facet: MAPPED | index as u32, sag: 0.0 }
     }
@@ -154,18 +171,60 @@ impl Slab {
     fn meets(&self, mesh: &FacetMesh, [a, b]: [Point; 2]) -> bool {
         let (low, high) = (a.min(b), a.max(b));
         let touches = (0..3).all(|k| high[k] >= f64::from(self.low[k]) && low[k] <= f64::from(self.high[k]));
-        touches && self.comes_near_plane(mesh, [a, b])
+        touches && self.comes_near_plane(mesh, [a, b], 0.0)
     }
 
-    /// Whether a way comes within the sag of the plane of one of the facet's triangles.
-    fn comes_near_plane(&self, mesh: &FacetMesh, way: [Point; 2]) -> bool {
+    /// Whether what lies within `reach`, mm, of the hull of these places comes within the sag of the plane of one of the facet's
+    /// triangles.
+    fn comes_near_plane<const N: usize>(&self, mesh: &FacetMesh, places: [Point; N], reach: f64) -> bool {
         let [a, b, c, d] = mesh.corners(self.facet as usize);
-        let comes_near = |across: Point| {
-            let reach = f64::from(self.sag) * across.length();
-            let [from, to] = way.map(|place| (place - a).dot(across));
-            from.min(to) <= reach && from.max(to) >= -reach
+        let comes_near = |across: Vector| {
+            let room = (f64::from(self.sag) + reach) * across.length();
+            let [low, high] = range_along(across, a, places);
+            low <= room && high >= -room
         };
         comes_near((b - a).cross(c - a)) || comes_near((c - a).cross(d - a))
+    }
+}
+
+/// The least and the largest of the products of an axis with the ways from `origin` to these places.
+#[inline(always)]
+fn range_along<const N: usize>(axis: Vector, origin: Point, places: [Point; N]) -> [f64; 2] {
+    let along = places.map(|place| (place - origin).dot(axis));
+    [along.into_iter().fold(f64::INFINITY, f64::min), along.into_iter().fold(f64::NEG_INFINITY, f64::max)]
+}
+
+/// All places within a reach of a facet, for telling the slabs that no way between such places touches.
+struct Surroundings {
+    corners: [Point; 4],
+    reach: f64,
+    bounds: Aabb,
+    /// Along the normal of the facet's first triangle from its first corner, as the range of all these places; a normal of zero tells
+    /// nothing.
+    normal: Vector,
+    range: [f64; 2],
+}
+
+impl Surroundings {
+    /// Of this facet, as far as `reach`, mm.
+    fn of_facet(mesh: &FacetMesh, facet: usize, reach: f64) -> Self {
+        let corners = mesh.corners(facet);
+        let [a, b, c, _] = corners;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let [low, high] = range_along(normal, a, corners);
+        let bounds = Aabb::from_points(corners).grown(reach);
+        Self { corners, reach, bounds, normal, range: [low - reach, high + reach] }
+    }
+
+    /// Whether a way between such places may touch this slab: `false` where the slab's box lies beside them along the facet's normal, or
+    /// they lie beyond the slab's planes.
+    fn may_meet(&self, mesh: &FacetMesh, slab: &Slab) -> bool {
+        let bounds = slab.bounds();
+        let middle = (bounds.center() - self.corners[0]).dot(self.normal);
+        let half = 0.5 * bounds.size().dot(self.normal.abs());
+        middle - half <= self.range[1]
+            && middle + half >= self.range[0]
+            && slab.comes_near_plane(mesh, self.corners, self.reach)
     }
 }
 
@@ -173,7 +232,7 @@ impl Slab {
 mod tests {
     use super::*;
     use crate::intersect::exact::{Exact, Settings};
-    use crate::math::{FaceId, Frame, Uv, Vector};
+    use crate::math::{FaceId, Frame, Uv};
     use crate::mesh::{Facet, MeshVertex};
     use crate::model::{Face, Model, Part, Shell};
     use crate::nurbs::sweep;
@@ -222,5 +281,45 @@ mod tests {
         }
         // A ring 0.1 mm wide and as much as ways reach beyond, of 400 mm²: some hundreds.
         assert!((200..2_000).contains(&met), "{met}");
+    }
+
+    /// Of facets across one another, in all directions: what is told beforehand to be far from a facet is far from every way near it.
+    #[test]
+    fn no_way_near_a_facet_touches_a_slab_that_was_left_out() {
+        let unit = |k: u32, m: f64| (f64::from(k) * m).fract();
+        let point = |k: u32| Point::new(unit(k, 0.618_034), unit(k, 0.754_878), unit(k, 0.569_84)) * 10.0;
+        let positions: Vec<Point> = (0..40)
+            .flat_map(|f| [0, 1, 2, 3].map(|k| (f, k)))
+            .map(|(f, k)| point(f) + 0.4 * point(97 * f + 13 * k))
+            .collect();
+        let vertex = |position| MeshVertex { position, normal: Vector::Z, uv: Uv::ZERO };
+        let facet = |f: u32| Facet { vertices: [0, 1, 2, 3].map(|k| 4 * f + k), face: FaceId(f) };
+        let mesh = FacetMesh {
+            vertices: (0..positions.len() as u32).map(vertex).collect(),
+            positions,
+            facets: (0..40).map(facet).collect(),
+            sag: vec![],
+        };
+        let exact = Exact::build(&Model::default(), &Settings::default());
+        let slabs = Slabs::of_mesh(&mesh, &FacetRecord::of_mesh(&mesh, &exact, 0.02), 0.1);
+        let boxes_meet = |f: usize, slab: &Slab| {
+            !Aabb::from_points(mesh.corners(f)).grown(0.1).intersection(slab.bounds()).is_empty()
+        };
+        let in_boxes: usize =
+            (0..40).map(|f| slabs.all.iter().filter(|slab| boxes_meet(f, slab)).count() - 1).sum();
+        assert!(4 * slabs.listed.len() < 3 * in_boxes, "{} of {in_boxes}", slabs.listed.len());
+        let mut met = 0;
+        for k in 0..40_000u32 {
+            let f = k % 40;
+            let [a, b, c, _] = mesh.corners(f as usize);
+            let (s, t) = (unit(k, 0.445), unit(k, 0.7247));
+            let on_facet = a + (b - a) * s.min(t) + (c - b) * (s.min(t) * s.max(t));
+            let aside = Vector::new(unit(k, 0.31) - 0.5, unit(k, 0.57) - 0.5, unit(k, 0.83) - 0.5).normalize();
+            let way = [on_facet, on_facet + 0.1 * unit(k, 0.177) * aside];
+            let meets = slabs.all.iter().any(|slab| slab.facet != f && slab.meets(&mesh, way));
+            assert_eq!(slabs.meet(&mesh, f, way), meets, "{f} {way:?}");
+            met += u32::from(meets);
+        }
+        assert!((300..30_000).contains(&met), "{met}");
     }
 }

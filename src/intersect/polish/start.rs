@@ -4,7 +4,9 @@ use super::Polished;
 use super::clear_start::ClearStart;
 use super::curved_cells::LOOK_BACK_OF_FLAT;
 use super::limits::{BEND_OF_SAGS, HIDDEN_BENDS, LEAST_SLACK_SINE, SHORT_OF_SAGS};
-use crate::math::{Departure, Point, Ray, Uv};
+#[cfg(doc)]
+use super::slabs::Slabs;
+use crate::math::{Departure, Point, Ray, Uv, distance_to_triangle};
 
 /// To which side of its surface a ray leaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +45,9 @@ impl Polished<'_> {
         // side that is left.
         let record = self.records.get(from.primitive as usize).filter(|r| r.face == from.face)?;
         let is_long = ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag;
-        if !is_long || self.is_in_slab(from.primitive, from.uv, [ray.point_at(ray.t_min); 2]) {
+        let place = ray.point_at(ray.t_min);
+        let is_told = is_long && self.is_told(from.primitive, from.uv, place);
+        if !is_told || self.slabs.meet(self.mesh, from.primitive, [place; 2]) {
             return None;
         }
         let sine = match record.decisive_sine(ray) {
@@ -54,13 +58,15 @@ impl Polished<'_> {
         Some(Start { slack: [slack / sine.abs().max(LEAST_SLACK_SINE); 2], side: Some(side) })
     }
 
-    /// Whether a place, mm, of the spline that belongs to this facet, with its parameters, may lie between another face and that one's
-    /// facets, or the way to it from `before` touch what lies between these.
+    /// Whether a place, mm, of the spline with its parameters is so near to a facet that [`Slabs::meet`] speaks of it: on the facet's own
+    /// piece, or within reach. Of a ray that came in flat the root lies beside the piece.
     #[inline(always)]
-    pub(super) fn is_in_slab(&self, facet: u32, uv: Uv, [before, place]: [Point; 2]) -> bool {
-        // Of a ray that came in flat the root lies beside the piece of the spline that its facet stands for.
-        let is_told = self.pieces[facet as usize].holds(uv) || self.slabs.reach(self.mesh, facet, place);
-        !is_told || self.slabs.meet(self.mesh, facet, [before, place])
+    pub(super) fn is_told(&self, facet: u32, uv: Uv, place: Point) -> bool {
+        self.pieces[facet as usize].holds(uv) || {
+            let [a, b, c, d] = self.mesh.corners(facet as usize);
+            let distance = distance_to_triangle(place, [a, b, c]).min(distance_to_triangle(place, [a, c, d]));
+            distance <= self.slabs.reach()
+        }
     }
 
     /// The sine at which a ray leaves the spline, negative for rays that go in; `None` where its next root may hide between the spline and

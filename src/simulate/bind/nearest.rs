@@ -1,6 +1,6 @@
 //! The face nearest to a point.
 
-use crate::math::{Aabb, Point, Uv, Vector};
+use crate::math::{Aabb, Point, Uv, Vector, distance_to_triangle};
 use crate::model::{Model, PlacedFace};
 use crate::nurbs::Surface;
 use crate::simulate::face_foot::{BOX_ROUNDING, PieceBoxes, nearest_on_face};
@@ -166,24 +166,6 @@ pub(super) fn face_bounds(f: &PlacedFace<'_>) -> Aabb {
         (None, None) => Aabb::EMPTY,
     };
     if local.is_empty() { local } else { Aabb::from_points(local.corners().map(|c| f.placement.point(c))) }
-}
-
-/// Returns the distance from a point to a triangle, in their unit: to the plane when the foot lies inside, else to the nearest edge; so of
-/// one without area too.
-fn distance_to_triangle(p: Point, [a, b, c]: [Point; 3]) -> f64 {
-    let n = (b - a).cross(c - a);
-    let within = |a: Point, b: Point| (b - a).cross(p - a).dot(n) >= 0.0;
-    if n.length_squared() > 0.0 && within(a, b) && within(b, c) && within(c, a) {
-        return ((p - a).dot(n) / n.length()).abs();
-    }
-    [(a, b), (b, c), (c, a)]
-        .into_iter()
-        .map(|(a, b)| {
-            let e = b - a;
-            let s = if e == Point::ZERO { 0.0 } else { ((p - a).dot(e) / e.length_squared()).clamp(0.0, 1.0) };
-            p.distance(a + e * s)
-        })
-        .fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
