@@ -172,6 +172,7 @@ impl Results {
         // In this order notes are read: what the scene says of itself, what the run found, what the errors are
         // worth.
         let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(bound.scarce_sources_note(&plan));
+        let found = found.chain(bound.uncounted_light_notes(&tallies.receivers));
         let found = found.chain(few_replicates(tallies.replicates));
         let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let scale = PowerScale::new(quantum, &plan, &partial.done);

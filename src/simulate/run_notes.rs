@@ -4,7 +4,9 @@ use super::bind::BoundScene;
 use super::body::AMBIENT;
 use super::outcome::{Counts, LostCause, LostRay};
 use super::plan::Plan;
+use super::receiver::{Receiver, Shape};
 use super::surfaces::{FaceOptics, Surface};
+use super::tally::Sum;
 use std::collections::BTreeMap;
 
 /// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
@@ -75,6 +77,26 @@ impl BoundScene {
              `rays` of its own",
             plan.rays
         ))
+    }
+
+    /// Returns one sentence for each receiver that ends light but counts that of so many interactions alone, and got none: `counted` says
+    /// what each got. Mostly light met it on the way to where it was to interact.
+    pub(crate) fn uncounted_light_notes(&self, counted: &[Sum]) -> impl Iterator<Item = String> + use<> {
+        let ends_light =
+            |r: &Receiver| r.absorbs && !matches!(r.shape, Shape::FarField { .. } | Shape::Absorbed { .. });
+        let dark = self.receivers.iter().zip(counted).filter(|(r, sum)| ends_light(r) && sum.total == 0);
+        let notes: Vec<String> = dark
+            .filter_map(|(r, _)| {
+                let n = r.interactions.filter(|&n| n > 0)?;
+                Some(format!(
+                    "'{}' counts light after exactly {n} interaction{} alone, and none came: what meets it before ends there uncounted, \
+                     unless it has `absorbs = false`",
+                    r.name,
+                    if n == 1 { "" } else { "s" }
+                ))
+            })
+            .collect();
+        notes.into_iter()
     }
 
     /// Whether a face of this instance lets light through, though no medium is behind it.

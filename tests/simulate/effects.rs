@@ -229,6 +229,26 @@ fn bulk_scatter_leaves_the_ballistic_share() {
     }
 }
 
+/// A plane before a mirror that counts light after one reflection ends all of it on the way there, and says so; one that lets it pass
+/// counts it on the way back.
+#[test]
+fn a_receiver_in_its_own_way_is_told() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-9.0, -9.0, 0.0), Point::new(9.0, 9.0, 1.0));
+    for (absorbs, reflected) in [(true, 0.0), (false, 0.8)] {
+        let r = world.run(
+            &format!(
+                "[run]\nrays = 200\n[[material]]\npart = 'plate'\nsurface = 'mirror'\nreflectance = 0.8
+                [[source]]\nkind = 'collimated'\nat = [0, 0, -20]
+                [[receiver]]\nname = 'back'\nat = [0, 0, -5]\nsize = [4, 4]\ncells = [1, 1]\ninteractions = 1\nabsorbs = {absorbs}\n"
+            ),
+            |_| (),
+        );
+        close(r.receivers[0].power, reflected, 1e-9);
+        assert_eq!(r.notes.iter().any(|note| note.starts_with("'back' counts")), absorbs, "{:?}", r.notes);
+    }
+}
+
 /// A ball of water inside a ball of glass inside air: a central ray meets all four faces and loses what Fresnel says.
 #[test]
 fn nested_bodies() {
