@@ -17,10 +17,17 @@ use smallvec::SmallVec;
 
 /// A facet with more slabs near it, as of a plate with many holes, has a map of them and looks for them in a tree.
 const MOST_LISTED: usize = 12;
-/// Slabs near a facet of which a map is made; one with more, as a long strip across everything, always looks in the tree.
+/// Slabs that are looked at for the map of one facet; one with more around it, as a long strip across everything, always looks in the tree.
 const MOST_MAPPED: usize = 4096;
+/// And for all maps of a mesh: a tenth of a second. Of 56,000 facets that all lie across each other maps took 5 s.
+const MOST_MAPPED_OF_MESH: usize = 1 << 22;
+/// Slabs that are looked at to find out whether a facet needs a map, those of its own face too.
+const MOST_LOOKED_AT: usize = 256;
 /// Room for what rounds a place, mm, and as a share of its coordinates: a million roundings.
 const ROOM: f64 = 1e-9;
+
+/// Slabs of other faces near a facet, by their index in [`Slabs::all`].
+type Listed = SmallVec<[u32; MOST_LISTED]>;
 
 /// What lies within the sag of a facet: a box around it, rounded outward, and that sag, mm.
 #[derive(Clone, Copy, Debug)]
@@ -52,26 +59,43 @@ impl Slabs {
         let curved = (0..mesh.facets.len() as u32).filter(|&f| records[f as usize].sag > FLAT_SAG);
         let all: Vec<Slab> = curved.map(|f| Slab::of_facet(mesh, f, records[f as usize].sag)).collect();
         let tree = BoxTree::new(&all.iter().map(Slab::bounds).collect::<Vec<Aabb>>());
-        let near = |f: usize| {
-            let bounds = Aabb::from_points(mesh.corners(f)).grown(reach);
-            let mut near: SmallVec<[u32; MOST_LISTED]> = SmallVec::new();
-            let are_too_many = tree.any_meeting(&bounds, |k| {
+        let box_of = |f: usize| Aabb::from_points(mesh.corners(f)).grown(reach);
+        // The slabs of other faces near a facet, and whether there are more that were not looked at.
+        let near = |f: usize, most_listed: usize, most_looked_at: usize| {
+            let mut near = Listed::new();
+            let mut looked_at = 0;
+            let are_more = tree.any_meeting(&box_of(f), |k| {
+                looked_at += 1;
                 let is_foreign = mesh.facets[all[k as usize].facet as usize].face != mesh.facets[f].face;
                 near.extend(is_foreign.then_some(k));
-                near.len() > MOST_MAPPED
+                near.len() > most_listed || looked_at > most_looked_at
             });
-            let map = (near.len() > MOST_LISTED).then(|| {
-                let mut map = SlabMap::new(bounds);
-                near.iter().for_each(|&k| map.mark(&all[k as usize].bounds()));
-                if are_too_many {
-                    map.mark(&bounds);
-                }
-                near = SmallVec::new();
-                map
-            });
-            (near, map)
+            (near, are_more)
         };
-        let of_facets: Vec<_> = (0..mesh.facets.len()).into_par_iter().map(near).collect();
+        let few = |f: usize| {
+            let (near, are_more) = near(f, MOST_LISTED, MOST_LOOKED_AT);
+            (!are_more).then_some(near)
+        };
+        let lists: Vec<_> = (0..mesh.facets.len()).into_par_iter().map(few).collect();
+        let crowded = lists.iter().filter(|list| list.is_none()).count();
+        let most = (MOST_MAPPED_OF_MESH / crowded.max(1)).min(MOST_MAPPED);
+        let list_or_map = |(f, list): (usize, Option<Listed>)| {
+            if let Some(near) = list {
+                return (near, None);
+            }
+            let (near, are_more) = near(f, most, most);
+            if !are_more && near.len() <= MOST_LISTED {
+                return (near, None);
+            }
+            let mut map = SlabMap::new(box_of(f));
+            if are_more {
+                map.mark(&box_of(f));
+            } else {
+                near.iter().for_each(|&k| map.mark(&all[k as usize].bounds()));
+            }
+            (Listed::new(), Some(map))
+        };
+        let of_facets: Vec<_> = lists.into_par_iter().enumerate().map(list_or_map).collect();
         let (mut starts, mut listed, mut maps) = (vec![0], Vec::new(), Vec::new());
         for (near, map) in of_facets {
             listed.extend(near.iter().map(|&k| all[k as usize]));
