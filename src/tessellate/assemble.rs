@@ -5,7 +5,7 @@ use super::border::edges::{self, Division, OwnDivision};
 use super::face::{self, FaceInput, Unmeshed};
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
-use super::fallback;
+use super::fallback::{self, BorderInput};
 use super::limits;
 use super::nodes::Position;
 use super::placed_part::PlacedPart;
@@ -156,6 +156,7 @@ fn mesh_with_rounds(
         }
         before = Some(PreviousRound { divisions, shared: shared.len(), meshes });
     };
+    fill_crossing_borders(part, &faces, (&divisions, &shared), &mut meshes);
     let again = |k: usize, taken: &TakenChords| {
         let (face, surface) = &faces[k];
         let (divisions, shared, surface) = (&divisions[..], &shared[..], surface.as_ref()?);
@@ -164,6 +165,27 @@ fn mesh_with_rounds(
     let taken = take_doubled_chords(part, &mut meshes, &mut budget, again);
     let causes = exceeded_limits(&faces, too_large);
     (with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken }), asked)
+}
+
+/// Replaces, in `meshes`, faces whose borders cross in the parameter plane by a mesh of their borders alone, where that lies within the
+/// tolerance of the surface: narrow strips, whose neighbours it meets.
+fn fill_crossing_borders(
+    part: &Part,
+    faces: &[(&Face, Option<FaceSurface<'_>>)],
+    (divisions, shared): (&[Division], &[Point]),
+    meshes: &mut [Option<FaceMesh>],
+) {
+    let crossing = faces.iter().zip(meshes).filter_map(|((face, surface), mesh)| {
+        let mesh = mesh.as_mut().filter(|mesh| mesh.repaired == Some(Repair::CrossingBorder))?;
+        Some((*face, surface.as_ref()?, mesh))
+    });
+    for (face, surface, mesh) in crossing {
+        let input = BorderInput { part, face, surface, divisions, shared };
+        let border = catch_panic(|| fallback::border_within_tolerance(input));
+        if let Some(border) = border.ok().flatten() {
+            *mesh = FaceMesh { repaired: Some(Repair::BorderOnly), ..border };
+        }
+    }
 }
 
 /// Replaces, in `meshes`, faces with a diagonal that the shell has as a chord elsewhere too, by what `mesh` makes without it, and counts
@@ -365,6 +387,7 @@ pub(super) fn mesh_face(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
         Err(Unmeshed::TooManySteps) => return None,
     };
     // The same library may give up on the border too.
-    let border = catch_panic(|| fallback::border_alone(part, face, surface, divisions, shared)).ok().flatten();
+    let input = BorderInput { part, face, surface, divisions, shared };
+    let border = catch_panic(|| fallback::border_alone(input)).ok().flatten();
     border.map(|mesh| FaceMesh { repaired: Some(how), ..mesh })
 }

@@ -13,7 +13,13 @@ use super::nodes::Position;
 use crate::math::polygon::is_inside_sides;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Face, Part};
+use crate::tessellate::proof::flat_triangle::distance_to_chord;
+use rustc_hash::FxHashMap;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+
+/// Share of the tolerance that a triangle may be high over a chord of the border to count as near to the surface: chords of borders that
+/// cross are held to less than the rest.
+const LOW_OVER_BORDER: f64 = 0.8;
 
 /// Coordinates below this, which spade refuses, are zero.
 const ZERO: f64 = 1e-30;
@@ -35,25 +41,39 @@ impl HasPosition for BorderCorner {
     }
 }
 
+/// A face with what its border is made of.
+#[derive(Clone, Copy)]
+pub(super) struct BorderInput<'i, 'a> {
+    pub(super) part: &'i Part,
+    pub(super) face: &'i Face,
+    pub(super) surface: &'i FaceSurface<'a>,
+    pub(super) divisions: &'i [Division],
+    /// The part's shared positions.
+    pub(super) shared: &'i [Point],
+}
+
 /// Meshes a face from its border alone, without a proof: every bound is infinite. `None` when no loop has three different places, or none
 /// of the two ways below gives triangles.
-pub(super) fn border_alone(
-    part: &Part,
-    face: &Face,
-    surface: &FaceSurface<'_>,
-    divisions: &[Division],
-    shared: &[Point],
+pub(super) fn border_alone(input: BorderInput<'_, '_>) -> Option<FaceMesh> {
+    filled_border(input, |loops, up| planar_triangulation(loops, up).or_else(|| zigzag_triangles(loops)))
+}
+
+/// Meshes a face from its border alone, its loops filled by `fill`, which is told where their normal points.
+fn filled_border(
+    input: BorderInput<'_, '_>,
+    fill: impl Fn(&mut [Vec<BorderCorner>], Vector) -> Option<Vec<[BorderCorner; 3]>>,
 ) -> Option<FaceMesh> {
+    let BorderInput { part, face, surface, divisions, shared } = input;
     let border =
         polygons::build(part, &polygons::loops(face), surface, divisions, &polygons::ImprintedPoints::NONE);
-    // The trims' own parameters gave nothing.
     let corner = |v: &polygons::PolygonVertex| {
         let place = match v.position {
             Position::Shared(p) => shared[p as usize],
             Position::Own(p) => border.own[p as usize],
         };
         let corner = || {
-            let uv = foot_search::nearest_parameters(surface.spline, place);
+            let is_there = surface.point(v.uv).distance(place) <= surface.tolerance(v.uv);
+            let uv = if is_there { v.uv } else { foot_search::nearest_parameters(surface.spline, place) };
             BorderCorner { position: v.position, place, uv, at: Point2::new(0.0, 0.0) }
         };
         place.is_finite().then(corner)
@@ -70,10 +90,7 @@ pub(super) fn border_alone(
     loops.retain(|r| r.len() > 2);
     // By the surface's own normals, for the mean normal of the loops alone does not tell outside from inside.
     let up = loops.iter().flatten().filter_map(|c| surface.normal(c.uv)).sum::<Vector>();
-    let triangles = match planar_triangulation(&mut loops, up).or_else(|| zigzag_triangles(&loops)) {
-        Some(triangles) if !triangles.is_empty() => triangles,
-        _ => return None,
-    };
+    let triangles = fill(&mut loops, up).filter(|triangles| !triangles.is_empty())?;
     let mut out = FaceMesh { own: border.own, ..FaceMesh::default() };
     for t in triangles {
         // Where the surface has no normal the triangle's does, so that corners are not shared; one without area shades
@@ -89,6 +106,51 @@ pub(super) fn border_alone(
         out.facets.push(MeshedFacet { corners, bound: f64::INFINITY, tolerance });
     }
     Some(out)
+}
+
+/// As [`border_alone`], where the facets lie within the tolerance of the surface, as far as samples tell; `None` elsewhere, and where no
+/// plane shows the border without a crossing, unless it is that of a strip between two edges.
+pub(super) fn border_within_tolerance(input: BorderInput<'_, '_>) -> Option<FaceMesh> {
+    let BorderInput { face, surface, shared, .. } = input;
+    let is_strip = matches!(&face.loops[..], [only] if only.uses.len() == 2);
+    let mesh = filled_border(input, |loops, up| {
+        planar_triangulation(loops, up).or_else(|| if is_strip { zigzag_triangles(loops) } else { None })
+    })?;
+    let position = |corner: u32| mesh.corners[corner as usize].position;
+    let place = |corner: u32| match position(corner) {
+        Position::Shared(p) => shared[p as usize],
+        Position::Own(p) => mesh.own[p as usize],
+    };
+    let sides = |facet: &MeshedFacet| {
+        let [a, b, c, _] = facet.corners;
+        [[a, b, c], [b, c, a], [c, a, b]]
+    };
+    let key = |a: u32, b: u32| {
+        let (a, b) = (position(a), position(b));
+        (a.min(b), a.max(b))
+    };
+    let mut uses: FxHashMap<(Position, Position), u32> = FxHashMap::default();
+    mesh.facets.iter().flat_map(sides).for_each(|[a, b, _]| *uses.entry(key(a, b)).or_default() += 1);
+    let is_near = |facet: &MeshedFacet| {
+        // The border's chords keep to their edges: what is low over one of them is near to the surface,
+        // also where no foot is found on it.
+        let is_low = |[a, b, c]: [u32; 3]| {
+            uses[&key(a, b)] == 1
+                && distance_to_chord(place(c), &[place(a), place(b)]) <= LOW_OVER_BORDER * facet.tolerance
+        };
+        let is_foot = |uv: Uv, p: Point| surface.point(uv).distance(p) <= facet.tolerance;
+        let corners = facet.corners;
+        let of_surface = |p: Point| {
+            // Mostly found from a corner; a search from everywhere takes far longer.
+            let starts = corners.iter().map(|&corner| mesh.corners[corner as usize].uv);
+            starts.map(|uv| foot_search::project(surface.spline, p, uv)).any(|uv| is_foot(uv, p))
+                || is_foot(foot_search::nearest_parameters(surface.spline, p), p)
+        };
+        let [a, b, c] = [0, 1, 2].map(|k: usize| place(corners[k]));
+        sides(facet).into_iter().any(is_low)
+            || [a + b, b + c, c + a].into_iter().all(|sum| of_surface(0.5 * sum)) && of_surface((a + b + c) / 3.0)
+    };
+    mesh.facets.iter().all(is_near).then_some(mesh)
 }
 
 /// Triangulates (constrained Delaunay) what `loops` hold in the plane across their mean normal, turned towards `up`. Sets where corners
@@ -135,15 +197,18 @@ fn planar_triangulation(loops: &mut [Vec<BorderCorner>], up: Vector) -> Option<V
     Some(cdt.inner_faces().map(|f| f.vertices().map(|v| *v.data())).filter(inside).collect())
 }
 
-/// Fills a single loop that no plane shows with triangles, from one of its sides to the other and back; `None` for several loops.
+/// Fills a single loop that no plane shows with triangles between its two sides, beginning at its first corner and always with the shorter
+/// of both chords across; `None` for several loops.
 fn zigzag_triangles(loops: &[Vec<BorderCorner>]) -> Option<Vec<[BorderCorner; 3]>> {
     let [ring] = loops else { return None };
     let (mut i, mut j) = (0, ring.len() - 1);
+    let across = |i: usize, j: usize| ring[i].place.distance(ring[j].place);
     let mut out = Vec::new();
     while j > i + 1 {
-        out.push([ring[i], ring[i + 1], ring[j]]);
-        i += 1;
-        if j > i + 1 {
+        if across(i + 1, j) <= across(i, j - 1) {
+            out.push([ring[i], ring[i + 1], ring[j]]);
+            i += 1;
+        } else {
             out.push([ring[i], ring[j - 1], ring[j]]);
             j -= 1;
         }

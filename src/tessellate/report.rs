@@ -191,7 +191,7 @@ pub enum Repair {
     CrossingBorder,
     /// Its facets cover more or less of its parameter plane than its border bounds: none of them is certified.
     AreaOff,
-    /// Its parameter plane gave nothing: only its border was triangulated.
+    /// Its parameter plane gave nothing, or its border crosses itself there: only the border was triangulated.
     BorderOnly,
     /// The triangulation library gave up on it: only its border was triangulated.
     TriangulationFailed,

@@ -8,7 +8,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::appearance;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::terminal_tables::blank_table;
-use crate::cli::work::contenders::{Contenders, Structures, time_all};
+use crate::cli::work::contenders::{Contenders, Structures};
 use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder};
@@ -88,12 +88,21 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
         Some(rays) => rays,
         None => own_rays(scene, model, &facets.bounds(), octree, &tracing, lift)?,
     };
-    let mut found = judge(&contenders, &rays, settings.loosest(), normals, console);
+    let mut found = judge(&contenders, &rays, settings.loosest(), console);
+    // Only now, as it takes no part in the comparison.
+    let polish = structures.polished();
+    // Hits on the facets say nothing of those moved to the spline: these are measured by themselves.
+    if normals == NormalMode::Exact {
+        let [distance, angle] = polished_errors(&*polish, exact, &rays, settings.loosest());
+        found.facets_vs_exact.t_error_mm = distance;
+        found.facets_vs_exact.normal_error_deg = angle;
+    }
+    structures.time_all(&mut found, &contenders, &*polish, &rays, console);
     // All that stand in the scene, as every other command counts them.
     found.scene.facets = facets.facet_count();
     write_rays(command, &found, octree, &rays, console)?;
     // What the facets change of the light, which only a scene has.
-    let on_facets = if normals == NormalMode::Exact { &*contenders.polish } else { octree };
+    let on_facets = if normals == NormalMode::Exact { &*polish } else { octree };
     let bound = scene.map(|s| s.bind(model)).transpose()?;
     let receivers = match scene.zip(bound.as_ref()) {
         Some((scene, bound)) => paired_receivers::trace_both(scene, bound, [on_facets, exact], &tracing, console),
@@ -124,28 +133,14 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     Ok(refused.and(report_defects(&found, console)))
 }
 
-/// Asks every ray of octree, BVH and spline, finds the causes of differences, and times all intersectors. `loosest` is the largest
-/// tolerance of the facets, mm.
-fn judge(
-    contenders: &Contenders<'_>,
-    rays: &[Ray],
-    loosest: f64,
-    normals: NormalMode,
-    console: &Console,
-) -> CrossCheck {
+/// Asks every ray of octree, BVH and spline, and finds the causes of differences. `loosest` is the largest tolerance of the facets, mm.
+fn judge(contenders: &Contenders<'_>, rays: &[Ray], loosest: f64, console: &Console) -> CrossCheck {
     let bar = console.progress_bar("judging", "rays", rays.len() as u64);
     let band = cross_check::Settings { fallback_band_mm: loosest, ..Default::default() };
     let total = rays.len() as f64;
     let progress = |p: Progress| bar.set_position((p.done * total) as u64);
-    let mut found = cross_check::cross_check_groups(&contenders.compared(), rays, &band, &progress);
+    let found = cross_check::cross_check_groups(&contenders.compared(), rays, &band, &progress);
     bar.finish_and_clear();
-    // Hits on the facets say nothing of those moved to the spline: these are measured by themselves.
-    if normals == NormalMode::Exact {
-        let [distance, angle] = polished_errors(&*contenders.polish, &*contenders.exact, rays, loosest);
-        found.facets_vs_exact.t_error_mm = distance;
-        found.facets_vs_exact.normal_error_deg = angle;
-    }
-    time_all(&mut found, &contenders.competitors(), rays, console);
     found
 }
 

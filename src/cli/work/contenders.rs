@@ -12,9 +12,14 @@ use crate::model::{Instancing, Model};
 use crate::pipeline::in_one_scene;
 use crate::study::cross_check::{Competitor, CrossCheck, GroupedIntersectors, measure};
 use crate::tessellate::GroupedFacets;
+use std::borrow::Cow;
 
-/// Rays of a timed round: enough for a tenth of a second on the slowest.
+/// Most rays of a timed round.
 const TIMED_RAYS: usize = 20_000;
+/// Time of a round, s, that is enough for the slowest: where that takes longer for [`TIMED_RAYS`], fewer are timed.
+const ROUND_SECONDS: f64 = 0.1;
+/// Rays that tell how many these are.
+const PROBED_RAYS: usize = 500;
 /// Timed rounds of every intersector, alternating.
 const TIMED_ROUNDS: usize = 3;
 /// Shortest time of a round that a rate is made of, s: below it a clock tells nothing.
@@ -32,27 +37,24 @@ struct GroupStructures<'a> {
     model: &'a Model,
     mesh: &'a FacetMesh,
     octree: Octree<'a>,
-    bvh2: Bvh<'a>,
     cwbvh: Bvh<'a>,
-    cwbvh_as_shipped: Bvh<'a>,
     exact: Exact,
+    /// How [`Self::cwbvh`] was built.
+    bvh_settings: bvh::Settings,
 }
 
-/// The intersectors, which answer in the scene's coordinates.
+/// The intersectors that are compared, which answer in the scene's coordinates.
 pub(crate) struct Contenders<'s> {
     groups: Vec<(&'s Model, &'s FacetMesh)>,
     instancing: Option<&'s Instancing>,
     pub(crate) octree: Box<dyn Intersector + 's>,
-    bvh2: Box<dyn Intersector + 's>,
     cwbvh: Box<dyn Intersector + 's>,
-    cwbvh_as_shipped: Box<dyn Intersector + 's>,
-    /// The octree with hits moved to the spline.
-    pub(crate) polish: Box<dyn Intersector + 's>,
     pub(crate) exact: Box<dyn Intersector + 's>,
 }
 
 impl<'a> Structures<'a> {
-    /// Builds them all, of a part that is placed often once; the spline's patches are cut for as many rays as are asked. Shows a spinner.
+    /// Builds those that are compared, of a part that is placed often once; the spline's patches are cut for as many rays as are asked.
+    /// Shows a spinner.
     pub(crate) fn build(
         model: &'a Model,
         facets: &'a GroupedFacets,
@@ -60,21 +62,20 @@ impl<'a> Structures<'a> {
         rays: u64,
         console: &Console,
     ) -> Self {
-        let spinner = console.spinner("building octree, BVHs and spline");
+        let spinner = console.spinner("building octree, BVH and spline");
         let instancing = facets.instancing.as_deref();
         let models: Vec<&Model> = instancing.map_or_else(|| vec![model], |i| i.groups.iter().collect());
         let groups = facets.meshes().zip(models).enumerate().map(|(k, (mesh, model))| {
             // A start that is far away comes to the part with the rounding that it has there.
             let farthest_start = instancing.map_or(0.0, |i| i.reach(k));
-            let cwbvh = bvh::Settings { normals, farthest_start, ..Default::default() };
+            let bvh_settings = bvh::Settings { normals, farthest_start, ..Default::default() };
             GroupStructures {
                 model,
                 mesh,
                 octree: Octree::build(mesh, &octree::Settings { normals, farthest_start, ..Default::default() }),
-                bvh2: Bvh::build(mesh, &bvh::Settings { kind: bvh::Kind::Bvh2, ..cwbvh }),
-                cwbvh: Bvh::build(mesh, &cwbvh),
-                cwbvh_as_shipped: Bvh::build(mesh, &bvh::Settings { cured: false, ..cwbvh }),
+                cwbvh: Bvh::build(mesh, &bvh_settings),
                 exact: Exact::build(model, &exact::Settings { farthest_start, ..exact::Settings::for_rays(rays) }),
+                bvh_settings,
             }
         });
         let structures = Self { groups: groups.collect(), instancing };
@@ -90,18 +91,65 @@ impl<'a> Structures<'a> {
         in_one_scene(self.instancing, self.groups.iter().map(of_group).collect())
     }
 
-    /// Returns the intersectors, each of which stands for the whole model.
+    /// Returns those that are compared, each of which stands for the whole model.
     pub(crate) fn contenders(&self) -> Contenders<'_> {
         Contenders {
             groups: self.groups.iter().map(|g| (g.model, g.mesh)).collect(),
             instancing: self.instancing,
             octree: self.joined(|g| Box::new(&g.octree)),
-            bvh2: self.joined(|g| Box::new(&g.bvh2)),
             cwbvh: self.joined(|g| Box::new(&g.cwbvh)),
-            cwbvh_as_shipped: self.joined(|g| Box::new(&g.cwbvh_as_shipped)),
-            polish: self.joined(|g| Box::new(Polished::new(&g.octree, g.mesh, &g.exact))),
             exact: self.joined(|g| Box::new(&g.exact)),
         }
+    }
+
+    /// Returns the octree with hits moved to the spline.
+    pub(crate) fn polished(&self) -> Box<dyn Intersector + '_> {
+        self.joined(|g| Box::new(Polished::new(&g.octree, g.mesh, &g.exact)))
+    }
+
+    /// Builds a BVH of other settings than that which is compared.
+    fn rival(&self, settings: impl Fn(bvh::Settings) -> bvh::Settings) -> Box<dyn Intersector + '_> {
+        self.joined(|g| Box::new(Bvh::build(g.mesh, &settings(g.bvh_settings))))
+    }
+
+    /// Measures build time, size and rate of every intersector on a sample of the rays, and fills them into `found`. The BVHs that are only
+    /// timed are built here: while answers were compared they would stand in memory for nothing.
+    pub(crate) fn time_all(
+        &self,
+        found: &mut CrossCheck,
+        contenders: &Contenders<'_>,
+        polish: &dyn Intersector,
+        rays: &[Ray],
+        console: &Console,
+    ) {
+        let spinner = console.spinner("timing");
+        let bvh2 = self.rival(|settings| bvh::Settings { kind: bvh::Kind::Bvh2, ..settings });
+        let cwbvh_as_shipped = self.rival(|settings| bvh::Settings { cured: false, ..settings });
+        let competitor = |name, who, batch| Competitor { name, who, batch };
+        let competitors = [
+            competitor("octree", &*contenders.octree, true),
+            // Asked ray by ray.
+            competitor("octree_single", &*contenders.octree, false),
+            competitor("bvh2", &*bvh2, true),
+            competitor("cwbvh", &*contenders.cwbvh, true),
+            competitor("cwbvh_as_shipped", &*cwbvh_as_shipped, true),
+            competitor("polish", polish, true),
+            competitor("exact", &*contenders.exact, true),
+        ];
+        for contender in &competitors {
+            let footprint = contender.who.footprint();
+            found.build_seconds.set(contender.name, footprint.build_seconds);
+            let bytes_per_facet = footprint.bytes as f64 / footprint.primitives.max(1) as f64;
+            found.bytes_per_facet.set(contender.name, bytes_per_facet);
+        }
+        let pace = measure(&competitors, &evenly(rays, PROBED_RAYS), 1);
+        let slowest = pace.iter().map(|(_, timing)| timing.median).fold(0.0, f64::max);
+        let enough = (ROUND_SECONDS / slowest.max(SHORTEST_ROUND) * PROBED_RAYS as f64) as usize;
+        let timed = evenly(rays, enough.clamp(PROBED_RAYS, TIMED_RAYS));
+        for (name, timing) in measure(&competitors, &timed, TIMED_ROUNDS) {
+            found.mrays_per_s.set(&name, timed.len() as f64 / timing.median.max(SHORTEST_ROUND) / MILLION);
+        }
+        spinner.finish_and_clear();
     }
 }
 
@@ -116,35 +164,10 @@ impl Contenders<'_> {
             exact: &*self.exact,
         }
     }
-
-    /// Returns all of them under the names of the document; `octree_single` is asked ray by ray.
-    pub(crate) fn competitors(&self) -> [Competitor<'_>; 7] {
-        let competitor = |name, who, batch| Competitor { name, who, batch };
-        [
-            competitor("octree", &*self.octree, true),
-            competitor("octree_single", &*self.octree, false),
-            competitor("bvh2", &*self.bvh2, true),
-            competitor("cwbvh", &*self.cwbvh, true),
-            competitor("cwbvh_as_shipped", &*self.cwbvh_as_shipped, true),
-            competitor("polish", &*self.polish, true),
-            competitor("exact", &*self.exact, true),
-        ]
-    }
 }
 
-/// Measures build time, size and rate of every intersector on a sample of the rays, and fills them into `found`.
-pub(crate) fn time_all(found: &mut CrossCheck, contenders: &[Competitor], rays: &[Ray], console: &Console) {
-    let spinner = console.spinner("timing");
-    for contender in contenders {
-        let footprint = contender.who.footprint();
-        found.build_seconds.set(contender.name, footprint.build_seconds);
-        let bytes_per_facet = footprint.bytes as f64 / footprint.primitives.max(1) as f64;
-        found.bytes_per_facet.set(contender.name, bytes_per_facet);
-    }
-    // Evenly over the rays, so that every kind of them is among the timed.
-    let timed: Vec<Ray> = rays.iter().copied().step_by(rays.len().div_ceil(TIMED_RAYS).max(1)).collect();
-    for (name, timing) in measure(contenders, &timed, TIMED_ROUNDS) {
-        found.mrays_per_s.set(&name, timed.len() as f64 / timing.median.max(SHORTEST_ROUND) / MILLION);
-    }
-    spinner.finish_and_clear();
+/// Returns at most so many of the rays, evenly over all of them, so that every kind is among them.
+fn evenly(rays: &[Ray], most: usize) -> Cow<'_, [Ray]> {
+    let step = rays.len().div_ceil(most).max(1);
+    if step == 1 { Cow::from(rays) } else { rays.iter().copied().step_by(step).collect() }
 }

@@ -69,7 +69,7 @@ impl Exact {
             Region::Border => {}
             decided => return (decided == Region::Inside, false),
         }
-        let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, local[0], local[1]);
+        let jet = net::evaluate(leaf.net(&self.geometry.nets), leaf.degree, local[0], local[1]);
         let (_, du, dv) = project(&jet);
         // Distances across the ray, not along the surface: on a face that the ray grazes, the root strays from the edge by the
         // gap over the sine, and still the edge must decide for both of its faces.
@@ -107,7 +107,7 @@ impl Exact {
 
     /// The certainty of a contact: tangent where the surface is regular and the ray grazes it, else uncertified.
     pub(super) fn contact_certainty(&self, leaf: &Leaf, [u, v]: [f64; 2], query: &Query) -> Certainty {
-        let jet = net::evaluate(leaf.net(&self.pool), leaf.degree, u, v);
+        let jet = net::evaluate(leaf.net(&self.geometry.nets), leaf.degree, u, v);
         let (_, du, dv) = project(&jet);
         let n = du.cross(dv);
         let regular = n.length() > REGULAR * du.length().max(dv.length()).powi(2);

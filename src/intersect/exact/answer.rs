@@ -138,7 +138,7 @@ impl Exact {
     #[inline(always)]
     fn hit(&self, query: &Query, root: &Root) -> Hit {
         let (leaf, label) = (&self.linearizations[root.leaf as usize], &self.labels[root.leaf as usize]);
-        let control = leaf.net(&self.pool);
+        let control = leaf.net(&self.geometry.nets);
         let mut t = root.t;
         let mut local = root.local;
         let mut jet = net::evaluate(control, leaf.degree, local[0], local[1]);
@@ -185,9 +185,9 @@ impl Exact {
         // On other patches only poles and cusps come here, where control points that should coincide differ by their own rounding:
         // with them 23 of 800 rays at the poles of a ball had a wrong normal. The limit does not see it.
         let given = patch.ill_scaled.then(|| self.geometry.reference(patch).tangents(uv));
-        given
-            .and_then(|[du, dv]| patch::cross_normal(du, dv, GIVEN_ROUNDING * patch.rounding))
-            .unwrap_or_else(|| patch::limit_normal(leaf.net(&self.pool), leaf.degree, local, patch.rounding))
+        given.and_then(|[du, dv]| patch::cross_normal(du, dv, GIVEN_ROUNDING * patch.rounding)).unwrap_or_else(
+            || patch::limit_normal(leaf.net(&self.geometry.nets), leaf.degree, local, patch.rounding),
+        )
     }
 }
 

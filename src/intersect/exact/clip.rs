@@ -102,7 +102,7 @@ impl Exact {
         query.clips += 1;
         let leaf = &self.leaves[index as usize];
         let oc = query.o - leaf.center;
-        let (net, size) = seen_along(query, leaf.net(&self.pool), oc);
+        let (net, size) = seen_along(query, leaf.net(&self.geometry.nets), oc);
         let noise = self.noise(leaf, oc);
         let margin = size.map(|s| noise + halving_rounding(leaf) * s);
         let departure = query.departure.and_then(|own| own.local_to(leaf, query.o, &self.geometry));
@@ -331,7 +331,7 @@ impl Exact {
     /// and rounding. What roots there are it cannot tell from the departure.
     fn runs_along(&self, query: &Query, clipping: &Clipping<'_>, node: &Node) -> bool {
         let Some((own, [u, v])) = query.departure.zip(clipping.departure) else { return false };
-        let control = clipping.leaf.net(&self.pool);
+        let control = clipping.leaf.net(&self.geometry.nets);
         let (_, du, dv) =
             project(&net::evaluate(control, clipping.leaf.degree, u.clamp(0.0, 1.0), v.clamp(0.0, 1.0)));
         let normal = du.cross(dv).normalize_or_zero();

@@ -1,6 +1,7 @@
 //! The model as the tracer sees it: placed faces in world orientation, cut into Bézier patches about centres of their own.
 
 use super::edge_use::edge_gaps;
+use super::net::{self, Jet, V4};
 use super::patch::{Patch, PatchGrid, is_ill_scaled, project};
 use super::reference::{self, ReferencePatch};
 use super::tolerances::FLAGGED_OF_GAP;
@@ -47,6 +48,8 @@ pub(super) struct FaceRecord {
 pub(super) struct Geometry {
     pub(super) faces: Vec<FaceRecord>,
     pub(super) patches: Vec<Patch>,
+    /// Control points of all patches, and behind them of the leaves whose nets are not their patches'.
+    pub(super) nets: Vec<V4>,
     pub(super) trims: Vec<Trim>,
     pub(super) grids: Vec<PatchGrid>,
     /// The surfaces as given, in the order of `grids`.
@@ -87,10 +90,11 @@ impl Geometry {
         // Instances share the trims and break lines of their part: found by the face's address, which names it for as long as the model
         // is borrowed.
         let mut shared: FxHashMap<*const Face, (u32, u32)> = FxHashMap::default();
+        let [mut patches, mut points] = [0; 2];
         for placed in model.placed_faces() {
             match placed.face {
                 Some(face) if is_usable(face) => {
-                    let (trim, grid) = *shared.entry(face as *const Face).or_insert_with(|| {
+                    let (_, grid) = *shared.entry(face as *const Face).or_insert_with(|| {
                         let grid = PatchGrid::new(face);
                         let gaps = &gaps[placed.part.0 as usize];
                         let widest_band = band / least_scale[placed.part.0 as usize];
@@ -99,14 +103,35 @@ impl Geometry {
                         geometry.surfaces.push(face.surface.clone());
                         (geometry.trims.len() as u32 - 1, geometry.grids.len() as u32 - 1)
                     });
-                    let closed = |s: &usize| model.part(placed.part).shells[*s].closed;
-                    let solid = placed.shell.filter(closed).map(|s| [placed.instance as u32, s as u32]);
-                    geometry.add_face(&placed, face, (trim, grid), solid);
+                    let count = geometry.grids[grid as usize].patch_count();
+                    patches += count;
+                    points += count * net::len(face.surface.degree.map(|d| d as u8));
                 }
                 _ => geometry.skipped.push(placed.id),
             }
         }
+        geometry.patches.reserve_exact(patches);
+        geometry.nets.reserve_exact(points);
+        for placed in model.placed_faces() {
+            let Some((face, &place)) = placed.face.and_then(|f| Some((f, shared.get(&(f as *const Face))?))) else {
+                continue;
+            };
+            let closed = |s: &usize| model.part(placed.part).shells[*s].closed;
+            let solid = placed.shell.filter(closed).map(|s| [placed.instance as u32, s as u32]);
+            geometry.add_face(&placed, face, place, solid);
+        }
         geometry
+    }
+
+    /// The control points of a patch, about its centre.
+    #[inline(always)]
+    pub(super) fn net(&self, patch: &Patch) -> &[V4] {
+        &self.nets[patch.net as usize..patch.net as usize + patch.net_len()]
+    }
+
+    /// The homogeneous point of a patch about its centre at local parameters, and derivatives by these.
+    pub(super) fn jet(&self, patch: &Patch, [u, v]: [f64; 2]) -> Jet {
+        net::evaluate(self.net(patch), patch.degree, u, v)
     }
 
     /// Distance from a trim, mm, within which a root is flagged where the faces along it lie `gap`, in the units of the part, off the edge.
@@ -143,14 +168,12 @@ impl Geometry {
             flagged,
             solid,
         });
-        let patches = face.surface.bezier_patches();
-        make_room(&mut self.patches, patches.len());
-        for mut patch in patches {
+        for mut patch in face.surface.bezier_patches() {
             // Knot insertion in double precision would lose what such a patch's small side has of digits.
             if is_ill_scaled(&patch) {
                 reference::extract(&face.surface, &mut patch);
             }
-            self.patches.push(Patch::new(&patch, record, placed));
+            self.patches.push(Patch::new(&patch, record, placed, &mut self.nets));
         }
     }
 
@@ -169,7 +192,7 @@ impl Geometry {
                 // All points of a collapsed side are one, so any of them will do.
                 let mut local = [0.5; 2];
                 local[d] = end as f64;
-                sides[d][end] && project(&patch.jet(local)).0.distance(point - patch.center) <= distance
+                sides[d][end] && project(&self.jet(patch, local)).0.distance(point - patch.center) <= distance
             })
         })
     }
@@ -182,7 +205,7 @@ impl Geometry {
             (0..2).any(|end| {
                 let mut local = [0.5; 2];
                 local[k] = end as f64;
-                sides[k][end] && near(project(&patch.jet(local)).0)
+                sides[k][end] && near(project(&self.jet(patch, local)).0)
             })
         })
     }
@@ -220,7 +243,7 @@ impl Geometry {
     /// A number with the sign of `(Su × Sv) · direction` at parameters of a face, in the world.
     pub(super) fn facing(&self, face: &FaceRecord, uv: Uv, direction: Vector) -> f64 {
         let patch = &self.patches[self.patch_at(face, uv) as usize];
-        let (_, du, dv) = project(&patch.jet(patch.local(uv)));
+        let (_, du, dv) = project(&self.jet(patch, patch.local(uv)));
         du.cross(dv).dot(direction)
     }
 }

@@ -24,9 +24,6 @@ const UNTOLD: f64 = 1e-9;
 pub(super) struct Leaf {
     /// Centre in the world.
     pub(super) center: Vector,
-    /// Axis-parallel box in the world.
-    pub(super) lo: Vector,
-    pub(super) hi: Vector,
     /// Axes of the oriented box: tangent, tangent, normal.
     pub(super) axes: [Vector; 3],
     /// The oriented box about the centre, along `axes`.
@@ -39,7 +36,7 @@ pub(super) struct Leaf {
     /// The rectangle in which roots count, local units: wider than the unit square on sides that are the border of a surface
     /// along which a trim may run.
     pub(super) reach: [[f64; 2]; 2],
-    /// First control point in the pool.
+    /// Index of its first control point in [`Geometry::nets`].
     pub(super) net: u32,
     /// Indices into [`Geometry::patches`] and [`Geometry::faces`].
     pub(super) patch: u32,
@@ -56,11 +53,25 @@ pub(super) struct Leaf {
     pub(super) rect: [[f64; 2]; 2],
 }
 
+/// Where a leaf's control points stand, for asking for them ahead of their use.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct NetPlace {
+    /// Index of the first in [`Geometry::nets`].
+    pub(super) first: u32,
+    /// How many there are.
+    pub(super) points: u16,
+}
+
+impl NetPlace {
+    pub(super) fn new(leaf: &Leaf) -> Self {
+        Self { first: leaf.net, points: net::len(leaf.degree) as u16 }
+    }
+}
+
 impl Leaf {
-    /// Its control points in the pool of all leaves, about its centre.
-    pub(super) fn net<'a>(&self, pool: &'a [V4]) -> &'a [V4] {
-        let n = (self.degree[0] as usize + 1) * (self.degree[1] as usize + 1);
-        &pool[self.net as usize..self.net as usize + n]
+    /// Its control points among all of [`Geometry::nets`], about its centre.
+    pub(super) fn net<'a>(&self, nets: &'a [V4]) -> &'a [V4] {
+        &nets[self.net as usize..self.net as usize + net::len(self.degree)]
     }
 
     /// Maps the leaf's parameters, 0 to 1 in each direction, to its patch's, likewise 0 to 1; the inverse of [`Self::leaf_parameters`].
@@ -68,10 +79,6 @@ impl Leaf {
     pub(super) fn patch_parameters(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[u0, u1], [v0, v1]] = self.rect;
         [u0 + (u1 - u0) * u, v0 + (v1 - v0) * v]
-    }
-
-    pub(super) fn bounds(&self) -> Aabb {
-        Aabb { min: self.lo, max: self.hi }
     }
 
     /// Turns local parameters of the patch into those of the leaf, outside the unit square where they lie beside it.
@@ -86,9 +93,11 @@ pub(super) fn xyz(a: &V4) -> Vector {
     Vector::new(a[0], a[1], a[2])
 }
 
-/// A leaf with what goes elsewhere: derivative boxes over the enlarged domain, and the net about its centre.
+/// A leaf with what goes elsewhere: the axis-parallel box in the world, derivative boxes over the enlarged domain, and the net about its
+/// centre.
 pub(super) struct Described {
     pub(super) leaf: Leaf,
+    pub(super) bounds: Aabb,
     pub(super) slopes: Slopes,
     pub(super) net: Net,
 }
@@ -141,8 +150,6 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
     let pad = slop + PLACED_ROUNDING * ROUND * (center.abs().max_element() + radius);
     let leaf = Leaf {
         center,
-        lo: center + lo - pad,
-        hi: center + hi + pad,
         axes,
         olo: olo - pad,
         ohi: ohi + pad,
@@ -158,7 +165,8 @@ pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: 
         contact: contact_distance(patch.size()),
         rect,
     };
-    Described { leaf, slopes, net: centred }
+    let bounds = Aabb { min: center + lo - pad, max: center + hi + pad };
+    Described { leaf, bounds, slopes, net: centred }
 }
 
 /// Which sides, low and high in u and in v, of the leaf over `rect` lie on the border of its surface. The two ends of a surface that closes
@@ -175,7 +183,8 @@ pub(super) fn border_sides(grid: &PatchGrid, patch: &Patch, rect: [[f64; 2]; 2])
 
 /// Widens the reach and boxes of a leaf on sides where `border` says that the surface ends, so that roots up to [`BANDS_BEYOND`] times
 /// `band` mm beyond count: the side of the shared edge decides there, not the end of the surface. Elsewhere another leaf begins.
-pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], band: f64) {
+pub(super) fn widen(described: &mut Described, border: [[bool; 2]; 2], band: f64) {
+    let Described { leaf, bounds, slopes, .. } = described;
     // No farther than half of the extension: beyond the extension the derivative boxes prove nothing.
     let far = BANDS_BEYOND * band;
     for (d, slope) in [&slopes.u, &slopes.v].into_iter().enumerate() {
@@ -189,8 +198,8 @@ pub(super) fn widen(leaf: &mut Leaf, slopes: &Slopes, border: [[bool; 2]; 2], ba
     }
     // The hierarchy must lead rays to what counts beyond the border.
     if border.iter().flatten().any(|&b| b) {
-        leaf.lo -= far;
-        leaf.hi += far;
+        bounds.min -= far;
+        bounds.max += far;
         leaf.olo -= far;
         leaf.ohi += far;
     }

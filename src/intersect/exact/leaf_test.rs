@@ -101,7 +101,7 @@ impl Exact {
         let clamp = |x: f64| x.clamp(-EXTENSION, 1.0 + EXTENSION);
         // Krawczyk's step is Newton's first. It is held within the extension, outside of which nothing is proved.
         let (mut u, mut v) = (clamp(0.5 + du), clamp(0.5 + dv));
-        let control = leaf.net(&self.pool);
+        let control = leaf.net(&self.geometry.nets);
         let mut last = du.abs().max(dv.abs());
         for _ in 0..STEPS {
             let jet = net::evaluate_inlined(control, leaf.degree, u, v);

@@ -2,7 +2,7 @@
 
 use super::geometry::Geometry;
 use super::leaf::Leaf;
-use super::net::{Jet, Slopes, V4};
+use super::net::{self, Jet, Slopes, V4};
 use super::tolerances::{COORDINATE_ROUNDING, REACH, ROUND};
 use crate::math::{FaceId, Uv, Vector};
 
@@ -19,7 +19,7 @@ pub(super) struct Linearization {
     pub(super) still_noise: f64,
     /// Half of the rectangle in which roots count, rounded up.
     pub(super) half: [f32; 2],
-    /// First control point in the pool.
+    /// Index of its first control point in [`Geometry::nets`].
     pub(super) net: u32,
     pub(super) degree: [u8; 2],
     /// Whether no trim passes: every root counts.
@@ -65,16 +65,10 @@ impl Linearization {
         }
     }
 
-    /// The same with its net `by` control points further on in the pool.
-    pub(super) fn moved_in_pool(self, by: u32) -> Self {
-        Self { net: self.net + by, ..self }
-    }
-
     /// As [`Leaf::net`].
     #[inline(always)]
-    pub(super) fn net<'a>(&self, pool: &'a [V4]) -> &'a [V4] {
-        let n = (self.degree[0] as usize + 1) * (self.degree[1] as usize + 1);
-        &pool[self.net as usize..self.net as usize + n]
+    pub(super) fn net<'a>(&self, nets: &'a [V4]) -> &'a [V4] {
+        &nets[self.net as usize..self.net as usize + net::len(self.degree)]
     }
 
     /// Derivatives by u and by v, then the value, in the middle of the leaf, seen by `n·A − k·W`.

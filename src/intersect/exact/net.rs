@@ -12,6 +12,12 @@ pub(super) type V4 = [f64; 4];
 /// A net that lives on the stack up to bicubic.
 pub(super) type Net = SmallVec<[V4; 16]>;
 
+/// Number of control points of a net of these degrees.
+#[inline(always)]
+pub(super) fn len([p, q]: [u8; 2]) -> usize {
+    (usize::from(p) + 1) * (usize::from(q) + 1)
+}
+
 /// Value and first derivatives with respect to the local parameters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Jet {

@@ -57,7 +57,7 @@ impl Exact {
         for step in 0..=steps {
             let patch = &self.geometry.patches[index as usize];
             let local = patch.local(uv);
-            let jet = patch.jet(local);
+            let jet = self.geometry.jet(patch, local);
             let (p, du, dv) = project(&jet);
             // About the patch's centre: far from the origin only the shift is rounded, not the whole evaluation.
             let oc = ray.origin - patch.center;
@@ -84,7 +84,8 @@ impl Exact {
                 if residual > near + rounding {
                     return None;
                 }
-                let normal = record.sign * patch::normal(&patch.net, patch.degree, local, &jet, patch.rounding);
+                let net = self.geometry.net(patch);
+                let normal = record.sign * patch::normal(net, patch.degree, local, &jet, patch.rounding);
                 let t = ray.direction.dot(off);
                 let trim = &self.geometry.trims[record.trim as usize];
                 let inside = match trim.cell_at(uv) {
@@ -120,7 +121,7 @@ impl Exact {
     pub fn distance_at(&self, face: FaceId, uv: Uv, point: crate::math::Point) -> Option<f64> {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];
-        let jet = patch.jet(patch.local(uv));
+        let jet = self.geometry.jet(patch, patch.local(uv));
         Some((point - patch.center - project(&jet).0).length())
     }
 
@@ -159,6 +160,7 @@ impl Exact {
         let record = &self.geometry.faces[*self.geometry.by_id.get(&face)? as usize];
         let patch = &self.geometry.patches[self.geometry.patch_at(record, uv) as usize];
         let local = patch.local(uv);
-        Some(record.sign * patch::normal(&patch.net, patch.degree, local, &patch.jet(local), patch.rounding))
+        let (net, jet) = (self.geometry.net(patch), self.geometry.jet(patch, local));
+        Some(record.sign * patch::normal(net, patch.degree, local, &jet, patch.rounding))
     }
 }

@@ -7,14 +7,14 @@
 //! Guarantee: the answer of a ray is the same bits whatever rays it is asked with and whatever the instruction set.
 
 use super::geometry::Geometry;
-use super::net::V4;
+use super::net::{self, V4};
 use super::newton::{STALLED, SurfacePoint};
 use super::newton_lanes::{Ends, Starts, iterate, iterate_fixed};
 use super::patch::TRUSTED;
 use super::structure::Exact;
 use super::tolerances::TANGENT;
 use super::trim::Region;
-use crate::intersect::prefetch;
+use crate::intersect::prefetch::{prefetch, prefetch_range};
 use crate::math::simd::f64x8::{Array, F64x8, LANES};
 #[cfg(target_arch = "x86_64")]
 use crate::math::simd::f64x8::{Avx2Pair, Avx512Register};
@@ -122,15 +122,17 @@ impl Convergence<'_> {
         }
     }
 
-    /// Asks for what the seeds after the `index`-th need: first their patches, then the cells of trims in which they begin and mostly end.
+    /// Asks for what the seeds after the `index`-th need: first their patches, then the nets of these and the cells of trims in which they
+    /// begin and mostly end.
     #[inline(always)]
     fn fetch_ahead(&self, index: usize) {
         if let Some(seed) = self.seeds.get(index + PATCHES_AHEAD) {
             prefetch(&self.geometry.patches, seed.patch as usize);
         }
         if let Some(seed) = self.seeds.get(index + CELLS_AHEAD) {
-            let face = self.geometry.patches[seed.patch as usize].face;
-            self.geometry.trims[self.geometry.faces[face as usize].trim as usize].fetch_cell(seed.uv);
+            let patch = &self.geometry.patches[seed.patch as usize];
+            prefetch_range(&self.geometry.nets, patch.net as usize, patch.net_len());
+            self.geometry.trims[self.geometry.faces[patch.face as usize].trim as usize].fetch_cell(seed.uv);
         }
     }
 }
@@ -183,13 +185,13 @@ fn solve_group<V: F64x8>(
         trusted: [0.0; LANES],
     };
     let first = &geometry.patches[seeds[group.seeds[0] as usize].patch as usize];
-    let mut patches = [first; LANES];
+    let mut nets = [geometry.net(first); LANES];
     for lane in 0..LANES {
         // Idle lanes repeat the first, so that they end when it does and divide by nothing that it does not.
         let index = if lane < group.count { group.seeds[lane] } else { group.seeds[0] };
         let seed = &seeds[index as usize];
         let (ray, patch) = (&rays[seed.ray as usize], &geometry.patches[seed.patch as usize]);
-        patches[lane] = patch;
+        nets[lane] = geometry.net(patch);
         let (origin, local) = (ray.origin - patch.center, patch.local(seed.uv));
         for c in 0..3 {
             starts.origin[c][lane] = origin[c];
@@ -202,11 +204,11 @@ fn solve_group<V: F64x8>(
         starts.trusted[lane] = shortest * shortest;
     }
     // Control points side by side: those of eight patches in a register.
-    let count = (usize::from(group.degree[0]) + 1) * (usize::from(group.degree[1]) + 1);
+    let count = net::len(group.degree);
     for k in 0..count {
-        let mut rows: [&V4; LANES] = [&first.net[k]; LANES];
+        let mut rows: [&V4; LANES] = [&nets[0][k]; LANES];
         for lane in 0..LANES {
-            rows[lane] = &patches[lane].net[k];
+            rows[lane] = &nets[lane][k];
         }
         net[k] = V::transpose(rows);
     }

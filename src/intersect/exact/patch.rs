@@ -1,6 +1,6 @@
 //! Bézier patches about centres of their own, and the lines that divide a surface into them.
 
-use super::net::{self, Jet, Net, V4};
+use super::net::{self, Jet, V4};
 use super::tolerances::{PARALLEL, SAME_POINT};
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Face, PlacedFace};
@@ -31,8 +31,8 @@ pub(super) struct Patch {
     /// Index into [`Geometry::faces`].
     pub(super) face: u32,
     pub(super) degree: [u8; 2],
-    /// Control points about `center`, weight 1 in the middle of the patch.
-    pub(super) net: Net,
+    /// Index in [`Geometry::nets`] of the first of its control points, which are about `center`, with weight 1 in the middle of the patch.
+    pub(super) net: u32,
     /// Error of the control points, and of derivatives got from them, mm.
     pub(super) rounding: f64,
     /// In the world.
@@ -69,36 +69,41 @@ impl PatchGrid {
         let poles = [0, 1].map(|d| [0, 1].map(|end| side(d, end).iter().all(|p| same(p, &side(d, end)[0]))));
         Self { breaks, closed, poles }
     }
+
+    /// Number of patches.
+    pub(super) fn patch_count(&self) -> usize {
+        self.breaks.iter().map(|b| b.len() - 1).product()
+    }
 }
 
 impl Patch {
-    /// Places a patch of the part in the world: its net about its own centre, of weight 1 in the middle. `face` indexes
+    /// Places a patch of the part in the world, and adds its net to `nets`: about its own centre, of weight 1 in the middle. `face` indexes
     /// [`Geometry::faces`].
-    pub(super) fn new(patch: &BezierPatch, face: u32, placed: &PlacedFace<'_>) -> Self {
+    pub(super) fn new(patch: &BezierPatch, face: u32, placed: &PlacedFace<'_>, nets: &mut Vec<V4>) -> Self {
         let middle = patch.local_jet(Uv::splat(0.5))[0];
         // Shifting to the patch's own centre before placing keeps the shape exact far from the origin.
         let center = middle.project();
-        let net: Net = patch
-            .points
+        let first = nets.len();
+        nets.extend(patch.points.iter().map(|p| {
+            let w = p.w / middle.w;
+            // Rounded once, so that neighbours still share their border when 1e6 mm are taken off both.
+            let shifted = Vector::new(
+                f64::mul_add(-center.x, p.w, p.x),
+                f64::mul_add(-center.y, p.w, p.y),
+                f64::mul_add(-center.z, p.w, p.z),
+            );
+            let a = placed.placement.vector(shifted / middle.w);
+            [a.x, a.y, a.z, w]
+        }));
+        let size = nets[first..]
             .iter()
-            .map(|p| {
-                let w = p.w / middle.w;
-                // Rounded once, so that neighbours still share their border when 1e6 mm are taken off both.
-                let shifted = Vector::new(
-                    f64::mul_add(-center.x, p.w, p.x),
-                    f64::mul_add(-center.y, p.w, p.y),
-                    f64::mul_add(-center.z, p.w, p.z),
-                );
-                let a = placed.placement.vector(shifted / middle.w);
-                [a.x, a.y, a.z, w]
-            })
-            .collect();
-        let size = net.iter().map(|p: &V4| p[0].abs().max(p[1].abs()).max(p[2].abs()) / p[3]).fold(0.0, f64::max);
+            .map(|p: &V4| p[0].abs().max(p[1].abs()).max(p[2].abs()) / p[3])
+            .fold(0.0, f64::max);
         Self {
             face,
             degree: patch.degree.map(|d| d as u8),
             rounding: NET_ROUNDING * f64::EPSILON * size,
-            net,
+            net: first as u32,
             center: placed.placement.point(center),
             domain: patch.domain,
             ill_scaled: is_ill_scaled(patch),
@@ -122,9 +127,10 @@ impl Patch {
         Uv::new(u0 + (u1 - u0) * u, v0 + (v1 - v0) * v)
     }
 
-    /// Homogeneous point about the centre at local parameters, and derivatives by these.
-    pub(super) fn jet(&self, [u, v]: [f64; 2]) -> Jet {
-        net::evaluate(&self.net, self.degree, u, v)
+    /// Number of its control points.
+    #[inline(always)]
+    pub(super) fn net_len(&self) -> usize {
+        net::len(self.degree)
     }
 }
 

@@ -174,7 +174,7 @@ impl DeparturePoint {
         }
         let patch = geometry.patch_at(&geometry.faces[face as usize], uv);
         let p = &geometry.patches[patch as usize];
-        let (s, ..) = project(&p.jet(p.local(uv)));
+        let (s, ..) = project(&geometry.jet(p, p.local(uv)));
         let off = (ray.origin - p.center - s).length();
         let reach = ray.origin.abs().max_element().max(geometry.farthest_start);
         let rounding = ORIGIN_ROUNDING * f64::EPSILON * reach;
@@ -197,7 +197,7 @@ impl DeparturePoint {
             local = local.map(|x| x.clamp(0.0, 1.0));
             // Beyond a crease the departure is no point of the patch: a ray that starts beside a wall meets it, however far ahead.
             let patch = &geometry.patches[leaf.patch as usize];
-            let (border, du, dv) = project(&patch.jet(local));
+            let (border, du, dv) = project(&geometry.jet(patch, local));
             let beside = (origin - patch.center - border).dot(du.cross(dv).normalize_or_zero());
             if beside.abs() > self.tolerance + self.off {
                 return None;

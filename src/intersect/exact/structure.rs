@@ -1,13 +1,12 @@
 //! The search structure: leaves, what tests them, and the hierarchy over them.
 
 use super::geometry::Geometry;
-use super::leaf::Leaf;
+use super::leaf::{Leaf, NetPlace};
 use super::linearization::{HitLabel, Linearization};
-use super::net::V4;
 use super::subdivision::{self, Flatness, PatchLeaves};
 use super::tree::Tree;
 use super::trim::Trim;
-use crate::math::{Aabb, FaceId};
+use crate::math::FaceId;
 use crate::model::Model;
 use std::time::Instant;
 
@@ -104,10 +103,8 @@ pub struct Exact {
     pub(super) linearizations: Vec<Linearization>,
     /// Of each leaf.
     pub(super) labels: Vec<HitLabel>,
-    /// Control points of all leaves.
-    pub(super) pool: Vec<V4>,
-    /// First control point of each leaf, and the pool's length.
-    pub(super) starts: Vec<u32>,
+    /// Of each leaf.
+    pub(super) net_places: Vec<NetPlace>,
     pub(super) tree: Tree,
     pub(super) settings: Settings,
     pub(super) build_seconds: f64,
@@ -120,15 +117,16 @@ impl Exact {
     /// Ready meshes and surfaces that are not finite or not positive in weight are left out: [`Exact::skipped`].
     pub fn build(model: &Model, settings: &Settings) -> Self {
         let start = Instant::now();
-        let geometry = Geometry::new(model, settings.trim_band, settings.farthest_start);
-        let PatchLeaves { leaves, linearizations, pool } = subdivide(&geometry, settings);
-        // One more start, so that the end of the last leaf is the start of the one behind it.
-        let mut starts: Vec<u32> = leaves.iter().map(|l| l.net).collect();
-        starts.push(pool.len() as u32);
-        let tree = Tree::build(&leaves.iter().map(Leaf::bounds).collect::<Vec<Aabb>>());
+        let mut geometry = Geometry::new(model, settings.trim_band, settings.farthest_start);
+        let PatchLeaves { leaves, linearizations, boxes, nets } = subdivide(&geometry, settings);
+        geometry.nets.reserve_exact(nets.len());
+        geometry.nets.extend(nets);
+        geometry.nets.shrink_to_fit();
+        let tree = Tree::build(&boxes);
+        let net_places = leaves.iter().map(NetPlace::new).collect();
         let labels = leaves.iter().map(|l| HitLabel::new(l, &geometry)).collect();
         let build_seconds = start.elapsed().as_secs_f64();
-        Self { geometry, leaves, linearizations, labels, pool, starts, tree, settings: *settings, build_seconds }
+        Self { geometry, leaves, linearizations, labels, net_places, tree, settings: *settings, build_seconds }
     }
 
     /// Placed faces that are not traced: ready meshes, and surfaces that are not usable.
@@ -148,11 +146,11 @@ impl Exact {
 
     /// Bytes of patches, leaves, hierarchy and trims, without copies of the model's surfaces and edges.
     pub(super) fn bytes(&self) -> usize {
-        let nets: usize = self.geometry.patches.iter().map(|p| size_of_val(p) + size_of_val(&*p.net)).sum();
+        let patches = size_of_val(&*self.geometry.patches) + size_of_val(&*self.geometry.nets);
         let tested = size_of_val(&*self.linearizations) + size_of_val(&*self.labels);
-        let leaves = size_of_val(&*self.leaves) + size_of_val(&*self.pool) + tested;
+        let leaves = size_of_val(&*self.leaves) + size_of_val(&*self.net_places) + tested;
         let trims: usize = self.geometry.trims.iter().map(Trim::bytes).sum();
-        leaves + size_of_val(&*self.starts) + size_of_val(&*self.tree.nodes) + nets + trims
+        leaves + size_of_val(&*self.tree.nodes) + patches + trims
     }
 }
 
@@ -202,13 +200,24 @@ mod tests {
             let knots = vec![0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
             let face = Face::whole(Surface { degree: [3, 3], knots: [knots.clone(), knots], points });
             let shells = vec![Shell { faces: vec![face], ..Shell::default() }];
-            let exact = Exact::build(&Model::from_part(Part { shells, ..Part::default() }), &Settings::default());
+            let model = Model::from_part(Part { shells, ..Part::default() });
+            let cut = subdivide(&Geometry::new(&model, 1e-6, 0.0), &Settings::default());
             for (ends, corner) in corners {
-                let mut leaves = exact.leaves.iter();
-                let leaf = leaves.find(|leaf| (0..2).all(|d| leaf.rect[d][ends[d]] == ends[d] as f64)).unwrap();
-                assert!(corner.cmpge(leaf.lo).all() && corner.cmple(leaf.hi).all(), "{corner} in {leaf:?}");
+                let is_at_corner = |leaf: &Leaf| (0..2).all(|d| leaf.rect[d][ends[d]] == ends[d] as f64);
+                let k = cut.leaves.iter().position(is_at_corner).unwrap();
+                assert!(cut.boxes[k].contains(corner), "{corner} in {:?}", cut.boxes[k]);
             }
         }
+    }
+
+    #[test]
+    fn leaves_that_are_whole_patches_take_their_nets() {
+        use crate::math::Frame;
+        let plane = crate::nurbs::sweep::plane(&Frame::IDENTITY, [[0.0, 10.0]; 2]);
+        let shells = vec![Shell { faces: vec![Face::whole(plane)], ..Shell::default() }];
+        let settings = Settings { leaves: 0, depth: 0, ..Settings::default() };
+        let exact = Exact::build(&Model::from_part(Part { shells, ..Part::default() }), &settings);
+        assert_eq!((exact.leaf_count(), exact.geometry.nets.len()), (exact.patch_count(), 4 * exact.patch_count()));
     }
 
     #[test]

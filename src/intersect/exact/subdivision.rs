@@ -43,19 +43,38 @@ const WEIGHT_RATIO: f64 = 1.5;
 pub(super) struct PatchLeaves {
     pub(super) leaves: Vec<Leaf>,
     pub(super) linearizations: Vec<Linearization>,
-    pub(super) pool: Vec<V4>,
+    /// The axis-parallel box around each leaf, in the world.
+    pub(super) boxes: Vec<Aabb>,
+    /// Of the leaves whose nets are not their patches': they come to stand behind [`Geometry::nets`], and leaves name them so.
+    pub(super) nets: Vec<V4>,
 }
 
 impl PatchLeaves {
-    /// Appends those of further patches, whose nets come to stand behind its own.
-    fn append(&mut self, other: Self) {
-        let offset = self.pool.len() as u32;
+    /// Room for so many leaves: of lists that grow step by step the allocator keeps what they have left behind.
+    fn with_capacity(leaves: usize) -> Self {
+        Self {
+            leaves: Vec::with_capacity(leaves),
+            linearizations: Vec::with_capacity(leaves),
+            boxes: Vec::with_capacity(leaves),
+            nets: Vec::new(),
+        }
+    }
+
+    /// Appends those of further patches, whose nets come to stand behind its own; `patch_points` is the length of [`Geometry::nets`].
+    fn append(&mut self, other: Self, patch_points: u32) {
+        let offset = self.nets.len() as u32;
+        let moved = |net: u32| if net < patch_points { net } else { net + offset };
         make_room(&mut self.leaves, other.leaves.len());
         make_room(&mut self.linearizations, other.linearizations.len());
-        make_room(&mut self.pool, other.pool.len());
-        self.leaves.extend(other.leaves.into_iter().map(|l| Leaf { net: l.net + offset, ..l }));
-        self.linearizations.extend(other.linearizations.into_iter().map(|l| l.moved_in_pool(offset)));
-        self.pool.extend(other.pool);
+        make_room(&mut self.boxes, other.boxes.len());
+        make_room(&mut self.nets, other.nets.len());
+        let first = self.leaves.len();
+        self.leaves.extend(other.leaves);
+        self.linearizations.extend(other.linearizations);
+        self.leaves[first..].iter_mut().for_each(|leaf| leaf.net = moved(leaf.net));
+        self.linearizations[first..].iter_mut().for_each(|leaf| leaf.net = moved(leaf.net));
+        self.boxes.extend(other.boxes);
+        self.nets.extend(other.nets);
     }
 }
 
@@ -103,8 +122,13 @@ pub(super) fn subdivide_all(geometry: &Geometry, flatness: Flatness) -> PatchLea
 /// As [`subdivide_all`]; `None` where there would be more than `most` leaves, found out before there are many more.
 pub(super) fn subdivide_up_to(geometry: &Geometry, flatness: Flatness, most: usize) -> Option<PatchLeaves> {
     let cropped = |patch: &Patch| {
-        let whole =
-            SubPatch { net: patch.net.clone(), rect: [[0.0, 1.0]; 2], depth: 0, crop_roundings: 0, vain: 0 };
+        let whole = SubPatch {
+            net: Net::from_slice(geometry.net(patch)),
+            rect: [[0.0, 1.0]; 2],
+            depth: 0,
+            crop_roundings: 0,
+            vain: 0,
+        };
         crop(geometry.trim_of(patch), patch, whole)
     };
     // Only now, from what the trims leave: a small face on a large surface must not make the scene look large. Cropped once more below,
@@ -127,15 +151,17 @@ pub(super) fn subdivide_up_to(geometry: &Geometry, flatness: Flatness, most: usi
         leaves.fetch_add(cut.leaves.len(), Ordering::Relaxed);
         cut
     };
-    let mut all = PatchLeaves::default();
+    let mut all = PatchLeaves::with_capacity(geometry.patches.len().min(most));
     for (k, block) in geometry.patches.chunks(BLOCK).enumerate() {
         let numbered = block.par_iter().enumerate().map(|(i, patch)| (k * BLOCK + i, patch));
         let cut: Vec<PatchLeaves> = numbered.map(leaves_of).collect();
         if leaves.load(Ordering::Relaxed) > most {
             return None;
         }
-        cut.into_iter().for_each(|one| all.append(one));
+        cut.into_iter().for_each(|one| all.append(one, geometry.nets.len() as u32));
     }
+    all.leaves.shrink_to_fit();
+    all.linearizations.shrink_to_fit();
     Some(all)
 }
 
@@ -178,7 +204,7 @@ impl Subdivision<'_> {
             }
             let SubPatch { net: piece, rect, depth, crop_roundings, vain } = part;
             let described = describe(self.patch, &piece, rect, depth + crop_roundings);
-            let area = described.leaf.bounds().half_area();
+            let area = described.bounds.half_area();
             let has_plane = deviation(&described.leaf, &described.slopes) < NO_TANGENT_PLANE;
             let vain = if has_plane { 0 } else { vain + 1 };
             let deepest = depth >= self.flatness.depth || vain > VAIN_HALVINGS;
@@ -221,22 +247,30 @@ impl Subdivision<'_> {
     }
 
     /// Makes a part a leaf and adds it to `out`, with its net and linearization.
-    fn add_leaf(&self, part: Described, region: Region, rect: [[f64; 2]; 2], out: &mut PatchLeaves) {
-        let Described { mut leaf, slopes, net: control } = part;
+    fn add_leaf(&self, mut part: Described, region: Region, rect: [[f64; 2]; 2], out: &mut PatchLeaves) {
+        let leaf = &mut part.leaf;
         leaf.whole = region == Region::Inside;
         leaf.has_pole = self.geometry.has_pole(self.patch);
         leaf.patch = self.index;
         leaf.face = self.patch.face;
         let face = &self.geometry.faces[self.patch.face as usize];
         // Only a leaf that a trim passes asks the shared edge which side a root lies on.
-        if !self.trim.whole && !leaf.whole {
+        if !self.trim.whole && !part.leaf.whole {
             let border = border_sides(&self.geometry.grids[face.grid as usize], self.patch, rect);
-            widen(&mut leaf, &slopes, border, face.band);
+            widen(&mut part, border, face.band);
         }
-        leaf.net = out.pool.len() as u32;
+        let Described { mut leaf, bounds, slopes, net: control } = part;
         let middle = net::evaluate(&control, self.patch.degree, 0.5, 0.5).s;
-        out.pool.extend(control);
+        // Of most leaves that are a whole patch of a polynomial surface the centre and the net are the patch's to the last bit.
+        leaf.net = if *control == *self.geometry.net(self.patch) {
+            self.patch.net
+        } else {
+            let net = self.geometry.nets.len() + out.nets.len();
+            out.nets.extend(control);
+            net as u32
+        };
         out.linearizations.push(Linearization::new(&leaf, &slopes, &middle, self.patch.ill_scaled));
+        out.boxes.push(bounds);
         out.leaves.push(leaf);
     }
 }

@@ -4,6 +4,7 @@
 //! cache holds, waiting for memory took two fifths of the time of a ray by itself. Each ray takes the very steps that it takes
 //! alone, so the bits are the same.
 
+use super::leaf::NetPlace;
 use super::query::Query;
 use super::slabs;
 use super::structure::Exact;
@@ -174,8 +175,8 @@ impl Exact {
         // Asked for now and read when the other lanes have had their turn.
         if let Some(leaf) = lane.leaf {
             prefetch(&self.linearizations, leaf as usize);
-            let [from, to] = [0, 1].map(|k| self.starts[leaf as usize + k] as usize);
-            prefetch_range(&self.pool, from, to - from);
+            let NetPlace { first, points } = self.net_places[leaf as usize];
+            prefetch_range(&self.geometry.nets, first as usize, usize::from(points));
         } else if let Some(root) = &lane.query.best {
             prefetch(&self.labels, root.leaf as usize);
         }

@@ -19,10 +19,17 @@ use smallvec::SmallVec;
 const MOST_WITHOUT_MAP: usize = 2;
 /// One with more, as of a plate with many holes, has no list of them and looks for them in the tree.
 const MOST_LISTED: usize = 12;
-/// Slabs in a facet's box of which a map is made; one with more, as a long strip across everything, always looks in the tree.
-const MOST_ASKED: u32 = 4096;
+/// Slabs that are looked at for the map of one facet; one with more around it, as a long strip across everything, always looks in the tree.
+const MOST_MAPPED: usize = 4096;
+/// And for all maps of a mesh: a tenth of a second. Of 56,000 facets that all lie across each other maps took 5 s.
+const MOST_MAPPED_OF_MESH: usize = 1 << 22;
+/// Slabs that are looked at to find out whether a facet needs more than a list, those of its own face too.
+const MOST_LOOKED_AT: usize = 256;
 /// Room for what rounds a place, mm, and as a share of its coordinates: a million roundings.
 const ROOM: f64 = 1e-9;
+
+/// Slabs of other faces near a facet, by their index in [`Slabs::all`].
+type Listed = SmallVec<[u32; MOST_LISTED]>;
 
 /// What lies within the sag of a facet: a box around it, rounded outward, and that sag, mm.
 #[derive(Clone, Copy, Debug)]
@@ -54,32 +61,43 @@ impl Slabs {
         let curved = (0..mesh.facets.len() as u32).filter(|&f| records[f as usize].sag > FLAT_SAG);
         let all: Vec<Slab> = curved.map(|f| Slab::of_facet(mesh, f, records[f as usize].sag)).collect();
         let tree = BoxTree::new(&all.iter().map(Slab::bounds).collect::<Vec<Aabb>>());
-        let near = |f: usize| {
+        // The slabs of other faces near a facet, and whether there are more that were not looked at.
+        let near = |f: usize, most_listed: usize, most_looked_at: usize| {
             let surroundings = Surroundings::of_facet(mesh, f, reach);
-            let bounds = surroundings.bounds;
-            let mut near: SmallVec<[u32; MOST_LISTED]> = SmallVec::new();
-            let mut asked = 0;
-            let are_too_many = tree.any_meeting(&bounds, |k| {
+            let mut near = Listed::new();
+            let mut looked_at = 0;
+            let are_more = tree.any_meeting(&surroundings.bounds, |k| {
+                looked_at += 1;
                 let slab = &all[k as usize];
                 let is_foreign = mesh.facets[slab.facet as usize].face != mesh.facets[f].face;
-                asked += u32::from(is_foreign);
                 near.extend((is_foreign && surroundings.may_meet(mesh, slab)).then_some(k));
-                asked > MOST_ASKED
+                near.len() > most_listed || looked_at > most_looked_at
             });
-            let map = (are_too_many || near.len() > MOST_WITHOUT_MAP).then(|| {
-                let mut map = SlabMap::new(bounds);
-                near.iter().for_each(|&k| map.mark(&all[k as usize].bounds()));
-                if are_too_many {
-                    map.mark(&bounds);
-                }
-                if are_too_many || near.len() > MOST_LISTED {
-                    near = SmallVec::new();
-                }
-                map
-            });
-            (near, map)
+            (near, are_more)
         };
-        let of_facets: Vec<_> = (0..mesh.facets.len()).into_par_iter().map(near).collect();
+        let few = |f: usize| {
+            let (near, are_more) = near(f, MOST_LISTED, MOST_LOOKED_AT);
+            (!are_more).then_some(near)
+        };
+        let lists: Vec<_> = (0..mesh.facets.len()).into_par_iter().map(few).collect();
+        let crowded = lists.iter().filter(|list| list.is_none()).count();
+        let most = (MOST_MAPPED_OF_MESH / crowded.max(1)).min(MOST_MAPPED);
+        let list_and_map = |(f, list): (usize, Option<Listed>)| {
+            let (near, are_more) = list.map_or_else(|| near(f, most, most), |list| (list, false));
+            if !are_more && near.len() <= MOST_WITHOUT_MAP {
+                return (near, None);
+            }
+            let bounds = Aabb::from_points(mesh.corners(f)).grown(reach);
+            let mut map = SlabMap::new(bounds);
+            if are_more {
+                map.mark(&bounds);
+            } else {
+                near.iter().for_each(|&k| map.mark(&all[k as usize].bounds()));
+            }
+            let is_listed = !are_more && near.len() <= MOST_LISTED;
+            (if is_listed { near } else { Listed::new() }, Some(map))
+        };
+        let of_facets: Vec<_> = lists.into_par_iter().enumerate().map(list_and_map).collect();
         let (mut starts, mut listed, mut maps) = (vec![0], Vec::new(), Vec::new());
         for (near, map) in of_facets {
             listed.extend(map.is_some().then(|| Slab::mapped(maps.len())));

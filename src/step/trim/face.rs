@@ -56,7 +56,7 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
     let fits = task.fit_edges()?;
     let mut gap = fits.values().fold(0f64, |g, f| g.max(f.gap));
     if !(gap <= LARGEST_GAP_SHARE * task.extent()) {
-        return Err("its edges do not lie on its surface");
+        return Err("its edges were not found on its surface");
     }
     let mut repairs: Vec<String> = Vec::new();
     if chart.error > offset::TOLERANCE {

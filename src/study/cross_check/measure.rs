@@ -7,6 +7,9 @@ use crate::study::{Rounds, Timing};
 use std::cell::RefCell;
 use std::hint::black_box;
 
+/// Rays of a batch: as many as a task of the cross-check has. The hits of all timed rays at once took as much memory as an octree.
+const BATCH: usize = 2048;
+
 /// One intersector in a race.
 #[derive(Clone, Copy)]
 pub struct Competitor<'a> {
@@ -14,14 +17,14 @@ pub struct Competitor<'a> {
     pub name: &'a str,
     /// The intersector that is timed.
     pub who: &'a dyn Intersector,
-    /// Whether it gets the rays as one batch or one by one.
+    /// Whether it gets the rays in batches or one by one.
     pub batch: bool,
 }
 
 /// Times all competitors on the same rays, on this thread, in alternating rounds; returns seconds per pass over the rays, by name.
 pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> Vec<(String, Timing)> {
     // One after the other they write to the same place.
-    let hits = RefCell::new(vec![None; rays.len()]);
+    let hits = RefCell::new(vec![None; rays.len().min(BATCH)]);
     let mut race = Rounds::default();
     for c in competitors {
         let Competitor { who, batch, .. } = *c;
@@ -29,15 +32,18 @@ pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> V
         race.add(c.name, move || {
             let mut cost = Cost::default();
             let hits = &mut *hits.borrow_mut();
-            if batch {
-                who.intersect_batch(rays, hits, &mut cost);
-            } else {
-                for (ray, hit) in rays.iter().zip(&mut *hits) {
-                    *hit = who.intersect(ray, &mut cost);
+            for rays in rays.chunks(BATCH) {
+                let hits = &mut hits[..rays.len()];
+                if batch {
+                    who.intersect_batch(rays, hits, &mut cost);
+                } else {
+                    for (ray, hit) in rays.iter().zip(&mut *hits) {
+                        *hit = who.intersect(ray, &mut cost);
+                    }
                 }
+                // Without it the compiler could leave out hits that nobody reads.
+                black_box(hits);
             }
-            // Without it the compiler could leave out hits that nobody reads.
-            black_box(hits);
         });
     }
     race.run(rounds)

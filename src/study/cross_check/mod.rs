@@ -120,17 +120,21 @@ pub fn cross_check_groups(
             tally
         })
         .collect();
-    let mut all = Tally::default();
+    let (mut all, mut t_errors, mut normal_errors) = <(Tally, Quantiles, Quantiles)>::default();
     // In the order of the rays: what is kept as an example does not hang on threads.
     for tally in tallies {
+        for &[distance, angle] in &tally.errors {
+            t_errors.add(distance);
+            normal_errors.add(angle);
+        }
         all.absorb(tally, settings.keep);
     }
     let mut check = all.check;
     check.rays = count;
     let facets = intersectors.groups.iter().map(|(_, mesh)| mesh.facets.len()).sum();
     check.scene = SceneSize { facets, patches: intersectors.exact.footprint().primitives };
-    check.facets_vs_exact.t_error_mm = all.t_errors.summary();
-    check.facets_vs_exact.normal_error_deg = all.normal_errors.summary();
+    check.facets_vs_exact.t_error_mm = t_errors.summary();
+    check.facets_vs_exact.normal_error_deg = normal_errors.summary();
     check.disagreements = all.kept;
     check
 }
@@ -145,8 +149,8 @@ pub(super) fn angle_deg(a: crate::math::Vector, b: crate::math::Vector) -> f64 {
 #[derive(Default)]
 struct Tally {
     check: CrossCheck,
-    t_errors: Quantiles,
-    normal_errors: Quantiles,
+    /// Distances along the ray, mm, and angles of normals, degrees. Listed, as a histogram of each would take eight times as much.
+    errors: Vec<[f64; 2]>,
     kept: Vec<Disagreement>,
 }
 
@@ -208,8 +212,7 @@ impl Tally {
         match (octree, exact) {
             (Some(f), Some(e)) if f.face == e.face => {
                 if matches!(cause, None | Some(Cause::WithinSag)) {
-                    self.t_errors.add((f.t - e.t).abs());
-                    self.normal_errors.add(angle_deg(f.normal, e.normal));
+                    self.errors.push([(f.t - e.t).abs(), angle_deg(f.normal, e.normal)]);
                 }
             }
             (Some(_), Some(_)) => found.other_face += 1,
@@ -232,7 +235,7 @@ impl Tally {
         *counter += 1;
     }
 
-    /// Adds another tally; of its kept rays as many as leave `keep` at most in all.
+    /// Adds another tally, but its errors; of its kept rays as many as leave `keep` at most in all.
     fn absorb(&mut self, other: Self, keep: usize) {
         let (a, b) = (&mut self.check, &other.check);
         a.hits += b.hits;
@@ -254,8 +257,6 @@ impl Tally {
         p.unproved += q.unproved;
         p.unmeshed += q.unmeshed;
         p.no_surface += q.no_surface;
-        self.t_errors.merge(&other.t_errors);
-        self.normal_errors.merge(&other.normal_errors);
         let room = keep.saturating_sub(self.kept.len());
         self.kept.extend(other.kept.into_iter().take(room));
     }

@@ -4,6 +4,7 @@ use super::border::{Border, SAMPLES, border_curves};
 use crate::math::{Point, Ray, Uv, Vector};
 use crate::model::PlacedFace;
 use crate::nurbs::Surface;
+use std::sync::OnceLock;
 
 /// Foot points whose distances differ by less, relative, are equally near; also the rounding of a foot point, as a share of the size.
 const EQUALLY_NEAR: f64 = 1e-9;
@@ -31,7 +32,8 @@ pub(super) struct PlacedSurface {
     /// Largest distance between an edge in space and its uv curve, or between the ends of edges that follow each other, mm.
     pub(super) gap: f64,
     borders: Vec<Border>,
-    seeds: Vec<(Uv, Point)>,
+    /// Samples over the domain, made when a foot is first held back by its end: of most faces none is.
+    seeds: OnceLock<Vec<(Uv, Point)>>,
 }
 
 /// The point of a surface nearest to a given one.
@@ -75,18 +77,21 @@ impl PlacedSurface {
         let flips = [face.reversed, placed.placement.is_mirrored()].iter().filter(|&&f| f).count();
         let size = surface.bounds().diagonal();
         let borders = border_curves(face, &surface, size).into_iter().map(|c| Border::new(c, &surface)).collect();
-        let [[u0, u1], [v0, v1]] = surface.domain();
-        let at = |i: usize, a: f64, b: f64| a + (b - a) * i as f64 / SAMPLES as f64;
-        let seeds = (0..=SAMPLES)
-            .flat_map(|i| (0..=SAMPLES).map(move |j| Uv::new(at(i, u0, u1), at(j, v0, v1))))
-            .map(|uv| (uv, surface.evaluate(uv)))
-            .collect();
         let sign = if flips == 1 { -1.0 } else { 1.0 };
         // A joint without an edge that is not one point is a gap between edges that the file left; facets go across it as they may.
         let joints = face.loops.iter().flat_map(|l| &l.uses).filter(|u| u.edge.is_none());
         let across = joints.map(|u| surface.evaluate(u.start()).distance(surface.evaluate(u.end())));
         let gap = across.fold(face.gap * placed.placement.scale, f64::max);
-        Some(Self { surface, sign, size, gap, borders, seeds })
+        Some(Self { surface, sign, size, gap, borders, seeds: OnceLock::new() })
+    }
+
+    /// Returns places evenly over the surface's domain.
+    fn seeds(&self) -> &[(Uv, Point)] {
+        let [[u0, u1], [v0, v1]] = self.surface.domain();
+        let at = |i: usize, a: f64, b: f64| a + (b - a) * i as f64 / SAMPLES as f64;
+        let parameters =
+            (0..=SAMPLES).flat_map(|i| (0..=SAMPLES).map(move |j| Uv::new(at(i, u0, u1), at(j, v0, v1))));
+        self.seeds.get_or_init(|| parameters.map(|uv| (uv, self.surface.evaluate(uv))).collect())
     }
 
     /// Returns the diagonal of the box about the control points, mm.
@@ -102,7 +107,7 @@ impl PlacedSurface {
         let mut best = self.describe(p, near, direction);
         if best.held {
             // The guess ran into a side of the domain: on a closed surface the foot may lie beyond the seam.
-            let mut seeds: Vec<_> = self.seeds.iter().map(|(uv, q)| (q.distance_squared(p), *uv)).collect();
+            let mut seeds: Vec<_> = self.seeds().iter().map(|(uv, q)| (q.distance_squared(p), *uv)).collect();
             seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
             // From the four nearest of some three hundred samples.
             for (_, uv) in seeds.into_iter().take(4) {
