@@ -1,4 +1,4 @@
-//! What is built or found out once: facets, octrees and choices in a folder that runs, processes and machines may share.
+//! What is built or found out once: models, facets, octrees and choices in a folder that runs, processes and machines may share.
 //!
 //! An entry is named by a hash of all that decides it: program, kind of machine, models, settings of the mesher. It is written under
 //! another name and renamed when it is whole; of a hundred processes that start at once one builds, while the others wait for its entry
@@ -6,7 +6,7 @@
 //! for longest goes.
 //!
 //! Guarantee: a run has the same bits with and without it. Known weakness: who may write the folder is trusted with results: an entry
-//! changed on purpose may change them, though no index of it leaves its array.
+//! changed on purpose may change or end them, though no index of it leaves its array.
 
 use super::monitor::Monitor;
 use super::turn::Turn;
@@ -35,11 +35,12 @@ const MOST_BYTES: u64 = 20_000_000_000;
 const STALE: Duration = Duration::from_secs(86_400);
 /// Bytes that are gathered before they are written.
 const WRITTEN_AT_ONCE: usize = 1 << 20;
-/// What follows the hash in the names of entries: of facets, of octrees, and of what was chosen for a run.
+/// What follows the hash in the names of entries: of models, of facets, of octrees, and of what was chosen for a run.
+pub(super) const MODEL: &str = ".model";
 const FACETS: &str = ".facets";
 const OCTREE: &str = ".octree";
 const CHOICE: &str = ".choice";
-const KINDS: [&str; 3] = [FACETS, OCTREE, CHOICE];
+const KINDS: [&str; 4] = [MODEL, FACETS, OCTREE, CHOICE];
 /// What follows in the names of those that are not whole yet.
 const UNFINISHED: &str = ".part";
 
@@ -90,7 +91,7 @@ impl Cache {
 
     /// Returns what `fetch` finds in the entry of this name, which another process may be making and is waited for; the turn to make it
     /// where it is not kept.
-    fn fetch_or_turn<T>(&self, name: &str, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
+    pub(super) fn fetch_or_turn<T>(&self, name: &str, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
         if let Some(kept) = fetch() {
             return Ok(kept);
         }
@@ -164,7 +165,7 @@ impl Cache {
 
     /// Reads an entry and marks it as just used; `None` where there is none, or one that is damaged or cannot be read, which is removed and
     /// told to the monitor.
-    fn fetch<T>(
+    pub(super) fn fetch<T>(
         &self,
         name: &str,
         monitor: &dyn Monitor,
@@ -189,7 +190,12 @@ impl Cache {
     }
 
     /// Writes an entry and removes what is too much; a failure is only told to the monitor.
-    fn keep(&self, name: &str, monitor: &dyn Monitor, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
+    pub(super) fn keep(
+        &self,
+        name: &str,
+        monitor: &dyn Monitor,
+        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) {
         // The standard library's seeded hasher is random: no further crate for a name.
         let random = RandomState::new().build_hasher().finish();
         let beside = self.folder.join(format!(".{name}.{random:016x}{UNFINISHED}"));
