@@ -21,6 +21,7 @@
 mod accuracy_target;
 mod cache;
 mod cached_model;
+mod checksum;
 mod cross_check;
 mod default_accuracy;
 mod error;

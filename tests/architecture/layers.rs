@@ -141,6 +141,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "settings",
             "monitor",
             "turn",
+            "checksum",
             "cache",
             "cached_model",
             "loading",
@@ -466,7 +467,13 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "surfaces",
         ],
     ),
-    ("step", &["chart", "error", "mod", "part21", "geometry", "report", "settings", "trim", "product", "import"]),
+    (
+        "step",
+        &[
+            "chart", "error", "mod", "part21", "geometry", "report", "settings", "trim", "product", "import",
+            "stored",
+        ],
+    ),
     (
         "study",
         &[
