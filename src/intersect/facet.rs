@@ -20,6 +20,7 @@ pub(crate) use super::start_triangle::LONGEST_NUDGE;
 
 use super::slopes::{LEAST_SINE, Slopes};
 use super::start_triangle::{LIFT, StartTriangle};
+use crate::math::simd::{self, Instructions, Kernel};
 use crate::math::{Aabb, Point, QuadHalf, Ray, Vector, distance_to_segment};
 use crate::mesh::FacetMesh;
 use std::hint::select_unpredictable;
@@ -45,11 +46,42 @@ pub(crate) fn is_usable(p: Point) -> bool {
     p.abs().cmple(Point::splat(LARGEST)).all()
 }
 
+/// The box around the usable ones of these points.
+struct UsableBounds<'a> {
+    points: &'a [Point],
+}
+
+impl Kernel for UsableBounds<'_> {
+    type Output = Aabb;
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) -> Aabb {
+        /// Coordinates of eight points, which are compared at once.
+        const LANES: usize = 24;
+        let (chunks, _) = bytemuck::cast_slice::<Point, f64>(self.points).as_chunks::<LANES>();
+        let (mut low, mut high, mut usable) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES], [true; LANES]);
+        for chunk in chunks {
+            for lane in 0..LANES {
+                let x = chunk[lane];
+                low[lane] = if x < low[lane] { x } else { low[lane] };
+                high[lane] = if x > high[lane] { x } else { high[lane] };
+                usable[lane] &= x.abs() <= LARGEST;
+            }
+        }
+        // Nearly always all are; else each is asked.
+        let chunked = if usable.contains(&false) { 0 } else { chunks.len() * LANES / 3 };
+        let corners = [low, high].map(|lanes| (0..LANES / 3).map(move |k| Point::from_slice(&lanes[3 * k..])));
+        let of_chunks = corners.into_iter().flatten().filter(|_| chunked > 0);
+        let others = self.points[chunked..].iter().copied().filter(|&p| is_usable(p));
+        Aabb::from_points(of_chunks.chain(others))
+    }
+}
+
 impl<'m> Surroundings<'m> {
     /// Takes the bounds of all usable positions, and 2⁻⁴⁰ of the largest coordinate as the reach, 0 without positions: a start is a
     /// rounded `origin + t·direction`, and this covers rays a thousand times longer than the scene. For a lamp it is a picometre.
     pub(crate) fn new(mesh: &'m FacetMesh) -> Self {
-        let bounds = Aabb::from_points(mesh.positions.iter().copied().filter(|&p| is_usable(p)));
+        let bounds = simd::dispatch(UsableBounds { points: &mesh.positions });
         let largest = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
         Self { mesh, reach: largest * REACH, bounds }
     }

@@ -126,7 +126,7 @@ impl BoxTree {
     }
 
     /// Makes a walk that has passed all boxes, to be restarted.
-    #[inline]
+    #[inline(always)]
     pub fn ended_walk(&self) -> BoxWalk<'_> {
         BoxWalk { tree: self, origin: Vector::ZERO, inverse: Vector::ZERO, least: 0.0, open: SmallVec::new() }
     }
@@ -193,7 +193,7 @@ pub struct BoxWalk<'t> {
 
 impl BoxWalk<'_> {
     /// Turns to another ray, as [`BoxTree::walk`], in its place: a walk takes half a kilobyte, which would take longer to move.
-    #[inline]
+    #[inline(always)]
     pub fn restart(&mut self, ray: &Ray) {
         self.end();
         (self.origin, self.inverse, self.least) = (ray.origin, ray.direction.recip(), ray.t_min);

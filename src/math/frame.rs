@@ -1,6 +1,7 @@
 //! Placements: similarity transforms as axes at an origin.
 
 use super::{Point, Vector};
+use serde::{Deserialize, Serialize};
 
 /// A similarity placement `x ↦ origin + scale · (x·X + y·Y + z·Z)`: right- or left-handed axes of unit length.
 ///
@@ -12,7 +13,7 @@ use super::{Point, Vector};
 /// assert_eq!(frame.point(Point::new(0.0, 0.0, 5.0)), Point::new(6.0, 2.0, 3.0));
 /// assert_eq!(frame.compose(&frame.inverse()).point(Point::ONE), Point::ONE);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Image of the origin.
     pub origin: Point,

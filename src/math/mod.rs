@@ -26,6 +26,7 @@ pub use frame::Frame;
 pub(crate) use maximum::{error_of_maximum, largest_distance};
 pub use ray::{Departure, QuadHalf, Ray};
 pub use roots::{quadratic_roots, safe_newton};
+use serde::{Deserialize, Serialize};
 pub(crate) use spread::{error_of_mean, error_of_sum, variance_from_residuals, variance_of_sum};
 
 /// A position, mm.
@@ -38,7 +39,9 @@ pub type Uv = glam::DVec2;
 pub type Homogeneous = glam::DVec4;
 
 /// Identifies one placed face of a model: its position in [`crate::model::Model::placed_faces`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, NoUninit, AnyBitPattern)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, NoUninit, AnyBitPattern, Serialize, Deserialize,
+)]
 #[repr(transparent)]
 pub struct FaceId(pub u32);
 

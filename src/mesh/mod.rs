@@ -11,6 +11,7 @@ mod topology;
 
 use crate::math::{Aabb, FaceId, Point, Uv, Vector};
 use bytemuck::{AnyBitPattern, NoUninit};
+use serde::{Deserialize, Serialize};
 pub use topology::Topology;
 
 /// A mesh of quad facets; a triangle is a quad whose last two corners coincide.
@@ -25,7 +26,7 @@ pub use topology::Topology;
 /// let square = FacetMesh { positions, vertices, facets, sag: vec![] };
 /// assert_eq!((square.area(), square.topology(0..1).open_edges), (1.0, 4));
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FacetMesh {
     /// Distinct points, mm; bit-equal where faces meet.
     pub positions: Vec<Point>,
@@ -39,7 +40,7 @@ pub struct FacetMesh {
 }
 
 /// A corner of facets: a position with the normal and parameters that one face has there.
-#[derive(Clone, Copy, Debug, PartialEq, AnyBitPattern)]
+#[derive(Clone, Copy, Debug, PartialEq, AnyBitPattern, Serialize, Deserialize)]
 // As it is kept from run to run.
 #[repr(C)]
 pub struct MeshVertex {
@@ -52,7 +53,7 @@ pub struct MeshVertex {
 }
 
 /// One quad, counter-clockwise seen from outside.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, NoUninit, AnyBitPattern)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, NoUninit, AnyBitPattern, Serialize, Deserialize)]
 // As it is kept from run to run.
 #[repr(C)]
 pub struct Facet {

@@ -3,6 +3,7 @@
 use super::arrays::{ArrayReader, invalid, write_array, write_records};
 use super::{Facet, FacetMesh, MeshVertex};
 use crate::math::Point;
+use crate::math::simd::{self, Instructions, Kernel};
 use bytemuck::{AnyBitPattern, NoUninit};
 use std::io::{self, Write};
 
@@ -14,6 +15,33 @@ struct VertexRecord {
     between: u32,
     normal: [f64; 3],
     uv: [f64; 2],
+}
+
+/// The largest vertex of these facets at each corner, and their largest face.
+struct LargestNumbers<'a> {
+    facets: &'a [Facet],
+}
+
+impl Kernel for LargestNumbers<'_> {
+    type Output = [u32; 5];
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) -> [u32; 5] {
+        /// Numbers of eight facets, which are compared at once.
+        const LANES: usize = 40;
+        let (chunks, rest) = bytemuck::cast_slice::<Facet, u32>(self.facets).as_chunks::<LANES>();
+        let mut lanes = [0; LANES];
+        for chunk in chunks {
+            for lane in 0..LANES {
+                lanes[lane] = chunk[lane].max(lanes[lane]);
+            }
+        }
+        let mut largest = [0; 5];
+        for (lane, number) in lanes.iter().chain(rest).enumerate() {
+            largest[lane % 5] = largest[lane % 5].max(*number);
+        }
+        largest
+    }
 }
 
 impl FacetMesh {
@@ -46,10 +74,9 @@ impl FacetMesh {
             last_position = vertices.iter().map(|v| v.position).fold(last_position, u32::max);
         })?;
         let facets: Vec<Facet> = from.array_with(|facets: &mut [Facet]| {
-            for Facet { vertices: [a, b, c, d], face } in facets {
-                last_vertex = last_vertex.max((*a).max(*b)).max((*c).max(*d));
-                last_face = face.0.max(last_face);
-            }
+            let [vertices @ .., face] = simd::dispatch(LargestNumbers { facets });
+            last_vertex = vertices.into_iter().fold(last_vertex, u32::max);
+            last_face = face.max(last_face);
         })?;
         let sag: Vec<f64> = from.array()?;
         // Told here once for all who index by these numbers later.

@@ -4,13 +4,13 @@ use super::EdgeId;
 use crate::math::{Frame, Uv};
 use crate::mesh::FacetMesh;
 use crate::nurbs::{Surface, UvCurve, area_within, least_area_within};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
 /// Red, green, blue in `[0, 1]`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Colour(pub [f64; 3]);
 
 /// As `#rrggbb`, 255 steps a channel; values beyond `[0, 1]` are clamped.
@@ -24,7 +24,7 @@ impl fmt::Display for Colour {
 /// What a surface was before it became a spline, kept for closed-form inversion and for users.
 ///
 /// Frames and lengths are in the part's coordinates, mm; parameters follow [`crate::nurbs::sweep`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Analytic {
     /// `frame.origin + u·x + v·y`.
@@ -170,7 +170,7 @@ impl Analytic {
 }
 
 /// A trimmed surface.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Face {
     /// Name in the file, empty when it had none.
     pub name: String,
@@ -250,7 +250,7 @@ impl Face {
 const NO_AREA: f64 = 1e-12;
 
 /// A closed chain of edge uses in the parameter plane.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct TrimLoop {
     /// In order of traversal, each ending where the next begins.
     pub uses: Vec<EdgeUse>,
@@ -287,7 +287,7 @@ impl TrimLoop {
 }
 
 /// One side of an edge, as a face's loop runs along it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct EdgeUse {
     /// The edge; `None` for a pole or a joint of no length, which exists in the parameter plane alone.
     pub edge: Option<EdgeId>,
@@ -312,7 +312,7 @@ impl EdgeUse {
 }
 
 /// A face that the file gives as a ready mesh (AP242 tessellated geometry), without a surface.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TessellatedFace {
     /// Name in the file, empty when it had none.
     pub name: String,

@@ -3,22 +3,23 @@
 use super::{Colour, Face, TessellatedFace};
 use crate::math::Point;
 use crate::nurbs::Curve;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Index into [`Part::edges`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct EdgeId(pub u32);
 
 /// Index into [`Part::vertices`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct VertexId(pub u32);
 
 /// Index into [`super::Model::parts`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct PartId(pub u32);
 
 /// A shape in its own coordinates: faces share its edges and vertices.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Part {
     /// Name of the product, empty when it had none.
     pub name: String,
@@ -35,7 +36,7 @@ pub struct Part {
 }
 
 /// An edge in space, cut to its ends.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Edge {
     /// The curve; its domain is the edge's parameter interval.
     pub curve: Curve,
@@ -46,7 +47,7 @@ pub struct Edge {
 }
 
 /// A set of faces.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Shell {
     /// The faces, in the file's order.
     pub faces: Vec<Face>,

@@ -3,9 +3,10 @@
 use super::{Colour, Face, Part, PartId, SurfaceKind, TessellatedFace};
 use crate::math::{FaceId, Frame};
 use rustc_hash::FxHashMap;
+use serde::{Deserialize, Serialize};
 
 /// A CAD model: distinct parts, and where they stand.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Model {
     /// Name of the model or file.
     pub name: String,
@@ -16,7 +17,7 @@ pub struct Model {
 }
 
 /// One placed use of a part.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Instance {
     /// Name of the occurrence; the part's name when it had none.
     pub name: String,

@@ -3,6 +3,7 @@
 use super::basis::{BROAD, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, find_span};
 use crate::math::{Aabb, Homogeneous, Point};
 use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
 use std::ops::{Add, Mul, Sub};
 
 /// A homogeneous control point: `DVec4` of a space curve, `DVec3` of a curve in the parameter plane.
@@ -58,7 +59,7 @@ impl ControlPoint for DVec3 {
 }
 
 /// A rational B-spline curve with clamped ends.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spline<P> {
     /// Polynomial degree, 1 to [`MAX_DEGREE`].
     pub degree: usize,

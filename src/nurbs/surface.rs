@@ -3,6 +3,7 @@
 use super::basis::{BROAD, MIDDLE, NARROW, WIDE, basis, find_span};
 use super::{BezierPatch, ControlPoint, Curve};
 use crate::math::{Aabb, Homogeneous, Point, Uv, Vector};
+use serde::{Deserialize, Serialize};
 
 /// Derivatives whose product, or whose ratio over the whole domain, is below this share span no plane of their own.
 const NO_PLANE: f64 = 1e-10;
@@ -24,7 +25,7 @@ const NO_NORMAL: f64 = 1e-12;
 /// let (point, normal) = (ball.evaluate(uv), ball.normal(uv).unwrap());
 /// assert!((point.length() - 10.0).abs() < 1e-13 && (normal - point / 10.0).length() < 1e-13);
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Surface {
     /// Polynomial degrees in u and v, 1 to [`super::MAX_DEGREE`].
     pub degree: [usize; 2],

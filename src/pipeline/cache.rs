@@ -1,4 +1,4 @@
-//! What is built or found out once: facets, octrees and choices in a folder that runs, processes and machines may share.
+//! What is built or found out once: models, facets, octrees and choices in a folder that runs, processes and machines may share.
 //!
 //! An entry is named by a hash of all that decides it: program, kind of machine, models, settings of the mesher. It is written under
 //! another name and renamed when it is whole; of a hundred processes that start at once one builds, while the others wait for its entry
@@ -6,8 +6,9 @@
 //! for longest goes.
 //!
 //! Guarantee: a run has the same bits with and without it. Known weakness: who may write the folder is trusted with results: an entry
-//! changed on purpose may change them, though no index of it leaves its array.
+//! changed on purpose may change or end them, though no index of it leaves its array.
 
+use super::checksum::Checksum;
 use super::monitor::Monitor;
 use super::turn::Turn;
 use crate::intersect::octree::{self, Octree};
@@ -26,20 +27,19 @@ use std::time::{Duration, SystemTime};
 /// The program whose work is kept: another version, or another commit, makes its own.
 pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
 /// First bytes of an entry.
-const MAGIC: &[u8] = b"lampyris cache 3\n";
-/// Bytes of the checksum at the end of an entry.
-const CHECKSUM_BYTES: u64 = 4;
+const MAGIC: &[u8] = b"lampyris cache 4\n";
 /// Most bytes of a folder, unless another limit is given: some fifty scenes of a million facets.
 const MOST_BYTES: u64 = 20_000_000_000;
 /// After so long an entry that was never finished is of a process that is no more.
 const STALE: Duration = Duration::from_secs(86_400);
 /// Bytes that are gathered before they are written.
 const WRITTEN_AT_ONCE: usize = 1 << 20;
-/// What follows the hash in the names of entries: of facets, of octrees, and of what was chosen for a run.
+/// What follows the hash in the names of entries: of models, of facets, of octrees, and of what was chosen for a run.
+pub(super) const MODEL: &str = ".model";
 const FACETS: &str = ".facets";
 const OCTREE: &str = ".octree";
 const CHOICE: &str = ".choice";
-const KINDS: [&str; 3] = [FACETS, OCTREE, CHOICE];
+const KINDS: [&str; 4] = [MODEL, FACETS, OCTREE, CHOICE];
 /// What follows in the names of those that are not whole yet.
 const UNFINISHED: &str = ".part";
 
@@ -90,7 +90,7 @@ impl Cache {
 
     /// Returns what `fetch` finds in the entry of this name, which another process may be making and is waited for; the turn to make it
     /// where it is not kept.
-    fn fetch_or_turn<T>(&self, name: &str, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
+    pub(super) fn fetch_or_turn<T>(&self, name: &str, fetch: impl Fn() -> Option<T>) -> Result<T, Turn> {
         if let Some(kept) = fetch() {
             return Ok(kept);
         }
@@ -164,7 +164,7 @@ impl Cache {
 
     /// Reads an entry and marks it as just used; `None` where there is none, or one that is damaged or cannot be read, which is removed and
     /// told to the monitor.
-    fn fetch<T>(
+    pub(super) fn fetch<T>(
         &self,
         name: &str,
         monitor: &dyn Monitor,
@@ -189,7 +189,12 @@ impl Cache {
     }
 
     /// Writes an entry and removes what is too much; a failure is only told to the monitor.
-    fn keep(&self, name: &str, monitor: &dyn Monitor, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) {
+    pub(super) fn keep(
+        &self,
+        name: &str,
+        monitor: &dyn Monitor,
+        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) {
         // The standard library's seeded hasher is random: no further crate for a name.
         let random = RandomState::new().build_hasher().finish();
         let beside = self.folder.join(format!(".{name}.{random:016x}{UNFINISHED}"));
@@ -321,12 +326,11 @@ fn remove(file: &Path) -> io::Result<()> {
 
 /// Writes what `write` writes to a file, between magic and checksum; an error too where the disk is full.
 fn write_entry(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let mut to =
-        HashingWriter { to: BufWriter::with_capacity(WRITTEN_AT_ONCE, file), sum: crc32fast::Hasher::new() };
+    let mut to = HashingWriter { to: BufWriter::with_capacity(WRITTEN_AT_ONCE, file), sum: Checksum::new() };
     to.write_all(MAGIC)?;
     write(&mut to)?;
-    let sum = to.sum.finalize();
-    to.to.write_all(&sum.to_le_bytes())?;
+    let sum = to.sum.finish();
+    to.to.write_all(sum.as_bytes())?;
     // Dropping the buffer would hide that the disk is full.
     to.to.into_inner().map_err(|e| e.into_error())?;
     Ok(())
@@ -342,8 +346,8 @@ fn read_entry<T>(
     read: impl FnOnce(&mut ArrayReader) -> io::Result<T>,
 ) -> io::Result<T> {
     let damaged = |what: &str| io::Error::new(io::ErrorKind::InvalidData, what.to_owned());
-    let payload = bytes.checked_sub(CHECKSUM_BYTES).ok_or_else(|| damaged("cut short"))?;
-    let mut from = HashingReader { from: file, sum: crc32fast::Hasher::new() };
+    let payload = bytes.checked_sub(Checksum::CHARACTERS as u64).ok_or_else(|| damaged("cut short"))?;
+    let mut from = HashingReader { from: file, sum: Checksum::new() };
     let mut magic = vec![0; MAGIC.len()];
     from.read_exact(&mut magic)?;
     if magic != MAGIC {
@@ -351,11 +355,11 @@ fn read_entry<T>(
     }
     let made = read(&mut ArrayReader::new(&mut from, payload.saturating_sub(MAGIC.len() as u64)))?;
     // After reading: the sum is one of all that was read, and what follows must be the sum and nothing else.
-    let sum = from.sum.finalize();
-    let mut kept = [0; CHECKSUM_BYTES as usize];
+    let sum = from.sum.finish();
+    let mut kept = [0; Checksum::CHARACTERS];
     file.read_exact(&mut kept)?;
     let is_end = file.read(&mut [0])? == 0;
-    if u32::from_le_bytes(kept) != sum || !is_end {
+    if kept != sum.as_bytes() || !is_end {
         return Err(damaged("damaged: its checksum is wrong"));
     }
     Ok(made)
@@ -364,13 +368,13 @@ fn read_entry<T>(
 /// Hashes what it writes.
 struct HashingWriter<W> {
     to: W,
-    sum: crc32fast::Hasher,
+    sum: Checksum,
 }
 
 impl<W: Write> Write for HashingWriter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.to.write(bytes)?;
-        self.sum.update(&bytes[..written]);
+        self.sum.add(&bytes[..written]);
         Ok(written)
     }
 
@@ -382,13 +386,13 @@ impl<W: Write> Write for HashingWriter<W> {
 /// Hashes what it reads.
 struct HashingReader<'a> {
     from: &'a mut File,
-    sum: crc32fast::Hasher,
+    sum: Checksum,
 }
 
 impl Read for HashingReader<'_> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let read = self.from.read(bytes)?;
-        self.sum.update(&bytes[..read]);
+        self.sum.add(&bytes[..read]);
         Ok(read)
     }
 }

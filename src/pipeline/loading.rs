@@ -1,5 +1,7 @@
 //! Scenes and the models that they name.
 
+use super::cache::Cache;
+use super::cached_model::read_step;
 use super::error::Error;
 use super::monitor::{Monitor, Stage, in_stage};
 use crate::model::Model;
@@ -67,14 +69,19 @@ pub fn read_models(scene: &Scene, read: impl Fn(&ModelUse) -> Result<Import, Err
     Ok(LoadedModel { model, reports, seconds: start.elapsed().as_secs_f64(), left_out })
 }
 
-/// Reads the models that a scene names, from its folder.
+/// Reads the models that a scene names, from its folder, or takes those from the cache that it keeps.
 ///
 /// # Errors
 /// When one cannot be read, or they cannot be put together.
-pub fn read_scene_models(scene: &Scene, monitor: &dyn Monitor) -> Result<LoadedModel, Error> {
+pub fn read_scene_models(
+    scene: &Scene,
+    cache: Option<&Cache>,
+    monitor: &dyn Monitor,
+) -> Result<LoadedModel, Error> {
     read_models(scene, |entry| {
         let path = scene.resolve(&entry.file);
-        let import = in_stage(monitor, Stage::Reading(&path), || step::read(&path, &step_settings(entry)));
+        let import =
+            in_stage(monitor, Stage::Reading(&path), || read_step(&path, &step_settings(entry), cache, monitor));
         import.map_err(|e| {
             let is_limit = matches!(e.kind(), step::ErrorKind::TooManyPlaced { .. });
             let error = Error::from(e);
@@ -100,6 +107,18 @@ pub fn step_settings(entry: &ModelUse) -> step::Settings {
 /// # Errors
 /// When the file is no scene, or a model cannot be read.
 pub fn read_scene(path: &Path, monitor: &dyn Monitor) -> Result<(Scene, LoadedModel), Error> {
+    read_cached_scene(path, None, monitor)
+}
+
+/// As [`read_scene`], but takes models from the cache that it keeps, and keeps those that it does not.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_cached_scene(
+    path: &Path,
+    cache: Option<&Cache>,
+    monitor: &dyn Monitor,
+) -> Result<(Scene, LoadedModel), Error> {
     // The likely slip: the CAD file in place of the scene.
     let is = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
     if ["stp", "step", "p21"].into_iter().any(is) {
@@ -109,6 +128,6 @@ pub fn read_scene(path: &Path, monitor: &dyn Monitor) -> Result<(Scene, LoadedMo
         return Err(error.help(advice));
     }
     let scene = Scene::read(path)?;
-    let loaded = read_scene_models(&scene, monitor)?;
+    let loaded = read_scene_models(&scene, cache, monitor)?;
     Ok((scene, loaded))
 }

@@ -20,6 +20,8 @@
 
 mod accuracy_target;
 mod cache;
+mod cached_model;
+mod checksum;
 mod cross_check;
 mod default_accuracy;
 mod error;
@@ -49,7 +51,7 @@ pub use error_target::{ErrorTarget, TargetResult};
 pub use facets::{mesh_settings, tessellate_by_part, tessellate_model};
 pub use growing_search::{GrowingSearch, RunKeeper, Unkept};
 pub use intersectors::{IntersectorChoice, in_one_scene, with_intersector};
-pub use loading::{LoadedModel, read_models, read_scene, read_scene_models, step_settings};
+pub use loading::{LoadedModel, read_cached_scene, read_models, read_scene, read_scene_models, step_settings};
 pub use monitor::{Monitor, Silent, Stage};
 pub use prepared_scene::{PreparedScene, TraceRequest};
 pub use ray_recorder::RayRecorder;

@@ -38,14 +38,22 @@ pub struct Import {
 /// When the file cannot be read or is no Part 21 text. Faces that cannot be converted are no error, see
 /// [`ImportReport::refusals`].
 pub fn read(path: &Path, settings: &Settings) -> Result<Import, Error> {
-    let bytes = formats::read_bytes(path)
-        .map_err(|source| Error::new(ErrorKind::Io { path: path.to_path_buf(), source }))?;
-    let name = formats::file_name(path);
+    let (name, bytes) = read_file(path)?;
     read_bytes(&name, &bytes, settings)
 }
 
+/// Reads a file without looking at what it holds; returns the name that messages and the model bear, and the bytes.
+///
+/// # Errors
+/// When it cannot be read.
+pub(crate) fn read_file(path: &Path) -> Result<(String, Vec<u8>), Error> {
+    let bytes = formats::read_bytes(path)
+        .map_err(|source| Error::new(ErrorKind::Io { path: path.to_path_buf(), source }))?;
+    Ok((formats::file_name(path), bytes))
+}
+
 /// A hash that tells files apart, the same on every machine.
-fn hash_bytes(bytes: &[u8]) -> u64 {
+pub(super) fn hash_bytes(bytes: &[u8]) -> u64 {
     let mut hasher = FxHasher::default();
     hasher.write(bytes);
     hasher.finish()

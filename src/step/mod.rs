@@ -29,11 +29,14 @@ mod part21;
 mod product;
 mod report;
 mod settings;
+mod stored;
 mod trim;
 
 pub use error::{Error, ErrorKind};
 #[cfg(feature = "cli")]
 pub(crate) use import::peak_bytes;
+pub(crate) use import::read_file;
 pub use import::{Import, read, read_bytes};
 pub use report::{FaceCounts, ImportReport, Note, PlacedCounts, Seconds, SurfaceCounts, UnitNames};
 pub use settings::Settings;
+pub(crate) use stored::Source;

@@ -1,10 +1,10 @@
 //! The account of an import, as `info --json` prints it.
 
 use crate::model::SurfaceKind;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a file holds and what could not be read: the object of `info --json`.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ImportReport {
     /// Name of the file.
     pub file: String,
@@ -53,7 +53,7 @@ pub struct ImportReport {
 }
 
 /// Names of units.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct UnitNames {
     /// Of lengths.
     pub length: Vec<String>,
@@ -62,7 +62,7 @@ pub struct UnitNames {
 }
 
 /// The account of distinct faces: `found = converted + refused`; repaired ones are among the converted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FaceCounts {
     /// In the file.
     pub found: usize,
@@ -75,7 +75,7 @@ pub struct FaceCounts {
 }
 
 /// The account of placed faces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlacedCounts {
     /// In the file.
     pub found: usize,
@@ -84,7 +84,7 @@ pub struct PlacedCounts {
 }
 
 /// Distinct converted faces by the kind of surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[allow(missing_docs)]
 pub struct SurfaceCounts {
     pub plane: usize,
@@ -123,7 +123,7 @@ impl SurfaceCounts {
 }
 
 /// A remark about an entity.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Note {
     /// Its `#id`.
     pub id: u64,
@@ -134,7 +134,7 @@ pub struct Note {
 }
 
 /// Time taken, s.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Seconds {
     /// From bytes to records.
     pub parse: f64,

@@ -140,9 +140,11 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "suggest",
             "settings",
             "monitor",
-            "loading",
             "turn",
+            "checksum",
             "cache",
+            "cached_model",
+            "loading",
             "expected_facets",
             "facets",
             "intersectors",
@@ -466,7 +468,13 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "surfaces",
         ],
     ),
-    ("step", &["chart", "error", "mod", "part21", "geometry", "report", "settings", "trim", "product", "import"]),
+    (
+        "step",
+        &[
+            "chart", "error", "mod", "part21", "geometry", "report", "settings", "trim", "product", "import",
+            "stored",
+        ],
+    ),
     (
         "study",
         &[

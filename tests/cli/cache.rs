@@ -1,4 +1,4 @@
-//! Facets and octrees that are kept from one run to the next, with the real binary.
+//! Models, facets and octrees that are kept from one run to the next, with the real binary.
 
 use crate::growing::{lens, lens_before_a_wall};
 use crate::runs::without_times;
@@ -27,7 +27,7 @@ fn runs_are_the_same_with_a_cold_a_warm_a_damaged_and_no_cache() {
     let digest = traced(path, &[]).0["digest"].clone();
     let cold = traced(path, &["--cache", "kept"]);
     let files = entries(&path.join("kept"));
-    assert_eq!((&cold.0["digest"], files.len()), (&digest, 2), "{files:?}");
+    assert_eq!((&cold.0["digest"], files.len()), (&digest, 3), "{files:?}");
     let whole: Vec<_> = files.iter().map(|f| std::fs::read(f).unwrap()).collect();
     assert_eq!(traced(path, &["--cache", "kept"]).0["digest"], digest);
     // Damage anywhere is noticed, named and mended.
@@ -46,12 +46,12 @@ fn runs_are_the_same_with_a_cold_a_warm_a_damaged_and_no_cache() {
     }
     // Other settings and another model are other entries.
     let finer = traced(path, &["--cache", "kept", "--angle", "3"]);
-    assert_eq!(entries(&path.join("kept")).len(), 4);
+    assert_eq!(entries(&path.join("kept")).len(), 5);
     assert_eq!(finer.0["digest"], traced(path, &["--angle", "3"]).0["digest"]);
     let model = std::fs::read_to_string(path.join("model.stp")).unwrap();
     std::fs::write(path.join("model.stp"), model + "\n").unwrap();
     assert_eq!(traced(path, &["--cache", "kept"]).0["digest"], digest);
-    assert_eq!(entries(&path.join("kept")).len(), 6);
+    assert_eq!(entries(&path.join("kept")).len(), 8);
 }
 
 /// A second run takes what the pilot of the first one found, its seconds among it.
@@ -88,9 +88,9 @@ fn a_cache_is_shown_limited_and_cleared() {
     traced(path, &["--cache", "kept"]);
     std::fs::write(path.join("kept/of others.octree"), "stays").unwrap();
     let shown = show(&[]);
-    assert_eq!(shown["entries"].as_array().unwrap().len(), 2);
+    assert_eq!(shown["entries"].as_array().unwrap().len(), 3);
     assert!(shown["bytes"].as_u64().unwrap() > 1000);
-    assert_eq!(show(&["--clear"])["removed"], 2);
+    assert_eq!(show(&["--clear"])["removed"], 3);
     assert_eq!(entries(&path.join("kept")), [path.join("kept/of others.octree")]);
     // Nothing fits into a limit of nothing; the run goes on.
     let output = std::process::Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
@@ -134,7 +134,7 @@ fn processes_that_start_at_once_share_a_cache() {
     for mut process in processes {
         assert!(process.wait().unwrap().success());
     }
-    assert_eq!(entries(&path.join("kept")).len(), 2);
+    assert_eq!(entries(&path.join("kept")).len(), 3);
     let (_, err) = traced(path, &["--cache", "kept"]);
     assert!(!err.contains("built anew"), "{err}");
 }

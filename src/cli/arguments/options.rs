@@ -58,10 +58,10 @@ impl MeshingOptions {
     }
 }
 
-/// Where facets and octrees are kept from one run to the next.
+/// Where models, facets and octrees are kept from one run to the next.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct CacheOption {
-    /// Keep facets and octree in this folder, which runs and machines may share, and take them from there; by default what the
+    /// Keep model, facets and octree in this folder, which runs and machines may share, and take them from there; by default what the
     /// variable LAMPYRIS_CACHE names, else nothing is kept. At most 20 GB, or what LAMPYRIS_CACHE_GB says
     #[arg(long, help_heading = "Facets", value_name = "DIR")]
     pub(crate) cache: Option<PathBuf>,

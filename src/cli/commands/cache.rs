@@ -38,7 +38,7 @@ pub(crate) fn run(option: &CacheOption, clear: bool, console: &Console) -> Resul
         console.say(format_args!("removed {} files", grouped(removed as u64)));
     }
     print(&format!(
-        "{}: {} facets and octrees, {} of at most {}\n",
+        "{}: {} models, facets and octrees, {} of at most {}\n",
         cache.folder().display(),
         entries.len(),
         bytes(total),

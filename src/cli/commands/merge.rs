@@ -18,7 +18,7 @@ use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::usage::Usage;
 use crate::cli::work::{input_files, lost_rays, results_folder};
-use crate::pipeline::{ErrorTarget, PreparedScene, SceneJob, TraceRequest, read_scene};
+use crate::pipeline::{ErrorTarget, PreparedScene, SceneJob, TraceRequest, read_cached_scene};
 use crate::simulate::{GROWING_REPLICATE, PartialRun};
 use serde_json::json;
 use std::cell::RefCell;
@@ -54,7 +54,9 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let header: TallyHeader = PartialRun::header(&read_part(&first)?).map_err(|m| input_failure(&first, m))?;
     // The part knows where its scene was.
     let scene_path = command.scene.map_or_else(|| header.scene(), Path::to_path_buf);
-    let (mut scene, loaded) = read_scene(&scene_path, &monitor).map_err(|error| match command.scene {
+    let cache = cache_folder::cache(command.cache)?;
+    let read = read_cached_scene(&scene_path, cache.as_ref(), &monitor);
+    let (mut scene, loaded) = read.map_err(|error| match command.scene {
         Some(_) => Failure::from(error),
         None => Failure::from(error).with_help("where the scene has moved since, --scene FILE says where it is"),
     })?;
@@ -65,7 +67,6 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     }
     set_threads(None)?;
     let (meshing, tracing) = (header.meshing(), header.tracing());
-    let cache = cache_folder::cache(command.cache)?;
     let target = command.until_error.map(|text| ErrorTarget::new(text, &scene)).transpose()?;
     let job = SceneJob { meshing, tracing, cache, chosen: header.choice(), ..SceneJob::new(scene, loaded) };
     let mut prepared = PreparedScene::new(job, &monitor)?;

@@ -19,7 +19,7 @@ use crate::cli::work::threads::set_threads;
 use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards, tally_file};
 use crate::pipeline::{
     AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, SceneJob, SceneResults, TraceRequest,
-    TracingSettings, read_scene, settings_for_accuracy,
+    TracingSettings, read_cached_scene, settings_for_accuracy,
 };
 use crate::report::{grouped, seconds};
 use crate::simulate::{PartialRun, PathSink, PathVertex, Scene};
@@ -59,7 +59,8 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
     let monitor = TerminalMonitor::new(console);
-    let (mut scene, loaded) = read_scene(command.scene, &monitor)?;
+    let cache = cache_folder::cache(&extra.cache)?;
+    let (mut scene, loaded) = read_cached_scene(command.scene, cache.as_ref(), &monitor)?;
     let has_results = shard.is_none() && !is_range && replay.is_empty();
     refuse_inputs(command, &scene, has_results)?;
     // Before the search for an accuracy and the pilot, which take their time; and again once the folder is this process's own.
@@ -85,7 +86,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         tracing,
         accuracy: plan,
         chosen: if is_part { tally_file::choice_of_parts(folder) } else { None },
-        cache: cache_folder::cache(&extra.cache)?,
+        cache,
         ..SceneJob::new(scene, loaded)
     };
     let mut prepared = PreparedScene::new(job, &monitor)?;

@@ -1,4 +1,4 @@
-//! The folder in which facets and octrees are kept, where one is asked for.
+//! The folder in which models, facets and octrees are kept, where one is asked for.
 
 use crate::cli::arguments::options::CacheOption;
 use crate::cli::failure::Failure;

@@ -7,7 +7,6 @@ use super::ray_stack::{Children, RayStack};
 use super::tree::Tree;
 use crate::intersect::facet::{FacetRay, Nearest};
 use crate::math::{Point, Ray, Vector};
-use std::hint::select_unpredictable;
 
 /// Smallest component of a direction that is divided by: along it a ray moves by less than the room around boxes in 10⁵ scene
 /// sizes, and 1e12 mm times its inverse is still a number in f32.
@@ -69,7 +68,7 @@ impl<const STACK: usize> RayState<STACK> {
     }
 
     /// Puts a ray, in the mesh's coordinates, on its way and replaces the one before: next is `root`, or the end when it passes by the
-    /// whole mesh. `index` tells whose hit it will be. What differs from ray to ray is chosen without branches.
+    /// whole mesh. `index` tells whose hit it will be. What differs from ray to ray within the mesh is chosen without branches.
     #[inline(always)]
     pub(super) fn start(&mut self, tree: &Tree, root: Link, ray: &Ray, index: usize) {
         self.unmet_facet = tree.unmet_facet(ray);
@@ -87,11 +86,16 @@ impl<const STACK: usize> RayState<STACK> {
         let mesh_box = &tree.mesh_box;
         // Far origins are moved to where they enter, since f32 is good only near the mesh. Rays of one kind mostly start all inside
         // or all outside.
-        let mut meets = true;
+        self.index = index;
+        self.best = Nearest::up_to(ray.t_max);
         self.shift = 0.0;
         if !(mesh_box.holds(origin) & (ray.t_min >= 0.0)) {
             let passage = mesh_box.passage(ray, origin, inverse);
-            meets = (passage.near <= passage.far) & passage.near.is_finite();
+            // Guessed wrong at times, but most rays of a source that shines all around end here.
+            if !((passage.near <= passage.far) & passage.near.is_finite()) {
+                self.next = Link::END;
+                return;
+            }
             self.shift = passage.near;
         }
         let moved = (tree.surroundings.slack(ray) + self.shift.abs() * SHIFT_ERROR) as f32;
@@ -119,12 +123,10 @@ impl<const STACK: usize> RayState<STACK> {
         self.sieve.axes = axes.map(|a| a as u8);
         self.facets = facets;
         self.sieve.slack = moved;
-        self.best = Nearest::up_to(ray.t_max);
         self.limit_to_hit();
-        self.next = Link(select_unpredictable(meets, root.0, Link::END.0));
+        self.next = root;
         self.candidates = 0;
         self.stack.clear();
-        self.index = index;
     }
 
     /// Ends box tests at the nearest hit so far, or at the end of the ray's range: rounded up, so that ties are seen, and never to zero,

@@ -4,6 +4,7 @@
 //! Guarantee: whoever asks goes through them in the order of the scene, and leaves out none that the ray crosses; so a tally has the
 //! same bits with and without the tree.
 
+use crate::math::simd::{self, Instructions, Kernel};
 use crate::math::{Aabb, BoxTree, Ray};
 use crate::simulate::receiver::Receiver;
 use smallvec::SmallVec;
@@ -49,12 +50,34 @@ impl ReceiverIndex {
     /// Appends the receivers whose boxes the ray meets nearer than `end`, mm, to `found`, and sorts it.
     #[inline(never)]
     fn collect_candidates(&self, tree: &BoxTree, ray: &Ray, end: f64, found: &mut Candidates) {
-        let mut walk = tree.walk(&ray.with_range(0.0, end));
-        while let Some(k) = walk.next(end) {
-            found.push(self.receivers[k as usize]);
-        }
+        simd::dispatch(Crossed { receivers: &self.receivers, tree, ray, end, found });
         // In the order of the scene, or the bits of a tally would depend on the tree.
-        found.sort_unstable();
+        if found.len() > 1 {
+            found.sort_unstable();
+        }
+    }
+}
+
+/// The walk through a tree of boxes, for [`simd::dispatch`]: the four children of a node are tried at once.
+struct Crossed<'a> {
+    receivers: &'a [u32],
+    tree: &'a BoxTree,
+    ray: &'a Ray,
+    end: f64,
+    found: &'a mut Candidates,
+}
+
+impl Kernel for Crossed<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Instructions>(self) {
+        let Self { receivers, tree, ray, end, found } = self;
+        let mut walk = tree.ended_walk();
+        walk.restart(&ray.with_range(0.0, end));
+        while let Some(k) = walk.next(end) {
+            found.push(receivers[k as usize]);
+        }
     }
 }
 
