@@ -17,6 +17,7 @@ mod proof;
 mod repairs;
 mod shapes;
 mod shared_edges;
+mod strips;
 mod support;
 #[path = "../support/turned.rs"]
 mod turned;

@@ -1,0 +1,58 @@
+//! Narrow strips whose borders cross in their parameters, but not in space.
+
+use lampyris::step;
+use lampyris::tessellate::{Repair, Settings, tessellate};
+
+/// On `(u, v, 300 (v − 4 (u − ½)²))` mm, between the curve at z = 0 and the one at z = 0.12 u (1 − u): 0.03 mm high along a parabola.
+const STRIP: &str = "ISO-10303-21;
+HEADER;
+FILE_DESCRIPTION((''),'2;1');
+FILE_NAME('','',(''),(''),'','','');
+FILE_SCHEMA(('AUTOMOTIVE_DESIGN'));
+ENDSEC;
+DATA;
+#1=CARTESIAN_POINT('',(0.,0.,-300.));
+#2=CARTESIAN_POINT('',(0.,1.,0.));
+#3=CARTESIAN_POINT('',(0.5,0.,300.));
+#4=CARTESIAN_POINT('',(0.5,1.,600.));
+#5=CARTESIAN_POINT('',(1.,0.,-300.));
+#6=CARTESIAN_POINT('',(1.,1.,0.));
+#7=B_SPLINE_SURFACE_WITH_KNOTS('',2,1,((#1,#2),(#3,#4),(#5,#6)),.UNSPECIFIED.,.F.,.F.,.F.,(3,3),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED.);
+#10=VERTEX_POINT('',#2);
+#11=VERTEX_POINT('',#6);
+#12=CARTESIAN_POINT('',(0.5,-1.,0.));
+#13=B_SPLINE_CURVE_WITH_KNOTS('',2,(#2,#12,#6),.UNSPECIFIED.,.F.,.F.,(3,3),(0.,1.),.UNSPECIFIED.);
+#14=CARTESIAN_POINT('',(0.5,-0.9998,0.06));
+#15=B_SPLINE_CURVE_WITH_KNOTS('',2,(#2,#14,#6),.UNSPECIFIED.,.F.,.F.,(3,3),(0.,1.),.UNSPECIFIED.);
+#16=EDGE_CURVE('',#10,#11,#13,.T.);
+#17=EDGE_CURVE('',#10,#11,#15,.T.);
+#18=ORIENTED_EDGE('',*,*,#16,.T.);
+#19=ORIENTED_EDGE('',*,*,#17,.F.);
+#20=EDGE_LOOP('',(#18,#19));
+#21=FACE_OUTER_BOUND('',#20,.T.);
+#22=ADVANCED_FACE('',(#21),#7,.T.);
+#23=OPEN_SHELL('',(#22));
+#24=SHELL_BASED_SURFACE_MODEL('',(#23));
+#25=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));
+#26=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));
+#27=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#25,#26))REPRESENTATION_CONTEXT('',''));
+#28=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#24),#27);
+ENDSEC;
+END-ISO-10303-21;
+";
+
+/// Its area: ∫ 0.12 u (1 − u) √(1 + 64 (u − ½)²) du from 0 to 1, mm².
+const AREA: f64 = 0.037_934_848_428;
+
+#[test]
+fn a_strip_whose_border_crosses_in_parameters_is_filled_in_space() {
+    let model = step::read_bytes("strip", STRIP.as_bytes(), &step::Settings::default()).unwrap().model;
+    for tolerance in [[0.05, 0.2], [0.02, 0.02]] {
+        let made = tessellate(&model, &Settings { tolerance, measure: true, ..Settings::default() });
+        let report = &made.report;
+        assert_eq!((report.faces.failed, report.repaired.len()), (0, 1));
+        assert_eq!(report.repaired[0].how, Repair::BorderOnly);
+        assert!((report.area_mm2 / AREA - 1.0).abs() < 1e-3, "{}", report.area_mm2);
+        assert!(report.repaired[0].reached_mm <= tolerance[1]);
+    }
+}
