@@ -5,7 +5,7 @@ use super::border::edges::{self, Division, OwnDivision};
 use super::face::{self, FaceInput, Unmeshed};
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
-use super::fallback::{self, BorderInput};
+use super::fallback;
 use super::limits;
 use super::nodes::Position;
 use super::placed_part::PlacedPart;
@@ -156,33 +156,31 @@ fn mesh_with_rounds(
         }
         before = Some(PreviousRound { divisions, shared: shared.len(), meshes });
     };
-    fill_crossing_borders(part, &faces, (&divisions, &shared), &mut meshes);
-    let again = |k: usize, taken: &TakenChords| {
+    let input = |k: usize| {
         let (face, surface) = &faces[k];
         let (divisions, shared, surface) = (&divisions[..], &shared[..], surface.as_ref()?);
-        mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken })
+        Some(FaceInput { part, face, surface, divisions, shared, settings, taken: &NO_CHORDS })
     };
+    fill_crossing_borders(&mut meshes, input);
+    let again = |k: usize, taken: &TakenChords| mesh_face(&FaceInput { taken, ..input(k)? });
     let taken = take_doubled_chords(part, &mut meshes, &mut budget, again);
     let causes = exceeded_limits(&faces, too_large);
     (with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken }), asked)
 }
 
 /// Replaces, in `meshes`, faces whose borders cross in the parameter plane by a mesh of their borders alone, where that lies within the
-/// tolerance of the surface: narrow strips, whose neighbours it meets.
-fn fill_crossing_borders(
-    part: &Part,
-    faces: &[(&Face, Option<FaceSurface<'_>>)],
-    (divisions, shared): (&[Division], &[Point]),
+/// tolerance of the surface: narrow strips, whose neighbours it meets. `input` gives what a face is meshed from, by its index.
+fn fill_crossing_borders<'i, 'a: 'i>(
     meshes: &mut [Option<FaceMesh>],
+    input: impl Fn(usize) -> Option<FaceInput<'i, 'a>>,
 ) {
-    let crossing = faces.iter().zip(meshes).filter_map(|((face, surface), mesh)| {
-        let mesh = mesh.as_mut().filter(|mesh| mesh.repaired == Some(Repair::CrossingBorder))?;
-        Some((*face, surface.as_ref()?, mesh))
-    });
-    for (face, surface, mesh) in crossing {
-        let input = BorderInput { part, face, surface, divisions, shared };
-        let border = catch_panic(|| fallback::border_within_tolerance(input));
-        if let Some(border) = border.ok().flatten() {
+    for (k, mesh) in meshes.iter_mut().enumerate() {
+        let Some(mesh) = mesh.as_mut().filter(|mesh| mesh.repaired == Some(Repair::CrossingBorder)) else {
+            continue;
+        };
+        let border =
+            input(k).and_then(|input| catch_panic(|| fallback::border_within_tolerance(&input)).ok().flatten());
+        if let Some(border) = border {
             *mesh = FaceMesh { repaired: Some(Repair::BorderOnly), ..border };
         }
     }
@@ -368,7 +366,7 @@ impl Renumbering {
 /// Meshes a face by cells and transition, or else from its border alone, which is marked as repaired. `None` where neither gives facets,
 /// where the work is over its limit, and where an edge or vertex does not exist.
 pub(super) fn mesh_face(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
-    let FaceInput { part, face, surface, divisions, shared, .. } = *input;
+    let FaceInput { part, face, .. } = *input;
     let uses = || face.loops.iter().flat_map(|l| &l.uses);
     // Edges and vertices that the part does not have cannot be met.
     let exists = |e: EdgeId| {
@@ -387,7 +385,6 @@ pub(super) fn mesh_face(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
         Err(Unmeshed::TooManySteps) => return None,
     };
     // The same library may give up on the border too.
-    let input = BorderInput { part, face, surface, divisions, shared };
     let border = catch_panic(|| fallback::border_alone(input)).ok().flatten();
     border.map(|mesh| FaceMesh { repaired: Some(how), ..mesh })
 }

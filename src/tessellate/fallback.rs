@@ -4,15 +4,13 @@
 //! The border's own points are kept, so that neighbours still meet it. Nothing is proved; how far it lies from the surface is
 //! sampled ([`super::RepairedFace::reached_mm`]).
 
-use super::border::edges::Division;
 use super::border::polygons;
+use super::face::FaceInput;
 use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
-use super::face_surface::FaceSurface;
 use super::foot_search;
 use super::nodes::Position;
 use crate::math::polygon::is_inside_sides;
 use crate::math::{Point, Uv, Vector};
-use crate::model::{Face, Part};
 use crate::tessellate::proof::flat_triangle::distance_to_chord;
 use rustc_hash::FxHashMap;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -41,29 +39,18 @@ impl HasPosition for BorderCorner {
     }
 }
 
-/// A face with what its border is made of.
-#[derive(Clone, Copy)]
-pub(super) struct BorderInput<'i, 'a> {
-    pub(super) part: &'i Part,
-    pub(super) face: &'i Face,
-    pub(super) surface: &'i FaceSurface<'a>,
-    pub(super) divisions: &'i [Division],
-    /// The part's shared positions.
-    pub(super) shared: &'i [Point],
-}
-
 /// Meshes a face from its border alone, without a proof: every bound is infinite. `None` when no loop has three different places, or none
 /// of the two ways below gives triangles.
-pub(super) fn border_alone(input: BorderInput<'_, '_>) -> Option<FaceMesh> {
+pub(super) fn border_alone(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
     filled_border(input, |loops, up| planar_triangulation(loops, up).or_else(|| zigzag_triangles(loops)))
 }
 
 /// Meshes a face from its border alone, its loops filled by `fill`, which is told where their normal points.
 fn filled_border(
-    input: BorderInput<'_, '_>,
+    input: &FaceInput<'_, '_>,
     fill: impl Fn(&mut [Vec<BorderCorner>], Vector) -> Option<Vec<[BorderCorner; 3]>>,
 ) -> Option<FaceMesh> {
-    let BorderInput { part, face, surface, divisions, shared } = input;
+    let FaceInput { part, face, surface, divisions, shared, .. } = *input;
     let border =
         polygons::build(part, &polygons::loops(face), surface, divisions, &polygons::ImprintedPoints::NONE);
     let corner = |v: &polygons::PolygonVertex| {
@@ -110,8 +97,8 @@ fn filled_border(
 
 /// As [`border_alone`], where the facets lie within the tolerance of the surface, as far as samples tell; `None` elsewhere, and where no
 /// plane shows the border without a crossing, unless it is that of a strip between two edges.
-pub(super) fn border_within_tolerance(input: BorderInput<'_, '_>) -> Option<FaceMesh> {
-    let BorderInput { face, surface, shared, .. } = input;
+pub(super) fn border_within_tolerance(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
+    let FaceInput { face, surface, shared, .. } = *input;
     let is_strip = matches!(&face.loops[..], [only] if only.uses.len() == 2);
     let mesh = filled_border(input, |loops, up| {
         planar_triangulation(loops, up).or_else(|| if is_strip { zigzag_triangles(loops) } else { None })

@@ -48,9 +48,7 @@ const TABLE_WIDTH: usize = 100;
 pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completion, Failure> {
     refuse_intersector(&command.tracing)?;
     // Before any work: a folder that cannot be made would cost it.
-    let outputs = [("--rays-out", &command.rays_out), ("--disagreements", &command.disagreements)];
-    let outputs: Vec<(&str, &Path)> =
-        outputs.into_iter().filter_map(|(option, path)| path.as_deref().map(|path| (option, path))).collect();
+    let outputs = outputs_of(command);
     let guard = InputGuard::new(command.rays_in.iter().map(PathBuf::as_path).chain([command.file.as_path()]));
     for (option, path) in &outputs {
         guard.refuse(option, path)?;
@@ -91,11 +89,8 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let mut found = judge(&contenders, &rays, settings.loosest(), console);
     // Only now, as it takes no part in the comparison.
     let polish = structures.polished();
-    // Hits on the facets say nothing of those moved to the spline: these are measured by themselves.
     if normals == NormalMode::Exact {
-        let [distance, angle] = polished_errors(&*polish, exact, &rays, settings.loosest());
-        found.facets_vs_exact.t_error_mm = distance;
-        found.facets_vs_exact.normal_error_deg = angle;
+        measure_polished(&mut found, [&*polish, exact], &rays, settings.loosest());
     }
     structures.time_all(&mut found, &contenders, &*polish, &rays, console);
     // All that stand in the scene, as every other command counts them.
@@ -131,6 +126,19 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     // Last, for the answer counts although faces are missing.
     let refused = input_files::report_refusals(loaded, command.limits.max_refused, console);
     Ok(refused.and(report_defects(&found, console)))
+}
+
+/// The files that were asked for, by their options.
+fn outputs_of(command: &CheckCommand) -> Vec<(&'static str, &Path)> {
+    let outputs = [("--rays-out", &command.rays_out), ("--disagreements", &command.disagreements)];
+    outputs.into_iter().filter_map(|(option, path)| path.as_deref().map(|path| (option, path))).collect()
+}
+
+/// Measures hits moved to the spline by themselves, for those on the facets say nothing of them: `polish` against `exact`.
+fn measure_polished(found: &mut CrossCheck, [polish, exact]: [&dyn Intersector; 2], rays: &[Ray], loosest: f64) {
+    let [distance, angle] = polished_errors(polish, exact, rays, loosest);
+    found.facets_vs_exact.t_error_mm = distance;
+    found.facets_vs_exact.normal_error_deg = angle;
 }
 
 /// Asks every ray of octree, BVH and spline, and finds the causes of differences. `loosest` is the largest tolerance of the facets, mm.
