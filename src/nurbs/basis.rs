@@ -13,6 +13,9 @@ pub(super) const BROAD: usize = 14;
 /// See [`NARROW`].
 pub(super) const WIDE: usize = MAX_DEGREE + 1;
 
+/// Spans among which the right one is found by counting.
+const FEW_SPANS: usize = 16;
+
 /// Finds the index `k` of the knot span `[knots[k], knots[k + 1])` that holds `t`, never an empty one. Knots must not decrease, and leave
 /// a domain.
 ///
@@ -22,7 +25,14 @@ pub fn find_span(knots: &[f64], degree: usize, t: f64) -> usize {
     if last == degree {
         return degree;
     }
-    let mut k = knots[degree..=last].partition_point(|&x| x <= t) + degree;
+    let inner = &knots[degree..=last];
+    // A few are counted without a branch, of which a search among them would guess every other one wrong.
+    let before = if inner.len() <= FEW_SPANS {
+        inner.iter().map(|&x| usize::from(x <= t)).sum()
+    } else {
+        inner.partition_point(|&x| x <= t)
+    };
+    let mut k = before + degree;
     k = k.saturating_sub(1).clamp(degree, last);
     // A span without length holds no parameter: back to the last one that has, or on to the first.
     while k > degree && knots[k] == knots[k + 1] {

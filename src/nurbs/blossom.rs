@@ -4,6 +4,75 @@ use super::basis::{BROAD, MAX_DEGREE, MIDDLE, NARROW, WIDE, find_span};
 use super::curve::{ControlPoint, Curve, Spline};
 use smallvec::SmallVec;
 
+/// Sets `out` to the Bézier points over `[a, b]` of the polynomial piece over knot span `span`, not empty: the i-th is the blossom at p − i
+/// times `a` and i times `b`. The bits are those of [`Spline::blossom`].
+fn bezier_points<P: ControlPoint>(
+    degree: usize,
+    knots: &[f64],
+    points: &[P],
+    span: usize,
+    ends: [f64; 2],
+    out: &mut [P],
+) {
+    match degree {
+        0..NARROW => bezier_points_in::<NARROW, P>(degree, knots, points, span, ends, out),
+        NARROW..MIDDLE => bezier_points_in::<MIDDLE, P>(degree, knots, points, span, ends, out),
+        MIDDLE..BROAD => bezier_points_in::<BROAD, P>(degree, knots, points, span, ends, out),
+        _ => bezier_points_in::<WIDE, P>(degree, knots, points, span, ends, out),
+    }
+}
+
+/// As [`bezier_points`], with room for `W` points.
+fn bezier_points_in<const W: usize, P: ControlPoint>(
+    p: usize,
+    knots: &[f64],
+    points: &[P],
+    span: usize,
+    [a, b]: [f64; 2],
+    out: &mut [P],
+) {
+    // How far `a` and `b` lie along each interval of each round: the same for all points.
+    let mut shares = [[[0.0; 2]; W]; W];
+    for r in 0..p {
+        for j in 0..p - r {
+            let (lo, hi) = (knots[span - p + j + r + 1], knots[span + j + 1]);
+            shares[r][j] = [(a - lo) / (hi - lo), (b - lo) / (hi - lo)];
+        }
+    }
+    let round = |d: &mut [P; W], r: usize, end: usize| {
+        for j in 0..p - r {
+            let s = shares[r][j][end];
+            d[j] = d[j] * (1.0 - s) + d[j + 1] * s;
+        }
+    };
+    let mut at_a = [P::ZERO; W];
+    at_a[..=p].copy_from_slice(&points[span - p..=span]);
+    // After r rounds at `a`, p − r rounds at `b` end in point p − r.
+    for r in 0..=p {
+        let mut d = at_a;
+        (r..p).for_each(|q| round(&mut d, q, 1));
+        out[p - r] = d[0];
+        if r < p {
+            round(&mut at_a, r, 0);
+        }
+    }
+}
+
+/// Appends to `out` the Bézier points of a spline over each knot span that is not empty, in order.
+pub(super) fn append_bezier_pieces<P: ControlPoint>(degree: usize, knots: &[f64], points: &[P], out: &mut Vec<P>) {
+    let p = degree;
+    for k in (p..points.len()).filter(|&k| knots[k] < knots[k + 1]) {
+        // Most analytic surfaces are Bézier pieces already.
+        if knots[k + 1 - p] == knots[k] && knots[k + p] == knots[k + 1] {
+            out.extend_from_slice(&points[k - p..=k]);
+            continue;
+        }
+        let start = out.len();
+        out.resize(start + p + 1, P::ZERO);
+        bezier_points(p, knots, points, k, [knots[k], knots[k + 1]], &mut out[start..]);
+    }
+}
+
 impl<P: ControlPoint> Spline<P> {
     /// The blossom (polar form), homogeneous, of the polynomial piece over knot span `span`, not empty, at `degree` arguments.
     pub(super) fn blossom(&self, span: usize, arguments: &[f64]) -> P {
@@ -30,6 +99,13 @@ impl<P: ControlPoint> Spline<P> {
             }
         }
         d[0]
+    }
+
+    /// Control points of the Bézier piece over each non-empty knot span, in order of [`Spline::breakpoints`].
+    pub fn bezier_pieces(&self) -> Vec<Vec<P>> {
+        let mut points = Vec::new();
+        append_bezier_pieces(self.degree, &self.knots, &self.points, &mut points);
+        points.chunks_exact(self.degree + 1).map(<[P]>::to_vec).collect()
     }
 
     /// Returns the same curve over another knot vector, one that refines this one on its domain `[knots[degree], knots[n]]`.
@@ -70,13 +146,8 @@ impl<P: ControlPoint> Spline<P> {
         if !(self.knots[span] <= a && a < b && b <= self.knots[span + 1]) {
             return self.restricted_across(span, a, b);
         }
-        let mut arguments = [a; MAX_DEGREE];
-        let mut out = SmallVec::new();
-        out.push(self.blossom(span, &arguments[..p]));
-        for i in 1..=p {
-            arguments[p - i] = b;
-            out.push(self.blossom(span, &arguments[..p]));
-        }
+        let mut out = SmallVec::from_elem(P::ZERO, p + 1);
+        bezier_points(p, &self.knots, &self.points, span, [a, b], &mut out);
         out
     }
 

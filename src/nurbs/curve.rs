@@ -1,6 +1,6 @@
 //! Curves in space and in the parameter plane: one rational spline over either kind of control point.
 
-use super::basis::{BROAD, MAX_DEGREE, MIDDLE, NARROW, WIDE, basis, find_span};
+use super::basis::{BROAD, MIDDLE, NARROW, WIDE, basis, find_span};
 use crate::math::{Aabb, Homogeneous, Point};
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -183,28 +183,6 @@ impl<P: ControlPoint> Spline<P> {
         let mut b = self.knots[self.degree..=self.points.len()].to_vec();
         b.dedup();
         b
-    }
-
-    /// Control points of the Bézier piece over each non-empty knot span, in order of [`Spline::breakpoints`].
-    pub fn bezier_pieces(&self) -> Vec<Vec<P>> {
-        let p = self.degree;
-        (p..self.points.len())
-            .filter(|&k| self.knots[k] < self.knots[k + 1])
-            .map(|k| {
-                // Most analytic surfaces are Bézier pieces already.
-                if self.knots[k + 1 - p] == self.knots[k] && self.knots[k + p] == self.knots[k + 1] {
-                    return self.points[k - p..=k].to_vec();
-                }
-                // The i-th Bézier point is the blossom at i times the right end and p − i times the left one.
-                let mut arguments = [self.knots[k]; MAX_DEGREE];
-                let mut piece = vec![self.blossom(k, &arguments[..p])];
-                for i in 1..=p {
-                    arguments[p - i] = self.knots[k + 1];
-                    piece.push(self.blossom(k, &arguments[..p]));
-                }
-                piece
-            })
-            .collect()
     }
 
     /// The same curve run backwards over the same domain, with `t` mapped to `t0 + t1 − t`.

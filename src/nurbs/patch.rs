@@ -1,7 +1,8 @@
 //! Bézier patches: the polynomial pieces of a surface, evaluated in Bernstein form.
 
 use super::basis::{BROAD, MIDDLE, NARROW, WIDE};
-use super::{Curve, SecondDerivatives, Surface};
+use super::blossom::append_bezier_pieces;
+use super::{SecondDerivatives, Surface};
 use crate::math::{Aabb, Homogeneous, Uv};
 
 /// A rational Bézier patch: one polynomial piece of a surface, over local parameters `[0, 1]²`.
@@ -24,14 +25,24 @@ pub struct BezierPatch {
     pub domain: [[f64; 2]; 2],
 }
 
-/// Calls a method with tables of basis functions just wide enough for both degrees: clearing wider ones took a quarter of meshing.
+/// Calls a method with tables of basis functions just wide enough for both degrees: clearing wider ones took a quarter of meshing. The
+/// degrees of most surfaces are known to the compiler, which leaves no loops.
 macro_rules! as_wide_as_needed {
     ($patch:ident.$method:ident($($argument:expr),*)) => {
-        match $patch.degree[0].max($patch.degree[1]) {
-            0..NARROW => $patch.$method::<NARROW>($($argument),*),
-            NARROW..MIDDLE => $patch.$method::<MIDDLE>($($argument),*),
-            MIDDLE..BROAD => $patch.$method::<BROAD>($($argument),*),
-            _ => $patch.$method::<WIDE>($($argument),*),
+        match $patch.degree {
+            [1, 1] => $patch.$method::<NARROW>([1, 1], $($argument),*),
+            [1, 2] => $patch.$method::<NARROW>([1, 2], $($argument),*),
+            [2, 1] => $patch.$method::<NARROW>([2, 1], $($argument),*),
+            [2, 2] => $patch.$method::<NARROW>([2, 2], $($argument),*),
+            [1, 3] => $patch.$method::<NARROW>([1, 3], $($argument),*),
+            [3, 1] => $patch.$method::<NARROW>([3, 1], $($argument),*),
+            [3, 3] => $patch.$method::<NARROW>([3, 3], $($argument),*),
+            degree => match degree[0].max(degree[1]) {
+                0..NARROW => $patch.$method::<NARROW>(degree, $($argument),*),
+                NARROW..MIDDLE => $patch.$method::<MIDDLE>(degree, $($argument),*),
+                MIDDLE..BROAD => $patch.$method::<BROAD>(degree, $($argument),*),
+                _ => $patch.$method::<WIDE>(degree, $($argument),*),
+            },
         }
     };
 }
@@ -41,28 +52,32 @@ impl BezierPatch {
     pub(super) fn extract(surface: &Surface) -> Vec<Self> {
         let [p, q] = surface.degree;
         let [nu, nv] = surface.counts();
-        let column = |j: usize| {
-            let points = (0..nu).map(|i| surface.points[i * nv + j]).collect();
-            Curve { degree: p, knots: surface.knots[0].clone(), points }
-        };
-        // columns[j][span][i]: Bézier points in u of every column of control points.
-        let columns: Vec<Vec<Vec<Homogeneous>>> = (0..nv).map(|j| column(j).bezier_pieces()).collect();
         let (us, vs) = (surface.breakpoints(0), surface.breakpoints(1));
-        let mut patches = Vec::with_capacity((us.len() - 1) * (vs.len() - 1));
         // First in u, then each row in v: knot insertion in one direction does not see the other.
+        let mut line: Vec<Homogeneous> = Vec::with_capacity(nu.max(nv));
+        // Bézier points in u of every column of control points, column by column.
+        let mut in_u = Vec::with_capacity(nv * (us.len() - 1) * (p + 1));
+        for j in 0..nv {
+            line.clear();
+            line.extend((0..nu).map(|i| surface.points[i * nv + j]));
+            append_bezier_pieces(p, &surface.knots[0], &line, &mut in_u);
+        }
+        let column = (us.len() - 1) * (p + 1);
+        let mut patches = Vec::with_capacity((us.len() - 1) * (vs.len() - 1));
+        let mut rows = Vec::new();
         for a in 0..us.len() - 1 {
-            let rows: Vec<Vec<Vec<Homogeneous>>> = (0..=p)
-                .map(|i| {
-                    let points = columns.iter().map(|c| c[a][i]).collect();
-                    Curve { degree: q, knots: surface.knots[1].clone(), points }.bezier_pieces()
-                })
-                .collect();
+            // Bézier points in both directions, row by row.
+            rows.clear();
+            for i in 0..=p {
+                line.clear();
+                line.extend(in_u.iter().skip(a * (p + 1) + i).step_by(column));
+                append_bezier_pieces(q, &surface.knots[1], &line, &mut rows);
+            }
+            let row = (vs.len() - 1) * (q + 1);
             for b in 0..vs.len() - 1 {
-                patches.push(Self {
-                    degree: [p, q],
-                    points: rows.iter().flat_map(|r| r[b].iter().copied()).collect(),
-                    domain: [[us[a], us[a + 1]], [vs[b], vs[b + 1]]],
-                });
+                let mut points = Vec::with_capacity((p + 1) * (q + 1));
+                rows.chunks_exact(row).for_each(|r| points.extend_from_slice(&r[b * (q + 1)..][..=q]));
+                patches.push(Self { degree: [p, q], points, domain: [[us[a], us[a + 1]], [vs[b], vs[b + 1]]] });
             }
         }
         patches
@@ -74,9 +89,9 @@ impl BezierPatch {
         as_wide_as_needed!(self.jet_of_width(local))
     }
 
-    /// As [`BezierPatch::local_jet`], with room for `W` basis functions, which the degree must stay below.
-    fn jet_of_width<const W: usize>(&self, local: Uv) -> [Homogeneous; 3] {
-        let [p, q] = self.degree;
+    /// As [`BezierPatch::local_jet`], with room for `W` basis functions, which the degree, the patch's own, must stay below.
+    #[inline(always)]
+    fn jet_of_width<const W: usize>(&self, [p, q]: [usize; 2], local: Uv) -> [Homogeneous; 3] {
         let (bu, du) = bernstein_to_first::<W>(p, local.x);
         let (bv, dv) = bernstein_to_first::<W>(q, local.y);
         let mut sums = [Homogeneous::ZERO; 3];
@@ -100,9 +115,9 @@ impl BezierPatch {
         as_wide_as_needed!(self.point_of_width(local))
     }
 
-    /// As [`BezierPatch::homogeneous_point`], with room for `W` basis functions, which the degree must stay below.
-    fn point_of_width<const W: usize>(&self, local: Uv) -> Homogeneous {
-        let [p, q] = self.degree;
+    /// As [`BezierPatch::homogeneous_point`], with room for `W` basis functions, which the degree, the patch's own, must stay below.
+    #[inline(always)]
+    fn point_of_width<const W: usize>(&self, [p, q]: [usize; 2], local: Uv) -> Homogeneous {
         let bu = bernstein::<W>(p, local.x);
         let bv = bernstein::<W>(q, local.y);
         let mut sum = Homogeneous::ZERO;
@@ -118,9 +133,14 @@ impl BezierPatch {
         as_wide_as_needed!(self.lattice_of_width(u, v))
     }
 
-    /// As [`BezierPatch::homogeneous_lattice`], with room for `W` basis functions, which the degree must stay below.
-    fn lattice_of_width<const W: usize>(&self, u: [f64; 3], v: [f64; 3]) -> [[Homogeneous; 3]; 3] {
-        let [p, q] = self.degree;
+    /// As [`BezierPatch::homogeneous_lattice`], with room for `W` basis functions, which the degree, the patch's own, must stay below.
+    #[inline(always)]
+    fn lattice_of_width<const W: usize>(
+        &self,
+        [p, q]: [usize; 2],
+        u: [f64; 3],
+        v: [f64; 3],
+    ) -> [[Homogeneous; 3]; 3] {
         let (bu, bv) = (u.map(|x| bernstein::<W>(p, x)), v.map(|x| bernstein::<W>(q, x)));
         let mut sums = [[Homogeneous::ZERO; 3]; 3];
         for (i, row) in self.points.chunks_exact(q + 1).enumerate() {
@@ -139,9 +159,9 @@ impl BezierPatch {
         as_wide_as_needed!(self.second_of_width(local))
     }
 
-    /// As [`BezierPatch::second_derivatives`], with room for `W` basis functions, which the degree must stay below.
-    fn second_of_width<const W: usize>(&self, local: Uv) -> SecondDerivatives {
-        let [p, q] = self.degree;
+    /// As [`BezierPatch::second_derivatives`], with room for `W` basis functions, which the degree, the patch's own, must stay below.
+    #[inline(always)]
+    fn second_of_width<const W: usize>(&self, [p, q]: [usize; 2], local: Uv) -> SecondDerivatives {
         let (bu, bv) = (bernstein_to_second::<W>(p, local.x), bernstein_to_second::<W>(q, local.y));
         let mut sums = [Homogeneous::ZERO; 6];
         for (i, row) in self.points.chunks_exact(q + 1).enumerate() {

@@ -33,6 +33,10 @@ const SCALE_CELLS: usize = 64;
 const SCALE_PLACES: usize = 5;
 const FEW_CELLS: usize = 4;
 
+/// Scale of the parameters of planes, whose triangles may have any shape: corners around a round hole do not stand on one circle then, and
+/// exact arithmetic need not tell that they do.
+const PLANE_SCALE: Uv = Uv::new(1.0, 0.875);
+
 /// By how much what facets cover may differ from what the border bounds: share of it, and of the box around it. Corners of cells are
 /// put on corners of the border up to 1e-7 of the box away.
 const COVERED: [f64; 2] = [1e-4, 1e-6];
@@ -274,5 +278,6 @@ fn parameter_scale(surface: &FaceSurface<'_>, polygons: &BorderPolygons, cells: 
     }
     let s = sum / count;
     // The larger one stays as it is: no parameter may overflow.
-    if s.is_finite() && s.min_element() > 0.0 { s / s.max_element() } else { Uv::ONE }
+    let s = if s.is_finite() && s.min_element() > 0.0 { s / s.max_element() } else { Uv::ONE };
+    if surface.affine { s * PLANE_SCALE } else { s }
 }

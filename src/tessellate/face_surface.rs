@@ -119,6 +119,10 @@ impl<'a> FaceSurface<'a> {
 
     /// Returns the parameter that is constant along the pole on which `uv` lies, 0 for u or 1 for v; `None` off the poles.
     pub(super) fn pole(&self, uv: Uv) -> Option<usize> {
+        // Most surfaces have none, and each facet asks for all of its corners.
+        if self.pole_size == 0.0 {
+            return None;
+        }
         let domain = self.spline.domain();
         let near = |d: usize, end: usize| {
             let [a, b] = domain[d];

@@ -6,6 +6,7 @@
 
 use super::face_mesh::FaceMesh;
 use super::nodes::Position;
+use rayon::prelude::*;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use std::ops::Range;
 
@@ -82,22 +83,15 @@ impl Chords {
     /// Counts how many sides of facets each chord of the faces in `range` is, and which chords one face has twice; unmeshed faces have
     /// none.
     fn new(meshes: &[Option<FaceMesh>], range: Range<usize>) -> Self {
-        let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::default();
+        let own: Vec<(usize, FxHashMap<[u32; 2], u32>)> = range
+            .into_par_iter()
+            .with_min_len(16)
+            .filter_map(|k| Some((k, own_chords(meshes[k].as_ref()?))))
+            .collect();
+        let most = own.iter().map(|(_, chords)| chords.len()).sum();
+        let mut uses: FxHashMap<[u32; 2], u32> = FxHashMap::with_capacity_and_hasher(most, FxBuildHasher);
         let mut diagonals: Vec<(usize, [u32; 2])> = Vec::new();
-        for k in range {
-            let Some(mesh) = &meshes[k] else { continue };
-            let mut own: FxHashMap<[u32; 2], u32> = FxHashMap::default();
-            for facet in &mesh.facets {
-                let at = facet.corners.map(|c| mesh.corners[c as usize].position);
-                for i in 0..4 {
-                    if let [Position::Shared(a), Position::Shared(b)] = [at[i], at[(i + 1) % 4]]
-                        // A triangle repeats a corner: that side is none.
-                        && a != b
-                    {
-                        *own.entry([a.min(b), a.max(b)]).or_default() += 1;
-                    }
-                }
-            }
+        for (k, own) in own {
             // Counted by face first: a face that has a chord twice has it as a diagonal.
             for (chord, count) in own {
                 *uses.entry(chord).or_default() += count;
@@ -109,6 +103,24 @@ impl Chords {
         diagonals.sort_unstable();
         Self { uses, diagonals }
     }
+}
+
+/// Returns how many sides of a face's facets each chord between shared positions is.
+fn own_chords(mesh: &FaceMesh) -> FxHashMap<[u32; 2], u32> {
+    let mut own: FxHashMap<[u32; 2], u32> =
+        FxHashMap::with_capacity_and_hasher(2 * mesh.facets.len(), FxBuildHasher);
+    for facet in &mesh.facets {
+        let at = facet.corners.map(|c| mesh.corners[c as usize].position);
+        for i in 0..4 {
+            if let [Position::Shared(a), Position::Shared(b)] = [at[i], at[(i + 1) % 4]]
+                // A triangle repeats a corner: that side is none.
+                && a != b
+            {
+                *own.entry([a.min(b), a.max(b)]).or_default() += 1;
+            }
+        }
+    }
+    own
 }
 
 #[cfg(test)]

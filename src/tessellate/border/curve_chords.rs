@@ -4,9 +4,12 @@ use crate::math::{Point, Vector};
 use crate::nurbs::Curve;
 use crate::tessellate::proof::flat_triangle::distance_to_chord;
 
-/// Steps in which the shape of a piece is sampled before it is divided, and those of one among many pieces.
-const STEPS: usize = 64;
+/// Most steps in which the shape of a piece is sampled before it is divided, fewest of conics, and those of one among many pieces.
+pub(super) const STEPS: usize = 64;
+const FEWEST_STEPS: usize = 16;
 const STEPS_OF_MANY: usize = 8;
+/// Steps for each control point of conics behind the first.
+const STEPS_PER_POINT: usize = 8;
 /// Pieces from which on each is one of many.
 const MANY_PIECES: usize = 10;
 /// Tolerances vary slowly: one in so many samples asks for its own.
@@ -55,18 +58,25 @@ pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
     (0..n).filter(|&i| i == 0 || i + 1 == n || is_kink(i)).map(|i| b[i]).collect()
 }
 
+/// Returns in how many steps a curve is sampled before it is divided: few where it is an arc or two of conics, which bend evenly.
+pub(super) fn steps_of(curve: &Curve) -> usize {
+    if curve.degree > 2 { STEPS } else { (STEPS_PER_POINT * (curve.points.len() - 1)).clamp(FEWEST_STEPS, STEPS) }
+}
+
 /// Divides a curve into chords within `tolerance`, mm, a function of the parameter and the chord's direction there: spread evenly in
 /// `√(curvature / tolerance)` between `breaks`, then halved where that is not enough. Returns the parameters ascending, all `breaks`
 /// included.
 ///
-/// `breaks` are at least two, ascending. Limits on chords and halvings can leave chords that exceed the tolerance.
+/// `breaks` are at least two, ascending; each piece between is sampled in `steps` steps. Limits on chords and halvings can leave chords
+/// that exceed the tolerance.
 pub(in crate::tessellate) fn chord_parameters(
     breaks: &[f64],
+    steps: usize,
     at: impl Fn(f64) -> Point,
     tolerance: impl Fn(f64, Vector) -> f64,
 ) -> Vec<f64> {
     // Many pieces are short, and need not be looked at as closely as one.
-    let steps = if breaks.len() > MANY_PIECES { STEPS_OF_MANY } else { STEPS };
+    let steps = if breaks.len() > MANY_PIECES { STEPS_OF_MANY } else { steps };
     let mut t = vec![breaks[0]];
     for pair in breaks.windows(2) {
         if let Some(piece) = Piece::new([pair[0], pair[1]], steps, &at, &tolerance) {
@@ -165,13 +175,14 @@ impl Piece {
     fn worst_excess(&self, inner: &[f64], at: &impl Fn(f64) -> Point) -> f64 {
         let [a, b] = self.ends;
         let last = self.tolerances.len() - 1;
-        let end = |k: usize| if k == 0 { a } else { inner.get(k - 1).copied().unwrap_or(b) };
-        let excess = |k: usize| {
-            let (x, y) = (end(k), end(k + 1));
-            let i = ((0.5 * (x + y) - a) / (b - a) * last as f64) as usize;
-            distance_to_chord(at(0.5 * (x + y)), &[at(x), at(y)]) / self.tolerances[i.min(last)]
+        let (mut from, mut start) = (a, at(a));
+        let mut excess = |to: f64| {
+            let (x, p) = (std::mem::replace(&mut from, to), std::mem::replace(&mut start, at(to)));
+            let middle = 0.5 * (x + to);
+            let i = ((middle - a) / (b - a) * last as f64) as usize;
+            distance_to_chord(at(middle), &[p, start]) / self.tolerances[i.min(last)]
         };
-        (0..=inner.len()).map(excess).fold(0.0, f64::max)
+        inner.iter().chain([&b]).map(|&to| excess(to)).fold(0.0, f64::max)
     }
 }
 
@@ -240,7 +251,7 @@ mod tests {
     fn a_line_that_overshoots_its_end_and_turns_back_is_divided_at_numbers() {
         // x = 4t(1 − t) + t², which ends at 1 and comes to 4/3 on its way: no curvature, and a middle that its chord misses.
         let at = |t: f64| Point::new(4.0 * t * (1.0 - t) + t * t, 0.0, 0.0);
-        let parameters = chord_parameters(&[0.0, 1.0], at, |_, _| 0.2);
+        let parameters = chord_parameters(&[0.0, 1.0], STEPS, at, |_, _| 0.2);
         assert!(parameters.windows(2).all(|w| w[0] < w[1]), "{parameters:?}");
         // By hand: the curve lies up to 1/3 beyond the one chord, and within the tolerance of two.
         assert!(parameters.len() > 2 && parameters.iter().all(|t| (0.0..=1.0).contains(t)), "{parameters:?}");

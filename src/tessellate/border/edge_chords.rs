@@ -22,6 +22,8 @@ const HOLLOW_SLACK: f64 = 1.0;
 const UV_SHARE: f64 = 0.02;
 /// The file's own gaps by which the uv chord may leave the curve further.
 const GAP_SLACK: f64 = 2.0;
+/// Where along a chord the curve is compared with it in the parameter plane.
+const PLACES: [f64; 3] = [0.25, 0.5, 0.75];
 /// Share of the tightest tolerance within which two places on an edge are one.
 const SAME_PLACE: f64 = 1e-3;
 /// Halvings that find where an edge crosses a crease: down to the spacing of numbers.
@@ -33,13 +35,15 @@ pub(in crate::tessellate) struct EdgeSide<'s, 'a> {
     pub(in crate::tessellate) edge_use: &'s EdgeUse,
 }
 
-/// Returns the tolerance, mm of the part, for a chord along `along` (any length, not zero) at `uv` of a face: all of the face's tolerance
-/// where the surface is straight across the chord, down to half of it where it bends that way; never more than the greatest turn of normals
-/// allows.
-fn chord_tolerance(surface: &FaceSurface<'_>, uv: Uv, along: Vector) -> f64 {
+/// Returns the tolerance, mm of the part, for a chord along `along` (any length, not zero) at parameter `t` of an edge of a face: all of
+/// the face's tolerance where the surface is straight across the chord, down to half of it where it bends that way; never more than the
+/// greatest turn of normals allows.
+fn chord_tolerance(side: &EdgeSide<'_, '_>, t: f64, along: Vector) -> f64 {
+    let surface = side.surface;
     if surface.affine {
         return surface.field.loosest();
     }
+    let uv = surface.spline.clamp(side.edge_use.uv.evaluate(t));
     let xi = surface.tolerance(uv);
     let d = surface.second_derivatives(uv);
     // At poles and cusps no curvature tells; half of it is what a surface that bends across is given at least.
@@ -59,8 +63,7 @@ fn chord_tolerance(surface: &FaceSurface<'_>, uv: Uv, along: Vector) -> f64 {
 /// Returns the tolerance, mm, for a chord of an edge at its parameter `t` in direction `along` (not zero, of any length): [`EDGE_SHARE`]
 /// of the least that its faces give, quartered for each `denser`. Infinite without sides.
 fn edge_tolerance(sides: &[EdgeSide<'_, '_>], denser: u32, t: f64, along: Vector) -> f64 {
-    let each =
-        sides.iter().map(|s| chord_tolerance(s.surface, s.surface.spline.clamp(s.edge_use.uv.evaluate(t)), along));
+    let each = sides.iter().map(|s| chord_tolerance(s, t, along));
     // Half the length is a quarter of the sag: each denser round asks for chords half as long.
     EDGE_SHARE * each.fold(f64::INFINITY, f64::min) / 4f64.powi(denser as i32)
 }
@@ -75,6 +78,7 @@ pub(super) fn edge_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser:
     } else {
         curve_chords::chord_parameters(
             &curve_chords::breaks(curve),
+            curve_chords::steps_of(curve),
             |t| curve.evaluate(t),
             |t, along| edge_tolerance(sides, denser, t, along),
         )
@@ -112,19 +116,22 @@ fn follow_in_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32, 
     bisect_coarse(&mut t, |a, b| {
         let chord = [at(a), at(b)];
         let is_straight = distance_to_chord(at(0.5 * (a + b)), &chord) <= STRAIGHT_EDGE * tightest;
+        let places = PLACES.map(|f| {
+            let t = a + (b - a) * f;
+            (f, t, at(t))
+        });
         sides.iter().any(|s| {
+            let FaceSurface { spline, field, affine, .. } = s.surface;
             let (ua, ub) = (s.edge_use.uv.evaluate(a), s.edge_use.uv.evaluate(b));
-            [0.25, 0.5, 0.75].iter().any(|&f| {
-                let t = a + (b - a) * f;
-                let curve_uv = s.edge_use.uv.evaluate(t);
+            places.iter().any(|&(f, t, here)| {
+                let curve_uv = || s.edge_use.uv.evaluate(t);
                 // The face lies to the left: a curve on that side of its chord leaves a strip beside the face to the facets.
-                let hollow = is_straight
-                    && !s.surface.affine
-                    && ((ub - ua).perp_dot(curve_uv - ua) > 0.0) != s.edge_use.reversed;
-                let slack = if hollow { HOLLOW_SLACK } else { UV_SLACK } * s.surface.field.tightest() * shorter;
-                let on = s.surface.point(s.surface.spline.clamp(ua.lerp(ub, f)));
+                let hollow =
+                    is_straight && !affine && ((ub - ua).perp_dot(curve_uv() - ua) > 0.0) != s.edge_use.reversed;
+                let slack = if hollow { HOLLOW_SLACK } else { UV_SLACK } * field.tightest() * shorter;
+                let on = s.surface.point(spline.clamp(ua.lerp(ub, f)));
                 // At the same parameter it is usually close enough; only else is the nearest point looked for.
-                if (on - at(t)).length() <= slack {
+                if (on - here).length() <= slack {
                     return false;
                 }
                 let near = nearest_on(&at, a, b, on);
@@ -132,14 +139,12 @@ fn follow_in_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32, 
                 // Chords in the parameter plane need not be closer than that as long as nothing fails for it; in
                 // denser rounds they must.
                 let loose = denser == 0 && !hollow && off <= UV_SHARE * (chord[1] - chord[0]).length();
-                if off <= slack
-                    || loose
-                    || hollow
-                        && off <= HOLLOW_SLACK * s.surface.tolerance(s.surface.spline.clamp(curve_uv)) * shorter
+                let curve_uv = spline.clamp(curve_uv());
+                if off <= slack || loose || hollow && off <= HOLLOW_SLACK * s.surface.tolerance(curve_uv) * shorter
                 {
                     return false;
                 }
-                let gap = (s.surface.point(s.surface.spline.clamp(curve_uv)) - at(t)).length();
+                let gap = (s.surface.point(curve_uv) - here).length();
                 off > slack + GAP_SLACK * gap
             })
         })

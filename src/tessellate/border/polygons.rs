@@ -222,7 +222,8 @@ fn free_side(
             );
             breaks.push(1.0);
             breaks.sort_by(f64::total_cmp);
-            let mut fs = curve_chords::chord_parameters(&breaks, at, |f, _| SEAM_SHARE * surface.tolerance(uv(f)));
+            let tolerance = |f: f64, _| SEAM_SHARE * surface.tolerance(uv(f));
+            let mut fs = curve_chords::chord_parameters(&breaks, curve_chords::STEPS, at, tolerance);
             imprinted.add_samples(&mut fs, at);
             let samples: Vec<(f64, Position)> = fs[1..fs.len() - 1].iter().map(|&f| (f, own.add(at(f)))).collect();
             seams.push(SeamSide { shape, samples: samples.clone() });

@@ -1,9 +1,8 @@
 //! How far a border edge's curve strays from its chord, in space and in parameters.
 
 use super::deviation::DeviationBounds;
-use super::flat_triangle::distance_to_chord;
 use super::prover::Prover;
-use crate::math::{Homogeneous, Point, Uv};
+use crate::math::{Homogeneous, Point, Uv, Vector};
 use crate::model::EdgeUse;
 use crate::nurbs::Curve;
 use crate::tessellate::face_surface::FaceSurface;
@@ -23,6 +22,8 @@ pub(in crate::tessellate) const STRAIGHT_EDGE: f64 = 0.1;
 const SMALL_SHARE: f64 = 0.5;
 /// Halvings of one knot span, and the parts that several are cut into: coarse first, finer where that is not clearly small.
 const MAX_HALVINGS: u32 = 3;
+/// Knot spans that are parts by themselves.
+const MOST_SPANS: usize = 8;
 const PARTS: [i32; 2] = [2, 8];
 
 /// The chords of a face's border by the edge between their nodes.
@@ -122,52 +123,110 @@ impl BorderChord {
 }
 
 /// Returns a bound, mm, of the distance from the curve over `[a, b]` to a chord, by hulls of its control points: of its halves, and of
-/// finer parts where those exceed `small`.
+/// finer parts where those exceed `small`. Of one arc of a conic it is sharp.
 fn curve_deviation(curve: &Curve, [a, b]: [f64; 2], chord: &[Point; 2], small: f64) -> f64 {
-    let mut piece = curve.restricted_points(a, b);
-    // Distance to a segment is a convex function: over the hull it is largest at a control point.
-    let away =
-        |points: &[Homogeneous]| points.iter().map(|p| distance_to_chord(p.project(), chord)).fold(0.0, f64::max);
+    let frame = ChordFrame::new(chord);
+    let over = |x: f64, y: f64| frame.moved(curve.restricted_points(x, y));
+    let mut piece = over(a, b);
     let n = curve.degree;
     // A line is its own control polygon.
     if n == 1 {
-        return away(&piece);
+        return frame.farthest(&piece);
     }
-    if piece.len() != n + 1 {
-        // Several knot spans: each part has its own control points.
-        let over = |parts: i32| {
-            let cut = |k: i32| if k == parts { b } else { a + (b - a) * k as f64 / parts as f64 };
-            let parts = (0..parts).filter(|&k| cut(k) < cut(k + 1));
-            parts.map(|k| away(&curve.restricted_points(cut(k), cut(k + 1)))).fold(0.0, f64::max)
-        };
-        let coarse = over(PARTS[0]);
-        return if coarse > small { over(PARTS[1]) } else { coarse };
+    if piece.len() == n + 1 {
+        return if n == 2 { frame.conic_deviation(&piece) } else { frame.piece_deviation(&mut piece, n, small) };
     }
-    // Halves by de Casteljau, the last one first, each further halved while it is not small.
-    let mut worst = 0f64;
-    let mut depths: SmallVec<[u32; 8]> = smallvec![0];
-    while let Some(depth) = depths.pop() {
-        let start = piece.len() - n - 1;
-        let off = away(&piece[start..]);
-        // A coarse hull that is no worse than the worst so far needs no finer one.
-        if depth == MAX_HALVINGS || depth > 0 && off <= small || off <= worst {
-            worst = worst.max(off);
-            piece.truncate(start);
-            continue;
+    // Several knot spans: each part has its own control points. A few are parts by themselves.
+    let knots = curve.knots.iter().copied().filter(|&k| a < k && k < b);
+    let mut ends: SmallVec<[f64; 16]> = std::iter::once(a).chain(knots).chain([b]).collect();
+    ends.dedup();
+    if ends.len() <= MOST_SPANS + 1 {
+        let parts = ends.windows(2).map(|part| frame.piece_deviation(&mut over(part[0], part[1]), n, small));
+        return parts.fold(0.0, f64::max);
+    }
+    let in_parts = |parts: i32| {
+        let cut = |k: i32| if k == parts { b } else { a + (b - a) * k as f64 / parts as f64 };
+        let parts = (0..parts).filter(|&k| cut(k) < cut(k + 1));
+        parts.map(|k| frame.farthest(&over(cut(k), cut(k + 1)))).fold(0.0, f64::max)
+    };
+    let coarse = in_parts(PARTS[0]);
+    if coarse > small { in_parts(PARTS[1]) } else { coarse }
+}
+
+/// Coordinates in which a chord runs along x from the origin, so that distances from it need no projection.
+struct ChordFrame {
+    origin: Point,
+    axes: [Vector; 3],
+    length: f64,
+}
+
+impl ChordFrame {
+    fn new(&[a, b]: &[Point; 2]) -> Self {
+        // Ends in one place have no direction, and need none.
+        let along = (b - a).try_normalize().unwrap_or(Vector::X);
+        let (y, z) = along.any_orthonormal_pair();
+        Self { origin: a, axes: [along, y, z], length: (b - a).length() }
+    }
+
+    /// Returns control points in these coordinates.
+    fn moved(&self, mut points: SmallVec<[Homogeneous; 8]>) -> SmallVec<[Homogeneous; 8]> {
+        for c in &mut points {
+            let x = c.truncate() - self.origin * c.w;
+            *c = Point::from_array(self.axes.map(|axis| axis.dot(x))).extend(c.w);
         }
-        for k in 0..=n {
-            piece.push(piece[start + k]);
-        }
-        let (low, high) = piece[start..].split_at_mut(n + 1);
-        for step in 0..=n {
-            low[step] = high[0];
-            for k in 0..n - step {
-                high[k] = 0.5 * (high[k] + high[k + 1]);
+        points
+    }
+
+    /// Returns the square of the distance, mm², of a point in these coordinates from the chord.
+    fn distance_squared(&self, p: Point) -> f64 {
+        let beyond = (p.x - self.length).max(-p.x).max(0.0);
+        beyond * beyond + p.y * p.y + p.z * p.z
+    }
+
+    /// Returns the greatest distance, mm, of a control point from the chord. It is a convex function: no point of the curve is farther.
+    fn farthest(&self, points: &[Homogeneous]) -> f64 {
+        points.iter().map(|c| self.distance_squared(c.project())).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Returns a bound, mm, of the distance of the Bézier curve of degree `n` that `piece` holds: by hulls of its halves, further halved
+    /// while they exceed `small`. The piece is used up.
+    fn piece_deviation(&self, piece: &mut SmallVec<[Homogeneous; 8]>, n: usize, small: f64) -> f64 {
+        let mut worst = 0f64;
+        let mut depths: SmallVec<[u32; 8]> = smallvec![0];
+        // Halves by de Casteljau, the last one first.
+        while let Some(depth) = depths.pop() {
+            let start = piece.len() - n - 1;
+            let off = self.farthest(&piece[start..]);
+            // A coarse hull that is no worse than the worst so far needs no finer one.
+            if depth == MAX_HALVINGS || depth > 0 && off <= small || off <= worst {
+                worst = worst.max(off);
+                piece.truncate(start);
+                continue;
             }
+            for k in 0..=n {
+                piece.push(piece[start + k]);
+            }
+            let (low, high) = piece[start..].split_at_mut(n + 1);
+            for step in 0..=n {
+                low[step] = high[0];
+                for k in 0..n - step {
+                    high[k] = 0.5 * (high[k] + high[k + 1]);
+                }
+            }
+            depths.extend([depth + 1, depth + 1]);
         }
-        depths.extend([depth + 1, depth + 1]);
+        worst
     }
-    worst
+
+    /// Returns a bound, mm, of the distance of the rational curve of degree two with these three control points. The middle one's share of
+    /// the curve is at most ω/(1 + ω) with ω = w₁/√(w₀w₂): that cuts the corner off their triangle.
+    fn conic_deviation(&self, piece: &[Homogeneous]) -> f64 {
+        let [first, middle, last] = [0, 1, 2].map(|i| piece[i].project());
+        let omega = piece[1].w / (piece[0].w * piece[2].w).sqrt();
+        let cut = |end: Point| end.lerp(middle, omega / (1.0 + omega));
+        let corners = [first, last, cut(first), cut(last)];
+        corners.map(|p| self.distance_squared(p)).into_iter().fold(0.0, f64::max).sqrt()
+    }
 }
 
 /// Returns how far the surface over `hull`, around a curve and its `chord` in parameters, reaches beyond the curve, mm: facets that end at
@@ -219,14 +278,11 @@ fn parameter_hull(surface: &FaceSurface<'_>, side: &EdgeUse, [a, b]: [f64; 2], c
         return Vec::new();
     }
     let m = 0.5 * (a + b);
+    let over = |from: f64, to: f64| if from < to { side.uv.restricted_points(from, to) } else { SmallVec::new() };
     // Two halves hull a curve four times as closely as one, and a line as well as one.
-    let pieces = if side.uv.degree == 1 { vec![[a, b]] } else { vec![[a, m], [m, b]] };
-    let mut points: Vec<Uv> = pieces
-        .iter()
-        .filter(|p| p[0] < p[1])
-        .flat_map(|&[a, b]| side.uv.restricted_points(a, b))
-        .map(|p| surface.spline.clamp(p.truncate() / p.z))
-        .collect();
+    let halves = if side.uv.degree == 1 { [over(a, b), SmallVec::new()] } else { [over(a, m), over(m, b)] };
+    let mut points: SmallVec<[Uv; 16]> =
+        halves.iter().flatten().map(|p| surface.spline.clamp(p.truncate() / p.z)).collect();
     if points.iter().all(|&p| off(p) < STRAIGHT) {
         return Vec::new();
     }
@@ -236,21 +292,24 @@ fn parameter_hull(surface: &FaceSurface<'_>, side: &EdgeUse, [a, b]: [f64; 2], c
 }
 
 /// Returns the convex hull, counter-clockwise, without points on its sides (Andrew's monotone chain).
-fn convex_hull(mut p: Vec<Uv>) -> Vec<Uv> {
-    p.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+fn convex_hull(mut p: SmallVec<[Uv; 16]>) -> Vec<Uv> {
+    p.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     p.dedup();
-    let half = |points: &mut dyn Iterator<Item = Uv>| {
-        let mut h: Vec<Uv> = Vec::new();
-        for q in points {
-            while h.len() >= 2 && (h[h.len() - 1] - h[h.len() - 2]).perp_dot(q - h[h.len() - 1]) <= 0.0 {
-                h.pop();
+    let mut hull: Vec<Uv> = Vec::with_capacity(p.len() + 1);
+    let mut add_half = |points: &mut dyn Iterator<Item = &Uv>| {
+        let start = hull.len();
+        for &q in points {
+            while hull.len() >= start + 2
+                && (hull[hull.len() - 1] - hull[hull.len() - 2]).perp_dot(q - hull[hull.len() - 1]) <= 0.0
+            {
+                hull.pop();
             }
-            h.push(q);
+            hull.push(q);
         }
-        h.pop();
-        h
+        // The next half begins there.
+        hull.pop();
     };
-    let mut lower = half(&mut p.iter().copied());
-    lower.extend(half(&mut p.iter().rev().copied()));
-    lower
+    add_half(&mut p.iter());
+    add_half(&mut p.iter().rev());
+    hull
 }

@@ -26,7 +26,6 @@ const MAX_HALVINGS: u32 = 24;
 pub(in crate::tessellate) struct DeviationBounds {
     net: Vec<Homogeneous>,
     deviation: Vec<Point>,
-    line: Vec<Homogeneous>,
     /// Nets that wait for halving, one after another.
     stack: Vec<Point>,
     /// What `net` holds: which patch (by address), over which rectangle, seen from where.
@@ -211,17 +210,8 @@ impl DeviationBounds {
         self.net.clear();
         // Seen from the facet, so that its size and not its place decides what is rounded.
         self.net.extend(patch.points.iter().map(|c| (c.truncate() - origin * c.w).extend(c.w)));
-        for row in self.net.chunks_exact_mut(q + 1) {
-            restrict_line(row, lo.y, hi.y);
-        }
-        for j in 0..=q {
-            self.line.clear();
-            self.line.extend((0..=p).map(|i| self.net[i * (q + 1) + j]));
-            restrict_line(&mut self.line, lo.x, hi.x);
-            for (i, &c) in self.line.iter().enumerate() {
-                self.net[i * (q + 1) + j] = c;
-            }
-        }
+        (0..=p).for_each(|i| restrict_line(&mut self.net, [i * (q + 1), 1, q], lo.y, hi.y));
+        (0..=q).for_each(|j| restrict_line(&mut self.net, [j, q + 1, p], lo.x, hi.x));
         &self.net
     }
 
@@ -263,23 +253,36 @@ fn are_equal([least, most]: [f64; 2]) -> bool {
     most - least <= EQUAL_WEIGHTS * most
 }
 
-/// Replaces control points over `[0, 1]` by those over `[lo, hi]`, 0 ≤ lo < hi ≤ 1.
-fn restrict_line(line: &mut [Homogeneous], lo: f64, hi: f64) {
-    let n = line.len() - 1;
+/// Replaces control points over `[0, 1]` by those over `[lo, hi]`, 0 ≤ lo < hi ≤ 1: the `n + 1` of a net's line, from `start` on every
+/// `step`-th.
+fn restrict_line(net: &mut [Homogeneous], [start, step, n]: [usize; 3], lo: f64, hi: f64) {
+    // Known degrees leave no loops.
+    match n {
+        1 => restrict_line_of_degree(net, [start, step, 1], lo, hi),
+        2 => restrict_line_of_degree(net, [start, step, 2], lo, hi),
+        3 => restrict_line_of_degree(net, [start, step, 3], lo, hi),
+        _ => restrict_line_of_degree(net, [start, step, n], lo, hi),
+    }
+}
+
+/// As [`restrict_line`].
+#[inline(always)]
+fn restrict_line_of_degree(net: &mut [Homogeneous], [start, step, n]: [usize; 3], lo: f64, hi: f64) {
+    let line = &mut net[start..=start + n * step];
     if hi < 1.0 {
         // Left part of a cut at `hi`.
-        for step in 1..=n {
-            for k in (step..=n).rev() {
-                line[k] = line[k - 1] * (1.0 - hi) + line[k] * hi;
+        for round in 1..=n {
+            for k in (round..=n).rev() {
+                line[k * step] = line[(k - 1) * step] * (1.0 - hi) + line[k * step] * hi;
             }
         }
     }
     if lo > 0.0 {
         // Right part of a cut at `lo`, seen from the part before `hi`.
         let t = if hi < 1.0 { lo / hi } else { lo };
-        for step in 1..=n {
-            for k in 0..=n - step {
-                line[k] = line[k] * (1.0 - t) + line[k + 1] * t;
+        for round in 1..=n {
+            for k in 0..=n - round {
+                line[k * step] = line[k * step] * (1.0 - t) + line[(k + 1) * step] * t;
             }
         }
     }

@@ -53,6 +53,11 @@ pub(in crate::tessellate) fn prove_triangle(
             return proved(worst);
         }
     }
+    // A flat piece and its straight sides are as far off as its corners are, the distance being convex.
+    if surface.affine {
+        let moved = n.map(|x| (surface.point(x.uv) - x.place).length()).into_iter().fold(0.0, f64::max);
+        return proved(worst.max(moved + prover.margin));
+    }
     // Inside and sides by one quick look, else each by its own hull. With two corners in one place the linear map has no inverse, and
     // there is no quick look.
     if !collapsed && let Some(bound) = prover.facet_bound(uv, xyz, false, limit) {
