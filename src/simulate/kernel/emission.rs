@@ -9,6 +9,7 @@ use super::receivers::clip_segment;
 use super::start::start_on_face;
 use super::starting_media::{start_behind_glue, start_clear_of_faces};
 use super::tracer::Tracer;
+use crate::intersect::prefetch;
 use crate::math::Ray;
 use crate::optics::polarised::Stokes;
 use crate::simulate::emitter::{Emission, MixedPacket, Portion, RaySampler};
@@ -128,6 +129,8 @@ impl SourceQueue {
         mixed.clear();
         while self.mixes && !mixed.is_full() && self.source < self.last {
             let emitter = &context.bound.emitters[self.source];
+            // Its rays start out of turn, when more sources than a cache holds have been looked at.
+            prefetch(&context.bound.emitters, self.source);
             mixed.add(emitter, self.portion(context), self.range[0], &mut self.next);
             if self.next >= self.range[1] {
                 self.enter_source(context, self.source + 1);
