@@ -197,7 +197,8 @@ impl<P: ControlPoint> Spline<P> {
                 }
                 // The i-th Bézier point is the blossom at i times the right end and p − i times the left one.
                 let mut arguments = [self.knots[k]; MAX_DEGREE];
-                let mut piece = vec![self.blossom(k, &arguments[..p])];
+                let mut piece = Vec::with_capacity(p + 1);
+                piece.push(self.blossom(k, &arguments[..p]));
                 for i in 1..=p {
                     arguments[p - i] = self.knots[k + 1];
                     piece.push(self.blossom(k, &arguments[..p]));

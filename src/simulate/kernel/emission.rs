@@ -17,6 +17,9 @@ use crate::simulate::outcome::{Event, LostCause};
 use crate::simulate::scene::Sampling;
 use crate::simulate::tally::quanta_as_integer;
 
+/// Sources before its turn at which one is asked for, where each has few rays: half a kilobyte each, they fill more than a second cache.
+const AHEAD: usize = 8;
+
 /// Goes through the rays of one replicate, source by source.
 pub(super) struct SourceQueue {
     replicate: u32,
@@ -129,8 +132,8 @@ impl SourceQueue {
         mixed.clear();
         while self.mixes && !mixed.is_full() && self.source < self.last {
             let emitter = &context.bound.emitters[self.source];
-            // Its rays start out of turn, when more sources than a cache holds have been looked at.
-            prefetch(&context.bound.emitters, self.source);
+            // Its rays start out of turn, so that no pattern tells the processor what is read next.
+            prefetch(&context.bound.emitters, self.source + AHEAD);
             mixed.add(emitter, self.portion(context), self.range[0], &mut self.next);
             if self.next >= self.range[1] {
                 self.enter_source(context, self.source + 1);
