@@ -55,8 +55,8 @@ impl<'m> Tree<'m> {
     }
 }
 
-/// Reads what is at the head of a tree: its statistics and the box around the usable positions of its mesh; an error where there are not as
-/// many numbers as that takes.
+/// Reads what is at the head of a tree: its statistics and the box around the usable positions of its mesh; an error where the number of
+/// numbers is wrong.
 fn read_head(from: &mut ArrayReader) -> io::Result<(Statistics, Aabb)> {
     let counts: Vec<u64> = from.array()?;
     let bounds: Vec<Point> = from.array()?;

@@ -53,8 +53,8 @@ pub(super) fn sort_by_cell<const CELLS: usize>(cells: &[u16], order: &mut [u32])
     }
 }
 
-/// Returns the first of the two dimensions by which rays of a source that asks for these pairs are put in order: of the direction, or of the
-/// place where no direction is drawn; `None` where neither is, as of a list, whose rays keep their order.
+/// Returns the first of the two dimensions by which rays of a source that asks for these pairs are put in order: of the direction, or of
+/// the place where no direction is drawn; `None` where neither is, as of a list, whose rays keep their order.
 #[inline(always)]
 pub(super) fn sorted_dimension([place, direction, _]: [bool; 3]) -> Option<usize> {
     // The direction decides most of what a ray meets; where all have one, the place does.
