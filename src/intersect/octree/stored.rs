@@ -34,8 +34,8 @@ impl<'m> Tree<'m> {
     /// Reads a tree of `mesh`, and its statistics.
     ///
     /// # Errors
-    /// When it cannot be read, or its links could lead nowhere or beyond the mesh. That its boxes hold the facets is not checked, nor the box
-    /// around the mesh and the depth: walks of a tree that is deeper than it says miss facets, but end.
+    /// When it cannot be read, or its links could lead nowhere or beyond the mesh. That its boxes hold the facets is not checked, nor the
+    /// box around the mesh and the depth: walks of a tree that is deeper than it says miss facets, but end.
     pub(super) fn read_arrays(mesh: &'m FacetMesh, from: &mut ArrayReader) -> io::Result<(Self, Statistics)> {
         let (statistics, bounds) = read_head(from)?;
         let root = from.array::<u32>()?.first().map(|&link| Link(link));
