@@ -1,4 +1,5 @@
 //! A run has no more threads than are asked for, from the reading of its files on.
+#![cfg(target_os = "linux")]
 
 use crate::files::fixture;
 use std::fs;
@@ -11,7 +12,6 @@ fn threads(process: u32) -> Vec<String> {
 }
 
 #[test]
-#[cfg(target_os = "linux")]
 fn one_thread_is_all_that_works() {
     let folder = tempfile::tempdir().unwrap();
     let mut run = Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
