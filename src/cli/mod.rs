@@ -17,6 +17,7 @@ mod output;
 mod work;
 
 use crate::formats::{is_unprintable, printable};
+use crate::math::huge_pages;
 use crate::tessellate::is_panic_guarded;
 use crate::truck::baseline;
 use arguments::command::Arguments;
@@ -32,6 +33,7 @@ use std::process::ExitCode;
 /// Exit codes: 0 done, 1 failed while running, 2 wrong arguments or scene, 3 input unreadable or not STEP, 4 done but more
 /// was refused or lost than `--max-refused` and `--max-lost` allow.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    huge_pages::prepare_heap();
     let typed: Vec<OsString> = arguments.into_iter().collect();
     let arguments = match Arguments::try_parse_from(&typed) {
         Ok(arguments) => arguments,

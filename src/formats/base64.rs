@@ -1,5 +1,17 @@
 //! Bytes as text, for data that stands within HTML, SVG and VTK files.
 
+/// The two letters of each number of twelve bits: by single ones a map of cells took a quarter of the time of all its files.
+static PAIRS: [[u8; 2]; 1 << 12] = {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut pairs = [[0; 2]; 1 << 12];
+    let mut bits = 0;
+    while bits < pairs.len() {
+        pairs[bits] = [ALPHABET[bits >> 6], ALPHABET[bits & 63]];
+        bits += 1;
+    }
+    pairs
+};
+
 /// Encodes bytes in standard base64 (RFC 4648 §4, with padding), on one line; no bytes give an empty text.
 ///
 /// ```
@@ -7,11 +19,11 @@
 /// assert_eq!(["f", "fo", "foobar"].map(|text| lampyris::formats::base64(text.as_bytes())), ["Zg==", "Zm8=", "Zm9vYmFy"]);
 /// ```
 pub fn base64(bytes: &[u8]) -> String {
-    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     // Three bytes are 24 bits, which four letters of six bits take.
     let letters = |[a, b, c]: [u8; 3]| {
         let word = u32::from_be_bytes([0, a, b, c]);
-        [18, 12, 6, 0].map(|shift| ALPHABET[(word >> shift & 63) as usize])
+        let [[a, b], [c, d]] = [word >> 12, word].map(|bits| PAIRS[bits as usize % PAIRS.len()]);
+        [a, b, c, d]
     };
     let mut text = vec![b'='; bytes.len().div_ceil(3) * 4];
     let (slots, _) = text.as_chunks_mut::<4>();

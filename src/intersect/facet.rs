@@ -81,7 +81,11 @@ impl<'m> Surroundings<'m> {
     /// Takes the bounds of all usable positions, and 2⁻⁴⁰ of the largest coordinate as the reach, 0 without positions: a start is a
     /// rounded `origin + t·direction`, and this covers rays a thousand times longer than the scene. For a lamp it is a picometre.
     pub(crate) fn new(mesh: &'m FacetMesh) -> Self {
-        let bounds = simd::dispatch(UsableBounds { points: &mesh.positions });
+        Self::with_bounds(mesh, simd::dispatch(UsableBounds { points: &mesh.positions }))
+    }
+
+    /// As [`Self::new`], where the bounds of all usable positions are known.
+    pub(crate) fn with_bounds(mesh: &'m FacetMesh, bounds: Aabb) -> Self {
         let largest = if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
         Self { mesh, reach: largest * REACH, bounds }
     }

@@ -27,7 +27,7 @@ use std::time::{Duration, SystemTime};
 /// The program whose work is kept: another version, or another commit, makes its own.
 pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
 /// First bytes of an entry.
-const MAGIC: &[u8] = b"lampyris cache 4\n";
+const MAGIC: &[u8] = b"lampyris cache 5\n";
 /// Most bytes of a folder, unless another limit is given: some fifty scenes of a million facets.
 const MOST_BYTES: u64 = 20_000_000_000;
 /// After so long an entry that was never finished is of a process that is no more.

@@ -65,29 +65,47 @@ pub(crate) struct NearestOnFace {
     pub(crate) uv: Uv,
 }
 
-/// Finds the point of a trimmed face that is nearest to `p`, both in the coordinates of the part; `loops` are its trims as polygons in
-/// parameters. `None` only where there is no sample inside them and no border.
-pub(crate) fn nearest_on_face(face: &Face, loops: &[Vec<Uv>], p: Point) -> Option<NearestOnFace> {
-    let s = &face.surface;
-    let [[u0, u1], [v0, v1]] = s.domain();
-    let at = |uv: Uv| NearestOnFace { distance: s.evaluate(uv).distance(p), uv };
-    let nearer = |a: &NearestOnFace, b: &NearestOnFace| a.distance.total_cmp(&b.distance);
-    // The nearest point is a foot inside the trims or lies on them.
-    let border = loops.iter().flatten().map(|&uv| at(uv)).min_by(nearer);
-    let grid = (0..SAMPLES * SAMPLES).map(|i| {
+/// Where searches for the nearest point of a trimmed face begin: worked out once for all that is asked of the face.
+#[derive(Clone, Debug)]
+pub(crate) struct FaceSamples {
+    /// The trims as polygons in parameters.
+    loops: Vec<Vec<Uv>>,
+    /// Corners of these, and a grid over the whole surface, in the coordinates of the part.
+    border: Vec<(Uv, Point)>,
+    grid: Vec<(Uv, Point)>,
+}
+
+impl FaceSamples {
+    /// Takes the samples of a face with these trims.
+    pub(crate) fn new(face: &Face, loops: Vec<Vec<Uv>>) -> Self {
+        let surface = &face.surface;
+        let sample = |uv: Uv| (uv, surface.evaluate(uv));
+        let [[u0, u1], [v0, v1]] = surface.domain();
         let middle = |k: usize, a: f64, b: f64| a + (b - a) * (k as f64 + 0.5) / SAMPLES as f64;
-        Uv::new(middle(i / SAMPLES, u0, u1), middle(i % SAMPLES, v0, v1))
-    });
-    // Whether a sample lies inside costs more than its distance: only those nearer than all before are asked.
-    let mut start: Option<NearestOnFace> = None;
-    for uv in grid {
-        let sample = at(uv);
-        if start.is_none_or(|nearest| nearer(&sample, &nearest).is_lt()) && is_inside_polygons(loops, uv) {
-            start = Some(sample);
-        }
+        let grid = (0..SAMPLES * SAMPLES)
+            .map(|i| sample(Uv::new(middle(i / SAMPLES, u0, u1), middle(i % SAMPLES, v0, v1))))
+            .collect();
+        Self { border: loops.iter().flatten().map(|&uv| sample(uv)).collect(), grid, loops }
     }
-    let foot = foot_from(face, |uv| is_inside_polygons(loops, uv), p, start.or(border)?);
-    Some(border.filter(|border| nearer(border, &foot).is_lt()).unwrap_or(foot))
+
+    /// Finds the point of the face that is nearest to `p`, both in the coordinates of the part; `face` is the one that the samples are of.
+    /// `None` only where there is no sample inside the trims and no border.
+    pub(crate) fn nearest(&self, face: &Face, p: Point) -> Option<NearestOnFace> {
+        let at = |&(uv, point): &(Uv, Point)| NearestOnFace { distance: point.distance(p), uv };
+        let nearer = |a: &NearestOnFace, b: &NearestOnFace| a.distance.total_cmp(&b.distance);
+        let is_inside = |uv: Uv| is_inside_polygons(&self.loops, uv);
+        // The nearest point is a foot inside the trims or lies on them.
+        let border = self.border.iter().map(at).min_by(nearer);
+        // Whether a sample lies inside costs more than its distance: only those nearer than all before are asked.
+        let mut start: Option<NearestOnFace> = None;
+        for sample in self.grid.iter().map(at) {
+            if start.is_none_or(|nearest| nearer(&sample, &nearest).is_lt()) && is_inside(sample.uv) {
+                start = Some(sample);
+            }
+        }
+        let foot = foot_from(face, is_inside, p, start.or(border)?);
+        Some(border.filter(|border| nearer(border, &foot).is_lt()).unwrap_or(foot))
+    }
 }
 
 /// Goes from a point of the face towards the foot of the perpendicular from `p` by Gauss–Newton; returns the nearest point inside the

@@ -30,6 +30,10 @@ impl PowerScale {
 
     /// Returns the standard error of [`Self::power`], without the spread that replicates of unequal size have by that alone.
     pub(crate) fn error(&self, sum: &Sum) -> f64 {
+        // Most cells of a short run, whose results took longer than a fifth of its rays.
+        if sum.total == 0 {
+            return 0.0;
+        }
         let spread = sum.error(self.replicates).powi(2);
         // Numbers of rays are not drawn: both spreads are independent, and their squares add up.
         let due_to_size = (self.size_spread * sum.total as f64).powi(2);

@@ -109,7 +109,7 @@ impl ChannelResult {
     fn new(
         r: &Receiver,
         (c, total, sums): (usize, &Sum, &[Sum]),
-        (scale, per): (&PowerScale, &impl Fn(usize) -> f64),
+        (scale, per): (&PowerScale, &[f64]),
         unit: &'static str,
     ) -> Self {
         let worth = r.channels.worth();
@@ -118,8 +118,8 @@ impl ChannelResult {
             unit,
             total: scale.power(total) * worth,
             error: scale.error(total) * worth,
-            cells: sums.iter().enumerate().map(|(k, s)| scale.power(s) * per(k) * worth).collect(),
-            errors: sums.iter().enumerate().map(|(k, s)| scale.error(s) * per(k) * worth).collect(),
+            cells: sums.iter().enumerate().map(|(k, s)| scale.power(s) * per[k] * worth).collect(),
+            errors: sums.iter().enumerate().map(|(k, s)| scale.error(s) * per[k] * worth).collect(),
         }
     }
 }
@@ -181,19 +181,20 @@ impl ReceiverResult {
         let grid = r.cells.map(|n| n as usize);
         let ShapeUnits { kind, unit, scale, half, middle, angles } = ShapeUnits::new(&r.shape, unit);
         // Power of a cell to its mean density: per area, or per solid angle for a far field.
-        let measure = |k: usize| r.measure(k % grid[0], k / grid[0]);
-        let off: Vec<usize> = (0..r.cell_count()).filter(|&k| measure(k) == 0.0).collect();
+        let measures: Vec<f64> = (0..r.cell_count()).map(|k| r.measure(k % grid[0], k / grid[0])).collect();
+        let off: Vec<usize> = (0..measures.len()).filter(|&k| measures[k] == 0.0).collect();
         // No light is counted off a disc: nothing over nothing stays nothing.
-        let per = |k: usize| if measure(k) > 0.0 { scale / measure(k) } else { 0.0 };
+        let density = |&measure: &f64| if measure > 0.0 { scale / measure } else { 0.0 };
+        let per: Vec<f64> = measures.iter().map(density).collect();
         let (sums, further) = tallies.cells[i].split_at(r.cell_count());
         let photometric = if scale == 1.0 { "cd" } else { "lx" };
         let channel_unit = if r.channels.worth() == 1.0 { unit } else { photometric };
         let channel = |(c, sums)| {
-            ChannelResult::new(r, (c, &tallies.channels[i][c], sums), (power_scale, &per), channel_unit)
+            ChannelResult::new(r, (c, &tallies.channels[i][c], sums), (power_scale, &per[..]), channel_unit)
         };
         let channels = further.chunks(r.cell_count()).enumerate().map(channel).collect();
-        let cells: Vec<f64> = sums.iter().enumerate().map(|(k, s)| power_scale.power(s) * per(k)).collect();
-        let errors = sums.iter().enumerate().map(|(k, s)| power_scale.error(s) * per(k)).collect();
+        let cells: Vec<f64> = sums.iter().enumerate().map(|(k, s)| power_scale.power(s) * per[k]).collect();
+        let errors = sums.iter().enumerate().map(|(k, s)| power_scale.error(s) * per[k]).collect();
         let total = &tallies.receivers[i];
         let means = tallies.moments[i].means(total.total);
         // A mean square is no less than the square of the mean, by whatever units both are counted in.
@@ -233,7 +234,7 @@ impl ReceiverResult {
             cells,
             errors,
             ray_power: ray * power_scale.quantum,
-            ray_cells: (0..r.cell_count()).map(|k| ray * power_scale.quantum * per(k)).collect(),
+            ray_cells: per.iter().map(|per| ray * power_scale.quantum * per).collect(),
             off,
         };
         result.max = result.cells_with_even_poles()[0].iter().copied().fold(0.0, f64::max);

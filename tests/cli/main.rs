@@ -24,3 +24,4 @@ mod runs;
 mod scene;
 mod studies;
 mod support;
+mod threads;

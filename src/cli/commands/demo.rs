@@ -45,13 +45,13 @@ pub(crate) fn run(
     for (name, content) in [(MODEL_NAME, LAMP), (SCENE_NAME, scene_text.as_bytes())] {
         refuse_replacing(&folder.join(name), content)?;
     }
+    set_threads(tracing.threads)?;
     let (scene, loaded) = lamp()?;
     let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();
     let say_step = |name: &str, what: String, time: f64| {
         console.say(format_args!("  {name:<12} {what:<58} {:>9}", seconds(time)));
     };
     say_step("read", format!("{faces} faces of {} parts", loaded.model.parts.len()), loaded.seconds);
-    set_threads(tracing.threads)?;
     let monitor = TerminalMonitor::new(console);
     let job = SceneJob { meshing, tracing, ..SceneJob::new(scene, loaded) };
     let prepared = PreparedScene::new(job, &monitor)?;

@@ -55,6 +55,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     // The part knows where its scene was.
     let scene_path = command.scene.map_or_else(|| header.scene(), Path::to_path_buf);
     let cache = cache_folder::cache(command.cache)?;
+    set_threads(None)?;
     let read = read_cached_scene(&scene_path, cache.as_ref(), &monitor);
     let (mut scene, loaded) = read.map_err(|error| match command.scene {
         Some(_) => Failure::from(error),
@@ -65,7 +66,6 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     if !is_tally(command.folder) {
         results_folder::refuse_inputs(&scene, &scene_path, command.folder)?;
     }
-    set_threads(None)?;
     let (meshing, tracing) = (header.meshing(), header.tracing());
     let target = command.until_error.map(|text| ErrorTarget::new(text, &scene)).transpose()?;
     let job = SceneJob { meshing, tracing, cache, chosen: header.choice(), ..SceneJob::new(scene, loaded) };

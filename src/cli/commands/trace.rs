@@ -58,6 +58,8 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     if extra.checkpoint.is_nan() || extra.checkpoint < 0.0 {
         return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
+    // Reading is done by these threads too.
+    set_threads(command.tracing.threads)?;
     let monitor = TerminalMonitor::new(console);
     let cache = cache_folder::cache(&extra.cache)?;
     let (mut scene, loaded) = read_cached_scene(command.scene, cache.as_ref(), &monitor)?;
@@ -77,7 +79,6 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         return Err(Failure::arguments(message)
             .with_help("give --tolerance and --normals with --shard, --resume and --rays A..B"));
     }
-    set_threads(command.tracing.threads)?;
     let requested = (command.meshing.clone(), command.tracing.clone());
     let AccurateSettings { meshing, tracing, plan } =
         settings_for_accuracy(accuracy, requested, Some(&scene), &loaded.model, &monitor)?;

@@ -60,14 +60,19 @@ impl PatchLeaves {
         }
     }
 
-    /// Appends those of further patches, whose nets come to stand behind its own; `patch_points` is the length of [`Geometry::nets`].
+    /// Makes room for those of further patches.
+    fn make_room(&mut self, more: &[Self]) {
+        let count = |of: fn(&Self) -> usize| more.iter().map(of).sum();
+        make_room(&mut self.leaves, count(|one| one.leaves.len()));
+        make_room(&mut self.linearizations, count(|one| one.linearizations.len()));
+        make_room(&mut self.boxes, count(|one| one.boxes.len()));
+        make_room(&mut self.nets, count(|one| one.nets.len()));
+    }
+
+    /// Appends those of a further patch, whose nets come to stand behind its own; `patch_points` is the length of [`Geometry::nets`].
     fn append(&mut self, other: Self, patch_points: u32) {
         let offset = self.nets.len() as u32;
         let moved = |net: u32| if net < patch_points { net } else { net + offset };
-        make_room(&mut self.leaves, other.leaves.len());
-        make_room(&mut self.linearizations, other.linearizations.len());
-        make_room(&mut self.boxes, other.boxes.len());
-        make_room(&mut self.nets, other.nets.len());
         let first = self.leaves.len();
         self.leaves.extend(other.leaves);
         self.linearizations.extend(other.linearizations);
@@ -158,6 +163,7 @@ pub(super) fn subdivide_up_to(geometry: &Geometry, flatness: Flatness, most: usi
         if leaves.load(Ordering::Relaxed) > most {
             return None;
         }
+        all.make_room(&cut);
         cut.into_iter().for_each(|one| all.append(one, geometry.nets.len() as u32));
     }
     all.leaves.shrink_to_fit();

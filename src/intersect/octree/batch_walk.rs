@@ -22,7 +22,7 @@ const AHEAD: usize = 8;
 pub(super) type States<const STACK: usize> = [RayState<STACK>; WIDTH];
 
 /// Walks the rays of a batch whose places are in `order`, all steps of a kind in a row, and writes their hits; other entries of `hits`
-/// stay.
+/// stay, and so may those of rays without one.
 #[inline(always)]
 pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
     tree: &Tree,
@@ -63,7 +63,12 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
         for ray in take(&mut queues.end) {
             let s = &mut states[ray];
             hits[s.index] = s.best.hit();
-            if let Some(&place) = order.get(next) {
+            // What passes by the mesh is answered, and its place free, at once: most rays of a source that shines all around are.
+            loop {
+                let Some(&place) = order.get(next) else {
+                    live -= 1;
+                    break;
+                };
                 let place = usize::from(place);
                 // Long before its turn, for neither a ray nor what is known of the facet that it leaves is in the cache.
                 if let Some(&place) = order.get(next + 2 * AHEAD) {
@@ -73,10 +78,11 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
                     prefetch(&tree.slopes, from.primitive as usize);
                 }
                 s.start(tree, root, &rays[place], place);
-                ways.note(ray, s.next);
                 next += 1;
-            } else {
-                live -= 1;
+                if s.next != Link::END {
+                    ways.note(ray, s.next);
+                    break;
+                }
             }
         }
         queues.put(&ways);

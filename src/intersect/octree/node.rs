@@ -134,15 +134,6 @@ impl Node {
         (0..CHILDREN).filter(move |slot| used >> slot & 1 == 1)
     }
 
-    /// The slots in use whose children are nodes, one bit for each.
-    #[inline(always)]
-    pub(super) fn inner_slots(&self) -> u32 {
-        let nodes = (self.children.iter().enumerate())
-            .fold(0, |bits, (slot, &child)| bits | u32::from(Link(child).is_node()) << slot);
-        // In this order: of a damaged node more bits may be set than it has slots.
-        nodes & self.used
-    }
-
     /// A node without children whose grid spans the box `all`, relative to the middle of the mesh.
     pub(super) fn bounding(all: &Box32) -> Self {
         let mut node = Self::EMPTY;

@@ -1,12 +1,13 @@
 //! A tree as bytes and back, to be kept from one run to the next: what is read is walked only where every link leads down and
 //! every index lies within the mesh.
 
-use super::node::{Block, Link, Node};
+use super::node::{Block, CHILDREN, Link, Node, Target};
 use super::statistics::Statistics;
 use super::tree::Tree;
 use crate::intersect::facet::Surroundings;
 use crate::intersect::slopes::Slopes;
 use crate::math::simd::{self, Instructions, Kernel};
+use crate::math::{Aabb, Point};
 use crate::mesh::FacetMesh;
 use crate::mesh::arrays::{ArrayReader, invalid, write_array};
 use std::io::{self, Write};
@@ -21,6 +22,8 @@ impl<'m> Tree<'m> {
         let counts: Vec<u64> =
             [nodes, blocks, references, left_out].into_iter().chain(fill).map(|n| *n as u64).collect();
         write_array(to, &counts)?;
+        let bounds = self.surroundings.bounds;
+        write_array(to, &[bounds.min, bounds.max])?;
         write_array(to, &depths.iter().map(|n| *n as u64).collect::<Vec<u64>>())?;
         write_array(to, &self.root.iter().map(|link| link.0).collect::<Vec<u32>>())?;
         write_array(to, &self.nodes)?;
@@ -31,9 +34,10 @@ impl<'m> Tree<'m> {
     /// Reads a tree of `mesh`, and its statistics.
     ///
     /// # Errors
-    /// When it cannot be read, or its links could lead nowhere or beyond the mesh. That its boxes hold the facets is not checked.
+    /// When it cannot be read, or its links could lead nowhere or beyond the mesh. That its boxes hold the facets is not checked, nor the
+    /// box around the mesh and the depth: walks of a tree that is deeper than it says miss facets, but end.
     pub(super) fn read_arrays(mesh: &'m FacetMesh, from: &mut ArrayReader) -> io::Result<(Self, Statistics)> {
-        let statistics = read_statistics(from)?;
+        let (statistics, bounds) = read_head(from)?;
         let root = from.array::<u32>()?.first().map(|&link| Link(link));
         let mut links = LinkCheck::default();
         let nodes: Vec<Node> = from.array_with(|nodes| links.take(nodes))?;
@@ -46,18 +50,23 @@ impl<'m> Tree<'m> {
         if !is_tree {
             return Err(invalid("no octree of this mesh"));
         }
-        Ok((Self::new(Surroundings::new(mesh), nodes, blocks, root, slopes), statistics))
+        let surroundings = Surroundings::with_bounds(mesh, bounds);
+        Ok((Self::new(surroundings, nodes, blocks, (root, statistics.depth()), slopes), statistics))
     }
 }
 
-/// Reads the statistics at the head of a tree; an error where their number is wrong.
-fn read_statistics(from: &mut ArrayReader) -> io::Result<Statistics> {
+/// Reads what is at the head of a tree: its statistics and the box around the usable positions of its mesh; an error where the number of
+/// numbers is wrong.
+fn read_head(from: &mut ArrayReader) -> io::Result<(Statistics, Aabb)> {
     let counts: Vec<u64> = from.array()?;
+    let bounds: Vec<Point> = from.array()?;
     let depths: Vec<u64> = from.array()?;
-    let counts: [u64; 8] = counts.try_into().map_err(|_| invalid("no octree"))?;
+    let (Ok(counts), Ok([min, max])) = (<[u64; 8]>::try_from(counts), <[Point; 2]>::try_from(bounds)) else {
+        return Err(invalid("no octree"));
+    };
     let [nodes, blocks, references, left_out, fill @ ..] = counts.map(|n| n as usize);
     let depths = depths.into_iter().map(|n| n as usize).collect();
-    Ok(Statistics { nodes, blocks, references, left_out, depths, fill })
+    Ok((Statistics { nodes, blocks, references, left_out, depths, fill }, Aabb { min, max }))
 }
 
 /// Whether every link leads to a later node or to a block, so that every walk ends: as far as nodes were taken.
@@ -65,10 +74,11 @@ fn read_statistics(from: &mut ArrayReader) -> io::Result<Statistics> {
 struct LinkCheck {
     /// Nodes that were taken.
     count: u32,
-    /// Whether a link leads back or nowhere.
-    is_broken: bool,
-    /// One more than the largest index of the nodes that links lead to, and of the blocks.
-    ends: [u32; 2],
+    /// Whether a link of this slot leads back or nowhere.
+    is_broken: [bool; CHILDREN],
+    /// One more than the largest index of the nodes, and of the blocks, that links of this slot lead to.
+    nodes: [u32; CHILDREN],
+    blocks: [u32; CHILDREN],
 }
 
 impl LinkCheck {
@@ -78,20 +88,18 @@ impl LinkCheck {
         simd::dispatch(LinkScan { check: self, nodes });
     }
 
-    /// Takes a link, which may lead to nodes from `least` on.
-    #[inline(always)]
-    fn follow(&mut self, link: Link, least: u32) {
-        // Without branches, so that the links of a node are followed at once: one by one they took a tenth of reading a tree.
-        let (is_node, is_block, index) = (link.is_node(), link.is_block(), link.index() as u32);
-        self.is_broken |= !(is_node | is_block) | (is_node & (index < least));
-        self.ends[0] = self.ends[0].max(if is_node { index + 1 } else { 0 });
-        self.ends[1] = self.ends[1].max(if is_block { index + 1 } else { 0 });
-    }
-
     /// Whether the links of all nodes, and that to the root, are those of a tree of so many nodes and blocks.
-    fn hold(mut self, root: Option<Link>, [nodes, blocks]: [usize; 2]) -> bool {
-        root.into_iter().for_each(|root| self.follow(root, 0));
-        !self.is_broken && self.ends[0] as usize <= nodes && self.ends[1] as usize <= blocks
+    fn hold(self, root: Option<Link>, [nodes, blocks]: [usize; 2]) -> bool {
+        let is_within = |ends: [u32; CHILDREN], count: usize| ends.iter().all(|&end| end as usize <= count);
+        let is_root = |root: Link| match root.target() {
+            Target::Node(index) => index < nodes,
+            Target::Block(index, _) => index < blocks,
+            Target::End => false,
+        };
+        !self.is_broken.contains(&true)
+            && is_within(self.nodes, nodes)
+            && is_within(self.blocks, blocks)
+            && root.is_none_or(is_root)
     }
 }
 
@@ -107,16 +115,28 @@ impl Kernel for LinkScan<'_> {
     #[inline(always)]
     fn run<I: Instructions>(self) {
         let Self { check, nodes } = self;
+        // Slot by slot, which are compared at once: one by one they took a tenth of reading a tree.
+        let (mut broken, mut node_ends, mut block_ends) = ([0; CHILDREN], check.nodes, check.blocks);
         for node in nodes {
             check.count += 1;
-            let least = check.count;
-            for (slot, child) in node.children.iter_mut().enumerate() {
-                let is_used = node.used >> slot & 1 != 0;
-                // For a child that is not in use the first block, which every tree with nodes has.
-                check.follow(if is_used { Link(*child) } else { Link::block(0, 1) }, least);
-                *child = if is_used { *child } else { 0 };
+            for slot in 0..CHILDREN {
+                // All bits or none.
+                let used = (node.used >> slot & 1).wrapping_neg();
+                let link = Link(node.children[slot]);
+                let [to_node, to_block] =
+                    [link.is_node(), link.is_block()].map(|is| u32::from(is).wrapping_neg() & used);
+                let index = link.index() as u32;
+                let leads_back = u32::from(index < check.count).wrapping_neg();
+                broken[slot] |= used & !to_block & (!to_node | leads_back);
+                node_ends[slot] = node_ends[slot].max(to_node & (index + 1));
+                block_ends[slot] = block_ends[slot].max(to_block & (index + 1));
+                node.children[slot] &= used;
             }
         }
+        for slot in 0..CHILDREN {
+            check.is_broken[slot] |= broken[slot] != 0;
+        }
+        (check.nodes, check.blocks) = (node_ends, block_ends);
     }
 }
 
@@ -213,6 +233,20 @@ mod tests {
             let [a, b] = [&read, &built].map(|tree| tree.intersect(&ray, &mut Cost::default()));
             assert_eq!(a, b);
             assert_eq!(a.is_some(), i < 100);
+        }
+        assert_eq!(read.tree.surroundings.bounds, mesh.bounds());
+    }
+
+    /// Stacks of rays are as deep as the statistics say that the tree is.
+    #[test]
+    fn statistics_know_the_levels_of_nodes() {
+        for count in [1, 4, 5, 100, 5000] {
+            let mesh = strip(count);
+            for settings in [Settings::default(), Settings::textbook()] {
+                let octree = Octree::build(&mesh, &settings);
+                let deepest = octree.boxes().into_iter().map(|(depth, _)| depth).max();
+                assert_eq!(octree.tree.levels, deepest.unwrap_or(0), "{count}");
+            }
         }
     }
 

@@ -6,7 +6,6 @@ use super::subdivision::subdivide;
 use super::{Settings, Statistics, flatten};
 use crate::intersect::facet::Surroundings;
 use crate::intersect::slopes::Slopes;
-use crate::math::simd::{self, Instructions, Kernel};
 use crate::math::{Aabb, Point, Ray, huge_pages};
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
@@ -44,22 +43,21 @@ impl<'m> Tree<'m> {
         };
         let mut slopes = huge_pages::with_capacity(mesh.facets.len());
         (0..mesh.facets.len()).into_par_iter().map(|f| Slopes::new(mesh.corners(f))).collect_into_vec(&mut slopes);
-        Self::new(surroundings, nodes, blocks, root, slopes)
+        Self::new(surroundings, nodes, blocks, (root, statistics.depth()), slopes)
     }
 
-    /// Joins nodes and blocks, given relative to the middle of the mesh, and the slopes of all facets with what walks need of the mesh;
-    /// checks nothing.
+    /// Joins nodes and blocks, given relative to the middle of the mesh, the root with the levels of nodes below it, and the slopes of all
+    /// facets with what walks need of the mesh; checks nothing.
     pub(super) fn new(
         surroundings: Surroundings<'m>,
         nodes: Vec<Node>,
         blocks: Vec<Block>,
-        root: Option<Link>,
+        (root, levels): (Option<Link>, usize),
         slopes: Vec<Slopes>,
     ) -> Self {
         let (finite, center) = (surroundings.bounds, middle(&surroundings));
         let bounds = if finite.is_empty() { Aabb::EMPTY } else { finite.grown(finite.diagonal() * BOUNDS_ROOM) };
         let mesh_box = MeshBox::new(center, &bounds);
-        let levels = levels(&nodes);
         Self { surroundings, center, mesh_box, nodes, blocks, root, levels, slopes }
     }
 
@@ -92,38 +90,6 @@ impl<'m> Tree<'m> {
     /// Bytes held, without the mesh.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.blocks) + size_of_val(&*self.slopes)
-    }
-}
-
-/// Nodes on the longest way down from the first one, where every link leads to a later node or to a block.
-fn levels(nodes: &[Node]) -> usize {
-    simd::dispatch(LevelCount { nodes })
-}
-
-/// What [`levels`] does, for [`simd::dispatch`].
-struct LevelCount<'a> {
-    nodes: &'a [Node],
-}
-
-impl Kernel for LevelCount<'_> {
-    type Output = usize;
-
-    #[inline(always)]
-    fn run<I: Instructions>(self) -> usize {
-        let mut above = vec![0; self.nodes.len()];
-        let mut levels = 0;
-        for (index, node) in self.nodes.iter().enumerate() {
-            let level = above[index] + 1;
-            levels = levels.max(level);
-            // Most nodes have blocks alone.
-            let mut inner = node.inner_slots();
-            while inner != 0 {
-                let child = Link(node.children[inner.trailing_zeros() as usize]).index();
-                above[child] = above[child].max(level);
-                inner &= inner - 1;
-            }
-        }
-        levels
     }
 }
 

@@ -3,18 +3,18 @@
 use crate::math::{Aabb, Point, Uv, Vector, distance_to_triangle};
 use crate::model::{Model, PlacedFace};
 use crate::nurbs::Surface;
-use crate::simulate::face_foot::{BOX_ROUNDING, PieceBoxes, nearest_on_face};
+use crate::simulate::face_foot::{BOX_ROUNDING, FaceSamples, PieceBoxes};
 use crate::simulate::trim_loops::trim_polygons;
 
 /// Finds the placed face nearest to a point, on the spline itself: samples inside the trimming loops, then Gauss–Newton. Faces are named by
 /// their index in the model; points and distances are in scene coordinates, mm.
 ///
 /// Exact for points on a face; between faces, good to the spacing of the samples (1/24 of a face) where the foot of the perpendicular lies
-/// outside a trimming loop. The loops of a face are made into polygons when it is first asked, and kept.
+/// outside a trimming loop. What a face is searched with is worked out when it is first asked, and kept.
 pub(super) struct Nearest<'a> {
     faces: Vec<PlacedFace<'a>>,
     bounds: Vec<Aabb>,
-    loops: Vec<Option<Vec<Vec<Uv>>>>,
+    samples: Vec<Option<FaceSamples>>,
     /// Of each face with a surface that was asked for, in the coordinates of its part.
     slabs: Vec<Option<Slab>>,
     /// Boxes around the pieces of these surfaces.
@@ -59,10 +59,10 @@ impl<'a> Nearest<'a> {
     pub(super) fn new(model: &'a Model) -> Self {
         let faces: Vec<_> = model.placed_faces().collect();
         let bounds = faces.iter().map(face_bounds).collect();
-        let loops = vec![None; faces.len()];
+        let samples = vec![None; faces.len()];
         let slabs = vec![None; faces.len()];
         let pieces = vec![None; faces.len()];
-        Self { faces, bounds, loops, slabs, pieces }
+        Self { faces, bounds, samples, slabs, pieces }
     }
 
     /// Returns a box around these faces; empty without any.
@@ -143,8 +143,9 @@ impl<'a> Nearest<'a> {
         let local = placed.placement.local_point(p);
         let in_part = match (placed.face, placed.tessellated) {
             (Some(face), _) => {
-                let loops = self.loops[index].get_or_insert_with(|| trim_polygons(face));
-                nearest_on_face(face, loops, local).map_or(f64::INFINITY, |nearest| nearest.distance)
+                let samples =
+                    self.samples[index].get_or_insert_with(|| FaceSamples::new(face, trim_polygons(face)));
+                samples.nearest(face, local).map_or(f64::INFINITY, |nearest| nearest.distance)
             }
             (None, Some(t)) => (0..t.mesh.facets.len())
                 .flat_map(|f| {

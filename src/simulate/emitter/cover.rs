@@ -2,7 +2,7 @@
 
 use crate::math::{Aabb, Frame, Point, Uv, Vector};
 use crate::model::{Face, PlacedFace};
-use crate::simulate::face_foot::{NearestOnFace, PieceBoxes, foot_from, nearest_on_face};
+use crate::simulate::face_foot::{FaceSamples, NearestOnFace, PieceBoxes, foot_from};
 use crate::simulate::trim_loops::{TrimRegion, trim_polygons};
 
 /// Cosine below which two outward normals look at each other: −60°, as where the kernel asks for faces at one place.
@@ -28,7 +28,7 @@ enum Trims {
     Plane(TrimRegion),
     /// Of any other, with boxes around its pieces: the box around a reflector holds its lamp, which would else have a foot looked for at
     /// each ray.
-    Curved(Vec<Vec<Uv>>, PieceBoxes),
+    Curved(FaceSamples, PieceBoxes),
 }
 
 impl Trims {
@@ -36,7 +36,7 @@ impl Trims {
         if face.surface.degree == [1, 1] {
             Self::Plane(TrimRegion::new(face))
         } else {
-            Self::Curved(trim_polygons(face), PieceBoxes::new(&face.surface))
+            Self::Curved(FaceSamples::new(face, trim_polygons(face)), PieceBoxes::new(&face.surface))
         }
     }
 }
@@ -78,7 +78,7 @@ impl Cover {
                 let distance = if inside { surface.evaluate(uv).distance(local) } else { f64::INFINITY };
                 Some(foot_from(&self.face, |uv| region.contains(uv), local, NearestOnFace { distance, uv }))
             }
-            Trims::Curved(loops, _) => nearest_on_face(&self.face, loops, local),
+            Trims::Curved(samples, _) => samples.nearest(&self.face, local),
         };
         let near = nearest.filter(|n| n.distance * self.placement.scale <= self.glue_mm);
         // Faces that meet at an edge are as near to each other there, but do not look at each other.

@@ -1,10 +1,11 @@
 //! Rays of many sources made together, for sources with so few rays in a replicate that packets of their own would be all but empty.
 //!
 //! The random numbers, azimuths included, are made for all rays at once, in loops over arrays that run in vectors; each ray then takes the
-//! shape and the frame of its own source. The bits are those of rays made one by one.
+//! shape and the frame of its own source. They start along a Z-curve through their directions, for which the processor guesses right what
+//! becomes of most of them. The bits are those of rays made one by one.
 
 use super::shape::Shape;
-use super::stream::{PACKET, PacketNumbers, Portion, unit};
+use super::stream::{PACKET, PacketNumbers, Portion, sort_by_cell, sorted_dimension, unit, z_order_cell};
 use super::{Emission, Emitter};
 use crate::math::Ray;
 use crate::math::simd::{self, Instructions, Kernel};
@@ -15,6 +16,11 @@ use crate::simulate::scene::Sampling;
 /// Rays of a source in a replicate up to which they are made among those of other sources: eight take as long as a packet of their own.
 const FEW: u64 = 8;
 const _: () = assert!(FEW <= LOW_INDICES as u64);
+
+/// Cells along the Z-curve that rays are put in order by: eight by eight.
+const CELLS: usize = 64;
+/// Bits by which these are fewer than those of [`z_order_cell`].
+const COARSER: u32 = 6;
 
 /// A number of each ray of a packet.
 type PacketWords = [u32; PACKET];
@@ -35,6 +41,8 @@ pub(crate) struct MixedPacket {
     numbers: [[PacketNumbers; 2]; 3],
     /// Sines and cosines of the azimuths of places and directions.
     azimuths: [[PacketNumbers; 2]; 2],
+    /// Its rays in the order in which they start.
+    order: PacketWords,
 }
 
 impl MixedPacket {
@@ -50,6 +58,7 @@ impl MixedPacket {
             pairs: [false; 3],
             numbers: [[[0.0; PACKET]; 2]; 3],
             azimuths: [[[0.0; PACKET]; 2]; 2],
+            order: [0; PACKET],
         })
     }
 
@@ -102,7 +111,7 @@ impl MixedPacket {
         if self.is_spent() {
             return None;
         }
-        let k = self.started % PACKET;
+        let k = self.order[self.started % PACKET] as usize % PACKET;
         self.started += 1;
         let source = self.sources[k] as usize;
         let emitter = &emitters[source];
@@ -133,6 +142,8 @@ impl Kernel for Draw<'_> {
         let ray = u64::from(self.replicate);
         // Place and direction take one block of random words for their four scrambles, the wavelength another.
         let blocks = [packet.pairs[0] || packet.pairs[1], packet.pairs[2]];
+        let along = sorted_dimension(packet.pairs);
+        let mut places = [[0; PACKET]; 2];
         for block in 0..2 {
             if !blocks[block] {
                 continue;
@@ -148,11 +159,19 @@ impl Kernel for Draw<'_> {
             let dimensions = if block == 0 { 0..4 } else { 4..random::DIMENSIONS };
             for d in dimensions {
                 let numbers = random::scrambled_low(&packet.in_stream, d, &scrambles[d % 4]);
+                if along == Some(d & !1) {
+                    places[d % 2] = numbers;
+                }
                 for k in 0..PACKET {
                     packet.numbers[d / 2][d % 2][k] = unit(numbers[k]);
                 }
             }
         }
+        let mut cells = [0; PACKET];
+        for k in 0..PACKET {
+            cells[k] = z_order_cell(places[0][k], places[1][k]) >> COARSER;
+        }
+        sort_by_cell::<CELLS>(&cells[..packet.rays], &mut packet.order);
         for pair in 0..2 {
             if packet.pairs[pair] {
                 for k in 0..PACKET {

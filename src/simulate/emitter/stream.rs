@@ -27,8 +27,38 @@ fn interleaved(x: u32) -> u32 {
 
 /// Returns the cell of a pair of 32-bit numbers along a Z-curve through the square, of 64 × 64 cells.
 #[inline(always)]
-fn z_order_cell(x: u32, y: u32) -> u16 {
+pub(super) fn z_order_cell(x: u32, y: u32) -> u16 {
     (interleaved(x >> (32 - CELL_BITS)) | interleaved(y >> (32 - CELL_BITS)) << 1) as u16
+}
+
+/// Writes the places of these cells, each below `CELLS`, in the order of the cells to `order`, which is as long; places of one cell keep
+/// their order, so that the result is the same everywhere.
+#[inline(always)]
+pub(super) fn sort_by_cell<const CELLS: usize>(cells: &[u16], order: &mut [u32]) {
+    // Counting sort: most cells hold one ray.
+    let mut ends = [0u16; CELLS];
+    for cell in cells {
+        ends[usize::from(*cell) % CELLS] += 1;
+    }
+    let mut sum = 0;
+    for end in &mut ends {
+        sum += *end;
+        *end = sum;
+    }
+    // From the back, which keeps the order within a cell.
+    for (k, cell) in cells.iter().enumerate().rev() {
+        let end = &mut ends[usize::from(*cell) % CELLS];
+        *end -= 1;
+        order[usize::from(*end)] = k as u32;
+    }
+}
+
+/// Returns the first of the two dimensions by which rays of a source that asks for these pairs are put in order: of the direction, or of
+/// the place where no direction is drawn; `None` where neither is, as of a list, whose rays keep their order.
+#[inline(always)]
+pub(super) fn sorted_dimension([place, direction, _]: [bool; 3]) -> Option<usize> {
+    // The direction decides most of what a ray meets; where all have one, the place does.
+    if direction { Some(2) } else { place.then_some(0) }
 }
 
 /// Width of the steps that a 32-bit number counts, 2⁻³².
@@ -192,30 +222,15 @@ impl Stream {
             }
         }
         let mut cells = [0u16; CHUNK];
-        if let Some(along) = self.sorted_dimension() {
+        if let Some(along) = sorted_dimension(self.pairs) {
             for ((cell, x), y) in cells.iter_mut().zip(&self.numbers[along]).zip(&self.numbers[along + 1]) {
                 // Morton order of the directions (or places): rays that start one after another go through the same part of the scene,
                 // whose nodes are still in the cache.
                 *cell = z_order_cell(*x, *y);
             }
         }
-        // Counting sort: most cells hold one ray of a chunk.
-        let mut ends = [0u16; CHUNK];
-        for cell in &cells[..n] {
-            ends[usize::from(*cell) % CHUNK] += 1;
-        }
-        let mut sum = 0;
-        for end in &mut ends {
-            sum += *end;
-            *end = sum;
-        }
         self.order.resize(n, 0);
-        // From the back, so that rays of one cell keep their order: the sort is stable and its result the same everywhere.
-        for (k, cell) in cells[..n].iter().enumerate().rev() {
-            let end = &mut ends[usize::from(*cell) % CHUNK];
-            *end -= 1;
-            self.order[usize::from(*end)] = k as u32;
-        }
+        sort_by_cell::<CHUNK>(&cells[..n], &mut self.order);
     }
 
     /// Makes the numbers of all rays of a [short](Self::is_short) stream, and the order in which they start.
@@ -229,18 +244,10 @@ impl Stream {
         self.order.clear();
         self.order.extend(0..self.rays);
         // Stable, as the counting sort of a chunk is.
-        if let Some(along) = self.sorted_dimension().filter(|_| self.rays > 1) {
+        if let Some(along) = sorted_dimension(self.pairs).filter(|_| self.rays > 1) {
             let [x, y] = [&self.numbers[along], &self.numbers[along + 1]];
             self.order.sort_by_key(|&k| z_order_cell(x[k as usize], y[k as usize]));
         }
-    }
-
-    /// Returns the first of the two dimensions by which rays are put in order: of the direction, or of the place where no direction is
-    /// drawn; `None` where neither is, as of a list, whose rays keep their order.
-    #[inline(always)]
-    fn sorted_dimension(&self) -> Option<usize> {
-        // The direction decides most of what a ray meets; where all have one, the place does.
-        if self.pairs[1] { Some(2) } else { self.pairs[0].then_some(0) }
     }
 
     /// Returns the numbers of a pair for the packet of rays that start from the `started`-th on; of no meaning beyond the last ray, and 0
