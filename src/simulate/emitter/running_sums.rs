@@ -1,7 +1,7 @@
 //! Running sums of what weighs something, searched for the place that a sum falls on.
 //!
-//! Above the sums stands every sixteenth of them, above those every sixteenth again, and so on: a search reads one run of sixteen neighbours
-//! of each level. A plain bisection of millions of sums would jump to another line of memory at most steps, and no cache holds them all.
+//! Above the sums stands every sixteenth of them, above those every sixteenth again, and so on: a search reads one run of sixteen of
+//! each level. A plain bisection of millions of sums would jump to another line of memory at most steps, and no cache holds them all.
 
 /// Sums of a run: two lines of a cache.
 const RUN: usize = 16;
