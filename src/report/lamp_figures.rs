@@ -13,6 +13,9 @@ use crate::study::figures::ReceiverFigures;
 
 /// Share of the power at which the curve of encircled power ends, per cent.
 const FRAMED_PERCENT: f64 = 99.5;
+/// Steps of the cells below which a radius says more of the cells than of the light: with the light in two cells beside each other it is
+/// half a step, in three in a row one.
+const FEW_CELLS: f64 = 2.0;
 /// Radii at which the encircled power is drawn.
 const RADII: usize = 200;
 
@@ -193,15 +196,22 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
     // A few stray rays far away would press the curve of all others against its axis.
     let lit = summed.partition_point(|p| p[1] < FRAMED_PERCENT) + 1;
     let (framed, beyond) = summed.split_at(lit.min(summed.len()));
+    let coarse = if radius_of(95.0) < FEW_CELLS * a.step() {
+        " These are few cells: smaller ones, by `cells` or `size` of the receiver, show more."
+    } else {
+        ""
+    };
     let rest = beyond.last().map_or(String::new(), |last| format!(", all within {} mm", figures(last[0], 3)));
     let caption = format!(
-        "Around the mean position of the light, cell by cell ({} mm): 50 % within {} mm, 80 % within {} mm, 95 % within {} mm{rest}.",
+        "Around the mean position of the light, cell by cell ({} mm): 50 % within {} mm, 80 % within {} mm, 95 % within {} mm{rest}.{coarse}",
         figures(a.step(), 2),
         figures(radius_of(50.0), 3),
         figures(radius_of(80.0), 3),
         figures(radius_of(95.0), 3)
     );
-    let mut points: Vec<[f64; 2]> = framed.iter().step_by(framed.len().div_ceil(RADII)).copied().collect();
+    // From nothing at the middle: of light in a few cells the curve would show their distances alone, as if it had a shape.
+    let mut points = vec![[0.0; 2]];
+    points.extend(framed.iter().step_by(framed.len().div_ceil(RADII)));
     // The last point, so that the curve ends where its caption says.
     points.extend(framed.last());
     let series = vec![Series { points, style: SeriesStyle::Line, ..Series::default() }];
@@ -269,7 +279,11 @@ mod tests {
         let results = simulate(&bound, &nothing, &RunSettings::from(&scene.run), &|_| true);
         let receiver = &results.receivers[0];
         let grid = super::super::receiver_grid(receiver).unwrap();
-        let Content::Series(series) = encircled_power(receiver, &grid).unwrap().content else { panic!("a curve") };
+        let chart = encircled_power(receiver, &grid).unwrap();
+        // Half of the light lies nearer than a cell is long, as little as these few tell.
+        assert!(chart.caption.contains("few cells"), "{}", chart.caption);
+        let Content::Series(series) = chart.content else { panic!("a curve") };
+        assert_eq!(series[0].points[0], [0.0; 2]);
         let within: Vec<f64> = series[0].points.iter().filter(|p| p[0] < 1.0).map(|p| p[1]).collect();
         // Of 178,000 rays on the disc a third falls there: 0.11 % if they came by chance, and they are spread more evenly.
         let share = within.iter().copied().fold(0.0, f64::max);

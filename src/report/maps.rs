@@ -102,10 +102,10 @@ pub(super) fn grids(results: &Results, error: Option<&GeometricError>) -> Vec<(u
 /// Cells of a cut that are drawn: more than a screen has pixels, and 400 kB of the page.
 const MOST_CUT_POINTS: usize = 2000;
 
-/// Draws the values along both axes through the peak, with their errors; `None` for a grid without cells.
+/// Draws the values along both axes through the peak, with their errors; `None` for a grid without cells or without light.
 pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let [a, b] = &grid.axes;
-    let (column, row) = grid.peak_cell()?;
+    let (column, row) = grid.peak_cell().filter(|(column, row)| grid.values[row * a.cells + column] > 0.0)?;
     // Every so many-th cell of a very fine receiver, the brightest among them: each has a bar of its error in the page.
     let shown = |axis: &Axis, peak: usize| {
         let step = axis.cells.div_ceil(MOST_CUT_POINTS);
@@ -138,6 +138,9 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
 /// Writes what a map shows: its peak, its noise and its cells.
 pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
     let peak = grid.peak().map(|([x, y], value)| {
+        if value <= 0.0 {
+            return "No light came here. ".to_owned();
+        }
         format!(
             "Peak {} {} at {} {} {}, {} {} {}. ",
             figures(value, 3),

@@ -57,7 +57,7 @@
     trace.hovertemplate = "%{text}<extra>%{fullData.name}</extra>";
   };
   const pick = (box) => {
-    const shown = Object.assign(document.createElement("output"), { className: "selector", textContent: "Click a face for the selector that a rule of the scene can name it by." });
+    const shown = Object.assign(document.createElement("output"), { className: "selector", textContent: "Click a face to see what names it in a rule of the scene." });
     box.after(shown);
     // What lies under the pointer is known from its last move. A press that does not turn the view is a click, even one so short that
     // no frame is drawn in it, which the library misses.

@@ -289,7 +289,9 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
                 "j": indices(triangles.iter().map(|t| t[1])), "k": indices(triangles.iter().map(|t| t[2])),
                 "opacity": opacity, "flatshading": true, "hoverinfo": "name",
                 "lighting": {"ambient": 0.6, "diffuse": 0.75, "specular": 0.15, "roughness": 0.6},
-                "lightposition": {"x": 600, "y": -1500, "z": 2500}});
+                // Above and to the right of who looks: under an orthographic camera plotly turns normals away from the viewer, and a light
+                // before the part left all that is seen in the shade.
+                "lightposition": {"x": -600, "y": 1500, "z": -2500}});
             if !labels.is_empty() {
                 // Where each face begins among the points: the page finds a face by the point under the pointer.
                 let (first, selectors): (Vec<u32>, Vec<&str>) =

@@ -76,6 +76,15 @@ const SHOWN: usize = 60_000;
 /// Triangles that a surface keeps in any case, so that it is recognised, unless surfaces are so many that these would pass [`SHOWN`].
 const LEAST_SHOWN: usize = 2000;
 
+/// Least brightness that a part is drawn with, of its brightest primary: of a darker one shading would show no form.
+const DARKEST: f64 = 0.3;
+
+/// Returns the colour that a part is drawn with: its own, very dark ones lightened.
+fn relief_colour(colour: [f64; 3]) -> [f64; 3] {
+    let lift = (DARKEST - colour.into_iter().fold(0.0, f64::max)).max(0.0);
+    colour.map(|primary| primary + lift)
+}
+
 impl View {
     /// Draws facets in the colours of their parts, simplified where there are more than 60,000 triangles, which the caption then says.
     pub fn of_facets(name: &str, title: &str, facets: &Facets) -> Self {
@@ -95,7 +104,7 @@ impl View {
                 name: shown.name,
                 points,
                 triangles,
-                colour: shown.group.colour,
+                colour: relief_colour(shown.group.colour),
                 opacity: shown.group.opacity,
                 values: None,
                 labels: labels.collect(),
@@ -261,6 +270,14 @@ mod tests {
     use super::*;
     use crate::math::{FaceId, Uv, Vector};
     use crate::mesh::{Facet, FacetMesh, MeshVertex};
+
+    #[test]
+    fn black_parts_are_drawn_with_form() {
+        assert_eq!(relief_colour([0.0; 3]), [0.3; 3]);
+        assert_eq!(relief_colour([0.1, 0.0, 0.2]).map(|c| (c * 100.0).round()), [20.0, 10.0, 30.0]);
+        let bright = [0.0, 0.3, 0.9];
+        assert_eq!(relief_colour(bright), bright);
+    }
 
     #[test]
     fn many_parts_of_one_look_are_one_surface() {

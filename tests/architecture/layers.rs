@@ -647,6 +647,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "simulate/emitter",
         &[
             "own_wavelengths",
+            "running_sums",
             "ray_list",
             "measured",
             "stream",

@@ -265,3 +265,17 @@ fn faces_that_have_no_facets_make_a_trace_incomplete() {
     let (code, _, err) = run(&["--intersector", "exact"]);
     assert!(code == 0 && !err.contains("no facets"), "{code} {err}");
 }
+
+/// Whoever puts a lamp into an opaque part or misspells a glass is told what it is and what to do, on the terminal and in the page.
+#[test]
+fn a_source_in_an_opaque_part_and_an_unknown_medium_are_told() {
+    let opaque = |scene: String| scene.replace("medium = \"glass\"", "surface = \"mirror\"\nreflectance = 0.9");
+    let folder = lens(|scene| opaque(scene).replace("at = [0, 0, -10]", "at = [0, 0, 2]"));
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out"]);
+    assert!(code == 4 && err.contains("as from a source that lies in it"), "{code} {err}");
+    let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("No light came here.") && !page.contains("cuts through the peak"));
+    let folder = lens(|scene| scene.replace("medium = \"glass\"", "medium = \"D-ZK3\""));
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out"]);
+    assert!(code == 2 && err.contains("lampyris media") && err.contains("name = \"D-ZK3\""), "{code} {err}");
+}

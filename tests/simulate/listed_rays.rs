@@ -162,7 +162,7 @@ fn rays_of_a_file_that_went_are_lost_as_unreadable() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("list.tm25ray");
     // More than are kept in memory.
-    let rays = vec![ray(0.0, Vector::Z, 1.0); (1 << 16) + 1];
+    let rays = vec![ray(0.0, Vector::Z, 1.0); (1 << 17) + 1];
     write_tm25(&file, &Tm25::from_rays(&rays, Flux::Radiant)).unwrap();
     let text = "[run]\nrays = 64\n[[source]]\nkind = 'rays'\nfile = 'list.tm25ray'\n";
     let scene = Scene::parse(text, "test.toml", folder.path()).unwrap();

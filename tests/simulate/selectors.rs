@@ -140,6 +140,22 @@ fn the_last_rule_decides_and_the_table_says_so() {
     assert!(!notes.contains("decides no face"), "{notes}");
 }
 
+/// A mirror on all faces of a glass body leaves it a mirror, for media and surfaces are given apart: easily overlooked, so it is said.
+#[test]
+fn a_body_without_a_clear_face_is_named() {
+    let notes = |materials: &str| bound(&twins(), materials).unwrap().notes().join("; ");
+    let mirrors = "[[material]]\nsurface = 'mirror'\n[[material]]\nmedium = 'N-BK7'\n";
+    let note = notes(mirrors);
+    assert!(note.contains("no light gets into or out of") && note.contains("opaque by [[material]] 1"), "{note}");
+    // Who gives a surface last means it.
+    let silvered = notes("[[material]]\nmedium = 'N-BK7'\n[[material]]\nsurface = 'mirror'\n");
+    assert!(!silvered.contains("no light gets into"), "{silvered}");
+    let clear = notes(&mirrors.replace("medium", "surface = 'interface'\nmedium"));
+    assert!(!clear.contains("no light gets into"), "{clear}");
+    let glass = notes("[[material]]\nmedium = 'N-BK7'\n");
+    assert!(!glass.contains("no light gets into"), "{glass}");
+}
+
 #[test]
 fn what_selects_nothing_is_refused_with_what_there_is() {
     for (selector, says) in [

@@ -82,9 +82,9 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
          # Parts are left out by what selects them: {{ file = …, without = [{{ part = \"helper*\" }}] }}.\n\
          model = [{{ file = {} }}]\n\n\
          # A face that no rule names absorbs all light that meets it. Rules select by part, instance, solid, face, entity (the #id\n\
-         # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins. `lampyris info FILE --faces`\n\
-         # shows what selects each face. In place of surface = \"absorber\" stands what it is: medium = \"PMMA\" (`lampyris media` lists\n\
-         # the media that have names), or surface = \"mirror\", reflectance = 0.9.\n\
+         # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins, for medium and surface apart.\n\
+         # `lampyris info FILE --faces` shows what selects each face. In place of surface = \"absorber\" stands what it is:\n\
+         # medium = \"PMMA\" (`lampyris media` lists the media that have names), or surface = \"mirror\", reflectance = 0.9.\n\
          {material}{}\n{light}",
         printable_line(&name),
         toml_string(&name),

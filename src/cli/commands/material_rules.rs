@@ -9,6 +9,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 const MOST_RULES: usize = 40;
 /// Rules up to which all stand in the scene; of more the most stay what no rule says too, black, and stand in comments.
 const MOST_LIVE_RULES: usize = 6;
+/// Numbers of solids that look alike up to which a rule lists them; more of them it selects by their part alone.
+const MOST_NUMBERS: usize = 8;
 /// Places of a part that are named.
 pub(super) const MOST_PLACES: usize = 6;
 
@@ -121,9 +123,20 @@ fn solid_rules(selector: &str, parts: &[NamedPart<'_>]) -> Vec<String> {
         }
         groups[group].push(solids);
     }
+    // The most alike, where they are too many to list, are what the first rule says of the whole part and others below of their own.
+    let most = (0..groups.len())
+        .rev()
+        .max_by_key(|&group| groups[group].len())
+        .filter(|&k| groups[k].len() > MOST_NUMBERS);
+    if let Some(most) = most {
+        groups[..=most].rotate_right(1);
+    }
     let names = parts.iter().flat_map(|(part, _)| &part.solids).map(|solid| (solid.name.as_str(), solid.index));
     let names: BTreeSet<(&str, usize)> = names.collect();
-    let rule = |alike: &Vec<Vec<&SolidAccount>>| {
+    let rule = |(place, alike): (usize, &Vec<Vec<&SolidAccount>>)| {
+        if most.is_some() && place == 0 {
+            return rule_text(selector, &format!("{} alike, each ", alike.len()), alike[0][0]);
+        }
         let numbers: Vec<String> = alike.iter().map(|solids| solids[0].index.to_string()).collect();
         let (solid, first) = match &alike[..] {
             [solids] => {
@@ -135,7 +148,7 @@ fn solid_rules(selector: &str, parts: &[NamedPart<'_>]) -> Vec<String> {
         };
         rule_text(&format!("{selector}, solid = {solid}"), &first, alike[0][0])
     };
-    groups.iter().map(rule).collect()
+    groups.iter().enumerate().map(rule).collect()
 }
 
 /// Returns the name of solids of one number as TOML, where all of them have it and no other solid among all `names` and numbers has.
@@ -218,6 +231,20 @@ mod tests {
             rules[2].contains("{ part = \"board\", solid = [0, 1], surface") && rules[2].contains("2 alike"),
             "{rules:?}"
         );
+    }
+
+    /// Forty-eight LEDs take no line of forty-eight numbers: their rule is that of the part, and stands above the board's, which wins.
+    #[test]
+    fn many_solids_alike_are_what_is_said_of_their_part() {
+        let mut ring = part("ring", 1, 49, 1.0);
+        ring.solids[0].faces[0].bbox_mm[1][0] = 94.0;
+        let rules = rule_texts(&[ring], &[Vec::new()]);
+        assert_eq!(rules.len(), 2, "{rules:?}");
+        assert!(
+            rules[0].starts_with("{ part = \"ring\", surface") && rules[0].contains("48 alike, each"),
+            "{rules:?}"
+        );
+        assert!(rules[1].starts_with("{ part = \"ring\", solid = 0, surface"), "{rules:?}");
     }
 
     /// A solid alone in its look is called by its name where no other solid has it, else by its number.

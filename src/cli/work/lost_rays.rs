@@ -118,7 +118,9 @@ fn cause_text(cause: LostCause) -> &'static str {
     match cause {
         LostCause::NoExit => "left the scene inside a medium, as by a gap or an open shell,",
         LostCause::ImpossibleMedium => "met a body from the wrong side, as through a gap or an open shell,",
-        LostCause::InsideSolid => "hit an opaque solid from inside, as through a gap,",
+        LostCause::InsideSolid => {
+            "hit an opaque solid from inside, as from a source that lies in it or through a gap,"
+        }
         LostCause::TooDeep => {
             "were in more bodies at once than a ray can carry, as after entering an open shell again and again,"
         }

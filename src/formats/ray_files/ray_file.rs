@@ -13,7 +13,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// Rays that are kept in memory, 80 bytes each; a list of more is left on the disk.
-pub(super) const MOST_IN_MEMORY: u64 = 1 << 16;
+pub(super) const MOST_IN_MEMORY: u64 = 1 << 17;
 
 /// Numbers of a ray in a scratch file: origin, direction, power, wavelength or NaN.
 const SCRATCH_NUMBERS: usize = 8;

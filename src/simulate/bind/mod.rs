@@ -115,6 +115,7 @@ impl Scene {
         bound.notes.extend(file_notes);
         bound.notes.extend(cover_notes);
         bound.notes.extend(notes::opening_note(&bound, model));
+        bound.notes.extend(notes::shut_body_note(&bound, &chosen));
         bound.notes.extend(notes::thin_body_note(&bound));
         bound.notes.extend(notes::ready_mesh_note(model));
         bound.notes.extend(flush_receivers::flush_receiver_notes(&bound.receivers, model, &bound.instances));

@@ -8,6 +8,7 @@ use crate::optics::catalogue;
 use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::Loaded;
 use crate::simulate::scene::{ByWavelength, Material, Reflectance, Scene, medium};
+use crate::simulate::surfaces::FaceOptics;
 use std::collections::BTreeSet;
 
 /// Share of a wavelength that the end of a table may be missed by: a unit that was converted to nm and back.
@@ -181,6 +182,24 @@ pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> 
     Some(format!(
         "'{instance}'{others} has the medium '{medium}' but no closed shell{sheet}: light that passes its opening is lost; close it in \
          the model, or give it a surface instead of a medium{asked}"
+    ))
+}
+
+/// Returns one sentence about the first body none of whose faces lets light through, where the rule that gave it a surface stands above the
+/// one that gave it its medium: whoever wrote the medium last means it to be seen. `None` where there is no such body.
+pub(super) fn shut_body_note(bound: &BoundScene, chosen: &ChosenRules) -> Option<String> {
+    let is_clear = |face: &FaceOptics| !bound.surfaces[usize::from(face.surface)].is_opaque();
+    let clear: BTreeSet<u32> = bound.faces.iter().filter(|face| is_clear(face)).map(|face| face.body).collect();
+    let shut =
+        bound.faces.iter().zip(chosen).filter(|(face, _)| face.body != AMBIENT && !clear.contains(&face.body));
+    let (body, surface, medium) = shut.into_iter().find_map(|(face, rules)| match *rules {
+        (Some(surface), Some(medium)) if surface < medium => Some((face.body, surface + 1, medium + 1)),
+        _ => None,
+    })?;
+    let [name, substance] = bound.body_names(body)?;
+    Some(format!(
+        "no light gets into or out of '{name}' ({substance}): all its faces are opaque by [[material]] {surface}, which [[material]] {medium} \
+         leaves as they are; `surface = \"interface\"` there makes them clear"
     ))
 }
 

@@ -10,6 +10,7 @@ mod mixed_packet;
 mod own_wavelengths;
 mod packet;
 mod ray_list;
+mod running_sums;
 mod sampler;
 mod shape;
 mod simd_dispatch;

@@ -1,15 +1,27 @@
 //! Measured rays as a source draws them, in the unit that the run counts.
 
 use super::own_wavelengths::OwnWavelengths;
+use super::running_sums::RunningSums;
 use crate::formats::{self, Flux, LightRay, RayBlock, RayFile};
 use crate::math::Aabb;
 use crate::optics::{Spectrum, Table, Wavelengths, xyz_of_watt};
 use crate::simulate::scene::{PowerUnit, Source};
 use std::sync::Arc;
 
-/// Rays whose powers are summed together: what a list holds in memory is one sum for each so many, and who draws a ray reads so many.
-/// With 64 the sums of 10⁸ rays would take 12 MB and a draw from a list of far more rays than are drawn half as long.
-const BLOCK: usize = 256;
+/// Fewest rays whose powers are summed together: who draws a ray reads as many. Fewer would cost a read from the disk no less.
+const SMALLEST_BLOCK: u64 = 32;
+
+/// Most sums that a list holds in memory, 16 MB; of longer lists the blocks are larger.
+const MOST_SUMS: u64 = 1 << 21;
+
+/// Rays that are read at a time when the whole list is, in the order of the file.
+const SURVEYED: usize = 4096;
+
+/// Returns how many rays of a list of this many are summed together, a power of two. A run of as many rays as the list draws in each of its
+/// replicates one ray in thousands: each draw reads a block of its own, and its time is that of its block.
+fn block_rays(rays: u64) -> usize {
+    rays.div_ceil(MOST_SUMS).next_power_of_two().max(SMALLEST_BLOCK) as usize
+}
 
 /// Measured rays, to be drawn in proportion to their power; at least one, and one with power.
 #[derive(Clone, Debug)]
@@ -21,8 +33,10 @@ pub(crate) struct RayList {
     pub(crate) spectrum: Option<Wavelengths>,
     /// What the reader changed or supposed, for people.
     pub(crate) notes: Vec<String>,
-    /// Power up to the end of each block of rays.
-    sums: Arc<[f64]>,
+    /// Rays of a block, [`block_rays`].
+    block: usize,
+    /// Power up to the end of each block.
+    sums: Arc<RunningSums>,
     /// Box around the origins, mm, in the source's frame.
     pub(crate) origins: Aabb,
     /// Wavelengths, nm, that single rays have of their own.
@@ -95,11 +109,12 @@ impl RayList {
             })?,
         };
         let mut list = Self {
+            block: block_rays(file.len()),
             file: Arc::new(file),
             efficacy,
             spectrum,
             notes,
-            sums: Arc::new([]),
+            sums: Arc::default(),
             origins: Aabb::EMPTY,
             own_wavelengths: Arc::default(),
         };
@@ -125,17 +140,20 @@ impl RayList {
         let mut wavelengths = OwnWavelengths::default();
         let mut block = RayBlock::default();
         let mut sum = 0.0;
-        for first in (0..self.file.len()).step_by(BLOCK) {
-            self.file.read_block(first, BLOCK, &mut block).map_err(changed)?;
+        for first in (0..self.len()).step_by(SURVEYED) {
+            self.file.read_block(first, SURVEYED, &mut block).map_err(changed)?;
             for k in 0..block.len() {
                 let ray = self.file.ray(&block, k).map_err(changed)?;
                 sum += self.power_of(&block, k);
                 self.origins = self.origins.union(Aabb::from_points([ray.origin]));
                 ray.wavelength_nm.into_iter().for_each(|nm| wavelengths.add(nm));
+                let read = first + k as u64 + 1;
+                if read.is_multiple_of(self.block as u64) || read == self.len() {
+                    sums.push(sum);
+                }
             }
-            sums.push(sum);
         }
-        self.sums = sums.into();
+        self.sums = Arc::new(RunningSums::new(sums));
         self.own_wavelengths = Arc::new(wavelengths);
         Ok(())
     }
@@ -147,7 +165,7 @@ impl RayList {
 
     /// Returns the power of all rays, in the unit of the run.
     pub(crate) fn power(&self) -> f64 {
-        self.sums.last().copied().unwrap_or(0.0)
+        self.sums.total()
     }
 
     /// Whether rays have wavelengths of their own.
@@ -188,11 +206,11 @@ impl RayList {
             return true;
         }
         cursor.number = None;
-        if self.file.read_block((number * BLOCK) as u64, BLOCK, &mut cursor.block).is_err() {
+        if self.file.read_block((number * self.block) as u64, self.block, &mut cursor.block).is_err() {
             return false;
         }
         // Added in the same order as when the list was opened: the sums are those to the bit.
-        let mut sum = if number == 0 { 0.0 } else { self.sums[number - 1] };
+        let mut sum = self.sums.before(number);
         cursor.sums.clear();
         for k in 0..cursor.block.len() {
             sum += self.power_of(&cursor.block, k);
@@ -213,8 +231,7 @@ impl RayList {
     pub(crate) fn ray_at_share(&self, share: f64, cursor: &mut ListCursor) -> Option<LightRay> {
         // The running sum is searched: each ray is drawn in proportion to its power.
         let at = share * self.power();
-        let number = self.sums.partition_point(|s| *s <= at).min(self.sums.len() - 1);
-        if !self.go_to(number, cursor) {
+        if !self.go_to(self.sums.place(at), cursor) {
             return None;
         }
         let last = cursor.block.len().checked_sub(1)?;
@@ -223,8 +240,9 @@ impl RayList {
 
     /// Returns the ray at this place of the list; `None` behind its end and when the file cannot be read any more.
     pub(crate) fn ray(&self, place: u64, cursor: &mut ListCursor) -> Option<LightRay> {
-        let found = place < self.len() && self.go_to((place / BLOCK as u64) as usize, cursor);
-        if found { self.ray_of_block((place % BLOCK as u64) as usize, cursor) } else { None }
+        let block = self.block as u64;
+        let found = place < self.len() && self.go_to((place / block) as usize, cursor);
+        if found { self.ray_of_block((place % block) as usize, cursor) } else { None }
     }
 }
 
@@ -280,12 +298,12 @@ mod tests {
     use crate::math::{Point, Vector};
 
     /// The ray at a share is the first whose running sum of powers, added from the first ray on, passes it, in whichever order shares are
-    /// asked for and wherever the list is kept: 70,000 rays are more than memory takes.
+    /// asked for and wherever the list is kept: 140,000 rays are more than memory takes.
     #[test]
     fn a_share_finds_the_ray_that_the_sums_of_all_find() {
         let folder = tempfile::tempdir().unwrap();
         let source = Source::default();
-        for n in [1, 256, 257, 70_000] {
+        for n in [1, 32, 33, 140_000] {
             let ray = |k: usize| LightRay {
                 origin: Point::new(k as f64, 0.0, 0.0),
                 direction: Vector::Z,

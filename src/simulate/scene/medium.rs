@@ -235,7 +235,10 @@ pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::
     known.extend(scene.media.iter().map(|m| m.name.as_str()));
     Err(match suggest::nearest(name, known) {
         Some(near) => error.help(format!("did you mean '{near}'?")),
-        None => error.help("add a [[medium]] of that name"),
+        None => error.help(format!(
+            "`lampyris media` lists the catalogue; others are described: [[medium]] with name = \"{name}\" and an `index`, or the `file` of a \
+             maker's catalogue"
+        )),
     })
 }
 
