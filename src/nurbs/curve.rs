@@ -61,7 +61,7 @@ impl ControlPoint for DVec3 {
 /// A rational B-spline curve with clamped ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spline<P> {
-    /// Polynomial degree, 1 to [`MAX_DEGREE`].
+    /// Polynomial degree, 1 to [`MAX_DEGREE`](super::MAX_DEGREE).
     pub degree: usize,
     /// Non-decreasing, `points.len() + degree + 1` of them.
     pub knots: Vec<f64>,
