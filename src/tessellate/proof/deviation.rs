@@ -253,10 +253,8 @@ fn are_equal([least, most]: [f64; 2]) -> bool {
     most - least <= EQUAL_WEIGHTS * most
 }
 
-/// Replaces control points over `[0, 1]` by those over `[lo, hi]`, 0 ≤ lo < hi ≤ 1: the `n + 1` of a net's line, from `start` on every
-/// `step`-th.
+/// Replaces the `n + 1` control points of a net's line, every `step`-th from `start`, by those over `[lo, hi]`, 0 ≤ lo < hi ≤ 1.
 fn restrict_line(net: &mut [Homogeneous], [start, step, n]: [usize; 3], lo: f64, hi: f64) {
-    // Known degrees leave no loops.
     match n {
         1 => restrict_line_of_degree(net, [start, step, 1], lo, hi),
         2 => restrict_line_of_degree(net, [start, step, 2], lo, hi),
@@ -265,12 +263,11 @@ fn restrict_line(net: &mut [Homogeneous], [start, step, n]: [usize; 3], lo: f64,
     }
 }
 
-/// As [`restrict_line`].
+/// As [`restrict_line`], without loops where `n` is known: the left part of a cut at `hi` first.
 #[inline(always)]
 fn restrict_line_of_degree(net: &mut [Homogeneous], [start, step, n]: [usize; 3], lo: f64, hi: f64) {
     let line = &mut net[start..=start + n * step];
     if hi < 1.0 {
-        // Left part of a cut at `hi`.
         for round in 1..=n {
             for k in (round..=n).rev() {
                 line[k * step] = line[(k - 1) * step] * (1.0 - hi) + line[k * step] * hi;
