@@ -4,10 +4,15 @@ use super::Point;
 
 /// Distance of `p` from the segment between `a` and `b`, in their unit; from `a` where they coincide.
 pub(crate) fn distance_to_segment(p: Point, a: Point, b: Point) -> f64 {
+    squared_distance_to_segment(p, a, b).sqrt()
+}
+
+/// The square of what [`distance_to_segment`] gives: of several segments only the nearest one's root is wanted.
+pub(crate) fn squared_distance_to_segment(p: Point, a: Point, b: Point) -> f64 {
     let (ab, ap) = (b - a, p - a);
     let along = ap.dot(ab) / ab.length_squared();
     // False as well where the segment is a point and `along` is no number.
-    if along > 0.0 { (ap - ab * along.min(1.0)).length() } else { ap.length() }
+    if along > 0.0 { (ap - ab * along.min(1.0)).length_squared() } else { ap.length_squared() }
 }
 
 /// Distance of `p` from a triangle, in their unit: from the plane when the foot lies inside, else from the nearest side; so of one without

@@ -21,7 +21,7 @@ use bytemuck::{AnyBitPattern, NoUninit};
 
 pub use aabb::Aabb;
 pub use box_tree::{BoxTree, BoxWalk};
-pub(crate) use distance::{distance_to_segment, distance_to_triangle};
+pub(crate) use distance::{distance_to_segment, distance_to_triangle, squared_distance_to_segment};
 pub use frame::Frame;
 pub(crate) use maximum::{error_of_maximum, largest_distance};
 pub use ray::{Departure, QuadHalf, Ray};

@@ -18,8 +18,7 @@ fn bezier_points<P: ControlPoint>(
         1 => bezier_points_in::<NARROW, P>(1, knots, points, span, ends, out),
         2 => bezier_points_in::<NARROW, P>(2, knots, points, span, ends, out),
         3 => bezier_points_in::<NARROW, P>(3, knots, points, span, ends, out),
-        0..NARROW => bezier_points_in::<NARROW, P>(degree, knots, points, span, ends, out),
-        NARROW..MIDDLE => bezier_points_in::<MIDDLE, P>(degree, knots, points, span, ends, out),
+        0..MIDDLE => bezier_points_in::<MIDDLE, P>(degree, knots, points, span, ends, out),
         MIDDLE..BROAD => bezier_points_in::<BROAD, P>(degree, knots, points, span, ends, out),
         _ => bezier_points_in::<WIDE, P>(degree, knots, points, span, ends, out),
     }

@@ -97,8 +97,7 @@ fn mesh_with_rounds(
     let laid_out =
         |(k, face)| (face, if too_large(k).is_some() { None } else { placed.surface(settings, k, face) });
     let faces: Vec<(&Face, Option<FaceSurface<'_>>)> = faces.into_par_iter().enumerate().map(laid_out).collect();
-    let known: Vec<(&Face, &FaceSurface<'_>)> =
-        faces.iter().filter_map(|(face, surface)| Some((*face, surface.as_ref()?))).collect();
+    let known: Vec<_> = faces.iter().filter_map(|(face, surface)| Some((*face, surface.as_ref()?))).collect();
     let sides = edge_sides(part, &known);
     let mut denser = vec![0u32; part.edges.len()];
     let mut further: Vec<Vec<f64>> = vec![Vec::new(); part.edges.len()];

@@ -81,10 +81,9 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let contenders = structures.contenders();
     let (octree, exact) = (&*contenders.octree, &*contenders.exact);
     // The same rays through all three, and a cause for every difference.
-    let lift = LIFT_IN_TOLERANCES * settings.loosest();
     let rays = match given {
         Some(rays) => rays,
-        None => own_rays(scene, model, &facets.bounds(), octree, &tracing, lift)?,
+        None => own_rays(scene, model, &facets.bounds(), octree, &tracing, settings.loosest())?,
     };
     let mut found = judge(&contenders, &rays, settings.loosest(), console);
     // Only now, as it takes no part in the comparison.
@@ -99,10 +98,9 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     // What the facets change of the light, which only a scene has.
     let on_facets = if normals == NormalMode::Exact { &*polish } else { octree };
     let bound = scene.map(|s| s.bind(model)).transpose()?;
-    let receivers = match scene.zip(bound.as_ref()) {
-        Some((scene, bound)) => paired_receivers::trace_both(scene, bound, [on_facets, exact], &tracing, console),
-        None => Vec::new(),
-    };
+    let receivers = scene.zip(bound.as_ref()).map_or_else(Vec::new, |(scene, bound)| {
+        paired_receivers::trace_both(scene, bound, [on_facets, exact], &tracing, console)
+    });
     let text = json_text(&json_document(&found, normals, scene.map(|_| &receivers[..]), reached.as_ref())?)?;
     if let Some(folder) = &command.output {
         let drawn = facets.drawn(MOST_DRAWN);
@@ -257,16 +255,17 @@ fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
     }
 }
 
-/// Returns the rays of a scene's own run, or a camera's, random and bouncing ones for a bare model. `lift` is how far, mm, rays begin off
-/// the facet that they leave.
+/// Returns the rays of a scene's own run, or a camera's, random and bouncing ones for a bare model, which begin [`LIFT_IN_TOLERANCES`]
+/// off the facet that they leave; `loosest` is the largest tolerance, mm.
 fn own_rays(
     scene: Option<&Scene>,
     model: &Model,
     bounds: &Aabb,
     octree: &dyn Intersector,
     tracing: &TracingSettings,
-    lift: f64,
+    loosest: f64,
 ) -> Result<Vec<Ray>, Failure> {
+    let lift = LIFT_IN_TOLERANCES * loosest;
     let count = tracing.rays().unwrap_or(RAYS);
     let Some(scene) = scene else {
         let seed = tracing.seed.unwrap_or(1);

@@ -63,26 +63,10 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
         for ray in take(&mut queues.end) {
             let s = &mut states[ray];
             hits[s.index] = s.best.hit();
-            // What passes by the mesh is answered, and its place free, at once: most rays of a source that shines all around are.
-            loop {
-                let Some(&place) = order.get(next) else {
-                    live -= 1;
-                    break;
-                };
-                let place = usize::from(place);
-                // Long before its turn, for neither a ray nor what is known of the facet that it leaves is in the cache.
-                if let Some(&place) = order.get(next + 2 * AHEAD) {
-                    prefetch(rays, usize::from(place));
-                }
-                if let Some(from) = order.get(next + AHEAD).and_then(|&place| rays[usize::from(place)].departure) {
-                    prefetch(&tree.slopes, from.primitive as usize);
-                }
-                s.start(tree, root, &rays[place], place);
-                next += 1;
-                if s.next != Link::END {
-                    ways.note(ray, s.next);
-                    break;
-                }
+            if start_next(tree, root, s, (rays, order), &mut next) {
+                ways.note(ray, s.next);
+            } else {
+                live -= 1;
             }
         }
         queues.put(&ways);
@@ -108,6 +92,34 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
             prefetch_corners(&arrays, &states[ray]);
         }
     }
+}
+
+/// Starts in a free place the first ray from `next` on that does not pass by the mesh; `false` where none is left. What passes by is
+/// answered at once, and leaves no hit: most rays of a source that shines all around do.
+#[inline(always)]
+fn start_next<const STACK: usize>(
+    tree: &Tree,
+    root: Link,
+    s: &mut RayState<STACK>,
+    (rays, order): (&[Ray], &[u16]),
+    next: &mut usize,
+) -> bool {
+    while let Some(&place) = order.get(*next) {
+        let place = usize::from(place);
+        // Long before its turn, for neither a ray nor what is known of the facet that it leaves is in the cache.
+        if let Some(&place) = order.get(*next + 2 * AHEAD) {
+            prefetch(rays, usize::from(place));
+        }
+        if let Some(from) = order.get(*next + AHEAD).and_then(|&place| rays[usize::from(place)].departure) {
+            prefetch(&tree.slopes, from.primitive as usize);
+        }
+        s.start(tree, root, &rays[place], place);
+        *next += 1;
+        if s.next != Link::END {
+            return true;
+        }
+    }
+    false
 }
 
 /// Asks for the memory of the corners of the facets that the sieve left, at least one; nearly always it is one.

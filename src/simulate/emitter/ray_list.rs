@@ -210,7 +210,7 @@ impl RayList {
             return false;
         }
         // Added in the same order as when the list was opened: the sums are those to the bit.
-        let mut sum = self.sums.before(number);
+        let mut sum = self.sums.sum_before(number);
         cursor.sums.clear();
         for k in 0..cursor.block.len() {
             sum += self.power_of(&cursor.block, k);

@@ -29,7 +29,7 @@ impl RunningSums {
     }
 
     /// The sum of all before the `k`-th place; 0 for the first.
-    pub(super) fn before(&self, k: usize) -> f64 {
+    pub(super) fn sum_before(&self, k: usize) -> f64 {
         if k == 0 { 0.0 } else { self.levels[0][k - 1] }
     }
 
@@ -61,6 +61,6 @@ mod tests {
                 assert_eq!(searched.place(at), expected, "{at} of {n}");
             }
         }
-        assert_eq!((RunningSums::default().total(), RunningSums::new(vec![3.0, 4.0]).before(1)), (0.0, 3.0));
+        assert_eq!((RunningSums::default().total(), RunningSums::new(vec![3.0, 4.0]).sum_before(1)), (0.0, 3.0));
     }
 }

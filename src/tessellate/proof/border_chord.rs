@@ -2,6 +2,7 @@
 
 use super::deviation::DeviationBounds;
 use super::prover::Prover;
+use super::refine::halve_net;
 use crate::math::{Homogeneous, Point, Uv, Vector};
 use crate::model::EdgeUse;
 use crate::nurbs::Curve;
@@ -207,12 +208,7 @@ impl ChordFrame {
                 piece.push(piece[start + k]);
             }
             let (low, high) = piece[start..].split_at_mut(n + 1);
-            for step in 0..=n {
-                low[step] = high[0];
-                for k in 0..n - step {
-                    high[k] = 0.5 * (high[k] + high[k + 1]);
-                }
-            }
+            halve_net(low, high, [n, 0], 0);
             depths.extend([depth + 1, depth + 1]);
         }
         worst

@@ -15,9 +15,9 @@
 //! The curve over the diagonal plays no part, where the proof of each triangle by itself must hold it to the traced diagonal: on a surface
 //! that is uneven or twisted in its own plane that alone cuts cells. And one net takes the place of the nets of two triangles.
 
-use super::flat_triangle::{distance_to_chord, squared_distance_to_chord};
+use super::flat_triangle::distance_to_chord;
 use super::prover::Prover;
-use crate::math::{Point, Uv, Vector};
+use crate::math::{Point, Uv, Vector, squared_distance_to_segment};
 use crate::tessellate::face_surface::patch_uv;
 use crate::tessellate::settings::Acceptance;
 
@@ -74,7 +74,7 @@ impl FlatQuad {
         if (0..4).all(|k| self.inward[k].dot(p - c[k]) >= 0.0) {
             return (p - c[0]).dot(self.normal).abs();
         }
-        let sides = (0..4).map(|k| squared_distance_to_chord(p, &[c[k], c[(k + 1) % 4]]));
+        let sides = (0..4).map(|k| squared_distance_to_segment(p, c[k], c[(k + 1) % 4]));
         sides.fold(f64::INFINITY, f64::min).sqrt()
     }
 }

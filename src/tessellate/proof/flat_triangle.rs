@@ -1,6 +1,6 @@
 //! Flat shapes: a triangle and a chord that measure distances, and a polygon that is clipped.
 
-use crate::math::{Point, Uv, Vector};
+use crate::math::{Point, Uv, Vector, distance_to_segment, squared_distance_to_segment};
 use smallvec::SmallVec;
 
 /// A triangle cut by a rectangle has seven corners at most.
@@ -46,17 +46,8 @@ pub(in crate::tessellate) fn is_rectangle(polygon: &[Uv], [[u0, u1], [v0, v1]]: 
 
 /// Returns the distance of `p` to the segment from `a` to `b`, not to their line: the ends of a closed curve may differ by a last bit, and
 /// the line through them can lie anywhere. Of ends in one place, the distance to that place.
-pub(in crate::tessellate) fn distance_to_chord(p: Point, chord: &[Point; 2]) -> f64 {
-    squared_distance_to_chord(p, chord).sqrt()
-}
-
-/// Returns the square of what [`distance_to_chord`] does: of several chords only the nearest one's root is wanted.
-pub(super) fn squared_distance_to_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
-    let (d, x) = (b - a, p - a);
-    // Ends in one place: the distance to that place.
-    let l = d.length_squared();
-    let t = if l > 0.0 { (x.dot(d) / l).clamp(0.0, 1.0) } else { 0.0 };
-    (x - d * t).length_squared()
+pub(in crate::tessellate) fn distance_to_chord(p: Point, &[a, b]: &[Point; 2]) -> f64 {
+    distance_to_segment(p, a, b)
 }
 
 /// A triangle, which may be degenerate, ready to measure distances.
@@ -87,7 +78,7 @@ impl FlatTriangle {
         {
             return (p - a).dot(n).abs();
         }
-        let sides = [[a, b], [b, c], [c, a]].map(|side| squared_distance_to_chord(p, &side));
+        let sides = [[a, b], [b, c], [c, a]].map(|[a, b]| squared_distance_to_segment(p, a, b));
         sides.into_iter().fold(f64::INFINITY, f64::min).sqrt()
     }
 }
