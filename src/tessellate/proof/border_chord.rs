@@ -309,3 +309,48 @@ fn convex_hull(mut p: SmallVec<[Uv; 16]>) -> Vec<Uv> {
     add_half(&mut p.iter().rev());
     hull
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::conic;
+    use crate::tessellate::proof::flat_triangle::distance_to_chord;
+
+    /// An arc of radius 10 and angle φ is 10·(1 − cos φ/2) from its chord: by one conic to the last digits, across knots nearly.
+    #[test]
+    fn an_arc_is_as_far_from_its_chord_as_its_closed_form_says() {
+        let arc = conic::arc(&Frame::IDENTITY, 10.0, [0.0, 4.0]);
+        let breaks = arc.breakpoints();
+        let bound = |t: [f64; 2]| {
+            let chord = t.map(|t| arc.evaluate(t));
+            let angle = chord[0].angle_between(chord[1]);
+            (curve_deviation(&arc, t, &chord, 0.0), 10.0 * (1.0 - (0.5 * angle).cos()))
+        };
+        for [from, to] in [[0.0, 1.0], [0.1, 0.4], [0.05, 0.95]] {
+            let (found, sag) = bound([from, to].map(|share| breaks[0] + share * (breaks[1] - breaks[0])));
+            assert!((found - sag).abs() < 1e-12 * 10.0, "{found} {sag}");
+        }
+        let (found, sag) = bound([0.7 * breaks[1], 1.2 * breaks[1]]);
+        assert!(sag <= found && found < 1.01 * sag, "{found} {sag}");
+    }
+
+    /// Ends that the file has moved off the curve, and a curve of degree three with an inflection: no sample is beyond the bound.
+    #[test]
+    fn no_sample_is_farther_from_a_chord_than_the_bound() {
+        let arc = conic::arc(&Frame::IDENTITY, 10.0, [0.0, 1.0]);
+        let points = [(0.0, 0.0), (1.0, 2.0), (2.0, -1.5), (4.0, 0.5)];
+        let points = points.map(|(x, y)| Homogeneous::new(x, y, 0.1 * x * y, 1.0)).to_vec();
+        let wave = Curve { degree: 3, knots: [[0.0; 4], [1.0; 4]].concat(), points };
+        for curve in [arc, wave] {
+            let [a, b] = curve.domain();
+            for moved in [Vector::ZERO, 0.3 * Vector::X, 0.3 * Vector::Y, -0.3 * Vector::Y, 0.3 * Vector::Z] {
+                let chord = [curve.evaluate(a) + moved, curve.evaluate(b)];
+                let off = |k: u32| distance_to_chord(curve.evaluate(a + (b - a) * f64::from(k) / 1000.0), &chord);
+                let farthest = (0..=1000).map(off).fold(0.0, f64::max);
+                let found = curve_deviation(&curve, [a, b], &chord, 0.0);
+                assert!(farthest <= found + 1e-12 && found <= 1.3 * farthest, "{found} {farthest} {moved}");
+            }
+        }
+    }
+}
