@@ -6,7 +6,8 @@ use super::border::polygons::{self, BorderPolygons, ImprintedPoints};
 use super::border_nodes::BorderNodes;
 use super::cells::branches;
 use super::cells::cell::{Subdivision, parameter_resolution};
-use super::cells::grid::{self, GridInput};
+use super::cells::cell_facets::GridInput;
+use super::cells::grid;
 use super::crossing_chords::CrossingChords;
 use super::emission::Emission;
 use super::face_mesh::FaceMesh;
@@ -133,16 +134,17 @@ pub(super) fn mesh_with_imprint(
         return Err(Unmeshed::TooManySteps);
     }
     transition.triangles.extend(&grid.triangles);
+    let exhausted = cells.exhausted || transition.exhausted;
     // Where the budget has ended, shorter chords only cost more.
-    let unproved = |t: &Transition| if cells.exhausted { vec![] } else { t.unproved_chords(&chords, &followed) };
+    let unproved = |t: &Transition| if exhausted { vec![] } else { t.unproved_chords(&chords, &followed) };
     // Where chords cross, the area is off for that: facets that hold ask for no shorter ones.
     let beside_crossings = (!transition.conflicts.is_empty()).then(|| unproved(&transition));
     let is_covered = prove_area(&mut transition, &mut grid.quads, &polygons);
-    let repaired = first_repair(&transition, is_covered, cells.exhausted);
+    let repaired = first_repair(&transition, is_covered, exhausted);
     let unproved = beside_crossings.unwrap_or_else(|| unproved(&transition));
     let refused = [&transition.conflicts[..], &transition.crossed];
     let crossing = CrossingChords::new(part, &transition.nodes, &followed, refused);
-    let mut coarse = if cells.exhausted { vec![] } else { crossing.edges_for_sag() };
+    let mut coarse = if exhausted { vec![] } else { crossing.edges_for_sag() };
     coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
     let facing = crossing.facing_samples();
     let whole_cells = grid.quads.iter().map(|&facet| TransitionFacet { facet, pole: None });
@@ -152,7 +154,7 @@ pub(super) fn mesh_with_imprint(
     let holds_imprint = transition.holds_imprint && transition.conflicts.is_empty();
     let edges_of =
         |chords: &[[u32; 2]]| chords.iter().filter_map(|s| Some(followed.get(s)?.edge)).collect::<Vec<_>>();
-    let turned = if cells.exhausted {
+    let turned = if exhausted {
         vec![]
     } else {
         coarse.extend(edges_of(&unproved));

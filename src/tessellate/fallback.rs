@@ -4,6 +4,7 @@
 //! The border's own points are kept, so that neighbours still meet it. Nothing is proved; how far it lies from the surface is
 //! sampled ([`super::RepairedFace::reached_mm`]).
 
+use super::border::edges::Division;
 use super::border::polygons;
 use super::face::FaceInput;
 use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
@@ -11,13 +12,14 @@ use super::foot_search;
 use super::nodes::Position;
 use crate::math::polygon::is_inside_sides;
 use crate::math::{Point, Uv, Vector};
+use crate::model::{Face, Part};
 use crate::tessellate::proof::flat_triangle::distance_to_chord;
 use rustc_hash::FxHashMap;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
+use std::iter;
 
-/// Share of the tolerance that a triangle may be high over a chord of the border to count as near to the surface: chords of borders that
-/// cross are held to less than the rest.
-const LOW_OVER_BORDER: f64 = 0.8;
+/// Where along a chord of the border its edge is asked how far it lies from it.
+const PLACES: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Coordinates below this, which spade refuses, are zero.
 const ZERO: f64 = 1e-30;
@@ -98,7 +100,7 @@ fn filled_border(
 /// As [`border_alone`], where the facets lie within the tolerance of the surface, as far as samples tell; `None` elsewhere, and where no
 /// plane shows the border without a crossing, unless it is that of a strip between two edges.
 pub(super) fn border_within_tolerance(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
-    let FaceInput { face, surface, shared, .. } = *input;
+    let FaceInput { part, face, surface, divisions, shared, .. } = *input;
     let is_strip = matches!(&face.loops[..], [only] if only.uses.len() == 2);
     let mesh = filled_border(input, |loops, up| {
         planar_triangulation(loops, up).or_else(|| if is_strip { zigzag_triangles(loops) } else { None })
@@ -112,18 +114,12 @@ pub(super) fn border_within_tolerance(input: &FaceInput<'_, '_>) -> Option<FaceM
         let [a, b, c, _] = facet.corners;
         [[a, b, c], [b, c, a], [c, a, b]]
     };
-    let key = |a: u32, b: u32| {
-        let (a, b) = (position(a), position(b));
-        (a.min(b), a.max(b))
-    };
-    let mut uses: FxHashMap<(Position, Position), u32> = FxHashMap::default();
-    mesh.facets.iter().flat_map(sides).for_each(|[a, b, _]| *uses.entry(key(a, b)).or_default() += 1);
+    let sags = chord_sags(part, face, divisions);
     let is_near = |facet: &MeshedFacet| {
-        // The border's chords keep to their edges: what is low over one of them is near to the surface,
-        // also where no foot is found on it.
+        // What is low over a chord of the border is near to its edge, and so to the surface, also where no foot is found on it.
         let is_low = |[a, b, c]: [u32; 3]| {
-            uses[&key(a, b)] == 1
-                && distance_to_chord(place(c), &[place(a), place(b)]) <= LOW_OVER_BORDER * facet.tolerance
+            let height = distance_to_chord(place(c), &[place(a), place(b)]);
+            sags.get(&chord(position(a), position(b))).is_some_and(|sag| sag + height <= facet.tolerance)
         };
         let is_foot = |uv: Uv, p: Point| surface.point(uv).distance(p) <= facet.tolerance;
         let corners = facet.corners;
@@ -138,6 +134,33 @@ pub(super) fn border_within_tolerance(input: &FaceInput<'_, '_>) -> Option<FaceM
             || [a + b, b + c, c + a].into_iter().all(|sum| of_surface(0.5 * sum)) && of_surface((a + b + c) / 3.0)
     };
     mesh.facets.iter().all(is_near).then_some(mesh)
+}
+
+/// Both ends of a chord, the lesser first.
+type Chord = [Position; 2];
+
+fn chord(a: Position, b: Position) -> Chord {
+    [a.min(b), a.max(b)]
+}
+
+/// Returns how far the edges of a face lie from their chords at most, mm, at [`PLACES`] of each.
+fn chord_sags(part: &Part, face: &Face, divisions: &[Division]) -> FxHashMap<Chord, f64> {
+    let mut sags = FxHashMap::default();
+    for edge in
+        face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| part.edges.get(u.edge?.0 as usize).zip(u.edge))
+    {
+        let (edge, Division { t, first }) = (edge.0, &divisions[edge.1.0 as usize]);
+        let inner = (0..t.len() as u32 - 2).map(|k| first + k);
+        let [from, to] = edge.vertices.map(|v| v.0);
+        let positions: Vec<u32> = iter::once(from).chain(inner).chain(iter::once(to)).collect();
+        for (ends, t) in positions.windows(2).zip(t.windows(2)) {
+            let at = |f: f64| edge.curve.evaluate(t[0] + f * (t[1] - t[0]));
+            let straight = [at(0.0), at(1.0)];
+            let sag = PLACES.map(|f| distance_to_chord(at(f), &straight)).into_iter().fold(0.0, f64::max);
+            sags.insert(chord(Position::Shared(ends[0]), Position::Shared(ends[1])), sag);
+        }
+    }
+    sags
 }
 
 /// Triangulates (constrained Delaunay) what `loops` hold in the plane across their mean normal, turned towards `up`. Sets where corners

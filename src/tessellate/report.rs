@@ -184,7 +184,7 @@ pub struct Seconds {
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Repair {
-    /// Its budget of facets ended: what was left has coarser cells.
+    /// Its budget of facets ended: what was left has coarser cells or triangles.
     CoarserCells,
     /// Its border crosses itself in the parameter plane: parts of it are not kept. Its facets are certified only if they cover as much as
     /// the border bounds.

@@ -1,6 +1,7 @@
 //! Facets and what is promised of them, judged by sampling that shares nothing with the proof.
 
 mod borders;
+mod budgets;
 mod closed;
 mod contacts;
 mod creases;

@@ -92,6 +92,28 @@ impl GridLines {
         ]
     }
 
+    /// Returns which line a side of a cell, 0 to 3 as in [`Cell::corners`], lies on: the parameter that is constant there, and the index.
+    pub(super) fn line_of_side(&self, cell: &Cell, side: usize) -> [usize; 2] {
+        let e = 1 - side % 2;
+        let level = if side == 0 || side == 3 { cell.lo[e] } else { cell.hi[e] };
+        [e, self.side_line(e, level)]
+    }
+
+    /// Adds the node that `make` makes on a side of a cell, 0 to 3 as in [`Cell::corners`], at the parameter `at` that changes along it. The
+    /// lines must be sorted, and stay so.
+    pub(super) fn add_node(&mut self, cell: &Cell, side: usize, at: f64, make: impl FnOnce(Uv) -> u32) {
+        let d = side % 2;
+        let e = 1 - d;
+        // The line's own parameter, to the bit, so that the line is found by it.
+        let level = if side == 0 || side == 3 { cell.lo[e] } else { cell.hi[e] };
+        let mut uv = Uv::splat(level);
+        uv[d] = at;
+        let id = make(uv);
+        let [e, line] = self.line_of_side(cell, side);
+        let on = &mut self.nodes[e][line];
+        on.insert(on.partition_point(|n| n.0 < at), (at, id));
+    }
+
     /// Returns places for further nodes: where one hanging vertex faces another in a row of at most [`MAX_BRIDGE`] cells, the sides between
     /// get one too, so that all of these cells fall into quads. `cells` are with the nodes of their corners; the lines must be sorted.
     pub(in crate::tessellate) fn bridges(&self, cells: &[(Cell, [u32; 4])], nodes: &Nodes) -> Vec<Bridge> {

@@ -3,7 +3,9 @@
 pub(in crate::tessellate) mod branches;
 pub(in crate::tessellate) mod candidate_facet;
 pub(in crate::tessellate) mod cell;
+pub(in crate::tessellate) mod cell_facets;
 pub(in crate::tessellate) mod grid;
 mod grid_lines;
 mod preferred_cuts;
+mod through_cuts;
 mod tree;

@@ -27,6 +27,8 @@ pub(super) type Cdt = ConstrainedDelaunayTriangulation<Vertex>;
 
 /// Segments from which on nodes inside whole cells stay in: they keep the region that a constraint clears small.
 const LONG_OUTLINE: usize = 4000;
+/// Mean lengths of the segments from which on one is long.
+const LONG_SEGMENT: f64 = 100.0;
 /// Coordinates below the first, which spade refuses, are zero; those above the second lose the exactness of its predicates.
 const COORDINATES: [f64; 2] = [1e-30, 1e30];
 /// Share of the domain, or of a coordinate that is larger, within which two places are one: some fifty roundings.
@@ -70,9 +72,33 @@ impl<'s, 'a> DelaunayMesh<'s, 'a> {
             ranks.sort_unstable_by_key(|rank| rank.reverse_bits());
         }
         self.handles = vec![None; used.len()];
+        if is_long {
+            self.begin_with_long(segments)?;
+        }
         for rank in ranks {
             let [n, coarser] = [rank, rank & rank.saturating_sub(1)].map(|r| order[r as usize] as usize);
+            if self.handles[n].is_some() {
+                continue;
+            }
             self.handles[n] = Some(self.insert_node(n as u32, self.handles[coarser].filter(|_| is_long))?);
+        }
+        Some(())
+    }
+
+    /// Inserts the ends of the long ones of `segments` and makes these constraints, uncounted: one that comes after thousands of nodes
+    /// beside its ends clears all edges between these, which took seven seconds. Errors are as in [`Self::insert_nodes`].
+    fn begin_with_long(&mut self, segments: &[[u32; 2]]) -> Option<()> {
+        let length = |s: &[u32; 2]| (self.scale * (self.nodes[s[1]].uv - self.nodes[s[0]].uv)).length();
+        let all: f64 = segments.iter().map(length).sum();
+        let long = |s: &&[u32; 2]| length(s) > LONG_SEGMENT * all / segments.len() as f64;
+        let long: Vec<[u32; 2]> = segments.iter().filter(long).copied().collect();
+        for n in long.iter().flatten().copied() {
+            if self.handles[n as usize].is_none() {
+                self.handles[n as usize] = Some(self.insert_node(n, None)?);
+            }
+        }
+        for [a, b] in long {
+            self.keep_crease(a, b);
         }
         Some(())
     }

@@ -45,6 +45,8 @@ pub(in crate::tessellate) struct Transition {
     pub(in crate::tessellate) crossed: Vec<[u32; 2]>,
     /// Whether all imprinted lines are edges of the triangulation.
     pub(in crate::tessellate) holds_imprint: bool,
+    /// Whether refinement ended for lack of corners or of work, and some triangles do not hold.
+    pub(in crate::tessellate) exhausted: bool,
 }
 
 impl Transition {
@@ -162,13 +164,15 @@ pub(in crate::tessellate) fn triangulate(
             failing.retain(|f| excess(f) >= WORST * worst);
         }
         // Also when the work of all rounds is used up: what then does not hold is counted as not proved.
+        let works_too_long = (round + 1) * triangles.len() > MAX_WORK;
         let ended = failing.is_empty()
             || surface.steps.are_too_many()
             || round == MAX_ROUNDS
-            || (round + 1) * triangles.len() > MAX_WORK
+            || works_too_long
             || corners >= limits.most_corners(falls);
+        let exhausted = !failing.is_empty() && (works_too_long || corners >= limits.budget);
         if ended || !mesh.refine(&failing, chords) {
-            return Some(Transition { nodes: mesh.nodes, triangles, conflicts, crossed, holds_imprint });
+            return Some(Transition { nodes: mesh.nodes, triangles, conflicts, crossed, holds_imprint, exhausted });
         }
         sides.update(&mesh);
         round += 1;
