@@ -138,10 +138,10 @@ pub(super) fn colours(series: &[Series]) -> Vec<&'static str> {
 }
 
 /// Whether a unit has one length along both axes of a map: degrees against degrees and mm against mm look as they are, unless that makes a
-/// thin stripe.
+/// thin stripe. A degree of C, which turns about the axis, is no length beside one of γ.
 pub(super) fn have_equal_units([a, b]: &[Axis; 2]) -> bool {
     let ratio = (a.range[1] - a.range[0]) / (b.range[1] - b.range[0]);
-    a.unit == b.unit && (0.3..3.4).contains(&ratio)
+    a.unit == b.unit && a.label != "C" && (0.3..3.4).contains(&ratio)
 }
 
 impl AxisStyle {
@@ -268,5 +268,14 @@ mod tests {
         };
         let caption = Chart::map("map", "", "", grid).caption;
         assert!(caption.contains("Isolux lines at 200, 500 lx,"), "{caption}");
+    }
+
+    /// Half a sphere in C and γ, cut to a narrow beam of 120 degrees, has the same ratio of sides as a screen in H and V.
+    #[test]
+    fn degrees_of_c_planes_are_no_lengths() {
+        let axis =
+            |label: &str, high: f64| Axis { label: label.into(), unit: "deg".into(), range: [0.0, high], cells: 2 };
+        assert!(have_equal_units(&[axis("H", 360.0), axis("V", 120.0)]));
+        assert!(!have_equal_units(&[axis("C", 360.0), axis("gamma", 120.0)]));
     }
 }

@@ -1,11 +1,12 @@
 //! Both errors of every figure, for people: what stands behind a ±, what limits the answer, what the next halving costs.
 
 use super::maps::spoken;
+use super::number::unit_in_words;
 use super::{Cell, Table, figures, grouped, seconds};
 use crate::intersect::NormalMode;
 use crate::simulate::{Absorbed, Results};
 use crate::study::default_accuracy::Chosen;
-use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, halving};
+use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, figure_in_words, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 
 /// Writes a figure of `digits` significant digits with its unit and one ± (1σ) for both errors. Both are named where the facets' exceeds
@@ -207,9 +208,9 @@ pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures]) -> Table 
             let [statistical, geometric] = error_cells(figure);
             table.row([
                 r.name.as_str().into(),
-                name.into(),
+                figure_in_words(name).into(),
                 Cell::Number(figure.value, 6),
-                figure.unit.as_str().into(),
+                unit_in_words(&figure.unit).into(),
                 statistical,
                 geometric,
                 limit.into(),
@@ -244,7 +245,7 @@ pub(super) fn alternative_table(chosen: &Chosen) -> Table {
             Cell::Number(a.tolerance_mm[0], 2),
             Cell::Number(a.tolerance_mm[1], 2),
             Cell::Number(a.seconds, 3),
-            a.figure.as_str().into(),
+            figure_in_words(&a.figure).into(),
             a.geometric_share.map_or_else(|| "–".into(), |share| Cell::Number(100.0 * share, 2)),
             Cell::Number(a.geometric_to_statistical, 2),
         ]);

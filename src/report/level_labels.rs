@@ -23,8 +23,12 @@ fn half_size(text: &str, [width, height]: [f64; 2]) -> [f64; 2] {
     [0.5 * width * text.chars().count() as f64, 0.5 * height]
 }
 
-/// Places the number of each level on its longest line, where it covers no other and no named point; levels without room are left out, the
-/// lowest first. `place` takes a point of the map to the picture, `letter` is the width of a character and the height of a line there.
+/// Lines that reach less far from their number than so many of its half sizes have none: it would hide the bright spot within them.
+const LEAST_REACH: f64 = 2.0;
+
+/// Places the number of each level on its longest line, where it covers no other, no named point and not most of its line; levels without
+/// room are left out, the lowest first. `place` takes a point of the map to the picture,
+/// `letter` is the width of a character and the height of a line there.
 pub(super) fn level_labels(
     marks: &Marks,
     place: impl Fn([f64; 2]) -> [f64; 2],
@@ -46,9 +50,16 @@ pub(super) fn level_labels(
         let is_free = |[x, y]: [f64; 2]| {
             taken.iter().all(|[m, h]| (x - m[0]).abs() > half[0] + h[0] || (y - m[1]).abs() > half[1] + h[1])
         };
+        let reaches_out = |[x, y]: [f64; 2]| {
+            let away = |p: &[f64; 2]| {
+                let [u, v] = place(*p);
+                (u - x).abs() > LEAST_REACH * half[0] || (v - y).abs() > LEAST_REACH * half[1]
+            };
+            line.points.iter().any(away)
+        };
         let candidates = PLACES.map(|share| line.points[(share * (line.points.len() - 1) as f64) as usize]);
         // A level without room is left out: two texts over each other say less than one.
-        if let Some(at) = candidates.into_iter().find(|at| is_free(place(*at))) {
+        if let Some(at) = candidates.into_iter().find(|at| is_free(place(*at)) && reaches_out(place(*at))) {
             taken.push([place(at), half]);
             labels.push(LevelLabel { text, at });
         }
@@ -95,18 +106,35 @@ mod tests {
             }
         }
         // On short lines there is no other height: the highest level stays, and those that are far enough from it.
-        let short = |k: usize| Isoline { points: vec![[5.0 * k as f64, 0.0]; 6], ..upright(k) };
+        let short = |k: usize| Isoline {
+            points: (0..6).map(|y| [5.0 * k as f64, 6.0 * f64::from(y)]).collect(),
+            ..upright(k)
+        };
         let marks = Marks { lines: (0..9).map(short).collect(), ..Marks::default() };
         assert_eq!(labels(&marks), ["900", "400"]);
     }
 
     #[test]
     fn names_of_points_are_not_written_over() {
-        let line = Isoline { level: 5.0, points: vec![[20.0, -6.0]; 6] };
+        let line = Isoline { level: 5.0, points: (0..6).map(|x| [17.0 + 3.0 * f64::from(x), -6.0]).collect() };
         let point = MapPoint { name: "HV".into(), note: String::new(), at: [10.0, 0.0] };
         let mut marks = Marks { lines: vec![line], points: vec![point], ..Marks::default() };
         assert!(labels(&marks).is_empty());
         marks.points[0].at = [10.0, 40.0];
         assert_eq!(labels(&marks), ["5"]);
+    }
+
+    /// Rings about a spot: the number, 21 by 13, is written at the left of a ring of radius 40 and would hide one of radius 8.
+    #[test]
+    fn a_number_hides_no_spot() {
+        let ring = |level: f64, radius: f64| Isoline {
+            level,
+            points: (0..=64)
+                .map(|k| f64::from(k) * std::f64::consts::TAU / 64.0)
+                .map(|t| [radius * t.cos(), radius * t.sin()])
+                .collect(),
+        };
+        let marks = Marks { lines: vec![ring(100.0, 40.0), ring(900.0, 8.0)], ..Marks::default() };
+        assert_eq!(labels(&marks), ["100"]);
     }
 }

@@ -1,5 +1,6 @@
 //! What a receiver counted as maps: the grid for files and pictures, its cuts, and what stands below them.
 
+use super::number::unit_in_words;
 use super::{AxisStyle, Chart, Series, SeriesStyle, figures};
 use crate::formats::file_stem;
 use crate::formats::{Axis, Grid, Layer};
@@ -92,11 +93,18 @@ pub(super) fn grids(results: &Results, error: Option<&GeometricError>) -> Vec<(u
         let of_all = |cells: &Vec<f64>| (cells.len() == r.cells.len()).then(|| cells.clone());
         let of_seen = r.photometric().and_then(|seen| measured?.channels.iter().find(|c| c.name == seen.name));
         let geometric = of_seen.and_then(|channel| of_all(&channel.cells));
-        grids.extend(photometric_grid(r).map(|grid| (k, Grid { geometric, ..grid })));
+        grids.extend(photometric_grid(r).map(|grid| (k, Grid { geometric, ..in_words(grid) })));
         let geometric = measured.and_then(|m| of_all(&m.cells));
-        grids.extend(receiver_grid(r).map(|grid| (k, Grid { geometric, ..grid })));
+        grids.extend(receiver_grid(r).map(|grid| (k, Grid { geometric, ..in_words(grid) })));
     }
     grids
+}
+
+/// Writes the units of a grid and its layers for people; files keep those of the results.
+fn in_words(mut grid: Grid) -> Grid {
+    let layers = grid.layers.iter_mut().map(|layer| &mut layer.unit);
+    std::iter::once(&mut grid.unit).chain(layers).for_each(|unit| *unit = unit_in_words(unit));
+    grid
 }
 
 /// Cells of a cut that are drawn: more than a screen has pixels, and 400 kB of the page.
@@ -165,4 +173,32 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
 /// Returns a name as words: with spaces in place of underscores.
 pub(super) fn spoken(name: &str) -> String {
     name.replace('_', " ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_of_maps_are_written_for_people() {
+        let axis = |label: &str| Axis { label: label.into(), unit: "mm".into(), range: [0.0, 2.0], cells: 2 };
+        let layer = Layer {
+            quantity: "red".into(),
+            unit: "W/m2".into(),
+            values: vec![0.0; 4],
+            error: vec![0.0; 4],
+            geometric: None,
+        };
+        let grid = in_words(Grid {
+            name: "wall".into(),
+            quantity: "irradiance".into(),
+            unit: "W/m2".into(),
+            axes: [axis("x"), axis("y")],
+            values: vec![0.0; 4],
+            error: None,
+            geometric: None,
+            layers: vec![layer],
+        });
+        assert_eq!([grid.unit.as_str(), &grid.layers[0].unit], ["W/m²"; 2]);
+    }
 }

@@ -63,6 +63,11 @@ pub(super) fn counted(value: f64, noun: &str) -> String {
     format!("{number} {noun}{end}")
 }
 
+/// Writes a unit of the results for people: `W/m²` for `W/m2`.
+pub(super) fn unit_in_words(unit: &str) -> String {
+    unit.replace("m2", "m²")
+}
+
 /// Writes a duration given in seconds: `1.23 s`, `45 ms`, `2 min 5 s`; a dash where it is not finite.
 pub fn seconds(value: f64) -> String {
     // The unit is that of what is printed: 0.9996 s are 1 s, not 1000 ms.

@@ -4,6 +4,7 @@ use super::colour_picture::colour_chart;
 use super::framing::{joined_cells, lit_part};
 use super::lamp_figures::{Counted, encircled_power, lamp_table, polar};
 use super::maps::{reading, spoken};
+use super::number::unit_in_words;
 use super::{Block, Chart};
 use crate::formats::{Grid, file_stem};
 use crate::regulation::Assessment;
@@ -14,7 +15,7 @@ pub(super) fn framed_map(r: &ReceiverResult, grid: &Grid) -> Chart {
     let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
     let stem = file_stem(&r.name);
     // Candela and lux beside watts: the unit tells the files apart.
-    let name = if grid.unit == r.unit { stem } else { format!("{stem}-{}", grid.unit) };
+    let name = if grid.unit == unit_in_words(r.unit) { stem } else { format!("{stem}-{}", grid.unit) };
     let mut caption = reading(r, grid);
     let part = lit_part(grid);
     if part.is_some() {

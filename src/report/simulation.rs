@@ -4,7 +4,7 @@ use super::cross_check::{self, verdict};
 use super::even_poles::with_joined_slivers;
 use super::lamp_figures::Counted;
 use super::maps::{cuts, grids, receiver_grid, spoken};
-use super::number::counted;
+use super::number::{counted, unit_in_words};
 use super::verdicts::{self, verdict_sentence};
 use super::{Block, Cell, Provenance, Report, Section, Table, View};
 use super::{errors, figures, grouped, receiver_blocks, seconds};
@@ -265,7 +265,7 @@ impl SimulationReport<'_> {
                 Cell::Number(r.power, 6),
                 Cell::Number(r.power_error, 2),
                 r.max.into(),
-                r.unit.into(),
+                unit_in_words(r.unit).into(),
                 place(r.centroid[0].into()),
                 place(r.centroid[1].into()),
                 place(r.rms[0].into()),

@@ -100,6 +100,17 @@ impl ReceiverFigures {
     }
 }
 
+/// Writes the name of a figure for people, `mean position 1` for `centroid_1`; what stands before it, as in `focus: rms_1`, stays.
+pub fn figure_in_words(name: &str) -> String {
+    let (receiver, figure) = name.split_at(name.rfind(": ").map_or(0, |colon| colon + 2));
+    let axis = |known: &str| figure.strip_prefix(known).filter(|axis| matches!(*axis, "1" | "2"));
+    match (axis("rms_"), axis("centroid_")) {
+        (Some(axis), _) => format!("{receiver}rms {axis}"),
+        (_, Some(axis)) => format!("{receiver}mean position {axis}"),
+        _ => name.into(),
+    }
+}
+
 /// Where a run found its hits, as far as its figures ask.
 #[derive(Clone, Copy, Debug)]
 pub enum Surface<'a> {
@@ -294,5 +305,14 @@ mod tests {
         let found = light_weighted_error(&cells, &[0.3, 0.3, 5.0, 5.0]).unwrap();
         assert!((found - 0.12).abs() < 1e-15, "{found}");
         assert_eq!(light_weighted_error(&[0.0; 4], &[5.0; 4]), None);
+    }
+
+    #[test]
+    fn figures_have_names_for_people() {
+        assert_eq!(figure_in_words("rms_1"), "rms 1");
+        assert_eq!(figure_in_words("focus: centroid_2"), "focus: mean position 2");
+        // Receivers and channels keep the names that the scene gave them.
+        assert_eq!(figure_in_words("rms_1: max"), "rms_1: max");
+        assert_eq!(figure_in_words("rms_red"), "rms_red");
     }
 }

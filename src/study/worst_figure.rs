@@ -1,5 +1,6 @@
 //! The figure of a run that facets get most wrong, against the standard error that the whole run will have.
 
+use super::figures::figure_in_words;
 use super::geometric_error::{FaceError, GeometricError, ReceiverError};
 use crate::math::FaceId;
 use crate::simulate::scene::Sampling;
@@ -110,10 +111,11 @@ impl Worst {
             return "not at all".into();
         }
         let by = self.share.map_or_else(|| "where it is 0".into(), |s| format!("by {} %", two_digits(100.0 * s)));
+        let figure = figure_in_words(&self.figure);
         if self.ratio >= LARGEST_RATIO {
-            return format!("{} {by}, without any standard error", self.figure);
+            return format!("{figure} {by}, without any standard error");
         }
-        format!("{} {by}, {} times its standard error", self.figure, two_digits(self.ratio))
+        format!("{figure} {by}, {} times its standard error", two_digits(self.ratio))
     }
 }
 
@@ -147,6 +149,6 @@ mod tests {
         assert_eq!(worst.ratio, LARGEST_RATIO);
         let mut worst = Worst::default();
         worst.weigh(["lamp", "rms_1"], 0.2, 0.05, 2.0);
-        assert_eq!(worst.in_words(), "lamp: rms_1 by 10 %, 4.0 times its standard error");
+        assert_eq!(worst.in_words(), "lamp: rms 1 by 10 %, 4.0 times its standard error");
     }
 }

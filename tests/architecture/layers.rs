@@ -551,6 +551,21 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "tessellate/cells",
+        &[
+            "cell",
+            "preferred_cuts",
+            "candidate_facet",
+            "tree",
+            "branches",
+            "grid_lines",
+            "cell_facets",
+            "through_cuts",
+            "grid",
+            "mod",
+        ],
+    ),
+    (
         "tessellate/proof",
         &[
             "cubic_reduction",

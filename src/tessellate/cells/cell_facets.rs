@@ -2,7 +2,6 @@
 
 use super::candidate_facet::CandidateFacet;
 use super::cell::{Cell, ProvedCell};
-use super::grid::Grid;
 use super::grid_lines::FACING;
 use crate::math::Uv;
 use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};
@@ -25,6 +24,17 @@ const NEARER: f64 = 1e-9;
 const SAME_CORNER: [f64; 2] = [1e-4, 1e-6];
 /// Share of the surface's size that covers those parameters' last digits: [`SAME_CORNER`] of the resolution is 1e-11 of the domain.
 const MOVED_PARAMETERS: f64 = 1e-10;
+
+/// The cells of a face that became facets.
+#[derive(Default)]
+pub(in crate::tessellate) struct Grid {
+    /// Corners in order of the traced diagonal.
+    pub(in crate::tessellate) quads: Vec<ProvedFacet<4>>,
+    /// Pieces of cells with hanging vertices; the transition's pairing may join them to quads.
+    pub(in crate::tessellate) triangles: Vec<ProvedFacet<3>>,
+    /// Sides of the facets that belong to one of them alone, which the transition must meet.
+    pub(in crate::tessellate) outline: Vec<[u32; 2]>,
+}
 
 /// What cells are made on.
 pub(in crate::tessellate) struct GridInput<'g> {

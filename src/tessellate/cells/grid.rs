@@ -1,24 +1,13 @@
 //! Whole cells as facets, and how their hanging vertices are resolved without cracks.
 
 use super::cell::{Cell, Subdivision};
-use super::cell_facets::{CellFacets, GridInput};
+use super::cell_facets::{CellFacets, Grid, GridInput};
 use super::grid_lines::GridLines;
 use super::through_cuts::add_through_cuts;
 use crate::math::Uv;
 use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};
 use crate::tessellate::proof::prover::Prover;
 use rustc_hash::FxHashMap;
-
-/// The cells of a face that became facets.
-#[derive(Default)]
-pub(in crate::tessellate) struct Grid {
-    /// Corners in order of the traced diagonal.
-    pub(in crate::tessellate) quads: Vec<ProvedFacet<4>>,
-    /// Pieces of cells with hanging vertices; the transition's pairing may join them to quads.
-    pub(in crate::tessellate) triangles: Vec<ProvedFacet<3>>,
-    /// Sides of the facets that belong to one of them alone, which the transition must meet.
-    pub(in crate::tessellate) outline: Vec<[u32; 2]>,
-}
 
 /// Makes facets of the cells inside; a cell with nodes on its sides becomes several, and one that does not hold so is cut through. What
 /// does not hold then stays open, for the transition to fill. Adds nodes to those of the border.

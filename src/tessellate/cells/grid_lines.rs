@@ -99,8 +99,8 @@ impl GridLines {
         [e, self.side_line(e, level)]
     }
 
-    /// Adds the node that `make` makes on a side of a cell, 0 to 3 as in [`Cell::corners`], at the parameter `at` that changes along it. The
-    /// lines must be sorted, and stay so.
+    /// Adds the node that `make` makes on a side of a cell, 0 to 3 as in [`Cell::corners`], at the parameter `at` that changes along it.
+    /// The lines must be sorted, and stay so.
     pub(super) fn add_node(&mut self, cell: &Cell, side: usize, at: f64, make: impl FnOnce(Uv) -> u32) {
         let d = side % 2;
         let e = 1 - d;
