@@ -124,7 +124,7 @@ mod tests {
         assert_eq!(labels(&marks), ["5"]);
     }
 
-    /// Rings about a spot: the number, 21 by 13, is written at the left of a ring of radius 40 and would hide one of radius 8.
+    /// Rings about a spot: the number, 21 by 13, is written at the left of a ring of radius 40 and would hide one of radius 6.
     #[test]
     fn a_number_hides_no_spot() {
         let ring = |level: f64, radius: f64| Isoline {
@@ -134,7 +134,7 @@ mod tests {
                 .map(|t| [radius * t.cos(), radius * t.sin()])
                 .collect(),
         };
-        let marks = Marks { lines: vec![ring(100.0, 40.0), ring(900.0, 8.0)], ..Marks::default() };
+        let marks = Marks { lines: vec![ring(100.0, 40.0), ring(900.0, 6.0)], ..Marks::default() };
         assert_eq!(labels(&marks), ["100"]);
     }
 }
