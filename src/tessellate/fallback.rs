@@ -4,12 +4,13 @@
 //! The border's own points are kept, so that neighbours still meet it. Nothing is proved; how far it lies from the surface is
 //! sampled ([`super::RepairedFace::reached_mm`]).
 
+use super::border::edge_chords::PLACES;
 use super::border::edges::Division;
 use super::border::polygons;
 use super::face::FaceInput;
 use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
 use super::foot_search;
-use super::nodes::Position;
+use super::nodes::{Position, edge_key};
 use crate::math::polygon::is_inside_sides;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Face, Part};
@@ -17,9 +18,6 @@ use crate::tessellate::proof::flat_triangle::distance_to_chord;
 use rustc_hash::FxHashMap;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 use std::iter;
-
-/// Where along a chord of the border its edge is asked how far it lies from it.
-const PLACES: [f64; 3] = [0.25, 0.5, 0.75];
 
 /// Coordinates below this, which spade refuses, are zero.
 const ZERO: f64 = 1e-30;
@@ -118,8 +116,9 @@ pub(super) fn border_within_tolerance(input: &FaceInput<'_, '_>) -> Option<FaceM
     let is_near = |facet: &MeshedFacet| {
         // What is low over a chord of the border is near to its edge, and so to the surface, also where no foot is found on it.
         let is_low = |[a, b, c]: [u32; 3]| {
+            let (Position::Shared(from), Position::Shared(to)) = (position(a), position(b)) else { return false };
             let height = distance_to_chord(place(c), &[place(a), place(b)]);
-            sags.get(&chord(position(a), position(b))).is_some_and(|sag| sag + height <= facet.tolerance)
+            sags.get(&edge_key(from, to)).is_some_and(|sag| sag + height <= facet.tolerance)
         };
         let is_foot = |uv: Uv, p: Point| surface.point(uv).distance(p) <= facet.tolerance;
         let corners = facet.corners;
@@ -136,28 +135,19 @@ pub(super) fn border_within_tolerance(input: &FaceInput<'_, '_>) -> Option<FaceM
     mesh.facets.iter().all(is_near).then_some(mesh)
 }
 
-/// Both ends of a chord, the lesser first.
-type Chord = [Position; 2];
-
-fn chord(a: Position, b: Position) -> Chord {
-    [a.min(b), a.max(b)]
-}
-
-/// Returns how far the edges of a face lie from their chords at most, mm, at [`PLACES`] of each.
-fn chord_sags(part: &Part, face: &Face, divisions: &[Division]) -> FxHashMap<Chord, f64> {
+/// Returns how far the edges of a face lie from their chords at most, mm, at [`PLACES`] of each, by the shared positions of its ends.
+fn chord_sags(part: &Part, face: &Face, divisions: &[Division]) -> FxHashMap<[u32; 2], f64> {
     let mut sags = FxHashMap::default();
-    for edge in
-        face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| part.edges.get(u.edge?.0 as usize).zip(u.edge))
-    {
-        let (edge, Division { t, first }) = (edge.0, &divisions[edge.1.0 as usize]);
+    for id in face.loops.iter().flat_map(|l| &l.uses).filter_map(|u| u.edge) {
+        let (edge, Division { t, first }) = (&part.edges[id.0 as usize], &divisions[id.0 as usize]);
         let inner = (0..t.len() as u32 - 2).map(|k| first + k);
         let [from, to] = edge.vertices.map(|v| v.0);
         let positions: Vec<u32> = iter::once(from).chain(inner).chain(iter::once(to)).collect();
         for (ends, t) in positions.windows(2).zip(t.windows(2)) {
             let at = |f: f64| edge.curve.evaluate(t[0] + f * (t[1] - t[0]));
-            let straight = [at(0.0), at(1.0)];
-            let sag = PLACES.map(|f| distance_to_chord(at(f), &straight)).into_iter().fold(0.0, f64::max);
-            sags.insert(chord(Position::Shared(ends[0]), Position::Shared(ends[1])), sag);
+            let chord = [at(0.0), at(1.0)];
+            let sag = PLACES.map(|f| distance_to_chord(at(f), &chord)).into_iter().fold(0.0, f64::max);
+            sags.insert(edge_key(ends[0], ends[1]), sag);
         }
     }
     sags

@@ -22,8 +22,8 @@ const HOLLOW_SLACK: f64 = 1.0;
 const UV_SHARE: f64 = 0.02;
 /// The file's own gaps by which the uv chord may leave the curve further.
 const GAP_SLACK: f64 = 2.0;
-/// Where along a chord the curve is compared with it in the parameter plane.
-const PLACES: [f64; 3] = [0.25, 0.5, 0.75];
+/// Where along a chord the curve is compared with it.
+pub(in crate::tessellate) const PLACES: [f64; 3] = [0.25, 0.5, 0.75];
 /// Share of the tightest tolerance within which two places on an edge are one.
 const SAME_PLACE: f64 = 1e-3;
 /// Halvings that find where an edge crosses a crease: down to the spacing of numbers.

@@ -15,6 +15,14 @@ impl Cell {
         [self.lo, Uv::new(self.hi.x, self.lo.y), self.hi, Uv::new(self.lo.x, self.hi.y)]
     }
 
+    /// Returns the place on side `side`, which begins at that one of [`Self::corners`], where the parameter that changes along it is `at`;
+    /// the other is the side's own to the bit.
+    pub(in crate::tessellate) fn on_side(&self, side: usize, at: f64) -> Uv {
+        let mut uv = self.corners()[side];
+        uv[side % 2] = at;
+        uv
+    }
+
     pub(in crate::tessellate) fn center(&self) -> Uv {
         0.5 * (self.lo + self.hi)
     }

@@ -10,6 +10,7 @@ use crate::tessellate::proof::facet::prove_triangle;
 use crate::tessellate::proof::flat_triangle::distance_to_chord;
 use crate::tessellate::proof::prover::Prover;
 use crate::tessellate::taken_chords::TakenChords;
+use std::iter;
 
 /// Most pieces of a cell that is cut from hanging vertex to hanging vertex.
 const MAX_PIECES: usize = 16;
@@ -48,6 +49,11 @@ pub(in crate::tessellate) struct GridInput<'g> {
     pub(in crate::tessellate) taken: &'g TakenChords,
 }
 
+/// Returns all nodes around a cell, counter-clockwise from its first corner.
+pub(super) fn nodes_around(corners: &[u32; 4], hanging: &[Vec<u32>; 4]) -> Vec<u32> {
+    (0..4).flat_map(|k| iter::once(corners[k]).chain(hanging[k].iter().copied())).collect()
+}
+
 /// Makes facets of single cells.
 pub(super) struct CellFacets<'b, 'g, 's, 'a> {
     pub(super) prover: &'b mut Prover<'s, 'a>,
@@ -61,30 +67,26 @@ impl CellFacets<'_, '_, '_, '_> {
     }
 
     /// Adds to `grid` the facets of a cell with hanging nodes: a grid of quads, or else triangles. `None`, and nothing added, where neither
-    /// holds. `polygon` are all nodes around the cell, counter-clockwise from its first corner.
+    /// holds.
     pub(super) fn with_hanging_nodes(
         &mut self,
         proved: &ProvedCell,
         corners: &[u32; 4],
         hanging: &[Vec<u32>; 4],
-        polygon: &[u32],
         grid: &mut Grid,
     ) -> Option<()> {
         match self.cut_across(proved.slack, corners, hanging) {
             Some(pieces) => grid.quads.extend(pieces),
-            None => grid.triangles.extend(self.triangulate(proved.slack, polygon)?),
+            None => grid.triangles.extend(self.triangulate(proved.slack, &nodes_around(corners, hanging))?),
         }
         Some(())
     }
 
     /// Whether a cell holds with these hanging nodes, as [`Self::with_hanging_nodes`] makes it; without any it does.
     pub(super) fn holds(&mut self, proved: &ProvedCell, corners: &[u32; 4], hanging: &[Vec<u32>; 4]) -> bool {
-        let polygon: Vec<u32> =
-            (0..4).flat_map(|k| std::iter::once(corners[k]).chain(hanging[k].iter().copied())).collect();
         let mark = self.input.nodes.mark();
-        let holds = polygon.len() == 4
-            || self.cut_across(proved.slack, corners, hanging).is_some()
-            || self.triangulate(proved.slack, &polygon).is_some();
+        let holds = hanging.iter().all(Vec::is_empty)
+            || self.with_hanging_nodes(proved, corners, hanging, &mut Grid::default()).is_some();
         self.input.nodes.rewind(mark);
         holds
     }

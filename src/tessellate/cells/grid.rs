@@ -1,7 +1,7 @@
 //! Whole cells as facets, and how their hanging vertices are resolved without cracks.
 
 use super::cell::{Cell, Subdivision};
-use super::cell_facets::{CellFacets, Grid, GridInput};
+use super::cell_facets::{CellFacets, Grid, GridInput, nodes_around};
 use super::grid_lines::GridLines;
 use super::through_cuts::add_through_cuts;
 use crate::math::Uv;
@@ -45,11 +45,10 @@ fn facets_of_cells(
     for (i, (proved, corners)) in cells.inside.iter().zip(corners).enumerate() {
         // A node on a side that belongs to the neighbours alone would be a crack; the cell must be cut from it.
         let hanging = lines.hanging_nodes(&proved.cell);
-        let polygon: Vec<u32> =
-            (0..4).flat_map(|k| std::iter::once(corners[k]).chain(hanging[k].iter().copied())).collect();
+        let polygon = nodes_around(corners, &hanging);
         let at_border = polygon.iter().any(|&n| n < border);
         let made = if polygon.len() > 4 {
-            builder.with_hanging_nodes(proved, corners, &hanging, &polygon, &mut grid)
+            builder.with_hanging_nodes(proved, corners, &hanging, &mut grid)
         } else if at_border {
             // The border's points are not quite where the cell's corners were proved to be.
             builder.at_border(proved, corners).map(|quad| grid.quads.push(quad))
@@ -130,9 +129,9 @@ fn add_bridges(
 ) {
     let named: Vec<(Cell, [u32; 4])> = cells.inside.iter().map(|l| l.cell).zip(corners.iter().copied()).collect();
     for bridge in lines.bridges(&named, nodes) {
-        lines.add_node(&named[bridge.cell].0, bridge.side, bridge.at, |uv| {
-            nodes.push_own(uv, prover.surface.point(uv))
-        });
+        let (cell, _) = named[bridge.cell];
+        let uv = cell.on_side(bridge.side, bridge.at);
+        lines.add_node(&cell, bridge.side, bridge.at, nodes.push_own(uv, prover.surface.point(uv)));
     }
 }
 

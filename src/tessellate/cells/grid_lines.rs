@@ -95,23 +95,16 @@ impl GridLines {
     /// Returns which line a side of a cell, 0 to 3 as in [`Cell::corners`], lies on: the parameter that is constant there, and the index.
     pub(super) fn line_of_side(&self, cell: &Cell, side: usize) -> [usize; 2] {
         let e = 1 - side % 2;
-        let level = if side == 0 || side == 3 { cell.lo[e] } else { cell.hi[e] };
-        [e, self.side_line(e, level)]
+        [e, self.side_line(e, cell.corners()[side][e])]
     }
 
-    /// Adds the node that `make` makes on a side of a cell, 0 to 3 as in [`Cell::corners`], at the parameter `at` that changes along it.
+    /// Adds a node on a side of a cell, at the parameter `at` that changes along it, and returns the line as [`Self::line_of_side`] does.
     /// The lines must be sorted, and stay so.
-    pub(super) fn add_node(&mut self, cell: &Cell, side: usize, at: f64, make: impl FnOnce(Uv) -> u32) {
-        let d = side % 2;
-        let e = 1 - d;
-        // The line's own parameter, to the bit, so that the line is found by it.
-        let level = if side == 0 || side == 3 { cell.lo[e] } else { cell.hi[e] };
-        let mut uv = Uv::splat(level);
-        uv[d] = at;
-        let id = make(uv);
+    pub(super) fn add_node(&mut self, cell: &Cell, side: usize, at: f64, node: u32) -> [usize; 2] {
         let [e, line] = self.line_of_side(cell, side);
         let on = &mut self.nodes[e][line];
-        on.insert(on.partition_point(|n| n.0 < at), (at, id));
+        on.insert(on.partition_point(|n| n.0 < at), (at, node));
+        [e, line]
     }
 
     /// Returns places for further nodes: where one hanging vertex faces another in a row of at most [`MAX_BRIDGE`] cells, the sides between

@@ -40,9 +40,9 @@ pub(super) fn add_through_cuts(
                 continue;
             }
             for (side, at) in cut {
-                let (nodes, surface) = (&mut *builder.input.nodes, builder.prover.surface);
-                lines.add_node(&proved.cell, side, at, |uv| nodes.push_own(uv, surface.point(uv)));
-                added.push((lines.line_of_side(&proved.cell, side), at));
+                let uv = proved.cell.on_side(side, at);
+                let node = builder.input.nodes.push_own(uv, builder.prover.surface.point(uv));
+                added.push((lines.add_node(&proved.cell, side, at, node), at));
             }
         }
         if added.is_empty() {
@@ -98,14 +98,12 @@ fn holds_when_cut(
     hanging: &[Vec<u32>; 4],
     cut: &[Counterpart],
 ) -> bool {
-    let cell = &proved.cell;
     let mark = builder.input.nodes.mark();
     let mut hanging = hanging.clone();
     let mut holds = true;
     for &(side, at) in cut {
         let d = side % 2;
-        let mut uv = if side == 0 || side == 3 { cell.lo } else { cell.hi };
-        uv[d] = at;
+        let uv = proved.cell.on_side(side, at);
         let nodes = &mut *builder.input.nodes;
         // Sides run counter-clockwise: those of the top and the left descend.
         let is_before = |n: u32| if side < 2 { nodes[n].uv[d] < at } else { nodes[n].uv[d] > at };
