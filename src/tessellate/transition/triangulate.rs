@@ -184,3 +184,37 @@ fn sorted_nodes(mut t: [u32; 3]) -> [u32; 3] {
     t.sort_unstable();
     t
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Homogeneous;
+    use crate::nurbs::Surface;
+    use crate::tessellate::settings::ToleranceField;
+    use crate::tessellate::taken_chords::NO_CHORDS;
+
+    /// The saddle z = 10 (2 u − 1)(2 v − 1) mm between the corners of its domain, which two triangles leave by 10 mm along z.
+    #[test]
+    fn what_ends_for_lack_of_corners_says_so() {
+        let points = [-10.0, 10.0].map(|x| [-10.0, 10.0].map(|y| Homogeneous::new(x, y, 0.1 * x * y, 1.0)));
+        let knots = vec![0.0, 0.0, 1.0, 1.0];
+        let spline =
+            Surface { degree: [1, 1], knots: [knots.clone(), knots], points: points.as_flattened().to_vec() };
+        let field = ToleranceField::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0);
+        let surface = FaceSurface::new(&spline, false, field);
+        let chords = BorderChords::default();
+        let refined = |budget: usize| {
+            let mut nodes = Nodes::default();
+            let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(u, v)| Uv::new(u, v));
+            let corners = corners.map(|uv| nodes.push_own(uv, surface.point(uv)));
+            let segments = (0..4).map(|k| [corners[k], corners[(k + 1) % 4]]).collect();
+            let (creases, imprinted) = (vec![], vec![]);
+            let scale = Uv::ONE;
+            let outline =
+                Outline { nodes, segments, creases, imprinted, chords: &chords, scale, taken: &NO_CHORDS };
+            let made = triangulate(&surface, Acceptance::default(), outline, budget).unwrap();
+            (made.exhausted, made.triangles.iter().all(|t| t.bound <= t.tolerance))
+        };
+        assert_eq!((refined(10), refined(100_000)), ((true, false), (false, true)));
+    }
+}
