@@ -187,6 +187,24 @@ fn trims_that_touch_themselves_need_no_repair() {
     }
 }
 
+/// A loop that passes a vertex twice, each time with trims that end half a micrometre beside it, on the far side of the others: 2 × 25 mm².
+#[test]
+fn trims_that_end_beside_a_vertex_do_not_cross_there() {
+    let mut corners = flat(&[[0.0, 0.0], [10.0, 0.0], [5.0, 5.0], [10.0, 10.0], [0.0, 10.0], [5.0, 5.0]]);
+    corners[2].0.x -= 5e-4;
+    corners[5].0.x += 5e-4;
+    let mut model = face(plane(), &[corners]);
+    for vertex in model.parts[0].edges.iter_mut().flat_map(|e| &mut e.vertices) {
+        if *vertex == VertexId(5) {
+            *vertex = VertexId(2);
+        }
+    }
+    let made = tessellate(&model, &measured(0.1));
+    let r = &made.report;
+    assert_eq!((r.faces.failed, r.faces.repaired, r.certified), (0, 0, r.facets), "{:?}", r.repaired);
+    assert!((r.area_mm2 - 50.0).abs() < 1e-9, "{}", r.area_mm2);
+}
+
 /// A loop that crosses itself is filled by parity: two triangles of 25 mm².
 #[test]
 fn a_loop_that_crosses_itself_is_named() {

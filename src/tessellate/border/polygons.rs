@@ -6,11 +6,15 @@ use crate::math::{Point, Uv};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
+use rustc_hash::FxHashMap;
 use std::borrow::Cow;
 
 /// Distance, mm, and share of the surface's size, within which corners that a face makes itself are one: ten times what the readers
 /// of files let the ends of neighbouring trims lie apart.
 const COINCIDENT_CORNERS: [f64; 2] = [1e-9, 1e-6];
+/// Share of the face's extent, in parameters, within which corners at one vertex of the file are one. The two sides of a seam are all of
+/// the extent apart, and so are the ends of a pole.
+const SAME_CORNER: f64 = 1e-3;
 /// Share of the surface's size within which a side without an edge is one point, or two such sides are one seam: such sides come
 /// from analytic surfaces, whose poles and seams close to rounding, or from splines fitted to them.
 const CLOSED_SIDE: f64 = 1e-5;
@@ -54,6 +58,25 @@ impl BorderPolygons {
     pub(in crate::tessellate) fn bounds(&self) -> (Uv, Uv) {
         let all = self.polygons.iter().flatten();
         all.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), v| (l.min(v.uv), h.max(v.uv)))
+    }
+
+    /// Gives corners at one of the file's `vertices` the parameters of the first, where they differ by less than [`SAME_CORNER`]. Trims end
+    /// beside the vertex, as far as the file is rough, and where a loop passes it twice its chords would cross there.
+    fn join_corners(&mut self, vertices: usize) {
+        let (lo, hi) = self.bounds();
+        let near = SAME_CORNER * (hi - lo);
+        let mut corners: FxHashMap<u32, Vec<Uv>> = FxHashMap::default();
+        for corner in self.polygons.iter_mut().flatten() {
+            let Position::Shared(vertex) = corner.position else { continue };
+            if vertex as usize >= vertices {
+                continue;
+            }
+            let known = corners.entry(vertex).or_default();
+            match known.iter().find(|uv| (**uv - corner.uv).abs().cmple(near).all()) {
+                Some(uv) => corner.uv = *uv,
+                None => known.push(corner.uv),
+            }
+        }
     }
 }
 
@@ -149,6 +172,7 @@ pub(in crate::tessellate) fn build(
         out.polygons.push(polygon);
     }
     out.own = own.points;
+    out.join_corners(part.vertices.len());
     out
 }
 
