@@ -111,6 +111,36 @@ fn a_whole_torus_is_closed_and_certified() {
     assert!((made.report.volume_mm3.unwrap() - exact).abs() < 0.05 * 4.0 * PI * PI * 40.0 * 12.0);
 }
 
+/// The outer half of a spring's wire of radius 0.25, twelve turns of radius 3 that rise by 0.5 each; by Pappus π·r·2π·(R + 2r/π) a turn, but
+/// for a share of 4e-4 by which it rises.
+#[test]
+fn the_turns_of_a_spring_are_cut_along_it() {
+    let (wire, radius, rise, turns) = (0.25, 3.0, 0.5, 12);
+    let turn =
+        [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0], [0.0, -1.0], [1.0, -1.0]];
+    let section =
+        [[radius, -wire], [radius + wire, -wire], [radius + wire, 0.0], [radius + wire, wire], [radius, wire]];
+    let weight = |k: usize| if k.is_multiple_of(2) { 1.0 } else { 0.5f64.sqrt() };
+    let corner = |i: usize, j: usize| {
+        let ([x, y], [r, z], w) = (turn[i % 8], section[j], weight(i) * weight(j));
+        (Point::new(r * x, r * y, z + rise * i as f64 / 8.0) * w).extend(w)
+    };
+    let knots = |spans: usize| (0..=spans).flat_map(|k| [k as f64; 2]).chain([spans as f64]).collect::<Vec<_>>();
+    let knots = [4 * turns, 2].map(|spans| [vec![0.0], knots(spans)].concat());
+    let points = (0..=8 * turns).flat_map(|i| (0..5).map(move |j| corner(i, j))).collect();
+    let model = whole(Surface { degree: [2, 2], knots, points });
+    let made = tessellate(&model, &measured(0.01));
+    let r = &made.report;
+    assert_eq!((r.certified, r.over_tolerance), (r.facets, Some(0)));
+    let area = turns as f64 * PI * wire * 2.0 * PI * (radius + 2.0 * wire / PI);
+    assert!(
+        (r.area_mm2 / area - 1.0).abs() < 0.03 && r.facets < 20_000,
+        "{} for {area}, {} facets",
+        r.area_mm2,
+        r.facets
+    );
+}
+
 /// A cylinder of radius `r` and height `h` with two caps; the seam is a real edge used twice.
 fn can(r: f64, h: f64, hole: Option<f64>) -> Part {
     let turn = [0.0, 2.0 * PI];

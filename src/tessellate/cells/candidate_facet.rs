@@ -6,6 +6,7 @@ use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::proof::flat_triangle::distance_to_chord;
 use crate::tessellate::proof::prover::Prover;
 use smallvec::SmallVec;
+use std::iter;
 
 /// Shares of the tolerance that the curve over the diagonal may stray from it in a cell that is proved as one quad. With hanging vertices
 /// the cell falls into triangles, which are held to such curves: without a limit 250 of 19,690 facets of a very rough surface are not
@@ -17,6 +18,8 @@ const NEARER: f64 = 1e-9;
 const SAG_DIFFERENCE: f64 = 0.05;
 /// Where a line is looked at besides its middle.
 const QUARTERS: [f64; 2] = [0.25, 0.75];
+/// Most knot spans of a line that are looked at.
+const MOST_SPANS: usize = 64;
 
 /// Corners of a facet: parameters and places, the traced diagonal from the first to the third.
 pub(in crate::tessellate) type Corners = [(Uv, Point); 4];
@@ -77,7 +80,7 @@ impl CandidateFacet {
     }
 
     /// Returns which parameter's range to halve where the cell does not fit within `limit`, mm: 0 for u, 1 for v. May evaluate the surface
-    /// at four points more.
+    /// at four points more, then once in each knot span.
     pub(in crate::tessellate) fn parameter_to_halve(
         &self,
         surface: &FaceSurface<'_>,
@@ -88,8 +91,15 @@ impl CandidateFacet {
         // A profile like an S passes through the middle of its chord: by the middle alone a trumpet was cut into 100,000 columns, and
         // never across. Where middles do not tell why a cell fails, quarters are looked at.
         if u.max(v) <= limit {
-            let [along_u, along_v] = self.quarter_sags(surface, cell);
-            (u, v) = (u.max(along_u), v.max(along_v));
+            let share = |d: usize, share: f64| cell.lo[d] + (cell.hi[d] - cell.lo[d]) * share;
+            let quarters = |d: usize| self.middle_line_sag(surface, cell, d, QUARTERS.map(|q| share(d, q)));
+            (u, v) = (u.max(quarters(0)), v.max(quarters(1)));
+        }
+        // Of four turns of a spring the quarters lie over the chord too, and half of its strip was cut into 100,000 columns.
+        if u.max(v) <= limit {
+            let spans =
+                |d: usize| self.middle_line_sag(surface, cell, d, span_middles(&surface.breaks[d], cell, d));
+            (u, v) = (u.max(spans(0)), v.max(spans(1)));
         }
         let p = &self.p;
         let length = |a: usize, b: usize, c: usize, d: usize| (p[c][d] - p[a][b]).length();
@@ -103,17 +113,21 @@ impl CandidateFacet {
         if along_u >= along_v { 0 } else { 1 }
     }
 
-    /// Largest distance of the quarters of the two middle lines from their chords, for the one along u and the one along v.
-    fn quarter_sags(&self, surface: &FaceSurface<'_>, cell: Cell) -> [f64; 2] {
-        let chords = [[self.p[0][1], self.p[2][1]], [self.p[1][0], self.p[1][2]]];
-        [0, 1].map(|d| {
-            let off = QUARTERS.map(|share| {
-                let mut at = cell.center();
-                at[d] = cell.lo[d] + (cell.hi[d] - cell.lo[d]) * share;
-                distance_to_chord(surface.point(at), &chords[d])
-            });
-            off[0].max(off[1])
-        })
+    /// Returns the largest distance, mm, from its chord of the middle line along direction `d` at these parameters; 0 without any.
+    fn middle_line_sag(
+        &self,
+        surface: &FaceSurface<'_>,
+        cell: Cell,
+        d: usize,
+        parameters: impl IntoIterator<Item = f64>,
+    ) -> f64 {
+        let chord = [[self.p[0][1], self.p[2][1]], [self.p[1][0], self.p[1][2]]][d];
+        let mut at = cell.center();
+        let off = |parameter: f64| {
+            at[d] = parameter;
+            distance_to_chord(surface.point(at), &chord)
+        };
+        parameters.into_iter().map(off).fold(0.0, f64::max)
     }
 
     /// Places of the corners, in the order of [`Cell::corners`].
@@ -153,6 +167,16 @@ impl CandidateFacet {
     }
 }
 
+/// Returns the middles of the knot spans that a cell crosses in direction `d`, of [`MOST_SPANS`] at most, evenly chosen; of a single span
+/// none.
+fn span_middles(breaks: &[f64], cell: Cell, d: usize) -> impl Iterator<Item = f64> {
+    let (lo, hi) = (cell.lo[d], cell.hi[d]);
+    let inner = &breaks[breaks.partition_point(|&t| t <= lo)..breaks.partition_point(|&t| t < hi)];
+    let ends = iter::once(lo).chain(inner.iter().copied());
+    let middles = ends.zip(inner.iter().copied().chain([hi])).map(|(a, b)| 0.5 * (a + b));
+    middles.skip(usize::from(inner.is_empty())).step_by(inner.len() / MOST_SPANS + 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,6 +197,28 @@ mod tests {
         let cell = Cell { lo: Uv::ZERO, hi: Uv::ONE };
         let candidate = CandidateFacet::new(&surface, cell);
         // The curve's farthest from its chord: by symmetry on either side of the middle, and none in it.
+        assert!(candidate.sag[0] > 0.009 && candidate.sag[1] < 1e-12, "{:?}", candidate.sag);
+        assert_eq!(candidate.parameter_to_halve(&surface, cell, 0.1), 1);
+    }
+
+    /// Along v a wave over the line from knot 2 to knot 6, on the line at each knot; along u an arc that sags by 0.01.
+    #[test]
+    fn a_wave_with_its_quarters_on_the_chord_is_cut_across() {
+        let wave = |k: usize| (k as f64, if k.is_multiple_of(2) { 4.0 } else { -4.0 });
+        let points: Vec<_> = [0.0, 1.0, 2.0]
+            .into_iter()
+            .flat_map(|u| {
+                (0..8)
+                    .map(move |k| wave(k))
+                    .map(move |(x, z)| Homogeneous::new(x, u, z + if u == 1.0 { 0.02 } else { 0.0 }, 1.0))
+            })
+            .collect();
+        let knots = [[vec![0.0; 3], vec![1.0; 3]].concat(), (0..11).map(|k| k as f64 - 1.0).collect()];
+        let spline = Surface { degree: [2, 2], knots, points };
+        let field = ToleranceField::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0);
+        let surface = FaceSurface::new(&spline, false, field);
+        let cell = Cell { lo: Uv::new(0.0, 2.0), hi: Uv::new(1.0, 6.0) };
+        let candidate = CandidateFacet::new(&surface, cell);
         assert!(candidate.sag[0] > 0.009 && candidate.sag[1] < 1e-12, "{:?}", candidate.sag);
         assert_eq!(candidate.parameter_to_halve(&surface, cell, 0.1), 1);
     }
