@@ -450,7 +450,10 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "conversion",
         ],
     ),
-    ("step/trim", &["tolerances", "fit", "loops", "task", "seam_path", "boundary", "region", "seams", "face"]),
+    (
+        "step/trim",
+        &["tolerances", "fit", "loops", "task", "touching", "seam_path", "boundary", "region", "seams", "face"],
+    ),
     (
         "step/geometry",
         &[

@@ -194,3 +194,60 @@ fn a_ring_narrower_than_the_sag_of_coarse_polygons_keeps_its_hole() {
     close(area(&import), PI * (outer * outer - inner * inner), 5e-3);
     assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
 }
+
+/// A strip of a cylinder of radius 2, three turns as a rational spline, that rises by its own width of 0.5 in a turn: each turn touches the
+/// next. `way` 1 winds up, −1 down; `forward` is the direction of its helices' curves.
+fn touching_turns(way: f64, forward: bool) -> String {
+    let turn = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
+    let (last, width) = (24, 0.5);
+    let corner = |k: usize, up: f64| {
+        let (x, y) = turn[k % 8];
+        [2.0 * f64::from(x), 2.0 * f64::from(y), way * width * (k as f64 / 8.0 + up)]
+    };
+    let mut list = Vec::new();
+    for k in 0..=last {
+        list.push((100 + k as u32, corner(k, 0.0)));
+        list.push((200 + k as u32, corner(k, 1.0)));
+    }
+    let all = |each: &dyn Fn(usize) -> String| (0..=last).map(each).collect::<Vec<_>>().join(",");
+    let ordered = |k: usize| if forward { k } else { last - k };
+    let weight = |k: usize| if k.is_multiple_of(2) { "1." } else { "0.7071067811865476" }.to_string();
+    let (weights, pairs) = (all(&weight), all(&|k| format!("({0},{0})", weight(k))));
+    let spans = |each: &dyn Fn(usize) -> String| (0..=last / 2).map(each).collect::<Vec<_>>().join(",");
+    let multiplicities = spans(&|k| if k % 12 == 0 { "3" } else { "2" }.to_string());
+    let knots = spans(&|k| format!("{k}."));
+    let helix = |id: u32, first: usize| {
+        format!(
+            "#{id}=(BOUNDED_CURVE()B_SPLINE_CURVE(2,({}),.UNSPECIFIED.,.F.,.F.)B_SPLINE_CURVE_WITH_KNOTS(({multiplicities}),({knots}),.UNSPECIFIED.)CURVE()\
+             GEOMETRIC_REPRESENTATION_ITEM()RATIONAL_B_SPLINE_CURVE(({weights}))REPRESENTATION_ITEM(''));\n",
+            all(&|k| format!("#{}", first + ordered(k)))
+        )
+    };
+    let (from, to, sense) = if forward { (30, 31, "T") } else { (31, 30, "F") };
+    let against = if forward { "F" } else { "T" };
+    points(&list)
+        + &helix(22, 100)
+        + &helix(23, 200)
+        + &format!(
+            "#21=(BOUNDED_SURFACE()B_SPLINE_SURFACE(2,1,({}),.UNSPECIFIED.,.F.,.F.,.F.)\
+             B_SPLINE_SURFACE_WITH_KNOTS(({multiplicities}),(2,2),({knots}),(0.,1.),.UNSPECIFIED.)\
+             GEOMETRIC_REPRESENTATION_ITEM()RATIONAL_B_SPLINE_SURFACE(({pairs}))REPRESENTATION_ITEM('')SURFACE());\n\
+             #30=VERTEX_POINT('',#100);\n#31=VERTEX_POINT('',#124);\n#32=VERTEX_POINT('',#200);\n#33=VERTEX_POINT('',#224);\n\
+             #40=EDGE_CURVE('',#{from},#{to},#22,.T.);\n#41=EDGE_CURVE('',#31,#33,$,.T.);\n#42=EDGE_CURVE('',#{},#{},#23,.T.);\n\
+             #43=EDGE_CURVE('',#30,#32,$,.T.);\n#50=ORIENTED_EDGE('',*,*,#40,.{sense}.);\n#51=ORIENTED_EDGE('',*,*,#41,.T.);\n\
+             #52=ORIENTED_EDGE('',*,*,#42,.{against}.);\n#53=ORIENTED_EDGE('',*,*,#43,.F.);\n#60=EDGE_LOOP('',(#50,#51,#52,#53));\n\
+             #70=FACE_OUTER_BOUND('',#60,.T.);\n#900=ADVANCED_FACE('',(#70),#21,.T.);\n",
+            all(&|k| format!("(#{},#{})", 100 + k, 200 + k)),
+            from + 2,
+            to + 2
+        )
+}
+
+#[test]
+fn edges_between_turns_that_touch_keep_to_their_own() {
+    for (way, forward) in [(1.0, true), (1.0, false), (-1.0, true), (-1.0, false)] {
+        let import = import(&touching_turns(way, forward));
+        close(area(&import), 3.0 * 4.0 * PI * 0.5, 1e-5);
+        assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
+    }
+}

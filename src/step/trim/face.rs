@@ -53,7 +53,8 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
     let task = task;
     let chart = &task.chart;
     let mut same_sense = task.same_sense != chart.flipped;
-    let fits = task.fit_edges()?;
+    let mut fits = task.fit_edges()?;
+    task.keep_to_sheets(&mut fits)?;
     let mut gap = fits.values().fold(0f64, |g, f| g.max(f.gap));
     if !(gap <= LARGEST_GAP_SHARE * task.extent()) {
         return Err("its edges were not found on its surface");

@@ -26,7 +26,7 @@ impl Budget {
     }
 
     /// Takes one evaluation; fails when none is left.
-    fn spend(&self) -> Result<(), Overrun> {
+    pub(super) fn spend(&self) -> Result<(), Overrun> {
         let left = self.0.get();
         self.0.set(left.saturating_sub(1));
         if left == 0 { Err(Overrun) } else { Ok(()) }
@@ -209,14 +209,14 @@ impl Target<'_> {
     }
 
     /// Fits a uv curve to an edge, over the edge's own parameter; fails only when the budget is used up. Beyond [`MAX_DEPTH`] halvings
-    /// pieces are taken as they are.
-    pub(crate) fn fit(&self, curve: &Curve) -> Result<Fit, Overrun> {
+    /// pieces are taken as they are. `start` is where it is expected to begin, if known.
+    pub(crate) fn fit(&self, curve: &Curve, start: Option<Uv>) -> Result<Fit, Overrun> {
         let breaks = curve.breakpoints();
         let spans = breaks.len() - 1;
         // One Bézier span of high degree may hold a whole turn of a thread.
         let pieces = if curve.degree == 1 { 1 } else { 4usize.div_ceil(spans).max(curve.degree.div_ceil(2)) };
         let mut nodes: Vec<(Node, Node)> = Vec::new();
-        let mut hint = None;
+        let mut hint = start;
         let mut gap = 0f64;
         for (points, pair) in curve.bezier_pieces().into_iter().zip(breaks.windows(2)) {
             let degree = curve.degree;

@@ -1,9 +1,9 @@
 //! From the loops of a face to one trimmed spline.
 //!
-//! Every edge is located in the parameters of the face's surface (`fit`, `task`); the loops are chained and unwrapped (`loops`), joined
-//! and closed over poles and by seams (`boundary`, `seam_path`); the rectangle that they cover becomes one rational B-spline (`region`), in
-//! whose parameters the seams and edges are found anew (`seams`, `face`). Of `tolerances`, `fit`, `loops`, `task`, `seam_path`, `boundary`,
-//! `region`, `seams` and `face` each sees only those before it.
+//! Every edge is located in the parameters of the face's surface (`fit`, `task`, `touching`); the loops are chained and unwrapped
+//! (`loops`), joined and closed over poles and by seams (`boundary`, `seam_path`); the rectangle that they cover becomes one rational
+//! B-spline (`region`), in whose parameters the seams and edges are found anew (`seams`, `face`). Of `tolerances`, `fit`, `loops`, `task`,
+//! `touching`, `seam_path`, `boundary`, `region`, `seams` and `face` each sees only those before it.
 
 mod boundary;
 pub(super) mod face;
@@ -14,3 +14,4 @@ mod seam_path;
 mod seams;
 pub(super) mod task;
 mod tolerances;
+mod touching;

@@ -45,7 +45,7 @@ impl<'t, 'e> Region<'t, 'e> {
             tolerance: self.task.tolerance,
             budget: &self.task.budget,
         };
-        target.fit(curve)
+        target.fit(curve, None)
     }
 
     /// Returns the straight line between the ends of a piece, in the spline's parameters and over the piece's own.

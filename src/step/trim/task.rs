@@ -41,15 +41,15 @@ impl FaceTask<'_> {
         for &(edge, _) in self.loops.iter().flatten() {
             // An edge that is run twice, along a seam, is fitted once.
             if let Entry::Vacant(slot) = fits.entry(edge) {
-                slot.insert(self.fit_edge(self.edges[&edge])?);
+                slot.insert(self.fit_edge(self.edges[&edge], None)?);
             }
         }
         Ok(fits)
     }
 
     /// Fits an edge in the chart's own parameters: exact on a plane, else within the tolerance, and put on the border where it swings just
-    /// over it.
-    fn fit_edge(&self, curve: &Curve) -> Result<Fit, Overrun> {
+    /// over it. `start` is where it is expected to begin, if known.
+    pub(super) fn fit_edge(&self, curve: &Curve, start: Option<Uv>) -> Result<Fit, Overrun> {
         let chart = &self.chart;
         if let Kind::Plane { frame } = &chart.kind {
             return Ok(project_to_plane(curve, |p| {
@@ -69,7 +69,7 @@ impl FaceTask<'_> {
             tolerance: self.tolerance,
             budget: &self.budget,
         };
-        let mut fit = target.fit(curve)?;
+        let mut fit = target.fit(curve, start)?;
         // Cubics between points of the border may swing over it.
         for p in &mut fit.curve.points {
             for d in 0..2 {

@@ -21,6 +21,10 @@ pub(super) const POLE_CLEARANCE: f64 = 2e-3;
 /// Directions for the poles whose clearances differ by less are as good as each other: the first one is kept.
 pub(super) const SCORE_NOISE: f64 = 1e-9;
 
+/// Places of a surface that are so many times as far apart along it as in space, beyond the file's accuracy, lie on sheets that touch: two
+/// turns of a spring are, and neighbouring places of an edge are not.
+pub(super) const TORN: f64 = 100.0;
+
 /// A loop whose area is below this share of the largest one is an edge run forth and back.
 pub(super) const EMPTY_LOOP_SHARE: f64 = 1e-12;
 /// Products of lengths below this share count as touching, not as crossing.
