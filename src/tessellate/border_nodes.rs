@@ -8,7 +8,7 @@ use super::imprint::{Imprint, ImprintEnd};
 use super::nodes::{Node, Nodes, Position, edge_key};
 use super::proof::border_chord::{BorderChord, BorderChords};
 use super::proof::deviation::DeviationBounds;
-use crate::math::{Point, Uv};
+use crate::math::{NearPoints, Point, Uv};
 use crate::model::{EdgeId, EdgeUse, Part, TrimLoop};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -66,7 +66,7 @@ impl BorderNodes {
             coincident: Vec::new(),
             imprinted: Vec::new(),
         };
-        let ids = out.add_nodes(part, polygons, shared);
+        let ids = out.add_nodes(part, surface, polygons, shared);
         let uses: Vec<&EdgeUse> = loops.iter().flat_map(|l| &l.uses).collect();
         let mut along_edges: Vec<EdgeSegment<'_>> = Vec::new();
         for (polygon, ids) in polygons.polygons.iter().zip(&ids) {
@@ -108,12 +108,18 @@ impl BorderNodes {
     }
 
     /// Makes the nodes of all polygons and returns their numbers, polygon by polygon. Corners at one vertex with the same parameters get
-    /// one node: loops that touch there would otherwise not know of each other's chords. Notes vertices that stand twice in the file in
-    /// `coincident`.
-    fn add_nodes(&mut self, part: &Part, polygons: &BorderPolygons, shared: &[Point]) -> Vec<Vec<u32>> {
+    /// one node: loops that touch there would otherwise not know of each other's chords. Notes vertices that stand twice in the file, up to
+    /// the rounding of their coordinates, in `coincident`.
+    fn add_nodes(
+        &mut self,
+        part: &Part,
+        surface: &FaceSurface<'_>,
+        polygons: &BorderPolygons,
+        shared: &[Point],
+    ) -> Vec<Vec<u32>> {
         let (lo, hi) = polygons.bounds();
         let near = SAME_PARAMETERS * (hi - lo);
-        let mut vertices: FxHashMap<[u64; 3], u32> = FxHashMap::default();
+        let mut vertices = NearPoints::within(surface.rounding.max(f64::MIN_POSITIVE));
         let mut node = |uv: Uv, position: Position| {
             let place = match position {
                 Position::Shared(p) => shared[p as usize],
@@ -124,17 +130,18 @@ impl BorderNodes {
                 return self.nodes.push(Node { uv, place, position });
             };
             if (here as usize) < part.vertices.len() {
-                let next = self.nodes.len();
-                let first = *vertices.entry(place.to_array().map(f64::to_bits)).or_insert(next);
+                let nodes = &self.nodes;
                 // In one place in space and in parameters: on either side of a seam they are two corners.
-                if first < next && (self.nodes[first].uv - uv).abs().cmple(near).all() {
-                    if let Position::Shared(there) = self.nodes[first].position
+                let has_uv = |n: u32| (nodes[n].uv - uv).abs().cmple(near).all();
+                if let Some(first) = vertices.first(place, |n| nodes[n].place, has_uv) {
+                    if let Position::Shared(there) = nodes[first].position
                         && there != here
                     {
                         self.coincident.push([there, here]);
                     }
                     return first;
                 }
+                vertices.insert(place, nodes.len());
             }
             self.nodes.push(Node { uv, place, position })
         };

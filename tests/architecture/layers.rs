@@ -293,6 +293,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "polygon",
             "distance",
             "maximum",
+            "near_points",
             "spread",
             "units",
         ],

@@ -154,10 +154,16 @@ fn a_face_between_two_chords_gets_a_facet() {
     assert!((made.report.area_mm2 - 0.01).abs() < 1e-12, "{}", made.report.area_mm2);
 }
 
-/// A hole that touches the outer loop in one place, where the file has a vertex for each of them: one corner for both, and the lid in the
-/// hole has the same.
+/// A hole that touches the outer loop in one place, where the file has a vertex for each of them, the same or a rounding apart: one corner
+/// for both, and the lid in the hole has the same.
 #[test]
 fn loops_that_touch_in_two_vertices_have_one_corner_there() {
+    for apart in [0.0, 1e-13] {
+        assert_one_corner_where_loops_touch(apart);
+    }
+}
+
+fn assert_one_corner_where_loops_touch(apart: f64) {
     let wall = sweep::cylinder(&Frame::IDENTITY, 50.0, [0.0, 1.0], [0.0, 60.0]);
     let touch = Uv::new(0.45, 10.0);
     let c = [Uv::new(0.1, 10.0), touch, Uv::new(0.9, 10.0), Uv::new(0.9, 50.0), Uv::new(0.1, 50.0)];
@@ -168,6 +174,9 @@ fn loops_that_touch_in_two_vertices_have_one_corner_there() {
     };
     let hole = vec![chain(256, ring)];
     let mut model = face(wall, &[outer, hole]);
+    let vertices = &mut model.parts[0].vertices;
+    let twice = (1..vertices.len()).find(|&k| vertices[..k].contains(&vertices[k])).unwrap();
+    vertices[twice] += apart;
     let faces = &mut model.parts[0].shells[0].faces;
     let mut lid = faces[0].clone();
     let mut around = lid.loops[1].clone();

@@ -4,7 +4,7 @@ use super::numbering::{ConvertedPart, add_face};
 use super::solid_recipes::{RecipeFace, SolidRecipe};
 use super::styles::Styles;
 use super::topology::ShapeItems;
-use crate::math::Point;
+use crate::math::{NearPoints, Point};
 use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
 use crate::nurbs::Curve;
 use crate::step::geometry::{GeometryReader, Outcome, Refusal};
@@ -12,7 +12,6 @@ use crate::step::settings::Settings;
 use crate::step::trim::face::{BuiltFace, build_face};
 use crate::step::trim::fit::Budget;
 use crate::step::trim::task::FaceTask;
-use rustc_hash::FxHashMap;
 
 /// Ends of edges of one recipe this near are one vertex, mm: the curves of a profile meet as loosely as its file says.
 const SAME_VERTEX_MM: f64 = 1e-3;
@@ -92,37 +91,22 @@ fn trim_faces(
 /// earlier vertices of the part are not shared. Returns the edges' ids, each `Some`.
 fn add_edges(edges: Vec<Curve>, part: &mut Part) -> Vec<Option<EdgeId>> {
     // Only among the vertices of this solid: another one that touches it keeps its own.
-    let mut near = NearVertices::default();
+    let mut known = NearPoints::within(SAME_VERTEX_MM);
+    let mut vertex = |p: Point| {
+        let near = known.first(p, |k| part.vertices[k as usize], |_| true);
+        let number = near.unwrap_or_else(|| {
+            let next = part.vertices.len() as u32;
+            known.insert(p, next);
+            part.vertices.push(p);
+            next
+        });
+        VertexId(number)
+    };
     let mut numbers = Vec::with_capacity(edges.len());
     for curve in edges {
-        let vertices = curve.domain().map(|t| near.vertex(curve.evaluate(t), &mut part.vertices));
+        let vertices = curve.domain().map(|t| vertex(curve.evaluate(t)));
         numbers.push(Some(EdgeId(part.edges.len() as u32)));
         part.edges.push(Edge { curve, vertices, entity: None });
     }
     numbers
-}
-
-/// Vertices by the cube of side [`SAME_VERTEX_MM`] in which they lie, as whole numbers of sides from the origin.
-#[derive(Default)]
-struct NearVertices {
-    cubes: FxHashMap<[i64; 3], Vec<u32>>,
-}
-
-impl NearVertices {
-    /// Returns the first vertex within [`SAME_VERTEX_MM`] of a point; where there is none, adds one there to `vertices`.
-    fn vertex(&mut self, p: Point, vertices: &mut Vec<Point>) -> VertexId {
-        let cube = p.to_array().map(|x| (x / SAME_VERTEX_MM).floor() as i64);
-        let steps = (0..27).map(|k: i64| [k % 3, k / 3 % 3, k / 9]);
-        let around = steps.map(|step| [0, 1, 2].map(|d| cube[d].saturating_add(step[d] - 1)));
-        let candidates = around.filter_map(|cube| self.cubes.get(&cube)).flatten();
-        let near = candidates.filter(|&&v| (vertices[v as usize] - p).length() <= SAME_VERTEX_MM).min();
-        let number = near.copied().unwrap_or_else(|| {
-            vertices.push(p);
-            vertices.len() as u32 - 1
-        });
-        if near.is_none() {
-            self.cubes.entry(cube).or_default().push(number);
-        }
-        VertexId(number)
-    }
 }
