@@ -277,7 +277,8 @@ impl SimulationReport<'_> {
         let section = Section::new("Energy").with_block(power).with_block(receivers);
         let section = section.with_block(errors::figure_table(self.results, self.figures));
         let section = section.with_block(errors::halving_cost(self.results, self.geometric).as_str());
-        let measured = self.geometric.filter(|g| g.rays > 0).map(errors::change_table).into_iter();
+        let measured = self.geometric.filter(|g| g.rays > 0);
+        let measured = measured.map(|g| errors::change_table(g, self.results, self.unit)).into_iter();
         let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(errors::alternative_table);
         let section = measured.chain(tried).fold(section, |s, table| s.with_block(table));
         if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {
