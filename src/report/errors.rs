@@ -279,7 +279,8 @@ pub(super) fn change_table(error: &GeometricError, results: &Results, unit: &str
         row("power".into(), &r.power, unit);
         // A receiver that counts power alone has no cells, and no place for a width.
         if r.peak_cells > 0 {
-            let over = if r.peak_cells == 1 { String::new() } else { format!(" over {0} × {0} cells", r.peak_cells) };
+            let over =
+                if r.peak_cells == 1 { String::new() } else { format!(" over {0} × {0} cells", r.peak_cells) };
             row(format!("max{over}"), &r.peak, &unit_in_words(result.unit));
         }
         if !r.unit.is_empty() {

@@ -1,4 +1,5 @@
-//! Numbers, colours and texts as plotly.js takes them. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of decimal text.
+//! Numbers, colours, light and texts as plotly.js takes them. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of
+//! decimal text.
 
 use crate::formats::{ColourMap, base64};
 use serde_json::{Value, json};
@@ -36,7 +37,30 @@ pub(super) fn css([r, g, b]: [f64; 3]) -> String {
     format!("rgb({},{},{})", byte(r), byte(g), byte(b))
 }
 
+/// Returns how a surface is lit. Ambient and diffuse light of more than 1 together would make bright parts white on every side. plotly
+/// takes triangles whose doubled area, squared, is below its epsilon as having no normal: narrow ones of a flat face stood black in it.
+pub(super) fn lighting(ambient: f64, diffuse: f64, specular: f64) -> Value {
+    json!({"ambient": ambient, "diffuse": diffuse, "specular": specular, "roughness": 0.6, "facenormalsepsilon": 0.0})
+}
+
 /// Returns a text as plotly shows it letter by letter: names of parts and receivers are data, and it reads them as HTML.
 pub(super) fn plain(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// Returns plotly's name of a side of a point, right and down.
+pub(super) fn text_position([right, down]: [i8; 2]) -> String {
+    let [row, column] =
+        [["top", "middle", "bottom"][(down + 1) as usize], ["left", "center", "right"][(right + 1) as usize]];
+    format!("{row} {column}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_stands_on_its_side() {
+        assert_eq!([[1, -1], [-1, 0], [0, 1]].map(text_position), ["top right", "middle left", "bottom center"]);
+    }
 }

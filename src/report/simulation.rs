@@ -248,15 +248,16 @@ impl SimulationReport<'_> {
             ("± (1σ)", self.unit),
             ("largest", ""),
             ("unit", ""),
-            ("mean position 1", "mm or °"),
-            ("mean position 2", "mm or °"),
-            ("rms 1", "mm or °"),
-            ("± (1σ)", "mm or °"),
-            ("rms 2", "mm or °"),
-            ("± (1σ)", "mm or °"),
+            ("mean position 1", ""),
+            ("mean position 2", ""),
+            ("rms 1", ""),
+            ("± (1σ)", ""),
+            ("rms 2", ""),
+            ("± (1σ)", ""),
         ];
         let power = errors::power_table(self.results, self.absorbed, self.unit);
-        let mut receivers = Table::new("receivers", "Receivers", &columns);
+        let caption = "Positions and widths in mm, of far fields and spheres in degrees.";
+        let mut receivers = Table::new("receivers", "Receivers", &columns).caption(caption);
         for r in &self.results.receivers {
             // Light that did not come has no place.
             let place = |cell: Cell| if r.power > 0.0 { cell } else { Cell::Empty };
