@@ -167,8 +167,8 @@ pub(super) fn power_table(results: &Results, absorbed: &[Figure], unit: &str) ->
     let columns = [("", ""), ("power", unit), ("share", "%"), ("± rays (1σ)", unit), ("± facets (1σ)", unit)];
     let p = &results.power;
     let mut table = Table::new("power", "Where the power went", &columns).caption(format!(
-        "Emitted is the sum of the others to {} of it. Received counts receivers that end light; one that lets it pass counts it again.",
-        figures(p.imbalance(), 1)
+        "Emitted is the sum of the others{}. Received counts receivers that end light; one that lets it pass counts it again.",
+        if p.imbalance() == 0.0 { String::new() } else { format!(", but for {} of it", figures(p.imbalance(), 1)) }
     ));
     let cells = |name: &str, power: f64| {
         [name.into(), Cell::Number(power, 6), Cell::Number(100.0 * power / p.emitted, 5)].into_iter()
@@ -253,24 +253,16 @@ pub(super) fn alternative_table(chosen: &Chosen) -> Table {
     table
 }
 
-/// Makes a table of each receiver's power, brightest place and widths on facets and on the spline.
-pub(super) fn change_table(error: &GeometricError) -> Table {
+/// Makes a table of what facets change of each receiver's power, brightest place and widths, a row each: as many columns would not fit on
+/// paper. `unit` is that of power; `error` has the receivers of `results`.
+pub(super) fn change_table(error: &GeometricError, results: &Results, unit: &str) -> Table {
     let columns = [
         ("receiver", ""),
-        ("power, facets", ""),
-        ("power, spline", ""),
-        ("power, ± of the difference", ""),
-        ("brightest, facets", ""),
-        ("brightest, spline", ""),
-        ("brightest, ± of the difference", ""),
-        ("over cells a side", ""),
-        ("width 1, facets", ""),
-        ("width 1, spline", ""),
-        ("width 1, ± of the difference", ""),
-        ("width 2, facets", ""),
-        ("width 2, spline", ""),
-        ("width 2, ± of the difference", ""),
-        ("unit of widths", ""),
+        ("figure", ""),
+        ("on facets", ""),
+        ("on the spline", ""),
+        ("± of the difference (1σ)", ""),
+        ("unit", ""),
     ];
     let caption = format!(
         "{} rays of the run, traced on the facets and on the true surfaces with the same random numbers. A width is the root mean square \
@@ -278,16 +270,23 @@ pub(super) fn change_table(error: &GeometricError) -> Table {
         grouped(error.rays)
     );
     let mut table = Table::new("faceting", "What the facets change", &columns).caption(caption);
-    for r in &error.receivers {
-        let three = |p: &Paired| [Cell::Number(p.facets, 5), Cell::Number(p.spline, 5), Cell::Number(p.error, 2)];
-        let cells = std::iter::once(r.name.as_str().into())
-            .chain(three(&r.power))
-            .chain(three(&r.peak))
-            .chain([r.peak_cells.into()])
-            .chain(three(&r.width[0]))
-            .chain(three(&r.width[1]))
-            .chain([r.unit.into()]);
-        table.row(cells);
+    for (r, result) in error.receivers.iter().zip(&results.receivers) {
+        let mut row = |figure: String, p: &Paired, unit: &str| {
+            let numbers = [Cell::Number(p.facets, 5), Cell::Number(p.spline, 5), Cell::Number(p.error, 2)];
+            let [name, figure, unit] = [r.name.as_str(), &figure, unit].map(Cell::from);
+            table.row([name, figure].into_iter().chain(numbers).chain([unit]));
+        };
+        row("power".into(), &r.power, unit);
+        // A receiver that counts power alone has no cells, and no place for a width.
+        if r.peak_cells > 0 {
+            let over =
+                if r.peak_cells == 1 { String::new() } else { format!(" over {0} × {0} cells", r.peak_cells) };
+            row(format!("max{over}"), &r.peak, &unit_in_words(result.unit));
+        }
+        if !r.unit.is_empty() {
+            row("width 1".into(), &r.width[0], r.unit);
+            row("width 2".into(), &r.width[1], r.unit);
+        }
     }
     table
 }

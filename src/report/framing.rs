@@ -14,6 +14,9 @@ const WORTH: f64 = 0.75;
 /// Fewest cells along an axis: a narrow spot is shown with its surroundings.
 const FEWEST_CELLS: usize = 24;
 
+/// What the caption of a picture of the [`lit_part`] ends with.
+pub(super) const LIT_PART_SHOWN: &str = " Shown: the part that is lit; the files hold all of it.";
+
 /// Most cells along an axis of a picture in the page: as many as it has pixels, and 2 MB of the page.
 const MOST_CELLS: usize = 600;
 

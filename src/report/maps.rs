@@ -1,5 +1,6 @@
 //! What a receiver counted as maps: the grid for files and pictures, its cuts, and what stands below them.
 
+use super::framing::{LIT_PART_SHOWN, lit_part};
 use super::number::unit_in_words;
 use super::{AxisStyle, Chart, Series, SeriesStyle, figures};
 use crate::formats::file_stem;
@@ -110,8 +111,11 @@ fn in_words(mut grid: Grid) -> Grid {
 /// Cells of a cut that are drawn: more than a screen has pixels, and 400 kB of the page.
 const MOST_CUT_POINTS: usize = 2000;
 
-/// Draws the values along both axes through the peak, with their errors; `None` for a grid without cells or without light.
+/// Draws the values along both axes through the peak, with their errors, as far as the map shows them; `None` for a grid without cells or
+/// without light.
 pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
+    let part = lit_part(grid);
+    let grid = part.as_ref().unwrap_or(grid);
     let [a, b] = &grid.axes;
     let (column, row) = grid.peak_cell().filter(|(column, row)| grid.values[row * a.cells + column] > 0.0)?;
     // Every so many-th cell of a very fine receiver, the brightest among them: each has a bar of its error in the page.
@@ -132,15 +136,14 @@ pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     ];
     // Cuts along two axes of different units have no unit in common.
     let unit = if a.unit == b.unit { a.unit.as_str() } else { "" };
-    let axes =
-        [AxisStyle::linear("position through the peak", unit), AxisStyle::linear(&grid.quantity, &grid.unit)];
+    let axes = [AxisStyle::linear("position", unit), AxisStyle::linear(&grid.quantity, &grid.unit)];
     let name = format!("{}-cuts", file_stem(&r.name));
-    let caption = if grid.geometric.is_some() {
-        "One row and one column of cells; bars are one standard error of rays and facets together."
-    } else {
-        "One row and one column of cells; bars are one standard error of the rays."
-    };
-    Some(Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), caption, axes, series))
+    let errors = if grid.geometric.is_some() { "rays and facets together" } else { "the rays" };
+    let mut caption = format!("One row and one column of cells; bars are one standard error of {errors}.");
+    if part.is_some() {
+        caption += LIT_PART_SHOWN;
+    }
+    Some(Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), &caption, axes, series))
 }
 
 /// Writes what a map shows: its peak, its noise and its cells.

@@ -1,11 +1,14 @@
-//! Charts and views as plotly.js figures. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of decimal text.
+//! Charts and views as plotly.js figures.
 
-use super::chart::{AxisStyle, Chart, Content, Marks, PALETTE, Series, SeriesStyle, colours, have_equal_units};
+use super::chart::{
+    AxisStyle, Chart, Content, MapPoint, Marks, PALETTE, Series, SeriesStyle, colours, have_equal_units,
+};
 use super::legend::legend_name;
-use super::level_labels::level_labels;
+use super::map_labels::{LevelLabel, MapLabels, POINT_RADIUS, map_labels};
+use super::plotly_data::{colour_scale, css, doubles, indices, lighting, plain, singles, text_position};
 use super::raster::{EYE, common_range};
 use super::view::{Shape, View};
-use crate::formats::{Axis, ColourMap, Picture, base64};
+use crate::formats::{Axis, Picture, base64};
 use serde_json::{Value, json};
 use std::io::Read;
 
@@ -23,39 +26,6 @@ pub(super) fn script() -> String {
     script.replace('\u{1a}', r"\x1a").replace('\u{1}', r"\x01")
 }
 
-/// Packs numbers as plotly's typed array of single precision.
-fn singles(values: impl Iterator<Item = f32>) -> Value {
-    let bytes: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
-    json!({"dtype": "f4", "bdata": base64(&bytes)})
-}
-
-/// Packs numbers as plotly's typed array of double precision.
-fn doubles(values: impl Iterator<Item = f64>) -> Value {
-    let bytes: Vec<u8> = values.flat_map(f64::to_le_bytes).collect();
-    json!({"dtype": "f8", "bdata": base64(&bytes)})
-}
-
-/// Packs whole numbers as plotly's typed array of 32 bits.
-fn indices(values: impl Iterator<Item = u32>) -> Value {
-    let bytes: Vec<u8> = values.flat_map(u32::to_le_bytes).collect();
-    json!({"dtype": "u4", "bdata": base64(&bytes)})
-}
-
-/// Returns the map as plotly's list of 17 stops.
-fn colour_scale(map: ColourMap) -> Value {
-    let stop = |k: u32| {
-        let [r, g, b] = map.colour(f64::from(k) / 16.0);
-        json!([f64::from(k) / 16.0, format!("rgb({r},{g},{b})")])
-    };
-    (0..=16).map(stop).collect()
-}
-
-/// Writes red, green and blue, from 0 to 1, as a CSS colour.
-fn css([r, g, b]: [f64; 3]) -> String {
-    let byte = |c: f64| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
-    format!("rgb({},{},{})", byte(r), byte(g), byte(b))
-}
-
 /// Returns plotly's axis over these values. On a logarithmic one plotly names every digit of a decade, which overlap where there are more
 /// than two.
 fn axis(style: &AxisStyle, values: impl Iterator<Item = f64>) -> Value {
@@ -70,11 +40,6 @@ fn axis(style: &AxisStyle, values: impl Iterator<Item = f64>) -> Value {
     };
     json!({"dtick": step, "title": {"text": style.title()}, "type": if style.log { "log" } else { "linear" },
         "automargin": true, "separatethousands": true, "exponentformat": if style.log { "power" } else { "none" }})
-}
-
-/// Returns a text as plotly shows it letter by letter: names of parts and receivers are data, and it reads them as HTML.
-fn plain(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Returns a chart as plotly's figure: an object with `data` and `layout`.
@@ -108,11 +73,12 @@ pub(super) fn chart(chart: &Chart) -> Value {
                 "colorbar": {"title": {"text": grid.unit, "side": "right"}, "thickness": 14, "outlinewidth": 0}});
             let same = have_equal_units(&grid.axes);
             let anchor = if same { json!({"scaleanchor": "x", "constrain": "domain"}) } else { json!({}) };
+            let labels = labels(marks, &grid.axes, same);
             let mut data = vec![heat];
-            data.extend(mark_traces(marks));
+            data.extend(mark_traces(marks, &labels));
             (
                 data,
-                json!({"yaxis": anchor, "xaxis": {"constrain": "domain"}, "annotations": level_annotations(marks, &grid.axes, same),
+                json!({"yaxis": anchor, "xaxis": {"constrain": "domain"}, "annotations": level_annotations(&labels),
                 "showlegend": false, "meta": {"unit": grid.unit, "scales": "both"}}),
             )
         }
@@ -139,7 +105,7 @@ pub(super) fn chart(chart: &Chart) -> Value {
 }
 
 /// Returns lines of equal value, borders of zones and named points as traces over a map; a NaN lifts the pen between two lines.
-fn mark_traces(marks: &Marks) -> Vec<Value> {
+fn mark_traces(marks: &Marks, labels: &MapLabels) -> Vec<Value> {
     let joined = |lines: &mut dyn Iterator<Item = &Vec<[f64; 2]>>| -> [Vec<f32>; 2] {
         let mut along = [Vec::new(), Vec::new()];
         for line in lines {
@@ -164,11 +130,15 @@ fn mark_traces(marks: &Marks) -> Vec<Value> {
     }
     if !marks.points.is_empty() {
         let along = |k: usize| doubles(marks.points.iter().map(move |p| p.at[k]));
-        let names: Vec<String> = marks.points.iter().map(|p| plain(&p.name)).collect();
+        let name = |(p, side): (&MapPoint, &Option<_>)| if side.is_some() { plain(&p.name) } else { String::new() };
+        let names: Vec<String> = marks.points.iter().zip(&labels.sides).map(name).collect();
+        let sides: Vec<String> = labels.sides.iter().map(|side| text_position(side.unwrap_or_default())).collect();
         let notes: Vec<String> = marks.points.iter().map(|p| plain(&format!("{}: {}", p.name, p.note))).collect();
+        // Names lie on black and on the brightest light: the shadow sets them off from both.
         traces.push(json!({"type": "scatter", "mode": "markers+text", "x": along(0), "y": along(1), "text": names,
-            "hovertext": notes, "hoverinfo": "text", "textposition": "top right",
-            "textfont": {"color": "#5eead4", "size": 11}, "marker": {"color": "#5eead4", "size": 7}}));
+            "hovertext": notes, "hoverinfo": "text", "textposition": sides,
+            "textfont": {"color": "#5eead4", "size": 12, "shadow": "0 0 3px #000, 0 0 2px #000"},
+            "marker": {"color": "#5eead4", "size": 2.0 * POINT_RADIUS}}));
     }
     traces
 }
@@ -176,21 +146,32 @@ fn mark_traces(marks: &Marks) -> Vec<Value> {
 /// Pixels of the longer side of a map in the page, about: pages have two columns, which windows make wider or narrower.
 const MAP_PIXELS: f64 = 260.0;
 
+/// Pixels of the longer side of a map with named points, which has both columns.
+const WIDE_MAP_PIXELS: f64 = 600.0;
+
 /// Width of a digit and height of a line of the labels in the page, pixels.
 const LETTER: [f64; 2] = [6.5, 15.0];
 
-/// Returns plotly's annotations with the levels of lines, where there is room for them; `same` where a unit has one length along both axes.
-fn level_annotations(marks: &Marks, axes: &[Axis; 2], same: bool) -> Vec<Value> {
+/// Returns where names and levels are written on a map; `same` where a unit has one length along both axes.
+fn labels(marks: &Marks, axes: &[Axis; 2], same: bool) -> MapLabels {
     let spans = [0, 1].map(|k| axes[k].range[1] - axes[k].range[0]);
+    let pixels = if marks.points.is_empty() { MAP_PIXELS } else { WIDE_MAP_PIXELS };
     let pixel = |at: [f64; 2]| {
         let span = |k: usize| if same { spans[0].max(spans[1]) } else { spans[k] };
-        [0, 1].map(|k| MAP_PIXELS * at[k] / span(k))
+        // Down from the top, as words are written.
+        [pixels * at[0] / span(0), -pixels * at[1] / span(1)]
     };
-    let labels = level_labels(marks, pixel, LETTER).into_iter().map(|label| {
+    let frame = [0, 1].map(|end| pixel([axes[0].range[end], axes[1].range[end]]));
+    map_labels(marks, pixel, frame, LETTER)
+}
+
+/// Returns plotly's annotations with the levels of lines.
+fn level_annotations(labels: &MapLabels) -> Vec<Value> {
+    let annotation = |label: &LevelLabel| {
         json!({"x": label.at[0], "y": label.at[1], "text": label.text, "showarrow": false,
             "font": {"color": "#ffffff", "size": 11}, "bgcolor": "rgba(0,0,0,0.35)"})
-    });
-    labels.collect()
+    };
+    labels.levels.iter().map(annotation).collect()
 }
 
 /// Returns a picture with its bottom row first.
@@ -288,7 +269,7 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
                 "z": singles(points.iter().map(|p| p[2])), "i": indices(triangles.iter().map(|t| t[0])),
                 "j": indices(triangles.iter().map(|t| t[1])), "k": indices(triangles.iter().map(|t| t[2])),
                 "opacity": opacity, "flatshading": true, "hoverinfo": "name",
-                "lighting": {"ambient": 0.6, "diffuse": 0.75, "specular": 0.15, "roughness": 0.6},
+                "lighting": lighting(0.35, 0.65, 0.15),
                 // Above and to the right of who looks: under an orthographic camera plotly turns normals away from the viewer, and a light
                 // before the part left all that is seen in the shade.
                 "lightposition": {"x": -600, "y": 1500, "z": -2500}});
@@ -304,7 +285,7 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
                     mesh["intensitymode"] = json!("cell");
                     (mesh["cmin"], mesh["cmax"]) = (json!(low), json!(high));
                     // Colours that are to be read keep their brightness on every side.
-                    mesh["lighting"] = json!({"ambient": 0.85, "diffuse": 0.25, "specular": 0.0});
+                    mesh["lighting"] = lighting(0.85, 0.25, 0.0);
                     mesh["colorscale"] = colour_scale(v.map);
                     mesh["colorbar"] =
                         json!({"title": {"text": v.label, "side": "right"}, "thickness": 14, "outlinewidth": 0});
@@ -372,6 +353,28 @@ mod tests {
     }
 
     /// As a browser shows it: the first row that plotly gets stands at the lower end of the axis.
+    /// Where a low beam was read on ±10.5°: 75L lies 0.29° above 50L, and its name above that of 50L, not below; none is left out.
+    #[test]
+    fn test_points_of_a_low_beam_all_have_their_names() {
+        let read = [
+            ("B50L", [-3.16, 0.555]),
+            ("75R", [1.42, -0.585]),
+            ("75L", [-3.16, -0.585]),
+            ("50L", [-3.16, -0.875]),
+            ("50R", [1.99, -0.875]),
+            ("50V", [0.27, -0.875]),
+            ("25R", [9.27, -1.73]),
+            ("Zone IV", [-4.06, -0.875]),
+            ("B8", [-3.73, -0.015]),
+        ];
+        let points = read.map(|(name, at)| MapPoint { name: name.into(), note: String::new(), at }).to_vec();
+        let axis = |half: f64| Axis { label: "H".into(), unit: "deg".into(), range: [-half, half], cells: 2 };
+        let labels = labels(&Marks { points, ..Marks::default() }, &[axis(10.5), axis(5.25)], true);
+        let side = |name: &str| labels.sides[read.iter().position(|(n, _)| *n == name).unwrap()].map(text_position);
+        assert_eq!(["75L", "50L"].map(side), ["top right", "bottom right"].map(|side| Some(side.to_owned())));
+        assert!(labels.sides.iter().all(Option::is_some), "{:?}", labels.sides);
+    }
+
     #[test]
     fn pictures_begin_at_the_bottom() {
         let picture = Picture { width: 1, height: 2, rgb: vec![1, 2, 3, 4, 5, 6] };

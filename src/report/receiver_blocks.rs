@@ -1,7 +1,7 @@
 //! What the page shows of one receiver: its map, and what people of the trade read beside it.
 
 use super::colour_picture::colour_chart;
-use super::framing::{joined_cells, lit_part};
+use super::framing::{LIT_PART_SHOWN, joined_cells, lit_part};
 use super::lamp_figures::{Counted, encircled_power, lamp_table, polar};
 use super::maps::{reading, spoken};
 use super::number::unit_in_words;
@@ -19,7 +19,7 @@ pub(super) fn framed_map(r: &ReceiverResult, grid: &Grid) -> Chart {
     let mut caption = reading(r, grid);
     let part = lit_part(grid);
     if part.is_some() {
-        caption += " Shown: the part that is lit; the files hold all of it.";
+        caption += LIT_PART_SHOWN;
     }
     let shown = part.unwrap_or_else(|| grid.clone());
     match joined_cells(&shown) {

@@ -248,15 +248,16 @@ impl SimulationReport<'_> {
             ("± (1σ)", self.unit),
             ("largest", ""),
             ("unit", ""),
-            ("mean position 1", "mm or °"),
-            ("mean position 2", "mm or °"),
-            ("rms 1", "mm or °"),
-            ("± (1σ)", "mm or °"),
-            ("rms 2", "mm or °"),
-            ("± (1σ)", "mm or °"),
+            ("mean position 1", ""),
+            ("mean position 2", ""),
+            ("rms 1", ""),
+            ("± (1σ)", ""),
+            ("rms 2", ""),
+            ("± (1σ)", ""),
         ];
         let power = errors::power_table(self.results, self.absorbed, self.unit);
-        let mut receivers = Table::new("receivers", "Receivers", &columns);
+        let caption = "Positions and widths in mm, of far fields and spheres in degrees.";
+        let mut receivers = Table::new("receivers", "Receivers", &columns).caption(caption);
         for r in &self.results.receivers {
             // Light that did not come has no place.
             let place = |cell: Cell| if r.power > 0.0 { cell } else { Cell::Empty };
@@ -277,7 +278,8 @@ impl SimulationReport<'_> {
         let section = Section::new("Energy").with_block(power).with_block(receivers);
         let section = section.with_block(errors::figure_table(self.results, self.figures));
         let section = section.with_block(errors::halving_cost(self.results, self.geometric).as_str());
-        let measured = self.geometric.filter(|g| g.rays > 0).map(errors::change_table).into_iter();
+        let measured = self.geometric.filter(|g| g.rays > 0);
+        let measured = measured.map(|g| errors::change_table(g, self.results, self.unit)).into_iter();
         let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(errors::alternative_table);
         let section = measured.chain(tried).fold(section, |s, table| s.with_block(table));
         if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {

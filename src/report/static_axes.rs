@@ -7,6 +7,11 @@ use super::number::figures;
 /// Plot area: left, top, right, bottom.
 pub(super) const AREA: [f64; 4] = [78.0, 16.0, 740.0, 410.0];
 
+/// Marks that an axis has, about, where there is room.
+const TICKS: f64 = 6.0;
+/// Room that a number beside an axis needs along it, units of the drawing: a sign, two digits and a gap.
+const TICK_ROOM: f64 = 36.0;
+
 /// A data range mapped to a stretch of the picture.
 pub(super) struct Scale {
     pub(super) low: f64,
@@ -72,7 +77,7 @@ impl Scale {
                 .flat_map(|e| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(e)));
             return fine.filter(|t| (self.low..=self.high).contains(t)).collect();
         }
-        let rough = (self.high - self.low) / 6.0;
+        let rough = (self.high - self.low) / TICKS.min((self.to - self.from).abs() / TICK_ROOM);
         let power = 10f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= rough).unwrap_or(rough);
         let first = (self.low / step).ceil() as i64;
@@ -136,4 +141,16 @@ pub(super) fn axes(
         turned: true,
         ink: Ink::Text,
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers of two digits with a sign need some 30 units: on 115 there is room for three.
+    #[test]
+    fn a_short_axis_has_few_numbers() {
+        assert_eq!(linear_scale([-15.0, 15.0], [0.0, 115.0]).ticks(), [-10.0, 0.0, 10.0]);
+        assert_eq!(linear_scale([-15.0, 15.0], [660.0, 0.0]).ticks().len(), 7);
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Content, Marks, have_equal_units};
 use super::drawing::{Anchor, Element, Ink, Place, TYPE_SIZE};
-use super::level_labels::level_labels;
+use super::map_labels::{NAME_GAP, POINT_RADIUS, map_labels};
 use super::number::figures;
 use super::static_axes::{AREA, Scale, axes, label, linear_scale, tick_label};
 use crate::formats::{Axis, ColourMap, Grid, Picture};
@@ -71,6 +71,9 @@ const ZONE: Ink = Ink::Colour([0x5e, 0xea, 0xd4]);
 /// Width of a digit, which most fonts have at about half of the height of the type, with room to either side.
 const LETTER_WIDTH: f64 = 0.6 * TYPE_SIZE;
 
+/// How far below its middle a line of text has its baseline, as a share of the height of the type.
+const BASELINE: f64 = 0.35;
+
 /// How strongly the lines of equal value stand against the map.
 const LINE_OPACITY: f64 = 0.75;
 
@@ -93,13 +96,19 @@ pub(super) fn draw_marks(elements: &mut Vec<Element>, marks: &Marks, unit: &str,
         let points: Vec<Place> = outline.iter().map(place).collect();
         elements.push(Element::Line { points, ink: ZONE, width: 1.2, opacity: 1.0, dashed: true });
     }
-    for label in level_labels(marks, |at| place(&at), [LETTER_WIDTH, TYPE_SIZE]) {
+    let frame = [[x.from, y.from], [x.to, y.to]];
+    let labels = map_labels(marks, |at| place(&at), frame, [LETTER_WIDTH, TYPE_SIZE]);
+    for label in labels.levels {
         elements.push(word(label.text, place(&label.at), MARK, Anchor::Middle));
     }
-    for point in &marks.points {
+    for (point, side) in marks.points.iter().zip(labels.sides) {
         let at = place(&point.at);
-        elements.push(Element::Disc { centre: at, radius: 3.5, ink: ZONE, opacity: 1.0 });
-        elements.push(word(point.name.clone(), [at[0] + 6.0, at[1] - 5.0], ZONE, Anchor::Start));
+        elements.push(Element::Disc { centre: at, radius: POINT_RADIUS, ink: ZONE, opacity: 1.0 });
+        let Some(side) = side else { continue };
+        let anchor = [Anchor::End, Anchor::Middle, Anchor::Start][(side[0] + 1) as usize];
+        let [right, down] = side.map(f64::from);
+        let base = at[1] + down * (NAME_GAP[1] + 0.5 * TYPE_SIZE) + BASELINE * TYPE_SIZE;
+        elements.push(word(point.name.clone(), [at[0] + right * NAME_GAP[0], base], ZONE, anchor));
     }
     // A map without lines has no level to name.
     if let Some(line) = marks.lines.first().filter(|_| marks.points.is_empty()) {

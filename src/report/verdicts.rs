@@ -121,8 +121,9 @@ fn section(a: &Assessment, grid: &Grid, number: usize) -> Section {
     let title = format!("{verdict} by {}: {}", a.regulation.id, grid.name);
     Section::new(&title)
         .with_block(text.as_str())
-        .with_block(table(a, &name))
+        // Above the table, in a row of its own: names of points need its width.
         .with_block(picture(a, grid, &name))
+        .with_block(table(a, &name))
         .with_block(road::from_above(&name, grid, aim))
         .with_block(road::from_driver(&name, grid, aim))
 }
@@ -262,6 +263,10 @@ mod tests {
             })
         };
         let all = sections(&[(0, by(low)), (0, by(high)), (0, by(low)), (1, by(low))], grid_of);
+        // Neighbouring pictures share a row, but for that of the test points.
+        let is_picture = |b: &Block| matches!(b, Block::Chart(_));
+        let kinds: Vec<bool> = all[0].blocks.iter().map(is_picture).collect();
+        assert_eq!(kinds, [false, true, false, true, true]);
         let mut names: Vec<&str> = all.iter().map(|s| s.title.as_str()).collect();
         for block in all.iter().flat_map(|s| &s.blocks) {
             match block {

@@ -247,6 +247,12 @@ fn a_trace_says_where_its_facets_show() {
         (said, serde_json::from_str::<Value>(&text).unwrap())
     };
     let (said, flat) = trace(&["--normals", "flat"]);
+    // A row for each figure: fifteen columns did not fit on paper.
+    let table = std::fs::read_to_string(folder.path().join("out/tables/faceting.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0].len(), 6, "{table}");
+    let figures: Vec<&str> = rows[1..].iter().map(|row| row[1].split_whitespace().next().unwrap()).collect();
+    assert_eq!(figures, ["power", "max", "width", "width"], "{table}");
     let width = &flat["faceting"]["receivers"][0]["width"][1];
     assert!(said && width[0].as_f64() > width[1].as_f64(), "{width}");
     let rms = &flat["receivers"][0]["figures"]["rms_1"];
@@ -285,6 +291,25 @@ fn figures_and_maps_carry_both_errors() {
         let file = receiver["files"][0].as_str().unwrap();
         let csv = std::fs::read_to_string(folder.path().join("out").join(file)).unwrap();
         assert!(csv.lines().next().unwrap().ends_with("statistical,geometric"), "{file}");
+    }
+}
+
+/// A spot of 8 mm on a wall of 400 mm, in cells of 1 mm: its cuts go as far as its map, not from end to end of the wall.
+#[test]
+fn cuts_show_the_part_that_is_lit() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "[run]\nrays = 20_000\n[[source]]\nkind = 'collimated'\nradius = 4
+        [[receiver]]\nname = 'wall'\nat = [0, 0, 9]\nsize = [400, 400]\ncells = [400, 400]\n";
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out", "-q"]);
+    assert_eq!(code, 0, "{err}");
+    let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    let data = page.split("data-for=\"fig-wall-cuts\">").nth(1).unwrap().split("</script>").next().unwrap();
+    let figure: Value = serde_json::from_str(data).unwrap();
+    for trace in figure["data"].as_array().unwrap() {
+        // Four characters stand for three bytes of numbers of eight.
+        let points = trace["x"]["bdata"].as_str().unwrap().len() * 3 / 4 / 8;
+        assert!((8..60).contains(&points), "{points} points");
     }
 }
 

@@ -129,6 +129,8 @@ fn the_page_stands_alone_and_its_parts_lie_beside_it() {
     let ours = ours.concat().replace("http://www.w3.org/2000/svg", "the name of a language, not an address");
     assert!(!ours.contains("http://") && !ours.contains("https://"), "an address in the page");
     assert!(page.contains("<strong>42 cd</strong> &amp; no &lt;more&gt;"));
+    // Of narrow triangles too: by its default plotly gives those no normal, and they stand black in a flat face.
+    assert!(ours.contains("\"facenormalsepsilon\":0.0"), "every triangle has its normal");
     assert!(!page.contains("left </script>"), "a name may not end a script");
     assert_eq!(
         std::fs::read_to_string(&written[9]).unwrap(),
