@@ -205,14 +205,11 @@ mod tests {
     #[test]
     fn a_wave_with_its_quarters_on_the_chord_is_cut_across() {
         let wave = |k: usize| (k as f64, if k.is_multiple_of(2) { 4.0 } else { -4.0 });
-        let points: Vec<_> = [0.0, 1.0, 2.0]
-            .into_iter()
-            .flat_map(|u| {
-                (0..8)
-                    .map(move |k| wave(k))
-                    .map(move |(x, z)| Homogeneous::new(x, u, z + if u == 1.0 { 0.02 } else { 0.0 }, 1.0))
-            })
-            .collect();
+        let row = |u: f64| {
+            let lift = if u == 1.0 { 0.02 } else { 0.0 };
+            (0..8).map(wave).map(move |(x, z)| Homogeneous::new(x, u, z + lift, 1.0))
+        };
+        let points = [0.0, 1.0, 2.0].into_iter().flat_map(row).collect();
         let knots = [[vec![0.0; 3], vec![1.0; 3]].concat(), (0..11).map(|k| k as f64 - 1.0).collect()];
         let spline = Surface { degree: [2, 2], knots, points };
         let field = ToleranceField::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0);
