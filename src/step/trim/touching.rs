@@ -12,9 +12,6 @@ use rustc_hash::FxHashMap;
 /// Places in a span of an edge at which it is followed from one end to the other.
 const STEPS: usize = 8;
 
-/// Most jumps of an edge that was found on a wrong sheet: where parameters mean little, as beside a fold of an offset, one has hundreds.
-const MOST_JUMPS: usize = 16;
-
 /// A use of an edge in a loop: its number, and whether it is run against its parameter.
 type Use = (usize, bool);
 
@@ -41,7 +38,7 @@ impl FaceTask<'_> {
     /// Fits one edge of a loop anew if its parameters jump: from its own end, then from where the neighbours end. Returns whether they did.
     fn keep_to_sheet(&self, uses: &[Use], k: usize, fits: &mut FxHashMap<usize, Fit>) -> Result<bool, Overrun> {
         let jumps = self.jumps(uses, k, fits);
-        if jumps == [0, 0] || jumps[0] > MOST_JUMPS {
+        if jumps == [0, 0] {
             return Ok(false);
         }
         let (edge, reversed) = uses[k];
