@@ -8,7 +8,7 @@ use super::imprint::{Imprint, ImprintEnd};
 use super::nodes::{Node, Nodes, Position, edge_key};
 use super::proof::border_chord::{BorderChord, BorderChords};
 use super::proof::deviation::DeviationBounds;
-use crate::math::{NearPoints, Point, Uv};
+use crate::math::{Point, Uv};
 use crate::model::{EdgeId, EdgeUse, Part, TrimLoop};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -33,8 +33,6 @@ pub(super) struct BorderNodes {
     pub(super) followed: FxHashMap<[u32; 2], Followed>,
     /// Segments that are one point in space.
     poles: Vec<[u32; 2]>,
-    /// Pairs of shared positions of vertices that the file has twice, where loops touch.
-    pub(super) coincident: Vec<[u32; 2]>,
     /// Segments of the border of another solid's face that this one carries.
     pub(super) imprinted: Vec<[u32; 2]>,
 }
@@ -63,10 +61,9 @@ impl BorderNodes {
             chords: BorderChords::default(),
             followed: FxHashMap::default(),
             poles: Vec::new(),
-            coincident: Vec::new(),
             imprinted: Vec::new(),
         };
-        let ids = out.add_nodes(part, surface, polygons, shared);
+        let ids = out.add_nodes(part, polygons, shared);
         let uses: Vec<&EdgeUse> = loops.iter().flat_map(|l| &l.uses).collect();
         let mut along_edges: Vec<EdgeSegment<'_>> = Vec::new();
         for (polygon, ids) in polygons.polygons.iter().zip(&ids) {
@@ -108,42 +105,19 @@ impl BorderNodes {
     }
 
     /// Makes the nodes of all polygons and returns their numbers, polygon by polygon. Corners at one vertex with the same parameters get
-    /// one node: loops that touch there would otherwise not know of each other's chords. Notes vertices that stand twice in the file, up to
-    /// the rounding of their coordinates, in `coincident`.
-    fn add_nodes(
-        &mut self,
-        part: &Part,
-        surface: &FaceSurface<'_>,
-        polygons: &BorderPolygons,
-        shared: &[Point],
-    ) -> Vec<Vec<u32>> {
-        let (lo, hi) = polygons.bounds();
-        let near = SAME_PARAMETERS * (hi - lo);
-        let mut vertices = NearPoints::within(surface.rounding.max(f64::MIN_POSITIVE));
-        let mut node = |uv: Uv, position: Position| {
-            let place = match position {
-                Position::Shared(p) => shared[p as usize],
-                Position::Own(p) => polygons.own[p as usize],
-            };
-            // Points of its own are one already: only the file's vertices can stand twice in one place.
-            let Position::Shared(here) = position else {
-                return self.nodes.push(Node { uv, place, position });
-            };
-            if (here as usize) < part.vertices.len() {
-                let nodes = &self.nodes;
-                // In one place in space and in parameters: on either side of a seam they are two corners.
-                let has_uv = |n: u32| (nodes[n].uv - uv).abs().cmple(near).all();
-                if let Some(first) = vertices.first(place, |n| nodes[n].place, has_uv) {
-                    if let Position::Shared(there) = nodes[first].position
-                        && there != here
-                    {
-                        self.coincident.push([there, here]);
-                    }
-                    return first;
+    /// one node: loops that touch there would otherwise not know of each other's chords.
+    fn add_nodes(&mut self, part: &Part, polygons: &BorderPolygons, shared: &[Point]) -> Vec<Vec<u32>> {
+        let mut at_vertices: FxHashMap<(u32, [u64; 2]), u32> = FxHashMap::default();
+        let mut node = |uv: Uv, position: Position| match position {
+            Position::Own(p) => self.nodes.push(Node { uv, place: polygons.own[p as usize], position }),
+            Position::Shared(p) => {
+                let mut add = || self.nodes.push(Node { uv, place: shared[p as usize], position });
+                if (p as usize) < part.vertices.len() {
+                    *at_vertices.entry((p, uv.to_array().map(f64::to_bits))).or_insert_with(add)
+                } else {
+                    add()
                 }
-                vertices.insert(place, nodes.len());
             }
-            self.nodes.push(Node { uv, place, position })
         };
         let polygons = polygons.polygons.iter();
         polygons.map(|p| p.iter().map(|v| node(v.uv, v.position)).collect()).collect()

@@ -122,7 +122,7 @@ pub(super) fn mesh_with_imprint(
     }
     border.divide_poles(&cells);
     let segments = unmet_segments(&border.segments, &grid.outline);
-    let BorderNodes { nodes, chords, followed, coincident, imprinted, .. } = border;
+    let BorderNodes { nodes, chords, followed, imprinted, .. } = border;
     // Without a transition its scale is of no interest, and it costs curvatures.
     let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
     let creases = crease_lines(surface, &nodes, &segments);
@@ -165,7 +165,7 @@ pub(super) fn mesh_with_imprint(
         return Err(Unmeshed::Empty);
     }
     let carrier = CarrierFacets { nodes, facets, vertex_nodes, holds_imprint };
-    Ok((FaceMesh { own, coarse, turned, facing, coincident, repaired, ..made }, carrier))
+    Ok((FaceMesh { own, coarse, turned, facing, coincident: polygons.coincident, repaired, ..made }, carrier))
 }
 
 /// Turns facets of nodes into facets of corners, and returns their nodes too.

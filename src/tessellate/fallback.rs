@@ -78,7 +78,7 @@ fn filled_border(
     // By the surface's own normals, for the mean normal of the loops alone does not tell outside from inside.
     let up = loops.iter().flatten().filter_map(|c| surface.normal(c.uv)).sum::<Vector>();
     let triangles = fill(&mut loops, up).filter(|triangles| !triangles.is_empty())?;
-    let mut out = FaceMesh { own: border.own, ..FaceMesh::default() };
+    let mut out = FaceMesh { own: border.own, coincident: border.coincident, ..FaceMesh::default() };
     for t in triangles {
         // Where the surface has no normal the triangle's does, so that corners are not shared; one without area shades
         // nothing.

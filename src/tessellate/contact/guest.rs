@@ -162,9 +162,8 @@ pub(super) fn taken_facets(
     let mut emission = Emission::new(surface, &border.nodes);
     made.iter().for_each(|(f, pole)| emission.add_facet(f, *pole));
     let out = emission.finish();
-    let coincident = border.coincident;
     let (_, own) = border.nodes.into_parts();
-    (FaceMesh { own, coincident, ..out }, sides)
+    (FaceMesh { own, coincident: guest.polygons.coincident.clone(), ..out }, sides)
 }
 
 /// Bounds a facet by its two triangles one by one, or else as a whole cell; returns bound and tolerance, mm, of which either may be the
