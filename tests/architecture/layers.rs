@@ -449,6 +449,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "zero_width",
             "spikes",
             "rims",
+            "face_edges",
             "conversion",
         ],
     ),

@@ -28,7 +28,8 @@ pub(crate) struct TrimmedEdge {
 impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads an edge's curve between its vertices, mm; that of a SUBEDGE is cut from its parent's. Refuses other kinds of edges. `alone` is
     /// whether a loop has no other edge: of a closed curve it is then the whole, though its vertices are two that lie apart by rounding.
-    pub(crate) fn edge(&self, id: u64, alone: bool) -> Outcome<TrimmedEdge> {
+    /// `against` is whether the edge runs against its curve where the file says that it runs along, and along it where it says against.
+    pub(crate) fn edge(&self, id: u64, alone: bool, against: bool) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
         let vertices = e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1));
         let Some(vertices) = vertices.or_else(|| e.attributes("SUBEDGE", 1)) else {
@@ -42,7 +43,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         // A simple EDGE_CURVE has its vertices before its geometry.
         let own = owner.attributes("EDGE_CURVE", 3);
         let (curve, sense) = own.map_or((None, true), |a| (a.id(0), a.flag(1) != Some(false)));
-        self.edge_between(e.id, [vertices.id(0), vertices.id(1)], curve, (sense, alone))
+        self.edge_between(e.id, [vertices.id(0), vertices.id(1)], curve, (sense != against, alone))
     }
 
     /// Reads edge #`id` from its first to its second vertex, mm: that part of `curve`, or all of a closed one where both vertices are one

@@ -1,7 +1,7 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
+use super::face_edges::{EMPTY_EDGE_MM, FaceEdges, edges_against_all_loops, face_edges};
 use super::free_surfaces::convert_free_surfaces;
-use super::loop_order::{DirectedUse, drop_opposite_loops, put_in_order};
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::{faces_against_neighbours, is_inside_out};
 use super::recipe_parts::convert_recipes;
@@ -10,7 +10,7 @@ use super::spikes::{EdgeTable, remove_spikes};
 use super::styles::Styles;
 use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
 use super::zero_width::{joined_vertex, remove_faces_without_width, vertex_ids, vertices_of_empty_edges};
-use crate::math::{Aabb, Point};
+use crate::math::Point;
 use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
 use crate::nurbs::Curve;
 use crate::step::geometry::edges::TrimmedEdge;
@@ -35,11 +35,6 @@ const SMALLEST_FACE_MM: f64 = 1e-3;
 const GAPS: f64 = 2.0;
 /// See [`GAPS`]; mm.
 const LARGEST_GAP_MM: f64 = 0.05;
-/// Share of the shortest edge by which the ends of uses may differ and still follow each other: far above the gaps of real files, far
-/// below the length of an edge that is run the wrong way.
-const FOLLOWING_SHARE: f64 = 0.1;
-/// An edge shorter than this has no length, mm.
-const EMPTY_EDGE_MM: f64 = 1e-9;
 /// Edges of a face whose points are asked for where a surface is sized by them.
 const ASKED_EDGES: usize = 64;
 
@@ -68,7 +63,10 @@ pub(crate) fn convert(
     let single = plans.values().flatten().flat_map(|plan| &plan.loops).filter(|l| l.len() == 1);
     let alone: FxHashSet<EdgeKey> = single.map(|l| l[0].0).collect();
     let mut edges: Vec<Outcome<TrimmedEdge>> =
-        keys.par_iter().map(|key| edge_curve(&geometry, *key, alone.contains(key))).collect();
+        keys.par_iter().map(|key| edge_curve(&geometry, *key, alone.contains(key), false)).collect();
+    for k in edges_against_all_loops(&ids, &plans, &edges, &index) {
+        edges[k] = edge_curve(&geometry, keys[k], alone.contains(&keys[k]), true);
+    }
     let joined = vertices_of_empty_edges(file, &keys, &edges);
     let mut removed = remove_faces_without_width(file, &ids, &mut plans, (&keys, &index), (&edges, &joined));
     let table = EdgeTable { keys: &mut keys, index: &mut index, edges: &mut edges };
@@ -215,11 +213,11 @@ fn add_shells(
 }
 
 /// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length. `alone` is whether a
-/// loop has no other edge.
-fn edge_curve(geometry: &GeometryReader<'_, '_>, key: EdgeKey, alone: bool) -> Outcome<TrimmedEdge> {
+/// loop has no other edge, `against` whether the edge runs against its curve where the file says that it runs along.
+fn edge_curve(geometry: &GeometryReader<'_, '_>, key: EdgeKey, alone: bool, against: bool) -> Outcome<TrimmedEdge> {
     match key {
         // Parts are cut from whole edges, which must be there first.
-        EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id, alone),
+        EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id, alone, against),
         EdgeKey::Straight(a, b) => {
             let (p, q) = (geometry.point(a)?, geometry.point(b)?);
             let length = (q - p).length();
@@ -230,60 +228,6 @@ fn edge_curve(geometry: &GeometryReader<'_, '_>, key: EdgeKey, alone: bool) -> O
             })
         }
     }
-}
-
-/// The edges of a face, in the order of its loops.
-struct FaceEdges<'e> {
-    /// By place among the edges that were asked for.
-    curves: FxHashMap<usize, &'e Curve>,
-    /// For each loop the edges, and whether it runs against them; loops without length are left out.
-    loops: Vec<Vec<(usize, bool)>>,
-    /// Around the edges, mm.
-    bounds: Aabb,
-    /// Largest distance of an edge's ends from its vertices, mm.
-    gap: f64,
-    repairs: Vec<&'static str>,
-}
-
-/// Collects the edges of a face that have a length, and puts each loop in order; fails with the first edge that cannot be had.
-fn face_edges<'e>(
-    plan: &FacePlan,
-    edges: &'e [Outcome<TrimmedEdge>],
-    index: &FxHashMap<EdgeKey, usize>,
-) -> Result<FaceEdges<'e>, &'e Refusal> {
-    let mut found = FaceEdges {
-        curves: FxHashMap::default(),
-        loops: Vec::with_capacity(plan.loops.len()),
-        bounds: Aabb::EMPTY,
-        gap: 0.0,
-        repairs: Vec::new(),
-    };
-    for uses in &plan.loops {
-        let mut kept: Vec<DirectedUse<usize>> = Vec::with_capacity(uses.len());
-        for (key, reversed) in uses {
-            let k = index[key];
-            let edge = edges[k].as_ref()?;
-            // The widest gap between an edge and its vertices tells how loosely points of this face hold together.
-            found.gap = found.gap.max(edge.gap);
-            found.repairs.extend(edge.repair.filter(|r| !found.repairs.contains(r)));
-            // An edge without length leaves no gap in its loop.
-            let Some(curve) = &edge.curve else { continue };
-            found.bounds = found.bounds.union(curve.bounds());
-            found.curves.entry(k).or_insert(curve);
-            let [a, b] = curve.domain().map(|t| curve.evaluate(t));
-            let (from, to) = if *reversed { (b, a) } else { (a, b) };
-            kept.push(DirectedUse { edge: k, reversed: *reversed, from, to });
-        }
-        let lengths = kept.iter().map(|u| (u.to - u.from).length()).filter(|l| *l > EMPTY_EDGE_MM);
-        // Shorter than the loop's shortest edge, so that no edge can be taken for a gap.
-        let tolerance = (FOLLOWING_SHARE * lengths.fold(1.0, f64::min)).max(ACCURACY_MM[0]);
-        found.repairs.extend(put_in_order(&mut kept, tolerance));
-        if !kept.is_empty() {
-            found.loops.push(kept.into_iter().map(|u| (u.edge, u.reversed)).collect());
-        }
-    }
-    found.repairs.extend(drop_opposite_loops(&mut found.loops));
-    Ok(found)
 }
 
 /// Whether points of the edges are needed to choose the part of a surface that is meant: of every kind but planes, cylinders, cones,

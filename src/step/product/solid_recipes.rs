@@ -169,8 +169,10 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
                 let EdgeKey::Entity(edge) = key else {
                     return Err(Refusal::new(area, "polygonal loops of a profile are not supported"));
                 };
-                let curve =
-                    self.edge(*edge, alone)?.curve.ok_or_else(|| Refusal::new(area, "an edge has no length"))?;
+                let curve = self
+                    .edge(*edge, alone, false)?
+                    .curve
+                    .ok_or_else(|| Refusal::new(area, "an edge has no length"))?;
                 Ok(if *reversed { curve.reversed() } else { curve })
             };
             let border = |l: &Vec<(EdgeKey, bool)>| l.iter().map(|use_| curve(use_, l.len() == 1)).collect();
