@@ -450,6 +450,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "spikes",
             "rims",
             "face_edges",
+            "swapped_vertices",
             "conversion",
         ],
     ),

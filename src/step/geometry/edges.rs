@@ -15,7 +15,7 @@ const PASSED_BY: &str = "the line of an edge passes both its vertices by: it run
 const MAX_PARENTS: usize = 4;
 
 /// An edge's curve, cut to its vertices and running from the first to the second.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct TrimmedEdge {
     /// `None` for an edge without length.
     pub(crate) curve: Option<Curve>,
@@ -23,13 +23,15 @@ pub(crate) struct TrimmedEdge {
     pub(crate) gap: f64,
     /// What had to be put right.
     pub(crate) repair: Option<&'static str>,
+    /// Whether it is part of a closed curve, of which the same vertices bound another part.
+    pub(crate) is_arc: bool,
 }
 
 impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads an edge's curve between its vertices, mm; that of a SUBEDGE is cut from its parent's. Refuses other kinds of edges. `alone` is
     /// whether a loop has no other edge: of a closed curve it is then the whole, though its vertices are two that lie apart by rounding.
-    /// `against` is whether the edge runs against its curve where the file says that it runs along, and along it where it says against.
-    pub(crate) fn edge(&self, id: u64, alone: bool, against: bool) -> Outcome<TrimmedEdge> {
+    /// `swapped` is whether the file has its vertices in the wrong order.
+    pub(crate) fn edge(&self, id: u64, alone: bool, swapped: bool) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
         let vertices = e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1));
         let Some(vertices) = vertices.or_else(|| e.attributes("SUBEDGE", 1)) else {
@@ -43,7 +45,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         // A simple EDGE_CURVE has its vertices before its geometry.
         let own = owner.attributes("EDGE_CURVE", 3);
         let (curve, sense) = own.map_or((None, true), |a| (a.id(0), a.flag(1) != Some(false)));
-        self.edge_between(e.id, [vertices.id(0), vertices.id(1)], curve, (sense != against, alone))
+        let [first, last] = if swapped { [1, 0] } else { [0, 1] };
+        self.edge_between(e.id, [vertices.id(first), vertices.id(last)], curve, (sense, alone))
     }
 
     /// Reads edge #`id` from its first to its second vertex, mm: that part of `curve`, or all of a closed one where both vertices are one
@@ -64,7 +67,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             // No geometry: straight.
             let length = (q - p).length();
             let curve = (!closed && length >= EMPTY_EDGE_MM).then(|| Curve::line(p, q, [0.0, length]));
-            return Ok(TrimmedEdge { curve, gap: 0.0, repair: None });
+            return Ok(TrimmedEdge { curve, ..TrimmedEdge::default() });
         };
         let directed = self.curve(curve, 0)?;
         // A loop of one edge encloses something: next to nothing of the curve cannot be meant.
@@ -94,7 +97,7 @@ pub(crate) fn trim_to_vertices(
     // A line that passes both vertices by is another edge's: of what this one is its vertices tell all.
     if passes_by(shape, [(ta, a), (tb, b)]) && (p - q).length() > LOOSE_VERTEX_MM {
         let curve = Curve::line(p, q, [0.0, (q - p).length()]);
-        return Some(TrimmedEdge { curve: Some(curve), gap: 0.0, repair: Some(PASSED_BY) });
+        return Some(TrimmedEdge { curve: Some(curve), repair: Some(PASSED_BY), ..TrimmedEdge::default() });
     }
     match shape.period() {
         Some(period) => {
@@ -116,11 +119,7 @@ pub(crate) fn trim_to_vertices(
                 tb = ta + (tb - ta).rem_euclid(period);
                 if tb - ta < noise || period - (tb - ta) < noise && coincident(p, q, accuracy) {
                     // Two vertices in one place: the whole curve, or nothing of it.
-                    return if coincident(p, q, accuracy) {
-                        Some(TrimmedEdge { curve: None, gap: 0.0, repair: None })
-                    } else {
-                        None
-                    };
+                    return if coincident(p, q, accuracy) { Some(TrimmedEdge::default()) } else { None };
                 }
             }
         }
@@ -131,7 +130,7 @@ pub(crate) fn trim_to_vertices(
                     if coincident(p, q, accuracy)
                         && (curve.evaluate(d0) - curve.evaluate(d1)).length() > LOOSE_VERTEX_MM
                     {
-                        return Some(TrimmedEdge { curve: None, gap: 0.0, repair: None });
+                        return Some(TrimmedEdge::default());
                     }
                     (ta, tb) = (d0, d1);
                 }
@@ -142,19 +141,16 @@ pub(crate) fn trim_to_vertices(
                 return finish_edge(curve, !forward, p, q);
             }
             if !(tb - ta > 0.0) || (a - b).length() < EQUAL_POINTS_MM && matches!(shape, CurveShape::Line { .. }) {
-                return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge {
-                    curve: None,
-                    gap: 0.0,
-                    repair: None,
-                });
+                return coincident(p, q, LOOSE_VERTEX_MM).then(TrimmedEdge::default);
             }
         }
     }
     let length_scale = EMPTY_PARAMETER * (ta.abs() + tb.abs());
     if !(tb - ta > length_scale) {
-        return coincident(p, q, LOOSE_VERTEX_MM).then_some(TrimmedEdge { curve: None, gap: 0.0, repair: None });
+        return coincident(p, q, LOOSE_VERTEX_MM).then(TrimmedEdge::default);
     }
-    finish_edge(shape.segment(ta, tb), forward, p, q)
+    let is_arc = shape.period().is_some() && !closed;
+    finish_edge(shape.segment(ta, tb), forward, p, q).map(|edge| TrimmedEdge { is_arc, ..edge })
 }
 
 /// Whether a line misses both vertices, each at its parameter, by more than [`LOOSE_VERTEX_MM`]; false of any other curve.
@@ -174,7 +170,7 @@ fn finish_edge(curve: Curve, forward: bool, p: Point, q: Point) -> Option<Trimme
     let gap = (curve.evaluate(a) - p).length().max((curve.evaluate(b) - q).length());
     let extent = curve.bounds().diagonal();
     if extent < EMPTY_EDGE_MM {
-        return Some(TrimmedEdge { curve: None, gap, repair: None });
+        return Some(TrimmedEdge { gap, ..TrimmedEdge::default() });
     }
-    Some(TrimmedEdge { curve: Some(curve), gap, repair: None })
+    Some(TrimmedEdge { curve: Some(curve), gap, ..TrimmedEdge::default() })
 }

@@ -1,6 +1,6 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
-use super::face_edges::{EMPTY_EDGE_MM, FaceEdges, edges_against_all_loops, face_edges};
+use super::face_edges::{EMPTY_EDGE_MM, FaceEdges, face_edges};
 use super::free_surfaces::convert_free_surfaces;
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::{faces_against_neighbours, is_inside_out};
@@ -8,6 +8,7 @@ use super::recipe_parts::convert_recipes;
 use super::rims::align_rims;
 use super::spikes::{EdgeTable, remove_spikes};
 use super::styles::Styles;
+use super::swapped_vertices::put_vertices_in_order;
 use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
 use super::zero_width::{joined_vertex, remove_faces_without_width, vertex_ids, vertices_of_empty_edges};
 use crate::math::Point;
@@ -63,10 +64,11 @@ pub(crate) fn convert(
     let single = plans.values().flatten().flat_map(|plan| &plan.loops).filter(|l| l.len() == 1);
     let alone: FxHashSet<EdgeKey> = single.map(|l| l[0].0).collect();
     let mut edges: Vec<Outcome<TrimmedEdge>> =
-        keys.par_iter().map(|key| edge_curve(&geometry, *key, alone.contains(key), false)).collect();
-    for k in edges_against_all_loops(&ids, &plans, &edges, &index) {
-        edges[k] = edge_curve(&geometry, keys[k], alone.contains(&keys[k]), true);
-    }
+        keys.par_iter().map(|key| edge_curve(&geometry, *key, alone.contains(key))).collect();
+    let table = EdgeTable { keys: &mut keys, index: &mut index, edges: &mut edges };
+    let swapped = put_vertices_in_order(&geometry, &ids, &mut plans, table);
+    let reason = "its vertices are in the wrong order: all loops run it the other way";
+    out.repaired.extend(swapped.iter().map(|&id| repair_note(file, id, reason.into())));
     let joined = vertices_of_empty_edges(file, &keys, &edges);
     let mut removed = remove_faces_without_width(file, &ids, &mut plans, (&keys, &index), (&edges, &joined));
     let table = EdgeTable { keys: &mut keys, index: &mut index, edges: &mut edges };
@@ -213,19 +215,16 @@ fn add_shells(
 }
 
 /// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length. `alone` is whether a
-/// loop has no other edge, `against` whether the edge runs against its curve where the file says that it runs along.
-fn edge_curve(geometry: &GeometryReader<'_, '_>, key: EdgeKey, alone: bool, against: bool) -> Outcome<TrimmedEdge> {
+/// loop has no other edge.
+fn edge_curve(geometry: &GeometryReader<'_, '_>, key: EdgeKey, alone: bool) -> Outcome<TrimmedEdge> {
     match key {
         // Parts are cut from whole edges, which must be there first.
-        EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id, alone, against),
+        EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id, alone, false),
         EdgeKey::Straight(a, b) => {
             let (p, q) = (geometry.point(a)?, geometry.point(b)?);
             let length = (q - p).length();
-            Ok(TrimmedEdge {
-                curve: (length > EMPTY_EDGE_MM).then(|| Curve::line(p, q, [0.0, length])),
-                gap: 0.0,
-                repair: None,
-            })
+            let curve = (length > EMPTY_EDGE_MM).then(|| Curve::line(p, q, [0.0, length]));
+            Ok(TrimmedEdge { curve, ..TrimmedEdge::default() })
         }
     }
 }

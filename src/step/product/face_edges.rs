@@ -1,4 +1,4 @@
-//! The edges of a face in the order of its loops, and edges whose vertices the file has in the wrong order.
+//! The edges of a face in the order of its loops.
 
 use super::loop_order::{DirectedUse, drop_opposite_loops, put_in_order};
 use super::topology::{EdgeKey, FacePlan};
@@ -6,7 +6,6 @@ use crate::math::Aabb;
 use crate::nurbs::Curve;
 use crate::step::geometry::edges::TrimmedEdge;
 use crate::step::geometry::{Outcome, Refusal};
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Share of the shortest edge by which the ends of uses may differ and still follow each other: far above the gaps of real files, far
@@ -66,7 +65,7 @@ pub(super) fn face_edges<'e>(
 }
 
 /// Returns the uses of a loop that have a length, with their ends: one without leaves no gap.
-fn directed_uses(
+pub(super) fn directed_uses(
     uses: &[(EdgeKey, bool)],
     edges: &[Outcome<TrimmedEdge>],
     index: &FxHashMap<EdgeKey, usize>,
@@ -83,64 +82,7 @@ fn directed_uses(
 
 /// Returns the distance, mm, within which the ends of a loop's uses follow each other: shorter than its shortest edge, so that no edge can
 /// be taken for a gap.
-fn following_tolerance(uses: &[DirectedUse<usize>]) -> f64 {
+pub(super) fn following_tolerance(uses: &[DirectedUse<usize>]) -> f64 {
     let lengths = uses.iter().map(|u| (u.to - u.from).length()).filter(|l| *l > EMPTY_EDGE_MM);
     (FOLLOWING_SHARE * lengths.fold(1.0, f64::min)).max(FOLLOWING_MM)
-}
-
-/// What the uses of an edge say of its direction.
-#[derive(Clone, Copy, Default)]
-struct Directions {
-    /// Uses that follow their neighbours.
-    following: u32,
-    /// Uses that would if the edge ran the other way.
-    against: u32,
-    /// Uses in loops of two edges of which either may be the wrong one.
-    either: u32,
-}
-
-/// Returns the edges, by their places in `edges`, that run against their neighbours in all of two loops or more: where a single use is the
-/// wrong way round its flag is wrong, but where all are the edge itself is. Of a circle its two vertices then bound the other arc.
-pub(super) fn edges_against_all_loops(
-    ids: &[u64],
-    plans: &FxHashMap<u64, Outcome<FacePlan>>,
-    edges: &[Outcome<TrimmedEdge>],
-    index: &FxHashMap<EdgeKey, usize>,
-) -> Vec<usize> {
-    let said = |id: &u64| -> Vec<(usize, Directions)> {
-        let loops = plans.get(id).and_then(|plan| plan.as_ref().ok()).map_or(&[][..], |plan| &plan.loops);
-        loops.iter().flat_map(|uses| loop_directions(directed_uses(uses, edges, index))).collect()
-    };
-    let said: Vec<Vec<(usize, Directions)>> = ids.par_iter().map(said).collect();
-    if said.iter().flatten().all(|(_, d)| d.against == 0) {
-        return Vec::new();
-    }
-    let mut all = vec![Directions::default(); edges.len()];
-    for (edge, said) in said.into_iter().flatten() {
-        let d = &mut all[edge];
-        d.following += said.following;
-        d.against += said.against;
-        d.either += said.either;
-    }
-    let is_against = |d: &Directions| d.following == 0 && d.against > 0 && d.against + d.either > 1;
-    (0..edges.len()).filter(|&k| is_against(&all[k])).collect()
-}
-
-/// Returns what each use of a loop says of its edge; nothing where the loop can't be closed.
-fn loop_directions(uses: Vec<DirectedUse<usize>>) -> Vec<(usize, Directions)> {
-    let following = Directions { following: 1, ..Directions::default() };
-    let against = Directions { against: 1, ..Directions::default() };
-    let either = Directions { either: 1, ..Directions::default() };
-    let mut turned = uses.clone();
-    let is_changed = put_in_order(&mut turned, following_tolerance(&uses)).is_some();
-    let is_same_order = uses.iter().zip(&turned).all(|(a, b)| a.edge == b.edge);
-    let said = |(a, b): (&DirectedUse<usize>, &DirectedUse<usize>)| {
-        let direction = match (is_changed, uses.len()) {
-            (true, 2) => either,
-            _ if a.reversed != b.reversed => against,
-            _ => following,
-        };
-        (a.edge, direction)
-    };
-    if is_same_order { uses.iter().zip(&turned).map(said).collect() } else { Vec::new() }
 }

@@ -45,22 +45,34 @@ pub(crate) fn put_in_order<T: Copy>(uses: &mut Vec<DirectedUse<T>>, tolerance: f
     None
 }
 
-/// Turns single uses around between neighbours that fit the other way; `None` when that does not close the loop.
+/// Turns the fewest uses around with which the loop closes in its order; `None` when none do.
 fn turn_misfits<T: Copy>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<Vec<DirectedUse<T>>> {
-    let n = uses.len();
+    let turned = turned_to_follow(uses, tolerance)?;
     let mut out = uses.to_vec();
-    for i in 0..n {
-        let (before, after) = (out[(i + n - 1) % n].to, out[(i + 1) % n].from);
-        let fits = |a: Point, b: Point| (a - b).length() <= tolerance;
-        if n > 1 && !fits(before, out[i].from) && fits(before, out[i].to) {
-            // The next one may be wrong too: then only the end before counts.
-            if fits(after, out[i].from) || !fits(after, out[i].to) {
-                out[i].turn();
+    out.iter_mut().zip(turned).filter(|(_, turned)| *turned).for_each(|(u, _)| u.turn());
+    Some(out)
+}
+
+/// Returns which uses are to be turned around, the fewest with which each begins where the one before ends, within `tolerance` mm, in the
+/// order they have; `None` when none do.
+pub(crate) fn turned_to_follow<T>(uses: &[DirectedUse<T>], tolerance: f64) -> Option<Vec<bool>> {
+    let first = uses.first()?;
+    let follows = |a: Point, b: Point| (a - b).length() <= tolerance;
+    let chained = |is_first_turned: bool| -> Option<Vec<bool>> {
+        let (start, mut end) = if is_first_turned { (first.to, first.from) } else { (first.from, first.to) };
+        let mut turned = vec![is_first_turned];
+        for u in &uses[1..] {
+            let is_turned = !follows(end, u.from);
+            if is_turned && !follows(end, u.to) {
+                return None;
             }
+            end = if is_turned { u.from } else { u.to };
+            turned.push(is_turned);
         }
-    }
-    // A repair counts only if it closes the loop; else the fault is another one.
-    (largest_gap(&out) <= tolerance).then_some(out)
+        follows(end, start).then_some(turned)
+    };
+    let count = |turned: &Vec<bool>| turned.iter().filter(|t| **t).count();
+    [false, true].into_iter().filter_map(chained).min_by_key(count)
 }
 
 /// Chains the uses anew from the first, turned where only their far end fits; `None` when that does not close the loop, or it is too long.

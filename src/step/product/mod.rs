@@ -2,9 +2,10 @@
 //!
 //! Source: ISO 10303-43/44. An assembly places representations (`assembly`, `usage_names`, `relations`, `placed_children`,
 //! `placed_count`; `shared_items` says which of their items, `asides` what a viewer would not show); a representation is shells of faces
-//! (`topology`, with loops put in order by `face_edges` and `loop_order`, and shells turned by `orientation`, what has no extent left out by `zero_width` and
-//! `spikes`), surfaces without a face and ready meshes (`free_surfaces`, `tessellated`), solids given as recipes (`solid_recipes`,
-//! `recipe_parts`); all of it with its colours and layers (`styles`) becomes one part (`numbering`, `conversion`).
+//! (`topology`, with loops put in order by `swapped_vertices`, `face_edges` and `loop_order`, shells turned by `orientation`, and what has
+//! no extent left out by `zero_width` and `spikes`), surfaces without a face and ready meshes (`free_surfaces`, `tessellated`), solids given
+//! as recipes (`solid_recipes`, `recipe_parts`); all of it with its colours and layers (`styles`) becomes one part (`numbering`,
+//! `conversion`).
 
 pub(super) mod asides;
 pub(super) mod assembly;
@@ -24,6 +25,7 @@ pub(super) mod shared_items;
 mod solid_recipes;
 mod spikes;
 pub(super) mod styles;
+mod swapped_vertices;
 mod tessellated;
 pub(super) mod topology;
 mod usage_names;

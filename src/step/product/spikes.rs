@@ -217,7 +217,7 @@ impl Spikes<'_, '_, '_> {
             let curve = Curve::line(p, q, [0.0, (q - p).length()]);
             let key = EdgeKey::Part { entity, ends };
             self.table.keys.push(key);
-            self.table.edges.push(Ok(TrimmedEdge { curve: Some(curve), gap, repair }));
+            self.table.edges.push(Ok(TrimmedEdge { curve: Some(curve), gap, repair, is_arc: false }));
             self.table.index.insert(key, self.table.keys.len() - 1);
             self.table.keys.len() - 1
         });
