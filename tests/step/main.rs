@@ -1,6 +1,7 @@
 //! Reading STEP files and the splines they hold, judged by quadrature and by figures of other programs.
 
 mod accounts;
+mod arcs;
 mod corpus;
 mod faces;
 #[path = "../support/files.rs"]
