@@ -81,13 +81,12 @@ impl Transition {
     }
 }
 
-/// Rounds of refinement.
-const MAX_ROUNDS: usize = 40;
 /// Share of a tolerance that the file's own gap may take for shorter chords to help.
 const WIDEST_GAP: f64 = 0.97;
 /// Share of the largest excess from which triangles are refined once the budget has ended.
 const WORST: f64 = 0.25;
-/// Triangles that all rounds together go through: each looks at all, which on a transition of 500,000 takes most of a second.
+/// Triangles that all rounds together go through: each looks at all, which on a transition of 500,000 takes most of a second. Rounds are
+/// not counted: in a helical groove each divided triangle makes one beside it fail, and 40 rounds left the last few.
 const MAX_WORK: usize = 8_000_000;
 /// How many corners refinement may make.
 struct Limits {
@@ -167,7 +166,6 @@ pub(in crate::tessellate) fn triangulate(
         let works_too_long = (round + 1) * triangles.len() > MAX_WORK;
         let ended = failing.is_empty()
             || surface.steps.are_too_many()
-            || round == MAX_ROUNDS
             || works_too_long
             || corners >= limits.most_corners(falls);
         let exhausted = !failing.is_empty() && (works_too_long || corners >= limits.budget);
