@@ -86,10 +86,17 @@ fn arc_directions(uses: &[(EdgeKey, bool)], table: &EdgeTable<'_>) -> Vec<(usize
     let Some(turned) = turned_to_follow(&uses, following_tolerance(&uses)) else { return Vec::new() };
     let others: Vec<bool> = uses.iter().zip(&turned).filter(|(u, _)| !is_arc(u.edge)).map(|(_, t)| *t).collect();
     let are_others_turned = 2 * others.iter().filter(|turned| **turned).count() > others.len();
-    let direction = |turned: bool| match () {
-        () if others.is_empty() => Directions { either: 1, ..Directions::default() },
-        () if turned == are_others_turned => Directions { following: 1, ..Directions::default() },
-        () => Directions { against: 1, ..Directions::default() },
+    let direction = |turned: bool| {
+        let mut said = Directions::default();
+        let count = if others.is_empty() {
+            &mut said.either
+        } else if turned == are_others_turned {
+            &mut said.following
+        } else {
+            &mut said.against
+        };
+        *count += 1;
+        said
     };
     let arcs = uses.iter().zip(&turned).filter(|(u, _)| is_arc(u.edge));
     arcs.map(|(u, turned)| (u.edge, direction(*turned))).collect()
