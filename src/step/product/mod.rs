@@ -2,9 +2,9 @@
 //!
 //! Source: ISO 10303-43/44. An assembly places representations (`assembly`, `usage_names`, `relations`, `placed_children`,
 //! `placed_count`; `shared_items` says which of their items, `asides` what a viewer would not show); a representation is shells of faces
-//! (`topology`, with loops put in order by `swapped_vertices`, `face_edges` and `loop_order`, shells turned by `orientation`, and what has
-//! no extent left out by `zero_width` and `spikes`), surfaces without a face and ready meshes (`free_surfaces`, `tessellated`), solids given
-//! as recipes (`solid_recipes`, `recipe_parts`); all of it with its colours and layers (`styles`) becomes one part (`numbering`,
+//! (`topology`, with loops put in order by `swapped_vertices`, `face_edges` and `loop_order`, shells turned by `orientation`, and what
+//! has no extent left out by `zero_width` and `spikes`), surfaces without a face and ready meshes (`free_surfaces`, `tessellated`), solids
+//! given as recipes (`solid_recipes`, `recipe_parts`); all of it with its colours and layers (`styles`) becomes one part (`numbering`,
 //! `conversion`).
 
 pub(super) mod asides;
