@@ -216,6 +216,14 @@ mod tests {
     use crate::report::Chart;
     use serde_json::Value;
 
+    /// On paper, dark colours would print pale words on white.
+    #[test]
+    fn dark_colours_are_those_of_the_screen() {
+        let dark: Vec<&str> =
+            include_str!("page.css").lines().filter(|line| line.contains("color-scheme: dark;")).collect();
+        assert!(dark.len() == 2 && dark.iter().all(|line| line.starts_with("@media screen ")), "{dark:?}");
+    }
+
     #[test]
     fn words_between_backticks_are_code() {
         let written = emphasised("**Note:** add `medium = \"<PMMA>\"` or `rays`; a ` stays.").into_string();
