@@ -81,8 +81,8 @@ impl Aim {
         // What has no edge cannot be aimed by it; to turn the lamp by noise would be worse.
         if !edge.is_found() {
             let how = format!(
-                "as placed: the steepest place at {}° is G = {:.3}, no cut-off (G of {} and more){}",
-                rule.scan_h_deg,
+                "as placed: the steepest place at {} is G = {:.3}, no cut-off (G of {} and more){}",
+                angle_text(rule.scan_h_deg),
                 edge.gradient,
                 rule.least_gradient,
                 doubt(&edge, "cut-off")
@@ -113,11 +113,11 @@ impl Aim {
             blurred.push([v_deg - blur, v_deg + blur].map(|v_deg| [below(v_deg).h_deg, v_deg]));
         }
         let how = format!(
-            "cut-off found at {:.2}° on H = {}° (G = {:.2}) and read as {}°{}; {}",
-            edge.position,
-            rule.scan_h_deg,
+            "cut-off found at {} on H = {} (G = {:.2}) and read as {}{}; {}",
+            angle_text(edge.position),
+            angle_text(rule.scan_h_deg),
             edge.gradient,
-            rule.line_v_deg,
+            angle_text(rule.line_v_deg),
             doubt(&edge, "cut-off"),
             sideways.how
         );
@@ -127,7 +127,7 @@ impl Aim {
     /// The same aim, what it leaves open turned with it, with every direction read `h_deg` farther right and `v_deg` farther up, as a
     /// regulation allows where a row fails.
     pub(super) fn realigned(&self, h_deg: f64, v_deg: f64) -> Self {
-        let how = format!("{}; realigned by {h_deg}° and {v_deg}°", self.how);
+        let how = format!("{}; realigned by {} and {}", self.how, angle_text(h_deg), angle_text(v_deg));
         let turned = |[h, v]: [f64; 2]| [h + h_deg, v + v_deg];
         Self {
             h_deg: self.h_deg + h_deg,
@@ -158,7 +158,14 @@ fn doubt(edge: &Edge, what: &str) -> String {
     }
     let all = edge.rivals.iter().chain([&edge.position]);
     let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| [low.min(*p), high.max(*p)]);
-    format!("; the errors of the map leave the {what} open from {low:.2}° to {high:.2}°")
+    format!("; the errors of the map leave the {what} open from {} to {}", angle_text(low), angle_text(high))
+}
+
+/// Writes an angle for people, to a hundredth of a degree: `−0.58°`, with a minus sign, as all numbers of the page.
+fn angle_text(angle_deg: f64) -> String {
+    let hundredths = (100.0 * angle_deg).round();
+    // Zero has no sign.
+    format!("{}°", hundredths / 100.0 + 0.0).replace('-', "−")
 }
 
 /// Returns as many of the aims as rows are asked by, spread over all of them.
@@ -196,7 +203,7 @@ impl Sideways {
             half_deg: [SCAN_HALF_DEG; 2],
             least: LEAST_ELBOW_GRADIENT,
         };
-        let none = format!("no elbow at V = {ELBOW_V_DEG}°, sideways as placed");
+        let none = format!("no elbow at V = {}, sideways as placed", angle_text(ELBOW_V_DEG));
         let Some(elbow) = scan.steepest_edge(map, |h| [h, ELBOW_V_DEG + v_deg]) else {
             return as_placed(Vec::new(), none);
         };
@@ -215,7 +222,8 @@ impl Sideways {
         let blur = slant * blur_by_cells(across, map.coarsest_deg());
         let blurred = (blur > LEAST_TURN_DEG).then_some([h_deg - blur, h_deg + blur]);
         let doubt = doubt(&elbow, "elbow");
-        let how = format!("elbow found at {:.2}° and read as {}°{doubt}", elbow.position, elbow_h_deg);
+        let how =
+            format!("elbow found at {} and read as {}{doubt}", angle_text(elbow.position), angle_text(elbow_h_deg));
         Self { h_deg, v_deg, others, moved, blurred, how }
     }
 
@@ -233,6 +241,16 @@ mod tests {
 
     fn rule() -> CutOff {
         Regulation::find("UN R112 B passing").unwrap().function.cut_off.unwrap()
+    }
+
+    #[test]
+    fn angles_of_an_aim_have_minus_signs_and_words_their_hyphens() {
+        assert_eq!([-0.5812, -2.5, 0.004, -0.004, 1.0].map(angle_text), ["−0.58°", "−2.5°", "0°", "0°", "1°"]);
+        let aim = Aim::by_cut_off(&map_of_means(passing(0.3, -0.21), 0.05), rule()).realigned(-0.25, 0.0);
+        assert!(aim.how.starts_with("cut-off found at −"), "{}", aim.how);
+        assert!(aim.how.ends_with("; realigned by −0.25° and 0°"), "{}", aim.how);
+        let has_hyphen = |text: &str| text.as_bytes().windows(2).any(|w| w[0] == b'-' && w[1].is_ascii_digit());
+        assert!(!has_hyphen(&aim.how), "{}", aim.how);
     }
 
     /// Cells of 0.149° are the widest that UN R112 allows, those of 0.025° half as wide as the edge is soft.

@@ -118,12 +118,10 @@ impl Band {
         let [width, height] = Canvas::SAMPLES;
         self.top = top;
         let rows = top..(top + BAND_ROWS).min(height);
-        // A background that reads on a white and on a dark page.
-        for (plane, [base, rise]) in self.rgb.iter_mut().zip([[0.10, 0.05], [0.11, 0.05], [0.14, 0.06]]) {
+        // That of paper, on which a dark picture would be a block of ink.
+        for plane in &mut self.rgb {
             plane.clear();
-            for y in rows.clone() {
-                plane.resize(plane.len() + width, base + rise * (y as f32 / height as f32));
-            }
+            plane.resize(rows.len() * width, 1.0);
         }
         self.depth.clear();
         self.depth.resize(rows.len() * width, f32::INFINITY);
@@ -307,6 +305,12 @@ mod tests {
             samples.extend(drawn.map(|(k, _)| [k % Canvas::SAMPLES[0], top + k / Canvas::SAMPLES[0]]));
         }
         assert_eq!(samples, (0..=60).map(|k| [100 + k, 40 + k]).collect::<Vec<_>>());
+    }
+
+    /// The page prints it, also one that was read in the dark.
+    #[test]
+    fn the_background_is_that_of_paper() {
+        assert!(Canvas::default().picture().rgb.iter().all(|byte| *byte == 255));
     }
 
     #[test]

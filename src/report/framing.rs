@@ -1,5 +1,7 @@
 //! What a picture shows of a grid: the part that is lit, in no more cells than a screen has use for.
 
+use super::contour::round_levels;
+use super::even_poles::is_all_around;
 use crate::formats::{Axis, Grid, Layer};
 
 /// Share of the peak below which a cell is dark to the eye on a linear scale of colours.
@@ -53,12 +55,20 @@ pub(super) fn joined_cells(grid: &Grid) -> Option<(Grid, [usize; 2])> {
     Some((grid, block))
 }
 
+/// Returns the value up to which a cell is dark. Over all directions there is some stray light everywhere: what lies below the lowest
+/// isocandela line is none that a luminaire is framed by.
+fn dark_value(grid: &Grid, peak: f64) -> f64 {
+    let lowest = round_levels(peak).first().copied().filter(|_| is_all_around(grid));
+    lowest.unwrap_or(DARK * peak)
+}
+
 /// Cuts a grid to the part around all cells that are not dark against the brightest; `None` where that is most of it, or nothing.
 pub(super) fn lit_part(grid: &Grid) -> Option<Grid> {
     let [a, b] = [grid.axes[0].cells, grid.axes[1].cells];
     // A dark receiver has no part that is lit.
     let peak = grid.values.iter().copied().fold(0.0, f64::max);
-    let lit: Vec<usize> = (0..grid.values.len()).filter(|&k| grid.values[k] > DARK * peak).collect();
+    let dark = dark_value(grid, peak);
+    let lit: Vec<usize> = (0..grid.values.len()).filter(|&k| grid.values[k] > dark).collect();
     let extent = |place: &dyn Fn(usize) -> usize, cells: usize| {
         let first = lit.iter().map(|&k| place(k)).min()?;
         let last = lit.iter().map(|&k| place(k)).max()?;
@@ -113,6 +123,31 @@ mod tests {
         );
         assert_eq!(joined.axes[0].step(), 3.0);
         assert!(joined_cells(&joined).is_none());
+    }
+
+    /// 4 cd behind a beam of 1000 cd, whose lowest line is that of 10 cd; 20 cd are more than stray light.
+    #[test]
+    fn stray_light_does_not_widen_the_frame_of_a_luminaire() {
+        let axis = |label: &str, end: f64, cells| Axis {
+            label: label.into(),
+            unit: "deg".into(),
+            range: [0.0, end],
+            cells,
+        };
+        let frame = |label: &str, stray: f64| {
+            let axes = [axis(label, 360.0, 72), axis("gamma", 180.0, 90)];
+            let value = |k: usize| if k / 72 < 10 { 1010.0 } else { stray };
+            let (name, quantity, unit) = (String::new(), String::new(), "cd".into());
+            let values = (0..72 * 90).map(value).collect();
+            let grid =
+                Grid { name, quantity, unit, axes, values, error: None, geometric: None, layers: Vec::new() };
+            lit_part(&grid).map(|part| part.axes.map(|axis| axis.range[1]))
+        };
+        let [all_around, gamma] = frame("C", 4.0).unwrap();
+        assert!(all_around == 360.0 && (20.0..50.0).contains(&gamma), "{gamma}");
+        assert_eq!(frame("C", 20.0), None);
+        // A headlamp's dark side, where glare is measured, stays.
+        assert_eq!(frame("H", 4.0), None);
     }
 
     #[test]

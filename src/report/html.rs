@@ -134,7 +134,7 @@ fn figure_markup(
             div class={ "plot " (kind) } id={ "fig-" (name) } tabindex="0" role="group" aria-label=(title) { (drawing) }
             script type="application/json" data-for={ "fig-" (name) } { (PreEscaped(json)) }
             figcaption {
-                (caption) (keys) " Static picture:"
+                (emphasised(caption)) (keys) " Static picture:"
                 @for kind in files { " " a href={ "figures/" (name) "." (kind) } { (kind.to_uppercase()) } }
             }
         }
@@ -188,9 +188,19 @@ fn provenance_markup(p: &Provenance) -> Markup {
     }
 }
 
-/// Writes text with `**words**` as strong; everything else in it is escaped.
+/// Writes text with `**words**` as strong and words between backticks as code; everything else in it is escaped.
 fn emphasised(text: &str) -> Markup {
-    html! { @for (k, piece) in text.split("**").enumerate() { @if k % 2 == 1 { strong { (piece) } } @else { (piece) } } }
+    html! { @for (k, piece) in text.split("**").enumerate() {
+        @if k % 2 == 1 { strong { (with_code(piece)) } } @else { (with_code(piece)) }
+    } }
+}
+
+/// Writes text with words between backticks as code; a backtick without another after it stays.
+fn with_code(text: &str) -> Markup {
+    let last = text.split('`').count() - 1;
+    html! { @for (k, piece) in text.split('`').enumerate() {
+        @if k % 2 == 0 { (piece) } @else if k < last { code { (piece) } } @else { "`" (piece) }
+    } }
 }
 
 /// Makes a title a name for links: lower case, words joined by hyphens; alike titles have one name.
@@ -205,6 +215,21 @@ mod tests {
     use crate::formats::{Axis, Grid};
     use crate::report::Chart;
     use serde_json::Value;
+
+    /// On paper, dark colours would print pale words on white.
+    #[test]
+    fn dark_colours_are_those_of_the_screen() {
+        let dark: Vec<&str> =
+            include_str!("page.css").lines().filter(|line| line.contains("color-scheme: dark;")).collect();
+        assert!(dark.len() == 2 && dark.iter().all(|line| line.starts_with("@media screen ")), "{dark:?}");
+    }
+
+    #[test]
+    fn words_between_backticks_are_code() {
+        let written = emphasised("**Note:** add `medium = \"<PMMA>\"` or `rays`; a ` stays.").into_string();
+        let wanted = "<strong>Note:</strong> add <code>medium = &quot;&lt;PMMA&gt;&quot;</code> or <code>rays</code>; a ` stays.";
+        assert_eq!(written, wanted);
+    }
 
     /// An evenly lit disc, whose corners have no cells, is evenly bright: its darkest cell is not black.
     #[test]

@@ -3,6 +3,7 @@
 use super::even_poles::{is_all_around, pole_rings};
 use super::half_width::half_width;
 use super::number::figures;
+use super::peak_lines::{Line, lines_through_peak};
 use super::verdicts::{multiple_text, without_rounding};
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
@@ -18,37 +19,6 @@ const FRAMED_PERCENT: f64 = 99.5;
 const FEW_CELLS: f64 = 2.0;
 /// Radii at which the encircled power is drawn.
 const RADII: usize = 200;
-
-/// A line through the brightest cell.
-struct Line {
-    /// What it is called.
-    name: String,
-    /// Distance of two of its cells, degrees.
-    step: f64,
-    /// Its cells, in their order.
-    cells: Vec<usize>,
-}
-
-/// Returns the lines along both axes through the brightest cell, or in its plane and the one across where the grid is over planes C all
-/// around, in which γ runs to both sides of its pole; `None` for a grid without cells.
-fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
-    let [a, b] = &grid.axes;
-    let (i, j) = grid.peak_cell()?;
-    let column = |i: usize| (0..b.cells).map(move |j| j * a.cells + i % a.cells);
-    if !is_all_around(grid) {
-        let row = (j * a.cells..(j + 1) * a.cells).collect();
-        return Some([
-            Line { name: format!("along {}", a.label), step: a.step(), cells: row },
-            Line { name: format!("along {}", b.label), step: b.step(), cells: column(i).collect() },
-        ]);
-    }
-    let plane = |i: usize| Line {
-        name: format!("in the plane C {}°", figures(a.center(i % a.cells), 3)),
-        step: b.step(),
-        cells: column(i + a.cells / 2).rev().chain(column(i)).collect(),
-    };
-    Some([plane(i), plane(i + a.cells / 4)])
-}
 
 /// Returns the width at half along a line and its error, both in degrees.
 fn width_along(grid: &Grid, line: &Line) -> [Cell; 2] {

@@ -1,7 +1,9 @@
 //! What a receiver counted as maps: the grid for files and pictures, its cuts, and what stands below them.
 
+use super::even_poles::is_all_around;
 use super::framing::{LIT_PART_SHOWN, lit_part};
 use super::number::unit_in_words;
+use super::peak_lines::lines_through_peak;
 use super::{AxisStyle, Chart, Series, SeriesStyle, figures};
 use crate::formats::file_stem;
 use crate::formats::{Axis, Grid, Layer};
@@ -111,39 +113,49 @@ fn in_words(mut grid: Grid) -> Grid {
 /// Cells of a cut that are drawn: more than a screen has pixels, and 400 kB of the page.
 const MOST_CUT_POINTS: usize = 2000;
 
-/// Draws the values along both axes through the peak, with their errors, as far as the map shows them; `None` for a grid without cells or
-/// without light.
-pub(super) fn cuts(r: &ReceiverResult, grid: &Grid) -> Option<Chart> {
+/// Draws the values along both axes through the peak, or of a luminaire in its plane and the one across, with their errors, as far as the
+/// map shows them; `None` for a grid without cells or without light.
+pub(super) fn cuts(grid: &Grid) -> Option<Chart> {
     let part = lit_part(grid);
-    let grid = part.as_ref().unwrap_or(grid);
+    let framed = part.as_ref().unwrap_or(grid);
+    let lines = lines_through_peak(grid).filter(|_| grid.peak().is_some_and(|(_, value)| value > 0.0))?;
     let [a, b] = &grid.axes;
-    let (column, row) = grid.peak_cell().filter(|(column, row)| grid.values[row * a.cells + column] > 0.0)?;
-    // Every so many-th cell of a very fine receiver, the brightest among them: each has a bar of its error in the page.
-    let shown = |axis: &Axis, peak: usize| {
-        let step = axis.cells.div_ceil(MOST_CUT_POINTS);
-        (peak % step..axis.cells).step_by(step)
+    let is_framed = |cell: usize| {
+        let at = [a.center(cell % a.cells), b.center(cell / a.cells)];
+        framed.axes.iter().zip(at).all(|(axis, x)| (axis.range[0]..=axis.range[1]).contains(&x))
     };
-    let along = |[axis, fixed]: [&Axis; 2], [peak, at]: [usize; 2], cell: &dyn Fn(usize) -> usize| Series {
-        name: format!("along {} at {} = {} {}", axis.label, fixed.label, figures(fixed.center(at), 3), fixed.unit),
-        points: shown(axis, peak).map(|k| [axis.center(k), grid.values[cell(k)]]).collect(),
-        errors: shown(axis, peak).filter_map(|k| grid.combined_error(cell(k))).collect(),
-        style: SeriesStyle::Line,
-        ..Series::default()
-    };
-    let series = vec![
-        along([a, b], [column, row], &|k| row * a.cells + k),
-        along([b, a], [row, column], &|k| k * a.cells + column),
-    ];
+    let series = lines.map(|line| {
+        let points = line.positions.iter().zip(&line.cells).map(|(x, &cell)| (*x, cell));
+        let points: Vec<(f64, usize)> = points.filter(|(_, cell)| is_framed(*cell)).collect();
+        // Every so many-th cell of a very fine receiver, the brightest among them: each has a bar of its error in the page.
+        let step = points.len().div_ceil(MOST_CUT_POINTS).max(1);
+        let value = |k: &usize| grid.values[points[*k].1];
+        let brightest = (0..points.len()).max_by(|k, l| value(k).total_cmp(&value(l))).unwrap_or(0);
+        let shown = || points.iter().skip(brightest % step).step_by(step);
+        Series {
+            name: line.name + &line.place,
+            points: shown().map(|(x, cell)| [*x, grid.values[*cell]]).collect(),
+            errors: shown().filter_map(|(_, cell)| grid.combined_error(*cell)).collect(),
+            style: SeriesStyle::Line,
+            ..Series::default()
+        }
+    });
     // Cuts along two axes of different units have no unit in common.
     let unit = if a.unit == b.unit { a.unit.as_str() } else { "" };
-    let axes = [AxisStyle::linear("position", unit), AxisStyle::linear(&grid.quantity, &grid.unit)];
-    let name = format!("{}-cuts", file_stem(&r.name));
+    let (position, cut) = if is_all_around(grid) {
+        (b.label.as_str(), "The plane C of the peak and the one across, with negative angles for their far sides")
+    } else {
+        ("position", "One row and one column of cells")
+    };
+    let axes = [AxisStyle::linear(position, unit), AxisStyle::linear(&grid.quantity, &grid.unit)];
+    let name = format!("{}-cuts", file_stem(&grid.name));
     let errors = if grid.geometric.is_some() { "rays and facets together" } else { "the rays" };
-    let mut caption = format!("One row and one column of cells; bars are one standard error of {errors}.");
+    let mut caption = format!("{cut}; bars are one standard error of {errors}.");
     if part.is_some() {
         caption += LIT_PART_SHOWN;
     }
-    Some(Chart::series(&name, &format!("{}: cuts through the peak", spoken(&r.name)), &caption, axes, series))
+    let title = format!("{}: cuts through the peak", spoken(&grid.name));
+    Some(Chart::series(&name, &title, &caption, axes, series.into()))
 }
 
 /// Writes what a map shows: its peak, its noise and its cells.
@@ -181,6 +193,40 @@ pub(super) fn spoken(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::Content;
+
+    /// A beam along γ 0 of 2° cells, with faint light beside and behind it.
+    fn beam() -> Grid {
+        let axis = |label: &str, end: f64, cells| Axis {
+            label: label.into(),
+            unit: "deg".into(),
+            range: [0.0, end],
+            cells,
+        };
+        let axes = [axis("C", 360.0, 72), axis("gamma", 180.0, 90)];
+        let values = (0..72 * 90).map(|k| match axes[1].center(k / 72) {
+            gamma if gamma < 20.0 => 1000.0 * (1.0 - gamma / 20.0) + (k % 72) as f64,
+            _ => 4.0,
+        });
+        let (name, quantity, unit) = ("spot".to_owned(), "luminous intensity".to_owned(), "cd".to_owned());
+        let values = values.collect();
+        Grid { name, quantity, unit, axes, values, error: None, geometric: None, layers: Vec::new() }
+    }
+
+    #[test]
+    fn cuts_of_a_luminaire_run_through_its_pole_as_far_as_it_is_lit() {
+        let grid = beam();
+        let chart = cuts(&grid).unwrap();
+        let Content::Series(series) = chart.content else { panic!("curves") };
+        assert_eq!(series[0].name, "in the plane C 358°");
+        for s in series {
+            let positions: Vec<f64> = s.points.iter().map(|p| p[0]).collect();
+            assert!(positions.is_sorted() && positions[0] == -positions[positions.len() - 1], "{positions:?}");
+            // As far as the frame of the map, and from cell to cell through the pole.
+            assert!((20.0..50.0).contains(&-positions[0]), "{positions:?}");
+            assert!(positions.windows(2).all(|p| (p[1] - p[0] - 2.0).abs() < 1e-9), "{positions:?}");
+        }
+    }
 
     #[test]
     fn units_of_maps_are_written_for_people() {

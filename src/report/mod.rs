@@ -26,6 +26,7 @@ mod legend;
 mod map_labels;
 mod maps;
 mod number;
+mod peak_lines;
 mod plotly;
 mod plotly_data;
 mod provenance;

@@ -223,7 +223,7 @@ impl SimulationReport<'_> {
             // The map that matters most stands beside the facets and has its cuts drawn.
             if let Some(view) = view.take() {
                 section = section.with_block(view);
-                if let Some(cuts) = cuts(r, &grid) {
+                if let Some(cuts) = cuts(&grid) {
                     section = section.with_block(cuts);
                 }
             }

@@ -234,6 +234,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "legend",
             "map_labels",
             "even_poles",
+            "peak_lines",
             "framing",
             "maps",
             "provenance",
