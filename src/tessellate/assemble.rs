@@ -110,7 +110,8 @@ fn mesh_with_rounds(
         let (divisions, shared) = edges::divide(part, &known, &sides, (&denser, &further), &mut own);
         let mesh = |(face, surface): &(&Face, Option<FaceSurface<'_>>)| {
             let (surface, taken) = (surface.as_ref()?, &NO_CHORDS);
-            mesh_face(&FaceInput { part, face, surface, divisions: &divisions, shared: &shared, settings, taken })
+            let (divisions, shared) = (&divisions[..], &shared[..]);
+            mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken, untangles: false })
         };
         let mut is_kept = vec![false; faces.len()];
         let meshes: Vec<Option<FaceMesh>> = match before.take() {
@@ -158,7 +159,7 @@ fn mesh_with_rounds(
     let input = |k: usize| {
         let (face, surface) = &faces[k];
         let (divisions, shared, surface) = (&divisions[..], &shared[..], surface.as_ref()?);
-        Some(FaceInput { part, face, surface, divisions, shared, settings, taken: &NO_CHORDS })
+        Some(FaceInput { part, face, surface, divisions, shared, settings, taken: &NO_CHORDS, untangles: false })
     };
     fill_crossing_borders(&mut meshes, input);
     let again = |k: usize, taken: &TakenChords| mesh_face(&FaceInput { taken, ..input(k)? });
@@ -167,8 +168,9 @@ fn mesh_with_rounds(
     (with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken }), asked)
 }
 
-/// Replaces, in `meshes`, faces whose borders cross in the parameter plane by a mesh of their borders alone, where that lies within the
-/// tolerance of the surface: narrow strips, whose neighbours it meets. `input` gives what a face is meshed from, by its index.
+/// Replaces, in `meshes`, faces whose borders cross in the parameter plane: by a mesh with their cusps untangled, or else by one of their
+/// borders alone, where that lies within the tolerance of the surface: narrow strips, whose neighbours it meets. `input` gives what a face
+/// is meshed from, by its index.
 fn fill_crossing_borders<'i, 'a: 'i>(
     meshes: &mut [Option<FaceMesh>],
     input: impl Fn(usize) -> Option<FaceInput<'i, 'a>>,
@@ -177,6 +179,11 @@ fn fill_crossing_borders<'i, 'a: 'i>(
         let Some(mesh) = mesh.as_mut().filter(|mesh| mesh.repaired == Some(Repair::CrossingBorder)) else {
             continue;
         };
+        let untangled = input(k).and_then(|input| mesh_face(&FaceInput { untangles: true, ..input }));
+        if let Some(untangled) = untangled.filter(|mesh| mesh.repaired.is_none()) {
+            *mesh = untangled;
+            continue;
+        }
         let border =
             input(k).and_then(|input| catch_panic(|| fallback::border_within_tolerance(&input)).ok().flatten());
         if let Some(border) = border {

@@ -73,6 +73,8 @@ pub(super) struct FaceInput<'i, 'a> {
     pub(super) settings: &'i Settings,
     /// Chords between shared positions that other faces have inside, which no side of a facet here may be.
     pub(super) taken: &'i TakenChords,
+    /// Whether samples beside cusps are moved where edges cross there by next to nothing.
+    pub(super) untangles: bool,
 }
 
 /// Meshes a face by cells and transition. Facets that are not proved are in the mesh, with their bound; errors are as in
@@ -90,10 +92,13 @@ pub(super) fn mesh_with_imprint(
     input: &FaceInput<'_, '_>,
     imprint: &Imprint,
 ) -> Result<(FaceMesh, CarrierFacets), Unmeshed> {
-    let FaceInput { part, face, surface, divisions, shared, settings, taken } = *input;
+    let FaceInput { part, face, surface, divisions, shared, settings, taken, untangles } = *input;
     let loops = polygons::loops(face);
     let imprinted = ImprintedPoints { points: &imprint.points(), near: imprint.near };
-    let polygons = polygons::build(part, &loops, surface, divisions, &imprinted);
+    let mut polygons = polygons::build(part, &loops, surface, divisions, &imprinted);
+    if untangles {
+        polygons.untangle_cusps(surface);
+    }
     // Loops of one chord or none enclose nothing in the parameter plane.
     if polygons.polygons.iter().all(|p| p.len() < 3) {
         return Err(Unmeshed::Empty);

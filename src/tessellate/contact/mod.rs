@@ -193,6 +193,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
                     shared: &shared,
                     settings: self.settings,
                     taken: &taken[k],
+                    untangles: false,
                 })
             };
             let meshes = before.faces.par_iter().enumerate().map(renew).collect();
@@ -214,6 +215,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             shared: &mesh.shared,
             settings: self.settings,
             taken: &mesh.taken[face.key.face],
+            untangles: false,
         }
     }
 

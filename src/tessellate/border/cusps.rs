@@ -1,0 +1,116 @@
+//! Cusps of a border whose two edges cross by less than the tolerance beside the corner, as real files have them where a round runs out
+//! into a line: in this face's parameters, samples move to the side of the other edge on which they belong.
+
+use super::polygons::{BorderPolygons, BorderSide, PolygonVertex};
+use crate::math::Uv;
+use crate::tessellate::face_surface::FaceSurface;
+
+/// Least cosine between two edges that meet in a cusp.
+const CUSP: f64 = 0.9;
+/// Share of the tolerance by which samples are moved at most: what is left goes to the facets.
+const FARTHEST: f64 = 0.25;
+/// Share of that by which moved samples lie beside the other edge.
+const BESIDE: f64 = 1e-2;
+
+impl BorderPolygons {
+    /// Moves samples beside cusps, in parameters alone, so that the chords of the two edges no longer cross. Places stay, which lie beside
+    /// the surface's points at the parameters by [`FARTHEST`] of the tolerance at most; vertices stay too.
+    pub(in crate::tessellate) fn untangle_cusps(&mut self, surface: &FaceSurface<'_>) {
+        for polygon in &mut self.polygons {
+            for corner in 0..polygon.len() {
+                let uv = polygon[corner].uv;
+                let d = surface.spline.derivatives(uv);
+                let scale = Uv::new(d.du.length(), d.dv.length());
+                if scale.min_element() > 0.0 {
+                    untangle(polygon, corner, scale, FARTHEST * surface.tolerance(uv));
+                }
+            }
+            for v in polygon {
+                v.uv = surface.spline.clamp(v.uv);
+            }
+        }
+    }
+}
+
+/// Moves the samples of the two edges that meet at a corner by up to `limit` mm; does nothing where they meet in no cusp, or are nowhere
+/// farther apart than that. `scale` is the length in mm of a unit of each parameter.
+fn untangle(polygon: &mut [PolygonVertex], corner: usize, scale: Uv, limit: f64) {
+    let origin = polygon[corner].uv;
+    let sides = [true, false].map(|ahead| side_from(polygon, corner, ahead));
+    let [mut ahead, mut back] =
+        [0, 1].map(|k| sides[k].iter().map(|&i| (polygon[i].uv - origin) * scale).collect::<Vec<Uv>>());
+    if ahead.len() < 2 || back.len() < 2 || sides[0][1] == sides[1][1] {
+        return;
+    }
+    if ahead[1].dot(back[1]) <= CUSP * ahead[1].length() * back[1].length() {
+        return;
+    }
+    // Where they are clearly apart, it is told on which side of the other each belongs.
+    let apart =
+        |line: &[Uv], points: &[Uv]| points.iter().map(|&p| beside(p, line).0).find(|away| away.abs() > limit);
+    let left = apart(&back, &ahead).or_else(|| apart(&ahead, &back).map(|away| -away));
+    let Some(sign) = left.map(f64::signum) else { return };
+    part(&mut ahead, &back, sign, limit);
+    part(&mut back, &ahead, -sign, limit);
+    for (side, points) in sides.iter().zip([ahead, back]) {
+        for (&i, p) in side.iter().zip(points).take(side.len() - 1).skip(1) {
+            polygon[i].uv = origin + p / scale;
+        }
+    }
+}
+
+/// Returns the vertices of a polygon from a corner to the end of the edge that runs ahead or back from it, both ends included; the corner
+/// alone where no edge of the part does, or none begins or ends there.
+fn side_from(polygon: &[PolygonVertex], corner: usize, ahead: bool) -> Vec<usize> {
+    let n = polygon.len();
+    let edge_use = |segment: usize| match polygon[segment].side {
+        BorderSide::Edge { edge_use, .. } => Some(edge_use),
+        _ => None,
+    };
+    let (before, after) = (edge_use((corner + n - 1) % n), edge_use(corner));
+    let along = if ahead { after } else { before };
+    let mut side = vec![corner];
+    if before == after || along.is_none() {
+        return side;
+    }
+    for step in 1..n {
+        let (segment, next) = if ahead {
+            ((corner + step - 1) % n, (corner + step) % n)
+        } else {
+            ((corner + n - step) % n, (corner + n - step) % n)
+        };
+        if edge_use(segment) != along {
+            break;
+        }
+        side.push(next);
+    }
+    side
+}
+
+/// Moves points to the side `sign` of a line, as far as they are within `limit` of it; the first and the last stay.
+fn part(points: &mut [Uv], line: &[Uv], sign: f64, limit: f64) {
+    let inner = points.len() - 1;
+    for p in &mut points[1..inner] {
+        let (away, foot, left) = beside(*p, line);
+        if away.abs() > limit {
+            break;
+        }
+        if away * sign < BESIDE * limit {
+            *p = foot + left * (sign * BESIDE * limit);
+        }
+    }
+}
+
+/// Returns how far a point lies to the left of a line of two points or more, its foot there, and the unit vector to the left.
+fn beside(p: Uv, line: &[Uv]) -> (f64, Uv, Uv) {
+    let foot = |s: &[Uv]| {
+        let along = s[1] - s[0];
+        let foot = s[0] + along * ((p - s[0]).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+        (foot, along.perp().normalize_or_zero())
+    };
+    let feet = line.windows(2).filter(|s| s[0] != s[1]).map(foot);
+    let nearest = feet.min_by(|a, b| (a.0 - p).length_squared().total_cmp(&(b.0 - p).length_squared()));
+    let Some((foot, left)) = nearest else { return (0.0, p, Uv::ZERO) };
+    let away = p - foot;
+    (away.length().copysign(away.dot(left)), foot, left)
+}
