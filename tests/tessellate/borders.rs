@@ -278,21 +278,21 @@ fn facets_keep_to_an_edge_that_is_straight_in_space() {
     }
 }
 
-/// A round runs out into a line and crosses it by 0.7 µm before it ends, as exporters leave it: beside the cusp its samples lie on the wrong
-/// side of the line.
+/// A round of eight pieces runs out into a line and crosses it by 0.6 µm before it ends, as exporters leave it: at tolerances that need
+/// them all, one of its samples lies on the wrong side of the line.
 #[test]
 fn edges_that_cross_beside_a_cusp_by_next_to_nothing_bound_their_face() {
     let plane = sweep::plane(&Frame::IDENTITY, [[-10.0, 10.0]; 2]);
     let round = |f: f64| {
         let (a, b, c) = (3.0 * (1.0 - f) * (1.0 - f) * f, 3.0 * (1.0 - f) * f * f, f * f * f);
-        Uv::new(-0.63 * a - 1.25 * b - 1.88 * c, -0.003 * a + 0.06 * c)
+        Uv::new(-0.63 * a - 1.25 * b - 1.88 * c, -0.0025 * a + 0.06 * c)
     };
     let [p, q, r] = [round(1.0), Uv::new(-7.0, 3.0), Uv::new(-7.0, 0.0)];
     let line = |a: Uv, b: Uv| chain(1, move |f| a.lerp(b, f));
-    let loops = vec![vec![line(r, Uv::ZERO), chain(200, round), line(p, q), line(q, r)]];
-    let corners: Vec<Uv> = (0..=200).map(|k| round(f64::from(k) / 200.0)).chain([q, r]).collect();
+    let loops = vec![vec![line(r, Uv::ZERO), chain(8, round), line(p, q), line(q, r)]];
+    let corners: Vec<Uv> = (0..=8).map(|k| round(f64::from(k) / 8.0)).chain([q, r]).collect();
     let area: f64 = 0.5 * corners.windows(2).map(|w| w[0].perp_dot(w[1])).sum::<f64>();
-    for tolerance in [0.05, 0.02, 0.01, 0.005] {
+    for tolerance in [0.05, 0.0032, 0.003, 0.0026] {
         let made = tessellate(&face(plane.clone(), &loops), &measured(tolerance));
         assert_proved(&made);
         assert_eq!(made.report.nonmanifold_edges, 0);
