@@ -3,7 +3,7 @@
 use super::placed_surface::PlacedSurface;
 use super::verdict::{Cause, Defect};
 use crate::intersect::{Certainty, Hit};
-use crate::math::{Aabb, FaceId, Ray, Uv, Vector};
+use crate::math::{Aabb, FaceId, Point, Ray, Vector};
 use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
 use std::sync::OnceLock;
@@ -35,6 +35,8 @@ pub(super) struct Classifier<'a> {
     surfaces: Vec<OnceLock<Option<PlacedSurface>>>,
     /// The facets of each face.
     facets: Vec<Vec<u32>>,
+    /// How far facets without a proof stray from the spline, mm, measured when it is first asked for: the same for all rays.
+    measured: Vec<OnceLock<f64>>,
     fallback: f64,
     /// Differences below this are rounding, mm.
     pub(super) rounding: f64,
@@ -56,7 +58,8 @@ impl<'a> Classifier<'a> {
         // Rounding goes with the numbers that coordinates are, not with the size of the model.
         let reach = Aabb::from_points([bounds.min.abs(), bounds.max.abs()]).max;
         let size = if bounds.is_empty() { 1.0 } else { reach.length() + bounds.diagonal() };
-        Self { mesh, placed, surfaces, facets, fallback, rounding: ROUNDING * size }
+        let measured = mesh.facets.iter().map(|_| OnceLock::new()).collect();
+        Self { mesh, placed, surfaces, facets, measured, fallback, rounding: ROUNDING * size }
     }
 
     /// Returns a face's surface at its place, made when it is first asked for; `None` for a ready mesh or a face that does not exist.
@@ -98,28 +101,36 @@ impl<'a> Classifier<'a> {
     /// that was hit, and those of the face that was hit first which the ray's line passes within as much. 0 without any.
     fn unproved_sag(&self, ray: &Ray, first: &Hit, facet: Option<&Hit>) -> f64 {
         let everywhere = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
-        let of_hit = facet.map(|f| (f.face, f.primitive, f.uv));
+        let of_hit = facet.map(|f| (f.face, f.primitive));
         let of_face = self.facets.get(first.face.index()).into_iter().flatten();
-        let doubtful = of_hit.into_iter().chain(of_face.map(|&i| (first.face, i, first.uv)));
+        let doubtful = of_hit.into_iter().chain(of_face.map(|&i| (first.face, i)));
         doubtful
-            .filter(|(_, i, _)| self.proved_sag(*i).is_none())
-            .filter_map(|(face, i, guess)| {
-                let sag = self.measured_sag(i, guess, self.surface(face)?, ray.direction);
+            .filter(|(_, i)| self.proved_sag(*i).is_none())
+            .filter_map(|(face, i)| {
+                let surface = self.surface(face)?;
+                let sag = *self.measured[i as usize].get_or_init(|| self.measured_sag(i, surface));
                 let bounds = Aabb::from_points(self.mesh.corners(i as usize)).grown(sag + self.rounding);
                 bounds.clip(&everywhere).map(|_| sag)
             })
             .fold(0.0, f64::max)
     }
 
-    /// Measures how far, mm, a facet strays from the spline: the farthest of 25 of its points. `guess` are parameters near it.
-    fn measured_sag(&self, facet: u32, guess: Uv, surface: &PlacedSurface, direction: Vector) -> f64 {
+    /// Measures how far, mm, a facet strays from the spline: the farthest of 25 of its points.
+    fn measured_sag(&self, facet: u32, surface: &PlacedSurface) -> f64 {
         // A grid over the facet's two triangles, which share the diagonal from a to c.
         let [a, b, c, d] = self.mesh.corners(facet as usize);
         let points = (0..25).map(|k| {
             let (u, v) = (f64::from(k / 5) / 4.0, f64::from(k % 5) / 4.0);
             if u >= v { a + (b - a) * (u - v) + (c - a) * v } else { a + (d - a) * (v - u) + (c - a) * u }
         });
-        points.map(|p| surface.foot(p, guess, direction).offset.abs()).fold(0.0, f64::max)
+        // Each point is near the one before; which way the surface bends there is not asked.
+        let mut guess = surface.nearest_seeds::<1>(a)[0];
+        let mut distance = |p: Point| {
+            let foot = surface.foot(p, guess, Vector::ZERO);
+            guess = foot.uv;
+            foot.offset.abs()
+        };
+        points.map(&mut distance).fold(0.0, f64::max)
     }
 
     /// Returns why facets and spline answer a ray differently; `None` when the answers agree to rounding. `None` for a hit is a miss.

@@ -94,6 +94,14 @@ impl PlacedSurface {
         self.seeds.get_or_init(|| parameters.map(|uv| (uv, self.surface.evaluate(uv))).collect())
     }
 
+    /// Returns the parameters of the samples nearest to `p`, the nearest first; there are more than `N`.
+    pub(super) fn nearest_seeds<const N: usize>(&self, p: Point) -> [Uv; N] {
+        let mut seeds: Vec<_> = self.seeds().iter().map(|(uv, q)| (q.distance_squared(p), *uv)).collect();
+        seeds.select_nth_unstable_by(N - 1, |a, b| a.0.total_cmp(&b.0));
+        seeds[..N].sort_by(|a, b| a.0.total_cmp(&b.0));
+        std::array::from_fn(|k| seeds[k].1)
+    }
+
     /// Returns the diagonal of the box about the control points, mm.
     pub(super) fn size(&self) -> f64 {
         self.size
@@ -107,10 +115,8 @@ impl PlacedSurface {
         let mut best = self.describe(p, near, direction);
         if best.held {
             // The guess ran into a side of the domain: on a closed surface the foot may lie beyond the seam.
-            let mut seeds: Vec<_> = self.seeds().iter().map(|(uv, q)| (q.distance_squared(p), *uv)).collect();
-            seeds.sort_by(|a, b| a.0.total_cmp(&b.0));
             // From the four nearest of some three hundred samples.
-            for (_, uv) in seeds.into_iter().take(4) {
+            for uv in self.nearest_seeds::<4>(p) {
                 let other = self.describe(p, self.project(p, uv), direction);
                 // Nearest alone counts: a foot that nothing holds may lie on the next turn of a screw.
                 let (far, near) = (other.offset.abs(), best.offset.abs());
