@@ -7,6 +7,19 @@ pub(crate) fn polygon_sides(polygon: &[Uv]) -> impl Iterator<Item = [Uv; 2]> + C
     (0..polygon.len()).map(move |k| [polygon[k], polygon[(k + 1) % polygon.len()]])
 }
 
+/// Returns the signed area of a polygon, positive counter-clockwise; 0 if it is empty.
+pub(crate) fn signed_area(polygon: &[Uv]) -> f64 {
+    let Some(&o) = polygon.first() else { return 0.0 };
+    // About the first corner: far from the origin the products would cancel.
+    0.5 * polygon_sides(polygon).map(|[a, b]| (a - o).perp_dot(b - o)).sum::<f64>()
+}
+
+/// Returns the point of a side nearest to `p`; its ends must differ.
+pub(crate) fn nearest_on_side([a, b]: [Uv; 2], p: Uv) -> Uv {
+    let along = b - a;
+    a + along * ((p - a).dot(along) / along.length_squared()).clamp(0.0, 1.0)
+}
+
 /// Returns the u at which a side crosses the line of constant `v`, which must lie between its ends.
 pub(crate) fn row_crossing([a, b]: [Uv; 2], v: f64) -> f64 {
     a.x + (v - a.y) / (b.y - a.y) * (b.x - a.x)

@@ -9,6 +9,7 @@ use super::fallback;
 use super::limits;
 use super::nodes::Position;
 use super::placed_part::PlacedPart;
+use super::previous_round::PreviousRound;
 use super::remesh_budget::RemeshBudget;
 use super::report::{FailureCause, Repair};
 use super::settings::Settings;
@@ -113,23 +114,9 @@ fn mesh_with_rounds(
             let (divisions, shared) = (&divisions[..], &shared[..]);
             mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken, untangles: false })
         };
-        let mut is_kept = vec![false; faces.len()];
-        let meshes: Vec<Option<FaceMesh>> = match before.take() {
-            None => faces.par_iter().map(mesh).collect(),
-            Some(before) => {
-                // Few edges change: faces whose own did not are as they were, but for the numbers of their corners.
-                let renumbering = Renumbering::new(part, (&before.divisions, before.shared), &divisions);
-                let stays = |((face, _), old): (&(&Face, Option<FaceSurface<'_>>), &Option<FaceMesh>)| {
-                    old.is_some()
-                        && !face.loops.iter().flat_map(|l| &l.uses).any(|u| renumbering.has_changed(u.edge))
-                };
-                is_kept = faces.iter().zip(&before.meshes).map(stays).collect();
-                let all = faces.par_iter().zip(before.meshes).zip(&is_kept);
-                let renew = |((face, old), is_kept): (_, &bool)| {
-                    if *is_kept { Option::map(old, |m| renumbering.renumbered(m)) } else { mesh(face) }
-                };
-                all.map(renew).collect()
-            }
+        let (meshes, is_kept) = match before.take() {
+            None => (faces.par_iter().map(mesh).collect(), vec![false; faces.len()]),
+            Some(before) => before.meshed_again(part, &faces, &divisions, mesh),
         };
         for (k, mesh) in meshes.iter().enumerate().filter(|(k, _)| !is_kept[*k]) {
             budget.spend(k, mesh.as_ref());
@@ -301,72 +288,6 @@ pub(super) fn with_coincident_vertices_joined(mut mesh: PartMesh) -> PartMesh {
         }
     }
     mesh
-}
-
-/// What a part looked like before some of its edges were sampled more densely.
-struct PreviousRound {
-    divisions: Vec<Division>,
-    /// How many shared positions there were.
-    shared: usize,
-    meshes: Vec<Option<FaceMesh>>,
-}
-
-/// Maps shared positions from one division of a part's edges to another, and knows which edges differ between the two.
-pub(super) struct Renumbering {
-    /// By edge.
-    changed: Vec<bool>,
-    to: Vec<u32>,
-    /// Whether a position of the first division is one of the second.
-    is_kept: Vec<bool>,
-}
-
-impl Renumbering {
-    /// Compares two divisions of a part's edges; `shared` is the number of positions that went with the first. Inner positions of changed
-    /// edges keep their old numbers, which mean nothing any more.
-    pub(super) fn new(part: &Part, (before, shared): (&[Division], usize), now: &[Division]) -> Self {
-        let mut to: Vec<u32> = (0..shared as u32).collect();
-        let mut is_kept = vec![true; shared];
-        let mut changed = Vec::with_capacity(part.edges.len());
-        for (old, new) in before.iter().zip(now) {
-            changed.push(old.t != new.t);
-            // Inner samples alone move: vertices come first in any division.
-            for k in 0..old.t.len() as u32 - 2 {
-                let position = (old.first + k) as usize;
-                is_kept[position] = old.t == new.t;
-                if old.t == new.t {
-                    to[position] = new.first + k;
-                }
-            }
-        }
-        Self { changed, to, is_kept }
-    }
-
-    /// Whether an edge is divided otherwise than before; false without an edge, true for one that the part does not have.
-    pub(super) fn has_changed(&self, edge: Option<EdgeId>) -> bool {
-        edge.is_some_and(|e| self.changed.get(e.0 as usize).is_none_or(|&c| c))
-    }
-
-    /// Returns the mesh with its shared positions renumbered. That of a face with a changed edge is of no use until it is made anew.
-    pub(super) fn renumbered(&self, mut mesh: FaceMesh) -> FaceMesh {
-        for corner in &mut mesh.corners {
-            if let Position::Shared(p) = &mut corner.position {
-                *p = self.to[*p as usize];
-            }
-        }
-        mesh.coincident.iter_mut().flatten().for_each(|p| *p = self.to[*p as usize]);
-        mesh
-    }
-
-    /// Returns the chords with their ends renumbered, without those that end inside a changed edge, where no position is what it was.
-    pub(super) fn renumbered_chords(&self, taken: &TakenChords) -> TakenChords {
-        let renumbered = |p: u32| self.is_kept[p as usize].then(|| self.to[p as usize]);
-        let mut out = TakenChords::default();
-        out.extend(taken.iter().filter_map(|[a, b]| {
-            let (a, b) = (renumbered(a)?, renumbered(b)?);
-            Some([a.min(b), a.max(b)])
-        }));
-        out
-    }
 }
 
 /// Meshes a face by cells and transition, or else from its border alone, which is marked as repaired. `None` where neither gives facets,

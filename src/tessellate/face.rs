@@ -23,9 +23,9 @@ use super::transition::pairing::{self, TransitionFacet};
 use super::transition::triangulate::{Outline, Transition, triangulate};
 use super::triangulator::{GaveUp, catch_panic};
 use super::turned_facets::turned_chords;
-use crate::math::polygon::{is_inside_sides, polygon_sides};
+use crate::math::polygon::{is_inside_sides, polygon_sides, signed_area};
 use crate::math::{Point, Uv};
-use crate::model::{Face, Part};
+use crate::model::{Face, Part, TrimLoop};
 use crate::nurbs::FundamentalForms;
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -77,6 +77,18 @@ pub(super) struct FaceInput<'i, 'a> {
     pub(super) untangles: bool,
 }
 
+impl FaceInput<'_, '_> {
+    /// Returns a polygon for each of the loops that bound the face, with corners at the imprinted points on it.
+    fn border_polygons(&self, loops: &[TrimLoop], imprint: &Imprint) -> BorderPolygons {
+        let imprinted = ImprintedPoints { points: &imprint.points(), near: imprint.near };
+        let mut polygons = polygons::build(self.part, loops, self.surface, self.divisions, &imprinted);
+        if self.untangles {
+            polygons.untangle_cusps(self.surface);
+        }
+        polygons
+    }
+}
+
 /// Meshes a face by cells and transition. Facets that are not proved are in the mesh, with their bound; errors are as in
 /// [`mesh_with_imprint`].
 pub(super) fn mesh(input: &FaceInput<'_, '_>) -> Result<FaceMesh, Unmeshed> {
@@ -92,15 +104,10 @@ pub(super) fn mesh_with_imprint(
     input: &FaceInput<'_, '_>,
     imprint: &Imprint,
 ) -> Result<(FaceMesh, CarrierFacets), Unmeshed> {
-    let FaceInput { part, face, surface, divisions, shared, settings, taken, untangles } = *input;
+    let FaceInput { part, face, surface, shared, settings, taken, .. } = *input;
     let loops = polygons::loops(face);
-    let imprinted = ImprintedPoints { points: &imprint.points(), near: imprint.near };
-    let mut polygons = polygons::build(part, &loops, surface, divisions, &imprinted);
-    if untangles {
-        polygons.untangle_cusps(surface);
-    }
-    // Loops of one chord or none enclose nothing in the parameter plane.
-    if polygons.polygons.iter().all(|p| p.len() < 3) {
+    let polygons = input.border_polygons(&loops, imprint);
+    if polygons.enclose_nothing(surface.extent()) {
         return Err(Unmeshed::Empty);
     }
     let mut border = BorderNodes::new(part, &loops, surface, &polygons, shared);
@@ -222,21 +229,15 @@ fn prove_area(transition: &mut Transition, quads: &mut [ProvedFacet<4>], polygon
 /// Whether facets cover as much of the parameter plane as the border bounds, within [`COVERED`]. More is covered where they overlap or the
 /// border crosses itself, less where something is left out; a gap and an overlap of one size are not told.
 fn covers_area_of_border(transition: &Transition, quads: &[ProvedFacet<4>], polygons: &BorderPolygons) -> bool {
-    // Only ratios and signs are compared: halving each would change none.
-    let doubled_area = |corners: &[Uv]| -> f64 {
-        let o = corners[0];
-        corners.windows(2).map(|w| (w[0] - o).perp_dot(w[1] - o)).sum()
-    };
     let uv = |n: u32| transition.nodes[n].uv;
-    let triangles = transition.triangles.iter().map(|f| doubled_area(&f.nodes.map(uv)).abs());
-    let quads = quads.iter().map(|f| doubled_area(&f.nodes.map(uv)).abs());
+    let triangles = transition.triangles.iter().map(|f| signed_area(&f.nodes.map(uv)).abs());
+    let quads = quads.iter().map(|f| signed_area(&f.nodes.map(uv)).abs());
     let covered: f64 = triangles.chain(quads).sum();
     let loops: Vec<Vec<Uv>> = polygons.polygons.iter().map(|p| p.iter().map(|v| v.uv).collect()).collect();
-    let loops: Vec<Vec<Uv>> = loops.into_iter().filter(|p| !p.is_empty()).collect();
     let (lo, hi) = polygons.bounds();
-    let around = 2.0 * (hi - lo).x * (hi - lo).y;
+    let around = (hi - lo).x * (hi - lo).y;
     let is_near = |bounded: f64| (covered - bounded).abs() <= COVERED[0] * bounded + COVERED[1] * around;
-    if is_near(loops.iter().map(|p| doubled_area(p)).sum::<f64>().abs()) {
+    if is_near(loops.iter().map(|p| signed_area(p)).sum::<f64>().abs()) {
         return true;
     }
     // Loops may run either way: one inside an odd number of others is a hole. Loops may touch, so that the middles of its sides vote.
@@ -252,8 +253,7 @@ fn covers_area_of_border(transition: &Transition, quads: &[ProvedFacet<4>], poly
             .collect();
         2 * asked.iter().filter(|inside| **inside).count() > asked.len()
     };
-    let bounded =
-        |k: usize| if is_hole(k) { -doubled_area(&loops[k]).abs() } else { doubled_area(&loops[k]).abs() };
+    let bounded = |k: usize| if is_hole(k) { -signed_area(&loops[k]).abs() } else { signed_area(&loops[k]).abs() };
     is_near((0..loops.len()).map(bounded).sum::<f64>())
 }
 

@@ -42,13 +42,13 @@ impl HasPosition for BorderCorner {
 /// Meshes a face from its border alone, without a proof: every bound is infinite. `None` when no loop has three different places, or none
 /// of the two ways below gives triangles.
 pub(super) fn border_alone(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
-    filled_border(input, |loops, up| planar_triangulation(loops, up).or_else(|| zigzag_triangles(loops)))
+    filled_border(input, |loops| planar_triangulation(loops).or_else(|| zigzag_triangles(loops)))
 }
 
-/// Meshes a face from its border alone, its loops filled by `fill`, which is told where their normal points.
+/// Meshes a face from its border alone, its loops filled by `fill` with triangles that run around as they do.
 fn filled_border(
     input: &FaceInput<'_, '_>,
-    fill: impl Fn(&mut [Vec<BorderCorner>], Vector) -> Option<Vec<[BorderCorner; 3]>>,
+    fill: impl Fn(&mut [Vec<BorderCorner>]) -> Option<Vec<[BorderCorner; 3]>>,
 ) -> Option<FaceMesh> {
     let FaceInput { part, face, surface, divisions, shared, .. } = *input;
     let border =
@@ -75,11 +75,13 @@ fn filled_border(
         }
     }
     loops.retain(|r| r.len() > 2);
-    // By the surface's own normals, for the mean normal of the loops alone does not tell outside from inside.
-    let up = loops.iter().flatten().filter_map(|c| surface.normal(c.uv)).sum::<Vector>();
-    let triangles = fill(&mut loops, up).filter(|triangles| !triangles.is_empty())?;
+    let triangles = fill(&mut loops).filter(|triangles| !triangles.is_empty())?;
     let mut out = FaceMesh { own: border.own, coincident: border.coincident, ..FaceMesh::default() };
-    for t in triangles {
+    for mut t in triangles {
+        // Outside is told by the loops, along which neighbours run the other way: a fold between chords that cross has other normals.
+        if surface.is_flipped() {
+            t.swap(1, 2);
+        }
         // Where the surface has no normal the triangle's does, so that corners are not shared; one without area shades
         // nothing.
         let flat = (t[1].place - t[0].place).cross(t[2].place - t[0].place).try_normalize().unwrap_or(Vector::Z);
@@ -100,8 +102,8 @@ fn filled_border(
 pub(super) fn border_within_tolerance(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
     let FaceInput { part, face, surface, divisions, shared, .. } = *input;
     let is_strip = matches!(&face.loops[..], [only] if only.uses.len() == 2);
-    let mesh = filled_border(input, |loops, up| {
-        planar_triangulation(loops, up).or_else(|| if is_strip { zigzag_triangles(loops) } else { None })
+    let mesh = filled_border(input, |loops| {
+        planar_triangulation(loops).or_else(|| if is_strip { zigzag_triangles(loops) } else { None })
     })?;
     let position = |corner: u32| mesh.corners[corner as usize].position;
     let place = |corner: u32| match position(corner) {
@@ -153,17 +155,15 @@ fn chord_sags(part: &Part, face: &Face, divisions: &[Division]) -> FxHashMap<[u3
     sags
 }
 
-/// Triangulates (constrained Delaunay) what `loops` hold in the plane across their mean normal, turned towards `up`. Sets where corners
-/// are seen; `None` where sides cross or corners coincide there, or there is no mean normal.
-fn planar_triangulation(loops: &mut [Vec<BorderCorner>], up: Vector) -> Option<Vec<[BorderCorner; 3]>> {
+/// Triangulates (constrained Delaunay) what `loops` hold in the plane across their mean normal. Sets where corners are seen; `None` where
+/// sides cross or corners coincide there, or there is no mean normal.
+fn planar_triangulation(loops: &mut [Vec<BorderCorner>]) -> Option<Vec<[BorderCorner; 3]>> {
     let area = |r: &Vec<BorderCorner>| -> Vector {
         let o = r[0].place;
         (0..r.len()).map(|k| (r[k].place - o).cross(r[(k + 1) % r.len()].place - o)).sum()
     };
     // The vector area of a loop does not depend on what is spanned in it: its direction is the loop's mean normal.
-    let mean: Vector = loops.iter().map(area).sum();
-    let mean = if mean.dot(up) < 0.0 { -mean } else { mean };
-    let z = mean.try_normalize()?;
+    let z = loops.iter().map(area).sum::<Vector>().try_normalize()?;
     let x = z.any_orthonormal_vector();
     let (y, o) = (z.cross(x), loops.first()?[0].place);
     let mut cdt = ConstrainedDelaunayTriangulation::<BorderCorner>::new();

@@ -34,6 +34,7 @@ mod limits;
 mod nodes;
 mod placed_part;
 mod placement;
+mod previous_round;
 mod proof;
 mod proof_steps;
 mod remesh_budget;

@@ -1,5 +1,6 @@
 //! Distances of points from a triangle in its own plane, for needles too.
 
+use crate::math::polygon::nearest_on_side;
 use crate::math::{Point, Uv, Vector};
 
 /// A triangle, which may be degenerate, in its own plane: x along its longest side, y along its height. What is perpendicular to the
@@ -57,11 +58,8 @@ impl TriangleFrame {
         if is_inside {
             return above;
         }
-        let to_side = |[m, n]: [Uv; 2]| {
-            let d = n - m;
-            (at - m - d * ((at - m).dot(d) / d.length_squared()).clamp(0.0, 1.0)).length_squared()
-        };
-        let beside = (0..3).map(|k| to_side(side(k))).fold(f64::INFINITY, f64::min);
+        let to_side = |k: usize| (at - nearest_on_side(side(k), at)).length_squared();
+        let beside = (0..3).map(to_side).fold(f64::INFINITY, f64::min);
         (beside + above * above).sqrt()
     }
 }

@@ -550,6 +550,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "limits",
             "face",
             "fallback",
+            "previous_round",
             "assemble",
             "placement",
             "evaluation",

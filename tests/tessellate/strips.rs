@@ -1,5 +1,8 @@
 //! Narrow strips whose borders cross in their parameters, but not in space.
 
+use lampyris::math::{Frame, Point, Uv, Vector};
+use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
+use lampyris::nurbs::{Curve, UvCurve, sweep};
 use lampyris::step;
 use lampyris::tessellate::{Settings, tessellate};
 
@@ -53,5 +56,60 @@ fn a_strip_whose_border_crosses_in_parameters_is_whole() {
         assert_eq!((report.faces.failed, report.over_tolerance), (0, Some(0)));
         assert!(report.repaired.is_empty(), "{:?}", report.repaired);
         assert!((report.area_mm2 / AREA - 1.0).abs() < 1e-3, "{}", report.area_mm2);
+    }
+}
+
+/// Where the parameters of a strip are one line, but for rounding to one side or the other, they do not even tell which side is outside: its
+/// loop does.
+#[test]
+fn a_face_of_its_border_alone_runs_along_its_edges_as_its_loops_do() {
+    let corners = [[0.0, 0.0], [5.0, -0.01], [10.0, 0.0], [5.0, 0.01]];
+    let place = |k: usize| Point::new(corners[k % 4][0], corners[k % 4][1], 0.0);
+    let edge = |k: usize| Edge {
+        curve: Curve::line(place(k), place(k + 1), [0.0, 1.0]),
+        vertices: [k, (k + 1) % 4].map(|v| VertexId(v as u32)),
+        entity: None,
+    };
+    let rim = |uv: &dyn Fn(Point) -> Uv| {
+        let edge_use = |k: usize| EdgeUse {
+            edge: Some(EdgeId(k as u32)),
+            reversed: false,
+            uv: UvCurve::line(uv(place(k)), uv(place(k + 1)), [0.0, 1.0]),
+        };
+        TrimLoop { uses: (0..4).map(edge_use).collect() }
+    };
+    let cases = [-1.0, 1.0].map(|up| [-1e-17, 0.0, 1e-17].map(|noise| [false, true].map(|r| (up, noise, r))));
+    for (up, noise, reversed) in cases.into_iter().flatten().flatten() {
+        let frame = |z: f64| Frame { y: Vector::Y * z, z: Vector::Z * z, ..Frame::IDENTITY };
+        let extents = [[-1.0, 11.0], [-1.0, 1.0]];
+        // Counter-clockwise seen from above: outside is there, and below for the other face.
+        let lost = Face {
+            loops: vec![rim(&|p| Uv::new(p.x, noise * p.y.signum()))],
+            reversed: false,
+            ..Face::whole(sweep::plane(&frame(up), extents))
+        };
+        let whole = Face {
+            loops: vec![rim(&|p| Uv::new(p.x, p.y))],
+            reversed: true,
+            ..Face::whole(sweep::plane(&Frame::IDENTITY, extents))
+        };
+        let mut faces = vec![lost, whole];
+        if reversed {
+            faces.iter_mut().for_each(|face| face.reversed ^= true);
+        }
+        let shell = Shell { faces, closed: true, ..Shell::default() };
+        let model = Model::from_part(Part {
+            vertices: (0..4).map(place).collect(),
+            edges: (0..4).map(edge).collect(),
+            shells: vec![shell],
+            ..Part::default()
+        });
+        let report = tessellate(&model, &Settings::uniform(0.1)).report;
+        assert_eq!(report.repaired.len(), 1, "{:?}", report.repaired);
+        assert_eq!(
+            (report.open_edges, report.nonmanifold_edges, report.shells.closed),
+            (0, 0, 1),
+            "{up} {noise} {reversed}"
+        );
     }
 }

@@ -3,6 +3,7 @@
 
 use super::polygons::{BorderPolygons, BorderSide, PolygonVertex};
 use crate::math::Uv;
+use crate::math::polygon::nearest_on_side;
 use crate::tessellate::face_surface::FaceSurface;
 
 /// Least cosine between two edges that meet in a cusp.
@@ -69,22 +70,14 @@ fn side_from(polygon: &[PolygonVertex], corner: usize, ahead: bool) -> Vec<usize
     };
     let (before, after) = (edge_use((corner + n - 1) % n), edge_use(corner));
     let along = if ahead { after } else { before };
-    let mut side = vec![corner];
     if before == after || along.is_none() {
-        return side;
+        return vec![corner];
     }
-    for step in 1..n {
-        let (segment, next) = if ahead {
-            ((corner + step - 1) % n, (corner + step) % n)
-        } else {
-            ((corner + n - step) % n, (corner + n - step) % n)
-        };
-        if edge_use(segment) != along {
-            break;
-        }
-        side.push(next);
-    }
-    side
+    let vertex = |step: usize| (if ahead { corner + step } else { corner + n - step }) % n;
+    // A segment has the number of the vertex where it starts.
+    let segment = |step: usize| vertex(if ahead { step - 1 } else { step });
+    let others = (1..n).take_while(|&step| edge_use(segment(step)) == along).map(vertex);
+    std::iter::once(corner).chain(others).collect()
 }
 
 /// Moves points to the side `sign` of a line, as far as they are within `limit` of it; the first and the last stay.
@@ -103,11 +96,7 @@ fn part(points: &mut [Uv], line: &[Uv], sign: f64, limit: f64) {
 
 /// Returns how far a point lies to the left of a line of two points or more, its foot there, and the unit vector to the left.
 fn beside(p: Uv, line: &[Uv]) -> (f64, Uv, Uv) {
-    let foot = |s: &[Uv]| {
-        let along = s[1] - s[0];
-        let foot = s[0] + along * ((p - s[0]).dot(along) / along.length_squared()).clamp(0.0, 1.0);
-        (foot, along.perp().normalize_or_zero())
-    };
+    let foot = |s: &[Uv]| (nearest_on_side([s[0], s[1]], p), (s[1] - s[0]).perp().normalize_or_zero());
     let feet = line.windows(2).filter(|s| s[0] != s[1]).map(foot);
     let nearest = feet.min_by(|a, b| (a.0 - p).length_squared().total_cmp(&(b.0 - p).length_squared()));
     let Some((foot, left)) = nearest else { return (0.0, p, Uv::ZERO) };

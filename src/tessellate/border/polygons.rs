@@ -2,6 +2,7 @@
 
 use super::curve_chords;
 use super::edges::Division;
+use crate::math::polygon::{polygon_sides, signed_area};
 use crate::math::{NearPoints, Point, Uv};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use crate::tessellate::face_surface::FaceSurface;
@@ -14,6 +15,9 @@ const COINCIDENT_CORNERS: [f64; 2] = [1e-9, 1e-6];
 /// Share of the face's extent, in parameters, within which corners at one place of the file's vertices are one. The two sides of a seam are
 /// all of the extent apart, and so are the ends of a pole.
 const SAME_CORNER: f64 = 1e-3;
+/// Width, as a share of the domain, that the rounding of parameters gives to a polygon all of whose corners lie on one line: some fifty
+/// ulps.
+const ROUNDED_WIDTH: f64 = 1e-14;
 /// Share of the surface's size within which a side without an edge is one point, or two such sides are one seam: such sides come
 /// from analytic surfaces, whose poles and seams close to rounding, or from splines fitted to them.
 const CLOSED_SIDE: f64 = 1e-5;
@@ -61,6 +65,18 @@ impl BorderPolygons {
         all.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), v| (l.min(v.uv), h.max(v.uv)))
     }
 
+    /// Whether no polygon encloses anything in the parameter plane: each is one chord or none, or narrower than its corners are rounded.
+    /// `extent` is that of the surface's domain.
+    pub(in crate::tessellate) fn enclose_nothing(&self, extent: Uv) -> bool {
+        let encloses = |polygon: &Vec<PolygonVertex>| {
+            let corners: Vec<Uv> = polygon.iter().map(|v| v.uv / extent).collect();
+            let reach = corners.iter().map(|uv| uv.abs().max_element()).fold(1.0, f64::max);
+            let length: f64 = polygon_sides(&corners).map(|[a, b]| (b - a).length()).sum();
+            polygon.len() > 2 && signed_area(&corners).abs() > ROUNDED_WIDTH * reach * length
+        };
+        !self.polygons.iter().any(encloses)
+    }
+
     /// Gives corners at one of the file's `vertices`, or at two within `rounding` mm, the parameters and the position of the first, where
     /// parameters differ by less than [`SAME_CORNER`]. Trims end beside the vertex, as far as the file is rough, and where a loop passes
     /// it twice, or two loops touch, their chords would cross there.
@@ -102,8 +118,6 @@ pub(in crate::tessellate) fn edges_of_collapsed_loops(
     loops: &[TrimLoop],
     polygons: &BorderPolygons,
 ) -> Vec<EdgeId> {
-    let doubled_area =
-        |p: &[Uv]| -> f64 { (1..p.len().saturating_sub(1)).map(|i| (p[i] - p[0]).perp_dot(p[i + 1] - p[0])).sum() };
     let mut found = Vec::new();
     for (trim, polygon) in loops.iter().zip(&polygons.polygons).filter(|(_, p)| p.len() <= MANY_CORNERS) {
         let mut curves: Vec<Uv> = Vec::new();
@@ -116,7 +130,7 @@ pub(in crate::tessellate) fn edges_of_collapsed_loops(
             }
         }
         let chords: Vec<Uv> = polygon.iter().map(|v| v.uv).collect();
-        let (chords, curves) = (doubled_area(&chords), doubled_area(&curves));
+        let (chords, curves) = (signed_area(&chords), signed_area(&curves));
         // Opposite signs or nearly nothing: the chords' polygon is another region than the loop's.
         if chords * curves < KEPT_AREA * curves * curves {
             found.extend(trim.uses.iter().filter_map(|u| u.edge));

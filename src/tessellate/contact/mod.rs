@@ -20,13 +20,14 @@ mod samples;
 mod shared_part;
 mod trimmed;
 
-use super::assemble::{PartMesh, Renumbering, face_with_surface, mesh_face, with_coincident_vertices_joined};
+use super::assemble::{PartMesh, face_with_surface, mesh_face, with_coincident_vertices_joined};
 use super::border::edges;
 use super::border::polygons::{self, ImprintedPoints};
 use super::face::{FaceInput, mesh_with_imprint};
 use super::face_mesh::FaceMesh;
 use super::imprint::{CarrierFacets, Imprint};
 use super::placed_part::PlacedPart;
+use super::previous_round::Renumbering;
 use super::settings::Settings;
 use super::taken_chords::TakenChords;
 use crate::math::{Aabb, Point};
