@@ -1,6 +1,6 @@
 //! Holes where a seam or a coarse outline would have them, against closed forms.
 
-use crate::faces::{area, close, import, points};
+use crate::faces::{area, close, import, points, read};
 use std::f64::consts::PI;
 
 /// A tube of radius 10 and height 20 whose rims have their vertices at angle 0, with a window of `half` rad to both sides of a place.
@@ -250,4 +250,41 @@ fn edges_between_turns_that_touch_keep_to_their_own() {
         close(area(&import), 3.0 * 4.0 * PI * 0.5, 1e-5);
         assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
     }
+}
+
+/// An octant of a sphere of radius 20, tilted so that one corner lies 7° from the pole; at another corner two edges end half as far apart.
+#[test]
+fn a_gap_at_one_corner_moves_no_other_corner_to_the_pole() {
+    let (radius, tilt) = (20.0, 7f64.to_radians());
+    let (sin, cos) = tilt.sin_cos();
+    let (half_sin, half_cos) = (0.5 * tilt).sin_cos();
+    let data = format!(
+        "#10=CARTESIAN_POINT('',(0.,0.,0.));#11=DIRECTION('',(0.,1.,0.));#12=DIRECTION('',(1.,0.,0.));#13=AXIS2_PLACEMENT_3D('',#10,#11,#12);\n\
+         #14=SPHERICAL_SURFACE('',#13,{radius:?});\n\
+         #20=CARTESIAN_POINT('',({:?},0.,0.));#21=CARTESIAN_POINT('',(0.,{:?},{:?}));#22=CARTESIAN_POINT('',(0.,{:?},{:?}));\n\
+         #23=VERTEX_POINT('',#20);#24=VERTEX_POINT('',#21);#25=VERTEX_POINT('',#22);\n\
+         #30=DIRECTION('',(0.,{:?},{:?}));#31=DIRECTION('',(0.,{cos:?},{:?}));#32=AXIS2_PLACEMENT_3D('',#10,#30,#31);\n\
+         #33=CIRCLE('',#32,{radius:?});#34=EDGE_CURVE('',#23,#24,#33,.T.);\n\
+         #40=DIRECTION('',(-1.,0.,0.));#41=DIRECTION('',(0.,0.,1.));#42=AXIS2_PLACEMENT_3D('',#10,#40,#41);\n\
+         #43=CIRCLE('',#42,{radius:?});#44=EDGE_CURVE('',#24,#25,#43,.T.);\n\
+         #50=DIRECTION('',(0.,{:?},{sin:?}));#51=DIRECTION('',(0.,{sin:?},{cos:?}));#52=AXIS2_PLACEMENT_3D('',#10,#50,#51);\n\
+         #53=CIRCLE('',#52,{radius:?});#54=EDGE_CURVE('',#23,#25,#53,.T.);\n\
+         #60=ORIENTED_EDGE('',*,*,#34,.T.);#61=ORIENTED_EDGE('',*,*,#44,.T.);#62=ORIENTED_EDGE('',*,*,#54,.F.);\n\
+         #63=EDGE_LOOP('',(#60,#61,#62));#64=FACE_BOUND('',#63,.T.);#900=ADVANCED_FACE('',(#64),#14,.T.);",
+        -radius,
+        radius * cos,
+        -radius * sin,
+        -radius * half_sin,
+        -radius * half_cos,
+        -sin,
+        -cos,
+        -sin,
+        -cos,
+    );
+    let import = read(&data);
+    let face = &import.model.parts[0].shells[0].faces[0];
+    // The edges end on a meridian, 3.5° apart; both are moved half of that.
+    let gap = 2.0 * radius * (0.25 * 0.5 * tilt).sin();
+    assert!((face.gap / gap - 1.0).abs() < 1e-3, "{} for {gap}", face.gap);
+    assert_eq!(face.loops[0].uses.len(), 3, "a side along a pole");
 }

@@ -17,6 +17,7 @@ mod swept_surfaces;
 mod tolerances;
 pub(super) mod units;
 
+pub(super) use self::tolerances::EMPTY_EDGE_MM;
 use self::units::Units;
 use crate::math::{Frame, Point, Vector};
 use crate::step::part21::{Args, Entity, File};

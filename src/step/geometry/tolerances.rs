@@ -41,7 +41,7 @@ pub(super) const EQUAL_POINTS_MM: f64 = 1e-12;
 /// A range of parameters below this share of their sum is rounding.
 pub(super) const EMPTY_PARAMETER: f64 = 1e-14;
 /// An edge smaller than this has no length.
-pub(super) const EMPTY_EDGE_MM: f64 = 1e-9;
+pub(in crate::step) const EMPTY_EDGE_MM: f64 = 1e-9;
 
 /// A cone this near to 90° is a plane that cannot be trimmed by heights, rad.
 pub(super) const CONE_SLOPE_MARGIN: f64 = 1e-9;

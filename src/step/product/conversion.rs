@@ -1,6 +1,6 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
-use super::face_edges::{EMPTY_EDGE_MM, FaceEdges, face_edges};
+use super::face_edges::{ACCURACY_MM, FaceEdges, face_edges};
 use super::free_surfaces::convert_free_surfaces;
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::{faces_against_neighbours, is_inside_out};
@@ -17,17 +17,15 @@ use crate::nurbs::Curve;
 use crate::step::geometry::edges::TrimmedEdge;
 use crate::step::geometry::extent::FaceExtent;
 use crate::step::geometry::units::Units;
-use crate::step::geometry::{FARTHEST_MM, GeometryReader, Outcome, Refusal};
+use crate::step::geometry::{EMPTY_EDGE_MM, FARTHEST_MM, GeometryReader, Outcome, Refusal};
 use crate::step::part21::File;
 use crate::step::settings::Settings;
 use crate::step::trim::face::{BuiltFace, build_face};
 use crate::step::trim::fit::Budget;
-use crate::step::trim::task::FaceTask;
+use crate::step::trim::task::{FaceTask, TaskEdge};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// Least and most that a file's stated accuracy counts for, mm: zero and metres are both written.
-const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
 /// Share of a face's size above which a stated accuracy would merge its own edges.
 const ACCURACY_SHARE: f64 = 1e-3;
 /// Faces smaller than this count as this large there, mm.
@@ -268,7 +266,7 @@ fn convert_face(
     geometry.entity(plan.surface)?;
     // What sizes itself by the edges asks for their points; of others they would be computed for nothing.
     let asked = if is_sized_by_edges(geometry.file, plan.surface) { ASKED_EDGES } else { 0 };
-    let along = |curve: &&Curve| {
+    let along = |(curve, _): &(&Curve, f64)| {
         let [a, b] = curve.domain();
         [0.0, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9].map(|f| curve.evaluate(a + f * (b - a)))
     };
@@ -280,16 +278,18 @@ fn convert_face(
         return Err(beyond_rounding(geometry, id, plan));
     }
 
-    // Points are one within what the file states, less on small faces, more where its edges leave gaps.
+    // Points are one within what the file states, less on small faces, more where an edge leaves gaps.
     let stated = geometry.units.accuracy.unwrap_or(ACCURACY_MM[0]).clamp(ACCURACY_MM[0], ACCURACY_MM[1]);
     let accuracy = stated.min(ACCURACY_SHARE * bounds.diagonal().max(SMALLEST_FACE_MM)).max(ACCURACY_MM[0]);
+    let with_gap = |gap: f64| accuracy.max(GAPS * gap.min(LARGEST_GAP_MM));
+    let edges = curves.iter().map(|(&k, &(curve, gap))| (k, TaskEdge { curve, accuracy: with_gap(gap) })).collect();
     let task = FaceTask {
         chart,
         same_sense: plan.same_sense,
         loops,
-        edges: curves,
+        edges,
         tolerance: settings.uv_tolerance,
-        accuracy: accuracy.max(GAPS * gap.min(LARGEST_GAP_MM)),
+        accuracy: with_gap(gap),
         budget: Budget::new(settings.face_budget),
         implicit_outer: false,
     };

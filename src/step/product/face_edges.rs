@@ -5,26 +5,24 @@ use super::topology::{EdgeKey, FacePlan};
 use crate::math::Aabb;
 use crate::nurbs::Curve;
 use crate::step::geometry::edges::TrimmedEdge;
-use crate::step::geometry::{Outcome, Refusal};
+use crate::step::geometry::{EMPTY_EDGE_MM, Outcome, Refusal};
 use rustc_hash::FxHashMap;
 
+/// Least and most that a file's stated accuracy counts for, mm: zero and metres are both written.
+pub(super) const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
 /// Share of the shortest edge by which the ends of uses may differ and still follow each other: far above the gaps of real files, far
 /// below the length of an edge that is run the wrong way.
 const FOLLOWING_SHARE: f64 = 0.1;
-/// Least distance within which they do, mm.
-const FOLLOWING_MM: f64 = 1e-6;
-/// An edge shorter than this has no length, mm.
-pub(super) const EMPTY_EDGE_MM: f64 = 1e-9;
 
 /// The edges of a face, in the order of its loops.
 pub(super) struct FaceEdges<'e> {
-    /// By place among the edges that were asked for.
-    pub(super) curves: FxHashMap<usize, &'e Curve>,
+    /// Curves by place among the edges that were asked for, with the distances of their ends from their vertices, mm.
+    pub(super) curves: FxHashMap<usize, (&'e Curve, f64)>,
     /// For each loop the edges, and whether it runs against them; loops without length are left out.
     pub(super) loops: Vec<Vec<(usize, bool)>>,
     /// Around the edges, mm.
     pub(super) bounds: Aabb,
-    /// Largest distance of an edge's ends from its vertices, mm.
+    /// Largest of these distances, of edges without length too.
     pub(super) gap: f64,
     pub(super) repairs: Vec<&'static str>,
 }
@@ -46,12 +44,12 @@ pub(super) fn face_edges<'e>(
         for (key, _) in uses {
             let k = index[key];
             let edge = edges[k].as_ref()?;
+            found.repairs.extend(edge.repair.filter(|r| !found.repairs.contains(r)));
             // The widest gap between an edge and its vertices tells how loosely points of this face hold together.
             found.gap = found.gap.max(edge.gap);
-            found.repairs.extend(edge.repair.filter(|r| !found.repairs.contains(r)));
             let Some(curve) = &edge.curve else { continue };
             found.bounds = found.bounds.union(curve.bounds());
-            found.curves.entry(k).or_insert(curve);
+            found.curves.entry(k).or_insert((curve, edge.gap));
         }
         let mut kept = directed_uses(uses, edges, index);
         let tolerance = following_tolerance(&kept);
@@ -84,5 +82,5 @@ pub(super) fn directed_uses(
 /// be taken for a gap.
 pub(super) fn following_tolerance(uses: &[DirectedUse<usize>]) -> f64 {
     let lengths = uses.iter().map(|u| (u.to - u.from).length()).filter(|l| *l > EMPTY_EDGE_MM);
-    (FOLLOWING_SHARE * lengths.fold(1.0, f64::min)).max(FOLLOWING_MM)
+    (FOLLOWING_SHARE * lengths.fold(1.0, f64::min)).max(ACCURACY_MM[0])
 }

@@ -14,7 +14,7 @@ use crate::step::part21::Entity;
 use crate::step::settings::Settings;
 use crate::step::trim::face::{BuiltFace, build_face};
 use crate::step::trim::fit::Budget;
-use crate::step::trim::task::FaceTask;
+use crate::step::trim::task::{FaceTask, TaskEdge};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -130,7 +130,7 @@ fn face_task<'e>(chart: Chart, boundaries: &'e [Vec<Curve>], settings: &Settings
         let mut uses = Vec::with_capacity(boundary.len());
         for curve in boundary {
             let k = edges.len();
-            edges.insert(k, curve);
+            edges.insert(k, TaskEdge { curve, accuracy: LOOSE_BOUNDARY_MM });
             uses.push((k, false));
         }
         loops.push(uses);

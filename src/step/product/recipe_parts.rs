@@ -11,7 +11,7 @@ use crate::step::geometry::{GeometryReader, Outcome, Refusal};
 use crate::step::settings::Settings;
 use crate::step::trim::face::{BuiltFace, build_face};
 use crate::step::trim::fit::Budget;
-use crate::step::trim::task::FaceTask;
+use crate::step::trim::task::{FaceTask, TaskEdge};
 
 /// Ends of edges of one recipe this near are one vertex, mm: the curves of a profile meet as loosely as its file says.
 const SAME_VERTEX_MM: f64 = 1e-3;
@@ -62,21 +62,22 @@ fn trim_faces(
     settings: &Settings,
 ) -> Outcome<(Vec<Curve>, Vec<BuiltFace>)> {
     let SolidRecipe { edges, faces } = solid;
+    // No `clamp`, which panics where the one setting is above the other, or no number.
+    let stated = geometry.units.accuracy.unwrap_or(settings.uv_tolerance);
+    let accuracy = stated.min(SAME_VERTEX_MM).max(settings.uv_tolerance);
     let mut built = Vec::with_capacity(faces.len());
     for RecipeFace { chart, same_sense, loops } in faces {
         let task = FaceTask {
             chart,
             same_sense,
-            edges: loops.iter().flatten().map(|&(edge, _)| (edge, &edges[edge])).collect(),
+            edges: loops
+                .iter()
+                .flatten()
+                .map(|&(edge, _)| (edge, TaskEdge { curve: &edges[edge], accuracy }))
+                .collect(),
             loops,
             tolerance: settings.uv_tolerance,
-            // No `clamp`, which panics where the one setting is above the other, or no number.
-            accuracy: geometry
-                .units
-                .accuracy
-                .unwrap_or(settings.uv_tolerance)
-                .min(SAME_VERTEX_MM)
-                .max(settings.uv_tolerance),
+            accuracy,
             budget: Budget::new(settings.face_budget),
             implicit_outer: false,
         };

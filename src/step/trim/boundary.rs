@@ -1,10 +1,11 @@
 //! From chains to the boundary of a region without periods: chains that wind around the surface are joined by seams,
 //! lone ones run to a pole or a natural border, closed surfaces get their outer boundary, holes move inside it.
 
-use super::loops::{Chain, Piece, Source, contains, signed_area};
+use super::loops::{Chain, Piece, Source, contains};
 use super::seam_path::{Goals, Obstacles, SeamPath, unrolled_polygon};
 use super::tolerances::{EMPTY_LOOP_SHARE, SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
 use crate::math::Uv;
+use crate::math::polygon::signed_area;
 use crate::nurbs::UvCurve;
 use crate::step::chart::Chart;
 
@@ -188,6 +189,7 @@ fn natural_boundary(chart: &Chart, holes: &[Vec<Uv>], seams: &mut Vec<[Uv; 2]>) 
         source,
         reversed,
         curve: UvCurve::line(a, b, [0.0, 1.0]),
+        accuracy: 0.0,
     };
     Ok(Chain::closed(vec![
         piece(bottom, corner[0], corner[1], false),
@@ -287,7 +289,7 @@ fn extend_to_border(
     } else {
         seams.push([foot, foot + displacement]);
         let curve = UvCurve::line(foot, foot + displacement, [0.0, 1.0]);
-        Piece { source: Source::Seam(seams.len() - 1), reversed: true, curve }
+        Piece { source: Source::Seam(seams.len() - 1), reversed: true, curve, accuracy: 0.0 }
     };
     let mut pieces = chain.pieces;
     pieces.extend(up.iter().map(|p| p.clone().shifted(displacement)));
@@ -377,7 +379,7 @@ fn seam_pieces(points: &[Uv], seams: &mut Vec<[Uv; 2]>) -> Vec<Piece> {
     for side in points.windows(2) {
         seams.push([side[0], side[1]]);
         let curve = UvCurve::line(side[0], side[1], [0.0, 1.0]);
-        pieces.push(Piece { source: Source::Seam(seams.len() - 1), reversed: false, curve });
+        pieces.push(Piece { source: Source::Seam(seams.len() - 1), reversed: false, curve, accuracy: 0.0 });
     }
     pieces
 }

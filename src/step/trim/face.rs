@@ -2,12 +2,13 @@
 
 use super::boundary::{Boundary, bound_region};
 use super::fit::{Fit, Overrun};
-use super::loops::{Chain, Piece, Source, close_loop, signed_area};
+use super::loops::{Chain, Piece, Source, close_loop};
 use super::region::Region;
 use super::seams::{Seam, Seams};
 use super::task::FaceTask;
 use super::tolerances::{EMPTY_RANGE, LARGEST_GAP_SHARE, SEAM_SLACK, SMALLEST_ACCURACY, WHOLE_PERIOD_SLACK};
 use crate::math::Uv;
+use crate::math::polygon::signed_area;
 use crate::model::{Analytic, EdgeId, EdgeUse, TrimLoop};
 use crate::nurbs::{ControlPoint, Surface, UvCurve};
 use crate::step::chart::{Chart, offset};
@@ -149,6 +150,7 @@ fn chain_loops(task: &FaceTask<'_>, fits: &FxHashMap<usize, Fit>, same_sense: bo
         source: Source::Edge(edge),
         reversed,
         curve: fits[&edge].curve.clone(),
+        accuracy: task.edges[&edge].accuracy.max(2.0 * fits[&edge].gap).max(SMALLEST_ACCURACY),
     };
     let mut chains = Vec::with_capacity(task.loops.len());
     for uses in &task.loops {

@@ -26,6 +26,8 @@ pub(crate) struct Piece {
     pub(crate) reversed: bool,
     /// Over the parameter of its edge or seam; from 0 to 1 for a step.
     pub(crate) curve: UvCurve,
+    /// Distance, mm, within which its ends are at a pole; 0 of what is no edge.
+    pub(crate) accuracy: f64,
 }
 
 impl Piece {
@@ -62,7 +64,8 @@ impl Piece {
 
     /// Returns a straight step that belongs to no edge.
     pub(crate) fn straight(from: Uv, to: Uv) -> Self {
-        Self { source: Source::Nothing, reversed: false, curve: UvCurve::line(from, to, [0.0, 1.0]) }
+        let curve = UvCurve::line(from, to, [0.0, 1.0]);
+        Self { source: Source::Nothing, reversed: false, curve, accuracy: 0.0 }
     }
 
     /// Appends points of the piece to `polygon`, in the direction of the loop and evenly over each span of the curve, from its start on;
@@ -153,14 +156,6 @@ impl Chain {
     }
 }
 
-/// Returns the signed area of a polygon, positive counter-clockwise; 0 if it is empty.
-pub(crate) fn signed_area(polygon: &[Uv]) -> f64 {
-    let n = polygon.len();
-    let Some(&o) = polygon.first() else { return 0.0 };
-    // About the first corner: far from the origin the products would cancel.
-    0.5 * (0..n).map(|i| (polygon[i] - o).perp_dot(polygon[(i + 1) % n] - o)).sum::<f64>()
-}
-
 /// Whether a point is inside a polygon; on its border either answer may come.
 pub(crate) fn contains(polygon: &[Uv], p: Uv) -> bool {
     is_inside_sides(polygon_sides(polygon), p)
@@ -236,10 +231,9 @@ impl Connection<'_> {
         let (from, start) = (last.end(), next.start());
         let near = chart.nearest_representative(start, from);
         let (p, q) = (chart.derivatives(from).point, chart.derivatives(near).point);
-        let near_pole = |pole: &&Pole| {
-            (pole.point - p).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
-                && (pole.point - q).length() <= tolerance.max(POLE_RESOLUTION_MM) * 4.0
-        };
+        // How roughly other edges of the face end says nothing of these two.
+        let reach = 4.0 * last.accuracy.max(next.accuracy).max(POLE_RESOLUTION_MM);
+        let near_pole = |pole: &&Pole| (pole.point - p).length() <= reach && (pole.point - q).length() <= reach;
         // Of two in one point, as at the ends of a canal that touches itself, the one that both pieces run into.
         let off = |pole: &Pole| (from[pole.fixed] - pole.at).abs() + (near[pole.fixed] - pole.at).abs();
         let pole = chart.poles.iter().filter(near_pole).min_by(|a, b| off(a).total_cmp(&off(b)));

@@ -2,9 +2,9 @@
 
 use super::fit::{Fit, Overrun, Target};
 use super::loops::Piece;
-use super::task::FaceTask;
+use super::task::{FaceTask, TaskEdge};
 use crate::math::Uv;
-use crate::nurbs::{ControlPoint, Curve, Surface, UvCurve};
+use crate::nurbs::{ControlPoint, Surface, UvCurve};
 use crate::step::chart::Pole;
 
 /// A face under construction: its chart, the rectangle of it that the loops cover, and the spline over that rectangle.
@@ -26,7 +26,7 @@ impl<'t, 'e> Region<'t, 'e> {
     }
 
     /// Fits an edge in the spline's parameters, following `piece`, the same edge in the chart's; fails when the budget is used up.
-    pub(super) fn refit(&self, piece: &Piece, curve: &Curve) -> Result<Fit, Overrun> {
+    pub(super) fn refit(&self, piece: &Piece, edge: TaskEdge<'_>) -> Result<Fit, Overrun> {
         let chart = &self.task.chart;
         let pole_here = |pole: &Pole| {
             let mut native = Uv::new(self.domain[0][0], self.domain[1][0]);
@@ -41,11 +41,11 @@ impl<'t, 'e> Region<'t, 'e> {
             range: self.surface.domain(),
             // The piece in the chart's parameters says which period is meant.
             period: [None; 2],
-            pole_tolerance: self.task.accuracy,
+            pole_tolerance: edge.accuracy,
             tolerance: self.task.tolerance,
             budget: &self.task.budget,
         };
-        target.fit(curve, None)
+        target.fit(edge.curve, None)
     }
 
     /// Returns the straight line between the ends of a piece, in the spline's parameters and over the piece's own.

@@ -3,6 +3,7 @@
 use super::fit::{Fit, Overrun};
 use super::loops::{Piece, Source};
 use super::region::Region;
+use super::task::TaskEdge;
 use super::tolerances::{ISOLINE_SLACK, SEAM_ERROR_MM};
 use crate::math::{Point, Uv};
 use crate::nurbs::{Curve, UvCurve, fit_cubic};
@@ -58,7 +59,7 @@ impl<'r, 't, 'e> Seams<'r, 't, 'e> {
         if self.region.task.chart.angular_directions() == [false, false] {
             return Ok(Fit { curve: UvCurve::line(a, b, [0.0, 1.0]), gap: seam.error });
         }
-        self.region.refit(piece, &seam.curve)
+        self.region.refit(piece, TaskEdge { curve: &seam.curve, accuracy: self.region.task.accuracy })
     }
 
     /// Hands over the seams in space, in the order of their numbers, with their ends.

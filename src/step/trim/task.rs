@@ -8,6 +8,15 @@ use crate::step::chart::{Chart, Kind};
 use rustc_hash::FxHashMap;
 use std::collections::hash_map::Entry;
 
+/// An edge of a face to be built.
+#[derive(Clone, Copy)]
+pub(crate) struct TaskEdge<'e> {
+    /// In space, mm.
+    pub(crate) curve: &'e Curve,
+    /// Distance within which its ends are those of its neighbours, or a pole, mm.
+    pub(crate) accuracy: f64,
+}
+
 /// A face to be built.
 pub(crate) struct FaceTask<'e> {
     pub(crate) chart: Chart,
@@ -15,11 +24,11 @@ pub(crate) struct FaceTask<'e> {
     pub(crate) same_sense: bool,
     /// Loops as the file runs them: edge and whether it is run against its parameter.
     pub(crate) loops: Vec<Vec<(usize, bool)>>,
-    /// The edges in space, mm, by the numbers of the loops.
-    pub(crate) edges: FxHashMap<usize, &'e Curve>,
+    /// By the numbers of the loops.
+    pub(crate) edges: FxHashMap<usize, TaskEdge<'e>>,
     /// Allowed error of uv curves, mm.
     pub(crate) tolerance: f64,
-    /// Distance below which points of the file are the same, mm.
+    /// Distance below which points of the file are the same, mm: the largest of its edges, or more.
     pub(crate) accuracy: f64,
     /// Work that the face may take.
     pub(crate) budget: Budget,
@@ -30,7 +39,7 @@ pub(crate) struct FaceTask<'e> {
 impl FaceTask<'_> {
     /// Returns the diagonal of the box around its edges, or without any the size of its surface, mm; never below [`SMALLEST_EXTENT`].
     pub(super) fn extent(&self) -> f64 {
-        let edges = self.edges.values().map(|curve| curve.bounds());
+        let edges = self.edges.values().map(|edge| edge.curve.bounds());
         let all = edges.reduce(|a, b| a.union(b));
         all.map_or(self.chart.size, |b| b.diagonal()).max(SMALLEST_EXTENT)
     }
@@ -49,10 +58,10 @@ impl FaceTask<'_> {
 
     /// Fits an edge in the chart's own parameters: exact on a plane, else within the tolerance, and put on the border where it swings just
     /// over it. `start` is where it is expected to begin, if known.
-    pub(super) fn fit_edge(&self, curve: &Curve, start: Option<Uv>) -> Result<Fit, Overrun> {
+    pub(super) fn fit_edge(&self, edge: TaskEdge<'_>, start: Option<Uv>) -> Result<Fit, Overrun> {
         let chart = &self.chart;
         if let Kind::Plane { frame } = &chart.kind {
-            return Ok(project_to_plane(curve, |p| {
+            return Ok(project_to_plane(edge.curve, |p| {
                 let q = frame.local_point(p);
                 (Uv::new(q.x, q.y), q.z)
             }));
@@ -65,11 +74,11 @@ impl FaceTask<'_> {
                 if chart.period[d].is_some() { [f64::NEG_INFINITY, f64::INFINITY] } else { chart.range[d] }
             }),
             period: chart.period,
-            pole_tolerance: self.accuracy,
+            pole_tolerance: edge.accuracy,
             tolerance: self.tolerance,
             budget: &self.budget,
         };
-        let mut fit = target.fit(curve, start)?;
+        let mut fit = target.fit(edge.curve, start)?;
         // Cubics between points of the border may swing over it.
         for p in &mut fit.curve.points {
             for d in 0..2 {
@@ -101,8 +110,8 @@ impl FaceTask<'_> {
         }
         let mut directions: Vec<Vector> = Vec::new();
         for edge in self.edges.values() {
-            let [a, b] = edge.domain();
-            let samples = (0..=32).map(|i| edge.evaluate(a + (b - a) * f64::from(i) / 32.0));
+            let [a, b] = edge.curve.domain();
+            let samples = (0..=32).map(|i| edge.curve.evaluate(a + (b - a) * f64::from(i) / 32.0));
             directions.extend(samples.filter_map(|p| (p - frame.origin).try_normalize()));
         }
         let clearance = |axis: Vector| directions.iter().map(|d| 1.0 - d.dot(axis).abs()).fold(1.0, f64::min);

@@ -42,14 +42,15 @@ impl FaceTask<'_> {
             return Ok(false);
         }
         let (edge, reversed) = uses[k];
-        let curve = self.edges[&edge];
+        let task_edge = self.edges[&edge];
+        let curve = task_edge.curve;
         let (before, after) = neighbours(uses, k, fits);
         let (at_start, at_end) = if reversed { (after, before) } else { (before, after) };
         let [own_start, own_end] = [false, true].map(|end| end_of(fits, (edge, false), end));
         let starts = [self.followed_back(curve, own_end)?, at_start, self.followed_back(curve, at_end)?];
         // From the sheet on which it began it would be found as it was.
         for start in starts.into_iter().filter(|start| self.is_torn(own_start, *start)) {
-            let Some(first) = fits.insert(edge, self.fit_edge(curve, Some(start))?) else { continue };
+            let Some(first) = fits.insert(edge, self.fit_edge(task_edge, Some(start))?) else { continue };
             if self.jumps(uses, k, fits) < jumps {
                 break;
             }
