@@ -2,10 +2,11 @@
 //! and where a crease runs beside a trim.
 
 use crate::support::trimmed::{chain, face};
-use lampyris::math::{Frame, Point, Uv};
+use lampyris::math::{Frame, Point, Uv, Vector};
 use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Instance, Model, Part, PartId, Shell, TrimLoop, VertexId};
-use lampyris::nurbs::{Curve, Surface, UvCurve, sweep};
+use lampyris::nurbs::{Curve, Surface, UvCurve, conic, sweep};
 use lampyris::tessellate::{Settings, tessellate};
+use std::collections::HashMap;
 use std::f64::consts::PI;
 
 const TOLERANCES: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
@@ -162,5 +163,80 @@ fn no_cell_reaches_beyond_a_trim_that_slants_a_little() {
             let topology = mesh.topology(0..mesh.facets.len());
             assert_eq!((topology.nonmanifold_edges, topology.turned_edges), (0, 0), "{slant} {tolerance}");
         }
+    }
+}
+
+/// A slot in a disc's rim, both of whose ends lie on the chord of the arc between the disc's flat sides: the chord is led over them, and the
+/// tube outside does not know them.
+#[test]
+fn the_chord_of_an_arc_passes_over_no_other_corner() {
+    let (sag, half) = (0.02f64, 1.5f64);
+    let radius = (half * half + sag * sag) / (2.0 * sag);
+    let angle = (half / radius).asin();
+    // The arc runs below the chord from (0, 0) to (3, 0), around the frame's z axis.
+    let frame =
+        Frame { origin: Point::new(half, radius - sag, 0.0), x: -Vector::Y, y: Vector::X, ..Frame::IDENTITY };
+    let corners = [[0.0, 0.0], [3.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 0.0]];
+    let n = corners.len();
+    let uv = |k: usize| Uv::from(corners[k % n]);
+    let place = |k: usize| uv(k).extend(0.0);
+    let mut vertices: Vec<Point> = (0..n).map(place).collect();
+    vertices.extend([place(0), place(1)].map(|p| p + Vector::Z));
+    let vertex_ids = |ends: [usize; 2]| ends.map(|v| VertexId(v as u32));
+    let arc = conic::arc(&frame, radius, [-angle, angle]);
+    let mut edges = vec![Edge { curve: arc.clone(), vertices: vertex_ids([0, 1]), entity: None }];
+    for k in 1..n {
+        let curve = Curve::line(place(k), place(k + 1), [0.0, 1.0]);
+        edges.push(Edge { curve, vertices: vertex_ids([k, (k + 1) % n]), entity: None });
+    }
+    let above = conic::arc(&Frame { origin: frame.origin + Vector::Z, ..frame }, radius, [-angle, angle]);
+    edges.push(Edge { curve: above, vertices: vertex_ids([n, n + 1]), entity: None });
+    for (from, to) in [(0, n), (1, n + 1)] {
+        let curve = Curve::line(vertices[from], vertices[to], [0.0, 1.0]);
+        edges.push(Edge { curve, vertices: vertex_ids([from, to]), entity: None });
+    }
+    let edge_use =
+        |edge: usize, reversed: bool, uv: UvCurve| EdgeUse { edge: Some(EdgeId(edge as u32)), reversed, uv };
+    // The flat side, seen from above; its plane has the coordinates x and y.
+    let flat_arc = UvCurve {
+        degree: arc.degree,
+        knots: arc.knots.clone(),
+        points: arc.points.iter().map(|p| Uv::new(p.x, p.y).extend(p.w)).collect(),
+    };
+    let mut rim = vec![edge_use(0, false, flat_arc)];
+    rim.extend((1..n).map(|k| edge_use(k, false, UvCurve::line(uv(k), uv(k + 1), [0.0, 1.0]))));
+    let flat = Face {
+        loops: vec![TrimLoop { uses: rim }],
+        ..Face::whole(sweep::plane(&Frame::IDENTITY, [[-1.0, 4.0]; 2]))
+    };
+    let line = |from: [f64; 2], to: [f64; 2]| UvCurve::line(Uv::from(from), Uv::from(to), [0.0, 1.0]);
+    let along = |z: f64| UvCurve::line(Uv::new(-angle, z), Uv::new(angle, z), [-angle, angle]);
+    let wall = vec![
+        edge_use(0, false, along(0.0)),
+        edge_use(n + 2, false, line([angle, 0.0], [angle, 1.0])),
+        edge_use(n, true, along(1.0)),
+        edge_use(n + 1, true, line([-angle, 0.0], [-angle, 1.0])),
+    ];
+    let tube = Face {
+        loops: vec![TrimLoop { uses: wall }],
+        ..Face::whole(sweep::cylinder(&frame, radius, [-angle, angle], [0.0, 1.0]))
+    };
+    let shells = vec![Shell { faces: vec![flat, tube], ..Shell::default() }];
+    let made =
+        tessellate(&Model::from_part(Part { vertices, edges, shells, ..Part::default() }), &Settings::uniform(0.1));
+    assert!(made.report.repaired.is_empty(), "{:?}", made.report.repaired);
+    // All that the two share is the arc: what one of them alone has below is the slot and the two pieces beside it, of length 1.
+    let mut uses: HashMap<[u32; 2], usize> = HashMap::new();
+    let mesh = &made.mesh;
+    for k in 0..mesh.facets.len() {
+        let c = mesh.corner_positions(k);
+        for [a, b] in [[c[0], c[1]], [c[1], c[2]], [c[2], c[3]], [c[3], c[0]]].into_iter().filter(|[a, b]| a != b) {
+            *uses.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    let place = |p: u32| mesh.positions[p as usize];
+    let open = uses.into_iter().filter(|(_, count)| *count == 1).map(|(ends, _)| ends.map(place));
+    for [a, b] in open.filter(|ends| ends.iter().all(|p| p.z == 0.0)) {
+        assert!(((b - a).length() - 1.0).abs() < 1e-9, "{a} {b}");
     }
 }

@@ -153,25 +153,30 @@ impl<'s, 'a> DelaunayMesh<'s, 'a> {
         })
     }
 
-    /// Makes constraints of border segments, counted in `border` for the flood fill; returns those that fail, and what they cross.
+    /// Makes constraints of border segments, counted in `border` for the flood fill; returns those that fail, and those that they cross or
+    /// that are led over other nodes: a neighbour that has the same chord does not know these.
     pub(super) fn constrain_border(&mut self, segments: &[[u32; 2]]) -> [Vec<[u32; 2]>; 2] {
         let mut conflicts = Vec::new();
         let mut crossed = Vec::new();
         for &[a, b] in segments {
-            if !self.constrain(a, b) {
-                conflicts.push([a, b]);
-                crossed.extend(self.crossed_by(a, b));
+            match self.constrain(a, b) {
+                0 => {
+                    conflicts.push([a, b]);
+                    crossed.extend(self.crossed_by(a, b));
+                }
+                1 => {}
+                _ => crossed.push([a, b]),
             }
         }
         [conflicts, crossed]
     }
 
-    /// Makes the segment between two nodes a constraint, and counts in `border` each of the edges that it is led over. `true`, and nothing
-    /// counted, where both nodes stand in one place; `false` where it would cross another or a node was not inserted.
-    pub(super) fn constrain(&mut self, a: u32, b: u32) -> bool {
-        let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else { return false };
+    /// Makes the segment between two nodes a constraint, and counts in `border` each of the edges that it is led over; returns how many.
+    /// One, and none counted, where both nodes stand in one place; none where it would cross another or a node was not inserted.
+    pub(super) fn constrain(&mut self, a: u32, b: u32) -> usize {
+        let (Some(from), Some(to)) = (self.handles[a as usize], self.handles[b as usize]) else { return 0 };
         if from == to {
-            return true;
+            return 1;
         }
         let made = self.cdt.try_add_constraint(from, to);
         for edge in &made {
@@ -179,7 +184,7 @@ impl<'s, 'a> DelaunayMesh<'s, 'a> {
             // The library may lead it over vertices on the way: each part counts.
             *self.border.entry(edge_key(e.from().data().node, e.to().data().node)).or_insert(0) += 1;
         }
-        !made.is_empty()
+        made.len()
     }
 
     /// Makes the line between two nodes a constraint that does not bound anything; leaves it out where it would cross another.

@@ -41,7 +41,7 @@ pub(in crate::tessellate) struct Transition {
     pub(in crate::tessellate) triangles: Vec<ProvedFacet<3>>,
     /// Segments that could not be kept because they cross others, or an end of which was not inserted.
     pub(in crate::tessellate) conflicts: Vec<[u32; 2]>,
-    /// Those that are kept and crossed by them.
+    /// Those that are kept, and crossed by them or led over other nodes.
     pub(in crate::tessellate) crossed: Vec<[u32; 2]>,
     /// Whether all imprinted lines are edges of the triangulation.
     pub(in crate::tessellate) holds_imprint: bool,
@@ -124,7 +124,7 @@ pub(in crate::tessellate) fn triangulate(
     mesh.insert_nodes(&segments, &imprinted)?;
     let [conflicts, crossed] = mesh.constrain_border(&segments);
     // Twice: for the flood fill a line that is crossed twice bounds nothing.
-    let holds_imprint = imprinted.iter().all(|&[a, b]| mesh.constrain(a, b) && mesh.constrain(a, b));
+    let holds_imprint = imprinted.iter().all(|&[a, b]| mesh.constrain(a, b) > 0 && mesh.constrain(a, b) > 0);
     for &[a, b] in &creases {
         mesh.keep_crease(a, b);
     }
