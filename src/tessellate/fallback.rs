@@ -11,7 +11,6 @@ use super::face::FaceInput;
 use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
 use super::foot_search;
 use super::nodes::{Position, edge_key};
-use crate::math::polygon::is_inside_sides;
 use crate::math::{Point, Uv, Vector};
 use crate::model::{Face, Part};
 use crate::tessellate::proof::flat_triangle::distance_to_chord;
@@ -167,7 +166,6 @@ fn planar_triangulation(loops: &mut [Vec<BorderCorner>]) -> Option<Vec<[BorderCo
     let x = z.any_orthonormal_vector();
     let (y, o) = (z.cross(x), loops.first()?[0].place);
     let mut cdt = ConstrainedDelaunayTriangulation::<BorderCorner>::new();
-    let mut segments = Vec::new();
     for ring in loops.iter_mut() {
         let mut handles = Vec::new();
         for c in ring.iter_mut() {
@@ -186,15 +184,34 @@ fn planar_triangulation(loops: &mut [Vec<BorderCorner>]) -> Option<Vec<[BorderCo
             if cdt.try_add_constraint(a, b).len() != 1 {
                 return None;
             }
-            segments.push([ring[k].at, ring[(k + 1) % ring.len()].at].map(|p| Uv::new(p.x, p.y)));
         }
     }
-    // The triangulation fills the convex hull: even–odd at the centroid tells what the loops hold.
-    let inside = |t: &[BorderCorner; 3]| {
-        let [a, b, c] = t.map(|corner| Uv::new(corner.at.x, corner.at.y));
-        is_inside_sides(segments.iter().copied(), (a + b + c) / 3.0)
-    };
-    Some(cdt.inner_faces().map(|f| f.vertices().map(|v| *v.data())).filter(inside).collect())
+    let is_inside = enclosed_faces(&cdt);
+    let enclosed = cdt.inner_faces().filter(|face| is_inside[face.fix().index()]);
+    Some(enclosed.map(|face| face.vertices().map(|v| *v.data())).collect())
+}
+
+/// Returns, by the index of each face of a triangulation, whether an odd number of constraints lies between it and the outside. Told by
+/// steps from face to face: the middle of a sliver beside a straight side is rounded to either side of it.
+fn enclosed_faces(cdt: &ConstrainedDelaunayTriangulation<BorderCorner>) -> Vec<bool> {
+    let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); cdt.num_all_faces()];
+    for edge in cdt.directed_edges() {
+        let beyond = edge.rev().face().fix().index();
+        neighbours[edge.face().fix().index()].push((beyond, edge.is_constraint_edge()));
+    }
+    let outside = cdt.outer_face().fix().index();
+    let mut found = vec![None; neighbours.len()];
+    found[outside] = Some(false);
+    let mut stack = vec![(outside, false)];
+    while let Some((face, is_inside)) = stack.pop() {
+        for &(beyond, is_side) in &neighbours[face] {
+            if found[beyond].is_none() {
+                found[beyond] = Some(is_inside != is_side);
+                stack.push((beyond, is_inside != is_side));
+            }
+        }
+    }
+    found.into_iter().map(|inside| inside == Some(true)).collect()
 }
 
 /// Fills a single loop that no plane shows with triangles between its two sides, beginning at its first corner and always with the shorter
