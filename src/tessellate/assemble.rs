@@ -163,12 +163,17 @@ fn fill_crossing_borders<'i, 'a: 'i>(
     input: impl Fn(usize) -> Option<FaceInput<'i, 'a>>,
 ) {
     for (k, mesh) in meshes.iter_mut().enumerate() {
-        let Some(mesh) = mesh.as_mut().filter(|mesh| mesh.repaired == Some(Repair::CrossingBorder)) else {
+        let Some(mesh) = mesh.as_mut() else { continue };
+        // A strip whose chords cross so often that nothing is left within them has a mesh of its border already.
+        if !matches!(mesh.repaired, Some(Repair::CrossingBorder | Repair::BorderOnly)) {
             continue;
-        };
+        }
         let untangled = input(k).and_then(|input| mesh_face(&FaceInput { untangles: true, ..input }));
         if let Some(untangled) = untangled.filter(|mesh| mesh.repaired.is_none()) {
             *mesh = untangled;
+            continue;
+        }
+        if mesh.repaired == Some(Repair::BorderOnly) {
             continue;
         }
         let border =

@@ -1,5 +1,6 @@
 //! Narrow strips whose borders cross in their parameters, but not in space.
 
+use crate::support::trimmed::{chain, face};
 use lampyris::math::{Frame, Point, Uv, Vector};
 use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Curve, UvCurve, sweep};
@@ -56,6 +57,23 @@ fn a_strip_whose_border_crosses_in_parameters_is_whole() {
         assert_eq!((report.faces.failed, report.over_tolerance), (0, Some(0)));
         assert!(report.repaired.is_empty(), "{:?}", report.repaired);
         assert!((report.area_mm2 / AREA - 1.0).abs() < 1e-3, "{}", report.area_mm2);
+    }
+}
+
+/// Two edges that cross each other four times by 0.2 µm, as fitted edges of real files do.
+#[test]
+fn a_strip_that_is_nowhere_wide_is_proved() {
+    let surface = sweep::cylinder(&Frame::IDENTITY, 10.0, [-1.0, 2.0], [-1.0, 6.0]);
+    let beside = |f: f64| {
+        let step = (5.0 * f).round() as i32;
+        let off = if step % 5 == 0 { 0.0 } else { 2e-5 * f64::from(1 - step % 2 * 2) };
+        Uv::new(0.5 * (1.0 - f) + off, 5.0 * (1.0 - f))
+    };
+    let model = face(surface, &[vec![chain(8, |f| Uv::new(0.5 * f, 5.0 * f)), chain(5, beside)]]);
+    for tolerance in [0.02, 0.05, 0.1, 0.2] {
+        let report = tessellate(&model, &Settings::uniform(tolerance)).report;
+        assert!(report.repaired.is_empty(), "{tolerance}: {:?}", report.repaired);
+        assert_eq!(report.certified, report.facets, "{tolerance}");
     }
 }
 

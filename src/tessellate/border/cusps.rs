@@ -1,5 +1,6 @@
 //! Cusps of a border whose two edges cross by less than the tolerance beside the corner, as real files have them where a round runs out
-//! into a line: in this face's parameters, samples move to the side of the other edge on which they belong.
+//! into a line, and of strips between two edges that are narrower than that: in this face's parameters, samples move to the side of the other
+//! edge on which they belong.
 
 use super::polygons::{BorderPolygons, BorderSide, PolygonVertex};
 use crate::math::Uv;
@@ -17,13 +18,15 @@ impl BorderPolygons {
     /// Moves samples beside cusps, in parameters alone, so that the chords of the two edges no longer cross. Places stay, which lie beside
     /// the surface's points at the parameters by [`FARTHEST`] of the tolerance at most; vertices stay too.
     pub(in crate::tessellate) fn untangle_cusps(&mut self, surface: &FaceSurface<'_>) {
+        // Of a hole it would be the other way round.
+        let is_alone = self.polygons.len() == 1;
         for polygon in &mut self.polygons {
             for corner in 0..polygon.len() {
                 let uv = polygon[corner].uv;
                 let d = surface.spline.derivatives(uv);
                 let scale = Uv::new(d.du.length(), d.dv.length());
                 if scale.min_element() > 0.0 {
-                    untangle(polygon, corner, scale, FARTHEST * surface.tolerance(uv));
+                    untangle(polygon, corner, scale, FARTHEST * surface.tolerance(uv), is_alone);
                 }
             }
             for v in polygon {
@@ -34,8 +37,9 @@ impl BorderPolygons {
 }
 
 /// Moves the samples of the two edges that meet at a corner by up to `limit` mm; does nothing where they meet in no cusp, or are nowhere
-/// farther apart than that. `scale` is the length in mm of a unit of each parameter.
-fn untangle(polygon: &mut [PolygonVertex], corner: usize, scale: Uv, limit: f64) {
+/// farther apart than that, unless they are the whole border: `is_alone` is whether there is no other polygon. `scale` is the length in mm
+/// of a unit of each parameter.
+fn untangle(polygon: &mut [PolygonVertex], corner: usize, scale: Uv, limit: f64, is_alone: bool) {
     let origin = polygon[corner].uv;
     let sides = [true, false].map(|ahead| side_from(polygon, corner, ahead));
     let [mut ahead, mut back] =
@@ -50,7 +54,9 @@ fn untangle(polygon: &mut [PolygonVertex], corner: usize, scale: Uv, limit: f64)
     let apart =
         |line: &[Uv], points: &[Uv]| points.iter().map(|&p| beside(p, line).0).find(|away| away.abs() > limit);
     let left = apart(&back, &ahead).or_else(|| apart(&ahead, &back).map(|away| -away));
-    let Some(sign) = left.map(f64::signum) else { return };
+    // A strip that is nowhere wide lies to the left of the way around it.
+    let is_strip = is_alone && ahead.len() + back.len() == polygon.len() + 2;
+    let Some(sign) = left.map(f64::signum).or(is_strip.then_some(-1.0)) else { return };
     part(&mut ahead, &back, sign, limit);
     part(&mut back, &ahead, -sign, limit);
     for (side, points) in sides.iter().zip([ahead, back]) {
