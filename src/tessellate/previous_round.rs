@@ -16,8 +16,8 @@ pub(super) struct PreviousRound {
 }
 
 impl PreviousRound {
-    /// Returns the meshes of faces on the edges divided anew, and which of them were kept: few edges change, and a face whose own did not is
-    /// as it was, but for the numbers of its corners. The others are made by `mesh`.
+    /// Returns the meshes of faces on the edges divided anew, and which of them were kept: few edges change, and a face whose own did not
+    /// is as it was, but for the numbers of its corners. The others are made by `mesh`.
     pub(super) fn meshed_again<'f, S: Sync>(
         self,
         part: &Part,

@@ -166,8 +166,8 @@ fn no_cell_reaches_beyond_a_trim_that_slants_a_little() {
     }
 }
 
-/// A slot in a disc's rim, both of whose ends lie on the chord of the arc between the disc's flat sides: the chord is led over them, and the
-/// tube outside does not know them.
+/// A slot in a disc's rim, both of whose ends lie on the chord of the arc between the disc's flat sides: the chord is led over them, and
+/// the tube outside does not know them.
 #[test]
 fn the_chord_of_an_arc_passes_over_no_other_corner() {
     let (sag, half) = (0.02f64, 1.5f64);

@@ -1,6 +1,6 @@
 //! Cusps of a border whose two edges cross by less than the tolerance beside the corner, as real files have them where a round runs out
-//! into a line, and of strips between two edges that are narrower than that: in this face's parameters, samples move to the side of the other
-//! edge on which they belong.
+//! into a line, and of strips between two edges that are narrower than that: in this face's parameters, samples move to the side of the
+//! other edge on which they belong.
 
 use super::polygons::{BorderPolygons, BorderSide, PolygonVertex};
 use crate::math::Uv;
