@@ -2,7 +2,7 @@
 
 use super::curve_chords;
 use super::edges::Division;
-use crate::math::polygon::{polygon_sides, signed_area};
+use crate::math::polygon::signed_area;
 use crate::math::{NearPoints, Point, Uv};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use crate::tessellate::face_surface::FaceSurface;
@@ -69,10 +69,14 @@ impl BorderPolygons {
     /// `extent` is that of the surface's domain.
     pub(in crate::tessellate) fn enclose_nothing(&self, extent: Uv) -> bool {
         let encloses = |polygon: &Vec<PolygonVertex>| {
-            let corners: Vec<Uv> = polygon.iter().map(|v| v.uv / extent).collect();
-            let reach = corners.iter().map(|uv| uv.abs().max_element()).fold(1.0, f64::max);
-            let length: f64 = polygon_sides(&corners).map(|[a, b]| (b - a).length()).sum();
-            polygon.len() > 2 && signed_area(&corners).abs() > ROUNDED_WIDTH * reach * length
+            let corners = || polygon.iter().map(|v| v.uv / extent);
+            let away = || corners().map(|uv| uv - polygon[0].uv / extent);
+            let reach = corners().map(|uv| uv.abs().max_element()).fold(1.0, f64::max);
+            // Not by its area, which is nothing of a loop like an eight too.
+            let farthest = away().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+            let along = farthest.unwrap_or(Uv::ZERO).normalize_or_zero();
+            let width = away().map(|p| along.perp_dot(p).abs()).fold(0.0, f64::max);
+            polygon.len() > 2 && width > ROUNDED_WIDTH * reach
         };
         !self.polygons.iter().any(encloses)
     }
