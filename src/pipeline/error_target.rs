@@ -15,7 +15,7 @@ use serde::Serialize;
 
 /// Rays of the first run.
 const FIRST_RAYS: u64 = 50_000;
-/// Growth of the rays from one run to the next where nothing arrived.
+/// Growth of the rays from one run to the next where nothing arrived, or no error is known.
 const GROWTH_FROM_NOTHING: f64 = 16.0;
 /// No answer asks for more rays than these: a machine's word holds them.
 const MOST_WANTED: f64 = 1e18;
@@ -138,10 +138,12 @@ impl ErrorTarget {
     }
 
     /// Returns how many times as many rays the target asks for, by an error that falls with their root, and a margin more; may be below 1.
-    /// `found` is that error, percent, of so many replicates; without one, as nothing arrived, the factor is [`GROWTH_FROM_NOTHING`].
+    /// `found` is that error, percent, of so many replicates; without one, as nothing arrived, or of a single replicate, which tells none,
+    /// the factor is [`GROWTH_FROM_NOTHING`].
     fn growth(&self, found: Option<f64>, replicates: u32) -> f64 {
         // The error falls with the root of the rays, so that they go with the square of what is missing.
-        found.map_or(GROWTH_FROM_NOTHING, |e| growth_margin(replicates) * (e / self.percent).powi(2))
+        let known = found.filter(|_| replicates > 1);
+        known.map_or(GROWTH_FROM_NOTHING, |e| growth_margin(replicates) * (e / self.percent).powi(2))
     }
 }
 
@@ -156,6 +158,8 @@ mod tests {
         let target = ErrorTarget { percent: 1.0, receiver: "wall".into(), cells: false };
         let missing = |found: Option<f64>| target.missing_rays(found, 90_000, 145);
         assert_eq!((missing(Some(2.0)), missing(None)), (390_000, 1_350_000));
+        // Of one replicate the error counts as the whole light, 10,000 times the rays.
+        assert_eq!(target.missing_rays(Some(100.0), 5_000, 1), 75_000);
         // At the very error the margin alone, and of many replicates nearly nothing: still one more.
         let of_many = target.missing_rays(Some(1.001), 90_000, 1_000_001);
         assert_eq!((missing(Some(1.001)), of_many), (35_000, 5_000));
