@@ -16,6 +16,8 @@ const EXTRACTIONS: f64 = 4.0;
 const PLACED_ROUNDING: f64 = 8.0;
 /// Roots count beyond a trimmed border as far as this many bands: on grazed faces they stray by the inverse of the sine.
 const BANDS_BEYOND: f64 = 32.0;
+/// The part of a patch that is all of it, in the patch's local parameters.
+pub(super) const WHOLE_PATCH: [[f64; 2]; 2] = [[0.0, 1.0]; 2];
 /// A Jacobian whose determinant is a smaller part of the product of its row sums says nothing of which halving helps.
 const UNTOLD: f64 = 1e-9;
 
@@ -106,7 +108,8 @@ pub(super) struct Described {
 /// roundings behind it. The caller fills in `net`, `patch`, `face`, `whole` and `has_pole`.
 pub(super) fn describe(patch: &Patch, piece: &[V4], rect: [[f64; 2]; 2], depth: u32) -> Described {
     let degree = patch.degree;
-    let middle = net::evaluate(piece, degree, 0.5, 0.5).s;
+    // A whole patch has its centre there and weight 1 but for rounding: its leaf has the same net, which then stands in memory once.
+    let middle = if rect == WHOLE_PATCH { [0.0, 0.0, 0.0, 1.0] } else { net::evaluate(piece, degree, 0.5, 0.5).s };
     let center = patch.center + xyz(&middle) / middle[3];
     // The offset as the rounded centre has it, so that the net and the centre agree.
     let offset = center - patch.center;

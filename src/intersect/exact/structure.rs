@@ -213,11 +213,18 @@ mod tests {
     #[test]
     fn leaves_that_are_whole_patches_take_their_nets() {
         use crate::math::Frame;
-        let plane = crate::nurbs::sweep::plane(&Frame::IDENTITY, [[0.0, 10.0]; 2]);
-        let shells = vec![Shell { faces: vec![Face::whole(plane)], ..Shell::default() }];
-        let settings = Settings { leaves: 0, depth: 0, ..Settings::default() };
-        let exact = Exact::build(&Model::from_part(Part { shells, ..Part::default() }), &settings);
-        assert_eq!((exact.leaf_count(), exact.geometry.nets.len()), (exact.patch_count(), 4 * exact.patch_count()));
+        let frame = Frame { origin: Point::new(0.1, 0.7, 1.3), ..Frame::IDENTITY };
+        let plane = crate::nurbs::sweep::plane(&frame, [[0.0, 10.0]; 2]);
+        // Rational, and so flat that neither its bend nor its box asks for halves.
+        let tube = crate::nurbs::sweep::cylinder(&frame, 100.0, [0.0, 0.05], [0.0, 5.0]);
+        for surface in [plane, tube] {
+            let shells = vec![Shell { faces: vec![Face::whole(surface)], ..Shell::default() }];
+            let settings = Settings { leaves: 0, depth: 0, ..Settings::default() };
+            let exact = Exact::build(&Model::from_part(Part { shells, ..Part::default() }), &settings);
+            let taken = |leaf: &&Leaf| leaf.net == exact.geometry.patches[leaf.patch as usize].net;
+            let taken = exact.leaves.iter().filter(taken).count();
+            assert_eq!((taken, exact.leaf_count()), (exact.patch_count(), exact.patch_count()));
+        }
     }
 
     #[test]

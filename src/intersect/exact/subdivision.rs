@@ -5,7 +5,9 @@
 //! 10.5 to 2.9, and both to twice the rate; cutting leaves that many rays meet flatter gave the valve another fifth.
 
 use super::geometry::{Geometry, make_room};
-use super::leaf::{Described, Leaf, border_sides, describe, deviation, flattening_direction, widen, xyz};
+use super::leaf::{
+    Described, Leaf, WHOLE_PATCH, border_sides, describe, deviation, flattening_direction, widen, xyz,
+};
 use super::linearization::Linearization;
 use super::net::{self, Net, V4};
 use super::patch::Patch;
@@ -129,7 +131,7 @@ pub(super) fn subdivide_up_to(geometry: &Geometry, flatness: Flatness, most: usi
     let cropped = |patch: &Patch| {
         let whole = SubPatch {
             net: Net::from_slice(geometry.net(patch)),
-            rect: [[0.0, 1.0]; 2],
+            rect: WHOLE_PATCH,
             depth: 0,
             crop_roundings: 0,
             vain: 0,
@@ -267,8 +269,7 @@ impl Subdivision<'_> {
         }
         let Described { mut leaf, bounds, slopes, net: control } = part;
         let middle = net::evaluate(&control, self.patch.degree, 0.5, 0.5).s;
-        // Of most leaves that are a whole patch of a polynomial surface the centre and the net are the patch's to the last bit.
-        leaf.net = if *control == *self.geometry.net(self.patch) {
+        leaf.net = if rect == WHOLE_PATCH {
             self.patch.net
         } else {
             let net = self.geometry.nets.len() + out.nets.len();
