@@ -9,6 +9,7 @@ use super::border::edges::Division;
 use super::border::polygons;
 use super::face::FaceInput;
 use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
+use super::flooding::flood;
 use super::foot_search;
 use super::nodes::{Position, edge_key};
 use crate::math::{Point, Uv, Vector};
@@ -186,32 +187,12 @@ fn planar_triangulation(loops: &mut [Vec<BorderCorner>]) -> Option<Vec<[BorderCo
             }
         }
     }
-    let is_inside = enclosed_faces(&cdt);
-    let enclosed = cdt.inner_faces().filter(|face| is_inside[face.fix().index()]);
+    let outer = cdt.outer_face().fix();
+    let mut inside = vec![None; cdt.num_all_faces()];
+    inside[outer.index()] = Some(false);
+    flood(&cdt, &mut inside, [outer], |side| side.is_constraint_edge());
+    let enclosed = cdt.inner_faces().filter(|face| inside[face.index()] == Some(true));
     Some(enclosed.map(|face| face.vertices().map(|v| *v.data())).collect())
-}
-
-/// Returns, by the index of each face of a triangulation, whether an odd number of constraints lies between it and the outside. Told by
-/// steps from face to face: the middle of a sliver beside a straight side is rounded to either side of it.
-fn enclosed_faces(cdt: &ConstrainedDelaunayTriangulation<BorderCorner>) -> Vec<bool> {
-    let mut neighbours: Vec<Vec<(usize, bool)>> = vec![Vec::new(); cdt.num_all_faces()];
-    for edge in cdt.directed_edges() {
-        let beyond = edge.rev().face().fix().index();
-        neighbours[edge.face().fix().index()].push((beyond, edge.is_constraint_edge()));
-    }
-    let outside = cdt.outer_face().fix().index();
-    let mut found = vec![None; neighbours.len()];
-    found[outside] = Some(false);
-    let mut stack = vec![(outside, false)];
-    while let Some((face, is_inside)) = stack.pop() {
-        for &(beyond, is_side) in &neighbours[face] {
-            if found[beyond].is_none() {
-                found[beyond] = Some(is_inside != is_side);
-                stack.push((beyond, is_inside != is_side));
-            }
-        }
-    }
-    found.into_iter().map(|inside| inside == Some(true)).collect()
 }
 
 /// Fills a single loop that no plane shows with triangles between its two sides, beginning at its first corner and always with the shorter

@@ -27,6 +27,7 @@ mod face;
 mod face_mesh;
 mod face_surface;
 mod fallback;
+mod flooding;
 mod foot_search;
 mod grouped;
 mod imprint;

@@ -522,6 +522,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "nodes",
             "triangle_frame",
+            "flooding",
             "foot_search",
             "sample",
             "settings",

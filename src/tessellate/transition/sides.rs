@@ -2,18 +2,14 @@
 
 use super::delaunay::{DelaunayMesh, Vertex};
 use crate::tessellate::border::enclosure::Enclosure;
+use crate::tessellate::flooding::{Side, flood};
 use crate::tessellate::nodes::edge_key;
 use rustc_hash::FxHashSet;
 use spade::Triangulation;
-use spade::handles::{
-    DirectedEdgeHandle, FaceHandle, FixedFaceHandle, FixedVertexHandle, InnerTag, PossiblyOuterTag,
-};
-use std::collections::VecDeque;
+use spade::handles::{FaceHandle, FixedFaceHandle, FixedVertexHandle, InnerTag, PossiblyOuterTag};
 
 /// A face of the triangulation other than the outer one.
 type InnerFace<'c> = FaceHandle<'c, InnerTag, Vertex, (), spade::CdtEdge<()>, ()>;
-/// A side of one, or of the outer face.
-type Side<'c> = DirectedEdgeHandle<'c, Vertex, (), spade::CdtEdge<()>, ()>;
 
 /// Where the faces of a triangulation lie.
 pub(super) struct Sides {
@@ -39,7 +35,7 @@ impl Sides {
         } else {
             let outer = cdt.outer_face().fix();
             sides.inside[outer.index()] = Some(false);
-            sides.walk(mesh, VecDeque::from([outer]));
+            sides.walk(mesh, vec![outer]);
         }
         sides
     }
@@ -82,33 +78,17 @@ impl Sides {
         self.asked += 1;
     }
 
-    /// Asks all faces that can be reached from known ones, breadth first; each crossing of the border turns the answer.
-    fn walk(&mut self, mesh: &DelaunayMesh<'_, '_>, mut queue: VecDeque<FixedFaceHandle<PossiblyOuterTag>>) {
-        let cdt = &mesh.cdt;
-        while let Some(face) = queue.pop_front() {
-            let inside = self.inside[face.index()] == Some(true);
-            let mut ask_beyond = |e: Side<'_>| {
-                self.looked += 1;
-                // Hull edges run along the outer face or against it, by version; take the unknown side.
-                for side in [e, e.rev()] {
-                    let next = side.face();
-                    if self.inside[next.index()].is_some() {
-                        continue;
-                    }
-                    let turns = e.is_constraint_edge() && {
-                        let name = edge_key(e.from().data().node, e.to().data().node);
-                        mesh.border.get(&name).is_some_and(|n| n % 2 == 1)
-                    };
-                    self.inside[next.index()] = Some(inside != turns);
-                    self.asked += 1;
-                    queue.push_back(next.fix());
-                }
-            };
-            match cdt.face(face).as_inner() {
-                Some(inner) => inner.adjacent_edges().into_iter().for_each(&mut ask_beyond),
-                None => cdt.convex_hull().for_each(&mut ask_beyond),
+    /// Asks all faces that can be reached from known ones; each crossing of the border turns the answer.
+    fn walk(&mut self, mesh: &DelaunayMesh<'_, '_>, known: Vec<FixedFaceHandle<PossiblyOuterTag>>) {
+        let turns = |e: &Side<'_, Vertex>| {
+            e.is_constraint_edge() && {
+                let name = edge_key(e.from().data().node, e.to().data().node);
+                mesh.border.get(&name).is_some_and(|n| n % 2 == 1)
             }
-        }
+        };
+        let steps = flood(&mesh.cdt, &mut self.inside, known, turns);
+        self.asked += steps.asked;
+        self.looked += steps.looked;
     }
 }
 
