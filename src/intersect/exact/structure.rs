@@ -224,6 +224,8 @@ mod tests {
             let taken = |leaf: &&Leaf| leaf.net == exact.geometry.patches[leaf.patch as usize].net;
             let taken = exact.leaves.iter().filter(taken).count();
             assert_eq!((taken, exact.leaf_count()), (exact.patch_count(), exact.patch_count()));
+            let of_patches: usize = exact.geometry.patches.iter().map(super::super::patch::Patch::net_len).sum();
+            assert_eq!(exact.geometry.nets.len(), of_patches);
         }
     }
 
