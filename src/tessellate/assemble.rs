@@ -164,22 +164,20 @@ fn fill_crossing_borders<'i, 'a: 'i>(
 ) {
     for (k, mesh) in meshes.iter_mut().enumerate() {
         let Some(mesh) = mesh.as_mut() else { continue };
-        // A strip whose chords cross so often that nothing is left within them has a mesh of its border already.
-        if !matches!(mesh.repaired, Some(Repair::CrossingBorder | Repair::BorderOnly)) {
-            continue;
-        }
+        let is_border_alone = match mesh.repaired {
+            Some(Repair::CrossingBorder) => false,
+            // A strip whose chords cross so often that nothing is left within them.
+            Some(Repair::BorderOnly) => true,
+            _ => continue,
+        };
         let untangled = input(k).and_then(|input| mesh_face(&FaceInput { untangles: true, ..input }));
-        if let Some(untangled) = untangled.filter(|mesh| mesh.repaired.is_none()) {
-            *mesh = untangled;
-            continue;
-        }
-        if mesh.repaired == Some(Repair::BorderOnly) {
-            continue;
-        }
-        let border =
-            input(k).and_then(|input| catch_panic(|| fallback::border_within_tolerance(&input)).ok().flatten());
-        if let Some(border) = border {
-            *mesh = FaceMesh { repaired: Some(Repair::BorderOnly), ..border };
+        let border = || {
+            let input = input(k).filter(|_| !is_border_alone)?;
+            let border = catch_panic(|| fallback::border_within_tolerance(&input)).ok().flatten()?;
+            Some(FaceMesh { repaired: Some(Repair::BorderOnly), ..border })
+        };
+        if let Some(filled) = untangled.filter(|mesh| mesh.repaired.is_none()).or_else(border) {
+            *mesh = filled;
         }
     }
 }

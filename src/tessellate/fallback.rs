@@ -9,7 +9,7 @@ use super::border::edges::Division;
 use super::border::polygons;
 use super::face::FaceInput;
 use super::face_mesh::{Corner, FaceMesh, MeshedFacet};
-use super::flooding::flood;
+use super::flooding::faces_inside;
 use super::foot_search;
 use super::nodes::{Position, edge_key};
 use crate::math::{Point, Uv, Vector};
@@ -187,10 +187,7 @@ fn planar_triangulation(loops: &mut [Vec<BorderCorner>]) -> Option<Vec<[BorderCo
             }
         }
     }
-    let outer = cdt.outer_face().fix();
-    let mut inside = vec![None; cdt.num_all_faces()];
-    inside[outer.index()] = Some(false);
-    flood(&cdt, &mut inside, [outer], |side| side.is_constraint_edge());
+    let (inside, _) = faces_inside(&cdt, |side| side.is_constraint_edge());
     let enclosed = cdt.inner_faces().filter(|face| inside[face.index()] == Some(true));
     Some(enclosed.map(|face| face.vertices().map(|v| *v.data())).collect())
 }

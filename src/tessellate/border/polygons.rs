@@ -69,14 +69,17 @@ impl BorderPolygons {
     /// `extent` is that of the surface's domain.
     pub(in crate::tessellate) fn enclose_nothing(&self, extent: Uv) -> bool {
         let encloses = |polygon: &Vec<PolygonVertex>| {
+            if polygon.len() <= 2 {
+                return false;
+            }
             let corners = || polygon.iter().map(|v| v.uv / extent);
             let away = || corners().map(|uv| uv - polygon[0].uv / extent);
             let reach = corners().map(|uv| uv.abs().max_element()).fold(1.0, f64::max);
             // Not by its area, which is nothing of a loop like an eight too.
-            let farthest = away().max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
-            let along = farthest.unwrap_or(Uv::ZERO).normalize_or_zero();
+            let farther = |a: Uv, b: Uv| if b.length_squared() < a.length_squared() { a } else { b };
+            let along = away().fold(Uv::ZERO, farther).normalize_or_zero();
             let width = away().map(|p| along.perp_dot(p).abs()).fold(0.0, f64::max);
-            polygon.len() > 2 && width > ROUNDED_WIDTH * reach
+            width > ROUNDED_WIDTH * reach
         };
         !self.polygons.iter().any(encloses)
     }

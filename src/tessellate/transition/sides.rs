@@ -2,11 +2,11 @@
 
 use super::delaunay::{DelaunayMesh, Vertex};
 use crate::tessellate::border::enclosure::Enclosure;
-use crate::tessellate::flooding::{Side, flood};
+use crate::tessellate::flooding::{Side, Steps, faces_inside, flood};
 use crate::tessellate::nodes::edge_key;
 use rustc_hash::FxHashSet;
 use spade::Triangulation;
-use spade::handles::{FaceHandle, FixedFaceHandle, FixedVertexHandle, InnerTag, PossiblyOuterTag};
+use spade::handles::{FaceHandle, FixedVertexHandle, InnerTag};
 
 /// A face of the triangulation other than the outer one.
 type InnerFace<'c> = FaceHandle<'c, InnerTag, Vertex, (), spade::CdtEdge<()>, ()>;
@@ -28,16 +28,15 @@ impl Sides {
     /// Asks all faces: by crossings of the border from outside, or by their centres within `by_centre` where constraints are missing.
     pub(super) fn new(mesh: &DelaunayMesh<'_, '_>, by_centre: Option<Enclosure>) -> Self {
         let cdt = &mesh.cdt;
-        let inside = vec![None; cdt.num_all_faces()];
-        let mut sides = Self { by_centre, inside, vertices: cdt.num_vertices(), asked: 0, looked: 0 };
-        if sides.by_centre.is_some() {
+        let vertices = cdt.num_vertices();
+        if by_centre.is_some() {
+            let inside = vec![None; cdt.num_all_faces()];
+            let mut sides = Self { by_centre, inside, vertices, asked: 0, looked: 0 };
             cdt.inner_faces().for_each(|face| sides.ask_centre(mesh, face));
-        } else {
-            let outer = cdt.outer_face().fix();
-            sides.inside[outer.index()] = Some(false);
-            sides.walk(mesh, vec![outer]);
+            return sides;
         }
-        sides
+        let (inside, Steps { asked, looked }) = faces_inside(cdt, |side| turns(mesh, side));
+        Self { by_centre, inside, vertices, asked, looked }
     }
 
     /// Asks the faces that have come since. Each has a corner that has come too: a vertex that is inserted changes no others.
@@ -61,8 +60,10 @@ impl Sides {
         let around = faces.iter().flat_map(|f| f.adjacent_edges()).map(|e| e.rev().face().fix());
         // Each once: of the outer face all sides are looked at, and on a border of thousands all new faces lie beside it.
         let mut seen = FxHashSet::default();
-        let known = around.filter(|f| self.inside[f.index()].is_some() && seen.insert(f.index())).collect();
-        self.walk(mesh, known);
+        let known: Vec<_> = around.filter(|f| self.inside[f.index()].is_some() && seen.insert(f.index())).collect();
+        let steps = flood(cdt, &mut self.inside, known, |side| turns(mesh, side));
+        self.asked += steps.asked;
+        self.looked += steps.looked;
     }
 
     /// Returns the nodes of the faces inside, in the order of the faces.
@@ -77,18 +78,13 @@ impl Sides {
         self.inside[face.index()] = self.by_centre.as_ref().map(|border| border.encloses((a + b + c) / 3.0));
         self.asked += 1;
     }
+}
 
-    /// Asks all faces that can be reached from known ones; each crossing of the border turns the answer.
-    fn walk(&mut self, mesh: &DelaunayMesh<'_, '_>, known: Vec<FixedFaceHandle<PossiblyOuterTag>>) {
-        let turns = |e: &Side<'_, Vertex>| {
-            e.is_constraint_edge() && {
-                let name = edge_key(e.from().data().node, e.to().data().node);
-                mesh.border.get(&name).is_some_and(|n| n % 2 == 1)
-            }
-        };
-        let steps = flood(&mesh.cdt, &mut self.inside, known, turns);
-        self.asked += steps.asked;
-        self.looked += steps.looked;
+/// Whether the border runs along a side an odd number of times, so that the answer turns there.
+fn turns(mesh: &DelaunayMesh<'_, '_>, side: &Side<'_, Vertex>) -> bool {
+    side.is_constraint_edge() && {
+        let name = edge_key(side.from().data().node, side.to().data().node);
+        mesh.border.get(&name).is_some_and(|n| n % 2 == 1)
     }
 }
 
