@@ -274,10 +274,13 @@ impl Lanes for Avx2Lanes {
         // SAFETY: see the head of the file.
         unsafe {
             let t_max = _mm256_set1_ps(t_max);
-            let (low, high) = (_mm256_loadu_ps(enters.as_ptr()), _mm256_loadu_ps(enters.as_ptr().add(8)));
-            let low = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(low, t_max));
-            let high = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(high, t_max));
-            (low | high << 8) as u32
+            // Of the topmost eight nearly always one is.
+            let high = _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_loadu_ps(enters.as_ptr().add(8)), t_max);
+            let high = _mm256_movemask_ps(high) as u32;
+            if high != 0 {
+                return high << 8;
+            }
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_loadu_ps(enters.as_ptr()), t_max)) as u32
         }
     }
 }

@@ -25,6 +25,6 @@ pub(super) trait Lanes {
     fn quad_edges(corners: [&[f64; 3]; 4], ray: &FacetRay, reach: f64) -> QuadEdges {
         QuadEdges::new(corners, ray, reach)
     }
-    /// Returns which distances do not lie beyond `t_max`, one bit each.
+    /// Returns which distances do not lie beyond `t_max`, one bit each; lower ones than the highest may be left out.
     fn open(enters: &[f32; 16], t_max: f32) -> u32;
 }
