@@ -44,7 +44,7 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
         state.start(tree, root, &rays[place], place);
         ways.note(ray, state.next);
     }
-    queues.put(&ways);
+    queues.put(Rays::first(live), &ways);
     while live > 0 {
         let entering = take(&mut queues.node);
         cost.nodes += entering.count() as u64;
@@ -56,23 +56,25 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
             prefetch_step(&arrays, s.next);
             ways.note(ray, s.next);
         }
-        queues.put(&ways);
+        queues.put(entering, &ways);
         // Here, not last: a ray that is started and at once asked for its first node waits until what was written of it has left the
         // processor's store buffer, which took an eighth of the walk.
-        let mut ways = Ways::default();
+        let (mut started, mut ways) = (Rays::default(), Ways::default());
         for ray in take(&mut queues.end) {
             let s = &mut states[ray];
             hits[s.index] = s.best.hit();
             if start_next(tree, root, s, (rays, order), &mut next) {
+                started.add_if(true, ray);
                 ways.note(ray, s.next);
             } else {
                 live -= 1;
             }
         }
-        queues.put(&ways);
+        queues.put(started, &ways);
         let mut ways = Ways::default();
         let mut tests = 0;
-        for ray in take(&mut queues.block) {
+        let sifting = take(&mut queues.block);
+        for ray in sifting {
             let s = &mut states[ray];
             // The sieve knows rounded corners only; what it leaves asks for its true ones first.
             let (index, count) = (s.next.index(), s.next.facets());
@@ -82,10 +84,10 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
             s.advance::<L>(Children::NONE);
             prefetch_step(&arrays, s.next);
             queues.corners.add_if(s.candidates != 0, ray);
-            ways.note_if(s.candidates == 0, ray, s.next);
+            ways.note(ray, s.next);
         }
         cost.tests += tests;
-        queues.put(&ways);
+        queues.put(sifting.without(queues.corners), &ways);
         test_waiting::<L, STACK>(tree, &arrays, states, &mut queues, &mut lanes);
         queues.exact.0 |= queues.corners.0;
         for ray in take(&mut queues.corners) {
@@ -159,7 +161,7 @@ fn test_waiting<L: Lanes, const STACK: usize>(
         for _ in 0..LANES {
             later.next();
         }
-        let tested = Rays(queues.exact.0 & !later.0);
+        let tested = queues.exact.without(later);
         queues.exact = later;
         test_in_lanes(tree, arrays, states, tested, lanes);
         let mut ways = Ways::default();
@@ -170,9 +172,9 @@ fn test_waiting<L: Lanes, const STACK: usize>(
             s.recheck_next::<L>();
             prefetch_step(arrays, s.next);
             queues.exact.add_if(s.candidates != 0, ray);
-            ways.note_if(s.candidates == 0, ray, s.next);
+            ways.note(ray, s.next);
         }
-        queues.put(&ways);
+        queues.put(tested.without(queues.exact), &ways);
     }
 }
 

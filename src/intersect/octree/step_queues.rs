@@ -15,6 +15,18 @@ impl Rays {
         self.0.count_ones() as usize
     }
 
+    /// The first so many, up to all of them.
+    #[inline(always)]
+    pub(super) fn first(count: usize) -> Self {
+        Self(((1u64 << count) - 1) as u32)
+    }
+
+    /// These but those others.
+    #[inline(always)]
+    pub(super) fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
+
     /// Adds a ray where `is_in`.
     #[inline(always)]
     pub(super) fn add_if(&mut self, is_in: bool, ray: usize) {
@@ -54,21 +66,19 @@ pub(super) struct StepQueues {
 }
 
 impl StepQueues {
-    /// Adds rays by where they go next.
+    /// Adds these rays by where they go next, of each of which `ways` has a note.
     #[inline(always)]
-    pub(super) fn put(&mut self, ways: &Ways) {
-        let Ways { rays, blocks_or_ends, ends } = *ways;
-        self.node.0 |= rays & !blocks_or_ends;
-        self.block.0 |= rays & blocks_or_ends & !ends;
-        self.end.0 |= rays & ends;
+    pub(super) fn put(&mut self, rays: Rays, ways: &Ways) {
+        let Ways { blocks_or_ends, ends } = *ways;
+        self.node.0 |= rays.0 & !blocks_or_ends;
+        self.block.0 |= rays.0 & blocks_or_ends & !ends;
+        self.end.0 |= rays.0 & ends;
     }
 }
 
-/// Rays and where they go next.
+/// Where rays go next, one bit each.
 #[derive(Default)]
 pub(super) struct Ways {
-    rays: u32,
-    /// Of all that were noted.
     blocks_or_ends: u32,
     ends: u32,
 }
@@ -77,14 +87,7 @@ impl Ways {
     /// Notes where a ray goes next.
     #[inline(always)]
     pub(super) fn note(&mut self, ray: usize, link: Link) {
-        self.note_if(true, ray, link);
-    }
-
-    /// Notes where a ray goes next if `is_in`.
-    #[inline(always)]
-    pub(super) fn note_if(&mut self, is_in: bool, ray: usize, link: Link) {
         let ray = ray % WIDTH;
-        self.rays |= u32::from(is_in) << ray;
         self.blocks_or_ends |= (link.kind() as u32 >> 1) << ray;
         self.ends |= (link.kind() as u32 & 1) << ray;
     }
@@ -99,12 +102,13 @@ mod tests {
         let mut ways = Ways::default();
         let links = [Link::node(7), Link::block(3, 4), Link::END, Link::block(0, 1), Link::node(0), Link::END];
         for (ray, link) in links.into_iter().enumerate() {
-            ways.note_if(ray != 5, 6 * ray, link);
+            ways.note(6 * ray, link);
         }
         let mut queues = StepQueues::default();
         queues.node.add_if(true, 31);
         queues.node.add_if(false, 1);
-        queues.put(&ways);
+        // All but the last.
+        queues.put(Rays(0b1_000001_000001_000001_000001), &ways);
         assert_eq!(queues.node.collect::<Vec<_>>(), [0, 24, 31]);
         assert_eq!(queues.block.collect::<Vec<_>>(), [6, 18]);
         assert_eq!(queues.end.collect::<Vec<_>>(), [12]);
