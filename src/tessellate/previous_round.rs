@@ -93,3 +93,62 @@ impl Renumbering {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Frame, Point, Uv, Vector};
+    use crate::model::{Edge, EdgeUse, TrimLoop, VertexId};
+    use crate::nurbs::{Curve, UvCurve, sweep};
+    use crate::tessellate::face_mesh::Corner;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    /// A face beside one edge; what else bounds it does not matter here.
+    fn face_beside(edge: u32) -> Face {
+        let uv = UvCurve::line(Uv::ZERO, Uv::X, [0.0, 1.0]);
+        let uses = vec![EdgeUse { edge: Some(EdgeId(edge)), reversed: false, uv }];
+        let plane = sweep::plane(&Frame::IDENTITY, [[0.0, 1.0]; 2]);
+        Face { loops: vec![TrimLoop { uses }], ..Face::whole(plane) }
+    }
+
+    /// An edge with so many inner samples, of which the first is this shared position.
+    fn division(inner: u32, first: u32) -> Division {
+        Division { t: (0..inner + 2).map(|k| f64::from(k) / f64::from(inner + 1)).collect(), first }
+    }
+
+    /// A mesh with corners at these shared positions, of which the last two are one.
+    fn mesh_at(shared: [u32; 3]) -> FaceMesh {
+        let corner = |p| Corner { position: Position::Shared(p), normal: Vector::Z, uv: Uv::ZERO };
+        let coincident = vec![[shared[1], shared[2]]];
+        FaceMesh { corners: shared.map(corner).to_vec(), coincident, ..FaceMesh::default() }
+    }
+
+    /// Two edges between the vertices 0 and 1 with samples at 2, 3 and at 4, 5; the first gets a third, and those of the other move up.
+    #[test]
+    fn faces_beside_unchanged_edges_are_kept() {
+        let curve = Curve::line(Point::ZERO, Point::X, [0.0, 1.0]);
+        let edge = Edge { curve, vertices: [VertexId(0), VertexId(1)], entity: None };
+        let part =
+            Part { vertices: vec![Point::ZERO, Point::X], edges: vec![edge.clone(), edge], ..Part::default() };
+        let before = PreviousRound {
+            divisions: vec![division(2, 2), division(2, 4)],
+            shared: 6,
+            meshes: vec![Some(mesh_at([0, 2, 3])), Some(mesh_at([1, 4, 5])), None],
+        };
+        let faces = [0, 1, 1].map(face_beside);
+        let faces: Vec<(&Face, ())> = faces.iter().map(|face| (face, ())).collect();
+        let made = AtomicU32::new(0);
+        let (meshes, kept) = before.meshed_again(&part, &faces, &[division(3, 2), division(2, 5)], |_| {
+            made.fetch_add(1, Ordering::Relaxed);
+            Some(mesh_at([0, 1, 6]))
+        });
+        // The first lies beside the edge that has changed, the last was not meshed before.
+        assert_eq!((kept, made.into_inner()), (vec![false, true, false], 2));
+        let positions = |mesh: &Option<FaceMesh>| {
+            let mesh = mesh.as_ref().unwrap();
+            (mesh.corners.iter().map(|c| c.position).collect::<Vec<_>>(), mesh.coincident.clone())
+        };
+        let at = |shared: [u32; 3]| (shared.map(Position::Shared).to_vec(), vec![[shared[1], shared[2]]]);
+        assert_eq!(meshes.iter().map(positions).collect::<Vec<_>>(), [at([0, 1, 6]), at([1, 5, 6]), at([0, 1, 6])]);
+    }
+}
