@@ -76,7 +76,8 @@ impl BorderPolygons {
             let away = || corners().map(|uv| uv - polygon[0].uv / extent);
             let reach = corners().map(|uv| uv.abs().max_element()).fold(1.0, f64::max);
             // Not by its area, which is nothing of a loop like an eight too.
-            let farther = |a: Uv, b: Uv| if b.length_squared() < a.length_squared() { a } else { b };
+            let farther =
+                |a: Uv, b: Uv| if b.length_squared().total_cmp(&a.length_squared()).is_lt() { a } else { b };
             let along = away().fold(Uv::ZERO, farther).normalize_or_zero();
             let width = away().map(|p| along.perp_dot(p).abs()).fold(0.0, f64::max);
             width > ROUNDED_WIDTH * reach
