@@ -15,7 +15,7 @@ pub(crate) fn hardware() -> String {
     // Not every kernel names its processor: then its architecture is said.
     let cpu = cpu.unwrap_or_else(|| std::env::consts::ARCH.to_owned());
     let memory = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobyte_field(&text, "MemTotal"));
-    let mut parts = vec![cpu, format!("{cores} cores")];
+    let mut parts = vec![cpu, if cores == 1 { "1 core".into() } else { format!("{cores} cores") }];
     parts.extend(memory.map(|kb| format!("{:.0} GB", kb as f64 / KILOBYTES_PER_GB)));
     parts.push(std::env::consts::OS.to_owned());
     parts.join(", ")

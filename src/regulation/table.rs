@@ -136,6 +136,17 @@ pub(super) struct Realignment {
     pub(super) vertical_deg: f64,
 }
 
+/// Names that a message lists.
+const MOST_NAMED: usize = 12;
+/// What a message names where nothing is near.
+const EXAMPLES: [&str; 4] =
+    ["UN R112 B passing", "UN R149-01 C passing", "UN R148-01 stop-S1", "FMVSS 108 LB2V"];
+
+/// A name in small letters, without spaces and dashes, which are written in many ways.
+fn plain(name: &str) -> String {
+    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+}
+
 impl Regulation {
     /// All functions there are tables of, file by file.
     pub fn all() -> Vec<Self> {
@@ -146,30 +157,45 @@ impl Regulation {
         FILES.iter().flat_map(read).collect()
     }
 
-    /// Finds a function by its name; upper and lower case, spaces and dashes do not matter, and a name that fits the beginning of others
-    /// means the first of them (`FMVSS 108 stop` is one lighted section).
+    /// Finds a function by its name; upper and lower case, spaces and dashes do not matter. The beginning of a name is enough where only
+    /// one begins so, or where those that do differ in the number of lighted sections alone: then one section is meant (`FMVSS 108 stop`).
     ///
     /// # Errors
-    /// When there is none; the message names up to twelve that begin alike.
+    /// When there is none or more than one; the message names up to twelve that begin alike.
     pub fn find(id: &str) -> Result<Self, String> {
-        let plain = |s: &str| -> String {
-            // Spaces and dashes are written in many ways.
-            s.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
-        };
         let wanted = plain(id);
         let all = Self::all();
-        let exact = all.iter().find(|r| plain(&r.id) == wanted);
-        let begins = || all.iter().find(|r| !wanted.is_empty() && plain(&r.id).starts_with(&wanted));
-        if let Some(found) = exact.or_else(begins) {
-            return Ok(found.clone());
+        if let Some(exact) = all.iter().find(|r| plain(&r.id) == wanted) {
+            return Ok(exact.clone());
+        }
+        let begin_so: Vec<&Self> =
+            all.iter().filter(|r| !wanted.is_empty() && plain(&r.id).starts_with(&wanted)).collect();
+        if let [first, others @ ..] = &begin_so[..]
+            && (others.is_empty() || begin_so.iter().all(|r| r.differs_in_sections(&wanted)))
+        {
+            return Ok((*first).clone());
+        }
+        let named = |found: &[&Self]| -> String {
+            let more = if found.len() > MOST_NAMED { " …" } else { "" };
+            let ids: Vec<&str> = found.iter().take(MOST_NAMED).map(|r| r.id.as_str()).collect();
+            format!("{}{more} (`assess --list` shows all)", ids.join(", "))
+        };
+        if !begin_so.is_empty() {
+            return Err(format!("'{id}' is the beginning of several regulations, name one: {}", named(&begin_so)));
         }
         // Five letters name a family: `unr11`, `fmvss`.
-        let family = |r: &&Self| plain(&r.id).chars().take(5).eq(wanted.chars().take(5));
-        let mut near: Vec<&str> = all.iter().filter(family).map(|r| r.id.as_str()).take(12).collect();
+        let mut near: Vec<&Self> =
+            all.iter().filter(|r| plain(&r.id).chars().take(5).eq(wanted.chars().take(5))).collect();
         if near.is_empty() {
-            near = vec!["UN R112 B passing", "UN R149-01 C passing", "UN R148-01 stop-S1", "FMVSS 108 LB2V"];
+            near = all.iter().filter(|r| EXAMPLES.contains(&r.id.as_str())).collect();
         }
-        Err(format!("no regulation is called '{id}'; there are {} … (`assess --list` shows all)", near.join(", ")))
+        Err(format!("no regulation is called '{id}'; there are {}", named(&near)))
+    }
+
+    /// Whether its name is `stem`, as [`plain`] has it, and a number of lighted sections.
+    fn differs_in_sections(&self, stem: &str) -> bool {
+        let parts = self.id.rsplit_once('-');
+        parts.is_some_and(|(own, sections)| plain(own) == stem && sections.parse::<u8>().is_ok())
     }
 
     /// Says, in a sentence for people, how far the rows were compared with a second source.
@@ -312,8 +338,24 @@ mod tests {
             ("FMVSS 108 stop", "FMVSS 108 stop-1"),
             ("fmvss108 LB2V", "FMVSS 108 LB2V"),
             ("UN R148-01 stop-S1", "UN R148-01 stop-S1"),
+            ("fmvss 108 rear turn red", "FMVSS 108 rear-turn-red-1"),
+            ("FMVSS 108 drl", "FMVSS 108 drl"),
+            ("un r148-01 rear fog f2", "UN R148-01 rear-fog-F2"),
+            ("FMVSS 108 backup-s", "FMVSS 108 backup-single"),
         ] {
             assert_eq!(Regulation::find(asked).unwrap().id, found);
+        }
+        // A wrong class would be judged without a word.
+        for (asked, named) in [
+            ("UN", "UN R112 A passing"),
+            ("UN R112", "UN R112 B passing"),
+            ("FMVSS 108 UB", "FMVSS 108 UB2"),
+            ("UN R148-01 indicator", "UN R148-01 indicator-11"),
+            ("FMVSS 108 rear-turn-amber", "FMVSS 108 rear-turn-amber-1-wide"),
+            ("FMVSS 108 front-turn-1", "FMVSS 108 front-turn-1-x1.5"),
+        ] {
+            let error = Regulation::find(asked).unwrap_err();
+            assert!(error.contains("several regulations") && error.contains(named), "{error}");
         }
         let error = Regulation::find("UN R112 X passing").unwrap_err();
         assert!(error.contains("UN R112 B passing"), "{error}");
