@@ -131,7 +131,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         limits: RefusalLimit,
     },
-    /// Look at what is built once and kept, or remove it
+    /// Look at what is built once and kept, or remove it; --cache or LAMPYRIS_CACHE must name the folder
     Cache {
         #[command(flatten)]
         folder: CacheOption,
@@ -258,7 +258,7 @@ pub(crate) struct TraceOptions {
     /// Number of parts for `--shard auto` where the launcher does not say it
     #[arg(long, value_name = "N", requires = "shard")]
     pub(crate) shards: Option<u32>,
-    /// Go on where an interrupted run stopped
+    /// Go on where an interrupted run stopped, with the same scene and options, the number of rays among them
     #[arg(long)]
     pub(crate) resume: bool,
     /// Save a long run every so many seconds, for --resume

@@ -70,8 +70,8 @@ pub(crate) struct CacheOption {
 /// Options of everything that traces.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct TracingOptions {
-    /// Number of rays, such as 1000000 or 1e6; by default what the scene says, or what suits the command. For trace also A..B: the rays
-    /// from A up to B, whose tally joins those of the rays before it
+    /// Number of rays, such as 10k, 5M, 2G, 1_000_000 or 1e6; by default what the scene says, or what suits the command; sources with
+    /// `rays` of their own keep them. For trace also A..B: the rays from A up to B, whose tally joins those of the rays before it
     #[arg(long = "rays", help_heading = "Rays", value_name = "N", value_parser = parse_ray_range, allow_hyphen_values = true)]
     pub(crate) ray_range: Option<RayRange>,
     /// Seed of all random numbers
@@ -187,7 +187,7 @@ const MOST_RAYS: f64 = 9e15;
 /// Relative error of a decimal number times a power of ten: half a unit in the last place of each factor and of the product.
 const PRODUCT_ROUNDING: f64 = 1.5 * f64::EPSILON;
 
-/// Reads a whole number from 1 to [`MOST_RAYS`]; `1e6`, `1_000_000` and `10M` are understood.
+/// Reads a whole number from 1 to [`MOST_RAYS`]; `1e6`, `1_000_000`, `10k`, `10M` and `10G` are understood.
 pub(crate) fn parse_count(text: &str) -> Result<u64, String> {
     let plain = text.replace('_', "");
     let (digits, factor) = match plain.chars().last() {
@@ -248,7 +248,10 @@ mod tests {
             (Ok(1_000_000), Ok(10_000_000), Ok(1000))
         );
         // 4.1 and 2.01 are no doubles: their products fall short of the whole number.
-        assert_eq!((parse_count("4.1M"), parse_count("2.01k")), (Ok(4_100_000), Ok(2010)));
+        assert_eq!(
+            (parse_count("4.1M"), parse_count("2.01k"), parse_count("2G")),
+            (Ok(4_100_000), Ok(2010), Ok(2_000_000_000))
+        );
         assert!(
             parse_count("-5").is_err()
                 && parse_count("0").is_err()

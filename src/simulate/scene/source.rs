@@ -57,7 +57,7 @@ pub struct Source {
     pub spectrum: Option<SpectrumKey>,
     /// Direction of the electric field of linearly polarised light, as far as each ray lets it; unpolarised without.
     pub polarised: Option<[f64; 3]>,
-    /// Number of its rays; by its share of the power otherwise.
+    /// Number of its rays, which `--rays` does not change; by its share of the power otherwise.
     #[serde(deserialize_with = "lenient::optional_count")]
     #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::count_schema"))]
     pub rays: Option<u64>,
