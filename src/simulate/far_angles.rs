@@ -66,11 +66,17 @@ mod tests {
     }
 
     #[test]
-    fn types_a_and_b_differ_off_axis() {
-        let d = Vector::new(0.5, 0.5, 0.5f64.sqrt());
-        let [h, v] = to_angles(d, FarFieldType::A);
-        assert!((v - (0.5f64).asin()).abs() < 1e-15 && (h - 0.5f64.sqrt().atan()).abs() < 1e-12 || h > v);
-        let [hb, vb] = to_angles(d, FarFieldType::B);
-        assert!((hb - v).abs() < 1e-15 && (vb - h).abs() < 1e-15);
+    fn types_a_and_b_turn_about_axes_in_opposite_order() {
+        // The formulas the other way: V of type A rises above the plane of H, H of type B leaves the plane of V.
+        let (h, v) = (0.3f64, -0.7f64);
+        let of_type_a = Vector::new(h.sin() * v.cos(), v.sin(), h.cos() * v.cos());
+        let of_type_b = Vector::new(h.sin(), h.cos() * v.sin(), h.cos() * v.cos());
+        for (d, angles, other) in
+            [(of_type_a, FarFieldType::A, FarFieldType::B), (of_type_b, FarFieldType::B, FarFieldType::A)]
+        {
+            let difference = |[a, b]: [f64; 2]| (a - h).abs().max((b - v).abs());
+            assert!(difference(to_angles(d, angles)) < 1e-15, "{angles:?}");
+            assert!(difference(to_angles(d, other)) > 0.01, "{angles:?}");
+        }
     }
 }
