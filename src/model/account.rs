@@ -45,7 +45,6 @@ impl SolidAccount {
     pub fn size_mm(&self) -> [f64; 3] {
         /// The rounding of places up to 100 m.
         const ROUNDING_MM: f64 = 1e-9;
-        // Without faces there is no box, and its sides are 0.
         let [low, high] = self.bbox_mm().unwrap_or_default();
         let side = |k: usize| high[k] - low[k];
         std::array::from_fn(|k| if side(k) < ROUNDING_MM { 0.0 } else { side(k) })

@@ -219,7 +219,6 @@ impl Cache {
                 remove(&unfinished.file)?;
             }
         }
-        // The oldest first.
         let entries = self.entries()?;
         let mut total: u64 = entries.iter().map(|e| e.bytes).sum();
         for entry in entries {

@@ -31,7 +31,6 @@ pub(super) fn draw(chart: &Chart) -> Drawing {
 /// Draws the names of series in their colours; nothing for a single one, which the title names.
 fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)]) {
     let [_, top, right, _] = AREA;
-    // A single series is named by the title.
     if names.len() < 2 {
         return;
     }

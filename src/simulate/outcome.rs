@@ -109,7 +109,7 @@ pub enum Event {
     Lost,
 }
 
-/// Things that happened.
+/// Event counts of a run or of a part of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Rays that left a source.

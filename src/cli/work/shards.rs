@@ -118,7 +118,6 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
 /// Returns the replicates of a shard (index from 0, count) of all; shards differ by one replicate at most, and may be empty.
 pub(crate) fn replicates_of_shard(all: Range<u32>, [index, count]: [u32; 2]) -> Range<u32> {
     let whole = u64::from(all.end.saturating_sub(all.start));
-    // By multiplication first: shards differ by one replicate at most.
     let first = |k: u32| all.start + (whole * u64::from(k) / u64::from(count.max(1))) as u32;
     first(index)..first(index + 1)
 }
