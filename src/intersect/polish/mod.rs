@@ -174,7 +174,7 @@ impl Intersector for Polished<'_> {
         // A root lies beside its facet's piece of the spline where the ray that found it came in flat. What the spline would be asked about
         // is left to it, so that how many these are does not depend on what was prepared.
         record.decisive_sine(ray).is_some_and(|sine| sine > 0.0)
-            && self.pieces[from.primitive as usize].holds(from.uv)
+            && self.pieces[from.primitive as usize].contains(from.uv)
             && ray.t_max - ray.t_min > SHORT_OF_SAGS * self.sag
             && !self.slabs.meet(self.mesh, from.primitive, [ray.point_at(ray.t_min); 2])
             && self.facets.escapes_spline(ray, self.sag)

@@ -10,24 +10,24 @@ const ROUNDINGS: f64 = 8.0;
 /// area.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
-    /// Of each side the numbers by which u and v are multiplied, and what the sum is above inside.
-    by_u: [f32; 4],
-    by_v: [f32; 4],
-    above: [f32; 4],
+    /// Edge functions: inside, `normal_u·u + normal_v·v` is above `offset` for every side.
+    normal_u: [f32; 4],
+    normal_v: [f32; 4],
+    offset: [f32; 4],
 }
 
 impl Piece {
-    /// Of this facet.
+    /// Returns the edge functions of a facet's corners.
     pub(super) fn of_facet(mesh: &FacetMesh, facet: usize) -> Self {
         let corners = mesh.facets[facet].vertices.map(|v| mesh.vertices[v as usize].uv);
         Self::between(corners)
     }
 
-    /// Between four places, in one or the other turn; two may be the same.
+    /// Returns the edge functions of four corners, in one or the other turn; two may be the same.
     fn between(corners: [Uv; 4]) -> Self {
         let [a, b, c, d] = corners;
         let turn = (c - a).perp_dot(d - b);
-        let mut piece = Self { by_u: [0.0; 4], by_v: [0.0; 4], above: [f32::INFINITY; 4] };
+        let mut piece = Self { normal_u: [0.0; 4], normal_v: [0.0; 4], offset: [f32::INFINITY; 4] };
         if !turn.is_finite() || turn == 0.0 {
             return piece;
         }
@@ -36,27 +36,27 @@ impl Piece {
             let (from, side) = (corners[k], corners[(k + 1) % 4] - corners[k]);
             // A side without length bounds nothing.
             if side == Uv::ZERO {
-                piece.above[k] = f32::NEG_INFINITY;
+                piece.offset[k] = f32::NEG_INFINITY;
                 continue;
             }
             let inward = side.perp() * turn.signum() / side.abs().max_element();
             let room = ROUNDINGS * f64::from(f32::EPSILON) * (inward.abs() * largest).element_sum();
-            piece.by_u[k] = inward.x as f32;
-            piece.by_v[k] = inward.y as f32;
-            piece.above[k] = (inward.dot(from) + room) as f32;
+            piece.normal_u[k] = inward.x as f32;
+            piece.normal_v[k] = inward.y as f32;
+            piece.offset[k] = (inward.dot(from) + room) as f32;
         }
         piece
     }
 
     /// Whether these parameters are known to lie in the piece.
     #[inline(always)]
-    pub(super) fn holds(&self, uv: Uv) -> bool {
+    pub(super) fn contains(&self, uv: Uv) -> bool {
         let [u, v] = uv.as_vec2().to_array();
-        let mut holds = true;
+        let mut inside = true;
         for k in 0..4 {
-            holds &= self.by_u[k] * u + self.by_v[k] * v > self.above[k];
+            inside &= self.normal_u[k] * u + self.normal_v[k] * v > self.offset[k];
         }
-        holds
+        inside
     }
 }
 
@@ -85,12 +85,12 @@ mod tests {
                 let sides: Vec<f64> = sides.map(|[from, to]| (to - from).perp_dot(place - from)).collect();
                 let is_inside = sides.iter().all(|&s| s > 0.0) || sides.iter().all(|&s| s < 0.0);
                 inside += u32::from(is_inside);
-                held += u32::from(piece.holds(place));
-                assert!(is_inside || !piece.holds(place), "{shape:?} {place}");
+                held += u32::from(piece.contains(place));
+                assert!(is_inside || !piece.contains(place), "{shape:?} {place}");
             }
             assert!(f64::from(held) > 0.9 * f64::from(inside) || origin == 1e3, "{held} of {inside}");
         }
-        assert!(!Piece::between([Uv::ONE; 4]).holds(Uv::ONE));
-        assert!(!Piece::between([Uv::ZERO, Uv::NAN, Uv::ONE, Uv::ONE]).holds(Uv::ONE));
+        assert!(!Piece::between([Uv::ONE; 4]).contains(Uv::ONE));
+        assert!(!Piece::between([Uv::ZERO, Uv::NAN, Uv::ONE, Uv::ONE]).contains(Uv::ONE));
     }
 }

@@ -62,7 +62,7 @@ impl Polished<'_> {
     /// piece, or within reach. Of a ray that came in flat the root lies beside the piece.
     #[inline(always)]
     pub(super) fn is_told(&self, facet: u32, uv: Uv, place: Point) -> bool {
-        self.pieces[facet as usize].holds(uv) || {
+        self.pieces[facet as usize].contains(uv) || {
             let [a, b, c, d] = self.mesh.corners(facet as usize);
             let distance = distance_to_triangle(place, [a, b, c]).min(distance_to_triangle(place, [a, c, d]));
             distance <= self.slabs.reach()
