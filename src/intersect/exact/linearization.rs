@@ -35,7 +35,7 @@ pub(super) struct Linearization {
 #[repr(C, align(64))]
 pub(super) struct HitLabel {
     /// The rectangle of the surface's domain: low corner and extent.
-    from: Uv,
+    low: Uv,
     extent: Uv,
     /// Error of the control points, and of derivatives got from them, mm.
     pub(super) rounding: f64,
@@ -101,10 +101,10 @@ impl HitLabel {
         let patch = &geometry.patches[leaf.patch as usize];
         let face = &geometry.faces[leaf.face as usize];
         let [u, v] = leaf.rect;
-        let (from, to) = (patch.uv([u[0], v[0]]), patch.uv([u[1], v[1]]));
+        let (low, high) = (patch.uv([u[0], v[0]]), patch.uv([u[1], v[1]]));
         Self {
-            from,
-            extent: to - from,
+            low,
+            extent: high - low,
             rounding: patch.rounding,
             sign: face.sign,
             face: face.id,
@@ -116,6 +116,6 @@ impl HitLabel {
     /// Turns local parameters of the leaf into surface parameters.
     #[inline(always)]
     pub(super) fn uv(&self, [u, v]: [f64; 2]) -> Uv {
-        self.from + self.extent * Uv::new(u, v)
+        self.low + self.extent * Uv::new(u, v)
     }
 }

@@ -5,7 +5,7 @@
 //! becomes of most of them. The bits are those of rays made one by one.
 
 use super::shape::Shape;
-use super::stream::{PACKET, PacketNumbers, Portion, sort_by_cell, sorted_dimension, unit, z_order_cell};
+use super::stream::{PACKET, PacketNumbers, Portion, midpoint_unit, sort_by_cell, sorted_dimension, z_order_cell};
 use super::{Emission, Emitter};
 use crate::math::Ray;
 use crate::math::simd::{self, Instructions, Kernel};
@@ -163,7 +163,7 @@ impl Kernel for Draw<'_> {
                     places[d % 2] = numbers;
                 }
                 for k in 0..PACKET {
-                    packet.numbers[d / 2][d % 2][k] = unit(numbers[k]);
+                    packet.numbers[d / 2][d % 2][k] = midpoint_unit(numbers[k]);
                 }
             }
         }

@@ -64,10 +64,9 @@ pub(super) fn sorted_dimension([place, direction, _]: [bool; 3]) -> Option<usize
 /// Width of the steps that a 32-bit number counts, 2⁻³².
 const STEP: f64 = 1.0 / 4_294_967_296.0;
 
-/// Returns the middle of a step of the unit interval: never 0 and never 1.
+/// Returns the middle of a step of the unit interval: never 0 and never 1, so that inversions have no end to fall off.
 #[inline(always)]
-pub(super) fn unit(number: u32) -> f64 {
-    // The middle of a step, which is neither 0 nor 1: inversions have no end to fall off.
+pub(super) fn midpoint_unit(number: u32) -> f64 {
     (f64::from(number) + 0.5) * STEP
 }
 
@@ -263,7 +262,7 @@ impl Stream {
                     *x = from[*k as usize];
                 }
                 for (x, n) in numbers.iter_mut().zip(raw) {
-                    *x = unit(n);
+                    *x = midpoint_unit(n);
                 }
             }
         }
@@ -278,7 +277,7 @@ impl Stream {
             Sampling::Random => self.random(index, pair),
             Sampling::Sobol => {
                 let k = (index.in_stream - self.first_number) as usize % CHUNK;
-                let number = |d: usize| unit(self.numbers[d][k]);
+                let number = |d: usize| midpoint_unit(self.numbers[d][k]);
                 [number(2 * pair as usize), number(2 * pair as usize + 1)]
             }
         }

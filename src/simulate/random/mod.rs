@@ -66,20 +66,20 @@ impl Key {
     /// Returns 128 random bits, a function of key and purpose alone.
     #[inline]
     pub fn words(&self, purpose: Purpose) -> [u32; 4] {
-        let (counter, key) = self.of_philox(purpose);
+        let (counter, key) = self.philox_input(purpose);
         philox4x32(counter, key)
     }
 
     /// Returns [`Key::words`], compiled with the caller's instruction set: for loops that run in vectors.
     #[inline(always)]
     pub(crate) fn words_in_loop(&self, purpose: Purpose) -> [u32; 4] {
-        let (counter, key) = self.of_philox(purpose);
+        let (counter, key) = self.philox_input(purpose);
         philox::ten_rounds(counter, key)
     }
 
     /// Returns counter and key of the generator.
     #[inline(always)]
-    fn of_philox(&self, purpose: Purpose) -> ([u32; 4], [u32; 2]) {
+    fn philox_input(&self, purpose: Purpose) -> ([u32; 4], [u32; 2]) {
         // 48 bits of the ray and 16 of the purpose share two words of the counter.
         let high = (self.ray >> 32) as u32 & 0xffff | (purpose as u32) << 16;
         ([self.ray as u32, high, self.bounce, self.branch], [self.seed as u32, (self.seed >> 32) as u32])

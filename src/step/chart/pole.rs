@@ -8,7 +8,7 @@ pub(in crate::step) struct Pole {
     /// Which parameter is constant there: 0 for u, 1 for v.
     pub(in crate::step) fixed: usize,
     /// Its value.
-    pub(in crate::step) at: f64,
+    pub(in crate::step) parameter: f64,
     /// Where the pole is, mm.
     pub(in crate::step) point: Point,
 }

@@ -79,7 +79,7 @@ impl SplineChart {
                 if self.collapsed[fixed][side] {
                     let at = domain[fixed][side];
                     let corner = if fixed == 0 { Uv::new(at, domain[1][0]) } else { Uv::new(domain[0][0], at) };
-                    poles.push(Pole { fixed, at, point: self.surface.evaluate(corner) });
+                    poles.push(Pole { fixed, parameter: at, point: self.surface.evaluate(corner) });
                 }
             }
         }

@@ -106,7 +106,7 @@ impl Chart {
                 if *half_angle != 0.0 {
                     // The apex, where the radius has shrunk to nothing.
                     let at = -radius / half_angle.tan();
-                    self.poles.push(Pole { fixed: 1, at, point: frame.point(Point::new(0.0, 0.0, at)) });
+                    self.poles.push(Pole { fixed: 1, parameter: at, point: frame.point(Point::new(0.0, 0.0, at)) });
                 }
             }
             Kind::Torus { frame, major, minor } => {
@@ -119,7 +119,7 @@ impl Chart {
                         self.range[1] = range;
                         for at in range {
                             let point = frame.point(Point::new(0.0, 0.0, minor * at.sin()));
-                            self.poles.push(Pole { fixed: 1, at, point });
+                            self.poles.push(Pole { fixed: 1, parameter: at, point });
                         }
                     }
                 }
@@ -134,7 +134,7 @@ impl Chart {
                 for (at, p) in range.into_iter().zip(ends) {
                     let q = frame.local_point(p);
                     if q.x.hypot(q.y) <= near {
-                        self.poles.push(Pole { fixed: 1, at, point: p });
+                        self.poles.push(Pole { fixed: 1, parameter: at, point: p });
                     }
                 }
                 // With poles at its ends the meridian closes through the axis, and no period joins them.

@@ -108,7 +108,7 @@ fn convert_surface(geometry: &GeometryReader<'_, '_>, id: u64, settings: &Settin
                 // A rectangle of less than a period is open there, and poles count where it ends at them.
                 if chart.period[d].is_none_or(|p| b - a < p * (1.0 - PERIOD_SLACK)) {
                     chart.period[d] = None;
-                    chart.poles.retain(|pole| pole.fixed != d || pole.at == a || pole.at == b);
+                    chart.poles.retain(|pole| pole.fixed != d || pole.parameter == a || pole.parameter == b);
                     chart.range[d] = range[d];
                 }
             }

@@ -148,7 +148,7 @@ fn bound_without_winding(
 fn is_closed(chart: &Chart) -> bool {
     (0..2).all(|d| {
         chart.period[d].is_some()
-            || chart.range[d].iter().all(|x| chart.poles.iter().any(|p| p.fixed == d && p.at == *x))
+            || chart.range[d].iter().all(|x| chart.poles.iter().any(|p| p.fixed == d && p.parameter == *x))
     })
 }
 
@@ -172,7 +172,7 @@ fn natural_boundary(chart: &Chart, holes: &[Vec<Uv>], seams: &mut Vec<[Uv; 2]>) 
     }
     let [[u0, u1], [v0, v1]] = range;
     let corner = [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)];
-    let is_pole = |fixed: usize, at: f64| chart.poles.iter().any(|p| p.fixed == fixed && p.at == at);
+    let is_pole = |fixed: usize, at: f64| chart.poles.iter().any(|p| p.fixed == fixed && p.parameter == at);
     let mut add = |a: Uv, b: Uv| {
         seams.push([a, b]);
         Source::Seam(seams.len() - 1)
@@ -248,10 +248,10 @@ fn extend_to_border(
     // The loop's mean height tells which poles and borders lie on its left.
     let mean = polygon.iter().map(|p| p[across]).sum::<f64>() / polygon.len() as f64;
     let side = |x: f64| if upper { x > mean } else { x < mean };
-    let pole = chart.poles.iter().find(|p| p.fixed == across && side(p.at));
+    let pole = chart.poles.iter().find(|p| p.fixed == across && side(p.parameter));
     let natural = chart.range[across][usize::from(upper)];
     let at = match pole {
-        Some(p) => p.at,
+        Some(p) => p.parameter,
         None if natural.is_finite() && chart.period[across].is_none() => natural,
         // Nothing closes it on its left: the loop runs the wrong way if something does on its right.
         None if chart.period[across].is_none() && may_turn && !chart.poles.is_empty() => {

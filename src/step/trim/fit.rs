@@ -96,13 +96,13 @@ impl Target<'_> {
             // At the pole itself one parameter means nothing: it goes on from two places inside.
             let slope = (second - first) / step;
             // A canal that touches itself has a pole at both ends, in one point: the one that the edge runs into is meant.
-            let off = |p: &Pole| (second[p.fixed] - p.at).abs();
+            let off = |p: &Pole| (second[p.fixed] - p.parameter).abs();
             let pole = self.poles.iter().filter(near).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(pole);
             let mut uv = first * 2.0 - second;
             for d in 0..2 {
                 uv[d] = uv[d].max(self.range[d][0]).min(self.range[d][1]);
             }
-            uv[pole.fixed] = pole.at;
+            uv[pole.fixed] = pole.parameter;
             return Ok(Node { t, uv, slope, miss });
         }
         let uv = (self.locate)(t, d.point, hint);

@@ -235,7 +235,8 @@ impl Connection<'_> {
         let reach = 4.0 * last.accuracy.max(next.accuracy).max(POLE_RESOLUTION_MM);
         let near_pole = |pole: &&Pole| (pole.point - p).length() <= reach && (pole.point - q).length() <= reach;
         // Of two in one point, as at the ends of a canal that touches itself, the one that both pieces run into.
-        let off = |pole: &Pole| (from[pole.fixed] - pole.at).abs() + (near[pole.fixed] - pole.at).abs();
+        let off =
+            |pole: &Pole| (from[pole.fixed] - pole.parameter).abs() + (near[pole.fixed] - pole.parameter).abs();
         let pole = chart.poles.iter().filter(near_pole).min_by(|a, b| off(a).total_cmp(&off(b)));
         let Some(pole) = pole else {
             let distance = (p - q).length();
@@ -248,12 +249,12 @@ impl Connection<'_> {
         };
         let free = 1 - pole.fixed;
         let same_edge = last.source == next.source;
-        let low = (last.middle()[pole.fixed] > pole.at) != turned;
+        let low = (last.middle()[pole.fixed] > pole.parameter) != turned;
         let amount = run_along_pole(pole, chart, low, start[free] - from[free], same_edge);
         let target = from[free] + amount;
         // Down to the pole, along it, and back: the first and last step are usually empty.
         let mut corner = from;
-        for (d, value) in [(pole.fixed, pole.at), (free, target), (pole.fixed, start[pole.fixed])] {
+        for (d, value) in [(pole.fixed, pole.parameter), (free, target), (pole.fixed, start[pole.fixed])] {
             let mut to = corner;
             to[d] = value;
             if (to[d] - corner[d]).abs() > EMPTY_STEP * (1.0 + value.abs()) {

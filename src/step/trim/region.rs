@@ -30,8 +30,8 @@ impl<'t, 'e> Region<'t, 'e> {
         let chart = &self.task.chart;
         let pole_here = |pole: &Pole| {
             let mut native = Uv::new(self.domain[0][0], self.domain[1][0]);
-            native[pole.fixed] = pole.at.clamp(self.domain[pole.fixed][0], self.domain[pole.fixed][1]);
-            Pole { at: self.parameters(native)[pole.fixed], ..*pole }
+            native[pole.fixed] = pole.parameter.clamp(self.domain[pole.fixed][0], self.domain[pole.fixed][1]);
+            Pole { parameter: self.parameters(native)[pole.fixed], ..*pole }
         };
         let poles: Vec<Pole> = chart.poles.iter().map(pole_here).collect();
         let target = Target {
