@@ -9,7 +9,7 @@ use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::{Ray, Vector};
 use crate::model::Model;
 use crate::simulate::{RunSettings, Scene, simulate};
-use crate::study::accuracy_target::{AccuracyPlan, AccuracyTarget, JobLight, meet_target, meet_target_for_light};
+use crate::study::accuracy_target::{AccuracyResult, AccuracyTarget, JobLight, meet_target, meet_target_for_light};
 use crate::study::{ModelMeshSource, Progress};
 
 /// How far above a surface a ray starts that left it and meets nothing more, mm: facets lie at most 0.8 mm off the surface here.
@@ -26,7 +26,7 @@ pub struct AccurateSettings {
     /// How to trace.
     pub tracing: TracingSettings,
     /// How the accuracy was reached; `None` where none was asked for.
-    pub plan: Option<AccuracyPlan>,
+    pub plan: Option<AccuracyResult>,
 }
 
 /// Finds the tolerances and normals that keep the direction error of light within so many degrees, for random rays or, with a scene, for
@@ -93,7 +93,7 @@ pub fn settings_for_accurate_facets(
     meshing: MeshingSettings,
     model: &Model,
     monitor: &dyn Monitor,
-) -> Result<(MeshingSettings, Option<AccuracyPlan>), Error> {
+) -> Result<(MeshingSettings, Option<AccuracyResult>), Error> {
     let Some(ask) = target(accuracy_deg, &meshing)? else { return Ok((meshing, None)) };
     // Readers of the facets interpolate between corners, and trace elsewhere: neither normals nor rays count.
     let ask = AccuracyTarget { kinds: vec![NormalMode::Bilinear], job_rays: 0.0, ..ask };
@@ -120,7 +120,7 @@ fn target(accuracy_deg: Option<f64>, meshing: &MeshingSettings) -> Result<Option
         let error = Error::setting("accuracy", "and the tolerance both say how fine the facets are to be");
         return Err(error.help("leave one of them out; tolerances of single parts may stand beside an accuracy"));
     }
-    let target = AccuracyTarget::degrees(degrees);
+    let target = AccuracyTarget::for_angle_deg(degrees);
     // Before the spline is built and rays are traced.
     target.check_angle().map_err(refused_angle)?;
     Ok(Some(target))

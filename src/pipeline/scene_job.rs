@@ -8,7 +8,7 @@ use super::settings::{MeshingSettings, TracingSettings};
 use crate::mesh::FacetMesh;
 use crate::model::Instancing;
 use crate::simulate::{Fingerprint, Scene};
-use crate::study::accuracy_target::AccuracyPlan;
+use crate::study::accuracy_target::AccuracyResult;
 use crate::study::default_accuracy::Chosen;
 use crate::tessellate::{self, GroupedFacets, Tessellation};
 use std::slice;
@@ -27,7 +27,7 @@ pub struct SceneJob {
     /// How it is traced.
     pub tracing: TracingSettings,
     /// How an accuracy that was asked for was reached.
-    pub accuracy: Option<AccuracyPlan>,
+    pub accuracy: Option<AccuracyResult>,
     /// What another part chose, which is taken in place of a pilot where that part is of the same run.
     pub chosen: Option<PartChoice>,
     /// Where facets and octree are kept for other runs; built anew where there is none.

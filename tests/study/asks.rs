@@ -10,7 +10,7 @@ use lampyris::pipeline::{MeshingSettings, Silent, TracingSettings, settings_for_
 use lampyris::simulate::Scene;
 use lampyris::step;
 use lampyris::study::accuracy::{Row, Settings, accuracy};
-use lampyris::study::accuracy_target::{AccuracyPlan, AccuracyTarget, TolerancePlan, meet_target};
+use lampyris::study::accuracy_target::{AccuracyResult, AccuracyTarget, TolerancePlan, meet_target};
 use lampyris::study::rays::{RaySource, Uniform};
 use lampyris::study::{FacetTree, MeasuredMesh, MeshSource, ModelMeshSource};
 use std::path::{Path, PathBuf};
@@ -93,7 +93,7 @@ impl Costs {
 }
 
 /// The 99th percentile of the error of mirrored directions, degrees, on 100,000 rays that the search has not seen.
-fn judged_again(product: &ModelMeshSource<'_>, found: &AccuracyPlan) -> f64 {
+fn judged_again(product: &ModelMeshSource<'_>, found: &AccuracyResult) -> f64 {
     let mesh = product.mesh_plan(&found.plan).mesh;
     let facets = product.build(&mesh, FacetTree::Octree, found.normals.on_facets());
     let polished = (found.normals == NormalMode::Exact).then(|| product.polish(&*facets, &mesh));
@@ -125,7 +125,7 @@ fn rays_inside_a_small_part_are_judged() {
     let tracing = TracingSettings { normals: Some(NormalMode::Bilinear), ..Default::default() };
     let asked = (MeshingSettings::default(), tracing);
     let found = settings_for_accuracy(Some(2.0), asked, Some(&scene), &ball.model, &Silent).unwrap().plan.unwrap();
-    let met = found.checked as f64 / AccuracyTarget::degrees(2.0).check_rays as f64;
+    let met = found.checked as f64 / AccuracyTarget::for_angle_deg(2.0).check_rays as f64;
     assert!(found.kept && (met - 2.0 / 3.0).abs() < 0.02, "{met} {}", found.answer);
 }
 
@@ -199,7 +199,7 @@ fn angles_that_are_none_are_refused() {
         let refused = settings_for_accuracy(Some(degrees), asked, Some(&scene), &ball.model, &Silent).unwrap_err();
         assert!(refused.to_string().contains("an angle above 0 and below 90 degrees"), "{degrees}: {refused}");
         let source = counted(&ball.model, false);
-        assert!(meet_target(&ball.model, &source, &AccuracyTarget::degrees(degrees), &|_| ()).is_err());
+        assert!(meet_target(&ball.model, &source, &AccuracyTarget::for_angle_deg(degrees), &|_| ()).is_err());
         assert!(source.facets.lock().unwrap().is_empty(), "{degrees}: refused before any work");
     }
 }
@@ -209,7 +209,7 @@ fn angles_that_are_none_are_refused() {
 fn what_no_ray_tells_is_not_known() {
     let ball = known_scenes::ball(10.0, 1.5);
     let kinds = vec![NormalMode::Bilinear];
-    let few = AccuracyTarget { check_rays: 2000, kinds, most_facets: 5000.0, ..AccuracyTarget::degrees(1.0) };
+    let few = AccuracyTarget { check_rays: 2000, kinds, most_facets: 5000.0, ..AccuracyTarget::for_angle_deg(1.0) };
     let found = meet_target(&ball.model, &counted(&ball.model, true), &few, &|_| ()).unwrap();
     assert_eq!((found.reached_deg, found.largest_deg, found.checked), (None, None, 0));
     assert!(found.flips > 0 && !found.kept && found.answer.contains("not known"), "{}", found.answer);
@@ -219,7 +219,7 @@ fn what_no_ray_tells_is_not_known() {
 #[test]
 fn a_search_ends_with_the_best_of_so_many_facets() {
     let ball = known_scenes::ball(10.0, 1.5);
-    let hard = AccuracyTarget { check_rays: 2000, ..AccuracyTarget::degrees(1e-6) };
+    let hard = AccuracyTarget { check_rays: 2000, ..AccuracyTarget::for_angle_deg(1e-6) };
     let source = counted(&ball.model, false);
     let kinds = vec![NormalMode::Flat, NormalMode::Bilinear];
     let most_facets = 5000.0;
@@ -258,7 +258,7 @@ fn asks_are_reached_and_cost_little_more_than_the_cheapest_combination() {
             let found = meet_target(
                 &model,
                 &product,
-                &AccuracyTarget { job_rays: JOB, ..AccuracyTarget::degrees(degrees) },
+                &AccuracyTarget { job_rays: JOB, ..AccuracyTarget::for_angle_deg(degrees) },
                 &|_| (),
             )
             .unwrap();

@@ -108,7 +108,7 @@ fn an_angle_asked_for_is_reached() {
     let model = read_model(&path).expect("fixtures are readable");
     let product = ModelMeshSource::new(&model);
     for degrees in [0.5, 0.02] {
-        let ask = AccuracyTarget { check_rays: 20_000, ..AccuracyTarget::degrees(degrees) };
+        let ask = AccuracyTarget { check_rays: 20_000, ..AccuracyTarget::for_angle_deg(degrees) };
         let found = meet_target(&model, &product, &ask, &|_| ()).unwrap();
         assert!(found.kept && found.reached_deg.unwrap() <= degrees && found.checked > 1000, "{found:?}");
     }

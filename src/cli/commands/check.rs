@@ -26,7 +26,7 @@ use crate::pipeline::{
 };
 use crate::report::{CheckReport, figures, grouped, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
-use crate::study::accuracy_target::AccuracyPlan;
+use crate::study::accuracy_target::AccuracyResult;
 use crate::study::cross_check::{self, CrossCheck};
 use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::receivers::PowerComparison;
@@ -201,7 +201,7 @@ fn json_document(
     found: &CrossCheck,
     normals: NormalMode,
     receivers: Option<&[PowerComparison]>,
-    reached: Option<&AccuracyPlan>,
+    reached: Option<&AccuracyResult>,
 ) -> Result<Value, Failure> {
     let mut document = json_value(found)?;
     document["normals"] = normals.to_string().into();

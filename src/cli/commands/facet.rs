@@ -70,7 +70,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
             #[serde(skip_serializing_if = "Option::is_none")]
             baseline: Option<Baseline>,
             #[serde(skip_serializing_if = "Option::is_none")]
-            accuracy: Option<crate::study::accuracy_target::AccuracyPlan>,
+            accuracy: Option<crate::study::accuracy_target::AccuracyResult>,
         }
         let both = Both { report: &made.report, baseline, accuracy: reached };
         print(&json_text(&both)?)?;

@@ -27,7 +27,7 @@ const MOST_FACETS: f64 = 6e6;
 #[derive(Clone, Debug, PartialEq)]
 pub struct AccuracyTarget {
     /// Direction error that 99 % of the rays must keep, mirrored and, where a face is known to let light through, refracted; degrees.
-    pub degrees: f64,
+    pub angle_deg: f64,
     /// Rays that the job will trace: a long job pays for finer facets or faster normals differently than a short one; 0 when only
     /// the facets are wanted.
     pub job_rays: f64,
@@ -47,23 +47,23 @@ impl AccuracyTarget {
     /// # Errors
     /// When it is not above 0 and below 90 degrees; the message says so.
     pub fn check_angle(&self) -> Result<(), String> {
-        if self.degrees > 0.0 && self.degrees < 90.0 {
+        if self.angle_deg > 0.0 && self.angle_deg < 90.0 {
             return Ok(());
         }
-        Err(format!("{}: an angle above 0 and below 90 degrees is needed, as 0.05", self.degrees))
+        Err(format!("{}: an angle above 0 and below 90 degrees is needed, as 0.05", self.angle_deg))
     }
 
     /// Returns the defaults for an angle: a job of a million rays, checked on 100,000, and meshes that take a minute and a half of one
     /// core.
-    pub fn degrees(degrees: f64) -> Self {
+    pub fn for_angle_deg(angle_deg: f64) -> Self {
         let kinds = vec![NormalMode::Flat, NormalMode::Bilinear, NormalMode::Cubic, NormalMode::Exact];
-        Self { degrees, job_rays: 1e6, check_rays: 100_000, kinds, most_facets: MOST_FACETS, seed: 1 }
+        Self { angle_deg, job_rays: 1e6, check_rays: 100_000, kinds, most_facets: MOST_FACETS, seed: 1 }
     }
 }
 
-/// What to do.
+/// Outcome of the search: the settings chosen and the error they reached.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct AccuracyPlan {
+pub struct AccuracyResult {
     /// Error that was asked for, degrees.
     pub asked_deg: f64,
     /// Reached on fresh rays (p99), degrees; `None` where none met the same face on facets and spline.

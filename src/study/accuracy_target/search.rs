@@ -3,7 +3,7 @@
 use super::direction_error::error_of_hit;
 use super::solution::Solution;
 use super::survey::{Survey, p99, tolerance_factor};
-use super::{AccuracyPlan, AccuracyTarget, Trial};
+use super::{AccuracyResult, AccuracyTarget, Trial};
 use crate::intersect::{Hit, NormalMode};
 use crate::math::{Aabb, FaceId, Ray};
 use crate::model::Model;
@@ -56,7 +56,7 @@ pub fn meet_target(
     mesh_source: &dyn MeshSource,
     target: &AccuracyTarget,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<AccuracyPlan, String> {
+) -> Result<AccuracyResult, String> {
     // Of the surfaces, not of facets: there are none yet.
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
     let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
@@ -80,7 +80,7 @@ pub fn meet_target_for_light(
     target: &AccuracyTarget,
     light: JobLight<'_>,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<AccuracyPlan, String> {
+) -> Result<AccuracyResult, String> {
     target.check_angle()?;
     let start = Instant::now();
     let clock = Clock::new(progress);
@@ -135,8 +135,8 @@ pub fn meet_target_for_light(
     let kept = found.is_kept(target);
     let [low, high] = found.plan.tolerance_mm();
     let answer = found.answer_sentence(target, search.gave_up.get());
-    Ok(AccuracyPlan {
-        asked_deg: target.degrees,
+    Ok(AccuracyResult {
+        asked_deg: target.angle_deg,
         reached_deg: found.reached,
         largest_deg: found.largest,
         kept,
@@ -261,7 +261,7 @@ impl Search<'_> {
     /// corrects it once by what pilots on those facets measure; forecasts the facets and the seconds of the run.
     fn candidate(&self, normals: NormalMode, local: bool) -> Candidate {
         let order = if normals == NormalMode::Flat || normals == NormalMode::Nearest { 0.5 } else { 1.0 };
-        let epsilon = (MARGIN * self.target.degrees).to_radians();
+        let epsilon = (MARGIN * self.target.angle_deg).to_radians();
         let range = [FINEST * self.coarse, COARSEST_FACTOR * self.coarse];
         let mut plan = match normals {
             // On the true normals no tolerance is needed for the angle: facets only find the face.
@@ -279,7 +279,7 @@ impl Search<'_> {
         let mut facets = m.made.len() as f64;
         // The pilots measured the coarser plan: their errors are judged against what that one should give.
         if normals != NormalMode::Exact {
-            let expected = self.target.degrees * MARGIN * coarser.powf(order);
+            let expected = self.target.angle_deg * MARGIN * coarser.powf(order);
             plan = pilot.clone();
             self.survey.adapt(&mut plan, &m.errors, expected, order);
             plan.scale(1.0 / coarser);
@@ -344,7 +344,7 @@ impl Search<'_> {
             });
             let good = found.is_accepted(self.target);
             // Reached far too well at a cost that counts: coarser facets are worth another try, twice.
-            let far_within = reached.is_some_and(|reached| reached < 0.6 * self.target.degrees);
+            let far_within = reached.is_some_and(|reached| reached < 0.6 * self.target.angle_deg);
             let wasteful = far_within && attempt < 2 && found.prepare > 0.2 * found.seconds();
             let was_good = best.as_ref().is_some_and(|b| b.is_accepted(self.target));
             let better = |b: &Solution| match (good, was_good) {
@@ -361,7 +361,7 @@ impl Search<'_> {
             // Without an angle there is nothing to go by.
             let Some(reached) = reached else { break };
             // Along the law of the error in the sag.
-            let growth = tolerance_factor(reached, MARGIN * self.target.degrees, candidate.order);
+            let growth = tolerance_factor(reached, MARGIN * self.target.angle_deg, candidate.order);
             if m.made.len() as f64 / growth > self.affordable() {
                 self.gave_up.set(true);
                 break;

@@ -35,12 +35,12 @@ impl Solution {
 
     /// Whether the 99th percentile is within what is asked.
     pub(super) fn is_kept(&self, target: &AccuracyTarget) -> bool {
-        self.is_within(target.degrees)
+        self.is_within(target.angle_deg)
     }
 
     /// Whether it is with enough to spare for other rays than these.
     pub(super) fn is_accepted(&self, target: &AccuracyTarget) -> bool {
-        self.is_within(ACCEPTED * target.degrees)
+        self.is_within(ACCEPTED * target.angle_deg)
     }
 
     /// Whether it errs less than another; what is not known is the worst.
@@ -89,7 +89,7 @@ impl Solution {
         };
         format!(
             "Asked {}°, {reached} with {} normals on {} facets within {range}{shortfall}.",
-            target.degrees, self.normals, self.facets
+            target.angle_deg, self.normals, self.facets
         )
     }
 }
