@@ -120,13 +120,14 @@ pub fn verdict(check: &CrossCheck) -> String {
         ),
         n => format!("**{} differences from the exact spline are unexplained**", grouped(n)),
     };
-    format!("Of {} rays asked again, {between}, and {beside}.", grouped(check.rays))
+    format!("Of {} ray segments checked, {between}, and {beside}.", grouped(check.rays))
 }
 
-/// Makes a table of all counts of rays: asked, hit, answered differently, explained by which cause, proved.
+/// Makes a table of all counts of ray segments: asked, hit, answered differently, explained by which cause, proved.
 pub(super) fn count_table(check: &CrossCheck) -> Table {
     let (f, e) = (&check.facets_vs_exact, &check.facets_vs_exact.explained);
-    let mut table = Table::new("cross-check", "The same rays, three intersectors", &[("", ""), ("rays", "")]);
+    let mut table =
+        Table::new("cross-check", "The same ray segments, three intersectors", &[("", ""), ("ray segments", "")]);
     for (name, count) in [
         ("asked", check.rays),
         ("hit the facets", check.hits),
