@@ -2,6 +2,7 @@
 
 use super::contour::{Isoline, isolines, round_levels};
 use super::figures;
+use super::number::unit_in_words;
 use crate::formats::{Axis, ColourMap, Grid, Picture};
 
 /// A picture in two dimensions: interactive in the page, static beside it.
@@ -157,7 +158,11 @@ impl AxisStyle {
 
     /// Returns label and unit as written at the axis; the label alone for pure numbers.
     pub fn title(&self) -> String {
-        if self.unit.is_empty() { self.label.clone() } else { format!("{} ({})", self.label, self.unit) }
+        if self.unit.is_empty() {
+            self.label.clone()
+        } else {
+            format!("{} ({})", self.label, unit_in_words(&self.unit))
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Both errors of every figure, for people: what stands behind a ±, what limits the answer, what the next halving costs.
 
 use super::maps::spoken;
-use super::number::unit_in_words;
+use super::number::{unit_in_words, with_unit};
 use super::{Cell, Table, figures, grouped, seconds};
 use crate::intersect::NormalMode;
 use crate::simulate::{Absorbed, Results};
@@ -94,7 +94,7 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
         parts.push(format!("its brightest place changes by {} %", figures(share, 2)));
     }
     let widths = |pick: fn(&Paired) -> f64| {
-        format!("{} × {} {}", figures(pick(&r.width[0]), 3), figures(pick(&r.width[1]), 3), r.unit)
+        format!("{} × {}", figures(pick(&r.width[0]), 3), with_unit(&figures(pick(&r.width[1]), 3), r.unit))
     };
     if is_limit(&r.rms[0], f.rms_1.as_ref()) || is_limit(&r.rms[1], f.rms_2.as_ref()) {
         let [on_facets, on_spline] = [widths(|p| p.facets), widths(|p| p.spline)];
@@ -104,7 +104,7 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
     // Where power or width changed, that the middle moved goes without saying.
     if moved && parts.is_empty() {
         let by = [0, 1].map(|a| figures(r.centroid[a].facets - r.centroid[a].spline, 2));
-        parts.push(format!("the light is moved by {} and {} {}", by[0], by[1], r.unit));
+        parts.push(format!("the light is moved by {} and {}", by[0], with_unit(&by[1], r.unit)));
     }
     // Only where nothing else was found: it says least of what is wrong.
     if parts.is_empty() && r.map.geometric > 3.0 * r.map.noise && r.map.geometric > r.map.statistical {
@@ -284,8 +284,8 @@ pub(super) fn change_table(error: &GeometricError, results: &Results, unit: &str
             row(format!("max{over}"), &r.peak, &unit_in_words(result.unit));
         }
         if !r.unit.is_empty() {
-            row("width 1".into(), &r.width[0], r.unit);
-            row("width 2".into(), &r.width[1], r.unit);
+            row("width 1".into(), &r.width[0], &unit_in_words(r.unit));
+            row("width 2".into(), &r.width[1], &unit_in_words(r.unit));
         }
     }
     table

@@ -2,7 +2,7 @@
 
 use super::even_poles::is_all_around;
 use super::framing::{LIT_PART_SHOWN, lit_part};
-use super::number::unit_in_words;
+use super::number::{unit_in_words, with_unit};
 use super::peak_lines::lines_through_peak;
 use super::{AxisStyle, Chart, Series, SeriesStyle, figures};
 use crate::formats::file_stem;
@@ -165,21 +165,19 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
             return "No light came here. ".to_owned();
         }
         format!(
-            "Peak {} {} at {} {} {}, {} {} {}. ",
+            "Peak {} {} at {} {}, {} {}. ",
             figures(value, 3),
             grid.unit,
             grid.axes[0].label,
-            figures(x, 3),
-            grid.axes[0].unit,
+            with_unit(&figures(x, 3), &grid.axes[0].unit),
             grid.axes[1].label,
-            figures(y, 3),
-            grid.axes[1].unit
+            with_unit(&figures(y, 3), &grid.axes[1].unit)
         )
     });
     let error = grid.error.as_ref().and_then(|errors| light_weighted_error(&grid.values, errors)).map(|share| {
         format!("Statistical error of a cell, weighted by its light: {} %. ", figures(100.0 * share, 2))
     });
-    let steps = grid.axes.each_ref().map(|axis| format!("{} {}", figures(axis.step(), 3), axis.unit));
+    let steps = grid.axes.each_ref().map(|axis| with_unit(&figures(axis.step(), 3), &axis.unit));
     let size = if steps[0] == steps[1] { steps[0].clone() } else { steps.join(" × ") };
     let cells = format!("{} × {} cells of {size}.", r.grid[0], r.grid[1]);
     [peak, error, Some(cells)].into_iter().flatten().collect()

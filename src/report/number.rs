@@ -63,9 +63,15 @@ pub(super) fn counted(value: f64, noun: &str) -> String {
     format!("{number} {noun}{end}")
 }
 
-/// Writes a unit of the results for people: `W/m²` for `W/m2`.
+/// Writes a unit of the results for people: `W/m²` for `W/m2`, `°` for `deg`.
 pub(super) fn unit_in_words(unit: &str) -> String {
-    unit.replace("m2", "m²")
+    if unit == "deg" { "°".into() } else { unit.replace("m2", "m²") }
+}
+
+/// Writes a number, or what stands for one, with its unit for people: `0.5°`, `0.5 mm`.
+pub(super) fn with_unit(number: &str, unit: &str) -> String {
+    let space = if unit == "deg" { "" } else { " " };
+    format!("{number}{space}{}", unit_in_words(unit))
 }
 
 /// Writes a duration given in seconds: `1.23 s`, `45 ms`, `2 min 5 s`; a dash where it is not finite.

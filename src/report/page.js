@@ -13,6 +13,8 @@
   const themed = (layout) => {
     const c = colours();
     layout.paper_bgcolor = layout.plot_bgcolor = "rgba(0,0,0,0)";
+    // Thousands set apart as in the tables and texts, from five digits on.
+    layout.separators = ".\u202f";
     layout.font = { color: c.fg, family: "system-ui, sans-serif", size: narrow() ? 11 : 13 };
     layout.hoverlabel = Object.assign(layout.hoverlabel || {}, { bgcolor: c.card, bordercolor: c.line, font: { color: c.fg } });
     for (const key of ["xaxis", "yaxis"]) if (layout[key]) Object.assign(layout[key], { gridcolor: c.line, zerolinecolor: c.line, linecolor: c.line });

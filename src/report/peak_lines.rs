@@ -2,13 +2,14 @@
 
 use super::even_poles::is_all_around;
 use super::figures;
+use super::number::with_unit;
 use crate::formats::Grid;
 
 /// A line of cells.
 pub(super) struct Line {
     /// Which way it runs: `along H`, `in the plane C 5°`.
     pub name: String,
-    /// Where it crosses the other axis: ` at V = 3 deg`; empty for a plane, which its name tells.
+    /// Where it crosses the other axis: ` at V = 3°`; empty for a plane, which its name tells.
     pub place: String,
     /// Distance of two of its cells, in units of its axis.
     pub step: f64,
@@ -27,7 +28,7 @@ pub(super) fn lines_through_peak(grid: &Grid) -> Option<[Line; 2]> {
     if !is_all_around(grid) {
         let line = |[axis, fixed]: [&crate::formats::Axis; 2], at: usize, cells| Line {
             name: format!("along {}", axis.label),
-            place: format!(" at {} = {} {}", fixed.label, figures(fixed.center(at), 3), fixed.unit),
+            place: format!(" at {} = {}", fixed.label, with_unit(&figures(fixed.center(at), 3), &fixed.unit)),
             step: axis.step(),
             cells,
             positions: (0..axis.cells).map(|k| axis.center(k)).collect(),

@@ -5,7 +5,9 @@ use super::chart::{
 };
 use super::legend::legend_name;
 use super::map_labels::{LevelLabel, MapLabels, POINT_RADIUS, map_labels};
-use super::plotly_data::{colour_scale, css, doubles, indices, lighting, plain, singles, text_position};
+use super::plotly_data::{
+    colour_scale, css, doubles, hover_place, indices, lighting, plain, singles, text_position,
+};
 use super::raster::{EYE, common_range};
 use super::view::{Shape, View};
 use crate::formats::{Axis, Picture, base64};
@@ -39,7 +41,7 @@ fn axis(style: &AxisStyle, values: impl Iterator<Item = f64>) -> Value {
         _ => json!("D2"),
     };
     json!({"dtick": step, "title": {"text": style.title()}, "type": if style.log { "log" } else { "linear" },
-        "automargin": true, "separatethousands": true, "exponentformat": if style.log { "power" } else { "none" }})
+        "automargin": true, "exponentformat": if style.log { "power" } else { "none" }})
 }
 
 /// Returns a chart as plotly's figure: an object with `data` and `layout`.
@@ -62,10 +64,7 @@ pub(super) fn chart(chart: &Chart) -> Value {
             let [a, b] = &grid.axes;
             let bytes: Vec<u8> = grid.values.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect();
             let z = json!({"dtype": "f4", "bdata": base64(&bytes), "shape": format!("{}, {}", b.cells, a.cells)});
-            let hover = format!(
-                "{} %{{x:.4g}} {}<br>{} %{{y:.4g}} {}<br><b>%{{z:.4g}} {}</b><extra></extra>",
-                a.label, a.unit, b.label, b.unit, grid.unit
-            );
+            let hover = format!("{}<br><b>%{{z:.4g}} {}</b><extra></extra>", hover_place(&grid.axes), grid.unit);
             // As in the static picture: plotly's own scale begins at the darkest cell, black however bright that is.
             let [low, high] = grid.colour_range();
             let heat = json!({"type": "heatmap", "z": z, "x0": a.center(0), "dx": a.step(), "y0": b.center(0),
@@ -187,7 +186,7 @@ fn picture_trace(axes: &[Axis; 2], picture: &Picture) -> (Vec<Value>, Value) {
     let source = upside_down(picture).to_png().map(|bytes| format!("data:image/png;base64,{}", base64(&bytes)));
     let image = json!({"type": "image", "source": source.ok(), "x0": a.center(0), "dx": a.step(),
         "y0": b.center(0), "dy": b.step(),
-        "hovertemplate": format!("{} %{{x:.4g}} {}<br>{} %{{y:.4g}} {}<extra></extra>", a.label, a.unit, b.label, b.unit)});
+        "hovertemplate": format!("{}<extra></extra>", hover_place(axes))});
     let anchor = if have_equal_units(axes) { json!("x") } else { json!(false) };
     let layout = json!({"yaxis": {"autorange": true, "scaleanchor": anchor, "constrain": "domain"},
         "xaxis": {"constrain": "domain"}, "showlegend": false});

@@ -1,8 +1,15 @@
 //! Numbers, colours, light and texts as plotly.js takes them. Arrays go in as base64 of their bytes (`bdata`), a quarter of the size of
 //! decimal text.
 
-use crate::formats::{ColourMap, base64};
+use super::number::with_unit;
+use crate::formats::{Axis, ColourMap, base64};
 use serde_json::{Value, json};
+
+/// Returns what plotly says of a place on a map: a line for each axis.
+pub(super) fn hover_place([a, b]: &[Axis; 2]) -> String {
+    let [x, y] = [("%{x:.4g}", a), ("%{y:.4g}", b)].map(|(number, axis)| with_unit(number, &axis.unit));
+    format!("{} {x}<br>{} {y}", a.label, b.label)
+}
 
 /// Packs numbers as plotly's typed array of single precision.
 pub(super) fn singles(values: impl Iterator<Item = f32>) -> Value {

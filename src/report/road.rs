@@ -71,7 +71,8 @@ fn chart(name: &str, title: &str, caption: &str, axes: [Axis; 2], value: impl Fn
 
 /// Draws the road from above, lx, with isolux lines; `name` begins the names of its files, `aim` is added to H and V, degrees.
 pub(super) fn from_above(name: &str, grid: &Grid, aim: [f64; 2]) -> Chart {
-    let axes = [axis("aside", "m", [-ASIDE_M, ASIDE_M], SQUARE_M), axis("ahead", "m", AHEAD_M, SQUARE_M)];
+    let axes =
+        [axis("lateral", "m", [-ASIDE_M, ASIDE_M], SQUARE_M), axis("distance ahead", "m", AHEAD_M, SQUARE_M)];
     let caption = format!(
         "One lamp {LAMP_HEIGHT_M} m above a level road, aimed as measured; illuminance of the road's plane. Where the far field ends the \
          road is drawn dark."
