@@ -99,6 +99,7 @@ impl SimulationReport<'_> {
     pub fn answer(&self) -> String {
         let r = self.results;
         let mut text = format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit);
+        // Parted by semicolons: what passes a receiver is counted by the next one too, so that shares need not add up.
         let parts: Vec<String> = (r.receivers.iter().zip(self.figures))
             .map(|(x, f)| {
                 let power = errors::with_errors(&f.power, 4);
@@ -106,7 +107,7 @@ impl SimulationReport<'_> {
                 format!("**{power}** ({}) reach {}{channels}", self.share(x.power), spoken(&x.name))
             })
             .collect();
-        text += &if parts.is_empty() { "none is counted by a receiver".into() } else { parts.join(", ") };
+        text += &if parts.is_empty() { "none is counted by a receiver".into() } else { parts.join("; ") };
         text += ". ";
         let directions = r.receivers.iter().zip(self.figures).filter(|(x, _)| x.kind == "far_field");
         let brightest: Vec<_> =
@@ -121,9 +122,9 @@ impl SimulationReport<'_> {
                 text += &format!(
                     "The brightest direction{of} is {} {}°, {} {}° with **{}**. ",
                     grid.axes[0].label,
-                    figures(h, 2),
+                    figures(h, 3),
                     grid.axes[1].label,
-                    figures(v, 2),
+                    figures(v, 3),
                     errors::with_errors(max, 3)
                 );
             }
@@ -330,8 +331,8 @@ impl SimulationReport<'_> {
 
     /// Makes the section on rays of this run that all intersectors were asked.
     fn cross_check(&self, check: &CrossCheck) -> Section {
-        let text = "A sample of the very rays of this run, asked again of the octree, of obvhs' BVH over the same facets and of the \
-            certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
+        let text = "A sample of the very ray segments of this run, asked again of the octree, of obvhs' BVH over the same facets and of \
+            the certified spline intersector. A ray that left a surface starts a few times the tolerance above it, so that all three are \
             asked the same question.";
         let section = Section::new("Cross-check")
             .with_block(text)
