@@ -156,6 +156,33 @@ fn what_an_interrupted_run_saved_is_not_written_over() {
     }
 }
 
+/// The number of rays decides no bit of a ray of a run that grows, but a run of other rays cannot go on from what is saved.
+#[test]
+fn a_saved_run_goes_on_with_its_own_rays_alone() {
+    let folder = lens(|s| s);
+    let path = folder.path();
+    let mut child = saving_run(path);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let saved = path.join("out/checkpoint.tally");
+    let before = fs::read(&saved).unwrap();
+    let resume = ["trace", "scene.toml", "-o", "out", "--resume", "--json"];
+    // Fewer, more, and the scene's own.
+    for rays in ["640000", "6e6", "20000"] {
+        let (code, _, err) = lampyris_in(path, &[&resume[..], &["--rays", rays]].concat());
+        let err = err.replace('\n', " ");
+        assert!(code == 2 && err.contains("--rays 3000000 or leave it out"), "{rays}: {code} {err}");
+        assert!(!err.contains("tracing") && fs::read(&saved).unwrap() == before, "{rays}: {err}");
+    }
+    let (code, out, err) = lampyris_in(path, &resume);
+    assert!(code == 0 && err.contains("going on from"), "{code} {err}");
+    let document: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(document["rays"], 3_000_000);
+    // The command that is recorded can be typed again for the same rays.
+    let command = document["provenance"]["command"].as_str().unwrap();
+    assert!(command.contains("--rays 3000000"), "{command}");
+}
+
 #[test]
 fn a_folder_has_one_owner_at_a_time() {
     let folder = lens(|s| s);

@@ -78,7 +78,7 @@ pub(crate) fn run(
         // What is left of the time of both.
         say_step("check", what, both - s.build - s.trace);
     }
-    let remarks = RunRemarks { sentences: reference_comparison(r), target: None };
+    let remarks = RunRemarks { sentences: reference_comparison(r), ..RunRemarks::default() };
     let start = std::time::Instant::now();
     let (document, answer) = results_folder::write(&prepared, folder, &mut run, &remarks, with_page, console)?;
     write_atomic(&folder.join(MODEL_NAME), |w| w.write_all(LAMP))?;

@@ -9,7 +9,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::closing;
 use crate::cli::output::json::json_text;
 use crate::cli::work::cache_folder;
-use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, refuse_overwriting};
+use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, continued_settings, refuse_overwriting};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::{OutputPlace, folder_of, require_space, try_file};
 use crate::cli::work::path_file::PathFile;
@@ -50,8 +50,9 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let shard =
         extra.shard.as_deref().map(|text| shards::requested_shard(text, extra.shards, console)).transpose()?;
     let replay = replay::parse_request(&extra.replay)?;
+    let tracing = tracing_settings(command, shard)?;
     // A range of rays is part of a run that grows: its tally joins those of the other rays.
-    let is_range = command.tracing.ray_range.is_some_and(|range| range.first.is_some());
+    let is_range = tracing.ray_range.is_some_and(|range| range.first.is_some());
     if is_range {
         ray_range::refuse_options(extra)?;
     }
@@ -59,7 +60,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
     // Reading is done by these threads too.
-    set_threads(command.tracing.threads)?;
+    set_threads(tracing.threads)?;
     let monitor = TerminalMonitor::new(console);
     let cache = cache_folder::cache(&extra.cache)?;
     let (mut scene, loaded) = read_cached_scene(command.scene, cache.as_ref(), &monitor)?;
@@ -79,7 +80,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         return Err(Failure::arguments(message)
             .with_help("give --tolerance and --normals with --shard, --resume and --rays A..B"));
     }
-    let requested = (command.meshing.clone(), command.tracing.clone());
+    let requested = (command.meshing.clone(), tracing);
     let AccurateSettings { meshing, tracing, plan } =
         settings_for_accuracy(accuracy, requested, Some(&scene), &loaded.model, &monitor)?;
     let job = SceneJob {
@@ -112,6 +113,26 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         None => trace_whole(&mut prepared, command, target.as_ref(), console)?,
     };
     Ok(done.and(refused))
+}
+
+/// Returns what is asked of the rays, with `--resume` those of the run that is saved; `shard` is its part, as index from 0 and count.
+///
+/// # Errors
+/// When other rays are asked for than the saved run has.
+fn tracing_settings(command: &TraceCommand, shard: Option<[u32; 2]>) -> Result<TracingSettings, Failure> {
+    let TraceCommand { folder, ref tracing, extra, .. } = *command;
+    // A search goes through runs of several lengths, and --rays is the most of them.
+    let is_search = extra.until_error.is_some() || extra.until_settled;
+    if !extra.resume || is_search {
+        return Ok(tracing.clone());
+    }
+    let range = tracing.ray_range.filter(|range| range.first.is_some());
+    let file = match shard.or(range.map(|_| [0, 1])) {
+        Some(shard) => shards::shard_file(folder, shard, range),
+        None if shards::is_tally(folder) => folder.to_path_buf(),
+        None => folder.join(CHECKPOINT),
+    };
+    continued_settings(&file, tracing)
 }
 
 /// Refuses outputs that would replace the scene or a file that it names; `has_results` says whether results are among them.
@@ -178,7 +199,8 @@ fn trace_whole(
         _ => Ok(()),
     };
     say_verification(&run, console)?;
-    let remarks = RunRemarks::say_target(result, console);
+    let remarks =
+        RunRemarks { first_command: checkpoint.first_command(), ..RunRemarks::say_target(result, console) };
     let written = results_folder::write(prepared, folder, &mut run, &remarks, with_page, console);
     let (document, answer) = match written {
         Ok(written) => written,

@@ -7,7 +7,8 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::machine;
 use crate::formats::{read_bytes, write_atomic};
-use crate::pipeline::PreparedScene;
+use crate::pipeline::{PreparedScene, RayRange, TracingSettings};
+use crate::report::grouped;
 use crate::simulate::PartialRun;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
@@ -28,8 +29,8 @@ pub(crate) struct Checkpoint<'a> {
     every: Duration,
     /// When it was saved last, or made.
     last: Mutex<Instant>,
-    /// What earlier processes took for the run.
-    earlier: Mutex<Usage>,
+    /// The head of what an earlier process left of the run, where this one goes on with it.
+    earlier: Mutex<Option<TallyHeader>>,
     pub(crate) console: &'a Console,
 }
 
@@ -83,16 +84,28 @@ impl<'a> Checkpoint<'a> {
         let expected = self.prepared.fingerprint()?.0;
         let same = |h: &TallyHeader| {
             if h.fingerprint == expected {
-                *self.earlier() = h.usage.clone();
+                *self.earlier() = Some(h.clone());
                 Ok(())
             } else {
                 Err(format!("it was left by another run: {}", h.command))
             }
         };
-        PartialRun::read(&bytes, same, &self.prepared.bound).map(Some).map_err(|m| {
+        let refuse = |m: String| {
             Failure::arguments(format!("{}: cannot go on from here: {m}", self.file.display()))
                 .with_help("run with the same scene, files, options and program, or into another place with -o")
-        })
+        };
+        let saved = PartialRun::read(&bytes, same, &self.prepared.bound).map_err(refuse)?;
+        // The fingerprint of a run that grows leaves its length open: a longer or shorter one would add up to no run.
+        let [there, asked] = [saved.replicates, self.prepared.replicate_range().end];
+        if there != asked {
+            return Err(refuse(format!("it is of a run of {there} replicates, and this one has {asked}")));
+        }
+        Ok(Some(saved))
+    }
+
+    /// Returns the command that began the run, where this one goes on with it: `None` where nothing was read of an earlier one.
+    pub(crate) fn first_command(&self) -> Option<String> {
+        self.earlier().as_ref().map(|header| header.command.clone())
     }
 
     /// Reads what an interrupted run left behind, and says how much that is.
@@ -137,16 +150,20 @@ impl<'a> Checkpoint<'a> {
         Ok(write_atomic(&self.file, |w| sum.write(&header, w))?)
     }
 
-    /// Locks what earlier processes took for this run.
-    fn earlier(&self) -> MutexGuard<'_, Usage> {
+    /// Locks the head of what an earlier process left.
+    fn earlier(&self) -> MutexGuard<'_, Option<TallyHeader>> {
         self.earlier.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Returns the header with what the run took so far, earlier processes included.
+    /// Returns the header with what the run took so far, earlier processes included, and the command that began it.
     fn header_now(&self) -> TallyHeader {
-        let wall = self.console.started.elapsed().as_secs_f64();
-        // A run that goes on counts what it took before.
-        self.header.with_usage(Usage::of_process(wall).continue_from(&self.earlier()))
+        let usage = Usage::of_process(self.console.started.elapsed().as_secs_f64());
+        let earlier = self.earlier();
+        let Some(earlier) = earlier.as_ref() else { return self.header.with_usage(usage) };
+        // A run that goes on counts what it took before, and is the run that was asked for first.
+        let mut header = self.header.with_usage(usage.continue_from(&earlier.usage));
+        header.command.clone_from(&earlier.command);
+        header
     }
 
     /// Saves the run in its own file or, where that cannot be written, in a new one wherever one can be; returns the file.
@@ -186,6 +203,46 @@ impl<'a> Checkpoint<'a> {
     }
 }
 
+/// Returns the settings of a run that goes on from `file`: those that are `asked` for, with the saved number of rays or range where none is
+/// asked; unchanged where no run is saved there.
+///
+/// # Errors
+/// When other rays are asked for than those of the saved run.
+pub(crate) fn continued_settings(file: &Path, asked: &TracingSettings) -> Result<TracingSettings, Failure> {
+    // What cannot be read is refused when all of it is, with its reason.
+    let Some(header) = saved_header(file) else { return Ok(asked.clone()) };
+    let saved = header.ray_range();
+    match asked.ray_range {
+        None => Ok(TracingSettings { ray_range: header.tracing().ray_range, ..asked.clone() }),
+        Some(range) if range == saved => Ok(asked.clone()),
+        Some(range) => {
+            let [saved_rays, asked_rays] = [saved, range].map(rays_text);
+            let message = format!(
+                "{}: the run that is saved there has {saved_rays}, and --rays asks for {asked_rays}",
+                file.display()
+            );
+            let help = format!(
+                "give --rays {} or leave it out to go on with that run; another run goes into another place with -o",
+                saved.first.map_or_else(|| saved.end.to_string(), |first| format!("{first}..{}", saved.end))
+            );
+            Err(Failure::arguments(message).with_help(help))
+        }
+    }
+}
+
+/// Returns rays in words: how many, or from which to which.
+fn rays_text(range: RayRange) -> String {
+    match range.first {
+        Some(first) => format!("the rays {}..{}", first, range.end),
+        None => format!("{} rays", grouped(range.end)),
+    }
+}
+
+/// Reads the head of what is saved in a file; `None` where nothing that can be read is.
+pub(crate) fn saved_header(file: &Path) -> Option<TallyHeader> {
+    PartialRun::header(&read_bytes(file).ok()?).ok()
+}
+
 /// Refuses to write over what an interrupted run left in `file`.
 ///
 /// # Errors
@@ -194,8 +251,7 @@ pub(crate) fn refuse_overwriting(file: &Path) -> Result<(), Failure> {
     if !file.exists() {
         return Ok(());
     }
-    let header = read_bytes(file).ok().and_then(|bytes| PartialRun::header::<TallyHeader>(&bytes).ok());
-    let whose = header.map_or(String::new(), |h| format!(" ({})", h.command));
+    let whose = saved_header(file).map_or(String::new(), |h| format!(" ({})", h.command));
     let failure = Failure::arguments(format!("{}: an interrupted run{whose} is saved there", file.display()));
     Err(failure.with_help("--resume goes on with it; else give another place with -o, or remove the file"))
 }

@@ -109,6 +109,8 @@ pub(crate) struct RunRemarks {
     pub(crate) sentences: Vec<String>,
     /// What came of the error that was asked for, if one was.
     pub(crate) target: Option<TargetResult>,
+    /// The command that began the run, where this one went on with it: the one that tells how many rays it has.
+    pub(crate) first_command: Option<String>,
 }
 
 impl RunRemarks {
@@ -118,7 +120,7 @@ impl RunRemarks {
         for sentence in &sentences {
             console.say(sentence.replace("**", ""));
         }
-        Self { sentences, target }
+        Self { sentences, target, first_command: None }
     }
 }
 
@@ -180,7 +182,10 @@ pub(crate) fn write(
     // The page shows paths as lines of its own.
     facets.paths = None;
     let has_lost_rays = lost_rays::write(folder, &run.results, prepared)?;
-    let provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
+    let mut provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
+    if let Some(command) = &remarks.first_command {
+        provenance.command.clone_from(command);
+    }
     let mut document = run.document(prepared).map_err(|e| Failure::running(e.to_string()))?;
     sequence_tables::add_ways(&mut document, &run.results, &prepared.job.loaded.model);
     face_tables::add_selectors(&mut document, &run.results, &prepared.job.loaded.model);

@@ -37,6 +37,9 @@ pub(crate) struct TallyHeader {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     plan: Option<StoredPlan>,
     rays: Option<u64>,
+    /// Rays of the run, or past the last of its range, whether they were asked for or are the scene's own.
+    #[serde(default)]
+    run_rays: u64,
     /// The first ray, where the run was asked for as a range of rays.
     #[serde(default)]
     pub(crate) first_ray: Option<u64>,
@@ -89,6 +92,7 @@ impl TallyHeader {
             plan: m.plan.as_ref().map(StoredPlan::new),
             // As many as were traced, whichever way they were asked for.
             rays: prepared.rays.or(t.rays()),
+            run_rays: prepared.run_settings().rays,
             first_ray: t.ray_range.and_then(|range| range.first),
             accuracy: accuracy_options(prepared),
             choice: prepared.chosen.as_ref().map(Chosen::to_words),
@@ -106,6 +110,11 @@ impl TallyHeader {
     /// Returns the number of rays of the run, where the scene's own was not taken.
     pub(crate) fn rays(&self) -> Option<u64> {
         self.rays
+    }
+
+    /// Returns the rays that the run traces, the scene's own number too.
+    pub(crate) fn ray_range(&self) -> RayRange {
+        RayRange { first: self.first_ray, end: self.run_rays }
     }
 
     /// Returns the same header with what the run took.
