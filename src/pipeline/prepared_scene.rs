@@ -94,7 +94,9 @@ impl PreparedScene {
         // All that can be refused is refused before facets are made, which may take minutes.
         let threads = job.tracing.thread_count()?;
         let choice = IntersectorChoice::new(&job.tracing, Some(&job.scene))?;
-        let bound = job.scene.bind(&job.loaded.model)?;
+        let own_rays = job.tracing.own_rays_note(&job.scene)?;
+        let mut bound = job.scene.bind(&job.loaded.model)?;
+        bound.notes.extend(own_rays);
         let mesh_settings = mesh_settings(&job.meshing, Some(&job.scene), &job.loaded.model)?;
         let instancing = Instancing::new(&job.loaded.model, mesh_settings.glue_mm).map(Arc::new);
         let mut prepared = Self {

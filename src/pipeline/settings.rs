@@ -2,7 +2,7 @@
 
 use super::error::Error;
 use crate::intersect::NormalMode;
-use crate::simulate::machine_threads;
+use crate::simulate::{Scene, machine_threads};
 use crate::study::accuracy_target::TolerancePlan;
 use std::fmt;
 use std::str::FromStr;
@@ -46,6 +46,33 @@ impl TracingSettings {
     /// Returns the number of rays that was asked for, those before a range included; `None` where none was.
     pub fn rays(&self) -> Option<u64> {
         self.ray_range.map(|range| range.end)
+    }
+
+    /// Returns a sentence about the sources whose rays a number that was asked for does not change, as they have `rays` of their own;
+    /// `None` where there are none, and of a range, which such a scene has not.
+    ///
+    /// # Errors
+    /// When there is no other source, so that the number would change nothing.
+    pub(super) fn own_rays_note(&self, scene: &Scene) -> Result<Option<String>, Error> {
+        let Some(RayRange { first: None, end }) = self.ray_range else { return Ok(None) };
+        let own = scene.sources.iter().filter(|source| source.rays.is_some()).count();
+        let all = scene.sources.len();
+        match own {
+            0 => Ok(None),
+            _ if own == all => {
+                let message = format!(
+                    "{end}: every source of the scene has `rays` of its own, and a number for the run changes none"
+                );
+                Err(Error::setting("rays", message)
+                    .help("take `rays` out of the [[source]]s, or ask for no number"))
+            }
+            _ => Ok(Some(format!(
+                "{own} of {all} sources {} `rays` of {} own, which the {end} rays that were asked for do not change: they are shared \
+                 out by power, and the others trace their shares",
+                if own == 1 { "has" } else { "have" },
+                if own == 1 { "its" } else { "their" },
+            ))),
+        }
     }
 
     /// Returns the number of threads to trace with: as many as the machine has where none are asked for, 16 times these at most.
@@ -127,4 +154,27 @@ pub(super) fn normal_mode(name: &str) -> Result<NormalMode, Error> {
         Error::setting("normals", format!("{name}: they are not known"))
             .help(format!("use one of {}", NormalMode::ALL.map(NormalMode::name).join(", ")))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn a_number_of_rays_that_sources_do_not_heed_is_told() {
+        let note = |own: [&str; 2], ray_range: Option<RayRange>| {
+            let sources = own.map(|rays| format!("[[source]]\nkind = 'point'\n{rays}\n")).concat();
+            let scene = Scene::parse(&sources, "s.toml", Path::new(".")).unwrap();
+            TracingSettings { ray_range, ..TracingSettings::default() }.own_rays_note(&scene)
+        };
+        let asked = Some(RayRange { first: None, end: 1000 });
+        assert!(
+            note(["", ""], asked).unwrap().is_none() && note(["rays = 5", "rays = 5"], None).unwrap().is_none()
+        );
+        let one = note(["rays = 5", ""], asked).unwrap().unwrap();
+        assert!(one.starts_with("1 of 2 sources has `rays` of its own, which the 1000 rays"), "{one}");
+        let error = note(["rays = 5", "rays = 6"], asked).unwrap_err();
+        assert!(error.setting_name() == Some("rays") && error.to_string().contains("every source"), "{error}");
+    }
 }

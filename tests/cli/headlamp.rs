@@ -143,6 +143,22 @@ fn what_no_rays_settle_is_not_waited_for() {
     assert!(found["rays"].as_u64().unwrap() < 4_000_000, "{} {err}", found["rays"]);
 }
 
+/// A number of rays that changes nothing is refused, and one that changes some of the sources alone is told.
+#[test]
+fn rays_that_sources_do_not_heed_are_not_asked_for_in_silence() {
+    let run = |folder: &tempfile::TempDir| {
+        let (code, _, err) = lampyris_in(folder.path(), &["trace", "low_beam.toml", "--rays", "1000", "--dry-run"]);
+        (code, err.replace('\n', " "))
+    };
+    let (code, err) = run(&low_beam(str::to_owned));
+    assert!(
+        code == 2 && err.contains("--rays 1000: every source of the scene has `rays` of its own"),
+        "{code} {err}"
+    );
+    let (code, err) = run(&low_beam(|scene| scene.replace("rays = 900_000\n", "")));
+    assert!(code == 0 && err.contains("3 of 4 sources have `rays` of their own"), "{code} {err}");
+}
+
 /// The tolerance of a run stands in one place, whoever chose it.
 #[test]
 fn results_name_the_tolerance() {
