@@ -155,7 +155,11 @@ impl From<step::Error> for Failure {
     fn from(e: step::Error) -> Self {
         let is_limit = matches!(e.kind(), step::ErrorKind::TooManyPlaced { .. });
         let failure: Self = pipeline::Error::from(e).into();
-        if is_limit { failure.with_help("`info`, `facet` and `check` take --max-placed COUNT") } else { failure }
+        if is_limit {
+            failure.with_help("`info`, `facet`, `check` and `init` take --max-placed COUNT")
+        } else {
+            failure
+        }
     }
 }
 

@@ -32,6 +32,30 @@ fn a_scene_is_made_for_a_file_and_can_be_traced_at_once() {
     assert_eq!(lampyris_in(path, &["trace", "a/b/s.toml", "--dry-run"]).0, 0);
 }
 
+/// A damaged file gets a scene of what is left of it, and whoever asks for it learns what is missing.
+#[test]
+fn a_scene_for_a_damaged_file_tells_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let model = fs::read_to_string(fixture("step/lens_planoconvex_nurbs.stp")).unwrap();
+    // The first face bounds a surface that is not there.
+    let at = model.find("ADVANCED_FACE(").unwrap();
+    let end = at + model[at..].find(");").unwrap();
+    let surface = at + model[at..end].rfind('#').unwrap();
+    let rest = surface + model[surface..].find(',').unwrap();
+    fs::write(path.join("torn.stp"), format!("{}#999999{}", &model[..surface], &model[rest..])).unwrap();
+    let (code, _, err) = lampyris_in(path, &["init", "torn.stp"]);
+    assert!(code == 4 && err.contains("wrote torn.toml") && err.contains("faces were refused"), "{code} {err}");
+    let (code, _, err) = lampyris_in(path, &["init", "torn.stp", "-o", "b.toml", "--max-refused", "1"]);
+    assert!(code == 0 && err.contains("faces were refused"), "{code} {err}");
+    // The limit that the file needs goes into its scene.
+    let limit = ["init", "torn.stp", "-o", "c.toml", "--max-refused", "1", "--max-placed", "7"];
+    assert_eq!(lampyris_in(path, &limit).0, 0);
+    assert!(fs::read_to_string(path.join("c.toml")).unwrap().contains("{ file = \"torn.stp\", max_placed = 7 }"));
+    let (code, _, err) = lampyris_in(path, &["init", "torn.stp", "-o", "d.toml", "--max-placed", "0"]);
+    assert!(code == 3 && err.contains("--max-placed"), "{code} {err}");
+}
+
 /// The scene that the README shows runs as it stands there, beside a file of the name that it gives.
 #[test]
 fn the_scene_of_the_readme_runs() {

@@ -167,6 +167,10 @@ pub(crate) enum Command {
         /// Scene file to write; by default named after the STEP file, in the working folder
         #[arg(short, long, value_name = "SCENE.toml")]
         output: Option<PathBuf>,
+        #[command(flatten)]
+        limits: RefusalLimit,
+        #[command(flatten)]
+        placed: PlacedLimit,
     },
     /// List the media that a scene may name
     Media,

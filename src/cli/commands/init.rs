@@ -1,7 +1,7 @@
 //! `lampyris init`: a commented scene for a STEP file, ready to be traced and to be changed.
 
 use super::material_rules::{MOST_PLACES, instance_names, material_text, rule_texts, toml_number, toml_string};
-use crate::cli::arguments::command::PlacedLimit;
+use crate::cli::arguments::command::{PlacedLimit, RefusalLimit};
 use crate::cli::completion::Completion;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
@@ -11,6 +11,7 @@ use crate::cli::work::output_place::{folder_of, make_folder};
 use crate::formats::{file_name, printable_line, write_atomic};
 use crate::model::Model;
 use crate::pipeline::LoadedModel;
+use crate::step;
 use serde_json::json;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -25,9 +26,16 @@ const ROUNDING: f64 = 1e-9;
 /// The receiver is so many times as wide as the beam.
 const RECEIVER_WIDTHS: f64 = 4.0;
 
-/// Writes a scene for a STEP file and says so; a file that is there is never written over, but refused.
-pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Result<Completion, Failure> {
-    let loaded = input_files::model_file(file, PlacedLimit::default(), console)?;
+/// Writes a scene for a STEP file, and says so and what could not be read; a file that is there is never written over, but refused.
+/// Incomplete where more faces were refused than the limit allows.
+pub(crate) fn run(
+    file: &Path,
+    output: Option<&Path>,
+    limits: RefusalLimit,
+    placed: PlacedLimit,
+    console: &Console,
+) -> Result<Completion, Failure> {
+    let loaded = input_files::model_file(file, placed, console)?;
     let scene_file = match output {
         Some(path) => path.to_path_buf(),
         None => PathBuf::from(last_component(file)).with_extension("toml"),
@@ -42,7 +50,7 @@ pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Resu
         let failure = Failure::arguments(format!("{}: no scene can name this file", file.display()));
         return Err(failure.with_help("its path is no UTF-8 text, as TOML is; give the file another name"));
     };
-    let text = scene_text(file, &reference, &loaded);
+    let text = scene_text(file, &model_entry(&reference, placed), &loaded);
     write_atomic(&scene_file, |w| w.write_all(text.as_bytes()))?;
     if console.json {
         print(&json_text(&json!({"scene": scene_file.display().to_string()}))?)?;
@@ -53,7 +61,15 @@ pub(crate) fn run(file: &Path, output: Option<&Path>, console: &Console) -> Resu
                 .dim(&format!("  say what the parts are made of, then `lampyris trace {}`", scene_file.display())),
         );
     }
-    Ok(Completion::Complete)
+    // Last, for the scene counts although faces are missing.
+    Ok(input_files::report_refusals(&loaded, limits.max_refused, console))
+}
+
+/// Returns the model's entry in the scene, as TOML: its path, and the limit of what it may place where that is not the usual one.
+fn model_entry(reference: &str, placed: PlacedLimit) -> String {
+    let [asked, usual] = [placed.settings(), step::Settings::default()].map(|settings| settings.max_placed);
+    let limit = if asked == usual { String::new() } else { format!(", max_placed = {asked}") };
+    format!("{{ file = {}{limit} }}", toml_string(reference))
 }
 
 /// Returns the name of a file without its folder; a path that ends in no name is left whole.
@@ -70,8 +86,8 @@ fn model_reference(file: &Path, scene_file: &Path) -> Option<String> {
     path.into_os_string().into_string().ok()
 }
 
-/// Returns the whole scene as TOML, a line for each thing. `file` is for its heading, `reference` the path of the model in it.
-fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
+/// Returns the whole scene as TOML, a line for each thing. `file` is for its heading, `entry` what names the model in it.
+fn scene_text(file: &Path, entry: &str, loaded: &LoadedModel) -> String {
     let model = &loaded.model;
     let name = file_name(file);
     let material = material_text(&rule_texts(&model.account(), &instance_names(model)));
@@ -80,7 +96,7 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
         "# A scene for {}: lengths in mm, powers in W. `lampyris schema --text` says what else may stand here.\n\
          title = {}\n\
          # Parts are left out by what selects them: {{ file = …, without = [{{ part = \"helper*\" }}] }}.\n\
-         model = [{{ file = {} }}]\n\n\
+         model = [{entry}]\n\n\
          # A face that no rule names absorbs all light that meets it. Rules select by part, instance, solid, face, entity (the #id\n\
          # of the file), layer, kind, radius_mm, colour or at (a point near the face); a later rule wins, for medium and surface apart.\n\
          # `lampyris info FILE --faces` shows what selects each face. In place of surface = \"absorber\" stands what it is:\n\
@@ -88,7 +104,6 @@ fn scene_text(file: &Path, reference: &str, loaded: &LoadedModel) -> String {
          {material}{}\n{light}",
         printable_line(&name),
         toml_string(&name),
-        toml_string(reference),
         places_text(model)
     )
 }

@@ -169,7 +169,8 @@ fn description(solid: &SolidAccount) -> String {
     let closed = if solid.closed { "closed" } else { "open: a medium would have a gap" };
     let size = solid.size_mm().map(toml_number).join(" × ");
     let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
-    format!("{closed}, {} faces, {size} mm{colour}", solid.faces.len())
+    let faces = solid.faces.len();
+    format!("{closed}, {faces} face{}, {size} mm{colour}", if faces == 1 { "" } else { "s" })
 }
 
 /// Returns a number of five digits as TOML takes it; what has no such form keeps all digits.
@@ -204,6 +205,12 @@ mod tests {
         };
         let solid = |index| SolidAccount { index, name: String::new(), closed: true, faces: vec![face.clone()] };
         PartAccount { name: name.into(), instances, solids: (0..solids).map(solid).collect() }
+    }
+
+    #[test]
+    fn one_face_is_a_face() {
+        let text = description(&part("glass", 1, 1, 9.0).solids[0]);
+        assert!(text.starts_with("closed, 1 face, "), "{text}");
     }
 
     #[test]

@@ -76,7 +76,9 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
             merge::run(&command, console)
         }
         Command::Cache { folder, clear } => cache::run(&folder, clear, console),
-        Command::Init { file, output } => init::run(&file, output.as_deref(), console),
+        Command::Init { file, output, limits, placed } => {
+            init::run(&file, output.as_deref(), limits, placed, console)
+        }
         Command::Media => media::run(console),
         Command::Licences => licences::run(console),
         Command::Assess { list: true, .. } => assess::list(console),
