@@ -21,6 +21,7 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         (&["facet", "a.stp", "--tolerance", "0.1", "--accuracy", "1deg"], "--accuracy"),
         (&["trace", "a.toml", "--rays", "-5"], "at least 1"),
         (&["trace", "a.toml", "--normals", "smooth"], "bilinear"),
+        (&["trace", "a.toml", "--intersector", "exact", "--normals", "bilinear"], "does not take --normals bilinear"),
         (&["study", "everything"], "accuracy"),
         (&["study", "accuracy", "--normals", "flat"], "study accuracy does not take --normals"),
         (&["study", "bvh", "--intersector", "exact"], "does not take --intersector"),

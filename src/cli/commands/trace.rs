@@ -17,9 +17,10 @@ use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards, tally_file};
+use crate::intersect::NormalMode;
 use crate::pipeline::{
-    AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, SceneJob, SceneResults, TraceRequest,
-    TracingSettings, read_cached_scene, settings_for_accuracy,
+    AccurateSettings, ErrorTarget, IntersectorChoice, IntersectorKind, MeshingSettings, PreparedScene, SceneJob,
+    SceneResults, TraceRequest, TracingSettings, read_cached_scene, settings_for_accuracy,
 };
 use crate::report::{grouped, seconds};
 use crate::simulate::{PartialRun, PathSink, PathVertex, Scene};
@@ -50,6 +51,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let shard =
         extra.shard.as_deref().map(|text| shards::requested_shard(text, extra.shards, console)).transpose()?;
     let replay = replay::parse_request(&extra.replay)?;
+    refuse_normals(&command.tracing, None)?;
     let tracing = tracing_settings(command, shard)?;
     // A range of rays is part of a run that grows: its tally joins those of the other rays.
     let is_range = tracing.ray_range.is_some_and(|range| range.first.is_some());
@@ -64,6 +66,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let monitor = TerminalMonitor::new(console);
     let cache = cache_folder::cache(&extra.cache)?;
     let (mut scene, loaded) = read_cached_scene(command.scene, cache.as_ref(), &monitor)?;
+    refuse_normals(&tracing, Some(&scene))?;
     let has_results = shard.is_none() && !is_range && replay.is_empty();
     refuse_inputs(command, &scene, has_results)?;
     // Before the search for an accuracy and the pilot, which take their time; and again once the folder is this process's own.
@@ -133,6 +136,17 @@ fn tracing_settings(command: &TraceCommand, shard: Option<[u32; 2]>) -> Result<T
         None => folder.join(CHECKPOINT),
     };
     continued_settings(&file, tracing)
+}
+
+/// Refuses normals of facets for a run on the spline, which has its own; `scene` may ask for the spline too.
+fn refuse_normals(tracing: &TracingSettings, scene: Option<&Scene>) -> Result<(), Failure> {
+    let Some(normals) = tracing.normals.filter(|normals| *normals != NormalMode::Exact) else { return Ok(()) };
+    if IntersectorChoice::new(tracing, scene)?.intersector != IntersectorKind::Exact {
+        return Ok(());
+    }
+    let asks = if tracing.intersector.is_some() { "--intersector exact" } else { "the scene's intersector = \"exact\"" };
+    let message = format!("{asks} does not take --normals {normals}: the spline has normals of its own");
+    Err(Failure::arguments(message).with_help("leave --normals out, or choose an intersector on facets, as octree"))
 }
 
 /// Refuses outputs that would replace the scene or a file that it names; `has_results` says whether results are among them.
