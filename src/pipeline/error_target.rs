@@ -52,11 +52,11 @@ pub struct TargetResult {
 }
 
 impl ErrorTarget {
-    /// Parses `P%@RECEIVER` or `P%@RECEIVER:cells`.
+    /// Parses `P%@RECEIVER` or `P%@RECEIVER:cells`, whatever receivers there are.
     ///
     /// # Errors
-    /// When the text is neither, P is not above 0 and below 100, the scene has no such receiver, or a source of it has `rays` of its own.
-    pub fn new(text: &str, scene: &Scene) -> Result<Self, Error> {
+    /// When the text is neither, or P is not above 0 and below 100.
+    pub fn parse(text: &str) -> Result<Self, Error> {
         let about = |message: String| Error::setting("until_error", format!("{text}: {message}"));
         let form = || about("write P%@RECEIVER, as in 0.5%@wall or 3%@wall:cells".into());
         let (percent, receiver) = text.split_once('@').ok_or_else(form)?;
@@ -68,6 +68,20 @@ impl ErrorTarget {
             Some(name) => (name, true),
             None => (receiver, false),
         };
+        if receiver.is_empty() {
+            return Err(form());
+        }
+        Ok(Self { percent, receiver: receiver.into(), cells })
+    }
+
+    /// Parses `P%@RECEIVER` or `P%@RECEIVER:cells` for a scene.
+    ///
+    /// # Errors
+    /// As [`Self::parse`], and when the scene has no such receiver, or a source of it has `rays` of its own.
+    pub fn new(text: &str, scene: &Scene) -> Result<Self, Error> {
+        let target = Self::parse(text)?;
+        let about = |message: String| Error::setting("until_error", format!("{text}: {message}"));
+        let receiver = target.receiver.as_str();
         let names: Vec<&str> = scene.receivers.iter().map(|r| r.name.as_str()).collect();
         if !names.contains(&receiver) {
             let error = about(format!("the scene has no receiver '{receiver}'"));
@@ -79,7 +93,7 @@ impl ErrorTarget {
             let error = about("a source with `rays` of its own does not grow".into());
             return Err(error.help("take `rays` out of the [[source]]s"));
         }
-        Ok(Self { percent, receiver: receiver.into(), cells })
+        Ok(target)
     }
 
     /// Returns the relative statistical error of the receiver's power or cells, percent; `None` where nothing arrived.

@@ -22,6 +22,12 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         (&["trace", "a.toml", "--rays", "-5"], "at least 1"),
         (&["trace", "a.toml", "--normals", "smooth"], "bilinear"),
         (&["trace", "a.toml", "--intersector", "exact", "--normals", "bilinear"], "does not take --normals bilinear"),
+        // No such scene: what is wrong with an option is said before anything is read.
+        (&["trace", "a.toml", "--until-error", "1%"], "P%@RECEIVER"),
+        (&["trace", "a.toml", "--until-error", "1%@"], "P%@RECEIVER"),
+        (&["merge", "parts", "-o", "out", "--until-error", "one@wall"], "P%@RECEIVER"),
+        (&["trace", "a.toml", "--paths", "p.foo"], "--paths paths.npz"),
+        (&["trace", "a.toml", "--ends", "e.foo"], "--ends ends.npz"),
         (&["study", "everything"], "accuracy"),
         (&["study", "accuracy", "--normals", "flat"], "study accuracy does not take --normals"),
         (&["study", "bvh", "--intersector", "exact"], "does not take --intersector"),

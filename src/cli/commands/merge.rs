@@ -46,6 +46,8 @@ const LOOK_AGAIN: Duration = Duration::from_millis(500);
 /// `.tally`. Incomplete where light was lost or faces refused beyond the limits, or the error asked for was not reached.
 pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completion, Failure> {
     let patience = Patience::new(command.wait)?;
+    // Before any part is waited for.
+    command.until_error.map(ErrorTarget::parse).transpose()?;
     // A sum in the place of a part: merged once more, their rays would count twice or be lost.
     let parts = part_files(command.parts)?;
     InputGuard::new(parts.iter().map(PathBuf::as_path)).refuse("-o", command.folder)?;

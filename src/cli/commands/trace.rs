@@ -51,15 +51,12 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let shard =
         extra.shard.as_deref().map(|text| shards::requested_shard(text, extra.shards, console)).transpose()?;
     let replay = replay::parse_request(&extra.replay)?;
-    refuse_normals(&command.tracing, None)?;
+    check_options(command)?;
     let tracing = tracing_settings(command, shard)?;
     // A range of rays is part of a run that grows: its tally joins those of the other rays.
     let is_range = tracing.ray_range.is_some_and(|range| range.first.is_some());
     if is_range {
         ray_range::refuse_options(extra)?;
-    }
-    if extra.checkpoint.is_nan() || extra.checkpoint < 0.0 {
-        return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
     }
     // Reading is done by these threads too.
     set_threads(tracing.threads)?;
@@ -67,6 +64,8 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let cache = cache_folder::cache(&extra.cache)?;
     let (mut scene, loaded) = read_cached_scene(command.scene, cache.as_ref(), &monitor)?;
     refuse_normals(&tracing, Some(&scene))?;
+    // A receiver that the scene has not is said before its facets are made.
+    let target = extra.until_error.as_deref().map(|text| ErrorTarget::new(text, &scene)).transpose()?;
     let has_results = shard.is_none() && !is_range && replay.is_empty();
     refuse_inputs(command, &scene, has_results)?;
     // Before the search for an accuracy and the pilot, which take their time; and again once the folder is this process's own.
@@ -95,8 +94,6 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         ..SceneJob::new(scene, loaded)
     };
     let mut prepared = PreparedScene::new(job, &monitor)?;
-    let target =
-        extra.until_error.as_deref().map(|text| ErrorTarget::new(text, &prepared.job.scene)).transpose()?;
     end_file::check(&prepared, extra.ends.as_deref())?;
     lost_rays::warn(&prepared, console);
     if extra.dry_run {
@@ -116,6 +113,21 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         None => trace_whole(&mut prepared, command, target.as_ref(), console)?,
     };
     Ok(done.and(refused))
+}
+
+/// Checks what can be told of the options without the scene.
+///
+/// # Errors
+/// For the first that has no meaning, names a file of a kind that is not written, or is not looked at.
+fn check_options(command: &TraceCommand) -> Result<(), Failure> {
+    let extra = command.extra;
+    refuse_normals(&command.tracing, None)?;
+    if extra.checkpoint.is_nan() || extra.checkpoint < 0.0 {
+        return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
+    }
+    extra.until_error.as_deref().map(ErrorTarget::parse).transpose()?;
+    extra.paths.as_deref().map_or(Ok(()), PathFile::check_name)?;
+    extra.ends.as_deref().map_or(Ok(()), end_file::check_name)
 }
 
 /// Returns what is asked of the rays, with `--resume` those of the run that is saved; `shard` is its part, as index from 0 and count.

@@ -25,13 +25,19 @@ const COLUMNS: [Column; 9] = [
 /// The face of an end that is at none.
 const NO_FACE: i64 = -1;
 
-/// Refuses, before anything is traced, what could not be written.
+/// Refuses a name that ends neither in `.npz` nor in `.csv`.
+pub(crate) fn check_name(file: &Path) -> Result<(), Failure> {
+    if is_csv(file) || file.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
+        return Ok(());
+    }
+    let message = format!("--ends {}: ends of rays are written as .npz or .csv", file.display());
+    Err(Failure::arguments(message).with_help("write --ends ends.npz"))
+}
+
+/// Refuses, before anything is traced, a scene without ends to write, or with too many.
 pub(crate) fn check(prepared: &PreparedScene, file: Option<&Path>) -> Result<(), Failure> {
     let Some(file) = file else { return Ok(()) };
     let refuse = |message: &str| Failure::arguments(format!("--ends {}: {message}", file.display()));
-    if !is_csv(file) && file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
-        return Err(refuse("ends of rays are written as .npz or .csv").with_help("write --ends ends.npz"));
-    }
     let lists = ray_lists(&prepared.bound);
     if lists.is_empty() {
         let help = "--paths FILE.npz has the paths of any source";

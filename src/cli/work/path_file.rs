@@ -22,12 +22,17 @@ pub(crate) struct PathFile {
 }
 
 impl PathFile {
-    /// Begins the file of ray paths; fails unless its name ends in `.npz`, or where it cannot be written.
-    pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
+    /// Refuses a name that does not end in `.npz`.
+    pub(crate) fn check_name(path: &Path) -> Result<(), Failure> {
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
             let message = format!("--paths {}: ray paths are written as .npz alone", path.display());
             return Err(Failure::arguments(message).with_help("write --paths paths.npz"));
         }
+        Ok(())
+    }
+
+    /// Begins the file of ray paths; fails where it cannot be written.
+    pub(crate) fn create(path: &Path) -> Result<Self, Failure> {
         Ok(Self { state: Mutex::new((NpzStream::create(path, &COLUMNS)?, None)) })
     }
 
