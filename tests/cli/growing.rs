@@ -83,6 +83,23 @@ fn merge_takes_the_choice_of_its_parts() {
         let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--rays", range, "-o", "parts"]);
         assert_eq!(code, 0, "{err}");
     }
+    let refused = |more: &[&str]| {
+        let (code, _, err) = lampyris_in(path, &[&["merge", "parts", "-o", "no"], more].concat());
+        // Nothing is traced, whatever the parts were traced on.
+        assert!(!err.contains("tracing on"), "{err}");
+        (code, err.replace('\n', " "))
+    };
+    let (code, err) = refused(&["--rays", "5"]);
+    assert!(code == 2 && err.contains("reach to ray 40000") && err.contains("leave --rays out"), "{code} {err}");
+    let other = std::fs::read_to_string(path.join("scene.toml"))
+        .unwrap()
+        .replace("reflectance = 0.95", "reflectance = 0.9");
+    std::fs::write(path.join("other.toml"), other).unwrap();
+    let (code, err) = refused(&["--scene", "other.toml"]);
+    assert!(
+        code == 3 && err.contains("--scene other.toml is not the scene that this part was traced from"),
+        "{err}"
+    );
     let [once, again] = ["once", "again"].map(|to| {
         merge(path, &["parts"], to);
         let text = std::fs::read_to_string(path.join(to).join("results.json")).unwrap();

@@ -174,6 +174,10 @@ fn a_saved_run_goes_on_with_its_own_rays_alone() {
         assert!(code == 2 && err.contains("--rays 3000000 or leave it out"), "{rays}: {code} {err}");
         assert!(!err.contains("tracing") && fs::read(&saved).unwrap() == before, "{rays}: {err}");
     }
+    // It is no part of a run that could be merged.
+    let (code, _, err) = lampyris_in(path, &["merge", "out", "-o", "merged"]);
+    let err = err.replace('\n', " ");
+    assert!(code == 3 && err.contains("an interrupted run") && err.contains("-o out --resume"), "{code} {err}");
     let (code, out, err) = lampyris_in(path, &resume);
     assert!(code == 0 && err.contains("going on from"), "{code} {err}");
     let document: Value = serde_json::from_str(&out).unwrap();

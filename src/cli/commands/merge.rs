@@ -8,7 +8,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::closing;
 use crate::cli::output::json::json_text;
 use crate::cli::work::cache_folder;
-use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint};
+use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, saved_header};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::results_folder::RunRemarks;
@@ -51,7 +51,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     // A sum in the place of a part: merged once more, their rays would count twice or be lost.
     let parts = part_files(command.parts)?;
     InputGuard::new(parts.iter().map(PathBuf::as_path)).refuse("-o", command.folder)?;
-    let monitor = TerminalMonitor::new(console);
+    let monitor = TerminalMonitor::of_traced(console);
     let first = first_part(command, &patience, console)?;
     let header: TallyHeader = PartialRun::header(&read_part(&first)?).map_err(|m| input_failure(&first, m))?;
     // The part knows where its scene was.
@@ -185,12 +185,23 @@ fn first_part(command: &MergeCommand, patience: &Patience, console: &Console) ->
         match files.into_iter().find(|file| file.exists()) {
             Some(file) => return Ok(file),
             None if patience.wait_again(console, "no part is there yet") => {}
-            None => {
-                let missing = command.parts.first().map_or_else(String::new, |p| p.display().to_string());
-                return Err(Failure::input(format!("{missing}: no .tally file is there")));
-            }
+            None => return Err(no_part(command.parts)),
         }
     }
+}
+
+/// Returns the failure of a merge whose arguments mean no part, which tells of an interrupted run in one of them.
+fn no_part(arguments: &[PathBuf]) -> Failure {
+    let Some(folder) = arguments.iter().find(|folder| folder.join(CHECKPOINT).is_file()) else {
+        let missing = arguments.first().map_or_else(String::new, |p| p.display().to_string());
+        return Failure::input(format!("{missing}: no .tally file is there"))
+            .with_help("`lampyris trace SCENE --shard I/N -o DIR` writes one, and so does --rays A..B");
+    };
+    let header = saved_header(&folder.join(CHECKPOINT));
+    let scene = header.map_or_else(|| "SCENE".into(), |header| header.scene().display().to_string());
+    let place = folder.display();
+    Failure::input(format!("{place}: no part is there, but an interrupted run, {CHECKPOINT}"))
+        .with_help(format!("finish it with `lampyris trace {scene} -o {place} --resume`"))
 }
 
 /// Returns the tally files that the arguments mean: files as they are given, there or not, and those in folders, sorted by name,
@@ -237,7 +248,18 @@ fn sum_parts(
             return Ok(());
         }
         Err(if h.fingerprint == header.fingerprint {
-            format!("the scene {} or the program has changed since this part was traced", h.scene().display())
+            match command.scene {
+                Some(given) => format!(
+                    "--scene {} is not the scene that this part was traced from, or another version of the program traced it",
+                    given.display()
+                ),
+                None => {
+                    format!(
+                        "the scene {} or the program has changed since this part was traced",
+                        h.scene().display()
+                    )
+                }
+            }
         } else if h.accuracy != header.accuracy {
             format!(
                 "it is part of another run ({}): traced with {}, the first part with {}; give both the same",
@@ -262,9 +284,13 @@ fn sum_parts(
         let replicates = u32::try_from(rays.div_ceil(GROWING_REPLICATE)).unwrap_or(u32::MAX);
         if !sum.grows || replicates < sum.replicates {
             let there = u64::from(sum.replicates) * GROWING_REPLICATE;
-            let message =
-                if sum.grows { format!("the parts reach to ray {there}") } else { "the run does not grow".into() };
-            return Err(Failure::arguments(format!("--rays {rays}: {message}")));
+            let (message, help) = if sum.grows {
+                (format!("the parts reach to ray {there}"), format!("give {there} or more, or leave --rays out"))
+            } else {
+                let help = "leave --rays out: parts of `lampyris trace --rays A..B` grow";
+                ("the run does not grow".into(), help.into())
+            };
+            return Err(Failure::arguments(format!("--rays {rays}: {message}")).with_help(help));
         }
         sum.replicates = replicates;
     }

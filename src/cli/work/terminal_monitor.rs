@@ -16,6 +16,8 @@ use std::sync::{Mutex, MutexGuard};
 pub(crate) struct TerminalMonitor<'a> {
     console: &'a Console,
     is_saveable: bool,
+    /// Whether rays are traced: what was traced already is not said to be.
+    is_tracing: bool,
     paths: Option<&'a PathFile>,
     shown: Mutex<Shown>,
 }
@@ -30,7 +32,12 @@ struct Shown {
 impl<'a> TerminalMonitor<'a> {
     /// Shows a job that cannot be saved.
     pub(crate) fn new(console: &'a Console) -> Self {
-        Self { console, is_saveable: false, paths: None, shown: Mutex::default() }
+        Self { console, is_saveable: false, is_tracing: true, paths: None, shown: Mutex::default() }
+    }
+
+    /// Shows a job whose rays were traced before.
+    pub(crate) fn of_traced(console: &'a Console) -> Self {
+        Self { is_tracing: false, ..Self::new(console) }
     }
 
     /// Shows a run that is saved when a signal asks it to stop, and stops it when its `paths` can no longer be written.
@@ -94,6 +101,9 @@ impl Monitor for TerminalMonitor<'_> {
     }
 
     fn chosen(&self, chosen: &Chosen) {
+        if !self.is_tracing {
+            return;
+        }
         let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));
         let how = match (chosen.intersector, chosen.normals) {
             ("exact", _) => "on the spline".to_owned(),
