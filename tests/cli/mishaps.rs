@@ -67,6 +67,32 @@ fn a_place_that_cannot_be_written_is_refused_before_tracing() {
     }
 }
 
+/// What stands in the way is named, with what to do about it.
+#[test]
+#[cfg(unix)]
+fn what_is_no_place_for_a_file_or_folder_and_no_scene_is_named() {
+    let folder = lens(|s| s);
+    let path = folder.path();
+    fs::write(path.join("file"), "").unwrap();
+    fs::create_dir(path.join("d.glb")).unwrap();
+    fs::write(path.join("odd.toml"), b"title = \"\xff\"").unwrap();
+    let cases: [(&[&str], i32, [&str; 2]); 7] = [
+        (&["trace", "scene.toml", "-o", "file"], 1, ["file: cannot be made: it is a file", "another folder"]),
+        (&["trace", "scene.toml", "-o", "file/out"], 1, ["out: cannot be made: file is a file", "another folder"]),
+        (&["man", "-o", "file"], 1, ["file: cannot be made: it is a file", "another folder"]),
+        (&["facet", "model.stp", "-o", "d.glb"], 1, ["d.glb: cannot be written: it is a folder", "name of a file"]),
+        (&["trace", "d.glb"], 3, ["it is a folder", "name the scene file in it"]),
+        (&["trace", "/dev/null"], 3, ["a pipe or a device", "a scene is a TOML file"]),
+        (&["trace", "odd.toml"], 3, ["no UTF-8 text", "TOML in UTF-8"]),
+    ];
+    for (arguments, expected, says) in cases {
+        let (code, _, err) = lampyris_in(path, arguments);
+        let err = err.replace('\n', " ");
+        assert!(code == expected && says.iter().all(|words| err.contains(words)), "{arguments:?}: {code} {err}");
+        assert!(!err.contains("os error"), "{arguments:?}: {err}");
+    }
+}
+
 #[test]
 fn a_receiver_with_a_name_longer_than_a_file_name_has_its_files() {
     let folder = lens(|s| s.replace("\"focus\"", &format!("\"{}\"", "A".repeat(260))));

@@ -11,7 +11,7 @@ use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::contenders::{Contenders, Structures};
 use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::input_guard::InputGuard;
-use crate::cli::work::output_place::{OutputPlace, folder_of, make_folder};
+use crate::cli::work::output_place::{OutputPlace, try_file};
 use crate::cli::work::ray_input::read_rays;
 use crate::cli::work::results_folder::MOST_DRAWN;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
@@ -52,7 +52,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let guard = InputGuard::new(command.rays_in.iter().map(PathBuf::as_path).chain([command.file.as_path()]));
     for (option, path) in &outputs {
         guard.refuse(option, path)?;
-        make_folder(&folder_of(path))?;
+        try_file(path)?;
     }
     let threads = threads::set_threads(command.tracing.threads)?;
     let given = command.rays_in.as_deref().map(read_rays).transpose()?;

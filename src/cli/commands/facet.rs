@@ -5,7 +5,7 @@ use crate::cli::console::{Console, print};
 use crate::cli::output::appearance;
 use crate::cli::output::json::json_text;
 use crate::cli::work::input_guard::InputGuard;
-use crate::cli::work::output_place::{folder_of, make_folder};
+use crate::cli::work::output_place::try_file;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{input_files, threads};
 use crate::cli::{completion::Completion, failure::Failure};
@@ -33,7 +33,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     let guard = InputGuard::new([command.file.as_path()]);
     for path in &command.output {
         guard.refuse("-o", path)?;
-        make_folder(&folder_of(path))?;
+        try_file(path)?;
     }
     threads::set_threads(command.threads)?;
     let loaded = input_files::model_file(&command.file, command.placed, console)?;

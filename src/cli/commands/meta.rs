@@ -3,6 +3,7 @@
 use crate::cli::arguments::command::Arguments;
 use crate::cli::console::{Console, print};
 use crate::cli::output::schema_page::schema_page;
+use crate::cli::work::output_place::make_folder;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::write_atomic;
 use clap::CommandFactory;
@@ -37,7 +38,7 @@ pub(crate) fn man(folder: Option<&Path>, console: &Console) -> Result<Completion
         print(&String::from_utf8_lossy(&render(command)?))?;
         return Ok(Completion::Complete);
     };
-    std::fs::create_dir_all(folder)?;
+    make_folder(folder)?;
     let subcommands: Vec<clap::Command> =
         // `help` is clap's own and has nothing to tell.
         command.get_subcommands().filter(|c| c.get_name() != "help").cloned().collect();

@@ -5,6 +5,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
 use crate::cli::output::json::json_text;
 use crate::cli::work::lost_rays::COLUMNS;
+use crate::cli::work::output_place::make_folder;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::formats::{read_text, write_vtp};
 use crate::pipeline::PreparedScene;
@@ -103,8 +104,7 @@ pub(crate) fn run(
         let message = format!("--replay: the run has {rays} rays, counted from 0");
         return Err(Failure::arguments(message).with_help("give the number of rays that the run had with --rays"));
     }
-    std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))?;
+    make_folder(folder)?;
     let (lines, _) = path_lines(&found.paths);
     write_vtp(&folder.join("replay.vtp"), &lines)?;
     if console.json {

@@ -4,7 +4,7 @@ use crate::cli::failure::Failure;
 use crate::cli::machine;
 use crate::formats::{file_name, write_atomic};
 use std::fs::{self, File, TryLockError};
-use std::io::{Read, Seek, Write};
+use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// Name of the lock of a folder of results.
@@ -46,7 +46,7 @@ impl OutputPlace {
     fn claim(folder: &Path, lock: PathBuf) -> Result<Self, Failure> {
         make_folder(folder)?;
         let unwritable = |e: std::io::Error| {
-            Failure::running(format!("{}: cannot be written: {e}", folder.display()))
+            Failure::running(format!("{}: cannot be written: {}", folder.display(), reason(&e)))
                 .with_help("nothing was traced; give another folder with -o")
         };
         // The owner before may remove its lock file between opening and locking: then once more.
@@ -117,7 +117,28 @@ fn is_file_at(_: &File, _: &Path) -> bool {
 /// # Errors
 /// When that fails.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(folder).map_err(|e| Failure::running(format!("{}: cannot be made: {e}", folder.display())))
+    fs::create_dir_all(folder).map_err(|e| {
+        let place = folder.display();
+        // What is in its way: itself, or a name above it.
+        let in_the_way = folder.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir());
+        let failure = Failure::running(match in_the_way {
+            Some(file) if file == folder => {
+                format!("{place}: cannot be made: it is a file, and a folder is needed")
+            }
+            Some(file) => format!("{place}: cannot be made: {} is a file", file.display()),
+            None => format!("{place}: cannot be made: {}", reason(&e)),
+        });
+        failure.with_help("give another folder")
+    })
+}
+
+/// Returns why a place cannot be written, in words where the system has but a number for it.
+fn reason(error: &std::io::Error) -> String {
+    match error.kind() {
+        ErrorKind::PermissionDenied => "there is no permission to write there".into(),
+        ErrorKind::ReadOnlyFilesystem => "it is on a file system that is read-only".into(),
+        _ => error.to_string(),
+    }
 }
 
 /// Tries, before any work, whether a file can be written; makes its folder. What is there stays as it is.
@@ -127,7 +148,8 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
 pub(crate) fn try_file(file: &Path) -> Result<(), Failure> {
     make_folder(&folder_of(file))?;
     if file.is_dir() {
-        return Err(Failure::running(format!("{}: cannot be written: it is a folder", file.display())));
+        let failure = Failure::running(format!("{}: cannot be written: it is a folder", file.display()));
+        return Err(failure.with_help("give the name of a file, in that folder or elsewhere"));
     }
     // Pipes and devices are opened when they are written: their readers may come late.
     if file.exists() && !file.is_file() {

@@ -32,6 +32,7 @@ pub(crate) use source::POWERS;
 pub use source::{Source, SourceKind};
 pub use spectrum::{SpectrumKey, SpectrumName};
 use std::collections::HashMap;
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -115,8 +116,15 @@ impl Scene {
         let name = path.display().to_string();
         // Through `formats`: a pipe in place of the file would never end.
         let text = crate::formats::read_text(path).map_err(|e| {
-            let kind = ErrorKind::Unreadable;
-            Error::new(kind, format!("{name}: cannot read the scene file: {e}")).help("check the path")
+            let help = match e.kind() {
+                io::ErrorKind::IsADirectory => "name the scene file in it, a .toml",
+                io::ErrorKind::InvalidData => "a scene is TOML in UTF-8: save it so, or name the scene file",
+                // What it is and what to do about it is said already.
+                io::ErrorKind::InvalidInput => "a scene is a TOML file",
+                io::ErrorKind::PermissionDenied => "give yourself permission to read it",
+                _ => "check the path",
+            };
+            Error::new(ErrorKind::Unreadable, format!("{name}: cannot read the scene file: {e}")).help(help)
         })?;
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Self::parse(&text, &name, folder)
