@@ -1,7 +1,10 @@
 //! The commands and their own options.
 
 use super::help_text;
-use super::options::{AccuracyOption, CacheOption, MeshingOptions, TracingOptions, parse_count, parse_share};
+use super::options::{
+    AccuracyOption, CacheOption, MeshingOptions, TracingOptions, parse_count, parse_limit, parse_listed,
+    parse_parts, parse_seconds, parse_share, parse_threads,
+};
 use crate::step;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -112,17 +115,17 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         scene: Option<PathBuf>,
         /// Wait at most so many seconds until all parts are there
-        #[arg(long, value_name = "SECONDS")]
+        #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true)]
         wait: Option<f64>,
         /// As many rays as the merged run is to have, where further ranges of a run that grows are still to come
-        #[arg(long, value_name = "N", value_parser = parse_count)]
+        #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
         rays: Option<u64>,
         /// Say how many rays are still missing until the statistical error (1σ) of a receiver's power, or of its :cells, is below P
         /// percent; the exit code is 4 as long as there are any
         #[arg(long, value_name = "P%@RECEIVER")]
         until_error: Option<String>,
         /// Largest share of energy that may be lost before the exit code becomes 4
-        #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST, value_parser = parse_share)]
+        #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST, value_parser = parse_share, allow_negative_numbers = true)]
         max_lost: f64,
         #[command(flatten)]
         cache: CacheOption,
@@ -211,7 +214,7 @@ pub(crate) struct FacetCommand {
     #[arg(long)]
     pub(crate) baseline: bool,
     /// Number of threads; all cores by default
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     #[command(flatten)]
     pub(crate) limits: RefusalLimit,
@@ -260,13 +263,13 @@ pub(crate) struct TraceOptions {
     #[arg(long, value_name = "I/N|auto", conflicts_with_all = ["paths", "verify_pruning", "until_error"])]
     pub(crate) shard: Option<String>,
     /// Number of parts for `--shard auto` where the launcher does not say it
-    #[arg(long, value_name = "N", requires = "shard")]
+    #[arg(long, value_name = "N", requires = "shard", value_parser = parse_parts, allow_negative_numbers = true)]
     pub(crate) shards: Option<u32>,
     /// Go on where an interrupted run stopped, with the same scene and options, the number of rays among them
     #[arg(long)]
     pub(crate) resume: bool,
     /// Save a long run every so many seconds, for --resume
-    #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = parse_seconds, allow_negative_numbers = true)]
     pub(crate) checkpoint: f64,
     /// Trace until the statistical error (1σ) of a receiver's power is below P percent, or, with :cells after its name, that of
     /// its cells weighted by their light; --rays is then the most to trace
@@ -287,10 +290,10 @@ pub(crate) struct TraceOptions {
     pub(crate) ends: Option<PathBuf>,
     /// Group the light of each receiver by the faces it met and what happened there, and list the N ways of most power, each with its
     /// error; each ray is then traced twice, and no other figure changes
-    #[arg(long, value_name = "N", conflicts_with = "verify_pruning")]
+    #[arg(long, value_name = "N", conflicts_with = "verify_pruning", value_parser = parse_listed, allow_negative_numbers = true)]
     pub(crate) sequences: Option<u32>,
     /// List the N faces that absorb and let out most, with the power that enters and leaves their bodies through them and its error
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse_listed, allow_negative_numbers = true)]
     pub(crate) faces: Option<u32>,
     /// Trace one ray again and show its path; a lost_rays.csv for all the rays in it; may be given several times
     #[arg(long, value_name = "RAY|FILE", conflicts_with_all = ["shard", "resume", "until_error", "verify_pruning", "paths"])]
@@ -302,7 +305,7 @@ pub(crate) struct TraceOptions {
     #[arg(long)]
     pub(crate) dry_run: bool,
     /// Largest share of energy that may be lost before the exit code becomes 4
-    #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST, value_parser = parse_share)]
+    #[arg(long, value_name = "SHARE", default_value_t = MOST_LOST, value_parser = parse_share, allow_negative_numbers = true)]
     pub(crate) max_lost: f64,
     #[command(flatten)]
     pub(crate) cache: CacheOption,
@@ -334,7 +337,9 @@ impl PageOption {
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct PlacedLimit {
     /// Most products and shapes that the assemblies of a STEP file may place; beyond it the file is refused
-    #[arg(long, value_name = "COUNT", default_value_t = step::Settings::default().max_placed)]
+    #[arg(
+        long, value_name = "COUNT", default_value_t = step::Settings::default().max_placed, value_parser = parse_limit, allow_negative_numbers = true
+    )]
     max_placed: u64,
 }
 
@@ -355,7 +360,7 @@ impl Default for PlacedLimit {
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub(crate) struct RefusalLimit {
     /// Largest share of faces that may be refused before the exit code becomes 4
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = parse_share)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = parse_share, allow_negative_numbers = true)]
     pub(crate) max_refused: f64,
 }
 

@@ -37,10 +37,10 @@ pub(crate) struct MeshingOptions {
     #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = parse_part)]
     pub(crate) part: Vec<(String, [f64; 2])>,
     /// Tolerance of one face, by its name or as #ID of its entity in the file; may be given several times, and wins over that of its part
-    #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = parse_part)]
+    #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = parse_face)]
     pub(crate) face: Vec<(String, [f64; 2])>,
     /// Tolerance of all faces of one optical role in the scene: mirror, interface, coated or absorber; may be given several times
-    #[arg(long, help_heading = "Facets", value_name = "ROLE=MIN..MAX", value_parser = parse_part)]
+    #[arg(long, help_heading = "Facets", value_name = "ROLE=MIN..MAX", value_parser = parse_role)]
     pub(crate) role: Vec<(String, [f64; 2])>,
 }
 
@@ -75,10 +75,10 @@ pub(crate) struct TracingOptions {
     #[arg(long = "rays", help_heading = "Rays", value_name = "N", value_parser = parse_ray_range, allow_hyphen_values = true)]
     pub(crate) ray_range: Option<RayRange>,
     /// Seed of all random numbers
-    #[arg(long, help_heading = "Rays", value_name = "S")]
+    #[arg(long, help_heading = "Rays", value_name = "S", value_parser = parse_seed, allow_negative_numbers = true)]
     pub(crate) seed: Option<u64>,
     /// Number of threads; all cores by default
-    #[arg(long, help_heading = "Rays", value_name = "N")]
+    #[arg(long, help_heading = "Rays", value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     /// What finds the hits; octree by default, in a traced scene chosen by a pilot
     #[arg(long, help_heading = "Rays", value_name = "NAME")]
@@ -157,14 +157,66 @@ fn parse_angle(text: &str) -> Result<f64, String> {
         .ok_or_else(|| format!("an angle is a number of degrees above 0 and below 90, not '{text}'"))
 }
 
-/// Reads the name of a part, face or role and its tolerances in mm, NAME=MIN..MAX.
+/// Reads the name of a part and its tolerances in mm, NAME=MIN..MAX.
 fn parse_part(text: &str) -> Result<(String, [f64; 2]), String> {
+    parse_place(text, "the name of the part", "NAME=MIN..MAX, as in cover=0.01..0.05")
+}
+
+/// Reads the name of a face, or `#` and the number of its entity, and its tolerances in mm.
+fn parse_face(text: &str) -> Result<(String, [f64; 2]), String> {
+    parse_place(text, "the name of the face or its #ID", "NAME=MIN..MAX or #ID=MIN..MAX, as in #17=0.01..0.05")
+}
+
+/// Reads an optical role and its tolerances in mm, ROLE=MIN..MAX.
+fn parse_role(text: &str) -> Result<(String, [f64; 2]), String> {
+    parse_place(text, "the role", "ROLE=MIN..MAX, as in mirror=0.01..0.05")
+}
+
+/// Reads a name and its tolerances in mm; messages call the name `what`, and show its `form`.
+fn parse_place(text: &str, what: &str, form: &str) -> Result<(String, [f64; 2]), String> {
     // The last '=' parts the two, since names of parts may contain it.
-    let (name, range) = text.rsplit_once('=').ok_or("write NAME=MIN..MAX, as in cover=0.01..0.05")?;
+    let (name, range) = text.rsplit_once('=').ok_or_else(|| format!("write {form}"))?;
     if name.trim().is_empty() {
-        return Err("the name of the part is missing; write NAME=MIN..MAX, as in cover=0.01..0.05".into());
+        return Err(format!("{what} is missing; write {form}"));
     }
     Ok((name.trim().to_owned(), parse_tolerance(range)?))
+}
+
+/// Reads a whole number from `least` to `most`.
+fn parse_whole(text: &str, least: u64, most: u64) -> Result<u64, String> {
+    let value = text.trim().parse::<u64>().ok().filter(|value| (least..=most).contains(value));
+    value.ok_or_else(|| format!("a whole number from {least} to {most} is wanted, not '{text}'"))
+}
+
+/// Reads the seed of random numbers.
+fn parse_seed(text: &str) -> Result<u64, String> {
+    parse_whole(text, 0, u64::MAX)
+}
+
+/// Reads a number of threads; how many of so many are of use is decided where they are started.
+pub(crate) fn parse_threads(text: &str) -> Result<usize, String> {
+    parse_whole(text, 1, u64::from(u32::MAX)).map(|threads| threads as usize)
+}
+
+/// Reads how many there are to be of something that is listed.
+pub(crate) fn parse_listed(text: &str) -> Result<u32, String> {
+    parse_whole(text, 0, u64::from(u32::MAX)).map(|count| count as u32)
+}
+
+/// Reads a number of parts, 1 or more.
+pub(crate) fn parse_parts(text: &str) -> Result<u32, String> {
+    parse_whole(text, 1, u64::from(u32::MAX)).map(|count| count as u32)
+}
+
+/// Reads a limit of how many of something there may be.
+pub(crate) fn parse_limit(text: &str) -> Result<u64, String> {
+    parse_whole(text, 0, u64::MAX)
+}
+
+/// Reads a number of seconds, 0 or more, `inf` for ever.
+pub(crate) fn parse_seconds(text: &str) -> Result<f64, String> {
+    let value = text.trim().parse::<f64>().ok().filter(|seconds| *seconds >= 0.0);
+    value.ok_or_else(|| format!("a number of seconds, 0 or more, is wanted, as in 30, not '{text}'"))
 }
 
 /// Reads a number of rays, `N`, or the half-open range `A..B` from ray A up to B.
@@ -206,10 +258,10 @@ pub(crate) fn parse_count(text: &str) -> Result<u64, String> {
     }
 }
 
-/// Reads a share, 0 or more; above 1 nothing is too much.
+/// Reads a share, from 0 to 1.
 pub(crate) fn parse_share(text: &str) -> Result<f64, String> {
     // Compared with no number, every share would be within it, or none.
-    let value = text.trim().parse::<f64>().ok().filter(|share| *share >= 0.0);
+    let value = text.trim().parse::<f64>().ok().filter(|share| (0.0..=1.0).contains(share));
     value.ok_or_else(|| format!("a share is a number from 0 to 1, as in 0.01, not '{text}'"))
 }
 
@@ -263,13 +315,25 @@ mod tests {
     #[test]
     fn shares() {
         assert_eq!((parse_share("0"), parse_share("1e-6")), (Ok(0.0), Ok(1e-6)));
-        assert!(["nan", "-0.1", "x", ""].iter().all(|text| parse_share(text).is_err()));
+        assert!(["nan", "-0.1", "1.5", "inf", "x", ""].iter().all(|text| parse_share(text).is_err()));
+    }
+
+    #[test]
+    fn whole_numbers_and_seconds() {
+        assert_eq!((parse_seed("0"), parse_threads("4"), parse_seconds("0.5")), (Ok(0), Ok(4), Ok(0.5)));
+        assert_eq!(parse_seed("18446744073709551615"), Ok(u64::MAX));
+        assert!(parse_seed("-1").unwrap_err().contains("from 0 to 18446744073709551615"));
+        assert!(["x", "0", "1.5", "5000000000"].iter().all(|text| parse_threads(text).is_err()));
+        assert!(["nan", "-1", "soon"].iter().all(|text| parse_seconds(text).is_err()));
     }
 
     #[test]
     fn parts_and_angles() {
         assert_eq!(parse_part("a=b=0.1"), Ok(("a=b".into(), [0.1, 0.1])));
-        assert!(parse_part("=0.1").is_err() && parse_part("cover").is_err());
+        assert!(parse_part("=0.1").unwrap_err().contains("name of the part"));
+        assert!(
+            parse_face("x").unwrap_err().contains("#17=") && parse_role("=1").unwrap_err().contains("the role")
+        );
         assert_eq!((parse_angle("5deg"), parse_accuracy("0.05deg")), (Ok(5.0), Ok(0.05)));
         assert!(parse_angle("90").is_err() && parse_accuracy("-1deg").is_err());
     }

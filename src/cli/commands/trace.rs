@@ -122,9 +122,6 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
 fn check_options(command: &TraceCommand) -> Result<(), Failure> {
     let extra = command.extra;
     refuse_normals(&command.tracing, None)?;
-    if extra.checkpoint.is_nan() || extra.checkpoint < 0.0 {
-        return Err(Failure::arguments(format!("--checkpoint {}: not a number of seconds", extra.checkpoint)));
-    }
     extra.until_error.as_deref().map(ErrorTarget::parse).transpose()?;
     extra.paths.as_deref().map_or(Ok(()), PathFile::check_name)?;
     extra.ends.as_deref().map_or(Ok(()), end_file::check_name)
@@ -156,7 +153,8 @@ fn refuse_normals(tracing: &TracingSettings, scene: Option<&Scene>) -> Result<()
     if IntersectorChoice::new(tracing, scene)?.intersector != IntersectorKind::Exact {
         return Ok(());
     }
-    let asks = if tracing.intersector.is_some() { "--intersector exact" } else { "the scene's intersector = \"exact\"" };
+    let asks =
+        if tracing.intersector.is_some() { "--intersector exact" } else { "the scene's intersector = \"exact\"" };
     let message = format!("{asks} does not take --normals {normals}: the spline has normals of its own");
     Err(Failure::arguments(message).with_help("leave --normals out, or choose an intersector on facets, as octree"))
 }
