@@ -254,6 +254,22 @@ fn a_receiver_in_a_face_is_named() {
         let text = format!("[[receiver]]\nname = 'r'\nsize = [2, 2]\nabsorbs = false\n{receiver}\n");
         bound(&model, &text).unwrap().notes().join("\n")
     };
+    // One that absorbs takes light of a body that had not left it yet; on what is opaque it takes what would have met that.
+    let absorbing = |material: &str, receiver: &str| {
+        let text = format!("[[material]]\n{material}\n[[receiver]]\nname = 'r'\nsize = [2, 2]\n{receiver}\n");
+        bound(&model, &text).unwrap().notes().join("\n")
+    };
+    let inside = absorbing("medium = 'PMMA'", "at = [1, 2, 3]");
+    assert!(inside.contains("'r' lies in face 5 of 'plate': light from inside ends on it"), "{inside}");
+    assert_eq!(absorbing("medium = 'PMMA'", "at = [1, 2, 3.01]"), "");
+    // Against its normal comes the light from outside, or that from inside.
+    assert_eq!(absorbing("medium = 'PMMA'", "at = [1, 2, 3]\none_sided = true"), "");
+    assert!(
+        absorbing("medium = 'PMMA'", "at = [1, 2, 3]\nnormal = [0, 0, -1]\none_sided = true").contains("lies in")
+    );
+    for opaque in ["surface = 'absorber'", "surface = 'mirror'\nreflectance = 0.9"] {
+        assert_eq!(absorbing(opaque, "at = [1, 2, 3]"), "", "{opaque}");
+    }
     assert!(notes("at = [1, 2, 3]").contains("'r' lies in face 5 of 'plate'"), "{}", notes("at = [1, 2, 3]"));
     assert!(notes("at = [1, 2, 3]\nnormal = [0, 0, -1]").contains("lies in"));
     for off in ["at = [1, 2, 3.001]", "at = [7, 2, 3]", "at = [1, 2, 3]\nnormal = [1, 0, 1]"] {

@@ -118,7 +118,7 @@ impl Scene {
         bound.notes.extend(notes::shut_body_note(&bound, &chosen));
         bound.notes.extend(notes::thin_body_note(&bound));
         bound.notes.extend(notes::ready_mesh_note(model));
-        bound.notes.extend(flush_receivers::flush_receiver_notes(&bound.receivers, model, &bound.instances));
+        bound.notes.extend(flush_receivers::flush_receiver_notes(&bound, model));
         Ok(bound)
     }
 }
