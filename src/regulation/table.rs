@@ -139,8 +139,7 @@ pub(super) struct Realignment {
 /// Names that a message lists.
 const MOST_NAMED: usize = 12;
 /// What a message names where nothing is near.
-const EXAMPLES: [&str; 4] =
-    ["UN R112 B passing", "UN R149-01 C passing", "UN R148-01 stop-S1", "FMVSS 108 LB2V"];
+const EXAMPLES: [&str; 4] = ["UN R112 B passing", "UN R149-01 C passing", "UN R148-01 stop-S1", "FMVSS 108 LB2V"];
 
 /// A name in small letters, without spaces and dashes, which are written in many ways.
 fn plain(name: &str) -> String {
