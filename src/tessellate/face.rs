@@ -113,10 +113,9 @@ pub(super) fn mesh_with_imprint(
     let mut border = BorderNodes::new(part, &loops, surface, &polygons, shared);
     let vertex_nodes = border.add_imprint(surface, imprint);
     let lines: Vec<[Uv; 2]> = border.imprinted.iter().map(|s| s.map(|n| border.nodes[n].uv)).collect();
-    let angle = settings.angle_deg.map(f64::to_radians);
     let budget = face_budget(face, surface, settings);
     // The tree is asked for imprinted lines too, which no cell may lie across.
-    let cells = branches::split(surface, settings.acceptance, &polygons, &lines, budget, angle);
+    let cells = branches::split(surface, settings.acceptance, &polygons, &lines, budget, surface.field.angle);
     let mut prover = Prover::new(surface, settings.acceptance);
     // Pairing must not join triangles across a side that neighbours have.
     let kept = border.segments.iter().chain(&border.imprinted);

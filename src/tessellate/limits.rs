@@ -5,27 +5,18 @@
 //! wild patch of degree 25, ends when its proofs have taken more steps than any real face takes. Nothing looks at a clock, so the outcome
 //! is the same on any machine and for any number of threads.
 
-use super::border::polygons;
+use super::expected_cells::{TIMES_EXPECTED, expected_cells};
 use super::face_surface::FaceSurface;
 use super::placed_part::PlacedPart;
 use super::report::{FailureCause, Report};
 use super::settings::Settings;
-use crate::math::Uv;
-use crate::math::polygon::is_inside_sides;
 use crate::model::{Face, Model};
-use crate::nurbs::FundamentalForms;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-/// Places along each side of a face's parameter box at which its curvature is asked.
-const PLACES: usize = 12;
-/// Share of the places, those of sharpest curvature, that are left out: near a pole or a kink one place says nothing of its surroundings.
-const SHARPEST_PLACES: f64 = 0.1;
 /// Largest size of a face in tolerances up to which it is not looked at: a ball of this size needs half as many
 /// cells. Each face of a file has that much to itself, so that the limit grows with the file.
 const FREE_SIZE: f64 = 20_000.0;
-/// Pieces in which a curve of a trim is looked at.
-const TRIM_STEPS: u32 = 8;
 
 /// Cells that the faces of any model may have at the default tolerance: those of a ball of 25 m, some eight seconds of one core.
 const CELLS_OF_ANY: f64 = 200_000.0;
@@ -56,8 +47,6 @@ fn times_finer([tightest, loosest]: [f64; 2]) -> f64 {
 
 /// Cells that a face too large to be meant may have at the default tolerance: some seconds of one core.
 const CELLS_OF_LARGE_FACE: f64 = 50_000.0;
-/// How many times the cells that a face is expected to need it may have: [`expected_cells`] estimates from below.
-const TIMES_EXPECTED: f64 = 4.0;
 
 /// Returns the cells that a face may have, at most those that the settings grant each: of a large one by its control points and its
 /// curvature. All of them where an angle is asked for, few where the tolerance is within the rounding of coordinates.
@@ -118,45 +107,6 @@ pub(super) fn faces_beyond(parts: &[PlacedPart<'_>], settings: &Settings) -> Too
         beyond.insert(key, cells);
     }
     beyond
-}
-
-/// Estimates from below how many cells a face needs, not whole: the mean over a grid of places inside its border, the sharpest tenth left
-/// out, of √(k / 8ξ)·L chords along u times those along v. 1 for a plane.
-pub(super) fn expected_cells(face: &Face, surface: &FaceSurface<'_>) -> f64 {
-    if surface.affine {
-        return 1.0;
-    }
-    let border: Vec<[Uv; 2]> = polygons::loops(face)
-        .iter()
-        .flat_map(|l| &l.uses)
-        .flat_map(|u| {
-            let [t0, t1] = u.uv.domain();
-            let at = move |i: u32| u.uv.evaluate(t0 + (t1 - t0) * f64::from(i) / f64::from(TRIM_STEPS));
-            (0..TRIM_STEPS).map(move |i| [at(i), at(i + 1)]).collect::<Vec<_>>()
-        })
-        .collect();
-    let ends = border.iter().flatten();
-    let (lo, hi) = ends.fold((Uv::INFINITY, Uv::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
-    let [[u0, u1], [v0, v1]] = surface.spline.domain();
-    let (lo, hi) = (lo.max(Uv::new(u0, v0)), hi.min(Uv::new(u1, v1)));
-    let size = hi - lo;
-    // How many cells the whole box would take if it were everywhere as it is at one place.
-    let cells_if_alike = |uv: Uv| -> Option<f64> {
-        let d = surface.second_derivatives(uv);
-        let forms = FundamentalForms::new(&d)?;
-        let tolerance = surface.tolerance(uv);
-        let chords = |k: f64, length: f64| ((k.abs() / (8.0 * tolerance)).sqrt() * length).max(1.0);
-        let along_u = chords(forms.normal_curvature(Uv::X), d.du.length() * size.x);
-        let along_v = chords(forms.normal_curvature(Uv::Y), d.dv.length() * size.y);
-        Some(along_u * along_v).filter(|cells| cells.is_finite())
-    };
-    let inside = |uv: &Uv| is_inside_sides(border.iter().copied(), *uv);
-    let place = |k: usize| lo + (Uv::new((k / PLACES) as f64, (k % PLACES) as f64) + 0.5) / PLACES as f64 * size;
-    let places = (0..PLACES * PLACES).map(place).filter(inside);
-    let mut cells: Vec<f64> = places.filter_map(cells_if_alike).collect();
-    cells.sort_by(f64::total_cmp);
-    let kept = cells.len() - (SHARPEST_PLACES * cells.len() as f64) as usize;
-    cells[..kept].iter().sum::<f64>() / (PLACES * PLACES) as f64
 }
 
 /// Sets the cause of the failed faces of a report. `cause` is asked with the part and the face's place in it; where it knows none, the
@@ -237,20 +187,5 @@ mod tests {
         assert_eq!(of(ball(&Frame::IDENTITY, 1.0), 0.05, 0.0), 10_000_000);
         // Closed, so that its tolerance follows its size, which is less than a rounding of where it is.
         assert_eq!(of(ball(&Frame::translation(Point::new(5.0, 6.0, 3.0)), 1e-300), 0.05, 0.0), 50_000);
-    }
-
-    #[test]
-    fn cells_of_a_ball_and_a_tube_are_those_of_their_chords() {
-        let (radius, tolerance) = (1000.0, 0.01);
-        let field = ToleranceField::new([tolerance; 2], [1.0, 10.0], Default::default(), 1.0);
-        let ball = Face::whole(sweep::sphere(&Frame::IDENTITY, radius, [0.0, 2.0 * PI], [-FRAC_PI_2, FRAC_PI_2]));
-        let cells = expected_cells(&ball, &FaceSurface::new(&ball.surface, false, field));
-        // Squares of side s sag by s²/8R along each side: 4πR² / 8Rξ of them.
-        let exact = FRAC_PI_2 * radius / tolerance;
-        assert!(cells > 0.7 * exact && cells < 1.1 * exact, "{cells} {exact}");
-        let tube = Face::whole(sweep::cylinder(&Frame::IDENTITY, radius, [0.0, PI], [0.0, 1e4]));
-        let cells = expected_cells(&tube, &FaceSurface::new(&tube.surface, false, field));
-        let exact = PI * radius / (8.0 * radius * tolerance).sqrt();
-        assert!(cells > 0.7 * exact && cells < 1.1 * exact, "{cells} {exact}");
     }
 }

@@ -23,6 +23,7 @@ mod contact;
 mod crossing_chords;
 mod emission;
 mod evaluation;
+mod expected_cells;
 mod face;
 mod face_mesh;
 mod face_surface;

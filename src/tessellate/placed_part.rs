@@ -1,5 +1,6 @@
 //! A part in all its places: which tolerance its faces are held to there.
 
+use super::expected_cells::angle_within_budget;
 use super::face_surface::FaceSurface;
 use super::proof_steps::ProofSteps;
 use super::settings::{FaceSelector, Settings, ToleranceField};
@@ -60,10 +61,11 @@ impl<'m> PlacedPart<'m> {
     pub(super) fn surface(&self, settings: &Settings, k: usize, face: &'m Face) -> Option<FaceSurface<'m>> {
         let (tolerance, radii) = self.tolerance(settings, k, face);
         is_finite(face).then(|| {
-            let field =
-                ToleranceField::new(tolerance, radii, settings.law, self.scale).with_angle(settings.angle_deg);
+            let field = ToleranceField::new(tolerance, radii, settings.law, self.scale);
             // Faces that were not read from a file have a gap of zero whether it was measured or not.
             let mut surface = FaceSurface::new(&face.surface, face.reversed, field);
+            let angle = settings.angle_deg.map(f64::to_radians);
+            surface.field.angle = angle.map(|asked| angle_within_budget(face, &surface, settings.budget, asked));
             surface.steps = ProofSteps::new(settings.most_steps);
             surface.gap = Some(face.gap).filter(|&g| g > 0.0);
             surface

@@ -20,7 +20,8 @@ pub struct Settings {
     pub radii: [f64; 2],
     /// How the tolerance runs between the two radii.
     pub law: ToleranceLaw,
-    /// Largest angle between a facet and the surface normals at its corners, degrees; `None` for no such condition.
+    /// Largest angle between a facet and the surface normals at its corners, degrees; `None` for no such condition. Faces that would need
+    /// more cells for it than their budget get the least angle that it allows: [`super::Report::over_angle`] names them.
     pub angle_deg: Option<f64>,
     /// Other tolerances for some places; of several that match a face, the last counts.
     pub overrides: Vec<ToleranceOverride>,
@@ -131,6 +132,10 @@ impl Settings {
     }
 }
 
+/// Share of the tightest tolerance below which facets are not divided for an angle. At a corner where a surface has no normal they went
+/// down to a picometre, and some no longer met those of the next face.
+const LEAST_SHARE: f64 = 0.01;
+
 /// The tolerance as a function of curvature, for one face in its part's own lengths.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ToleranceField {
@@ -138,7 +143,8 @@ pub(super) struct ToleranceField {
     range: [f64; 2],
     radii: [f64; 2],
     law: ToleranceLaw,
-    /// Largest angle between a facet and the normals at its corners, radians.
+    /// Largest angle between a facet and the normals at its corners, radians: that of [`Settings::angle_deg`], or the least that the face can
+    /// be held to.
     pub(super) angle: Option<f64>,
 }
 
@@ -188,15 +194,16 @@ impl ToleranceField {
         Self { range: self.range.map(|x| x.min(most)), ..self }
     }
 
-    /// Returns the same with the angle condition of [`Settings::angle_deg`].
-    pub(super) fn with_angle(self, degrees: Option<f64>) -> Self {
-        Self { angle: degrees.map(f64::to_radians), ..self }
+    /// Returns the sag, mm, at which a chord meets the angle condition where the curvature is `k`, 1/mm: the chord's ends turn by k·L/2 and
+    /// it sags k·L²/8, or of one of [`Self::least_of_angle`]. Infinite without a condition.
+    pub(super) fn sag_at_angle(&self, k: f64) -> f64 {
+        // No chord is made shorter than the least for its angle.
+        self.angle.map_or(f64::INFINITY, |a| a * a / (2.0 * k.min(2.0 * a / self.least_of_angle())))
     }
 
-    /// Returns the sag, mm, at which a chord meets the angle condition where the curvature is `k`, 1/mm: the chord's ends turn by k·L/2 and
-    /// it sags k·L²/8. Infinite without a condition.
-    pub(super) fn sag_at_angle(&self, k: f64) -> f64 {
-        self.angle.map_or(f64::INFINITY, |a| a * a / (2.0 * k))
+    /// Returns the length, mm, below which facets are not divided for an angle: [`LEAST_SHARE`] of the tightest tolerance.
+    pub(super) fn least_of_angle(&self) -> f64 {
+        LEAST_SHARE * self.range[0]
     }
 
     /// Returns the tolerance at the sharpest places, mm.

@@ -537,6 +537,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "turned_facets",
             "imprint",
             "border",
+            "expected_cells",
             "cells",
             "crossing_chords",
             "border_nodes",

@@ -5,7 +5,7 @@ use lampyris::math::{Homogeneous, Uv};
 use lampyris::model::Model;
 use lampyris::nurbs::Surface;
 use lampyris::tessellate::{Repair, Settings, tessellate};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// The bowl z = (x² + y²) / 100 mm over 100 mm each way, a circle of 90 mm of it.
 fn round_bowl() -> Model {
@@ -34,4 +34,24 @@ fn a_face_whose_budget_ended_is_named() {
         named[usize::from(is_whole)] += 1;
     }
     assert!(named.into_iter().all(|count| count > 0), "{named:?}");
+}
+
+/// However small an angle is asked for: facets get the least that their number allows, and none stands upright where the budget would have
+/// ended beside fine ones.
+#[test]
+fn an_angle_beyond_the_budget_leaves_the_surface_smooth() {
+    let model = round_bowl();
+    // Of z = r² / 100 within 45 mm.
+    let area = PI / (6.0 * 1e-4) * ((1.0 + 4e-4 * 45.0 * 45.0f64).powf(1.5) - 1.0);
+    for (angle, budget) in [(0.5, 20_000), (0.02, 20_000), (1e-9, 20_000)] {
+        let made = tessellate(
+            &model,
+            &Settings { angle_deg: Some(angle), budget, measure: true, ..Settings::uniform(0.2) },
+        );
+        let report = &made.report;
+        assert!((report.area_mm2 / area - 1.0).abs() < 2e-3, "{angle}: {} {area}", report.area_mm2);
+        assert!(report.facets < 2 * budget && report.repaired.is_empty(), "{angle}: {}", report.facets);
+        let steep = &report.over_angle.as_ref().unwrap()[0];
+        assert!(steep.largest_deg < 5.0, "{angle}: {}", steep.largest_deg);
+    }
 }

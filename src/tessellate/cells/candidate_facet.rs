@@ -65,6 +65,11 @@ pub(in crate::tessellate) struct CandidateFacet {
 }
 
 impl CandidateFacet {
+    /// The longer of the diagonals between its corners, mm.
+    pub(in crate::tessellate) fn extent(&self) -> f64 {
+        self.p[0][0].distance(self.p[2][2]).max(self.p[0][2].distance(self.p[2][0]))
+    }
+
     /// Evaluates the surface at the corners, side middles and middle of the cell, and measures sags; proves nothing.
     pub(in crate::tessellate) fn new(surface: &FaceSurface<'_>, cell: Cell) -> Self {
         let middle = cell.center();

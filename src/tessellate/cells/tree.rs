@@ -317,7 +317,8 @@ impl Tree<'_, '_> {
             }
         }
         // Once tolerances have grown, angles do not matter any more.
-        if let Some(max) = self.max_angle.filter(|_| slack == 1.0) {
+        let is_divided = slack == 1.0 && candidate.extent() > self.surface.field.least_of_angle();
+        if let Some(max) = self.max_angle.filter(|_| is_divided) {
             let n: Vec<_> = cell.corners().iter().filter_map(|&c| self.surface.normal(c)).collect();
             // Normals within the angle of one facet differ by twice as much at most.
             let turned = n.iter().any(|a| n.iter().any(|b| a.angle_between(*b) > 2.0 * max));

@@ -39,8 +39,8 @@ impl DelaunayMesh<'_, '_> {
         (0..3).find(|&k| is_taken(t[k], t[(k + 1) % 3]))
     }
 
-    /// Returns the side, not on the outline, whose ends' normals differ most, if a normal breaks the angle condition and that side turns by
-    /// more than it; `None` otherwise and without a condition.
+    /// Returns the side, not on the outline and long enough to be divided for an angle, whose ends' normals differ most, if a normal breaks
+    /// the angle condition and that side turns by more than it; `None` otherwise and without a condition.
     fn steep_side(&self, t: [u32; 3]) -> Option<usize> {
         let most = self.surface.field.angle?;
         let n = t.map(|i| self.nodes[i]);
@@ -52,7 +52,8 @@ impl DelaunayMesh<'_, '_> {
             (Some(a), Some(b)) => a.angle_between(b),
             _ => 0.0,
         };
-        let free = (0..3).filter(|&k| self.is_inner(t[k], t[(k + 1) % 3]));
+        let is_long = |k: usize| n[k].place.distance(n[(k + 1) % 3].place) > self.surface.field.least_of_angle();
+        let free = (0..3).filter(|&k| self.is_inner(t[k], t[(k + 1) % 3]) && is_long(k));
         let side = free.max_by(|&a, &b| turn(a).total_cmp(&turn(b)))?;
         (steep && turn(side) > most).then_some(side)
     }
