@@ -36,10 +36,10 @@ fn the_terminal_shows_the_table_and_the_folder_holds_it() {
     let path = folder.path().display().to_string();
     let scene = fixture("scenes/s3_reflector.toml").display().to_string();
     let (code, out, err) = lampyris(&["study", "effects", "--rays", "3000", "-o", &path, &scene]);
-    assert_eq!((code, out.as_str()), (0, ""), "{err}");
+    assert!(code == 0 && !err.contains("polarisation"), "{err}");
     let words = |start: &str| {
         let line =
-            err.lines().find(|l| l.trim_start().starts_with(start)).unwrap_or_else(|| panic!("{start}: {err}"));
+            out.lines().find(|l| l.trim_start().starts_with(start)).unwrap_or_else(|| panic!("{start}: {out}"));
         line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
     };
     assert!(words("as called for: reflection").contains(&"mirror".into()));

@@ -189,8 +189,8 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
     if console.json {
         print(&text)?;
     } else {
-        console.say(format_args!("{}", terminal_tables::study_tables(&report, console.width())));
-        console.say(format_args!("  {}\n", report.answer.replace("**", "")));
+        let tables = terminal_tables::study_tables(&report, console.width());
+        print(&format!("{tables}\n  {}\n\n", report.answer.replace("**", "")))?;
         if command.page.is_wanted() {
             console.say(format_args!("  {}", console.bold(&folder.join("report.html").display().to_string())));
         }
