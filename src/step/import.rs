@@ -86,6 +86,12 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     if file.fault_count > file.faults.len() {
         report.problems.push(format!("{} further statements were skipped", file.fault_count - file.faults.len()));
     }
+    report.cut_off = !file.is_ended;
+    if report.cut_off {
+        report.problems.push(format!(
+            "{name}: the file ends without END-ISO-10303-21, as one that was cut off does; what is missing is not known: get it whole"
+        ));
+    }
     let missing = file.missing_ids();
     if let Some(first) = missing.first() {
         let count = missing.len();
@@ -140,6 +146,11 @@ fn read_units(file: &File<'_>, settings: &Settings, report: &mut ImportReport) -
         }
         add(&mut names.length, assigned.length_name);
         add(&mut names.angle, assigned.angle_name);
+    }
+    if names.length.is_empty() && settings.length_unit_mm.is_none() {
+        problems.push(format!(
+            "{name}: no unit of length is named: lengths are taken to be in mm. unit_mm of a scene's model sets another"
+        ));
     }
     let length = settings.length_unit_mm.unwrap_or(Units::DEFAULT.length);
     (units, fallback.unwrap_or(Units { length, ..Units::DEFAULT }))

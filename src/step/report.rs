@@ -46,6 +46,9 @@ pub struct ImportReport {
     pub gap_max_mm: f64,
     /// Statements and placements that could not be read, with their lines or instances.
     pub problems: Vec<String>,
+    /// Whether the file was cut off: shapes may be missing of which nothing tells.
+    #[serde(default)]
+    pub cut_off: bool,
     /// Time taken.
     pub seconds: Seconds,
     /// Largest resident size of the process so far, bytes; 0 where the system does not tell.

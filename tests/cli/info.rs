@@ -212,3 +212,31 @@ fn faces_are_listed_with_the_places_of_their_own_part() {
         (&"Open CASCADE STEP translator 7.8 2".into(), &serde_json::json!(["Open CASCADE STEP translator 7.8 2"]))
     );
 }
+
+/// Cut between two records, where nothing else tells of it: what is missing is not known, so that the whole is not there either.
+#[test]
+fn a_file_that_was_cut_off_is_told_and_incomplete() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(step("lamp_multicavity.stp")).unwrap();
+    let half = text[..text.len() / 2].rfind(";\n").unwrap() + 2;
+    for (cut, limit, expected) in [(half, "0.1", 4), (half, "1", 0), (text.len(), "0", 0)] {
+        let path = written(folder.path(), "cut.stp", &text.as_bytes()[..cut]).display().to_string();
+        for command in ["info", "facet"] {
+            let (code, out, err) = lampyris(&[command, &path, "--max-refused", limit]);
+            assert_eq!(code, expected, "{command} {cut}: {out}{err}");
+            assert_eq!((out + &err).contains("END-ISO-10303-21"), cut == half, "{command} {cut}");
+        }
+    }
+}
+
+#[test]
+fn lengths_without_a_unit_are_said_to_be_taken_as_mm() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(step("lamp_multicavity_inch.stp")).unwrap();
+    let without = text.replace("LENGTH_UNIT()", "");
+    for (text, is_said) in [(&without, true), (&text, false)] {
+        let path = written(folder.path(), "unit.stp", text.as_bytes()).display().to_string();
+        let (_, out, err) = lampyris(&["info", &path]);
+        assert_eq!((out + &err).contains("taken to be in mm"), is_said);
+    }
+}

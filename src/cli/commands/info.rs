@@ -35,7 +35,8 @@ pub(crate) fn run(
     }
     // Products, for zero of zero faces are no excess.
     let over = report.faces.refused as f64 > limits.max_refused * report.faces.found as f64;
-    Ok(Completion::incomplete_if(over || report.faces.found == 0))
+    let is_cut_off = report.cut_off && limits.max_refused < 1.0;
+    Ok(Completion::incomplete_if(over || is_cut_off || report.faces.found == 0))
 }
 
 /// Returns the report of an import as lines for people; lists are cut off without -v.

@@ -53,7 +53,7 @@ pub(crate) fn scene_or_model(path: &Path, placed: PlacedLimit, console: &Console
 }
 
 /// Says what could not be read of the files, what they hide and how many faces were refused, if any; incomplete where the refused are a
-/// larger share of all faces than `max_refused`.
+/// larger share of all faces than `max_refused`, or a file was cut off.
 pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &Console) -> Completion {
     let [refused, found] = loaded.refused_faces();
     let problems: Vec<&String> = loaded.reports.iter().flat_map(|r| &r.problems).collect();
@@ -68,8 +68,10 @@ pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &
     if hidden > 0 {
         console.say(format_args!("light meets {hidden} items that the model hides; `lampyris info` lists them"));
     }
+    // How much of a file that was cut off is missing nobody knows: less than all of it.
+    let is_cut_off = loaded.reports.iter().any(|r| r.cut_off) && max_refused < 1.0;
     if refused == 0 {
-        return Completion::Complete;
+        return Completion::incomplete_if(is_cut_off);
     }
     let message = format!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons");
     let is_incomplete = refused as f64 > max_refused * found as f64;
@@ -78,7 +80,7 @@ pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &
     } else {
         console.say(message)
     }
-    Completion::incomplete_if(is_incomplete)
+    Completion::incomplete_if(is_incomplete || is_cut_off)
 }
 
 /// Says how many faces of a run that is traced on facets have none, if any: light passes where they are. Incomplete where that is a larger

@@ -88,6 +88,8 @@ pub(super) struct File<'a> {
     pub(super) faults: Vec<Fault>,
     /// How many were skipped.
     pub(super) fault_count: usize,
+    /// Whether the word stands in it that ends a file: one that was cut off lacks it.
+    pub(super) is_ended: bool,
 }
 
 impl<'a> File<'a> {

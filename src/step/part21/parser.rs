@@ -34,6 +34,7 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
         fault_count: 0,
         lines: (0, 1),
         rewound: 0,
+        is_ended: false,
     };
     let marked = p.statements();
     // A lost first line is forgiven to a file that goes on with instances.
@@ -62,6 +63,7 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
         kinds,
         faults: p.faults,
         fault_count: p.fault_count,
+        is_ended: p.is_ended,
     })
 }
 
@@ -81,6 +83,8 @@ struct Parser<'a> {
     lines: (usize, usize),
     /// Bytes read again because of faults; bounded, so that time stays linear in the input.
     rewound: usize,
+    /// See [`File::is_ended`].
+    is_ended: bool,
 }
 
 type Parsed<T> = Result<T, &'static str>;
@@ -108,6 +112,7 @@ impl Parser<'_> {
                 c if c.is_ascii_alphabetic() => {
                     let name = Keyword::new(self.source, self.identifier());
                     marked |= name.bytes(self.source) == b"ISO-10303-21";
+                    self.is_ended |= name.bytes(self.source) == b"END-ISO-10303-21";
                     // A long word at the very beginning is some other kind of file.
                     if !marked && self.instances.is_empty() && self.at - start > 64 {
                         return false;
