@@ -258,7 +258,13 @@ fn absent_shapes(file: &File<'_>) -> String {
     let listed: Vec<String> = most.iter().take(LISTED_ENTITIES).map(|(name, n)| format!("{name} ({n})")).collect();
     let commonest =
         if listed.is_empty() { "it has no entity".into() } else { format!("commonest are {}", listed.join(", ")) };
-    format!("no face, surface or mesh was found; {commonest}; export solids or surfaces")
+    let faces = file.entities_named(&["ADVANCED_FACE", "FACE_SURFACE"]).count();
+    let found = if faces == 0 {
+        "no face, surface or mesh was found".into()
+    } else {
+        format!("the file has faces ({faces}), but no representation of a shape leads to one")
+    };
+    format!("{found}; {commonest}; export solids or surfaces")
 }
 
 /// Fills in the report's counts of parts with a face, instances, shells and converted placed faces, and adds the names, each once.

@@ -202,6 +202,8 @@ struct Errors<'a> {
     /// Light that was lost: it might have fallen on any receiver, so it is an error of every one, on the spline too.
     lost_power: f64,
     lost_share: f64,
+    /// See [`GeometricError::unseen_power`].
+    unseen_power: f64,
 }
 
 impl<'a> Errors<'a> {
@@ -212,11 +214,16 @@ impl<'a> Errors<'a> {
             _ => None,
         };
         let lost_power = results.power.lost;
+        let unseen_power = match surface {
+            Surface::Facets(error) => error.unseen_power(results.power.emitted),
+            _ => 0.0,
+        };
         Self {
             surface,
             measured,
             lost_power,
             lost_share: lost_power / results.power.emitted.max(f64::MIN_POSITIVE),
+            unseen_power,
         }
     }
 
@@ -232,7 +239,9 @@ impl<'a> Errors<'a> {
 
     /// Makes the figures of a receiver, each with both its errors; for absorbed power only that and channels.
     fn figures(&self, r: &ReceiverResult, unit: &str) -> ReceiverFigures {
-        let power = self.geometric(self.lost_power, |m| m.power.geometric());
+        let of_facets =
+            |m: &ReceiverError| if m.power.is_alike() { self.unseen_power } else { m.power.geometric() };
+        let power = self.geometric(self.lost_power, of_facets);
         let is_dark = r.power <= 0.0;
         let power = Figure::new(r.power, unit, if is_dark { r.ray_power } else { r.power_error }, power);
         let channels = self.channels(r, unit);

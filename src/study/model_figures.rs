@@ -16,7 +16,10 @@ fn geometric(results: &Results, surface: Surface<'_>, absorbed: &Absorbed) -> Op
     let lost = results.power.lost;
     let measured = |error: &GeometricError| {
         let found = error.absorbed.binary_search_by_key(&absorbed.index, |e| e.index).ok()?;
-        Some(error.absorbed[found].power.geometric().hypot(lost))
+        let power = error.absorbed[found].power;
+        let of_facets =
+            if power.is_alike() { error.unseen_power(results.power.emitted) } else { power.geometric() };
+        Some(of_facets.hypot(lost))
     };
     match surface {
         Surface::Spline => Some(lost),

@@ -174,16 +174,16 @@ fn the_page_of_scenes_is_that_of_the_program() {
 #[test]
 fn info_on_a_file_without_shapes_names_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
-    let text = part21("#1=CARTESIAN_POINT('',(0.,0.,0.));#2=MY_SHAPE(#1);#3=MY_SHAPE(#1);");
-    let path = written(folder.path(), "points.stp", text.as_bytes());
-    let (code, out, _) = lampyris(&["info", path.to_str().unwrap()]);
-    assert_eq!(code, 4, "{out}");
-    assert!(
-        out.contains(
-            "points.stp: no face, surface or mesh was found; commonest are MY_SHAPE (2), CARTESIAN_POINT (1)"
-        ),
-        "{out}"
-    );
+    let points = "#1=CARTESIAN_POINT('',(0.,0.,0.));#2=MY_SHAPE(#1);#3=MY_SHAPE(#1);";
+    let face = "#1=CARTESIAN_POINT('',(0.,0.,0.));#2=ADVANCED_FACE('',(),#1,.T.);";
+    for (data, said) in [
+        (points, "points.stp: no face, surface or mesh was found; commonest are MY_SHAPE (2), CARTESIAN_POINT (1)"),
+        (face, "points.stp: the file has faces (1), but no representation of a shape leads to one; commonest are"),
+    ] {
+        let path = written(folder.path(), "points.stp", part21(data).as_bytes());
+        let (code, out, _) = lampyris(&["info", path.to_str().unwrap()]);
+        assert!(code == 4 && out.contains(said), "{out}");
+    }
 }
 
 /// Parts that lost all of their faces are not listed, and the places of those that are stand beside them: of a file without any face the

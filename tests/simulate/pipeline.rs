@@ -95,6 +95,27 @@ fn cells_that_are_too_many_to_compare_are_named() {
     assert_eq!(run([64, 64]), (true, 0));
 }
 
+/// A receiver beside all light has the error of a ray in those that compared: that facets send it none on these is no proof.
+#[test]
+fn facets_that_changed_no_ray_may_change_one_in_so_many() {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes/s1_lens.toml");
+    let (mut scene, loaded) = read_scene(&scene, &Silent).unwrap();
+    scene.receivers.truncate(1);
+    scene.receivers[0].at = [0.0, 5000.0, 107.0];
+    let tracing = TracingSettings {
+        ray_range: Some(RayRange { first: None, end: 20_000 }),
+        threads: Some(2),
+        intersector: Some(IntersectorKind::Octree),
+        ..TracingSettings::default()
+    };
+    let prepared = PreparedScene::new(SceneJob { tracing, ..SceneJob::new(scene, loaded) }, &Silent).unwrap();
+    let run = prepared.trace(TraceRequest::default(), &Silent).unwrap();
+    let power = run.figures(&prepared)[0].power.clone();
+    assert_eq!(power.value, 0.0);
+    // The source has 1 W; what was lost on the way is far less.
+    assert!(power.geometric.is_some_and(|g| (1.0 / 20_000.0..1e-3).contains(&g)), "{power:?}");
+}
+
 #[test]
 fn requests_that_cannot_be_met_say_what_to_do() {
     let prepared = lens(3000);

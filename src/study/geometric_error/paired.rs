@@ -24,6 +24,11 @@ impl Paired {
         (self.facets - self.spline).hypot(self.error)
     }
 
+    /// Whether no replicate differed on facets: then how far they may differ is not told.
+    pub(in crate::study) fn is_alike(&self) -> bool {
+        self.facets == self.spline && self.error == 0.0
+    }
+
     /// Adds what the difference may be by rays that are rarer than `share` of all, each of which takes all its light along.
     pub(super) fn add_unseen(&mut self, share: f64) {
         self.error = self.error.hypot(share * self.spline);
