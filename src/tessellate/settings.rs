@@ -143,8 +143,8 @@ pub(super) struct ToleranceField {
     range: [f64; 2],
     radii: [f64; 2],
     law: ToleranceLaw,
-    /// Largest angle between a facet and the normals at its corners, radians: that of [`Settings::angle_deg`], or the least that the face can
-    /// be held to.
+    /// Largest angle between a facet and the normals at its corners, radians: that of [`Settings::angle_deg`], or the least that the face
+    /// can be held to.
     pub(super) angle: Option<f64>,
 }
 

@@ -457,7 +457,19 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     ),
     (
         "step/trim",
-        &["tolerances", "fit", "loops", "task", "touching", "seam_path", "boundary", "region", "seams", "face"],
+        &[
+            "tolerances",
+            "fit",
+            "loops",
+            "task",
+            "touching",
+            "seam_path",
+            "holes",
+            "boundary",
+            "region",
+            "seams",
+            "face",
+        ],
     ),
     (
         "step/geometry",

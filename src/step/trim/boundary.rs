@@ -1,7 +1,8 @@
 //! From chains to the boundary of a region without periods: chains that wind around the surface are joined by seams,
 //! lone ones run to a pole or a natural border, closed surfaces get their outer boundary, holes move inside it.
 
-use super::loops::{Chain, Piece, Source, contains};
+use super::holes::place_hole;
+use super::loops::{Chain, Piece, Source};
 use super::seam_path::{Goals, Obstacles, SeamPath, unrolled_polygon};
 use super::tolerances::{EMPTY_LOOP_SHARE, SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
 use crate::math::Uv;
@@ -70,62 +71,6 @@ pub(crate) fn bound_region(
     }
     add_with_holes(outer, plain, chart, &mut out);
     Ok(out)
-}
-
-/// Most periods by which a hole is moved: no thread of a real part has as many turns in one face.
-const MOST_PERIODS: f64 = 64.0;
-/// How much finer the border's polygon is where the first one has a hole outside: a hexagon in a circle 1.5 % wider stood out of the
-/// 16-sided polygon of that circle.
-const FINE_DENSITY: usize = 16;
-
-/// By how many periods a hole may be moved along `axis` so that it reaches into a border, the fewest first: a border that is cut along a
-/// helix leans over several.
-fn period_counts(hole: &[Uv], border: &[Uv], axis: usize, period: f64) -> Vec<i32> {
-    let range = |places: &[Uv]| {
-        let along = places.iter().map(|p| p[axis]);
-        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)])
-    };
-    let ([hole_lo, hole_hi], [lo, hi]) = (range(hole), range(border));
-    let least = ((lo - hole_hi) / period).floor().max(-MOST_PERIODS) as i32;
-    let most = ((hi - hole_lo) / period).ceil().min(MOST_PERIODS) as i32;
-    let mut counts: Vec<i32> = (least.min(0)..=most.max(0)).collect();
-    counts.sort_by_key(|count| count.abs());
-    counts
-}
-
-/// Moves a hole by periods into the border, and turns it clockwise; one that lies in no place inside is a loop of its own and turned the
-/// other way. Notes what was turned.
-fn place_hole(mut hole: Chain, outer: &Chain, chart: &Chart, repairs: &mut Vec<&'static str>) -> Chain {
-    let polygon = hole.polygon();
-    let shift_into = |border: &[Uv]| {
-        let counts = [0, 1].map(|d| chart.period[d].map_or(vec![0], |p| period_counts(&polygon, border, d, p)));
-        let [along_u, along_v] = &counts;
-        let shifts = along_u.iter().flat_map(|&i| along_v.iter().map(move |&j| [i, j]));
-        // Most of a few places decide: one may lie on the border.
-        let inside = |shift: &Uv| {
-            let n = polygon.len();
-            let hits = (0..5).filter(|k| contains(border, polygon[k * n / 5] + *shift)).count();
-            hits >= 3
-        };
-        shifts.map(|count| chart.whole_periods(count)).find(inside)
-    };
-    let shift = shift_into(&outer.polygon()).or_else(|| shift_into(&outer.polygon_of_density(FINE_DENSITY)));
-    match shift {
-        Some(shift) => {
-            hole.shift(shift);
-            if signed_area(&polygon) > 0.0 {
-                hole.reverse();
-                repairs.push("a hole was turned around");
-            }
-        }
-        None => {
-            if signed_area(&polygon) < 0.0 {
-                hole.reverse();
-                repairs.push("a loop outside the others was turned around");
-            }
-        }
-    }
-    hole
 }
 
 /// Adds to `out` an outer loop and its holes, moved into it.

@@ -8,6 +8,7 @@
 mod boundary;
 pub(super) mod face;
 pub(super) mod fit;
+mod holes;
 pub(super) mod loops;
 mod region;
 mod seam_path;

@@ -1,0 +1,87 @@
+//! Where the holes of a face lie on a surface with periods: moved by whole ones until they are inside its border.
+
+use super::loops::{Chain, contains};
+use crate::math::Uv;
+use crate::math::polygon::signed_area;
+use crate::step::chart::Chart;
+
+/// Places of a hole that are looked for inside the border.
+const PLACES: usize = 5;
+/// Most periods by which a hole is moved: no thread of a real part has as many turns in one face.
+const MOST_PERIODS: f64 = 64.0;
+/// How much finer the border's polygon is where the first one has a hole outside: a hexagon in a circle 1.5 % wider stood out of the
+/// 16-sided polygon of that circle.
+const FINE_DENSITY: usize = 16;
+
+/// By how many periods a hole may be moved along `axis` so that it reaches into a border, the fewest first: a border that is cut along a
+/// helix leans over several.
+fn period_counts(hole: &[Uv], border: &[Uv], axis: usize, period: f64) -> Vec<i32> {
+    let range = |places: &[Uv]| {
+        let along = places.iter().map(|p| p[axis]);
+        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)])
+    };
+    let ([hole_lo, hole_hi], [lo, hi]) = (range(hole), range(border));
+    let least = ((lo - hole_hi) / period).floor().max(-MOST_PERIODS) as i32;
+    let most = ((hi - hole_lo) / period).ceil().min(MOST_PERIODS) as i32;
+    let mut counts: Vec<i32> = (least.min(0)..=most.max(0)).collect();
+    counts.sort_by_key(|count| count.abs());
+    counts
+}
+
+/// Moves a hole by periods into the border, and turns it clockwise; one that lies in no place inside is a loop of its own and turned the
+/// other way. Notes what was turned.
+pub(super) fn place_hole(mut hole: Chain, outer: &Chain, chart: &Chart, repairs: &mut Vec<&'static str>) -> Chain {
+    let polygon = hole.polygon();
+    // Most of a few places decide, for one may lie on the border; a shift with all of them inside is the better one.
+    let shift_into = |border: &[Uv], least: usize| {
+        let counts = [0, 1].map(|d| chart.period[d].map_or(vec![0], |p| period_counts(&polygon, border, d, p)));
+        let [along_u, along_v] = &counts;
+        let shifts = along_u.iter().flat_map(|&i| along_v.iter().map(move |&j| [i, j]));
+        let inside = |shift: &Uv| {
+            let places = (0..PLACES).map(|k| polygon[k * polygon.len() / PLACES]);
+            places.filter(|&place| contains(border, place + *shift)).count() >= least
+        };
+        shifts.map(|count| chart.whole_periods(count)).find(inside)
+    };
+    let [coarse, fine] = [outer.polygon(), outer.polygon_of_density(FINE_DENSITY)];
+    let tries = [(&coarse, PLACES), (&fine, PLACES), (&coarse, PLACES / 2 + 1), (&fine, PLACES / 2 + 1)];
+    let shift = tries.into_iter().find_map(|(border, least)| shift_into(border, least));
+    match shift {
+        Some(shift) => {
+            hole.shift(shift);
+            if signed_area(&polygon) > 0.0 {
+                hole.reverse();
+                repairs.push("a hole was turned around");
+            }
+        }
+        None => {
+            if signed_area(&polygon) < 0.0 {
+                hole.reverse();
+                repairs.push("a loop outside the others was turned around");
+            }
+        }
+    }
+    hole
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hole of 1 by 1 and a border from 30 to 33 along u, of a period of 2π: four of them lead before it, five into it, none across.
+    #[test]
+    fn a_hole_is_moved_as_far_as_its_border_leans() {
+        let square = |low: f64, size: f64| {
+            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|p| Uv::new(low, 0.0) + Uv::from_array(p) * size)
+        };
+        let period = std::f64::consts::TAU;
+        let counts = period_counts(&square(0.0, 1.0), &square(30.0, 3.0), 0, period);
+        assert!(
+            counts.contains(&5) && counts.contains(&0) && counts.iter().all(|c| (0..=6).contains(c)),
+            "{counts:?}"
+        );
+        let counts = period_counts(&square(0.0, 1.0), &square(-20.0, 40.0), 0, period);
+        assert_eq!(counts[0], 0);
+        assert!(counts.iter().all(|c| c.abs() <= 4) && counts.contains(&-3) && counts.contains(&3), "{counts:?}");
+    }
+}
