@@ -15,6 +15,9 @@ const SHARPEST_PLACES: f64 = 0.1;
 const TRIM_STEPS: u32 = 8;
 /// How many times the cells that a face is expected to need it may have: [`expected_cells`] estimates from below.
 pub(super) const TIMES_EXPECTED: f64 = 4.0;
+/// How many times the cells that are expected of an angle a face may take: diagonals turn farther than sides, halving makes cells smaller
+/// than need be, and the border takes some.
+const TIMES_OF_ANGLE: f64 = 10.0;
 /// An angle, radians, below which none is considered: rounding turns the normals of small facets by as much.
 const LEAST_ANGLE: f64 = 1e-9;
 /// By how much an angle grows at least that takes too many cells.
@@ -32,7 +35,7 @@ pub(super) fn expected_cells(face: &Face, surface: &FaceSurface<'_>) -> f64 {
 /// Where cells of a smaller one end the budget midway, coarse ones are left beside fine ones, with facets between them that stand upright
 /// within the tolerance: at 0.03° a lens got three quarters more area.
 pub(super) fn angle_within_budget(face: &Face, surface: &FaceSurface<'_>, budget: usize, asked: f64) -> f64 {
-    let cells = budget as f64 / TIMES_EXPECTED;
+    let cells = budget as f64 / TIMES_OF_ANGLE;
     let mut angle = asked.max(LEAST_ANGLE);
     loop {
         let times_too_many = cells_of_chords(face, surface, |k, _| k / (2.0 * angle)) / cells;
@@ -117,12 +120,12 @@ mod tests {
             angle_within_budget(face, &FaceSurface::new(&face.surface, false, field), budget, asked)
         };
         for asked in [0.0, 1e-12, 1e-5] {
-            let (on_ball, on_tube) = (of(&ball, 400_000, asked), of(&tube, 40_000, asked));
+            let (on_ball, on_tube) = (of(&ball, 1_000_000, asked), of(&tube, 100_000, asked));
             let [ball_exact, tube_exact] = [(PI / 100_000.0).sqrt(), PI / 2.0 / 10_000.0];
             assert!(on_ball > 0.8 * ball_exact && on_ball < 1.05 * ball_exact, "{on_ball} {ball_exact}");
             assert!(on_tube > 0.8 * tube_exact && on_tube < 1.05 * tube_exact, "{on_tube} {tube_exact}");
             assert_eq!(of(&plane, 4, asked), asked);
         }
-        assert_eq!(of(&ball, 400_000, 0.01), 0.01);
+        assert_eq!(of(&ball, 1_000_000, 0.01), 0.01);
     }
 }
