@@ -6,6 +6,7 @@ use crate::math::Uv;
 use crate::math::polygon::is_inside_sides;
 use crate::model::Face;
 use crate::nurbs::FundamentalForms;
+use std::f64::consts::FRAC_PI_2;
 
 /// Places along each side of a face's parameter box at which its curvature is asked.
 const PLACES: usize = 12;
@@ -35,11 +36,16 @@ pub(super) fn expected_cells(face: &Face, surface: &FaceSurface<'_>) -> f64 {
 /// Where cells of a smaller one end the budget midway, coarse ones are left beside fine ones, with facets between them that stand upright
 /// within the tolerance: at 0.03° a lens got three quarters more area.
 pub(super) fn angle_within_budget(face: &Face, surface: &FaceSurface<'_>, budget: usize, asked: f64) -> f64 {
+    // A plane has one normal.
+    if surface.affine {
+        return asked;
+    }
     let cells = budget as f64 / TIMES_OF_ANGLE;
     let mut angle = asked.max(LEAST_ANGLE);
     loop {
         let times_too_many = cells_of_chords(face, surface, |k, _| k / (2.0 * angle)) / cells;
-        if times_too_many <= 1.0 {
+        // Beyond a right angle there is nothing to gain, however few cells there may be.
+        if times_too_many <= 1.0 || angle > FRAC_PI_2 {
             return if angle > LEAST_ANGLE { angle } else { asked };
         }
         // Of a ball the square of it decides, of a tube, which takes more rounds, the angle itself.
@@ -92,7 +98,7 @@ mod tests {
     use crate::math::Frame;
     use crate::nurbs::sweep;
     use crate::tessellate::settings::ToleranceField;
-    use std::f64::consts::{FRAC_PI_2, PI};
+    use std::f64::consts::PI;
 
     #[test]
     fn cells_of_a_ball_and_a_tube_are_those_of_their_chords() {
