@@ -239,9 +239,7 @@ impl<'a> Errors<'a> {
 
     /// Makes the figures of a receiver, each with both its errors; for absorbed power only that and channels.
     fn figures(&self, r: &ReceiverResult, unit: &str) -> ReceiverFigures {
-        let of_facets =
-            |m: &ReceiverError| if m.power.is_alike() { self.unseen_power } else { m.power.geometric() };
-        let power = self.geometric(self.lost_power, of_facets);
+        let power = self.geometric(self.lost_power, |m| m.power.geometric_or(self.unseen_power));
         let is_dark = r.power <= 0.0;
         let power = Figure::new(r.power, unit, if is_dark { r.ray_power } else { r.power_error }, power);
         let channels = self.channels(r, unit);

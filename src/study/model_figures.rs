@@ -16,9 +16,7 @@ fn geometric(results: &Results, surface: Surface<'_>, absorbed: &Absorbed) -> Op
     let lost = results.power.lost;
     let measured = |error: &GeometricError| {
         let found = error.absorbed.binary_search_by_key(&absorbed.index, |e| e.index).ok()?;
-        let power = error.absorbed[found].power;
-        let of_facets =
-            if power.is_alike() { error.unseen_power(results.power.emitted) } else { power.geometric() };
+        let of_facets = error.absorbed[found].power.geometric_or(error.unseen_power(results.power.emitted));
         Some(of_facets.hypot(lost))
     };
     match surface {

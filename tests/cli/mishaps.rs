@@ -4,7 +4,7 @@ use crate::files::{fixture, part21};
 use crate::support::lampyris_in;
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -52,6 +52,16 @@ fn saving_run(folder: &Path) -> Child {
         std::thread::sleep(Duration::from_millis(5));
     }
     panic!("nothing was saved");
+}
+
+/// Kills a run that has saved what it traced; returns the file with that, and its bytes.
+fn killed_run(folder: &Path) -> (PathBuf, Vec<u8>) {
+    let mut child = saving_run(folder);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let saved = folder.join("out/checkpoint.tally");
+    let bytes = fs::read(&saved).unwrap();
+    (saved, bytes)
 }
 
 #[test]
@@ -169,11 +179,7 @@ fn parts_of_a_run_take_no_accuracy() {
 fn what_an_interrupted_run_saved_is_not_written_over() {
     let folder = lens(|s| s);
     let path = folder.path();
-    let mut child = saving_run(path);
-    child.kill().unwrap();
-    child.wait().unwrap();
-    let saved = path.join("out/checkpoint.tally");
-    let before = fs::read(&saved).unwrap();
+    let (saved, before) = killed_run(path);
     // Before the search for an accuracy too, which says what it reached.
     for asked in [["--rays", "3000000"], ["--rays", "1000"], ["--accuracy", "5deg"]] {
         let (code, _, err) = lampyris_in(path, &[&["trace", "scene.toml", "-o", "out"][..], &asked].concat());
@@ -187,11 +193,7 @@ fn what_an_interrupted_run_saved_is_not_written_over() {
 fn a_saved_run_goes_on_with_its_own_rays_alone() {
     let folder = lens(|s| s);
     let path = folder.path();
-    let mut child = saving_run(path);
-    child.kill().unwrap();
-    child.wait().unwrap();
-    let saved = path.join("out/checkpoint.tally");
-    let before = fs::read(&saved).unwrap();
+    let (saved, before) = killed_run(path);
     let resume = ["trace", "scene.toml", "-o", "out", "--resume", "--json"];
     // Fewer, more, and the scene's own.
     for rays in ["640000", "6e6", "20000"] {

@@ -13,12 +13,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The lens of the fixtures, traced on the spline.
 fn lens(rays: u64) -> PreparedScene {
+    changed_lens(rays, IntersectorKind::Exact, |_| ())
+}
+
+/// The lens of the fixtures with its scene changed.
+fn changed_lens(rays: u64, intersector: IntersectorKind, change: impl Fn(&mut Scene)) -> PreparedScene {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes/s1_lens.toml");
-    let (scene, loaded) = read_scene(&scene, &Silent).unwrap();
+    let (mut scene, loaded) = read_scene(&scene, &Silent).unwrap();
+    change(&mut scene);
     let tracing = TracingSettings {
         ray_range: Some(RayRange { first: None, end: rays }),
         threads: Some(2),
-        intersector: Some(IntersectorKind::Exact),
+        intersector: Some(intersector),
         ..TracingSettings::default()
     };
     PreparedScene::new(SceneJob { tracing, ..SceneJob::new(scene, loaded) }, &Silent).unwrap()
@@ -74,18 +80,11 @@ fn every_figure_has_both_errors_and_the_document_holds_them() {
 /// Of more than 2²² cells facets and spline are compared without them: what has no error says why.
 #[test]
 fn cells_that_are_too_many_to_compare_are_named() {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes/s1_lens.toml");
     let run = |cells: [u32; 2]| {
-        let (mut scene, loaded) = read_scene(&scene, &Silent).unwrap();
-        scene.receivers.truncate(1);
-        scene.receivers[0].cells = cells;
-        let tracing = TracingSettings {
-            ray_range: Some(RayRange { first: None, end: 1000 }),
-            threads: Some(2),
-            intersector: Some(IntersectorKind::Octree),
-            ..TracingSettings::default()
-        };
-        let prepared = PreparedScene::new(SceneJob { tracing, ..SceneJob::new(scene, loaded) }, &Silent).unwrap();
+        let prepared = changed_lens(1000, IntersectorKind::Octree, |scene| {
+            scene.receivers.truncate(1);
+            scene.receivers[0].cells = cells;
+        });
         let run = prepared.trace(TraceRequest::default(), &Silent).unwrap();
         let max = run.figures(&prepared)[0].max.clone().expect("a map");
         let said = run.results.notes.iter().filter(|note| note.contains("too many to compare")).count();
@@ -98,17 +97,10 @@ fn cells_that_are_too_many_to_compare_are_named() {
 /// A receiver beside all light has the error of a ray in those that compared: that facets send it none on these is no proof.
 #[test]
 fn facets_that_changed_no_ray_may_change_one_in_so_many() {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/scenes/s1_lens.toml");
-    let (mut scene, loaded) = read_scene(&scene, &Silent).unwrap();
-    scene.receivers.truncate(1);
-    scene.receivers[0].at = [0.0, 5000.0, 107.0];
-    let tracing = TracingSettings {
-        ray_range: Some(RayRange { first: None, end: 20_000 }),
-        threads: Some(2),
-        intersector: Some(IntersectorKind::Octree),
-        ..TracingSettings::default()
-    };
-    let prepared = PreparedScene::new(SceneJob { tracing, ..SceneJob::new(scene, loaded) }, &Silent).unwrap();
+    let prepared = changed_lens(20_000, IntersectorKind::Octree, |scene| {
+        scene.receivers.truncate(1);
+        scene.receivers[0].at = [0.0, 5000.0, 107.0];
+    });
     let run = prepared.trace(TraceRequest::default(), &Silent).unwrap();
     let power = run.figures(&prepared)[0].power.clone();
     assert_eq!(power.value, 0.0);

@@ -33,10 +33,11 @@ pub(crate) fn run(
     } else {
         print(&import_summary(&report, console))?;
     }
-    // Products, for zero of zero faces are no excess.
-    let over = report.faces.refused as f64 > limits.max_refused * report.faces.found as f64;
-    let is_cut_off = report.cut_off && limits.max_refused < 1.0;
-    Ok(Completion::incomplete_if(over || is_cut_off || report.faces.found == 0))
+    let faces = report.faces;
+    // Zero of zero faces are no excess.
+    let is_incomplete = faces.found == 0
+        || input_files::is_too_much_missing([faces.refused, faces.found], report.cut_off, limits.max_refused);
+    Ok(Completion::incomplete_if(is_incomplete))
 }
 
 /// Returns the report of an import as lines for people; lists are cut off without -v.

@@ -52,6 +52,12 @@ pub(crate) fn scene_or_model(path: &Path, placed: PlacedLimit, console: &Console
     Ok(Input::Step(model_file(path, placed, console)?))
 }
 
+/// Whether of so many faces that were found more were refused than the share `most`, or a file was cut off: how much of that is missing
+/// nobody knows, but it is less than all.
+pub(crate) fn is_too_much_missing([refused, found]: [usize; 2], is_cut_off: bool, most: f64) -> bool {
+    refused as f64 > most * found as f64 || is_cut_off && most < 1.0
+}
+
 /// Says what could not be read of the files, what they hide and how many faces were refused, if any; incomplete where the refused are a
 /// larger share of all faces than `max_refused`, or a file was cut off.
 pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &Console) -> Completion {
@@ -68,19 +74,19 @@ pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &
     if hidden > 0 {
         console.say(format_args!("light meets {hidden} items that the model hides; `lampyris info` lists them"));
     }
-    // How much of a file that was cut off is missing nobody knows: less than all of it.
-    let is_cut_off = loaded.reports.iter().any(|r| r.cut_off) && max_refused < 1.0;
-    if refused == 0 {
-        return Completion::incomplete_if(is_cut_off);
+    let is_cut_off = loaded.reports.iter().any(|r| r.cut_off);
+    let is_incomplete = is_too_much_missing([refused, found], is_cut_off, max_refused);
+    if refused > 0 {
+        let message =
+            format!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons");
+        // Few enough to be allowed they are no more than a remark, which a file that was cut off does not make graver.
+        if is_too_much_missing([refused, found], false, max_refused) {
+            console.insist(message)
+        } else {
+            console.say(message)
+        }
     }
-    let message = format!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons");
-    let is_incomplete = refused as f64 > max_refused * found as f64;
-    if is_incomplete {
-        console.insist(message)
-    } else {
-        console.say(message)
-    }
-    Completion::incomplete_if(is_incomplete || is_cut_off)
+    Completion::incomplete_if(is_incomplete)
 }
 
 /// Says how many faces of a run that is traced on facets have none, if any: light passes where they are. Incomplete where that is a larger

@@ -20,12 +20,11 @@ pub(super) fn flush_receiver_notes(bound: &BoundScene, model: &Model) -> Vec<Str
         optics.body != AMBIENT && !bound.surfaces[usize::from(optics.surface)].is_opaque()
     };
     let notes = bound.receivers.iter().filter_map(|receiver| {
-        let (frame, half) = match &receiver.shape {
-            Shape::Plane { frame, half, .. } => (frame, *half),
-            Shape::Disc { frame, radius, .. } => (frame, [*radius; 2]),
+        let (frame, half, is_one_sided) = match &receiver.shape {
+            Shape::Plane { frame, half, one_sided, .. } => (frame, *half, *one_sided),
+            Shape::Disc { frame, radius, one_sided, .. } => (frame, [*radius; 2], *one_sided),
             _ => return None,
         };
-        let is_one_sided = matches!(receiver.shape, Shape::Plane { one_sided: true, .. } | Shape::Disc { one_sided: true, .. });
         // One that counts what comes from outside alone lets the light that leaves pass unseen.
         let stops_leaving = |face: &PlacedFace<'_>| {
             lets_light_out(face) && !(is_one_sided && outward(face).is_some_and(|n| n.dot(frame.z) > 0.0))

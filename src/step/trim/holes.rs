@@ -43,9 +43,13 @@ pub(super) fn place_hole(mut hole: Chain, outer: &Chain, chart: &Chart, repairs:
         };
         shifts.map(|count| chart.whole_periods(count)).find(inside)
     };
-    let [coarse, fine] = [outer.polygon(), outer.polygon_of_density(FINE_DENSITY)];
-    let tries = [(&coarse, PLACES), (&fine, PLACES), (&coarse, PLACES / 2 + 1), (&fine, PLACES / 2 + 1)];
-    let shift = tries.into_iter().find_map(|(border, least)| shift_into(border, least));
+    let coarse = outer.polygon();
+    // Nearly all holes are whole in the coarse border: the fine one is made for few.
+    let shift = shift_into(&coarse, PLACES).or_else(|| {
+        let fine = outer.polygon_of_density(FINE_DENSITY);
+        let tries = [(&fine, PLACES), (&coarse, PLACES / 2 + 1), (&fine, PLACES / 2 + 1)];
+        tries.into_iter().find_map(|(border, least)| shift_into(border, least))
+    });
     match shift {
         Some(shift) => {
             hole.shift(shift);

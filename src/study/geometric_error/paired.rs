@@ -24,9 +24,9 @@ impl Paired {
         (self.facets - self.spline).hypot(self.error)
     }
 
-    /// Whether no replicate differed on facets: then how far they may differ is not told.
-    pub(in crate::study) fn is_alike(&self) -> bool {
-        self.facets == self.spline && self.error == 0.0
+    /// Returns the geometric error, and `unseen` where no replicate differed on facets: that tells of no error at all.
+    pub(in crate::study) fn geometric_or(&self, unseen: f64) -> f64 {
+        if self.facets == self.spline && self.error == 0.0 { unseen } else { self.geometric() }
     }
 
     /// Adds what the difference may be by rays that are rarer than `share` of all, each of which takes all its light along.
