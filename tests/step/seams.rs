@@ -1,6 +1,7 @@
 //! Holes where a seam or a coarse outline would have them, against closed forms.
 
 use crate::faces::{area, close, import, points, read};
+use lampyris::tessellate::{Settings, tessellate};
 use std::f64::consts::{PI, SQRT_2};
 
 /// A tube of radius 10 and height 20 whose rims have their vertices at angle 0, with a window of `half` rad to both sides of a place.
@@ -140,6 +141,57 @@ fn flank(turns: u32) -> String {
 fn the_flank_of_a_thread_has_as_many_turns_as_the_thread() {
     for turns in [1, 9] {
         close(area(&import(&flank(turns))), 0.5 * 2.0 * 2.0 * PI * f64::from(turns), 1e-4);
+    }
+}
+
+/// A tube of radius 2 with a slot of height 0.5 along a helix that rises by 1 a turn, 1 mm from both rims, its curves written as polylines;
+/// `way` 1 winds up, −1 down.
+fn tube_with_helical_slot(turns: u32, way: f64) -> String {
+    let n = 64 * turns;
+    let place = |k: u32, up: f64| {
+        let angle = way * f64::from(k) * PI / 32.0;
+        [2.0 * angle.cos(), 2.0 * angle.sin(), 1.0 + f64::from(k) / 64.0 + up]
+    };
+    let height = 2.5 + f64::from(turns);
+    let mut list = vec![(10, [0., 0., 0.]), (11, [0., 0., height]), (12, [2., 0., 0.]), (13, [2., 0., height])];
+    for k in 0..=n {
+        list.push((1000 + k, place(k, 0.0)));
+        list.push((50_000 + k, place(k, 0.5)));
+    }
+    let line = |first: u32| (0..=n).map(|k| format!("#{}", first + k)).collect::<Vec<_>>().join(",");
+    let sense = if way > 0.0 { "F" } else { "T" };
+    points(&list)
+        + &format!(
+            "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n#22=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n\
+             #23=AXIS2_PLACEMENT_3D('',#11,#20,#21);\n#24=CYLINDRICAL_SURFACE('',#22,2.);\n#25=CIRCLE('',#22,2.);\n\
+             #26=CIRCLE('',#23,2.);\n#27=POLYLINE('',({}));\n#28=POLYLINE('',({}));\n\
+             #30=VERTEX_POINT('',#12);\n#31=VERTEX_POINT('',#13);\n#32=VERTEX_POINT('',#1000);\n#33=VERTEX_POINT('',#{last});\n\
+             #34=VERTEX_POINT('',#{});\n#35=VERTEX_POINT('',#50000);\n\
+             #40=EDGE_CURVE('',#30,#30,#25,.T.);\n#41=EDGE_CURVE('',#31,#31,#26,.T.);\n#42=EDGE_CURVE('',#32,#33,#27,.T.);\n\
+             #43=EDGE_CURVE('',#33,#34,$,.T.);\n#44=EDGE_CURVE('',#35,#34,#28,.T.);\n#45=EDGE_CURVE('',#35,#32,$,.T.);\n\
+             #50=ORIENTED_EDGE('',*,*,#40,.T.);\n#51=ORIENTED_EDGE('',*,*,#41,.F.);\n#52=ORIENTED_EDGE('',*,*,#42,.T.);\n\
+             #53=ORIENTED_EDGE('',*,*,#43,.T.);\n#54=ORIENTED_EDGE('',*,*,#44,.F.);\n#55=ORIENTED_EDGE('',*,*,#45,.T.);\n\
+             #60=EDGE_LOOP('',(#50));\n#61=EDGE_LOOP('',(#51));\n#62=EDGE_LOOP('',(#52,#53,#54,#55));\n\
+             #70=FACE_OUTER_BOUND('',#60,.T.);\n#71=FACE_BOUND('',#61,.T.);\n#72=FACE_BOUND('',#62,.{sense}.);\n\
+             #900=ADVANCED_FACE('',(#70,#71,#72),#24,.T.);\n",
+            line(1000),
+            line(50_000),
+            50_000 + n,
+            last = 1000 + n,
+        )
+}
+
+/// The seam between the rims has to turn as often as the slot: every straight one would cross it.
+#[test]
+fn a_seam_passes_a_slot_of_many_turns() {
+    for (turns, way) in [(1, 1.0), (4, 1.0), (4, -1.0), (9, 1.0)] {
+        let import = import(&tube_with_helical_slot(turns, way));
+        let expected = 4.0 * PI * (2.5 + f64::from(turns) - 0.5 * f64::from(turns));
+        close(area(&import), expected, 1e-4);
+        assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
+        let report = tessellate(&import.model, &Settings::uniform(0.02)).report;
+        assert!(report.repaired.is_empty(), "{:?}", report.repaired);
+        assert!((report.area_mm2 / expected - 1.0).abs() < 0.02, "{} mm² for {expected}", report.area_mm2);
     }
 }
 

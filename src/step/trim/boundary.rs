@@ -315,7 +315,12 @@ fn join_winding_pair(
     let seam = match straight {
         Some(&(_, i, j, q)) => SeamPath { start: i, goal: j, points: vec![starts_a[i], q] },
         None => {
-            let goals: Vec<(usize, Uv)> = pairs.iter().map(|(_, _, j, q)| (*j, *q)).collect();
+            // Beside a hole of several turns, such as a slot along a helix, the seam ends as many turns on.
+            let turns = -obstacles.turns()..=obstacles.turns();
+            let copies = |&(_, _, j, q): &(f64, usize, usize, Uv)| {
+                turns.clone().map(move |turn| (j, q + displacement * f64::from(turn)))
+            };
+            let goals: Vec<(usize, Uv)> = pairs.iter().flat_map(copies).collect();
             let metric = chart.derivatives(starts_a[0]);
             obstacles
                 .way_around(&starts_a, &Goals::Points(&goals), &metric)

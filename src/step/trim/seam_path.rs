@@ -7,6 +7,7 @@
 use super::tolerances::CROSSING_NOISE;
 use crate::math::Uv;
 use crate::nurbs::Derivatives;
+use std::ops::RangeInclusive;
 
 /// How far a box stands off its hole, as shares of the hole's size; the first with which there is a way.
 const MARGINS: [f64; 4] = [0.2, 0.06, 0.015, 0.004];
@@ -15,6 +16,10 @@ const MAX_CORNERS: usize = 4000;
 
 /// Places along each side of the strip between two loops that are in each other's way.
 const LATTICE: f64 = 24.0;
+/// Places half-way between two turns of a hole, about so many along each of its turns.
+const PLACES_PER_TURN: usize = 16;
+/// Most turns of a hole that are looked at.
+const MOST_TURNS: i32 = 64;
 
 /// A seam's way: the numbers of its start and goal, and its places in parameters, both ends included.
 pub(super) struct SeamPath {
@@ -62,9 +67,16 @@ impl Obstacles<'_> {
         let found = around_holes.find_map(|corners| self.way_by(starts, goals, metric, corners));
         // Where the loops themselves are in the way, by places between them.
         found.or_else(|| {
-            let everywhere = [self.corners(MARGINS[MARGINS.len() - 1]), self.lattice()].concat();
+            let everywhere =
+                [self.corners(MARGINS[MARGINS.len() - 1]), self.lattice(), self.between_turns()].concat();
             self.way_by(starts, goals, metric, everywhere)
         })
+    }
+
+    /// Returns how many displacements the longest hole reaches over, beyond the one in which a seam has room beside a short one: as many
+    /// turns a seam may have to make with it.
+    pub(super) fn turns(&self) -> i32 {
+        self.holes.iter().map(|hole| turns_of(hole, self.displacement)).max().unwrap_or(0)
     }
 
     /// Returns the shortest way from a start to a goal by way of these corners that nothing bars; `None` without one, and where it would
@@ -152,6 +164,22 @@ impl Obstacles<'_> {
         places
     }
 
+    /// Returns places half-way between each hole of more than one turn, such as a slot along a helix, and its next copy, in all turns that
+    /// the hole has.
+    fn between_turns(&self) -> Vec<Uv> {
+        let mut places = Vec::new();
+        for hole in self.holes {
+            let turns = turns_of(hole, self.displacement);
+            let count = PLACES_PER_TURN * turns as usize;
+            for copy in -turns..turns {
+                let by = self.displacement * (f64::from(copy) + 0.5);
+                places.extend((0..count).map(|k| hole[k * hole.len() / count] + by));
+            }
+        }
+        places.truncate(MAX_CORNERS);
+        places
+    }
+
     /// Whether a way misses its copies on both sides: the cut surface then lies in one sheet.
     fn is_simple(&self, points: &[Uv]) -> bool {
         let crosses_copy = |side: &[Uv]| {
@@ -171,14 +199,38 @@ pub(super) fn unrolled_polygon(polygon: &[Uv], displacement: Uv) -> Vec<Uv> {
     open
 }
 
-/// Whether a segment crosses a polygon or one of its two nearest copies by `period` on either side; touching does not count, a corner
-/// between both sides does.
+/// Returns the least and the most of some places along `period`, in periods.
+fn range_along(places: &[Uv], period: Uv) -> [f64; 2] {
+    let along = places.iter().map(|p| p.dot(period) / period.length_squared());
+    along.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)])
+}
+
+/// Returns over how many whole periods a hole reaches; [`MOST_TURNS`] at most.
+fn turns_of(hole: &[Uv], period: Uv) -> i32 {
+    let [lo, hi] = range_along(hole, period);
+    (hi - lo).clamp(0.0, f64::from(MOST_TURNS)) as i32
+}
+
+/// Returns by how many periods copies of a polygon are moved that may meet a segment; one that is endless in this direction has one only.
+fn copies_beside(polygon: &[Uv], segment: [Uv; 2], period: Uv) -> RangeInclusive<i32> {
+    if period == Uv::ZERO {
+        return 0..=0;
+    }
+    let [lo, hi] = range_along(polygon, period);
+    let [from, to] = range_along(&segment, period);
+    let first = (from - hi - CROSSING_NOISE).ceil().max(f64::from(-MOST_TURNS));
+    let last = (to - lo + CROSSING_NOISE).floor().min(f64::from(MOST_TURNS));
+    first as i32..=last as i32
+}
+
+/// Whether a segment crosses a polygon or a copy of it, moved by whole `period`s; touching does not count, a corner between both sides
+/// does.
 fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bool {
     let n = polygon.len();
     let sides = if closed { n } else { n - 1 };
     let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
-    [-2.0, -1.0, 0.0, 1.0, 2.0].iter().any(|&k| {
-        let by = period * k;
+    copies_beside(polygon, [a, b], period).any(|copy| {
+        let by = period * f64::from(copy);
         let slack = CROSSING_NOISE * (b - a).length();
         let lo = a.min(b) - by - slack;
         let hi = a.max(b) - by + slack;
@@ -239,5 +291,29 @@ mod tests {
         let foot = |p: Uv| Uv::new(p.x, 1.0);
         let border = obstacles.way_around(&[start], &Goals::Line(&foot), &metric).expect("a way to the border");
         assert_eq!(border.points[border.points.len() - 1].y, 1.0);
+    }
+    /// A strip with a slot that leans over four of its periods: a straight way crosses copies of it that lie far off.
+    #[test]
+    fn a_seam_turns_as_often_as_the_slot_beside_it() {
+        let turn = Uv::new(6.0, 0.0);
+        let line = |v: f64| unrolled_polygon(&[Uv::new(0.0, v), Uv::new(3.0, v)], turn);
+        let along = |x: f64| Uv::new(x, 1.0 + x / 6.0);
+        let lower = (0..=48).map(|k| along(0.5 * f64::from(k)));
+        let slot: Vec<Uv> = lower.clone().chain(lower.rev().map(|p| p + Uv::new(0.0, 0.5))).collect();
+        let holes = [slot];
+        let obstacles = Obstacles { holes: &holes, borders: &[line(0.0), line(6.5)], displacement: turn };
+        assert_eq!(obstacles.turns(), 4);
+        for copy in -4..=4 {
+            let across = Uv::new(6.0 * f64::from(copy) + 12.0, 0.0);
+            assert!(!obstacles.leave_free(across, across + Uv::new(0.0, 6.5)), "copy {copy}");
+        }
+        let start = Uv::new(1.0, 0.0);
+        let goals: Vec<(usize, Uv)> = (-4..=4).map(|turn| (0, Uv::new(6.0 * f64::from(turn) + 1.0, 6.5))).collect();
+        let metric = Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y };
+        let path = obstacles.way_around(&[start], &Goals::Points(&goals), &metric).expect("a way");
+        assert!(path.points.windows(2).all(|s| obstacles.leave_free(s[0], s[1])));
+        // The slot's middle leans by 24 from its lower end to its upper one: three whole turns at least.
+        let end = path.points[path.points.len() - 1];
+        assert!((end - start).x >= 18.0, "{end}");
     }
 }
