@@ -8,13 +8,16 @@ use super::cells::branches;
 use super::cells::cell::{Subdivision, parameter_resolution};
 use super::cells::cell_facets::GridInput;
 use super::cells::grid;
+use super::closing::Closing;
 use super::crossing_chords::CrossingChords;
+use super::detours::with_detours;
 use super::emission::Emission;
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::imprint::{CarrierFacets, Imprint};
 use super::limits::face_budget;
 use super::nodes::{Nodes, ProvedFacet, edge_key};
+use super::proof::border_chord::BorderChords;
 use super::proof::prover::Prover;
 use super::report::Repair;
 use super::taken_chords::TakenChords;
@@ -73,7 +76,8 @@ pub(super) struct FaceInput<'i, 'a> {
     pub(super) settings: &'i Settings,
     /// Chords between shared positions that other faces have inside, which no side of a facet here may be.
     pub(super) taken: &'i TakenChords,
-    /// Whether samples beside cusps are moved where edges cross there by next to nothing.
+    /// Whether samples beside cusps are moved where edges cross there by next to nothing, and other chords led over corners that they pass
+    /// on the wrong side.
     pub(super) untangles: bool,
 }
 
@@ -121,24 +125,24 @@ pub(super) fn mesh_with_imprint(
     let kept = border.segments.iter().chain(&border.imprinted);
     let fixed: FxHashSet<[u32; 2]> = kept.map(|s| edge_key(s[0], s[1])).collect();
     let (lo, hi) = polygons.bounds();
-    let input = GridInput {
+    let grid_input = GridInput {
         nodes: &mut border.nodes,
         chords: &border.chords,
         resolution: parameter_resolution(lo, hi),
         taken,
     };
-    let mut grid = grid::build(&mut prover, &cells, input);
+    let mut grid = grid::build(&mut prover, &cells, grid_input);
     if surface.steps.are_too_many() {
         return Err(Unmeshed::TooManySteps);
     }
     border.divide_poles(&cells);
     let segments = unmet_segments(&border.segments, &grid.outline);
-    let BorderNodes { nodes, chords, followed, imprinted, .. } = border;
-    // Without a transition its scale is of no interest, and it costs curvatures.
-    let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, &polygons, &cells) };
-    let creases = crease_lines(surface, &nodes, &segments);
-    let outline = Outline { nodes, segments, creases, imprinted, chords: &chords, scale, taken };
-    let triangulate = || triangulate(surface, settings.acceptance, outline, budget);
+    let BorderNodes { nodes, chords, followed, imprinted, segments: on_border, .. } = border;
+    let lines = (nodes, segments, imprinted);
+    let triangulate = || {
+        let outline = outline(input, (&polygons, &cells), (&on_border, &chords), lines);
+        triangulate(surface, settings.acceptance, outline, budget)
+    };
     let mut transition = catch_panic(triangulate)?.ok_or(Unmeshed::Empty)?;
     // Proofs that were not tried any more say nothing: the face is given up whole, whichever thread came how far.
     if surface.steps.are_too_many() {
@@ -158,9 +162,10 @@ pub(super) fn mesh_with_imprint(
     let mut coarse = if exhausted { vec![] } else { crossing.edges_for_sag() };
     coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
     let facing = crossing.facing_samples();
-    let whole_cells = grid.quads.iter().map(|&facet| TransitionFacet { facet, pole: None });
-    let paired = pairing::pair_triangles(&transition, &fixed, &mut prover);
-    let (made, facets) = emit(surface, &transition.nodes, whole_cells.chain(paired));
+    let mut facets: Vec<TransitionFacet> = grid.quads.iter().copied().map(TransitionFacet::from).collect();
+    facets.extend(pairing::pair_triangles(&transition, &fixed, &mut prover));
+    let closing = Closing { surface, nodes: &transition.nodes, segments: &on_border, chords: &chords, taken };
+    let (made, facets) = emit(&closing, facets);
     // Conflicts may have cost an imprinted line, so that the guests' facets would not be bounded by it.
     let holds_imprint = transition.holds_imprint && transition.conflicts.is_empty();
     let edges_of =
@@ -179,19 +184,28 @@ pub(super) fn mesh_with_imprint(
     Ok((FaceMesh { own, coarse, turned, facing, coincident: polygons.coincident, repaired, ..made }, carrier))
 }
 
-/// Turns facets of nodes into facets of corners, and returns their nodes too.
-fn emit(
-    surface: &FaceSurface<'_>,
-    nodes: &Nodes,
-    facets: impl Iterator<Item = TransitionFacet>,
-) -> (FaceMesh, Vec<[u32; 4]>) {
-    let mut emission = Emission::new(surface, nodes);
-    let add = |f: TransitionFacet| {
-        emission.add_facet(&f.facet, f.pole);
-        f.facet.nodes
-    };
-    let facets = facets.map(add).collect();
-    (emission.finish(), facets)
+/// Returns what lies between whole cells and the border: `nodes`, the `segments` around it, and the lines inside that are `imprinted`.
+fn outline<'t>(
+    input: &FaceInput<'t, '_>,
+    (polygons, cells): (&BorderPolygons, &Subdivision),
+    (border, chords): (&[[u32; 2]], &'t BorderChords),
+    (nodes, segments, imprinted): (Nodes, Vec<[u32; 2]>, Vec<[u32; 2]>),
+) -> Outline<'t> {
+    let FaceInput { surface, taken, untangles, .. } = *input;
+    // Without a transition its scale is of no interest, and it costs curvatures.
+    let scale = if segments.is_empty() { Uv::ONE } else { parameter_scale(surface, polygons, cells) };
+    let creases = crease_lines(surface, &nodes, &segments);
+    let outline = Outline { nodes, segments, creases, imprinted, chords, scale, taken };
+    if untangles { with_detours(surface, outline, border) } else { outline }
+}
+
+/// Closes the face, turns facets of nodes into facets of corners, and returns their nodes too.
+fn emit(closing: &Closing<'_, '_>, mut facets: Vec<TransitionFacet>) -> (FaceMesh, Vec<[u32; 4]>) {
+    let added = closing.facets(&facets);
+    facets.extend(added.into_iter().map(TransitionFacet::from));
+    let mut emission = Emission::new(closing.surface, closing.nodes);
+    facets.iter().for_each(|f| emission.add_facet(&f.facet, f.pole));
+    (emission.finish(), facets.iter().map(|f| f.facet.nodes).collect())
 }
 
 /// Returns the gravest of what was given up: a border that crosses itself, then area, then a budget used up. `None` if nothing was.

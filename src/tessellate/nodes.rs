@@ -23,7 +23,7 @@ pub(super) struct Node {
 }
 
 /// The nodes of a face, named by their index, and the places of the positions that are its own.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Nodes {
     all: Vec<Node>,
     own: Vec<Point>,

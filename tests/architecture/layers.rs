@@ -559,6 +559,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "sample_budget",
             "repairs",
             "transition",
+            "closing",
+            "detours",
             "triangulator",
             "placed_part",
             "limits",

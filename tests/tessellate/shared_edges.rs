@@ -75,6 +75,62 @@ fn no_diagonal_is_in_two_faces_where_another_solid_lies_on_one() {
     }
 }
 
+/// A prism of height 2 over a polygon: two lids and a wall over each side.
+fn prism_over(corners: &[[f64; 2]]) -> Model {
+    let n = corners.len();
+    let place = |k: usize, z: f64| Point::new(corners[k % n][0], corners[k % n][1], z);
+    // Vertices and sides of the bottom, then of the top, then the upright edges.
+    let vertices: Vec<Point> = [0.0, 2.0].iter().flat_map(|&z| (0..n).map(move |k| place(k, z))).collect();
+    let ends = |k: usize| match k / n {
+        2 => [k % n, k % n + n],
+        lid => [k, lid * n + (k + 1) % n],
+    };
+    let edge = |k: usize| Edge {
+        curve: Curve::line(vertices[ends(k)[0]], vertices[ends(k)[1]], [0.0, 1.0]),
+        vertices: ends(k).map(|v| VertexId(v as u32)),
+        entity: None,
+    };
+    let uses = |edges: &[(usize, bool)], uv: &dyn Fn(Point) -> Uv| {
+        let one = |&(k, reversed): &(usize, bool)| EdgeUse {
+            edge: Some(EdgeId(k as u32)),
+            reversed,
+            uv: UvCurve::line(uv(vertices[ends(k)[0]]), uv(vertices[ends(k)[1]]), [0.0, 1.0]),
+        };
+        vec![TrimLoop { uses: edges.iter().map(one).collect() }]
+    };
+    let extents = [[-20.0, 20.0]; 2];
+    let lid = |top: usize| {
+        let rim: Vec<(usize, bool)> = (0..n).map(|k| (top * n + k, false)).collect();
+        let frame = Frame { origin: Vector::Z * (2 * top) as f64, ..Frame::IDENTITY };
+        let loops = uses(&rim, &|p| Uv::new(p.x, p.y));
+        Face { loops, reversed: top == 0, ..Face::whole(sweep::plane(&frame, extents)) }
+    };
+    let wall = |k: usize| {
+        let x = (place(k + 1, 0.0) - place(k, 0.0)).normalize();
+        let frame = Frame { origin: place(k, 0.0), x, y: Vector::Z, z: x.cross(Vector::Z), ..Frame::IDENTITY };
+        let uv = |p: Point| Uv::new((p - frame.origin).dot(x), p.z);
+        let rim = [(k, false), (2 * n + (k + 1) % n, false), (n + k, true), (2 * n + k, true)];
+        Face { loops: uses(&rim, &uv), ..Face::whole(sweep::plane(&frame, extents)) }
+    };
+    let faces = [0, 1].map(lid).into_iter().chain((0..n).map(wall)).collect();
+    let shell = Shell { faces, closed: true, ..Shell::default() };
+    let edges = (0..3 * n).map(edge).collect();
+    Model::from_part(Part { vertices, edges, shells: vec![shell], ..Part::default() })
+}
+
+/// A side that runs back along another: between them a lid has no area, but its walls have other corners.
+#[test]
+fn a_border_that_runs_back_along_itself_leaves_no_gap() {
+    for off in [0.0, 1e-15, -1e-15, 1e-9, -1e-9, 1e-4, -1e-4] {
+        let made =
+            tessellate(&prism_over(&[[0.0, 0.0], [6.0, 0.0], [6.0, 3.0], [3.0, off]]), &Settings::uniform(0.1));
+        let r = &made.report;
+        assert_eq!((r.open_edges, r.nonmanifold_edges, r.shells.closed), (0, 0, 1), "{off}");
+        let volume = r.volume_mm3.expect("of a closed shell");
+        assert!((volume - 9.0).abs() <= 12.0 * off.abs() + 1e-9, "{volume} for {off}");
+    }
+}
+
 /// A bond wire: two facets around it would be enough for the tolerance, and would have all their corners in two places.
 #[test]
 fn a_tube_thinner_than_its_tolerance_does_not_fold_flat() {

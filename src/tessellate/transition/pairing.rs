@@ -18,6 +18,12 @@ pub(in crate::tessellate) struct TransitionFacet {
     pub(in crate::tessellate) pole: Option<(usize, Uv)>,
 }
 
+impl From<ProvedFacet<4>> for TransitionFacet {
+    fn from(facet: ProvedFacet<4>) -> Self {
+        Self { facet, pole: None }
+    }
+}
+
 /// Cosine of the sharpest and bluntest corner that a quad may have: 1.8°.
 const SHARPEST: f64 = 0.9995;
 /// Cosine below which a quad is made before any triangle's lack of mates is looked at: corners from 60° to 120°.

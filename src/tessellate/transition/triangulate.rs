@@ -177,6 +177,18 @@ pub(in crate::tessellate) fn triangulate(
     }
 }
 
+/// Returns the segments of an outline that cannot be kept and those in their way, as [`Transition::conflicts`] and
+/// [`Transition::crossed`], without triangles; `None` when nodes have no usable parameters.
+pub(in crate::tessellate) fn crossings(
+    surface: &FaceSurface<'_>,
+    outline: &Outline<'_>,
+) -> Option<[Vec<[u32; 2]>; 2]> {
+    let Outline { nodes, segments, imprinted, scale, taken, .. } = outline;
+    let mut mesh = DelaunayMesh::new(surface, nodes.clone(), *scale, taken);
+    mesh.insert_nodes(segments, imprinted)?;
+    Some(mesh.constrain_border(segments))
+}
+
 /// Returns the three nodes in ascending order.
 fn sorted_nodes(mut t: [u32; 3]) -> [u32; 3] {
     t.sort_unstable();
