@@ -50,39 +50,39 @@ impl Timing {
     }
 }
 
-/// Competitors timed in alternating rounds: A B C, then C B A, and so on, so that a slow phase of the machine meets all
+/// Contenders timed in alternating rounds: A B C, then C B A, and so on, so that a slow phase of the machine meets all
 /// of them alike.
 #[derive(Default)]
 pub struct Rounds<'a> {
-    competitors: Vec<(String, Box<dyn FnMut() + 'a>)>,
+    contenders: Vec<(String, Box<dyn FnMut() + 'a>)>,
 }
 
 impl<'a> Rounds<'a> {
-    /// Adds a competitor; one call of `run` is one timed run.
+    /// Adds a contender; one call of `run` is one timed run.
     pub fn add(&mut self, name: impl Into<String>, run: impl FnMut() + 'a) {
-        self.competitors.push((name.into(), Box::new(run)));
+        self.contenders.push((name.into(), Box::new(run)));
     }
 
-    /// Runs every competitor once untimed and then `rounds` times; results in the order of adding.
+    /// Runs every contender once untimed and then `rounds` times; results in the order of adding.
     pub fn run(mut self, rounds: usize) -> Vec<(String, Timing)> {
-        let mut seconds = vec![Vec::with_capacity(rounds); self.competitors.len()];
+        let mut seconds = vec![Vec::with_capacity(rounds); self.contenders.len()];
         // Untimed: caches, pages and clock frequencies settle.
-        for (_, run) in &mut self.competitors {
+        for (_, run) in &mut self.contenders {
             run();
         }
         for round in 0..rounds {
             let order: Vec<usize> = if round % 2 == 0 {
-                (0..self.competitors.len()).collect()
+                (0..self.contenders.len()).collect()
             } else {
-                (0..self.competitors.len()).rev().collect()
+                (0..self.contenders.len()).rev().collect()
             };
             for i in order {
                 let start = Instant::now();
-                (self.competitors[i].1)();
+                (self.contenders[i].1)();
                 seconds[i].push(start.elapsed().as_secs_f64());
             }
         }
-        self.competitors.into_iter().zip(seconds).map(|((name, _), s)| (name, Timing::from_seconds(s))).collect()
+        self.contenders.into_iter().zip(seconds).map(|((name, _), s)| (name, Timing::from_seconds(s))).collect()
     }
 }
 

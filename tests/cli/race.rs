@@ -15,7 +15,7 @@ fn the_race_writes_rows_pictures_and_the_octree() {
     assert_eq!(code, 0, "{err}");
     let document: Value = serde_json::from_str(&out).unwrap();
     let rows = document["rows"].as_array().unwrap();
-    // Eight entrants, four kinds of rays; batch and single on one thread, batch on two.
+    // Eight contenders, four kinds of rays; batch and single on one thread, batch on two.
     assert_eq!(rows.len(), 8 * 4 * 3);
     for row in rows {
         assert!(row["mrays_per_s_median"].as_f64().unwrap() > 0.0, "{row}");
@@ -70,7 +70,7 @@ fn the_race_asks_the_rays_of_a_file_and_keeps_them() {
     assert_eq!(code, 0, "{err}");
     let document: Value = serde_json::from_str(&out).unwrap();
     let rows = document["rows"].as_array().unwrap();
-    // Eight entrants, batch and single.
+    // Eight contenders, batch and single.
     assert_eq!(rows.len(), 8 * 2);
     for row in rows {
         assert_eq!(

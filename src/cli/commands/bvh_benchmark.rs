@@ -20,7 +20,7 @@ use crate::mesh::FacetMesh;
 use crate::pipeline::{MeshingSettings, TracingSettings};
 use crate::report::{figures, grouped};
 use crate::study::arbiter::{Verdict, arbitrate, same_distance};
-use crate::study::cross_check::{Competitor, measure};
+use crate::study::cross_check::{TimedIntersector, measure};
 use crate::study::rays::{Bounces, Camera, RaySource, Uniform};
 use crate::study::surface_rays::SurfacePaths;
 use crate::study::{Progress, Timing};
@@ -157,7 +157,7 @@ fn write_rays(path: &Path, rays: &[Ray]) -> Result<(), Failure> {
 }
 
 /// One of those that race.
-struct Entrant<'a> {
+struct Contender<'a> {
     name: &'static str,
     build: &'static str,
     who: &'a dyn Intersector,
@@ -187,15 +187,15 @@ impl BvhBenchmark {
         let shipped = Bvh::build(mesh, &bvh::Settings { cured: false, ..Default::default() });
         let slow = Bvh::build(mesh, &bvh::Settings { quality: bvh::Quality::VerySlow, ..Default::default() });
         let (parry, f64_bvh) = (Parry::build(mesh), BinaryBvh::build(mesh));
-        let mut entrants = vec![
-            Entrant { name: "octree", build: "T = 128", who: octree },
-            Entrant { name: "octree, textbook", build: "T = 8", who: &textbook },
-            Entrant { name: "bvh2", build: "medium", who: &binary },
-            Entrant { name: "cwbvh", build: "medium", who: &cured },
-            Entrant { name: "cwbvh", build: "very slow", who: &slow },
-            Entrant { name: "cwbvh as shipped", build: "medium", who: &shipped },
-            Entrant { name: "parry3d", build: "binned", who: &parry },
-            Entrant { name: "bvh", build: "f64", who: &f64_bvh },
+        let mut contenders = vec![
+            Contender { name: "octree", build: "T = 128", who: octree },
+            Contender { name: "octree, textbook", build: "T = 8", who: &textbook },
+            Contender { name: "bvh2", build: "medium", who: &binary },
+            Contender { name: "cwbvh", build: "medium", who: &cured },
+            Contender { name: "cwbvh", build: "very slow", who: &slow },
+            Contender { name: "cwbvh as shipped", build: "medium", who: &shipped },
+            Contender { name: "parry3d", build: "binned", who: &parry },
+            Contender { name: "bvh", build: "f64", who: &f64_bvh },
         ];
         let of_embree = |primitives| {
             let built = embree.map(|(path, library)| Embree::build(library, path, mesh, primitives));
@@ -203,11 +203,11 @@ impl BvhBenchmark {
         };
         let (triangles, quads) = (of_embree(Primitives::Triangles)?, of_embree(Primitives::Quads)?);
         for (build, built) in [("triangles", &triangles), ("quads", &quads)] {
-            entrants.extend(built.as_ref().map(|who| Entrant { name: "embree", build, who }));
+            contenders.extend(built.as_ref().map(|who| Contender { name: "embree", build, who }));
         }
         let mut shape = OctreeShape::new(octree);
         for (kind, rays) in kinds {
-            let cost = self.measure_rays(&Question { model, mesh, kind, rays }, &entrants, threads);
+            let cost = self.measure_rays(&Question { model, mesh, kind, rays }, &contenders, threads);
             shape.costs.push(((*kind).into(), cost));
         }
         self.shapes.push(shape);
@@ -215,16 +215,16 @@ impl BvhBenchmark {
     }
 
     /// Measures all intersectors on rays of one kind and appends a row for each of three calls: batches and single rays on one thread,
-    /// batches on `threads`. Returns the work of the octree, which must be the first of `entrants`, for the rays asked once, before any is
-    /// timed.
-    fn measure_rays(&mut self, question: &Question, entrants: &[Entrant], threads: usize) -> Cost {
+    /// batches on `threads`. Returns the work of the octree, which must be the first of `contenders`, for the rays asked once, before any
+    /// is timed.
+    fn measure_rays(&mut self, question: &Question, contenders: &[Contender], threads: usize) -> Cost {
         let Question { mesh, kind, rays, .. } = *question;
         // The octree's answers are what others are compared with; who is right is asked of the arbiter.
-        let truth = ask_rays(entrants[0].who, rays).0;
+        let truth = ask_rays(contenders[0].who, rays).0;
         let hits = truth.iter().flatten().count();
-        let mut judged: Vec<(Comparison, Cost)> = (entrants.iter())
-            .map(|entrant| {
-                let (hits, cost) = ask_rays(entrant.who, rays);
+        let mut judged: Vec<(Comparison, Cost)> = (contenders.iter())
+            .map(|contender| {
+                let (hits, cost) = ask_rays(contender.who, rays);
                 (Comparison::new(mesh, rays, &truth, &hits), cost)
             })
             .collect();
@@ -237,16 +237,16 @@ impl BvhBenchmark {
             }
             // As many rays for each thread as for one: waking the threads took a tenth of a shorter round.
             let crowd = rays.repeat(threads);
-            let shared: Vec<ParallelBatches> = entrants.iter().map(|e| ParallelBatches(e.who)).collect();
-            let competitors: Vec<Competitor> = (entrants.iter().zip(&shared))
-                .map(|(entrant, shared)| {
-                    let who: &dyn Intersector = if threads > 1 { shared } else { entrant.who };
-                    Competitor { name: entrant.name, who, batch }
+            let shared: Vec<ParallelBatches> = contenders.iter().map(|e| ParallelBatches(e.who)).collect();
+            let timed: Vec<TimedIntersector> = (contenders.iter().zip(&shared))
+                .map(|(contender, shared)| {
+                    let who: &dyn Intersector = if threads > 1 { shared } else { contender.who };
+                    TimedIntersector { name: contender.name, who, batch }
                 })
                 .collect();
-            let timings = measure(&competitors, &crowd, ROUNDS);
-            for ((entrant, (_, timing)), judgement) in entrants.iter().zip(timings).zip(&judged) {
-                let mut row = timing_row(question, entrant, (call, threads), timing, judgement);
+            let timings = measure(&timed, &crowd, ROUNDS);
+            for ((contender, (_, timing)), judgement) in contenders.iter().zip(timings).zip(&judged) {
+                let mut row = timing_row(question, contender, (call, threads), timing, judgement);
                 row["hits"] = hits.into();
                 self.rows.push(row);
             }
@@ -268,17 +268,17 @@ impl BvhBenchmark {
 /// Returns the row of what one intersector did with one call on so many threads; its `hits` are 0, for the caller to set.
 fn timing_row(
     question: &Question,
-    entrant: &Entrant,
+    contender: &Contender,
     (call, threads): (&str, usize),
     timing: Timing,
     (comparison, cost): &(Comparison, Cost),
 ) -> Value {
     let Question { model, mesh, kind, rays } = *question;
-    let footprint = entrant.who.footprint();
+    let footprint = contender.who.footprint();
     let rate = |seconds: f64| (rays.len() * threads) as f64 / seconds.max(SHORTEST_ROUND) / MILLION;
     let per_ray = |n: u64| n as f64 / rays.len().max(1) as f64;
     json!({
-        "model": model, "facets": mesh.facets.len(), "intersector": entrant.name, "build": entrant.build,
+        "model": model, "facets": mesh.facets.len(), "intersector": contender.name, "build": contender.build,
         "rays_kind": kind, "call": call, "threads": threads,
         // A rate is fast where the time is short: the percentiles change places.
         "mrays_per_s_min": rate(timing.p90), "mrays_per_s_median": rate(timing.median), "mrays_per_s_p90": rate(timing.min),

@@ -10,7 +10,7 @@ use crate::math::Ray;
 use crate::mesh::FacetMesh;
 use crate::model::{Instancing, Model};
 use crate::pipeline::in_one_scene;
-use crate::study::cross_check::{Competitor, CrossCheck, GroupedIntersectors, measure};
+use crate::study::cross_check::{CrossCheck, GroupedIntersectors, TimedIntersector, measure};
 use crate::tessellate::GroupedFacets;
 use std::borrow::Cow;
 
@@ -108,7 +108,7 @@ impl<'a> Structures<'a> {
     }
 
     /// Builds a BVH of other settings than that which is compared.
-    fn rival(&self, settings: impl Fn(bvh::Settings) -> bvh::Settings) -> Box<dyn Intersector + '_> {
+    fn bvh_of(&self, settings: impl Fn(bvh::Settings) -> bvh::Settings) -> Box<dyn Intersector + '_> {
         self.joined(|g| Box::new(Bvh::build(g.mesh, &settings(g.bvh_settings))))
     }
 
@@ -123,30 +123,30 @@ impl<'a> Structures<'a> {
         console: &Console,
     ) {
         let spinner = console.spinner("timing");
-        let bvh2 = self.rival(|settings| bvh::Settings { kind: bvh::Kind::Bvh2, ..settings });
-        let cwbvh_as_shipped = self.rival(|settings| bvh::Settings { cured: false, ..settings });
-        let competitor = |name, who, batch| Competitor { name, who, batch };
-        let competitors = [
-            competitor("octree", &*contenders.octree, true),
+        let bvh2 = self.bvh_of(|settings| bvh::Settings { kind: bvh::Kind::Bvh2, ..settings });
+        let cwbvh_as_shipped = self.bvh_of(|settings| bvh::Settings { cured: false, ..settings });
+        let asked = |name, who, batch| TimedIntersector { name, who, batch };
+        let intersectors = [
+            asked("octree", &*contenders.octree, true),
             // Asked ray by ray.
-            competitor("octree_single", &*contenders.octree, false),
-            competitor("bvh2", &*bvh2, true),
-            competitor("cwbvh", &*contenders.cwbvh, true),
-            competitor("cwbvh_as_shipped", &*cwbvh_as_shipped, true),
-            competitor("polish", polish, true),
-            competitor("exact", &*contenders.exact, true),
+            asked("octree_single", &*contenders.octree, false),
+            asked("bvh2", &*bvh2, true),
+            asked("cwbvh", &*contenders.cwbvh, true),
+            asked("cwbvh_as_shipped", &*cwbvh_as_shipped, true),
+            asked("polish", polish, true),
+            asked("exact", &*contenders.exact, true),
         ];
-        for contender in &competitors {
+        for contender in &intersectors {
             let footprint = contender.who.footprint();
             found.build_seconds.set(contender.name, footprint.build_seconds);
             let bytes_per_facet = footprint.bytes as f64 / footprint.primitives.max(1) as f64;
             found.bytes_per_facet.set(contender.name, bytes_per_facet);
         }
-        let pace = measure(&competitors, &evenly(rays, PROBED_RAYS), 1);
+        let pace = measure(&intersectors, &evenly(rays, PROBED_RAYS), 1);
         let slowest = pace.iter().map(|(_, timing)| timing.median).fold(0.0, f64::max);
         let enough = (ROUND_SECONDS / slowest.max(SHORTEST_ROUND) * PROBED_RAYS as f64) as usize;
         let timed = evenly(rays, enough.clamp(PROBED_RAYS, TIMED_RAYS));
-        for (name, timing) in measure(&competitors, &timed, TIMED_ROUNDS) {
+        for (name, timing) in measure(&intersectors, &timed, TIMED_ROUNDS) {
             found.mrays_per_s.set(&name, timed.len() as f64 / timing.median.max(SHORTEST_ROUND) / MILLION);
         }
         spinner.finish_and_clear();

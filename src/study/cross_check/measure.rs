@@ -10,9 +10,9 @@ use std::hint::black_box;
 /// Rays of a batch: as many as a task of the cross-check has. The hits of all timed rays at once took as much memory as an octree.
 const BATCH: usize = 2048;
 
-/// One intersector in a race.
+/// An intersector and how it is asked while it is timed.
 #[derive(Clone, Copy)]
-pub struct Competitor<'a> {
+pub struct TimedIntersector<'a> {
     /// As in [`PerIntersector`]: `octree`, `octree_single`, `bvh2`, `cwbvh`, `cwbvh_as_shipped`, `polish`, `exact`.
     pub name: &'a str,
     /// The intersector that is timed.
@@ -21,13 +21,13 @@ pub struct Competitor<'a> {
     pub batch: bool,
 }
 
-/// Times all competitors on the same rays, on this thread, in alternating rounds; returns seconds per pass over the rays, by name.
-pub fn measure(competitors: &[Competitor<'_>], rays: &[Ray], rounds: usize) -> Vec<(String, Timing)> {
+/// Times intersectors on the same rays, on this thread, in alternating rounds; returns seconds per pass over the rays, by name.
+pub fn measure(intersectors: &[TimedIntersector<'_>], rays: &[Ray], rounds: usize) -> Vec<(String, Timing)> {
     // One after the other they write to the same place.
     let hits = RefCell::new(vec![None; rays.len().min(BATCH)]);
     let mut race = Rounds::default();
-    for c in competitors {
-        let Competitor { who, batch, .. } = *c;
+    for c in intersectors {
+        let TimedIntersector { who, batch, .. } = *c;
         let hits = &hits;
         race.add(c.name, move || {
             let mut cost = Cost::default();

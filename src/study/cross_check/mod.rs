@@ -18,7 +18,7 @@ mod measure;
 mod placed_surface;
 mod verdict;
 
-pub use measure::{Competitor, measure};
+pub use measure::{TimedIntersector, measure};
 pub use verdict::{
     Cause, Certainties, CrossCheck, Defect, Disagreement, Explained, FacetsAgainstExact, FacetsDiffer,
     PerIntersector, SceneSize,
