@@ -19,6 +19,8 @@ pub(super) const TIMES_EXPECTED: f64 = 4.0;
 /// How many times the cells that are expected of an angle a face may take: diagonals turn farther than sides, halving makes cells smaller
 /// than need be, and the border takes some.
 const TIMES_OF_ANGLE: f64 = 10.0;
+/// Cells that any face may have for an angle.
+const LEAST_GRANTED: f64 = 2000.0;
 /// An angle, radians, below which none is considered: rounding turns the normals of small facets by as much.
 const LEAST_ANGLE: f64 = 1e-9;
 /// By how much an angle grows at least that takes too many cells.
@@ -51,6 +53,12 @@ pub(super) fn angle_within_budget(face: &Face, surface: &FaceSurface<'_>, budget
         // Of a ball the square of it decides, of a tube, which takes more rounds, the angle itself.
         angle *= times_too_many.sqrt().max(ANGLE_STEP);
     }
+}
+
+/// Returns how many cells a face is granted for its tolerance and an angle, radians, together: more only a fold or a pole asks for.
+pub(super) fn cells_granted_for_angle(face: &Face, surface: &FaceSurface<'_>, angle: f64) -> usize {
+    let of_angle = cells_of_chords(face, surface, |k, _| k / (2.0 * angle));
+    (LEAST_GRANTED + TIMES_OF_ANGLE * (of_angle + expected_cells(face, surface))) as usize
 }
 
 /// The mean over a grid of places inside a face's border, the sharpest tenth left out, of its chords along u times those along v, as many

@@ -12,6 +12,7 @@ use super::closing::Closing;
 use super::crossing_chords::CrossingChords;
 use super::detours::with_detours;
 use super::emission::Emission;
+use super::expected_cells::cells_granted_for_angle;
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::imprint::{CarrierFacets, Imprint};
@@ -31,6 +32,7 @@ use crate::math::{Point, Uv};
 use crate::model::{Face, Part, TrimLoop};
 use crate::nurbs::FundamentalForms;
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::f64::consts::FRAC_PI_2;
 
 /// Cells at the border that are looked at for the scale of parameters, and places along each side of the face where these are few.
 const SCALE_CELLS: usize = 64;
@@ -119,7 +121,7 @@ pub(super) fn mesh_with_imprint(
     let lines: Vec<[Uv; 2]> = border.imprinted.iter().map(|s| s.map(|n| border.nodes[n].uv)).collect();
     let budget = face_budget(face, surface, settings);
     // The tree is asked for imprinted lines too, which no cell may lie across.
-    let cells = branches::split(surface, settings.acceptance, &polygons, &lines, budget, surface.field.angle);
+    let cells = split_for_angle(input, &polygons, &lines, budget);
     let mut prover = Prover::new(surface, settings.acceptance);
     // Pairing must not join triangles across a side that neighbours have.
     let kept = border.segments.iter().chain(&border.imprinted);
@@ -182,6 +184,26 @@ pub(super) fn mesh_with_imprint(
     }
     let carrier = CarrierFacets { nodes, facets, vertex_nodes, holds_imprint };
     Ok((FaceMesh { own, coarse, turned, facing, coincident: polygons.coincident, repaired, ..made }, carrier))
+}
+
+/// Splits a face as [`branches::split`] for its angle, twice that, and so on, until one does not take more cells than it may, and then for
+/// its tolerance alone: where normals turn at a fold no cell is small enough, and the tolerance would be given up with the angle.
+fn split_for_angle(
+    input: &FaceInput<'_, '_>,
+    polygons: &BorderPolygons,
+    lines: &[[Uv; 2]],
+    budget: usize,
+) -> Subdivision {
+    let FaceInput { face, surface, settings, .. } = *input;
+    let mut angle = surface.field.angle;
+    loop {
+        let granted = angle.map_or(budget, |angle| budget.min(cells_granted_for_angle(face, surface, angle)));
+        let cells = branches::split(surface, settings.acceptance, polygons, lines, granted, angle);
+        if !cells.exhausted || angle.is_none() || surface.steps.are_too_many() {
+            return cells;
+        }
+        angle = angle.map(|angle| 2.0 * angle).filter(|angle| *angle < FRAC_PI_2);
+    }
 }
 
 /// Returns what lies between whole cells and the border: `nodes`, the `segments` around it, and the lines inside that are `imprinted`.

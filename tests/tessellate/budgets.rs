@@ -55,3 +55,28 @@ fn an_angle_beyond_the_budget_leaves_the_surface_smooth() {
         assert!(steep.largest_deg < 5.0, "{angle}: {}", steep.largest_deg);
     }
 }
+
+/// Along a cusp, the curve (s², s³) drawn out, normals turn around within nothing: no cell is small enough for an angle there, and the tolerance holds
+/// all the same.
+#[test]
+fn an_angle_that_no_cell_reaches_costs_no_tolerance() {
+    let (scale, length) = (4.0, 20.0);
+    // Control values of s² and s³ for s from −1 to 1.5.
+    let profile = [[1.0, -1.0], [-2.0 / 3.0, 1.5], [-0.25, -2.25], [2.25, 3.375]];
+    let row = |[x, z]: [f64; 2]| [0.0, length].map(|y| Homogeneous::new(scale * x, y, scale * z, 1.0));
+    let knots = |degree: usize| [vec![0.0; degree + 1], vec![1.0; degree + 1]].concat();
+    let points = profile.map(row).as_flattened().to_vec();
+    let surface = Surface { degree: [3, 1], knots: [knots(3), knots(1)], points };
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Uv::from_array);
+    let side = |k: usize| chain(200, |t| corners[k].lerp(corners[(k + 1) % 4], t));
+    let model = face(surface, &[(0..4).map(side).collect()]);
+    let made = tessellate(&model, &Settings { angle_deg: Some(5.0), measure: true, ..Settings::uniform(0.1) });
+    let report = &made.report;
+    assert!(report.repaired.is_empty(), "{:?}", report.repaired);
+    assert!(report.certified == report.facets && report.facets < 5000, "{}", report.facets);
+    assert_eq!(report.over_angle.as_ref().map(Vec::len), Some(1));
+    // ∫ |s| √(4 + 9 s²) ds, to 0 from each side.
+    let half = |s: f64| ((4.0 + 9.0 * s * s).powf(1.5) - 8.0) / 27.0;
+    let area = scale * length * (half(1.0) + half(1.5));
+    assert!((report.area_mm2 / area - 1.0).abs() < 1e-3, "{} {area}", report.area_mm2);
+}

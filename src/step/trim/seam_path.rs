@@ -63,12 +63,13 @@ impl Obstacles<'_> {
     /// Returns the shortest way found from one of the starts to a goal, by lengths on the surface near the first start; `None` where holes
     /// and borders leave none.
     pub(super) fn way_around(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives) -> Option<SeamPath> {
-        let mut around_holes = MARGINS.iter().map(|margin| self.corners(*margin));
+        // Beside a hole of several turns no corner of a box helps.
+        let between = Some(self.between_turns()).filter(|places| !places.is_empty());
+        let mut around_holes = between.into_iter().chain(MARGINS.iter().map(|margin| self.corners(*margin)));
         let found = around_holes.find_map(|corners| self.way_by(starts, goals, metric, corners));
         // Where the loops themselves are in the way, by places between them.
         found.or_else(|| {
-            let everywhere =
-                [self.corners(MARGINS[MARGINS.len() - 1]), self.lattice(), self.between_turns()].concat();
+            let everywhere = [self.corners(MARGINS[MARGINS.len() - 1]), self.lattice()].concat();
             self.way_by(starts, goals, metric, everywhere)
         })
     }

@@ -22,14 +22,8 @@ struct Wish {
 }
 
 impl DelaunayMesh<'_, '_> {
-    /// Returns the index of the side (from corner k to k + 1) for which a triangle is divided even where it is near enough to the surface;
-    /// `None` without one.
-    pub(super) fn side_to_divide(&self, t: [u32; 3]) -> Option<usize> {
-        self.steep_side(t).or_else(|| self.taken_side(t))
-    }
-
-    /// Returns the first side of a triangle, not on the outline, that is a taken chord; `None` without one.
-    fn taken_side(&self, t: [u32; 3]) -> Option<usize> {
+    /// Returns the first side of a triangle (from corner k to k + 1), not on the outline, that is a taken chord; `None` without one.
+    pub(super) fn taken_side(&self, t: [u32; 3]) -> Option<usize> {
         if self.taken.is_empty() {
             return None;
         }
@@ -41,7 +35,7 @@ impl DelaunayMesh<'_, '_> {
 
     /// Returns the side, not on the outline and long enough to be divided for an angle, whose ends' normals differ most, if a normal breaks
     /// the angle condition and that side turns by more than it; `None` otherwise and without a condition.
-    fn steep_side(&self, t: [u32; 3]) -> Option<usize> {
+    pub(super) fn steep_side(&self, t: [u32; 3]) -> Option<usize> {
         let most = self.surface.field.angle?;
         let n = t.map(|i| self.nodes[i]);
         let flat = (n[1].place - n[0].place).cross(n[2].place - n[0].place).try_normalize()?;
@@ -128,7 +122,8 @@ impl DelaunayMesh<'_, '_> {
         let t = f.nodes;
         let end = |k: usize| t[(k + 1) % 3];
         let middles = pole::side_middles(self.surface, t.map(|n| self.nodes[n].uv));
-        if let Some(k) = self.side_to_divide(t).filter(|_| f.bound <= f.tolerance) {
+        // Near enough to the surface, it is divided for one of its sides.
+        if let Some(k) = self.steep_side(t).or_else(|| self.taken_side(t)).filter(|_| f.bound <= f.tolerance) {
             return divided
                 .insert(edge_key(t[k], end(k)))
                 .then_some(Wish { triangle: *f, places: [middles[k]; 2] });

@@ -149,7 +149,14 @@ pub(in crate::tessellate) fn triangulate(
         known.extend(new.iter().map(|&t| sorted_nodes(t)).zip(proved));
         let triangles: Vec<ProvedFacet<3>> =
             triangles.iter().map(|&nodes| ProvedFacet { nodes, ..known[&sorted_nodes(nodes)] }).collect();
-        let fails = |f: &&ProvedFacet<3>| f.bound > f.tolerance || mesh.side_to_divide(f.nodes).is_some();
+        // For an angle alone a transition does not grow beyond the usual: where a border lies beside its surface, or at a fold, no facet
+        // reaches it however small.
+        let for_angle = mesh.cdt.num_vertices() < limits.usual;
+        let fails = |f: &&ProvedFacet<3>| {
+            f.bound > f.tolerance
+                || mesh.taken_side(f.nodes).is_some()
+                || for_angle && mesh.steep_side(f.nodes).is_some()
+        };
         let mut failing: Vec<ProvedFacet<3>> = triangles.iter().filter(fails).copied().collect();
         // Beyond the usual measure only what is about to hold goes on: the flank of a thread of 20 m has no whole cells, and is done after
         // 12 times the corners of its border.
