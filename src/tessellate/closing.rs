@@ -1,6 +1,5 @@
-//! Facets that close a face where its others leave its border: between chords that lie on one line in the parameter plane or cross there
-//! for what they stray, and between corners that fall together in space alone. No triangle has an area there, and yet the neighbours on both
-//! sides have different corners.
+//! Facets that close a face where its others leave its border: between chords that lie on one line in the parameter plane, or cross
+//! there for what they stray, no triangle has an area, and yet the neighbours on both sides have different corners.
 
 use super::face_surface::FaceSurface;
 use super::nodes::{Nodes, Position, ProvedFacet, edge_key};
@@ -33,13 +32,11 @@ impl Closing<'_, '_> {
     /// Returns triangles that fill the gaps between the border and `facets`, each at most [`HIGHEST`] tolerances high. Wider gaps stay
     /// open.
     pub(super) fn facets(&self, facets: &[TransitionFacet]) -> Vec<ProvedFacet<4>> {
-        // As a further facet should run along them: with the border, and against the facets.
-        let against = facets.iter().flat_map(|f| sides(f.facet.nodes)).map(|[a, b]| [b, a]);
-        let all = self.segments.iter().copied().chain(against);
+        let all = self.border_sides(facets);
         // How often facets or the border run along each: an even number of times where both agree.
         let mut uses: FxHashMap<Side, u32> = FxHashMap::default();
-        all.clone().for_each(|[a, b]| *uses.entry(self.side(a, b)).or_insert(0) += 1);
-        let open = self.open_sides(all, &uses);
+        all.iter().for_each(|&[a, b]| *uses.entry(self.side(a, b)).or_insert(0) += 1);
+        let open = self.open_sides(&all, &uses);
         if open.is_empty() || open.len() > MOST_SIDES {
             return Vec::new();
         }
@@ -47,14 +44,28 @@ impl Closing<'_, '_> {
         self.gaps(open).into_iter().flat_map(filled).collect()
     }
 
+    /// Returns the sides between positions of the border, those of its segments first, in the direction in which a further facet should run
+    /// along them: as the border, and against the facets. All but these are sides of two facets.
+    fn border_sides(&self, facets: &[TransitionFacet]) -> Vec<[u32; 2]> {
+        let position = |n: u32| self.nodes[n].position;
+        let border: FxHashSet<Position> = self.segments.iter().flatten().map(|n| position(*n)).collect();
+        let on_border: Vec<bool> = self.nodes.iter().map(|n| border.contains(&n.position)).collect();
+        let against = facets.iter().flat_map(|f| sides(f.facet.nodes)).map(|[a, b]| [b, a]);
+        let against = against.filter(|side| side.iter().all(|n| on_border[*n as usize]));
+        self.segments.iter().copied().chain(against).collect()
+    }
+
     /// Returns those of `all` sides on which border and facets do not agree, each once.
-    fn open_sides(&self, all: impl Iterator<Item = [u32; 2]>, uses: &FxHashMap<Side, u32>) -> Vec<[u32; 2]> {
+    fn open_sides(&self, all: &[[u32; 2]], uses: &FxHashMap<Side, u32>) -> Vec<[u32; 2]> {
+        let mut open = Vec::new();
         let mut seen = FxHashSet::default();
-        let mut is_open = |&[a, b]: &[u32; 2]| {
+        for &[a, b] in all {
             let side = self.side(a, b);
-            side[0] != side[1] && uses[&side] % 2 == 1 && seen.insert(side)
-        };
-        all.filter(|side| is_open(side)).collect()
+            if side[0] != side[1] && uses[&side] % 2 == 1 && seen.insert(side) {
+                open.push([a, b]);
+            }
+        }
+        open
     }
 
     /// Returns closed ways along open sides that come by no position twice, by the nodes at their corners.

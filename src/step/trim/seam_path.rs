@@ -16,8 +16,13 @@ const MAX_CORNERS: usize = 4000;
 
 /// Places along each side of the strip between two loops that are in each other's way.
 const LATTICE: f64 = 24.0;
-/// Places half-way between two turns of a hole, about so many along each of its turns.
+/// Places between two turns of a hole: so many along each of its turns, of a hole of many turns fewer, about so many in all.
 const PLACES_PER_TURN: usize = 16;
+const PLACES_BETWEEN: usize = 1000;
+/// Least such places along a whole hole; the strip beside a helix is straight.
+const LEAST_PLACES: usize = 8;
+/// Where they lie between a side of the hole and its next copy: no slot is likely to be just so wide that they lie on its other side.
+const BETWEEN: [f64; 4] = [0.23, 0.41, 0.59, 0.77];
 /// Most turns of a hole that are looked at.
 const MOST_TURNS: i32 = 64;
 
@@ -165,15 +170,16 @@ impl Obstacles<'_> {
         places
     }
 
-    /// Returns places half-way between each hole of more than one turn, such as a slot along a helix, and its next copy, in all turns that
-    /// the hole has.
+    /// Returns places between each hole of more than one turn, such as a slot along a helix, and its next copy, in all turns that the hole
+    /// has.
     fn between_turns(&self) -> Vec<Uv> {
         let mut places = Vec::new();
         for hole in self.holes {
             let turns = turns_of(hole, self.displacement);
-            let count = PLACES_PER_TURN * turns as usize;
-            for copy in -turns..turns {
-                let by = self.displacement * (f64::from(copy) + 0.5);
+            let Some(most) = PLACES_BETWEEN.checked_div(2 * BETWEEN.len() * turns as usize) else { continue };
+            let count = (PLACES_PER_TURN * turns as usize).min(most).max(LEAST_PLACES);
+            for (copy, share) in (-turns..turns).flat_map(|copy| BETWEEN.map(|share| (copy, share))) {
+                let by = self.displacement * (f64::from(copy) + share);
                 places.extend((0..count).map(|k| hole[k * hole.len() / count] + by));
             }
         }
@@ -293,6 +299,7 @@ mod tests {
         let border = obstacles.way_around(&[start], &Goals::Line(&foot), &metric).expect("a way to the border");
         assert_eq!(border.points[border.points.len() - 1].y, 1.0);
     }
+
     /// A strip with a slot that leans over four of its periods: a straight way crosses copies of it that lie far off.
     #[test]
     fn a_seam_turns_as_often_as_the_slot_beside_it() {
@@ -300,7 +307,7 @@ mod tests {
         let line = |v: f64| unrolled_polygon(&[Uv::new(0.0, v), Uv::new(3.0, v)], turn);
         let along = |x: f64| Uv::new(x, 1.0 + x / 6.0);
         let lower = (0..=48).map(|k| along(0.5 * f64::from(k)));
-        let slot: Vec<Uv> = lower.clone().chain(lower.rev().map(|p| p + Uv::new(0.0, 0.5))).collect();
+        let slot: Vec<Uv> = lower.clone().chain(lower.rev().map(|p| p + Uv::new(0.0, 0.3))).collect();
         let holes = [slot];
         let obstacles = Obstacles { holes: &holes, borders: &[line(0.0), line(6.5)], displacement: turn };
         assert_eq!(obstacles.turns(), 4);
