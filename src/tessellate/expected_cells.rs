@@ -45,7 +45,7 @@ pub(super) fn angle_within_budget(face: &Face, surface: &FaceSurface<'_>, budget
     let cells = budget as f64 / TIMES_OF_ANGLE;
     let mut angle = asked.max(LEAST_ANGLE);
     loop {
-        let times_too_many = cells_of_chords(face, surface, |k, _| k / (2.0 * angle)) / cells;
+        let times_too_many = cells_of_angle(face, surface, angle) / cells;
         // Beyond a right angle there is nothing to gain, however few cells there may be.
         if times_too_many <= 1.0 || angle > FRAC_PI_2 {
             return if angle > LEAST_ANGLE { angle } else { asked };
@@ -57,8 +57,13 @@ pub(super) fn angle_within_budget(face: &Face, surface: &FaceSurface<'_>, budget
 
 /// Returns how many cells a face is granted for its tolerance and an angle, radians, together: more only a fold or a pole asks for.
 pub(super) fn cells_granted_for_angle(face: &Face, surface: &FaceSurface<'_>, angle: f64) -> usize {
-    let of_angle = cells_of_chords(face, surface, |k, _| k / (2.0 * angle));
-    (LEAST_GRANTED + TIMES_OF_ANGLE * (of_angle + expected_cells(face, surface))) as usize
+    (LEAST_GRANTED + TIMES_OF_ANGLE * (cells_of_angle(face, surface, angle) + expected_cells(face, surface)))
+        as usize
+}
+
+/// Estimates from below how many cells a face needs for an angle, radians, alone, as [`expected_cells`] does for its tolerance.
+fn cells_of_angle(face: &Face, surface: &FaceSurface<'_>, angle: f64) -> f64 {
+    cells_of_chords(face, surface, |k, _| k / (2.0 * angle))
 }
 
 /// The mean over a grid of places inside a face's border, the sharpest tenth left out, of its chords along u times those along v, as many
