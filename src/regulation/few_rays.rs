@@ -113,6 +113,9 @@ pub(super) struct LandedRays {
     rows: usize,
     /// Flux, lm, its variance, lm², and solid angle, sr, of the cells before a row and a column; a row and a column more than cells.
     sums: Vec<[f64; 3]>,
+    /// How many cells windows reach to each side of their middle one, each a quarter farther than the one before; the last one reaches from
+    /// any cell over the whole map.
+    reaches: Vec<usize>,
 }
 
 impl LandedRays {
@@ -133,7 +136,11 @@ impl LandedRays {
             sums.push([0, 1, 2].map(|k| above[k] + row[k]));
         }
         let rows = sums.len() / (columns + 1) - 1;
-        Self { sample, columns, rows, sums }
+        let mut reaches = vec![1];
+        while let Some(&last) = reaches.last().filter(|last| **last < columns.max(rows)) {
+            reaches.push(last + last.div_ceil(4));
+        }
+        Self { sample, columns, rows, sums, reaches }
     }
 
     /// Returns flux, variance and solid angle of the cells of a box of half-open ranges: the first cell is in it, the end is not.
@@ -145,35 +152,36 @@ impl LandedRays {
 
     /// Returns the heaviest rays that may land, unseen, in a cell (counted row after row) of a reading that is |`margin`| cd from its
     /// limit, at the one-sided confidence of `sigmas` standard errors; the heaviest of all where the window is dark or larger than the map.
-    pub(super) fn landing_ray(&self, cell: usize, margin: f64, sigmas: f64) -> LandingRay {
+    /// `size` is which window is looked at first and becomes the one that was taken: that of a cell nearby is about as large.
+    pub(super) fn landing_ray(&self, cell: usize, margin: f64, sigmas: f64, size: &mut usize) -> LandingRay {
         let heaviest = self.sample.heaviest_flux;
         let unknown = LandingRay { flux: heaviest, heaviest, hidden: 0.0 };
         // Light of the heaviest rays, as bright as the margin, brings so many to the window that none is met as seldom as asked for.
         let wanted = upper_count(0.0, sigmas) * heaviest / margin.abs();
         let (row, column) = (cell / self.columns, cell % self.columns);
-        let whole = self.columns.max(self.rows);
-        let mut reach = 1;
-        loop {
+        let window = |reach: usize| {
             let across = [column.saturating_sub(reach), (column + reach + 1).min(self.columns)];
             let along = [row.saturating_sub(reach), (row + reach + 1).min(self.rows)];
-            let [flux, variance, angle] = self.box_sums(across, along);
-            if angle >= wanted {
-                // What is left of nothing is not to be divided by.
-                if flux <= heaviest * CANCELLED_SHARE || variance <= 0.0 {
-                    return unknown;
-                }
-                let landed = (variance / flux).min(heaviest);
-                return LandingRay {
-                    flux: landed,
-                    heaviest,
-                    hidden: variance / (heaviest * angle) * (1.0 - landed / heaviest),
-                };
-            }
-            if reach >= whole {
-                return unknown;
-            }
-            reach += reach.div_ceil(4);
+            self.box_sums(across, along)
+        };
+        // The smallest one that is large enough.
+        let is_large = |size: usize| window(self.reaches[size])[2] >= wanted;
+        while *size > 0 && is_large(*size - 1) {
+            *size -= 1;
         }
+        while *size < self.reaches.len() && !is_large(*size) {
+            *size += 1;
+        }
+        let Some([flux, variance, angle]) = self.reaches.get(*size).map(|reach| window(*reach)) else {
+            return unknown;
+        };
+        // What is left of nothing is not to be divided by.
+        if flux <= heaviest * CANCELLED_SHARE || variance <= 0.0 {
+            return unknown;
+        }
+        let landed = (variance / flux).min(heaviest);
+        let hidden = variance / (heaviest * angle) * (1.0 - landed / heaviest);
+        LandingRay { flux: landed, heaviest, hidden }
     }
 }
 
@@ -227,11 +235,19 @@ mod tests {
         let landed = LandedRays::new(RaySample { heaviest_flux: 50.0, replicates: 128 }, 10, cells);
         assert_eq!(landed.box_sums([0, 10], [0, 10]), [149.0, 2599.0, 100.0]);
         // 6.7 rays of 50 lm at 40 cd take 8.4 cells: a window of nine holds only light ones, of which 9/50 lm may hide heavy ones.
-        let beside = landed.landing_ray(0, 100.0, 3.0);
+        let ray = |cell: usize, margin: f64| {
+            let first = landed.landing_ray(cell, margin, 3.0, &mut 0);
+            // Whichever window is looked at first, the same is taken.
+            for mut size in 0..=landed.reaches.len() {
+                assert_eq!(landed.landing_ray(cell, margin, 3.0, &mut size).flux, first.flux);
+            }
+            first
+        };
+        let beside = ray(0, 100.0);
         assert!((beside.flux - 1.0).abs() < 1e-9 && (beside.hidden - 0.98 / 50.0).abs() < 1e-9, "{beside:?}");
-        let near = landed.landing_ray(99, 100.0, 3.0);
+        let near = ray(99, 100.0);
         assert!(near.flux > 45.0, "{near:?}");
         // No window is large enough to show that there is none.
-        assert_eq!(landed.landing_ray(0, 1.0, 3.0).flux, 50.0);
+        assert_eq!(ray(0, 1.0).flux, 50.0);
     }
 }

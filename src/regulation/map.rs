@@ -206,6 +206,9 @@ impl IntensityMap {
         let cells = [cell - step, cell, cell + step];
         let [below, here, above] = cells.map(|cell| self.cells[cell][0]);
         let [before, after] = [here - below, above - here];
+        if before == 0.0 && after == 0.0 {
+            return;
+        }
         // What rises evenly from cell to cell does so within them. Where it does not, the slope may lie anywhere between none and that
         // beyond which the cell would be brighter or darker somewhere than its neighbours are on the mean.
         let spread = cells.map(|cell| self.cells[cell][1]);
@@ -261,7 +264,7 @@ impl IntensityMap {
     /// Returns how far the truth may lie from a reading that is `margin` cd from its limit: above it for a `sign` of 1, below for −1.
     pub(super) fn noise(&self, weights: &CellWeights, sign: f64, margin: f64, sigmas: f64) -> Noise {
         let replicates = self.landed.as_ref().map_or(u32::MAX, |landed| landed.sample.replicates);
-        let mut light = 0.0;
+        let (mut light, mut window) = (0.0, 0);
         let mut noise =
             Noise { ray_cd: 0.0, hidden: 0.0, hidden_ray_cd: 0.0, counted: 0.0, other: 0.0, replicates };
         for &(cell, weight) in &weights.by_cell {
@@ -270,7 +273,7 @@ impl IntensityMap {
             match &self.landed {
                 // More rays here bring the reading nearer to what it might be.
                 Some(landed) if sign * weight > 0.0 => {
-                    let ray = landed.landing_ray(cell, margin, sigmas);
+                    let ray = landed.landing_ray(cell, margin, sigmas, &mut window);
                     noise.counted += variance;
                     let candela = |flux: f64| weight.abs() * flux / self.solid_angle(cell);
                     noise.ray_cd = noise.ray_cd.max(candela(ray.flux));

@@ -1,15 +1,20 @@
 //! Rows judged by every aim that the errors of a map leave open.
 
+use super::aim::Aim;
 use super::assessment::{Assumptions, RowVerdict};
 use super::few_rays::SIGMAS;
 use super::judgement::Verdict;
 use super::photometer::Photometer;
 use super::row_verdict::judge_rows;
 use super::table::Regulation;
+use rayon::prelude::*;
 
 /// Most open aims by which rows of many directions are judged, each of which takes as long as a hundred points: of more, so many that lie
 /// among all of them.
 const MOST_FOR_EXTENDED: usize = 30;
+
+/// Aims by which rows of many directions are judged side by side: the zones of each take memory, on a far field of millions of cells hundreds of MB.
+const AIMS_AT_ONCE: usize = 4;
 
 /// What is remarked on rows that errors of their reading do not make unsure.
 const OUTSIDE_BY_AIM: &str = "by an aim that the errors of the map leave open it lies outside the far field";
@@ -27,9 +32,17 @@ pub(super) fn judge_by_open_aims(
     let mut spread = vec![0.0; rows.len()];
     // All of them are asked: a row's error must not depend on their order.
     let every = photometer.aim.rivals.len().div_ceil(MOST_FOR_EXTENDED).max(1);
-    for (k, open) in photometer.aim.open_aims().enumerate() {
+    let judge = |(k, open): (usize, &Aim)| {
         let is_asked = |row: usize| k % every == 0 || !regulation.function.rows[row].is_extended();
-        let others = judge_rows(&Photometer { aim: &open, ..*photometer }, regulation, assumptions, is_asked);
+        judge_rows(&Photometer { aim: open, ..*photometer }, regulation, assumptions, is_asked)
+    };
+    let open: Vec<Aim> = photometer.aim.open_aims().collect();
+    let at_once = AIMS_AT_ONCE * every;
+    let judged = open.chunks(at_once).enumerate().flat_map(|(chunk, aims)| {
+        let aims: Vec<(usize, &Aim)> = (chunk * at_once..).zip(aims).collect();
+        aims.into_par_iter().map(judge).collect::<Vec<_>>()
+    });
+    for others in judged {
         for ((row, other), spread) in rows.iter_mut().zip(others).zip(&mut spread) {
             let Some(other) = other else { continue };
             // What settles it by one aim does not where it is open which one holds.
@@ -58,7 +71,6 @@ pub(super) fn judge_by_open_aims(
 
 #[cfg(test)]
 mod tests {
-    use super::super::aim::Aim;
     use super::super::opening::Sensor;
     use super::super::test_lamps::{map, normal, passing, uniform};
     use super::super::verdict::assess;
