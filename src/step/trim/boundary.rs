@@ -227,7 +227,8 @@ fn extend_to_border(
     let displacement = chain.displacement(chart);
     // Straight across from a vertex that sees the border, or around the holes before it.
     let starts: Vec<Uv> = chain.pieces.iter().map(Piece::start).collect();
-    let obstacles = Obstacles { holes, borders: &[unrolled_polygon(&polygon, displacement)], displacement };
+    let borders = [unrolled_polygon(&polygon, displacement)];
+    let obstacles = Obstacles::new(holes, &borders, displacement);
     let foot_of = |p: Uv| {
         let mut foot = p;
         foot[across] = at;
@@ -310,7 +311,8 @@ fn join_winding_pair(
     pairs.sort_by(|x, y| x.0.total_cmp(&y.0));
     // Each pair costs a look at all obstacles; the best few thousand will do.
     pairs.truncate(4096);
-    let obstacles = Obstacles { holes, borders: &[border_a, border_b], displacement };
+    let borders = [border_a, border_b];
+    let obstacles = Obstacles::new(holes, &borders, displacement);
     let straight = pairs.iter().find(|(_, i, _, q)| obstacles.leave_free(starts_a[*i], *q));
     let seam = match straight {
         Some(&(_, i, j, q)) => SeamPath { start: i, goal: j, points: vec![starts_a[i], q] },

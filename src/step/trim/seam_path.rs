@@ -25,6 +25,8 @@ const LEAST_PLACES: usize = 8;
 const BETWEEN: [f64; 4] = [0.23, 0.41, 0.59, 0.77];
 /// Most turns of a hole that are looked at.
 const MOST_TURNS: i32 = 64;
+/// Sides of a chain that one box is around.
+const SIDES_OF_RUN: usize = 16;
 
 /// A seam's way: the numbers of its start and goal, and its places in parameters, both ends included.
 pub(super) struct SeamPath {
@@ -43,9 +45,22 @@ pub(super) enum Goals<'g> {
 
 /// What a seam must not cross, with its copies by multiples of the displacement: closed holes and open borders, in parameters.
 pub(super) struct Obstacles<'o> {
-    pub(super) holes: &'o [Vec<Uv>],
-    pub(super) borders: &'o [Vec<Uv>],
-    pub(super) displacement: Uv,
+    holes: &'o [Vec<Uv>],
+    borders: &'o [Vec<Uv>],
+    displacement: Uv,
+    chains: Vec<Chain<'o>>,
+}
+
+/// Places one after the other, in parameters, with boxes around runs of the sides between them.
+struct Chain<'o> {
+    places: &'o [Uv],
+    closed: bool,
+    /// What it is copied by; without one it stands once.
+    period: Uv,
+    /// The least and the most of its places along the period, in periods.
+    along: [f64; 2],
+    /// Lowest and highest corner around each [`SIDES_OF_RUN`] sides.
+    boxes: Vec<[Uv; 2]>,
 }
 
 /// A corner on the way.
@@ -58,11 +73,16 @@ struct Node {
     settled: bool,
 }
 
-impl Obstacles<'_> {
+impl<'o> Obstacles<'o> {
+    pub(super) fn new(holes: &'o [Vec<Uv>], borders: &'o [Vec<Uv>], displacement: Uv) -> Self {
+        let closed = holes.iter().map(|places| Chain::new(places, true, displacement));
+        let chains = closed.chain(borders.iter().map(|places| Chain::new(places, false, displacement))).collect();
+        Self { holes, borders, displacement, chains }
+    }
+
     /// Whether the straight line between two places crosses no hole, no border and no copy of these.
     pub(super) fn leave_free(&self, from: Uv, to: Uv) -> bool {
-        !self.holes.iter().any(|h| segment_crosses(h, true, from, to, self.displacement))
-            && !self.borders.iter().any(|b| segment_crosses(b, false, from, to, self.displacement))
+        !self.chains.iter().any(|chain| chain.is_crossed(from, to))
     }
 
     /// Returns the shortest way found from one of the starts to a goal, by lengths on the surface near the first start; `None` where holes
@@ -189,10 +209,11 @@ impl Obstacles<'_> {
 
     /// Whether a way misses its copies on both sides: the cut surface then lies in one sheet.
     fn is_simple(&self, points: &[Uv]) -> bool {
+        let chain = Chain::new(points, false, Uv::ZERO);
         let crosses_copy = |side: &[Uv]| {
             [-1.0, 1.0].iter().any(|&copy| {
                 let by = self.displacement * copy;
-                segment_crosses(points, false, side[0] + by, side[1] + by, Uv::ZERO)
+                chain.is_crossed(side[0] + by, side[1] + by)
             })
         };
         !points.windows(2).any(crosses_copy)
@@ -218,50 +239,65 @@ fn turns_of(hole: &[Uv], period: Uv) -> i32 {
     (hi - lo).clamp(0.0, f64::from(MOST_TURNS)) as i32
 }
 
-/// Returns by how many periods copies of a polygon are moved that may meet a segment; one that is endless in this direction has one only.
-fn copies_beside(polygon: &[Uv], segment: [Uv; 2], period: Uv) -> RangeInclusive<i32> {
-    if period == Uv::ZERO {
-        return 0..=0;
+impl<'o> Chain<'o> {
+    fn new(places: &'o [Uv], closed: bool, period: Uv) -> Self {
+        let n = places.len();
+        let sides = if closed { n } else { n.saturating_sub(1) };
+        let around = |first: usize| {
+            let run = || (first..=(first + SIDES_OF_RUN).min(sides)).map(|k| places[k % n]);
+            [run().fold(Uv::INFINITY, Uv::min), run().fold(Uv::NEG_INFINITY, Uv::max)]
+        };
+        let boxes = (0..sides).step_by(SIDES_OF_RUN).map(around).collect();
+        Self { places, closed, period, along: range_along(places, period), boxes }
     }
-    let [lo, hi] = range_along(polygon, period);
-    let [from, to] = range_along(&segment, period);
-    let first = (from - hi - CROSSING_NOISE).ceil().max(f64::from(-MOST_TURNS));
-    let last = (to - lo + CROSSING_NOISE).floor().min(f64::from(MOST_TURNS));
-    first as i32..=last as i32
-}
 
-/// Whether a segment crosses a polygon or a copy of it, moved by whole `period`s; touching does not count, a corner between both sides
-/// does.
-fn segment_crosses(polygon: &[Uv], closed: bool, a: Uv, b: Uv, period: Uv) -> bool {
-    let n = polygon.len();
-    let sides = if closed { n } else { n - 1 };
-    let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
-    copies_beside(polygon, [a, b], period).any(|copy| {
-        let by = period * f64::from(copy);
+    /// Whether the segment between two places crosses the chain or a copy of it; touching does not count, a corner between both sides does.
+    fn is_crossed(&self, a: Uv, b: Uv) -> bool {
         let slack = CROSSING_NOISE * (b - a).length();
-        let lo = a.min(b) - by - slack;
-        let hi = a.max(b) - by + slack;
-        (0..sides).any(|i| {
-            let (p, q) = (polygon[i], polygon[(i + 1) % n]);
-            if p.x.max(q.x) < lo.x || p.x.min(q.x) > hi.x || p.y.max(q.y) < lo.y || p.y.min(q.y) > hi.y {
-                return false;
-            }
-            let p = p + by;
-            let q = q + by;
-            // Segments cross where each has the ends of the other on opposite sides.
-            let (s1, s2, s3, s4) = (side(a, b, p), side(a, b, q), side(p, q, a), side(p, q, b));
-            let noise = CROSSING_NOISE * (b - a).length() * (q - p).length();
-            let ends_apart = s3 > noise && s4 < -noise || s3 < -noise && s4 > noise;
-            if s2.abs() <= noise && ends_apart {
-                // Through a corner: between what comes before it and what comes after it.
-                let on_line = |x: Uv| side(a, b, x + by).abs() <= noise;
-                let rest = if closed { n } else { n - 2 - i };
-                let next = (2..=rest).map(|k| polygon[(i + k) % n]).find(|x| !on_line(*x));
-                return next.is_some_and(|x| s1.abs() > noise && side(a, b, x + by) * s1 < 0.0);
-            }
-            (s1 > noise && s2 < -noise || s1 < -noise && s2 > noise) && ends_apart
+        self.copies_beside([a, b]).any(|copy| {
+            let by = self.period * f64::from(copy);
+            let (lo, hi) = (a.min(b) - by - slack, a.max(b) - by + slack);
+            let meets = |[low, high]: [Uv; 2]| high.cmpge(lo).all() && low.cmple(hi).all();
+            let near = self.boxes.iter().enumerate().filter(|(_, around)| meets(**around));
+            let mut sides = near.flat_map(|(run, _)| (run * SIDES_OF_RUN..self.sides()).take(SIDES_OF_RUN));
+            sides.any(|side| self.side_is_crossed(side, [a - by, b - by]))
         })
-    })
+    }
+
+    /// Returns how many sides it has.
+    fn sides(&self) -> usize {
+        if self.closed { self.places.len() } else { self.places.len() - 1 }
+    }
+
+    /// Returns by how many periods copies of it are moved that may meet a segment.
+    fn copies_beside(&self, segment: [Uv; 2]) -> RangeInclusive<i32> {
+        if self.period == Uv::ZERO {
+            return 0..=0;
+        }
+        let [lo, hi] = self.along;
+        let [from, to] = range_along(&segment, self.period);
+        let first = (from - hi - CROSSING_NOISE).ceil().max(f64::from(-MOST_TURNS));
+        let last = (to - lo + CROSSING_NOISE).floor().min(f64::from(MOST_TURNS));
+        first as i32..=last as i32
+    }
+
+    /// Whether a segment crosses the side that begins at so many places.
+    fn side_is_crossed(&self, i: usize, [a, b]: [Uv; 2]) -> bool {
+        let n = self.places.len();
+        let (p, q) = (self.places[i], self.places[(i + 1) % n]);
+        // Segments cross where each has the ends of the other on opposite sides.
+        let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
+        let (s1, s2, s3, s4) = (side(a, b, p), side(a, b, q), side(p, q, a), side(p, q, b));
+        let noise = CROSSING_NOISE * (b - a).length() * (q - p).length();
+        let ends_apart = s3 > noise && s4 < -noise || s3 < -noise && s4 > noise;
+        if s2.abs() <= noise && ends_apart {
+            // Through a corner: between what comes before it and what comes after it.
+            let rest = if self.closed { n } else { n - 2 - i };
+            let next = (2..=rest).map(|k| self.places[(i + k) % n]).find(|x| side(a, b, *x).abs() > noise);
+            return next.is_some_and(|x| s1.abs() > noise && side(a, b, x) * s1 < 0.0);
+        }
+        (s1 > noise && s2 < -noise || s1 < -noise && s2 > noise) && ends_apart
+    }
 }
 
 #[cfg(test)]
@@ -279,7 +315,8 @@ mod tests {
             .collect();
         let metric = Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y };
         let holes = [hole];
-        let obstacles = Obstacles { holes: &holes, borders: &[line(0.0), line(1.0)], displacement: turn };
+        let borders = [line(0.0), line(1.0)];
+        let obstacles = Obstacles::new(&holes, &borders, turn);
         let (start, goal) = (Uv::ZERO, Uv::new(0.0, 1.0));
         assert!(!obstacles.leave_free(start, goal));
         let path = obstacles.way_around(&[start], &Goals::Points(&[(7, goal)]), &metric).expect("a way");
@@ -291,10 +328,10 @@ mod tests {
         // A hole whose corners lie on the straight seam is in its way as well.
         let turned: Vec<Uv> = obstacles.holes[0].iter().map(|p| *p + Uv::new(1.0, 0.0)).collect();
         let through = [turned];
-        let obstacles = Obstacles { holes: &through, ..obstacles };
+        let obstacles = Obstacles::new(&through, &borders, turn);
         assert!(!obstacles.leave_free(Uv::new(1.0, 0.0), Uv::new(1.0, 1.0)));
         assert!(obstacles.leave_free(Uv::new(1.3, 0.0), Uv::new(1.3, 1.0)), "a hole that is touched");
-        let obstacles = Obstacles { holes: &holes, ..obstacles };
+        let obstacles = Obstacles::new(&holes, &borders, turn);
         let foot = |p: Uv| Uv::new(p.x, 1.0);
         let border = obstacles.way_around(&[start], &Goals::Line(&foot), &metric).expect("a way to the border");
         assert_eq!(border.points[border.points.len() - 1].y, 1.0);
@@ -309,7 +346,8 @@ mod tests {
         let lower = (0..=48).map(|k| along(0.5 * f64::from(k)));
         let slot: Vec<Uv> = lower.clone().chain(lower.rev().map(|p| p + Uv::new(0.0, 0.3))).collect();
         let holes = [slot];
-        let obstacles = Obstacles { holes: &holes, borders: &[line(0.0), line(6.5)], displacement: turn };
+        let borders = [line(0.0), line(6.5)];
+        let obstacles = Obstacles::new(&holes, &borders, turn);
         assert_eq!(obstacles.turns(), 4);
         for copy in -4..=4 {
             let across = Uv::new(6.0 * f64::from(copy) + 12.0, 0.0);
