@@ -72,22 +72,33 @@ fn counterparts(builder: &CellFacets<'_, '_, '_, '_>, cell: &Cell, hanging: &[Ve
             at.sort_by(f64::total_cmp);
             at
         };
-        let (here, there) = (ascending(side), ascending(side + 2));
-        let (mut i, mut j) = (0, 0);
-        while i < here.len() || j < there.len() {
-            let [a, b] = [here.get(i), there.get(j)].map(|at| at.copied().unwrap_or(f64::INFINITY));
-            if (a - b).abs() <= near {
-                (i, j) = (i + 1, j + 1);
-            } else if a < b {
-                out.push((side + 2, a));
-                i += 1;
-            } else {
-                out.push((side, b));
-                j += 1;
-            }
-        }
+        let [here, there] = not_faced([&ascending(side), &ascending(side + 2)], near);
+        out.extend(here.into_iter().map(|at| (side + 2, at)));
+        out.extend(there.into_iter().map(|at| (side, at)));
     }
     out
+}
+
+/// Returns, of two ascending lists of places, those that none of the other list faces within `near`. A place faces one other, and leaves it
+/// to the next of its own list where that is nearer.
+fn not_faced([here, there]: [&[f64]; 2], near: f64) -> [Vec<f64>; 2] {
+    let mut alone = [Vec::new(), Vec::new()];
+    let (mut i, mut j) = (0, 0);
+    while i < here.len() || j < there.len() {
+        let at = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(f64::INFINITY);
+        let (a, b) = (at(here, i), at(there, j));
+        let nearer_comes = if a < b { at(here, i + 1) - b } else { at(there, j + 1) - a }.abs() < (a - b).abs();
+        if (a - b).abs() <= near && !nearer_comes {
+            (i, j) = (i + 1, j + 1);
+        } else if a < b {
+            alone[0].push(a);
+            i += 1;
+        } else {
+            alone[1].push(b);
+            j += 1;
+        }
+    }
+    alone
 }
 
 /// Whether a cell holds as quads once it has the nodes of `cut`, none of which may divide a side of the border.
@@ -116,4 +127,20 @@ fn holds_when_cut(
     holds = holds && builder.cut_across(proved.slack, corners, &hanging).is_some();
     builder.input.nodes.rewind(mark);
     holds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_faces_the_nearest_of_the_other_side() {
+        let none = [Vec::<f64>::new(), vec![]];
+        assert_eq!(not_faced([&[], &[]], 0.2), none);
+        assert_eq!(not_faced([&[1.0, 2.0], &[1.1, 1.9]], 0.2), none);
+        assert_eq!(not_faced([&[1.0, 2.0], &[1.5]], 0.2), [vec![1.0, 2.0], vec![1.5]]);
+        // As wide apart as places may be that face each other: the first one is alone, and no other has two in its place.
+        assert_eq!(not_faced([&[1.0, 1.2, 1.4], &[0.8, 1.0, 1.2, 1.4]], 0.3), [vec![], vec![0.8]]);
+        assert_eq!(not_faced([&[0.8, 1.0, 1.2], &[1.0, 1.2, 1.4]], 0.3), [vec![0.8], vec![1.4]]);
+    }
 }
