@@ -13,7 +13,7 @@ use rayon::prelude::*;
 /// among all of them.
 const MOST_FOR_EXTENDED: usize = 30;
 
-/// Aims by which rows of many directions are judged side by side: the zones of each take memory, on a far field of millions of cells hundreds of MB.
+/// Aims by which rows of many directions are judged side by side: zones take memory, on a far field of millions of cells hundreds of MB.
 const AIMS_AT_ONCE: usize = 4;
 
 /// What is remarked on rows that errors of their reading do not make unsure.

@@ -3,6 +3,7 @@
 //! Between two arcs that touch, chords cross however short they are: near the cusp the arcs are nearer to each other than any chord to
 //! its arc. With corners in the same places on both they bend alike and stay apart.
 
+use super::face_surface::FaceSurface;
 use super::nodes::{Nodes, edge_key};
 use crate::math::{Point, Uv};
 use crate::model::{EdgeId, Part};
@@ -50,6 +51,7 @@ impl<'c> CrossingChords<'c> {
     /// Finds which of the chords in `conflicts` and in `crossed` cross; `followed` are the edges by chord.
     pub(super) fn new(
         part: &'c Part,
+        surface: &FaceSurface<'_>,
         nodes: &'c Nodes,
         followed: &FxHashMap<[u32; 2], Followed>,
         [conflicts, crossed]: [&[[u32; 2]]; 2],
@@ -62,7 +64,10 @@ impl<'c> CrossingChords<'c> {
         let place = |s: [u32; 2]| s.map(|n| nodes[n].place);
         let sag = |(ends, on): FollowedChord| {
             let curve = &part.edges[on.edge.0 as usize].curve;
-            distance_to_chord(curve.evaluate(0.5 * (on.t[0] + on.t[1])), &place(ends))
+            // Near a pole what is straight in parameters bows farther than the edge does.
+            let [a, b] = uv(ends);
+            let middles = [curve.evaluate(0.5 * (on.t[0] + on.t[1])), surface.point(0.5 * (a + b))];
+            middles.map(|p| distance_to_chord(p, &place(ends))).into_iter().fold(0.0, f64::max)
         };
         // Edges that cross farther than their chords sag do so themselves: corners in one place would only hide it.
         let is_for_sag = |a: FollowedChord, b: FollowedChord| {

@@ -17,6 +17,7 @@ use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::imprint::{CarrierFacets, Imprint};
 use super::limits::face_budget;
+use super::lobes::turn_lobes;
 use super::nodes::{Nodes, ProvedFacet, edge_key};
 use super::proof::border_chord::BorderChords;
 use super::proof::prover::Prover;
@@ -160,12 +161,15 @@ pub(super) fn mesh_with_imprint(
     let repaired = first_repair(&transition, is_covered, exhausted);
     let unproved = beside_crossings.unwrap_or_else(|| unproved(&transition));
     let refused = [&transition.conflicts[..], &transition.crossed];
-    let crossing = CrossingChords::new(part, &transition.nodes, &followed, refused);
+    let crossing = CrossingChords::new(part, surface, &transition.nodes, &followed, refused);
     let mut coarse = if exhausted { vec![] } else { crossing.edges_for_sag() };
     coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
     let facing = crossing.facing_samples();
     let mut facets: Vec<TransitionFacet> = grid.quads.iter().copied().map(TransitionFacet::from).collect();
     facets.extend(pairing::pair_triangles(&transition, &fixed, &mut prover));
+    if !transition.conflicts.is_empty() || input.untangles {
+        turn_lobes(&transition.nodes, &on_border, &mut facets);
+    }
     let closing = Closing { surface, nodes: &transition.nodes, segments: &on_border, chords: &chords, taken };
     let (made, facets) = emit(&closing, facets);
     // Conflicts may have cost an imprinted line, so that the guests' facets would not be bounded by it.

@@ -35,6 +35,7 @@ mod foot_search;
 mod grouped;
 mod imprint;
 mod limits;
+mod lobes;
 mod nodes;
 mod placed_part;
 mod placement;

@@ -559,6 +559,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "sample_budget",
             "repairs",
             "transition",
+            "lobes",
             "closing",
             "detours",
             "triangulator",

@@ -52,7 +52,7 @@ fn light_that_is_caught_beside_a_brick_that_absorbs_is_absorbed() {
     world.cuboid("clear", Point::ZERO, Point::new(20.0, 20.0, 20.0));
     world.cuboid("grey", Point::new(0.0, 0.0, 20.0), Point::new(20.0, 20.0, 21.0));
     let text = "[run]\nrays = 2000\nmax_bounces = 100000\npower_floor = 1e-4
-        [[medium]]\nname = 'glass'\nindex = 1.5\n[[medium]]\nname = 'grey'\nindex = 1.5\nabsorption_per_mm = 0.001
+        [[medium]]\nname = 'glass'\nindex = 1.5\n[[medium]]\nname = 'grey'\nindex = 1.5\nabsorption_per_mm = 0.003
         [[material]]\npart = 'clear'\nmedium = 'glass'\n[[material]]\npart = 'grey'\nmedium = 'grey'
         [[source]]\nkind = 'point'\nat = [7.1, 8.3, 9.7]";
     let r = world.run(text, |_| ());

@@ -18,6 +18,7 @@ mod proof;
 mod repairs;
 mod shapes;
 mod shared_edges;
+mod spherical_triangles;
 mod strips;
 mod support;
 #[path = "../support/turned.rs"]

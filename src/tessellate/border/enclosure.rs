@@ -1,13 +1,13 @@
 //! Which side of a border places lie on, asked many times.
 
 use crate::math::Uv;
-use crate::math::polygon::is_inside_sides;
+use crate::math::polygon::crosses_ray_from;
 
-/// Sides of one node that are compared one by one: about what two binary searches take.
+/// Sides of one node that are compared one by one: about what a binary search takes twice.
 const SIDES_OF_LEAF: usize = 16;
 
-/// The sides of a border in a tree of boxes. A box right of a place counts the sides that cross its height by two binary searches, so that
-/// few sides are compared: a damaged face with a winding border of thousands of sides spent two thirds of its time comparing.
+/// The sides of a border in a tree of boxes. A box right of a place counts the sides that cross its height by a binary search, so that few
+/// sides are compared: a damaged face with a winding border of thousands of sides spent two thirds of its time comparing.
 pub(in crate::tessellate) struct Enclosure {
     /// Each half of a node's sides is a run.
     sides: Vec<[Uv; 2]>,
@@ -29,8 +29,8 @@ struct Node {
 /// What a node has that is no leaf.
 struct Halves {
     nodes: [usize; 2],
-    /// The v of the lower and of the upper ends of all sides, ascending.
-    ends: [Vec<f64>; 2],
+    /// The v of the ends of all sides, ascending, each with how many more sides rise than fall from there up to the next end.
+    ends: Vec<(f64, i32)>,
 }
 
 impl Enclosure {
@@ -61,9 +61,14 @@ impl Enclosure {
             } else {
                 sides.select_nth_unstable_by(half, |s, t| (s[0].y + s[1].y).total_cmp(&(t[0].y + t[1].y)));
             }
-            let mut ends =
-                [f64::min, f64::max].map(|end| sides.iter().map(|[a, b]| end(a.y, b.y)).collect::<Vec<_>>());
-            ends.iter_mut().for_each(|ends| ends.sort_unstable_by(f64::total_cmp));
+            // What a rising side adds at its lower end it takes away at its upper end; a falling one the other way round.
+            let mut ends: Vec<(f64, i32)> = sides.iter().flat_map(|[a, b]| [(a.y, 1), (b.y, -1)]).collect();
+            ends.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+            let mut rising = 0;
+            for (_, rises) in &mut ends {
+                rising += *rises;
+                *rises = rising;
+            }
             let nodes = [self.add_node(first, half, extent), self.add_node(first + half, count - half, extent)];
             self.nodes[index].halves = Some(Halves { nodes, ends });
         }
@@ -73,23 +78,31 @@ impl Enclosure {
     /// Whether `p` lies inside the closed loops of the border, by the parity of their crossings with the ray along +u. On the border either
     /// answer may come.
     pub(in crate::tessellate) fn encloses(&self, p: Uv) -> bool {
-        !self.nodes.is_empty() && self.crosses_odd_times(0, p)
+        self.winding_number(p) % 2 != 0
     }
 
-    /// Whether the ray from `p` along +u crosses an odd number of the sides of a node.
-    fn crosses_odd_times(&self, node: usize, p: Uv) -> bool {
+    /// Returns how often the border runs around `p`, counter-clockwise less clockwise. On the border any neighbour's answer may come.
+    pub(in crate::tessellate) fn winding_number(&self, p: Uv) -> i32 {
+        if self.nodes.is_empty() { 0 } else { self.rising_right_of(0, p) }
+    }
+
+    /// Returns how many more of a node's sides rise than fall across the ray from `p` along +u.
+    fn rising_right_of(&self, node: usize, p: Uv) -> i32 {
         let Node { first, count, low, high, halves } = &self.nodes[node];
         // Half open as the test of a single side.
         if p.y < low.y || p.y >= high.y || p.x > high.x {
-            return false;
+            return 0;
         }
         match halves {
             Some(Halves { ends, .. }) if p.x < low.x => {
-                let [begun, ended] = [0, 1].map(|k| ends[k].partition_point(|v| *v <= p.y));
-                begun % 2 != ended % 2
+                let begun = ends.partition_point(|(v, _)| *v <= p.y);
+                begun.checked_sub(1).map_or(0, |last| ends[last].1)
             }
-            Some(Halves { nodes: [a, b], .. }) => self.crosses_odd_times(*a, p) != self.crosses_odd_times(*b, p),
-            None => is_inside_sides(self.sides[*first..first + count].iter().copied(), p),
+            Some(Halves { nodes: [a, b], .. }) => self.rising_right_of(*a, p) + self.rising_right_of(*b, p),
+            None => {
+                let crossing = self.sides[*first..first + count].iter().filter(|side| crosses_ray_from(p, **side));
+                crossing.map(|[a, b]| if a.y < b.y { 1 } else { -1 }).sum()
+            }
         }
     }
 }
@@ -103,7 +116,8 @@ fn bounds(sides: &[[Uv; 2]]) -> (Uv, Uv) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::polygon::polygon_sides;
+    use crate::math::polygon::{is_inside_sides, polygon_sides};
+    use std::f64::consts::TAU;
 
     #[test]
     fn trees_cross_what_all_sides_cross() {
@@ -125,6 +139,22 @@ mod tests {
         assert!(!Enclosure::new(vec![[Uv::ZERO, Uv::X]]).encloses(Uv::new(-1.0, 0.0)));
         assert!(!Enclosure::new(vec![[Uv::ZERO, Uv::X]; 99]).encloses(Uv::new(-1.0, 0.0)));
         assert!(!Enclosure::new(Vec::new()).encloses(Uv::ZERO));
+    }
+
+    /// A spiral of three turns, closed along +u, and one of a triangle's size of 40 sides a turn.
+    #[test]
+    fn winding_numbers_count_turns() {
+        for sides in [3, 40] {
+            let corner = |k: usize| Uv::from_angle((k as f64 + 0.5) / sides as f64 * TAU) * (3.0 + k as f64);
+            let spiral: Vec<Uv> = (0..3 * sides).map(corner).collect();
+            let backwards: Vec<Uv> = spiral.iter().rev().copied().collect();
+            let [left, right] = [spiral, backwards].map(|p| Enclosure::new(polygon_sides(&p).collect()));
+            // Left of all the closing side lies behind: three turns, two, one and none.
+            for (radius, turns) in [(0.0, 3), (3.2 + sides as f64, 2), (3.2 + 2.0 * sides as f64, 1), (1e3, 0)] {
+                let p = Uv::new(-radius, 0.1);
+                assert_eq!((left.winding_number(p), right.winding_number(p)), (turns, -turns), "{sides}: {p}");
+            }
+        }
     }
 
     /// A comb whose teeth all cross one height, and one whose teeth lie one above the other.

@@ -24,6 +24,20 @@ impl From<ProvedFacet<4>> for TransitionFacet {
     }
 }
 
+impl TransitionFacet {
+    /// Lets the facet run the other way round, from the same first corner.
+    pub(in crate::tessellate) fn turn_over(&mut self) {
+        let [a, b, c, d] = self.facet.nodes;
+        let last = if c == d { 2 } else { 3 };
+        self.facet.nodes = if c == d { [a, c, b, b] } else { [a, d, c, b] };
+        if let Some((at, _)) = &mut self.pole
+            && *at > 0
+        {
+            *at = last + 1 - *at;
+        }
+    }
+}
+
 /// Cosine of the sharpest and bluntest corner that a quad may have: 1.8°.
 const SHARPEST: f64 = 0.9995;
 /// Cosine below which a quad is made before any triangle's lack of mates is looked at: corners from 60° to 120°.

@@ -14,6 +14,9 @@ const SAME_PLACE: f64 = 1e-6;
 /// Share of the tolerance from which the sag of a side is what a triangle fails for.
 const SAGGING: f64 = 0.2;
 
+/// Share of the surface's domain that a triangle is wide whose corners do not stand on one line: trims meet lines no better.
+const LEAST_WIDTH: f64 = 1e-7;
+
 /// A point that a triangle asks for.
 struct Wish {
     triangle: ProvedFacet<3>,
@@ -34,10 +37,14 @@ impl DelaunayMesh<'_, '_> {
     }
 
     /// Returns the side, not on the outline and long enough to be divided for an angle, whose ends' normals differ most, if a normal breaks
-    /// the angle condition and that side turns by more than it; `None` otherwise and without a condition.
+    /// the angle condition and that side turns by more than it; `None` otherwise, without a condition, and for a triangle without width in
+    /// parameters: it stands between a chord and its own arc, and so do all that it could be divided into.
     pub(super) fn steep_side(&self, t: [u32; 3]) -> Option<usize> {
         let most = self.surface.field.angle?;
         let n = t.map(|i| self.nodes[i]);
+        if !self.has_width(n.map(|x| x.uv)) {
+            return None;
+        }
         let flat = (n[1].place - n[0].place).cross(n[2].place - n[0].place).try_normalize()?;
         let normals = n.map(|x| self.surface.spline.normal(x.uv));
         // Either side of the triangle may be meant: which way it is turned is decided later.
@@ -50,6 +57,16 @@ impl DelaunayMesh<'_, '_> {
         let free = (0..3).filter(|&k| self.is_inner(t[k], t[(k + 1) % 3]) && is_long(k));
         let side = free.max_by(|&a, &b| turn(a).total_cmp(&turn(b)))?;
         (steep && turn(side) > most).then_some(side)
+    }
+
+    /// Whether a triangle is wider, in shares of the surface's domain, than trims are fitted to their curves; at a pole its sector is.
+    fn has_width(&self, mut uv: [Uv; 3]) -> bool {
+        if let Some((corner, at_pole)) = pole::facet_parameters(self.surface, &uv) {
+            uv[corner] = at_pole;
+        }
+        let [a, b, c] = uv.map(|uv| uv / self.surface.extent());
+        let longest = [b - a, c - b, a - c].into_iter().map(Uv::length).fold(0.0, f64::max);
+        (b - a).perp_dot(c - a).abs() > LEAST_WIDTH * longest
     }
 
     /// Whether an edge is not on the outline.
