@@ -28,27 +28,14 @@ pub(super) struct Closing<'c, 'a> {
 /// The two positions of a side, in ascending order.
 type Side = [Position; 2];
 
-/// How facets should run along a side, or the border does.
-#[derive(Clone, Copy, Default)]
-struct Uses {
-    /// An even number where both agree.
-    count: u32,
-    /// Those from the first position to the second, less those back.
-    ascending: i32,
-}
-
 impl Closing<'_, '_> {
     /// Returns triangles that fill the gaps between the border and `facets`, each at most [`HIGHEST`] tolerances high. Wider gaps stay
     /// open.
     pub(super) fn facets(&self, facets: &[TransitionFacet]) -> Vec<ProvedFacet<4>> {
         let all = self.border_sides(facets);
-        let mut uses: FxHashMap<Side, Uses> = FxHashMap::default();
-        for &[a, b] in &all {
-            let side = self.side(a, b);
-            let uses = uses.entry(side).or_default();
-            uses.count += 1;
-            uses.ascending += if self.nodes[a].position == side[0] { 1 } else { -1 };
-        }
+        // How often facets or the border run along each: an even number of times where both agree.
+        let mut uses: FxHashMap<Side, u32> = FxHashMap::default();
+        all.iter().for_each(|&[a, b]| *uses.entry(self.side(a, b)).or_insert(0) += 1);
         let open = self.open_sides(&all, &uses);
         if open.is_empty() || open.len() > MOST_SIDES {
             return Vec::new();
@@ -68,15 +55,14 @@ impl Closing<'_, '_> {
         self.segments.iter().copied().chain(against).collect()
     }
 
-    /// Returns those of `all` sides on which border and facets do not agree, each once and in the direction that is missing.
-    fn open_sides(&self, all: &[[u32; 2]], uses: &FxHashMap<Side, Uses>) -> Vec<[u32; 2]> {
+    /// Returns those of `all` sides on which border and facets do not agree, each once.
+    fn open_sides(&self, all: &[[u32; 2]], uses: &FxHashMap<Side, u32>) -> Vec<[u32; 2]> {
         let mut open = Vec::new();
         let mut seen = FxHashSet::default();
         for &[a, b] in all {
             let side = self.side(a, b);
-            if side[0] != side[1] && uses[&side].count % 2 == 1 && seen.insert(side) {
-                let ascends = uses[&side].ascending > 0;
-                open.push(if ascends == (self.nodes[a].position == side[0]) { [a, b] } else { [b, a] });
+            if side[0] != side[1] && uses[&side] % 2 == 1 && seen.insert(side) {
+                open.push([a, b]);
             }
         }
         open
@@ -112,7 +98,7 @@ impl Closing<'_, '_> {
 
     /// Fills a gap with the triangles of least area in all that have no side in common with others; `None` where one of them would be
     /// higher than [`HIGHEST`] tolerances.
-    fn filled(&self, gap: &[u32], uses: &FxHashMap<Side, Uses>) -> Option<Vec<ProvedFacet<4>>> {
+    fn filled(&self, gap: &[u32], uses: &FxHashMap<Side, u32>) -> Option<Vec<ProvedFacet<4>>> {
         let n = gap.len();
         if !(3..=MOST_CORNERS).contains(&n) {
             return None;
@@ -147,7 +133,7 @@ impl Closing<'_, '_> {
     }
 
     /// Whether a diagonal is a side of the face or of another already.
-    fn is_doubled(&self, [a, b]: [u32; 2], uses: &FxHashMap<Side, Uses>) -> bool {
+    fn is_doubled(&self, [a, b]: [u32; 2], uses: &FxHashMap<Side, u32>) -> bool {
         let side = self.side(a, b);
         uses.contains_key(&side) || self.taken.contains(side)
     }

@@ -162,3 +162,41 @@ impl DelaunayMesh<'_, '_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::{Surface, sweep};
+    use crate::tessellate::face_surface::FaceSurface;
+    use crate::tessellate::nodes::Nodes;
+    use crate::tessellate::settings::ToleranceField;
+    use crate::tessellate::taken_chords::NO_CHORDS;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    /// Whether a triangle, its corners in shares of the surface's domain, is divided for an angle of 3°.
+    fn is_divided(spline: &Surface, corners: [[f64; 2]; 3]) -> bool {
+        let mut field = ToleranceField::new([0.2; 2], [1.0, 10.0], Default::default(), 1.0);
+        field.angle = Some(0.05);
+        let surface = FaceSurface::new(spline, false, field);
+        let mut nodes = Nodes::default();
+        let [[u0, _], [v0, _]] = spline.domain();
+        for share in corners {
+            let uv = Uv::new(u0, v0) + Uv::from_array(share) * surface.extent();
+            nodes.push_own(uv, surface.point(uv));
+        }
+        DelaunayMesh::new(&surface, nodes, Uv::ONE, &NO_CHORDS).steep_side([0, 1, 2]).is_some()
+    }
+
+    /// All of these stand upright on the surface: between a chord of 36° and its arc, or the wider one beside it.
+    #[test]
+    fn triangles_without_width_are_not_divided_for_an_angle() {
+        let tube = sweep::cylinder(&Frame::IDENTITY, 5.0, [0.0, PI], [0.0, 10.0]);
+        assert!(is_divided(&tube, [[0.1, 0.5], [0.3, 0.5], [0.2, 0.6]]));
+        assert!(!is_divided(&tube, [[0.1, 0.5], [0.3, 0.5], [0.2, 0.5 + 1e-8]]));
+        // At a pole its parameter across says nothing of a width.
+        let cap = sweep::sphere(&Frame::IDENTITY, 5.0, [0.0, FRAC_PI_2], [0.0, FRAC_PI_2]);
+        assert!(is_divided(&cap, [[0.2, 0.6], [0.5, 0.8], [0.9, 1.0]]));
+        assert!(!is_divided(&cap, [[0.2, 0.6], [0.2 + 1e-8, 0.8], [0.9, 1.0]]));
+    }
+}
