@@ -201,7 +201,7 @@ pub(crate) fn regulations() -> Vec<(String, String, usize, String)> {
 }
 
 /// What the command says of names that it does not know: how to see all of them there.
-const LIST_OF_COMMAND: &str = " … (`assess --list` shows all)";
+const LIST_OF_COMMAND: &str = "(`assess --list` shows all)";
 
 /// A far field over H and V in candela judged by a regulation, as JSON.
 #[pyfunction]
@@ -224,7 +224,7 @@ pub(crate) fn assess(
     }
     let wanted = RegulationUse { id: regulation.into(), receiver: Some(r.name.clone()), left_hand, as_placed };
     let judged = py.detach(|| results.found.verdict(&results.scene, &wanted)).map_err(|e| {
-        let reason = e.trim_end_matches(LIST_OF_COMMAND);
+        let reason = e.trim_end_matches(LIST_OF_COMMAND).trim_end_matches([' ', '…']);
         let all = if reason.len() < e.len() { "; lampyris.regulations() has all of them" } else { "" };
         SceneError::new_err(format!("{reason}{all}"))
     })?;

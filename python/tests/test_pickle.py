@@ -30,7 +30,11 @@ def listed(models: Any = ()) -> lp.Scene:
     return scene.add(lp.rays(array), lp.plane("wall", at=(0, 0, 300), size=(10, 10), cells=(2, 2)))
 
 
-@pytest.mark.parametrize("make", [lamp, listed, lambda: lp.Scene.from_toml(SCENES[0])], ids=["model", "rays", "file"])
+def filed() -> lp.Scene:
+    return lp.Scene.from_toml(next(s for s in SCENES if s.stem == "s1_lens"))
+
+
+@pytest.mark.parametrize("make", [lamp, listed, filed], ids=["model", "rays", "file"])
 def test_scenes_are_pickled_whether_traced_or_not(make: Any) -> None:
     scene = make()
     fresh = again(scene)
@@ -93,7 +97,7 @@ def test_parts_come_from_a_pool(method: str) -> None:
 
 
 def test_runs_and_receivers_are_pickled_with_their_arrays() -> None:
-    scene = lp.Scene.from_toml(next(s for s in SCENES if s.stem == "s1_lens"))
+    scene = filed()
     scene.add(lp.plane("wall", at=(0, 0, 300), cells=(5, 4), channels="photometric"), lp.far_field("far", step_deg=10))
     run = scene.trace(progress=False, **SETTINGS)
     for other in (again(run), again(again(run)), copy.deepcopy(run)):
