@@ -50,7 +50,7 @@ impl Closing<'_, '_> {
         let position = |n: u32| self.nodes[n].position;
         let border: FxHashSet<Position> = self.segments.iter().flatten().map(|n| position(*n)).collect();
         let on_border: Vec<bool> = self.nodes.iter().map(|n| border.contains(&n.position)).collect();
-        let against = facets.iter().flat_map(|f| sides(f.facet.nodes)).map(|[a, b]| [b, a]);
+        let against = facets.iter().flat_map(TransitionFacet::sides).map(|[a, b]| [b, a]);
         let against = against.filter(|side| side.iter().all(|n| on_border[*n as usize]));
         self.segments.iter().copied().chain(against).collect()
     }
@@ -163,11 +163,6 @@ impl Closing<'_, '_> {
         let (a, b) = (self.nodes[a].position, self.nodes[b].position);
         [a.min(b), a.max(b)]
     }
-}
-
-/// Returns the sides of a facet, which of a triangle are one of no length too.
-fn sides(nodes: [u32; 4]) -> [[u32; 2]; 4] {
-    [0, 1, 2, 3].map(|k| [nodes[k], nodes[(k + 1) % 4]])
 }
 
 #[cfg(test)]

@@ -167,11 +167,8 @@ pub(super) fn mesh_with_imprint(
     let facing = crossing.facing_samples();
     let mut facets: Vec<TransitionFacet> = grid.quads.iter().copied().map(TransitionFacet::from).collect();
     facets.extend(pairing::pair_triangles(&transition, &fixed, &mut prover));
-    if !transition.conflicts.is_empty() || input.untangles {
-        turn_lobes(&transition.nodes, &on_border, &mut facets);
-    }
     let closing = Closing { surface, nodes: &transition.nodes, segments: &on_border, chords: &chords, taken };
-    let (made, facets) = emit(&closing, facets);
+    let (made, facets) = emit(&closing, facets, !transition.conflicts.is_empty() || input.untangles);
     // Conflicts may have cost an imprinted line, so that the guests' facets would not be bounded by it.
     let holds_imprint = transition.holds_imprint && transition.conflicts.is_empty();
     let edges_of =
@@ -225,8 +222,12 @@ fn outline<'t>(
     if untangles { with_detours(surface, outline, border) } else { outline }
 }
 
-/// Closes the face, turns facets of nodes into facets of corners, and returns their nodes too.
-fn emit(closing: &Closing<'_, '_>, mut facets: Vec<TransitionFacet>) -> (FaceMesh, Vec<[u32; 4]>) {
+/// Closes the face, whose border may cross itself where it `has_lobes`, turns facets of nodes into facets of corners, and returns their
+/// nodes too.
+fn emit(closing: &Closing<'_, '_>, mut facets: Vec<TransitionFacet>, has_lobes: bool) -> (FaceMesh, Vec<[u32; 4]>) {
+    if has_lobes {
+        turn_lobes(closing.nodes, closing.segments, &mut facets);
+    }
     let added = closing.facets(&facets);
     facets.extend(added.into_iter().map(TransitionFacet::from));
     let mut emission = Emission::new(closing.surface, closing.nodes);

@@ -71,23 +71,17 @@ impl<'n> Sides<'n> {
 
     /// Adds so many times to what is missing along the sides of a facet.
     fn run_along(&mut self, facet: &TransitionFacet, times: i32) {
-        facet_sides(facet).for_each(|side| self.add(side, times));
+        facet.sides().into_iter().for_each(|side| self.add(side, times));
     }
 
     /// Returns how much is missing along the sides of a facet, in either direction.
     fn missing(&self, facet: &TransitionFacet) -> i32 {
-        let along = facet_sides(facet).map(|side| {
+        let along = facet.sides().map(|side| {
             let [a, b] = side.map(|n| self.nodes[n].position);
             if a == b { 0 } else { self.missing.get(&[a.min(b), a.max(b)]).map_or(0, |missing| missing.abs()) }
         });
-        along.sum()
+        along.into_iter().sum()
     }
-}
-
-/// Returns the sides of a facet.
-fn facet_sides(facet: &TransitionFacet) -> impl Iterator<Item = [u32; 2]> {
-    let nodes = facet.facet.nodes;
-    (0..4).map(move |k| [nodes[k], nodes[(k + 1) % 4]])
 }
 
 #[cfg(test)]

@@ -25,6 +25,12 @@ impl From<ProvedFacet<4>> for TransitionFacet {
 }
 
 impl TransitionFacet {
+    /// Returns its sides, which of a triangle are one of no length too.
+    pub(in crate::tessellate) fn sides(&self) -> [[u32; 2]; 4] {
+        let nodes = self.facet.nodes;
+        [0, 1, 2, 3].map(|k| [nodes[k], nodes[(k + 1) % 4]])
+    }
+
     /// Lets the facet run the other way round, from the same first corner.
     pub(in crate::tessellate) fn turn_over(&mut self) {
         let [a, b, c, d] = self.facet.nodes;
