@@ -1,8 +1,9 @@
-//! From cells to nodes and blocks: sparse octants merged into full nodes, children next to each other.
+//! From cells to nodes and blocks: cells merged into full nodes, children next to each other.
 
 use super::cell::{Cell, Content};
 use super::clip::Box32;
 use super::node::{Block, CHILDREN, Link, Node};
+use super::node_areas::{NodeAreas, shares};
 use super::{Settings, Statistics};
 use crate::math::{Point, huge_pages};
 use crate::mesh::FacetMesh;
@@ -60,12 +61,12 @@ impl Draft {
                 self.blocks.push((count, facets));
                 Link::block(self.blocks.len() - 1, count)
             }
-            Content::Cells(cells) => {
+            Content::Cells(inner) => {
                 let me = reserved.unwrap_or_else(|| self.reserve(1));
                 self.stats.nodes += 1;
                 // Cells have eight octants of which a surface meets four or so; grandchildren fill the empty
                 // places.
-                let children = if collapse { merge(cells) } else { cells };
+                let children = if collapse { open_cells(inner.cells) } else { inner.cells };
                 let mut node = Node::bounding(&cell.bounds);
                 let boxes: Vec<_> = children.iter().map(|c| c.bounds).collect();
                 let links = if depth < PARALLEL_LEVELS {
@@ -143,25 +144,20 @@ impl Draft {
     }
 }
 
-/// Replaces the largest inner child by its own children, as long as no more than [`CHILDREN`] come of it.
-fn merge(mut children: Vec<Cell>) -> Vec<Cell> {
-    loop {
-        let mut best: Option<(f32, usize)> = None;
-        for (i, child) in children.iter().enumerate() {
-            if let Content::Cells(inner) = &child.content
-                && children.len() - 1 + inner.len() <= CHILDREN
-            // Opening a child takes one place away and adds as many as it has.
-            {
-                let area = child.bounds.half_area();
-                // Of equal ones the last, so that the result does not depend on how children were swapped before.
-                if best.is_none_or(|(a, _)| area >= a) {
-                    best = Some((area, i));
-                }
-            }
-        }
-        let Some((_, i)) = best else { return children };
-        if let Content::Cells(inner) = children.swap_remove(i).content {
-            children.extend(inner);
+/// Opens those of the cells in a cell that do not become nodes, so that what is left are the children of its node: [`CHILDREN`] at most.
+fn open_cells(cells: Vec<Cell>) -> Vec<Cell> {
+    let mut children = Vec::with_capacity(CHILDREN);
+    open_into(cells, CHILDREN, &mut children);
+    children
+}
+
+/// Opens cells within so many places, at least one for each, and adds what is left to `children`.
+fn open_into(cells: Vec<Cell>, places: usize, children: &mut Vec<Cell>) {
+    let areas: Vec<NodeAreas> = cells.iter().map(|cell| *cell.node_areas()).collect();
+    for ((cell, areas), share) in cells.into_iter().zip(&areas).zip(shares(&areas, places)) {
+        match cell.content {
+            Content::Cells(inner) if areas.is_opened(share) => open_into(inner.cells, share, children),
+            content => children.push(Cell { content, ..cell }),
         }
     }
 }
@@ -220,4 +216,80 @@ fn octant_slots(middles: &[[f32; 3]]) -> [usize; 8] {
         placed[child] = true;
     }
     slots
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A box whose half area is this.
+    fn bounds(area: f32) -> Box32 {
+        Box32 { low: [0.0; 3], high: [area, 1.0, 0.0] }
+    }
+
+    /// A cell of so many blocks, divided at random into two to eight, with areas that are whole numbers, so that sums are exact.
+    fn cell(blocks: usize, random: &mut impl FnMut(usize) -> usize) -> Cell {
+        if blocks == 1 {
+            return Cell { bounds: bounds(1.0), content: Content::Block(1, [0, u32::MAX, u32::MAX, u32::MAX]) };
+        }
+        let mut counts = vec![1; (2 + random(7)).min(blocks)];
+        for _ in counts.len()..blocks {
+            let k = random(counts.len());
+            counts[k] += 1;
+        }
+        let cells = counts.into_iter().map(|count| cell(count, random)).collect();
+        Cell::of_cells(bounds((1 + random(1000)) as f32), cells)
+    }
+
+    /// The least area of the node of a cell and those below it, by trying all ways to open cells.
+    fn least_area(cell: &Cell) -> f32 {
+        let Content::Cells(inner) = &cell.content else { return 0.0 };
+        let mut least = f32::INFINITY;
+        let mut ways = vec![(inner.cells.iter().collect::<Vec<&Cell>>(), Vec::<&Cell>::new())];
+        while let Some((mut waiting, closed)) = ways.pop() {
+            if waiting.len() + closed.len() > CHILDREN {
+                continue;
+            }
+            let Some(next) = waiting.pop() else {
+                least = least.min(closed.iter().map(|cell| least_area(cell)).sum());
+                continue;
+            };
+            if let Content::Cells(inner) = &next.content {
+                ways.push((waiting.iter().copied().chain(&inner.cells).collect(), closed.clone()));
+            }
+            ways.push((waiting, closed.into_iter().chain([next]).collect()));
+        }
+        cell.bounds.half_area() + least
+    }
+
+    /// The area of the node of a cell and of those below it, as they come of [`open_cells`], and the blocks under them.
+    fn opened(cell: Cell) -> (f32, usize) {
+        let Content::Cells(inner) = cell.content else { return (0.0, 1) };
+        let children = open_cells(inner.cells);
+        assert!((2..=CHILDREN).contains(&children.len()));
+        children.into_iter().map(opened).fold((cell.bounds.half_area(), 0), |(a, b), (area, n)| (a + area, b + n))
+    }
+
+    #[test]
+    fn nodes_have_the_least_area_of_all_ways_to_open_cells() {
+        let mut state = 1u64;
+        let mut random = |below: usize| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as usize % below
+        };
+        for blocks in (2..=22).chain([22; 30]) {
+            let cell = cell(blocks, &mut random);
+            let least = least_area(&cell);
+            assert_eq!(opened(cell), (least, blocks));
+        }
+    }
+
+    /// Boxes without area, of facets on a line, still fill nodes.
+    #[test]
+    fn cells_without_area_are_opened() {
+        let block = || Cell { bounds: bounds(0.0), content: Content::Block(1, [0, u32::MAX, u32::MAX, u32::MAX]) };
+        let chain = (0..15).fold(block(), |inner, _| Cell::of_cells(bounds(0.0), vec![block(), inner]));
+        let Content::Cells(inner) = chain.content else { unreachable!("of cells") };
+        assert_eq!(open_cells(inner.cells).len(), CHILDREN);
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! Cells are split at their middle while more than [`Settings::threshold`] facets meet them; facets are clipped exactly
 //! against the cells they meet. Under a leaf cell facets are packed by the surface-area heuristic into blocks of four
-//! quads; sparse octants are merged until a node has up to sixteen children, whose boxes are eight-bit, relative to the
+//! quads; cells are merged into nodes of up to sixteen children with the least area of boxes, which are eight-bit, relative to the
 //! node, tight to the clipped geometry and rounded outward. Blocks hold corners in 16 bits and only *sort out*, with
 //! an error bound, what a ray cannot hit; what remains is decided by the watertight f64 test of `intersect::facet`. Thirty-two rays of
 //! a batch are under way at a time; the steps of one kind are done in a row, each ray prefetching while the others compute.
@@ -33,6 +33,7 @@ mod lanes;
 mod light_buffer;
 mod mesh_box;
 mod node;
+mod node_areas;
 mod pack;
 mod portable;
 mod quad_edges;

@@ -88,7 +88,7 @@ impl Packing<'_> {
         self.partition_orders(range.clone(), axis, left);
         let middle = range.start + left;
         let halves = vec![self.pack(range.start..middle, depth + 1), self.pack(middle..range.end, depth + 1)];
-        Cell { bounds, content: Content::Cells(halves) }
+        Cell::of_cells(bounds, halves)
     }
 
     /// Moves the first `left` places of a range along `axis` to the front of it in the other orders too; each half keeps its order.

@@ -6,12 +6,12 @@ use crate::math::simd::Level;
 /// How the tree is built and walked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// T: a box is split while more facets than this meet it. 128 was fastest on lamps; 8 without `collapse` is the
+    /// T: a box is split while more facets than this meet it. 256 was fastest on lamps; 8 without `collapse` is the
     /// textbook tree, 64 suits scenes of long thin facets.
     pub threshold: usize,
     /// Depth at which splitting ends; more than 32 is taken as 32. Uneven scenes need 20 and more.
     pub max_depth: u32,
-    /// Merge sparse octants into full nodes of sixteen.
+    /// Merge cells into nodes of up to sixteen children.
     pub collapse: bool,
     /// A box is no longer split once its facets have been duplicated this often on the way to it, so that memory stays bounded.
     pub max_duplication: f64,
@@ -27,7 +27,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            threshold: 128,
+            threshold: 256,
             max_depth: 24,
             collapse: true,
             max_duplication: 16.0,

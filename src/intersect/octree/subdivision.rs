@@ -1,6 +1,6 @@
 //! Growing the tree: cells split at their middle, facets clipped to the cells they meet.
 
-use super::cell::{Cell, ClippedFacet, Content, bounds};
+use super::cell::{Cell, ClippedFacet, bounds};
 use super::clip::{Box32, clip};
 use super::pack::pack;
 use super::{Settings, Statistics};
@@ -104,7 +104,7 @@ impl Subdivision<'_> {
         {
             return only;
         }
-        Cell { bounds, content: Content::Cells(cells) }
+        Cell::of_cells(bounds, cells)
     }
 
     /// The point where a cell is split. Along an axis where it is thin that is its end, so that all facets go to the lower side: halving
