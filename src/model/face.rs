@@ -193,7 +193,25 @@ pub struct Face {
     pub gap: f64,
 }
 
+/// Corners this near to one plane, as a share of their distances, span one: rounding of a file's twelve digits.
+const PLANE: f64 = 1e-10;
+
 impl Face {
+    /// Whether it is one bilinear patch in a plane within straight lines, which facets follow to rounding.
+    pub fn is_polygon(&self) -> bool {
+        let surface = &self.surface;
+        let [[u0, u1], [v0, v1]] = surface.domain();
+        let corners =
+            [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)].map(|uv| surface.evaluate(uv));
+        // Of a quadrangle in a plane the diagonals span that plane.
+        let [a, b, c, d] = corners;
+        let normal = (c - a).cross(d - b);
+        let size = (c - a).length().max((d - b).length());
+        let is_plane = (b - a).dot(normal).abs() <= PLANE * size * normal.length();
+        let is_straight = self.loops.iter().flat_map(|l| &l.uses).all(|u| u.uv.degree == 1);
+        surface.degree == [1, 1] && surface.points.len() == 4 && is_plane && is_straight
+    }
+
     /// A nameless face that is the whole domain of its surface, with `Su × Sv` outward.
     pub fn whole(surface: Surface) -> Self {
         Self {

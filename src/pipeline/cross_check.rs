@@ -186,6 +186,5 @@ fn facet_effects(
         path_samples: 0,
         ..run
     };
-    let found = geometric_error(&prepared.bound, facets_and_spline, &settings);
-    Some(if prepared.choice.normals == NormalMode::Exact { found.with_unseen_rays() } else { found })
+    Some(geometric_error(&prepared.bound, facets_and_spline, &settings))
 }

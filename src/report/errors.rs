@@ -15,7 +15,8 @@ pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
     let Figure { value, unit, statistical, geometric, .. } = figure;
     // One ray is stated as the error where none arrived: three of them are the limit of 95 %.
     if *value == 0.0 && *statistical > 0.0 && geometric.is_none_or(|g| g == 0.0) {
-        return format!("0 {unit} (no ray arrived: at most {}, 95 %)", figures(3.0 * statistical, 2));
+        let most = with_unit(&figures(3.0 * statistical, 2), unit);
+        return format!("0 {unit} (no ray arrived: at most {most}, 95 %)");
     }
     let value = figures(*value, digits);
     match geometric {
@@ -117,12 +118,11 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
 fn absorbed_sentence(error: &GeometricError, absorbed: &Absorbed, figure: &Figure) -> String {
     let measured = error.absorbed.iter().find(|e| e.index == absorbed.index);
     match measured.filter(|e| e.power.is_significant() && figure.limited_by == Limit::Geometry) {
-        Some(e) if e.power.spline > 0.0 => format!(
-            "{} absorbs {} % other power in {}",
-            spoken(&e.name),
-            figures(100.0 * (e.power.facets / e.power.spline - 1.0), 2),
-            e.r#in
-        ),
+        Some(e) if e.power.spline > 0.0 => {
+            let change = 100.0 * (e.power.facets / e.power.spline - 1.0);
+            let (by, how) = (figures(change.abs(), 2), if change < 0.0 { "less" } else { "more" });
+            format!("{} absorbs {by} % {how} power in {}", spoken(&e.name), e.r#in)
+        }
         Some(e) => format!("{} absorbs power in {} where it would none", spoken(&e.name), e.r#in),
         None => String::new(),
     }

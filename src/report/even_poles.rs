@@ -1,5 +1,6 @@
 //! Grids over planes C all around, whose cells at a pole are slivers of one direction, and nearly so beside it.
 
+use super::number::{figures, without_rounding};
 use crate::formats::Grid;
 use crate::simulate::PoleRings;
 use std::borrow::Cow;
@@ -14,6 +15,27 @@ pub(super) fn pole_rings(grid: &Grid) -> PoleRings {
 /// Whether a grid is over planes C all around, with γ from its pole on.
 pub(super) fn is_all_around(grid: &Grid) -> bool {
     pole_rings(grid).has_poles(grid.values.len())[0]
+}
+
+/// Returns the brightest direction of a far field in words, and how bright it is; a pole has no plane.
+pub(super) fn brightest_direction(grid: &Grid) -> Option<(String, f64)> {
+    let ([h, v], value) = grid.peak()?;
+    let [_, gamma] = &grid.axes;
+    let (_, row) = grid.peak_cell()?;
+    let ends = [(0, gamma.range[0]), (gamma.cells - 1, gamma.range[1])];
+    let poles = pole_rings(grid).has_poles(grid.values.len());
+    let pole = ends.iter().zip(poles).find(|((end, _), is_pole)| *is_pole && row == *end);
+    let direction = match pole {
+        Some(((_, angle), _)) => format!("{} {}°", gamma.label, figures(*angle, 3)),
+        None => direction_text(grid, [h, v]),
+    };
+    Some((direction, value))
+}
+
+/// Returns a direction of a far field, degrees, in words.
+pub(super) fn direction_text(grid: &Grid, at: [f64; 2]) -> String {
+    let [h, v] = at.map(|x| figures(without_rounding(x), 3));
+    format!("{} {h}°, {} {v}°", grid.axes[0].label, grid.axes[1].label)
 }
 
 /// Returns a grid in which all cells of the ring at a pole (γ 0° and 180°) have the mean of the ring, with the error of that, in its

@@ -1,10 +1,10 @@
 //! Figures of a lamp in the words of the trade: Imax, HV, widths at half, flux and efficiency; where the light of a spot lies.
 
-use super::even_poles::{is_all_around, pole_rings};
+use super::even_poles::{brightest_direction, direction_text, is_all_around, pole_rings};
 use super::half_width::half_width;
 use super::number::figures;
 use super::peak_lines::{Line, lines_through_peak};
-use super::verdicts::{multiple_text, without_rounding};
+use super::verdicts::multiple_text;
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
 use crate::math::{error_of_maximum, error_of_mean};
@@ -17,6 +17,8 @@ const FRAMED_PERCENT: f64 = 99.5;
 /// Steps of the cells below which a radius says more of the cells than of the light: with the light in two cells beside each other it is
 /// half a step, in three in a row one.
 const FEW_CELLS: f64 = 2.0;
+/// Distance in cells from an edge between two within which a plane lies on it.
+const ON_EDGE: f64 = 1e-9;
 /// Radii at which the encircled power is drawn.
 const RADII: usize = 200;
 
@@ -57,12 +59,11 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
     let title = format!("{}: figures of the lamp", super::maps::spoken(&receiver.name));
     let name = format!("{}-lamp", crate::formats::file_stem(&receiver.name));
     let mut table = Table::new(&name, &title, &[("", ""), ("value", ""), ("±", ""), ("unit", ""), ("where", "")]);
-    let degrees = |at: [f64; 2]| {
-        let [h, v] = at.map(|x| figures(without_rounding(x), 3));
-        format!("{} {h}°, {} {v}°", grid.axes[0].label, grid.axes[1].label)
-    };
-    if let Some((place, value)) = grid.peak() {
-        table.row(["Imax".into(), Cell::Number(value, 5), peak_error(grid), "cd".into(), degrees(place).into()]);
+    if let Some((place, value)) = brightest_direction(grid) {
+        // Where the map is the one whose brightest cell is a figure of the run, its error is that figure's.
+        let known = of_receiver.max.as_ref().filter(|max| max.unit == grid.unit);
+        let error = known.map_or_else(|| peak_error(grid), |max| Cell::Number(max.combined(), 2));
+        table.row(["Imax".into(), Cell::Number(value, 5), error, "cd".into(), place.into()]);
     }
     let power = &of_receiver.power;
     let seen = receiver.photometric().and_then(|seen| of_receiver.channels.iter().find(|c| c.name == seen.name));
@@ -87,7 +88,7 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
         table.row(["HV".into(), value, error, "cd".into(), place.into()]);
     }
     if let Some(assessment) = assessment {
-        add_assessment(&mut table, assessment, degrees);
+        add_assessment(&mut table, assessment, |at| direction_text(grid, at));
     }
     table
 }
@@ -191,6 +192,18 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
     Some(Chart::series(&name, &title, &caption, axes, series))
 }
 
+/// The angles γ, radians, and the intensities in the half-plane of this angle C of a grid that is all around.
+fn half_plane(grid: &Grid, angle_deg: f64) -> Vec<(f64, f64)> {
+    let [c, gamma] = &grid.axes;
+    let column = ((angle_deg - c.range[0]) / c.step()).rem_euclid(c.cells as f64);
+    // A plane between two cells takes their mean.
+    let edge = column.round();
+    let column = if (column - edge).abs() < ON_EDGE { edge } else { column };
+    let (after, before) = (column.floor() as usize % c.cells, (column.ceil() as usize + c.cells - 1) % c.cells);
+    let value = |j: usize| 0.5 * (grid.values[j * c.cells + after] + grid.values[j * c.cells + before]);
+    (0..gamma.cells).map(|j| (gamma.center(j).to_radians(), value(j))).collect()
+}
+
 /// Draws the polar diagram of a luminaire: intensities over γ in the planes C 0–180 and C 90–270, nadir below; `None` for a grid that is
 /// not over C-planes all around.
 pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
@@ -198,18 +211,10 @@ pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     if !is_all_around(grid) {
         return None;
     }
-    let [c, gamma] = &grid.axes;
-    let half_plane = |angle: f64| {
-        let column = ((angle - c.range[0]) / c.step()).rem_euclid(c.cells as f64);
-        // A plane between two cells takes their mean.
-        let (after, before) = (column.floor() as usize % c.cells, (column.ceil() as usize + c.cells - 1) % c.cells);
-        let value = |j: usize| 0.5 * (grid.values[j * c.cells + after] + grid.values[j * c.cells + before]);
-        (0..gamma.cells).map(|j| (gamma.center(j).to_radians(), value(j))).collect::<Vec<_>>()
-    };
     let plane = |name: &str, right: f64| {
         // The opposite half-plane, drawn to the left.
-        let left = half_plane(right + 180.0).into_iter().rev().map(|(g, i)| [-i * g.sin(), -i * g.cos()]);
-        let right = half_plane(right).into_iter().map(|(g, i)| [i * g.sin(), -i * g.cos()]);
+        let left = half_plane(grid, right + 180.0).into_iter().rev().map(|(g, i)| [-i * g.sin(), -i * g.cos()]);
+        let right = half_plane(grid, right).into_iter().map(|(g, i)| [i * g.sin(), -i * g.cos()]);
         let points = left.chain(right).collect();
         Series { name: name.into(), points, style: SeriesStyle::Line, ..Series::default() }
     };
@@ -298,6 +303,23 @@ mod tests {
         // Only the cells at the pole are uncertain, by a tenth.
         let error = Some((0..7200).map(|k| if k < 120 { 0.1 * values[k] } else { 0.0 }).collect());
         Grid { name, quantity, unit, axes, values, error, geometric: None, layers: Vec::new() }
+    }
+
+    /// 270° over 76 cells is cell 57 and a rounding: between two cells all the same.
+    #[test]
+    fn planes_between_two_cells_take_their_mean() {
+        let axis = |end: f64, cells| crate::formats::Axis {
+            label: "C".into(),
+            unit: "°".into(),
+            range: [0.0, end],
+            cells,
+        };
+        let values = (0..76).map(|c| if c == 56 { 2.0 } else { 0.0 }).collect();
+        let (name, quantity, unit) = ("l".to_owned(), String::new(), "cd".to_owned());
+        let axes = [axis(360.0, 76), axis(180.0, 1)];
+        let grid = Grid { name, quantity, unit, axes, values, error: None, geometric: None, layers: Vec::new() };
+        assert_eq!(half_plane(&grid, 270.0), [(PI / 2.0, 1.0)]);
+        assert_eq!(half_plane(&grid, 268.0), [(PI / 2.0, 2.0)]);
     }
 
     #[test]

@@ -28,6 +28,7 @@ mod maps;
 mod number;
 mod peak_lines;
 mod plotly;
+mod plotly_axis;
 mod plotly_data;
 mod provenance;
 mod raster;
@@ -55,7 +56,7 @@ pub(crate) use even_poles::with_even_poles;
 #[cfg(feature = "cli")]
 pub(crate) use maps::on_receiver;
 pub use maps::{photometric_grid, receiver_grid};
-pub use number::{bytes, figures, grouped, seconds};
+pub use number::{bytes, figures, grouped, seconds, tolerance_text};
 pub use provenance::Provenance;
 pub use simulation::{SimulationReport, path_lines};
 pub use studies::study_report;

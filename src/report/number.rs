@@ -6,7 +6,7 @@ const KILO: f64 = 1e3;
 const MEGA: f64 = 1e6;
 const GIGA: f64 = 1e9;
 
-/// What three digits round up to the next power of ten, 999.5 of 1000, is at least that power when multiplied by this.
+/// Lifts a value to the next power of ten exactly where three digits would round it there, as 999.5 to 1000.
 const ROUNDS_UP: f64 = 1.0 / 0.9995;
 
 /// Sets thousands apart (ISO 80000-1, 7.3.1), without a line breaking there.
@@ -124,6 +124,19 @@ fn in_thousands(whole: &str) -> String {
         text.push(c);
     }
     text
+}
+
+/// Writes the smallest and the largest tolerance, mm: `0.05..0.2 mm`, or `0.2 mm` where both are the same.
+pub fn tolerance_text(range: [f64; 2]) -> String {
+    let [low, high] = range.map(|tolerance| figures(tolerance, 4));
+    if low == high { format!("{low} mm") } else { format!("{low}..{high} mm") }
+}
+
+/// Returns an angle, degrees, or 0 for what the sums of aiming leave of that.
+pub(super) fn without_rounding(angle_deg: f64) -> f64 {
+    /// Far below what is printed beside other angles, far above the rounding of a full turn.
+    const NO_ANGLE_DEG: f64 = 1e-9;
+    if angle_deg.abs() < NO_ANGLE_DEG { 0.0 } else { angle_deg }
 }
 
 #[cfg(test)]

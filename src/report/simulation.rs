@@ -1,7 +1,7 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
 use super::cross_check::{self, verdict};
-use super::even_poles::with_joined_slivers;
+use super::even_poles::{brightest_direction, with_joined_slivers};
 use super::lamp_figures::Counted;
 use super::maps::{cuts, grids, receiver_grid, spoken};
 use super::number::{counted, unit_in_words};
@@ -17,6 +17,9 @@ use crate::study::{cross_check::CrossCheck, default_accuracy::Chosen, geometric_
 /// Share of the power from which on light that limits cut off is spoken of: below it no figure of four digits changes.
 const WORTH_A_SENTENCE: f64 = 1e-4;
 
+/// Paths drawn that leave the model, and those that end inside, which would hide the others.
+const DRAWN_LEAVING: usize = 250;
+const DRAWN_ENDING: usize = 60;
 /// Statistical error of the brightest cell, as a share of it, beyond which no direction is called the brightest.
 const MOST_UNCERTAIN_PEAK: f64 = 0.3;
 
@@ -117,16 +120,10 @@ impl SimulationReport<'_> {
         for (grid, max) in
             brightest.into_iter().filter(|(_, max)| max.statistical < MOST_UNCERTAIN_PEAK * max.value)
         {
-            if let Some(([h, v], _)) = with_joined_slivers(&grid).peak() {
+            if let Some((direction, _)) = brightest_direction(&with_joined_slivers(&grid)) {
                 let of = if several { format!(" of {}", spoken(&grid.name)) } else { String::new() };
-                text += &format!(
-                    "The brightest direction{of} is {} {}°, {} {}° with **{}**. ",
-                    grid.axes[0].label,
-                    figures(h, 3),
-                    grid.axes[1].label,
-                    figures(v, 3),
-                    errors::with_errors(max, 3)
-                );
+                let value = errors::with_errors(max, 3);
+                text += &format!("The brightest direction{of} is {direction} with **{value}**. ");
             }
         }
         text += &format!(
@@ -193,7 +190,7 @@ impl SimulationReport<'_> {
         }
         sections.extend([self.effects(), self.cost()]);
         let (title, provenance) = (self.title.clone(), self.provenance.clone());
-        // Receivers are called as their users like.
+        // Receivers have names of the user's choice, which may be those of the report's own blocks.
         Report { title, answer: self.answer(), sections, provenance }.with_distinct_names()
     }
 
@@ -205,12 +202,9 @@ impl SimulationReport<'_> {
         // Directions first: what a lamp is judged by.
         maps.sort_by_key(|(k, _)| self.results.receivers[*k].kind != "far_field");
         let (lines, ends) = path_lines(&self.results.paths);
-        let around = self.facets.mesh.bounds();
-        // Rays that leave go to infinity: they are cut a little outside of the model.
-        let lines = lines.inside(&around.grown(0.35 * around.diagonal().max(1.0)));
-        let out = lines_ending(&lines, &ends, |e| matches!(e, Event::Received | Event::Escaped), 250);
-        // Far fewer that end inside: they would hide the others.
-        let stay = lines_ending(&lines, &ends, |e| !matches!(e, Event::Received | Event::Escaped), 60);
+        let lines = lines.near(&self.facets.mesh.bounds());
+        let out = lines_ending(&lines, &ends, |e| matches!(e, Event::Received | Event::Escaped), DRAWN_LEAVING);
+        let stay = lines_ending(&lines, &ends, |e| !matches!(e, Event::Received | Event::Escaped), DRAWN_ENDING);
         let mut view = Some(
             View::of_facets("facets", "Facets and ray paths", self.facets)
                 .lines("rays that leave", &out, [1.0, 0.72, 0.12])

@@ -2,6 +2,7 @@
 
 use super::chart::MapPoint;
 use super::framing::lit_part;
+use super::number::without_rounding;
 use super::{Cell, Chart, Section, Table, figures, road};
 use crate::formats::{Grid, file_stem};
 use crate::regulation::{Assessment, Bound, Row, RowVerdict, Traffic, Verdict};
@@ -61,13 +62,6 @@ pub fn direction_text([h, v]: [f64; 2]) -> String {
         _ => "0".to_owned(),
     };
     format!("{} {}", side(h, 'R', 'L'), side(v, 'U', 'D'))
-}
-
-/// Returns an angle, degrees, or 0 for what the sums of aiming leave of that.
-pub(super) fn without_rounding(angle_deg: f64) -> f64 {
-    /// Far below what is printed beside other angles, far above the rounding of a full turn.
-    const NO_ANGLE_DEG: f64 = 1e-9;
-    if angle_deg.abs() < NO_ANGLE_DEG { 0.0 } else { angle_deg }
 }
 
 /// Writes what would settle an unsure row; nothing for any other.

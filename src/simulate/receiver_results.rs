@@ -6,7 +6,7 @@ use super::receiver::{Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
 use super::tallies::Tallies;
 use super::tally::{Moments, Sum};
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use std::borrow::Cow;
 
 /// Square millimetres to a square metre.
@@ -48,7 +48,6 @@ pub struct ReceiverResult {
     /// Middle of the ranges of angles, degrees; 0 for planes.
     pub middle: [f64; 2],
     /// Type of the angles of a far field.
-    #[serde(serialize_with = "angle_type")]
     pub angles: Option<FarFieldType>,
     /// Power, lumens or CIE values of each further channel.
     pub channels: Vec<ChannelResult>,
@@ -96,11 +95,6 @@ impl ChannelResult {
     pub fn total_unit<'u>(&self, power: &'u str) -> &'u str {
         if matches!(self.unit, "lx" | "cd") { "lm" } else { power }
     }
-}
-
-/// Writes the letter of a far field's type, or null.
-fn angle_type<S: Serializer>(a: &Option<FarFieldType>, s: S) -> Result<S::Ok, S::Error> {
-    a.serialize(s)
 }
 
 impl ChannelResult {
@@ -263,6 +257,16 @@ impl ReceiverResult {
             rings.clear_rivals(cells, errors.to_mut());
         }
         even
+    }
+
+    /// Returns values of the cells with the mean of each group that [`Self::cells_with_even_poles`] joins.
+    pub(crate) fn with_joined_cells<'v>(&self, values: &'v [f64]) -> Cow<'v, [f64]> {
+        let rings = self.pole_rings();
+        let mut joined = Cow::Borrowed(values);
+        if !rings.is_empty() && values.len() == self.cells.len() {
+            rings.joined_cells(&self.cells, Some(&self.errors)).level(joined.to_mut());
+        }
+        joined
     }
 
     /// Returns the rings of cells at and beside γ 0° and 180°, as far as the map reaches them; none where it is not one of planes C all

@@ -98,7 +98,7 @@ const PAPER: [(&str, f64); 3] =
 #[derive(Clone, Copy)]
 struct Ready<'r> {
     name: &'static str,
-    who: &'r dyn Intersector,
+    intersector: &'r dyn Intersector,
     facets: Option<usize>,
 }
 
@@ -147,9 +147,9 @@ fn prepare_all(methods: &[Method<'_>], model: &Model, ready: &[Ready<'_>], then:
     // An intersector lives within the call that it is handed to: to have all at once, each is prepared inside of the
     // one before.
     let Some((first, rest)) = methods.split_first() else { return then(ready) };
-    (first.with)(model, &mut |who, facets| {
+    (first.with)(model, &mut |intersector, facets| {
         let mut more = ready.to_vec();
-        more.push(Ready { name: first.name, who, facets });
+        more.push(Ready { name: first.name, intersector, facets });
         prepare_all(rest, model, &more, then);
     });
 }
@@ -161,31 +161,31 @@ fn time_ready(
     (ready, prepare): (&[Ready<'_>], &[Timing]),
     settings: &Settings,
 ) -> Vec<Row> {
-    let run = |who: &dyn Intersector, rays: u64| {
+    let run = |intersector: &dyn Intersector, rays: u64| {
         let settings =
             RunSettings { rays, seed: settings.seed, threads: settings.threads, ..RunSettings::default() };
-        simulate(bound, who, &settings, &|_| true)
+        simulate(bound, intersector, &settings, &|_| true)
     };
     let traditional = ready.iter().find(|r| r.name == "traditional");
     let few = traditional.map_or(settings.rays, |t| {
         // A short run first tells how many rays the time allows.
         let start = Instant::now();
-        run(t.who, 1024);
+        run(t.intersector, 1024);
         let affordable = 1024.0 * settings.traditional_seconds / start.elapsed().as_secs_f64();
         (affordable as u64).max(1024).min(settings.rays)
     });
     let count = |r: &Ready<'_>| if r.name == "traditional" { few } else { settings.rays };
     let mut rounds = Rounds::default();
     for r in ready {
-        let (who, rays) = (r.who, count(r));
+        let (intersector, rays) = (r.intersector, count(r));
         let run = &run;
         rounds.add(r.name, move || {
-            run(who, rays);
+            run(intersector, rays);
         });
     }
     let timings: Vec<Timing> = rounds.run(settings.rounds).into_iter().map(|t| t.1).collect();
     // All with the same few rays: a receiver's power is only comparable at the same number.
-    let power = |r: &Ready<'_>| run(r.who, few).receivers.first().map_or(0.0, |x| x.power);
+    let power = |r: &Ready<'_>| run(r.intersector, few).receivers.first().map_or(0.0, |x| x.power);
     let before = Cell::new(None);
     if let Some(i) = ready.iter().position(|r| r.name == "traditional") {
         before.set(Some((timings[i].median / few as f64, power(&ready[i]), prepare[i].median)));

@@ -14,7 +14,6 @@
 use super::geometric_error::{GeometricError, MOST_CELLS, ReplicatedRun, compare, trace_replicates};
 use super::worst_figure::{Worst, worst_figure};
 use crate::intersect::{Intersector, NormalMode};
-use crate::math::Uv;
 use crate::model::{Face, Model};
 use crate::simulate::{BoundScene, RunSettings};
 use crate::tessellate::GroupedFacets;
@@ -34,8 +33,6 @@ const GROWN_RAYS: u64 = 100_000_000;
 const REPLICATES: u32 = 64;
 /// Share of the light that the spline may lose beyond what facets do before facets are taken all the same.
 const LOST: f64 = 1e-3;
-/// Corners this near to one plane, as a share of their distances, span one: rounding of a file's twelve digits.
-const PLANE: f64 = 1e-10;
 /// Finer facets are tried up to this many times the error allowed: beyond it they are too many for their work to be foretold.
 const MOST_FINER: f64 = 50.0;
 /// The error of interpolated normals and places falls with the tolerance at first order or faster; so much finer to be sure.
@@ -94,7 +91,7 @@ pub struct Alternative {
     pub normals: NormalMode,
     /// `octree` or `exact`.
     pub intersector: &'static str,
-    /// Seconds of tracing the whole run so, from those of the pilot.
+    /// Seconds of tracing the whole run so, or 10⁸ rays of one that grows, from those of the pilot.
     pub seconds: f64,
     /// What it gets wrong of the figure that it gets most wrong, as a share of that figure; absent where it is 0 on the spline, as the
     /// width of a perfect focus is.
@@ -159,27 +156,30 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     let settings = undecided.pilot_settings();
     // Standard errors are foretold for as many rays as the run has, or will have grown to.
     let scale = undecided.judged_rays() as f64 / settings.rays as f64;
-    // Once: every way is compared with the same rays of the spline.
+    let as_grown = if undecided.run.grows { "; a run that grows is judged as one of 10⁸ rays" } else { "" };
     let spline = trace_replicates(bound, undecided.source.exact(), &settings);
+    let emitted = spline.results.power.emitted;
     let error = compare(bound, [&undecided.trace_facets(undecided.facets, &settings), &spline]);
     let worst = worst_figure(bound, &error, &settings, scale);
     let mut alternatives = vec![
         alternative(tolerance, ON_FACETS, &worst, error.seconds[0] * scale),
         alternative(tolerance, ON_SPLINE, &Worst::default(), error.seconds[1] * scale),
     ];
-    let chosen = |(intersector, normals), tolerance_mm, because, alternatives, geometric| Chosen {
-        tolerance_mm,
-        normals,
-        intersector,
-        because,
-        pilot_rays: settings.rays,
-        pilot_seconds: start.elapsed().as_secs_f64(),
-        alternatives,
-        geometric,
-    };
-    // Facets go first wherever they are good enough: they are faster.
-    if worst.ratio <= 1.0 {
-        let because = format!("facets change no figure by more than its statistical error ({})", worst.in_words());
+    let chosen =
+        |(intersector, normals), tolerance_mm, because, alternatives, geometric: Option<GeometricError>| Chosen {
+            tolerance_mm,
+            normals,
+            intersector,
+            because,
+            pilot_rays: settings.rays,
+            pilot_seconds: start.elapsed().as_secs_f64(),
+            alternatives,
+            geometric: geometric.map(|error| error.with_unseen_rays(emitted)),
+        };
+    let unjudged = error.unjudged(scale, emitted).map(|name| name.to_owned());
+    if worst.ratio <= 1.0 && unjudged.is_none() {
+        let because =
+            format!("facets change no figure by more than its statistical error ({}{as_grown})", worst.in_words());
         return (chosen(ON_FACETS, tolerance, because, alternatives, Some(error)), None);
     }
     // What the spline loses is an error too, and one that more rays do not mend.
@@ -187,21 +187,30 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
         let because = "the spline loses more light than facets do".to_owned();
         return (chosen(ON_FACETS, tolerance, because, alternatives, Some(error)), None);
     }
+    if let Some(name) = unjudged {
+        let because = format!("too few of the pilot's rays reach {name} to judge what facets change there");
+        return (chosen(ON_SPLINE, tolerance, because, alternatives, None), None);
+    }
     // The cheapest first; each must pass a pilot of its own.
     for way in undecided.ways_before_spline(&worst, &error) {
         let tried = undecided.try_way(way, &settings, &spline);
-        let tried_worst = worst_figure(bound, &tried.error, &settings, scale);
+        let tried_worst = match way {
+            Way::Finer(_) => worst_figure(bound, &tried.error, &settings, scale),
+            // Moved hits are mostly the spline's own: no difference at all is not none.
+            Way::Moved => worst_figure(bound, &tried.error.clone().with_unseen_rays(emitted), &settings, scale),
+        };
         let seconds = tried.error.seconds[0] * scale + tried.finer.as_ref().map_or(0.0, |finer| finer.seconds);
         // Between the two that are always there.
         let record = alternative(tried.tolerance_mm, way.traced_with(), &tried_worst, seconds);
         alternatives.insert(alternatives.len() - 1, record);
         if tried_worst.ratio <= 1.0 && tried.is_fit {
-            let because = format!("{} ({})", way.reason(), worst.in_words());
+            let because = format!("{} ({}{as_grown})", way.reason(), worst.in_words());
             let chosen = chosen(way.traced_with(), tried.tolerance_mm, because, alternatives, Some(tried.error));
             return (chosen, tried.finer);
         }
     }
-    let because = format!("facets change the answer by more than its statistical error ({})", worst.in_words());
+    let because =
+        format!("facets change the answer by more than its statistical error ({}{as_grown})", worst.in_words());
     (chosen(ON_SPLINE, tolerance, because, alternatives, None), None)
 }
 
@@ -313,7 +322,7 @@ impl Undecided<'_> {
 
     /// Whether every face is a polygon in a plane or a ready mesh.
     fn is_flat(&self) -> bool {
-        self.faces().flatten().all(is_polygon)
+        self.faces().flatten().all(Face::is_polygon)
     }
 
     /// Returns the number of rays whose statistical error facets must stay below.
@@ -323,7 +332,6 @@ impl Undecided<'_> {
 
     /// Returns the run's settings with the pilot's number of rays, from the first one on, its own replicates and no shard.
     fn pilot_settings(&self) -> RunSettings {
-        // No more rays than the run itself has.
         let rays = (self.judged_rays() / SHARE).clamp(PILOT_RAYS[0], PILOT_RAYS[1]).min(self.judged_rays());
         // The first rays, whichever are asked for: every range of a run that grows must choose alike.
         RunSettings {
@@ -376,25 +384,10 @@ impl Undecided<'_> {
                 });
                 let run = run.expect("the source calls what it is given");
                 let asked = run.results.cost.doubtful as f64 / run.results.segments.max(1) as f64;
-                let error = compared(&run).with_unseen_rays();
+                let error = compared(&run);
                 let is_fit = MOVED_HIT + asked * SPLINE_HIT < SPLINE_HIT && error.lost[0] <= error.lost[1];
                 TriedWay { tolerance_mm: self.tolerance, error, is_fit, finer: None }
             }
         }
     }
-}
-
-/// Whether a face is one bilinear patch in a plane within straight lines, which facets follow to rounding.
-fn is_polygon(face: &Face) -> bool {
-    let surface = &face.surface;
-    let [[u0, u1], [v0, v1]] = surface.domain();
-    let corners =
-        [Uv::new(u0, v0), Uv::new(u1, v0), Uv::new(u1, v1), Uv::new(u0, v1)].map(|uv| surface.evaluate(uv));
-    // Of a quadrangle in a plane the diagonals span that plane.
-    let [a, b, c, d] = corners;
-    let normal = (c - a).cross(d - b);
-    let size = (c - a).length().max((d - b).length());
-    let is_plane = (b - a).dot(normal).abs() <= PLANE * size * normal.length();
-    let is_straight = face.loops.iter().flat_map(|l| &l.uses).all(|u| u.uv.degree == 1);
-    surface.degree == [1, 1] && surface.points.len() == 4 && is_plane && is_straight
 }

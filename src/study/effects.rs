@@ -41,7 +41,7 @@ pub struct Row {
 pub fn effects(
     name: &str,
     bound: &BoundScene,
-    who: &dyn Intersector,
+    intersector: &dyn Intersector,
     settings: &RunSettings,
     rounds: usize,
 ) -> Vec<Row> {
@@ -64,7 +64,7 @@ pub fn effects(
     for (called, run, slot) in &kernels {
         // Results are kept beside the clock: a run for the digest alone would double the study.
         race.add(*called, move || {
-            let result = simulate(bound, who, run, &|_| true);
+            let result = simulate(bound, intersector, run, &|_| true);
             if let Ok(mut slot) = slot.lock() {
                 *slot = Some(result);
             }

@@ -5,6 +5,7 @@
 
 use super::geometric_error::{GeometricError, Paired, ReceiverError};
 use crate::math::error_of_maximum;
+use crate::optics::MAX_EFFICACY;
 use crate::simulate::{ChannelResult, ReceiverResult, Results};
 use serde::Serialize;
 
@@ -160,12 +161,9 @@ fn channel_worth(r: &ReceiverResult, c: &ChannelResult) -> f64 {
     } else if r.power > 0.0 {
         c.total / r.power
     } else {
-        PEAK_EFFICACY
+        MAX_EFFICACY
     }
 }
-
-/// Most lumens of a watt, those of 555 nm (CIE 1924).
-const PEAK_EFFICACY: f64 = 683.0;
 
 /// Seconds that the next halving of either error would cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -195,6 +193,9 @@ pub fn halving(results: &Results, geometric: Option<&GeometricError>) -> Halving
     }
 }
 
+/// Times the mean of the cells around it from which on a cell is a spot of its own.
+const STANDS_OUT: f64 = 4.0;
+
 /// What is known of the geometric errors of one receiver.
 struct Errors<'a> {
     surface: Surface<'a>,
@@ -204,6 +205,8 @@ struct Errors<'a> {
     lost_share: f64,
     /// See [`GeometricError::unseen_power`].
     unseen_power: f64,
+    /// Rays that compared facets and spline, as a share of those of the run.
+    compared: f64,
 }
 
 impl<'a> Errors<'a> {
@@ -218,9 +221,14 @@ impl<'a> Errors<'a> {
             Surface::Facets(error) => error.unseen_power(results.power.emitted),
             _ => 0.0,
         };
+        let compared = match surface {
+            Surface::Facets(error) if error.rays > 0 => error.rays as f64 / results.rays.max(1) as f64,
+            _ => f64::INFINITY,
+        };
         Self {
             surface,
             measured,
+            compared,
             lost_power,
             lost_share: lost_power / results.power.emitted.max(f64::MIN_POSITIVE),
             unseen_power,
@@ -261,8 +269,10 @@ impl<'a> Errors<'a> {
         let max = self.geometric(self.lost_share * r.max, |m| {
             let square = if m.peak.facets > 0.0 { r.max / m.peak.facets } else { 1.0 } * m.peak.geometric();
             // The run may have its brightest cell elsewhere than the few rays that compared had theirs, where facets change nothing.
-            let cell = brightest.and_then(|k| m.cells.get(k)).copied();
-            cell.map_or(square, |cell| square.max(cell))
+            let geometric = r.with_joined_cells(&m.cells);
+            let cell = brightest.and_then(|k| geometric.get(k)).copied();
+            let unmet = brightest.map_or(0.0, |k| self.unmet_peak(&cells, r, k, m.peak_cells));
+            cell.map_or(square, |cell| square.max(cell)).max(unmet)
         });
         // Of a map too large to compare nothing is known.
         let max = max.filter(|_| self.measured.is_none_or(ReceiverError::has_cells));
@@ -286,6 +296,22 @@ impl<'a> Errors<'a> {
             centroid_2: along(r.centroid[1], r.centroid_error[1], &|m| m.centroid[1]),
             channels,
         }
+    }
+
+    /// Returns what may be wrong of the value of the cell `brightest` that stands far above the square of `side` cells around it: such a
+    /// spot is judged by as many of the comparing rays as came to it alone, and by fewer than one not at all.
+    fn unmet_peak(&self, cells: &[f64], r: &ReceiverResult, brightest: usize, side: usize) -> f64 {
+        let [nx, ny] = r.grid;
+        let around = |at: usize, n: usize| at.saturating_sub(side / 2)..(at + side.div_ceil(2)).min(n);
+        let [columns, rows] = [around(brightest % nx, nx), around(brightest / nx, ny)];
+        let count = columns.len() * rows.len();
+        let light: f64 = rows.map(|y| cells[y * nx..][columns.clone()].iter().sum::<f64>()).sum();
+        let value = cells[brightest];
+        if value * count as f64 <= STANDS_OUT * light {
+            return 0.0;
+        }
+        let rays = self.compared * value / r.ray_cells[brightest].max(f64::MIN_POSITIVE);
+        value / rays.max(1.0)
     }
 
     /// Makes the figures of a receiver's channels; `unit` is that of powers, which bins are told in.

@@ -85,16 +85,21 @@ const CHUNK: usize = 4096;
 
 /// Writes the answers to all rays into `hits`, of the same length, and returns the work. On the current rayon pool, or for one thread on
 /// this thread; any other number of threads means the pool.
-pub(super) fn answer(who: &dyn Intersector, rays: &[Ray], threads: usize, hits: &mut [Option<Hit>]) -> Cost {
+pub(super) fn answer(
+    intersector: &dyn Intersector,
+    rays: &[Ray],
+    threads: usize,
+    hits: &mut [Option<Hit>],
+) -> Cost {
     if threads == 1 {
         let mut cost = Cost::default();
         // On this thread, for times of one thread must not hold what a pool costs.
-        who.intersect_batch(rays, hits, &mut cost);
+        intersector.intersect_batch(rays, hits, &mut cost);
         return cost;
     }
     let one = |(rays, hits): (&[Ray], &mut [Option<Hit>])| {
         let mut cost = Cost::default();
-        who.intersect_batch(rays, hits, &mut cost);
+        intersector.intersect_batch(rays, hits, &mut cost);
         cost
     };
     let sum = |mut a: Cost, b: Cost| {

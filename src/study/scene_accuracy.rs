@@ -74,18 +74,18 @@ impl Pilot {
     /// Times a twentieth and a quarter of the run on the spline and, at the tolerance `middle`, mm, on an octree of facets with each of
     /// [`KINDS`], and extrapolates each to all rays; meshing and building is timed once, as it is. Traces 1.75 times the rays of a run.
     fn time(mesh_source: &dyn MeshSource, bound: &BoundScene, run: &RunSettings, middle: f64) -> Self {
-        let timed = |who: &dyn Intersector, rays: u64| {
+        let timed = |intersector: &dyn Intersector, rays: u64| {
             let few = RunSettings { rays, path_samples: 0, ..run.clone() };
             let start = Instant::now();
-            simulate(bound, who, &few, &|_| true);
+            simulate(bound, intersector, &few, &|_| true);
             start.elapsed().as_secs_f64()
         };
         // Two numbers of rays, for a run costs something before its first: a tenth of the rays alone gave a third too much. The first
         // run also warms threads and caches.
         let (few, more) = (run.rays.div_ceil(20), run.rays.div_ceil(4));
-        let seconds = |who: &dyn Intersector| {
-            timed(who, few);
-            let (a, b) = (timed(who, few), timed(who, more));
+        let seconds = |intersector: &dyn Intersector| {
+            timed(intersector, few);
+            let (a, b) = (timed(intersector, few), timed(intersector, more));
             b + (b - a).max(0.0) * (run.rays - more) as f64 / (more - few).max(1) as f64
         };
         let spline = seconds(mesh_source.exact());

@@ -6,7 +6,7 @@ use lampyris::math::{Frame, Homogeneous, Point, Vector};
 use lampyris::mesh::FacetMesh;
 use lampyris::model::Model;
 use lampyris::nurbs::{ControlPoint, Surface, sweep};
-use lampyris::study::accuracy::{Settings, accuracy};
+use lampyris::study::accuracy::{Settings, accuracy, sentence};
 use lampyris::study::rays::{RaySource, Uniform};
 use lampyris::study::{FacetTree, MeasuredMesh, MeshSource, ModelMeshSource, sample_models};
 use std::f64::consts::PI;
@@ -171,6 +171,15 @@ fn bilinear_normals_on_a_mirror_ball_stay_within_the_formula() {
         assert!(r.direction_error_deg_rms > 0.0 && r.direction_error_deg_rms < r.direction_error_deg_max);
     }
     assert!(study.answer.starts_with("For 0.05° take"), "{}", study.answer);
+    // The spline is taken where it costs less than all facets that are good enough, and is no advice where it costs more.
+    for (seconds, taken) in [(0.0, true), (1e9, false)] {
+        let mut rows = study.rows.clone();
+        for r in rows.iter_mut().filter(|r| r.tolerance_mm.is_none()) {
+            r.seconds_trace_median = seconds;
+        }
+        let answer = sentence(&rows, 0.05);
+        assert_eq!(answer.starts_with("For 0.05° take the exact spline"), taken, "{answer}");
+    }
     // The front falls in error and rises in time.
     let key = |&i: &usize| (study.rows[i].seconds(), study.rows[i].direction_error_deg_p99);
     assert!(study.front.windows(2).all(|w| key(&w[0]).0 <= key(&w[1]).0 && key(&w[0]).1 > key(&w[1]).1));

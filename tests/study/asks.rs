@@ -97,15 +97,15 @@ fn judged_again(product: &ModelMeshSource<'_>, found: &AccuracyResult) -> f64 {
     let mesh = product.mesh_plan(&found.plan).mesh;
     let facets = product.build(&mesh, FacetTree::Octree, found.normals.on_facets());
     let polished = (found.normals == NormalMode::Exact).then(|| product.polish(&*facets, &mesh));
-    let who: &dyn Intersector = polished.as_deref().unwrap_or(&*facets);
+    let intersector: &dyn Intersector = polished.as_deref().unwrap_or(&*facets);
     let rays = Uniform::new(&mesh.bounds(), 4711, 100_000).rays(0..100_000);
-    let ask = |who: &dyn Intersector| {
+    let ask = |intersector: &dyn Intersector| {
         let mut hits = vec![None; rays.len()];
-        who.intersect_batch(&rays, &mut hits, &mut Cost::default());
+        intersector.intersect_batch(&rays, &mut hits, &mut Cost::default());
         hits
     };
     let mirrored = |d: Vector, n: Vector| d - n * (2.0 * d.dot(n));
-    let mut errors: Vec<f64> = (rays.iter().zip(ask(who)).zip(ask(product.exact())))
+    let mut errors: Vec<f64> = (rays.iter().zip(ask(intersector)).zip(ask(product.exact())))
         .filter_map(|((ray, a), b)| Some((ray.direction, a?, b?)))
         .filter(|(_, a, b)| a.face == b.face)
         .map(|(d, a, b)| {

@@ -215,31 +215,34 @@ impl Row {
     }
 }
 
-/// Writes "For 0.05° take …": the combination of facets that is cheapest for a million rays with a p99 direction error within `target`
-/// degrees, or that there is none; and what the spline costs.
+/// Writes "For 0.05° take …": what is cheapest for a million rays, the spline or the facets with a p99 direction error within `target`
+/// degrees, and what the other costs; or that no facets keep it.
 pub fn sentence(rows: &[Row], target: f64) -> String {
     let threads = rows.iter().map(|r| r.threads).max().unwrap_or(1);
     let timed =
         |facets: bool| rows.iter().filter(move |r| r.threads == threads && r.tolerance_mm.is_some() == facets);
-    // The spline has no direction error and would win every comparison of errors.
     let good = timed(true).filter(|r| r.direction_error_deg_p99 <= target);
     let cheapest = good.min_by(|a, b| a.seconds_of_job().total_cmp(&b.seconds_of_job()));
-    let cheapest = cheapest.and_then(|r| Some((r, r.tolerance_mm?)));
-    let exact = timed(false)
-        .next()
-        .map_or(String::new(), |e| format!("; the exact spline costs **{:.2} s**", e.seconds_of_job()));
-    match cheapest {
-        Some((r, tolerance)) => format!(
-            "For {target}° take {}{} mm with {} normals in the {}: **{:.2} s** for a million rays on {threads} threads{exact}. \
-             99 % of the mirrored rays keep that direction error ({:.2e}° reached). Times are those of {} rays, tracing taken in proportion.",
-            if r.adaptive { "adaptively from " } else { "" },
-            tolerance,
-            r.normals,
-            r.intersector,
-            r.seconds_of_job(),
-            r.direction_error_deg_p99,
-            r.rays
-        ),
-        None => format!("No swept combination of facets reaches {target}°{exact}."),
-    }
+    let cost = |r: &Row| format!("**{:.2} s**", r.seconds_of_job());
+    let job = format!("for a million rays on {threads} threads");
+    let spline = timed(false).next();
+    let Some((facets, tolerance)) = cheapest.and_then(|r| Some((r, r.tolerance_mm?))) else {
+        let spline = spline.map_or(String::new(), |e| format!("; the exact spline costs {} {job}", cost(e)));
+        return format!("No swept combination of facets reaches {target}°{spline}.");
+    };
+    let from = if facets.adaptive { "tolerances from " } else { "" };
+    let settings = format!("{from}{tolerance} mm with {} normals in the {}", facets.normals, facets.intersector);
+    // The spline has no direction error, so that it is the better one where it costs no more.
+    let choice = match spline {
+        Some(e) if e.seconds_of_job() <= facets.seconds_of_job() => {
+            format!("the exact spline: {} {job}; the cheapest facets, {settings}, cost {}", cost(e), cost(facets))
+        }
+        Some(e) => format!("{settings}: {} {job}; the exact spline costs {}", cost(facets), cost(e)),
+        None => format!("{settings}: {} {job}", cost(facets)),
+    };
+    format!(
+        "For {target}° take {choice}. On the facets 99 % of the mirrored rays keep that direction error ({:.2e}° reached). Times are \
+         those of {} rays, tracing taken in proportion.",
+        facets.direction_error_deg_p99, facets.rays
+    )
 }

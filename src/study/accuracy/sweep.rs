@@ -120,7 +120,7 @@ struct Sweep<'a> {
 
 /// One structure in the race, with its latest hits.
 struct Runner<'a> {
-    who: &'a dyn Intersector,
+    intersector: &'a dyn Intersector,
     hits: Mutex<Vec<Option<Hit>>>,
 }
 
@@ -132,7 +132,7 @@ impl Sweep<'_> {
             rounds.add("", || {
                 self.countdown.tick();
                 if let Ok(mut hits) = runner.hits.lock() {
-                    answer(runner.who, self.rays, threads, &mut hits);
+                    answer(runner.intersector, self.rays, threads, &mut hits);
                 }
             });
         }
@@ -140,17 +140,17 @@ impl Sweep<'_> {
     }
 
     /// Makes a structure ready to race, without hits yet.
-    fn runner<'a>(&self, who: &'a dyn Intersector) -> Runner<'a> {
-        Runner { who, hits: Mutex::new(vec![None; self.rays.len()]) }
+    fn runner<'a>(&self, intersector: &'a dyn Intersector) -> Runner<'a> {
+        Runner { intersector, hits: Mutex::new(vec![None; self.rays.len()]) }
     }
 
     /// Times the exact spline, adds its rows, and keeps its hits as the truth of all that follows.
     fn time_spline(&mut self) {
-        let who = self.mesh_source.exact();
-        let runners = [self.runner(who)];
+        let intersector = self.mesh_source.exact();
+        let runners = [self.runner(intersector)];
         for &threads in &self.settings.threads {
             let timing = self.time_alternating(&runners, threads)[0];
-            let footprint = who.footprint();
+            let footprint = intersector.footprint();
             let row = Row { facets: footprint.primitives, bytes: footprint.bytes, ..Row::default() };
             let row = Row {
                 normals: "exact".into(),
@@ -193,11 +193,11 @@ impl Sweep<'_> {
         &self,
         tolerance: [f64; 2],
         meshed: &MeasuredMesh,
-        (tree, normals, who): (FacetTree, NormalMode, &dyn Intersector),
+        (tree, normals, intersector): (FacetTree, NormalMode, &dyn Intersector),
         hits: &[Option<Hit>],
     ) -> Row {
         let errors = HitErrors::between(self.rays, hits, &self.truth);
-        let footprint = who.footprint();
+        let footprint = intersector.footprint();
         Row {
             tolerance_mm: Some(tolerance[0]),
             adaptive: tolerance[0] != tolerance[1],

@@ -16,7 +16,7 @@ pub struct TimedIntersector<'a> {
     /// As in [`PerIntersector`]: `octree`, `octree_single`, `bvh2`, `cwbvh`, `cwbvh_as_shipped`, `polish`, `exact`.
     pub name: &'a str,
     /// The intersector that is timed.
-    pub who: &'a dyn Intersector,
+    pub intersector: &'a dyn Intersector,
     /// Whether it gets the rays in batches or one by one.
     pub batch: bool,
 }
@@ -27,7 +27,7 @@ pub fn measure(intersectors: &[TimedIntersector<'_>], rays: &[Ray], rounds: usiz
     let hits = RefCell::new(vec![None; rays.len().min(BATCH)]);
     let mut race = Rounds::default();
     for c in intersectors {
-        let TimedIntersector { who, batch, .. } = *c;
+        let TimedIntersector { intersector, batch, .. } = *c;
         let hits = &hits;
         race.add(c.name, move || {
             let mut cost = Cost::default();
@@ -35,10 +35,10 @@ pub fn measure(intersectors: &[TimedIntersector<'_>], rays: &[Ray], rounds: usiz
             for rays in rays.chunks(BATCH) {
                 let hits = &mut hits[..rays.len()];
                 if batch {
-                    who.intersect_batch(rays, hits, &mut cost);
+                    intersector.intersect_batch(rays, hits, &mut cost);
                 } else {
                     for (ray, hit) in rays.iter().zip(&mut *hits) {
-                        *hit = who.intersect(ray, &mut cost);
+                        *hit = intersector.intersect(ray, &mut cost);
                     }
                 }
                 // Without it the compiler could leave out hits that nobody reads.

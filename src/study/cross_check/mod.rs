@@ -162,9 +162,9 @@ impl Tally {
         first: u64,
         rays: &[Ray],
     ) -> Self {
-        let ask = |who: &dyn Intersector| {
+        let ask = |intersector: &dyn Intersector| {
             let mut hits = vec![None; rays.len()];
-            who.intersect_batch(rays, &mut hits, &mut Cost::default());
+            intersector.intersect_batch(rays, &mut hits, &mut Cost::default());
             hits
         };
         let (octree, bvh, exact) = (ask(intersectors.octree), ask(intersectors.bvh), ask(intersectors.exact));

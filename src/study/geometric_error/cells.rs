@@ -214,7 +214,8 @@ impl<'r> CellPairs<'r> {
 
     /// Returns the estimated geometric error of each cell, row by row and in the unit of the receiver or channel, and the side, in cells,
     /// of the largest square that shares one error because its rays were few; a cell whose own rays show a larger error has that. What
-    /// noise is left after pooling is in it; squares without rays have 0.
+    /// noise is left after pooling is in it; squares without rays have 0. Cells around a pole are one place, and have the error of their
+    /// mean.
     pub(super) fn cell_errors(&self) -> (Vec<f64>, usize) {
         let mut layer = vec![0.0; self.cells.len()];
         let mut pooled = 1;
@@ -247,6 +248,13 @@ impl<'r> CellPairs<'r> {
                 // Where facets fold light they move it by whole cells: the few that lose or gain it err by more than their neighbours.
                 layer[c] = (shared.max(self.cells[c].excess()) + noise).sqrt() * self.unit[c];
             }
+        }
+        for &y in &self.pole_rows {
+            let ring = || self.cells_of(Block { x: 0, y, size: [self.grid[0], 1] });
+            let difference: f64 = ring().map(|c| self.cells[c].difference()).sum();
+            let variance: f64 = ring().map(|c| self.cells[c].difference_variance).sum();
+            let error = difference.hypot(variance.sqrt()) / self.grid[0] as f64;
+            ring().for_each(|c| layer[c] = error * self.unit[c]);
         }
         (layer, pooled)
     }
@@ -289,6 +297,34 @@ fn add_replicate(cells: &mut [Cell], facets: &[(u32, u64)], spline: &[(u32, u64)
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of sixteen slivers each second one got ten rays more on facets, and ten fewer in the other replicate, but for one: their mean is as
+    /// uncertain as sixteen such cells together.
+    #[test]
+    fn cells_around_a_pole_have_the_error_of_their_mean() {
+        let quanta = 1u64 << 40;
+        let list = |more: [u64; 2]| (0..16).map(|c| (c, (100 + more[c as usize % 2]) * quanta)).collect::<Vec<_>>();
+        let sums = |cells| ReplicateSums { layers: vec![cells], ..ReplicateSums::default() };
+        let facets = [sums(list([10, 0])), sums(list([1, 11]))];
+        let spline = [sums(list([0, 10])), sums(list([10, 0]))];
+        let pairs: Vec<_> =
+            facets.iter().zip(&spline).map(|(a, b)| [a.layers[0].as_slice(), b.layers[0].as_slice()]).collect();
+        let pairs = CellPairs {
+            grid: [16, 1],
+            pole_rows: vec![0],
+            cells: paired_cells(16, &pairs),
+            power: None,
+            ray: quanta as f64,
+            unit: vec![1.0; 16],
+            measure: vec![1.0; 16],
+            replicates: [facets.iter().collect(), spline.iter().collect()],
+            layer: 0,
+        };
+        let (errors, _) = pairs.cell_errors();
+        // All got one ray more, with a variance of 2 · (10² + 9² − ½) and 2 · (10² + 11² − ½) rays.
+        let error = (16f64.powi(2) + 8.0 * (361.0 + 441.0)).sqrt() / 16.0;
+        assert!(errors.iter().all(|e| (e / quanta as f64 / error - 1.0).abs() < 1e-12), "{errors:?}");
+    }
 
     /// A disc of 4 × 4 cells whose corners lie off it: 300 rays in one cell of the spline, none on facets.
     #[test]

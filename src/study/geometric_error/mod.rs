@@ -124,12 +124,34 @@ impl GeometricError {
         if self.rays > 0 { emitted / self.rays as f64 } else { 0.0 }
     }
 
-    /// Adds to every figure but those of cells what rays may change of it that are too rare to be among these: hits that are moved to the
-    /// spline are mostly the spline's own, so that replicates without a difference tell of none at all, and yet a ray in so many more may
-    /// pass a silhouette.
-    pub fn with_unseen_rays(mut self) -> Self {
-        let share = 1.0 / self.rays.max(1) as f64;
-        for r in &mut self.receivers {
+    /// How many of these rays brought a power, of which `emitted` left the sources: of weak rays, as behind a filter, the spread tells it.
+    fn rays_of(&self, power: &Paired, statistical: f64, emitted: f64) -> f64 {
+        let by_power = power.spline * self.rays as f64 / emitted.max(f64::MIN_POSITIVE);
+        let by_spread = if statistical > 0.0 { (power.spline / statistical).powi(2) } else { 0.0 };
+        // Rays of a net spread less than independent ones, and look like more.
+        by_power.max(by_spread.min(self.rays as f64))
+    }
+
+    /// Returns a receiver or body that so few of these rays came to that a run of `scale` times as many will know its light better than
+    /// they tell what facets change of it: one ray in `n` is unseen among `n`, a share of `1/n`, where the run's error is one of
+    /// `1/√(n·scale)`.
+    pub(in crate::study) fn unjudged(&self, scale: f64, emitted: f64) -> Option<&str> {
+        let receivers = self.receivers.iter().map(|r| (&r.name, &r.power, r.statistical.power));
+        let bodies = self.absorbed.iter().map(|a| (&a.name, &a.power, a.statistical));
+        let few =
+            |(_, power, statistical): &(&String, &Paired, f64)| self.rays_of(power, *statistical, emitted) < scale;
+        receivers.chain(bodies).find(few).map(|(name, ..)| name.as_str())
+    }
+
+    /// Adds to every figure but those of cells what rays may change of it that are too rare to be among these, one of those that came
+    /// there: rays without a difference tell of none at all, and yet one more may pass a silhouette.
+    pub fn with_unseen_rays(mut self, emitted: f64) -> Self {
+        let shares: Vec<f64> = (self.receivers.iter())
+            .map(|r| 1.0 / self.rays_of(&r.power, r.statistical.power, emitted).max(1.0))
+            .collect();
+        let of_bodies: Vec<f64> =
+            (self.absorbed.iter()).map(|a| 1.0 / self.rays_of(&a.power, a.statistical, emitted).max(1.0)).collect();
+        for (r, share) in self.receivers.iter_mut().zip(shares) {
             let totals = r.channels.iter_mut().map(|c| &mut c.total);
             let figures = [&mut r.power, &mut r.peak].into_iter().chain(&mut r.rms).chain(&mut r.width);
             figures.chain(totals).for_each(|figure| figure.add_unseen(share));
@@ -138,7 +160,8 @@ impl GeometricError {
                 place.error = place.error.hypot(share * width.spline);
             }
         }
-        self.absorbed.iter_mut().for_each(|a| a.power.add_unseen(share));
+        self.absorbed.iter_mut().zip(of_bodies).for_each(|(a, share)| a.power.add_unseen(share));
+        let share = 1.0 / self.rays.max(1) as f64;
         for face in &mut self.faces {
             let powers = [&mut face.absorbed, &mut face.entered, &mut face.left];
             powers.into_iter().for_each(|figure| figure.add_unseen(share));
@@ -147,7 +170,7 @@ impl GeometricError {
     }
 }
 
-/// Traces the run of these settings on facets and on the spline and compares every figure.
+/// Traces the run of these settings on facets and on the spline and compares every figure, with what rarer rays may change of it.
 pub fn geometric_error(
     bound: &BoundScene,
     [facets, spline]: [&dyn Intersector; 2],
@@ -156,7 +179,7 @@ pub fn geometric_error(
     // Of grids of millions the cells of both runs would be most of what the program holds.
     let facets = trace_replicates(bound, facets, settings).without_cells();
     let spline = trace_replicates(bound, spline, settings).without_cells();
-    compare(bound, [&facets, &spline])
+    compare(bound, [&facets, &spline]).with_unseen_rays(spline.results.power.emitted)
 }
 
 /// Compares every figure of two runs of the same rays, the first on facets, the second on the spline; rays and
@@ -244,6 +267,25 @@ impl ReceiverError {
 mod tests {
     use super::*;
 
+    /// A hundred rays tell of a share of a hundredth at best, which a run of a hundred times as many rays knows as well as by its own; few
+    /// that bring little each are as many as their spread says.
+    #[test]
+    fn a_receiver_that_few_rays_reach_is_not_judged() {
+        let receiver = |rays: f64, statistical: f64| ReceiverError {
+            name: "spot".into(),
+            power: Paired { facets: rays, spline: rays, error: 0.0 },
+            statistical: Statistical { power: statistical, ..Statistical::default() },
+            ..ReceiverError::default()
+        };
+        let unjudged = |rays: f64, statistical: f64, scale: f64| {
+            let receivers = vec![receiver(rays, statistical)];
+            let found = GeometricError { rays: 65_536, receivers, ..GeometricError::default() };
+            found.unjudged(scale, 65_536.0).is_some()
+        };
+        assert!(unjudged(0.0, 0.0, 32.0) && unjudged(99.0, 9.95, 100.0) && !unjudged(101.0, 10.05, 100.0));
+        assert!(!unjudged(1.0, 0.01, 100.0));
+    }
+
     #[test]
     fn a_ray_that_no_replicate_saw_may_have_moved_every_figure() {
         let same = |x: f64| Paired { facets: x, spline: x, error: 0.0 };
@@ -255,8 +297,9 @@ mod tests {
             peak: same(7.0),
             ..ReceiverError::default()
         };
-        let found = GeometricError { rays: 10, receivers: vec![receiver], ..GeometricError::default() };
-        let r = &found.with_unseen_rays().receivers[0];
+        let found = GeometricError { rays: 30, receivers: vec![receiver], ..GeometricError::default() };
+        // A third of what was emitted: ten rays came.
+        let r = &found.with_unseen_rays(9.0).receivers[0];
         // One ray of ten, at a standard deviation from the mean, moves that by a tenth of the deviation wherever the mean is.
         let errors = [r.power, r.centroid[0], r.centroid[1], r.rms[0], r.width[1], r.peak].map(|p| p.geometric());
         for (error, expected) in errors.into_iter().zip([0.3, 0.2, 0.5, 0.2, 0.5, 0.7]) {

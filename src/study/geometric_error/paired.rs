@@ -24,12 +24,12 @@ impl Paired {
         (self.facets - self.spline).hypot(self.error)
     }
 
-    /// Returns the geometric error, and `unseen` where no replicate differed on facets: that tells of no error at all.
+    /// Returns the geometric error, at least `unseen` where facets made no difference: that tells of no error at all.
     pub(in crate::study) fn geometric_or(&self, unseen: f64) -> f64 {
-        if self.facets == self.spline && self.error == 0.0 { unseen } else { self.geometric() }
+        if self.facets == self.spline { self.error.max(unseen) } else { self.geometric() }
     }
 
-    /// Adds what the difference may be by rays that are rarer than `share` of all, each of which takes all its light along.
+    /// Adds what the difference may be by rays that are rarer than `share` of all that come, each of which takes all its light along.
     pub(super) fn add_unseen(&mut self, share: f64) {
         self.error = self.error.hypot(share * self.spline);
     }

@@ -54,7 +54,7 @@ pub struct Row {
 
 impl Scene<'_> {
     /// Asks an intersector every question and counts the grades; a trimmed case asks facets none.
-    pub fn ask(&self, name: &str, who: &dyn Intersector, geometry: Geometry) -> Row {
+    pub fn ask(&self, name: &str, intersector: &dyn Intersector, geometry: Geometry) -> Row {
         let mut row = Row {
             case: self.case.name.into(),
             variant: self.variant.name().into(),
@@ -64,7 +64,7 @@ impl Scene<'_> {
             flagged: 0,
             wrong: 0,
         };
-        for grade in self.grades(who, geometry) {
+        for grade in self.grades(intersector, geometry) {
             row.rays += 1;
             match grade {
                 Grade::Right => row.right += 1,
@@ -81,12 +81,12 @@ const STEPS: usize = 256;
 
 impl Scene<'_> {
     /// Returns one grade per question, in order; none for facets of a trimmed case.
-    pub fn grades(&self, who: &dyn Intersector, geometry: Geometry) -> Vec<Grade> {
+    pub fn grades(&self, intersector: &dyn Intersector, geometry: Geometry) -> Vec<Grade> {
         // A trimmed case has no mesh.
         if geometry == Geometry::Facets && self.mesh.facets.is_empty() {
             return Vec::new();
         }
-        let grader = Grader { scene: self, who, geometry, band: self.band() };
+        let grader = Grader { scene: self, intersector, geometry, band: self.band() };
         self.case.questions.iter().map(|q| grader.grade(q)).collect()
     }
 
@@ -123,7 +123,7 @@ impl Scene<'_> {
 /// Who is asked, and by how much facets may be off.
 struct Grader<'a> {
     scene: &'a Scene<'a>,
-    who: &'a dyn Intersector,
+    intersector: &'a dyn Intersector,
     geometry: Geometry,
     band: f64,
 }
@@ -136,14 +136,16 @@ fn is_flagged(hit: &Hit) -> bool {
 impl Grader<'_> {
     /// Asks for the nearest hit of a ray in the scene's place.
     fn ask(&self, ray: &Ray) -> Option<Hit> {
-        self.who.intersect(ray, &mut Cost::default())
+        self.intersector.intersect(ray, &mut Cost::default())
     }
 
     /// Whether a miss of the spline is one that the intersector itself is not sure of: it has no hit to carry the flag, but
     /// it counts a fallback.
     fn unsure_miss(&self, ray: &Ray) -> bool {
         let mut cost = Cost::default();
-        self.geometry == Geometry::Spline && self.who.intersect(ray, &mut cost).is_none() && cost.fallbacks > 0
+        self.geometry == Geometry::Spline
+            && self.intersector.intersect(ray, &mut cost).is_none()
+            && cost.fallbacks > 0
     }
 
     /// Grades a miss where there should be a hit: wrong, or flagged where the spline is not sure of it.

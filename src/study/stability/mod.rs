@@ -93,8 +93,8 @@ mod tests {
             questions: vec![Question::Chord { toward, direction, radius: 1.0 }],
         };
         let scene = case.scene(Variant::Home);
-        let who = Blind(exact::Exact::build(&scene.model, &exact::Settings::default()), certainty);
-        scene.grades(&who, Geometry::Spline)[0]
+        let intersector = Blind(exact::Exact::build(&scene.model, &exact::Settings::default()), certainty);
+        scene.grades(&intersector, Geometry::Spline)[0]
     }
 
     #[test]
