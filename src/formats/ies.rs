@@ -149,12 +149,12 @@ impl Numbers<'_> {
 
     /// Reads the next number, which must be whole, at least 1 and no more than the file has numbers.
     fn read_count(&mut self, what: &str) -> Result<usize, Error> {
-        let x = self.read_number(what)?;
+        let (x, most) = (self.read_number(what)?, self.words.len());
         // No count can exceed the numbers that are there: a lie about it costs no memory.
-        if x >= 1.0 && x.fract() == 0.0 && x <= self.words.len() as f64 {
+        if x >= 1.0 && x.fract() == 0.0 && x <= most as f64 {
             Ok(x as usize)
         } else {
-            Err(self.error(format!("{what} is {x}, but the file holds {} numbers", self.words.len())))
+            Err(self.error(format!("{what} is {x}, not a whole number from 1 to {most}, the numbers of the file")))
         }
     }
 
@@ -373,7 +373,8 @@ mod tests {
     fn refusals_name_the_line() {
         for (wrong, right, message) in [
             ("3 2 1 1", "3 2 7 1", "photometric type 7"),
-            ("3 2 1 1", "300000000 2 1 1", "number of vertical angles is 300000000"),
+            ("3 2 1 1", "300000000 2 1 1", "angles is 300000000, not a whole number from 1 to"),
+            ("3 2 1 1", "2.5 2 1 1", "number of vertical angles is 2.5, not a whole number"),
             ("1e0", "", "candela values"),
             ("45,90", "45,45", "must ascend"),
             ("TILT=INCLUDE", "TILT=lamp.tlt", "refers to another file"),

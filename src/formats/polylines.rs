@@ -2,6 +2,9 @@
 
 use crate::math::{Aabb, Point, Ray};
 
+/// Share of a model's diagonal up to which lines are drawn around it.
+const DRAWN_AROUND: f64 = 0.35;
+
 /// Open polylines with one value each of any number of quantities: ray paths, usually.
 ///
 /// ```
@@ -35,6 +38,12 @@ impl Polylines {
             let start = if k == 0 { 0 } else { self.ends[k - 1] };
             &self.points[start..self.ends[k]]
         })
+    }
+
+    /// Cuts lines a little outside of a model in this box, so that rays to infinity do not make it a speck in a picture; see
+    /// [`Self::inside`].
+    pub fn near(&self, model: &Aabb) -> Self {
+        self.inside(&model.grown(DRAWN_AROUND * model.diagonal()))
     }
 
     /// Cuts lines to where they first pass a box, so that rays to infinity, and sources far away, do not decide what a viewer shows. Values

@@ -67,11 +67,6 @@ pub struct Repairs {
 }
 
 impl Repairs {
-    /// Whether anything was changed.
-    pub fn has_changes(&self) -> bool {
-        *self != Self::default()
-    }
-
     /// All that was changed in either.
     fn union(self, o: Self) -> Self {
         Self {

@@ -284,15 +284,6 @@ impl Surface {
         self.map_direction(0, |c| c.restricted(u0, u1)).map_direction(1, |c| c.restricted(v0, v1))
     }
 
-    /// The same surface with u and v exchanged, which turns its normal around.
-    pub fn transposed(&self) -> Self {
-        Self {
-            degree: [self.degree[1], self.degree[0]],
-            knots: [self.knots[1].clone(), self.knots[0].clone()],
-            points: self.lines(0).into_iter().flatten().collect(),
-        }
-    }
-
     /// The surface with every control point's position changed by `place` and weights kept: exact for affine maps.
     pub fn transformed(&self, place: impl Fn(Point) -> Point) -> Self {
         let points = self.points.iter().map(|p| Homogeneous::weighted(place(p.project()), p.w)).collect();
@@ -358,13 +349,12 @@ mod tests {
     }
 
     #[test]
-    fn restriction_and_transposition_keep_the_points() {
+    fn restrictions_and_isolines_keep_the_points() {
         let s = sweep::torus(&Frame::IDENTITY, 5.0, 2.0, [0.0, 2.0 * PI], [0.0, 2.0 * PI]);
         let r = s.restricted([[0.3, 4.0], [1.0, 5.5]]);
         assert_eq!(r.domain(), [[0.3, 4.0], [1.0, 5.5]]);
         let uv = Uv::new(2.9, 3.3);
         assert!((r.evaluate(uv) - s.evaluate(uv)).length() < 1e-13);
-        assert!((s.transposed().evaluate(Uv::new(uv.y, uv.x)) - s.evaluate(uv)).length() < 1e-13);
         assert!((s.isoline(0, 2.9).evaluate(3.3) - s.evaluate(uv)).length() < 1e-13);
         assert!((s.isoline(1, 3.3).evaluate(2.9) - s.evaluate(uv)).length() < 1e-13);
     }

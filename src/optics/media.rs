@@ -58,11 +58,6 @@ pub enum Index {
 }
 
 impl Index {
-    /// The one-term Sellmeier form `n² = 1 + A λ²/(λ² − B)`.
-    pub fn sultanova(a: f64, b: f64) -> Self {
-        Self::Sellmeier(vec![[a, b]])
-    }
-
     /// The index at a vacuum wavelength.
     ///
     /// NaN where a formula has no real value, far outside the range it was fitted to; see [`Index::checked`].
@@ -232,7 +227,9 @@ mod tests {
         let schott = Index::Schott([2.25, -0.01, 0.01, 0.001, 0.0001, 0.00001]);
         let n2 = 2.25 - 0.0025 + 0.04 + 0.016 + 0.0064 + 0.00256;
         assert!((schott.value(500.0) - f64::sqrt(n2)).abs() < 1e-15);
-        assert!((Index::sultanova(1.25, 0.05).value(500.0) - f64::sqrt(1.0 + 1.25 * 0.25 / 0.2)).abs() < 1e-15);
+        assert!(
+            (Index::Sellmeier(vec![[1.25, 0.05]]).value(500.0) - f64::sqrt(1.0 + 1.25 * 0.25 / 0.2)).abs() < 1e-15
+        );
         assert!(schott.is_dispersive() && !Index::Cauchy(vec![1.5, 0.0]).is_dispersive());
         assert_eq!(Index::Constant(1.5).abbe_number(), f64::INFINITY);
     }
@@ -265,6 +262,6 @@ mod tests {
         assert!(Absorption::per_mm(-1.0).is_err());
         let e = Absorption::from_transmittance(10.0, [(400.0, 1.2)]).unwrap_err();
         assert!(e.to_string().contains("internal transmittance is 1.2"), "{e}");
-        assert!(Index::sultanova(1.2, 0.3).checked(&[450.0]).is_err());
+        assert!(Index::Sellmeier(vec![[1.2, 0.3]]).checked(&[450.0]).is_err());
     }
 }

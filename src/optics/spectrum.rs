@@ -270,7 +270,7 @@ impl Wavelengths {
     pub fn photometric(&self) -> Result<Self, Error> {
         match &self.kind {
             Kind::Lines(nm) => {
-                // Powers of lines are kept as running sums, from which they are had back.
+                // Powers of lines are kept as running sums, from which they are recovered.
                 let before = std::iter::once(0.0).chain(self.sums.iter().copied());
                 let watts = self.sums.iter().zip(before).map(|(s, before)| s - before);
                 Self::lines(&nm.iter().zip(watts).map(|(&nm, w)| [nm, w * xyz_of_watt(nm)[1]]).collect::<Vec<_>>())

@@ -53,7 +53,7 @@ pub fn ray_lists(bound: &BoundScene) -> Vec<(u32, u64)> {
 /// Traces every ray of every list by itself; rows in the order of sources, rays and branches. A ray
 /// that cannot be read any more has no row.
 pub fn listed_ends(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings) -> Vec<ListedEnd> {
-    // Of each ray alone a wave has one place.
+    // Each ray is traced alone, so that a wavefront needs a single place.
     let single = RunSettings { batch: 1, ..settings.clone() };
     let mut context = Context::new(bound, intersector, &single);
     context.plan.record_all();

@@ -109,6 +109,24 @@ pub enum Event {
     Lost,
 }
 
+impl Event {
+    /// Returns its name in messages, the same as in JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Emitted => "emitted",
+            Self::Split => "split",
+            Self::Reflected => "reflected",
+            Self::Transmitted => "transmitted",
+            Self::Scattered => "scattered",
+            Self::Absorbed => "absorbed",
+            Self::Received => "received",
+            Self::Escaped => "escaped",
+            Self::CutOff => "cut_off",
+            Self::Lost => "lost",
+        }
+    }
+}
+
 /// Event counts of a run or of a part of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
@@ -160,12 +178,19 @@ impl Counts {
 
 #[cfg(test)]
 mod tests {
+    use super::Event::{
+        self, Absorbed, CutOff, Emitted, Escaped, Lost, Received, Reflected, Scattered, Split, Transmitted,
+    };
     use super::LostCause::{self, ImpossibleMedium, InsideSolid, NoExit, NotANumber, TooDeep, Unreadable};
 
     #[test]
     fn names_are_those_of_json() {
         for cause in [NoExit, ImpossibleMedium, InsideSolid, TooDeep, NotANumber, Unreadable] {
             assert_eq!(serde_json::to_value(cause).unwrap(), LostCause::name(cause));
+        }
+        let there = [Emitted, Split, Reflected, Transmitted, Scattered];
+        for event in there.into_iter().chain([Absorbed, Received, Escaped, CutOff, Lost]) {
+            assert_eq!(serde_json::to_value(event).unwrap(), Event::name(event));
         }
     }
 }

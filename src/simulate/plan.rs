@@ -2,10 +2,12 @@
 
 use super::bind::BoundScene;
 use super::emitter::Emitter;
+use super::scene::MOST_RAYS;
 use super::settings::RunSettings;
 use super::tally::QUANTA;
 
-/// Where one ray in so many and one more is recorded, or fewer, they are traced once more: that costs less than a kernel that records.
+/// Record mask from which on recorded rays are traced a second time: to trace one in 64 or fewer again costs less than to trace every ray
+/// with a kernel that records.
 const FEW: u64 = 63;
 
 /// How far a ray that escapes is drawn, mm.
@@ -30,7 +32,7 @@ const SUM_OF_SQUARES: f64 = (1u128 << 127) as f64 * 16.0;
 /// beside its rays is below a per cent.
 pub const GROWING_REPLICATE: u64 = 5_000;
 
-/// Replicates from which on a run is divided into those of a fixed size without being asked to.
+/// Fewest replicates of a fixed size for which a run is divided into them unasked.
 const FEWEST_GROWING: u64 = 128;
 
 /// The rays of one source: in the whole run, or in each replicate of one that can grow.
@@ -75,15 +77,16 @@ impl Plan {
     pub(crate) fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
         let emitted: f64 = bound.emitters.iter().map(|e| e.power).sum();
         let grows = can_grow(bound) && (settings.grows || grows_unasked(settings));
+        let asked = settings.rays.clamp(1, MOST_RAYS);
         // A run that can grow is divided replicate by replicate, source by source within each; any other source by source.
-        let counts = rays_of_sources(bound, if grows { GROWING_REPLICATE } else { settings.rays }, emitted);
+        let counts = rays_of_sources(bound, if grows { GROWING_REPLICATE } else { asked }, emitted);
         let divided: u64 = counts.iter().sum();
         // Each source emits exactly its power: its rays weigh a little more or less than the average one.
         let weight = |(e, &n): (&Emitter, &u64)| (n, (e.power / emitted) * (divided as f64 / n as f64));
         let weights: Vec<(u64, f64)> = bound.emitters.iter().zip(&counts).map(weight).collect();
         // Errors come from the spread of replicates, each of which needs rays enough to be a sample of the whole.
         let replicates = if grows {
-            settings.rays.div_ceil(GROWING_REPLICATE) as u32
+            asked.div_ceil(GROWING_REPLICATE) as u32
         } else {
             // At least two, for an error; at most as many as leave each some rays; and enough for the words that
             // count quanta.

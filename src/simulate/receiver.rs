@@ -244,7 +244,6 @@ impl Receiver {
 
     /// Returns the spot at a place given in half sides, from −1 to 1, with its cell; the upper border belongs to the last cell.
     fn spot_at(&self, at: [f64; 2], radius2: f64) -> Spot {
-        // The upper border belongs to the last cell.
         let index = |x: f64, n: u32| ((0.5 * (x + 1.0) * f64::from(n)) as u32).min(n - 1) as usize;
         let cell = index(at[1], self.cells[1]) * self.cells[0] as usize + index(at[0], self.cells[0]);
         Spot { cell, at, radius2 }

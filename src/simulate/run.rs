@@ -179,7 +179,7 @@ fn announce(context: &Context<'_>, replicates: usize, threads: usize) {
     });
 }
 
-/// Lets the intersector work out beforehand what it will know of a run, so that two runs on it compare.
+/// Does the work that the intersector does once for a run now, so that the times of two runs on it are comparable.
 pub(crate) fn prepare(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings) {
     let context = Context::new(bound, intersector, settings);
     let replicates = (context.plan.first_replicate..context.plan.replicates).len();
@@ -189,9 +189,8 @@ pub(crate) fn prepare(bound: &BoundScene, intersector: &dyn Intersector, setting
 /// Traces some rays of a run once more, by their number, and records their whole paths: `paths` and `ledger` of the results are theirs.
 /// Numbers that the run does not have are passed over; powers are scaled as if these rays were all.
 pub fn replay(bound: &BoundScene, intersector: &dyn Intersector, settings: &RunSettings, rays: &[u64]) -> Results {
-    // A ray that is traced alone would leave the rest of a wave idle.
     let start = Instant::now();
-    // Of each ray alone a wave has one place.
+    // Each ray is traced alone, so that a wavefront needs a single place.
     let single = RunSettings { batch: 1, ..settings.clone() };
     let mut context = Context::new(bound, intersector, &single);
     context.plan.record_all();

@@ -35,7 +35,8 @@ fn prepared(model: &Model, text: &str, intersector: IntersectorKind, normals: No
     let loaded = LoadedModel { model: model.clone(), ..LoadedModel::default() };
     let tracing = TracingSettings {
         intersector: Some(intersector),
-        normals: Some(normals),
+        // The spline has normals of its own.
+        normals: (intersector != IntersectorKind::Exact).then_some(normals),
         threads: Some(2),
         ..TracingSettings::default()
     };
@@ -50,7 +51,8 @@ fn in_one_piece(prepared: &PreparedScene) -> Results {
     let exact = || Exact::build(model, &exact::Settings::for_few_rays());
     let normals = prepared.choice.normals.on_facets();
     let octree = Octree::build(&mesh, &octree::Settings { normals, ..Default::default() });
-    let trace = |who: &dyn Intersector| simulate(&prepared.bound, who, &prepared.run_settings(), &|_| true);
+    let trace =
+        |intersector: &dyn Intersector| simulate(&prepared.bound, intersector, &prepared.run_settings(), &|_| true);
     match (prepared.choice.intersector, prepared.choice.normals) {
         (IntersectorKind::Exact, _) => trace(&exact()),
         (_, NormalMode::Exact) => trace(&Polished::new(&octree, &mesh, &exact())),

@@ -30,6 +30,12 @@ fn values_out_of_range_are_refused_by_name() {
         ("[[model]]\nfile = \"x.stp\"\nplacement = { scale = -1 }", "scale"),
         ("[run]\nrays = 0", "rays"),
         ("[run]\nrays = 3e13", "2e13"),
+        ("[[source]]\nrays = 30_000_000_000_000", "2e13"),
+        ("[[source]]\nrays = 15_000_000_000_000\n[[source]]\nrays = 15_000_000_000_000", "all sources"),
+        ("[[receiver]]\nname = 'r'\nat = [nan, 0, 0]\nsize = [1, 1]", "`at` must"),
+        ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nup = [0, 0, 0]", "`up` must"),
+        ("[[receiver]]\nname = 'r'\nx = [0, inf, 0]\nsize = [1, 1]", "`x` must"),
+        ("[[receiver]]\nname = 'r'\nsize = [1, 1]\n[[receiver]]\nname = 'R'\nsize = [1, 1]", "both be called 'R'"),
         ("[run]\nray = 10", "ray"),
     ] {
         let said = refusal(head);

@@ -2,7 +2,7 @@
 
 use super::bytes::ByteReader;
 use super::ray_collector::RayCollector;
-use super::ray_file::{Flux, RayFile, RaySet, RowLayout, RowWavelength};
+use super::ray_file::{Flux, RayFile, RowLayout, RowWavelength};
 use super::tm25_header::{ColumnPlaces, SpectralData, Tm25Columns, Tm25Header};
 use crate::formats::rays::unit_direction;
 use crate::formats::{Error, LightRay, write_atomic};
@@ -120,18 +120,14 @@ impl Tm25Reader {
         Ok(Self { file, header, notes, places })
     }
 
-    /// Reads the rays, their powers in the preferred flux where the file has both, and scales them to the header's total.
+    /// Makes the rays of it, looked at once each, their powers in the preferred flux where the file has both and scaled to the header's
+    /// total; where they are more than `most_in_memory` they are read from the disk as they are drawn.
     ///
     /// A file with a spectral table per ray gives each ray one wavelength of its table, spread so that the rays of a table together
     /// have its spectrum.
     ///
     /// # Errors
     /// When the file ends early or a row makes no ray; the message names the ray.
-    pub fn into_rays(self, preferred: Flux) -> Result<RaySet, Error> {
-        self.into_ray_file(preferred, u64::MAX)?.into_set()
-    }
-
-    /// Makes the rays of it, looked at once each; where they are more than `most_in_memory` they are read from the disk as they are drawn.
     pub(super) fn into_ray_file(mut self, preferred: Flux, most_in_memory: u64) -> Result<RayFile, Error> {
         let flux = match (self.places.radiant, self.places.luminous) {
             (Some(_), Some(_)) => preferred,

@@ -25,7 +25,7 @@ pub use material::{LobeKind, Material, ModelUse, Placement, Reflectance, Scatter
 pub use medium::{ByWavelength, Medium};
 pub use receiver::{Channels, FarFieldType, Receiver, ReceiverKind};
 pub use regulation::RegulationUse;
-pub use run::{Accuracy, Interfaces, PowerUnit, Run, Sampling};
+pub use run::{Accuracy, Interfaces, MOST_RAYS, PowerUnit, Run, Sampling};
 pub use selector::{ColourKey, FaceSelector, OneOrMany, SolidKey};
 use serde::{Deserialize, Serialize};
 pub(crate) use source::POWERS;
@@ -223,20 +223,21 @@ impl Scene {
     /// Refuses two receivers whose names make the same file name, with or without what pictures in colours add to it, and one that would
     /// write over lost_rays.csv.
     fn check_receiver_names(&self) -> Result<(), Error> {
-        // By the name of the file, not of the receiver: `a b` and `a_b` would write over each other.
+        // By the name of the file, not of the receiver: `a b` and `a_b` would write over each other, on some systems `a` and `A` too.
         let mut stems: HashMap<String, &str> = HashMap::new();
         for (i, Receiver { name, channels, .. }) in self.receivers.iter().enumerate() {
             let stem = file_stem(name);
             let colours = (*channels == Some(Channels::Xyz)).then(|| format!("{stem}-colours"));
             for stem in [Some(stem), colours].into_iter().flatten() {
-                let message = match stems.get(&stem) {
-                    _ if stem == "lost_rays" => format!("a receiver called '{name}' would overwrite lost_rays.csv"),
+                let file = stem.to_lowercase();
+                let message = match stems.get(&file) {
+                    _ if file == "lost_rays" => format!("a receiver called '{name}' would overwrite lost_rays.csv"),
                     Some(other) if *other == name => format!("two receivers are called '{name}'"),
                     Some(other) => {
                         format!("the files of the receivers '{other}' and '{name}' would both be called '{stem}'")
                     }
                     None => {
-                        stems.insert(stem, name);
+                        stems.insert(file, name);
                         continue;
                     }
                 };

@@ -220,11 +220,16 @@ impl Receiver {
         if self.cells.contains(&0) || u64::from(self.cells[0]) * u64::from(self.cells[1]) > 1 << 24 {
             return fail("cells", "`cells` must be at least 1 and at most 16 million in all");
         }
-        // Finite first: comparisons with what is no number would let it pass.
-        if !self.at.iter().chain(&self.normal).chain(&self.up).chain(self.x.iter().flatten()).all(|x| x.is_finite())
-            || self.normal.iter().all(|x| *x == 0.0)
-        {
-            return fail("normal", "`at` must be a point, `normal`, `up` and `x` directions");
+        if !self.at.iter().all(|x| x.is_finite()) {
+            return fail("at", "`at` must be a point, of three finite numbers");
+        }
+        for (key, direction) in [("normal", Some(self.normal)), ("up", Some(self.up)), ("x", self.x)] {
+            if direction.is_some_and(|d| !d.iter().all(|x| x.is_finite()) || d == [0.0; 3]) {
+                return fail(
+                    key,
+                    &format!("`{key}` must be a direction, of three finite numbers that are not all 0"),
+                );
+            }
         }
         if self.channels.is_some() && self.bins_nm.is_some() {
             return fail("bins_nm", "a receiver has `channels` or `bins_nm`, not both");

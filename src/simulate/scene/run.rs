@@ -27,7 +27,7 @@ const GLUES_MM: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 const WAVELENGTHS_NM: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 /// Most rays of a run: of one that grows, the 32 bits that number its replicates of 5000 rays hold no more.
-const MOST_RAYS: u64 = 20_000_000_000_000;
+pub const MOST_RAYS: u64 = 20_000_000_000_000;
 
 /// Settings of the run.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]

@@ -1,6 +1,6 @@
 //! The key `[[source]]`: where light comes from.
 
-use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene, SpectrumKey, lenient};
+use super::{FaceSelector, Key, MOST_RAYS, OneOrMany, PowerUnit, Scene, SpectrumKey, lenient};
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
@@ -226,8 +226,9 @@ impl Source {
 
     /// Returns the first that is wrong with the number of rays, the spectrum or the polarisation; `None` where nothing is.
     fn light_fault(&self, scene: &Scene) -> Fault {
-        if self.rays == Some(0) {
-            return Some(("rays", "`rays` must be positive".into()));
+        let all = scene.sources.iter().filter_map(|source| source.rays).fold(0, u64::saturating_add);
+        if self.rays.is_some_and(|rays| rays == 0 || all > MOST_RAYS) {
+            return Some(("rays", "`rays` must be positive, and those of all sources 2e13 at most".into()));
         }
         if let Some(Err(message)) = self.spectrum.as_ref().map(|s| s.wavelengths(scene.run.unit)) {
             return Some(("spectrum", message));
