@@ -6,7 +6,8 @@ use super::settings::ToleranceField;
 use crate::math::{Point, Uv, Vector};
 use crate::nurbs::{BezierPatch, FundamentalForms, SecondDerivatives, Surface};
 
-/// Share of the domain, and of the surface's size, within which a place is a pole; borders end there up to their rounding.
+/// Share of the domain, and of the surface's size or what rounds a point on it if that is more, within which a place is a pole; borders end
+/// there up to their rounding.
 const POLE: f64 = 1e-9;
 
 /// Sine of the angle between tangents from which a knot is a crease, and from which it is one that nothing may lie across: shallower
@@ -29,8 +30,8 @@ const NO_DERIVATIVE: f64 = 1e-10;
 const BESIDE_CREASE: f64 = 1e-9;
 /// Share of the way to the domain's centre at which the curvature of a pole is taken.
 const BESIDE_POLE: f64 = 1e-3;
-/// Share of the surface's size, and of a weight, within which control points lie on an affine image of their parameters.
-const AFFINE: [f64; 2] = [1e-12, 1e-14];
+/// Share of a weight within which those of an affine image of its parameters are equal.
+const EQUAL_WEIGHTS: f64 = 1e-14;
 /// Share of the shorter knot interval at which tangents on both sides of a knot are compared, and at how many places along it.
 const CREASE_STEP: f64 = 1e-6;
 const CREASE_PLACES: usize = 9;
@@ -85,10 +86,11 @@ impl<'a> FaceSurface<'a> {
         let size = bounds.diagonal();
         let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
         let curving = SecondDerivativeBounds::new(surface, &patches, &breaks);
-        let least = POLE * size;
+        let rounding = (SIZE_MARGIN * size).max(PLACE_MARGIN_ULPS * f64::EPSILON * farthest);
+        let least = (POLE * size).max(rounding);
         let poles = [0, 1].map(|d| [0, 1].map(|end| side_size(surface, d, end) <= least));
         let pole_size = if poles.iter().flatten().any(|&p| p) { least } else { 0.0 };
-        let affine = is_affine(surface, size);
+        let affine = is_affine(surface, rounding);
         // A ball or ring within its tolerance would be a point: all its triangles had two corners in one place.
         let most = CLOSED_TOLERANCE * size;
         let closed = [0, 1].map(|d| is_closed(surface, d, least));
@@ -108,7 +110,7 @@ impl<'a> FaceSurface<'a> {
             creases,
             sharp,
             size,
-            rounding: (SIZE_MARGIN * size).max(PLACE_MARGIN_ULPS * f64::EPSILON * farthest),
+            rounding,
             poles,
             closed,
             gap: None,
@@ -292,8 +294,8 @@ pub(super) fn patch_uv(patch: &BezierPatch, uv: Uv) -> Uv {
 }
 
 /// Whether the surface is an affine map of its parameters: all control points lie on one affine image of their Greville abscissas, with
-/// equal weights, within [`AFFINE`]. `size` is the diagonal of the surface's box.
-fn is_affine(s: &Surface, size: f64) -> bool {
+/// equal weights, within `rounding`, mm.
+fn is_affine(s: &Surface, rounding: f64) -> bool {
     let [nu, nv] = s.counts();
     // A spline whose control points lie on an affine map at their Greville abscissas is that map.
     let greville =
@@ -307,7 +309,7 @@ fn is_affine(s: &Surface, size: f64) -> bool {
             let a = (greville(0, i) - g0[0]) / (g1[0] - g0[0]);
             let b = (greville(1, j) - g0[1]) / (g1[1] - g0[1]);
             let off = (at(i, j) - (o + x * a + y * b)).length();
-            off <= AFFINE[0] * size && (s.points[i * nv + j].w - w).abs() <= AFFINE[1] * w
+            off <= rounding && (s.points[i * nv + j].w - w).abs() <= EQUAL_WEIGHTS * w
         })
     })
 }
@@ -340,4 +342,26 @@ fn crease_knots(s: &Surface, d: usize, breaks: &[Vec<f64>; 2], least: f64) -> Ve
         })
         .map(|(_, &k)| k)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::nurbs::sweep;
+    use std::f64::consts::{FRAC_PI_2, TAU};
+
+    /// What rounds a coordinate of 10⁶ mm is ten times what a plane of 10 mm at the origin may be off, and at 10⁹ mm a pole as well.
+    #[test]
+    fn planes_and_poles_are_known_far_from_the_origin() {
+        let field = || ToleranceField::new([0.1; 2], [1.0, 10.0], Default::default(), 1.0);
+        for far in [0.0, 1e6, 1e9] {
+            let frame = Frame::from_axis(Point::splat(far), Vector::new(0.3, 0.5, 0.8), None);
+            let plane = sweep::plane(&frame, [[0.0, 10.0 / 3.0], [0.7, 7.9]]);
+            assert!(FaceSurface::new(&plane, false, field()).affine, "{far}");
+            let ball = sweep::sphere(&frame, 5.0, [0.0, TAU], [-FRAC_PI_2, FRAC_PI_2]);
+            let ball = FaceSurface::new(&ball, false, field());
+            assert!(!ball.affine && ball.poles.contains(&[true; 2]), "{far}");
+        }
+    }
 }

@@ -69,7 +69,10 @@ pub(crate) fn within_reach(e: Entity<'_, '_>, point: Point) -> Outcome<Point> {
     if point.abs().max_element() <= FARTHEST_MM {
         return Ok(point);
     }
-    Err(Refusal::new(e, format!("a coordinate is beyond {FARTHEST_MM:e} mm, where rounding eats shapes")))
+    Err(Refusal::new(
+        e,
+        format!("a coordinate is beyond {FARTHEST_MM:e} mm, too far out for double precision to hold a shape"),
+    ))
 }
 
 /// Reads geometry in mm and radians.

@@ -344,7 +344,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         if !(placement.origin.abs().max_element() <= FARTHEST_MM) {
             if self.reached.insert(id) {
                 self.problems.push(format!(
-                    "#{id}: stands beyond {FARTHEST_MM:e} mm, where rounding eats shapes; it is left out"
+                    "#{id}: stands beyond {FARTHEST_MM:e} mm, too far out for double precision to hold a shape; it is left out"
                 ));
             }
             return;

@@ -238,8 +238,10 @@ fn is_sized_by_edges(file: &File<'_>, surface: u64) -> bool {
 /// Makes the refusal of a face whose surface reaches farther than numbers tell places apart.
 fn beyond_rounding(geometry: &GeometryReader<'_, '_>, id: u64, plan: &FacePlan) -> Refusal {
     let surface = geometry.file.entity_name(plan.surface);
-    let reason =
-        format!("#{} {surface}: reaches beyond {FARTHEST_MM:e} mm, where rounding eats shapes", plan.surface);
+    let reason = format!(
+        "#{} {surface}: reaches beyond {FARTHEST_MM:e} mm, too far out for double precision to hold a shape",
+        plan.surface
+    );
     Refusal { id, entity: geometry.file.entity_name(id), reason }
 }
 
