@@ -151,10 +151,10 @@ pub(super) fn count_table(check: &CrossCheck) -> Table {
 }
 
 /// Makes a table of how far hits and normals of `who` are off, where both hit the same place.
-pub(super) fn error_table(check: &CrossCheck, who: &str) -> Table {
+pub(super) fn error_table(check: &CrossCheck, subject: &str) -> Table {
     let f = &check.facets_vs_exact;
     let columns = [("", ""), ("median", ""), ("99 %", ""), ("largest", ""), ("unit", "")];
-    let title = format!("How far the {who} are from the spline, where both hit the same place");
+    let title = format!("How far the {subject} are from the spline, where both hit the same place");
     let mut table = Table::new("facet-errors", &title, &columns);
     for (name, s, unit) in [("distance along the ray", &f.t_error_mm, "mm"), ("normal", &f.normal_error_deg, "°")]
     {
@@ -287,9 +287,9 @@ impl CheckReport<'_> {
 
     /// Makes the section on errors of facets and of the normals on them.
     fn distance(&self) -> Section {
-        let who = if self.normals == "exact" { "facets' hits, moved to the spline," } else { "facets" };
+        let subject = if self.normals == "exact" { "facets' hits, moved to the spline," } else { "facets" };
         let section = Section::new("Facets against the spline")
-            .with_block(error_table(self.check, who))
+            .with_block(error_table(self.check, subject))
             .with_block(count_table(self.check));
         self.tables.iter().cloned().fold(section, |s, t| s.with_block(t))
     }

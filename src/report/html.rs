@@ -77,7 +77,6 @@ pub(super) fn page(report: &Report, png: PngOf) -> String {
 /// Writes a section of the page; neighbouring pictures share a row, at most two.
 fn section_markup(section: &Section, png: PngOf) -> Markup {
     let mut rows: Vec<Vec<&Block>> = Vec::new();
-    // Neighbouring pictures share a row, at most two.
     for block in &section.blocks {
         let picture = |b: &Block| matches!(b, Block::Chart(_) | Block::View(_));
         match rows.last_mut() {

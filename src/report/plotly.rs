@@ -1,10 +1,9 @@
 //! Charts and views as plotly.js figures.
 
-use super::chart::{
-    AxisStyle, Chart, Content, MapPoint, Marks, PALETTE, Series, SeriesStyle, colours, have_equal_units,
-};
+use super::chart::{Chart, Content, MapPoint, Marks, PALETTE, Series, SeriesStyle, colours, have_equal_units};
 use super::legend::legend_name;
 use super::map_labels::{LevelLabel, MapLabels, POINT_RADIUS, map_labels};
+use super::plotly_axis::axis;
 use super::plotly_data::{
     colour_scale, css, doubles, hover_place, indices, lighting, plain, singles, text_position,
 };
@@ -26,22 +25,6 @@ pub(super) fn script() -> String {
     flate2::read::GzDecoder::new(SCRIPT).read_to_string(&mut script).expect("the script in the program is whole");
     // Strings of it hold signatures of picture formats: control characters, which the escapes stand for as well.
     script.replace('\u{1a}', r"\x1a").replace('\u{1}', r"\x01")
-}
-
-/// Returns plotly's axis over these values. On a logarithmic one plotly names every digit of a decade, which overlap where there are more
-/// than two.
-fn axis(style: &AxisStyle, values: impl Iterator<Item = f64>) -> Value {
-    let good = values.filter(|v| v.is_finite() && *v > 0.0);
-    let (low, high) = good.fold((f64::INFINITY, 0f64), |(a, b), v| (a.min(v), b.max(v)));
-    let decades = (high / low).log10();
-    // Where plotly's own steps are good it is left to them.
-    let step = match decades {
-        d if !style.log || !d.is_finite() || d > 4.0 => Value::Null,
-        d if d > 1.5 => json!(1),
-        _ => json!("D2"),
-    };
-    json!({"dtick": step, "title": {"text": style.title()}, "type": if style.log { "log" } else { "linear" },
-        "automargin": true, "exponentformat": if style.log { "power" } else { "none" }})
 }
 
 /// Returns a chart as plotly's figure: an object with `data` and `layout`.
@@ -351,7 +334,6 @@ mod tests {
         }
     }
 
-    /// As a browser shows it: the first row that plotly gets stands at the lower end of the axis.
     /// Where a low beam was read on ±10.5°: 75L lies 0.29° above 50L, and its name above that of 50L, not below; none is left out.
     #[test]
     fn test_points_of_a_low_beam_all_have_their_names() {
@@ -374,6 +356,7 @@ mod tests {
         assert!(labels.sides.iter().all(Option::is_some), "{:?}", labels.sides);
     }
 
+    /// As a browser shows it: the first row that plotly gets stands at the lower end of the axis.
     #[test]
     fn pictures_begin_at_the_bottom() {
         let picture = Picture { width: 1, height: 2, rgb: vec![1, 2, 3, 4, 5, 6] };

@@ -42,7 +42,11 @@ impl Scale {
                 low = low.min(0.0);
             }
             // All values alike leave no range; half of the value on both sides makes one.
-            let pad = if high > low { 0.04 * (high - low) } else { 0.5 * high.abs().max(1.0) };
+            let pad = match high.abs() {
+                _ if high > low => 0.04 * (high - low),
+                0.0 => 0.5,
+                value => 0.5 * value,
+            };
             (low, high) = (if zero && low == 0.0 { 0.0 } else { low - pad }, high + pad);
         }
         Self { low, high, log: axis.log, from, to }
@@ -152,5 +156,18 @@ mod tests {
     fn a_short_axis_has_few_numbers() {
         assert_eq!(linear_scale([-15.0, 15.0], [0.0, 115.0]).ticks(), [-10.0, 0.0, 10.0]);
         assert_eq!(linear_scale([-15.0, 15.0], [660.0, 0.0]).ticks().len(), 7);
+    }
+
+    /// Values that are all the same stand in the middle, whatever their unit.
+    #[test]
+    fn one_value_has_room_on_both_sides() {
+        for value in [1e-6, -3.0, 0.0, 1e9] {
+            let axis = AxisStyle::linear("power", "W");
+            let scale = Scale::new([value, value].into_iter(), &axis, [0.0, 100.0], false);
+            let half = if value == 0.0 { 0.5 } else { 0.5 * f64::abs(value) };
+            for (at, place) in [(value, 50.0), (value + half, 100.0), (value - half, 0.0)] {
+                assert!((scale.position(at) - place).abs() < 1e-9, "{value}: {}", scale.position(at));
+            }
+        }
     }
 }

@@ -257,6 +257,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "cross_check",
             "canvas",
             "raster",
+            "plotly_axis",
             "plotly_data",
             "plotly",
             "html",

@@ -117,8 +117,8 @@ mod tests {
 
     #[test]
     fn verdicts_are_added_up_by_case_and_by_intersector() {
-        let row = |case: &str, who: &str, counts: [u64; 3]| {
-            json!({"case": case, "variant": "home", "intersector": who, "rays": counts.iter().sum::<u64>(),
+        let row = |case: &str, intersector: &str, counts: [u64; 3]| {
+            json!({"case": case, "variant": "home", "intersector": intersector, "rays": counts.iter().sum::<u64>(),
                 "right": counts[0], "flagged": counts[1], "wrong": counts[2]})
         };
         let rows = json!([
