@@ -39,10 +39,10 @@ fn bench(name: &str, model: &Model) {
     let mut seconds = [Vec::new(), Vec::new()];
     let mut cost = Cost::default();
     for _ in 0..ROUNDS {
-        for (who, times) in [&octree as &dyn Intersector, &polished].into_iter().zip(&mut seconds) {
+        for (intersector, times) in [&octree as &dyn Intersector, &polished].into_iter().zip(&mut seconds) {
             cost = Cost::default();
             let start = Instant::now();
-            who.intersect_batch(&rays, &mut hits, &mut cost);
+            intersector.intersect_batch(&rays, &mut hits, &mut cost);
             times.push(start.elapsed().as_secs_f64());
         }
     }

@@ -80,8 +80,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let mesh = tessellate::tessellate(&model, &tessellate::Settings::uniform(0.001)).mesh;
     let octree = Octree::build(&mesh, &octree::Settings::default());
-    let powers = [&Sphere(10.0) as &dyn Intersector, &octree].map(|who| {
-        let results = simulate(&scene, who, &run, &|_| true);
+    let powers = [&Sphere(10.0) as &dyn Intersector, &octree].map(|intersector| {
+        let results = simulate(&scene, intersector, &run, &|_| true);
         println!("power {:.5}, spot {:.4} mm", results.receivers[0].power, results.receivers[0].rms[0]);
         assert!(results.power.imbalance() < 1e-9);
         results.receivers[0].power

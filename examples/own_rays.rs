@@ -26,10 +26,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Ray::new(Point::new(0.0, 0.0, 20.0), Vector::new(radius * turn.cos(), radius * turn.sin(), z))
     };
     let rays: Vec<Ray> = (0..2000).map(fan).collect();
-    let answers = |who: &dyn Intersector| {
+    let answers = |intersector: &dyn Intersector| {
         let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
         let mut cost = Cost::default();
-        who.intersect_batch(&rays, &mut hits, &mut cost);
+        intersector.intersect_batch(&rays, &mut hits, &mut cost);
         (hits, cost)
     };
     let (on_octree, octree_cost) = answers(&octree);

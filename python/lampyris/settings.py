@@ -12,8 +12,8 @@ from ._types import tolerance_list, tolerance_range
 #: Settings of a trace that are none of the scene's own.
 Settings = dict[str, Any]
 
-#: Most rays of a run: counts are exact up to it.
-MOST_RAYS = 1 << 47
+#: Most rays of a run.
+MOST_RAYS = 20_000_000_000_000
 #: Seeds are unsigned integers of 64 bits.
 LARGEST_SEED = (1 << 64) - 1
 #: Numbers of threads are unsigned integers of 32 bits at least; no more are started than are of use.

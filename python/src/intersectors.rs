@@ -99,7 +99,7 @@ fn fault(k: usize, origin: &[f64], direction: &[f64]) -> String {
 
 /// Asks about all rays, on the current pool, until told to stop; gives the first ray that is none, where there is one.
 fn ask(
-    who: &dyn Intersector,
+    intersector: &dyn Intersector,
     rays: [&[f64]; 2],
     range: [f64; 2],
     into: &mut HitArrays,
@@ -129,7 +129,7 @@ fn ask(
             }
             let mut cost = Cost::default();
             hits[..count].fill(None);
-            who.intersect_batch(rays, &mut hits[..count], &mut cost);
+            intersector.intersect_batch(rays, &mut hits[..count], &mut cost);
             for (k, hit) in hits[..count].iter().enumerate() {
                 rows.write(k, hit.as_ref());
             }
@@ -243,10 +243,10 @@ impl Tracer {
             return Err(PyValueError::new_err("threads: at least one is needed; leave it out for all"));
         }
         let (from, along) = (rows(&origins)?, rows(&directions)?);
-        let who = self.structure.intersector();
+        let intersector = self.structure.intersector();
         let work = |stops: &AtomicBool| {
             let mut arrays = HitArrays::new(n);
-            let (cost, bad) = ask(who, [from, along], [t_min, t_max], &mut arrays, stops);
+            let (cost, bad) = ask(intersector, [from, along], [t_min, t_max], &mut arrays, stops);
             (arrays, cost, bad)
         };
         let (arrays, cost, bad) = if n < UNHEARD_RAYS {
@@ -271,12 +271,12 @@ impl Tracer {
     ) -> PyResult<(f64, f64, usize)> {
         let (origins, directions) = (columns(origins, "origins", 3)?, columns(directions, "directions", 3)?);
         let (from, along) = (rows(&origins)?, rows(&directions)?);
-        let who = self.structure.intersector();
+        let intersector = self.structure.intersector();
         let (n, range) = (length(&origins), [0.0, f64::INFINITY]);
         Ok(py.detach(|| {
             let start = Instant::now();
             let mut arrays = HitArrays::new(n);
-            ask(who, [from, along], range, &mut arrays, &AtomicBool::new(false));
+            ask(intersector, [from, along], range, &mut arrays, &AtomicBool::new(false));
             let into_arrays = start.elapsed().as_secs_f64();
             drop(arrays);
             let pairs = from.chunks(3).zip(along.chunks(3));
@@ -284,7 +284,7 @@ impl Tracer {
             let start = Instant::now();
             let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
             rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).for_each(|(rays, hits)| {
-                who.intersect_batch(rays, hits, &mut Cost::default());
+                intersector.intersect_batch(rays, hits, &mut Cost::default());
             });
             (into_arrays, start.elapsed().as_secs_f64(), hits.iter().flatten().count())
         }))

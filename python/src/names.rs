@@ -1,15 +1,12 @@
 //! Words and numbers that several functions take.
 
-use crate::errors::SceneError;
+use crate::errors::{SceneError, of_pipeline};
 use lampyris::intersect::NormalMode;
 use pyo3::prelude::*;
 
-/// The kind of normals of this name.
+/// The kind of normals of this name, in any case.
 pub(crate) fn normal_mode(name: &str) -> PyResult<NormalMode> {
-    NormalMode::ALL.into_iter().find(|m| m.name() == name).ok_or_else(|| {
-        let known = NormalMode::ALL.map(NormalMode::name).join(", ");
-        SceneError::new_err(format!("normals {name:?}: they are not known; use one of {known}"))
-    })
+    lampyris::pipeline::normal_mode(name).map_err(of_pipeline)
 }
 
 /// Refuses what is no range of tolerances.

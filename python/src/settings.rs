@@ -3,6 +3,7 @@
 use crate::errors::{SceneError, of_pipeline};
 use crate::names::{normal_mode, require_tolerance};
 use lampyris::pipeline::{MeshingSettings, RayRange, TracingSettings};
+use lampyris::simulate::MOST_RAYS;
 use pyo3::prelude::*;
 
 /// What is asked beside the scene; the Python side gives every key.
@@ -21,9 +22,6 @@ pub(crate) struct Settings {
     intersector: Option<String>,
     normals: Option<String>,
 }
-
-/// Most rays of a run: doubles count singly up to it.
-const MOST_RAYS: u64 = 1 << 47;
 
 impl Settings {
     pub(crate) fn meshing(&self) -> PyResult<MeshingSettings> {
@@ -54,7 +52,7 @@ impl Settings {
             && !(first.unwrap_or(0)..MOST_RAYS).contains(&end.wrapping_sub(1))
         {
             return Err(SceneError::new_err(format!(
-                "rays = {end}: a number of rays is whole, at least 1 and at most 1e14"
+                "rays = {end}: a number of rays is whole, at least 1 and at most 2e13"
             )));
         }
         let intersector = self.intersector.as_ref().map(|name| name.parse().map_err(of_pipeline)).transpose()?;

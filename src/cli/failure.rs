@@ -29,9 +29,8 @@ struct Excerpt {
 }
 
 impl Failure {
-    /// Makes a failure; what a terminal would obey in the message is written out.
+    /// Makes a failure; control codes that the message quotes are written out.
     fn new(code: u8, message: impl Into<String>) -> Self {
-        // What a message quotes may hold codes that a terminal obeys.
         Self { code, message: printable(&message.into()).into_owned(), help: None, excerpt: None }
     }
 

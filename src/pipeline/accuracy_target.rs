@@ -1,6 +1,7 @@
 //! A direction error asked for in place of a tolerance.
 
 use super::error::Error;
+use super::facets::mesh_settings;
 use super::intersectors::IntersectorChoice;
 use super::monitor::{Monitor, Stage, in_stage};
 use super::ray_recorder::RayRecorder;
@@ -59,21 +60,19 @@ pub fn settings_for_accuracy(
     if let Some(normals) = tracing.normals {
         ask.kinds = vec![normals];
     }
-    let mut product = ModelMeshSource::new(model);
-    // Faces of two bodies in one place are faceted once, as the run will.
-    product.mesher.glue_mm = scene.map_or(product.mesher.glue_mm, |scene| scene.run.glue_mm);
+    let source = mesh_source(&meshing, scene, model)?;
     let progress = |p: Progress| monitor.study_progress(&p);
     let bound = scene.map(|scene| scene.bind(model).map(|bound| (scene, bound))).transpose()?;
     let found = in_stage(monitor, Stage::Aiming, || match &bound {
-        None => meet_target(model, &product, &ask, &progress),
+        None => meet_target(model, &source, &ask, &progress),
         Some((scene, bound)) => {
             let rays = |seed: u64, count: u64| {
                 let settings = RunSettings { rays: count, seed, path_samples: 0, ..RunSettings::from(&scene.run) };
-                scene_rays(&product, model, &settings, bound)
+                scene_rays(&source, model, &settings, bound)
             };
             let relative_index = |face| bound.entered_body(face).map(|body| bound.relative_index(body));
             let light = JobLight { rays: &rays, relative_index: &relative_index };
-            meet_target_for_light(model, &product, &ask, light, &progress)
+            meet_target_for_light(model, &source, &ask, light, &progress)
         }
     });
     let found = found.map_err(refused_angle)?;
@@ -97,12 +96,28 @@ pub fn settings_for_accurate_facets(
     let Some(ask) = target(accuracy_deg, &meshing)? else { return Ok((meshing, None)) };
     // Readers of the facets interpolate between corners, and trace elsewhere: neither normals nor rays count.
     let ask = AccuracyTarget { kinds: vec![NormalMode::Bilinear], job_rays: 0.0, ..ask };
+    let source = mesh_source(&meshing, None, model)?;
     monitor.begin(Stage::Aiming);
-    let found = meet_target(model, &ModelMeshSource::new(model), &ask, &|p| monitor.study_progress(&p));
+    let found = meet_target(model, &source, &ask, &|p| monitor.study_progress(&p));
     monitor.end();
     let found = found.map_err(refused_angle)?;
     monitor.aimed(&found.answer);
     Ok((MeshingSettings { plan: Some(found.plan.clone()), ..meshing }, Some(found)))
+}
+
+/// Returns what makes the facets of the search: with the angle and the tolerances of single places of the run itself.
+///
+/// # Errors
+/// As of [`mesh_settings`].
+fn mesh_source<'m>(
+    meshing: &MeshingSettings,
+    scene: Option<&Scene>,
+    model: &'m Model,
+) -> Result<ModelMeshSource<'m>, Error> {
+    let mesher = mesh_settings(meshing, scene, model)?;
+    let mut source = ModelMeshSource::new(model);
+    source.mesher = mesher;
+    Ok(source)
 }
 
 /// Returns the error of an angle that nothing can be aimed at.
@@ -129,12 +144,12 @@ fn target(accuracy_deg: Option<f64>, meshing: &MeshingSettings) -> Result<Option
 /// Traces the scene's run on the spline and returns a sample of its segments, from the sources and from surfaces, lifted off the latter: at
 /// most as many as the run has rays.
 fn scene_rays(
-    product: &ModelMeshSource<'_>,
+    source: &ModelMeshSource<'_>,
     model: &Model,
     settings: &RunSettings,
     bound: &crate::simulate::BoundScene,
 ) -> Vec<Ray> {
-    let exact: &dyn Intersector = product.spline();
+    let exact: &dyn Intersector = source.spline();
     // As many as are traced: about every ray meets one surface.
     let recorder = RayRecorder::new(exact, settings.rays, settings.rays);
     simulate(bound, &recorder, settings, &|_| true);

@@ -78,17 +78,17 @@ fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
         "its parts are",
         name,
         &known,
-        "its parts have no names; select faces by the number of their entity, as in --face #17=0.01",
+        "its parts have no names; select faces by the number of their entity, as in --face 17=0.01",
     )))
 }
 
-/// Selects a face by its name or, as `#ID`, by its entity; a face that is called `#17` wins over entity 17.
+/// Selects a face by its name or by the number of its entity, with or without `#`, which a shell may take for a comment; a face that is
+/// called `17` wins over entity 17.
 ///
 /// # Errors
 /// When there is none, with the names that are like it.
 fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Error> {
-    // As STEP writes entities.
-    let entity = name.strip_prefix('#').and_then(|id| id.parse().ok());
+    let entity = name.strip_prefix('#').unwrap_or(name).parse().ok();
     let faces = || model.placed_faces().filter_map(|f| f.face);
     if faces().any(|f| f.name == name) {
         return Ok(FaceSelector::Face(name.to_owned()));
@@ -102,7 +102,7 @@ fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Error> {
         "its faces are",
         name,
         &known,
-        "its faces have no names; write the number of the entity in the file, as in #17=0.01",
+        "its faces have no names; write the number of the entity in the file, as in 17=0.01",
     )))
 }
 

@@ -47,6 +47,25 @@ impl IntersectorChoice {
     }
 }
 
+/// Refuses normals of facets that are asked for beside the spline or above it: it has normals of its own.
+///
+/// # Errors
+/// Then, and when the scene names an intersector or normals that are not known.
+pub fn refuse_facet_normals(tracing: &TracingSettings, scene: Option<&Scene>) -> Result<(), Error> {
+    let IntersectorChoice { intersector, normals } = IntersectorChoice::new(tracing, scene)?;
+    // Settings that stand above the scene may leave its normals without meaning.
+    let is_asked = tracing.normals.is_some()
+        || tracing.intersector.is_none() && scene.is_some_and(|scene| scene.accuracy.normals.is_some());
+    if intersector != IntersectorKind::Exact || !is_asked || normals == NormalMode::Exact {
+        return Ok(());
+    }
+    let error = Error::setting(
+        "normals",
+        format!("{normals} with the intersector exact: the spline has normals of its own"),
+    );
+    Err(error.help("leave the normals out, or choose an intersector on facets, as octree"))
+}
+
 /// What stands for a group itself: the spline, and the facets of faces that have none, as ready meshes have none.
 #[derive(Debug)]
 pub(super) struct TrueSurface {

@@ -6,7 +6,7 @@ use super::error::Error;
 use super::expected_facets::expected_facets;
 use super::facets::mesh_settings;
 use super::fingerprint::run_fingerprint;
-use super::intersectors::{self, IntersectorChoice, TrueSurface, farthest_start};
+use super::intersectors::{self, IntersectorChoice, TrueSurface, farthest_start, refuse_facet_normals};
 use super::loading::LoadedModel;
 use super::monitor::{Monitor, Stage};
 use super::scene_job::SceneJob;
@@ -94,6 +94,7 @@ impl PreparedScene {
         // All that can be refused is refused before facets are made, which may take minutes.
         let threads = job.tracing.thread_count()?;
         let choice = IntersectorChoice::new(&job.tracing, Some(&job.scene))?;
+        refuse_facet_normals(&job.tracing, Some(&job.scene))?;
         let own_rays = job.tracing.own_rays_note(&job.scene)?;
         let mut bound = job.scene.bind(&job.loaded.model)?;
         bound.notes.extend(own_rays);

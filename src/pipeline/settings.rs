@@ -149,7 +149,7 @@ impl FromStr for IntersectorKind {
 ///
 /// # Errors
 /// When there is none.
-pub(super) fn normal_mode(name: &str) -> Result<NormalMode, Error> {
+pub fn normal_mode(name: &str) -> Result<NormalMode, Error> {
     NormalMode::ALL.into_iter().find(|mode| mode.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
         Error::setting("normals", format!("{name}: they are not known"))
             .help(format!("use one of {}", NormalMode::ALL.map(NormalMode::name).join(", ")))

@@ -21,12 +21,26 @@ fn one_face_of_a_lens_is_finer_than_the_rest() {
     let (coarse, fine) = (facets(&["--tolerance", "0.1"]), facets(&["--tolerance", "0.001"]));
     let mut each = 0;
     // The file's three faces: two of them are curved.
-    for face in ["#17", "#54", "#109"] {
+    for face in ["17", "#54", "#109"] {
         let one = facets(&["--tolerance", "0.1", "--face", &format!("{face}=0.001")]);
         assert!(one >= coarse && one < fine, "{face}: {one} of {coarse} and {fine}");
         each += usize::from(one > 2 * coarse);
     }
     assert!(each >= 1);
+}
+
+/// What a search says of its facets is true of those that are made: with the angle and the tolerances of single faces.
+#[test]
+fn an_accuracy_is_reached_with_the_other_settings_of_the_facets() {
+    for options in [&["--angle", "2"][..], &["--face", "17=0.001"]] {
+        let lens = fixture("step/lens_planoconvex_analytic.stp").display().to_string();
+        let folder = tempfile::tempdir().unwrap();
+        let all = [&["facet", &lens, "--accuracy", "0.5deg", "--json"], options].concat();
+        let (code, out, err) = lampyris_in(folder.path(), &all);
+        assert_eq!(code, 0, "{err}");
+        let report: Value = serde_json::from_str(&out).unwrap();
+        assert_eq!(report["accuracy"]["facets"], report["facets"], "{options:?}");
+    }
 }
 
 #[test]

@@ -17,9 +17,9 @@ const SINGLE: f64 = 1e-4;
 
 /// Rays that hit otherwise than the octree's, which are `rays` long.
 fn differing(octree: &Octree, other: &dyn Intersector, rays: &[Ray]) -> usize {
-    let ask = |who: &dyn Intersector| -> Vec<Option<Hit>> {
+    let ask = |intersector: &dyn Intersector| -> Vec<Option<Hit>> {
         let mut hits = vec![None; rays.len()];
-        who.intersect_batch(rays, &mut hits, &mut Cost::default());
+        intersector.intersect_batch(rays, &mut hits, &mut Cost::default());
         hits
     };
     let same = |(a, b): &(&Option<Hit>, &Option<Hit>)| match (a, b) {

@@ -112,13 +112,13 @@ impl Scene {
 }
 
 /// One by one and in a batch: the same bits.
-fn ask(who: &dyn Intersector, rays: &[Ray]) -> Vec<Option<Hit>> {
+fn ask(intersector: &dyn Intersector, rays: &[Ray]) -> Vec<Option<Hit>> {
     let mut hits = vec![None; rays.len()];
     let mut cost = Cost::default();
-    who.intersect_batch(rays, &mut hits, &mut cost);
+    intersector.intersect_batch(rays, &mut hits, &mut cost);
     assert_eq!(cost.rays, rays.len() as u64);
     for (ray, hit) in rays.iter().zip(&hits) {
-        assert_eq!(who.intersect(ray, &mut Cost::default()), *hit, "{ray:?}");
+        assert_eq!(intersector.intersect(ray, &mut Cost::default()), *hit, "{ray:?}");
     }
     hits
 }

@@ -34,9 +34,9 @@ fn same(name: &str, mesh: &FacetMesh, beam: Beam, rays: &[Ray]) {
     let judge = Bvh::build(mesh, &bvh::Settings::default());
     let beams = [(Beam::Point(Point::splat(0.5)), u64::MAX), (beam, u64::MAX)];
     knowing.prepare_for(&ExpectedRays { rays: u64::MAX, threads: 2, beams: &beams, sag: 0.0 });
-    let ask = |who: &dyn Intersector| {
+    let ask = |intersector: &dyn Intersector| {
         let (mut hits, mut cost) = (vec![None; rays.len()], Cost::default());
-        who.intersect_batch(rays, &mut hits, &mut cost);
+        intersector.intersect_batch(rays, &mut hits, &mut cost);
         (hits, cost)
     };
     let ((known, less), (walked, more)) = (ask(&knowing), ask(&plain));

@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
     /// Print one JSON document on stdout instead of text
     #[arg(long, global = true, display_order = 901, help_heading = EVERYWHERE)]
     pub(crate) json: bool,
-    /// No messages and no progress, but why the exit code is not 0
+    /// Print nothing but results and the reason for a non-zero exit code
     #[arg(short, long, global = true, display_order = 902, help_heading = EVERYWHERE)]
     pub(crate) quiet: bool,
     /// Say more; twice for everything
@@ -114,10 +114,10 @@ pub(crate) enum Command {
         /// The scene, where it is no longer at the place that the parts name
         #[arg(long, value_name = "FILE")]
         scene: Option<PathBuf>,
-        /// Wait at most so many seconds until all parts are there
+        /// Seconds to wait for parts that are still missing
         #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true)]
         wait: Option<f64>,
-        /// As many rays as the merged run is to have, where further ranges of a run that grows are still to come
+        /// Rays of the whole run, where further ranges of a run that grows are still to come
         #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
         rays: Option<u64>,
         /// Say how many rays are still missing until the statistical error (1σ) of a receiver's power, or of its :cells, is below P
@@ -198,8 +198,9 @@ pub(crate) enum Command {
     },
 }
 
-/// What `facet` takes.
+/// What `facet` takes. Roles are those of a scene, which it has not.
 #[derive(Debug, clap::Args)]
+#[command(mut_arg("role", |role| role.hide(true)))]
 pub(crate) struct FacetCommand {
     /// STEP file
     pub(crate) file: PathBuf,

@@ -3,6 +3,7 @@
 
 use crate::intersect::NormalMode;
 use crate::pipeline::{IntersectorKind, MeshingSettings, RayRange, TracingSettings};
+use crate::simulate::MOST_RAYS;
 use crate::tessellate::LEAST_TOLERANCE_MM;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
@@ -36,7 +37,8 @@ pub(crate) struct MeshingOptions {
     /// Tolerance of one part, by name; may be given several times
     #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = parse_part)]
     pub(crate) part: Vec<(String, [f64; 2])>,
-    /// Tolerance of one face, by its name or as #ID of its entity in the file; may be given several times, and wins over that of its part
+    /// Tolerance of one face, by its name or the number of its entity in the file; may be given several times, and wins over that of its
+    /// part
     #[arg(long, help_heading = "Facets", value_name = "NAME=MIN..MAX", value_parser = parse_face)]
     pub(crate) face: Vec<(String, [f64; 2])>,
     /// Tolerance of all faces of one optical role in the scene: mirror, interface, coated or absorber; may be given several times
@@ -162,9 +164,9 @@ fn parse_part(text: &str) -> Result<(String, [f64; 2]), String> {
     parse_place(text, "the name of the part", "NAME=MIN..MAX, as in cover=0.01..0.05")
 }
 
-/// Reads the name of a face, or `#` and the number of its entity, and its tolerances in mm.
+/// Reads the name of a face, or the number of its entity, and its tolerances in mm.
 fn parse_face(text: &str) -> Result<(String, [f64; 2]), String> {
-    parse_place(text, "the name of the face or its #ID", "NAME=MIN..MAX or #ID=MIN..MAX, as in #17=0.01..0.05")
+    parse_place(text, "the name of the face or its number", "NAME=MIN..MAX or ID=MIN..MAX, as in 17=0.01..0.05")
 }
 
 /// Reads an optical role and its tolerances in mm, ROLE=MIN..MAX.
@@ -233,9 +235,6 @@ fn parse_ray_range(text: &str) -> Result<RayRange, String> {
     Ok(RayRange { first: Some(first), end })
 }
 
-/// Largest number of rays: doubles, in which it may be written, count singly up to it.
-const MOST_RAYS: f64 = 9e15;
-
 /// Relative error of a decimal number times a power of ten: half a unit in the last place of each factor and of the product.
 const PRODUCT_ROUNDING: f64 = 1.5 * f64::EPSILON;
 
@@ -251,10 +250,10 @@ pub(crate) fn parse_count(text: &str) -> Result<u64, String> {
     };
     let value = digits.parse::<f64>().map_err(|_| format!("'{text}' is no number"))? * factor;
     let whole = value.round();
-    if (1.0..=MOST_RAYS).contains(&whole) && (value - whole).abs() <= PRODUCT_ROUNDING * whole {
+    if (1.0..=MOST_RAYS as f64).contains(&whole) && (value - whole).abs() <= PRODUCT_ROUNDING * whole {
         Ok(whole as u64)
     } else {
-        Err(format!("a number of rays is whole and at least 1, not {text}"))
+        Err(format!("a number of rays is whole, from 1 to {:e}, not {text}", MOST_RAYS as f64))
     }
 }
 
@@ -310,6 +309,7 @@ mod tests {
                 && parse_count("1.5").is_err()
                 && parse_count("").is_err()
         );
+        assert!(parse_count("2e13").is_ok() && parse_count("20000000000001").unwrap_err().contains("2e13"));
     }
 
     #[test]
@@ -331,9 +331,7 @@ mod tests {
     fn parts_and_angles() {
         assert_eq!(parse_part("a=b=0.1"), Ok(("a=b".into(), [0.1, 0.1])));
         assert!(parse_part("=0.1").unwrap_err().contains("name of the part"));
-        assert!(
-            parse_face("x").unwrap_err().contains("#17=") && parse_role("=1").unwrap_err().contains("the role")
-        );
+        assert!(parse_face("x").unwrap_err().contains("17=") && parse_role("=1").unwrap_err().contains("the role"));
         assert_eq!((parse_angle("5deg"), parse_accuracy("0.05deg")), (Ok(5.0), Ok(0.05)));
         assert!(parse_angle("90").is_err() && parse_accuracy("-1deg").is_err());
     }

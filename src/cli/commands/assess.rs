@@ -93,12 +93,24 @@ impl ResultsFile {
         // The second one tells whether there is a choice to make.
         match (found.next(), found.next()) {
             (Some(one), None) => Ok(one),
-            (None, _) => Err(failure("no far field in candela over H and V")),
+            (None, _) => Err(failure(&match name {
+                Some(name) => {
+                    format!("no far field '{name}' in candela over H and V; its receivers are {}", self.receivers())
+                }
+                None => "no far field in candela over H and V".into(),
+            })),
             (Some(a), Some(b)) => Err(failure(&format!(
                 "several far fields: choose one by --receiver {} or {}",
                 a["name"], b["name"]
             ))),
         }
+    }
+
+    /// Lists the names of the receivers.
+    fn receivers(&self) -> String {
+        let receivers = self.results["receivers"].as_array().into_iter().flatten();
+        let names: Vec<&str> = receivers.filter_map(|r| r["name"].as_str()).collect();
+        names.join(", ")
     }
 
     /// Returns how many rays were traced, on which the prediction of errors for more rays rests; fails where the results do not say.

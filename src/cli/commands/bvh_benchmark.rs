@@ -159,8 +159,8 @@ fn write_rays(path: &Path, rays: &[Ray]) -> Result<(), Failure> {
 /// One of those that race.
 struct Contender<'a> {
     name: &'static str,
-    build: &'static str,
-    who: &'a dyn Intersector,
+    build: &'a str,
+    intersector: &'a dyn Intersector,
 }
 
 /// Rays of one kind on one mesh.
@@ -187,15 +187,17 @@ impl BvhBenchmark {
         let shipped = Bvh::build(mesh, &bvh::Settings { cured: false, ..Default::default() });
         let slow = Bvh::build(mesh, &bvh::Settings { quality: bvh::Quality::VerySlow, ..Default::default() });
         let (parry, f64_bvh) = (Parry::build(mesh), BinaryBvh::build(mesh));
+        let [ours, of_books] = [octree::Settings::default(), octree::Settings::textbook()]
+            .map(|settings| format!("T = {}", settings.threshold));
         let mut contenders = vec![
-            Contender { name: "octree", build: "T = 128", who: octree },
-            Contender { name: "octree, textbook", build: "T = 8", who: &textbook },
-            Contender { name: "bvh2", build: "medium", who: &binary },
-            Contender { name: "cwbvh", build: "medium", who: &cured },
-            Contender { name: "cwbvh", build: "very slow", who: &slow },
-            Contender { name: "cwbvh as shipped", build: "medium", who: &shipped },
-            Contender { name: "parry3d", build: "binned", who: &parry },
-            Contender { name: "bvh", build: "f64", who: &f64_bvh },
+            Contender { name: "octree", build: &ours, intersector: octree },
+            Contender { name: "octree, textbook", build: &of_books, intersector: &textbook },
+            Contender { name: "bvh2", build: "medium", intersector: &binary },
+            Contender { name: "cwbvh", build: "medium", intersector: &cured },
+            Contender { name: "cwbvh", build: "very slow", intersector: &slow },
+            Contender { name: "cwbvh as shipped", build: "medium", intersector: &shipped },
+            Contender { name: "parry3d", build: "binned", intersector: &parry },
+            Contender { name: "bvh", build: "f64", intersector: &f64_bvh },
         ];
         let of_embree = |primitives| {
             let built = embree.map(|(path, library)| Embree::build(library, path, mesh, primitives));
@@ -203,7 +205,7 @@ impl BvhBenchmark {
         };
         let (triangles, quads) = (of_embree(Primitives::Triangles)?, of_embree(Primitives::Quads)?);
         for (build, built) in [("triangles", &triangles), ("quads", &quads)] {
-            contenders.extend(built.as_ref().map(|who| Contender { name: "embree", build, who }));
+            contenders.extend(built.as_ref().map(|intersector| Contender { name: "embree", build, intersector }));
         }
         let mut shape = OctreeShape::new(octree);
         for (kind, rays) in kinds {
@@ -220,11 +222,11 @@ impl BvhBenchmark {
     fn measure_rays(&mut self, question: &Question, contenders: &[Contender], threads: usize) -> Cost {
         let Question { mesh, kind, rays, .. } = *question;
         // The octree's answers are what others are compared with; who is right is asked of the arbiter.
-        let truth = ask_rays(contenders[0].who, rays).0;
+        let truth = ask_rays(contenders[0].intersector, rays).0;
         let hits = truth.iter().flatten().count();
         let mut judged: Vec<(Comparison, Cost)> = (contenders.iter())
             .map(|contender| {
-                let (hits, cost) = ask_rays(contender.who, rays);
+                let (hits, cost) = ask_rays(contender.intersector, rays);
                 (Comparison::new(mesh, rays, &truth, &hits), cost)
             })
             .collect();
@@ -237,11 +239,11 @@ impl BvhBenchmark {
             }
             // As many rays for each thread as for one: waking the threads took a tenth of a shorter round.
             let crowd = rays.repeat(threads);
-            let shared: Vec<ParallelBatches> = contenders.iter().map(|e| ParallelBatches(e.who)).collect();
+            let shared: Vec<ParallelBatches> = contenders.iter().map(|e| ParallelBatches(e.intersector)).collect();
             let timed: Vec<TimedIntersector> = (contenders.iter().zip(&shared))
                 .map(|(contender, shared)| {
-                    let who: &dyn Intersector = if threads > 1 { shared } else { contender.who };
-                    TimedIntersector { name: contender.name, who, batch }
+                    let intersector: &dyn Intersector = if threads > 1 { shared } else { contender.intersector };
+                    TimedIntersector { name: contender.name, intersector, batch }
                 })
                 .collect();
             let timings = measure(&timed, &crowd, ROUNDS);
@@ -274,7 +276,7 @@ fn timing_row(
     (comparison, cost): &(Comparison, Cost),
 ) -> Value {
     let Question { model, mesh, kind, rays } = *question;
-    let footprint = contender.who.footprint();
+    let footprint = contender.intersector.footprint();
     let rate = |seconds: f64| (rays.len() * threads) as f64 / seconds.max(SHORTEST_ROUND) / MILLION;
     let per_ray = |n: u64| n as f64 / rays.len().max(1) as f64;
     json!({
@@ -329,10 +331,10 @@ fn edge_rays(mesh: &FacetMesh, bounds: &Aabb, seed: u64, count: u64) -> Vec<Ray>
 }
 
 /// Asks a structure all rays as one batch; returns its answers in their order, and what that cost.
-fn ask_rays(who: &dyn Intersector, rays: &[Ray]) -> (Vec<Option<Hit>>, Cost) {
+fn ask_rays(intersector: &dyn Intersector, rays: &[Ray]) -> (Vec<Option<Hit>>, Cost) {
     let mut hits = vec![None; rays.len()];
     let mut cost = Cost::default();
-    who.intersect_batch(rays, &mut hits, &mut cost);
+    intersector.intersect_batch(rays, &mut hits, &mut cost);
     (hits, cost)
 }
 
@@ -375,18 +377,17 @@ impl Comparison {
 fn answer_text(rows: &[Value]) -> String {
     let most = rows.iter().filter_map(|r| r["facets"].as_u64()).max().unwrap_or(0);
     let kind = if rows.iter().any(|r| r["rays_kind"] == GIVEN) { GIVEN } else { "incoherent" };
-    let rate = |name: &str, build: &str, call: &str| {
+    let rate = |name: &str, call: &str| {
         let fits = |r: &&Value| {
             r["facets"] == most
                 && r["intersector"] == name
-                && r["build"] == build
                 && r["call"] == call
                 && r["rays_kind"] == kind
                 && r["threads"] == 1
         };
         rows.iter().find(fits).and_then(|r| r["mrays_per_s_median"].as_f64()).unwrap_or(f64::NAN)
     };
-    let (octree, cwbvh) = (rate("octree", "T = 128", "batch"), rate("cwbvh as shipped", "medium", "single"));
+    let (octree, cwbvh) = (rate("octree", "batch"), rate("cwbvh as shipped", "single"));
     format!(
         "With {} facets and {kind} rays on one thread the octree, asked in batches, answers **{} million rays/s**, obvhs' CwBvh as \
          shipped, asked ray by ray, {}: **{} ×** (medians of {ROUNDS} alternating rounds).",

@@ -292,9 +292,9 @@ fn own_rays(
 /// Returns how far hits moved to the spline are from it, along the ray in mm and in the normal in degrees. Beyond `near` mm it is another
 /// crossing, which the facets' own verdict counts.
 fn polished_errors(polish: &dyn Intersector, exact: &dyn Intersector, rays: &[Ray], near: f64) -> [Summary; 2] {
-    let ask = |who: &dyn Intersector| {
+    let ask = |intersector: &dyn Intersector| {
         let mut hits = vec![None; rays.len()];
-        who.intersect_batch(rays, &mut hits, &mut Cost::default());
+        intersector.intersect_batch(rays, &mut hits, &mut Cost::default());
         hits
     };
     let (mut distance, mut angle) = (Quantiles::default(), Quantiles::default());

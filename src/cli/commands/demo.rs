@@ -12,7 +12,7 @@ use crate::formats::{read_bytes, write_atomic};
 use crate::pipeline::{
     LoadedModel, MeshingSettings, PreparedScene, SceneJob, TraceRequest, TracingSettings, read_models,
 };
-use crate::report::{figures, grouped, seconds};
+use crate::report::{figures, grouped, seconds, tolerance_text};
 use crate::simulate::Scene;
 use crate::step;
 use std::path::Path;
@@ -55,9 +55,8 @@ pub(crate) fn run(
     let monitor = TerminalMonitor::new(console);
     let job = SceneJob { meshing, tracing, ..SceneJob::new(scene, loaded) };
     let prepared = PreparedScene::new(job, &monitor)?;
-    let [low, high] = prepared.mesh_settings.tolerance;
-    let what =
-        format!("{} facets within {low}..{high} mm of the splines", grouped(prepared.facets.facet_count() as u64));
+    let facets = grouped(prepared.facets.facet_count() as u64);
+    let what = format!("{facets} facets within {} of the splines", tolerance_text(prepared.mesh_settings.range()));
     say_step("tessellate", what, prepared.tessellation_seconds);
     let start = std::time::Instant::now();
     // Claimed before the trace, which would be lost on a folder that cannot be written.

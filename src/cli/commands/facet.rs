@@ -13,7 +13,7 @@ use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, lower_extension
 use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
 use crate::pipeline::{mesh_settings, settings_for_accurate_facets, tessellate_model};
-use crate::report::{bytes, figures, grouped, seconds};
+use crate::report::{bytes, figures, grouped, seconds, tolerance_text};
 use crate::step::peak_bytes;
 use crate::tessellate::{Report, sampled_sag};
 use crate::truck::baseline;
@@ -166,8 +166,7 @@ fn meshing_summary(r: &Report) -> String {
         format!("{}: {} quads, {} triangles; {} vertices", n(r.facets), n(r.quads), n(r.triangles), n(r.vertices)),
     );
     line("quads", format!("{} % of the area", figures(100.0 * r.quad_area_share, 4)));
-    let [low, high] = [r.tolerance_mm.min, r.tolerance_mm.max].map(|t| figures(t, 4));
-    line("tolerance", if low == high { format!("{low} mm") } else { format!("{low}..{high} mm") });
+    line("tolerance", tolerance_text([r.tolerance_mm.min, r.tolerance_mm.max]));
     line(
         "certified",
         format!("{} of {} facets are proved to be within their tolerance", n(r.certified), n(r.facets)),

@@ -12,14 +12,14 @@ use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, saved_header};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::results_folder::RunRemarks;
-use crate::cli::work::shards::{is_tally, replicates_of_shard};
+use crate::cli::work::shards::is_tally;
 use crate::cli::work::tally_file::TallyHeader;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::usage::Usage;
 use crate::cli::work::{input_files, lost_rays, results_folder};
 use crate::pipeline::{ErrorTarget, PreparedScene, SceneJob, TraceRequest, read_cached_scene};
-use crate::simulate::{GROWING_REPLICATE, PartialRun};
+use crate::simulate::{GROWING_REPLICATE, PartialRun, shard_replicates};
 use serde_json::json;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -300,14 +300,14 @@ fn sum_parts(
 /// Returns a text of how many replicates are missing, and which shards or, of a run that grows, which rays they are.
 fn missing_parts(whole: &PartialRun, header: &TallyHeader) -> String {
     let absent = |r: &u32| whole.done.binary_search(r).is_err();
-    let count = (0..whole.replicates).filter(absent).count();
+    let count = whole.replicates as usize - whole.done.len();
     let mut text = format!("{count} of the {} replicates of the run are missing", whole.replicates);
     if whole.grows && (header.first_ray.is_some() || header.shard.is_none()) {
         text += &format!(": rays {}", missing_rays(whole).join(", "));
     } else if let Some([_, n]) = header.shard {
         let shards: Vec<String> = (0..n)
             // A shard without any of its replicates, or with some of them only.
-            .filter(|&k| replicates_of_shard(0..whole.replicates, [k, n]).any(|r| absent(&r)))
+            .filter(|&k| shard_replicates(0..whole.replicates, [k, n]).any(|r| absent(&r)))
             .map(|k| format!("{}/{n}", k + 1))
             .collect();
         text += &format!(": those of shard {}", shards.join(", "));

@@ -9,8 +9,8 @@ use crate::cli::work::output_place::make_folder;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::formats::{read_text, write_vtp};
 use crate::pipeline::PreparedScene;
-use crate::report::path_lines;
-use crate::simulate::{PathVertex, Results, RunSettings, replay};
+use crate::report::{figures, path_lines};
+use crate::simulate::{MOST_RAYS, PathVertex, Results, RunSettings, replay};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -74,6 +74,9 @@ fn read_ledger(text: &str, request: &mut ReplayRequest) -> Result<(), String> {
         let grows = last.next().and_then(|s| s.parse().ok());
         let grows = grows.ok_or(format!("line {}: the last cell must be true or false", k + 2))?;
         let (rays, seed) = (number(last.next())?, number(last.next())?);
+        if rays == 0 || rays > MOST_RAYS {
+            return Err(format!("line {}: no run has {rays} rays", k + 2));
+        }
         let run = LedgerRun { seed, rays, grows };
         // One ledger is of one run; of two nobody could say which seed holds.
         if request.run.replace(run).is_some_and(|other| other != run) {
@@ -117,17 +120,29 @@ pub(crate) fn run(
     Ok(())
 }
 
+/// Head of the powers of vertices.
+const POWER: &str = "power [of an average ray]";
+
 /// Prints every vertex of every path, in mm and scene coordinates, and where and why a ray was lost.
 fn print_paths(prepared: &PreparedScene, found: &Results) -> Result<(), Failure> {
     // Branches of a split ray follow each other.
     for path in found.paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
         print(&format!("ray {}, branch {}\n", path[0].ray, path[0].branch))?;
+        // Widths as those of the rows.
+        print(&format!(
+            "  {:<6}  {:<12} {:>14} {:>14} {:>14}  {}\n",
+            "bounce", "event", "x [mm]", "y [mm]", "z [mm]", POWER
+        ))?;
         for v in path {
             let p = v.point;
-            let event = format!("{:?}", v.event);
+            let event = v.event.name().replace('_', " ");
             print(&format!(
-                "  {:>5}  {event:<12} {:>22} {:>22} {:>22}  power {}\n",
-                v.bounce, p.x, p.y, p.z, v.power
+                "  {:>6}  {event:<12} {:>14.6} {:>14.6} {:>14.6}  {}\n",
+                v.bounce,
+                p.x,
+                p.y,
+                p.z,
+                figures(v.power, 6)
             ))?;
         }
         for l in found.ledger.iter().filter(|l| (l.ray, l.branch) == (path[0].ray, path[0].branch)) {

@@ -23,7 +23,7 @@ use crate::pipeline::{
     IntersectorChoice, LoadedModel, MeshingSettings, TracingSettings, mesh_settings, tessellate_model,
     with_intersector,
 };
-use crate::report::{Section, View, study_report};
+use crate::report::{Section, View, study_report, tolerance_text};
 use crate::simulate::{RunSettings, Scene};
 use crate::study::complexity::Method;
 use crate::study::{
@@ -141,7 +141,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         StudyKind::Complexity => study_complexity(command, seed, threads, &progress)?,
         StudyKind::Stability => study_stability(&progress)?,
         StudyKind::Bvh => {
-            let race = BvhCommand {
+            let benchmark = BvhCommand {
                 file: command.file,
                 rays_in: command.rays_in,
                 embree: command.embree,
@@ -149,7 +149,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
                 meshing: &command.meshing,
                 tracing: &command.tracing,
             };
-            let benchmark = super::bvh_benchmark::run(&race, console, &progress)?;
+            let benchmark = super::bvh_benchmark::run(&benchmark, console, &progress)?;
             shapes = benchmark.shapes;
             StudyResult::new(&benchmark.rows, benchmark.answer)?
         }
@@ -253,10 +253,10 @@ fn error_view(command: &StudyCommand, console: &Console) -> Result<Section, Fail
     let (errors, _) = super::facet::normal_errors(&loaded.model, &made.mesh);
     let bound = scene.as_ref().map(|s| s.bind(&loaded.model)).transpose()?;
     let facets = crate::cli::output::appearance::grouped_facets(&loaded.model, &made.mesh, bound.as_ref());
-    let [low, high] = settings.tolerance;
     let text = format!(
-        "Largest angle between the bilinear normal and the spline's on each of {} facets within {low}..{high} mm.",
-        made.mesh.facets.len()
+        "Largest angle between the bilinear normal and the spline's on each of {} facets within {}.",
+        made.mesh.facets.len(),
+        tolerance_text(settings.range())
     );
     let view =
         View::of_values("error", "Error of the normal", &facets, "normal error (°)", &errors, ColourMap::Viridis);
@@ -378,8 +378,9 @@ fn study_effects(command: &StudyCommand, threads: usize, console: &Console) -> R
     let mut run = RunSettings { threads, ..RunSettings::from(&scene.run) };
     run.rays = command.tracing.rays().unwrap_or(run.rays.min(1_000_000));
     run.seed = command.tracing.seed.unwrap_or(run.seed);
-    let rows = with_intersector(choice, &loaded.model, &made.mesh, &TerminalMonitor::new(console), |who, _| {
-        effects::effects(&name, &bound, who, &run, 5)
-    });
+    let rows =
+        with_intersector(choice, &loaded.model, &made.mesh, &TerminalMonitor::new(console), |intersector, _| {
+            effects::effects(&name, &bound, intersector, &run, 5)
+        });
     Ok(StudyResult { seed: Some(run.seed), ..StudyResult::new(&rows, effects::answer(&rows))? })
 }

@@ -17,10 +17,9 @@ use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards, tally_file};
-use crate::intersect::NormalMode;
 use crate::pipeline::{
-    AccurateSettings, ErrorTarget, IntersectorChoice, IntersectorKind, MeshingSettings, PreparedScene, SceneJob,
-    SceneResults, TraceRequest, TracingSettings, read_cached_scene, settings_for_accuracy,
+    AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, SceneJob, SceneResults, TraceRequest,
+    TracingSettings, read_cached_scene, refuse_facet_normals, settings_for_accuracy,
 };
 use crate::report::{grouped, seconds};
 use crate::simulate::{PartialRun, PathSink, PathVertex, Scene};
@@ -63,8 +62,8 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let monitor = TerminalMonitor::new(console);
     let cache = cache_folder::cache(&extra.cache)?;
     let (mut scene, loaded) = read_cached_scene(command.scene, cache.as_ref(), &monitor)?;
-    refuse_normals(&tracing, Some(&scene))?;
-    // A receiver that the scene has not is said before its facets are made.
+    refuse_facet_normals(&tracing, Some(&scene))?;
+    // An unknown receiver is reported before time is spent on facets.
     let target = extra.until_error.as_deref().map(|text| ErrorTarget::new(text, &scene)).transpose()?;
     let has_results = shard.is_none() && !is_range && replay.is_empty();
     refuse_inputs(command, &scene, has_results)?;
@@ -121,7 +120,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
 /// For the first that has no meaning, names a file of a kind that is not written, or is not looked at.
 fn check_options(command: &TraceCommand) -> Result<(), Failure> {
     let extra = command.extra;
-    refuse_normals(&command.tracing, None)?;
+    refuse_facet_normals(&command.tracing, None)?;
     extra.until_error.as_deref().map(ErrorTarget::parse).transpose()?;
     extra.paths.as_deref().map_or(Ok(()), PathFile::check_name)?;
     extra.ends.as_deref().map_or(Ok(()), end_file::check_name)
@@ -145,18 +144,6 @@ fn tracing_settings(command: &TraceCommand, shard: Option<[u32; 2]>) -> Result<T
         None => folder.join(CHECKPOINT),
     };
     continued_settings(&file, tracing)
-}
-
-/// Refuses normals of facets for a run on the spline, which has its own; `scene` may ask for the spline too.
-fn refuse_normals(tracing: &TracingSettings, scene: Option<&Scene>) -> Result<(), Failure> {
-    let Some(normals) = tracing.normals.filter(|normals| *normals != NormalMode::Exact) else { return Ok(()) };
-    if IntersectorChoice::new(tracing, scene)?.intersector != IntersectorKind::Exact {
-        return Ok(());
-    }
-    let asks =
-        if tracing.intersector.is_some() { "--intersector exact" } else { "the scene's intersector = \"exact\"" };
-    let message = format!("{asks} does not take --normals {normals}: the spline has normals of its own");
-    Err(Failure::arguments(message).with_help("leave --normals out, or choose an intersector on facets, as octree"))
 }
 
 /// Refuses outputs that would replace the scene or a file that it names; `has_results` says whether results are among them.

@@ -114,9 +114,7 @@ fn sequence_view(results: &Results, facets: &Facets) -> View {
         let mut lines = Polylines::default();
         let same = ways.iter().filter(|w| w.steps == sequence.steps);
         same.take(MOST_DRAWN).for_each(|w| lines.push(w.points.iter().copied()));
-        // Rays that leave go to infinity: they are cut a little outside of the model.
-        let bounds = facets.mesh.bounds();
-        let near = lines.inside(&bounds.grown(0.35 * bounds.diagonal().max(1.0)));
+        let near = lines.near(&facets.mesh.bounds());
         let name = format!("{} {}", results.receivers[receiver].name, rank + 1);
         view = view.lines(&name, &near, colour);
     }

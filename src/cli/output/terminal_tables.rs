@@ -1,7 +1,7 @@
 //! Tables on the terminal: one style for all commands, numbers to the right.
 
 use crate::report::{Block, Cell, Report, Table};
-use comfy_table::{CellAlignment, ContentArrangement, LineStyle, TableStyle};
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, TableStyle, Width};
 
 /// A line under the heading and nothing else, so that rows stay close together.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
@@ -21,16 +21,40 @@ pub(crate) fn table_text(table: &Table, width: usize) -> String {
     let heading = |c: &crate::report::Column| {
         if c.unit.is_empty() { c.title.clone() } else { format!("{} [{}]", c.title, c.unit) }
     };
-    grid.set_header(table.columns.iter().map(heading));
+    let headings: Vec<String> = table.columns.iter().map(heading).collect();
+    grid.set_header(&headings);
     for row in &table.rows {
         grid.add_row(row.iter().map(Cell::shown));
     }
-    for (k, column) in grid.column_iter_mut().enumerate() {
+    let least = least_widths(table, &headings, width);
+    for ((k, column), least) in grid.column_iter_mut().enumerate().zip(least) {
         // A column with words is read from the left.
         let words = table.rows.iter().any(|r| matches!(r.get(k), Some(Cell::Text(_))));
         column.set_cell_alignment(if words { CellAlignment::Left } else { CellAlignment::Right });
+        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(least + PADDING)));
     }
     format!("  {}\n{grid}\n", table.title)
+}
+
+/// Columns of a terminal that a table's column has beside its text.
+const PADDING: u16 = 2;
+
+/// The least width of each column: no number is broken, whatever that takes, and where there is room no word of a heading.
+fn least_widths(table: &Table, headings: &[String], width: usize) -> Vec<u16> {
+    let of_numbers = |k: usize| {
+        let cells = table.rows.iter().filter_map(|row| row.get(k));
+        cells
+            .filter(|cell| !matches!(cell, Cell::Text(_)))
+            .map(|cell| cell.shown().chars().count())
+            .max()
+            .unwrap_or(0)
+    };
+    let numbers: Vec<usize> = (0..table.columns.len()).map(of_numbers).collect();
+    let word = |heading: &String| heading.split_whitespace().map(|word| word.chars().count()).max().unwrap_or(0);
+    let with_words: Vec<usize> = headings.iter().zip(&numbers).map(|(h, numbers)| word(h).max(*numbers)).collect();
+    let room = width.saturating_sub(headings.len() * usize::from(PADDING + 1));
+    let least = if with_words.iter().sum::<usize>() <= room { with_words } else { numbers };
+    least.into_iter().map(|least| u16::try_from(least).unwrap_or(u16::MAX)).collect()
 }
 
 /// Returns the tables of a study's page as text, empty ones and its list of every measurement left out.
@@ -72,6 +96,22 @@ mod tests {
             lines,
             ["  Sags", " face   sag [mm]", "─────────────────", " a           0.5", " long      12.25"]
         );
+    }
+
+    /// On whatever few columns a number stands in one line, and where there is room a word of a heading too.
+    #[test]
+    fn numbers_are_not_broken() {
+        let columns = [("face", ""), ("absorbed share", "W"), ("from the facets", "W")];
+        let mut table = Table::new("t", "Faces", &columns);
+        let words = "a face of the cover that has a long name";
+        table.row([words.into(), Cell::Number(200_000.0, 4), Cell::Number(-3.08e-5, 3)]);
+        for (width, has_words) in [(100, true), (40, true), (24, false), (5, false)] {
+            let text = table_text(&table, width);
+            for number in [Cell::Number(200_000.0, 4).shown(), Cell::Number(-3.08e-5, 3).shown()] {
+                assert!(text.contains(&number), "{width}: {text}");
+            }
+            assert_eq!(text.contains("absorbed") && text.contains("facets"), has_words, "{width}: {text}");
+        }
     }
 
     #[test]

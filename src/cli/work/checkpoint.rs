@@ -198,7 +198,6 @@ impl<'a> Checkpoint<'a> {
     /// Removes the file of a run that is over. A failure is passed over: a file left behind only makes the next run there ask for
     /// `--resume`.
     pub(crate) fn remove(&self) {
-        // Left behind it is only refused next time.
         let _ = std::fs::remove_file(&self.file);
     }
 }

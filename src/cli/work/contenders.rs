@@ -125,7 +125,7 @@ impl<'a> Structures<'a> {
         let spinner = console.spinner("timing");
         let bvh2 = self.bvh_of(|settings| bvh::Settings { kind: bvh::Kind::Bvh2, ..settings });
         let cwbvh_as_shipped = self.bvh_of(|settings| bvh::Settings { cured: false, ..settings });
-        let asked = |name, who, batch| TimedIntersector { name, who, batch };
+        let asked = |name, intersector, batch| TimedIntersector { name, intersector, batch };
         let intersectors = [
             asked("octree", &*contenders.octree, true),
             // Asked ray by ray.
@@ -137,7 +137,7 @@ impl<'a> Structures<'a> {
             asked("exact", &*contenders.exact, true),
         ];
         for contender in &intersectors {
-            let footprint = contender.who.footprint();
+            let footprint = contender.intersector.footprint();
             found.build_seconds.set(contender.name, footprint.build_seconds);
             let bytes_per_facet = footprint.bytes as f64 / footprint.primitives.max(1) as f64;
             found.bytes_per_facet.set(contender.name, bytes_per_facet);

@@ -163,7 +163,6 @@ pub(crate) fn try_file(file: &Path) -> Result<(), Failure> {
 
 /// Returns the folder that a file is in; `.` for a bare name.
 pub(crate) fn folder_of(path: &Path) -> PathBuf {
-    // A bare name is in the working folder.
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
     parent.unwrap_or(Path::new(".")).to_path_buf()
 }

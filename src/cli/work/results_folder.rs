@@ -145,9 +145,6 @@ pub(crate) fn write_anywhere(
     })
 }
 
-/// Paths are shown as far as this share of the model's diagonal around it.
-const PATH_MARGIN: f64 = 0.35;
-
 /// Writes everything into a folder, which is made; the page, if wanted, comes last, so that a folder with a page is complete. Notes in
 /// `run` which files each receiver got. Returns the document of `results.json` and the answer in words.
 pub(crate) fn write(
@@ -173,9 +170,7 @@ pub(crate) fn write(
     let (paths, _) = path_lines(&run.results.paths);
     write_vtp(&folder.join("paths.vtp"), &paths)?;
     let mesh = &*prepared.facets.drawn(MOST_DRAWN);
-    let bounds = prepared.facets.bounds();
-    // Rays that leave go to infinity and would make the model a speck.
-    let near: Polylines = paths.inside(&bounds.grown(PATH_MARGIN * bounds.diagonal().max(1.0)));
+    let near: Polylines = paths.near(&prepared.facets.bounds());
     let mut facets = appearance::grouped_facets(&prepared.job.loaded.model, mesh, Some(&prepared.bound));
     facets.paths = Some(&near);
     write_facets(&folder.join("facets.glb"), &facets)?;

@@ -3,7 +3,7 @@
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::pipeline::RayRange;
-use crate::simulate::PartialRun;
+use crate::simulate::{PartialRun, shard_replicates};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,6 @@ struct LauncherShard {
 
 /// Variables in which a launcher says which part a process is, and of how many.
 struct Launcher {
-    name: &'static str,
     /// Counted from 0, or from the value of `first`.
     index: &'static str,
     /// The number of parts, where the launcher says it.
@@ -59,23 +58,16 @@ struct Launcher {
 /// Arrays before ranks: a task of an array may hold ranks of its own, whose number is 1 then.
 const LAUNCHERS: [Launcher; 6] = [
     Launcher {
-        name: "SLURM_ARRAY_TASK_ID",
         index: "SLURM_ARRAY_TASK_ID",
         count: Some("SLURM_ARRAY_TASK_COUNT"),
         first: Some("SLURM_ARRAY_TASK_MIN"),
         step: Some("SLURM_ARRAY_TASK_STEP"),
     },
-    Launcher { name: "PBS_ARRAY_INDEX", index: "PBS_ARRAY_INDEX", count: None, first: None, step: None },
-    Launcher { name: "JOB_COMPLETION_INDEX", index: "JOB_COMPLETION_INDEX", count: None, first: None, step: None },
-    Launcher {
-        name: "OMPI_COMM_WORLD_RANK",
-        index: "OMPI_COMM_WORLD_RANK",
-        count: Some("OMPI_COMM_WORLD_SIZE"),
-        first: None,
-        step: None,
-    },
-    Launcher { name: "PMI_RANK", index: "PMI_RANK", count: Some("PMI_SIZE"), first: None, step: None },
-    Launcher { name: "SLURM_PROCID", index: "SLURM_PROCID", count: Some("SLURM_NTASKS"), first: None, step: None },
+    Launcher { index: "PBS_ARRAY_INDEX", count: None, first: None, step: None },
+    Launcher { index: "JOB_COMPLETION_INDEX", count: None, first: None, step: None },
+    Launcher { index: "OMPI_COMM_WORLD_RANK", count: Some("OMPI_COMM_WORLD_SIZE"), first: None, step: None },
+    Launcher { index: "PMI_RANK", count: Some("PMI_SIZE"), first: None, step: None },
+    Launcher { index: "SLURM_PROCID", count: Some("SLURM_NTASKS"), first: None, step: None },
 ];
 
 /// Returns the part that the environment names; `parts` is `--shards N`, which wins over the launcher's own number. Fails where no launcher
@@ -91,7 +83,7 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
         let Some(index) = number(launcher.index)? else { continue };
         let stated = launcher.count.map(number).transpose()?.flatten();
         let Some(count) = parts.or(stated) else {
-            let failure = Failure::arguments(format!("--shard auto: {} says no number of parts", launcher.name));
+            let failure = Failure::arguments(format!("--shard auto: {} says no number of parts", launcher.index));
             return Err(failure.with_help("add --shards N"));
         };
         // PBS arrays may begin anywhere; from 1 to N is their custom, and without a 0 nothing else is known.
@@ -102,7 +94,7 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
         let place = index.checked_sub(first).filter(|offset| offset % step == 0).map(|offset| offset / step);
         return match place {
             Some(place) if place < count && count <= MOST_SHARDS => {
-                Ok(LauncherShard { launcher: launcher.name, shard: [place, count] })
+                Ok(LauncherShard { launcher: launcher.index, shard: [place, count] })
             }
             _ => Err(Failure::arguments(format!(
                 "--shard auto: {}={index} is no part of {count} (counted from {first} in steps of {step})",
@@ -115,16 +107,9 @@ fn launcher_shard(variable: &dyn Fn(&str) -> Option<String>, parts: Option<u32>)
         .with_help(format!("it takes {}; else write --shard I/N", known.join(", "))))
 }
 
-/// Returns the replicates of a shard (index from 0, count) of all; shards differ by one replicate at most, and may be empty.
-pub(crate) fn replicates_of_shard(all: Range<u32>, [index, count]: [u32; 2]) -> Range<u32> {
-    let whole = u64::from(all.end.saturating_sub(all.start));
-    let first = |k: u32| all.start + (whole * u64::from(k) / u64::from(count.max(1))) as u32;
-    first(index)..first(index + 1)
-}
-
 /// Whether a part holds every replicate that its shard (index from 0, count) has of all replicates.
 pub(crate) fn is_shard_done(portion: &PartialRun, all: Range<u32>, shard: [u32; 2]) -> bool {
-    replicates_of_shard(all, shard).all(|r| portion.done.binary_search(&r).is_ok())
+    shard_replicates(all, shard).all(|r| portion.done.binary_search(&r).is_ok())
 }
 
 /// Returns where the tally of a shard (index from 0, count) goes: the file that was asked for, or one in the folder that was, named after

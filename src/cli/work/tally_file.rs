@@ -18,7 +18,7 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What stands at the head of a tally file: enough to write the results of the whole run. Lengths and angles as bits of `f64`.
+/// The head of a tally file. Lengths and angles as bits of `f64`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct TallyHeader {
     pub(crate) fingerprint: String,

@@ -5,7 +5,7 @@ use crate::cli::console::{Console, show_progress};
 use crate::cli::interruption::{self, SaveableRun};
 use crate::intersect::NormalMode;
 use crate::pipeline::{Monitor, Stage};
-use crate::report::{figures, grouped};
+use crate::report::{figures, grouped, tolerance_text};
 use crate::study;
 use crate::study::default_accuracy::Chosen;
 use indicatif::ProgressBar;
@@ -104,11 +104,11 @@ impl Monitor for TerminalMonitor<'_> {
         if !self.is_tracing {
             return;
         }
-        let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));
+        let tolerance = tolerance_text(chosen.tolerance_mm);
         let how = match (chosen.intersector, chosen.normals) {
             ("exact", _) => "on the spline".to_owned(),
-            (_, NormalMode::Exact) => format!("on facets of {low}..{high} mm with hits moved to the spline"),
-            _ => format!("on facets of {low}..{high} mm with {} normals", chosen.normals),
+            (_, NormalMode::Exact) => format!("on facets of {tolerance} with hits moved to the spline"),
+            _ => format!("on facets of {tolerance} with {} normals", chosen.normals),
         };
         // Why is told with the results.
         self.console.say(format_args!("tracing {how}"));
