@@ -272,13 +272,15 @@ impl<'a> Errors<'a> {
             let geometric = r.with_joined_cells(&m.cells);
             let cell = brightest.and_then(|k| geometric.get(k)).copied();
             let unmet = brightest.map_or(0.0, |k| self.unmet_peak(&cells, r, k, m.peak_cells));
+            let unmet = if self.is_unmet() { r.max } else { unmet };
             cell.map_or(square, |cell| square.max(cell)).max(unmet)
         });
         // Of a map too large to compare nothing is known.
         let max = max.filter(|_| self.measured.is_none_or(ReceiverError::has_cells));
         let length = if matches!(r.kind, "plane" | "disc") { "mm" } else { "deg" };
         let along = |value: f64, statistical: f64, paired: &dyn Fn(&ReceiverError) -> Paired| {
-            let geometric = self.geometric(0.0, |m| paired(m).geometric());
+            let size = r.rms[0].hypot(r.rms[1]);
+            let geometric = self.geometric(0.0, |m| if self.is_unmet() { size } else { paired(m).geometric() });
             // Light that did not come has no place.
             (!is_dark).then(|| Figure::new(value, length, statistical, geometric))
         };
@@ -296,6 +298,11 @@ impl<'a> Errors<'a> {
             centroid_2: along(r.centroid[1], r.centroid_error[1], &|m| m.centroid[1]),
             channels,
         }
+    }
+
+    /// Whether no ray that compared facets and spline came to the receiver: of light that did come, nothing but its power is known.
+    fn is_unmet(&self) -> bool {
+        self.compared.is_finite() && self.measured.is_some_and(|m| m.power.facets == 0.0 && m.power.spline == 0.0)
     }
 
     /// Returns what may be wrong of the value of the cell `brightest` that stands far above the square of `side` cells around it: such a
@@ -317,7 +324,8 @@ impl<'a> Errors<'a> {
     /// Makes the figures of a receiver's channels; `unit` is that of powers, which bins are told in.
     fn channels(&self, r: &ReceiverResult, unit: &str) -> Vec<ChannelFigure> {
         let of_channel = |(k, c): (usize, &ChannelResult)| {
-            let measured = |m: &ReceiverError| m.channels.get(k).map_or(0.0, |c| c.total.geometric());
+            let of_facets = |m: &ReceiverError| m.channels.get(k).map_or(0.0, |c| c.total.geometric());
+            let measured = |m: &ReceiverError| if self.is_unmet() { c.total } else { of_facets(m) };
             let geometric = self.geometric(self.lost_share * c.total, measured);
             let unit = c.total_unit(unit);
             let statistical = if c.total > 0.0 { c.error } else { channel_worth(r, c) * r.ray_power };

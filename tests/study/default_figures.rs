@@ -122,6 +122,20 @@ fn the_default_answer_is_right_on_scenes_known_in_closed_form() {
     assert!(count >= 60 && missed.len() as f64 <= 0.02 * count as f64, "{} of {count}: {missed:#?}", missed.len());
 }
 
+/// A black ball takes a ten-thousandth of the light, three rays of the pilot, none of which need pass its facets: that they see no difference
+/// tells of none.
+#[test]
+fn a_receiver_that_few_rays_of_the_pilot_reach_takes_the_spline() {
+    let text = "[[source]]\nkind = 'cone'\nhalf_angle_deg = 60\nat = [0, 0, -200]\ndirection = [0, 0, 1]\npower = 1\n\
+        [[receiver]]\nname = 'ball'\nkind = 'absorbed'\npart = 'ball'\n";
+    let share = (1.0 - f64::asin(0.01).cos()) / 0.5;
+    let figures = vec![("power", share)];
+    let known = KnownScene { text: text.into(), figures, half: 1.0, ..known_scenes::ball(2.0, 1.5) };
+    let answer = default_answer(&known, 1_000_000, 2);
+    assert_eq!(misses(&known, &answer), [""; 0]);
+    assert!(answer.chosen.because.contains("too few of the pilot's rays reach ball"), "{}", answer.chosen.because);
+}
+
 /// A paraboloid with an LED of 0.2 mm: facets of 0.05 to 0.2 mm blur what it throws, and say so.
 #[test]
 fn facets_that_blur_a_lamp_say_by_how_much() {

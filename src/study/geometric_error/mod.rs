@@ -132,25 +132,20 @@ impl GeometricError {
         by_power.max(by_spread.min(self.rays as f64))
     }
 
-    /// Returns a receiver or body that so few of these rays came to that a run of `scale` times as many will know its light better than
-    /// they tell what facets change of it: one ray in `n` is unseen among `n`, a share of `1/n`, where the run's error is one of
-    /// `1/√(n·scale)`.
+    /// Returns a receiver that so few of these rays came to that a run of `scale` times as many will know its light better than they tell
+    /// what facets change of it: one ray in `n` is unseen among `n`, a share of `1/n`, where the run's error is one of `1/√(n·scale)`.
+    /// What bodies absorb is no reason for the spline: nobody asked for that, and its error says how little is known.
     pub(in crate::study) fn unjudged(&self, scale: f64, emitted: f64) -> Option<&str> {
-        let receivers = self.receivers.iter().map(|r| (&r.name, &r.power, r.statistical.power));
-        let bodies = self.absorbed.iter().map(|a| (&a.name, &a.power, a.statistical));
-        let few =
-            |(_, power, statistical): &(&String, &Paired, f64)| self.rays_of(power, *statistical, emitted) < scale;
-        receivers.chain(bodies).find(few).map(|(name, ..)| name.as_str())
+        let is_unjudged = |r: &&ReceiverError| self.rays_of(&r.power, r.statistical.power, emitted) < scale;
+        self.receivers.iter().find(is_unjudged).map(|r| r.name.as_str())
     }
 
-    /// Adds to every figure but those of cells what rays may change of it that are too rare to be among these, one of those that came
-    /// there: rays without a difference tell of none at all, and yet one more may pass a silhouette.
+    /// Adds to every figure but those of cells what rays may change of it that are too rare to be among these, at a receiver one of those
+    /// that came there: rays without a difference tell of none at all, and yet one more may pass a silhouette.
     pub fn with_unseen_rays(mut self, emitted: f64) -> Self {
         let shares: Vec<f64> = (self.receivers.iter())
             .map(|r| 1.0 / self.rays_of(&r.power, r.statistical.power, emitted).max(1.0))
             .collect();
-        let of_bodies: Vec<f64> =
-            (self.absorbed.iter()).map(|a| 1.0 / self.rays_of(&a.power, a.statistical, emitted).max(1.0)).collect();
         for (r, share) in self.receivers.iter_mut().zip(shares) {
             let totals = r.channels.iter_mut().map(|c| &mut c.total);
             let figures = [&mut r.power, &mut r.peak].into_iter().chain(&mut r.rms).chain(&mut r.width);
@@ -160,8 +155,9 @@ impl GeometricError {
                 place.error = place.error.hypot(share * width.spline);
             }
         }
-        self.absorbed.iter_mut().zip(of_bodies).for_each(|(a, share)| a.power.add_unseen(share));
+        // Of what nobody asked for, as little as of all light; its figures have one ray more where they are told.
         let share = 1.0 / self.rays.max(1) as f64;
+        self.absorbed.iter_mut().for_each(|a| a.power.add_unseen(share));
         for face in &mut self.faces {
             let powers = [&mut face.absorbed, &mut face.entered, &mut face.left];
             powers.into_iter().for_each(|figure| figure.add_unseen(share));

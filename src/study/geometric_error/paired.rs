@@ -24,9 +24,11 @@ impl Paired {
         (self.facets - self.spline).hypot(self.error)
     }
 
-    /// Returns the geometric error, at least `unseen` where facets made no difference: that tells of no error at all.
+    /// Returns the geometric error, at least `unseen`, the power of one ray, where facets changed less than that: it tells of no error at
+    /// all.
     pub(in crate::study) fn geometric_or(&self, unseen: f64) -> f64 {
-        if self.facets == self.spline { self.error.max(unseen) } else { self.geometric() }
+        let changed = (self.facets - self.spline).abs();
+        if changed < unseen { self.geometric().max(unseen) } else { self.geometric() }
     }
 
     /// Adds what the difference may be by rays that are rarer than `share` of all that come, each of which takes all its light along.
