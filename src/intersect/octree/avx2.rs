@@ -284,3 +284,23 @@ impl Lanes for Avx2Lanes {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::octree::portable::Portable;
+
+    /// Of sixteen entries the lower eight are looked at where none above them is open.
+    #[test]
+    fn an_open_entry_is_found_wherever_it_lies() {
+        if !(is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")) {
+            return;
+        }
+        for open in 0..16 {
+            let mut enters = [2.0; 16];
+            enters[open] = 1.0;
+            let found = [Avx2Lanes::open(&enters, 1.5), Portable::open(&enters, 1.5)];
+            assert_eq!(found, [1 << open; 2]);
+        }
+    }
+}

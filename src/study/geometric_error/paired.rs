@@ -48,3 +48,20 @@ impl Serialize for Paired {
         [self.facets, self.spline, self.error].serialize(s)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A difference of less than one ray is none that a ray told; one of more is known by itself.
+    #[test]
+    fn a_figure_that_no_ray_changed_is_as_uncertain_as_one() {
+        let power = |facets: f64, error: f64| Paired { facets, spline: 3.0, error };
+        assert_eq!(power(3.0, 0.0).geometric_or(0.5), 0.5);
+        assert_eq!(power(3.0 + 1e-12, 1e-9).geometric_or(0.5), 0.5);
+        assert_eq!(power(3.0, 2.0).geometric_or(0.5), 2.0);
+        assert_eq!(power(7.0, 0.0).geometric_or(0.5), 4.0);
+        // Facets that are the surface.
+        assert_eq!(power(3.0, 0.0).geometric_or(0.0), 0.0);
+    }
+}
