@@ -236,8 +236,10 @@ impl<'a> Errors<'a> {
     }
 
     /// Returns the geometric error of a figure: `of_facets` and `lost`, what lost rays might add to it, in quadrature; `lost` alone on the
-    /// spline, `None` where the facets were not judged.
-    fn geometric(&self, lost: f64, of_facets: impl Fn(&ReceiverError) -> f64) -> Option<f64> {
+    /// spline, `None` where the facets were not judged. Where no ray that compared facets and spline came to the receiver, `unmet` stands
+    /// in place of `of_facets`.
+    fn geometric(&self, lost: f64, unmet: f64, of_facets: impl Fn(&ReceiverError) -> f64) -> Option<f64> {
+        let of_facets = |m: &ReceiverError| if self.is_unmet() { unmet } else { of_facets(m) };
         match self.surface {
             Surface::Spline => Some(lost),
             Surface::Facets(_) => self.measured.map(|m| of_facets(m).hypot(lost)),
@@ -247,7 +249,7 @@ impl<'a> Errors<'a> {
 
     /// Makes the figures of a receiver, each with both its errors; for absorbed power only that and channels.
     fn figures(&self, r: &ReceiverResult, unit: &str) -> ReceiverFigures {
-        let power = self.geometric(self.lost_power, |m| m.power.geometric_or(self.unseen_power));
+        let power = self.geometric(self.lost_power, self.unseen_power, |m| m.power.geometric_or(self.unseen_power));
         let is_dark = r.power <= 0.0;
         let power = Figure::new(r.power, unit, if is_dark { r.ray_power } else { r.power_error }, power);
         let channels = self.channels(r, unit);
@@ -266,13 +268,12 @@ impl<'a> Errors<'a> {
         // The brightest place was measured over squares of cells: what facets change of it is taken as a share.
         let [cells, errors] = r.cells_with_even_poles();
         let brightest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b]));
-        let max = self.geometric(self.lost_share * r.max, |m| {
+        let max = self.geometric(self.lost_share * r.max, r.max, |m| {
             let square = if m.peak.facets > 0.0 { r.max / m.peak.facets } else { 1.0 } * m.peak.geometric();
             // The run may have its brightest cell elsewhere than the few rays that compared had theirs, where facets change nothing.
             let geometric = r.with_joined_cells(&m.cells);
             let cell = brightest.and_then(|k| geometric.get(k)).copied();
             let unmet = brightest.map_or(0.0, |k| self.unmet_peak(&cells, r, k, m.peak_cells));
-            let unmet = if self.is_unmet() { r.max } else { unmet };
             cell.map_or(square, |cell| square.max(cell)).max(unmet)
         });
         // Of a map too large to compare nothing is known.
@@ -280,7 +281,7 @@ impl<'a> Errors<'a> {
         let length = if matches!(r.kind, "plane" | "disc") { "mm" } else { "deg" };
         let along = |value: f64, statistical: f64, paired: &dyn Fn(&ReceiverError) -> Paired| {
             let size = r.rms[0].hypot(r.rms[1]);
-            let geometric = self.geometric(0.0, |m| if self.is_unmet() { size } else { paired(m).geometric() });
+            let geometric = self.geometric(0.0, size, |m| paired(m).geometric());
             // Light that did not come has no place.
             (!is_dark).then(|| Figure::new(value, length, statistical, geometric))
         };
@@ -325,8 +326,7 @@ impl<'a> Errors<'a> {
     fn channels(&self, r: &ReceiverResult, unit: &str) -> Vec<ChannelFigure> {
         let of_channel = |(k, c): (usize, &ChannelResult)| {
             let of_facets = |m: &ReceiverError| m.channels.get(k).map_or(0.0, |c| c.total.geometric());
-            let measured = |m: &ReceiverError| if self.is_unmet() { c.total } else { of_facets(m) };
-            let geometric = self.geometric(self.lost_share * c.total, measured);
+            let geometric = self.geometric(self.lost_share * c.total, c.total, of_facets);
             let unit = c.total_unit(unit);
             let statistical = if c.total > 0.0 { c.error } else { channel_worth(r, c) * r.ray_power };
             ChannelFigure { name: c.name.clone(), figure: Figure::new(c.total, unit, statistical, geometric) }

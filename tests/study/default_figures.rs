@@ -162,6 +162,16 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
     let all = figures(&results, Surface::Facets(&elsewhere), "lm");
     let geometric = named(&all[0], "max").geometric.unwrap();
     assert!(geometric > 0.0 && geometric >= error.receivers[0].cells[brightest], "{geometric}");
+    // Of light that none of the comparing rays met nothing is known but that it came.
+    let mut unmet = error.clone();
+    unmet.receivers[0].power = Paired::default();
+    let all = figures(&results, Surface::Facets(&unmet), "lm");
+    let width = results.receivers[0].rms[0].hypot(results.receivers[0].rms[1]);
+    let expected = [("max", results.receivers[0].max), ("rms_1", width), ("centroid_2", width)];
+    for (name, unknown) in expected {
+        let geometric = named(&all[0], name).geometric.unwrap();
+        assert!(geometric >= unknown && unknown > 0.0, "{name}: {geometric} of {unknown}");
+    }
     // A run that asks for nothing is not traced on them.
     let answer = default_answer(&known, 100_000, 2);
     let max = named(&answer.figures[0], "max");
