@@ -14,6 +14,7 @@ use crate::simulate::{PartialRun, ReceiverResult, Results, RunSettings, ask_agai
 use crate::study::Progress;
 use crate::study::cross_check::{self, CrossCheck, GroupedIntersectors, cross_check_groups};
 use crate::study::geometric_error::{GeometricError, geometric_error};
+use std::time::Instant;
 
 /// Segments of a run that are asked again of BVH and spline, at most.
 const MOST_RECHECKED: u64 = 10_000;
@@ -64,9 +65,11 @@ impl PreparedScene {
             results.seconds.read = self.job.loaded.seconds;
             results.seconds.tessellate = self.tessellation_seconds;
             results.seconds.build = build_seconds;
+            let started = Instant::now();
             let (check, geometric) = recheck(self, &results, intersector, monitor);
+            let check_seconds = started.elapsed().as_secs_f64();
             results.notes.extend(geometric.iter().flat_map(|error| unknown_cells_notes(error, &results.receivers)));
-            Ok(SceneResults { results, check, geometric, verification, sums_without_cells: sums })
+            Ok(SceneResults { results, check, geometric, check_seconds, verification, sums_without_cells: sums })
         })
     }
 }

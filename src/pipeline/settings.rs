@@ -125,6 +125,14 @@ impl IntersectorKind {
             Self::Exact => "exact",
         }
     }
+
+    /// Returns what is built for it, to follow "the".
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Exact => "boxes of the spline",
+            facets => facets.name(),
+        }
+    }
 }
 
 impl fmt::Display for IntersectorKind {

@@ -58,7 +58,6 @@ pub(crate) fn run(
     let facets = grouped(prepared.facets.facet_count() as u64);
     let what = format!("{facets} facets within {} of the splines", tolerance_text(prepared.mesh_settings.range()));
     say_step("tessellate", what, prepared.tessellation_seconds);
-    let start = std::time::Instant::now();
     // Claimed before the trace, which would be lost on a folder that cannot be written.
     let _owned = OutputPlace::folder(folder)?;
     let with_page = page.is_wanted();
@@ -66,16 +65,14 @@ pub(crate) fn run(
     let mut run = prepared
         .trace(TraceRequest::default(), &monitor)
         .map_err(|_| Failure::running("demo: the run was stopped"))?;
-    let both = start.elapsed().as_secs_f64();
     let r = &run.results;
     let s = r.seconds;
-    say_step("build", format!("the {}", prepared.choice.intersector), s.build);
+    say_step("build", format!("the {}", prepared.choice.intersector.in_words()), s.build);
     let what = format!("{} rays, {} segments", grouped(r.rays), grouped(r.segments));
     say_step("trace", what, s.trace);
     if let Some(check) = &run.check {
         let what = format!("{} ray segments asked again of BVH and exact spline", grouped(check.rays));
-        // What is left of the time of both.
-        say_step("check", what, both - s.build - s.trace);
+        say_step("check", what, run.check_seconds);
     }
     let remarks = RunRemarks { sentences: reference_comparison(r), ..RunRemarks::default() };
     let start = std::time::Instant::now();

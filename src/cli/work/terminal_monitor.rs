@@ -60,7 +60,7 @@ impl Monitor for TerminalMonitor<'_> {
             Stage::Tessellating => console.spinner("making facets"),
             Stage::Choosing => console.spinner("choosing facets or spline by a pilot"),
             Stage::Aiming => console.stage_bar("aiming"),
-            Stage::Building(kind) => console.spinner(&format!("building {kind}")),
+            Stage::Building(kind) => console.spinner(&format!("building the {}", kind.in_words())),
             Stage::BuildingCheck(what) => console.spinner(&format!("building {what} for the cross-check")),
             Stage::Tracing(rays) => {
                 // From here on a signal stops the run and saves it; before it there is nothing to save.
