@@ -4,6 +4,7 @@ use super::cache::Cache;
 use super::cached_model::read_step;
 use super::error::Error;
 use super::monitor::{Monitor, Stage, in_stage};
+use crate::formats::lower_extension;
 use crate::model::Model;
 use crate::simulate::scene::ModelUse;
 use crate::simulate::{LeftOut, Scene};
@@ -120,8 +121,7 @@ pub fn read_cached_scene(
     monitor: &dyn Monitor,
 ) -> Result<(Scene, LoadedModel), Error> {
     // The likely slip: the CAD file in place of the scene.
-    let is = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
-    if ["stp", "step", "p21"].into_iter().any(is) {
+    if matches!(lower_extension(path).as_str(), "stp" | "step" | "p21") {
         let error = Error::request(format!("{}: a STEP file, where a scene (.toml) is needed", path.display()));
         let advice = "a STEP file alone has no light: name it under [[model]] of a scene with sources and receivers \
             (`lampyris schema` says how), or use `lampyris info`, `facet` or `check` on it";

@@ -29,6 +29,9 @@ fn a_scene_is_made_for_a_file_and_can_be_traced_at_once() {
     // Never over a file that is there; into folders that are not.
     assert_eq!(lampyris_in(path, &["init", "my lens.stp"]).0, 2);
     assert_eq!(lampyris_in(path, &["init", "my lens.stp", "-o", "a/b/s.toml"]).0, 0);
+    // Nor under a name that `trace` would take for a STEP file.
+    let (code, _, err) = lampyris_in(path, &["init", "my lens.stp", "-o", "other.stp"]);
+    assert!(code == 2 && err.contains("-o other.toml") && !path.join("other.stp").exists(), "{err}");
     assert_eq!(lampyris_in(path, &["trace", "a/b/s.toml", "--dry-run"]).0, 0);
 }
 

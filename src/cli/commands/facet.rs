@@ -52,7 +52,7 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     made.report.peak_bytes = peak_bytes();
     let mut facets = appearance::grouped_facets(&loaded.model, &made.mesh, None);
     // Only VTU has a place for them, and they cost a look at every facet.
-    if command.output.iter().any(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtu"))) {
+    if command.output.iter().any(|path| lower_extension(path) == "vtu") {
         (facets.normal_error_deg, facets.curvature_per_mm) = normal_errors(&loaded.model, &made.mesh);
     }
     for path in &command.output {

@@ -8,7 +8,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
 use crate::cli::work::input_files;
 use crate::cli::work::output_place::{folder_of, make_folder};
-use crate::formats::{file_name, printable_line, write_atomic};
+use crate::formats::{file_name, lower_extension, printable_line, write_atomic};
 use crate::model::Model;
 use crate::pipeline::LoadedModel;
 use crate::step;
@@ -35,11 +35,16 @@ pub(crate) fn run(
     placed: PlacedLimit,
     console: &Console,
 ) -> Result<Completion, Failure> {
-    let loaded = input_files::model_file(file, placed, console)?;
     let scene_file = match output {
         Some(path) => path.to_path_buf(),
         None => PathBuf::from(last_component(file)).with_extension("toml"),
     };
+    // Whoever reads the file goes by the end of its name.
+    if lower_extension(&scene_file) != "toml" {
+        let failure = Failure::arguments(format!("-o {}: the name of a scene ends in .toml", scene_file.display()));
+        return Err(failure.with_help(format!("write -o {}", scene_file.with_extension("toml").display())));
+    }
+    let loaded = input_files::model_file(file, placed, console)?;
     // A scene has work in it: it is never written over.
     if scene_file.exists() {
         let failure = Failure::arguments(format!("{}: is there already", scene_file.display()));

@@ -3,7 +3,7 @@
 use super::terminal_monitor::TerminalMonitor;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
-use crate::formats::{Column, NpzStream, file_name, write_atomic};
+use crate::formats::{Column, NpzStream, file_name, lower_extension, write_atomic};
 use crate::pipeline::PreparedScene;
 use crate::report::grouped;
 use crate::simulate::{ListedEnd, MOST_LISTED_RAYS, RunSettings, listed_ends, ray_lists};
@@ -27,7 +27,7 @@ const NO_FACE: i64 = -1;
 
 /// Refuses a name that ends neither in `.npz` nor in `.csv`.
 pub(crate) fn check_name(file: &Path) -> Result<(), Failure> {
-    if is_csv(file) || file.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
+    if matches!(lower_extension(file).as_str(), "csv" | "npz") {
         return Ok(());
     }
     let message = format!("--ends {}: ends of rays are written as .npz or .csv", file.display());
@@ -59,7 +59,7 @@ pub(crate) fn check(prepared: &PreparedScene, file: Option<&Path>) -> Result<(),
 }
 
 fn is_csv(file: &Path) -> bool {
-    file.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"))
+    lower_extension(file) == "csv"
 }
 
 /// Traces every ray of the lists once and writes where each ended.

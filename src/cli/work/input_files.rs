@@ -4,6 +4,7 @@ use super::terminal_monitor::TerminalMonitor;
 use crate::cli::arguments::command::PlacedLimit;
 use crate::cli::console::Console;
 use crate::cli::{completion::Completion, failure::Failure};
+use crate::formats::lower_extension;
 use crate::pipeline::{LoadedModel, PreparedScene, read_scene};
 use crate::simulate::Scene;
 use crate::step::{self, Import};
@@ -45,7 +46,7 @@ pub(crate) fn model_file(path: &Path, placed: PlacedLimit, console: &Console) ->
 /// Reads a scene with its models when the name ends in `.toml`, and a STEP file otherwise; the limit holds for the latter alone.
 pub(crate) fn scene_or_model(path: &Path, placed: PlacedLimit, console: &Console) -> Result<Input, Failure> {
     // By the name: a STEP file has several, a scene one.
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+    if lower_extension(path) == "toml" {
         let (scene, loaded) = read_scene(path, &TerminalMonitor::new(console))?;
         return Ok(Input::Scene(Box::new(scene), loaded));
     }

@@ -1,7 +1,7 @@
 //! `--paths FILE.npz`: every vertex of every path of a run.
 
 use crate::cli::failure::Failure;
-use crate::formats::{Column, Error, NpzStream};
+use crate::formats::{Column, Error, NpzStream, lower_extension};
 use crate::simulate::PathVertex;
 use std::path::Path;
 use std::sync::Mutex;
@@ -24,7 +24,7 @@ pub(crate) struct PathFile {
 impl PathFile {
     /// Refuses a name that does not end in `.npz`.
     pub(crate) fn check_name(path: &Path) -> Result<(), Failure> {
-        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
+        if lower_extension(path) != "npz" {
             let message = format!("--paths {}: ray paths are written as .npz alone", path.display());
             return Err(Failure::arguments(message).with_help("write --paths paths.npz"));
         }

@@ -2,6 +2,7 @@
 
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
+use crate::formats::lower_extension;
 use crate::pipeline::RayRange;
 use crate::simulate::{PartialRun, shard_replicates};
 use std::ops::Range;
@@ -129,7 +130,7 @@ pub(crate) fn shard_file(output: &Path, [i, n]: [u32; 2], rays: Option<RayRange>
 
 /// Whether a path names a tally file, told by its extension.
 pub(crate) fn is_tally(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("tally"))
+    lower_extension(path) == "tally"
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ pub use ray_file::{Flux, RayBlock, RayFile, RaySet};
 pub use tm25::{Tm25, Tm25Reader, read_tm25, write_tm25};
 pub use tm25_header::{SpectralData, Tm25Columns, Tm25Header};
 
+use super::file_names::lower_extension;
 use super::input::open_file;
 use super::ray_csv::read_csv;
 use super::ray_npz::read_npz;
@@ -107,10 +108,7 @@ pub fn read_rays(path: &Path) -> Result<Vec<LightRay>, Error> {
 
 /// Reads a list of rays in NPZ or CSV and hands each to `add`.
 fn read_list(path: &Path, add: impl FnMut(LightRay) -> Result<(), Error>) -> Result<(), Error> {
-    match path.extension() {
-        Some(extension) if extension.eq_ignore_ascii_case("npz") => read_npz(path, add),
-        _ => read_csv(path, add),
-    }
+    if lower_extension(path) == "npz" { read_npz(path, add) } else { read_csv(path, add) }
 }
 
 #[cfg(test)]

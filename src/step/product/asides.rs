@@ -1,5 +1,6 @@
 //! What few entities of a file say beside its shapes: what it hides, which other files it needs, which directions point nowhere.
 
+use crate::formats::lower_extension;
 use crate::step::part21::{Entity, File};
 use crate::step::report::Note;
 use rustc_hash::FxHashSet;
@@ -21,8 +22,7 @@ pub(crate) fn external_files(file: &File<'_>, own: &str) -> Vec<Note> {
     for e in file.entities_named(&["DOCUMENT_FILE"]) {
         let Some(other) = e.attributes("DOCUMENT_FILE", 0).and_then(|a| a.text(0)) else { continue };
         // Drawings and files of a CAD system, or the file itself, may be named as well.
-        let extension = Path::new(&other).extension();
-        let is_step = extension.is_some_and(|x| ["stp", "step"].iter().any(|known| x.eq_ignore_ascii_case(known)));
+        let is_step = matches!(lower_extension(Path::new(&other)).as_str(), "stp" | "step");
         if is_step && !other.eq_ignore_ascii_case(own) {
             let reason = format!(
                 "shapes are in {other}, which is not read with this file: export the assembly as one file, or use that file too"
