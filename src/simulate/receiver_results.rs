@@ -95,9 +95,7 @@ impl ChannelResult {
     pub fn total_unit<'u>(&self, power: &'u str) -> &'u str {
         if matches!(self.unit, "lx" | "cd") { "lm" } else { power }
     }
-}
 
-impl ChannelResult {
     /// The figures of channel `c` from the sums of its total and its cells; `scale` and `per` make power and density of a power, the
     /// latter by the cell.
     fn new(

@@ -4,14 +4,19 @@ use crate::files::fixture;
 use crate::support::lampyris_in;
 use serde_json::Value;
 
-/// Facets of the lens with further options.
-fn facets(options: &[&str]) -> u64 {
+/// What `facet` says of the lens with further options.
+fn report(options: &[&str]) -> Value {
     let lens = fixture("step/lens_planoconvex_analytic.stp").display().to_string();
     let folder = tempfile::tempdir().unwrap();
     let all = [&["facet", &lens, "--json", "--threads", "2"], options].concat();
     let (code, out, err) = lampyris_in(folder.path(), &all);
     assert_eq!(code, 0, "{err}");
-    let report: Value = serde_json::from_str(&out).unwrap();
+    serde_json::from_str(&out).unwrap()
+}
+
+/// Facets of the lens with further options.
+fn facets(options: &[&str]) -> u64 {
+    let report = report(options);
     assert_eq!(report["over_tolerance"], 0);
     report["facets"].as_u64().unwrap()
 }
@@ -33,12 +38,7 @@ fn one_face_of_a_lens_is_finer_than_the_rest() {
 #[test]
 fn an_accuracy_is_reached_with_the_other_settings_of_the_facets() {
     for options in [&["--angle", "2"][..], &["--face", "17=0.001"]] {
-        let lens = fixture("step/lens_planoconvex_analytic.stp").display().to_string();
-        let folder = tempfile::tempdir().unwrap();
-        let all = [&["facet", &lens, "--accuracy", "0.5deg", "--json"], options].concat();
-        let (code, out, err) = lampyris_in(folder.path(), &all);
-        assert_eq!(code, 0, "{err}");
-        let report: Value = serde_json::from_str(&out).unwrap();
+        let report = report(&[&["--accuracy", "0.5deg"], options].concat());
         assert_eq!(report["accuracy"]["facets"], report["facets"], "{options:?}");
     }
 }
