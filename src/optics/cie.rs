@@ -51,6 +51,11 @@ pub(super) fn observer_range() -> [f64; 2] {
     [OBSERVER_START, OBSERVER_START + STEP * (OBSERVER.len() - 1) as f64]
 }
 
+/// The largest values of x̄, ȳ and z̄, each by itself.
+pub fn observer_peaks() -> [f64; 3] {
+    std::array::from_fn(|k| OBSERVER.iter().map(|values| values[k]).fold(0.0, f64::max))
+}
+
 /// The colour-matching functions x̄, ȳ, z̄ at a wavelength in nm, linear between the points, zero beyond them.
 pub(super) fn observer(wavelength_nm: f64) -> [f64; 3] {
     let x = (wavelength_nm - OBSERVER_START) / STEP;
@@ -61,4 +66,17 @@ pub(super) fn observer(wavelength_nm: f64) -> [f64; 3] {
     let i = (x as usize).min(OBSERVER.len() - 2);
     let s = x - i as f64;
     std::array::from_fn(|k| OBSERVER[i][k] + s * (OBSERVER[i + 1][k] - OBSERVER[i][k]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn peaks_are_those_of_the_cie() {
+        // At 600, 555 and 445 nm.
+        for (peak, expected) in observer_peaks().into_iter().zip([1.0622, 1.0, 1.7826]) {
+            assert!((peak / expected - 1.0).abs() < 1e-4, "{peak} {expected}");
+        }
+    }
 }

@@ -33,6 +33,7 @@ mod table;
 mod testing;
 
 pub use abg::Abg;
+pub use cie::observer_peaks;
 pub use coating::{Coating, CoatingTable, Split};
 pub use colour::{linear_srgb, srgb_byte};
 pub use dispersion::{Dispersion, Pole};

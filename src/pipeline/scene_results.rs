@@ -53,8 +53,8 @@ impl SceneResults {
         }
     }
 
-    /// Returns the errors of a receiver's cells from the facets, in its unit; zeros on the spline, `None` where they are not known, empty
-    /// where there were too many cells to compare.
+    /// Returns the errors of a receiver's cells from the facets, in its unit, with what rarer rays than those that compared may change of
+    /// each; zeros on the spline, `None` where they are not known, empty where there were too many cells to compare.
     pub fn geometric_cells(&self, prepared: &PreparedScene, receiver: usize) -> Option<Vec<f64>> {
         // On the true surfaces the error is known, and it is none.
         let none = vec![0.0; self.results.receivers[receiver].cells.len()];
@@ -62,8 +62,18 @@ impl SceneResults {
             (IntersectorKind::Exact, _) => Some(none),
             // Facets that are the surface itself were not compared cell by cell.
             (_, Some(error)) if error.rays == 0 => Some(none),
-            (_, measured) => measured.as_ref().and_then(|error| Some(error.receivers.get(receiver)?.cells.clone())),
+            (_, measured) => {
+                let errors = &measured.as_ref()?.receivers.get(receiver)?.cells;
+                self.with_unseen_rays(receiver, errors, &self.results.receivers[receiver].cells)
+            }
         }
+    }
+
+    /// Adds to errors of cells of a receiver what rays may change of them that are too rare to be among those that compared facets and
+    /// spline, where these were compared.
+    fn with_unseen_rays(&self, receiver: usize, errors: &[f64], cells: &[f64]) -> Option<Vec<f64>> {
+        let share = self.geometric.as_ref()?.unseen_share(receiver, self.results.power.emitted);
+        Some(errors.iter().zip(cells).map(|(error, cell)| error.hypot(share * cell)).collect())
     }
 
     /// Returns for each further channel of a receiver the errors of its cells from the facets, in its unit; zeros on the spline, `None`
@@ -73,7 +83,10 @@ impl SceneResults {
         let of_channel = |c: usize| match (prepared.choice.intersector, &self.geometric) {
             (IntersectorKind::Exact, _) => none.clone(),
             (_, Some(error)) if error.rays == 0 => none.clone(),
-            (_, measured) => Some(measured.as_ref()?.receivers.get(receiver)?.channels.get(c)?.cells.clone()),
+            (_, measured) => {
+                let errors = &measured.as_ref()?.receivers.get(receiver)?.channels.get(c)?.cells;
+                self.with_unseen_rays(receiver, errors, &self.results.receivers[receiver].channels[c].cells)
+            }
         };
         (0..self.results.receivers[receiver].channels.len()).map(of_channel).collect()
     }

@@ -14,8 +14,8 @@ use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
     let Figure { value, unit, statistical, geometric, .. } = figure;
     // One ray is stated as the error where none arrived: three of them are the limit of 95 %.
-    if *value == 0.0 && *statistical > 0.0 && geometric.is_none_or(|g| g == 0.0) {
-        let most = with_unit(&figures(3.0 * statistical, 2), unit);
+    if *value == 0.0 && *statistical > 0.0 {
+        let most = with_unit(&figures(3.0 * figure.combined(), 2), unit);
         return format!("0 {unit} (no ray arrived: at most {most}, 95 %)");
     }
     let value = figures(*value, digits);
@@ -167,7 +167,7 @@ pub(super) fn power_table(results: &Results, absorbed: &[Figure], unit: &str) ->
     let columns = [("", ""), ("power", unit), ("share", "%"), ("± rays (1σ)", unit), ("± facets (1σ)", unit)];
     let p = &results.power;
     let mut table = Table::new("power", "Where the power went", &columns).caption(format!(
-        "Emitted is the sum of the others{}. Received counts receivers that end light; one that lets it pass counts it again.",
+        "Emitted is the sum of the others{}. Received counts receivers that end light: what passes one that lets it through is counted where it ends.",
         if p.imbalance() == 0.0 { String::new() } else { format!(", but for {} of it", figures(p.imbalance(), 1)) }
     ));
     let cells = |name: &str, power: f64| {

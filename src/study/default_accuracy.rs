@@ -24,7 +24,7 @@ use std::time::Instant;
 const SHARE: u64 = 32;
 /// Least and most rays of a pilot: fewer tell nothing of a map, more would only show what is far below what people look at.
 const PILOT_RAYS: [u64; 2] = [4096, 65_536];
-/// Runs of at most so many rays take the spline at once: a pilot would cost a good part of what facets could save.
+/// Runs of at most so many rays take the spline at once: a pilot would cost much of what facets could save.
 const SHORT_RUN: u64 = 32_768;
 /// A run that grows is judged as of so many rays, whichever of them are asked for: all its ranges take the same settings, so that they
 /// merge, and what it took holds until it has grown so far.
@@ -288,7 +288,7 @@ impl Undecided<'_> {
             let has_mesh = self.faces().any(|face| face.is_none());
             (ON_FACETS, if has_mesh { READY_OR_FLAT } else { FLAT })
         } else if self.judged_rays() <= SHORT_RUN {
-            (ON_SPLINE, "the run has so few rays that a pilot would cost a good part of what facets could save")
+            (ON_SPLINE, "the run has so few rays that a pilot would cost much of what facets could save")
         } else if self.bound.emitters.iter().any(|e| e.rays.is_some_and(|n| n > self.judged_rays() / SHARE)) {
             (ON_SPLINE, "a source has so many rays of its own that a pilot would trace most of the run")
         } else if self.has_huge_map() {

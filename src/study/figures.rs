@@ -5,7 +5,7 @@
 
 use super::geometric_error::{GeometricError, Paired, ReceiverError};
 use crate::math::error_of_maximum;
-use crate::optics::MAX_EFFICACY;
+use crate::optics::{MAX_EFFICACY, observer_peaks};
 use crate::simulate::{ChannelResult, ReceiverResult, Results};
 use serde::Serialize;
 
@@ -151,18 +151,22 @@ pub fn channel_cell_errors(r: &ReceiverResult, c: &ChannelResult) -> Vec<f64> {
     (0..c.cells.len()).map(stated).collect()
 }
 
-/// Returns what a channel counts of a watt on the receiver on average: lumens or CIE values, those of 555 nm on a dark receiver; 1 for a
-/// bin, which counts power.
+fn largest_of(cells: &[f64]) -> f64 {
+    cells.iter().copied().fold(0.0, f64::max)
+}
+
+/// Returns what a channel counts of a watt on the receiver on average: lumens or CIE values, on a dark receiver the most that light of any
+/// wavelength has; 1 for a bin, which counts power.
 fn channel_worth(r: &ReceiverResult, c: &ChannelResult) -> f64 {
-    let is_weighted = matches!(c.name.as_str(), "lm" | "X" | "Y" | "Z");
-    // Where no light arrived nothing is known of its colour: that of the eye's peak is the most it can be worth.
-    if !is_weighted {
-        1.0
-    } else if r.power > 0.0 {
-        c.total / r.power
-    } else {
-        MAX_EFFICACY
-    }
+    let [x, y, z] = observer_peaks().map(|peak| MAX_EFFICACY * peak);
+    let most = match c.name.as_str() {
+        "X" => x,
+        "Y" | "lm" => y,
+        "Z" => z,
+        _ => return 1.0,
+    };
+    // Where no light arrived nothing is known of its colour.
+    if r.power > 0.0 { c.total / r.power } else { most }
 }
 
 /// Seconds that the next halving of either error would cost.
@@ -268,7 +272,7 @@ impl<'a> Errors<'a> {
         // The brightest place was measured over squares of cells: what facets change of it is taken as a share.
         let [cells, errors] = r.cells_with_even_poles();
         let brightest = (0..cells.len()).max_by(|&a, &b| cells[a].total_cmp(&cells[b]));
-        let max = self.geometric(self.lost_share * r.max, r.max, |m| {
+        let max = self.geometric(self.lost_share * r.max, self.unmet_maximum(r), |m| {
             let square = if m.peak.facets > 0.0 { r.max / m.peak.facets } else { 1.0 } * m.peak.geometric();
             // The run may have its brightest cell elsewhere than the few rays that compared had theirs, where facets change nothing.
             let geometric = r.with_joined_cells(&m.cells);
@@ -286,7 +290,7 @@ impl<'a> Errors<'a> {
             (!is_dark).then(|| Figure::new(value, length, statistical, geometric))
         };
         let largest = if is_dark {
-            r.ray_cells.iter().copied().fold(0.0, f64::max)
+            largest_of(&r.ray_cells)
         } else {
             error_of_maximum(cells.iter().zip(errors.iter()).map(|(&cell, &error)| [cell, error]))
         };
@@ -304,6 +308,13 @@ impl<'a> Errors<'a> {
     /// Whether no ray that compared facets and spline came to the receiver: of light that did come, nothing but its power is known.
     fn is_unmet(&self) -> bool {
         self.compared.is_finite() && self.measured.is_some_and(|m| m.power.facets == 0.0 && m.power.spline == 0.0)
+    }
+
+    /// The geometric error of the largest cell of a receiver that no comparing ray came to: all of it, of a dark one what an unseen ray
+    /// brings.
+    fn unmet_maximum(&self, r: &ReceiverResult) -> f64 {
+        let of_ray = largest_of(&r.ray_cells) / r.ray_power.max(f64::MIN_POSITIVE);
+        if r.max > 0.0 { r.max } else { self.unseen_power * of_ray }
     }
 
     /// Returns what may be wrong of the value of the cell `brightest` that stands far above the square of `side` cells around it: such a
@@ -326,7 +337,8 @@ impl<'a> Errors<'a> {
     fn channels(&self, r: &ReceiverResult, unit: &str) -> Vec<ChannelFigure> {
         let of_channel = |(k, c): (usize, &ChannelResult)| {
             let of_facets = |m: &ReceiverError| m.channels.get(k).map_or(0.0, |c| c.total.geometric());
-            let geometric = self.geometric(self.lost_share * c.total, c.total, of_facets);
+            let unmet = if c.total > 0.0 { c.total } else { channel_worth(r, c) * self.unseen_power };
+            let geometric = self.geometric(self.lost_share * c.total, unmet, of_facets);
             let unit = c.total_unit(unit);
             let statistical = if c.total > 0.0 { c.error } else { channel_worth(r, c) * r.ray_power };
             ChannelFigure { name: c.name.clone(), figure: Figure::new(c.total, unit, statistical, geometric) }

@@ -172,6 +172,16 @@ fn facets_that_blur_a_lamp_say_by_how_much() {
         let geometric = named(&all[0], name).geometric.unwrap();
         assert!(geometric >= unknown && unknown > 0.0, "{name}: {geometric} of {unknown}");
     }
+    // Nor that there is none, where none came in the whole run.
+    let mut dark = results.clone();
+    let receiver = &mut dark.receivers[0];
+    (receiver.power, receiver.max) = (0.0, 0.0);
+    receiver.cells.fill(0.0);
+    let all = figures(&dark, Surface::Facets(&unmet), "lm");
+    assert!(
+        named(&all[0], "max").geometric.is_some_and(|g| g > 0.0)
+            && named(&all[0], "power").geometric.unwrap() > 0.0
+    );
     // A run that asks for nothing is not traced on them.
     let answer = default_answer(&known, 100_000, 2);
     let max = named(&answer.figures[0], "max");

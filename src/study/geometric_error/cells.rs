@@ -196,7 +196,7 @@ impl<'r> CellPairs<'r> {
         let density = Paired { facets, spline, error: if side > 1 { noise.hypot(blurred) } else { noise } };
         // A ring about a pole is one place, which is known as well as all its cells together.
         let places = if block.size[0] == side { count } else { count * count };
-        Peak { density, cells: side, statistical: (variance / places).sqrt() }
+        Peak { density, cells: side.min(self.grid[0].max(self.grid[1])), statistical: (variance / places).sqrt() }
     }
 
     /// Compares all cells together, as shares of the root of the sum of the spline's squares.

@@ -140,12 +140,16 @@ impl GeometricError {
         self.receivers.iter().find(is_unjudged).map(|r| r.name.as_str())
     }
 
+    /// The share of the light of receiver `k` that rays may change which are too rare to be among these: one of those that came there.
+    pub fn unseen_share(&self, k: usize, emitted: f64) -> f64 {
+        let r = &self.receivers[k];
+        1.0 / self.rays_of(&r.power, r.statistical.power, emitted).max(1.0)
+    }
+
     /// Adds to every figure but those of cells what rays may change of it that are too rare to be among these, at a receiver one of those
     /// that came there: rays without a difference tell of none at all, and yet one more may pass a silhouette.
     pub fn with_unseen_rays(mut self, emitted: f64) -> Self {
-        let shares: Vec<f64> = (self.receivers.iter())
-            .map(|r| 1.0 / self.rays_of(&r.power, r.statistical.power, emitted).max(1.0))
-            .collect();
+        let shares: Vec<f64> = (0..self.receivers.len()).map(|k| self.unseen_share(k, emitted)).collect();
         for (r, share) in self.receivers.iter_mut().zip(shares) {
             let totals = r.channels.iter_mut().map(|c| &mut c.total);
             let figures = [&mut r.power, &mut r.peak].into_iter().chain(&mut r.rms).chain(&mut r.width);
