@@ -134,7 +134,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         limits: RefusalLimit,
     },
-    /// Look at what is built once and kept, or remove it; --cache or LAMPYRIS_CACHE must name the folder
+    /// List or remove the models, facets and octrees that are kept from earlier runs; --cache or LAMPYRIS_CACHE must name the folder
     Cache {
         #[command(flatten)]
         folder: CacheOption,
@@ -214,7 +214,7 @@ pub(crate) struct FacetCommand {
     /// Mesh the model by truck-meshalgo too, at the tight end of the tolerance, and set it beside ours
     #[arg(long)]
     pub(crate) baseline: bool,
-    /// Number of threads; all cores by default
+    /// Number of threads, at most 16 for each core; as many as there are cores by default
     #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     #[command(flatten)]

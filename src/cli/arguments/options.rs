@@ -79,7 +79,7 @@ pub(crate) struct TracingOptions {
     /// Seed of all random numbers
     #[arg(long, help_heading = "Rays", value_name = "S", value_parser = parse_seed, allow_negative_numbers = true)]
     pub(crate) seed: Option<u64>,
-    /// Number of threads; all cores by default
+    /// Number of threads, at most 16 for each core; as many as there are cores by default
     #[arg(long, help_heading = "Rays", value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     /// What finds the hits; octree by default, in a traced scene chosen by a pilot

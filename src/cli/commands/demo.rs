@@ -94,7 +94,7 @@ fn refuse_replacing(file: &Path, content: &[u8]) -> Result<(), Failure> {
     if !file.exists() || read_bytes(file).is_ok_and(|bytes| bytes == content) {
         return Ok(());
     }
-    let message = format!("{}: is there already, and is not what the demo writes", file.display());
+    let message = format!("{} already exists, and is not what the demo writes", file.display());
     Err(Failure::arguments(message).with_help("give another folder with -o"))
 }
 

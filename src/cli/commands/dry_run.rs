@@ -7,7 +7,7 @@ use crate::cli::output::json::json_text;
 use crate::cli::output::rule_table::{left_out_document, left_out_table, rule_document, rule_table};
 use crate::cli::output::terminal_tables::table_text;
 use crate::model::Part;
-use crate::pipeline::PreparedScene;
+use crate::pipeline::{IntersectorKind, PreparedScene};
 use crate::report::{bytes, grouped, seconds};
 use serde_json::json;
 use std::path::Path;
@@ -29,16 +29,19 @@ pub(super) fn run(prepared: &PreparedScene, folder: &Path, console: &Console) ->
         print(&json_text(&document)?)?;
         return Ok(Completion::Complete);
     }
+    let made = format!("{} facets ({})", grouped(facets.facet_count() as u64), bytes(facets.bytes() as u64));
+    let traced_on = match prepared.choice.intersector {
+        IntersectorKind::Exact => format!("on the splines of {faces} faces ({made} are for pictures alone)"),
+        on_facets => {
+            format!("through {made} of {faces} faces, {on_facets} with {} normals", prepared.choice.normals)
+        }
+    };
     print(&format!(
-        "would trace {} rays (seed {}) on {} threads through {} facets ({}) of {faces} faces, {} with {} normals,\n\
+        "would trace {} rays (seed {}) on {} threads {traced_on},\n\
          and write into {}; reading took {}, tessellation {}\n",
         grouped(settings.rays),
         settings.seed,
         prepared.threads,
-        grouped(facets.facet_count() as u64),
-        bytes(facets.bytes() as u64),
-        prepared.choice.intersector,
-        prepared.choice.normals,
         folder.display(),
         seconds(loaded.seconds),
         seconds(prepared.tessellation_seconds)

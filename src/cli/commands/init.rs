@@ -47,7 +47,7 @@ pub(crate) fn run(
     let loaded = input_files::model_file(file, placed, console)?;
     // A scene has work in it: it is never written over.
     if scene_file.exists() {
-        let failure = Failure::arguments(format!("{}: is there already", scene_file.display()));
+        let failure = Failure::arguments(format!("{} already exists", scene_file.display()));
         return Err(failure.with_help("give another name with -o"));
     }
     make_folder(&folder_of(&scene_file))?;

@@ -6,7 +6,9 @@ use crate::formats::{
     Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_eulumdat,
     write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_png, write_tm25, write_vti,
 };
-use crate::report::{colour_picture, file_stem, on_receiver, photometric_grid, receiver_grid, with_even_poles};
+use crate::report::{
+    colour_picture, figures, file_stem, on_receiver, photometric_grid, receiver_grid, with_even_poles,
+};
 use crate::simulate::ReceiverResult;
 use crate::simulate::scene::{FarFieldType, Receiver, ReceiverKind};
 use std::path::Path;
@@ -120,8 +122,8 @@ const ADDITIONAL: usize = 7;
 /// nearest cells, at a pole the mean of its ring, which `grid` has in all cells of the ring. `None` for other receivers, and where its
 /// ranges are not those of a whole luminaire.
 ///
-/// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, mostly within a thousandth of
-/// 1, so that their flux is `lumens`.
+/// A cell holds a mean, LM-63 values between which readers interpolate: all are scaled by one factor, within some thousandths of
+/// 1 and told in the file, so that their flux is `lumens`.
 fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Photometry> {
     let half_turn = [-90.0, 90.0];
     // Light of a luminaire may go up or down alone (LM-63-2002, 5.11).
@@ -185,6 +187,8 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
     // A dark far field has no flux to be scaled to.
     if factor.is_finite() {
         photometry.candela.iter_mut().for_each(|c| *c *= factor);
+        let said = format!("values of the cells times {}, to have their flux between them", figures(factor, 5));
+        photometry.keywords.push(("OTHER".to_owned(), said));
     }
     Some(photometry)
 }

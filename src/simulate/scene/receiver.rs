@@ -49,7 +49,7 @@ pub struct Receiver {
     pub h_deg: [f64; 2],
     /// Second angle of a far field (V, or γ), from and to, degrees.
     pub v_deg: [f64; 2],
-    /// What is counted besides power.
+    /// What is counted besides power, where that is in watts.
     pub channels: Option<Channels>,
     /// Edges of spectral bins, rising, nm: power is counted in each. Not beside `channels`, which another receiver there may have.
     pub bins_nm: Option<Vec<f64>>,
