@@ -113,7 +113,7 @@ impl Aim {
             blurred.push([v_deg - blur, v_deg + blur].map(|v_deg| [below(v_deg).h_deg, v_deg]));
         }
         let how = format!(
-            "cut-off found at {} on H = {} (G = {:.2}) and read as {}{}; {}",
+            "cut-off found at {} on H = {} (G = {:.2}) and aimed to {}{}; {}",
             angle_text(edge.position),
             angle_text(rule.scan_h_deg),
             edge.gradient,
@@ -222,8 +222,11 @@ impl Sideways {
         let blur = slant * blur_by_cells(across, map.coarsest_deg());
         let blurred = (blur > LEAST_TURN_DEG).then_some([h_deg - blur, h_deg + blur]);
         let doubt = doubt(&elbow, "elbow");
-        let how =
-            format!("elbow found at {} and read as {}{doubt}", angle_text(elbow.position), angle_text(elbow_h_deg));
+        let how = format!(
+            "elbow found at {} and aimed to {}{doubt}",
+            angle_text(elbow.position),
+            angle_text(elbow_h_deg)
+        );
         Self { h_deg, v_deg, others, moved, blurred, how }
     }
 

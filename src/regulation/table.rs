@@ -201,7 +201,7 @@ impl Regulation {
     pub fn checked(&self) -> String {
         let two = self.function.rows.iter().filter(|r| r.evidence == "two").count();
         format!(
-            "{two} of {} rows were compared with a second source, the others have one; compare with the text in force before relying on them",
+            "{two} of {} rows were compared with a second source, the others rest on one; compare with the text in force before relying on them",
             self.function.rows.len()
         )
     }

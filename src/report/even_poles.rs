@@ -1,6 +1,6 @@
 //! Grids over planes C all around, whose cells at a pole are slivers of one direction, and nearly so beside it.
 
-use super::number::{figures, without_rounding};
+use super::number::{coordinate_figures, without_rounding};
 use crate::formats::Grid;
 use crate::simulate::PoleRings;
 use std::borrow::Cow;
@@ -26,7 +26,7 @@ pub(super) fn brightest_direction(grid: &Grid) -> Option<(String, f64)> {
     let poles = pole_rings(grid).has_poles(grid.values.len());
     let pole = ends.iter().zip(poles).find(|((end, _), is_pole)| *is_pole && row == *end);
     let direction = match pole {
-        Some(((_, angle), _)) => format!("{} {}°", gamma.label, figures(*angle, 3)),
+        Some(((_, angle), _)) => format!("{} {}°", gamma.label, coordinate_figures(*angle)),
         None => direction_text(grid, [h, v]),
     };
     Some((direction, value))
@@ -34,7 +34,7 @@ pub(super) fn brightest_direction(grid: &Grid) -> Option<(String, f64)> {
 
 /// Returns a direction of a far field, degrees, in words.
 pub(super) fn direction_text(grid: &Grid, at: [f64; 2]) -> String {
-    let [h, v] = at.map(|x| figures(without_rounding(x), 3));
+    let [h, v] = at.map(|x| coordinate_figures(without_rounding(x)));
     format!("{} {h}°, {} {v}°", grid.axes[0].label, grid.axes[1].label)
 }
 

@@ -58,7 +58,11 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
     let Counted { receiver, figures: of_receiver, grid } = *counted;
     let title = format!("{}: figures of the lamp", super::maps::spoken(&receiver.name));
     let name = format!("{}-lamp", crate::formats::file_stem(&receiver.name));
-    let mut table = Table::new(&name, &title, &[("", ""), ("value", ""), ("±", ""), ("unit", ""), ("where", "")]);
+    let mut table = Table::new(
+        &name,
+        &title,
+        &[("", ""), ("value", ""), ("± rays and facets (1σ)", ""), ("unit", ""), ("where", "")],
+    );
     if let Some((place, value)) = brightest_direction(grid) {
         // Where the map is the one whose brightest cell is a figure of the run, its error is that figure's.
         let known = of_receiver.max.as_ref().filter(|max| max.unit == grid.unit);
@@ -222,7 +226,7 @@ pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     let name = format!("{}-polar", crate::formats::file_stem(&receiver.name));
     let title = format!("{}: polar diagram", super::maps::spoken(&receiver.name));
     let unit = grid.unit.as_str();
-    let axes = [AxisStyle::linear("intensity aside", unit), AxisStyle::linear("intensity up", unit)];
+    let axes = [AxisStyle::linear("intensity, sideways", unit), AxisStyle::linear("intensity up", unit)];
     let caption =
         "The length of the arrow from the origin to the curve is the intensity in its direction; γ 0 points down.";
     Some(Chart::series(&name, &title, caption, axes, series).with_equal_scales())
@@ -282,7 +286,11 @@ mod tests {
         let aim = Aim { h_deg: 0.5, v_deg: 0.25, ..Aim::default() };
         let (traffic, verdict) = (Traffic::Left, Verdict::Pass);
         let assessment = Assessment { regulation, traffic, aim, sensor_deg: 0.1, rows, verdict };
-        let mut table = Table::new("lamp", "", &[("", ""), ("value", ""), ("±", ""), ("unit", ""), ("where", "")]);
+        let mut table = Table::new(
+            "lamp",
+            "",
+            &[("", ""), ("value", ""), ("± rays and facets (1σ)", ""), ("unit", ""), ("where", "")],
+        );
         add_assessment(&mut table, &assessment, |[h, v]| format!("{h} {v}"));
         let [_, row] = &table.rows[..] else { panic!() };
         assert_eq!(row[0].shown(), "HV inside the 80 % isocandela, less 0.8 × Imax");

@@ -1,8 +1,8 @@
 //! What a receiver counted as maps: the grid for files and pictures, its cuts, and what stands below them.
 
-use super::even_poles::is_all_around;
+use super::even_poles::{brightest_direction, is_all_around};
 use super::framing::{LIT_PART_SHOWN, lit_part};
-use super::number::{unit_in_words, with_unit};
+use super::number::{coordinate_figures, unit_in_words, with_unit};
 use super::peak_lines::lines_through_peak;
 use super::{AxisStyle, Chart, Series, SeriesStyle, figures};
 use crate::formats::file_stem;
@@ -160,19 +160,22 @@ pub(super) fn cuts(grid: &Grid) -> Option<Chart> {
 
 /// Writes what a map shows: its peak, its noise and its cells.
 pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
-    let peak = grid.peak().map(|([x, y], value)| {
+    let place = |[x, y]: [f64; 2]| {
+        let [x, y] = [(0, x), (1, y)].map(|(a, at)| {
+            let Axis { label, unit, .. } = &grid.axes[a];
+            format!("{label} {}", with_unit(&coordinate_figures(at), unit))
+        });
+        format!("{x}, {y}")
+    };
+    let peak = match brightest_direction(grid).filter(|_| r.kind == "far_field") {
+        Some(direction) => Some(direction),
+        None => grid.peak().map(|(at, value)| (place(at), value)),
+    };
+    let peak = peak.map(|(place, value)| {
         if value <= 0.0 {
             return "No light came here. ".to_owned();
         }
-        format!(
-            "Peak {} {} at {} {}, {} {}. ",
-            figures(value, 3),
-            grid.unit,
-            grid.axes[0].label,
-            with_unit(&figures(x, 3), &grid.axes[0].unit),
-            grid.axes[1].label,
-            with_unit(&figures(y, 3), &grid.axes[1].unit)
-        )
+        format!("Peak {} {} at {place}. ", figures(value, 3), grid.unit)
     });
     let error = grid.error.as_ref().and_then(|errors| light_weighted_error(&grid.values, errors)).map(|share| {
         format!("Statistical error of a cell, weighted by its light: {} %. ", figures(100.0 * share, 2))

@@ -132,6 +132,11 @@ pub fn tolerance_text(range: [f64; 2]) -> String {
     if low == high { format!("{low} mm") } else { format!("{low}..{high} mm") }
 }
 
+/// Writes a coordinate of a map, mm or degrees, to three figures, of a hundred and more to a tenth.
+pub(super) fn coordinate_figures(at: f64) -> String {
+    figures(at, if at.abs() < 100.0 { 3 } else { 4 })
+}
+
 /// Returns an angle, degrees, or 0 for what the sums of aiming leave of that.
 pub(super) fn without_rounding(angle_deg: f64) -> f64 {
     /// Far below what is printed beside other angles, far above the rounding of a full turn.

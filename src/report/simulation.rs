@@ -240,34 +240,36 @@ impl SimulationReport<'_> {
         let columns = [
             ("receiver", ""),
             ("power", self.unit),
-            ("± (1σ)", self.unit),
+            ("± of the power (1σ)", self.unit),
             ("largest", ""),
             ("unit", ""),
             ("mean position 1", ""),
             ("mean position 2", ""),
             ("rms 1", ""),
-            ("± (1σ)", ""),
+            ("± of rms 1 (1σ)", ""),
             ("rms 2", ""),
-            ("± (1σ)", ""),
+            ("± of rms 2 (1σ)", ""),
         ];
         let power = errors::power_table(self.results, self.absorbed, self.unit);
-        let caption = "Positions and widths in mm, of far fields and spheres in degrees.";
+        let caption = "Positions and widths in mm, of far fields and spheres in degrees; errors are those of rays and facets together.";
         let mut receivers = Table::new("receivers", "Receivers", &columns).caption(caption);
-        for r in &self.results.receivers {
+        for (r, f) in self.results.receivers.iter().zip(self.figures) {
             // Light that did not come has no place.
             let place = |cell: Cell| if r.power > 0.0 { cell } else { Cell::Empty };
+            let error =
+                |figure: &Option<Figure>| figure.as_ref().map_or(Cell::Empty, |f| Cell::Number(f.combined(), 2));
             receivers.row([
                 r.name.as_str().into(),
                 Cell::Number(r.power, 6),
-                Cell::Number(r.power_error, 2),
+                Cell::Number(f.power.combined(), 2),
                 r.max.into(),
                 unit_in_words(r.unit).into(),
                 place(r.centroid[0].into()),
                 place(r.centroid[1].into()),
                 place(r.rms[0].into()),
-                place(Cell::Number(r.rms_error[0], 2)),
+                error(&f.rms_1),
                 place(r.rms[1].into()),
-                place(Cell::Number(r.rms_error[1], 2)),
+                error(&f.rms_2),
             ]);
         }
         let section = Section::new("Energy").with_block(power).with_block(receivers);
@@ -302,8 +304,7 @@ impl SimulationReport<'_> {
         for (i, r) in self.results.receivers.iter().enumerate() {
             let sum: f64 = r.channels.iter().map(|c| c.total).sum();
             for (j, c) in r.channels.iter().enumerate() {
-                let figure = self.figures.get(i).and_then(|f| f.channels.get(j));
-                let geometric = figure.and_then(|f| f.figure.geometric);
+                let [statistical, geometric] = errors::error_cells(&self.figures[i].channels[j].figure);
                 let shown = |name: &str| c.name == name && sum > 0.0;
                 // x and y stand at the row of X; a dark receiver has no chromaticity.
                 let chromaticity = |k: usize| Cell::from(r.channels[k].total / sum);
@@ -312,8 +313,8 @@ impl SimulationReport<'_> {
                     r.name.as_str().into(),
                     c.name.as_str().into(),
                     Cell::Number(c.total, 6),
-                    Cell::Number(c.error, 2),
-                    geometric.map_or_else(|| "–".into(), |g| Cell::Number(g, 2)),
+                    statistical,
+                    geometric,
                     c.total_unit(self.unit).into(),
                     x,
                     y,

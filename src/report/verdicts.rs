@@ -127,8 +127,8 @@ fn table(a: &Assessment, name: &str) -> Table {
     let columns = [
         ("row", ""),
         ("direction", ""),
-        ("asked", "cd"),
-        ("read", "cd"),
+        ("limit", "cd"),
+        ("reading", "cd"),
         ("± rays", "cd"),
         ("± facets", "cd"),
         ("± cells", "cd"),
