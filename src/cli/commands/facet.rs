@@ -171,7 +171,8 @@ fn meshing_summary(r: &Report) -> String {
         "certified",
         format!("{} of {} facets are proved to be within their tolerance", n(r.certified), n(r.facets)),
     );
-    let mut sag = format!("proved at most {} mm", figures(r.sag_mm.bound_max, 4));
+    let of = if r.certified < r.facets { " on the certified ones" } else { "" };
+    let mut sag = format!("proved at most {} mm{of}", figures(r.sag_mm.bound_max, 4));
     if let (Some(max), Some(mean)) = (r.sag_mm.sampled_max, r.sag_mm.sampled_mean) {
         sag += &format!("; sampled: at most {} mm, mean {} mm", figures(max, 4), figures(mean, 3));
     }
