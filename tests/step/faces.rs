@@ -247,13 +247,17 @@ fn square_along(curve: &str) -> String {
 }
 
 #[test]
-fn a_line_that_passes_both_vertices_by_gives_way_to_them() {
-    // Of the edge from (0, 0, 0) to (1, 0, 0): half a millimetre beside it and 0.4 above.
-    let line = "#80=LINE('',#81,#82);\n#81=CARTESIAN_POINT('',(0.3,-0.5,0.4));\n#82=VECTOR('',#83,1.);\n#83=DIRECTION('',(1.,0.,0.));\n";
-    let import = import(&square_along(line));
-    close(area(&import), 1.0, 1e-12);
-    assert_eq!(import.report.faces.refused, 0, "{:?}", import.report.refusals);
-    assert_eq!(import.report.faces.repaired, 1, "{:?}", import.report.repairs);
+fn a_line_that_passes_a_vertex_by_gives_way_to_both() {
+    // Of the edge from (0, 0, 0) to (1, 0, 0): half a millimetre beside it and 0.4 above; from its start, and 0.05 beside its end.
+    for (from, along) in [("(0.3,-0.5,0.4)", "(1.,0.,0.)"), ("(0.,0.,0.)", "(1.,-0.05,0.)")] {
+        let line = format!(
+            "#80=LINE('',#81,#82);\n#81=CARTESIAN_POINT('',{from});\n#82=VECTOR('',#83,1.);\n#83=DIRECTION('',{along});\n"
+        );
+        let import = import(&square_along(&line));
+        close(area(&import), 1.0, 1e-12);
+        assert_eq!(import.report.faces.refused, 0, "{:?}", import.report.refusals);
+        assert_eq!(import.report.faces.repaired, 1, "{:?}", import.report.repairs);
+    }
 }
 
 #[test]

@@ -341,14 +341,15 @@ fn a_solid_that_touches_itself_along_an_edge_is_closed() {
     assert!((volume - 2.0 * SIDE.powi(3)).abs() < 1e-9, "{volume}");
 }
 
-/// A face between two straight edges with the same vertices, of which one is a line that misses them by more than a writer rounds.
-#[test]
-fn a_face_between_two_straight_edges_is_left_out() {
-    let missed = 1.5e-3;
+/// A cube whose edge from corner 4 to 5 is two, with a face between them on `surface`, of which the second, #93, has the curve #94 of
+/// `curve`; the second face, above, has the first one, and the third, beside, has #93.
+fn cube_with_a_doubled_edge(curve: &str, surface: &str) -> String {
     let corners: Vec<[f64; 3]> = cube_corners().into_iter().take(8).collect();
     let faces: [&[usize]; 7] = [CUBE[0], CUBE[1], CUBE[2], CUBE[3], CUBE[4], CUBE[5], &[4, 5]];
     // Its corners in a line give no normal.
-    let text = solid_text(&corners, &faces, &[".T."; 7], None).replace("(NaN,NaN,NaN)", "(0.0,1.0,0.0)");
+    let text = solid_text(&corners, &faces, &[".T."; 7], None)
+        .replace("(NaN,NaN,NaN)", "(0.0,1.0,0.0)")
+        .replace("#100063=PLANE('',#100062);", surface);
     // The edge from corner 4 to 5 is the first of the second face; the third face and this one get another in its place.
     let first = text.find("=EDGE_CURVE('',#204,#205,").expect("an edge");
     let start = text[..first].rfind('#').expect("its id");
@@ -358,14 +359,48 @@ fn a_face_between_two_straight_edges_is_left_out() {
     let last = parts.split_off(2);
     let text = [parts.join(&format!("*,{edge},")), last[..2].join("*,#93,"), last[2].clone()];
     let text = [text[0].clone(), format!("*,#93,{}", text[1]), format!("*,{edge},{}", text[2])].concat();
-    let other = format!(
-        "DATA;\n#90=CARTESIAN_POINT('',(0.,{:?},{SIDE:?}));#91=DIRECTION('',(1.,0.,0.));#92=VECTOR('',#91,1.);\
-         #94=LINE('',#90,#92);#93=EDGE_CURVE('',#204,#205,#94,.T.);\n",
+    text.replacen("DATA;\n", &format!("DATA;\n#93=EDGE_CURVE('',#204,#205,#94,.T.);{curve}\n"), 1)
+}
+
+/// Returns the faces that were left out for having no width.
+fn faces_without_width(import: &Import) -> Vec<u64> {
+    import.report.repairs.iter().filter(|r| r.reason.contains("it has no width")).map(|r| r.id).collect()
+}
+
+/// A face between two straight edges with the same vertices, of which one is a line that misses them by more than a writer rounds.
+#[test]
+fn a_face_between_two_straight_edges_is_left_out() {
+    let missed = 1.5e-3;
+    let line = format!(
+        "#90=CARTESIAN_POINT('',(0.,{:?},{SIDE:?}));#91=DIRECTION('',(1.,0.,0.));#92=VECTOR('',#91,1.);#94=LINE('',#90,#92);",
         -missed
     );
-    let import = read(&text.replacen("DATA;\n", &other, 1));
+    let import = read(&cube_with_a_doubled_edge(&line, "#100063=PLANE('',#100062);"));
     assert_closes(&import);
-    let said: Vec<u64> =
-        import.report.repairs.iter().filter(|r| r.reason.contains("it has no width")).map(|r| r.id).collect();
-    assert_eq!(said, [100_066]);
+    assert_eq!(faces_without_width(&import), [100_066]);
+}
+
+/// A face between a line and a parabola that leaves it by 4 µm, where points within 10 µm are one to the file; on a plane, and on a spline
+/// with a border.
+#[test]
+fn a_face_thinner_than_the_accuracy_of_its_file_is_left_out() {
+    let curve = format!(
+        "#90=CARTESIAN_POINT('',({:?},0.,{:?}));#94=B_SPLINE_CURVE_WITH_KNOTS('',2,(#104,#90,#105),.UNSPECIFIED.,.F.,.F.,(3,3),(0.,1.),.UNSPECIFIED.);",
+        0.5 * SIDE,
+        SIDE + 8e-3
+    );
+    let spline = "#100063=B_SPLINE_SURFACE_WITH_KNOTS('',1,1,((#81,#82),(#83,#84)),.UNSPECIFIED.,.F.,.F.,.F.,(2,2),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED.);\
+                  #81=CARTESIAN_POINT('',(-1.,0.,9.));#82=CARTESIAN_POINT('',(-1.,0.,11.));\
+                  #83=CARTESIAN_POINT('',(11.,0.,9.));#84=CARTESIAN_POINT('',(11.,0.,11.));";
+    let coarse = "GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#80))GLOBAL_UNIT_ASSIGNED_CONTEXT";
+    let accuracy = "DATA;\n#80=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.01),#2,'','');";
+    for surface in ["#100063=PLANE('',#100062);", spline] {
+        let text = cube_with_a_doubled_edge(&curve, surface);
+        let stated = text.replacen("GLOBAL_UNIT_ASSIGNED_CONTEXT", coarse, 1).replacen("DATA;\n", accuracy, 1);
+        let import = read(&stated);
+        assert_closes(&import);
+        assert_eq!(faces_without_width(&import), [100_066]);
+        // Of a file that states nothing it is a face.
+        assert!(faces_without_width(&read(&text)).is_empty());
+    }
 }

@@ -9,8 +9,8 @@ use super::{GeometryReader, Outcome, Refusal};
 use crate::math::Point;
 use crate::nurbs::Curve;
 
-/// What is told of a line that passes both vertices by.
-const PASSED_BY: &str = "the line of an edge passes both its vertices by: it runs between them";
+/// What is told of a line that passes a vertex by.
+const PASSED_BY: &str = "the line of an edge passes one of its vertices by: it runs between them";
 /// Longest chain of edges that are parts of edges.
 const MAX_PARENTS: usize = 4;
 
@@ -78,7 +78,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
 }
 
 /// Returns the edge from `p` to `q` along a curve, the whole of it if `closed`; `sense` is whether the edge runs along the curve as the
-/// file names it, which is corrected on an open curve. A line that passes both vertices by is replaced by the segment between them; an edge
+/// file names it, which is corrected on an open curve. A line that passes a vertex by is replaced by the segment between both; an edge
 /// whose vertices coincide has no curve. `None` where nothing of the curve lies between vertices that are apart, or its numbers are not
 /// finite.
 pub(crate) fn trim_to_vertices(
@@ -94,7 +94,7 @@ pub(crate) fn trim_to_vertices(
     let (a, b) = if forward { (p, q) } else { (q, p) };
     let (mut ta, mut tb) = (shape.parameter(a), shape.parameter(b));
     let accuracy = VERTEX_MM + VERTEX_SHARE * p.abs().max_element();
-    // A line that passes both vertices by is another edge's: of what this one is its vertices tell all.
+    // The edges beside it end in its vertices: a line that misses one would leave a gap there, or be another edge's.
     if passes_by(shape, [(ta, a), (tb, b)]) && (p - q).length() > LOOSE_VERTEX_MM {
         let curve = Curve::line(p, q, [0.0, (q - p).length()]);
         return Some(TrimmedEdge { curve: Some(curve), repair: Some(PASSED_BY), ..TrimmedEdge::default() });
@@ -153,10 +153,10 @@ pub(crate) fn trim_to_vertices(
     finish_edge(shape.segment(ta, tb), forward, p, q).map(|edge| TrimmedEdge { is_arc, ..edge })
 }
 
-/// Whether a line misses both vertices, each at its parameter, by more than [`LOOSE_VERTEX_MM`]; false of any other curve.
+/// Whether a line misses one of two vertices, each at its parameter, by more than [`LOOSE_VERTEX_MM`]; false of any other curve.
 fn passes_by(shape: &CurveShape, ends: [(f64, Point); 2]) -> bool {
     let CurveShape::Line { origin, direction } = shape else { return false };
-    ends.iter().all(|&(t, vertex)| (*origin + *direction * t - vertex).length() > LOOSE_VERTEX_MM)
+    ends.iter().any(|&(t, vertex)| (*origin + *direction * t - vertex).length() > LOOSE_VERTEX_MM)
 }
 
 /// Returns the curve turned as the edge runs, with its gap to the vertices; `None` where it has no parameters left or is no number.

@@ -1,6 +1,6 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
-use super::face_edges::{ACCURACY_MM, FaceEdges, face_edges};
+use super::face_edges::{FaceEdges, face_edges, stated_accuracy};
 use super::free_surfaces::convert_free_surfaces;
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::{faces_against_neighbours, is_inside_out};
@@ -26,10 +26,6 @@ use crate::step::trim::task::{FaceTask, TaskEdge};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// Share of a face's size above which a stated accuracy would merge its own edges.
-const ACCURACY_SHARE: f64 = 1e-3;
-/// Faces smaller than this count as this large there, mm.
-const SMALLEST_FACE_MM: f64 = 1e-3;
 /// Ends of edges this many of their gaps apart are one, up to a gap of [`LARGEST_GAP_MM`].
 const GAPS: f64 = 2.0;
 /// See [`GAPS`]; mm.
@@ -68,7 +64,7 @@ pub(crate) fn convert(
     let reason = "its vertices are in the wrong order: all loops run it the other way";
     out.repaired.extend(swapped.iter().map(|&id| repair_note(file, id, reason.into())));
     let joined = vertices_of_empty_edges(file, &keys, &edges);
-    let mut removed = remove_faces_without_width(file, &ids, &mut plans, (&keys, &index), (&edges, &joined));
+    let mut removed = remove_faces_without_width(&geometry, &ids, &mut plans, (&keys, &index), (&edges, &joined));
     let table = EdgeTable { keys: &mut keys, index: &mut index, edges: &mut edges };
     let spiked = remove_spikes(file, &ids, &mut plans, table, &joined);
     removed.extend(spiked.removed);
@@ -280,9 +276,8 @@ fn convert_face(
         return Err(beyond_rounding(geometry, id, plan));
     }
 
-    // Points are one within what the file states, less on small faces, more where an edge leaves gaps.
-    let stated = geometry.units.accuracy.unwrap_or(ACCURACY_MM[0]).clamp(ACCURACY_MM[0], ACCURACY_MM[1]);
-    let accuracy = stated.min(ACCURACY_SHARE * bounds.diagonal().max(SMALLEST_FACE_MM)).max(ACCURACY_MM[0]);
+    // Points are one within what the file states, or more where an edge leaves gaps.
+    let accuracy = stated_accuracy(geometry.units.accuracy, bounds.diagonal());
     let with_gap = |gap: f64| accuracy.max(GAPS * gap.min(LARGEST_GAP_MM));
     let edges = curves.iter().map(|(&k, &(curve, gap))| (k, TaskEdge { curve, accuracy: with_gap(gap) })).collect();
     let task = FaceTask {

@@ -9,7 +9,11 @@ use crate::step::geometry::{EMPTY_EDGE_MM, Outcome, Refusal};
 use rustc_hash::FxHashMap;
 
 /// Least and most that a file's stated accuracy counts for, mm: zero and metres are both written.
-pub(super) const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
+const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
+/// Share of a face's size above which a stated accuracy would merge its own edges.
+const ACCURACY_SHARE: f64 = 1e-3;
+/// Faces smaller than this count as this large there, mm.
+const SMALLEST_FACE_MM: f64 = 1e-3;
 /// Share of the shortest edge by which the ends of uses may differ and still follow each other: far above the gaps of real files, far
 /// below the length of an edge that is run the wrong way.
 const FOLLOWING_SHARE: f64 = 0.1;
@@ -25,6 +29,12 @@ pub(super) struct FaceEdges<'e> {
     /// Largest of these distances, of edges without length too.
     pub(super) gap: f64,
     pub(super) repairs: Vec<&'static str>,
+}
+
+/// Returns the distance, mm, within which points of a face of this size are one: what the file states, less on small faces.
+pub(super) fn stated_accuracy(stated: Option<f64>, size: f64) -> f64 {
+    let stated = stated.unwrap_or(ACCURACY_MM[0]).clamp(ACCURACY_MM[0], ACCURACY_MM[1]);
+    stated.min(ACCURACY_SHARE * size.max(SMALLEST_FACE_MM)).max(ACCURACY_MM[0])
 }
 
 /// Collects the edges of a face that have a length, and puts each loop in order; fails with the first edge that cannot be had.

@@ -2,10 +2,12 @@
 //!
 //! Of an edge without length the two vertices become one; of a face between two edges that coincide, the two edges.
 
+use super::face_edges::stated_accuracy;
 use super::topology::{EdgeKey, FacePlan};
-use crate::nurbs::{ControlPoint, Curve};
-use crate::step::geometry::Outcome;
+use crate::nurbs::{ControlPoint, Curve, project};
 use crate::step::geometry::edges::TrimmedEdge;
+use crate::step::geometry::extent::FaceExtent;
+use crate::step::geometry::{GeometryReader, Outcome};
 use crate::step::part21::File;
 use rustc_hash::FxHashMap;
 
@@ -16,8 +18,8 @@ const LARGEST_GAP_MM: f64 = 1e-3;
 /// Ends of a curve nearer than this are one: no edge is shorter.
 const CLOSED_MM: f64 = 1e-9;
 /// Points that are compared along two edges.
-const COMPARED_POINTS: usize = 9;
-/// Surfaces without an end: that a loop which encloses nothing means all of one, as it might of a sphere, cannot be.
+const COMPARED_POINTS: usize = 33;
+/// Surfaces without an end, of which a face cannot be the whole.
 const UNBOUNDED: [&str; 3] = ["PLANE", "CYLINDRICAL_SURFACE", "CONICAL_SURFACE"];
 
 /// Returns the ids of an edge's vertices, as the file orders them; `None` for each that it does not name.
@@ -98,25 +100,22 @@ impl CoincidentEdges {
     }
 }
 
-/// Finds the faces without width: those on unbounded surfaces whose only edges with length are two that coincide. Takes these out of
-/// `plans`, has the faces beside them use one edge in place of the two, and returns their ids in the order of `ids`. `joined` is that of
-/// [`vertices_of_empty_edges`].
+/// Finds the faces without width: those whose only edges with length are two that coincide, on a surface of which they cannot be the
+/// whole. Takes these out of `plans`, has the faces beside them use one edge in place of the two, and returns their ids in the order of
+/// `ids`. `joined` is that of [`vertices_of_empty_edges`].
 pub(super) fn remove_faces_without_width(
-    file: &File<'_>,
+    geometry: &GeometryReader<'_, '_>,
     ids: &[u64],
     plans: &mut FxHashMap<u64, Outcome<FacePlan>>,
     (keys, index): (&[EdgeKey], &FxHashMap<EdgeKey, usize>),
     (edges, joined): (&[Outcome<TrimmedEdge>], &FxHashMap<u64, u64>),
 ) -> Vec<u64> {
-    let ends = |edge: usize| vertex_ids(file, keys[edge]).map(|id| id.map(|id| joined_vertex(joined, id)));
+    let ends = |edge: usize| vertex_ids(geometry.file, keys[edge]).map(|id| id.map(|id| joined_vertex(joined, id)));
     let mut coincident = CoincidentEdges::default();
     let mut removed = Vec::new();
     for id in ids {
         let Some(Ok(plan)) = plans.get(id) else { continue };
         let Some([(first, forth), (second, back)]) = two_edges(plan, index, edges) else { continue };
-        if !file.entity(plan.surface).is_some_and(|s| s.is_one_of(&UNBOUNDED)) {
-            continue;
-        }
         // A loop of two that are both run forward comes back on the second: it runs against the first.
         let opposite = forth == back;
         let (from, mut to) = (ends(first), ends(second));
@@ -124,7 +123,11 @@ pub(super) fn remove_faces_without_width(
             to.reverse();
         }
         let (Ok(a), Ok(b)) = (&edges[first], &edges[second]) else { continue };
-        if from == to && !from.contains(&None) && edges_coincide(a, b, opposite) {
+        if from == to
+            && !from.contains(&None)
+            && edges_coincide(a, b, geometry.units.accuracy)
+            && !may_be_whole(geometry, plan.surface, a)
+        {
             coincident.join([first, second], opposite);
             removed.push(*id);
         }
@@ -139,6 +142,17 @@ pub(super) fn remove_faces_without_width(
         *reversed ^= opposite;
     }
     removed
+}
+
+/// Whether a loop along one edge and back may mean the whole of a surface, as it does of a sphere: of one that is closed or ends in a pole.
+fn may_be_whole(geometry: &GeometryReader<'_, '_>, surface: u64, edge: &TrimmedEdge) -> bool {
+    if geometry.file.entity(surface).is_some_and(|s| s.is_one_of(&UNBOUNDED)) {
+        return false;
+    }
+    let Some(curve) = &edge.curve else { return true };
+    let extent = FaceExtent::from_bounds(curve.bounds(), &[]);
+    // A surface that cannot be read is refused where its face is.
+    geometry.chart(surface, extent, 0).map_or(true, |c| c.period != [None, None] || !c.poles.is_empty())
 }
 
 /// Returns the two edges of a face that have a length, and whether its loop runs against them; `None` where it has more or fewer, or one
@@ -161,23 +175,21 @@ pub(super) fn coincidence_tolerance(a: &TrimmedEdge, b: &TrimmedEdge) -> f64 {
     COINCIDENT_MM + a.gap.min(LARGEST_GAP_MM) + b.gap.min(LARGEST_GAP_MM)
 }
 
-/// Whether two edges between the same vertices coincide: both are straight, or equal at equal shares of their parameters, one of them
-/// backwards if `opposite`, within what they miss their vertices by.
-fn edges_coincide(a: &TrimmedEdge, b: &TrimmedEdge, opposite: bool) -> bool {
+/// Whether two edges between the same vertices coincide: both are straight, or no point of either is farther from the other than points
+/// that are one to the file, whose stated accuracy is in mm.
+fn edges_coincide(a: &TrimmedEdge, b: &TrimmedEdge, stated: Option<f64>) -> bool {
     let (Some(first), Some(second)) = (&a.curve, &b.curve) else { return false };
     // However far a writer's line misses its vertices, between two of them there is one straight line.
     let is_straight = |curve: &Curve| curve.degree == 1 && curve.points.len() == 2;
     if is_straight(first) && is_straight(second) {
         return true;
     }
-    let tolerance = coincidence_tolerance(a, b);
-    let point = |curve: &Curve, share: f64| {
+    let size = first.bounds().union(second.bounds()).diagonal();
+    let tolerance = coincidence_tolerance(a, b) + stated_accuracy(stated, size);
+    let follows = |curve: &Curve, other: &Curve| {
         let [t0, t1] = curve.domain();
-        curve.evaluate(t0 + share * (t1 - t0))
+        let point = |k: usize| curve.evaluate(t0 + (t1 - t0) * k as f64 / (COMPARED_POINTS - 1) as f64);
+        (0..COMPARED_POINTS).all(|k| project::nearest(other, point(k)).1 <= tolerance)
     };
-    (0..COMPARED_POINTS).all(|k| {
-        let share = k as f64 / (COMPARED_POINTS - 1) as f64;
-        let other = if opposite { 1.0 - share } else { share };
-        (point(first, share) - point(second, other)).length() <= tolerance
-    })
+    follows(first, second) && follows(second, first)
 }
