@@ -159,7 +159,8 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     let as_grown = if undecided.run.grows { "; a run that grows is judged as one of 10⁸ rays" } else { "" };
     let spline = trace_replicates(bound, undecided.source.exact(), &settings);
     let emitted = spline.results.power.emitted;
-    let error = compare(bound, [&undecided.trace_facets(undecided.facets, &settings), &spline]);
+    let on_facets = trace_replicates(bound, &*undecided.source.octree(undecided.facets), &settings);
+    let error = compare(bound, [&on_facets, &spline]);
     let worst = worst_figure(bound, &error, &settings, scale);
     let mut alternatives = vec![
         alternative(tolerance, ON_FACETS, &worst, error.seconds[0] * scale),
@@ -192,6 +193,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
         return (chosen(ON_SPLINE, tolerance, because, alternatives, None), None);
     }
     // The cheapest first; each must pass a pilot of its own.
+    let mut unfit = None;
     for way in undecided.ways_before_spline(&worst, &error) {
         let tried = undecided.try_way(way, &settings, &spline);
         let tried_worst = match way {
@@ -203,14 +205,17 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
         // Between the two that are always there.
         let record = alternative(tried.tolerance_mm, way.traced_with(), &tried_worst, seconds);
         alternatives.insert(alternatives.len() - 1, record);
-        if tried_worst.ratio <= 1.0 && tried.is_fit {
+        let passes = tried_worst.ratio <= 1.0;
+        if passes && tried.unfit.is_none() {
             let because = format!("{} ({}{as_grown})", way.reason(), worst.in_words());
             let chosen = chosen(way.traced_with(), tried.tolerance_mm, because, alternatives, Some(tried.error));
             return (chosen, tried.finer);
         }
+        unfit = unfit.or(tried.unfit.filter(|_| passes));
     }
-    let because =
-        format!("facets change the answer by more than its statistical error ({}{as_grown})", worst.in_words());
+    let worst = worst.in_words();
+    let unfit = unfit.map(|why| format!("; {why}")).unwrap_or_default();
+    let because = format!("facets change the answer by more than its statistical error ({worst}{as_grown}){unfit}");
     (chosen(ON_SPLINE, tolerance, because, alternatives, None), None)
 }
 
@@ -247,8 +252,8 @@ impl Way {
 struct TriedWay {
     tolerance_mm: [f64; 2],
     error: GeometricError,
-    /// Whether by its counted work it is cheaper than the spline, and moved hits lose no more light.
-    is_fit: bool,
+    /// Why it is not taken however little it gets wrong.
+    unfit: Option<&'static str>,
     /// Facets finer than the default ones.
     finer: Option<TimedFacets>,
 }
@@ -345,11 +350,6 @@ impl Undecided<'_> {
         }
     }
 
-    /// Traces the pilot on facets.
-    fn trace_facets(&self, facets: &GroupedFacets, settings: &RunSettings) -> ReplicatedRun {
-        trace_replicates(self.bound, &*self.source.octree(facets), settings)
-    }
-
     /// Returns the ways that counted work foretells to be cheaper than the spline, the cheapest first.
     fn ways_before_spline(&self, worst: &Worst, error: &GeometricError) -> Vec<Way> {
         let hits = error.segments_per_ray * self.judged_rays() as f64;
@@ -374,8 +374,8 @@ impl Undecided<'_> {
             Way::Finer(factor) => {
                 let tolerance_mm = self.tolerance.map(|t| t / factor);
                 let finer = self.source.facets(tolerance_mm);
-                let error = compared(&self.trace_facets(&finer.facets, settings));
-                TriedWay { tolerance_mm, error, is_fit: true, finer: Some(finer) }
+                let error = compared(&trace_replicates(self.bound, &*self.source.octree(&finer.facets), settings));
+                TriedWay { tolerance_mm, error, unfit: None, finer: Some(finer) }
             }
             Way::Moved => {
                 let mut run = None;
@@ -385,8 +385,14 @@ impl Undecided<'_> {
                 let run = run.expect("the source calls what it is given");
                 let asked = run.results.cost.doubtful as f64 / run.results.segments.max(1) as f64;
                 let error = compared(&run);
-                let is_fit = MOVED_HIT + asked * SPLINE_HIT < SPLINE_HIT && error.lost[0] <= error.lost[1];
-                TriedWay { tolerance_mm: self.tolerance, error, is_fit, finer: None }
+                let unfit = if error.lost[0] > error.lost[1] {
+                    Some("hits moved to the spline lose more light than it")
+                } else if MOVED_HIT + asked * SPLINE_HIT >= SPLINE_HIT {
+                    Some("moving hits would ask the spline so often that by counted work it is no cheaper")
+                } else {
+                    None
+                };
+                TriedWay { tolerance_mm: self.tolerance, error, unfit, finer: None }
             }
         }
     }

@@ -134,7 +134,8 @@ impl<'a> Bounces<'a> {
     /// Makes `count` rays through a box, mm; `guide` finds the points they leave, and `lift`, mm, is best a few times the sag of the
     /// facets.
     pub fn new(bounds: &Aabb, guide: &'a dyn Intersector, lift: f64, seed: u64, count: u64) -> Self {
-        Self { first: Uniform::new(bounds, seed, count), guide, lift }
+        // Another stream than that of `Uniform` with this seed, whose rays may be asked beside these.
+        Self { first: Uniform::new(bounds, seed ^ 0x9e6c_63d0_876a_9a47, count), guide, lift }
     }
 
     /// Makes all eight rays of a path: each leaves the hit of the one before in a random direction on the side it came from, or begins
