@@ -9,6 +9,13 @@ const MAX_DEPTH: usize = 8;
 /// Least and largest unit, mm or radians: an attometre, an exametre. A damaged definition of 1e-300 took facets a minute.
 const SIZES: [f64; 2] = [1e-15, 1e21];
 
+/// Least and most that a stated accuracy counts for, mm: zero and metres are both written.
+const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
+/// Share of a face's size above which it would merge the face's own edges.
+const ACCURACY_SHARE: f64 = 1e-3;
+/// Faces smaller than this count as this large there, mm.
+const SMALLEST_FACE_MM: f64 = 1e-3;
+
 /// Factors from a context's units to mm and radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Units {
@@ -23,6 +30,12 @@ pub(crate) struct Units {
 impl Units {
     /// Millimetres and radians.
     pub(crate) const DEFAULT: Self = Self { length: 1.0, angle: 1.0, accuracy: None };
+
+    /// Returns the distance, mm, within which points of a face of this size, mm, are one: what the file states, less on small faces.
+    pub(crate) fn accuracy_on_face(&self, size: f64) -> f64 {
+        let stated = self.accuracy.unwrap_or(ACCURACY_MM[0]).clamp(ACCURACY_MM[0], ACCURACY_MM[1]);
+        stated.min(ACCURACY_SHARE * size.max(SMALLEST_FACE_MM)).max(ACCURACY_MM[0])
+    }
 }
 
 /// Units that a context assigns, with their names for the report; `None` for a name that it does not assign.

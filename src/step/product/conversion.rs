@@ -1,6 +1,6 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
-use super::face_edges::{FaceEdges, face_edges, stated_accuracy};
+use super::face_edges::{FaceEdges, face_edges};
 use super::free_surfaces::convert_free_surfaces;
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::{faces_against_neighbours, is_inside_out};
@@ -277,7 +277,7 @@ fn convert_face(
     }
 
     // Points are one within what the file states, or more where an edge leaves gaps.
-    let accuracy = stated_accuracy(geometry.units.accuracy, bounds.diagonal());
+    let accuracy = geometry.units.accuracy_on_face(bounds.diagonal());
     let with_gap = |gap: f64| accuracy.max(GAPS * gap.min(LARGEST_GAP_MM));
     let edges = curves.iter().map(|(&k, &(curve, gap))| (k, TaskEdge { curve, accuracy: with_gap(gap) })).collect();
     let task = FaceTask {

@@ -8,15 +8,11 @@ use crate::step::geometry::edges::TrimmedEdge;
 use crate::step::geometry::{EMPTY_EDGE_MM, Outcome, Refusal};
 use rustc_hash::FxHashMap;
 
-/// Least and most that a file's stated accuracy counts for, mm: zero and metres are both written.
-const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
-/// Share of a face's size above which a stated accuracy would merge its own edges.
-const ACCURACY_SHARE: f64 = 1e-3;
-/// Faces smaller than this count as this large there, mm.
-const SMALLEST_FACE_MM: f64 = 1e-3;
 /// Share of the shortest edge by which the ends of uses may differ and still follow each other: far above the gaps of real files, far
 /// below the length of an edge that is run the wrong way.
 const FOLLOWING_SHARE: f64 = 0.1;
+/// The least difference that is none, mm.
+const LEAST_FOLLOWING_MM: f64 = 1e-6;
 
 /// The edges of a face, in the order of its loops.
 pub(super) struct FaceEdges<'e> {
@@ -29,12 +25,6 @@ pub(super) struct FaceEdges<'e> {
     /// Largest of these distances, of edges without length too.
     pub(super) gap: f64,
     pub(super) repairs: Vec<&'static str>,
-}
-
-/// Returns the distance, mm, within which points of a face of this size are one: what the file states, less on small faces.
-pub(super) fn stated_accuracy(stated: Option<f64>, size: f64) -> f64 {
-    let stated = stated.unwrap_or(ACCURACY_MM[0]).clamp(ACCURACY_MM[0], ACCURACY_MM[1]);
-    stated.min(ACCURACY_SHARE * size.max(SMALLEST_FACE_MM)).max(ACCURACY_MM[0])
 }
 
 /// Collects the edges of a face that have a length, and puts each loop in order; fails with the first edge that cannot be had.
@@ -92,5 +82,5 @@ pub(super) fn directed_uses(
 /// be taken for a gap.
 pub(super) fn following_tolerance(uses: &[DirectedUse<usize>]) -> f64 {
     let lengths = uses.iter().map(|u| (u.to - u.from).length()).filter(|l| *l > EMPTY_EDGE_MM);
-    (FOLLOWING_SHARE * lengths.fold(1.0, f64::min)).max(ACCURACY_MM[0])
+    (FOLLOWING_SHARE * lengths.fold(1.0, f64::min)).max(LEAST_FOLLOWING_MM)
 }

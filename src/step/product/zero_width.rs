@@ -2,11 +2,11 @@
 //!
 //! Of an edge without length the two vertices become one; of a face between two edges that coincide, the two edges.
 
-use super::face_edges::stated_accuracy;
 use super::topology::{EdgeKey, FacePlan};
 use crate::nurbs::{ControlPoint, Curve, project};
 use crate::step::geometry::edges::TrimmedEdge;
 use crate::step::geometry::extent::FaceExtent;
+use crate::step::geometry::units::Units;
 use crate::step::geometry::{GeometryReader, Outcome};
 use crate::step::part21::File;
 use rustc_hash::FxHashMap;
@@ -125,7 +125,7 @@ pub(super) fn remove_faces_without_width(
         let (Ok(a), Ok(b)) = (&edges[first], &edges[second]) else { continue };
         if from == to
             && !from.contains(&None)
-            && edges_coincide(a, b, geometry.units.accuracy)
+            && edges_coincide(a, b, geometry.units)
             && !may_be_whole(geometry, plan.surface, a)
         {
             coincident.join([first, second], opposite);
@@ -176,8 +176,8 @@ pub(super) fn coincidence_tolerance(a: &TrimmedEdge, b: &TrimmedEdge) -> f64 {
 }
 
 /// Whether two edges between the same vertices coincide: both are straight, or no point of either is farther from the other than points
-/// that are one to the file, whose stated accuracy is in mm.
-fn edges_coincide(a: &TrimmedEdge, b: &TrimmedEdge, stated: Option<f64>) -> bool {
+/// that are one to the file.
+fn edges_coincide(a: &TrimmedEdge, b: &TrimmedEdge, units: Units) -> bool {
     let (Some(first), Some(second)) = (&a.curve, &b.curve) else { return false };
     // However far a writer's line misses its vertices, between two of them there is one straight line.
     let is_straight = |curve: &Curve| curve.degree == 1 && curve.points.len() == 2;
@@ -185,7 +185,7 @@ fn edges_coincide(a: &TrimmedEdge, b: &TrimmedEdge, stated: Option<f64>) -> bool
         return true;
     }
     let size = first.bounds().union(second.bounds()).diagonal();
-    let tolerance = coincidence_tolerance(a, b) + stated_accuracy(stated, size);
+    let tolerance = coincidence_tolerance(a, b) + units.accuracy_on_face(size);
     let follows = |curve: &Curve, other: &Curve| {
         let [t0, t1] = curve.domain();
         let point = |k: usize| curve.evaluate(t0 + (t1 - t0) * k as f64 / (COMPARED_POINTS - 1) as f64);
