@@ -677,6 +677,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "face_selectors",
             "frames",
             "flush_receivers",
+            "overlapping_receivers",
             "chosen",
             "rule_table",
             "materials",

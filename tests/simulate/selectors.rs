@@ -276,3 +276,26 @@ fn a_receiver_in_a_face_is_named() {
         assert_eq!(notes(off), "", "{off}");
     }
 }
+
+/// Of two receivers that overlap in one plane one takes the light of both: a note says so, and none where they touch along a border, stand
+/// off, look away from each other or let light pass.
+#[test]
+fn receivers_that_overlap_in_one_plane_are_named() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 3.0));
+    let notes = |common: &str, second: &str| {
+        let text = format!(
+            "[[receiver]]\nname = 'a'\nat = [0, 0, 20]\nsize = [4, 4]\n{common}\n[[receiver]]\nname = 'b'\nsize = [2, 6]\n{common}\n{second}\n"
+        );
+        bound(&world.model, &text).unwrap().notes().join("\n")
+    };
+    for overlapping in ["at = [0, 0, 20]", "at = [2.9, 4.9, 20]", "at = [0, 0, 20]\nnormal = [0, 0, -1]"] {
+        assert!(notes("", overlapping).contains("'a' and 'b' lie in one plane"), "{overlapping}");
+        assert_eq!(notes("absorbs = false", overlapping), "", "{overlapping}");
+    }
+    for apart in ["at = [3, 0, 20]", "at = [0, 0, 20.01]", "at = [0, 0, 20]\nnormal = [0, 1, 1]"] {
+        assert_eq!(notes("", apart), "", "{apart}");
+    }
+    let back_to_back = notes("one_sided = true", "at = [0, 0, 20]\nnormal = [0, 0, -1]");
+    assert_eq!(back_to_back, "");
+}

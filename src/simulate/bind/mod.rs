@@ -14,6 +14,7 @@ mod luminous;
 mod materials;
 mod nearest;
 mod notes;
+mod overlapping_receivers;
 mod role;
 mod rule_table;
 mod select;
@@ -119,6 +120,7 @@ impl Scene {
         bound.notes.extend(notes::thin_body_note(&bound));
         bound.notes.extend(notes::ready_mesh_note(model));
         bound.notes.extend(flush_receivers::flush_receiver_notes(&bound, model));
+        bound.notes.extend(overlapping_receivers::overlapping_receiver_notes(&bound));
         Ok(bound)
     }
 }
