@@ -118,6 +118,7 @@ pub fn verdict(check: &CrossCheck) -> String {
              surface, by the facets' small distance from it",
             grouped(beyond)
         ),
+        1 => "**1 difference from the exact spline is unexplained**".to_owned(),
         n => format!("**{} differences from the exact spline are unexplained**", grouped(n)),
     };
     format!("Of {} ray segments checked, {between}, and {beside}.", grouped(check.rays))

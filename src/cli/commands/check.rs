@@ -185,8 +185,10 @@ fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     let unexplained = found.facets_vs_exact.unexplained;
     let defects = [
         (found.scene.facets == 0, "nothing was checked: the model has no facets".to_owned()),
-        (disagreements > 0, format!("octree and BVH answer {} rays differently", grouped(disagreements))),
-        (unexplained > 0, format!("{} differences from the spline are unexplained", grouped(unexplained))),
+        (disagreements == 1, "octree and BVH answer 1 ray differently".to_owned()),
+        (disagreements > 1, format!("octree and BVH answer {} rays differently", grouped(disagreements))),
+        (unexplained == 1, "1 difference from the spline is unexplained".to_owned()),
+        (unexplained > 1, format!("{} differences from the spline are unexplained", grouped(unexplained))),
     ];
     let mut completion = Completion::Complete;
     for (_, defect) in defects.iter().filter(|(is_found, _)| *is_found) {

@@ -14,6 +14,8 @@ use std::path::Path;
 /// Names and notes shown without -v: what fits a screen.
 const SHOWN_NAMES: usize = 12;
 const SHOWN_NOTES: usize = 20;
+/// Largest distance between edges and faces that is not worth a word, mm: what curves in parameters are allowed.
+const NO_GAP_MM: f64 = 1e-6;
 
 /// Reads a STEP file and prints what it holds and what was refused, or with `faces` all of its faces. Incomplete where more faces were
 /// refused than the limit allows, and where there are none.
@@ -68,6 +70,9 @@ fn import_summary(r: &ImportReport, console: &Console) -> String {
             line("box", format!("x {}, y {}, z {} mm", side(0), side(1), side(2)));
         }
         None => line("box", "nothing to bound".into()),
+    }
+    if r.gap_max_mm > NO_GAP_MM {
+        line("edges", format!("up to {} mm off the faces that they bound", figures(r.gap_max_mm, 2)));
     }
     let shown: Vec<String> = r.names.iter().take(SHOWN_NAMES).cloned().collect();
     let more = if r.names.len() > SHOWN_NAMES {
