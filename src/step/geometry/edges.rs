@@ -3,7 +3,8 @@
 use super::composite::coincident;
 use super::curves::{CurveShape, DirectedCurve};
 use super::tolerances::{
-    EMPTY_EDGE_MM, EMPTY_PARAMETER, EMPTY_SHARE, EQUAL_POINTS_MM, LOOSE_VERTEX_MM, VERTEX_MM, VERTEX_SHARE,
+    EMPTY_EDGE_MM, EMPTY_PARAMETER, EMPTY_SHARE, EQUAL_POINTS_MM, LARGEST_VERTEX_GAP_MM, LOOSE_VERTEX_MM,
+    VERTEX_MM, VERTEX_SHARE,
 };
 use super::{GeometryReader, Outcome, Refusal};
 use crate::math::Point;
@@ -95,9 +96,12 @@ pub(crate) fn trim_to_vertices(
     let (mut ta, mut tb) = (shape.parameter(a), shape.parameter(b));
     let accuracy = VERTEX_MM + VERTEX_SHARE * p.abs().max_element();
     // The edges beside it end in its vertices: a line that misses one would leave a gap there, or be another edge's.
-    if passes_by(shape, [(ta, a), (tb, b)]) && (p - q).length() > LOOSE_VERTEX_MM {
-        let curve = Curve::line(p, q, [0.0, (q - p).length()]);
-        return Some(TrimmedEdge { curve: Some(curve), repair: Some(PASSED_BY), ..TrimmedEdge::default() });
+    let [least, most] = misses_of_line(shape, [(ta, a), (tb, b)]);
+    if most > LOOSE_VERTEX_MM && (p - q).length() > LOOSE_VERTEX_MM {
+        let curve = Some(Curve::line(p, q, [0.0, (q - p).length()]));
+        let is_gap = least <= LOOSE_VERTEX_MM && most <= LARGEST_VERTEX_GAP_MM;
+        let (gap, repair) = if is_gap { (most, None) } else { (0.0, Some(PASSED_BY)) };
+        return Some(TrimmedEdge { curve, gap, repair, ..TrimmedEdge::default() });
     }
     match shape.period() {
         Some(period) => {
@@ -153,10 +157,11 @@ pub(crate) fn trim_to_vertices(
     finish_edge(shape.segment(ta, tb), forward, p, q).map(|edge| TrimmedEdge { is_arc, ..edge })
 }
 
-/// Whether a line misses one of two vertices, each at its parameter, by more than [`LOOSE_VERTEX_MM`]; false of any other curve.
-fn passes_by(shape: &CurveShape, ends: [(f64, Point); 2]) -> bool {
-    let CurveShape::Line { origin, direction } = shape else { return false };
-    ends.iter().any(|&(t, vertex)| (*origin + *direction * t - vertex).length() > LOOSE_VERTEX_MM)
+/// Returns by how much a line misses two vertices, each at its parameter, the lesser first, mm; 0 of any other curve.
+fn misses_of_line(shape: &CurveShape, ends: [(f64, Point); 2]) -> [f64; 2] {
+    let CurveShape::Line { origin, direction } = shape else { return [0.0; 2] };
+    let [a, b] = ends.map(|(t, vertex)| (*origin + *direction * t - vertex).length());
+    [a.min(b), a.max(b)]
 }
 
 /// Returns the curve turned as the edge runs, with its gap to the vertices; `None` where it has no parameters left or is no number.
