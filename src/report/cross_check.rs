@@ -5,6 +5,7 @@ use super::{figures, grouped};
 use crate::formats::{Facets, Polylines};
 use crate::math::{Point, Vector};
 use crate::study::cross_check::{Cause, CrossCheck, Disagreement};
+use std::collections::BTreeSet;
 
 /// Everything that the report of a check speaks of.
 pub struct CheckReport<'a> {
@@ -118,10 +119,21 @@ pub fn verdict(check: &CrossCheck) -> String {
              surface, by the facets' small distance from it",
             grouped(beyond)
         ),
-        1 => "**1 difference from the exact spline is unexplained**".to_owned(),
-        n => format!("**{} differences from the exact spline are unexplained**", grouped(n)),
+        _ => format!("**{}**", unexplained(check)),
     };
     format!("Of {} ray segments checked, {between}, and {beside}.", grouped(check.rays))
+}
+
+/// Writes how many differences from the spline are unexplained, at least one, and what is wrong with those that were kept.
+pub fn unexplained(check: &CrossCheck) -> String {
+    let defects: BTreeSet<&str> =
+        check.disagreements.iter().filter_map(|d| d.cause?.name().strip_prefix("unexplained: ")).collect();
+    let defects: Vec<&str> = defects.into_iter().collect();
+    let what = if defects.is_empty() { String::new() } else { format!(" ({})", defects.join(", ")) };
+    match check.facets_vs_exact.unexplained {
+        1 => format!("1 difference from the exact spline is unexplained{what}"),
+        n => format!("{} differences from the exact spline are unexplained{what}", grouped(n)),
+    }
 }
 
 /// Makes a table of all counts of ray segments: asked, hit, answered differently, explained by which cause, proved.

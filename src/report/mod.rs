@@ -49,7 +49,7 @@ pub use crate::formats::file_stem;
 pub use chart::{AxisStyle, Chart, Content, MapPoint, Marks, Series, SeriesStyle};
 pub use colour_picture::colour_picture;
 pub use contour::Isoline;
-pub use cross_check::{CheckReport, verdict};
+pub use cross_check::{CheckReport, unexplained, verdict};
 pub use document::{Block, Report, Section};
 #[cfg(feature = "cli")]
 pub(crate) use even_poles::with_even_poles;

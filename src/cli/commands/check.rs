@@ -24,7 +24,7 @@ use crate::pipeline::{
     AccurateSettings, IntersectorChoice, LIFT_IN_TOLERANCES, RayRecorder, TracingSettings, mesh_settings,
     settings_for_accuracy, tessellate_by_part,
 };
-use crate::report::{CheckReport, figures, grouped, verdict};
+use crate::report::{CheckReport, figures, grouped, unexplained, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
 use crate::study::accuracy_target::AccuracyResult;
 use crate::study::cross_check::{self, CrossCheck};
@@ -182,13 +182,11 @@ fn refuse_intersector(tracing: &TracingOptions) -> Result<(), Failure> {
 /// found.
 fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     let disagreements = found.octree_vs_bvh.disagree;
-    let unexplained = found.facets_vs_exact.unexplained;
     let defects = [
         (found.scene.facets == 0, "nothing was checked: the model has no facets".to_owned()),
         (disagreements == 1, "octree and BVH answer 1 ray differently".to_owned()),
         (disagreements > 1, format!("octree and BVH answer {} rays differently", grouped(disagreements))),
-        (unexplained == 1, "1 difference from the spline is unexplained".to_owned()),
-        (unexplained > 1, format!("{} differences from the spline are unexplained", grouped(unexplained))),
+        (found.facets_vs_exact.unexplained > 0, unexplained(found)),
     ];
     let mut completion = Completion::Complete;
     for (_, defect) in defects.iter().filter(|(is_found, _)| *is_found) {
