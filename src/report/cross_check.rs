@@ -96,7 +96,6 @@ fn kind_of(d: &Disagreement) -> &'static str {
     match d.cause {
         // A difference between two trees over the same facets is graver than any between facets and spline.
         _ if d.facets_differ => "octree and BVH differ",
-        Some(Cause::Unexplained(_)) => "unexplained",
         Some(cause) => cause.name(),
         None => "within sag",
     }
@@ -126,8 +125,11 @@ pub fn verdict(check: &CrossCheck) -> String {
 
 /// Writes how many differences from the spline are unexplained, at least one, and what is wrong with those that were kept.
 pub fn unexplained(check: &CrossCheck) -> String {
-    let defects: BTreeSet<&str> =
-        check.disagreements.iter().filter_map(|d| d.cause?.name().strip_prefix("unexplained: ")).collect();
+    let defect_of = |d: &Disagreement| match d.cause {
+        Some(Cause::Unexplained(defect)) => Some(defect.name()),
+        _ => None,
+    };
+    let defects: BTreeSet<&str> = check.disagreements.iter().filter_map(defect_of).collect();
     let defects: Vec<&str> = defects.into_iter().collect();
     let what = if defects.is_empty() { String::new() } else { format!(" ({})", defects.join(", ")) };
     match check.facets_vs_exact.unexplained {

@@ -7,6 +7,9 @@ use super::scene::{self, FarFieldType, ReceiverKind};
 use crate::math::{Aabb, Frame, Point, Ray, Vector};
 use std::f64::consts::TAU;
 
+/// Share of a flat receiver's half side, and sine of an angle to its plane, below which another surface lies in that plane.
+pub(crate) const FLUSH: f64 = 1e-9;
+
 /// A receiver as the kernel asks it.
 #[derive(Clone, Debug)]
 pub(crate) struct Receiver {
@@ -49,6 +52,27 @@ pub(crate) enum Shape {
     Absorbed {
         faces: Vec<u32>,
     },
+}
+
+/// A plane or disc, as the rectangle that holds it; `half` are half sides, mm.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FlatShape<'r> {
+    pub(crate) frame: &'r Frame,
+    pub(crate) half: [f64; 2],
+    pub(crate) is_one_sided: bool,
+}
+
+impl FlatShape<'_> {
+    /// Corners of the rectangle.
+    pub(crate) fn corners(&self) -> [Point; 4] {
+        let Self { frame, half: [a, b], .. } = *self;
+        [[-a, -b], [-a, b], [a, -b], [a, b]].map(|[x, y]| frame.origin + frame.x * x + frame.y * y)
+    }
+
+    /// Returns the distance, mm, below which others are in its plane or touch it along a border alone.
+    pub(crate) fn near(&self) -> f64 {
+        FLUSH * self.half[0].max(self.half[1])
+    }
 }
 
 /// Where light meets a receiver: the cell, and the coordinates in units of the half sides, each from −1 to 1.
@@ -121,18 +145,28 @@ impl Receiver {
         self.cell_count() * (1 + self.channels.count())
     }
 
+    /// Returns a plane or disc as its rectangle; `None` for any other shape.
+    pub(crate) fn flat(&self) -> Option<FlatShape<'_>> {
+        match &self.shape {
+            Shape::Plane { frame, half, one_sided } => {
+                Some(FlatShape { frame, half: *half, is_one_sided: *one_sided })
+            }
+            Shape::Disc { frame, radius, one_sided, .. } => {
+                Some(FlatShape { frame, half: [*radius; 2], is_one_sided: *one_sided })
+            }
+            Shape::Sphere { .. } | Shape::FarField { .. } | Shape::Absorbed { .. } => None,
+        }
+    }
+
     /// A box around what stands in space; empty for what stands nowhere.
     pub(crate) fn bounds(&self) -> Aabb {
-        match &self.shape {
-            Shape::Plane { frame, half, .. } => rectangle_bounds(frame, *half),
-            // That of the square around it: a box that is too large costs a test, no light.
-            Shape::Disc { frame, radius, .. } => rectangle_bounds(frame, [*radius; 2]),
-            Shape::Sphere { frame, radius } => {
-                let reach = Vector::splat(*radius);
-                Aabb::from_points([frame.origin - reach, frame.origin + reach])
-            }
-            Shape::FarField { .. } | Shape::Absorbed { .. } => Aabb::EMPTY,
+        // Of a disc that of the square around it: a box that is too large costs a test, no light.
+        if let Some(flat) = self.flat() {
+            return Aabb::from_points(flat.corners());
         }
+        let Shape::Sphere { frame, radius } = &self.shape else { return Aabb::EMPTY };
+        let reach = Vector::splat(*radius);
+        Aabb::from_points([frame.origin - reach, frame.origin + reach])
     }
 
     /// Whether it may have a point in common with a box; a `true` in vain costs time alone. Always `false` for far fields and absorbed
@@ -268,12 +302,6 @@ impl Receiver {
             Shape::Absorbed { .. } => 1.0,
         }
     }
-}
-
-/// A box around a rectangle of these half sides.
-fn rectangle_bounds(frame: &Frame, half: [f64; 2]) -> Aabb {
-    let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-    Aabb::from_points(corners.map(|[x, y]| frame.origin + frame.x * (x * half[0]) + frame.y * (y * half[1])))
 }
 
 /// Returns the distance along a ray, mm, at which it crosses the x–y plane of a frame, if in `(after, before)`; `None` for a parallel ray

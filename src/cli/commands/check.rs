@@ -182,10 +182,10 @@ fn refuse_intersector(tracing: &TracingOptions) -> Result<(), Failure> {
 /// found.
 fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     let disagreements = found.octree_vs_bvh.disagree;
+    let rays = if disagreements == 1 { "ray" } else { "rays" };
     let defects = [
         (found.scene.facets == 0, "nothing was checked: the model has no facets".to_owned()),
-        (disagreements == 1, "octree and BVH answer 1 ray differently".to_owned()),
-        (disagreements > 1, format!("octree and BVH answer {} rays differently", grouped(disagreements))),
+        (disagreements > 0, format!("octree and BVH answer {} {rays} differently", grouped(disagreements))),
         (found.facets_vs_exact.unexplained > 0, unexplained(found)),
     ];
     let mut completion = Completion::Complete;

@@ -3,13 +3,10 @@
 
 use super::bound_scene::BoundScene;
 use super::nearest::face_bounds;
-use crate::math::{Aabb, Frame, Uv, Vector};
+use crate::math::{Aabb, Uv, Vector};
 use crate::model::{Analytic, Model, PlacedFace};
 use crate::simulate::body::AMBIENT;
-use crate::simulate::receiver::Shape;
-
-/// Distance, as a share of the receiver's half side, below which a face is in its plane.
-const FLUSH: f64 = 1e-9;
+use crate::simulate::receiver::{FLUSH, FlatShape};
 
 /// Returns a sentence for each receiver that lies in a flat face of the model, naming the first such face; of one that absorbs, in a face
 /// that lets light out of a body.
@@ -20,16 +17,12 @@ pub(super) fn flush_receiver_notes(bound: &BoundScene, model: &Model) -> Vec<Str
         optics.body != AMBIENT && !bound.surfaces[usize::from(optics.surface)].is_opaque()
     };
     let notes = bound.receivers.iter().filter_map(|receiver| {
-        let (frame, half, is_one_sided) = match &receiver.shape {
-            Shape::Plane { frame, half, one_sided, .. } => (frame, *half, *one_sided),
-            Shape::Disc { frame, radius, one_sided, .. } => (frame, [*radius; 2], *one_sided),
-            _ => return None,
-        };
+        let flat = receiver.flat()?;
         // One that counts what comes from outside alone lets the light that leaves pass unseen.
         let stops_leaving = |face: &PlacedFace<'_>| {
-            lets_light_out(face) && !(is_one_sided && outward(face).is_some_and(|n| n.dot(frame.z) > 0.0))
+            lets_light_out(face) && !(flat.is_one_sided && outward(face).is_some_and(|n| n.dot(flat.frame.z) > 0.0))
         };
-        let mut faces = model.placed_faces().filter(|face| is_flush(face, frame, half));
+        let mut faces = model.placed_faces().filter(|face| is_flush(face, &flat));
         let face = faces.find(|face| !receiver.absorbs || stops_leaving(face))?;
         let what = face.entity().map_or_else(|| format!("face {}", face.id.0), |id| format!("face #{id}"));
         let part = &bound.instances[face.instance];
@@ -53,16 +46,14 @@ fn outward(face: &PlacedFace<'_>) -> Option<Vector> {
     Some(face.placement.normal(if spline.reversed { -normal } else { normal }))
 }
 
-/// Whether a flat face lies in the plane of a receiver of this frame and these half sides, mm, and meets its rectangle.
-fn is_flush(face: &PlacedFace<'_>, frame: &Frame, half: [f64; 2]) -> bool {
+/// Whether a flat face lies in the plane of a receiver and meets its rectangle.
+fn is_flush(face: &PlacedFace<'_>, receiver: &FlatShape<'_>) -> bool {
     let Some(Analytic::Plane { frame: plane }) = face.face.map(|f| &f.analytic) else { return false };
-    let near = FLUSH * half[0].max(half[1]);
+    let (near, frame) = (receiver.near(), receiver.frame);
     let normal = face.placement.direction(plane.z);
     let height = frame.local_point(face.placement.point(plane.origin)).z;
     if height.abs() > near || frame.z.cross(normal).length() > FLUSH {
         return false;
     }
-    let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-    let rectangle = corners.map(|[a, b]| frame.origin + frame.x * (a * half[0]) + frame.y * (b * half[1]));
-    !Aabb::from_points(rectangle).grown(near).intersection(face_bounds(face)).is_empty()
+    !Aabb::from_points(receiver.corners()).grown(near).intersection(face_bounds(face)).is_empty()
 }

@@ -1,60 +1,45 @@
 //! Receivers that lie in one plane and overlap: light that would meet both ends on one, and the other counts none of it.
 
 use super::bound_scene::BoundScene;
-use crate::math::{Frame, Point};
-use crate::simulate::receiver::{Receiver, Shape};
+use crate::math::Point;
+use crate::simulate::receiver::{FlatShape, Receiver};
 
-/// Distance, as a share of a receiver's half side, below which two are in one plane or touch along a border alone.
-const FLUSH: f64 = 1e-9;
-
-/// A flat receiver, as the rectangle that holds it.
-struct Flat<'r> {
+/// A flat receiver with its reach along x, mm.
+struct Candidate<'r> {
     receiver: &'r Receiver,
-    frame: &'r Frame,
-    half: [f64; 2],
-    is_one_sided: bool,
-    /// Its reach along x, mm.
+    flat: FlatShape<'r>,
     along_x: [f64; 2],
 }
 
-impl<'r> Flat<'r> {
+impl<'r> Candidate<'r> {
     /// `None` for a receiver that is not flat.
     fn new(receiver: &'r Receiver) -> Option<Self> {
-        let (frame, half, is_one_sided) = match &receiver.shape {
-            Shape::Plane { frame, half, one_sided, .. } => (frame, *half, *one_sided),
-            Shape::Disc { frame, radius, one_sided, .. } => (frame, [*radius; 2], *one_sided),
-            _ => return None,
-        };
-        let reach = frame.x.x.abs() * half[0] + frame.y.x.abs() * half[1];
-        let along_x = [frame.origin.x - reach, frame.origin.x + reach];
-        Some(Self { receiver, frame, half, is_one_sided, along_x })
-    }
-
-    fn corners(&self) -> [Point; 4] {
-        let Self { frame, half: [a, b], .. } = *self;
-        [[-a, -b], [-a, b], [a, -b], [a, b]].map(|[x, y]| frame.origin + frame.x * x + frame.y * y)
+        let bounds = receiver.bounds();
+        Some(Self { receiver, flat: receiver.flat()?, along_x: [bounds.min.x, bounds.max.x] })
     }
 
     /// Whether another one lies in its plane and beyond none of its sides.
     fn is_under(&self, other: &Self) -> bool {
-        let near = FLUSH * self.half[0].max(self.half[1]);
-        let seen = other.corners().map(|p| self.frame.local_point(p));
+        let FlatShape { frame, half, .. } = self.flat;
+        let near = self.flat.near();
+        let seen = other.flat.corners().map(|p| frame.local_point(p));
         let reaches = |at: fn(&Point) -> f64, half: f64| {
             seen.iter().any(|p| at(p) < half - near) && seen.iter().any(|p| at(p) > near - half)
         };
-        seen.iter().all(|p| p.z.abs() <= near) && reaches(|p| p.x, self.half[0]) && reaches(|p| p.y, self.half[1])
+        seen.iter().all(|p| p.z.abs() <= near) && reaches(|p| p.x, half[0]) && reaches(|p| p.y, half[1])
     }
 
     /// Whether light that meets both may end on one of them: not where each looks away from the other.
     fn competes_with(&self, other: &Self) -> bool {
-        let are_back_to_back = self.is_one_sided && other.is_one_sided && self.frame.z.dot(other.frame.z) < 0.0;
+        let are_back_to_back =
+            self.flat.is_one_sided && other.flat.is_one_sided && self.flat.frame.z.dot(other.flat.frame.z) < 0.0;
         (self.receiver.absorbs || other.receiver.absorbs) && !are_back_to_back
     }
 }
 
 /// Returns a sentence for each two flat receivers, of which at least one absorbs, that overlap in one plane.
 pub(super) fn overlapping_receiver_notes(bound: &BoundScene) -> Vec<String> {
-    let mut flat: Vec<Flat<'_>> = bound.receivers.iter().filter_map(Flat::new).collect();
+    let mut flat: Vec<Candidate<'_>> = bound.receivers.iter().filter_map(Candidate::new).collect();
     flat.sort_by(|a, b| a.along_x[0].total_cmp(&b.along_x[0]));
     let mut notes = Vec::new();
     for (i, first) in flat.iter().enumerate() {

@@ -3,8 +3,8 @@
 use super::composite::coincident;
 use super::curves::{CurveShape, DirectedCurve};
 use super::tolerances::{
-    EMPTY_EDGE_MM, EMPTY_PARAMETER, EMPTY_SHARE, EQUAL_POINTS_MM, LARGEST_VERTEX_GAP_MM, LOOSE_VERTEX_MM,
-    VERTEX_MM, VERTEX_SHARE,
+    ACCURACY_MM, EMPTY_EDGE_MM, EMPTY_PARAMETER, EMPTY_SHARE, EQUAL_POINTS_MM, LOOSE_VERTEX_MM, VERTEX_MM,
+    VERTEX_SHARE,
 };
 use super::{GeometryReader, Outcome, Refusal};
 use crate::math::Point;
@@ -96,10 +96,11 @@ pub(crate) fn trim_to_vertices(
     let (mut ta, mut tb) = (shape.parameter(a), shape.parameter(b));
     let accuracy = VERTEX_MM + VERTEX_SHARE * p.abs().max_element();
     // The edges beside it end in its vertices: a line that misses one would leave a gap there, or be another edge's.
+    // By as much as files say that they are inaccurate it may miss one without a word.
     let [least, most] = misses_of_line(shape, [(ta, a), (tb, b)]);
     if most > LOOSE_VERTEX_MM && (p - q).length() > LOOSE_VERTEX_MM {
         let curve = Some(Curve::line(p, q, [0.0, (q - p).length()]));
-        let is_gap = least <= LOOSE_VERTEX_MM && most <= LARGEST_VERTEX_GAP_MM;
+        let is_gap = least <= LOOSE_VERTEX_MM && most <= ACCURACY_MM[1];
         let (gap, repair) = if is_gap { (most, None) } else { (0.0, Some(PASSED_BY)) };
         return Some(TrimmedEdge { curve, gap, repair, ..TrimmedEdge::default() });
     }

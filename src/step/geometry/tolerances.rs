@@ -36,8 +36,8 @@ pub(super) const EMPTY_SHARE: f64 = 1e-9;
 /// Two vertices this near may be one that the file wrote twice: an edge of nothing between them is left out, one between vertices
 /// farther apart is refused.
 pub(super) const LOOSE_VERTEX_MM: f64 = 1e-3;
-/// By so much a line may miss one of its vertices without a word, the largest accuracy that files state.
-pub(super) const LARGEST_VERTEX_GAP_MM: f64 = 1e-2;
+/// Least and most that a file's stated accuracy counts for: zero and metres are both written.
+pub(super) const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
 /// Points nearer than this are equal.
 pub(super) const EQUAL_POINTS_MM: f64 = 1e-12;
 /// A range of parameters below this share of their sum is rounding.

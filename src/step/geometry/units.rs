@@ -1,5 +1,6 @@
 //! Units of a representation context: one file may mix several.
 
+use super::tolerances::ACCURACY_MM;
 use crate::math::units::{DEGREE, INCH, METRE, si_prefix};
 use crate::step::part21::{Args, Entity, File};
 
@@ -9,8 +10,6 @@ const MAX_DEPTH: usize = 8;
 /// Least and largest unit, mm or radians: an attometre, an exametre. A damaged definition of 1e-300 took facets a minute.
 const SIZES: [f64; 2] = [1e-15, 1e21];
 
-/// Least and most that a stated accuracy counts for, mm: zero and metres are both written.
-const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
 /// Share of a face's size above which it would merge the face's own edges.
 const ACCURACY_SHARE: f64 = 1e-3;
 /// Faces smaller than this count as this large there, mm.

@@ -45,8 +45,20 @@ pub enum Defect {
     Inconclusive,
 }
 
+impl Defect {
+    /// Returns the word used in sentences and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OffTheSurface => "off the surface",
+            Self::MissedCrossing => "missed crossing",
+            Self::Orientation => "orientation",
+            Self::Inconclusive => "inconclusive",
+        }
+    }
+}
+
 impl Cause {
-    /// Returns the word used in tables.
+    /// Returns the word used in tables, one for all defects.
     pub fn name(self) -> &'static str {
         match self {
             Self::WithinSag => "within sag",
@@ -57,10 +69,7 @@ impl Cause {
             Self::Unproved => "unproved facet",
             Self::Unmeshed => "unmeshed",
             Self::NoSurface => "no surface",
-            Self::Unexplained(Defect::OffTheSurface) => "unexplained: off the surface",
-            Self::Unexplained(Defect::MissedCrossing) => "unexplained: missed crossing",
-            Self::Unexplained(Defect::Orientation) => "unexplained: orientation",
-            Self::Unexplained(Defect::Inconclusive) => "unexplained: inconclusive",
+            Self::Unexplained(_) => "unexplained",
         }
     }
 }
