@@ -12,6 +12,7 @@
 //! might have done.
 
 use super::geometric_error::{GeometricError, MOST_CELLS, ReplicatedRun, compare, trace_replicates};
+use super::tracing_way::{ON_FACETS, ON_SPLINE, Way, unfit_moved_hits, ways_before_spline};
 use super::worst_figure::{Worst, worst_figure};
 use crate::intersect::{Intersector, NormalMode};
 use crate::model::{Face, Model};
@@ -33,30 +34,10 @@ const GROWN_RAYS: u64 = 100_000_000;
 const REPLICATES: u32 = 64;
 /// Share of the light that the spline may lose beyond what facets do before facets are taken all the same.
 const LOST: f64 = 1e-3;
-/// Finer facets are tried up to this many times the error allowed: beyond it they are too many for their work to be foretold.
-const MOST_FINER: f64 = 50.0;
-/// The error of interpolated normals and places falls with the tolerance at first order or faster; so much finer to be sure.
-const MARGIN: f64 = 1.5;
-/// Work of one nearest hit on facets with the rest of its path, ns on one thread of an x86-64 of 2021 (AMD EPYC); measured on the
-/// three scenes of the fixtures, as are the others.
-const FACET_HIT: f64 = 350.0;
-/// Work of the same hit on facets and moved to the spline, ns: 0.5 to 0.6 of that on the spline on five scenes that ask it about no more
-/// than 1 % of them, 0.7 on a light guide that asks about 14 %.
-const MOVED_HIT: f64 = 500.0;
-/// Work of the same hit on the spline, ns; that of a hit to be moved, too, about which it is asked.
-const SPLINE_HIT: f64 = 850.0;
-/// Work of making one facet and sorting it into the octree, ns.
-const FACET: f64 = 15_000.0;
-
 /// Why facets are the surface itself: with ready meshes among the faces, and without.
 const READY_OR_FLAT: &str = "all faces are ready meshes or flat, so that facets are the surface that was given; how far a ready mesh is \
     from its own original is not known";
 const FLAT: &str = "all faces are flat, so that facets are the surface itself";
-
-/// Intersector and normals of a run on facets, of one whose facet hits are moved to the spline, and of one on the spline.
-const ON_FACETS: (&str, NormalMode) = ("octree", NormalMode::Bilinear);
-const MOVED: (&str, NormalMode) = ("octree", NormalMode::Exact);
-const ON_SPLINE: (&str, NormalMode) = ("exact", NormalMode::Exact);
 
 /// What a run is traced with, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -194,7 +175,8 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     }
     // The cheapest first; each must pass a pilot of its own.
     let mut unfit = None;
-    for way in undecided.ways_before_spline(&worst, &error) {
+    let hits = error.segments_per_ray * undecided.judged_rays() as f64;
+    for way in ways_before_spline(worst.ratio, undecided.facet_count(), hits) {
         let tried = undecided.try_way(way, &settings, &spline);
         let tried_worst = match way {
             Way::Finer(_) => worst_figure(bound, &tried.error, &settings, scale),
@@ -217,35 +199,6 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     let unfit = unfit.map(|why| format!("; {why}")).unwrap_or_default();
     let because = format!("facets change the answer by more than its statistical error ({worst}{as_grown}){unfit}");
     (chosen(ON_SPLINE, tolerance, because, alternatives, None), None)
-}
-
-/// A way to trace the run between facets of the default tolerance and the spline.
-#[derive(Clone, Copy, Debug)]
-enum Way {
-    /// Facets so many times finer.
-    Finer(f64),
-    /// Hits on the facets moved to the spline.
-    Moved,
-}
-
-impl Way {
-    /// Returns intersector and normals.
-    fn traced_with(self) -> (&'static str, NormalMode) {
-        match self {
-            Self::Finer(_) => ON_FACETS,
-            Self::Moved => MOVED,
-        }
-    }
-
-    /// Says why it is taken; what facets of the default tolerance get wrong comes after it.
-    fn reason(self) -> &'static str {
-        match self {
-            Self::Finer(_) => "at the default tolerance facets are too coarse",
-            Self::Moved => {
-                "facets change the answer by more than its statistical error until their hits are moved to the spline"
-            }
-        }
-    }
 }
 
 /// What came of the pilot of a [`Way`].
@@ -330,6 +283,11 @@ impl Undecided<'_> {
         self.faces().flatten().all(Face::is_polygon)
     }
 
+    /// Returns the number of facets of the default tolerance.
+    fn facet_count(&self) -> usize {
+        self.facets.meshes().map(|mesh| mesh.facets.len()).sum()
+    }
+
     /// Returns the number of rays whose statistical error facets must stay below.
     fn judged_rays(&self) -> u64 {
         if self.run.grows { GROWN_RAYS } else { self.run.rays }
@@ -350,23 +308,6 @@ impl Undecided<'_> {
         }
     }
 
-    /// Returns the ways that counted work foretells to be cheaper than the spline, the cheapest first.
-    fn ways_before_spline(&self, worst: &Worst, error: &GeometricError) -> Vec<Way> {
-        let hits = error.segments_per_ray * self.judged_rays() as f64;
-        let factor = MARGIN * worst.ratio;
-        let facets: usize = self.facets.meshes().map(|mesh| mesh.facets.len()).sum();
-        // The number of facets goes with the inverse of the tolerance; tracing takes about a tenth longer for each halving of it.
-        let finer = factor * facets as f64 * FACET + hits * FACET_HIT * (1.0 + 0.1 * factor.log2());
-        // Of moved hits only a trial tells about how many the spline must be asked.
-        let mut ways = vec![(Way::Moved, hits * MOVED_HIT)];
-        if factor <= MOST_FINER {
-            ways.push((Way::Finer(factor), finer));
-        }
-        ways.retain(|(_, work)| *work < hits * SPLINE_HIT);
-        ways.sort_by(|(_, a), (_, b)| a.total_cmp(b));
-        ways.into_iter().map(|(way, _)| way).collect()
-    }
-
     /// Traces the pilot so, and compares it with that on the spline.
     fn try_way(&self, way: Way, settings: &RunSettings, spline: &ReplicatedRun) -> TriedWay {
         let compared = |run: &ReplicatedRun| compare(self.bound, [run, spline]);
@@ -385,13 +326,7 @@ impl Undecided<'_> {
                 let run = run.expect("the source calls what it is given");
                 let asked = run.results.cost.doubtful as f64 / run.results.segments.max(1) as f64;
                 let error = compared(&run);
-                let unfit = if error.lost[0] > error.lost[1] {
-                    Some("hits moved to the spline lose more light than it")
-                } else if MOVED_HIT + asked * SPLINE_HIT >= SPLINE_HIT {
-                    Some("moving hits would ask the spline so often that by counted work it is no cheaper")
-                } else {
-                    None
-                };
+                let unfit = unfit_moved_hits(error.lost, asked);
                 TriedWay { tolerance_mm: self.tolerance, error, unfit, finer: None }
             }
         }

@@ -36,6 +36,7 @@ mod stored_choice;
 pub mod surface_rays;
 mod timing;
 mod tolerance_plan;
+mod tracing_way;
 mod worst_figure;
 
 #[cfg(feature = "report")]

@@ -203,6 +203,8 @@ impl RaySource for Chain<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::intersect::octree::{self, Octree};
+    use crate::mesh::FacetMesh;
 
     #[test]
     fn rays_do_not_depend_on_the_range_they_are_asked_in() {
@@ -215,5 +217,16 @@ mod tests {
         assert_eq!(all, pieces);
         assert!(all.iter().all(|r| (r.direction.length() - 1.0).abs() < 1e-15));
         assert!(all[100..].iter().all(|r| bounds.grown(0.2).clip(r).is_some()), "random rays pass through the box");
+    }
+
+    #[test]
+    fn bounces_repeat_no_random_ray_of_the_same_seed() {
+        let bounds = Aabb { min: Point::new(-1.0, -2.0, -3.0), max: Point::new(1.0, 2.0, 3.0) };
+        let nothing = FacetMesh::default();
+        let guide = Octree::build(&nothing, &octree::Settings::default());
+        // No ray hits, so that each bounce begins anew.
+        let bounces = Bounces::new(&bounds, &guide, 0.1, 3, 64).rays(0..64);
+        let uniform = Uniform::new(&bounds, 3, 64).rays(0..64);
+        assert!(bounces.iter().all(|ray| !uniform.contains(ray)));
     }
 }

@@ -476,9 +476,9 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "step/geometry",
         &[
+            "tolerances",
             "units",
             "mod",
-            "tolerances",
             "extent",
             "curves",
             "composite",
@@ -520,6 +520,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "figures",
             "model_figures",
             "worst_figure",
+            "tracing_way",
             "default_accuracy",
             "stored_choice",
             "interpolation",

@@ -1,0 +1,81 @@
+//! Ways to trace a run between facets of the default tolerance and the spline, and the counted work that foretells which are cheaper than
+//! the spline.
+
+use crate::intersect::NormalMode;
+
+/// The error of interpolated normals and places falls with the tolerance at first order or faster; so much finer to be sure.
+const MARGIN: f64 = 1.5;
+/// Finer facets are tried up to this many times the error allowed: beyond it they are too many for their work to be foretold.
+const MOST_FINER: f64 = 50.0;
+/// Work of one nearest hit on facets with the rest of its path, ns on one thread of an x86-64 of 2021 (AMD EPYC); measured on the
+/// three scenes of the fixtures, as are the others.
+const FACET_HIT: f64 = 350.0;
+/// Work of the same hit on facets and moved to the spline, ns: 0.5 to 0.6 of that on the spline on five scenes that ask it about no more
+/// than 1 % of them, 0.7 on a light guide that asks about 14 %.
+const MOVED_HIT: f64 = 500.0;
+/// Work of the same hit on the spline, ns; that of a hit to be moved, too, about which it is asked.
+const SPLINE_HIT: f64 = 850.0;
+/// Work of making one facet and sorting it into the octree, ns.
+const FACET: f64 = 15_000.0;
+
+/// Intersector and normals of a run on facets, of one whose facet hits are moved to the spline, and of one on the spline.
+pub(super) const ON_FACETS: (&str, NormalMode) = ("octree", NormalMode::Bilinear);
+const MOVED: (&str, NormalMode) = ("octree", NormalMode::Exact);
+pub(super) const ON_SPLINE: (&str, NormalMode) = ("exact", NormalMode::Exact);
+
+/// A way to trace the run between facets of the default tolerance and the spline.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Way {
+    /// Facets so many times finer.
+    Finer(f64),
+    /// Hits on the facets moved to the spline.
+    Moved,
+}
+
+impl Way {
+    /// Returns intersector and normals.
+    pub(super) fn traced_with(self) -> (&'static str, NormalMode) {
+        match self {
+            Self::Finer(_) => ON_FACETS,
+            Self::Moved => MOVED,
+        }
+    }
+
+    /// Says why it is taken; what facets of the default tolerance get wrong comes after it.
+    pub(super) fn reason(self) -> &'static str {
+        match self {
+            Self::Finer(_) => "at the default tolerance facets are too coarse",
+            Self::Moved => {
+                "facets change the answer by more than its statistical error until their hits are moved to the spline"
+            }
+        }
+    }
+}
+
+/// Returns the ways that counted work foretells to be cheaper than the spline, the cheapest first. `excess` is by how many standard errors
+/// the `facets` of the default tolerance change the worst figure, `hits` are those of the whole run.
+pub(super) fn ways_before_spline(excess: f64, facets: usize, hits: f64) -> Vec<Way> {
+    let factor = MARGIN * excess;
+    // The number of facets goes with the inverse of the tolerance; tracing takes about a tenth longer for each halving of it.
+    let finer = factor * facets as f64 * FACET + hits * FACET_HIT * (1.0 + 0.1 * factor.log2());
+    // Of moved hits only a trial tells about how many the spline must be asked.
+    let mut ways = vec![(Way::Moved, hits * MOVED_HIT)];
+    if factor <= MOST_FINER {
+        ways.push((Way::Finer(factor), finer));
+    }
+    ways.retain(|(_, work)| *work < hits * SPLINE_HIT);
+    ways.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+    ways.into_iter().map(|(way, _)| way).collect()
+}
+
+/// Says why moved hits are not taken however little they get wrong; `None` where they may be. `lost` is the light lost by them and by the
+/// spline, `asked` the share of hits about which the spline was asked.
+pub(super) fn unfit_moved_hits(lost: [f64; 2], asked: f64) -> Option<&'static str> {
+    if lost[0] > lost[1] {
+        Some("hits moved to the spline lose more light than it")
+    } else if MOVED_HIT + asked * SPLINE_HIT >= SPLINE_HIT {
+        Some("moving hits would ask the spline so often that by counted work it is no cheaper")
+    } else {
+        None
+    }
+}
