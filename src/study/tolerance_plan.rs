@@ -96,3 +96,21 @@ impl TolerancePlan {
         settings.overrides.splice(0..0, own);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plan_keeps_within_its_bounds_and_follows_the_radius_between_them() {
+        let mut plan = TolerancePlan::even(0.1, [0.01, 1.0]);
+        plan.other = RelativeTolerance { faces: Vec::new(), of_radius: 0.001, radii_mm: [2.0, 5000.0] };
+        // 0.001 of 2 mm is below the lower bound, which 10 mm reach; of 5 m above the upper one, which a metre reaches.
+        assert_eq!(plan.range(&plan.other), ([0.01, 1.0], [10.0, 1000.0]));
+        assert_eq!((plan.tolerance_mm(), plan.loosest_mm()), ([0.01, 1.0], 1.0));
+        assert_eq!(plan.unbounded_mm(), 0.002);
+        plan.scale(100.0);
+        // 0.1 of either radius is within or above: one tolerance from 2 mm on would be 0.2.
+        assert_eq!(plan.range(&plan.other), ([0.2, 1.0], [2.0, 10.0]));
+    }
+}

@@ -79,3 +79,27 @@ pub(super) fn unfit_moved_hits(lost: [f64; 2], asked: f64) -> Option<&'static st
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moved_hits_that_lose_more_light_or_ask_too_often_are_unfit() {
+        assert_eq!(unfit_moved_hits([0.01, 0.01], 0.1), None);
+        assert!(unfit_moved_hits([0.02, 0.01], 0.1).unwrap().contains("lose more light"));
+        // Asked about every other hit: 500 ns and half of 850 ns for 850 ns.
+        assert!(unfit_moved_hits([0.01, 0.01], 0.5).unwrap().contains("no cheaper"));
+    }
+
+    #[test]
+    fn finer_facets_are_tried_where_their_work_pays() {
+        let finer = |excess: f64, facets: usize, hits: f64| {
+            ways_before_spline(excess, facets, hits).iter().any(|way| matches!(way, Way::Finer(_)))
+        };
+        // Three times as many facets, 45 ms of work, for ten million hits; for ten thousand; and 150 times as many.
+        assert!(finer(2.0, 1000, 1e7));
+        assert!(!finer(2.0, 1000, 1e4));
+        assert!(!finer(100.0, 1000, 1e12));
+    }
+}

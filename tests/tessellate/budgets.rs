@@ -80,3 +80,23 @@ fn an_angle_that_no_cell_reaches_costs_no_tolerance() {
     let area = scale * length * (half(1.0) + half(1.5));
     assert!((report.area_mm2 / area - 1.0).abs() < 1e-3, "{} {area}", report.area_mm2);
 }
+
+/// A flat sheet with one sharp bump, which hides in the sharpest tenth that is left out of what is foretold: the bump gets the least angle that
+/// the cells allow, not the tolerance alone, for which two facets do.
+#[test]
+fn an_angle_that_a_sharp_place_makes_too_small_is_doubled_until_cells_do() {
+    const N: usize = 30;
+    let knots = [vec![0.0; 3], (0..=N - 3).map(|k| k as f64).collect(), vec![(N - 3) as f64; 3]].concat();
+    let height = |i: usize, j: usize| if (i, j) == (15, 15) { 5.0 } else { 0.0 };
+    let rows = (0..N).map(|i| (0..N).map(move |j| Homogeneous::new(i as f64, j as f64, height(i, j), 1.0)));
+    let surface = Surface { degree: [3, 3], knots: [knots.clone(), knots], points: rows.flatten().collect() };
+    let far = (N - 3) as f64;
+    let corners = [[0.0, 0.0], [far, 0.0], [far, far], [0.0, far]].map(Uv::from_array);
+    let side = |k: usize| chain(100, |t| corners[k].lerp(corners[(k + 1) % 4], t));
+    let model = face(surface, &[(0..4).map(side).collect()]);
+    let made = |angle_deg| tessellate(&model, &Settings { angle_deg, ..Settings::uniform(2.0) }).report;
+    assert_eq!(made(None).facets, 2);
+    let report = made(Some(0.2));
+    assert!(report.facets > 1000 && report.repaired.is_empty(), "{} {:?}", report.facets, report.repaired);
+    assert!(report.over_angle.unwrap()[0].largest_deg < 15.0);
+}
