@@ -81,10 +81,10 @@ fn an_angle_that_no_cell_reaches_costs_no_tolerance() {
     assert!((report.area_mm2 / area - 1.0).abs() < 1e-3, "{} {area}", report.area_mm2);
 }
 
-/// A flat sheet with one sharp bump, which hides in the sharpest tenth that is left out of what is foretold: the bump gets the least angle that
-/// the cells allow, not the tolerance alone, for which two facets do.
+/// A flat sheet with one sharp bump, which hides in the sharpest tenth that is left out of what is foretold: the bump is meshed for its
+/// angle as far as the budget goes, not for the tolerance alone, for which two facets do.
 #[test]
-fn an_angle_that_a_sharp_place_makes_too_small_is_doubled_until_cells_do() {
+fn a_sharp_place_that_nothing_foretells_is_meshed_for_its_angle() {
     const N: usize = 30;
     let knots = [vec![0.0; 3], (0..=N - 3).map(|k| k as f64).collect(), vec![(N - 3) as f64; 3]].concat();
     let height = |i: usize, j: usize| if (i, j) == (15, 15) { 5.0 } else { 0.0 };
