@@ -34,6 +34,7 @@ const GROWN_RAYS: u64 = 100_000_000;
 const REPLICATES: u32 = 64;
 /// Share of the light that the spline may lose beyond what facets do before facets are taken all the same.
 const LOST: f64 = 1e-3;
+
 /// Why facets are the surface itself: with ready meshes among the faces, and without.
 const READY_OR_FLAT: &str = "all faces are ready meshes or flat, so that facets are the surface that was given; how far a ready mesh is \
     from its own original is not known";
@@ -176,7 +177,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     // The cheapest first; each must pass a pilot of its own.
     let mut unfit = None;
     let hits = error.segments_per_ray * undecided.judged_rays() as f64;
-    for way in ways_before_spline(worst.ratio, undecided.facet_count(), hits) {
+    for way in ways_before_spline(worst.ratio, undecided.made_facets(), hits) {
         let tried = undecided.try_way(way, &settings, &spline);
         let tried_worst = match way {
             Way::Finer(_) => worst_figure(bound, &tried.error, &settings, scale),
@@ -283,8 +284,8 @@ impl Undecided<'_> {
         self.faces().flatten().all(Face::is_polygon)
     }
 
-    /// Returns the number of facets of the default tolerance.
-    fn facet_count(&self) -> usize {
+    /// Returns how many facets of the default tolerance were made: those of a part that is placed often count once.
+    fn made_facets(&self) -> usize {
         self.facets.meshes().map(|mesh| mesh.facets.len()).sum()
     }
 

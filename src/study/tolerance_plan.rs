@@ -110,7 +110,7 @@ mod tests {
         assert_eq!((plan.tolerance_mm(), plan.loosest_mm()), ([0.01, 1.0], 1.0));
         assert_eq!(plan.unbounded_mm(), 0.002);
         plan.scale(100.0);
-        // 0.1 of either radius is within or above: one tolerance from 2 mm on would be 0.2.
+        // 0.1 of 2 mm is within the bounds; the upper one is reached by 10 mm.
         assert_eq!(plan.range(&plan.other), ([0.2, 1.0], [2.0, 10.0]));
     }
 }
