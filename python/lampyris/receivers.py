@@ -40,14 +40,15 @@ def plane(
 
 def far_field(
     name: str,
-    h_deg: Vector = (-90.0, 90.0),
-    v_deg: Vector = (-90.0, 90.0),
+    h_deg: Vector | None = None,
+    v_deg: Vector | None = None,
     cells: Cells | None = None,
     step_deg: float | None = None,
     **keys: Any,
 ) -> Receiver:
     """All light that leaves the scene by direction, power per solid angle.
 
+    An angle that is not given goes from −90° to 90°; with ``angles="C"``, C from 0° to 360° and γ from 0° to 180°.
     The map has ``cells``, or whole cells that come closest to ``step_deg``: of 7° over 180° there are 26, of 6.92°.
     """
     if step_deg is not None:
@@ -55,10 +56,12 @@ def far_field(
             raise ValueError(f"far_field: cells = {cells!r} and step_deg = {step_deg!r} both say how fine it is; leave one out")
         if not real_number("step_deg", step_deg) > 0.0:
             raise ValueError(f"step_deg = {step_deg}: it must be positive")
-        for axis, ends in (("h_deg", h_deg), ("v_deg", v_deg)):
+        whole = ((0.0, 360.0), (0.0, 180.0)) if keys.get("angles") == "C" else ((-90.0, 90.0), (-90.0, 90.0))
+        ranges = [unset if ends is None else ends for ends, unset in zip((h_deg, v_deg), whole)]
+        for axis, ends in zip(("h_deg", "v_deg"), ranges):
             if not np.isfinite(np.asarray(ends, dtype=float)).all() or np.shape(ends) != (2,):
                 raise ValueError(f"{axis} = {ends!r}: two finite angles are needed, as (-40, 40)")
-        cells = [max(1, round((high - low) / step_deg)) for low, high in (h_deg, v_deg)]
+        cells = [max(1, round((high - low) / step_deg)) for low, high in ranges]
     return _receiver("far_field", name, keys, h_deg=h_deg, v_deg=v_deg, cells=cells)
 
 

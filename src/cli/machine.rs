@@ -1,6 +1,7 @@
 //! What the machine is, as far as the system tells: processor, cores, memory, name.
 
 use crate::formats::file_stem;
+use crate::report::count_of;
 use crate::simulate::machine_threads;
 use std::fs;
 use std::time::SystemTime;
@@ -15,7 +16,7 @@ pub(crate) fn hardware() -> String {
     // Not every kernel names its processor: then its architecture is said.
     let cpu = cpu.unwrap_or_else(|| std::env::consts::ARCH.to_owned());
     let memory = fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobyte_field(&text, "MemTotal"));
-    let mut parts = vec![cpu, if cores == 1 { "1 core".into() } else { format!("{cores} cores") }];
+    let mut parts = vec![cpu, count_of(cores as u64, "core")];
     parts.extend(memory.map(|kb| format!("{:.0} GB", kb as f64 / KILOBYTES_PER_GB)));
     parts.push(std::env::consts::OS.to_owned());
     parts.join(", ")

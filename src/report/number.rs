@@ -56,6 +56,16 @@ pub fn grouped(value: u64) -> String {
     in_thousands(&value.to_string())
 }
 
+/// Writes how many there are of something, with its noun in the plural with an `s` unless it is one.
+///
+/// ```
+/// assert_eq!(lampyris::report::count_of(1, "ray"), "1 ray");
+/// assert_eq!(lampyris::report::count_of(20, "ray"), "20 rays");
+/// ```
+pub fn count_of(number: u64, noun: &str) -> String {
+    format!("{} {noun}{}", grouped(number), if number == 1 { "" } else { "s" })
+}
+
 /// Writes a number of up to four digits with its noun, in the plural with an `s` unless it is written as 1.
 pub(super) fn counted(value: f64, noun: &str) -> String {
     let number = figures(value, 4);

@@ -100,12 +100,13 @@ impl Receiver {
                 one_sided: r.one_sided,
                 cells: DiscCells::new(r.cells),
             },
-            ReceiverKind::Sphere => {
-                Shape::Sphere { frame: far_axes(at, n, Vector::from_array(r.up)), radius: r.radius.unwrap_or(1.0) }
-            }
+            ReceiverKind::Sphere => Shape::Sphere {
+                frame: far_axes(at, n, Vector::from_array(r.up())),
+                radius: r.radius.unwrap_or(1.0),
+            },
             ReceiverKind::FarField => {
                 let (h, v) = r.angles_deg();
-                let frame = far_axes(Point::ZERO, n, Vector::from_array(r.up));
+                let frame = far_axes(Point::ZERO, n, Vector::from_array(r.up()));
                 let rad = |x: [f64; 2], y: [f64; 2], i: usize| [x[i].to_radians(), y[i].to_radians()];
                 Shape::FarField { frame, angles: r.angles, low: rad(h, v, 0), high: rad(h, v, 1) }
             }
@@ -325,7 +326,7 @@ mod tests {
     fn far(angles: FarFieldType, h: [f64; 2], v: [f64; 2], cells: [u32; 2]) -> Receiver {
         let kind = ReceiverKind::FarField;
         Receiver::new(
-            &scene::Receiver { kind, angles, h_deg: h, v_deg: v, cells, ..Default::default() },
+            &scene::Receiver { kind, angles, h_deg: Some(h), v_deg: Some(v), cells, ..Default::default() },
             Vec::new(),
         )
     }

@@ -131,7 +131,8 @@ impl BoundScene {
                  `medium`, or the face a surface that lets nothing through"
             }
             LostCause::InsideSolid => {
-                "it came to a closed opaque solid from inside, as from a source that lies in it"
+                "it came to a closed opaque solid from inside, as from a source that lies in it: move the source out, or, where the solid is \
+                 drawn around a hollow, give the part a `medium` of index 1"
             }
             LostCause::TooDeep => "more bodies lie in each other than a ray can carry",
             LostCause::NotANumber => "its place or direction is no number",

@@ -91,4 +91,20 @@ fn a_frame_must_be_one() {
     let message = bind(&world, "frame = 'headlamp'");
     assert!(message.contains("placed 2 times"), "{message}");
     assert_eq!(bind(&world, "frame = 'right'"), "");
+    assert_eq!(bind(&world, "frame = 'r*t'"), "");
+    let message = bind(&world, "frame = '*t'");
+    assert!(message.contains("'*t' is placed 2 times"), "{message}");
+}
+
+/// Where the file's parts stand in an assembly of their own, the model's coordinates are those of its file.
+#[test]
+fn a_model_is_a_frame_by_its_name() {
+    let text = "[[model]]\nfile = 'a.stp'\nname = 'module'\nplacement = { at = [0, 0, 50] }\n\
+        [run]\nrays = 1024\n[[source]]\nkind = 'collimated'\nframe = 'module'\n\
+        [[receiver]]\nname = 'below'\nkind = 'disc'\nradius = 1\nat = [0, 0, 49]\nabsorbs = false\n\
+        [[receiver]]\nname = 'above'\nkind = 'disc'\nradius = 1\nat = [0, 0, 51]\nabsorbs = false\n";
+    let scene = Scene::parse(text, "test.toml", Path::new(".")).unwrap();
+    let (mut world, _) = lamp();
+    world.model = scene.assemble(vec![world.model]).unwrap();
+    assert_eq!(powers(&world, text), [0.0, 1.0]);
 }

@@ -106,6 +106,9 @@ fn what_means_nothing_is_refused_by_name() {
     for (head, key, line) in [
         (format!("{PLANE}radius = 3"), "radius", 4),
         (format!("{PLANE}h_deg = [-5, 5]"), "h_deg", 4),
+        (format!("{PLANE}up = [0, 1, 0]"), "up", 4),
+        ("[[receiver]]\nname = 'r'\nkind = 'sphere'\nradius = 1\nh_deg = [-90, 90]".into(), "h_deg", 5),
+        ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nangles = 'C'\nh_deg = [-90, 90]".into(), "h_deg", 5),
         (format!("{PLANE}instance = 'x'"), "instance", 4),
         ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nsize = [1, 1]".into(), "size", 4),
         ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nabsorbs = false".into(), "absorbs", 4),

@@ -24,7 +24,7 @@ use crate::pipeline::{
     AccurateSettings, IntersectorChoice, LIFT_IN_TOLERANCES, RayRecorder, TracingSettings, mesh_settings,
     settings_for_accuracy, tessellate_by_part,
 };
-use crate::report::{CheckReport, figures, grouped, unexplained, verdict};
+use crate::report::{CheckReport, count_of, figures, grouped, unexplained, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
 use crate::study::accuracy_target::AccuracyResult;
 use crate::study::cross_check::{self, CrossCheck};
@@ -182,10 +182,9 @@ fn refuse_intersector(tracing: &TracingOptions) -> Result<(), Failure> {
 /// found.
 fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     let disagreements = found.octree_vs_bvh.disagree;
-    let rays = if disagreements == 1 { "ray" } else { "rays" };
     let defects = [
         (found.scene.facets == 0, "nothing was checked: the model has no facets".to_owned()),
-        (disagreements > 0, format!("octree and BVH answer {} {rays} differently", grouped(disagreements))),
+        (disagreements > 0, format!("octree and BVH answer {} differently", count_of(disagreements, "ray"))),
         (found.facets_vs_exact.unexplained > 0, unexplained(found)),
     ];
     let mut completion = Completion::Complete;

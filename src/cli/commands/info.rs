@@ -7,7 +7,7 @@ use crate::cli::output::json::json_text;
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::input_files;
 use crate::cli::{completion::Completion, failure::Failure};
-use crate::report::{bytes, figures, grouped, seconds};
+use crate::report::{bytes, count_of, figures, grouped, seconds};
 use crate::step::ImportReport;
 use std::path::Path;
 
@@ -48,8 +48,8 @@ fn import_summary(r: &ImportReport, console: &Console) -> String {
     let mut text = format!("{}  {}, {}\n", r.file, bytes(r.bytes), list(&r.schema));
     let mut line = |name: &str, what: String| text += &format!("  {name:<10} {what}\n");
     line("units", format!("length {}; angle {}", list(&r.units.length), list(&r.units.angle)));
-    let count = |n: usize, name: &str| format!("{} {name}{}", grouped(n as u64), if n == 1 { "" } else { "s" });
-    let shapes = [count(r.parts, "part"), count(r.instances, "instance"), count(r.shells, "shell")];
+    let shapes = [(r.parts, "part"), (r.instances, "instance"), (r.shells, "shell")];
+    let shapes = shapes.map(|(number, noun)| count_of(number as u64, noun));
     line("shapes", shapes.join(", "));
     let f = &r.faces;
     line(

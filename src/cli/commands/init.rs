@@ -11,6 +11,7 @@ use crate::cli::work::output_place::{folder_of, make_folder};
 use crate::formats::{file_name, lower_extension, printable_line, write_atomic};
 use crate::model::Model;
 use crate::pipeline::LoadedModel;
+use crate::report::count_of;
 use crate::step;
 use serde_json::json;
 use std::ffi::OsStr;
@@ -168,9 +169,8 @@ fn light_text(model: &Model) -> String {
     let up = ["[0, 0, 1]", "[0, 0, 1]", "[0, 1, 0]"][axis];
     let letter = ["x", "y", "z"][axis];
     let width = toml_number(RECEIVER_WIDTHS * radius);
-    let parts = model.parts.len();
     format!(
-        "# The model ({parts} part{}) lies within x {} … {}, y {} … {}, z {} … {} mm. A parallel beam along {letter} covers it.\n\
+        "# The model ({}) lies within x {} … {}, y {} … {}, z {} … {} mm. A parallel beam along {letter} covers it.\n\
          # Other kinds: point, cone, lambertian, cosine, ies, eulumdat, rays. Faces of the model that shine, as an LED's chip:\n\
          # {{ kind = \"lambertian\", on = {{ entity = 17 }}, power = 2.5 }}, without at, direction and radius.\n\
          source = [\n    {{ kind = \"collimated\", at = {}, direction = {direction}, radius = {} }},\n]\n\n\
@@ -180,7 +180,7 @@ fn light_text(model: &Model) -> String {
          {{ name = \"behind\", at = {}, normal = {direction}, size = [{width}, {width}], absorbs = false }},\n    \
          {{ name = \"distribution\", kind = \"far_field\", normal = {direction}, up = {up}, angles = \"C\", cells = [72, 90] }},\n]\n\n\
          [run]\nrays = 1_000_000  # unit = \"lm\" counts lumens, lux and candela\n",
-        if parts == 1 { "" } else { "s" },
+        count_of(model.parts.len() as u64, "part"),
         toml_number(low[0]),
         toml_number(high[0]),
         toml_number(low[1]),

@@ -2,7 +2,7 @@
 
 use crate::formats::printable_toml;
 use crate::model::{Model, PartAccount, SolidAccount};
-use crate::report::figures;
+use crate::report::{count_of, figures};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Rules that are written; of more, a comment says how many there are.
@@ -169,8 +169,7 @@ fn description(solid: &SolidAccount) -> String {
     let closed = if solid.closed { "closed" } else { "open: a medium would have a gap" };
     let size = solid.size_mm().map(toml_number).join(" × ");
     let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
-    let faces = solid.faces.len();
-    format!("{closed}, {faces} face{}, {size} mm{colour}", if faces == 1 { "" } else { "s" })
+    format!("{closed}, {}, {size} mm{colour}", count_of(solid.faces.len() as u64, "face"))
 }
 
 /// Returns a number of five digits as TOML takes it; what has no such form keeps all digits.

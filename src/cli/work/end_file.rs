@@ -5,7 +5,7 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::formats::{Column, NpzStream, file_name, lower_extension, write_atomic};
 use crate::pipeline::PreparedScene;
-use crate::report::grouped;
+use crate::report::{count_of, grouped};
 use crate::simulate::{ListedEnd, MOST_LISTED_RAYS, RunSettings, listed_ends, ray_lists};
 use std::path::Path;
 
@@ -81,11 +81,11 @@ pub(crate) fn write(prepared: &PreparedScene, file: Option<&Path>, console: &Con
 /// Counts rays, not rows: a ray that was split has several, which stand together.
 fn counted(ends: &[ListedEnd]) -> String {
     let rays = ends.chunk_by(|a, b| (a.source, a.ray) == (b.source, b.ray)).count();
-    let rays_text = format!("{} {}", grouped(rays as u64), if rays == 1 { "ray" } else { "rays" });
+    let rays_text = count_of(rays as u64, "ray");
     if rays == ends.len() {
         return rays_text;
     }
-    format!("{rays_text} and what they were split into ({} rows)", grouped(ends.len() as u64))
+    format!("{rays_text} and what they were split into ({})", count_of(ends.len() as u64, "row"))
 }
 
 /// Returns the number of the face where a ray ended, as both files hold it: [`NO_FACE`] for none.

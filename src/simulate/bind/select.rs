@@ -16,7 +16,7 @@ const RADIUS_ROUNDING: f64 = 1e-4;
 const DECIMALS: f64 = 1e3;
 
 /// Whether a whole name fits a pattern in which each `*` stands for any characters, or none; upper and lower case differ.
-fn matches_pattern(pattern: &str, name: &str) -> bool {
+pub(super) fn matches_pattern(pattern: &str, name: &str) -> bool {
     let mut pieces = pattern.split('*');
     let Some(mut rest) = name.strip_prefix(pieces.next().unwrap_or("")) else { return false };
     let mut last = None;

@@ -17,8 +17,8 @@ pub struct Receiver {
     pub name: String,
     /// What it is.
     pub kind: ReceiverKind,
-    /// Instance, or part that is placed once, in whose own coordinates `at`, `normal`, `x` and `up` are given: the receiver goes where it
-    /// goes.
+    /// Instance, part that is placed once, or `name` of a `[[model]]`, in whose own coordinates `at`, `normal`, `x` and `up` are given: the
+    /// receiver goes where it goes. `*` in a name stands for anything.
     pub frame: Option<String>,
     /// Centre of a plane, disc or sphere, mm.
     pub at: [f64; 3],
@@ -26,11 +26,11 @@ pub struct Receiver {
     pub normal: [f64; 3],
     /// Direction of the first side of a plane, or of the cells of a disc, as far as `normal` lets it; the second is `normal` × `x`.
     pub x: Option<[f64; 3]>,
-    /// Upward direction of a far field, as far as `normal` lets it.
-    pub up: [f64; 3],
-    /// Sides of a plane, mm.
+    /// Upward direction of a far field or of a sphere's cells, as far as `normal` lets it; y unless given.
+    pub up: Option<[f64; 3]>,
+    /// Sides of a plane, mm; a `frame` that enlarges moves the receiver and leaves them.
     pub size: Option<[f64; 2]>,
-    /// Radius of a disc or sphere, mm.
+    /// Radius of a disc or sphere, mm; a `frame` that enlarges moves the receiver and leaves it.
     #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub radius: Option<f64>,
     /// Number of cells along both sides; of a disc along those of the square around it, whose corners stay empty.
@@ -45,10 +45,11 @@ pub struct Receiver {
     /// Angles of a far field: for one who looks along `normal`, positive H lies to the right and positive V up; C 0 lies to the right
     /// and C 90 up.
     pub angles: FarFieldType,
-    /// First angle of a far field (H, or C), from and to, degrees.
-    pub h_deg: [f64; 2],
-    /// Second angle of a far field (V, or γ), from and to, degrees.
-    pub v_deg: [f64; 2],
+    /// First angle of a far field (H, or C), from and to, degrees; −90 to 90 unless given, of C-planes 0 to 360. A sphere counts all
+    /// directions.
+    pub h_deg: Option<[f64; 2]>,
+    /// Second angle of a far field (V, or γ), from and to, degrees; −90 to 90 unless given, of C-planes 0 to 180.
+    pub v_deg: Option<[f64; 2]>,
     /// What is counted besides power, where that is in watts.
     pub channels: Option<Channels>,
     /// Edges of spectral bins, rising, nm: power is counted in each. Not beside `channels`, which another receiver there may have.
@@ -70,7 +71,7 @@ impl Default for Receiver {
             at: [0.0; 3],
             normal: [0.0, 0.0, 1.0],
             x: None,
-            up: [0.0, 1.0, 0.0],
+            up: None,
             size: None,
             radius: None,
             cells: [100, 100],
@@ -78,8 +79,8 @@ impl Default for Receiver {
             one_sided: false,
             interactions: None,
             angles: FarFieldType::A,
-            h_deg: [-90.0, 90.0],
-            v_deg: [-90.0, 90.0],
+            h_deg: None,
+            v_deg: None,
             channels: None,
             bins_nm: None,
             part: None,
@@ -137,18 +138,18 @@ pub enum FarFieldType {
 }
 
 impl Receiver {
-    /// Returns the ranges of both angles, degrees, as given; for C-planes all directions in place of a range that is the default.
+    /// Returns the ranges of both angles, degrees: where one is not given, the half space ahead, and of C-planes all directions.
     pub(crate) fn angles_deg(&self) -> ([f64; 2], [f64; 2]) {
-        let unset = Self::default();
-        match self.angles {
-            // A range that is the default was not given: degrees from −90 mean nothing for C-planes.
-            FarFieldType::C if self.h_deg == unset.h_deg && self.v_deg == unset.v_deg => {
-                ([0.0, 360.0], [0.0, 180.0])
-            }
-            FarFieldType::C if self.h_deg == unset.h_deg => ([0.0, 360.0], self.v_deg),
-            FarFieldType::C if self.v_deg == unset.v_deg => (self.h_deg, [0.0, 180.0]),
-            _ => (self.h_deg, self.v_deg),
-        }
+        let (h, v) = match self.angles {
+            FarFieldType::A | FarFieldType::B => ([-90.0, 90.0], [-90.0, 90.0]),
+            FarFieldType::C => ([0.0, 360.0], [0.0, 180.0]),
+        };
+        (self.h_deg.unwrap_or(h), self.v_deg.unwrap_or(v))
+    }
+
+    /// Returns the upward direction.
+    pub(crate) fn up(&self) -> [f64; 3] {
+        self.up.unwrap_or([0.0, 1.0, 0.0])
     }
 
     /// Returns how many sums it keeps at most: its cells for power and once more for each channel or bin. A receiver of absorbed power
@@ -184,7 +185,7 @@ impl Receiver {
                 "plane, disc, sphere or far_field",
             ),
             ("x", self.x.is_some(), &[Plane, Disc], "plane or disc"),
-            ("up", self.up != unset.up, &[Sphere, FarField], "sphere or far_field"),
+            ("up", self.up.is_some(), &[Sphere, FarField], "sphere or far_field"),
             ("size", self.size.is_some(), &[Plane], "plane"),
             ("radius", self.radius.is_some(), &[Disc, Sphere], "disc or sphere"),
             ("absorbs", !self.absorbs, &[Plane, Disc, Sphere], "plane, disc or sphere"),
@@ -196,8 +197,8 @@ impl Receiver {
             ),
             ("one_sided", self.one_sided, &[Plane, Disc], "plane or disc"),
             ("angles", self.angles != unset.angles, &[FarField], "far_field"),
-            ("h_deg", self.h_deg != unset.h_deg, &[FarField], "far_field"),
-            ("v_deg", self.v_deg != unset.v_deg, &[FarField], "far_field"),
+            ("h_deg", self.h_deg.is_some(), &[FarField], "far_field"),
+            ("v_deg", self.v_deg.is_some(), &[FarField], "far_field"),
             ("part", self.part.is_some(), &[Absorbed], "absorbed"),
             ("instance", self.instance.is_some(), &[Absorbed], "absorbed"),
             ("on", self.on.is_some(), &[Absorbed], "absorbed"),
@@ -223,7 +224,7 @@ impl Receiver {
         if !self.at.iter().all(|x| x.is_finite()) {
             return fail("at", "`at` must be a point, of three finite numbers");
         }
-        for (key, direction) in [("normal", Some(self.normal)), ("up", Some(self.up)), ("x", self.x)] {
+        for (key, direction) in [("normal", Some(self.normal)), ("up", self.up), ("x", self.x)] {
             if direction.is_some_and(|d| !d.iter().all(|x| x.is_finite()) || d == [0.0; 3]) {
                 return fail(
                     key,

@@ -23,15 +23,17 @@ pub struct Source {
     /// Its main axis points along `direction`, for type C with the plane C 0 along `x` and C 90 to its left as seen by one who looks
     /// along `direction` (counterclockwise in the plan of a luminaire that shines down), for types A and B with upward along `x`
     /// (+y unless said otherwise) and positive H to the right. Ray lists stand with their origin in `at`.
-    /// Long ones stay on the disk; of CSV and NPZ 64 bytes a ray are unpacked into the folder for temporary files (`TMPDIR`). The TILT
+    /// In CSV a row is a ray, below a head that names the columns `x,y,z,dx,dy,dz,power,wavelength_nm` in any order, or in this one
+    /// without a head; the wavelength may be missing. NPZ has the arrays `origin`, `direction`, `power` and, if given, `wavelength_nm`.
+    /// Long lists stay on the disk; of CSV and NPZ 64 bytes a ray are unpacked into the folder for temporary files (`TMPDIR`). The TILT
     /// table of an IES file, which is for tilted lamps, is left out.
     pub file: Option<String>,
     /// The faces that shine, outward, instead of `at`, `direction`, `x`, `radius` and `size`. Where an opaque face of another solid lies
     /// against one of them, as a board against a chip, it does not shine: all of the power leaves from the rest, and a note says how much
     /// that is.
     pub on: Option<FaceSelector>,
-    /// Instance, or part that is placed once, in whose own coordinates `at`, `direction`, `x` and `polarised` are given, and the rays of a
-    /// list: the source goes where it goes.
+    /// Instance, part that is placed once, or `name` of a `[[model]]`, in whose own coordinates `at`, `direction`, `x` and `polarised` are
+    /// given, and the rays of a list: the source goes where it goes. `*` in a name stands for anything.
     pub frame: Option<String>,
     /// Position or centre, mm.
     pub at: [f64; 3],
