@@ -81,11 +81,12 @@ pub(crate) fn report_lost_light(
         return Completion::Complete;
     }
     console.insist(format_args!(
-        "{} % of the energy was lost, more than --max-lost allows: {}; {} lists {}",
+        "{} % of the energy was lost, more than --max-lost allows: {}; {} lists {}{}",
         figures(100.0 * share, 2),
         loss_reasons(results, prepared),
         folder.join(LEDGER).display(),
-        if is_cut(results) { format!("the first {} of them", results.ledger.len()) } else { "them all".into() }
+        if is_cut(results) { format!("the first {} of them", results.ledger.len()) } else { "them all".into() },
+        advice(results)
     ));
     Completion::Incomplete
 }
@@ -106,6 +107,15 @@ fn loss_reasons(results: &Results, prepared: &PreparedScene) -> String {
         all.iter().take(NAMED_REASONS).map(|((why, place), n)| format!("{n} {why} at '{place}'")).collect();
     let counted = if is_cut(results) { format!("of the first {}: ", results.ledger.len()) } else { String::new() };
     format!("{counted}{}", reasons.join("; "))
+}
+
+/// Returns what to do about the loss, to follow a sentence; empty where a model's own gaps are to blame.
+fn advice(results: &Results) -> &'static str {
+    if results.ledger.iter().any(|l| l.cause == LostCause::InsideSolid) {
+        "; move sources out of solids, or, where a solid is drawn around a hollow, give its part a `medium` of index 1"
+    } else {
+        ""
+    }
 }
 
 /// Whether more rays were lost than the ledger keeps.

@@ -10,6 +10,8 @@ const PLAIN_NUMBERS: std::ops::Range<f64> = 1e-4..1e4;
 const ACCEPTED: f64 = 0.96;
 /// Share of the rays that the 99th percentile leaves out.
 const BEYOND_PERCENTILE: f64 = 0.01;
+/// Rays beyond the percentile from which on it hardly changes with other rays.
+const FEW_BEYOND: f64 = 10.0;
 
 /// What a kind of normals came to.
 pub(super) struct Solution {
@@ -63,6 +65,11 @@ impl Solution {
         format!("; {} % more meet another face or none", three_digits(100.0 * share))
     }
 
+    /// Returns that so few rays leave their 99th percentile to chance, where they do.
+    fn with_few_rays(&self) -> &'static str {
+        if self.checked as f64 * BEYOND_PERCENTILE < FEW_BEYOND { ", too few to be sure of it" } else { "" }
+    }
+
     /// Returns what was asked, what was reached and by which facets and normals, as one sentence; `gave_up` where finer facets were too
     /// many to be tried.
     pub(super) fn answer_sentence(&self, target: &AccuracyTarget, gave_up: bool) -> String {
@@ -74,9 +81,10 @@ impl Solution {
         };
         let reached = match self.reached.zip(self.largest) {
             Some((reached, largest)) => format!(
-                "reached {}° (99th percentile of {} fresh rays against the spline, at most {}°{})",
+                "reached {}° (99th percentile of {} fresh rays against the spline{}, at most {}°{})",
                 three_digits(reached),
                 self.checked,
+                self.with_few_rays(),
                 three_digits(largest),
                 self.without_angle()
             ),
@@ -101,4 +109,31 @@ fn three_digits(x: f64) -> String {
     }
     let decimals = (2 - x.log10().floor() as i32).max(0) as usize;
     format!("{x:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_percentile_of_few_rays_is_told_as_unsure() {
+        let answer = |checked| {
+            let solution = Solution {
+                normals: NormalMode::Bilinear,
+                plan: TolerancePlan::uniform(0.1),
+                facets: 100,
+                prepare: 0.0,
+                trace: 0.0,
+                reached: Some(0.5),
+                largest: Some(0.75),
+                checked,
+                flips: 0,
+            };
+            solution.answer_sentence(&AccuracyTarget::for_angle_deg(1.0), false)
+        };
+        assert!(
+            answer(24).contains("of 24 fresh rays against the spline, too few to be sure of it, at most 0.750°")
+        );
+        assert!(answer(1000).contains("of 1000 fresh rays against the spline, at most 0.750°"));
+    }
 }
