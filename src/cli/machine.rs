@@ -1,7 +1,7 @@
 //! What the machine is, as far as the system tells: processor, cores, memory, name.
 
+use crate::formats::count_of;
 use crate::formats::file_stem;
-use crate::report::count_of;
 use crate::simulate::machine_threads;
 use std::fs;
 use std::time::SystemTime;

@@ -66,9 +66,9 @@ pub fn settings_for_accuracy(
     let found = in_stage(monitor, Stage::Aiming, || match &bound {
         None => meet_target(model, &source, &ask, &progress),
         Some((scene, bound)) => {
-            let rays = |seed: u64, count: u64| {
+            let rays = |traced_on: &dyn Intersector, seed: u64, count: u64| {
                 let settings = RunSettings { rays: count, seed, path_samples: 0, ..RunSettings::from(&scene.run) };
-                scene_rays(&source, model, &settings, bound)
+                scene_rays(traced_on, model, &settings, bound)
             };
             let relative_index = |face| bound.entered_body(face).map(|body| bound.relative_index(body));
             let light = JobLight { rays: &rays, relative_index: &relative_index };
@@ -141,19 +141,18 @@ fn target(accuracy_deg: Option<f64>, meshing: &MeshingSettings) -> Result<Option
     Ok(Some(target))
 }
 
-/// Traces the scene's run on the spline and returns a sample of its segments, from the sources and from surfaces, lifted off the latter: at
-/// most as many as the run has rays.
+/// Traces the scene's run and returns a sample of its segments, from the sources and from surfaces, lifted off the latter: at most as many
+/// as the run has rays.
 fn scene_rays(
-    source: &ModelMeshSource<'_>,
+    traced_on: &dyn Intersector,
     model: &Model,
     settings: &RunSettings,
     bound: &crate::simulate::BoundScene,
 ) -> Vec<Ray> {
-    let exact: &dyn Intersector = source.spline();
     // As many as are traced: about every ray meets one surface.
-    let recorder = RayRecorder::new(exact, settings.rays, settings.rays);
+    let recorder = RayRecorder::new(traced_on, settings.rays, settings.rays);
     simulate(bound, &recorder, settings, &|_| true);
-    let start = |ray: &Ray, up: Vector| match exact.intersect(ray, &mut Cost::default()) {
+    let start = |ray: &Ray, up: Vector| match traced_on.intersect(ray, &mut Cost::default()) {
         Some(hit) => ray.point_at(STARTING_SHARE * hit.t),
         None => ray.origin + RAY_LIFT_MM * up,
     };

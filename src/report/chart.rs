@@ -1,8 +1,8 @@
 //! Pictures in two dimensions as plain data: series, bars and maps with their axes.
 
 use super::contour::{Isoline, isolines, round_levels};
-use super::figures;
 use super::number::unit_in_words;
+use crate::formats::figures;
 use crate::formats::{Axis, ColourMap, Grid, Picture};
 
 /// A picture in two dimensions: interactive in the page, static beside it.

@@ -2,8 +2,8 @@
 
 use super::chart::Chart;
 use super::drawing::{Anchor, DASH, Drawing, Element, Ink, Place, TYPE_SIZE};
-use super::number::NARROW_SPACE;
 use super::static_chart;
+use crate::formats::NARROW_SPACE;
 use crate::formats::Picture;
 use ab_glyph::{Font, FontRef, OutlineCurve};
 use tiny_skia::{

@@ -3,7 +3,7 @@
 use super::Chart;
 use super::framing::lit_part;
 use super::maps::spoken;
-use super::number::figures;
+use crate::formats::figures;
 use crate::formats::{Grid, Picture, file_stem};
 use crate::optics::{linear_srgb, srgb_byte};
 

@@ -1,8 +1,8 @@
 //! The cross-check, for people: octree against BVH against spline, every cause in words, the disagreeing rays in 3-D.
 
 use super::{AxisStyle, Cell, Chart, Content, Provenance, Report, Section, Table, View};
-use super::{figures, grouped};
 use crate::formats::{Facets, Polylines};
+use crate::formats::{figures, grouped};
 use crate::math::{Point, Vector};
 use crate::study::cross_check::{Cause, CrossCheck, Disagreement};
 use std::collections::BTreeSet;

@@ -2,7 +2,8 @@
 
 use super::maps::spoken;
 use super::number::{unit_in_words, with_unit};
-use super::{Cell, Table, figures, grouped, seconds};
+use super::{Cell, Table, seconds};
+use crate::formats::{figures, grouped};
 use crate::intersect::NormalMode;
 use crate::simulate::{Absorbed, Results};
 use crate::study::default_accuracy::Chosen;

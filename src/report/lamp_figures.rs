@@ -2,11 +2,11 @@
 
 use super::even_poles::{brightest_direction, direction_text, is_all_around, pole_rings};
 use super::half_width::half_width;
-use super::number::figures;
 use super::peak_lines::{Line, lines_through_peak};
 use super::verdicts::multiple_text;
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
+use crate::formats::figures;
 use crate::math::{error_of_maximum, error_of_mean};
 use crate::regulation::Assessment;
 use crate::simulate::{ReceiverResult, Results};

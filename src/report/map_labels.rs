@@ -2,7 +2,7 @@
 
 use super::chart::Marks;
 use super::contour::Isoline;
-use super::number::figures;
+use crate::formats::figures;
 
 /// Digits of a level.
 const DIGITS: usize = 3;

@@ -56,7 +56,7 @@ pub(crate) use even_poles::with_even_poles;
 #[cfg(feature = "cli")]
 pub(crate) use maps::on_receiver;
 pub use maps::{photometric_grid, receiver_grid};
-pub use number::{bytes, count_of, figures, grouped, seconds, tolerance_text};
+pub use number::{bytes, seconds, tolerance_text};
 pub use provenance::Provenance;
 pub use simulation::{SimulationReport, path_lines};
 pub use studies::study_report;

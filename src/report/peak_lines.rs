@@ -1,9 +1,9 @@
 //! Lines of cells through the brightest one: along both axes of a grid, or in planes C of one that is all around.
 
 use super::even_poles::is_all_around;
-use super::figures;
 use super::number::with_unit;
 use crate::formats::Grid;
+use crate::formats::figures;
 
 /// A line of cells.
 pub(super) struct Line {

@@ -3,7 +3,8 @@
 use super::chart::MapPoint;
 use super::framing::lit_part;
 use super::number::without_rounding;
-use super::{Cell, Chart, Section, Table, figures, road};
+use super::{Cell, Chart, Section, Table, road};
+use crate::formats::figures;
 use crate::formats::{Grid, file_stem};
 use crate::regulation::{Assessment, Bound, Row, RowVerdict, Traffic, Verdict};
 

@@ -1,7 +1,7 @@
 //! 3-D views as plain data, made of facets, lines and points, simplified until a page can show them.
 
 use super::view_triangles::{FaceTriangles, merge_corners, triangles_of, used_points};
-use crate::formats::{ColourMap, Facets, Group, Polylines};
+use crate::formats::{ColourMap, Facets, Group, Polylines, figures, grouped};
 use crate::math::Point;
 
 /// A 3-D view: turns in the page, a static picture beside it.
@@ -113,7 +113,7 @@ impl View {
         if merged > 0.0 {
             view.caption = format!(
                 "Shown simplified: corners closer than about {} mm are merged; the traced mesh is untouched.",
-                super::figures(merged, 2)
+                figures(merged, 2)
             );
         }
         view
@@ -133,7 +133,7 @@ impl View {
         let step = total.div_ceil(SHOWN).max(1);
         let caption = match step {
             1 => String::new(),
-            _ => format!("Shown: one triangle in {step} of {}.", super::grouped(total as u64)),
+            _ => format!("Shown: one triangle in {step} of {}.", grouped(total as u64)),
         };
         let mut view = Self { name: name.into(), title: title.into(), caption, shapes: Vec::new() };
         // Clear parts apart, so that one sees through them.
@@ -254,7 +254,7 @@ fn shown_surfaces<'a>(facets: &'a Facets) -> Vec<Shown<'a>> {
     }
     let named = |(s, more): (Shown<'a>, usize)| match more {
         0 => s,
-        _ => Shown { name: format!("{} and {} more", s.name, super::grouped(more as u64)), ..s },
+        _ => Shown { name: format!("{} and {} more", s.name, grouped(more as u64)), ..s },
     };
     looks.into_iter().map(named).collect()
 }

@@ -3,6 +3,7 @@
 use super::bind::BoundScene;
 use super::body::{AMBIENT, Body};
 use super::surfaces::{Coated, FaceOptics, Surface};
+use crate::formats::count_of;
 use crate::optics::{Coating, Effect, Effects};
 use serde::Serialize;
 
@@ -119,14 +120,14 @@ fn required(bound: &BoundScene) -> Required {
         let (wanted, because) = match effect {
             Effect::Reflection => {
                 let n = mirrors + coated(&|c| !c.coating.is_reflectionless());
-                (n > 0, plural(n, "reflecting face", "no face is a mirror"))
+                (n > 0, counted_or(n, "reflecting face", "no face is a mirror"))
             }
             Effect::Refraction => {
-                (interfaces > 0, plural(interfaces, "interface face", "no face lets light into a medium"))
+                (interfaces > 0, counted_or(interfaces, "interface face", "no face lets light into a medium"))
             }
             Effect::Fresnel => {
                 let n = bare + metals;
-                (n > 0, plural(n, "bare or metal face", "no face is a bare interface or a metal"))
+                (n > 0, counted_or(n, "bare or metal face", "no face is a bare interface or a metal"))
             }
             Effect::BulkAbsorption => medium(in_medium(&Body::absorbs), "absorbs", "no medium absorbs"),
             Effect::BulkScatter => medium(in_medium(&|b| b.scatter.is_some()), "scatters", "no medium scatters"),
@@ -135,7 +136,7 @@ fn required(bound: &BoundScene) -> Required {
             Effect::Dispersion => needs_wavelength(bound, in_medium(&Body::is_dispersive)),
             Effect::SurfaceScatter => {
                 let n = coated(&|c| c.scatter.is_some());
-                (n > 0, plural(n, "rough or diffuse face", "no face scatters"))
+                (n > 0, counted_or(n, "rough or diffuse face", "no face scatters"))
             }
             Effect::Coating => {
                 let n = coated(&|c| match c.coating {
@@ -144,7 +145,7 @@ fn required(bound: &BoundScene) -> Required {
                     Coating::Ideal { transmittance, .. } => transmittance > 0.0 || c.scatter.is_none(),
                     Coating::Table(_) => true,
                 });
-                (n > 0, plural(n, "coated face", "no face is coated"))
+                (n > 0, counted_or(n, "coated face", "no face is coated"))
             }
         };
         let list = if wanted { &mut required.simulated } else { &mut required.not_simulated };
@@ -185,11 +186,7 @@ fn needs_wavelength(bound: &BoundScene, medium: Option<&str>) -> (bool, String) 
     }
 }
 
-/// Returns the number with its noun, in the plural with an `s`; for 0 the words `none`.
-fn plural(n: usize, noun: &str, none: &str) -> String {
-    match n {
-        0 => none.into(),
-        1 => format!("1 {noun}"),
-        n => format!("{n} {noun}s"),
-    }
+/// Returns the number with its noun, for 0 the words `none`.
+fn counted_or(n: usize, noun: &str, none: &str) -> String {
+    if n == 0 { none.into() } else { count_of(n as u64, noun) }
 }

@@ -34,6 +34,7 @@ mod grid;
 mod hooks;
 mod kernel;
 mod listed_rays;
+mod lost_light;
 mod outcome;
 mod partial_run;
 mod path_sample;

@@ -1,13 +1,11 @@
 //! What someone who reads the results must know about a run: light that was lost, bodies that overlap.
 
 use super::bind::BoundScene;
-use super::body::AMBIENT;
-use super::outcome::{Counts, LostCause, LostRay};
+use super::outcome::{Counts, LostRay};
 use super::plan::Plan;
 use super::receiver::{Receiver, Shape};
-use super::surfaces::{FaceOptics, Surface};
 use super::tally::Sum;
-use std::collections::BTreeMap;
+use crate::formats::count_of;
 
 /// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
 /// one scene once in 10^6 segments.
@@ -89,63 +87,23 @@ impl BoundScene {
             .filter_map(|(r, _)| {
                 let n = r.interactions.filter(|&n| n > 0)?;
                 Some(format!(
-                    "'{}' counts light after exactly {n} interaction{} alone, and none came: what meets it before ends there uncounted, \
+                    "'{}' counts light after exactly {} alone, and none came: what meets it before ends there uncounted, \
                      unless it has `absorbs = false`",
                     r.name,
-                    if n == 1 { "" } else { "s" }
+                    count_of(n.into(), "interaction")
                 ))
             })
             .collect();
         notes.into_iter()
     }
 
-    /// Whether a face of this instance lets light through, though no medium is behind it.
-    fn lets_light_into_solid(&self, instance: Option<&str>) -> bool {
-        let is_open = |face: &FaceOptics| {
-            face.body == AMBIENT && matches!(&self.surfaces[face.surface as usize], Surface::Coated(c) if !c.opaque)
-        };
-        let of_instance =
-            |face: usize| self.instances.get(self.instance_of_face[face] as usize).map(String::as_str);
-        (0..self.faces.len()).any(|face| is_open(&self.faces[face]) && of_instance(face) == instance)
-    }
-
     /// Returns one sentence about lost light: where most of it was, and why; `None` where the ledger is empty. `lost` counts those beyond
     /// it.
     pub(crate) fn lost_note(&self, lost: u64, ledger: &[LostRay]) -> Option<String> {
-        let mut places: BTreeMap<(u32, Option<&str>, LostCause), usize> = BTreeMap::new();
-        for l in ledger {
-            let at = l.face.and_then(|f| self.instance(f));
-            *places.entry((l.body, at, l.cause)).or_default() += 1;
-        }
-        // From the back, since the last of equals is taken: the first in order is named, whatever threads did.
-        let ((body, at, cause), number) = places.into_iter().rev().max_by_key(|(_, number)| *number)?;
-        let why = match cause {
-            LostCause::NoExit => {
-                "it left the scene inside a body, by a gap between faces, an open mesh or a missing face"
-            }
-            LostCause::ImpossibleMedium => {
-                "it came to a face from the wrong side, as where a mesh gapes or is turned, or bodies overlap"
-            }
-            LostCause::InsideSolid if self.lets_light_into_solid(at) => {
-                "a face of it lets light through, but what is behind has no medium, and its other faces are opaque: give the part a \
-                 `medium`, or the face a surface that lets nothing through"
-            }
-            LostCause::InsideSolid => {
-                "it came to a closed opaque solid from inside, as from a source that lies in it: move the source out, or, where the solid is \
-                 drawn around a hollow, give the part a `medium` of index 1"
-            }
-            LostCause::TooDeep => "more bodies lie in each other than a ray can carry",
-            LostCause::NotANumber => "its place or direction is no number",
-            LostCause::Unreadable => "its ray file was changed or went while it was in use",
-        };
-        let place = match (self.body_names(body).filter(|_| body != AMBIENT), at) {
-            (Some([name, medium]), _) => format!("in '{name}' ({medium})"),
-            (None, Some(name)) => format!("at '{name}'"),
-            (None, None) => "outside all bodies".into(),
-        };
+        let first = self.loss_reasons(ledger).into_iter().next()?;
+        let recorded = ledger.len();
         Some(format!(
-            "{lost} paths were lost; {number} of the {} on record {place}: {why}; `trace --replay lost_rays.csv` shows their ways",
-            ledger.len()
+            "{lost} paths were lost; of the {recorded} on record {first}; `trace --replay lost_rays.csv` shows their ways"
         ))
     }
 }

@@ -332,7 +332,7 @@ fn a_source_in_an_opaque_part_and_an_unknown_medium_are_told() {
     let folder = lens(|scene| opaque(scene).replace("at = [0, 0, -10]", "at = [0, 0, 2]"));
     let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out"]);
     assert!(code == 4 && err.contains("as from a source that lies in it"), "{code} {err}");
-    assert!(err.contains("give its part a `medium` of index 1"), "{err}");
+    assert!(err.contains("give the part a `medium` of index 1"), "{err}");
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     assert!(page.contains("No light came here.") && !page.contains("cuts through the peak"));
     let folder = lens(|scene| scene.replace("medium = \"glass\"", "medium = \"D-ZK3\""));

@@ -16,6 +16,7 @@ use crate::cli::work::ray_input::read_rays;
 use crate::cli::work::results_folder::MOST_DRAWN;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{paired_receivers, threads};
+use crate::formats::{count_of, figures, grouped};
 use crate::formats::{file_name, write_atomic};
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::{Aabb, Ray};
@@ -24,7 +25,7 @@ use crate::pipeline::{
     AccurateSettings, IntersectorChoice, LIFT_IN_TOLERANCES, RayRecorder, TracingSettings, mesh_settings,
     settings_for_accuracy, tessellate_by_part,
 };
-use crate::report::{CheckReport, count_of, figures, grouped, unexplained, verdict};
+use crate::report::{CheckReport, unexplained, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
 use crate::study::accuracy_target::AccuracyResult;
 use crate::study::cross_check::{self, CrossCheck};

@@ -3,8 +3,8 @@
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::json::{json_text, json_value};
+use crate::formats::{figures, grouped};
 use crate::model::{FaceAccount, Model, PartAccount, PlacedFace, SolidAccount, are_shared};
-use crate::report::{figures, grouped};
 use crate::simulate::face_selectors;
 use serde_json::json;
 

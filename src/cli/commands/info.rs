@@ -7,7 +7,8 @@ use crate::cli::output::json::json_text;
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::input_files;
 use crate::cli::{completion::Completion, failure::Failure};
-use crate::report::{bytes, count_of, figures, grouped, seconds};
+use crate::formats::{count_of, figures, grouped};
+use crate::report::{bytes, seconds};
 use crate::step::ImportReport;
 use std::path::Path;
 

@@ -3,8 +3,8 @@
 use crate::cli::arguments::command::TraceOptions;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
+use crate::formats::grouped;
 use crate::pipeline::{PreparedScene, RayRange};
-use crate::report::grouped;
 use crate::simulate::{GROWING_REPLICATE, grows};
 
 /// Refuses, with a range of rays, what is written of whole runs alone.

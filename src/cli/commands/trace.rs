@@ -17,11 +17,12 @@ use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards, tally_file};
+use crate::formats::grouped;
 use crate::pipeline::{
     AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, SceneJob, SceneResults, TraceRequest,
     TracingSettings, read_cached_scene, refuse_facet_normals, settings_for_accuracy,
 };
-use crate::report::{grouped, seconds};
+use crate::report::seconds;
 use crate::simulate::{PartialRun, PathSink, PathVertex, Scene};
 use serde_json::json;
 use std::path::Path;

@@ -2,13 +2,12 @@
 //! fields in candela.
 
 use crate::cli::failure::Failure;
+use crate::formats::figures;
 use crate::formats::{
     Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_eulumdat,
     write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_png, write_tm25, write_vti,
 };
-use crate::report::{
-    colour_picture, figures, file_stem, on_receiver, photometric_grid, receiver_grid, with_even_poles,
-};
+use crate::report::{colour_picture, file_stem, on_receiver, photometric_grid, receiver_grid, with_even_poles};
 use crate::simulate::ReceiverResult;
 use crate::simulate::scene::{FarFieldType, Receiver, ReceiverKind};
 use std::path::Path;

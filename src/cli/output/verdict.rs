@@ -2,9 +2,10 @@
 
 use super::terminal_tables::{blank_table, wrapped_lines};
 use crate::cli::console::Console;
+use crate::formats::figures;
 use crate::regulation::{Assessment, RowVerdict};
 use crate::report::{
-    direction_text, figures, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
+    direction_text, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
 };
 use comfy_table::CellAlignment;
 

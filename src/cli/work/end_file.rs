@@ -4,8 +4,8 @@ use super::terminal_monitor::TerminalMonitor;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::formats::{Column, NpzStream, file_name, lower_extension, write_atomic};
+use crate::formats::{count_of, grouped};
 use crate::pipeline::PreparedScene;
-use crate::report::{count_of, grouped};
 use crate::simulate::{ListedEnd, MOST_LISTED_RAYS, RunSettings, listed_ends, ray_lists};
 use std::path::Path;
 

@@ -1,9 +1,10 @@
 //! What facets change of each receiver of a scene, from the same rays on facets and on the spline.
 
 use crate::cli::console::Console;
+use crate::formats::figures;
 use crate::intersect::Intersector;
 use crate::pipeline::TracingSettings;
-use crate::report::{Cell, Table, figures};
+use crate::report::{Cell, Table};
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::receivers::{PowerComparison, compare_power};
 

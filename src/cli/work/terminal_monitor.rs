@@ -3,9 +3,10 @@
 use super::path_file::PathFile;
 use crate::cli::console::{Console, show_progress};
 use crate::cli::interruption::{self, SaveableRun};
+use crate::formats::{figures, grouped};
 use crate::intersect::NormalMode;
 use crate::pipeline::{Monitor, Stage};
-use crate::report::{figures, grouped, tolerance_text};
+use crate::report::tolerance_text;
 use crate::study;
 use crate::study::default_accuracy::Chosen;
 use indicatif::ProgressBar;

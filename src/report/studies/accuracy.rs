@@ -1,7 +1,8 @@
 //! Tolerance × normals × intersector: the cost–accuracy front, the slopes beside their theory, where the time goes.
 
 use super::rows::{distinct, number, text};
-use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table, figures, seconds};
+use crate::formats::figures;
+use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table, seconds};
 use crate::study::slope;
 use serde_json::Value;
 

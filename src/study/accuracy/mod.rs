@@ -9,6 +9,7 @@ pub use sweep::accuracy;
 
 use super::hit_errors::slope;
 use super::mesh_source::FacetTree;
+use crate::formats::count_of;
 use crate::intersect::NormalMode;
 use serde::Serialize;
 
@@ -224,7 +225,7 @@ pub fn sentence(rows: &[Row], target: f64) -> String {
     let good = timed(true).filter(|r| r.direction_error_deg_p99 <= target);
     let cheapest = good.min_by(|a, b| a.seconds_of_job().total_cmp(&b.seconds_of_job()));
     let cost = |r: &Row| format!("**{:.2} s**", r.seconds_of_job());
-    let job = format!("for a million rays on {threads} thread{}", if threads == 1 { "" } else { "s" });
+    let job = format!("for a million rays on {}", count_of(threads as u64, "thread"));
     let spline = timed(false).next();
     let Some((facets, tolerance)) = cheapest.and_then(|r| Some((r, r.tolerance_mm?))) else {
         let spline = spline.map_or(String::new(), |e| format!("; the exact spline costs {} {job}", cost(e)));

@@ -13,6 +13,7 @@ mod direction_error;
 mod search;
 mod solution;
 mod survey;
+mod trial_rays;
 
 pub use super::tolerance_plan::{RelativeTolerance, TolerancePlan};
 pub use search::{JobLight, RayGenerator, meet_target, meet_target_for_light};
@@ -31,7 +32,7 @@ pub struct AccuracyTarget {
     /// Rays that the job will trace: a long job pays for finer facets or faster normals differently than a short one; 0 when only
     /// the facets are wanted.
     pub job_rays: f64,
-    /// Fresh rays of the final check.
+    /// Fresh rays of the final check, as many on the spline as on the facets.
     pub check_rays: u64,
     /// Kinds of normals that may be taken.
     pub kinds: Vec<NormalMode>,
@@ -66,7 +67,8 @@ impl AccuracyTarget {
 pub struct AccuracyResult {
     /// Error that was asked for, degrees.
     pub asked_deg: f64,
-    /// Reached on fresh rays (p99), degrees; `None` where none met the same face on facets and spline.
+    /// Reached on fresh rays (p99, the worse of those traced on facets and on the spline), degrees; `None` where none met the same face on
+    /// both.
     pub reached_deg: Option<f64>,
     /// The largest error of these rays, degrees; `None` as above.
     pub largest_deg: Option<f64>,

@@ -1,10 +1,10 @@
 //! The search for the cheapest tolerances and normals that meet an accuracy target.
 
-use super::direction_error::error_of_hit;
 use super::solution::Solution;
-use super::survey::{Survey, p99, tolerance_factor};
+use super::survey::{Survey, tolerance_factor};
+use super::trial_rays::{DirectionErrors, ReferenceRays};
 use super::{AccuracyResult, AccuracyTarget, Trial};
-use crate::intersect::{Hit, NormalMode};
+use crate::intersect::{Intersector, NormalMode};
 use crate::math::{Aabb, FaceId, Ray};
 use crate::model::Model;
 use crate::study::Progress;
@@ -34,8 +34,8 @@ const ATTEMPTS: usize = 6;
 /// All meshes of a search together may have so many times the facets that one may: a few attempts at the finest.
 const LARGEST_MESHES: f64 = 3.0;
 
-/// Rays of a seed, and how many: those that the job will meet.
-pub type RayGenerator<'r> = dyn Fn(u64, u64) -> Vec<Ray> + Sync + 'r;
+/// Rays of a job on these surfaces, by seed and number.
+pub type RayGenerator<'r> = dyn Fn(&dyn Intersector, u64, u64) -> Vec<Ray> + Sync + 'r;
 
 /// The light of a job.
 #[derive(Clone, Copy)]
@@ -60,7 +60,7 @@ pub fn meet_target(
     // Of the surfaces, not of facets: there are none yet.
     let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
     let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
-    let uniform = |seed: u64, count: u64| {
+    let uniform = |_: &dyn Intersector, seed: u64, count: u64| {
         let source = Uniform::new(&bounds, seed, count);
         source.rays(0..source.len())
     };
@@ -86,7 +86,7 @@ pub fn meet_target_for_light(
     let clock = Clock::new(progress);
     // The spline's hits are the truth, and tell which faces matter and how sharply they bend.
     clock.report("pilot rays", 0.0);
-    let pilots = ReferenceRays::new(mesh_source, (light.rays)(target.seed, PILOTS));
+    let pilots = ReferenceRays::new(mesh_source, (light.rays)(mesh_source.exact(), target.seed, PILOTS));
     let survey = Survey::new(model, &pilots.rays, &pilots.truth);
     let coarse = coarse_tolerance(model);
     let search = Search {
@@ -161,21 +161,6 @@ fn coarse_tolerance(model: &Model) -> f64 {
     (bounds.diagonal() / SMALL_MODEL).clamp(FINEST_COARSE, COARSEST)
 }
 
-/// Rays with their exact hits.
-struct ReferenceRays {
-    rays: Vec<Ray>,
-    truth: Vec<Option<Hit>>,
-}
-
-impl ReferenceRays {
-    /// Asks the spline all rays, on the current rayon pool, and keeps its hits.
-    fn new(mesh_source: &dyn MeshSource, rays: Vec<Ray>) -> Self {
-        let mut truth = vec![None; rays.len()];
-        answer(mesh_source.exact(), &rays, rayon::current_num_threads(), &mut truth);
-        Self { rays, truth }
-    }
-}
-
 /// A kind of normals with the tolerances that should do.
 struct Candidate {
     normals: NormalMode,
@@ -188,15 +173,13 @@ struct Candidate {
 }
 
 /// What some rays showed on the facets of a plan.
-struct Measured {
+struct Measured<E> {
     /// The face of each facet.
     made: Vec<FaceId>,
     /// Seconds of meshing and building, and of a ray.
     prepare: f64,
     per_ray: f64,
-    /// Degrees, with the face.
-    errors: Vec<(FaceId, f64)>,
-    flips: u64,
+    errors: E,
 }
 
 /// What all candidates are judged with.
@@ -217,44 +200,49 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Meshes by a plan, times the reference rays on it, and compares where light goes with the spline; rays that hit on one of
-    /// both alone, or on faces in other places, are counted as flips.
-    fn measure(&self, plan: &TolerancePlan, normals: NormalMode, on: &ReferenceRays) -> Measured {
+    /// Meshes by a plan, times the pilots on it, and has `judge` find how far off such facets send light: it is given them, and how far
+    /// apart two faces may lie that touch, mm.
+    fn measure<E>(
+        &self,
+        plan: &TolerancePlan,
+        normals: NormalMode,
+        judge: impl FnOnce(&dyn Intersector, f64) -> E,
+    ) -> Measured<E> {
         let meshed = self.mesh_source.mesh_plan(plan);
-        let mut hits = vec![None; on.rays.len()];
+        let rays = &self.pilots.rays;
+        let mut hits = vec![None; rays.len()];
         let start = Instant::now();
-        let mut measured =
-            with_intersectors(self.mesh_source, &meshed.mesh, &[FacetTree::Octree], &[normals], |trees| {
-                let build = start.elapsed().as_secs_f64();
-                // Twice, and the better of both: the first pass also fills the caches.
-                let seconds = [0, 1].map(|_| {
-                    let start = Instant::now();
-                    answer(trees[0].2, &on.rays, rayon::current_num_threads(), &mut hits);
-                    start.elapsed().as_secs_f64()
-                });
-                let per_ray = seconds[0].min(seconds[1]) / on.rays.len().max(1) as f64;
-                let prepare = meshed.seconds + build;
-                let made = meshed.mesh.facets.iter().map(|f| f.face).collect();
-                Measured { made, prepare, per_ray, errors: Vec::new(), flips: 0 }
+        with_intersectors(self.mesh_source, &meshed.mesh, &[FacetTree::Octree], &[normals], |trees| {
+            let build = start.elapsed().as_secs_f64();
+            let facets = trees[0].2;
+            // Twice, and the better of both: the first pass also fills the caches.
+            let seconds = [0, 1].map(|_| {
+                let start = Instant::now();
+                answer(facets, rays, rayon::current_num_threads(), &mut hits);
+                start.elapsed().as_secs_f64()
             });
-        // Facets of two bodies that touch stray from their spline to either side.
-        let apart = 2.0 * plan.loosest_mm();
-        for ((ray, hit), truth) in on.rays.iter().zip(&hits).zip(&on.truth) {
-            let error = match (hit, truth) {
-                (None, None) => continue,
-                (Some(hit), Some(truth)) => {
-                    let error = error_of_hit(ray.direction, [hit, truth], apart, &self.light.relative_index);
-                    error.map(|error| (truth.face, error))
-                }
-                _ => None,
-            };
-            // In another place there is no angle: such rays are told apart from the percentile.
-            match error {
-                Some(error) => measured.errors.push(error),
-                None => measured.flips += 1,
+            let made = meshed.mesh.facets.iter().map(|f| f.face).collect();
+            Measured {
+                made,
+                prepare: meshed.seconds + build,
+                per_ray: seconds[0].min(seconds[1]) / rays.len().max(1) as f64,
+                // Facets of two bodies that touch stray from their spline to either side.
+                errors: judge(facets, 2.0 * plan.loosest_mm()),
             }
-        }
-        measured
+        })
+    }
+
+    /// Returns how far off facets send fresh rays of the job: those that it meets on the spline, and those that it meets on these facets,
+    /// which graze where the spline's do not.
+    fn judge(&self, facets: &dyn Intersector, apart_mm: f64) -> [DirectionErrors; 2] {
+        [self.mesh_source.exact(), facets].map(|traced_on| {
+            self.fresh.set(self.fresh.get() + 1);
+            // Another seed for each set: facets tuned to one set of rays must not be judged by it.
+            let seed = self.target.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let rays = (self.light.rays)(traced_on, seed, self.target.check_rays);
+            let fresh = ReferenceRays::new(self.mesh_source, rays);
+            fresh.compare(facets, apart_mm, &self.light.relative_index)
+        })
     }
 
     /// Makes the plan for these normals by the formulas, with one tolerance for all places unless `local`; meshes it, or a coarser one, and
@@ -275,13 +263,15 @@ impl Search<'_> {
         let coarser = (0.25 * self.coarse / plan.unbounded_mm()).max(1.0);
         let mut pilot = plan.clone();
         pilot.scale(coarser);
-        let m = self.measure(&pilot, normals, &self.pilots);
+        let m = self.measure(&pilot, normals, |facets, apart_mm| {
+            self.pilots.compare(facets, apart_mm, &self.light.relative_index)
+        });
         let mut facets = m.made.len() as f64;
         // The pilots measured the coarser plan: their errors are judged against what that one should give.
         if normals != NormalMode::Exact {
             let expected = self.target.angle_deg * MARGIN * coarser.powf(order);
             plan = pilot.clone();
-            self.survey.adapt(&mut plan, &m.errors, expected, order);
+            self.survey.adapt(&mut plan, &m.errors.errors, expected, order);
             plan.scale(1.0 / coarser);
             facets = self.survey.expected_facets(&plan, &pilot, &m.made);
         }
@@ -315,15 +305,12 @@ impl Search<'_> {
         }
         let mut best: Option<Solution> = None;
         for attempt in 0..ATTEMPTS {
-            self.fresh.set(self.fresh.get() + 1);
-            // Another seed for each set: facets tuned to one set of rays must not be judged by it.
-            let seed = self.target.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            let fresh = ReferenceRays::new(self.mesh_source, (self.light.rays)(seed, self.target.check_rays));
-            let m = self.measure(&plan, normals, &fresh);
+            let m = self.measure(&plan, normals, |facets, apart_mm| self.judge(facets, apart_mm));
             self.made.set(self.made.get() + m.made.len() as f64);
-            let mut errors: Vec<f64> = m.errors.iter().map(|e| e.1).collect();
-            let reached = p99(&mut errors);
-            let largest = errors.iter().copied().max_by(f64::total_cmp);
+            // Both sets of rays must keep what is asked.
+            let worst =
+                |of: fn(&DirectionErrors) -> Option<f64>| m.errors.iter().filter_map(of).max_by(f64::total_cmp);
+            let reached = worst(DirectionErrors::percentile);
             let found = Solution {
                 normals,
                 plan: plan.clone(),
@@ -331,9 +318,9 @@ impl Search<'_> {
                 prepare: m.prepare,
                 trace: m.per_ray * self.target.job_rays,
                 reached,
-                largest,
-                checked: m.errors.len() as u64,
-                flips: m.flips,
+                largest: worst(DirectionErrors::largest),
+                checked: m.errors.iter().map(|set| set.errors.len() as u64).sum(),
+                flips: m.errors.iter().map(|set| set.flips).sum(),
             };
             trials.push(Trial {
                 normals: normals.name().into(),

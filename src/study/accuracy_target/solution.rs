@@ -1,17 +1,16 @@
 //! What a kind of normals came to on fresh rays, and the sentence that says it.
 
 use super::AccuracyTarget;
+use crate::formats::figures;
 use crate::intersect::NormalMode;
 use crate::study::tolerance_plan::TolerancePlan;
 
-/// Numbers written without an exponent.
-const PLAIN_NUMBERS: std::ops::Range<f64> = 1e-4..1e4;
 /// An error is accepted with this much to spare, so that other rays than the judge's find it kept too.
 const ACCEPTED: f64 = 0.96;
 /// Share of the rays that the 99th percentile leaves out.
 const BEYOND_PERCENTILE: f64 = 0.01;
-/// Rays beyond the percentile from which on it hardly changes with other rays.
-const FEW_BEYOND: f64 = 10.0;
+/// Rays beyond the percentile from which on it hardly changes with other rays: ten of each of two sets.
+const FEW_BEYOND: f64 = 20.0;
 
 /// What a kind of normals came to.
 pub(super) struct Solution {
@@ -62,7 +61,7 @@ impl Solution {
         if share <= BEYOND_PERCENTILE {
             return String::new();
         }
-        format!("; {} % more meet another face or none", three_digits(100.0 * share))
+        format!("; {} % more meet another face or none", figures(100.0 * share, 3))
     }
 
     /// Returns that so few rays leave their 99th percentile to chance, where they do.
@@ -75,17 +74,17 @@ impl Solution {
     pub(super) fn answer_sentence(&self, target: &AccuracyTarget, gave_up: bool) -> String {
         let [low, high] = self.plan.tolerance_mm();
         let range = if low == high {
-            format!("{} mm", three_digits(low))
+            format!("{} mm", figures(low, 3))
         } else {
-            format!("{} to {} mm", three_digits(low), three_digits(high))
+            format!("{} to {} mm", figures(low, 3), figures(high, 3))
         };
         let reached = match self.reached.zip(self.largest) {
             Some((reached, largest)) => format!(
-                "reached {}° (99th percentile of {} fresh rays against the spline{}, at most {}°{})",
-                three_digits(reached),
+                "reached {}° (99th percentile of {} fresh rays on facets and on the spline, the worse of both{}, at most {}°{})",
+                figures(reached, 3),
                 self.checked,
                 self.with_few_rays(),
-                three_digits(largest),
+                figures(largest, 3),
                 self.without_angle()
             ),
             None => "what is reached is not known (no fresh ray met the same face on facets and spline)".to_owned(),
@@ -100,15 +99,6 @@ impl Solution {
             target.angle_deg, self.normals, self.facets
         )
     }
-}
-
-/// Writes a number with three digits, or with two and an exponent outside of 1e-4 to 1e4.
-fn three_digits(x: f64) -> String {
-    if !PLAIN_NUMBERS.contains(&x) {
-        return format!("{x:.1e}");
-    }
-    let decimals = (2 - x.log10().floor() as i32).max(0) as usize;
-    format!("{x:.decimals$}")
 }
 
 #[cfg(test)]
@@ -132,8 +122,11 @@ mod tests {
             solution.answer_sentence(&AccuracyTarget::for_angle_deg(1.0), false)
         };
         assert!(
-            answer(24).contains("of 24 fresh rays against the spline, too few to be sure of it, at most 0.750°")
+            answer(24).contains("of 24 fresh rays on facets and on the spline, the worse of both, too few to be sure of it, at most 0.75°")
         );
-        assert!(answer(1000).contains("of 1000 fresh rays against the spline, at most 0.750°"));
+        assert!(
+            answer(2000)
+                .contains("of 2000 fresh rays on facets and on the spline, the worse of both, at most 0.75°")
+        );
     }
 }

@@ -1,0 +1,70 @@
+//! Where light was lost, why, and what to do about it.
+
+use super::bind::BoundScene;
+use super::body::AMBIENT;
+use super::outcome::{LostCause, LostRay};
+use super::surfaces::{FaceOptics, Surface};
+use std::collections::BTreeMap;
+
+/// Reasons that are told.
+const TOLD_REASONS: usize = 3;
+
+impl BoundScene {
+    /// Returns where most rays of the ledger were lost, why, and what helps, in words; the [`TOLD_REASONS`] most frequent first, none of an
+    /// empty ledger.
+    pub(crate) fn loss_reasons(&self, ledger: &[LostRay]) -> Vec<String> {
+        let mut places: BTreeMap<(u32, Option<&str>, LostCause), usize> = BTreeMap::new();
+        for l in ledger {
+            let at = l.face.and_then(|f| self.instance(f));
+            *places.entry((l.body, at, l.cause)).or_default() += 1;
+        }
+        let mut places: Vec<_> = places.into_iter().collect();
+        // A stable sort: equals stay in the order of their places, whatever threads did.
+        places.sort_by_key(|(_, number)| std::cmp::Reverse(*number));
+        places.truncate(TOLD_REASONS);
+        let told = places.into_iter().map(|((body, at, cause), number)| {
+            let place = match (self.body_names(body).filter(|_| body != AMBIENT), at) {
+                (Some([name, medium]), _) => format!("in '{name}' ({medium})"),
+                (None, Some(name)) => format!("at '{name}'"),
+                (None, None) => "outside all bodies".into(),
+            };
+            format!("{number} {place}: {}", self.reason(cause, at))
+        });
+        told.collect()
+    }
+
+    /// Returns what happened to light that was lost so at an instance, and what helps.
+    fn reason(&self, cause: LostCause, at: Option<&str>) -> &'static str {
+        match cause {
+            LostCause::NoExit => {
+                "light left the scene inside a body, by a gap between faces, an open mesh or a missing face"
+            }
+            LostCause::ImpossibleMedium => {
+                "light came to a face from the wrong side, as where a mesh gapes or is turned, or bodies overlap"
+            }
+            LostCause::InsideSolid if self.lets_light_into_solid(at) => {
+                "a face of it lets light through, but what is behind has no medium, and its other faces are opaque: give the part a \
+                 `medium`, or the face a surface that lets nothing through"
+            }
+            LostCause::InsideSolid => {
+                "light came to a closed opaque solid from inside, as from a source that lies in it: move the source out, or, where the solid \
+                 is drawn around a hollow, give the part a `medium` of index 1"
+            }
+            LostCause::TooDeep => {
+                "more bodies lie in each other than a ray can carry, as after it entered an open shell again and again"
+            }
+            LostCause::NotANumber => "a place or direction is no number",
+            LostCause::Unreadable => "the ray file was changed or went while it was in use",
+        }
+    }
+
+    /// Whether a face of this instance lets light through, though no medium is behind it.
+    fn lets_light_into_solid(&self, instance: Option<&str>) -> bool {
+        let is_open = |face: &FaceOptics| {
+            face.body == AMBIENT && matches!(&self.surfaces[face.surface as usize], Surface::Coated(c) if !c.opaque)
+        };
+        let of_instance =
+            |face: usize| self.instances.get(self.instance_of_face[face] as usize).map(String::as_str);
+        (0..self.faces.len()).any(|face| is_open(&self.faces[face]) && of_instance(face) == instance)
+    }
+}

@@ -1,0 +1,72 @@
+//! Rays that facets are tried with, and how far off they send them.
+
+use super::direction_error::error_of_hit;
+use super::survey::p99;
+use crate::intersect::{Hit, Intersector};
+use crate::math::{FaceId, Ray};
+use crate::study::mesh_source::{MeshSource, answer};
+
+/// Rays with their exact hits.
+pub(super) struct ReferenceRays {
+    pub(super) rays: Vec<Ray>,
+    pub(super) truth: Vec<Option<Hit>>,
+}
+
+impl ReferenceRays {
+    /// Asks the spline all rays, on the current rayon pool, and keeps its hits.
+    pub(super) fn new(mesh_source: &dyn MeshSource, rays: Vec<Ray>) -> Self {
+        let mut truth = vec![None; rays.len()];
+        answer(mesh_source.exact(), &rays, rayon::current_num_threads(), &mut truth);
+        Self { rays, truth }
+    }
+
+    /// Asks facets the rays, on the current rayon pool, and compares where light goes with the spline, as
+    /// [`error_of_hit`] does.
+    pub(super) fn compare(
+        &self,
+        facets: &dyn Intersector,
+        apart_mm: f64,
+        relative_index: &dyn Fn(FaceId) -> Option<f64>,
+    ) -> DirectionErrors {
+        let mut hits = vec![None; self.rays.len()];
+        answer(facets, &self.rays, rayon::current_num_threads(), &mut hits);
+        let mut found = DirectionErrors::default();
+        for ((ray, hit), truth) in self.rays.iter().zip(&hits).zip(&self.truth) {
+            let error = match (hit, truth) {
+                (None, None) => continue,
+                (Some(hit), Some(truth)) => {
+                    let error = error_of_hit(ray.direction, [hit, truth], apart_mm, relative_index);
+                    error.map(|error| (truth.face, error))
+                }
+                _ => None,
+            };
+            // In another place there is no angle: such rays are told apart from the percentile.
+            match error {
+                Some(error) => found.errors.push(error),
+                None => found.flips += 1,
+            }
+        }
+        found
+    }
+}
+
+/// How far off facets send some rays.
+#[derive(Default)]
+pub(super) struct DirectionErrors {
+    /// Degrees, with the face that the spline's hit is on.
+    pub(super) errors: Vec<(FaceId, f64)>,
+    /// Rays that hit facets or spline alone, or faces in other places.
+    pub(super) flips: u64,
+}
+
+impl DirectionErrors {
+    /// Returns the 99th percentile, degrees; `None` where no ray has an angle.
+    pub(super) fn percentile(&self) -> Option<f64> {
+        p99(&mut self.errors.iter().map(|e| e.1).collect::<Vec<f64>>())
+    }
+
+    /// Returns the largest error, degrees; `None` where no ray has an angle.
+    pub(super) fn largest(&self) -> Option<f64> {
+        self.errors.iter().map(|e| e.1).max_by(f64::total_cmp)
+    }
+}
