@@ -86,6 +86,7 @@ pub mod simulate;
 pub mod step;
 pub mod study;
 pub mod tessellate;
+pub mod text;
 #[cfg(feature = "truck")]
 pub mod truck;
 

@@ -1,8 +1,8 @@
 //! What the machine is, as far as the system tells: processor, cores, memory, name.
 
-use crate::formats::count_of;
 use crate::formats::file_stem;
 use crate::simulate::machine_threads;
+use crate::text::count_of;
 use std::fs;
 use std::time::SystemTime;
 

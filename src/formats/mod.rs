@@ -2,8 +2,7 @@
 //!
 //! Facets go out as Wavefront OBJ, Stanford PLY, STL, VTK's VTU, glTF 2.0 (GLB) and the seed's Data_2; grids as
 //! CSV, NPZ, PNG and VTI; polylines as VTP. Intensities are read and written as IES LM-63 and
-//! EULUMDAT, lists of rays as CSV and NPZ and the seed's Data_1, results as its Data_3. Numbers for people
-//! are written here as well.
+//! EULUMDAT, lists of rays as CSV and NPZ and the seed's Data_1, results as its Data_3.
 //!
 //! Guarantee: every file is written beside its final name and renamed when complete ([`write_atomic`]), so a reader
 //! never sees half of one; `f64` values survive CSV, NPZ, VTU, VTP, VTI, PLY and OBJ bit for bit (shortest text that reads back
@@ -25,7 +24,6 @@ mod grid;
 mod ies;
 mod input;
 mod npz;
-mod number;
 mod obj;
 mod photometry;
 mod ply;
@@ -57,9 +55,6 @@ pub use grid::{Axis, Grid, Layer, write_grid_csv, write_grid_npz};
 pub use ies::{parse_ies, read_ies, write_ies};
 pub use input::{open_file, read_bytes, read_text};
 pub use npz::{NpyArray, write_npz};
-#[cfg(feature = "report")]
-pub(crate) use number::NARROW_SPACE;
-pub use number::{count_of, figures, grouped};
 pub use photometry::{PhotometricType, Photometry};
 pub use png::{ColourMap, Picture, write_grid_png, write_png};
 pub use polylines::Polylines;

@@ -4,9 +4,9 @@ use super::prepared_scene::PreparedScene;
 use super::settings::IntersectorKind;
 use crate::simulate::{PartialRun, Results, Verification};
 use crate::study::cross_check::CrossCheck;
-use crate::study::figures::{self, Figure, ReceiverFigures, Surface};
+use crate::study::figures::{self, ReceiverFigures, Surface};
 use crate::study::geometric_error::GeometricError;
-use crate::study::model_figures;
+use crate::study::model_figures::{PowerFigures, power_figures};
 use serde_json::Value;
 
 /// The results of a run with what else was found out about it.
@@ -39,9 +39,9 @@ impl SceneResults {
         figures::figures(&self.results, self.surface(prepared), prepared.power_unit())
     }
 
-    /// Returns the powers that bodies and media took, with both their errors, as [`Results::absorbed`] lists them.
-    pub fn absorbed_figures(&self, prepared: &PreparedScene) -> Vec<Figure> {
-        model_figures::absorbed_figures(&self.results, self.surface(prepared), prepared.power_unit())
+    /// Returns the powers by where light ended and those that bodies and media took, with both their errors.
+    pub fn power_figures(&self, prepared: &PreparedScene) -> PowerFigures {
+        power_figures(&self.results, self.surface(prepared), prepared.power_unit())
     }
 
     /// Returns what the run was traced on: the spline, or facets with what they change where that was measured.
@@ -129,7 +129,9 @@ impl SceneResults {
         for (k, figures) in self.figures(prepared).iter().enumerate() {
             document["receivers"][k]["figures"] = serde_json::to_value(figures)?;
         }
-        for (k, figure) in self.absorbed_figures(prepared).iter().enumerate() {
+        let power = self.power_figures(prepared);
+        document["power_figures"] = serde_json::to_value(&power)?;
+        for (k, figure) in power.by_body.iter().enumerate() {
             document["absorbed"][k]["figure"] = serde_json::to_value(figure)?;
         }
         for (k, errors) in self.geometric_face_errors(prepared).into_iter().enumerate() {

@@ -1,6 +1,6 @@
 //! Names close to a mistyped one.
 
-use crate::simulate::scene::suggest::nearest;
+use crate::text::nearest_name;
 
 /// Writes a sentence with the closest known name first, and up to twenty of all: `did you mean 'cover'? its parts are cover, housing`.
 /// Without known names it is `otherwise`, what to do instead.
@@ -17,7 +17,7 @@ pub(super) fn closest_name(intro: &str, given: &str, known: &[&str], otherwise: 
     // A screen of names; files may have thousands of parts.
     let shown = unique.iter().take(20).copied().collect::<Vec<_>>().join(", ");
     let rest = if unique.len() > 20 { format!(" and {} more", unique.len() - 20) } else { String::new() };
-    match nearest(given, unique.iter().copied()) {
+    match nearest_name(given, unique.iter().copied()) {
         Some(name) => format!("did you mean '{name}'? {intro} {shown}{rest}"),
         None => format!("{intro} {shown}{rest}"),
     }

@@ -1,6 +1,7 @@
 //! The tables of regulations: what is asked, in which direction, and where the figure comes from.
 
 use super::row::{Row, with_key};
+use crate::text::nearest_name;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
@@ -160,7 +161,7 @@ impl Regulation {
     /// one begins so, or where those that do differ in the number of lighted sections alone: then one section is meant (`FMVSS 108 stop`).
     ///
     /// # Errors
-    /// When there is none or more than one; the message names up to twelve that begin alike.
+    /// When there is none or more than one; the message names the nearest, and up to twelve that begin alike.
     pub fn find(id: &str) -> Result<Self, String> {
         let wanted = plain(id);
         let all = Self::all();
@@ -188,7 +189,12 @@ impl Regulation {
         if near.is_empty() {
             near = all.iter().filter(|r| EXAMPLES.contains(&r.id.as_str())).collect();
         }
-        Err(format!("no regulation is called '{id}'; there are {}", named(&near)))
+        // What people leave out or spell otherwise must not count.
+        let plain_ids: Vec<String> = all.iter().map(|r| plain(&r.id)).collect();
+        let meant = nearest_name(&wanted, plain_ids.iter().map(String::as_str));
+        let meant = meant.and_then(|meant| all.iter().find(|r| plain(&r.id) == meant));
+        let did_you_mean = meant.map(|r| format!("did you mean '{}'? ", r.id)).unwrap_or_default();
+        Err(format!("no regulation is called '{id}'; {did_you_mean}there are {}", named(&near)))
     }
 
     /// Whether its name is `stem`, as [`plain`] has it, and a number of lighted sections.

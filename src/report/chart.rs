@@ -2,8 +2,8 @@
 
 use super::contour::{Isoline, isolines, round_levels};
 use super::number::unit_in_words;
-use crate::formats::figures;
 use crate::formats::{Axis, ColourMap, Grid, Picture};
+use crate::text::figures;
 
 /// A picture in two dimensions: interactive in the page, static beside it.
 #[derive(Clone, Debug)]

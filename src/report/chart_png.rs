@@ -3,8 +3,8 @@
 use super::chart::Chart;
 use super::drawing::{Anchor, DASH, Drawing, Element, Ink, Place, TYPE_SIZE};
 use super::static_chart;
-use crate::formats::NARROW_SPACE;
 use crate::formats::Picture;
+use crate::text::NARROW_SPACE;
 use ab_glyph::{Font, FontRef, OutlineCurve};
 use tiny_skia::{
     Color, FillRule, FilterQuality, LineJoin, Paint, Path, PathBuilder, Pattern, Pixmap, Rect, SpreadMode, Stroke,

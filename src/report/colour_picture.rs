@@ -3,9 +3,9 @@
 use super::Chart;
 use super::framing::lit_part;
 use super::maps::spoken;
-use crate::formats::figures;
 use crate::formats::{Grid, Picture, file_stem};
 use crate::optics::{linear_srgb, srgb_byte};
+use crate::text::figures;
 
 /// Least pixels on the longer side of a picture that is a file.
 const FILE_PIXELS: usize = 800;

@@ -2,9 +2,9 @@
 
 use super::{AxisStyle, Cell, Chart, Content, Provenance, Report, Section, Table, View};
 use crate::formats::{Facets, Polylines};
-use crate::formats::{figures, grouped};
 use crate::math::{Point, Vector};
 use crate::study::cross_check::{Cause, CrossCheck, Disagreement};
+use crate::text::{figures, grouped};
 use std::collections::BTreeSet;
 
 /// Everything that the report of a check speaks of.

@@ -3,12 +3,13 @@
 use super::maps::spoken;
 use super::number::{unit_in_words, with_unit};
 use super::{Cell, Table, seconds};
-use crate::formats::{figures, grouped};
 use crate::intersect::NormalMode;
 use crate::simulate::{Absorbed, Results};
 use crate::study::default_accuracy::Chosen;
 use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, figure_in_words, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
+use crate::study::model_figures::PowerFigures;
+use crate::text::{figures, grouped};
 
 /// Writes a figure of `digits` significant digits with its unit and one ± (1σ) for both errors. Both are named where the facets' exceeds
 /// a tenth of the rays', the rays' alone where the facets were not judged. A 0 that no ray reached gets its limit of 95 % instead.
@@ -163,8 +164,8 @@ pub(super) fn choice_sentence(chosen: &Chosen) -> String {
     format!("Traced {how}, because {}. ", chosen.because)
 }
 
-/// Makes a table of where the power went, what bodies and media took with both its errors.
-pub(super) fn power_table(results: &Results, absorbed: &[Figure], unit: &str) -> Table {
+/// Makes a table of where the power went, each sum with both its errors; what was lost is itself an error of the others.
+pub(super) fn power_table(results: &Results, power: &PowerFigures, unit: &str) -> Table {
     let columns = [("", ""), ("power", unit), ("share", "%"), ("± rays (1σ)", unit), ("± facets (1σ)", unit)];
     let p = &results.power;
     let mut table = Table::new("power", "Where the power went", &columns).caption(format!(
@@ -175,14 +176,13 @@ pub(super) fn power_table(results: &Results, absorbed: &[Figure], unit: &str) ->
         [name.into(), Cell::Number(power, 6), Cell::Number(100.0 * power / p.emitted, 5)].into_iter()
     };
     table.row(cells("emitted", p.emitted));
-    let errors = &results.power_errors;
-    table.row(cells("received", p.received).chain([Cell::Number(errors.received, 2)]));
-    for (a, figure) in results.absorbed.iter().zip(absorbed) {
+    table.row(cells("received", p.received).chain(error_cells(&power.received)));
+    for (a, figure) in results.absorbed.iter().zip(&power.by_body) {
         table.row(cells(&format!("absorbed in {} ({})", a.name, a.r#in), a.power).chain(error_cells(figure)));
     }
-    table.row(cells("escaped", p.escaped).chain([Cell::Number(errors.escaped, 2)]));
-    table.row(cells("cut off by limits", p.cut_off).chain([Cell::Number(errors.cut_off, 2)]));
-    table.row(cells("lost", p.lost).chain([Cell::Number(errors.lost, 2)]));
+    table.row(cells("escaped", p.escaped).chain(error_cells(&power.escaped)));
+    table.row(cells("cut off by limits", p.cut_off).chain(error_cells(&power.cut_off)));
+    table.row(cells("lost", p.lost).chain([Cell::Number(results.power_errors.lost, 2)]));
     table
 }
 

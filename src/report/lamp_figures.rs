@@ -6,11 +6,11 @@ use super::peak_lines::{Line, lines_through_peak};
 use super::verdicts::multiple_text;
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
-use crate::formats::figures;
 use crate::math::{error_of_maximum, error_of_mean};
 use crate::regulation::Assessment;
 use crate::simulate::{ReceiverResult, Results};
 use crate::study::figures::ReceiverFigures;
+use crate::text::figures;
 
 /// Share of the power at which the curve of encircled power ends, per cent.
 const FRAMED_PERCENT: f64 = 99.5;

@@ -2,7 +2,7 @@
 
 use super::chart::Marks;
 use super::contour::Isoline;
-use crate::formats::figures;
+use crate::text::figures;
 
 /// Digits of a level.
 const DIGITS: usize = 3;

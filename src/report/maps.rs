@@ -5,13 +5,13 @@ use super::framing::{LIT_PART_SHOWN, lit_part};
 use super::number::{coordinate_figures, unit_in_words, with_unit};
 use super::peak_lines::lines_through_peak;
 use super::{AxisStyle, Chart, Series, SeriesStyle};
-use crate::formats::figures;
 use crate::formats::file_stem;
 use crate::formats::{Axis, Grid, Layer};
 use crate::simulate::scene::FarFieldType;
 use crate::simulate::{ChannelResult, ReceiverResult, Results};
 use crate::study::figures::{cell_errors, channel_cell_errors, light_weighted_error};
 use crate::study::geometric_error::GeometricError;
+use crate::text::figures;
 
 /// Returns the cells of a receiver with their axes, mm or degrees; `None` for a receiver that has one number only.
 pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {

@@ -1,6 +1,6 @@
 //! Numbers with units for people, in the unit that fits the size.
 
-use crate::formats::figures;
+use crate::text::figures;
 
 /// Prefixes of the SI.
 const MILLI: f64 = 1e-3;

@@ -3,7 +3,7 @@
 use super::even_poles::is_all_around;
 use super::number::with_unit;
 use crate::formats::Grid;
-use crate::formats::figures;
+use crate::text::figures;
 
 /// A line of cells.
 pub(super) struct Line {

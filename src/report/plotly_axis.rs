@@ -1,7 +1,7 @@
 //! Axes of plotly's figures.
 
 use super::chart::AxisStyle;
-use crate::formats::figures;
+use crate::text::figures;
 use serde_json::{Value, json};
 
 /// Decades up to which a logarithmic axis has marks at 1, 2 and 5 of each, and up to which at each decade.

@@ -9,11 +9,12 @@ use super::verdicts::{self, verdict_sentence};
 use super::{Block, Cell, Provenance, Report, Section, Table, View};
 use super::{errors, receiver_blocks, seconds};
 use crate::formats::{Facets, Polylines};
-use crate::formats::{figures, grouped};
 use crate::regulation::Assessment;
 use crate::simulate::{Event, PathVertex, Results};
 use crate::study::figures::{Figure, ReceiverFigures};
+use crate::study::model_figures::PowerFigures;
 use crate::study::{cross_check::CrossCheck, default_accuracy::Chosen, geometric_error::GeometricError};
+use crate::text::{figures, grouped};
 
 /// Share of the power from which on light that limits cut off is spoken of: below it no figure of four digits changes.
 const WORTH_A_SENTENCE: f64 = 1e-4;
@@ -44,8 +45,8 @@ pub struct SimulationReport<'a> {
     pub figures: &'a [ReceiverFigures],
     /// Some of the rays on facets and on the spline, where the run was on facets.
     pub geometric: Option<&'a GeometricError>,
-    /// The powers that bodies and media took, with both errors.
-    pub absorbed: &'a [Figure],
+    /// Where the power went, with both errors.
+    pub power: &'a PowerFigures,
     /// Why the run was traced as it was, where it was not asked for.
     pub chosen: Option<&'a Chosen>,
     /// What regulations say of receivers, by their index.
@@ -142,7 +143,9 @@ impl SimulationReport<'_> {
         );
         text += &self.verdicts.iter().map(|(_, a)| verdict_sentence(a)).collect::<String>();
         text += &self.cut_off_sentence();
-        text.extend(self.geometric.map(|g| errors::facet_limits(g, self.results, self.figures, self.absorbed)));
+        text.extend(
+            self.geometric.map(|g| errors::facet_limits(g, self.results, self.figures, &self.power.by_body)),
+        );
         text.extend(self.chosen.map(errors::choice_sentence));
         if let Some(check) = self.check {
             text += &verdict(check);
@@ -251,7 +254,7 @@ impl SimulationReport<'_> {
             ("rms 2", ""),
             ("± of rms 2 (1σ)", ""),
         ];
-        let power = errors::power_table(self.results, self.absorbed, self.unit);
+        let power = errors::power_table(self.results, self.power, self.unit);
         let caption = "Positions and widths in mm, of far fields and spheres in degrees; errors are those of rays and facets together.";
         let mut receivers = Table::new("receivers", "Receivers", &columns).caption(caption);
         for (r, f) in self.results.receivers.iter().zip(self.figures) {

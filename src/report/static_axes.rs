@@ -2,7 +2,7 @@
 
 use super::chart::{AxisStyle, Chart};
 use super::drawing::{Anchor, Element, Ink, Place};
-use crate::formats::figures;
+use crate::text::figures;
 
 /// Plot area: left, top, right, bottom.
 pub(super) const AREA: [f64; 4] = [78.0, 16.0, 740.0, 410.0];

@@ -4,8 +4,8 @@ use super::chart::{Chart, Content, Marks, have_equal_units};
 use super::drawing::{Anchor, Element, Ink, Place, TYPE_SIZE};
 use super::map_labels::{NAME_GAP, POINT_RADIUS, map_labels};
 use super::static_axes::{AREA, Scale, axes, label, linear_scale, tick_label};
-use crate::formats::figures;
 use crate::formats::{Axis, ColourMap, Grid, Picture};
+use crate::text::figures;
 
 /// Room for the colour bar beside a map.
 const BAR_ROOM: f64 = 74.0;

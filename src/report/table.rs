@@ -1,7 +1,7 @@
 //! Tables for the page and as CSV.
 
 use crate::formats::csv_text;
-use crate::formats::{figures, grouped};
+use crate::text::{figures, grouped};
 
 /// A table that can be sorted and copied; also written as CSV.
 ///

@@ -4,9 +4,9 @@ use super::chart::MapPoint;
 use super::framing::lit_part;
 use super::number::without_rounding;
 use super::{Cell, Chart, Section, Table, road};
-use crate::formats::figures;
 use crate::formats::{Grid, file_stem};
 use crate::regulation::{Assessment, Bound, Row, RowVerdict, Traffic, Verdict};
+use crate::text::figures;
 
 /// Significant digits of intensities: more than any photometer has.
 const DIGITS: usize = 5;

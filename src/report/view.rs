@@ -1,8 +1,9 @@
 //! 3-D views as plain data, made of facets, lines and points, simplified until a page can show them.
 
 use super::view_triangles::{FaceTriangles, merge_corners, triangles_of, used_points};
-use crate::formats::{ColourMap, Facets, Group, Polylines, figures, grouped};
+use crate::formats::{ColourMap, Facets, Group, Polylines};
 use crate::math::Point;
+use crate::text::{figures, grouped};
 
 /// A 3-D view: turns in the page, a static picture beside it.
 #[derive(Clone, Debug)]

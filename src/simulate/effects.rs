@@ -3,8 +3,8 @@
 use super::bind::BoundScene;
 use super::body::{AMBIENT, Body};
 use super::surfaces::{Coated, FaceOptics, Surface};
-use crate::formats::count_of;
 use crate::optics::{Coating, Effect, Effects};
+use crate::text::count_of;
 use serde::Serialize;
 
 /// An effect with the reason why it is, or is not, simulated.

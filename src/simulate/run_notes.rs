@@ -5,7 +5,7 @@ use super::outcome::{Counts, LostRay};
 use super::plan::Plan;
 use super::receiver::{Receiver, Shape};
 use super::tally::Sum;
-use crate::formats::count_of;
+use crate::text::count_of;
 
 /// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
 /// one scene once in 10^6 segments.

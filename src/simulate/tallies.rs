@@ -159,6 +159,11 @@ impl ReplicateTally {
         taken.into_iter().collect()
     }
 
+    /// Returns the quanta that were received, absorbed, escaped and were cut off.
+    pub(crate) fn end_quanta(&self) -> [u64; 4] {
+        [self.ends.received, self.ends.absorbed, self.ends.escaped, self.ends.cut_off]
+    }
+
     /// Books power that a face takes, a whole number of quanta.
     #[inline]
     pub(crate) fn absorb(&mut self, face: FaceId, quanta: f64) {

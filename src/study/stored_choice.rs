@@ -7,12 +7,12 @@
 
 use super::default_accuracy::{Alternative, Chosen};
 use super::geometric_error::{
-    AbsorbedError, ChannelError, FaceError, GeometricError, MapError, Paired, ReceiverError, Statistical,
+    AbsorbedError, ChannelError, EndErrors, FaceError, GeometricError, MapError, Paired, ReceiverError, Statistical,
 };
 use crate::intersect::NormalMode;
 
 /// The first word; what begins with another is of another version.
-const FORM: u64 = 4;
+const FORM: u64 = 5;
 /// What a choice can name, by its number.
 const INTERSECTORS: [&str; 2] = ["octree", "exact"];
 /// What positions on a receiver are counted in, by its number.
@@ -128,11 +128,15 @@ fn exchange_alternative(words: &mut dyn Words, alternative: &mut Alternative) ->
 
 /// Writes or reads what facets change of a run.
 fn exchange_error(words: &mut dyn Words, error: &mut GeometricError) -> Option<()> {
-    let GeometricError { rays, lost, segments_per_ray, seconds, receivers, absorbed, faces } = error;
+    let GeometricError { rays, lost, segments_per_ray, seconds, power, receivers, absorbed, faces } = error;
     words.word(rays)?;
     exchange_numbers(words, lost)?;
     exchange_number(words, segments_per_ray)?;
     exchange_numbers(words, seconds)?;
+    let EndErrors { received, absorbed: all_absorbed, escaped, cut_off } = power;
+    for end in [received, all_absorbed, escaped, cut_off] {
+        exchange_paired(words, end)?;
+    }
     exchange_list(words, receivers, &ReceiverError::default(), exchange_receiver)?;
     exchange_list(words, absorbed, &AbsorbedError::default(), exchange_absorbed)?;
     exchange_list(words, faces, &FaceError::default(), exchange_face)
@@ -323,6 +327,12 @@ mod tests {
             lost: [1e-9, 2e-9],
             segments_per_ray: 4.5,
             seconds: [0.25, 0.5],
+            power: EndErrors {
+                received: paired(14.0),
+                absorbed: paired(15.0),
+                escaped: paired(16.0),
+                cut_off: paired(17.0),
+            },
             receivers: vec![receiver, ReceiverError::default()],
             absorbed: vec![AbsorbedError {
                 name: "Körper".into(),

@@ -3,6 +3,7 @@
 /// Modules and their layers; modules of one layer do not see each other.
 pub(crate) const LAYERS: &[(&str, u32)] = &[
     ("math", 0),
+    ("text", 0),
     ("nurbs", 1),
     ("mesh", 1),
     ("formats", 2),
@@ -172,7 +173,6 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "atomic",
             "input",
             "printable",
-            "number",
             "mod",
             "agf",
             "npz",
@@ -737,7 +737,6 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "lenient",
             "conditions",
-            "suggest",
             "selector",
             "locate mod medium surface material",
             "run",

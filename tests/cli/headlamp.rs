@@ -77,6 +77,8 @@ fn a_low_beam_goes_from_step_to_verdict() {
 fn a_regulation_that_means_nothing_is_refused_before_tracing() {
     for (from, to, says) in [
         ("\"UN R112 B passing\"", "\"UN R999\"", "no regulation is called"),
+        ("\"UN R112 B passing\"", "\"UN R112 B pasing\"", "did you mean 'UN R112 B passing'?"),
+        ("\"UN R112 B passing\"", "\"UN R122 B passing\"", "did you mean 'UN R112 B passing'?"),
         ("cells = [210, 105]", "cells = [50, 25]", "0.149"),
         ("kind = \"far_field\"", "kind = \"far_field\"\nangles = \"B\"", "far field over H and V"),
         ("unit = \"lm\"", "unit = \"W\"", "counts watts"),

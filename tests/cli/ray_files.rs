@@ -173,7 +173,9 @@ fn every_ray_of_a_list_has_its_end() {
     let (code, _, err) = ends("scene.toml", "ends.txt");
     assert!(code == 2 && err.contains(".npz or .csv"), "{err}");
     std::fs::write(folder.path().join("point.toml"), format!("[run]\nrays = 400\n[[source]]\n{SCREEN}")).unwrap();
-    let (code, _, err) = ends("point.toml", "ends.csv");
+    // Before facets are made, for which the part is looked for.
+    let early = ["trace", "point.toml", "--ends", "ends.csv", "--part", "none=0.1", "-o", "out"];
+    let (code, _, err) = lampyris_in(folder.path(), &early);
     assert!(code == 2 && err.contains("no source of this scene is a list of rays"), "{err}");
 }
 

@@ -10,7 +10,7 @@ use lampyris::simulate::{BoundScene, Results, RunSettings, Scene, simulate};
 use lampyris::study::default_accuracy::{Chosen, PilotSource, TimedFacets, Undecided, choose};
 use lampyris::study::figures::{Figure, Limit, ReceiverFigures, Surface, figures};
 use lampyris::study::geometric_error::{GeometricError, Paired, geometric_error};
-use lampyris::study::model_figures::absorbed_figures;
+use lampyris::study::model_figures::power_figures;
 use lampyris::study::{FacetTree, MeshSource, ModelMeshSource, Random};
 use lampyris::tessellate::{self, GroupedFacets, Tessellation, tessellate};
 use lampyris::truck::{Conic, Lens};
@@ -230,7 +230,7 @@ fn what_a_black_ball_takes_is_judged_without_a_receiver() {
     assert_eq!(answer.chosen.intersector, "exact", "{}", answer.chosen.because);
     let tried = &answer.chosen.alternatives[0];
     assert!(tried.figure.starts_with("ball") && tried.figure.ends_with("absorbed in faces"), "{tried:?}");
-    let [on_spline] = &absorbed_figures(&answer.results, Surface::Spline, "W")[..] else { panic!("one body") };
+    let [on_spline] = &power_figures(&answer.results, Surface::Spline, "W").by_body[..] else { panic!("one body") };
     assert!((on_spline.value - 0.25).abs() < 3.0 * on_spline.combined(), "{on_spline:?}");
 
     // On facets that were asked for.
@@ -241,12 +241,19 @@ fn what_a_black_ball_takes_is_judged_without_a_receiver() {
     let few = RunSettings { rays: 16_384, replicates: 64, ..run };
     let error = geometric_error(&bound, [&octree, source.exact()], &few);
     let surface = Surface::Facets(&error);
-    let [body] = &absorbed_figures(&results, surface, "W")[..] else { panic!("one body") };
+    let power = power_figures(&results, surface, "W");
+    let [body] = &power.by_body[..] else { panic!("one body") };
     let off = (body.value - 0.25).abs();
     assert!(off > 10.0 * body.statistical, "the facets of this test are too good: {body:?}");
     assert!(off < 3.0 * body.combined() && body.limited_by == Limit::Geometry, "{body:?}");
+    // All light is taken by the body or gone, and as wrong in sum.
+    for (sum, truth) in [(&power.absorbed, 0.25), (&power.escaped, 0.75)] {
+        let off = (sum.value - truth).abs();
+        assert!(off > 10.0 * sum.statistical && off < 3.0 * sum.combined(), "{sum:?}, truly {truth}");
+    }
     // Facets that nobody compared tell nothing of their error.
-    assert!(absorbed_figures(&results, Surface::Unmeasured, "W")[0].geometric.is_none());
+    let unmeasured = power_figures(&results, Surface::Unmeasured, "W");
+    assert!(unmeasured.by_body[0].geometric.is_none() && unmeasured.escaped.geometric.is_none());
 }
 
 /// A clear ball in a beam takes nothing and no receiver sees it, but the scene asks for what passes its face: facets within the sphere let
@@ -283,7 +290,7 @@ fn what_a_glass_takes_is_judged_without_a_receiver() {
     let truth = 0.25 * (1.0 - 2.0 * (1.0 - (1.0 + chord) * f64::exp(-chord)) / (chord * chord));
     assert!(answer.chosen.alternatives[0].figure.ends_with("absorbed in glass"), "{:?}", answer.chosen);
     let surface = answer.chosen.geometric.as_ref().map_or(Surface::Spline, Surface::Facets);
-    let [glass] = &absorbed_figures(&answer.results, surface, "W")[..] else { panic!("one medium") };
+    let [glass] = &power_figures(&answer.results, surface, "W").by_body[..] else { panic!("one medium") };
     assert!((glass.value - truth).abs() < 3.0 * glass.combined(), "{glass:?}, truly {truth}");
 }
 

@@ -6,8 +6,8 @@ use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
 use crate::cli::work::cache_folder::{self, FOLDER_VARIABLE};
-use crate::formats::grouped;
 use crate::report::bytes;
+use crate::text::grouped;
 use serde_json::json;
 
 /// Prints what the folder of the cache holds, after emptying it if `clear`; fails where no cache is named.

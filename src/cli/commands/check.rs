@@ -16,7 +16,6 @@ use crate::cli::work::ray_input::read_rays;
 use crate::cli::work::results_folder::MOST_DRAWN;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{paired_receivers, threads};
-use crate::formats::{count_of, figures, grouped};
 use crate::formats::{file_name, write_atomic};
 use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::{Aabb, Ray};
@@ -32,6 +31,7 @@ use crate::study::cross_check::{self, CrossCheck};
 use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::receivers::PowerComparison;
 use crate::study::{Progress, Quantiles, Summary, records};
+use crate::text::{count_of, figures, grouped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 

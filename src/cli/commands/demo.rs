@@ -8,7 +8,6 @@ use crate::cli::work::results_folder::{self, RunRemarks};
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::{completion::Completion, failure::Failure};
-use crate::formats::{figures, grouped};
 use crate::formats::{read_bytes, write_atomic};
 use crate::pipeline::{
     LoadedModel, MeshingSettings, PreparedScene, SceneJob, TraceRequest, TracingSettings, read_models,
@@ -16,6 +15,7 @@ use crate::pipeline::{
 use crate::report::{seconds, tolerance_text};
 use crate::simulate::Scene;
 use crate::step;
+use crate::text::{figures, grouped};
 use std::path::Path;
 
 /// The lamp: housing with three paraboloids, clear cover, three LED blocks.

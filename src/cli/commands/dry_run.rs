@@ -6,10 +6,10 @@ use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
 use crate::cli::output::rule_table::{left_out_document, left_out_table, rule_document, rule_table};
 use crate::cli::output::terminal_tables::table_text;
-use crate::formats::grouped;
 use crate::model::Part;
 use crate::pipeline::{IntersectorKind, PreparedScene};
 use crate::report::{bytes, seconds};
+use crate::text::grouped;
 use serde_json::json;
 use std::path::Path;
 

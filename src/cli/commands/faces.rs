@@ -3,9 +3,9 @@
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::json::{json_text, json_value};
-use crate::formats::{figures, grouped};
 use crate::model::{FaceAccount, Model, PartAccount, PlacedFace, SolidAccount, are_shared};
 use crate::simulate::face_selectors;
+use crate::text::{figures, grouped};
 use serde_json::json;
 
 /// Faces of a solid that are listed without -v; of more, the first ones and how many there are.

@@ -10,13 +10,13 @@ use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::{input_files, threads};
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::formats::{ErrorKind, FACET_EXTENSIONS, is_facet_file, lower_extension, write_facets};
-use crate::formats::{figures, grouped};
 use crate::mesh::FacetMesh;
 use crate::model::{Model, PlacedFace};
 use crate::pipeline::{mesh_settings, settings_for_accurate_facets, tessellate_model};
 use crate::report::{bytes, seconds, tolerance_text};
 use crate::step::peak_bytes;
 use crate::tessellate::{Report, sampled_sag};
+use crate::text::{figures, grouped};
 use crate::truck::baseline;
 use serde::Serialize;
 

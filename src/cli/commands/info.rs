@@ -7,9 +7,9 @@ use crate::cli::output::json::json_text;
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::input_files;
 use crate::cli::{completion::Completion, failure::Failure};
-use crate::formats::{count_of, figures, grouped};
 use crate::report::{bytes, seconds};
 use crate::step::ImportReport;
+use crate::text::{count_of, figures, grouped};
 use std::path::Path;
 
 /// Names and notes shown without -v: what fits a screen.

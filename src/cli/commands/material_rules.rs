@@ -1,8 +1,8 @@
 //! The rules of a new scene: a line for each part, or solids of it that look alike, with what may be said of it in a comment.
 
 use crate::formats::printable_toml;
-use crate::formats::{count_of, figures};
 use crate::model::{Model, PartAccount, SolidAccount};
+use crate::text::{count_of, figures};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Rules that are written; of more, a comment says how many there are.

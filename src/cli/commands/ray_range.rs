@@ -3,9 +3,9 @@
 use crate::cli::arguments::command::TraceOptions;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
-use crate::formats::grouped;
 use crate::pipeline::{PreparedScene, RayRange};
 use crate::simulate::{GROWING_REPLICATE, grows};
+use crate::text::grouped;
 
 /// Refuses, with a range of rays, what is written of whole runs alone.
 pub(super) fn refuse_options(extra: &TraceOptions) -> Result<(), Failure> {

@@ -7,11 +7,11 @@ use crate::cli::output::json::json_text;
 use crate::cli::work::lost_rays::COLUMNS;
 use crate::cli::work::output_place::make_folder;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
-use crate::formats::figures;
 use crate::formats::{read_text, write_vtp};
 use crate::pipeline::PreparedScene;
 use crate::report::path_lines;
 use crate::simulate::{MOST_RAYS, PathVertex, Results, RunSettings, replay};
+use crate::text::figures;
 use serde_json::{Value, json};
 use std::path::Path;
 

@@ -17,13 +17,13 @@ use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards, tally_file};
-use crate::formats::grouped;
 use crate::pipeline::{
     AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, SceneJob, SceneResults, TraceRequest,
     TracingSettings, read_cached_scene, refuse_facet_normals, settings_for_accuracy,
 };
 use crate::report::seconds;
 use crate::simulate::{PartialRun, PathSink, PathVertex, Scene};
+use crate::text::grouped;
 use serde_json::json;
 use std::path::Path;
 
@@ -64,8 +64,12 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let cache = cache_folder::cache(&extra.cache)?;
     let (mut scene, loaded) = read_cached_scene(command.scene, cache.as_ref(), &monitor)?;
     refuse_facet_normals(&tracing, Some(&scene))?;
-    // An unknown receiver is reported before time is spent on facets.
+    // What the scene cannot give is said before time is spent on facets and a pilot.
     let target = extra.until_error.as_deref().map(|text| ErrorTarget::new(text, &scene)).transpose()?;
+    if extra.until_settled {
+        verdicts::check_settling(&scene)?;
+    }
+    extra.ends.as_deref().map_or(Ok(()), |file| end_file::check_scene(&scene, file))?;
     let has_results = shard.is_none() && !is_range && replay.is_empty();
     refuse_inputs(command, &scene, has_results)?;
     // Before the search for an accuracy and the pilot, which take their time; and again once the folder is this process's own.
@@ -94,7 +98,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         ..SceneJob::new(scene, loaded)
     };
     let mut prepared = PreparedScene::new(job, &monitor)?;
-    end_file::check(&prepared, extra.ends.as_deref())?;
+    extra.ends.as_deref().map_or(Ok(()), |file| end_file::check_rays(&prepared, file))?;
     lost_rays::warn(&prepared, console);
     if extra.dry_run {
         return dry_run::run(&prepared, folder, console);

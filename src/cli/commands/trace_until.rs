@@ -1,6 +1,5 @@
 //! `trace --until-error` and `--until-settled`: the number of rays is looked for by runs of growing length, each saved while it goes on.
 
-use super::verdicts;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::work::checkpoint::Checkpoint;
@@ -91,16 +90,13 @@ impl SearchPlace<'_> {
 /// `prepared.rays`.
 ///
 /// # Errors
-/// When the scene has nothing to be settled, or what is saved is of another run.
+/// When what is saved is of another run.
 pub(super) fn trace_until(
     prepared: &mut PreparedScene,
     until: Until<'_>,
     place: &SearchPlace<'_>,
     resume: bool,
 ) -> Result<SearchedRun, Failure> {
-    if let Until::Settled = until {
-        verdicts::check_settling(prepared)?;
-    }
     let done = if resume { place.saved_run(prepared)? } else { None };
     let resume_rays = done.as_ref().map(|_| prepared.run_settings().rays);
     let keeper = SavedRuns { place, done: Mutex::new(done) };

@@ -4,6 +4,7 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::verdict::summary;
 use crate::pipeline::{PreparedScene, SceneResults};
+use crate::simulate::Scene;
 use serde_json::Value;
 
 /// What is said where --until-settled did not settle every row.
@@ -32,8 +33,7 @@ pub(super) fn are_unsettled(document: &Value) -> bool {
 ///
 /// # Errors
 /// When the scene names no regulation, or its sources have their own numbers of rays.
-pub(super) fn check_settling(prepared: &PreparedScene) -> Result<(), Failure> {
-    let scene = &prepared.job.scene;
+pub(super) fn check_settling(scene: &Scene) -> Result<(), Failure> {
     if scene.regulations.is_empty() {
         let failure = Failure::arguments("--until-settled: the scene names no regulation");
         return Err(failure.with_help("add a [[regulation]] with its `id`"));

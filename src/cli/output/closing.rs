@@ -7,10 +7,10 @@ use super::terminal_tables::wrapped_lines;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::formats::printable_line;
-use crate::formats::{figures, grouped};
 use crate::pipeline::{PreparedScene, SceneResults, TargetResult};
 use crate::report::file_stem;
 use crate::simulate::Results;
+use crate::text::{figures, grouped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 

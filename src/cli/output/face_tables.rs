@@ -3,11 +3,11 @@
 use super::sequence_tables::face_names;
 use crate::cli::console::{Console, print};
 use crate::cli::output::terminal_tables::table_text;
-use crate::formats::{figures, grouped};
 use crate::model::Model;
 use crate::pipeline::{PreparedScene, SceneResults};
 use crate::report::{Cell, Section, Table};
 use crate::simulate::{FaceResult, Results};
+use crate::text::{figures, grouped};
 use serde_json::Value;
 use std::io;
 

@@ -2,12 +2,12 @@
 
 use crate::cli::failure::Failure;
 use crate::formats::{Facets, Group, Polylines, write_atomic, write_facets};
-use crate::formats::{figures, grouped};
 use crate::intersect::octree::{Octree, Statistics};
 use crate::intersect::{Cost, Intersector};
 use crate::math::{Aabb, FaceId, Point, Uv, Vector};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
 use crate::report::{AxisStyle, Chart, Content, Section, Table, View};
+use crate::text::{figures, grouped};
 use std::path::Path;
 
 /// Most boxes written to files; deeper levels are left out beyond it.

@@ -2,7 +2,6 @@
 //! fields in candela.
 
 use crate::cli::failure::Failure;
-use crate::formats::figures;
 use crate::formats::{
     Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_eulumdat,
     write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_png, write_tm25, write_vti,
@@ -10,6 +9,7 @@ use crate::formats::{
 use crate::report::{colour_picture, file_stem, on_receiver, photometric_grid, receiver_grid, with_even_poles};
 use crate::simulate::ReceiverResult;
 use crate::simulate::scene::{FarFieldType, Receiver, ReceiverKind};
+use crate::text::figures;
 use std::path::Path;
 
 /// A far field whose ends are this near to those of all directions holds all of them, degrees.

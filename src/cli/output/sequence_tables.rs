@@ -4,10 +4,10 @@ use super::rule_table::face_labels;
 use crate::cli::console::{Console, print};
 use crate::cli::output::terminal_tables::table_text;
 use crate::formats::{Facets, Polylines};
-use crate::formats::{figures, grouped};
 use crate::model::{Model, PlacedFace};
 use crate::report::{Cell, Section, Table, View, file_stem};
 use crate::simulate::{Event, Results, SequenceResult, recorded_ways};
+use crate::text::{figures, grouped};
 use serde_json::Value;
 use std::io;
 

@@ -101,11 +101,8 @@ mod tests {
 
     #[test]
     fn a_sentence_does_not_break_within_a_number() {
-        let text = format!("of  {} rays\nand more", crate::formats::grouped(16_384));
-        assert_eq!(
-            wrapped_lines(&text, 7),
-            ["of", crate::formats::grouped(16_384).as_str(), "rays", "and", "more"]
-        );
+        let text = format!("of  {} rays\nand more", crate::text::grouped(16_384));
+        assert_eq!(wrapped_lines(&text, 7), ["of", crate::text::grouped(16_384).as_str(), "rays", "and", "more"]);
     }
 
     /// On whatever few columns a number stands in one line, and where there is room a word of a heading too.

@@ -2,11 +2,11 @@
 
 use super::terminal_tables::{blank_table, wrapped_lines};
 use crate::cli::console::Console;
-use crate::formats::figures;
 use crate::regulation::{Assessment, RowVerdict};
 use crate::report::{
     direction_text, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
 };
+use crate::text::figures;
 use comfy_table::CellAlignment;
 
 /// Significant digits of intensities: more than any photometer has.

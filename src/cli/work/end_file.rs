@@ -4,9 +4,10 @@ use super::terminal_monitor::TerminalMonitor;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::formats::{Column, NpzStream, file_name, lower_extension, write_atomic};
-use crate::formats::{count_of, grouped};
 use crate::pipeline::PreparedScene;
-use crate::simulate::{ListedEnd, MOST_LISTED_RAYS, RunSettings, listed_ends, ray_lists};
+use crate::simulate::scene::Source;
+use crate::simulate::{ListedEnd, MOST_LISTED_RAYS, RunSettings, Scene, listed_ends, ray_lists};
+use crate::text::{count_of, grouped};
 use std::path::Path;
 
 /// The arrays of an NPZ file, one row per end.
@@ -34,15 +35,18 @@ pub(crate) fn check_name(file: &Path) -> Result<(), Failure> {
     Err(Failure::arguments(message).with_help("write --ends ends.npz"))
 }
 
-/// Refuses, before anything is traced, a scene without ends to write, or with too many.
-pub(crate) fn check(prepared: &PreparedScene, file: Option<&Path>) -> Result<(), Failure> {
-    let Some(file) = file else { return Ok(()) };
-    let refuse = |message: &str| Failure::arguments(format!("--ends {}: {message}", file.display()));
-    let lists = ray_lists(&prepared.bound);
-    if lists.is_empty() {
-        let help = "--paths FILE.npz has the paths of any source";
-        return Err(refuse("no source of this scene is a list of rays").with_help(help));
+/// Refuses, before anything is prepared, a scene without a list of rays.
+pub(crate) fn check_scene(scene: &Scene, file: &Path) -> Result<(), Failure> {
+    if scene.sources.iter().any(Source::is_ray_list) {
+        return Ok(());
     }
+    let message = format!("--ends {}: no source of this scene is a list of rays", file.display());
+    Err(Failure::arguments(message).with_help("--paths FILE.npz has the paths of any source"))
+}
+
+/// Refuses, before anything is traced, lists of too many rays.
+pub(crate) fn check_rays(prepared: &PreparedScene, file: &Path) -> Result<(), Failure> {
+    let lists = ray_lists(&prepared.bound);
     let rays: u64 = lists.iter().map(|(_, rays)| rays).sum();
     if rays > MOST_LISTED_RAYS {
         let largest = lists.iter().max_by_key(|(_, rays)| rays).map_or(0, |(source, _)| *source as usize);
@@ -53,7 +57,8 @@ pub(crate) fn check(prepared: &PreparedScene, file: Option<&Path>) -> Result<(),
             grouped(rays),
             grouped(MOST_LISTED_RAYS)
         );
-        return Err(refuse(&message).with_help("give a shorter list, or take --paths"));
+        let failure = Failure::arguments(format!("--ends {}: {message}", file.display()));
+        return Err(failure.with_help("give a shorter list, or take --paths"));
     }
     Ok(())
 }

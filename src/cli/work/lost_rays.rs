@@ -4,10 +4,10 @@ use crate::cli::completion::Completion;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
-use crate::formats::figures;
 use crate::formats::{csv_quoted_text, printable_line, write_atomic};
 use crate::pipeline::PreparedScene;
 use crate::simulate::Results;
+use crate::text::figures;
 use std::path::Path;
 
 /// The first line of a ledger.

@@ -1,12 +1,12 @@
 //! What facets change of each receiver of a scene, from the same rays on facets and on the spline.
 
 use crate::cli::console::Console;
-use crate::formats::figures;
 use crate::intersect::Intersector;
 use crate::pipeline::TracingSettings;
 use crate::report::{Cell, Table};
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::receivers::{PowerComparison, compare_power};
+use crate::text::figures;
 
 /// Rays at most: a second or two on the spline of a lamp.
 const MOST_RAYS: u64 = 100_000;

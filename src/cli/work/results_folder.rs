@@ -10,7 +10,6 @@ use crate::cli::output::closing::{LEDGER, target_sentence};
 use crate::cli::output::face_tables;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table, sequence_tables};
-use crate::formats::grouped;
 use crate::formats::{ColourMap, Facets, Polylines, read_text, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
 use crate::mesh::FacetMesh;
@@ -18,7 +17,9 @@ use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults, TargetResult
 use crate::regulation::Assessment;
 use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, path_lines};
 use crate::simulate::{Scene, arrivals};
-use crate::study::figures::{Figure, ReceiverFigures};
+use crate::study::figures::ReceiverFigures;
+use crate::study::model_figures::PowerFigures;
+use crate::text::grouped;
 use serde_json::Value;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -167,7 +168,7 @@ pub(crate) fn write(
         run.results.receivers[k].files = receiver_files::write(folder, receiver, geometric, rays)?;
     }
     let all_figures = run.figures(prepared);
-    let absorbed = run.absorbed_figures(prepared);
+    let power = run.power_figures(prepared);
     let (paths, _) = path_lines(&run.results.paths);
     write_vtp(&folder.join("paths.vtp"), &paths)?;
     let mesh = &*prepared.facets.drawn(MOST_DRAWN);
@@ -207,7 +208,7 @@ pub(crate) fn write(
     if with_page {
         facets.labels = rule_table::face_labels(&prepared.job.loaded.model);
     }
-    let found = (all_figures.as_slice(), absorbed.as_slice(), verdicts.as_slice());
+    let found = (all_figures.as_slice(), &power, verdicts.as_slice());
     let report = report_page(prepared, run, found, &facets, remarks.sentences.clone(), provenance);
     let answer = report.answer();
     if with_page {
@@ -221,7 +222,7 @@ pub(crate) fn write(
 fn report_page<'a>(
     prepared: &'a PreparedScene,
     run: &'a SceneResults,
-    (all_figures, absorbed, verdicts): (&'a [ReceiverFigures], &'a [Figure], &'a [(usize, Assessment)]),
+    (all_figures, power, verdicts): (&'a [ReceiverFigures], &'a PowerFigures, &'a [(usize, Assessment)]),
     facets: &'a Facets,
     sentences: Vec<String>,
     provenance: Provenance,
@@ -241,7 +242,7 @@ fn report_page<'a>(
         check: run.check.as_ref(),
         figures: all_figures,
         geometric: run.geometric.as_ref(),
-        absorbed,
+        power,
         chosen: prepared.chosen.as_ref(),
         verdicts,
         sections: sequence_tables::sequence_section(

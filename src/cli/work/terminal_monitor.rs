@@ -3,12 +3,12 @@
 use super::path_file::PathFile;
 use crate::cli::console::{Console, show_progress};
 use crate::cli::interruption::{self, SaveableRun};
-use crate::formats::{figures, grouped};
 use crate::intersect::NormalMode;
 use crate::pipeline::{Monitor, Stage};
 use crate::report::tolerance_text;
 use crate::study;
 use crate::study::default_accuracy::Chosen;
+use crate::text::{figures, grouped};
 use indicatif::ProgressBar;
 use std::sync::{Mutex, MutexGuard};
 

@@ -1,9 +1,9 @@
 //! Tolerance × normals × intersector: the cost–accuracy front, the slopes beside their theory, where the time goes.
 
 use super::rows::{distinct, number, text};
-use crate::formats::figures;
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table, seconds};
 use crate::study::slope;
+use crate::text::figures;
 use serde_json::Value;
 
 /// Direction errors below it are rounding of unit vectors in double precision, degrees.

@@ -1,8 +1,8 @@
 //! What each effect costs on a scene: the smallest kernel, each effect added alone, everything.
 
 use super::rows::{number, text};
-use crate::formats::figures;
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, seconds};
+use crate::text::figures;
 use serde_json::Value;
 
 /// Writes what the kernel of a row can do: the effect added, or all that it was asked for.

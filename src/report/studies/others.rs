@@ -1,9 +1,9 @@
 //! The smaller studies: one picture of the comparison each, and the published figures beside ours where there are some.
 
 use super::rows::{distinct, number, text};
-use crate::formats::{figures, grouped};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, Table};
 use crate::study::interpolation::{Ratios, Row};
+use crate::text::{figures, grouped};
 use serde::Deserialize;
 use serde_json::Value;
 

@@ -1,8 +1,8 @@
 //! Right, flagged and wrong: per intersector, and per hard case.
 
 use super::rows::{distinct, text};
-use crate::formats::grouped;
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table};
+use crate::text::grouped;
 use serde_json::Value;
 
 /// Makes title, answer and sections of the stability study: the right, flagged and wrong answers of its rows, by intersector and by case.

@@ -3,8 +3,9 @@
 use super::nearest::Nearest;
 use crate::math::Point;
 use crate::model::{Instance, Model, PlacedFace, SurfaceKind};
-use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, SolidKey, suggest};
+use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, SolidKey};
 use crate::simulate::{Error, ErrorKind};
+use crate::text;
 
 /// Difference up to which two shares of a colour are the same: half a step of `#rrggbb`, 1/255.
 const COLOUR_STEP: f64 = 2e-3;
@@ -225,7 +226,7 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Res
 
 /// Returns advice that names the nearest name, or the first twelve in alphabetical order where none is near; sorts out empty ones.
 pub(super) fn advice(word: &str, mut names: Vec<&str>) -> String {
-    if let Some(near) = suggest::nearest(word, names.iter().copied().filter(|n| !n.is_empty())) {
+    if let Some(near) = text::nearest_name(word, names.iter().copied().filter(|n| !n.is_empty())) {
         return format!("did you mean '{near}'?");
     }
     names.sort_unstable();

@@ -26,6 +26,7 @@ use crate::intersect::Beam;
 use crate::math::{Aabb, FaceId, Frame, Point, Ray, Vector, orthonormal_pair};
 use crate::optics::sampling::sin_cos_turns;
 use crate::optics::{Spectrum, Wavelengths};
+use crate::text;
 pub(crate) use area::{Area, CoveredArea};
 pub(crate) use cover::Cover;
 use far::NearStart;
@@ -360,7 +361,7 @@ fn stated_media(scene: &Scene, source: usize, bodies: &[Body]) -> Result<SmallVe
             let advice = if names.is_empty() {
                 "no instance has a `medium`; leave `inside` out".into()
             } else {
-                scene::suggest::nearest_or_all(instance, &names)
+                text::nearest_or_all(instance, &names)
             };
             return Err(scene.error(ErrorKind::NoMatch, &at, message).help(advice));
         };

@@ -1,7 +1,8 @@
 //! Where in a scene file something is wrong, and what was probably meant.
 
-use super::{Key, suggest};
+use super::Key;
 use crate::simulate::{Error, ErrorKind};
+use crate::text;
 use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
@@ -208,7 +209,7 @@ pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>) -> 
             let error = Error::new(ErrorKind::Syntax, format!("unknown key `{word}`"));
             let meant =
                 ELSEWHERE.iter().find(|(start, beside, _)| word.starts_with(start) && known.contains(beside));
-            match (meant, suggest::nearest(word, known.iter().copied())) {
+            match (meant, text::nearest_name(word, known.iter().copied())) {
                 (Some((_, _, help)), _) => error.help(*help),
                 (None, Some(near)) => error.help(format!("did you mean `{near}`?")),
                 (None, None) => error.help(format!("known here: {}", known.join(", "))),
@@ -221,7 +222,7 @@ pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>) -> 
             Error::new(ErrorKind::Unsupported, format!("`{word}`: {effect} is not simulated"))
         } else {
             let error = Error::new(ErrorKind::Syntax, format!("`{word}` is none of {}", known.join(", ")));
-            match suggest::nearest(word, known.iter().copied()) {
+            match text::nearest_name(word, known.iter().copied()) {
                 Some(near) => error.help(format!("did you mean `{near}`?")),
                 None => error,
             }

@@ -1,9 +1,10 @@
 //! The key `[[medium]]`: transparent media.
 
-use super::{Key, Scene, suggest};
+use super::{Key, Scene};
 use crate::formats::{AgfGlass, read_agf};
 use crate::optics::{self, Absorption, BulkScatter, Dispersion, Index, Pole, Table, catalogue};
 use crate::simulate::{Error, ErrorKind};
+use crate::text;
 use serde::{Deserialize, Serialize};
 
 /// A transparent medium, with exactly one of the ways to give its index.
@@ -193,7 +194,7 @@ pub(super) fn read_glasses(scene: &Scene) -> Result<Vec<Option<AgfGlass>>, Error
         let Some(glass) = all.iter().find(|g| g.name.eq_ignore_ascii_case(name)) else {
             let message = format!("no glass of {file} is called '{name}'");
             let error = scene.error(ErrorKind::NoMatch, &at("catalogue"), message);
-            let near = suggest::nearest(name, all.iter().map(|g| g.name.as_str()));
+            let near = text::nearest_name(name, all.iter().map(|g| g.name.as_str()));
             return Err(match near {
                 Some(near) => error.help(format!("did you mean '{near}'?")),
                 None => error.help(format!("it has {} glasses, the first {}", all.len(), all[0].name)),
@@ -211,7 +212,7 @@ pub(super) fn read_glasses(scene: &Scene) -> Result<Vec<Option<AgfGlass>>, Error
 fn catalogued(name: &str) -> Result<optics::Medium, String> {
     catalogue::medium(name).ok_or_else(|| {
         let names: Vec<&str> = catalogue::names().collect();
-        match suggest::nearest(name, names.iter().copied()) {
+        match text::nearest_name(name, names.iter().copied()) {
             Some(near) => format!("no medium of the catalogue is called '{name}'; did you mean '{near}'?"),
             None => format!("no medium of the catalogue is called '{name}'; there are: {}", names.join(", ")),
         }
@@ -233,7 +234,7 @@ pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::
     let error = scene.error(ErrorKind::NoMatch, at, format!("no medium is called '{name}'"));
     let mut known: Vec<&str> = catalogue::names().collect();
     known.extend(scene.media.iter().map(|m| m.name.as_str()));
-    Err(match suggest::nearest(name, known) {
+    Err(match text::nearest_name(name, known) {
         Some(near) => error.help(format!("did you mean '{near}'?")),
         None => error.help(format!(
             "`lampyris media` lists the catalogue; others are described: [[medium]] with name = \"{name}\" and an `index`, or the `file` of a \

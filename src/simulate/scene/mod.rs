@@ -16,7 +16,6 @@ mod run;
 mod selector;
 mod source;
 mod spectrum;
-pub(crate) mod suggest;
 mod surface;
 
 use super::{Error, ErrorKind};

@@ -1,8 +1,9 @@
 //! The keys `[run]` and `[accuracy]`: settings of a run, and how models are faceted and traced.
 
-use super::{Key, Scene, lenient, suggest};
+use super::{Key, Scene, lenient};
 use crate::simulate::{Error, ErrorKind};
 use crate::tessellate::LEAST_TOLERANCE_MM;
+use crate::text;
 use serde::{Deserialize, Serialize};
 
 /// The helium d line, at which catalogues give n_d, nm.
@@ -175,7 +176,7 @@ impl Accuracy {
             };
             let at = [Key::Name("accuracy"), Key::Name(key)];
             let error = scene.error(ErrorKind::Value, &at, format!("'{name}' is none of {}", known.join(", ")));
-            return Err(match suggest::nearest(name, known.iter().copied()) {
+            return Err(match text::nearest_name(name, known.iter().copied()) {
                 Some(near) => error.help(format!("did you mean '{near}'?")),
                 None => error,
             });

@@ -117,6 +117,11 @@ pub enum SourceKind {
 }
 
 impl Source {
+    /// Whether its rays are those of a file, one by one.
+    pub(crate) fn is_ray_list(&self) -> bool {
+        matches!(self.kind, SourceKind::Rays | SourceKind::Data1)
+    }
+
     /// Refuses a source with the first of its faults; `index` is its place in the scene.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fault = (self.power_fault())
@@ -153,7 +158,7 @@ impl Source {
     /// Returns the key and fault where a file is missing or given in vain, or where `on`, `frame`, `radius`, `size` or a place does not go
     /// with such a source or with each other; `None` where nothing is wrong.
     fn file_fault(&self) -> Fault {
-        let list = matches!(self.kind, SourceKind::Rays | SourceKind::Data1);
+        let list = self.is_ray_list();
         let measured = list || matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);
         let sized = self.radius.is_some() || self.size.is_some();
         if measured && self.file.is_none() {

@@ -9,8 +9,8 @@ pub use sweep::accuracy;
 
 use super::hit_errors::slope;
 use super::mesh_source::FacetTree;
-use crate::formats::count_of;
 use crate::intersect::NormalMode;
+use crate::text::count_of;
 use serde::Serialize;
 
 /// Direction errors below this are rounding, degrees: 8e6 units in the last place of a radian.

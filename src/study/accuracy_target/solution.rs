@@ -1,9 +1,9 @@
 //! What a kind of normals came to on fresh rays, and the sentence that says it.
 
 use super::AccuracyTarget;
-use crate::formats::figures;
 use crate::intersect::NormalMode;
 use crate::study::tolerance_plan::TolerancePlan;
+use crate::text::figures;
 
 /// An error is accepted with this much to spare, so that other rays than the judge's find it kept too.
 const ACCEPTED: f64 = 0.96;

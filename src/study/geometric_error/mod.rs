@@ -9,6 +9,7 @@
 //! rays of this number can tell.
 
 mod cells;
+mod ends;
 mod estimate;
 mod faces;
 mod model_powers;
@@ -16,6 +17,7 @@ mod paired;
 mod replicates;
 
 pub use cells::MapError;
+pub use ends::EndErrors;
 pub use faces::FaceError;
 pub use model_powers::AbsorbedError;
 pub use paired::Paired;
@@ -38,6 +40,8 @@ pub struct GeometricError {
     pub segments_per_ray: f64,
     /// Seconds of tracing, on facets and on the spline.
     pub seconds: [f64; 2],
+    /// Where all light ended.
+    pub power: EndErrors,
     /// Every receiver of the scene.
     pub receivers: Vec<ReceiverError>,
     /// Bodies and media that took light.
@@ -161,6 +165,7 @@ impl GeometricError {
         }
         // Of what nobody asked for, as little as of all light; its figures have one ray more where they are told.
         let share = 1.0 / self.rays.max(1) as f64;
+        self.power.each_mut().into_iter().for_each(|end| end.add_unseen(share));
         self.absorbed.iter_mut().for_each(|a| a.power.add_unseen(share));
         for face in &mut self.faces {
             let powers = [&mut face.absorbed, &mut face.entered, &mut face.left];
@@ -191,6 +196,7 @@ pub(in crate::study) fn compare(bound: &BoundScene, runs: [&ReplicatedRun; 2]) -
         lost: results.map(|r| r.power.lost / r.power.emitted),
         segments_per_ray: results[1].segments as f64 / results[1].rays.max(1) as f64,
         seconds: results.map(|r| r.seconds.trace),
+        power: ends::end_errors(runs),
         receivers: (0..results[1].receivers.len()).map(|k| receiver_error(bound, runs, k)).collect(),
         absorbed: model_powers::absorbed_errors(bound, runs),
         faces: faces::face_errors(runs),

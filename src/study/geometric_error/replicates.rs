@@ -34,6 +34,8 @@ pub(in crate::study) struct ReplicatedRun {
     /// What each replicate brought to bodies and media, as places of [`Tallies::model_sums`](crate::simulate::Tallies::model_sums), rising,
     /// with quanta.
     pub(super) model_quanta: Vec<Vec<(u32, u64)>>,
+    /// What of each replicate was received, absorbed, escaped and was cut off, quanta.
+    pub(super) ends: Vec<[u64; 4]>,
 }
 
 /// What one replicate brought to the receivers, to the faces, and to bodies and media.
@@ -42,6 +44,7 @@ struct Brought {
     receivers: Vec<ReplicateSums>,
     faces: FaceSums,
     model_quanta: Vec<(u32, u64)>,
+    ends: [u64; 4],
 }
 
 /// Cells of a receiver that are kept apart.
@@ -97,6 +100,7 @@ impl Brought {
                 .into_iter()
                 .map(|(k, quanta)| (k, word_of_quanta(quanta)))
                 .collect(),
+            ends: tally.end_quanta(),
         }
     }
 }
@@ -136,11 +140,18 @@ pub(in crate::study) fn trace_replicates(
     let hooks = Hooks { replicate: Some(&replicate), ..Hooks::with_progress(&|_| true) };
     let results = Results::new(bound, settings, trace(bound, intersector, settings, None, &hooks));
     let by_replicate = by_replicate.into_inner().unwrap_or_else(|e| e.into_inner());
-    let mut run = ReplicatedRun { results, replicates: Vec::new(), faces: Vec::new(), model_quanta: Vec::new() };
+    let mut run = ReplicatedRun {
+        results,
+        replicates: Vec::new(),
+        faces: Vec::new(),
+        model_quanta: Vec::new(),
+        ends: Vec::new(),
+    };
     for brought in by_replicate {
         run.replicates.push(brought.receivers);
         run.faces.push(brought.faces);
         run.model_quanta.push(brought.model_quanta);
+        run.ends.push(brought.ends);
     }
     run
 }

@@ -2,7 +2,7 @@
 
 /// Returns the candidate nearest to a word, in any case of letters; `None` for no word, and where all differ in more than a third of the
 /// longer one's letters and one more.
-pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn nearest_name<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let word = word.to_lowercase();
     let longer = |c: &str| c.chars().count().max(word.chars().count());
     candidates
@@ -16,7 +16,7 @@ pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a s
 
 /// Returns advice that names the nearest name, or the first twelve where none is near.
 pub(crate) fn nearest_or_all(word: &str, names: &[&str]) -> String {
-    match nearest(word, names.iter().copied()) {
+    match nearest_name(word, names.iter().copied()) {
         Some(near) => format!("did you mean '{near}'?"),
         // Twelve fit into a line or two.
         None => format!("there are: {}", names[..names.len().min(12)].join(", ")),
@@ -25,7 +25,7 @@ pub(crate) fn nearest_or_all(word: &str, names: &[&str]) -> String {
 
 /// Returns the edit distance (Levenshtein 1966), which tells letters by their case. Quadratic; words are cut at 64 characters so that no
 /// input makes it long.
-pub(crate) fn edit_distance(a: &str, b: &str) -> usize {
+fn edit_distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.iter().enumerate() {
@@ -47,12 +47,12 @@ mod tests {
     #[test]
     fn slips_are_recognised_and_other_words_are_not() {
         let keys = ["reflectance", "transmittance", "medium", "part"];
-        assert_eq!(nearest("reflectence", keys), Some("reflectance"));
-        assert_eq!(nearest("Medum", keys), Some("medium"));
-        assert_eq!(nearest("wavelength", keys), None);
+        assert_eq!(nearest_name("reflectence", keys), Some("reflectance"));
+        assert_eq!(nearest_name("Medum", keys), Some("medium"));
+        assert_eq!(nearest_name("wavelength", keys), None);
         // No word is like any; and letters count, of which some take two bytes.
-        assert_eq!(nearest("", ["A"]), None);
-        assert_eq!(nearest("änäöü", ["äbcdü"]), None);
+        assert_eq!(nearest_name("", ["A"]), None);
+        assert_eq!(nearest_name("änäöü", ["äbcdü"]), None);
         assert_eq!(edit_distance("kitten", "sitting"), 3);
     }
 }

@@ -7,7 +7,7 @@ pub(crate) const NARROW_SPACE: char = '\u{202f}';
 /// thousands apart: `0.0123`, `1234`, `3.2e−9`. What is not a number is a dash.
 ///
 /// ```
-/// assert_eq!(lampyris::formats::figures(0.0123456, 3), "0.0123");
+/// assert_eq!(lampyris::text::figures(0.0123456, 3), "0.0123");
 /// ```
 pub fn figures(value: f64, digits: usize) -> String {
     if !value.is_finite() {
@@ -50,8 +50,8 @@ pub fn grouped(value: u64) -> String {
 /// Writes how many there are of something, with its noun in the plural with an `s` unless it is one.
 ///
 /// ```
-/// assert_eq!(lampyris::formats::count_of(1, "ray"), "1 ray");
-/// assert_eq!(lampyris::formats::count_of(20, "ray"), "20 rays");
+/// assert_eq!(lampyris::text::count_of(1, "ray"), "1 ray");
+/// assert_eq!(lampyris::text::count_of(20, "ray"), "20 rays");
 /// ```
 pub fn count_of(number: u64, noun: &str) -> String {
     format!("{} {noun}{}", grouped(number), if number == 1 { "" } else { "s" })

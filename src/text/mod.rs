@@ -1,0 +1,9 @@
+//! Text for people: numbers with as many digits as mean something, and the name that was probably meant.
+
+mod nearest_name;
+mod number;
+
+pub(crate) use nearest_name::{nearest_name, nearest_or_all};
+#[cfg(feature = "report")]
+pub(crate) use number::NARROW_SPACE;
+pub use number::{count_of, figures, grouped};
