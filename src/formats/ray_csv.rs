@@ -1,7 +1,7 @@
 //! Lists of rays in CSV, read line by line in memory that does not grow with the list.
 
 use super::input::open_file;
-use super::rays::COLUMNS;
+use super::rays::{COLUMNS, misnamed_wavelength};
 use super::{Error, ErrorKind, LightRay};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -116,6 +116,9 @@ fn columns(cells: &[&str], header: bool) -> Result<Vec<usize>, String> {
             n => Err(format!("{n} columns; a ray has {} and, if wanted, wavelength_nm", COLUMNS[..7].join(", "))),
         };
     }
+    if let Some(refusal) = misnamed_wavelength(cells.iter().copied()) {
+        return Err(format!("column {refusal}"));
+    }
     let mut order = Vec::new();
     for (k, name) in COLUMNS.iter().enumerate() {
         // Looked for twice: of two columns of one name either may be meant.
@@ -181,6 +184,12 @@ mod tests {
             ("0,0,0\n", "r.csv:1: 3 columns"),
             ("0,0,0,0,0,1,inf\n", "r.csv:1: inf is no finite number"),
             (&"7".repeat(1 << 17), "r.csv:1: more than 65536 bytes in one line"),
+            (
+                "x,y,z,dx,dy,dz,power,Wavelength\n",
+                "r.csv:1: column 'Wavelength' is not read; call wavelengths in nm",
+            ),
+            ("x,y,z,dx,dy,dz,power,lambda_um,note\n", "r.csv:1: column 'lambda_um' is not read"),
+            ("0,0,0,0,0,1,1,0.55\n", "r.csv:1: a wavelength of 0.55 nm; from 1 to 1e6 nm"),
             ("x,y,z,dx,dy,dz,power,X\n", "r.csv:1: column 'x' stands twice, the second time as column 8"),
         ] {
             let e = parse_csv(text).unwrap_err().to_string();

@@ -1,6 +1,7 @@
 //! Lists of rays in NPZ, whose arrays are unpacked side by side in memory that does not grow with the list.
 
 use super::input::open_file;
+use super::rays::misnamed_wavelength;
 use super::{Error, ErrorKind, LightRay};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -37,6 +38,10 @@ pub(super) fn read_npz(path: &Path, mut add: impl FnMut(LightRay) -> Result<(), 
         let file = open_file(path).map_err(unreadable)?;
         let archive = ZipArchive::new(BufReader::new(file));
         archives.push(archive.map_err(|e| malformed(format!("not an NPZ file: {e}")))?);
+    }
+    let names: Vec<_> = archives[0].file_names().filter_map(Result::ok).collect();
+    if let Some(refusal) = misnamed_wavelength(names.iter().map(|name| name.trim_end_matches(".npy"))) {
+        return Err(malformed(format!("array {refusal}")));
     }
     let mut arrays = Vec::new();
     for (archive, (name, width)) in archives.iter_mut().zip(ARRAYS) {
@@ -166,6 +171,24 @@ mod tests {
         write_npz(&path, &[array("origin", 3, &[0.0; 6]), direction, power]).unwrap();
         let refusal = read_rays(&path).unwrap_err().to_string();
         assert!(refusal.contains("ray 2: a power of -1"), "{refusal}");
+    }
+
+    #[test]
+    fn wavelengths_of_another_name_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        let array = |name, width: usize, data| NpyArray { name, shape: [1, width][..width.min(2)].to_vec(), data };
+        let ray =
+            [array("origin", 3, &[0.0; 3]), array("direction", 3, &[0.0, 0.0, 1.0]), array("power", 1, &[1.0])];
+        let wavelength = |name, nm| [&ray[..], &[array(name, 1, nm)]].concat();
+        write_npz(&path, &wavelength("wavelength", &[550.0])).unwrap();
+        let refusal = read_rays(&path).unwrap_err().to_string();
+        assert!(
+            refusal.contains("array 'wavelength' is not read; call wavelengths in nm 'wavelength_nm'"),
+            "{refusal}"
+        );
+        write_npz(&path, &wavelength("wavelength_nm", &[550.0])).unwrap();
+        assert_eq!(read_rays(&path).unwrap()[0].wavelength_nm, Some(550.0));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::file_names::lower_extension;
 use super::{Error, ErrorKind, NpyArray, write_atomic, write_npz};
+use crate::math::units::WAVELENGTHS_NM;
 use crate::math::{Point, Vector};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -24,12 +25,46 @@ const SQUARABLE: std::ops::Range<f64> = 1e-100..1e100;
 /// A length this near to 1 is 1 but for rounding: a few units in the last place of a double.
 const UNIT_ROUNDING: f64 = 1e-15;
 
+/// Returns a unit direction in single precision that keeps its bits when it is read and written again: the nearest such one within a unit
+/// in the last place of each component.
+pub(super) fn stored_direction(direction: Vector) -> [f32; 3] {
+    let nearest = direction.to_array().map(|x| x as f32);
+    // What is read is brought to unit length, in double precision. Of two hundred directions one then rounds to another than was written.
+    let read = |stored: &[f32; 3]| unit_direction(Vector::from_array(stored.map(f64::from)));
+    let keeps_its_bits =
+        |stored: &[f32; 3]| read(stored).is_some_and(|d| d.to_array().map(|x| x as f32) == *stored);
+    if keeps_its_bits(&nearest) {
+        return nearest;
+    }
+    let steps = |x: f32| if x == 0.0 { [x; 3] } else { [x.next_down(), x, x.next_up()] };
+    let [xs, ys, zs] = nearest.map(steps);
+    let neighbours = (0..27).map(|k| [xs[k % 3], ys[k / 3 % 3], zs[k / 9]]);
+    let off = |stored: &[f32; 3]| read(stored).map_or(f64::INFINITY, |d| d.distance_squared(direction));
+    neighbours.filter(keeps_its_bits).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(nearest)
+}
+
+/// Returns the refusal, for people, of a column or array that is named as if it held the wavelength but is not read; `None` where there is
+/// none, or the wavelength is there.
+pub(super) fn misnamed_wavelength<'a>(names: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    let names: Vec<&str> = names.into_iter().collect();
+    let [.., known] = COLUMNS;
+    if names.iter().any(|name| name.eq_ignore_ascii_case(known)) {
+        return None;
+    }
+    let is_meant = |name: &&&str| {
+        let name = name.to_lowercase();
+        ["wave", "lambda", "wl", "λ"].iter().any(|start| name.starts_with(start))
+    };
+    let name = names.iter().find(is_meant)?;
+    Some(format!("'{name}' is not read; call wavelengths in nm '{known}', or leave them out"))
+}
+
 /// Names of the columns of a CSV file, in the order they are written.
 pub(super) const COLUMNS: [&str; 8] = ["x", "y", "z", "dx", "dy", "dz", "power", "wavelength_nm"];
 
 impl LightRay {
     /// Makes a ray of seven or eight numbers: origin (mm), direction, power and, if given, wavelength (nm); the direction is brought to
-    /// unit length. An error, for people, where one is not finite, the direction zero, the power negative or the wavelength not positive.
+    /// unit length. An error, for people, where one is not finite, the direction zero, the power negative or the wavelength none of light.
     pub(super) fn from_numbers(numbers: &[f64]) -> Result<Self, String> {
         let triple = |k: usize| Vector::new(numbers[k], numbers[k + 1], numbers[k + 2]);
         if let Some(bad) = numbers.iter().find(|x| !x.is_finite()) {
@@ -42,8 +77,10 @@ impl LightRay {
             return Err(format!("a power of {power}; powers must be zero or more"));
         }
         let wavelength_nm = numbers.get(7).copied();
-        if wavelength_nm.is_some_and(|w| w <= 0.0) {
-            return Err("a wavelength must be positive, in nm".into());
+        if let Some(wavelength) = wavelength_nm.filter(|w| !WAVELENGTHS_NM.contains(w)) {
+            return Err(format!(
+                "a wavelength of {wavelength} nm; from 1 to 1e6 nm are read, and 0.55 µm are 550 nm"
+            ));
         }
         Ok(Self { origin: triple(0), direction, power, wavelength_nm })
     }

@@ -5,11 +5,13 @@ use super::fresnel::{self, Power};
 use super::refraction::cos_transmitted;
 use super::table::{bracket, check_increasing};
 
-/// By what two shares that were written as decimals may add up to more than one.
-const SUM_ROUNDING: f64 = 1e-12;
+/// By what two shares may add up to more than one: each was rounded to three digits or more.
+const SUM_ROUNDING: f64 = 1e-3;
 
-/// The same for a table, whose shares were computed by another program and printed with nine digits or more.
-const TABLE_ROUNDING: f64 = 1e-9;
+/// What each may be.
+const SHARE: &str = "from 0 to 1, as 0.95 for 95 %";
+/// What both together may be.
+const AT_MOST_ONE: &str = "at most 1 (a thousandth more is taken for rounding)";
 
 /// What an interface does to the power that meets it.
 ///
@@ -61,17 +63,17 @@ impl Split {
 }
 
 impl Coating {
-    /// Constant shares; a rounding by which both are more than 1 together is taken off the transmittance.
+    /// Constant shares; up to a thousandth by which both are more than 1 together, as rounded figures are, is taken off the transmittance.
     ///
     /// # Errors
     /// When one is not from 0 to 1, or both are more than 1 together.
     pub fn ideal(reflectance: f64, transmittance: f64) -> Result<Self, Error> {
         let share = |x: f64| (0.0..=1.0).contains(&x);
-        require("a reflectance", reflectance, share(reflectance), "from 0 to 1")?;
-        require("a transmittance", transmittance, share(transmittance), "from 0 to 1")?;
+        require("a reflectance", reflectance, share(reflectance), SHARE)?;
+        require("a transmittance", transmittance, share(transmittance), SHARE)?;
         let sum = reflectance + transmittance;
-        require("reflectance plus transmittance", sum, sum <= 1.0 + SUM_ROUNDING, "at most 1")?;
-        // Shares written as decimals may be a rounding above the whole, and light must not become more.
+        require("reflectance plus transmittance", sum, sum <= 1.0 + SUM_ROUNDING, AT_MOST_ONE)?;
+        // Light must not become more.
         Ok(Self::Ideal { reflectance, transmittance: transmittance.min(1.0 - reflectance) })
     }
 
@@ -141,12 +143,12 @@ pub struct CoatingTable {
 }
 
 impl CoatingTable {
-    /// A table from cells angle by angle, in each wavelength by wavelength (nm).
+    /// A table from cells angle by angle, in each wavelength by wavelength (nm); shares together above 1 as in [`Coating::ideal`].
     ///
     /// # Errors
     /// When an axis is empty or not strictly increasing, angles leave 0 to 90°, there are more or fewer cells, or a share is not from 0 to
     /// 1 or two are more than 1 together.
-    pub fn new(angles_deg: Vec<f64>, wavelengths_nm: Vec<f64>, cells: Vec<Split>) -> Result<Self, Error> {
+    pub fn new(angles_deg: Vec<f64>, wavelengths_nm: Vec<f64>, mut cells: Vec<Split>) -> Result<Self, Error> {
         let what = "coating";
         if angles_deg.is_empty() || wavelengths_nm.is_empty() {
             return Err(ErrorKind::EmptyTable { what }.into());
@@ -160,17 +162,19 @@ impl CoatingTable {
         if cells.len() != expected {
             return Err(ErrorKind::WrongCount { what, found: cells.len(), expected }.into());
         }
-        for c in &cells {
+        let columns = wavelengths_nm.len();
+        for (k, c) in cells.iter_mut().enumerate() {
             for (r, t) in [(c.reflected.rs, c.transmitted.rs), (c.reflected.rp, c.transmitted.rp)] {
-                require("a reflectance of the coating", r, (0.0..=1.0).contains(&r), "from 0 to 1")?;
-                require("a transmittance of the coating", t, (0.0..=1.0).contains(&t), "from 0 to 1")?;
-                require(
-                    "reflectance plus transmittance of the coating",
-                    r + t,
-                    r + t <= 1.0 + TABLE_ROUNDING,
-                    "at most 1",
-                )?;
+                require("a reflectance of the coating", r, (0.0..=1.0).contains(&r), SHARE)?;
+                require("a transmittance of the coating", t, (0.0..=1.0).contains(&t), SHARE)?;
+                if r + t > 1.0 + SUM_ROUNDING {
+                    let [angle_deg, wavelength_nm] = [angles_deg[k / columns], wavelengths_nm[k % columns]];
+                    return Err(ErrorKind::CoatingGain { angle_deg, wavelength_nm, sum: r + t }.into());
+                }
             }
+            // Light must not become more.
+            c.transmitted.rs = c.transmitted.rs.min(1.0 - c.reflected.rs);
+            c.transmitted.rp = c.transmitted.rp.min(1.0 - c.reflected.rp);
         }
         Ok(Self { angles_deg, wavelengths_nm, cells })
     }
@@ -257,6 +261,21 @@ mod tests {
         assert!((s.reflected.rs - 0.98).abs() < 1e-12 && s.transmitted == Power::NONE);
         let mirror = Coating::ideal(0.95, 0.0).unwrap().split(0.5, 1.5, 1.0, 550.0);
         assert_eq!(mirror.reflected, same(0.95));
+    }
+
+    /// Vendors print shares with four digits, whose roundings add up.
+    #[test]
+    fn rounded_shares_lose_what_is_too_much() {
+        let row =
+            |rs: f64, ts: f64| Split { reflected: Power { rs, rp: 0.1 }, transmitted: Power { rs: ts, rp: 0.9 } };
+        let table = |row| CoatingTable::new(vec![0.0, 30.0], vec![500.0, 550.0], vec![row; 4]);
+        let read = table(row(0.0274, 0.9727)).unwrap().shares(30.0, 500.0);
+        assert!((read.transmitted.rs - 0.9726).abs() < 1e-15 && read.absorbed().abs() < 1e-15, "{read:?}");
+        let mut cells = vec![row(0.5, 0.4); 4];
+        cells[3] = row(0.5, 0.52);
+        let e = CoatingTable::new(vec![0.0, 30.0], vec![500.0, 550.0], cells).unwrap_err().to_string();
+        assert!(e.contains("at 30° and 550 nm") && e.contains("1.02"), "{e}");
+        assert!(Coating::ideal(0.0274, 0.9727).is_ok() && Coating::ideal(0.03, 0.98).is_err());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Colours of a screen: CIE 1931 X, Y, Z as sRGB (IEC 61966-2-1), whose white is D65.
+//! Colours as numbers, and those of a screen: CIE 1931 X, Y, Z as sRGB (IEC 61966-2-1), whose white is D65.
 
 /// Linear red, green and blue of X, Y, Z, in the unit of Y; a colour that no screen has gets negative parts.
 pub fn linear_srgb([x, y, z]: [f64; 3]) -> [f64; 3] {
@@ -16,6 +16,12 @@ pub fn srgb_byte(linear: f64) -> u8 {
     // Straight where a power would be infinitely steep.
     let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (255.0 * encoded).round() as u8
+}
+
+/// Chromaticity `(x, y)`; `None` for black.
+pub fn chromaticity([x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
+    let sum = x + y + z;
+    (sum > 0.0).then(|| [x / sum, y / sum])
 }
 
 #[cfg(test)]

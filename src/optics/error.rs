@@ -49,6 +49,19 @@ pub enum ErrorKind {
         /// What would be accepted.
         allowed: &'static str,
     },
+    /// A cell of a coating's table that gives more light than comes.
+    #[error(
+        "reflectance plus transmittance of the coating is {sum} at {angle_deg}° and {wavelength_nm} nm, but must be at most 1 (a thousandth \
+         more is taken for rounding)"
+    )]
+    CoatingGain {
+        /// Angle of the cell, degrees.
+        angle_deg: f64,
+        /// Wavelength of the cell, nm.
+        wavelength_nm: f64,
+        /// Both shares together.
+        sum: f64,
+    },
     /// A spectrum or lobe that carries no power.
     #[error("{what} carries no power; give at least one positive value")]
     NoPower {

@@ -13,7 +13,8 @@
 
 mod abg;
 pub mod catalogue;
-mod cie;
+mod cie_daylight;
+mod cie_observer;
 mod coating;
 mod colour;
 mod dispersion;
@@ -33,9 +34,9 @@ mod table;
 mod testing;
 
 pub use abg::Abg;
-pub use cie::observer_peaks;
+pub use cie_observer::{MAX_EFFICACY, observer_peaks, xyz_of_watt};
 pub use coating::{Coating, CoatingTable, Split};
-pub use colour::{linear_srgb, srgb_byte};
+pub use colour::{chromaticity, linear_srgb, srgb_byte};
 pub use dispersion::{Dispersion, Pole};
 pub use effects::{Effect, Effects};
 pub use error::{Error, ErrorKind};
@@ -44,5 +45,5 @@ pub use media::{Absorption, Index, Medium, line};
 pub use phase::BulkScatter;
 pub use refraction::{reflect, refract, refract_with_cosine};
 pub use scatter::{Lobe, Scatter};
-pub use spectrum::{MAX_EFFICACY, Spectrum, Wavelengths, WhiteLed, chromaticity, xyz_of_watt};
+pub use spectrum::{Spectrum, Wavelengths, WhiteLed};
 pub use table::Table;

@@ -1,12 +1,11 @@
 //! Spectra of sources, and wavelengths drawn from them.
 
-use super::cie;
+use super::cie_daylight;
+use super::cie_observer::{observer_range, xyz_of_watt};
 use super::error::{Error, ErrorKind, require};
 use super::intensity::linear_quantile;
 use super::table::Table;
-
-/// Lumens per watt at 555 nm (540 THz), by definition of the candela.
-pub const MAX_EFFICACY: f64 = 683.0;
+use crate::math::units::WAVELENGTHS_NM;
 
 /// The power of a source over the wavelength, up to a factor.
 ///
@@ -84,14 +83,18 @@ impl Spectrum {
             Self::Lines(lines) => Wavelengths::lines(lines),
             Self::Table(table) => Wavelengths::continuous(table.clone()),
             Self::D65 => {
-                let rows = cie::DAYLIGHT.iter().enumerate();
-                let table = Table::new("D65", rows.map(|(i, &p)| (cie::DAYLIGHT_START + cie::STEP * i as f64, p)))?;
+                let rows = cie_daylight::DAYLIGHT.iter().enumerate();
+                let table = Table::new(
+                    "D65",
+                    rows.map(|(i, &p)| (cie_daylight::DAYLIGHT_START + cie_daylight::STEP * i as f64, p)),
+                )?;
                 Wavelengths::continuous(table)
             }
             Self::BlackBody { kelvin, range_nm: [a, b] } => {
                 require("the temperature", *kelvin, *kelvin > 0.0, "positive, in kelvin")?;
-                require("the first wavelength", *a, *a >= 1.0, "at least 1 nm")?;
-                require("the last wavelength", *b, b > a && *b <= 1e6, "above the first and at most 1e6 nm")?;
+                require_wavelength("the first wavelength", *a)?;
+                require_wavelength("the last wavelength", *b)?;
+                require("the last wavelength", *b, b > a, "above the first")?;
                 Wavelengths::continuous(Table::sampled([*a, *b], steps(*b - *a), |nm| planck(nm, *kelvin)))
             }
             Self::WhiteLed(led) => {
@@ -109,6 +112,11 @@ impl Spectrum {
             }
         }
     }
+}
+
+/// Refuses what is no wavelength of light in nm.
+fn require_wavelength(what: &'static str, nm: f64) -> Result<f64, Error> {
+    require(what, nm, WAVELENGTHS_NM.contains(&nm), "from 1 to 1e6 nm; 0.55 µm are 550 nm")
 }
 
 /// Number of steps over a range of wavelengths: of at most 1 nm, but from 64 to 4000.
@@ -149,7 +157,7 @@ impl Wavelengths {
         let mut sum = 0.0;
         let mut sums = Vec::with_capacity(lines.len());
         for &[nm, power] in lines {
-            require("a wavelength", nm, nm > 0.0, "positive, in nm")?;
+            require_wavelength("a wavelength", nm)?;
             sum += require("the power of a line", power, power >= 0.0, "zero or more")?;
             sums.push(sum);
         }
@@ -162,7 +170,8 @@ impl Wavelengths {
         let points: Vec<[f64; 2]> = table.points().map(|(x, y)| [x, y]).collect();
         let [low, _] = table.extremes();
         require("the power of a spectrum", low, low >= 0.0, "zero or more at every wavelength")?;
-        require("the first wavelength", points[0][0], points[0][0] > 0.0, "positive, in nm")?;
+        require_wavelength("the first wavelength", points[0][0])?;
+        require_wavelength("the last wavelength", points[points.len() - 1][0])?;
         let mut sums = vec![0.0];
         for p in points.windows(2) {
             // Linear between its points, so that trapezia are exact.
@@ -276,7 +285,7 @@ impl Wavelengths {
                 Self::lines(&nm.iter().zip(watts).map(|(&nm, w)| [nm, w * xyz_of_watt(nm)[1]]).collect::<Vec<_>>())
             }
             Kind::Continuous(points) => {
-                let [first, last] = cie::observer_range();
+                let [first, last] = observer_range();
                 let [a, b] = self.range_nm().map(|nm| nm.clamp(first, last));
                 let steps = (0..=(b - a).ceil() as usize).map(|k| (a + k as f64).min(b));
                 // Between its own points the spectrum is linear: with these and every nanometre the product is followed closely.
@@ -296,20 +305,10 @@ impl Wavelengths {
     }
 }
 
-/// CIE XYZ of one watt at a wavelength, Y in lumens; zero outside 380 to 780 nm.
-pub fn xyz_of_watt(wavelength_nm: f64) -> [f64; 3] {
-    cie::observer(wavelength_nm).map(|v| MAX_EFFICACY * v)
-}
-
-/// Chromaticity `(x, y)`; `None` for black.
-pub fn chromaticity([x, y, z]: [f64; 3]) -> Option<[f64; 2]> {
-    let sum = x + y + z;
-    (sum > 0.0).then(|| [x / sum, y / sum])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::optics::chromaticity;
     use crate::optics::testing::numbers;
 
     fn xy(s: &Spectrum) -> [f64; 2] {

@@ -169,7 +169,7 @@ impl SimulationReport<'_> {
             ),
             (caught, others) => format!(
                 "{} paths that went round in a clear body by total reflection without end ([run] caught_after), {} at \
-                 another limit of [run]",
+                 another limit: max_bounces, max_length_mm or power_floor",
                 grouped(caught),
                 grouped(others)
             ),

@@ -203,7 +203,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "optics",
         &[
-            "cie",
+            "cie_daylight",
+            "cie_observer",
             "colour",
             "dispersion",
             "effects",

@@ -4,9 +4,8 @@ use super::bytes::ByteReader;
 use super::ray_collector::RayCollector;
 use super::ray_file::{Flux, RayFile, RowLayout, RowWavelength};
 use super::tm25_header::{ColumnPlaces, SpectralData, Tm25Columns, Tm25Header};
-use crate::formats::rays::unit_direction;
+use crate::formats::rays::stored_direction;
 use crate::formats::{Error, LightRay, write_atomic};
-use crate::math::Vector;
 use std::path::Path;
 
 /// A TM-25 file in memory.
@@ -32,6 +31,14 @@ impl Tm25 {
         };
         let identifier = if spectral { SpectralData::PerRay } else { SpectralData::None };
         let mut header = Tm25Header::of_simulation(rays.len() as u64, columns, identifier);
+        if spectral {
+            let range = |nearer: fn(f64, f64) -> f64, start| {
+                rays.iter().filter_map(|r| r.wavelength_nm).fold(start, nearer)
+            };
+            let [least, greatest] = [range(f64::min, f64::INFINITY), range(f64::max, 0.0)];
+            // The first is that of a file with one wavelength.
+            header.wavelengths = [f32::NAN, least as f32, greatest as f32];
+        }
         // Of the powers as they are written: read and written again, the file states the same.
         let total: f64 = rays.iter().map(|r| f64::from(r.power as f32)).sum();
         match flux {
@@ -47,24 +54,6 @@ impl Tm25 {
         }
         Self { header, rows }
     }
-}
-
-/// Returns a unit direction in single precision that keeps its bits when it is read and written again: the nearest such one within a unit
-/// in the last place of each component.
-fn stored_direction(direction: Vector) -> [f32; 3] {
-    let nearest = direction.to_array().map(|x| x as f32);
-    // What is read is brought to unit length, in double precision. Of two hundred directions one then rounds to another than was written.
-    let read = |stored: &[f32; 3]| unit_direction(Vector::from_array(stored.map(f64::from)));
-    let keeps_its_bits =
-        |stored: &[f32; 3]| read(stored).is_some_and(|d| d.to_array().map(|x| x as f32) == *stored);
-    if keeps_its_bits(&nearest) {
-        return nearest;
-    }
-    let steps = |x: f32| if x == 0.0 { [x; 3] } else { [x.next_down(), x, x.next_up()] };
-    let [xs, ys, zs] = nearest.map(steps);
-    let neighbours = (0..27).map(|k| [xs[k % 3], ys[k / 3 % 3], zs[k / 9]]);
-    let off = |stored: &[f32; 3]| read(stored).map_or(f64::INFINITY, |d| d.distance_squared(direction));
-    neighbours.filter(keeps_its_bits).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(nearest)
 }
 
 /// Reads a whole TM-25 file.
@@ -320,6 +309,11 @@ mod tests {
             write_tm25(&path, &Tm25::from_rays(&rays, flux)).unwrap();
             let set = read_ray_set(&path, flux).unwrap();
             assert_eq!(set.flux, Some(flux));
+            // With wavelengths the header must say their range (4.7.1.11 and 12).
+            let [_, least, greatest] = read_tm25(&path).unwrap().header.wavelengths;
+            assert_eq!(least.is_nan(), !(spectral && flux == Flux::Radiant));
+            let mut nm = rays.iter().filter_map(|r| r.wavelength_nm).map(|nm| nm as f32);
+            assert!(least.is_nan() || nm.all(|nm| (least..=greatest).contains(&nm)), "{least} {greatest}");
             assert!(set.notes.is_empty(), "{:?}", set.notes);
             for (a, b) in rays.iter().zip(&set.rays) {
                 assert!((a.origin - b.origin).length() <= 1e-7 * a.origin.length().max(1.0));

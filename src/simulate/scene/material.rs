@@ -114,9 +114,11 @@ pub struct Material {
     /// Share of the power that is reflected: constant, `[[angle_deg, share], …]` or `[[angle_deg, nm, share], …]` over a full
     /// grid. 1 for mirrors and diffuse faces, 0 for coatings unless said otherwise.
     pub reflectance: Option<Reflectance>,
-    /// Share of the power that a coating transmits; the rest is absorbed.
+    /// Share of the power that a coating transmits, 0 unless said otherwise; the rest is absorbed.
     pub transmittance: Option<f64>,
-    /// Rows of a coating over a full grid: `[angle_deg, nm, R, T]` or `[angle_deg, nm, Rs, Rp, Ts, Tp]`.
+    /// Rows of a coating over a full grid: `[angle_deg, nm, R, T]` or `[angle_deg, nm, Rs, Rp, Ts, Tp]`. The angle is that in the
+    /// rarer of the two media, for light from either side; between rows shares are linear, beyond them constant, and where
+    /// light cannot leave a medium what would be transmitted is reflected.
     pub coating: Option<Vec<Vec<f64>>>,
     /// Complex index `[n, k]` of a metal.
     pub metal: Option<[f64; 2]>,

@@ -1,6 +1,7 @@
 //! The key `[[receiver]]`: where light is counted.
 
 use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene};
+use crate::math::units::WAVELENGTHS_NM;
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
@@ -242,6 +243,12 @@ impl Receiver {
             && (b.len() < 2 || b.len() > 1000 || !b.windows(2).all(|w| w[0] < w[1]))
         {
             return fail("bins_nm", "`bins_nm` must be 2 to 1000 rising wavelengths");
+        }
+        // Light of the last bin ends there: edges in micrometres lie below all light.
+        if let Some([.., last]) = self.bins_nm.as_deref()
+            && !WAVELENGTHS_NM.contains(last)
+        {
+            return fail("bins_nm", "`bins_nm` must end between 1 and 1e6 nm; 0.55 µm are 550 nm");
         }
         if (self.channels.is_some() || self.bins_nm.is_some()) && self.kind == ReceiverKind::Absorbed {
             return fail("channels", "absorbed flux is counted as power alone");

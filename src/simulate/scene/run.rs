@@ -1,6 +1,7 @@
 //! The keys `[run]` and `[accuracy]`: settings of a run, and how models are faceted and traced.
 
 use super::{Key, Scene, lenient};
+use crate::math::units::WAVELENGTHS_NM;
 use crate::simulate::{Error, ErrorKind};
 use crate::tessellate::LEAST_TOLERANCE_MM;
 use crate::text;
@@ -23,9 +24,6 @@ const GLUE_MM: f64 = 1e-3;
 
 /// Glue distances that may be asked for, mm: from the rounding of places to what would close real gaps.
 const GLUES_MM: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
-
-/// Wavelengths that may be asked for, nm: from X-rays to a millimetre.
-const WAVELENGTHS_NM: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 
 /// Most rays of a run: of one that grows, the 32 bits that number its replicates of 5000 rays hold no more.
 pub const MOST_RAYS: u64 = 20_000_000_000_000;
@@ -204,7 +202,9 @@ impl Run {
             r if !(0.0..1.0).contains(&r.power_floor) => fail("power_floor", "must be in [0, 1)"),
             r if !(0.0..=1.0).contains(&r.split_floor) => fail("split_floor", "must be in [0, 1]"),
             r if r.max_length_mm.is_nan() || r.max_length_mm <= 0.0 => fail("max_length_mm", "must be positive"),
-            r if !WAVELENGTHS_NM.contains(&r.wavelength_nm) => fail("wavelength_nm", "must be from 1 to 1e6"),
+            r if !WAVELENGTHS_NM.contains(&r.wavelength_nm) => {
+                fail("wavelength_nm", "must be from 1 to 1e6 nm; 0.55 µm are 550 nm")
+            }
             r if !GLUES_MM.contains(&r.glue_mm) => {
                 fail("glue_mm", "must be from 1e-9 to 1: faces at the same place are always one interface")
             }

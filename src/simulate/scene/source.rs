@@ -214,7 +214,7 @@ impl Source {
             return Some(("x", "`x` must be a direction".into()));
         }
         if !is_finite(&self.at) {
-            return Some(("at", "not a point".into()));
+            return Some(("at", "`at` must be three finite numbers, mm".into()));
         }
         if !is_direction(&self.direction) {
             return Some(("direction", "not a direction".into()));

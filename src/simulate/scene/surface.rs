@@ -84,9 +84,11 @@ impl Material {
             }
             // The lobe is known, so what is wrong are its parameters.
             (LobeKind::Lambertian, ..) => return Err("a lambertian lobe has no parameters".into()),
-            (LobeKind::Gaussian, ..) => return Err("a gaussian lobe has `sigma_deg` and nothing else".into()),
-            (LobeKind::Cosine, ..) => return Err("a cosine lobe has `exponent` and nothing else".into()),
-            (LobeKind::Abg, ..) => return Err("an abg lobe has `abg = [A, B, g]` and nothing else".into()),
+            (LobeKind::Gaussian, ..) => {
+                return Err("a gaussian lobe needs `sigma_deg`, and has nothing else".into());
+            }
+            (LobeKind::Cosine, ..) => return Err("a cosine lobe needs `exponent`, and has nothing else".into()),
+            (LobeKind::Abg, ..) => return Err("an abg lobe needs `abg = [A, B, g]`, and has nothing else".into()),
         };
         Scatter::new(s.share.unwrap_or(1.0), lobe).map(Some).map_err(|e| e.to_string())
     }
