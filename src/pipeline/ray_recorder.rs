@@ -4,31 +4,51 @@ use crate::intersect::{Cost, ExpectedRays, Footprint, Hit, Intersector};
 use crate::math::{Point, Ray, Vector};
 use crate::model::{Model, PlacedFace};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Rays noted over rays wanted: a fifth more, as some cannot be asked again.
 const SPARE: f64 = 1.2;
+/// Rays kept over rays wanted, where many more come than were expected, as in an integrating sphere.
+const KEPT: usize = 4;
 
 /// Passes every question on and notes some segments of paths: those whose hash is smallest, so that neither threads nor batches decide
 /// which.
 pub struct RayRecorder<'a> {
     inner: &'a dyn Intersector,
-    threshold: u64,
+    /// Largest hash that is noted; falls where too many are.
+    threshold: AtomicU64,
+    /// Rays kept.
+    most: usize,
     sample: Mutex<Vec<(u64, Ray)>>,
 }
 
 impl<'a> RayRecorder<'a> {
-    /// Notes about `wanted` and a fifth more of `expected` rays; all where fewer come than are wanted.
+    /// Notes about `wanted` and a fifth more of `expected` rays, all where fewer come than are wanted, and at most [`KEPT`] times as many
+    /// as are wanted.
     pub fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
         let share = (SPARE * wanted as f64 / expected.max(1) as f64).min(1.0);
         // Hashes are even over 64 bits: their share below the threshold is the share of the rays noted.
-        Self { inner, threshold: (share * u64::MAX as f64) as u64, sample: Mutex::new(Vec::new()) }
+        Self {
+            inner,
+            threshold: ((share * u64::MAX as f64) as u64).into(),
+            most: KEPT * wanted.max(1) as usize,
+            sample: Mutex::new(Vec::new()),
+        }
     }
 
     /// Keeps the ray where its hash is among the chosen ones.
     fn note(&self, ray: &Ray) {
         let hash = hash(ray);
-        if hash <= self.threshold {
-            self.sample.lock().unwrap_or_else(|e| e.into_inner()).push((hash, *ray));
+        if hash > self.threshold.load(Ordering::Relaxed) {
+            return;
+        }
+        let mut sample = self.sample.lock().unwrap_or_else(|e| e.into_inner());
+        sample.push((hash, *ray));
+        // Twice as many, so that it happens seldom.
+        if sample.len() >= 2 * self.most {
+            let (_, largest_kept, _) = sample.select_nth_unstable_by_key(self.most - 1, |(hash, _)| *hash);
+            self.threshold.store(largest_kept.0, Ordering::Relaxed);
+            sample.truncate(self.most);
         }
     }
 
@@ -40,6 +60,8 @@ impl<'a> RayRecorder<'a> {
         let mut noted = self.sample.into_inner().unwrap_or_else(|e| e.into_inner());
         // By the hash: an order that no thread and no batch decides, and that mixes sources and bounces.
         noted.sort_by_key(|(hash, _)| *hash);
+        // What is kept beyond these depends on when the threshold fell.
+        noted.truncate(self.most);
         noted.into_iter().filter_map(|(_, ray)| lift_off(ray, &faces, &start)).take(wanted).collect()
     }
 }
@@ -113,14 +135,21 @@ mod tests {
     fn the_sample_does_not_depend_on_the_order_of_questions() {
         let rays: Vec<Ray> =
             (0..20_000).map(|k| Ray::new(Point::splat(f64::from(k)), Vector::new(0.6, 0.0, 0.8))).collect();
-        let sample = |rays: &[Ray]| {
-            let recorder = RayRecorder::new(&Nothing, 500, rays.len() as u64);
+        let sample = |rays: &[Ray], expected: u64| {
+            let recorder = RayRecorder::new(&Nothing, 500, expected);
             recorder.intersect_batch(rays, &mut vec![None; rays.len()], &mut Cost::default());
             recorder.rays(500, &Model::default(), |ray, up| ray.origin + 0.1 * up)
         };
-        let (forward, backward) = (sample(&rays), sample(&rays.iter().rev().copied().collect::<Vec<_>>()));
+        let back: Vec<Ray> = rays.iter().rev().copied().collect();
+        let (forward, backward) = (sample(&rays, 20_000), sample(&back, 20_000));
         assert_eq!(forward.len(), 500);
         assert_eq!(forward, backward);
+        // Of forty times as many rays as were expected the same are taken, and few are kept.
+        assert_eq!(sample(&rays, 500), forward);
+        assert_eq!(sample(&back, 500), forward);
+        let recorder = RayRecorder::new(&Nothing, 500, 500);
+        recorder.intersect_batch(&rays, &mut vec![None; rays.len()], &mut Cost::default());
+        assert!(recorder.sample.into_inner().unwrap().len() < 2 * KEPT * 500);
         let mean = forward.iter().map(|r| r.origin.x).sum::<f64>() / 500.0;
         // The mean of 500 uniform draws from 0..20,000 has a standard error of 258.
         assert!((mean - 10_000.0).abs() < 1300.0, "{mean}");

@@ -223,6 +223,21 @@ fn rules_that_do_not_fit_the_model_are_refused_with_advice() {
     }
 }
 
+/// N-BK7 with its constants in nm² bends next to nothing: 0.999 97 for 1.5168.
+#[test]
+fn constants_of_a_glass_in_square_nanometres_are_refused() {
+    let glass = |unit: f64| {
+        let rows =
+            [[1.039_612_12, 0.006_000_698_67], [0.231_792_344, 0.020_017_914_4], [1.010_469_45, 103.560_653]];
+        let rows = rows.map(|[b, c]| format!("[{b}, {}]", c * unit)).join(", ");
+        Scene::parse(&format!("[[medium]]\nname = 'g'\nsellmeier = [{rows}]\n"), "scene.toml", Path::new("."))
+    };
+    assert!(glass(1.0).is_ok());
+    let e = glass(1e6).unwrap_err();
+    let said = e.to_string();
+    assert!(said.contains("below 1") && said.contains("C in µm²") && e.line_and_column().is_some(), "{said}");
+}
+
 /// Light of wavelengths that a table or a formula was not made for is used at the table's ends, and this is said by name.
 #[test]
 fn light_beyond_a_table_is_named() {

@@ -247,6 +247,7 @@ impl Spectrum {
 mod tests {
     use super::*;
     use crate::formats::read_ray_set;
+    use crate::math::Vector;
 
     /// A file with every part a TM-25 file may have, and columns that are not traced.
     fn sample() -> Tm25 {

@@ -267,6 +267,12 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
                 format!("the index of '{}' at {} nm is {n}, not from 0.1 to 10", m.name, scene.run.wavelength_nm);
             return Err(scene.error(ErrorKind::Value, &at("name"), message));
         }
+        // Constants in nm² leave nearly nothing of each term, with the wrong sign: no light would be bent, in silence.
+        if m.sellmeier.is_some() && n < 1.0 {
+            let message = format!("`sellmeier` gives an index of {n} at {} nm, below 1", scene.run.wavelength_nm);
+            let error = scene.error(ErrorKind::Value, &at("sellmeier"), message);
+            return Err(error.help("its rows are [B, C] with C in µm², the square of a resonance's wavelength"));
+        }
     }
     Ok(())
 }
