@@ -19,7 +19,7 @@ const RAY_LIFT_MM: f64 = 1.0;
 /// line: lifted off the wall of a light guide by a tenth of that way it met the next wall less flat, and 0.42° were claimed for 0.51°.
 const STARTING_SHARE: f64 = 0.5;
 /// Rays that tell how many segments a path has.
-const PROBED_RAYS: u64 = 1024;
+const PROBED_RAYS: u64 = 64;
 /// Segments that are traced for each that is wanted, where paths are long: enough that those taken are of many paths.
 const SEGMENTS_A_WANTED_RAY: f64 = 16.0;
 

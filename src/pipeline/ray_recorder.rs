@@ -23,8 +23,8 @@ pub struct RayRecorder<'a> {
 }
 
 impl<'a> RayRecorder<'a> {
-    /// Notes about `wanted` and a fifth more of `expected` rays, all where fewer come than are wanted, and at most [`KEPT`] times as many
-    /// as are wanted.
+    /// Notes about `wanted` and a fifth more of `expected` rays, all where fewer come than are wanted, and at most four times as many as
+    /// are wanted.
     pub fn new(inner: &'a dyn Intersector, wanted: u64, expected: u64) -> Self {
         let share = (SPARE * wanted as f64 / expected.max(1) as f64).min(1.0);
         // Hashes are even over 64 bits: their share below the threshold is the share of the rays noted.

@@ -16,27 +16,36 @@ pub(super) fn error_of_hit(
 ) -> Option<f64> {
     let inside = relative_index(spline.face);
     if facet.face == spline.face {
-        return Some(direction_error_deg(incoming, facet.normal, spline.normal, inside));
+        return Some(direction_error_deg(incoming, [facet.normal, facet.geometric_normal], spline.normal, inside));
     }
     // Where two bodies touch, facets may name the face of the one and the spline that of the other, which looks the other way.
     let distance = (facet.t - spline.t) * spline.normal.dot(incoming);
     let touches = facet.normal.dot(spline.normal) < 0.0 && distance.abs() <= apart_mm;
     // From body to body the surroundings cancel.
     let between = inside.zip(relative_index(facet.face)).map(|(inside, around)| inside / around).or(inside);
-    touches.then(|| direction_error_deg(incoming, -facet.normal, spline.normal, between))
+    let seen_back = [-facet.normal, -facet.geometric_normal];
+    touches.then(|| direction_error_deg(incoming, seen_back, spline.normal, between))
 }
 
-/// Returns the larger of the angles, degrees, between the directions that a facet's normal and the spline's send light of direction
+/// Returns the larger of the angles, degrees, between the directions that a facet and the spline's normal send light of direction
 /// `incoming` to: mirrored, and refracted where the face lets light through and neither reflects it totally. All are unit vectors,
-/// normals outward.
+/// normals outward; those of the facet are the interpolated one and its own, which a simulation takes where the former would send light to
+/// the wrong side.
 ///
 /// `relative_index` is the index of the body that the face bounds over that around it, `None` where no light passes. Just short of total
 /// reflection light leaves the body misdirected by many times the error of the normal, mirrored light by twice at most.
-fn direction_error_deg(incoming: Vector, facet: Vector, spline: Vector, relative_index: Option<f64>) -> f64 {
-    let mirrored = angle_deg(reflect(incoming, facet), reflect(incoming, spline));
-    let Some(inside) = relative_index else { return mirrored };
+fn direction_error_deg(incoming: Vector, facet: [Vector; 2], spline: Vector, relative_index: Option<f64>) -> f64 {
     let comes_out = incoming.dot(spline) > 0.0;
-    let index_ahead = if comes_out { inside.recip() } else { inside };
+    let index_ahead = relative_index.map(|inside| if comes_out { inside.recip() } else { inside });
+    let [interpolated, flat] = facet;
+    let goes_on = |direction: Vector| direction.dot(flat) * incoming.dot(flat) > 0.0;
+    let passes = index_ahead.and_then(|index| refract(incoming, interpolated, index)).is_none_or(goes_on);
+    let faces_light = incoming.dot(interpolated) * incoming.dot(flat) > 0.0;
+    let facet = if passes && faces_light { interpolated } else { flat };
+    let reflected =
+        Some(reflect(incoming, facet)).filter(|r| !goes_on(*r)).unwrap_or_else(|| reflect(incoming, flat));
+    let mirrored = angle_deg(reflected, reflect(incoming, spline));
+    let Some(index_ahead) = index_ahead else { return mirrored };
     match (refract(incoming, facet, index_ahead), refract(incoming, spline, index_ahead)) {
         (Some(facet), Some(spline)) => mirrored.max(angle_deg(facet, spline)),
         // What is reflected totally on one side passes on the other with next to no power.
@@ -56,7 +65,7 @@ mod tests {
 
     #[test]
     fn beside_total_reflection_the_refracted_light_errs_most() {
-        let error = |light: Vector, index| direction_error_deg(light, off_z(0.01), Vector::Z, index);
+        let error = |light: Vector, index| direction_error_deg(light, [off_z(0.01); 2], Vector::Z, index);
         // A mirror turns light by twice what its normal is turned.
         assert!((error(off_z(40.0), None) - 0.02).abs() < 1e-9);
         // asin(1.5 sin 41.5°) = 83.67°, and 83.54° for a normal turned by 0.01°: Snell's law by hand, less the turn itself.
@@ -66,5 +75,17 @@ mod tests {
         // Into the body it is a third of the normal's error, and the mirrored light errs more; beyond the critical angle nothing leaves.
         assert!((error(-off_z(40.0), Some(1.5)) - 0.02).abs() < 1e-9);
         assert!((error(off_z(45.0), Some(1.5)) - 0.02).abs() < 1e-9);
+    }
+
+    /// Light at 46° in glass of 1.5 is reflected totally by the facet, but would pass at a normal turned by 4.3°: asin(1.5 sin 41.7°) =
+    /// 86.2°, at 90.5° to the facet's own and so back into the glass. The simulation goes by the facet's own then; a mirror does not.
+    #[test]
+    fn the_facets_own_normal_counts_where_a_simulation_takes_it() {
+        let facet = [off_z(4.3), Vector::Z];
+        let error = |index| direction_error_deg(off_z(46.0), facet, Vector::Z, index);
+        assert!((error(None) - 8.6).abs() < 1e-9 && error(Some(1.5)).abs() < 1e-9, "{:?}", error(Some(1.5)));
+        // Of light at 88° a normal turned by 3° makes a reflection at 94°, through the facet.
+        let grazing = |flat| direction_error_deg(-off_z(88.0), [off_z(-3.0), flat], Vector::Z, None);
+        assert!(grazing(Vector::Z).abs() < 1e-9 && (grazing(off_z(-3.0)) - 6.0).abs() < 1e-9);
     }
 }
