@@ -37,10 +37,10 @@ impl BoundScene {
     fn reason(&self, cause: LostCause, at: Option<&str>) -> &'static str {
         match cause {
             LostCause::NoExit => {
-                "light left the scene inside a body, by a gap between faces, an open mesh or a missing face"
+                "light left the scene inside a body, by a gap between faces, an open shell or a missing face"
             }
             LostCause::ImpossibleMedium => {
-                "light came to a face from the wrong side, as where a mesh gapes or is turned, or bodies overlap"
+                "light came to a face from the wrong side, as through an open shell, or where a mesh is turned or bodies overlap"
             }
             LostCause::InsideSolid if self.lets_light_into_solid(at) => {
                 "a face of it lets light through, but what is behind has no medium, and its other faces are opaque: give the part a \
