@@ -172,5 +172,5 @@ fn rays_of_a_file_that_went_are_lost_as_unreadable() {
     let results = simulate(&bound, &world, &RunSettings::from(&scene.run), &|_| true);
     assert_eq!(results.lost_rays, 64);
     assert!(results.ledger.iter().all(|lost| lost.cause == LostCause::Unreadable), "{:?}", results.ledger[0]);
-    assert!(results.notes.iter().any(|note| note.contains("its ray file was changed")), "{:?}", results.notes);
+    assert!(results.notes.iter().any(|note| note.contains("the ray file was changed")), "{:?}", results.notes);
 }
