@@ -49,7 +49,7 @@ import lampyris as lp
         (lambda s: s.add_model(3), TypeError, r"lampyris.read_step\(path\)"),
         (lambda s: s.add(lp.led(colour=1j)).trace(), TypeError, r"source\[1\].colour: a scene holds numbers"),
         (lambda s: s.add(lp.far_field("f", h_deg=(5,), step_deg=1)), ValueError, r"h_deg = \(5,\): two finite angles"),
-        (lambda s: s.add(lp.led(at=(0, 0, float("nan")))).trace(), ValueError, "not a point"),
+        (lambda s: s.add(lp.led(at=(0, 0, float("nan")))).trace(), ValueError, "three finite numbers"),
         (lambda s: s.trace(rays=500, progress=False).assess("R1", "far"), ValueError, r"lampyris.regulations\(\) has all"),
         (lambda s: s.trace(accuracy_deg=0.1, tolerance=0.1), ValueError, "both say how fine"),
         (lambda s: s.trace(tolerance=True), ValueError, "one number of mm or two"),
