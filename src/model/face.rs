@@ -199,6 +199,13 @@ const PLANE: f64 = 1e-10;
 impl Face {
     /// Whether it is one bilinear patch in a plane within straight lines, which facets follow to rounding.
     pub fn is_polygon(&self) -> bool {
+        let is_straight = self.loops.iter().flat_map(|l| &l.uses).all(|u| u.uv.degree == 1);
+        self.surface.degree == [1, 1] && self.surface.points.len() == 4 && is_straight && self.is_plane()
+    }
+
+    /// Whether all control points of its surface lie in the plane that the corners of the domain span, so that facets have its normal. A
+    /// surface whose corners meet, as those of a disc do, counts as curved.
+    pub fn is_plane(&self) -> bool {
         let surface = &self.surface;
         let [[u0, u1], [v0, v1]] = surface.domain();
         let corners =
@@ -207,9 +214,9 @@ impl Face {
         let [a, b, c, d] = corners;
         let normal = (c - a).cross(d - b);
         let size = (c - a).length().max((d - b).length());
-        let is_plane = (b - a).dot(normal).abs() <= PLANE * size * normal.length();
-        let is_straight = self.loops.iter().flat_map(|l| &l.uses).all(|u| u.uv.degree == 1);
-        surface.degree == [1, 1] && surface.points.len() == 4 && is_plane && is_straight
+        let off = PLANE * size * normal.length();
+        let in_plane = surface.points.iter().all(|p| (p.truncate() / p.w - a).dot(normal).abs() <= off);
+        in_plane && normal.length() > PLANE * size * size
     }
 
     /// A nameless face that is the whole domain of its surface, with `Su × Sv` outward.
@@ -342,4 +349,27 @@ pub struct TessellatedFace {
     pub layer: Option<Arc<str>>,
     /// The facets, all of face 0.
     pub mesh: FacetMesh,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vector;
+    use crate::nurbs::sweep;
+    use std::f64::consts::{FRAC_PI_2, TAU};
+
+    #[test]
+    fn planes_are_told_from_curved_surfaces() {
+        let tilted = Frame::from_axis(Vector::new(1e4, -3.0, 7.0), Vector::new(0.3, -0.2, 0.9), None);
+        let is_plane = |surface: Surface| Face::whole(surface).is_plane();
+        let mut square = sweep::plane(&tilted, [[0.0, 20.0], [0.0, 1.0]]);
+        assert!(is_plane(square.clone()));
+        // A corner lifted by a millionth of the square bends it; a cylinder closed or open, and a sphere, are none.
+        square.points[3] += (1e-5 * tilted.z).extend(0.0);
+        assert!(!is_plane(square));
+        for angle in [FRAC_PI_2, TAU] {
+            assert!(!is_plane(sweep::cylinder(&tilted, 5.0, [0.0, angle], [0.0, 10.0])));
+        }
+        assert!(!is_plane(sweep::sphere(&tilted, 5.0, [0.0, TAU], [-FRAC_PI_2, FRAC_PI_2])));
+    }
 }

@@ -8,9 +8,9 @@ use super::error::Error;
 use super::growing_search::{GrowingSearch, growth_margin, most_rays, next_rays};
 use super::monitor::Monitor;
 use super::prepared_scene::PreparedScene;
-use super::suggest;
 use crate::simulate::{GROWING_REPLICATE, PartialRun, Results, Scene};
 use crate::study::figures::{cell_errors, light_weighted_error};
+use crate::text::nearest_or_listed;
 use serde::Serialize;
 
 /// Rays of the first run.
@@ -85,8 +85,8 @@ impl ErrorTarget {
         let names: Vec<&str> = scene.receivers.iter().map(|r| r.name.as_str()).collect();
         if !names.contains(&receiver) {
             let error = about(format!("the scene has no receiver '{receiver}'"));
-            let otherwise = "it has no receivers: add a [[receiver]]";
-            return Err(error.help(suggest::closest_name("its receivers are", receiver, &names, otherwise)));
+            let advice = nearest_or_listed(receiver, names);
+            return Err(error.help(advice.unwrap_or_else(|| "it has no receivers: add a [[receiver]]".into())));
         }
         // Rays of its own do not grow with the run: more would be asked for than are ever traced.
         if scene.sources.iter().any(|s| s.rays.is_some()) {

@@ -3,10 +3,10 @@
 use super::error::Error;
 use super::monitor::{Monitor, Stage, in_stage};
 use super::settings::MeshingSettings;
-use super::suggest;
 use crate::model::{Instancing, Model};
 use crate::simulate::{BoundScene, Scene};
 use crate::tessellate::{self, FaceSelector, GroupedFacets, Tessellation, ToleranceOverride, tessellate};
+use crate::text::nearest_or_listed;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -72,13 +72,9 @@ fn place_of_part(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     if model.parts.iter().any(|p| p.name == name) {
         return Ok(FaceSelector::Part(name.to_owned()));
     }
-    let known: Vec<&str> = model.parts.iter().map(|p| p.name.as_str()).filter(|n| !n.is_empty()).collect();
-    // Only names that exist help; many parts have none.
-    Err(Error::setting("part", format!("{name}: the model has no part of this name")).help(suggest::closest_name(
-        "its parts are",
-        name,
-        &known,
-        "its parts have no names; select faces by the number of their entity, as in --face 17=0.01",
+    let advice = nearest_or_listed(name, model.parts.iter().map(|p| p.name.as_str()));
+    Err(Error::setting("part", format!("{name}: the model has no part of this name")).help(advice.unwrap_or_else(
+        || "its parts have no names; select faces by the number of their entity, as in --face 17=0.01".into(),
     )))
 }
 
@@ -96,14 +92,10 @@ fn place_of_face(name: &str, model: &Model) -> Result<FaceSelector, Error> {
     if let Some(id) = entity.filter(|id| faces().any(|f| f.entity == Some(*id))) {
         return Ok(FaceSelector::Entity(id));
     }
-    let known: Vec<&str> = faces().map(|f| f.name.as_str()).filter(|n| !n.is_empty()).collect();
     let error = Error::setting("face", format!("{name}: the model has no face of this name or number"));
-    Err(error.help(suggest::closest_name(
-        "its faces are",
-        name,
-        &known,
-        "its faces have no names; write the number of the entity in the file, as in 17=0.01",
-    )))
+    Err(error.help(nearest_or_listed(name, faces().map(|f| f.name.as_str())).unwrap_or_else(|| {
+        "its faces have no names; write the number of the entity in the file, as in 17=0.01".into()
+    })))
 }
 
 /// Makes the facets of a model in one piece, tells the monitor, and returns them with the seconds they took.

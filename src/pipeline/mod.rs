@@ -39,7 +39,6 @@ mod scene_job;
 mod scene_results;
 mod settings;
 mod settled_target;
-mod suggest;
 mod turn;
 mod verdicts;
 

@@ -2,11 +2,12 @@
 
 use super::even_poles::{brightest_direction, direction_text, is_all_around, pole_rings};
 use super::half_width::half_width;
+use super::maps::{peak_error, spoken};
 use super::peak_lines::{Line, lines_through_peak};
 use super::verdicts::multiple_text;
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
-use crate::math::{error_of_maximum, error_of_mean};
+use crate::math::error_of_mean;
 use crate::regulation::Assessment;
 use crate::simulate::{ReceiverResult, Results};
 use crate::study::figures::ReceiverFigures;
@@ -31,17 +32,6 @@ fn width_along(grid: &Grid, line: &Line) -> [Cell; 2] {
     [Cell::Number(width.cells * line.step, 3), error]
 }
 
-/// Returns the standard error of the largest value, in its unit: the statistical one with the upward bias of a noisy maximum
-/// ([`error_of_maximum`]), and the geometric one of its cell, as squares; empty without statistical errors. `grid` has even poles.
-fn peak_error(grid: &Grid) -> Cell {
-    let (Some((i, j)), Some(mut errors)) = (grid.peak_cell(), grid.error.clone()) else { return Cell::Empty };
-    let cells = grid.axes[0].cells;
-    pole_rings(grid).clear_rivals(&grid.values, &mut errors);
-    let geometric = grid.geometric.as_ref().map_or(0.0, |geometric| geometric[j * cells + i]);
-    let values = grid.values.iter().zip(&errors).map(|(&value, &error)| [value, error]);
-    Cell::Number(error_of_maximum(values).hypot(geometric), 2)
-}
-
 /// What a receiver counted.
 #[derive(Clone, Copy)]
 pub(super) struct Counted<'a> {
@@ -56,7 +46,7 @@ pub(super) struct Counted<'a> {
 /// Makes a table of the figures of a far field in candela, with the points of a regulation where it was judged by one.
 pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: Option<&Assessment>) -> Table {
     let Counted { receiver, figures: of_receiver, grid } = *counted;
-    let title = format!("{}: figures of the lamp", super::maps::spoken(&receiver.name));
+    let title = format!("{}: figures of the lamp", spoken(&receiver.name));
     let name = format!("{}-lamp", crate::formats::file_stem(&receiver.name));
     let mut table = Table::new(
         &name,
@@ -64,9 +54,7 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
         &[("", ""), ("value", ""), ("± rays and facets (1σ)", ""), ("unit", ""), ("where", "")],
     );
     if let Some((place, value)) = brightest_direction(grid) {
-        // Where the map is the one whose brightest cell is a figure of the run, its error is that figure's.
-        let known = of_receiver.max.as_ref().filter(|max| max.unit == grid.unit);
-        let error = known.map_or_else(|| peak_error(grid), |max| Cell::Number(max.combined(), 2));
+        let error = peak_error(grid, of_receiver.max.as_ref()).map_or(Cell::Empty, |error| Cell::Number(error, 2));
         table.row(["Imax".into(), Cell::Number(value, 5), error, "cd".into(), place.into()]);
     }
     let power = &of_receiver.power;
@@ -191,7 +179,7 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
     points.extend(framed.last());
     let series = vec![Series { points, style: SeriesStyle::Line, ..Series::default() }];
     let name = format!("{}-encircled", crate::formats::file_stem(&receiver.name));
-    let title = format!("{}: encircled power", super::maps::spoken(&receiver.name));
+    let title = format!("{}: encircled power", spoken(&receiver.name));
     let axes = [AxisStyle::linear("radius", "mm"), AxisStyle::linear("power within", "%")];
     Some(Chart::series(&name, &title, &caption, axes, series))
 }
@@ -224,7 +212,7 @@ pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     };
     let series = vec![plane("C 0–180", 0.0), plane("C 90–270", 90.0)];
     let name = format!("{}-polar", crate::formats::file_stem(&receiver.name));
-    let title = format!("{}: polar diagram", super::maps::spoken(&receiver.name));
+    let title = format!("{}: polar diagram", spoken(&receiver.name));
     let unit = grid.unit.as_str();
     let axes = [AxisStyle::linear("intensity, sideways", unit), AxisStyle::linear("intensity up", unit)];
     let caption =
@@ -343,7 +331,7 @@ mod tests {
         let Some([Cell::Number(ahead, _), Cell::Number(ahead_error, _)]) = value_ahead(&even) else { panic!("HV") };
         assert!((ahead / at_pole - 1.0).abs() < 1e-12);
         // 60 cells of ±10 % of twice the value, and 60 without light: √60 · 0.2 / 120 of it.
-        let Cell::Number(error, _) = peak_error(&even) else { panic!("an error") };
+        let error = peak_error(&even, None).unwrap();
         for error in [error, ahead_error] {
             assert!((error / at_pole - 0.2 * 60f64.sqrt() / 120.0).abs() < 1e-12, "{error}");
         }
@@ -372,7 +360,7 @@ mod tests {
             Some(grid.values.iter().map(|v| if *v == grid.values[59 * 120 + 5] { own } else { 0.0 }).collect());
         let even = with_even_poles(&grid);
         assert_eq!(even.peak_cell(), Some((5, 59)));
-        let Cell::Number(error, _) = peak_error(&even) else { panic!("an error") };
+        let error = peak_error(&even, None).unwrap();
         assert!((error - own).abs() < 1e-12, "{error}");
     }
 }

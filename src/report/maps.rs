@@ -1,15 +1,16 @@
 //! What a receiver counted as maps: the grid for files and pictures, its cuts, and what stands below them.
 
-use super::even_poles::{brightest_direction, is_all_around};
+use super::even_poles::{brightest_direction, is_all_around, pole_rings};
 use super::framing::{LIT_PART_SHOWN, lit_part};
 use super::number::{coordinate_figures, unit_in_words, with_unit};
 use super::peak_lines::lines_through_peak;
 use super::{AxisStyle, Chart, Series, SeriesStyle};
 use crate::formats::file_stem;
 use crate::formats::{Axis, Grid, Layer};
+use crate::math::error_of_maximum;
 use crate::simulate::scene::FarFieldType;
 use crate::simulate::{ChannelResult, ReceiverResult, Results};
-use crate::study::figures::{cell_errors, channel_cell_errors, light_weighted_error};
+use crate::study::figures::{Figure, cell_errors, channel_cell_errors, light_weighted_error};
 use crate::study::geometric_error::GeometricError;
 use crate::text::figures;
 
@@ -159,8 +160,24 @@ pub(super) fn cuts(grid: &Grid) -> Option<Chart> {
     Some(Chart::series(&name, &title, &caption, axes, series.into()))
 }
 
-/// Writes what a map shows: its peak, its noise and its cells.
-pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
+/// Returns the standard error of the largest value, in its unit: that of the receiver's figure `max` where that has the unit of the grid,
+/// else the statistical one with the upward bias of a noisy maximum ([`error_of_maximum`]) and the geometric one of its cell, as squares;
+/// `None` without statistical errors. `grid` has even poles.
+pub(super) fn peak_error(grid: &Grid, max: Option<&Figure>) -> Option<f64> {
+    if let Some(max) = max.filter(|max| unit_in_words(&max.unit) == grid.unit) {
+        return Some(max.combined());
+    }
+    let (i, j) = grid.peak_cell()?;
+    let mut errors = grid.error.clone()?;
+    pole_rings(grid).clear_rivals(&grid.values, &mut errors);
+    let geometric = grid.geometric.as_ref().map_or(0.0, |geometric| geometric[j * grid.axes[0].cells + i]);
+    let values = grid.values.iter().zip(&errors).map(|(&value, &error)| [value, error]);
+    Some(error_of_maximum(values).hypot(geometric))
+}
+
+/// Writes what a map of a receiver shows: its peak with its error, its noise and its cells. `max` is the receiver's figure of the peak, in
+/// the unit of this map or of another.
+pub(super) fn reading(r: &ReceiverResult, grid: &Grid, max: Option<&Figure>) -> String {
     let place = |[x, y]: [f64; 2]| {
         let [x, y] = [(0, x), (1, y)].map(|(a, at)| {
             let Axis { label, unit, .. } = &grid.axes[a];
@@ -176,7 +193,9 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid) -> String {
         if value <= 0.0 {
             return "No light came here. ".to_owned();
         }
-        format!("Peak {} {} at {place}. ", figures(value, 3), grid.unit)
+        let of = if max.is_some_and(|max| max.geometric.is_none()) { " (± of the rays alone)" } else { "" };
+        let error = peak_error(grid, max).map_or_else(String::new, |error| format!(" ± {}", figures(error, 2)));
+        format!("Peak {}{error} {}{of} at {place}. ", figures(value, 3), grid.unit)
     });
     let error = grid.error.as_ref().and_then(|errors| light_weighted_error(&grid.values, errors)).map(|share| {
         format!("Statistical error of a cell, weighted by its light: {} %. ", figures(100.0 * share, 2))
@@ -228,6 +247,16 @@ mod tests {
             assert!((20.0..50.0).contains(&-positions[0]), "{positions:?}");
             assert!(positions.windows(2).all(|p| (p[1] - p[0] - 2.0).abs() < 1e-9), "{positions:?}");
         }
+    }
+
+    #[test]
+    fn the_peak_has_the_error_of_its_figure_in_the_same_unit() {
+        let mut grid = beam();
+        grid.error = Some(grid.values.iter().map(|v| 0.01 * v).collect());
+        let max = |unit: &str, geometric| Figure::new(1071.0, unit, 30.0, geometric);
+        assert_eq!(peak_error(&grid, Some(&max("cd", Some(40.0)))), Some(50.0));
+        // Watts a steradian are another map's: the cell's own 1 %, or more for that many rivals.
+        assert!((10.0..20.0).contains(&peak_error(&grid, Some(&max("W/sr", None))).unwrap()));
     }
 
     #[test]

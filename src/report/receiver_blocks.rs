@@ -11,12 +11,13 @@ use crate::regulation::Assessment;
 use crate::simulate::{ReceiverResult, Results};
 
 /// Draws the map of a receiver, framed around its light; the caption says where that is a part of it.
-pub(super) fn framed_map(r: &ReceiverResult, grid: &Grid) -> Chart {
+pub(super) fn framed_map(counted: &Counted<'_>) -> Chart {
+    let Counted { receiver: r, figures, grid } = *counted;
     let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
     let stem = file_stem(&r.name);
     // Candela and lux beside watts: the unit tells the files apart.
     let name = if grid.unit == unit_in_words(r.unit) { stem } else { format!("{stem}-{}", grid.unit) };
-    let mut caption = reading(r, grid);
+    let mut caption = reading(r, grid, figures.max.as_ref());
     let part = lit_part(grid);
     if part.is_some() {
         caption += LIT_PART_SHOWN;

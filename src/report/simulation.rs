@@ -216,9 +216,9 @@ impl SimulationReport<'_> {
                 .caption(&self.drawn),
         );
         for (k, grid) in maps {
-            let r = &self.results.receivers[k];
             let grid = with_joined_slivers(&grid);
-            section = section.with_block(receiver_blocks::framed_map(r, &grid));
+            let shown = Counted { receiver: &self.results.receivers[k], figures: &self.figures[k], grid: &grid };
+            section = section.with_block(receiver_blocks::framed_map(&shown));
             // The map that matters most stands beside the facets and has its cuts drawn.
             if let Some(view) = view.take() {
                 section = section.with_block(view);
@@ -227,7 +227,6 @@ impl SimulationReport<'_> {
                 }
             }
             let judged = self.verdicts.iter().find(|(receiver, _)| *receiver == k).map(|(_, a)| a);
-            let shown = Counted { receiver: r, figures: &self.figures[k], grid: &grid };
             section.blocks.extend(receiver_blocks::trade_figures(&shown, self.results, judged));
         }
         if let Some(view) = view {

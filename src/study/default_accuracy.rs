@@ -143,7 +143,8 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     let emitted = spline.results.power.emitted;
     let on_facets = trace_replicates(bound, &*undecided.source.octree(undecided.facets), &settings);
     let error = compare(bound, [&on_facets, &spline]);
-    let worst = worst_figure(bound, &error, &settings, scale);
+    let ends = &spline.results.power_errors;
+    let worst = worst_figure(bound, (&error, ends), &settings, scale);
     let mut alternatives = vec![
         alternative(tolerance, ON_FACETS, &worst, error.seconds[0] * scale),
         alternative(tolerance, ON_SPLINE, &Worst::default(), error.seconds[1] * scale),
@@ -180,9 +181,12 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     for way in ways_before_spline(worst.ratio, undecided.made_facets(), hits) {
         let tried = undecided.try_way(way, &settings, &spline);
         let tried_worst = match way {
-            Way::Finer(_) => worst_figure(bound, &tried.error, &settings, scale),
+            Way::Finer(_) => worst_figure(bound, (&tried.error, ends), &settings, scale),
             // Moved hits are mostly the spline's own: no difference at all is not none.
-            Way::Moved => worst_figure(bound, &tried.error.clone().with_unseen_rays(emitted), &settings, scale),
+            Way::Moved => {
+                let error = tried.error.clone().with_unseen_rays(emitted);
+                worst_figure(bound, (&error, ends), &settings, scale)
+            }
         };
         let seconds = tried.error.seconds[0] * scale + tried.finer.as_ref().map_or(0.0, |finer| finer.seconds);
         // Between the two that are always there.

@@ -1,15 +1,15 @@
 //! Errors of the hits of one intersector against the exact hits of the same rays, and the order at which they fall.
 
-use super::mesh_source::{reflect, refract};
 use super::{Quantiles, cross_check::angle_deg};
 use crate::intersect::Hit;
 use crate::math::Ray;
+use crate::optics::{reflect, refract};
 
 /// Sum of squares of logarithms below which all points stand at one abscissa and have no slope.
 const SAME_ABSCISSA: f64 = 1e-12;
 
-/// Relative index of the refraction that direction errors are given for: air to glass.
-pub(super) const GLASS: f64 = 1.5;
+/// Index of air over that of glass: the refraction that direction errors are given for.
+const AIR_TO_GLASS: f64 = 1.0 / 1.5;
 
 /// Errors of one intersector's hits against the exact hits of the same rays.
 #[derive(Clone, Debug, Default)]
@@ -46,7 +46,7 @@ impl HitErrors {
             e.reflected.add(angle_deg(reflect(ray.direction, h.normal), reflect(ray.direction, t.normal)));
             // Total reflection of either leaves no direction to compare.
             if let (Some(a), Some(b)) =
-                (refract(ray.direction, h.normal, GLASS), refract(ray.direction, t.normal, GLASS))
+                (refract(ray.direction, h.normal, AIR_TO_GLASS), refract(ray.direction, t.normal, AIR_TO_GLASS))
             {
                 e.refracted.add(angle_deg(a, b));
             }

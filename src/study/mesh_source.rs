@@ -2,7 +2,7 @@
 
 use super::tolerance_plan::TolerancePlan;
 use crate::intersect::{Cost, Hit, Intersector, NormalMode};
-use crate::math::{Ray, Vector};
+use crate::math::Ray;
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -108,34 +108,4 @@ pub(super) fn answer(
     };
     // Sums of integers: their order does not matter.
     rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).map(one).reduce(Cost::default, sum)
-}
-
-/// Returns the direction `d` mirrored at a surface with unit normal `n`, which may point to either side.
-pub(super) fn reflect(d: Vector, n: Vector) -> Vector {
-    d - n * (2.0 * d.dot(n))
-}
-
-/// Returns the direction behind a surface; `None` for total reflection. `index_ratio` is the index behind it over that before it, the
-/// inverse of what [`crate::optics::refract`] takes. Both vectors have unit length; the normal may point to either side.
-pub(super) fn refract(d: Vector, n: Vector, index_ratio: f64) -> Option<Vector> {
-    // Snell's law wants the normal against the ray.
-    let n = if d.dot(n) > 0.0 { -n } else { n };
-    let cos_i = -d.dot(n);
-    let sin2_t = (1.0 - cos_i * cos_i) / (index_ratio * index_ratio);
-    (sin2_t < 1.0).then(|| d / index_ratio + n * (cos_i / index_ratio - (1.0 - sin2_t).sqrt()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn snell_and_mirror() {
-        let d = Vector::new(0.6, 0.0, -0.8);
-        assert_eq!(reflect(d, Vector::Z), Vector::new(0.6, 0.0, 0.8));
-        let t = refract(d, Vector::Z, 1.5).unwrap();
-        assert!((t.x - 0.4).abs() < 1e-15 && (t.length() - 1.0).abs() < 1e-15 && t.z < 0.0);
-        assert_eq!(refract(d, -Vector::Z, 1.5), Some(t));
-        assert!(refract(Vector::new(0.8, 0.0, -0.6), Vector::Z, 1.0 / 1.5).is_none());
-    }
 }

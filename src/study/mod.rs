@@ -13,6 +13,7 @@ pub mod accuracy;
 pub mod accuracy_target;
 pub mod arbiter;
 pub mod complexity;
+mod counted_work;
 pub mod cross_check;
 pub mod default_accuracy;
 pub mod effects;

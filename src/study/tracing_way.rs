@@ -1,22 +1,13 @@
-//! Ways to trace a run between facets of the default tolerance and the spline, and the counted work that foretells which are cheaper than
+//! Ways to trace a run between facets of the default tolerance and the spline, and which of them counted work foretells to be cheaper than
 //! the spline.
 
+use super::counted_work::{FACET, FACET_HIT, MOVED_HIT, SPLINE_HIT, longer_on};
 use crate::intersect::NormalMode;
 
 /// The error of interpolated normals and places falls with the tolerance at first order or faster; so much finer to be sure.
 const MARGIN: f64 = 1.5;
 /// Finer facets are tried up to this many times the error allowed: beyond it they are too many for their work to be foretold.
 const MOST_FINER: f64 = 50.0;
-/// Work of one nearest hit on facets with the rest of its path, ns on one thread of an x86-64 of 2021 (AMD EPYC); measured on the
-/// three scenes of the fixtures, as are the others.
-const FACET_HIT: f64 = 350.0;
-/// Work of the same hit on facets and moved to the spline, ns: 0.5 to 0.6 of that on the spline on five scenes that ask it about no more
-/// than 1 % of them, 0.7 on a light guide that asks about 14 %.
-const MOVED_HIT: f64 = 500.0;
-/// Work of the same hit on the spline, ns; that of a hit to be moved, too, about which it is asked.
-const SPLINE_HIT: f64 = 850.0;
-/// Work of making one facet and sorting it into the octree, ns.
-const FACET: f64 = 15_000.0;
 
 /// Intersector and normals of a run on facets, of one whose facet hits are moved to the spline, and of one on the spline.
 pub(super) const ON_FACETS: (&str, NormalMode) = ("octree", NormalMode::Bilinear);
@@ -56,8 +47,8 @@ impl Way {
 /// the `facets` of the default tolerance change the worst figure, `hits` are those of the whole run.
 pub(super) fn ways_before_spline(excess: f64, facets: usize, hits: f64) -> Vec<Way> {
     let factor = MARGIN * excess;
-    // The number of facets goes with the inverse of the tolerance; tracing takes about a tenth longer for each halving of it.
-    let finer = factor * facets as f64 * FACET + hits * FACET_HIT * (1.0 + 0.1 * factor.log2());
+    // The number of facets goes with the inverse of the tolerance.
+    let finer = factor * facets as f64 * FACET + hits * FACET_HIT * longer_on(factor);
     // Of moved hits only a trial tells about how many the spline must be asked.
     let mut ways = vec![(Way::Moved, hits * MOVED_HIT)];
     if factor <= MOST_FINER {

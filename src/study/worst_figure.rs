@@ -1,10 +1,10 @@
 //! The figure of a run that facets get most wrong, against the standard error that the whole run will have.
 
 use super::figures::figure_in_words;
-use super::geometric_error::{FaceError, GeometricError, ReceiverError};
+use super::geometric_error::{EndErrors, FaceError, GeometricError, ReceiverError};
 use crate::math::FaceId;
 use crate::simulate::scene::Sampling;
-use crate::simulate::{BoundScene, RunSettings};
+use crate::simulate::{BoundScene, Power, RunSettings};
 
 /// Standard errors of sums over a scrambled net fall with the number of rays to this power: 0.52 to 0.68 for power, positions and
 /// widths on the three scenes of the fixtures from 2¹⁴ to 2²⁰ rays.
@@ -26,11 +26,12 @@ pub(super) struct Worst {
     pub(super) figure: String,
 }
 
-/// Finds the figure whose geometric error is largest against the statistical one that a run of `scale` times the rays will have, among them
-/// those of the faces that the scene lists; a ratio of 0 and no name where facets change nothing.
+/// Finds the figure whose geometric error is largest against the statistical one that a run of `scale` times the pilot's rays will have,
+/// among them those of the faces that the scene lists; a ratio of 0 and no name where facets change nothing. `ends` are the pilot's
+/// statistical errors of the powers by where light ended.
 pub(super) fn worst_figure(
     bound: &BoundScene,
-    error: &GeometricError,
+    (error, ends): (&GeometricError, &Power),
     settings: &RunSettings,
     scale: f64,
 ) -> Worst {
@@ -42,6 +43,7 @@ pub(super) fn worst_figure(
             worst.weigh([&r.name, figure], geometric, allowed, value);
         });
     }
+    worst.weigh_ends(&error.power, ends, sums);
     for a in &error.absorbed {
         let figure = format!("absorbed in {}", a.r#in);
         worst.weigh([&a.name, &figure], a.power.geometric(), a.statistical * sums, a.power.spline);
@@ -90,6 +92,19 @@ fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut
 }
 
 impl Worst {
+    /// Takes the powers by where light ended; `sums` is the factor from the statistical errors of the pilot to those of the whole run.
+    fn weigh_ends(&mut self, errors: &EndErrors, statistical: &Power, sums: f64) {
+        let powers = [
+            ("received", errors.received, statistical.received),
+            ("absorbed", errors.absorbed, statistical.absorbed),
+            ("escaped", errors.escaped, statistical.escaped),
+            ("cut off", errors.cut_off, statistical.cut_off),
+        ];
+        for (figure, power, statistical) in powers {
+            self.weigh(["all light", figure], power.geometric(), statistical * sums, power.spline);
+        }
+    }
+
     /// Takes a figure of `of`, with its geometric error, the statistical one of the whole run (`allowed`) and its value, in place of the
     /// worst so far if it is worse.
     fn weigh(&mut self, [of, figure]: [&str; 2], geometric: f64, allowed: f64, value: f64) {
@@ -132,11 +147,23 @@ fn two_digits(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::geometric_error::Paired;
 
     #[test]
     fn two_digits_are_told() {
         let told = [477.48, 12.3, 4.04, 0.519, 0.0123, 99.7].map(two_digits);
         assert_eq!(told, ["480", "12", "4.0", "0.52", "0.012", "100"]);
+    }
+
+    #[test]
+    fn light_that_no_receiver_counts_is_weighed() {
+        let power = |facets: f64, spline: f64| Paired { facets, spline, error: 0.0 };
+        let errors = EndErrors { received: power(0.6, 0.6), escaped: power(0.39, 0.4), ..Default::default() };
+        let statistical = Power { received: 1e-3, escaped: 4e-3, ..Default::default() };
+        let mut worst = Worst::default();
+        worst.weigh_ends(&errors, &statistical, 0.5);
+        // 0.01 of 0.4, and of half of 0.004.
+        assert_eq!(worst.in_words(), "all light: escaped by 2.5 %, 5.0 times its standard error");
     }
 
     #[test]

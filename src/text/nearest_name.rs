@@ -14,12 +14,22 @@ pub(crate) fn nearest_name<'a>(word: &str, candidates: impl IntoIterator<Item = 
         .map(|(_, c)| c)
 }
 
-/// Returns advice that names the nearest name, or the first twelve where none is near.
-pub(crate) fn nearest_or_all(word: &str, names: &[&str]) -> String {
-    match nearest_name(word, names.iter().copied()) {
-        Some(near) => format!("did you mean '{near}'?"),
-        // Twelve fit into a line or two.
-        None => format!("there are: {}", names[..names.len().min(12)].join(", ")),
+/// Names that advice lists at most: a line or two of them.
+const LISTED: usize = 12;
+
+/// Returns advice that names the nearest name, or the first in alphabetical order where none is near; `None` without names. Empty ones are
+/// sorted out.
+pub(crate) fn nearest_or_listed<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    let mut names: Vec<&str> = names.into_iter().filter(|name| !name.is_empty()).collect();
+    if let Some(near) = nearest_name(word, names.iter().copied()) {
+        return Some(format!("did you mean '{near}'?"));
+    }
+    names.sort_unstable();
+    names.dedup();
+    match names.len() {
+        0 => None,
+        n if n <= LISTED => Some(format!("there are: {}", names.join(", "))),
+        n => Some(format!("there are {n}, among them: {}", names[..LISTED].join(", "))),
     }
 }
 
@@ -54,5 +64,19 @@ mod tests {
         assert_eq!(nearest_name("", ["A"]), None);
         assert_eq!(nearest_name("änäöü", ["äbcdü"]), None);
         assert_eq!(edit_distance("kitten", "sitting"), 3);
+    }
+
+    #[test]
+    fn without_a_near_name_some_are_listed() {
+        let advice = |word, names: &[&'static str]| nearest_or_listed(word, names.iter().copied());
+        assert_eq!(advice("huosing", &["cover", "housing"]).unwrap(), "did you mean 'housing'?");
+        assert_eq!(advice("xyz", &["housing", "", "cover", "cover"]).unwrap(), "there are: cover, housing");
+        assert_eq!(advice("xyz", &[""]), None);
+        let many: Vec<String> = (10..40).map(|k| format!("part {k}")).collect();
+        let listed = nearest_or_listed("xyz", many.iter().map(String::as_str)).unwrap();
+        assert!(
+            listed.starts_with("there are 30, among them: part 10, ") && listed.ends_with(", part 21"),
+            "{listed}"
+        );
     }
 }

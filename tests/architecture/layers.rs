@@ -138,7 +138,6 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "mod",
             "error",
-            "suggest",
             "settings",
             "monitor",
             "turn",
@@ -214,6 +213,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "mod",
             "phase",
             "refraction",
+            "facet_normals",
             "fresnel",
             "polarised",
             "sampling",
@@ -522,6 +522,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "figures",
             "model_figures",
             "worst_figure",
+            "counted_work",
             "tracing_way",
             "default_accuracy",
             "stored_choice",

@@ -3,9 +3,10 @@
 use crate::files::{fixture, step_files};
 use crate::known_scenes;
 use lampyris::intersect::{Cost, Footprint, Hit, Intersector, NormalMode};
-use lampyris::math::{FaceId, Ray, Vector};
+use lampyris::math::{FaceId, Frame, Ray, Vector};
 use lampyris::mesh::FacetMesh;
-use lampyris::model::Model;
+use lampyris::model::{Face, Model, Shell};
+use lampyris::nurbs::sweep;
 use lampyris::pipeline::{MeshingSettings, Silent, TracingSettings, settings_for_accuracy};
 use lampyris::simulate::Scene;
 use lampyris::step;
@@ -148,6 +149,8 @@ struct Counted<'m> {
     product: ModelMeshSource<'m>,
     renumbered: Option<Renumbered<'m>>,
     facets: Mutex<Vec<usize>>,
+    /// Seconds that a mesh is said to take.
+    seconds: Option<f64>,
 }
 
 struct Renumbered<'m>(ModelMeshSource<'m>);
@@ -169,7 +172,8 @@ impl MeshSource for Counted<'_> {
     }
 
     fn mesh_plan(&self, plan: &TolerancePlan) -> MeasuredMesh {
-        let made = self.product.mesh_plan(plan);
+        let mut made = self.product.mesh_plan(plan);
+        made.seconds = self.seconds.unwrap_or(made.seconds);
         self.facets.lock().unwrap().push(made.mesh.facets.len());
         made
     }
@@ -189,7 +193,7 @@ impl MeshSource for Counted<'_> {
 
 fn counted<'m>(model: &'m Model, renumbers: bool) -> Counted<'m> {
     let renumbered = renumbers.then(|| Renumbered(ModelMeshSource::new(model)));
-    Counted { product: ModelMeshSource::new(model), renumbered, facets: Mutex::default() }
+    Counted { product: ModelMeshSource::new(model), renumbered, facets: Mutex::default(), seconds: None }
 }
 
 #[test]
@@ -243,6 +247,60 @@ fn rays_that_facets_alone_send_must_keep_what_is_asked() {
     assert!(alike.kept && apart.kept, "{}\n{}", alike.answer, apart.answer);
     // Mirrored light errs by 2·(s/R)·tan i: at 9 to 9.9 of 10 the tangent is 2 to 7, at up to 2 it is at most 0.2.
     assert!(apart.facets > 2 * alike.facets, "{}\n{}", alike.answer, apart.answer);
+}
+
+/// However much light meets a plane, what little meets a curved face beside it keeps what is asked.
+#[test]
+fn hits_on_flat_faces_do_not_make_up_for_others() {
+    let ball = known_scenes::ball(10.0, 1.5);
+    let plane = sweep::plane(&Frame::IDENTITY, [[20.0, 40.0], [0.0, 20.0]]);
+    let mut model = ball.model.clone();
+    model.parts[0].shells.push(Shell { faces: vec![Face::whole(plane)], ..Shell::default() });
+    let source = ModelMeshSource::new(&model);
+    let kinds = vec![NormalMode::Bilinear];
+    let target = AccuracyTarget { check_rays: 40_000, kinds, ..AccuracyTarget::for_angle_deg(0.3) };
+    // One ray in so many falls on the ball, from 4 to 8 mm off its axis.
+    let found = |one_in: u64| {
+        let rays = |_: &dyn Intersector, _: u64, count: u64| -> Vec<Ray> {
+            let x = |k: u64| {
+                let share = (k as f64 + 0.5) / count as f64;
+                if k.is_multiple_of(one_in) { 4.0 + 4.0 * share } else { 20.0 + 20.0 * share }
+            };
+            (0..count).map(|k| Ray::new(Vector::new(x(k), 0.1, -50.0), Vector::Z)).collect()
+        };
+        let light = JobLight { rays: &rays, relative_index: &|_| None };
+        meet_target_for_light(&model, &source, &target, light, &|_| ()).unwrap()
+    };
+    let [alone, rare] = [found(1), found(200)];
+    assert!(alone.kept && rare.kept && rare.checked == 400, "{}\n{}", alone.answer, rare.answer);
+    let ratio = rare.facets as f64 / alone.facets as f64;
+    assert!((0.7..1.5).contains(&ratio), "{}\n{}", alone.answer, rare.answer);
+}
+
+/// Light that meets planes alone is never misdirected.
+#[test]
+fn on_flat_faces_alone_any_angle_is_kept() {
+    let plane = sweep::plane(&Frame::IDENTITY, [[0.0, 20.0], [0.0, 20.0]]);
+    let mut model = known_scenes::ball(10.0, 1.5).model;
+    model.parts[0].shells[0] = Shell { faces: vec![Face::whole(plane)], ..Shell::default() };
+    let target = AccuracyTarget { check_rays: 4000, ..AccuracyTarget::for_angle_deg(1e-6) };
+    let found = meet_target(&model, &ModelMeshSource::new(&model), &target, &|_| ()).unwrap();
+    assert!(found.kept && found.reached_deg == Some(0.0) && found.facets < 100, "{}", found.answer);
+    assert!(found.answer.contains("reached 0° (fresh rays met flat faces alone)"), "{}", found.answer);
+}
+
+/// A loaded machine finds the same facets as an idle one.
+#[test]
+fn what_is_chosen_does_not_depend_on_a_clock() {
+    let ball = known_scenes::ball(10.0, 1.5);
+    let target = AccuracyTarget { check_rays: 4000, ..AccuracyTarget::for_angle_deg(0.3) };
+    let chosen = |seconds| {
+        let source = Counted { seconds: Some(seconds), ..counted(&ball.model, false) };
+        let found = meet_target(&ball.model, &source, &target, &|_| ()).unwrap();
+        let tried: Vec<_> = found.trials.iter().map(|t| (t.normals.clone(), t.facets)).collect();
+        (found.normals, found.plan, tried)
+    };
+    assert_eq!(chosen(0.0), chosen(1e4));
 }
 
 /// A search for what cannot be reached ends after a counted number of facets with the best that it found, and says so.

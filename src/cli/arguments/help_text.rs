@@ -20,7 +20,7 @@ pub(crate) const FACET_LONG: &str = concat!(
 
 JSON (--json): facets, quads, triangles, vertices, tolerance_mm, sag_mm (bound_max is proved over certified facets, sampled_max and sampled_mean are \
 measured by other code), over_tolerance, normal_error_deg, area_mm2, volume_mm3, shells, open_edges, faces, seconds. \
-With --accuracy also 'accuracy': asked_deg, reached_deg (99th percentile of fresh rays against the spline), kept, normals, \
+With --accuracy also 'accuracy': asked_deg, reached_deg (99th percentile of fresh rays at curved faces, against the spline), kept, normals, \
 tolerance_mm, and every combination tried."
 );
 

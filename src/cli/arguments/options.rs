@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// A direction error asked for in place of a tolerance.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct AccuracyOption {
-    /// Ask for a direction error (99th percentile) in place of a tolerance, such as 0.05deg
+    /// Ask for a direction error (99th percentile at curved faces) in place of a tolerance, such as 0.05deg
     #[arg(
         long,
         help_heading = "Facets",

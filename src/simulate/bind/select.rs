@@ -219,24 +219,14 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Res
     if faces.is_empty() {
         let error = scene.error(ErrorKind::NoMatch, &at, "this receiver matches no face of the model");
         let names = model.instances.iter().flat_map(|i| [model.part(i.part).name.as_str(), i.name.as_str()]);
-        return Err(error.help(advice("", names.collect())));
+        return Err(error.help(advice("", names)));
     }
     Ok(faces)
 }
 
-/// Returns advice that names the nearest name, or the first twelve in alphabetical order where none is near; sorts out empty ones.
-pub(super) fn advice(word: &str, mut names: Vec<&str>) -> String {
-    if let Some(near) = text::nearest_name(word, names.iter().copied().filter(|n| !n.is_empty())) {
-        return format!("did you mean '{near}'?");
-    }
-    names.sort_unstable();
-    names.dedup();
-    names.retain(|n| !n.is_empty());
-    match names.len() {
-        0 => "the model has no such names".into(),
-        n if n <= 12 => format!("there are: {}", names.join(", ")),
-        n => format!("there are {n}, among them: {}", names[..12].join(", ")),
-    }
+/// Returns advice that names the nearest name, or some where none is near.
+pub(super) fn advice<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    text::nearest_or_listed(word, names).unwrap_or_else(|| "the model has no such names".into())
 }
 
 #[cfg(test)]

@@ -357,12 +357,9 @@ fn stated_media(scene: &Scene, source: usize, bodies: &[Body]) -> Result<SmallVe
         let Some(body) = bodies.iter().skip(1).position(|b| b.is_called(instance)) else {
             let at = [scene::Key::Name("source"), scene::Key::Index(source), scene::Key::Name("inside")];
             let message = format!("no instance called '{instance}' has a medium");
-            let names: Vec<&str> = bodies.iter().skip(1).map(|b| b.name.as_str()).collect();
-            let advice = if names.is_empty() {
-                "no instance has a `medium`; leave `inside` out".into()
-            } else {
-                text::nearest_or_all(instance, &names)
-            };
+            let names = bodies.iter().skip(1).map(|b| b.name.as_str());
+            let advice = text::nearest_or_listed(instance, names)
+                .unwrap_or_else(|| "no instance has a `medium`; leave `inside` out".into());
             return Err(scene.error(ErrorKind::NoMatch, &at, message).help(advice));
         };
         // Body 0 are the surroundings.

@@ -161,7 +161,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
                 None
             }
         };
-        self.tally.counts.corrected_normals += u64::from(at.corrected_normals);
+        self.tally.counts.corrected_normals += u64::from(at.normals.corrections);
         if C::MEDIA {
             self.tally.counts.refused_contacts += u64::from(at.refused_contact);
         }

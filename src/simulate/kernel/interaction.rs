@@ -7,7 +7,7 @@ use super::payload::RayPayload;
 use crate::intersect::Hit;
 use crate::math::{Departure, Point, Vector};
 use crate::optics::polarised::{Mueller, Stokes};
-use crate::optics::{Scatter, reflect};
+use crate::optics::{FacetNormals, Scatter, reflect};
 use crate::simulate::outcome::LostCause;
 use crate::simulate::random::{Key, Purpose};
 use crate::simulate::surfaces::FaceOptics;
@@ -21,8 +21,8 @@ pub(super) struct SurfaceInteraction<'a> {
     pub(super) point: Point,
     /// Distance from the face that the next segment passes over, mm: the glue distance at touching faces, else 0.
     pub(super) skip: f64,
-    /// Times that the facet's normal had to be taken for the interpolated one.
-    pub(super) corrected_normals: u32,
+    /// Its normals, and how often the facet's own had to be taken.
+    pub(super) normals: FacetNormals,
     /// Two bodies that are found to overlap here.
     pub(super) overlap: Option<[u32; 2]>,
     /// Whether another body touches here that light cannot cross into or out of.
@@ -74,37 +74,8 @@ impl<'a> SurfaceInteraction<'a> {
     /// Makes the meeting of a ray with a face at a point, of which nothing is known yet.
     #[inline(always)]
     pub(super) fn new(hit: &'a Hit, face: FaceOptics, entering: bool, point: Point) -> Self {
-        let (skip, corrected_normals) = (0.0, 0);
-        Self { hit, face, entering, point, skip, corrected_normals, overlap: None, refused_contact: false }
-    }
-
-    /// Returns the normal to shade with and the cosine of incidence, from 0 to 1. A normal that looks away from the ray is replaced by the
-    /// facet's, and counted.
-    #[inline(always)]
-    pub(super) fn shading_normal(&mut self, direction: Vector) -> (Vector, f64) {
-        let shaded = direction.dot(self.hit.normal);
-        let flat = direction.dot(self.hit.geometric_normal);
-        // Both normals must see the ray from one side: interpolated ones may tip over at grazing incidence.
-        if shaded * flat > 0.0 {
-            (self.hit.normal, shaded.abs().min(1.0))
-        } else {
-            self.corrected_normals += 1;
-            (self.hit.geometric_normal, flat.abs().min(1.0))
-        }
-    }
-
-    /// Returns the reflected direction, on the side of the facet that the ray came from; about the facet's normal, and counted, where
-    /// `normal` would send it through.
-    #[inline(always)]
-    pub(super) fn reflected_direction(&mut self, direction: Vector, normal: Vector) -> Vector {
-        let flat = self.hit.geometric_normal;
-        let r = reflect(direction, normal);
-        // A reflection that points into the facet would meet it again from inside.
-        if r.dot(flat) * direction.dot(flat) < 0.0 {
-            return r;
-        }
-        self.corrected_normals += 1;
-        reflect(direction, flat)
+        let normals = FacetNormals::new(hit.normal, hit.geometric_normal);
+        Self { hit, face, entering, point, skip: 0.0, normals, overlap: None, refused_contact: false }
     }
 
     /// Returns the place as one that a ray leaves.
@@ -150,7 +121,7 @@ impl<C: RayPayload> Division<'_, C> {
         at: &mut SurfaceInteraction<'_>,
     ) -> Vector {
         self.take_payload::<0>(context, path, d);
-        let specular = at.reflected_direction(d, self.normal);
+        let specular = at.normals.reflected(d, self.normal);
         self.scattered_direction(context, path, specular, at)
     }
 
@@ -223,6 +194,6 @@ fn scatter_at<C: RayPayload>(
     }
     // The lobe stands about the shading normal and may dip below the surface itself. Mirrored back the power is kept, and the count says
     // how often that was.
-    at.corrected_normals += 1;
+    at.normals.corrections += 1;
     reflect(direction, side)
 }

@@ -7,7 +7,7 @@ use super::path::Path;
 use super::payload::RayPayload;
 use crate::math::{Ray, Vector};
 use crate::optics::polarised::{self, Mueller};
-use crate::optics::{Coating, Split, fresnel, refract_with_cosine};
+use crate::optics::{Coating, Split, fresnel};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::surfaces::{Coated, Surface};
 use crate::simulate::tally::round_quanta;
@@ -42,18 +42,18 @@ fn mirror_interaction<'s, C: RayPayload>(
     direction: Vector,
     at: &mut SurfaceInteraction<'_>,
 ) -> Interaction<'s, C> {
-    let (normal, _) = at.shading_normal(direction);
+    let (normal, _) = at.normals.facing(direction);
     let mut payload = path.payload;
     turn_polarisation(context, &mut payload, &CONDUCTOR, direction, normal);
     // In whole quanta, so that what is kept and what is absorbed add up to the last one.
     let kept = round_quanta(path.quanta * share);
-    Interaction::Reflect { kept, direction: at.reflected_direction(direction, normal), payload }
+    Interaction::Reflect { kept, direction: at.normals.reflected(direction, normal), payload }
 }
 
 /// Returns what the bare boundary of a body does to light: both ways on with their shares; nothing is drawn or booked.
 ///
 /// Light passes unchanged where its innermost body stays the same. After too long by total reflection alone it is trapped, and it is lost
-/// where its media cannot be on the other side even when found anew. Writes `skip`, `overlap`, `refused_contact` and `corrected_normals` of
+/// where its media cannot be on the other side even when found anew. Writes `skip`, `overlap`, `refused_contact` and the corrections of `normals` in
 /// `at`.
 #[inline(always)]
 fn interface_interaction<'s, C: RayPayload>(
@@ -75,7 +75,7 @@ fn interface_interaction<'s, C: RayPayload>(
     }
     let eta = context.index(here, &payload) / context.index(there, &payload);
     let d = ray.direction;
-    let (normal, cos_i, transmitted) = refracted(d, eta, at);
+    let (normal, cos_i, transmitted) = at.normals.refracted(d, eta);
     // Total reflection: no light is on the other side, so `across` is dropped.
     let Some((transmitted, cos_t)) = transmitted else {
         if path.is_trapped_in(context, here) {
@@ -84,7 +84,7 @@ fn interface_interaction<'s, C: RayPayload>(
         if payload.stokes_mut().is_some() {
             turn_polarisation(context, &mut payload, &polarised::reflected(cos_i, eta), d, normal);
         }
-        return Interaction::ReflectTotally { direction: at.reflected_direction(d, normal), payload };
+        return Interaction::ReflectTotally { direction: at.normals.reflected(d, normal), payload };
     };
     // From both cosines, which refraction has already worked out: no further root.
     let mut share = fresnel::of_cosines(cos_i, cos_t, eta).unpolarised();
@@ -148,7 +148,7 @@ fn coating_interaction<'s, C: RayPayload>(
     // The shares of the coating between these media, which may have been found anew.
     let [n1, n2] = [payload.body(), across.body()].map(|body| context.index(body, &payload));
     let d = ray.direction;
-    let (normal, cos_i, transmitted) = refracted(d, n1 / n2, at);
+    let (normal, cos_i, transmitted) = at.normals.refracted(d, n1 / n2);
     let wavelength = payload.wavelength().unwrap_or(context.bound.light.wavelength);
     let split = coated.coating.split(cos_i, n1, n2, wavelength);
     let mut shares = [split.reflected.unpolarised(), split.transmitted.unpolarised()];
@@ -198,23 +198,6 @@ fn polarised_share<C: RayPayload>(
         Some(stokes) if context.polarised() => stokes.through(m, d, n).i.clamp(0.0, 1.0),
         _ => unpolarised,
     }
-}
-
-/// Returns the normal to refract about, the cosine of incidence, and the refracted direction on the far side of the facet with its cosine;
-/// `None` for these two at total reflection. `eta` is the index before the face over that behind it. Counts in `at` where the facet's
-/// normal was taken.
-#[inline(always)]
-fn refracted(d: Vector, eta: f64, at: &mut SurfaceInteraction<'_>) -> (Vector, f64, Option<(Vector, f64)>) {
-    let flat = at.hit.geometric_normal;
-    let (normal, cos_i) = at.shading_normal(d);
-    let transmitted = refract_with_cosine(d, normal, eta);
-    // The interpolated normal would send the transmitted ray back to the side it came from: the facet's own decides
-    // then.
-    if transmitted.is_none_or(|(t, _)| t.dot(flat) * d.dot(flat) > 0.0) {
-        return (normal, cos_i, transmitted);
-    }
-    at.corrected_normals += 1;
-    (flat, d.dot(flat).abs().min(1.0), refract_with_cosine(d, flat, eta))
 }
 
 /// Returns the matrices of reflection and transmission; a table has no phases, and reflects like a conductor.

@@ -2,8 +2,8 @@
 
 use crate::intersect::Hit;
 use crate::math::{FaceId, Vector};
+use crate::optics::{FacetNormals, reflect, refract};
 use crate::study::cross_check::angle_deg;
-use crate::study::mesh_source::{reflect, refract};
 
 /// Returns how far off, degrees, light of direction `incoming` leaves its hit on facets, by its hit on the spline; `None` where the two are
 /// on faces that do not touch back to back, within `apart_mm` along the normal. `relative_index` is that of [`direction_error_deg`] for a
@@ -16,41 +16,43 @@ pub(super) fn error_of_hit(
 ) -> Option<f64> {
     let inside = relative_index(spline.face);
     if facet.face == spline.face {
-        return Some(direction_error_deg(incoming, [facet.normal, facet.geometric_normal], spline.normal, inside));
+        let normals = FacetNormals::new(facet.normal, facet.geometric_normal);
+        return Some(direction_error_deg(incoming, normals, spline.normal, inside));
     }
     // Where two bodies touch, facets may name the face of the one and the spline that of the other, which looks the other way.
     let distance = (facet.t - spline.t) * spline.normal.dot(incoming);
     let touches = facet.normal.dot(spline.normal) < 0.0 && distance.abs() <= apart_mm;
     // From body to body the surroundings cancel.
     let between = inside.zip(relative_index(facet.face)).map(|(inside, around)| inside / around).or(inside);
-    let seen_back = [-facet.normal, -facet.geometric_normal];
+    let seen_back = FacetNormals::new(-facet.normal, -facet.geometric_normal);
     touches.then(|| direction_error_deg(incoming, seen_back, spline.normal, between))
 }
 
 /// Returns the larger of the angles, degrees, between the directions that a facet and the spline's normal send light of direction
 /// `incoming` to: mirrored, and refracted where the face lets light through and neither reflects it totally. All are unit vectors,
-/// normals outward; those of the facet are the interpolated one and its own, which a simulation takes where the former would send light to
-/// the wrong side.
+/// normals outward; light leaves the facet as in a simulation.
 ///
 /// `relative_index` is the index of the body that the face bounds over that around it, `None` where no light passes. Just short of total
 /// reflection light leaves the body misdirected by many times the error of the normal, mirrored light by twice at most.
-fn direction_error_deg(incoming: Vector, facet: [Vector; 2], spline: Vector, relative_index: Option<f64>) -> f64 {
+fn direction_error_deg(
+    incoming: Vector,
+    mut facet: FacetNormals,
+    spline: Vector,
+    relative_index: Option<f64>,
+) -> f64 {
     let comes_out = incoming.dot(spline) > 0.0;
-    let index_ahead = relative_index.map(|inside| if comes_out { inside.recip() } else { inside });
-    let [interpolated, flat] = facet;
-    let goes_on = |direction: Vector| direction.dot(flat) * incoming.dot(flat) > 0.0;
-    let passes = index_ahead.and_then(|index| refract(incoming, interpolated, index)).is_none_or(goes_on);
-    let faces_light = incoming.dot(interpolated) * incoming.dot(flat) > 0.0;
-    let facet = if passes && faces_light { interpolated } else { flat };
-    let reflected =
-        Some(reflect(incoming, facet)).filter(|r| !goes_on(*r)).unwrap_or_else(|| reflect(incoming, flat));
-    let mirrored = angle_deg(reflected, reflect(incoming, spline));
-    let Some(index_ahead) = index_ahead else { return mirrored };
-    match (refract(incoming, facet, index_ahead), refract(incoming, spline, index_ahead)) {
-        (Some(facet), Some(spline)) => mirrored.max(angle_deg(facet, spline)),
-        // What is reflected totally on one side passes on the other with next to no power.
-        _ => mirrored,
-    }
+    // The index before the face over that behind it.
+    let eta = relative_index.map(|inside| if comes_out { inside } else { inside.recip() });
+    let (normal, refracted) = match eta {
+        Some(eta) => {
+            let (normal, _, transmitted) = facet.refracted(incoming, eta);
+            (normal, transmitted.map(|(direction, _)| direction).zip(refract(incoming, spline, eta)))
+        }
+        None => (facet.facing(incoming).0, None),
+    };
+    let mirrored = angle_deg(facet.reflected(incoming, normal), reflect(incoming, spline));
+    // What is reflected totally on one side passes on the other with next to no power.
+    refracted.map_or(mirrored, |(facet, spline)| mirrored.max(angle_deg(facet, spline)))
 }
 
 #[cfg(test)]
@@ -65,7 +67,9 @@ mod tests {
 
     #[test]
     fn beside_total_reflection_the_refracted_light_errs_most() {
-        let error = |light: Vector, index| direction_error_deg(light, [off_z(0.01); 2], Vector::Z, index);
+        let error = |light: Vector, index| {
+            direction_error_deg(light, FacetNormals::new(off_z(0.01), off_z(0.01)), Vector::Z, index)
+        };
         // A mirror turns light by twice what its normal is turned.
         assert!((error(off_z(40.0), None) - 0.02).abs() < 1e-9);
         // asin(1.5 sin 41.5°) = 83.67°, and 83.54° for a normal turned by 0.01°: Snell's law by hand, less the turn itself.
@@ -81,11 +85,12 @@ mod tests {
     /// 86.2°, at 90.5° to the facet's own and so back into the glass. The simulation goes by the facet's own then; a mirror does not.
     #[test]
     fn the_facets_own_normal_counts_where_a_simulation_takes_it() {
-        let facet = [off_z(4.3), Vector::Z];
+        let facet = FacetNormals::new(off_z(4.3), Vector::Z);
         let error = |index| direction_error_deg(off_z(46.0), facet, Vector::Z, index);
         assert!((error(None) - 8.6).abs() < 1e-9 && error(Some(1.5)).abs() < 1e-9, "{:?}", error(Some(1.5)));
         // Of light at 88° a normal turned by 3° makes a reflection at 94°, through the facet.
-        let grazing = |flat| direction_error_deg(-off_z(88.0), [off_z(-3.0), flat], Vector::Z, None);
+        let grazing =
+            |flat| direction_error_deg(-off_z(88.0), FacetNormals::new(off_z(-3.0), flat), Vector::Z, None);
         assert!(grazing(Vector::Z).abs() < 1e-9 && (grazing(off_z(-3.0)) - 6.0).abs() < 1e-9);
     }
 }

@@ -5,9 +5,9 @@
 //! tolerance in proportion to the radius, sag ≤ ε·R/(2 tan i). The same rays on such facets then tell how far each face is from what was
 //! asked, for facets do not err as much as the formula allows. Fresh rays judge the result against the spline.
 //!
-//! Every kind of normals that could be the cheapest is made to reach what is asked and then timed. The answer names
-//! the largest error beside the 99th percentile, and rays that no angle stands for. Known weakness: other rays (more grazing ones) err
-//! more.
+//! Every kind of normals that could be the cheapest is made to reach what is asked. What is cheapest follows from counted work, never from
+//! a clock, so that every machine takes the same facets; the seconds of the answer are measured. It names the largest error beside the
+//! 99th percentile, and rays that no angle stands for. Known weakness: other rays (more grazing ones) err more.
 
 mod direction_error;
 mod search;
@@ -27,7 +27,8 @@ const MOST_FACETS: f64 = 6e6;
 /// What is asked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AccuracyTarget {
-    /// Direction error that 99 % of the rays must keep, mirrored and, where a face is known to let light through, refracted; degrees.
+    /// Direction error that 99 % of the hits on curved faces must keep, of the mirrored light and, where a face is known to let light through,
+    /// of the refracted; degrees.
     pub angle_deg: f64,
     /// Rays that the job will trace: a long job pays for finer facets or faster normals differently than a short one; 0 when only
     /// the facets are wanted.
@@ -67,8 +68,8 @@ impl AccuracyTarget {
 pub struct AccuracyResult {
     /// Error that was asked for, degrees.
     pub asked_deg: f64,
-    /// Reached on fresh rays (p99, the worse of those traced on facets and on the spline), degrees; `None` where none met the same face on
-    /// both.
+    /// Reached on curved faces by fresh rays (p99, the worse of those traced on facets and on the spline), degrees; 0 where flat ones alone
+    /// were met, `None` where no face was the same on both.
     pub reached_deg: Option<f64>,
     /// The largest error of these rays, degrees; `None` as above.
     pub largest_deg: Option<f64>,
@@ -90,7 +91,7 @@ pub struct AccuracyResult {
     /// Every combination that was measured on fresh rays.
     #[serde(rename = "tries")]
     pub trials: Vec<Trial>,
-    /// Rays of the check that hit.
+    /// Rays of the check that hit curved faces.
     pub checked: u64,
     /// Rays of the check that hit on one of facets and spline only, or different faces: no angle stands for them.
     pub flips: u64,
@@ -111,7 +112,7 @@ pub struct Trial {
     pub facets: usize,
     /// 99th percentile of the direction error, degrees; `None` where no ray met the same face on facets and spline.
     pub reached_deg: Option<f64>,
-    /// Seconds for the whole job.
+    /// Seconds for the whole job, measured.
     pub seconds: f64,
 }
 

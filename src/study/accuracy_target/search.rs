@@ -1,14 +1,14 @@
 //! The search for the cheapest tolerances and normals that meet an accuracy target.
 
-use super::solution::Solution;
+use super::solution::{JobWork, Solution};
 use super::survey::{Survey, tolerance_factor};
 use super::trial_rays::{DirectionErrors, ReferenceRays};
 use super::{AccuracyResult, AccuracyTarget, Trial};
-use crate::intersect::{Intersector, NormalMode};
+use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::{Aabb, FaceId, Ray};
 use crate::model::Model;
 use crate::study::Progress;
-use crate::study::mesh_source::{FacetTree, MeshSource, answer, with_intersectors};
+use crate::study::mesh_source::{FacetTree, MeshSource, with_intersectors};
 use crate::study::rays::{RaySource, Uniform};
 use crate::study::timing::Clock;
 use crate::study::tolerance_plan::TolerancePlan;
@@ -106,13 +106,13 @@ pub fn meet_target_for_light(
     let even =
         target.kinds.iter().filter(|n| **n != NormalMode::Exact).map(|&normals| search.candidate(normals, false));
     let mut kinds: Vec<Candidate> = local.chain(even).collect();
-    // The one that promises to be cheapest first: what it is measured to cost may rule out the others.
-    kinds.sort_by(|a, b| a.predicted.total_cmp(&b.predicted));
+    // The one that promises to be cheapest first: what it comes to may rule out the others.
+    kinds.sort_by(|a, b| a.work.total_cmp(&b.work));
     let mut trials: Vec<Trial> = Vec::new();
     let mut best: Option<Solution> = None;
     for (k, candidate) in kinds.iter().enumerate() {
-        // A kind that is dearer by its own forecast than what another was measured to cost is not worth the wait.
-        let beaten = best.as_ref().is_some_and(|b| b.is_kept(target) && candidate.predicted > 0.8 * b.seconds());
+        // A kind that is dearer by its own forecast than what another came to is not worth the wait.
+        let beaten = best.as_ref().is_some_and(|b| b.is_kept(target) && candidate.work > 0.8 * b.work.total());
         if beaten {
             continue;
         }
@@ -122,7 +122,7 @@ pub fn meet_target_for_light(
         let is_open = best.as_ref().is_none_or(|b| !b.is_kept(target));
         let Some(found) = search.reach(candidate, is_open, &mut trials) else { continue };
         let better = |b: &Solution| match (found.is_kept(target), b.is_kept(target)) {
-            (true, true) => found.seconds() < b.seconds(),
+            (true, true) => found.work.total() < b.work.total(),
             (false, false) => found.errs_less(b),
             (is_kept, _) => is_kept,
         };
@@ -167,18 +167,17 @@ struct Candidate {
     plan: TolerancePlan,
     /// Order of the error in the sag.
     order: f64,
-    /// Facets and seconds that are expected.
+    /// Facets and counted work that are expected.
     facets: f64,
-    predicted: f64,
+    work: f64,
 }
 
 /// What some rays showed on the facets of a plan.
 struct Measured<E> {
     /// The face of each facet.
     made: Vec<FaceId>,
-    /// Seconds of meshing and building, and of a ray.
+    /// Seconds of meshing and building.
     prepare: f64,
-    per_ray: f64,
     errors: E,
 }
 
@@ -200,8 +199,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Meshes by a plan, times the pilots on it, and has `judge` find how far off such facets send light: it is given them, and how far
-    /// apart two faces may lie that touch, mm.
+    /// Meshes by a plan, and has `judge` find how far off such facets send light: it is given them, and how far apart two faces may lie that
+    /// touch, mm.
     fn measure<E>(
         &self,
         plan: &TolerancePlan,
@@ -209,26 +208,13 @@ impl Search<'_> {
         judge: impl FnOnce(&dyn Intersector, f64) -> E,
     ) -> Measured<E> {
         let meshed = self.mesh_source.mesh_plan(plan);
-        let rays = &self.pilots.rays;
-        let mut hits = vec![None; rays.len()];
         let start = Instant::now();
         with_intersectors(self.mesh_source, &meshed.mesh, &[FacetTree::Octree], &[normals], |trees| {
             let build = start.elapsed().as_secs_f64();
-            let facets = trees[0].2;
-            // Twice, and the better of both: the first pass also fills the caches.
-            let seconds = [0, 1].map(|_| {
-                let start = Instant::now();
-                answer(facets, rays, rayon::current_num_threads(), &mut hits);
-                start.elapsed().as_secs_f64()
-            });
             let made = meshed.mesh.facets.iter().map(|f| f.face).collect();
-            Measured {
-                made,
-                prepare: meshed.seconds + build,
-                per_ray: seconds[0].min(seconds[1]) / rays.len().max(1) as f64,
-                // Facets of two bodies that touch stray from their spline to either side.
-                errors: judge(facets, 2.0 * plan.loosest_mm()),
-            }
+            // Facets of two bodies that touch stray from their spline to either side.
+            let errors = judge(trees[0].2, 2.0 * plan.loosest_mm());
+            Measured { made, prepare: meshed.seconds + build, errors }
         })
     }
 
@@ -241,12 +227,12 @@ impl Search<'_> {
             let seed = self.target.seed ^ self.fresh.get().wrapping_mul(0x9e37_79b9_7f4a_7c15);
             let rays = (self.light.rays)(traced_on, seed, self.target.check_rays);
             let fresh = ReferenceRays::new(self.mesh_source, rays);
-            fresh.compare(facets, apart_mm, &self.light.relative_index)
+            fresh.compare(facets, apart_mm, &self.light.relative_index, &self.survey)
         })
     }
 
     /// Makes the plan for these normals by the formulas, with one tolerance for all places unless `local`; meshes it, or a coarser one, and
-    /// corrects it once by what pilots on those facets measure; forecasts the facets and the seconds of the run.
+    /// corrects it once by what pilots on those facets measure; forecasts the facets and the work of the job.
     fn candidate(&self, normals: NormalMode, local: bool) -> Candidate {
         let order = if normals == NormalMode::Flat || normals == NormalMode::Nearest { 0.5 } else { 1.0 };
         let epsilon = (MARGIN * self.target.angle_deg).to_radians();
@@ -264,7 +250,7 @@ impl Search<'_> {
         let mut pilot = plan.clone();
         pilot.scale(coarser);
         let m = self.measure(&pilot, normals, |facets, apart_mm| {
-            self.pilots.compare(facets, apart_mm, &self.light.relative_index)
+            self.pilots.compare(facets, apart_mm, &self.light.relative_index, &self.survey)
         });
         let mut facets = m.made.len() as f64;
         // The pilots measured the coarser plan: their errors are judged against what that one should give.
@@ -275,10 +261,8 @@ impl Search<'_> {
             plan.scale(1.0 / coarser);
             facets = self.survey.expected_facets(&plan, &pilot, &m.made);
         }
-        let ratio = facets / m.made.len().max(1) as f64;
-        // Facets, and with them meshing and building, go with 1/tolerance; tracing grows by about a tenth per halving.
-        let trace = m.per_ray * self.target.job_rays * (1.0 + 0.1 * ratio.log2().max(0.0));
-        Candidate { normals, plan, order, facets, predicted: m.prepare * ratio + trace }
+        let work = JobWork::new(facets, self.target.job_rays, normals, m.errors.cost).total();
+        Candidate { normals, plan, order, facets, work }
     }
 
     /// Returns the most facets that the next mesh may have: those of one mesh, or what is left of those of the whole search; may be
@@ -311,31 +295,38 @@ impl Search<'_> {
             let worst =
                 |of: fn(&DirectionErrors) -> Option<f64>| m.errors.iter().filter_map(of).max_by(f64::total_cmp);
             let reached = worst(DirectionErrors::percentile);
+            let (cost, seconds) = m.errors.iter().fold((Cost::default(), 0.0), |(mut cost, seconds), set| {
+                cost += set.cost;
+                (cost, seconds + set.seconds)
+            });
+            let facets = m.made.len();
             let found = Solution {
                 normals,
                 plan: plan.clone(),
-                facets: m.made.len(),
+                facets,
                 prepare: m.prepare,
-                trace: m.per_ray * self.target.job_rays,
+                trace: seconds / cost.rays.max(1) as f64 * self.target.job_rays,
+                work: JobWork::new(facets as f64, self.target.job_rays, normals, cost),
                 reached,
                 largest: worst(DirectionErrors::largest),
                 checked: m.errors.iter().map(|set| set.errors.len() as u64).sum(),
+                flat: m.errors.iter().map(|set| set.flat).sum(),
                 flips: m.errors.iter().map(|set| set.flips).sum(),
             };
             trials.push(Trial {
                 normals: normals.name().into(),
                 tolerance_mm: plan.tolerance_mm(),
-                facets: m.made.len(),
+                facets,
                 reached_deg: reached,
                 seconds: found.seconds(),
             });
             let good = found.is_accepted(self.target);
             // Reached far too well at a cost that counts: coarser facets are worth another try, twice.
             let far_within = reached.is_some_and(|reached| reached < 0.6 * self.target.angle_deg);
-            let wasteful = far_within && attempt < 2 && found.prepare > 0.2 * found.seconds();
+            let wasteful = far_within && attempt < 2 && found.work.prepare > 0.2 * found.work.total();
             let was_good = best.as_ref().is_some_and(|b| b.is_accepted(self.target));
             let better = |b: &Solution| match (good, was_good) {
-                (true, true) => found.seconds() < b.seconds(),
+                (true, true) => found.work.total() < b.work.total(),
                 (a, b_good) => a && !b_good || a == b_good && found.errs_less(b),
             };
             if best.as_ref().is_none_or(better) {
@@ -349,7 +340,7 @@ impl Search<'_> {
             let Some(reached) = reached else { break };
             // Along the law of the error in the sag.
             let growth = tolerance_factor(reached, MARGIN * self.target.angle_deg, candidate.order);
-            if m.made.len() as f64 / growth > self.affordable() {
+            if facets as f64 / growth > self.affordable() {
                 self.gave_up.set(true);
                 break;
             }
@@ -366,9 +357,11 @@ impl Search<'_> {
             facets: 0,
             prepare: 0.0,
             trace: 0.0,
+            work: JobWork::default(),
             reached: None,
             largest: None,
             checked: 0,
+            flat: 0,
             flips: 0,
         }
     }

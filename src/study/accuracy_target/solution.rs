@@ -1,7 +1,8 @@
 //! What a kind of normals came to on fresh rays, and the sentence that says it.
 
 use super::AccuracyTarget;
-use crate::intersect::NormalMode;
+use crate::intersect::{Cost, NormalMode};
+use crate::study::counted_work::{FACET, FACET_HIT, MOVED_HIT, SPLINE_HIT, longer_on};
 use crate::study::tolerance_plan::TolerancePlan;
 use crate::text::figures;
 
@@ -12,19 +13,50 @@ const BEYOND_PERCENTILE: f64 = 0.01;
 /// Rays beyond the percentile from which on it hardly changes with other rays: ten of each of two sets.
 const FEW_BEYOND: f64 = 20.0;
 
+/// Facets of which a hit takes the counted work.
+const COUNTED_FACETS: f64 = 4096.0;
+
+/// Counted work of a job, ns.
+#[derive(Clone, Copy, Default)]
+pub(super) struct JobWork {
+    /// Of making the facets.
+    pub(super) prepare: f64,
+    /// Of its rays.
+    pub(super) trace: f64,
+}
+
+impl JobWork {
+    /// Returns that of so many rays on so many facets; `cost` is that of some rays with these normals.
+    pub(super) fn new(facets: f64, rays: f64, normals: NormalMode, cost: Cost) -> Self {
+        let hit = if normals == NormalMode::Exact { MOVED_HIT } else { FACET_HIT };
+        let asked = cost.doubtful as f64 / cost.rays.max(1) as f64;
+        // Fewer facets than one are none to walk through.
+        let on_facets = hit * longer_on(facets.max(1.0) / COUNTED_FACETS).max(0.0);
+        Self { prepare: facets * FACET, trace: rays * (on_facets + asked * SPLINE_HIT) }
+    }
+
+    /// Returns that of the whole job.
+    pub(super) fn total(self) -> f64 {
+        self.prepare + self.trace
+    }
+}
+
 /// What a kind of normals came to.
 pub(super) struct Solution {
     pub(super) normals: NormalMode,
     pub(super) plan: TolerancePlan,
     pub(super) facets: usize,
-    /// Seconds of meshing and building, and of the job's rays.
+    /// Seconds of meshing and building, and of the job's rays, as measured.
     pub(super) prepare: f64,
     pub(super) trace: f64,
+    /// Counted work of both, by which solutions are compared.
+    pub(super) work: JobWork,
     /// The 99th percentile and the largest error, degrees; `None` where no ray met the same face on facets and spline.
     pub(super) reached: Option<f64>,
     pub(super) largest: Option<f64>,
-    /// Rays that have an angle, and those that have none as they met another face.
+    /// Rays that hit curved faces and have an angle, those that hit flat ones, and those that have no angle as they met another face.
     pub(super) checked: u64,
+    pub(super) flat: u64,
     pub(super) flips: u64,
 }
 
@@ -50,14 +82,14 @@ impl Solution {
         known(self) < known(other)
     }
 
-    /// Returns the seconds of the whole job.
+    /// Returns the measured seconds of the whole job.
     pub(super) fn seconds(&self) -> f64 {
         self.prepare + self.trace
     }
 
     /// Returns the share of rays that no angle stands for, in words; empty where the percentile leaves out as many.
     fn without_angle(&self) -> String {
-        let share = self.flips as f64 / (self.flips + self.checked).max(1) as f64;
+        let share = self.flips as f64 / (self.flips + self.flat + self.checked).max(1) as f64;
         if share <= BEYOND_PERCENTILE {
             return String::new();
         }
@@ -73,14 +105,14 @@ impl Solution {
     /// many to be tried.
     pub(super) fn answer_sentence(&self, target: &AccuracyTarget, gave_up: bool) -> String {
         let [low, high] = self.plan.tolerance_mm();
-        let range = if low == high {
-            format!("{} mm", figures(low, 3))
-        } else {
-            format!("{} to {} mm", figures(low, 3), figures(high, 3))
-        };
+        let [low, high] = [low, high].map(|mm| figures(mm, 3));
+        let range = if low == high { format!("{low} mm") } else { format!("{low} to {high} mm") };
         let reached = match self.reached.zip(self.largest) {
+            Some(_) if self.checked == 0 => {
+                format!("reached 0° (fresh rays met flat faces alone{})", self.without_angle())
+            }
             Some((reached, largest)) => format!(
-                "reached {}° (99th percentile of {} fresh rays on facets and on the spline, the worse of both{}, at most {}°{})",
+                "reached {}° (99th percentile of {} hits of fresh rays on curved faces, the worse of facets and spline{}; the largest {}°{})",
                 figures(reached, 3),
                 self.checked,
                 self.with_few_rays(),
@@ -114,19 +146,17 @@ mod tests {
                 facets: 100,
                 prepare: 0.0,
                 trace: 0.0,
+                work: JobWork::default(),
                 reached: Some(0.5),
                 largest: Some(0.75),
                 checked,
+                flat: 0,
                 flips: 0,
             };
             solution.answer_sentence(&AccuracyTarget::for_angle_deg(1.0), false)
         };
-        assert!(
-            answer(24).contains("of 24 fresh rays on facets and on the spline, the worse of both, too few to be sure of it, at most 0.75°")
-        );
-        assert!(
-            answer(2000)
-                .contains("of 2000 fresh rays on facets and on the spline, the worse of both, at most 0.75°")
-        );
+        let of_both = "hits of fresh rays on curved faces, the worse of facets and spline";
+        assert!(answer(24).contains(&format!("of 24 {of_both}, too few to be sure of it; the largest 0.75°)")));
+        assert!(answer(2000).contains(&format!("of 2000 {of_both}; the largest 0.75°)")));
     }
 }

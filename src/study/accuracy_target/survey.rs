@@ -33,6 +33,8 @@ pub(super) struct Survey {
     faces: Vec<Vec<FaceId>>,
     /// Index of the distinct face of each placed one; `None` for ready meshes.
     of: Vec<Option<usize>>,
+    /// Whether each placed face is a plane or a ready mesh, of which facets have the normals.
+    flat: Vec<bool>,
     pilots: Vec<PilotHit>,
 }
 
@@ -46,7 +48,8 @@ impl Survey {
     pub(super) fn new(model: &Model, rays: &[Ray], truth: &[Option<Hit>]) -> Self {
         let placed: Vec<_> = model.placed_faces().collect();
         let mut names: FxHashMap<*const Face, usize> = FxHashMap::default();
-        let mut survey = Self { faces: Vec::new(), of: Vec::with_capacity(placed.len()), pilots: Vec::new() };
+        let flat = placed.iter().map(|p| p.face.is_none_or(Face::is_plane)).collect();
+        let mut survey = Self { faces: Vec::new(), of: Vec::with_capacity(placed.len()), flat, pilots: Vec::new() };
         for p in &placed {
             survey.of.push(p.face.map(|face| {
                 // One face of a part in many placements is one face: its rays are counted together.
@@ -71,6 +74,11 @@ impl Survey {
             }
         }
         survey
+    }
+
+    /// Whether facets of a face have its normals however coarse they are, so that hits on it tell of no error.
+    pub(super) fn is_flat(&self, face: FaceId) -> bool {
+        self.flat.get(face.index()).copied().unwrap_or(false)
     }
 
     /// Makes the plan by the formulas, for an angle of `epsilon` rad: sag ≤ ε·R/(2·tan i) for interpolated normals, 1 − cos(ε/2) of R for

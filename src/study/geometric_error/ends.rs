@@ -1,8 +1,8 @@
 //! What facets change of where the light ended.
 
-use super::cells::paired_cells;
 use super::paired::Paired;
 use super::replicates::ReplicatedRun;
+use crate::math::variance_of_sum;
 use serde::Serialize;
 
 /// What facets change of the sums over all light, by how it ended. What was lost is no figure of the true surfaces, and is left out.
@@ -27,19 +27,18 @@ impl EndErrors {
 
 /// Compares the sums over all light of both runs.
 pub(super) fn end_errors(runs: [&ReplicatedRun; 2]) -> EndErrors {
-    let listed = |run: &ReplicatedRun| -> Vec<Vec<(u32, u64)>> {
-        run.ends.iter().map(|ends| (0..).zip(ends.iter().copied()).collect()).collect()
-    };
-    let [facets, spline] = runs.map(listed);
-    let pairs: Vec<_> = facets.iter().zip(&spline).map(|(a, b)| [a.as_slice(), b.as_slice()]).collect();
     let quantum = runs[1].results.quantum;
+    let [facets, spline] = runs.map(|run| &run.ends);
     let mut errors = EndErrors::default();
-    for (end, cell) in errors.each_mut().into_iter().zip(paired_cells(4, &pairs)) {
-        *end = Paired {
-            facets: cell.facets * quantum,
-            spline: cell.spline * quantum,
-            error: cell.difference_variance.sqrt() * quantum,
-        };
+    for (k, end) in errors.each_mut().into_iter().enumerate() {
+        let (mut sums, mut squares) = ([0.0; 2], 0.0);
+        for replicate in facets.iter().zip(spline) {
+            let pair = [replicate.0[k] as f64, replicate.1[k] as f64];
+            sums = [sums[0] + pair[0], sums[1] + pair[1]];
+            squares += (pair[0] - pair[1]).powi(2);
+        }
+        let error = variance_of_sum(squares, sums[0] - sums[1], spline.len()).sqrt();
+        *end = Paired { facets: sums[0] * quantum, spline: sums[1] * quantum, error: error * quantum };
     }
     errors
 }
