@@ -1,6 +1,6 @@
 //! Figures of a lamp in the words of the trade: Imax, HV, widths at half, flux and efficiency; where the light of a spot lies.
 
-use super::even_poles::{brightest_direction, direction_text, is_all_around, pole_rings};
+use super::even_poles::{brightest_direction, direction_text, is_all_around};
 use super::half_width::half_width;
 use super::maps::{peak_error, spoken};
 use super::peak_lines::{Line, lines_through_peak};

@@ -6,9 +6,9 @@ use super::lamp_figures::{Counted, encircled_power, lamp_table, polar};
 use super::maps::{reading, spoken};
 use super::number::unit_in_words;
 use super::{Block, Chart};
-use crate::formats::{Grid, file_stem};
+use crate::formats::file_stem;
 use crate::regulation::Assessment;
-use crate::simulate::{ReceiverResult, Results};
+use crate::simulate::Results;
 
 /// Draws the map of a receiver, framed around its light; the caption says where that is a part of it.
 pub(super) fn framed_map(counted: &Counted<'_>) -> Chart {

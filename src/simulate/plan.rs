@@ -36,12 +36,36 @@ pub const GROWING_REPLICATE: u64 = 5_000;
 const FEWEST_GROWING: u64 = 128;
 
 /// The rays of one source: in the whole run, or in each replicate of one that can grow.
+///
+/// Every replicate has the same quanta of it, so that their spread is that of the light alone: where its rays don't divide evenly, those of
+/// a replicate with one more weigh less. A source with fewer rays than there are replicates is in some of them alone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SourceShare {
-    /// Number of its first ray, how many it has, and the quanta of each.
+    /// Number of its first ray, and how many it has.
     first: u64,
     rays: u64,
-    pub(crate) quanta: f64,
+    /// Rays that each replicate has at least.
+    fewest: u64,
+    /// Quanta of each ray in a replicate with that many, and with one more.
+    quanta: [f64; 2],
+}
+
+impl SourceShare {
+    /// Makes the share of a source whose rays have so many quanta in the mean, divided into so many parts.
+    fn new(first: u64, rays: u64, quanta: f64, parts: u32) -> Self {
+        let (fewest, mean) = (rays / u64::from(parts), rays as f64 / f64::from(parts));
+        let in_replicate_of = |count: u64| if fewest == 0 { quanta } else { quanta * mean / count as f64 };
+        Self { first, rays, fewest, quanta: [fewest, fewest + 1].map(|n| in_replicate_of(n).round().max(1.0)) }
+    }
+
+    /// Returns the quanta of all its rays, divided into so many parts.
+    fn all_quanta(&self, parts: u32) -> f64 {
+        let parts = u64::from(parts);
+        // So many have one ray more.
+        let larger = self.rays % parts;
+        let rays = [(parts - larger) * self.fewest, larger * (self.fewest + 1)];
+        rays[0] as f64 * self.quanta[0] + rays[1] as f64 * self.quanta[1]
+    }
 }
 
 /// How the rays of a run are divided among sources and replicates.
@@ -94,19 +118,21 @@ impl Plan {
             replicates.max((divided >> MOST_RAYS_LOG2) as u32)
         };
         let average_ray = average_quanta(&weights, (!grows).then_some(replicates));
+        let parts = if grows { 1 } else { replicates };
         let mut first = 0;
         let share = |&(rays, weight): &(u64, f64)| {
-            let share = SourceShare { first, rays, quanta: (average_ray * weight).round().max(1.0) };
+            let share = SourceShare::new(first, rays, average_ray * weight, parts);
             first += rays;
             share
         };
-        let shares = weights.iter().map(share).collect();
         let first_replicate = if grows { settings.first_ray.div_ceil(GROWING_REPLICATE) as u32 } else { 0 };
         let rays = if grows { divided * u64::from(replicates) } else { divided };
         // A power of two, so that whether a ray is recorded is one `and` of its index.
         let record_mask =
             (settings.path_samples > 0).then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
-        let quantum = emitted / (rays as f64 * average_ray);
+        let shares: Vec<SourceShare> = weights.iter().map(share).collect();
+        let divided_quanta: f64 = shares.iter().map(|share| share.all_quanta(parts)).sum();
+        let quantum = emitted / (divided_quanta * f64::from(replicates / parts));
         Self {
             shares,
             replicate_rays: grows.then_some(divided),
@@ -124,7 +150,7 @@ impl Plan {
 
     /// Quanta of a ray of the source whose rays weigh most.
     pub(crate) fn heaviest_ray(&self) -> f64 {
-        self.shares.iter().map(|share| share.quanta).fold(0.0, f64::max)
+        self.shares.iter().flat_map(|share| share.quanta).fold(0.0, f64::max)
     }
 
     /// Whether it is divided into replicates of a fixed size, so that further ones may follow.
@@ -155,25 +181,11 @@ impl Plan {
         if self.grows() { [0, 1] } else { [replicate, self.replicates] }
     }
 
-    /// Returns the standard error that replicates of unequal size feign in the sum of `replicates` of them, as a share of the sum, where
-    /// every ray brings as much: that of the source whose rays are divided most evenly, for the light may be all its own; 0 where a source
-    /// has no ray in one of them, which no spread of numbers of rays tells about.
-    pub(super) fn size_spread(&self, replicates: &[u32]) -> f64 {
-        let count = replicates.len() as f64;
-        let scarce = self.shares.iter().any(|share| share.rays < u64::from(self.replicates));
-        if self.grows() || replicates.len() < 2 || scarce {
-            return 0.0;
-        }
-        let of_source = |source: usize| {
-            let rays = replicates.iter().map(|&r| {
-                let [from, to] = self.range(source, r);
-                (to - from) as f64
-            });
-            let total: f64 = rays.clone().sum();
-            let squares: f64 = rays.map(|n| (n - total / count).powi(2)).sum();
-            (squares * count / (count - 1.0)).sqrt() / total
-        };
-        (0..self.shares.len()).map(of_source).fold(f64::INFINITY, f64::min)
+    /// Returns the quanta of each ray of a source in a replicate that has so many of its rays.
+    #[inline]
+    pub(crate) fn quanta(&self, source: usize, rays: u64) -> f64 {
+        let share = &self.shares[source];
+        share.quanta[usize::from(rays > share.fewest)]
     }
 
     /// Goes through the rays of a replicate, each as its source and its number in the run.
@@ -274,7 +286,14 @@ fn grows_unasked(settings: &RunSettings) -> bool {
 /// average; `replicates` is `None` where these are those of each replicate.
 fn average_quanta(weights: &[(u64, f64)], replicates: Option<u32>) -> f64 {
     let parts = f64::from(replicates.unwrap_or(1));
-    let heaviest = weights.iter().map(|w| w.1).fold(0.0, f64::max);
+    // In a replicate with fewer of them rays weigh up to twice as much.
+    let heaviest = weights
+        .iter()
+        .map(|(rays, weight)| {
+            let mean = *rays as f64 / parts;
+            if mean < 1.0 { *weight } else { weight * mean / mean.floor() }
+        })
+        .fold(0.0, f64::max);
     // A source of few rays may have them all in one replicate.
     let fullest: f64 = weights.iter().map(|(rays, weight)| (*rays as f64 / parts).ceil() * weight).sum();
     let fits = |average: f64| {
@@ -315,7 +334,7 @@ mod tests {
     fn every_ray_is_located_in_the_range_that_has_it_however_few_its_source_has() {
         for replicates in [2, 3, 16, 62, 128] {
             for rays in 1..=2 * u64::from(replicates) + 1 {
-                let share = |first| SourceShare { first, rays, quanta: QUANTA };
+                let share = |first| SourceShare::new(first, rays, QUANTA, replicates);
                 let plan = Plan {
                     shares: vec![share(0), share(rays)],
                     replicate_rays: None,
@@ -331,6 +350,14 @@ mod tests {
                 };
                 let mut located = 0;
                 for replicate in 0..replicates {
+                    // Each has the same quanta of a source, but for rounding, where it has any ray of it.
+                    let [from, to] = plan.range(0, replicate);
+                    let quanta = (to - from) as f64 * plan.quanta(0, to - from);
+                    let mean = rays as f64 / f64::from(replicates) * QUANTA;
+                    assert!(
+                        mean < QUANTA || (quanta / mean - 1.0).abs() < 1e-12,
+                        "{rays} in {replicates}: {quanta}"
+                    );
                     for (source, ray) in plan.rays_of_replicate(replicate) {
                         assert_eq!(
                             plan.locate(ray),

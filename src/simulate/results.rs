@@ -175,7 +175,7 @@ impl Results {
         let found = found.chain(bound.uncounted_light_notes(&tallies.receivers));
         let found = found.chain(few_replicates(tallies.replicates));
         let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
-        let scale = PowerScale::new(quantum, &plan, &partial.done);
+        let scale = PowerScale { quantum, replicates: partial.done.len() as u32 };
         let power = tallies.ends.each_ref().map(|s| scale.power(s));
         let errors = tallies.ends.each_ref().map(|s| scale.error(s));
         let digest = digest(&tallies);

@@ -37,7 +37,7 @@ pub struct Figure {
 
 impl Figure {
     /// Makes a figure, and says which of its errors is the larger; statistics where the geometric one is not known.
-    pub(super) fn new(value: f64, unit: &str, statistical: f64, geometric: Option<f64>) -> Self {
+    pub(crate) fn new(value: f64, unit: &str, statistical: f64, geometric: Option<f64>) -> Self {
         let limited_by =
             // Without a measured geometric error the number of rays is all there is to blame.
             if geometric.is_some_and(|g| g > statistical) { Limit::Geometry } else { Limit::Statistics };

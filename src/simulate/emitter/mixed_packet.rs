@@ -25,6 +25,16 @@ const COARSER: u32 = 6;
 /// A number of each ray of a packet.
 type PacketWords = [u32; PACKET];
 
+/// A ray that starts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MixedRay {
+    pub(crate) source: usize,
+    /// Number in the run.
+    pub(crate) in_run: u64,
+    pub(crate) quanta: f64,
+    pub(crate) emission: Emission,
+}
+
 /// Rays of many sources, of one replicate of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct MixedPacket {
@@ -36,6 +46,8 @@ pub(crate) struct MixedPacket {
     sources: PacketWords,
     in_stream: PacketWords,
     in_run: [u64; PACKET],
+    /// Its quanta.
+    quanta: [f64; PACKET],
     /// Which pairs of numbers any of the sources asks for: for the place, the direction, the wavelength.
     pairs: [bool; 3],
     numbers: [[PacketNumbers; 2]; 3],
@@ -55,6 +67,7 @@ impl MixedPacket {
             sources: [0; PACKET],
             in_stream: [0; PACKET],
             in_run: [0; PACKET],
+            quanta: [0.0; PACKET],
             pairs: [false; 3],
             numbers: [[[0.0; PACKET]; 2]; 3],
             azimuths: [[[0.0; PACKET]; 2]; 2],
@@ -68,9 +81,9 @@ impl MixedPacket {
         rays <= FEW && sampling == Sampling::Sobol && simple_shape
     }
 
-    /// Takes a portion of which the first ray has the number `first` in the run, from its ray number `*next` in the run on, as far as there
-    /// is room, and moves `next` past those that were taken. [`Self::takes`] must have said so.
-    pub(crate) fn add(&mut self, emitter: &Emitter, portion: Portion, first: u64, next: &mut u64) {
+    /// Takes a portion of which the first ray has the number `first` in the run and each these quanta, from its ray number `*next` in the run
+    /// on, as far as there is room, and moves `next` past those that were taken. [`Self::takes`] must have said so.
+    pub(crate) fn add(&mut self, emitter: &Emitter, portion: Portion, (first, quanta): (u64, f64), next: &mut u64) {
         for (any, own) in self.pairs.iter_mut().zip(emitter.needed_pairs()) {
             *any |= own;
         }
@@ -79,6 +92,7 @@ impl MixedPacket {
             self.sources[self.rays] = portion.source;
             self.in_stream[self.rays] = (*next - first) as u32;
             self.in_run[self.rays] = *next;
+            self.quanta[self.rays] = quanta;
             self.rays += 1;
             *next += 1;
         }
@@ -104,10 +118,10 @@ impl MixedPacket {
         simd::dispatch_widest(Draw { packet: self, replicate });
     }
 
-    /// Writes the next ray that starts to `ray`, and returns its source, its number in the run and its emission; `None` where all have
-    /// started. Numbers must have been drawn; `emitters` are those of all sources.
+    /// Writes the next ray that starts to `ray`, and returns the rest of it; `None` where all have started. Numbers must have been drawn;
+    /// `emitters` are those of all sources.
     #[inline(always)]
-    pub(crate) fn next_ray(&mut self, emitters: &[Emitter], ray: &mut Ray) -> Option<(usize, u64, Emission)> {
+    pub(crate) fn next_ray(&mut self, emitters: &[Emitter], ray: &mut Ray) -> Option<MixedRay> {
         if self.is_spent() {
             return None;
         }
@@ -122,7 +136,8 @@ impl MixedPacket {
         *ray = Ray::new(origin, emitter.direction([f.x, f.y, f.z], || pair(1), |_| azimuth(1)));
         emitter.bring_near(ray);
         let wavelength = emitter.wavelengths.as_ref().map(|wavelengths| wavelengths.sample(pair(2)[0]));
-        Some((source, self.in_run[k], Emission { from: None, wavelength, failed: false }))
+        let emission = Emission { from: None, wavelength, failed: false };
+        Some(MixedRay { source, in_run: self.in_run[k], quanta: self.quanta[k], emission })
     }
 }
 
@@ -213,7 +228,8 @@ mod tests {
         let mut check = |packet: &mut MixedPacket, firsts: &[u64]| {
             packet.draw(replicate);
             let mut ray = start();
-            while let Some((source, in_run, emission)) = packet.next_ray(&bound.emitters, &mut ray) {
+            while let Some(started) = packet.next_ray(&bound.emitters, &mut ray) {
+                let MixedRay { source, in_run, emission, .. } = started;
                 let emitter = &bound.emitters[source];
                 let portion = Portion { replicate, source: source as u32, rays: 8, lattice: [0, 1] };
                 let mut alone = start();
@@ -221,7 +237,7 @@ mod tests {
                 let (same, expected) = RaySampler::new(emitter, seed, sampling, portion, firsts[source])
                     .single_ray(emitter, index, &mut alone);
                 assert_eq!((ray, in_run, emission.wavelength), (alone, same.in_run, expected.wavelength));
-                assert!(emission.wavelength.is_some());
+                assert!(emission.wavelength.is_some() && started.quanta == (source + 1) as f64);
                 seen += 1;
             }
             packet.clear();
@@ -234,7 +250,7 @@ mod tests {
             let portion = Portion { replicate, source: source as u32, rays, lattice: [0, 1] };
             let mut next = first;
             while next < first + rays {
-                packet.add(emitter, portion, first, &mut next);
+                packet.add(emitter, portion, (first, (source + 1) as f64), &mut next);
                 if packet.is_full() {
                     check(&mut packet, &firsts);
                 }

@@ -31,7 +31,7 @@ pub(crate) use area::{Area, CoveredArea};
 pub(crate) use cover::Cover;
 use far::NearStart;
 pub(crate) use measured::{Loaded, load};
-pub(crate) use mixed_packet::MixedPacket;
+pub(crate) use mixed_packet::{MixedPacket, MixedRay};
 pub(crate) use ray_list::{ListCursor, RayList};
 pub(crate) use sampler::RaySampler;
 use shape::{

@@ -12,7 +12,7 @@ use super::tracer::Tracer;
 use crate::intersect::prefetch;
 use crate::math::Ray;
 use crate::optics::polarised::Stokes;
-use crate::simulate::emitter::{Emission, MixedPacket, Portion, RaySampler};
+use crate::simulate::emitter::{Emission, MixedPacket, MixedRay, Portion, RaySampler};
 use crate::simulate::outcome::{Event, LostCause};
 use crate::simulate::scene::Sampling;
 use crate::simulate::tally::quanta_as_integer;
@@ -27,6 +27,8 @@ pub(super) struct SourceQueue {
     /// Number in the run of the next ray, and of the first and past the last of this source in this replicate.
     next: u64,
     range: [u64; 2],
+    /// Quanta of each ray of this source in this replicate.
+    quanta: f64,
     sampler: Option<RaySampler>,
     /// The rays that start next, where many sources have few in this replicate.
     mixed: Option<Box<MixedPacket>>,
@@ -48,10 +50,22 @@ impl SourceQueue {
     pub(super) fn new(context: &Context<'_>, rays: RaySelection) -> Self {
         let last = context.plan.shares.len();
         let single = !matches!(rays, RaySelection::Replicate(_));
-        let (range, sampler, listed) = ([0, 0], None, None);
+        let (range, quanta, sampler, listed) = ([0, 0], 0.0, None, None);
         let (mixed, mixes, spread) = (None, false, [0; 3]);
-        let mut queue =
-            Self { replicate: 0, source: 0, next: 0, range, sampler, mixed, mixes, last, single, spread, listed };
+        let mut queue = Self {
+            replicate: 0,
+            source: 0,
+            next: 0,
+            range,
+            quanta,
+            sampler,
+            mixed,
+            mixes,
+            last,
+            single,
+            spread,
+            listed,
+        };
         match rays {
             RaySelection::Replicate(replicate) => {
                 queue.replicate = replicate;
@@ -69,7 +83,7 @@ impl SourceQueue {
                 if let Some(emitter) = context.bound.emitters.get(source as usize) {
                     let seed = context.settings.seed;
                     queue.sampler = Some(RaySampler::new(emitter, seed, Sampling::Random, portion, ray));
-                    queue.range = [0, 1];
+                    (queue.range, queue.quanta) = ([0, 1], context.plan.quanta(source as usize, 1));
                 }
             }
         }
@@ -108,6 +122,7 @@ impl SourceQueue {
         self.range = context.plan.range(source, self.replicate);
         self.next = self.range[0];
         let portion = self.portion(context);
+        self.quanta = context.plan.quanta(source, portion.rays);
         self.mixes = !self.single && MixedPacket::takes(emitter, context.settings.sampling, portion.rays);
         if !self.mixes {
             self.make_sampler(context, portion);
@@ -134,7 +149,7 @@ impl SourceQueue {
             let emitter = &context.bound.emitters[self.source];
             // Its rays start out of turn, so that no pattern tells the processor what is read next.
             prefetch(&context.bound.emitters, self.source + AHEAD);
-            mixed.add(emitter, self.portion(context), self.range[0], &mut self.next);
+            mixed.add(emitter, self.portion(context), (self.range[0], self.quanta), &mut self.next);
             if self.next >= self.range[1] {
                 self.enter_source(context, self.source + 1);
             }
@@ -167,9 +182,10 @@ impl SourceQueue {
         let context = tracer.context;
         loop {
             if let Some(mixed) = &mut self.mixed
-                && let Some((source, number, emission)) = mixed.next_ray(&context.bound.emitters, ray)
+                && let Some(MixedRay { source, in_run, quanta, emission }) =
+                    mixed.next_ray(&context.bound.emitters, ray)
             {
-                *path = Path::at_source(number, context.plan.shares[source].quanta, C::in_surroundings());
+                *path = Path::at_source(in_run, quanta, C::in_surroundings());
                 if tracer.start_path(source, &emission, path, ray) {
                     return true;
                 }
@@ -199,7 +215,7 @@ impl SourceQueue {
             } else {
                 sampler.next_ray(emitter, started, ray)
             };
-            *path = Path::at_source(index.in_run, context.plan.shares[self.source].quanta, C::in_surroundings());
+            *path = Path::at_source(index.in_run, self.quanta, C::in_surroundings());
             if tracer.start_path(self.source, &emission, path, ray) {
                 return true;
             }
