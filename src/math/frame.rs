@@ -32,6 +32,11 @@ const PARALLEL: f64 = 1e-12;
 /// Sine below which the part across a hint loses a digit or more.
 const STEEP: f64 = 0.1;
 
+/// Returns the unit vector of a direction of any length, even one whose square is beyond all numbers; `None` without a direction.
+fn unit(direction: Vector) -> Option<Vector> {
+    direction.try_normalize().or_else(|| (direction / direction.abs().max_element()).try_normalize())
+}
+
 impl Frame {
     /// Leaves everything where it is.
     pub const IDENTITY: Self = Self { origin: Point::ZERO, x: Vector::X, y: Vector::Y, z: Vector::Z, scale: 1.0 };
@@ -45,9 +50,9 @@ impl Frame {
     ///
     /// Missing or parallel `x_hint` falls back to a perpendicular of the axis; a zero axis falls back to `Z`.
     pub fn from_axis(origin: Point, axis: Vector, x_hint: Option<Vector>) -> Self {
-        let z = axis.try_normalize().unwrap_or(Vector::Z);
+        let z = unit(axis).unwrap_or(Vector::Z);
         let x = x_hint
-            .and_then(|h| h.try_normalize())
+            .and_then(unit)
             .map(|h| h - z * h.dot(z))
             .filter(|p| p.length_squared() > PARALLEL * PARALLEL)
             .and_then(|p| p.try_normalize().map(|x| (x, p.length_squared() < STEEP * STEEP)))
@@ -133,6 +138,15 @@ mod tests {
 
     fn odd_frame() -> Frame {
         Frame { scale: 25.4, ..Frame::from_axis(Point::new(3.0, -2.0, 7.0), Vector::new(1.0, 2.0, -0.5), None) }
+    }
+
+    #[test]
+    fn a_direction_may_have_any_length() {
+        let turned = Frame::from_axis(Point::ZERO, Vector::Y, Some(Vector::Z));
+        for length in [1e-300, 1e-200, 1.0, 1e200, 1e308] {
+            let frame = Frame::from_axis(Point::ZERO, length * Vector::Y, Some(length * Vector::Z));
+            assert_eq!((frame.z, frame.x), (turned.z, turned.x), "{length}");
+        }
     }
 
     #[test]

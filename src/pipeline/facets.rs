@@ -50,7 +50,7 @@ pub fn mesh_settings(
 /// Selects the faces of an optical role, which only a scene knows; binds the scene to the model.
 ///
 /// # Errors
-/// When the role is not known, there is no scene, or the scene does not fit the model.
+/// When the role is not known or no face has it, there is no scene, or the scene does not fit the model.
 fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<FaceSelector, Error> {
     if !BoundScene::ROLES.contains(&role) {
         let error = Error::setting("role", format!("{role}: there is no such optical role"));
@@ -61,7 +61,15 @@ fn place_of_role(role: &str, scene: Option<&Scene>, model: &Model) -> Result<Fac
         return Err(error
             .help("name the face or the part instead, as the command's --face NAME=0.01 and --part NAME=0.01 do"));
     };
-    Ok(FaceSelector::Placed(scene.bind(model)?.faces_in_role(role)))
+    let bound = scene.bind(model)?;
+    let faces = bound.faces_in_role(role);
+    if faces.is_empty() {
+        let there: Vec<&str> =
+            BoundScene::ROLES.into_iter().filter(|role| !bound.faces_in_role(role).is_empty()).collect();
+        let error = Error::setting("role", format!("{role}: no face of the scene has this role"));
+        return Err(error.help(format!("there are faces of: {}", there.join(", "))));
+    }
+    Ok(FaceSelector::Placed(faces))
 }
 
 /// Selects a part by its name, letter for letter.

@@ -47,7 +47,7 @@ fn kinds(check: &CrossCheck) -> Vec<Kind> {
             "within sag",
             e.within_sag,
             [0.45, 0.50, 0.55],
-            "Both hit the same place; the distances differ by no more than the facets' proved distance from the spline.",
+            "Both hit the same place: along the normal, not along the ray, no farther apart than the facets' proved distance from the spline.",
         ),
         kind(
             "silhouette",

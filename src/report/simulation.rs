@@ -129,12 +129,18 @@ impl SimulationReport<'_> {
             }
         }
         text += &format!(
-            "**{} rays** of {} each took **{}** on {}, {} million rays/s; {} lost. ",
+            "**{} rays** of {} each took **{}** {}; {} lost. ",
             grouped(r.rays),
             counted(r.segments as f64 / r.rays.max(1) as f64, "segment"),
             seconds(r.seconds.trace),
-            counted(r.threads as f64, "thread"),
-            figures(r.mrays_per_s, 3),
+            match &r.seconds.merged {
+                // Parts that ran side by side took less, and one after the other no less.
+                Some(merged) => format!("in all, in {}", counted(f64::from(merged.parts), "part")),
+                None => {
+                    let threads = counted(r.threads as f64, "thread");
+                    format!("on {threads}, {} million rays/s", figures(r.mrays_per_s, 3))
+                }
+            },
             match r.lost_rays {
                 0 => "none was".into(),
                 1 => "one was".into(),
@@ -175,9 +181,8 @@ impl SimulationReport<'_> {
             ),
         };
         format!(
-            "**{} {}** ({}) were cut off, {why}. ",
-            figures(r.power.cut_off, 4),
-            self.unit,
+            "**{}** ({}) were cut off, {why}. ",
+            errors::with_errors(&self.power.cut_off, 4),
             self.share(r.power.cut_off)
         )
     }
@@ -347,7 +352,7 @@ impl SimulationReport<'_> {
         let used = &self.results.effects;
         let mut table = Table::new("effects", "Effects", &[("effect", ""), ("simulated", ""), ("because", "")])
             .caption(format!(
-                "The kernel '{}' was compiled for exactly these effects; leaving the others out changes no bit of the result.",
+                "The kernel '{}' is the leanest that can simulate these effects; leaving the others out changes no bit of the result.",
                 used.kernel
             ));
         for (list, word) in [(&used.simulated, "yes"), (&used.not_simulated, "no")] {

@@ -6,7 +6,7 @@ use super::number::without_rounding;
 use super::{Cell, Chart, Section, Table, road};
 use crate::formats::{Grid, file_stem};
 use crate::regulation::{Assessment, Bound, Row, RowVerdict, Traffic, Verdict};
-use crate::text::figures;
+use crate::text::{NARROW_SPACE, figures};
 
 /// Significant digits of intensities: more than any photometer has.
 const DIGITS: usize = 5;
@@ -37,8 +37,8 @@ pub fn requirement_text(row: &RowVerdict) -> String {
     let number = |x: f64| figures(x, DIGITS);
     match (row.row.min, row.row.max) {
         (Some(min), Some(max)) => format!("{} … {}", number(min), number(max)),
-        (Some(min), None) => format!("≥ {}", number(min)),
-        (None, Some(max)) => format!("≤ {}", number(max)),
+        (Some(min), None) => format!("≥{NARROW_SPACE}{}", number(min)),
+        (None, Some(max)) => format!("≤{NARROW_SPACE}{}", number(max)),
         (None, None) => {
             let relative = || {
                 let sign = if row.row.bound? == Bound::Min { '≥' } else { '≤' };

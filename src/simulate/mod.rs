@@ -78,7 +78,9 @@ pub use plan::GROWING_REPLICATE;
 pub(crate) use pole_rings::PoleRings;
 pub use receiver_results::{ChannelResult, ReceiverResult};
 pub use results::{Absorbed, EffectsUsed, Power, Results};
-pub use run::{ask_again, grows, replay, replicate_range, replicates, shard_replicates, simulate, trace};
+pub use run::{
+    ask_again, grows, rays_of_run, replay, replicate_range, replicates, shard_replicates, simulate, trace,
+};
 pub use scene::{MOST_RAYS, Scene};
 pub use seconds::{MergedSeconds, Seconds};
 pub use sequence::{MOST_STEPS, RecordedWay, Sequence, SequenceStep, SequenceSums, recorded_ways};

@@ -247,6 +247,11 @@ pub fn grows(bound: &BoundScene, settings: &RunSettings) -> bool {
     Plan::new(bound, settings).grows()
 }
 
+/// Returns the rays that a run traces: more than are asked for where sources have numbers of their own.
+pub fn rays_of_run(bound: &BoundScene, settings: &RunSettings) -> u64 {
+    Plan::new(bound, settings).rays
+}
+
 #[cfg(test)]
 mod tests {
     use super::rays_of_replicates;

@@ -5,11 +5,10 @@
 //! would be comes from the spread over the run's replicates.
 
 use super::Progress;
-use super::geometric_error::trace_replicates;
+use super::geometric_error::{ReceiverError, compare, trace_replicates};
 use super::mesh_source::{FacetTree, MeshSource, with_intersectors};
 use super::timing::Countdown;
 use crate::intersect::{Intersector, NormalMode};
-use crate::math::error_of_sum;
 use crate::simulate::{BoundScene, ReceiverResult, RunSettings, simulate};
 use serde::Serialize;
 use std::time::Instant;
@@ -68,7 +67,7 @@ pub struct PowerComparison {
 }
 
 /// Traces the same rays on facets and on the spline and compares the power of every receiver, with the error of the difference from
-/// replicate to replicate.
+/// replicate to replicate and from rays too rare to be among these.
 pub fn compare_power(
     bound: &BoundScene,
     facets: &dyn Intersector,
@@ -76,26 +75,17 @@ pub fn compare_power(
     settings: &RunSettings,
 ) -> Vec<PowerComparison> {
     let [on_facets, on_spline] = [facets, exact].map(|i| trace_replicates(bound, i, settings));
-    let (found, truth) = (&on_facets.results, &on_spline.results);
-    (found.receivers.iter().zip(&truth.receivers).enumerate())
-        .map(|(k, (f, e))| {
-            let differences = on_facets
-                .replicates
-                .iter()
-                .zip(&on_spline.replicates)
-                // Counts are exact integers: their differences are too.
-                .map(|(a, b)| a[k].power as f64 - b[k].power as f64);
-            let differences: Vec<f64> = differences.map(|d| d * truth.quantum).collect();
-            PowerComparison {
-                name: f.name.clone(),
-                power_facets: f.power,
-                power_exact: e.power,
-                difference: differences.iter().sum(),
-                difference_error: error_of_sum(&differences),
-                power_error: e.power_error,
-            }
-        })
-        .collect()
+    let truth = &on_spline.results;
+    let error = compare(bound, [&on_facets, &on_spline]).with_unseen_rays(truth.power.emitted);
+    let comparison = |(r, e): (&ReceiverError, &ReceiverResult)| PowerComparison {
+        name: e.name.clone(),
+        power_facets: r.power.facets,
+        power_exact: r.power.spline,
+        difference: r.power.facets - r.power.spline,
+        difference_error: r.power.error,
+        power_error: e.power_error,
+    };
+    error.receivers.iter().zip(&truth.receivers).map(comparison).collect()
 }
 
 /// What to trace on, and the seconds that this will take.

@@ -397,4 +397,6 @@ fn an_error_that_is_not_reached_is_said() {
     let arguments = ["trace", "scene.toml", "-o", "out", "--until-error", "0.0001%@focus", "--rays", "60000"];
     let (code, _, err) = lampyris_in(folder.path(), &arguments);
     assert!(code == 4 && err.replace('\n', " ").contains("not reached with"), "{code} {err}");
+    let (code, _, err) = lampyris_in(folder.path(), &[&arguments[..], &["-q"]].concat());
+    assert!(code == 4 && err.contains("not reached with"), "{code} {err}");
 }

@@ -27,6 +27,8 @@ fn values_out_of_range_are_refused_by_name() {
         ("[[receiver]]\nname = 'r'\nsize = [200, 1e-308]", "1e-9"),
         ("[[receiver]]\nname = 'r'\nkind = 'disc'\nradius = 1e308", "1e12"),
         ("[[model]]\nfile = \"x.stp\"\nunit_mm = 0", "unit_mm"),
+        ("[[model]]\nfile = \"x.stp\"\nunit_mm = 1e-300", "1e-9"),
+        ("[[model]]\nfile = \"x.stp\"\nplacement = { scale = 1e20 }", "1e6"),
         ("[[model]]\nfile = \"x.stp\"\nplacement = { scale = -1 }", "scale"),
         ("[run]\nrays = 0", "rays"),
         ("[run]\nrays = 3e13", "2e13"),

@@ -56,7 +56,8 @@ pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completi
     if console.json {
         print(&json_text(&document)?)?;
     } else {
-        print(&summary(&assessment, console))?;
+        // Data: whether stdout is a terminal is not asked.
+        print(&summary(&assessment, console.width(), str::to_owned))?;
     }
     Ok(Completion::Complete)
 }

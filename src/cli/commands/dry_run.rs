@@ -9,6 +9,7 @@ use crate::cli::output::terminal_tables::table_text;
 use crate::model::Part;
 use crate::pipeline::{IntersectorKind, PreparedScene};
 use crate::report::{bytes, seconds};
+use crate::simulate::{Required, rays_of_run};
 use crate::text::grouped;
 use serde_json::json;
 use std::path::Path;
@@ -19,9 +20,11 @@ pub(super) fn run(prepared: &PreparedScene, folder: &Path, console: &Console) ->
     let facets = &prepared.facets;
     let loaded = &prepared.job.loaded;
     let faces: usize = loaded.model.parts.iter().map(Part::face_count).sum();
-    let effects = crate::simulate::Required::new(&prepared.bound);
+    let effects = Required::new(&prepared.bound);
+    // Sources may have numbers of their own.
+    let rays = rays_of_run(&prepared.bound, &settings);
     if console.json {
-        let document = json!({"dry_run": true, "chosen": prepared.chosen, "rays": settings.rays, "seed": settings.seed, "threads": prepared.threads,
+        let document = json!({"dry_run": true, "chosen": prepared.chosen, "rays": rays, "seed": settings.seed, "threads": prepared.threads,
             "faces": faces, "facets": facets.facet_count(), "mesh_bytes": facets.bytes(),
             "intersector": prepared.choice.intersector.to_string(), "normals": prepared.choice.normals.to_string(),
             "rules": rule_document(&prepared.bound, &loaded.model), "left_out": left_out_document(&loaded.left_out),
@@ -32,7 +35,9 @@ pub(super) fn run(prepared: &PreparedScene, folder: &Path, console: &Console) ->
     }
     let made = format!("{} facets ({})", grouped(facets.facet_count() as u64), bytes(facets.bytes() as u64));
     let traced_on = match prepared.choice.intersector {
-        IntersectorKind::Exact => format!("on the splines of {faces} faces ({made} are for pictures alone)"),
+        IntersectorKind::Exact => {
+            format!("on the splines of {faces} faces ({made} are for pictures and the check alone)")
+        }
         on_facets => {
             format!("through {made} of {faces} faces, {on_facets} with {} normals", prepared.choice.normals)
         }
@@ -40,7 +45,7 @@ pub(super) fn run(prepared: &PreparedScene, folder: &Path, console: &Console) ->
     print(&format!(
         "would trace {} rays (seed {}) on {} threads {traced_on},\n\
          and write into {}; reading took {}, tessellation {}\n",
-        grouped(settings.rays),
+        grouped(rays),
         settings.seed,
         prepared.threads,
         folder.display(),

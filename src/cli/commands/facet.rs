@@ -16,7 +16,7 @@ use crate::pipeline::{mesh_settings, settings_for_accurate_facets, tessellate_mo
 use crate::report::{bytes, seconds, tolerance_text};
 use crate::step::peak_bytes;
 use crate::tessellate::{Report, sampled_sag};
-use crate::text::{figures, grouped};
+use crate::text::{count_of, figures, grouped};
 use crate::truck::baseline;
 use serde::Serialize;
 
@@ -203,9 +203,9 @@ fn meshing_summary(r: &Report) -> String {
             match count {
                 0 => "kept by all facets".to_owned(),
                 _ => format!(
-                    "{} facets of {} faces turn farther, at most {}°",
-                    n(count),
-                    steep.len(),
+                    "{} of {} turn farther, at most {}°",
+                    count_of(count as u64, "facet"),
+                    count_of(steep.len() as u64, "face"),
                     figures(largest, 3)
                 ),
             },

@@ -17,7 +17,7 @@ pub(super) const UNSETTLED: &str = "**Not settled**: rows stay unsure, by the fa
 /// When a far field cannot be judged.
 pub(super) fn say_verdicts(run: &SceneResults, prepared: &PreparedScene, console: &Console) -> Result<(), Failure> {
     for verdict in run.verdicts(prepared).map_err(Failure::running)? {
-        console.say(summary(&verdict.assessment, console));
+        console.say(summary(&verdict.assessment, console.width(), |text| console.bold(text)));
     }
     Ok(())
 }

@@ -14,6 +14,8 @@ use crate::text::{figures, grouped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
+/// What stands before each line.
+const INDENT: &str = "  ";
 /// Longest line of the closing paragraph, characters.
 const LINE_LENGTH: usize = 96;
 
@@ -56,8 +58,8 @@ pub(crate) fn print_results(
 /// Says the last lines of a traced scene: what was found, and which files to open.
 fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: bool, console: &Console) {
     console.say("");
-    for line in wrapped_lines(&answer.replace("**", ""), console.width().min(LINE_LENGTH)) {
-        console.say(format_args!("  {line}"));
+    for line in wrapped_lines(&answer.replace("**", ""), console.width().min(LINE_LENGTH) - INDENT.len()) {
+        console.say(format_args!("{INDENT}{line}"));
     }
     console.say("");
     let mut files = notable_files(folder, results);

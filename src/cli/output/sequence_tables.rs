@@ -7,7 +7,7 @@ use crate::formats::{Facets, Polylines};
 use crate::model::{Model, PlacedFace};
 use crate::report::{Cell, Section, Table, View, file_stem};
 use crate::simulate::{Event, Results, SequenceResult, recorded_ways};
-use crate::text::{figures, grouped};
+use crate::text::{count_of, figures};
 use serde_json::Value;
 use std::io;
 
@@ -77,8 +77,8 @@ fn sequence_tables(results: &Results, model: &Model, unit: &str) -> Vec<Table> {
         let share = |power: f64| Cell::Number(100.0 * power / receiver.power, SHARE_DIGITS);
         let name = format!("{}-sequences", file_stem(&receiver.name));
         let caption = format!(
-            "{} ways were found; all others together brought {} {unit}.",
-            grouped(found.count as u64),
+            "Of {} all others together brought {} {unit}.",
+            count_of(found.count as u64, "way"),
             figures(found.rest, SHARE_DIGITS)
         );
         let title = format!("{}: ways of its light", receiver.name);

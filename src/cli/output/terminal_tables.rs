@@ -15,46 +15,84 @@ pub(crate) fn blank_table(width: usize) -> comfy_table::Table {
     table
 }
 
-/// Returns a report's table for the terminal, at most `width` columns wide, its title above it; columns of numbers to the right.
+/// Returns a report's table for the terminal, its title, if it has one, above it; columns of numbers to the right. A table of more columns
+/// than `width` has room for becomes several, each behind the columns of words that name the rows. No number is broken.
 pub(crate) fn table_text(table: &Table, width: usize) -> String {
-    let mut grid = blank_table(width);
-    let heading = |c: &crate::report::Column| {
-        if c.unit.is_empty() { c.title.clone() } else { format!("{} [{}]", c.title, c.unit) }
-    };
-    let headings: Vec<String> = table.columns.iter().map(heading).collect();
-    grid.set_header(&headings);
-    for row in &table.rows {
-        grid.add_row(row.iter().map(Cell::shown));
-    }
-    let least = least_widths(table, &headings, width);
-    for ((k, column), least) in grid.column_iter_mut().enumerate().zip(least) {
-        // A column with words is read from the left.
-        let words = table.rows.iter().any(|r| matches!(r.get(k), Some(Cell::Text(_))));
-        column.set_cell_alignment(if words { CellAlignment::Left } else { CellAlignment::Right });
-        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(least + PADDING)));
-    }
-    format!("  {}\n{grid}\n", table.title)
+    let columns: Vec<Column<'_>> = (0..table.columns.len()).map(|k| Column::new(table, k)).collect();
+    let grids = divided(&columns, width).into_iter().map(|shown| grid_text(table, &shown, width));
+    let title = if table.title.is_empty() { String::new() } else { format!("  {}\n", table.title) };
+    title + &grids.collect::<Vec<_>>().join("\n")
 }
 
 /// Columns of a terminal that a table's column has beside its text.
-const PADDING: u16 = 2;
+const PADDING: usize = 3;
+/// Longest word that is kept whole: longer ones are paths and names.
+const LONGEST_WORD: usize = 14;
 
-/// The least width of each column: no number is broken, whatever that takes, and where there is room no word of a heading.
-fn least_widths(table: &Table, headings: &[String], width: usize) -> Vec<u16> {
-    let of_numbers = |k: usize| {
-        let cells = table.rows.iter().filter_map(|row| row.get(k));
-        cells
-            .filter(|cell| !matches!(cell, Cell::Text(_)))
-            .map(|cell| cell.shown().chars().count())
-            .max()
-            .unwrap_or(0)
-    };
-    let numbers: Vec<usize> = (0..table.columns.len()).map(of_numbers).collect();
-    let word = |heading: &String| heading.split_whitespace().map(|word| word.chars().count()).max().unwrap_or(0);
-    let with_words: Vec<usize> = headings.iter().zip(&numbers).map(|(h, numbers)| word(h).max(*numbers)).collect();
-    let room = width.saturating_sub(headings.len() * usize::from(PADDING + 1));
-    let least = if with_words.iter().sum::<usize>() <= room { with_words } else { numbers };
-    least.into_iter().map(|least| u16::try_from(least).unwrap_or(u16::MAX)).collect()
+/// A column of a table, and what it takes on a terminal.
+struct Column<'t> {
+    heading: String,
+    cells: Vec<&'t Cell>,
+    /// Whether it has words, and is read from the left.
+    is_words: bool,
+    /// Width at which no number is broken, and at which no word is either, but for long ones.
+    least: usize,
+    easy: usize,
+}
+
+impl<'t> Column<'t> {
+    fn new(table: &'t Table, index: usize) -> Self {
+        let crate::report::Column { title, unit } = &table.columns[index];
+        let heading = if unit.is_empty() { title.clone() } else { format!("{title} [{unit}]") };
+        let cells: Vec<&Cell> = table.rows.iter().filter_map(|row| row.get(index)).collect();
+        let is_text = |cell: &&Cell| matches!(cell, Cell::Text(_));
+        let numbers = cells.iter().filter(|cell| !is_text(cell)).map(|cell| cell.shown().chars().count());
+        let least = numbers.max().unwrap_or(1);
+        let words = |text: &str| text.split([' ', '\n']).map(|word| word.chars().count()).max().unwrap_or(0);
+        let of_texts = cells.iter().filter(|cell| is_text(cell)).map(|cell| words(&cell.shown()));
+        let longest = of_texts.fold(words(&heading), usize::max).min(LONGEST_WORD);
+        Self { is_words: cells.iter().any(is_text), heading, cells, least, easy: longest.max(least) }
+    }
+}
+
+/// Divides columns into tables that fit `width`, each with the first columns of words, which name the rows. All in one where not even one
+/// column has room beside these.
+fn divided<'c>(columns: &'c [Column<'_>], width: usize) -> Vec<Vec<&'c Column<'c>>> {
+    let takes = |columns: &[&Column<'_>]| columns.iter().map(|c| c.easy + PADDING).sum::<usize>();
+    let names: Vec<&Column<'_>> = columns.iter().take_while(|c| c.is_words).collect();
+    let all: Vec<&Column<'_>> = columns.iter().collect();
+    let widest = columns[names.len()..].iter().map(|c| c.easy + PADDING).max().unwrap_or(0);
+    if takes(&all) <= width || takes(&names) + widest > width {
+        return vec![all];
+    }
+    let mut tables = vec![names.clone()];
+    for column in &columns[names.len()..] {
+        if let Some(last) = tables.last_mut().filter(|last| takes(last) + column.easy + PADDING <= width) {
+            last.push(column);
+        } else {
+            tables.push([&names[..], &[column]].concat());
+        }
+    }
+    tables
+}
+
+/// Returns some columns of a table as a table of their own.
+fn grid_text(table: &Table, columns: &[&Column<'_>], width: usize) -> String {
+    let mut grid = blank_table(width);
+    grid.set_header(columns.iter().map(|c| &c.heading));
+    for row in 0..table.rows.len() {
+        grid.add_row(columns.iter().map(|c| c.cells.get(row).map_or_else(String::new, |cell| cell.shown())));
+    }
+    let is_easy = columns.iter().map(|c| c.easy + PADDING).sum::<usize>() <= width;
+    for (shown, column) in grid.column_iter_mut().zip(columns) {
+        shown.set_cell_alignment(if column.is_words { CellAlignment::Left } else { CellAlignment::Right });
+        // Of the padding two columns are the table's own, around the text.
+        let least = (if is_easy { column.easy } else { column.least }) + PADDING - 1;
+        shown.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(
+            u16::try_from(least).unwrap_or(u16::MAX),
+        )));
+    }
+    format!("{grid}\n")
 }
 
 /// Returns the tables of a study's page as text, empty ones and its list of every measurement left out.
@@ -112,13 +150,26 @@ mod tests {
         let mut table = Table::new("t", "Faces", &columns);
         let words = "a face of the cover that has a long name";
         table.row([words.into(), Cell::Number(200_000.0, 4), Cell::Number(-3.08e-5, 3)]);
-        for (width, has_words) in [(100, true), (40, true), (24, false), (5, false)] {
+        for (width, has_words) in [(100, true), (40, true), (24, true), (5, false)] {
             let text = table_text(&table, width);
             for number in [Cell::Number(200_000.0, 4).shown(), Cell::Number(-3.08e-5, 3).shown()] {
                 assert!(text.contains(&number), "{width}: {text}");
             }
             assert_eq!(text.contains("absorbed") && text.contains("facets"), has_words, "{width}: {text}");
         }
+    }
+
+    /// What has no room beside the others stands in a table below, behind the names of the rows.
+    #[test]
+    fn a_wide_table_is_divided() {
+        let mut table =
+            Table::new("t", "Faces", &[("receiver", ""), ("power", "W"), ("error", "W"), ("share", "%")]);
+        table.row(["screen".into(), Cell::from(0.5), Cell::from(0.25), Cell::from(12.5)]);
+        let lines: Vec<String> = table_text(&table, 32).lines().map(|l| l.trim_end().to_owned()).collect();
+        let [first, second] = [&lines[1], &lines[5]];
+        assert!(first.contains("receiver") && first.contains("power") && !first.contains("share"), "{lines:?}");
+        assert!(second.contains("receiver") && second.contains("share") && lines[7].contains("12.5"), "{lines:?}");
+        assert!(lines.iter().all(|line| line.chars().count() <= 32), "{lines:?}");
     }
 
     #[test]

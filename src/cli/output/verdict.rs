@@ -1,56 +1,55 @@
 //! An assessment on the terminal.
 
-use super::terminal_tables::{blank_table, wrapped_lines};
-use crate::cli::console::Console;
+use super::terminal_tables::{table_text, wrapped_lines};
 use crate::regulation::{Assessment, RowVerdict};
 use crate::report::{
-    direction_text, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
+    Cell, Table, direction_text, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
 };
-use crate::text::figures;
-use comfy_table::CellAlignment;
 
 /// Significant digits of intensities: more than any photometer has.
 const DIGITS: usize = 5;
 
-/// Describes an assessment in lines and a table: aim, photometer, every row, what is remarked on rows, and the whole.
-pub(crate) fn summary(a: &Assessment, console: &Console) -> String {
-    let mut text = format!("{}  {}\n", console.bold(&a.regulation.id), a.regulation.function.name);
+/// Columns of the table, with their units.
+const COLUMNS: [(&str, &str); 9] = [
+    ("", ""),
+    ("direction", ""),
+    ("limit", "cd"),
+    ("reading", "cd"),
+    ("± rays", ""),
+    ("± facets", ""),
+    ("± cells", ""),
+    ("verdict", ""),
+    ("settled by", ""),
+];
+
+/// Describes an assessment in lines of at most `width` columns and a table: aim, photometer, every row, what is remarked on rows, and the
+/// whole. `bold` emphasizes where the text is shown.
+pub(crate) fn summary(a: &Assessment, width: usize, bold: impl Fn(&str) -> String) -> String {
+    let mut text = format!("{}  {}\n", bold(&a.regulation.id), a.regulation.function.name);
     let sensor = format!("{:.3}° from side to side", a.sensor_deg);
     let tables = a.regulation.checked();
     let labels =
         [("aim", a.aim.how.as_str()), ("traffic", traffic_sentence(a)), ("sensor", &sensor), ("tables", &tables)];
     for (label, sentence) in labels {
-        text += &labelled_lines(label, sentence, console.width());
+        text += &labelled_lines(label, sentence, width);
     }
-    let mut table = blank_table(console.width());
-    table.set_header([
-        "",
-        "direction",
-        "limit [cd]",
-        "reading [cd]",
-        "± rays",
-        "± facets",
-        "± cells",
-        "verdict",
-        "settled by",
-    ]);
+    let mut table = Table::new("verdict", "", &COLUMNS);
     for row in &a.rows {
-        table.add_row(row_cells(row));
-    }
-    for column in 2..=6 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
+        table.row(row_cells(row));
     }
     let counts = verdict_counts(a);
     let unjudged = a.rows.len() - counts.iter().sum::<usize>();
-    text += &format!("{table}\n");
+    text += &table_text(&table, width);
     for (note, rows) in notes(a) {
-        text += &format!("  {}: {note}\n", rows.join(", "));
+        for (k, line) in
+            wrapped_lines(&format!("{}: {note}", rows.join(", ")), width.saturating_sub(4)).iter().enumerate()
+        {
+            text += &format!("  {}{line}\n", if k == 0 { "" } else { "  " });
+        }
     }
     text += &format!("  {} pass, {} fail, {} unsure", counts[0], counts[1], counts[2]);
     text += &if unjudged > 0 { format!(", {unjudged} not judged (notes and conditions)") } else { String::new() };
-    text + &format!("; the whole: {}\n", console.bold(&a.verdict.to_string()))
+    text + &format!("; the whole: {}\n", bold(&a.verdict.to_string()))
 }
 
 /// Columns of the labels above the table, with the blanks around them.
@@ -78,21 +77,21 @@ fn notes(a: &Assessment) -> Vec<(&str, Vec<&str>)> {
     notes
 }
 
-/// Returns the nine cells of a row of the table; a dash where nothing was read.
-fn row_cells(row: &RowVerdict) -> [String; 9] {
+/// Returns the cells of a row of the table; a dash where nothing was read.
+fn row_cells(row: &RowVerdict) -> [Cell; COLUMNS.len()] {
     let read = |value: fn(crate::regulation::Reading) -> Option<f64>| {
-        row.reading.and_then(value).map_or("–".to_owned(), |x| figures(x, DIGITS))
+        row.reading.and_then(value).map_or(Cell::Empty, |x| Cell::Number(x, DIGITS))
     };
     [
-        row.row.id.clone(),
-        row.direction.map_or(String::new(), direction_text),
-        requirement_text(row),
+        row.row.id.as_str().into(),
+        row.direction.map_or(String::new(), direction_text).into(),
+        requirement_text(row).into(),
         read(|r| Some(r.value)),
         read(|r| Some(r.statistical)),
         read(|r| r.geometric),
         read(|r| Some(r.cells)),
-        row.verdict.map_or("not judged".to_owned(), |v| v.to_string()),
-        settling_text(row),
+        row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
+        settling_text(row).into(),
     ]
 }
 
@@ -114,7 +113,7 @@ mod tests {
             notes.iter().any(|(note, rows)| note.starts_with("as printed") && rows[..] == ["Group 1", "Group 5"]),
             "{notes:?}"
         );
-        assert!(a.rows.iter().all(|row| row_cells(row)[8].is_empty()));
+        assert!(a.rows.iter().all(|row| row_cells(row)[8] == Cell::Text(String::new())));
     }
 
     #[test]

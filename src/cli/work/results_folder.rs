@@ -116,11 +116,17 @@ pub(crate) struct RunRemarks {
 }
 
 impl RunRemarks {
-    /// Puts what came of an error that was asked for into a sentence, and says it; nothing where nothing was asked.
+    /// Puts what came of an error that was asked for into a sentence, which is among the closing lines; says it here where there are none,
+    /// and quiet or not where it is why the exit code is not 0. Nothing where nothing was asked.
     pub(crate) fn say_target(target: Option<TargetResult>, console: &Console) -> Self {
         let sentences: Vec<String> = target.iter().map(target_sentence).collect();
-        for sentence in &sentences {
-            console.say(sentence.replace("**", ""));
+        let is_missed = target.as_ref().is_some_and(|target| !target.reached);
+        for sentence in sentences.iter().map(|sentence| sentence.replace("**", "")) {
+            if is_missed {
+                console.insist(sentence);
+            } else if console.json {
+                console.say(sentence);
+            }
         }
         Self { sentences, target, first_command: None }
     }

@@ -81,8 +81,8 @@ impl MixedPacket {
         rays <= FEW && sampling == Sampling::Sobol && simple_shape
     }
 
-    /// Takes a portion of which the first ray has the number `first` in the run and each these quanta, from its ray number `*next` in the run
-    /// on, as far as there is room, and moves `next` past those that were taken. [`Self::takes`] must have said so.
+    /// Takes a portion of which the first ray has the number `first` in the run and each these quanta, from its ray number `*next` in the
+    /// run on, as far as there is room, and moves `next` past those that were taken. [`Self::takes`] must have said so.
     pub(crate) fn add(&mut self, emitter: &Emitter, portion: Portion, (first, quanta): (u64, f64), next: &mut u64) {
         for (any, own) in self.pairs.iter_mut().zip(emitter.needed_pairs()) {
             *any |= own;

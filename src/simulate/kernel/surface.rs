@@ -53,8 +53,8 @@ fn mirror_interaction<'s, C: RayPayload>(
 /// Returns what the bare boundary of a body does to light: both ways on with their shares; nothing is drawn or booked.
 ///
 /// Light passes unchanged where its innermost body stays the same. After too long by total reflection alone it is trapped, and it is lost
-/// where its media cannot be on the other side even when found anew. Writes `skip`, `overlap`, `refused_contact` and the corrections of `normals` in
-/// `at`.
+/// where its media cannot be on the other side even when found anew. Writes `skip`, `overlap`, `refused_contact` and the corrections of
+/// `normals` in `at`.
 #[inline(always)]
 fn interface_interaction<'s, C: RayPayload>(
     context: &Context<'_>,

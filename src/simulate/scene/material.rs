@@ -26,6 +26,8 @@ pub struct ModelUse {
 
 /// Farthest coordinate of a placement, mm. There a place is known to 15 nm, and a hit to as much: a thousandth of the finest facets.
 const FARTHEST_PLACE: f64 = 1e11;
+/// Units of files, mm, and scales of placements: from a picometre to a kilometre.
+const SCALES: std::ops::RangeInclusive<f64> = 1e-9..=1e6;
 
 impl ModelUse {
     /// Refuses a model without a file, or with a placement or unit that is no number or out of range; `index` is its place in the scene.
@@ -35,7 +37,6 @@ impl ModelUse {
             at.extend(keys.iter().map(|k| Key::Name(k)));
             Err(scene.error(ErrorKind::Value, &at, message.to_owned()))
         };
-        let positive = |x: f64| x > 0.0 && x.is_finite();
         let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
         let direction = |x: &[f64; 3]| finite(x) && x.iter().any(|x| *x != 0.0);
         let p = &self.placement;
@@ -51,8 +52,12 @@ impl ModelUse {
             }
             _ if !direction(&p.z) => fail(&["placement", "z"], "`z` must be a direction"),
             _ if p.x.is_some_and(|x| !direction(&x)) => fail(&["placement", "x"], "`x` must be a direction"),
-            m if m.unit_mm.is_some_and(|u| !positive(u)) => fail(&["unit_mm"], "`unit_mm` must be positive"),
-            m if !positive(m.placement.scale) => fail(&["placement", "scale"], "`scale` must be positive"),
+            m if m.unit_mm.is_some_and(|u| !SCALES.contains(&u)) => {
+                fail(&["unit_mm"], "`unit_mm` must be a length from 1e-9 to 1e6 mm")
+            }
+            m if !SCALES.contains(&m.placement.scale) => {
+                fail(&["placement", "scale"], "`scale` must be a factor from 1e-9 to 1e6")
+            }
             _ => Ok(()),
         }
     }

@@ -3,6 +3,7 @@
 use super::{FarFieldType, Key, PowerUnit, Receiver, ReceiverKind, Scene};
 use crate::regulation::Regulation;
 use crate::simulate::{Error, ErrorKind};
+use crate::text::nearest_name;
 use serde::{Deserialize, Serialize};
 
 /// A regulation whose verdict is printed with the run.
@@ -50,10 +51,16 @@ impl RegulationUse {
         }
         let Some(receiver) = self.receiver_index(scene) else {
             let message = match &self.receiver {
-                Some(name) => format!("the scene has no one receiver '{name}'"),
-                None => "the scene has no far field over H and V, or several".into(),
+                Some(name) => format!("the scene has no receiver '{name}', or several"),
+                None => "the scene has no far field over H and V (`angles = \"A\"`), or several".into(),
             };
-            return fail("receiver", message, "name a receiver of `kind = \"far_field\"`");
+            let names = scene.receivers.iter().map(|receiver| receiver.name.as_str());
+            let near = self.receiver.as_ref().and_then(|name| nearest_name(name, names));
+            let help = match near {
+                Some(near) => format!("did you mean '{near}'?"),
+                None => "name a receiver of `kind = \"far_field\"` with `angles = \"A\"`".into(),
+            };
+            return fail("receiver", message, &help);
         };
         let receiver = &scene.receivers[receiver];
         if receiver.kind != ReceiverKind::FarField || receiver.angles != FarFieldType::A {

@@ -27,8 +27,8 @@ const MOST_FACETS: f64 = 6e6;
 /// What is asked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AccuracyTarget {
-    /// Direction error that 99 % of the hits on curved faces must keep, of the mirrored light and, where a face is known to let light through,
-    /// of the refracted; degrees.
+    /// Direction error that 99 % of the hits on curved faces must keep, of the mirrored light and, where a face is known to let light
+    /// through, of the refracted; degrees.
     pub angle_deg: f64,
     /// Rays that the job will trace: a long job pays for finer facets or faster normals differently than a short one; 0 when only
     /// the facets are wanted.
