@@ -16,7 +16,9 @@ const MOST_FOR_EXTENDED: usize = 30;
 /// Aims by which rows of many directions are judged side by side: zones take memory, on a far field of millions of cells hundreds of MB.
 const AIMS_AT_ONCE: usize = 4;
 
-/// What is remarked on rows that errors of their reading do not make unsure.
+/// What is remarked on rows that another open aim makes unsure: by a verdict of its own, and by none as it sees them outside.
+const OTHER_BY_AIM: &str =
+    "by an aim that the errors of the map leave open its verdict is another; more rays tell which aim holds";
 const OUTSIDE_BY_AIM: &str = "by an aim that the errors of the map leave open it lies outside the far field";
 
 /// Judges all rows as the map is aimed, and then by the other aims that its errors leave open. A lamp that is aimed by noise fails and
@@ -47,8 +49,10 @@ pub(super) fn judge_by_open_aims(
             let Some(other) = other else { continue };
             // What settles it by one aim does not where it is open which one holds.
             if row.verdict != other.verdict {
-                if other.unseen > 0 && row.unseen == 0 && row.verdict != Some(Verdict::Unsure) {
-                    row.row.add_note(OUTSIDE_BY_AIM);
+                // Once: then it is unsure, and nothing is said to settle it.
+                if row.verdict != Some(Verdict::Unsure) || row.settles.is_some() {
+                    let is_outside = other.unseen > 0 && row.unseen == 0;
+                    row.row.add_note(if is_outside { OUTSIDE_BY_AIM } else { OTHER_BY_AIM });
                 }
                 (row.verdict, row.settles) = (Some(Verdict::Unsure), None);
             }

@@ -71,7 +71,7 @@ pub fn settling_text(row: &RowVerdict) -> String {
         return "a wider far field".into();
     }
     let Some(settles) = row.settles else { return String::new() };
-    let rays = format!("{:.1e} rays", settles.rays as f64);
+    let rays = format!("{:.1e} rays in all", settles.rays as f64);
     match (settles.tolerance_mm, settles.tolerance_share) {
         (Some(tolerance), _) => format!("{rays}, {} mm", figures(tolerance, 2)),
         (None, Some(share)) => format!("{rays}, facets {} times as fine", figures(1.0 / share, 2)),

@@ -277,6 +277,19 @@ impl ReceiverResult {
         PoleRings::new(self.grid, bounds(0), bounds(1))
     }
 
+    /// Returns one sentence where light came and none of it is of wavelengths that its channels count; `None` where it has none.
+    pub(super) fn unseen_light_note(&self) -> Option<String> {
+        let is_unseen =
+            self.power > 0.0 && !self.channels.is_empty() && self.channels.iter().all(|c| c.total == 0.0);
+        is_unseen.then(|| {
+            format!(
+                "no light that came to '{}' is of wavelengths that it counts: `bins_nm` hold none of them, or they lie beyond the eye's 360 to \
+                 830 nm",
+                self.name
+            )
+        })
+    }
+
     /// Returns the channel in lumens, `lm` or the Y of CIE values; `None` for a receiver that counts power alone or bins.
     pub fn photometric(&self) -> Option<&ChannelResult> {
         self.channels.iter().find(|c| matches!(c.name.as_str(), "lm" | "Y"))

@@ -9,6 +9,7 @@ use super::hooks::Traced;
 use super::outcome::{Counts, LostRay, PathVertex};
 use super::plan::Plan;
 use super::power_scale::PowerScale;
+use super::receiver::Receiver;
 use super::receiver_results::ReceiverResult;
 use super::seconds::Seconds;
 use super::sequence_results::ReceiverSequences;
@@ -174,8 +175,13 @@ impl Results {
         let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(bound.scarce_sources_note(&plan));
         let found = found.chain(bound.uncounted_light_notes(&tallies.receivers));
         let found = found.chain(few_replicates(tallies.replicates));
-        let notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
+        let mut notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let scale = PowerScale { quantum, replicates: partial.done.len() as u32 };
+        let receiver = |(i, r): (usize, &Receiver)| {
+            ReceiverResult::new(r, i, &tallies, (&scale, plan.heaviest_ray()), bound.scene.run.unit)
+        };
+        let receivers: Vec<ReceiverResult> = bound.receivers.iter().enumerate().map(receiver).collect();
+        notes.extend(receivers.iter().filter_map(ReceiverResult::unseen_light_note));
         let power = tallies.ends.each_ref().map(|s| scale.power(s));
         let errors = tallies.ends.each_ref().map(|s| scale.error(s));
         let digest = digest(&tallies);
@@ -201,14 +207,7 @@ impl Results {
             caught_rays: caught,
             corrected_normals,
             absorbed: absorbed_by(bound, &tallies, &scale),
-            receivers: bound
-                .receivers
-                .iter()
-                .enumerate()
-                .map(|(i, r)| {
-                    ReceiverResult::new(r, i, &tallies, (&scale, plan.heaviest_ray()), bound.scene.run.unit)
-                })
-                .collect(),
+            receivers,
             sequences: sequences(bound, &tallies, &scale),
             faces: bound.counts_faces().then(|| FaceResults::new(bound, &tallies, &scale)),
             grows: plan.grows(),

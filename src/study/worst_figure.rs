@@ -13,6 +13,8 @@ const NET_ORDER: f64 = 0.6;
 const RANDOM_ORDER: f64 = 0.5;
 /// Errors below this share of a figure are nobody's concern.
 const NEGLIGIBLE: f64 = 1e-6;
+/// Ratio up to which two figures are as wrong as one another.
+const AS_WRONG: f64 = 1.01;
 /// The largest multiple of a standard error that is told: beyond, that error is none.
 const LARGEST_RATIO: f64 = 1e9;
 
@@ -43,7 +45,6 @@ pub(super) fn worst_figure(
             worst.weigh([&r.name, figure], geometric, allowed, value);
         });
     }
-    worst.weigh_ends(&error.power, ends, sums);
     for a in &error.absorbed {
         let figure = format!("absorbed in {}", a.r#in);
         worst.weigh([&a.name, &figure], a.power.geometric(), a.statistical * sums, a.power.spline);
@@ -55,7 +56,10 @@ pub(super) fn worst_figure(
             worst.weigh([&name, figure], power.geometric(), statistical * sums, power.spline);
         }
     }
-    worst
+    let mut all_light = Worst::default();
+    all_light.weigh_ends(&error.power, ends, sums);
+    // What a receiver or body has as much of is named by these.
+    if all_light.ratio > AS_WRONG * worst.ratio { all_light } else { worst }
 }
 
 /// Returns the faces that the scene will list: those that absorb and let out most on the spline.
@@ -92,13 +96,13 @@ fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut
 }
 
 impl Worst {
-    /// Takes the powers by where light ended; `sums` is the factor from the statistical errors of the pilot to those of the whole run.
+    /// Takes the powers by where light ended, but for what a limit cut off, which is no figure of the true surfaces; `sums` is the factor from
+    /// the statistical errors of the pilot to those of the whole run.
     fn weigh_ends(&mut self, errors: &EndErrors, statistical: &Power, sums: f64) {
         let powers = [
             ("received", errors.received, statistical.received),
             ("absorbed", errors.absorbed, statistical.absorbed),
             ("escaped", errors.escaped, statistical.escaped),
-            ("cut off", errors.cut_off, statistical.cut_off),
         ];
         for (figure, power, statistical) in powers {
             self.weigh(["all light", figure], power.geometric(), statistical * sums, power.spline);

@@ -7,7 +7,7 @@ use lampyris::simulate::{RunSettings, Scene, simulate};
 use lampyris::study::figures::{Limit, Surface, cell_errors, figures};
 use std::path::Path;
 
-/// Of 1 W in 10,000 rays one is 0.1 mW, on a cell of 1 cm² 1 W/m².
+/// Of 1 W in 10,000 rays one is 0.1 mW, on a cell of 1 cm² 1 W/m²; in replicates of 78 rays, for 78.125 in the mean, a little more.
 #[test]
 fn what_no_ray_reached_is_not_stated_as_exactly_dark() {
     let source = "kind = 'collimated'\nat = [-5, 0, -1]\ndirection = [0, 0, 1]\nradius = 1\npower = 1";
@@ -27,15 +27,16 @@ fn what_no_ray_reached_is_not_stated_as_exactly_dark() {
     let nothing = Octree::build(&no_facets, &octree::Settings::default());
     let results = simulate(&bound, &nothing, &RunSettings::from(&scene.run), &|_| true);
     let close =
-        |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-3, "{found} for {expected}");
-    // All light falls into the first cell: replicates differ by one ray in 78 alone.
+        |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-9, "{found} for {expected}");
+    // All light falls into the first cell, as much of it in each replicate.
     let lit = cell_errors(&results.receivers[0]);
     assert!(lit[0] < 1e-3 * results.receivers[0].cells[0], "{lit:?}");
-    close(lit[1], 1.0);
-    cell_errors(&results.receivers[1]).into_iter().for_each(|error| close(error, 1.0));
+    let heaviest = 78.125 / 78.0;
+    close(lit[1], heaviest);
+    cell_errors(&results.receivers[1]).into_iter().for_each(|error| close(error, heaviest));
     let dark = &figures(&results, Surface::Spline, "W")[1];
-    close(dark.power.statistical, 1e-4);
-    close(dark.max.as_ref().unwrap().statistical, 1.0);
+    close(dark.power.statistical, 1e-4 * heaviest);
+    close(dark.max.as_ref().unwrap().statistical, heaviest);
     assert_eq!((dark.power.value, dark.power.limited_by), (0.0, Limit::Statistics));
     assert!(dark.centroid_1.is_none() && dark.rms_2.is_none(), "no light has no place: {dark:?}");
 }

@@ -140,3 +140,17 @@ fn a_map_ends_at_the_rim() {
     let beyond = |k: &usize| middle(*k)[0].hypot(middle(*k)[1]) > 1.0;
     assert_eq!(part.off, (0..110).filter(beyond).collect::<Vec<_>>());
 }
+
+/// Light of 587.56 nm is in a bin from 500 to 600 nm, and in none from 600 nm on.
+#[test]
+fn light_that_no_channel_counts_is_told() {
+    let is_told = |bins: &str| {
+        let scene = format!(
+            "[run]\nrays = 1000\n[[source]]\nkind = 'collimated'\nradius = 1\n\
+             [[receiver]]\nname = 'screen'\nat = [0, 0, 5]\nsize = [4, 4]\ncells = [2, 2]\nbins_nm = {bins}\n"
+        );
+        let run = World::default().run(&scene, |_| {});
+        run.notes.iter().any(|note| note.contains("came to 'screen' is of wavelengths"))
+    };
+    assert!(is_told("[600, 700]") && !is_told("[500, 600]"));
+}

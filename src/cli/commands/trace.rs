@@ -82,7 +82,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     // What is traced in parts is chosen once: by the part that came first.
     let is_part = shard.is_some() || extra.resume || is_range;
     if accuracy.is_some() && is_part {
-        let message = "--accuracy chooses by times that it measures, which differ from run to run: parts would not fit together";
+        let message = "--accuracy would search for its facets again in every part";
         return Err(Failure::arguments(message)
             .with_help("give --tolerance and --normals with --shard, --resume and --rays A..B"));
     }

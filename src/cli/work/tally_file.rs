@@ -33,7 +33,7 @@ pub(crate) struct TallyHeader {
     face: Vec<(String, [u64; 2])>,
     #[serde(default)]
     role: Vec<(String, [u64; 2])>,
-    /// Local tolerances that an accuracy came to: measured times decided them, so that they cannot be found again.
+    /// Local tolerances that an accuracy came to, so that they need not be searched for again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     plan: Option<StoredPlan>,
     rays: Option<u64>,

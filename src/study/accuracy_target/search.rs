@@ -199,8 +199,8 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Meshes by a plan, and has `judge` find how far off such facets send light: it is given them, and how far apart two faces may lie that
-    /// touch, mm.
+    /// Meshes by a plan, and has `judge` find how far off such facets send light: it is given them, and how far apart two faces may lie
+    /// that touch, mm.
     fn measure<E>(
         &self,
         plan: &TolerancePlan,
