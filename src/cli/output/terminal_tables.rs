@@ -59,7 +59,10 @@ impl<'t> Column<'t> {
 /// column has room beside these.
 fn divided<'c>(columns: &'c [Column<'_>], width: usize) -> Vec<Vec<&'c Column<'c>>> {
     let takes = |columns: &[&Column<'_>]| columns.iter().map(|c| c.easy + PADDING).sum::<usize>();
-    let names: Vec<&Column<'_>> = columns.iter().take_while(|c| c.is_words).collect();
+    // A number between words, as a tolerance before the kind of normals, is part of a row's name.
+    let is_words = |k: usize| columns.get(k).is_some_and(|column| column.is_words);
+    let named = (0..columns.len()).take_while(|&k| is_words(k) || is_words(k + 1)).count();
+    let names: Vec<&Column<'_>> = columns[..named].iter().collect();
     let all: Vec<&Column<'_>> = columns.iter().collect();
     let widest = columns[names.len()..].iter().map(|c| c.easy + PADDING).max().unwrap_or(0);
     if takes(&all) <= width || takes(&names) + widest > width {
@@ -162,17 +165,20 @@ mod tests {
     /// What has no room beside the others stands in a table below, behind the names of the rows.
     #[test]
     fn a_wide_table_is_divided() {
-        let mut table =
-            Table::new("t", "Faces", &[("receiver", ""), ("power", "W"), ("error", "W"), ("share", "%")]);
-        table.row(["screen".into(), Cell::from(0.5), Cell::from(0.25), Cell::from(12.5)]);
-        let lines: Vec<String> = table_text(&table, 32).lines().map(|l| l.trim_end().to_owned()).collect();
+        let columns =
+            [("receiver", ""), ("at", "mm"), ("normals", ""), ("power", "W"), ("error", "W"), ("share", "%")];
+        let mut table = Table::new("t", "Faces", &columns);
+        let [power, error, share] = [0.5, 0.25, 12.5].map(Cell::from);
+        table.row(["screen".into(), Cell::from(0.2), "flat".into(), power, error, share]);
+        let lines: Vec<String> = table_text(&table, 46).lines().map(|l| l.trim_end().to_owned()).collect();
         let headings: Vec<&String> = lines.iter().filter(|line| line.contains("receiver")).collect();
         assert!(headings[0].contains("power") && headings[1].contains("share"), "{lines:?}");
+        assert!(headings.iter().all(|heading| heading.contains("at") && heading.contains("normals")), "{lines:?}");
         assert!(
             lines.last().unwrap().starts_with(" screen") && lines.last().unwrap().ends_with("12.5"),
             "{lines:?}"
         );
-        assert!(lines.iter().all(|line| line.chars().count() <= 32), "{lines:?}");
+        assert!(lines.iter().all(|line| line.chars().count() <= 46), "{lines:?}");
     }
 
     #[test]

@@ -12,13 +12,13 @@ const DIGITS: usize = 5;
 /// Columns of the table, with their units.
 const COLUMNS: [(&str, &str); 9] = [
     ("", ""),
-    ("direction", ""),
+    ("verdict", ""),
     ("limit", "cd"),
     ("reading", "cd"),
     ("± rays", ""),
     ("± facets", ""),
     ("± cells", ""),
-    ("verdict", ""),
+    ("direction", ""),
     ("settled by", ""),
 ];
 
@@ -84,13 +84,13 @@ fn row_cells(row: &RowVerdict) -> [Cell; COLUMNS.len()] {
     };
     [
         row.row.id.as_str().into(),
-        row.direction.map_or(String::new(), direction_text).into(),
+        row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
         requirement_text(row).into(),
         read(|r| Some(r.value)),
         read(|r| Some(r.statistical)),
         read(|r| r.geometric),
         read(|r| Some(r.cells)),
-        row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
+        row.direction.map_or(String::new(), direction_text).into(),
         settling_text(row).into(),
     ]
 }

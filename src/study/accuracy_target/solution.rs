@@ -2,7 +2,7 @@
 
 use super::AccuracyTarget;
 use crate::intersect::{Cost, NormalMode};
-use crate::study::counted_work::{FACET, FACET_HIT, MOVED_HIT, SPLINE_HIT, longer_on};
+use crate::study::counted_work::{CUBIC_HIT, FACET, FACET_HIT, MOVED_HIT, SPLINE_HIT, longer_on};
 use crate::study::tolerance_plan::TolerancePlan;
 use crate::text::figures;
 
@@ -28,7 +28,11 @@ pub(super) struct JobWork {
 impl JobWork {
     /// Returns that of so many rays on so many facets; `cost` is that of some rays with these normals.
     pub(super) fn new(facets: f64, rays: f64, normals: NormalMode, cost: Cost) -> Self {
-        let hit = if normals == NormalMode::Exact { MOVED_HIT } else { FACET_HIT };
+        let hit = match normals {
+            NormalMode::Exact => MOVED_HIT,
+            NormalMode::Cubic => CUBIC_HIT,
+            NormalMode::Flat | NormalMode::Nearest | NormalMode::Bilinear => FACET_HIT,
+        };
         let asked = cost.doubtful as f64 / cost.rays.max(1) as f64;
         // Fewer facets than one are none to walk through.
         let on_facets = hit * longer_on(facets.max(1.0) / COUNTED_FACETS).max(0.0);
