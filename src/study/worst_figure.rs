@@ -96,8 +96,8 @@ fn each_figure(r: &ReceiverError, [sums, cells]: [f64; 2], weigh: &mut dyn FnMut
 }
 
 impl Worst {
-    /// Takes the powers by where light ended, but for what a limit cut off, which is no figure of the true surfaces; `sums` is the factor from
-    /// the statistical errors of the pilot to those of the whole run.
+    /// Takes the powers by where light ended, but for what a limit cut off, which is no figure of the true surfaces; `sums` is the factor
+    /// from the statistical errors of the pilot to those of the whole run.
     fn weigh_ends(&mut self, errors: &EndErrors, statistical: &Power, sums: f64) {
         let powers = [
             ("received", errors.received, statistical.received),
