@@ -184,7 +184,9 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
             Way::Finer(_) => worst_figure(bound, (&tried.error, ends), &settings, scale),
             // Moved hits are mostly the spline's own: no difference at all is not none.
             Way::Moved => {
-                let error = tried.error.clone().with_unseen_rays(emitted);
+                // Of all light what is seen is enough: of most scenes its errors are next to none.
+                let power = tried.error.power;
+                let error = GeometricError { power, ..tried.error.clone().with_unseen_rays(emitted) };
                 worst_figure(bound, (&error, ends), &settings, scale)
             }
         };
