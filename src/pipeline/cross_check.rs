@@ -8,12 +8,12 @@ use super::ray_recorder::RayRecorder;
 use super::scene_results::SceneResults;
 use super::settings::IntersectorKind;
 use crate::intersect::bvh::{self, Bvh};
-use crate::intersect::{Cost, Intersector, NormalMode};
-use crate::math::{Ray, Vector};
+use crate::intersect::{Intersector, NormalMode};
+use crate::math::Ray;
 use crate::simulate::{PartialRun, ReceiverResult, Results, RunSettings, ask_again, verify_pruning};
-use crate::study::Progress;
 use crate::study::cross_check::{self, CrossCheck, GroupedIntersectors, cross_check_groups};
 use crate::study::geometric_error::{GeometricError, geometric_error};
+use crate::study::{Lift, Progress};
 use std::time::Instant;
 
 /// Segments of a run that are asked again of BVH and spline, at most.
@@ -24,10 +24,6 @@ const RECHECKED_SHARE: f64 = 0.1;
 const FEWEST_RECHECKED: u64 = 2000;
 /// The fewest rays whose segments these are: 2000 paths are as many places, directions and depths, however long each is.
 const FEWEST_REPLAYED: u64 = 2000;
-/// Tolerances above a surface that a ray which left it starts at, so that facets and spline are asked the same question.
-pub const LIFT_IN_TOLERANCES: f64 = 4.0;
-/// That height at most, as a share of the way to the next surface above: a ray within a wall thinner than that starts within it.
-const LIFT_IN_WALLS: f64 = 0.25;
 
 /// Rays traced on facets and on the spline: some 16,000 tell widths within a few per cent.
 const FACETING_RAYS: f64 = 16_384.0;
@@ -127,13 +123,8 @@ fn sample_segments(prepared: &PreparedScene, results: &Results, intersector: &dy
     let expected = (count as f64 * segments_a_ray) as u64;
     let recorder = RayRecorder::new(intersector, asked, expected);
     ask_again(&prepared.bound, &recorder, &settings, (step, count));
-    let lift = LIFT_IN_TOLERANCES * prepared.mesh_settings.loosest();
-    let start = |ray: &Ray, up: Vector| {
-        let upwards = Ray { direction: up, ..*ray };
-        let next = intersector.intersect(&upwards, &mut Cost::default()).map_or(f64::INFINITY, |hit| hit.t);
-        ray.origin + lift.min(LIFT_IN_WALLS * next) * up
-    };
-    recorder.rays(asked as usize, &prepared.job.loaded.model, start)
+    let lift = Lift::new(intersector, prepared.mesh_settings.loosest());
+    recorder.rays(asked as usize, &prepared.job.loaded.model, |ray, up| lift.start(ray, up))
 }
 
 /// Builds what the run has not of BVH and octree, and compares both and the spline on these rays.

@@ -22,6 +22,7 @@ pub mod geometric_error;
 mod hit_errors;
 pub mod interpolation;
 pub mod lamp;
+mod lift;
 mod mesh_source;
 pub mod model_figures;
 mod model_mesh_source;
@@ -42,6 +43,7 @@ mod worst_figure;
 
 #[cfg(feature = "report")]
 pub(crate) use hit_errors::slope;
+pub use lift::Lift;
 pub use mesh_source::{FacetTree, MeasuredMesh, MeshSource};
 pub use model_mesh_source::ModelMeshSource;
 pub use quantiles::{Quantiles, Summary};

@@ -1,6 +1,6 @@
 //! Rays to ask of a model, each a pure function of its index: a camera's, random ones through the box, and bounces.
 
-use super::Random;
+use super::{Lift, Random};
 use crate::intersect::{Cost, Intersector};
 use crate::math::{Aabb, Point, Ray, Vector, orthonormal_pair};
 use std::ops::Range;
@@ -121,21 +121,24 @@ pub const RAYS_PER_PATH: u64 = 8;
 
 /// Incoherent rays: paths of up to eight rays that leave each hit in a random direction on the side they came from.
 ///
-/// A ray starts `lift` mm above the surface, in free space, so that all intersectors are asked the very same question
-/// whatever they take for the surface. A path that leaves the model begins anew.
+/// A ray starts above the surface, in free space, so that all intersectors are asked the very same question whatever they take for the
+/// surface. A path that leaves the model begins anew.
 #[derive(Clone, Copy)]
 pub struct Bounces<'a> {
     first: Uniform,
     guide: &'a dyn Intersector,
-    lift: f64,
+    lift: Lift<'a>,
 }
 
 impl<'a> Bounces<'a> {
-    /// Makes `count` rays through a box, mm; `guide` finds the points they leave, and `lift`, mm, is best a few times the sag of the
-    /// facets.
-    pub fn new(bounds: &Aabb, guide: &'a dyn Intersector, lift: f64, seed: u64, count: u64) -> Self {
+    /// Makes `count` rays through a box, mm; `guide` finds the points they leave, and `tolerance` is the loosest of the facets, mm.
+    pub fn new(bounds: &Aabb, guide: &'a dyn Intersector, tolerance: f64, seed: u64, count: u64) -> Self {
         // Another stream than that of `Uniform` with this seed, whose rays may be asked beside these.
-        Self { first: Uniform::new(bounds, seed ^ 0x9e6c_63d0_876a_9a47, count), guide, lift }
+        Self {
+            first: Uniform::new(bounds, seed ^ 0x9e6c_63d0_876a_9a47, count),
+            guide,
+            lift: Lift::new(guide, tolerance),
+        }
     }
 
     /// Makes all eight rays of a path: each leaves the hit of the one before in a random direction on the side it came from, or begins
@@ -152,7 +155,8 @@ impl<'a> Bounces<'a> {
                 Some(hit) => {
                     let side = if hit.geometric_normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
                     let n = hit.geometric_normal * side;
-                    Ray::new(ray.point_at(hit.t) + n * self.lift, random.hemisphere(n))
+                    let left = Ray::new(ray.point_at(hit.t), n).with_departure(hit.departure());
+                    Ray::new(self.lift.start(&left, n), random.hemisphere(n))
                 }
                 None => self.first.ray(path * RAYS_PER_PATH + k),
             };

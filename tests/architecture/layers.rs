@@ -44,6 +44,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         "cli/output",
         &[
             "json",
+            "sentences",
             "terminal_tables",
             "appearance",
             "octree_shape",
@@ -508,6 +509,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "timing",
             "records",
             "arbiter",
+            "lift",
             "rays",
             "surface_rays",
             "sample_models",

@@ -110,3 +110,24 @@ fn parts_that_are_placed_often_are_built_once() {
     assert!(count(many, "/hits") > 500);
     assert_eq!([count(many, "/facets_vs_exact/unexplained"), count(many, "/octree_vs_bvh/disagree")], [0, 0]);
 }
+
+/// Rays within a lens that is thinner than what keeps them clear of coarse facets are asked within it.
+#[test]
+fn rays_within_a_thin_wall_start_within_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = format!(
+        "[[model]]\nfile = '{}'\n[[medium]]\nname = 'glass'\nindex = 1.5168\n[[material]]\npart = '*'\nmedium = 'glass'\n\
+         [[source]]\nkind = 'collimated'\nat = [0, 0, -10]\nradius = 10\n\
+         [[receiver]]\nname = 'focus'\nat = [0, 0, 107.026853]\nsize = [40, 40]\ncells = [20, 20]\n",
+        fixture("step/lens_planoconvex_nurbs.stp").display()
+    );
+    let path = folder.path().join("lens.toml");
+    std::fs::write(&path, scene).unwrap();
+    let file = path.display().to_string();
+    let (code, out, err) = lampyris(&["check", &file, "--json", "--rays", "3000", "--tolerance", "3"]);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(count(&found, "/rays"), 3000);
+    // A third of them are within the lens.
+    assert!(count(&found, "/facets_vs_exact/hit_miss") < 30, "{}", found["facets_vs_exact"]);
+}

@@ -19,7 +19,7 @@ fn cross_checked(model: &Model, rays: u64) -> CrossCheck {
     let bounds = made.mesh.bounds();
     let camera = Camera::new(&bounds, rays / 3);
     let uniform = Uniform::new(&bounds, 1, rays / 3);
-    let bounces = Bounces::new(&bounds, &octree, 0.8, 2, rays / 3);
+    let bounces = Bounces::new(&bounds, &octree, 0.2, 2, rays / 3);
     let chain = Chain(vec![&camera, &uniform, &bounces]);
     let subjects = Intersectors { model, mesh: &made.mesh, octree: &octree, bvh: &bvh, exact: product.exact() };
     assert_eq!(chain.len(), rays / 3 * 3);

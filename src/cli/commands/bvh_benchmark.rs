@@ -128,7 +128,7 @@ fn own_rays(mesh: &FacetMesh, octree: &Octree, tolerance: f64, tracing: &Tracing
     let count = tracing.rays().unwrap_or(RAYS);
     let seed = tracing.seed.unwrap_or(1);
     let bounds = mesh.bounds();
-    let bounces = Bounces::new(&bounds, octree, 4.0 * tolerance, seed, count);
+    let bounces = Bounces::new(&bounds, octree, tolerance, seed, count);
     let surface = SurfacePaths::new(mesh, octree, seed, count);
     vec![
         ("coherent", Camera::new(&bounds, count).rays(0..count)),

@@ -7,6 +7,7 @@ use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::appearance;
 use crate::cli::output::json::{json_text, json_value};
+use crate::cli::output::sentences::sentence_lines;
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::contenders::{Contenders, Structures};
 use crate::cli::work::input_files::{self, Input};
@@ -21,8 +22,8 @@ use crate::intersect::{Cost, Intersector, NormalMode};
 use crate::math::{Aabb, Ray};
 use crate::model::Model;
 use crate::pipeline::{
-    AccurateSettings, IntersectorChoice, LIFT_IN_TOLERANCES, RayRecorder, TracingSettings, mesh_settings,
-    settings_for_accuracy, tessellate_by_part,
+    AccurateSettings, IntersectorChoice, RayRecorder, TracingSettings, mesh_settings, settings_for_accuracy,
+    tessellate_by_part,
 };
 use crate::report::{CheckReport, unexplained, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
@@ -30,7 +31,7 @@ use crate::study::accuracy_target::AccuracyResult;
 use crate::study::cross_check::{self, CrossCheck};
 use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
 use crate::study::receivers::PowerComparison;
-use crate::study::{Progress, Quantiles, Summary, records};
+use crate::study::{Lift, Progress, Quantiles, Summary, records};
 use crate::text::{count_of, figures, grouped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -119,7 +120,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     if console.json {
         print(&text)?;
     } else {
-        print(&(check_summary(&found, normals) + &paired_receivers::summary(&receivers)))?;
+        print(&(check_summary(&found, normals, console.width()) + &paired_receivers::summary(&receivers)))?;
         say_files(command, &found, console);
     }
     // Last, for the answer counts although faces are missing.
@@ -255,8 +256,8 @@ fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
     }
 }
 
-/// Returns the rays of a scene's own run, or a camera's, random and bouncing ones for a bare model, which begin [`LIFT_IN_TOLERANCES`]
-/// off the facet that they leave; `loosest` is the largest tolerance, mm.
+/// Returns the rays of a scene's own run, or a camera's, random and bouncing ones for a bare model, which begin above the
+/// facet that they leave; `loosest` is the largest tolerance, mm.
 fn own_rays(
     scene: Option<&Scene>,
     model: &Model,
@@ -265,7 +266,6 @@ fn own_rays(
     tracing: &TracingSettings,
     loosest: f64,
 ) -> Result<Vec<Ray>, Failure> {
-    let lift = LIFT_IN_TOLERANCES * loosest;
     let count = tracing.rays().unwrap_or(RAYS);
     let Some(scene) = scene else {
         let seed = tracing.seed.unwrap_or(1);
@@ -273,7 +273,7 @@ fn own_rays(
         let third = (count / 3).max(1);
         let camera = Camera::new(bounds, third.min(count));
         let uniform = Uniform::new(bounds, seed, third.min(count - camera.len()));
-        let bounces = Bounces::new(bounds, octree, lift, seed, count - camera.len() - uniform.len());
+        let bounces = Bounces::new(bounds, octree, loosest, seed, count - camera.len() - uniform.len());
         let chain = Chain(vec![&camera, &uniform, &bounces]);
         return Ok(chain.rays(0..chain.len()));
     };
@@ -286,7 +286,8 @@ fn own_rays(
     };
     let recorder = RayRecorder::new(octree, count, count);
     simulate(&bound, &recorder, &settings, &|_| true);
-    Ok(recorder.rays(count as usize, model, |ray, up| ray.origin + lift * up))
+    let lift = Lift::new(octree, loosest);
+    Ok(recorder.rays(count as usize, model, |ray, up| lift.start(ray, up)))
 }
 
 /// Returns how far hits moved to the spline are from it, along the ray in mm and in the normal in degrees. Beyond `near` mm it is another
@@ -316,10 +317,10 @@ fn spread_text(q: &Summary, unit: &str) -> String {
 }
 
 /// Returns what was found, for people: the verdict, differences by cause, errors, and a table of rates.
-fn check_summary(c: &CrossCheck, normals: NormalMode) -> String {
+fn check_summary(c: &CrossCheck, normals: NormalMode, width: usize) -> String {
     let f = &c.facets_vs_exact;
     let e = &f.explained;
-    let mut text = format!("  {}\n\n", verdict(c).replace("**", ""));
+    let mut text = sentence_lines("  ", 2, &verdict(c).replace("**", ""), width) + "\n";
     let mut line = |name: &str, what: String| text += &format!("  {name:<12} {what}\n");
     line(
         "rays",

@@ -2,8 +2,8 @@
 
 use super::face_tables::print_faces;
 use super::json::json_text;
+use super::sentences::sentence_lines;
 use super::sequence_tables::print_sequences;
-use super::terminal_tables::wrapped_lines;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::formats::printable_line;
@@ -14,8 +14,6 @@ use crate::text::{figures, grouped};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// What stands before each line.
-const INDENT: &str = "  ";
 /// Longest line of the closing paragraph, characters.
 const LINE_LENGTH: usize = 96;
 
@@ -58,10 +56,7 @@ pub(crate) fn print_results(
 /// Says the last lines of a traced scene: what was found, and which files to open.
 fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: bool, console: &Console) {
     console.say("");
-    for line in wrapped_lines(&answer.replace("**", ""), console.width().min(LINE_LENGTH) - INDENT.len()) {
-        console.say(format_args!("{INDENT}{line}"));
-    }
-    console.say("");
+    console.say(sentence_lines("  ", 2, &answer.replace("**", ""), console.width().min(LINE_LENGTH)));
     let mut files = notable_files(folder, results);
     // Without a page its line, the first one, is left out.
     if !with_page {

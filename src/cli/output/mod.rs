@@ -8,6 +8,7 @@ pub(super) mod octree_shape;
 pub(super) mod receiver_files;
 pub(super) mod rule_table;
 pub(super) mod schema_page;
+pub(super) mod sentences;
 pub(super) mod sequence_tables;
 pub(super) mod terminal_tables;
 pub(super) mod verdict;

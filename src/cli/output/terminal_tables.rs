@@ -106,24 +106,6 @@ pub(crate) fn study_tables(report: &Report, width: usize) -> String {
     wanted.map(|t| table_text(t, width) + "\n").collect()
 }
 
-/// Breaks a text into lines of at most `width` characters; a longer word has a line to itself. An empty text is one empty line.
-pub(crate) fn wrapped_lines(text: &str, width: usize) -> Vec<String> {
-    let mut lines: Vec<String> = vec![String::new()];
-    // At spaces and line breaks alone: the narrow one within a number does not break it.
-    for word in text.split([' ', '\n']).filter(|word| !word.is_empty()) {
-        let line = lines.last_mut().map(|l| (l.chars().count(), l));
-        match line {
-            Some((0, line)) => line.push_str(word),
-            Some((n, line)) if n + 1 + word.chars().count() <= width => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -138,12 +120,6 @@ mod tests {
             lines,
             ["  Sags", " face   sag [mm]", "─────────────────", " a           0.5", " long      12.25"]
         );
-    }
-
-    #[test]
-    fn a_sentence_does_not_break_within_a_number() {
-        let text = format!("of  {} rays\nand more", crate::text::grouped(16_384));
-        assert_eq!(wrapped_lines(&text, 7), ["of", crate::text::grouped(16_384).as_str(), "rays", "and", "more"]);
     }
 
     /// On whatever few columns a number stands in one line, and where there is room a word of a heading too.

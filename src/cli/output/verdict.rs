@@ -1,6 +1,7 @@
 //! An assessment on the terminal.
 
-use super::terminal_tables::{table_text, wrapped_lines};
+use super::sentences::sentence_lines;
+use super::terminal_tables::table_text;
 use crate::regulation::{Assessment, RowVerdict};
 use crate::report::{
     Cell, Table, direction_text, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
@@ -30,8 +31,8 @@ pub(crate) fn summary(a: &Assessment, width: usize, bold: impl Fn(&str) -> Strin
     let tables = a.regulation.checked();
     let labels =
         [("aim", a.aim.how.as_str()), ("traffic", traffic_sentence(a)), ("sensor", &sensor), ("tables", &tables)];
-    for (label, sentence) in labels {
-        text += &labelled_lines(label, sentence, width);
+    for (label, sentence) in labels.iter().filter(|(_, sentence)| !sentence.trim().is_empty()) {
+        text += &sentence_lines(&format!("  {label:<8}"), LABEL_COLUMNS, sentence, width);
     }
     let mut table = Table::new("verdict", "", &COLUMNS);
     for row in &a.rows {
@@ -41,11 +42,7 @@ pub(crate) fn summary(a: &Assessment, width: usize, bold: impl Fn(&str) -> Strin
     let unjudged = a.rows.len() - counts.iter().sum::<usize>();
     text += &table_text(&table, width);
     for (note, rows) in notes(a) {
-        for (k, line) in
-            wrapped_lines(&format!("{}: {note}", rows.join(", ")), width.saturating_sub(4)).iter().enumerate()
-        {
-            text += &format!("  {}{line}\n", if k == 0 { "" } else { "  " });
-        }
+        text += &sentence_lines("  ", 4, &format!("{}: {note}", rows.join(", ")), width);
     }
     text += &format!("  {} pass, {} fail, {} unsure", counts[0], counts[1], counts[2]);
     text += &if unjudged > 0 { format!(", {unjudged} not judged (notes and conditions)") } else { String::new() };
@@ -54,16 +51,6 @@ pub(crate) fn summary(a: &Assessment, width: usize, bold: impl Fn(&str) -> Strin
 
 /// Columns of the labels above the table, with the blanks around them.
 const LABEL_COLUMNS: usize = 10;
-
-/// Returns a sentence behind its label in lines that fit a terminal of so many columns; nothing for an empty sentence.
-fn labelled_lines(label: &str, sentence: &str, width: usize) -> String {
-    if sentence.trim().is_empty() {
-        return String::new();
-    }
-    let lines = wrapped_lines(sentence, width.saturating_sub(LABEL_COLUMNS).max(LABEL_COLUMNS));
-    let labels = std::iter::once(label).chain(std::iter::repeat(""));
-    labels.zip(lines).map(|(label, line)| format!("  {label:<8}{line}\n")).collect()
-}
 
 /// Returns what is remarked on rows that were judged, in the order of the table, each with the rows that it is remarked on.
 fn notes(a: &Assessment) -> Vec<(&str, Vec<&str>)> {
@@ -114,18 +101,6 @@ mod tests {
             "{notes:?}"
         );
         assert!(a.rows.iter().all(|row| row_cells(row)[8] == Cell::Text(String::new())));
-    }
-
-    #[test]
-    fn sentences_above_the_table_keep_to_the_width() {
-        let how = "turned by H 0.12°, V −0.34°, so that the elbow of its cut-off lies at 0.57° below the horizon";
-        let text = labelled_lines("aim", how, 50);
-        assert!(text.starts_with("  aim     turned by") && text.lines().count() == 3, "{text}");
-        assert!(text.lines().all(|line| line.chars().count() <= 50), "{text}");
-        assert!(
-            text.lines().skip(1).all(|line| line.starts_with("          ") && !line.starts_with("           "))
-        );
-        assert_eq!(labelled_lines("traffic", " ", 50), "");
     }
 
     fn passed(row: crate::regulation::Row) -> RowVerdict {
