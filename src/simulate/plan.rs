@@ -53,9 +53,9 @@ pub(crate) struct SourceShare {
 impl SourceShare {
     /// Makes the share of a source whose rays have so many quanta in the mean, divided into so many parts.
     fn new(first: u64, rays: u64, quanta: f64, parts: u32) -> Self {
-        let (fewest, mean) = (rays / u64::from(parts), rays as f64 / f64::from(parts));
-        let in_replicate_of = |count: u64| if fewest == 0 { quanta } else { quanta * mean / count as f64 };
-        Self { first, rays, fewest, quanta: [fewest, fewest + 1].map(|n| in_replicate_of(n).round().max(1.0)) }
+        let fewest = rays / u64::from(parts);
+        let quanta = [fewest, fewest + 1].map(|n| (quanta * weight_among(n, rays, parts)).round().max(1.0));
+        Self { first, rays, fewest, quanta }
     }
 
     /// Returns the quanta of all its rays, divided into so many parts.
@@ -66,6 +66,13 @@ impl SourceShare {
         let rays = [(parts - larger) * self.fewest, larger * (self.fewest + 1)];
         rays[0] as f64 * self.quanta[0] + rays[1] as f64 * self.quanta[1]
     }
+}
+
+/// Returns what a ray weighs in a part with so many of a source's rays, over its weight where all parts have the same number: as much as
+/// makes all parts alike, up to twice. A source with fewer rays than there are parts cannot be in all of them.
+fn weight_among(count: u64, rays: u64, parts: u32) -> f64 {
+    let mean = rays as f64 / f64::from(parts);
+    if mean < 1.0 { 1.0 } else { mean / count as f64 }
 }
 
 /// How the rays of a run are divided among sources and replicates.
@@ -117,22 +124,23 @@ impl Plan {
             let replicates = settings.replicates.clamp(2, (divided / FEWEST_RAYS).clamp(2, 1 << 16) as u32);
             replicates.max((divided >> MOST_RAYS_LOG2) as u32)
         };
-        let average_ray = average_quanta(&weights, (!grows).then_some(replicates));
+        // What the rays of a source are divided into: one replicate of a run that can grow, else all.
         let parts = if grows { 1 } else { replicates };
+        let average_ray = average_quanta(&weights, parts);
         let mut first = 0;
         let share = |&(rays, weight): &(u64, f64)| {
             let share = SourceShare::new(first, rays, average_ray * weight, parts);
             first += rays;
             share
         };
+        let shares: Vec<SourceShare> = weights.iter().map(share).collect();
+        let divided_quanta: f64 = shares.iter().map(|share| share.all_quanta(parts)).sum();
+        let quantum = emitted / (divided_quanta * f64::from(replicates / parts));
         let first_replicate = if grows { settings.first_ray.div_ceil(GROWING_REPLICATE) as u32 } else { 0 };
         let rays = if grows { divided * u64::from(replicates) } else { divided };
         // A power of two, so that whether a ray is recorded is one `and` of its index.
         let record_mask =
             (settings.path_samples > 0).then(|| (rays / settings.path_samples.min(rays)).next_power_of_two() - 1);
-        let shares: Vec<SourceShare> = weights.iter().map(share).collect();
-        let divided_quanta: f64 = shares.iter().map(|share| share.all_quanta(parts)).sum();
-        let quantum = emitted / (divided_quanta * f64::from(replicates / parts));
         Self {
             shares,
             replicate_rays: grows.then_some(divided),
@@ -283,23 +291,17 @@ fn grows_unasked(settings: &RunSettings) -> bool {
 
 /// Returns the quanta of an average ray: [`QUANTA`], halved until the heaviest ray is a whole number that is exact and no sum of a
 /// replicate, or of the squares of so many, overflows. `weights` are the rays of each source and what one of them weighs against the
-/// average; `replicates` is `None` where these are those of each replicate.
-fn average_quanta(weights: &[(u64, f64)], replicates: Option<u32>) -> f64 {
-    let parts = f64::from(replicates.unwrap_or(1));
-    // In a replicate with fewer of them rays weigh up to twice as much.
-    let heaviest = weights
-        .iter()
-        .map(|(rays, weight)| {
-            let mean = *rays as f64 / parts;
-            if mean < 1.0 { *weight } else { weight * mean / mean.floor() }
-        })
-        .fold(0.0, f64::max);
+/// average; they are divided into so many parts, one where they are those of each replicate.
+fn average_quanta(weights: &[(u64, f64)], parts: u32) -> f64 {
+    let in_smallest = |&(rays, weight): &(u64, f64)| weight * weight_among(rays / u64::from(parts), rays, parts);
+    let heaviest = weights.iter().map(in_smallest).fold(0.0, f64::max);
+    let replicates = f64::from(parts);
     // A source of few rays may have them all in one replicate.
-    let fullest: f64 = weights.iter().map(|(rays, weight)| (*rays as f64 / parts).ceil() * weight).sum();
+    let fullest: f64 = weights.iter().map(|(rays, weight)| (*rays as f64 / replicates).ceil() * weight).sum();
     let fits = |average: f64| {
         let replicate = average * fullest;
         // How many replicates a run that grows will have is not known; its own are small.
-        let squares = if replicates.is_some() { parts * replicate * replicate } else { 0.0 };
+        let squares = if parts > 1 { replicates * replicate * replicate } else { 0.0 };
         average * heaviest <= HEAVIEST_RAY && replicate <= FULLEST_REPLICATE && squares < SUM_OF_SQUARES
     };
     let mut average = QUANTA;
@@ -376,14 +378,14 @@ mod tests {
     fn the_heaviest_ray_and_the_squares_of_large_runs_fit_their_words() {
         // The usual run, and the largest whose sums hold 2⁴⁰ quanta a ray.
         for rays in [1_000_000, 1 << 29] {
-            assert_eq!(average_quanta(&[(rays, 1.0)], Some(((rays >> MOST_RAYS_LOG2) as u32).max(128))), QUANTA);
+            assert_eq!(average_quanta(&[(rays, 1.0)], ((rays >> MOST_RAYS_LOG2) as u32).max(128)), QUANTA);
         }
         // One ray with half the power beside 8·10⁷ others: 2⁶⁵ quanta of 2⁴⁰ a mean ray.
         let (n, lone) = (8e7, 0.5 * (8e7 + 1.0));
-        let average = average_quanta(&[(1, lone), (8e7 as u64, 0.5 * (n + 1.0) / n)], Some(128));
+        let average = average_quanta(&[(1, lone), (8e7 as u64, 0.5 * (n + 1.0) / n)], 128);
         assert!(average * lone <= 2f64.powi(53) && 2.0 * average * lone > 2f64.powi(53));
         // 2³¹ rays in 2¹⁰ replicates at the rim of a receiver: each has Σ w·x = 2²¹ rays, cut to a quarter quantum; squared, times 2¹⁰.
-        let average = average_quanta(&[(1 << 31, 1.0)], Some(1 << 10));
+        let average = average_quanta(&[(1 << 31, 1.0)], 1 << 10);
         let squares = 2f64.powi(10) * (2f64.powi(21) * average / 4.0).powi(2);
         assert!(squares < 2f64.powi(127) && average > 2f64.powi(37));
     }

@@ -3,7 +3,7 @@
 mod nearest_name;
 mod number;
 
-pub(crate) use nearest_name::{nearest_name, nearest_or_listed};
+pub(crate) use nearest_name::{did_you_mean, nearest_name, nearest_or_listed};
 #[cfg(feature = "report")]
 pub(crate) use number::NARROW_SPACE;
 pub use number::{count_of, figures, grouped};

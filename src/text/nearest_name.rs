@@ -17,12 +17,18 @@ pub(crate) fn nearest_name<'a>(word: &str, candidates: impl IntoIterator<Item = 
 /// Names that advice lists at most: a line or two of them.
 const LISTED: usize = 12;
 
+/// Returns the question whether the nearest candidate was meant; `None` where none is near.
+pub(crate) fn did_you_mean<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    nearest_name(word, candidates).map(|near| format!("did you mean '{near}'?"))
+}
+
 /// Returns advice that names the nearest name, or the first in alphabetical order where none is near; `None` without names. Empty ones are
 /// sorted out.
 pub(crate) fn nearest_or_listed<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let mut names: Vec<&str> = names.into_iter().filter(|name| !name.is_empty()).collect();
-    if let Some(near) = nearest_name(word, names.iter().copied()) {
-        return Some(format!("did you mean '{near}'?"));
+    let asked = did_you_mean(word, names.iter().copied());
+    if asked.is_some() {
+        return asked;
     }
     names.sort_unstable();
     names.dedup();

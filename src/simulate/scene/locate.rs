@@ -69,6 +69,9 @@ const LISTS: [(&str, &str); 10] = [
     ("without", "write a list of selectors, as in without = [{ part = \"helper*\" }]"),
 ];
 
+/// What to write for a line of a STEP file.
+const ENTITY: &str = "write the number of the file's line without its `#`, as in entity = 39, or a list of them";
+
 /// Returns the bytes of the value at a path, or of the deepest table on the way when the value is not written; `None` where not even its
 /// first key is, or the text is no TOML.
 pub(super) fn span(text: &str, path: &[Key<'_>]) -> Option<Range<usize>> {
@@ -153,7 +156,8 @@ fn type_error(message: &str, key: &str) -> Error {
         ("did not match any variant of untagged enum ByWavelength", "neither a number nor rows [nm, value]"),
     ] {
         if message.contains(form) {
-            return Error::new(ErrorKind::Syntax, format!("this is {plain}"));
+            let error = Error::new(ErrorKind::Syntax, format!("this is {plain}"));
+            return if key == "entity" { error.help(ENTITY) } else { error };
         }
     }
     let plain = PLAIN_TYPES.iter().fold(message.to_owned(), |m, (form, plain)| m.replace(form, plain));
@@ -209,11 +213,11 @@ pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>) -> 
             let error = Error::new(ErrorKind::Syntax, format!("unknown key `{word}`"));
             let meant =
                 ELSEWHERE.iter().find(|(start, beside, _)| word.starts_with(start) && known.contains(beside));
-            match (meant, text::nearest_name(word, known.iter().copied())) {
-                (Some((_, _, help)), _) => error.help(*help),
-                (None, Some(near)) => error.help(format!("did you mean `{near}`?")),
-                (None, None) => error.help(format!("known here: {}", known.join(", "))),
-            }
+            error.help(match meant {
+                Some((_, _, help)) => (*help).to_owned(),
+                None => text::did_you_mean(word, known.iter().copied())
+                    .unwrap_or_else(|| format!("known here: {}", known.join(", "))),
+            })
         }
     } else if message.starts_with("unknown variant") {
         let word = words.next().unwrap_or("");
@@ -222,8 +226,8 @@ pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>) -> 
             Error::new(ErrorKind::Unsupported, format!("`{word}`: {effect} is not simulated"))
         } else {
             let error = Error::new(ErrorKind::Syntax, format!("`{word}` is none of {}", known.join(", ")));
-            match text::nearest_name(word, known.iter().copied()) {
-                Some(near) => error.help(format!("did you mean `{near}`?")),
+            match text::did_you_mean(word, known.iter().copied()) {
+                Some(advice) => error.help(advice),
                 None => error,
             }
         }

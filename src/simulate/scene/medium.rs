@@ -194,11 +194,9 @@ pub(super) fn read_glasses(scene: &Scene) -> Result<Vec<Option<AgfGlass>>, Error
         let Some(glass) = all.iter().find(|g| g.name.eq_ignore_ascii_case(name)) else {
             let message = format!("no glass of {file} is called '{name}'");
             let error = scene.error(ErrorKind::NoMatch, &at("catalogue"), message);
-            let near = text::nearest_name(name, all.iter().map(|g| g.name.as_str()));
-            return Err(match near {
-                Some(near) => error.help(format!("did you mean '{near}'?")),
-                None => error.help(format!("it has {} glasses, the first {}", all.len(), all[0].name)),
-            });
+            let advice = text::did_you_mean(name, all.iter().map(|g| g.name.as_str()))
+                .unwrap_or_else(|| format!("it has {} glasses, the first {}", all.len(), all[0].name));
+            return Err(error.help(advice));
         };
         glasses.push(Some(glass.clone()));
     }
@@ -212,10 +210,9 @@ pub(super) fn read_glasses(scene: &Scene) -> Result<Vec<Option<AgfGlass>>, Error
 fn catalogued(name: &str) -> Result<optics::Medium, String> {
     catalogue::medium(name).ok_or_else(|| {
         let names: Vec<&str> = catalogue::names().collect();
-        match text::nearest_name(name, names.iter().copied()) {
-            Some(near) => format!("no medium of the catalogue is called '{name}'; did you mean '{near}'?"),
-            None => format!("no medium of the catalogue is called '{name}'; there are: {}", names.join(", ")),
-        }
+        let advice = text::did_you_mean(name, names.iter().copied())
+            .unwrap_or_else(|| format!("there are: {}", names.join(", ")));
+        format!("no medium of the catalogue is called '{name}'; {advice}")
     })
 }
 
@@ -234,13 +231,12 @@ pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::
     let error = scene.error(ErrorKind::NoMatch, at, format!("no medium is called '{name}'"));
     let mut known: Vec<&str> = catalogue::names().collect();
     known.extend(scene.media.iter().map(|m| m.name.as_str()));
-    Err(match text::nearest_name(name, known) {
-        Some(near) => error.help(format!("did you mean '{near}'?")),
-        None => error.help(format!(
+    Err(error.help(text::did_you_mean(name, known).unwrap_or_else(|| {
+        format!(
             "`lampyris media` lists the catalogue; others are described: [[medium]] with name = \"{name}\" and an `index`, or the `file` of a \
              maker's catalogue"
-        )),
-    })
+        )
+    })))
 }
 
 /// Refuses media without a name of their own, without exactly one index, with values that [`Medium::optics`] refuses, or with an index

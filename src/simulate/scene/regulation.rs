@@ -3,7 +3,7 @@
 use super::{FarFieldType, Key, PowerUnit, Receiver, ReceiverKind, Scene};
 use crate::regulation::Regulation;
 use crate::simulate::{Error, ErrorKind};
-use crate::text::nearest_name;
+use crate::text::did_you_mean;
 use serde::{Deserialize, Serialize};
 
 /// A regulation whose verdict is printed with the run.
@@ -55,11 +55,9 @@ impl RegulationUse {
                 None => "the scene has no far field over H and V (`angles = \"A\"`), or several".into(),
             };
             let names = scene.receivers.iter().map(|receiver| receiver.name.as_str());
-            let near = self.receiver.as_ref().and_then(|name| nearest_name(name, names));
-            let help = match near {
-                Some(near) => format!("did you mean '{near}'?"),
-                None => "name a receiver of `kind = \"far_field\"` with `angles = \"A\"`".into(),
-            };
+            let advice = self.receiver.as_ref().and_then(|name| did_you_mean(name, names));
+            let help =
+                advice.unwrap_or_else(|| "name a receiver of `kind = \"far_field\"` with `angles = \"A\"`".into());
             return fail("receiver", message, &help);
         };
         let receiver = &scene.receivers[receiver];

@@ -174,8 +174,8 @@ impl Accuracy {
             };
             let at = [Key::Name("accuracy"), Key::Name(key)];
             let error = scene.error(ErrorKind::Value, &at, format!("'{name}' is none of {}", known.join(", ")));
-            return Err(match text::nearest_name(name, known.iter().copied()) {
-                Some(near) => error.help(format!("did you mean '{near}'?")),
+            return Err(match text::did_you_mean(name, known.iter().copied()) {
+                Some(advice) => error.help(advice),
                 None => error,
             });
         }

@@ -1,8 +1,7 @@
 //! What facets change of where the light ended.
 
-use super::paired::Paired;
+use super::paired::{Paired, PairedSums};
 use super::replicates::ReplicatedRun;
-use crate::math::variance_of_sum;
 use serde::Serialize;
 
 /// What facets change of the sums over all light, by how it ended. What was lost is no figure of the true surfaces, and is left out.
@@ -31,14 +30,9 @@ pub(super) fn end_errors(runs: [&ReplicatedRun; 2]) -> EndErrors {
     let [facets, spline] = runs.map(|run| &run.ends);
     let mut errors = EndErrors::default();
     for (k, end) in errors.each_mut().into_iter().enumerate() {
-        let (mut sums, mut squares) = ([0.0; 2], 0.0);
-        for replicate in facets.iter().zip(spline) {
-            let pair = [replicate.0[k] as f64, replicate.1[k] as f64];
-            sums = [sums[0] + pair[0], sums[1] + pair[1]];
-            squares += (pair[0] - pair[1]).powi(2);
-        }
-        let error = variance_of_sum(squares, sums[0] - sums[1], spline.len()).sqrt();
-        *end = Paired { facets: sums[0] * quantum, spline: sums[1] * quantum, error: error * quantum };
+        let mut sums = PairedSums::default();
+        facets.iter().zip(spline).for_each(|(facets, spline)| sums.add(facets[k], spline[k]));
+        *end = sums.paired(spline.len(), quantum);
     }
     errors
 }

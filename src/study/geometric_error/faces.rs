@@ -1,8 +1,7 @@
 //! What facets change of the power that each face absorbs and lets through, from replicates of the same rays.
 
-use super::paired::Paired;
+use super::paired::{Paired, PairedSums};
 use super::replicates::{FaceQuanta, ReplicatedRun};
-use crate::math::variance_of_sum;
 use rustc_hash::FxHashMap;
 
 /// What facets change of the power at one face, in the unit of the sources.
@@ -32,40 +31,6 @@ impl FaceError {
     }
 }
 
-/// Sums over replicates of one kind of power at one face, quanta.
-#[derive(Clone, Copy, Debug, Default)]
-struct PairedSums {
-    /// On facets and on the spline.
-    totals: [f64; 2],
-    /// Of the squares of the replicates' differences.
-    squares: f64,
-    /// Of the squares of the spline's replicates.
-    spline_squares: f64,
-}
-
-impl PairedSums {
-    /// Adds what one replicate brought on facets and on the spline, quanta.
-    fn add(&mut self, facets: u64, spline: u64) {
-        let [facets, spline] = [facets as f64, spline as f64];
-        self.totals[0] += facets;
-        self.totals[1] += spline;
-        self.squares += (facets - spline).powi(2);
-        self.spline_squares += spline * spline;
-    }
-
-    /// Returns both powers, and the standard error of their difference over so many replicates; `quantum` is the power of one.
-    fn paired(&self, replicates: usize, quantum: f64) -> Paired {
-        let error = variance_of_sum(self.squares, self.totals[0] - self.totals[1], replicates).sqrt() * quantum;
-        let [facets, spline] = self.totals.map(|total| total * quantum);
-        Paired { facets, spline, error }
-    }
-
-    /// Returns the standard error of the power on the spline.
-    fn statistical(&self, replicates: usize, quantum: f64) -> f64 {
-        variance_of_sum(self.spline_squares, self.totals[1], replicates).sqrt() * quantum
-    }
-}
-
 /// Compares the power at each face that rays of either run met, the first on facets, by rising face.
 pub(super) fn face_errors(runs: [&ReplicatedRun; 2]) -> Vec<FaceError> {
     // Sums, not what every replicate brought: of 10⁵ faces that would be gigabytes.
@@ -88,24 +53,4 @@ pub(super) fn face_errors(runs: [&ReplicatedRun; 2]) -> Vec<FaceError> {
     let mut errors: Vec<FaceError> = sums.into_iter().map(error).collect();
     errors.sort_by_key(|e| e.face);
     errors
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::error_of_sum;
-
-    /// The error from sums is that of the replicates' differences.
-    #[test]
-    fn the_error_of_a_difference_is_that_of_its_replicates() {
-        let brought: [[u32; 2]; 5] = [[5, 3], [0, 4], [7, 7], [0, 0], [12, 1]];
-        let mut sums = PairedSums::default();
-        brought.iter().for_each(|[a, b]| sums.add((*a).into(), (*b).into()));
-        let found = sums.paired(brought.len(), 0.5);
-        let expected = 0.5 * error_of_sum(&brought.map(|[a, b]| f64::from(a) - f64::from(b)));
-        assert_eq!((found.facets, found.spline), (12.0, 7.5));
-        assert!((found.error / expected - 1.0).abs() < 1e-12, "{} {expected}", found.error);
-        let on_spline = 0.5 * error_of_sum(&brought.map(|[_, b]| f64::from(b)));
-        assert!((sums.statistical(brought.len(), 0.5) / on_spline - 1.0).abs() < 1e-12);
-    }
 }

@@ -1,5 +1,6 @@
 //! A figure of the same rays on facets and on the spline, and the error of what replicates tell.
 
+use crate::math::variance_of_sum;
 use serde::{Serialize, Serializer};
 
 /// Standard errors beyond which a difference is one: by chance alone once in 370 times.
@@ -49,9 +50,44 @@ impl Serialize for Paired {
     }
 }
 
+/// Sums over replicates of one power, quanta.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PairedSums {
+    /// On facets and on the spline.
+    totals: [f64; 2],
+    /// Of the squares of the replicates' differences.
+    squares: f64,
+    /// Of the squares of the spline's replicates.
+    spline_squares: f64,
+}
+
+impl PairedSums {
+    /// Adds what one replicate brought on facets and on the spline, quanta.
+    pub(super) fn add(&mut self, facets: u64, spline: u64) {
+        let [facets, spline] = [facets as f64, spline as f64];
+        self.totals[0] += facets;
+        self.totals[1] += spline;
+        self.squares += (facets - spline).powi(2);
+        self.spline_squares += spline * spline;
+    }
+
+    /// Returns both powers, and the standard error of their difference over so many replicates; `quantum` is the power of one.
+    pub(super) fn paired(&self, replicates: usize, quantum: f64) -> Paired {
+        let error = variance_of_sum(self.squares, self.totals[0] - self.totals[1], replicates).sqrt() * quantum;
+        let [facets, spline] = self.totals.map(|total| total * quantum);
+        Paired { facets, spline, error }
+    }
+
+    /// Returns the standard error of the power on the spline.
+    pub(super) fn statistical(&self, replicates: usize, quantum: f64) -> f64 {
+        variance_of_sum(self.spline_squares, self.totals[1], replicates).sqrt() * quantum
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::error_of_sum;
 
     /// A difference of less than one ray is none that a ray told; one of more is known by itself.
     #[test]
@@ -63,5 +99,19 @@ mod tests {
         assert_eq!(power(7.0, 0.0).geometric_or(0.5), 4.0);
         // Facets that are the surface.
         assert_eq!(power(3.0, 0.0).geometric_or(0.0), 0.0);
+    }
+
+    /// The error from sums is that of the replicates' differences.
+    #[test]
+    fn the_error_of_a_difference_is_that_of_its_replicates() {
+        let brought: [[u32; 2]; 5] = [[5, 3], [0, 4], [7, 7], [0, 0], [12, 1]];
+        let mut sums = PairedSums::default();
+        brought.iter().for_each(|[a, b]| sums.add((*a).into(), (*b).into()));
+        let found = sums.paired(brought.len(), 0.5);
+        let expected = 0.5 * error_of_sum(&brought.map(|[a, b]| f64::from(a) - f64::from(b)));
+        assert_eq!((found.facets, found.spline), (12.0, 7.5));
+        assert!((found.error / expected - 1.0).abs() < 1e-12, "{} {expected}", found.error);
+        let on_spline = 0.5 * error_of_sum(&brought.map(|[_, b]| f64::from(b)));
+        assert!((sums.statistical(brought.len(), 0.5) / on_spline - 1.0).abs() < 1e-12);
     }
 }
