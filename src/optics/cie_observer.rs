@@ -153,7 +153,7 @@ const OBSERVER: [[f64; 3]; 471] = [
 ];
 
 /// First and last wavelength that the observer sees, nm.
-pub(super) fn observer_range() -> [f64; 2] {
+pub(crate) fn observer_range() -> [f64; 2] {
     [START, START + STEP * (OBSERVER.len() - 1) as f64]
 }
 

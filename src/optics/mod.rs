@@ -35,6 +35,7 @@ mod table;
 mod testing;
 
 pub use abg::Abg;
+pub(crate) use cie_observer::observer_range;
 pub use cie_observer::{MAX_EFFICACY, observer_peaks, xyz_of_watt};
 pub use coating::{Coating, CoatingTable, Split};
 pub use colour::{chromaticity, linear_srgb, srgb_byte};

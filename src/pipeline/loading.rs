@@ -123,8 +123,8 @@ pub fn read_cached_scene(
     // The likely slip: the CAD file in place of the scene.
     if matches!(lower_extension(path).as_str(), "stp" | "step" | "p21") {
         let error = Error::request(format!("{}: a STEP file, where a scene (.toml) is needed", path.display()));
-        let advice = "a STEP file alone has no light: name it under [[model]] of a scene with sources and receivers \
-            (`lampyris schema` says how), or use `lampyris info`, `facet` or `check` on it";
+        let advice = "a STEP file alone has no light: `lampyris init` writes a scene for it, with a source and receivers; `lampyris info`, \
+                      `facet` and `check` take the file itself";
         return Err(error.help(advice));
     }
     let scene = Scene::read(path)?;

@@ -199,6 +199,19 @@ fn ranges_that_do_not_fit_are_refused_with_what_would() {
     assert!(code == 3 && err.contains("--tolerance 0.05..0.05") && err.contains("--tolerance 0.1..0.1"), "{err}");
 }
 
+/// A part that is there twice is refused, and the files that hold it are named.
+#[test]
+fn a_part_that_is_there_twice_is_named_with_the_other_one() {
+    let folder = lens("20_000");
+    let path = folder.path();
+    for part in ["first.tally", "again.tally"] {
+        trace(path, &["--rays", "0..5000", "-o", part]);
+    }
+    let (code, _, err) = lampyris_in(path, &["merge", "first.tally", "again.tally", "-o", "no"]);
+    assert!(code == 3 && err.contains("again.tally: its replicate 0 is in an earlier part"), "{err}");
+    assert!(err.contains("first.tally holds it too: leave one of the two out"), "{err}");
+}
+
 /// More parts than replicates: some hold nothing, and together they hold everything once.
 #[test]
 fn there_may_be_more_parts_than_replicates() {

@@ -39,6 +39,7 @@ fn values_out_of_range_are_refused_by_name() {
         ("[[receiver]]\nname = 'r'\nx = [0, inf, 0]\nsize = [1, 1]", "`x` must"),
         ("[[receiver]]\nname = 'r'\nsize = [1, 1]\n[[receiver]]\nname = 'R'\nsize = [1, 1]", "both be called 'R'"),
         ("[run]\nray = 10", "ray"),
+        ("[[material]]\nentity = '#39'\nsurface = 'absorber'", "without its `#`"),
     ] {
         let said = refusal(head);
         assert!(said.contains(key), "{head}: {said}");

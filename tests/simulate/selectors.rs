@@ -47,6 +47,7 @@ fn what_is_no_colour_is_refused_in_rules_sources_and_receivers() {
     let model = twins();
     for table in [
         "[[material]]\non = { colour = 'red' }\nsurface = 'mirror'",
+        "[[material]]\non = { colour = [200, 20, 20] }\nsurface = 'mirror'",
         "[[source]]\nkind = 'lambertian'\non = { colour = 'red' }",
         "[[receiver]]\nname = 'lit'\nkind = 'absorbed'\non = { colour = 'red' }",
     ] {
@@ -239,6 +240,23 @@ fn every_face_of_the_corpus_has_a_selector_of_its_own() {
         println!("{}: {count} faces", path.display());
     }
     println!("{total} faces, each with a selector of its own");
+}
+
+/// A medium that no rule names is a slip, and lumens of light that nobody sees are none.
+#[test]
+fn what_the_scene_describes_in_vain_is_told() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 3.0));
+    let notes = |text: &str| bound(&world.model, text).unwrap().notes().join("\n");
+    let media = "[[medium]]\nname = 'a'\nindex = 1.5\n[[medium]]\nname = 'b'\nindex = 1.6\n";
+    let unused = notes(&format!("{media}[[material]]\nmedium = 'a'\n"));
+    assert_eq!(unused, "of [[medium]] 'b' is in no use: no [[material]] names it as its `medium`");
+    let both = notes(&format!("{media}[[material]]\nmedium = 'a'\n[[material]]\npart = 'plate'\nmedium = 'b'\n"));
+    assert!(!both.contains("[[medium]]"), "{both}");
+    for (run, told) in [("", false), ("unit = 'lm'\n", false), ("unit = 'lm'\nwavelength_nm = 1000\n", true)] {
+        let said = notes(&format!("[run]\n{run}[[material]]\nsurface = 'absorber'\n"));
+        assert_eq!(said.contains("in lumens, but the eye sees nothing of light of 1000 nm"), told, "{run}: {said}");
+    }
 }
 
 /// A receiver in the face of a plate counts what rounding leaves on either side of it: a note says so, and none where it stands off or lies

@@ -233,6 +233,16 @@ fn read_part(path: &Path) -> Result<Vec<u8>, Failure> {
     crate::formats::read_bytes(path).map_err(|e| input_failure(path, e))
 }
 
+/// Says why a part cannot be added to the `earlier` ones, and which of them holds the same.
+fn not_merged(path: &Path, message: String, earlier: &[(&Path, Vec<u32>)], part: &PartialRun) -> Failure {
+    let shares = |done: &[u32]| part.done.iter().any(|replicate| done.binary_search(replicate).is_ok());
+    let failure = input_failure(path, message);
+    match earlier.iter().find(|(file, done)| *file != path && shares(done)) {
+        Some((file, _)) => failure.with_help(format!("{} holds it too: leave one of the two out", file.display())),
+        None => failure,
+    }
+}
+
 /// Sums up all parts that the arguments mean, each of which must be of the run that the first one's header names, and the usage of their
 /// processes. `--rays` sets how long a run that grows is to be.
 fn sum_parts(
@@ -270,11 +280,15 @@ fn sum_parts(
         })
     };
     let mut sum: Option<PartialRun> = None;
-    for path in &part_files(command.parts)? {
+    let files = part_files(command.parts)?;
+    // The replicates of each file before, for a message.
+    let mut earlier: Vec<(&Path, Vec<u32>)> = Vec::with_capacity(files.len());
+    for path in &files {
         let part =
             PartialRun::read(&read_part(path)?, check, &prepared.bound).map_err(|m| input_failure(path, m))?;
+        earlier.push((path, part.done.clone()));
         match &mut sum {
-            Some(sum) => sum.merge(&part).map_err(|m| input_failure(path, m))?,
+            Some(sum) => sum.merge(&part).map_err(|m| not_merged(path, m, &earlier, &part))?,
             None => sum = Some(part),
         }
     }

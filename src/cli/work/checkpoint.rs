@@ -92,7 +92,7 @@ impl<'a> Checkpoint<'a> {
         };
         let refuse = |m: String| {
             Failure::arguments(format!("{}: cannot go on from here: {m}", self.file.display()))
-                .with_help("run with the same scene, files, options and program, or into another place with -o")
+                .with_help("run with the same scene, files, options and program, remove this file, or run into another place with -o")
         };
         let saved = PartialRun::read(&bytes, same, &self.prepared.bound).map_err(refuse)?;
         // The fingerprint of a run that grows leaves its length open: a longer or shorter one would add up to no run.

@@ -111,6 +111,8 @@ impl Scene {
             rules: rule_table::rule_table(self, &chosen),
             notes: notes::range_notes(self, &chosen, &ranges),
         };
+        bound.notes.extend(notes::invisible_light_note(self, &ranges));
+        bound.notes.extend(notes::unused_media_note(self));
         bound.notes.extend(notes::replaced_rules_note(&bound.rules));
         bound.solids = (bound.emitters.len() >= MANY_SOURCES).then(|| bodies::solids(&bound, model, margin));
         bound.notes.extend(file_notes);

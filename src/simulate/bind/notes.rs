@@ -4,10 +4,10 @@
 use super::bound_scene::{BoundScene, RuleFaces};
 use super::chosen::ChosenRules;
 use crate::model::{Model, PlacedFace};
-use crate::optics::catalogue;
+use crate::optics::{catalogue, observer_range};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::Loaded;
-use crate::simulate::scene::{ByWavelength, Material, Reflectance, Scene, medium};
+use crate::simulate::scene::{ByWavelength, Material, PowerUnit, Reflectance, Scene, medium};
 use crate::simulate::surfaces::FaceOptics;
 use std::collections::BTreeSet;
 
@@ -64,6 +64,36 @@ fn source_label(scene: &Scene, source: usize) -> String {
         Some(name) if !name.is_empty() => format!("the source '{name}'"),
         _ => format!("[[source]] {}", source + 1),
     }
+}
+
+/// Returns one sentence about the sources whose power is in lumens though the eye sees nothing of their light, naming the first; `None`
+/// where there is none. `light` is first and last wavelength of each source, nm.
+pub(super) fn invisible_light_note(scene: &Scene, light: &[[f64; 2]]) -> Option<String> {
+    if scene.run.unit != PowerUnit::Lumen {
+        return None;
+    }
+    let [from, to] = observer_range();
+    let is_invisible = |&source: &usize| light[source][1] < from || light[source][0] > to;
+    let invisible: Vec<usize> = (0..light.len()).filter(is_invisible).collect();
+    let first = *invisible.first()?;
+    let others = if invisible.len() > 1 { format!(" (and {} more)", invisible.len() - 1) } else { String::new() };
+    Some(format!(
+        "the power of {}{others} is in lumens, but the eye sees nothing of light of {} nm: give it in watts, without `unit = \"lm\"` in [run]",
+        source_label(scene, first),
+        light[first][0]
+    ))
+}
+
+/// Returns one sentence about the media of the scene that no rule names, nor the surroundings; `None` where all are named.
+pub(super) fn unused_media_note(scene: &Scene) -> Option<String> {
+    let named = scene.materials.iter().filter_map(|rule| rule.medium.as_deref());
+    let named: BTreeSet<&str> = named.chain(scene.ambient.as_deref()).collect();
+    let unused = scene.media.iter().map(|medium| medium.name.as_str()).filter(|name| !named.contains(name));
+    let quoted: Vec<String> = unused.map(|name| format!("'{name}'")).collect();
+    let verb = if quoted.len() == 1 { "is" } else { "are" };
+    (!quoted.is_empty()).then(|| {
+        format!("of [[medium]] {} {verb} in no use: no [[material]] names it as its `medium`", quoted.join(", "))
+    })
 }
 
 /// Returns what the readers of ray files changed or supposed, each sentence with its source in front.

@@ -172,7 +172,8 @@ impl Scene {
 
     /// Returns the error that the colour at a place of the scene is none.
     pub(super) fn not_a_colour(&self, at: &[Key<'_>]) -> Error {
-        self.error(ErrorKind::Value, at, "not a colour").help("write \"#rrggbb\" or [r, g, b]")
+        self.error(ErrorKind::Value, at, "not a colour")
+            .help("write \"#rrggbb\", or shares of red, green and blue from 0 to 1, as in [0.8, 0.1, 0]")
     }
 
     /// Makes an error about the value at `path`, with its place in the file; without a place for a scene that was not parsed from text.

@@ -82,10 +82,10 @@ pub enum ColourKey {
 }
 
 impl ColourKey {
-    /// Returns it as red, green, blue; `None` for a text that is no `#rrggbb`. Three numbers are taken as they are.
+    /// Returns it as red, green, blue; `None` for a text that is no `#rrggbb`, and for numbers beyond 0 and 1.
     pub fn rgb(&self) -> Option<[f64; 3]> {
         match self {
-            Self::Rgb(c) => Some(*c),
+            Self::Rgb(c) => c.iter().all(|x| (0.0..=1.0).contains(x)).then_some(*c),
             Self::Hex(s) => {
                 // Six ASCII digits: slicing by bytes would else split a character.
                 let hex = s.strip_prefix('#').filter(|h| h.len() == 6 && h.is_ascii())?;
