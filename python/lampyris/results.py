@@ -262,7 +262,7 @@ class Run(Mapping[str, Receiver]):
 
     @property
     def seconds(self) -> dict[str, float]:
-        """Seconds of reading, meshing, building and tracing."""
+        """Seconds of reading, meshing, building, tracing and checking."""
         return dict(self.document["seconds"])
 
     @property

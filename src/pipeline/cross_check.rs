@@ -65,9 +65,9 @@ impl PreparedScene {
             results.seconds.build = build_seconds;
             let started = Instant::now();
             let (check, geometric) = recheck(self, &results, intersector, monitor);
-            let check_seconds = started.elapsed().as_secs_f64();
+            results.seconds.check = started.elapsed().as_secs_f64();
             results.notes.extend(geometric.iter().flat_map(|error| unknown_cells_notes(error, &results.receivers)));
-            Ok(SceneResults { results, check, geometric, check_seconds, verification, sums_without_cells: sums })
+            Ok(SceneResults { results, check, geometric, verification, sums_without_cells: sums })
         })
     }
 }

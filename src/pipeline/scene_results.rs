@@ -18,8 +18,6 @@ pub struct SceneResults {
     pub check: Option<CrossCheck>,
     /// What the facets change of the light, where the run was on facets.
     pub geometric: Option<GeometricError>,
-    /// Seconds that both took.
-    pub check_seconds: f64,
     /// The pruned kernel against the full one, when asked for.
     pub verification: Option<Verification>,
     /// The sums that the results were made of but for their cells, which the results have; none of a verified run.

@@ -381,6 +381,7 @@ impl SimulationReport<'_> {
                     figures(self.results.segments as f64 / self.results.rays as f64, 4)
                 ),
             ),
+            ("check", s.check, "some of its rays asked again of BVH and spline".to_owned()),
         ] {
             table.row([name.into(), Cell::Number(time, 3), what.into()]);
         }

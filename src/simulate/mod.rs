@@ -54,6 +54,7 @@ mod sequence;
 mod sequence_recorder;
 mod sequence_results;
 mod settings;
+mod source_share;
 mod surfaces;
 mod tallies;
 mod tally;

@@ -4,6 +4,7 @@ use super::bind::BoundScene;
 use super::emitter::Emitter;
 use super::scene::MOST_RAYS;
 use super::settings::RunSettings;
+use super::source_share::{SourceShare, weight_among};
 use super::tally::QUANTA;
 
 /// Record mask from which on recorded rays are traced a second time: to trace one in 64 or fewer again costs less than to trace every ray
@@ -22,6 +23,9 @@ const MOST_RAYS_LOG2: u32 = 21;
 /// Most quanta of one ray: whole numbers up to 2⁵³ are exact.
 const HEAVIEST_RAY: f64 = (1u64 << 53) as f64;
 
+/// Quanta of a ray from which on the rounding of its power is nobody's concern: 5e-10 of it.
+const FINE_RAY: f64 = (1u64 << 30) as f64;
+
 /// Most quanta of a replicate, half of what its words of 63 bits hold.
 const FULLEST_REPLICATE: f64 = (1u64 << 62) as f64;
 
@@ -34,46 +38,6 @@ pub const GROWING_REPLICATE: u64 = 5_000;
 
 /// Fewest replicates of a fixed size for which a run is divided into them unasked.
 const FEWEST_GROWING: u64 = 128;
-
-/// The rays of one source: in the whole run, or in each replicate of one that can grow.
-///
-/// Every replicate has the same quanta of it, so that their spread is that of the light alone: where its rays don't divide evenly, those of
-/// a replicate with one more weigh less. A source with fewer rays than there are replicates is in some of them alone.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SourceShare {
-    /// Number of its first ray, and how many it has.
-    first: u64,
-    rays: u64,
-    /// Rays that each replicate has at least.
-    fewest: u64,
-    /// Quanta of each ray in a replicate with that many, and with one more.
-    quanta: [f64; 2],
-}
-
-impl SourceShare {
-    /// Makes the share of a source whose rays have so many quanta in the mean, divided into so many parts.
-    fn new(first: u64, rays: u64, quanta: f64, parts: u32) -> Self {
-        let fewest = rays / u64::from(parts);
-        let quanta = [fewest, fewest + 1].map(|n| (quanta * weight_among(n, rays, parts)).round().max(1.0));
-        Self { first, rays, fewest, quanta }
-    }
-
-    /// Returns the quanta of all its rays, divided into so many parts.
-    fn all_quanta(&self, parts: u32) -> f64 {
-        let parts = u64::from(parts);
-        // So many have one ray more.
-        let larger = self.rays % parts;
-        let rays = [(parts - larger) * self.fewest, larger * (self.fewest + 1)];
-        rays[0] as f64 * self.quanta[0] + rays[1] as f64 * self.quanta[1]
-    }
-}
-
-/// Returns what a ray weighs in a part with so many of a source's rays, over its weight where all parts have the same number: as much as
-/// makes all parts alike, up to twice. A source with fewer rays than there are parts cannot be in all of them.
-fn weight_among(count: u64, rays: u64, parts: u32) -> f64 {
-    let mean = rays as f64 / f64::from(parts);
-    if mean < 1.0 { 1.0 } else { mean / count as f64 }
-}
 
 /// How the rays of a run are divided among sources and replicates.
 #[derive(Clone, Debug)]
@@ -159,6 +123,12 @@ impl Plan {
     /// Quanta of a ray of the source whose rays weigh most.
     pub(crate) fn heaviest_ray(&self) -> f64 {
         self.shares.iter().flat_map(|share| share.quanta).fold(0.0, f64::max)
+    }
+
+    /// Returns the power that all rays of a source have, of which each is a whole number of quanta, in the unit of the sources.
+    pub(crate) fn counted_power(&self, source: usize) -> f64 {
+        let parts = if self.grows() { 1 } else { self.replicates };
+        self.shares[source].all_quanta(parts) * f64::from(self.replicates / parts) * self.quantum
     }
 
     /// Whether it is divided into replicates of a fixed size, so that further ones may follow.
@@ -290,7 +260,7 @@ fn grows_unasked(settings: &RunSettings) -> bool {
 }
 
 /// Returns the quanta of an average ray: [`QUANTA`], halved until the heaviest ray is a whole number that is exact and no sum of a
-/// replicate, or of the squares of so many, overflows. `weights` are the rays of each source and what one of them weighs against the
+/// replicate, or of the squares of so many, overflows; doubled, as far as these allow, until the lightest ray is fine. `weights` are the rays of each source and what one of them weighs against the
 /// average; they are divided into so many parts, one where they are those of each replicate.
 fn average_quanta(weights: &[(u64, f64)], parts: u32) -> f64 {
     let in_smallest = |&(rays, weight): &(u64, f64)| weight * weight_among(rays / u64::from(parts), rays, parts);
@@ -308,6 +278,11 @@ fn average_quanta(weights: &[(u64, f64)], parts: u32) -> f64 {
     // A power of two: the share of every ray keeps its digits.
     while !fits(average) && average > 1.0 {
         average *= 0.5;
+    }
+    let lightest = weights.iter().map(|(_, weight)| *weight).fold(f64::INFINITY, f64::min);
+    // Of one part the squares are not known.
+    while parts > 1 && lightest * average < FINE_RAY && fits(2.0 * average) {
+        average *= 2.0;
     }
     average
 }
@@ -384,6 +359,10 @@ mod tests {
         let (n, lone) = (8e7, 0.5 * (8e7 + 1.0));
         let average = average_quanta(&[(1, lone), (8e7 as u64, 0.5 * (n + 1.0) / n)], 128);
         assert!(average * lone <= 2f64.powi(53) && 2.0 * average * lone > 2f64.powi(53));
+        // The rays of one source weigh 10⁻¹³ of the others': as many quanta as the heavy ones leave room for, which weigh a little over 2
+        // in a replicate of 156.
+        let average = average_quanta(&[(20_000, 2.0), (20_000, 2e-13)], 128);
+        assert_eq!(average, 2f64.powi(51));
         // 2³¹ rays in 2¹⁰ replicates at the rim of a receiver: each has Σ w·x = 2²¹ rays, cut to a quarter quantum; squared, times 2¹⁰.
         let average = average_quanta(&[(1 << 31, 1.0)], 1 << 10);
         let squares = 2f64.powi(10) * (2f64.powi(21) * average / 4.0).powi(2);

@@ -172,7 +172,10 @@ impl Results {
         let bodies = bound.overlap_note(&tallies.counts).into_iter().chain(bound.repair_notes(&tallies.counts));
         // In this order notes are read: what the scene says of itself, what the run found, what the errors are
         // worth.
-        let found = bodies.chain(bound.lost_note(lost, &tallies.ledger)).chain(bound.scarce_sources_note(&plan));
+        let found = bodies
+            .chain(bound.lost_note(lost, &tallies.ledger))
+            .chain(bound.scarce_sources_note(&plan))
+            .chain(bound.rounded_sources_note(&plan));
         let found = found.chain(bound.uncounted_light_notes(&tallies.receivers));
         let found = found.chain(few_replicates(tallies.replicates));
         let mut notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();

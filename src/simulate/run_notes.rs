@@ -5,13 +5,15 @@ use super::outcome::{Counts, LostRay};
 use super::plan::Plan;
 use super::receiver::{Receiver, Shape};
 use super::tally::Sum;
-use crate::text::count_of;
+use crate::text::{count_of, figures};
 
 /// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
 /// one scene once in 10^6 segments.
 const OVERLAP_SEGMENTS: u64 = 10_000;
 /// Rays of a source below which next to nothing is known of its light.
 const SCARCE_RAYS: u64 = 64;
+/// Share of a source's power from which on what rounding changes of it is told.
+const ROUNDED: f64 = 1e-5;
 /// Share of the mean power of a source below which it is told: among thousands alike each has few rays, and all together enough.
 const WEAK: f64 = 0.1;
 
@@ -63,10 +65,7 @@ impl BoundScene {
         };
         let scarce: Vec<usize> = (0..self.emitters.len()).filter(is_scarce).collect();
         let &first = scarce.iter().min_by_key(|source| plan.rays_of_source(**source))?;
-        let name = match self.scene.sources.get(first).map(|s| s.name.as_str()) {
-            Some(name) if !name.is_empty() => format!("the source '{name}'"),
-            _ => format!("[[source]] {}", first + 1),
-        };
+        let name = self.scene.source_label(first);
         let (rays, percent) = (plan.rays_of_source(first), 100.0 * self.emitters[first].power / plan.emitted);
         let others =
             if scarce.len() > 1 { format!(" ({} sources have so few)", scarce.len()) } else { String::new() };
@@ -75,6 +74,22 @@ impl BoundScene {
              `rays` of its own",
             plan.rays
         ))
+    }
+
+    /// Returns one sentence about sources so weak beside the others that the rounding of their rays' power to whole quanta shows; `None`
+    /// where there are none.
+    pub(crate) fn rounded_sources_note(&self, plan: &Plan) -> Option<String> {
+        let rounding = |&source: &usize| (plan.counted_power(source) / self.emitters[source].power - 1.0).abs();
+        let first = (0..self.emitters.len()).max_by(|a, b| rounding(a).total_cmp(&rounding(b)))?;
+        (rounding(&first) > ROUNDED).then(|| {
+            format!(
+                "the light of {} is counted as {} instead of {}: its rays weigh so little beside those of other sources that they are \
+                 rounded; trace it in a run of its own, without those",
+                self.scene.source_label(first),
+                figures(plan.counted_power(first), 4),
+                figures(self.emitters[first].power, 4)
+            )
+        })
     }
 
     /// Returns one sentence for each receiver that ends light but counts that of so many interactions alone, and got none: `counted` says

@@ -13,6 +13,8 @@ pub struct Seconds {
     pub build: f64,
     /// Tracing; of a merged run that of all parts together.
     pub trace: f64,
+    /// Asking some of its rays again of BVH and spline, and comparing facets with the spline.
+    pub check: f64,
     /// What the parts of a merged run took.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub merged: Option<MergedSeconds>,

@@ -26,6 +26,8 @@ pub(super) struct Worst {
     /// Geometric error as a share of the figure, `None` where that is 0, and its name.
     pub(super) share: Option<f64>,
     pub(super) figure: String,
+    /// Whether the rays alone err by less than is anybody's concern, so that the ratio is no multiple of their error.
+    is_certain: bool,
 }
 
 /// Finds the figure whose geometric error is largest against the statistical one that a run of `scale` times the pilot's rays will have,
@@ -117,10 +119,11 @@ impl Worst {
             return;
         }
         // No figure is asked for beyond a millionth of itself; of one that is 0 without an error no multiple is a number to be read.
-        let ratio = (geometric / allowed.max(NEGLIGIBLE * value.abs())).min(LARGEST_RATIO);
+        let negligible = NEGLIGIBLE * value.abs();
+        let ratio = (geometric / allowed.max(negligible)).min(LARGEST_RATIO);
         if ratio > self.ratio {
             let share = (value != 0.0).then(|| geometric / value.abs());
-            *self = Self { ratio, share, figure: format!("{of}: {figure}") };
+            *self = Self { ratio, share, figure: format!("{of}: {figure}"), is_certain: allowed <= negligible };
         }
     }
 
@@ -131,8 +134,8 @@ impl Worst {
         }
         let by = self.share.map_or_else(|| "where it is 0".into(), |s| format!("by {} %", two_digits(100.0 * s)));
         let figure = figure_in_words(&self.figure);
-        if self.ratio >= LARGEST_RATIO {
-            return format!("{figure} {by}, without any standard error");
+        if self.is_certain {
+            return format!("{figure} {by}, where the pilot's rays tell of no standard error");
         }
         format!("{figure} {by}, {} times its standard error", two_digits(self.ratio))
     }
@@ -176,7 +179,10 @@ mod tests {
         worst.weigh(["lamp", "absorbed"], 0.0, 0.0, 0.0);
         assert_eq!(worst.in_words(), "not at all");
         worst.weigh(["lamp", "absorbed"], 1e-4, 0.0, 0.0);
-        assert_eq!(worst.in_words(), "lamp: absorbed where it is 0, without any standard error");
+        assert_eq!(
+            worst.in_words(),
+            "lamp: absorbed where it is 0, where the pilot's rays tell of no standard error"
+        );
         assert_eq!(worst.ratio, LARGEST_RATIO);
         let mut worst = Worst::default();
         worst.weigh(["lamp", "rms_1"], 0.2, 0.05, 2.0);

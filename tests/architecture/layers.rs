@@ -644,6 +644,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "bind",
             "assemble",
             "effects",
+            "source_share",
             "plan",
             "lost_light",
             "run_notes",

@@ -108,7 +108,7 @@ fn a_selector_that_means_nothing_is_refused_with_what_there_is() {
         ("without = [{ part = 'leds' }]", "did you mean 'led'?"),
         ("without = [{ part = 'led', kind = 'torus' }]", "matches no face"),
         ("without = [{ entity = 999999 }]", "no face is #999999"),
-        ("without = [{ parts = 'led' }]", "`part`"),
+        ("without = [{ parts = 'led' }]", "did you mean 'part'?"),
         ("without = { part = 'led' }", "without = [{ part = \"helper*\" }]"),
     ] {
         fs::write(path.join("s.toml"), scene("lamp.stp", without)).unwrap();

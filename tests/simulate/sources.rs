@@ -331,3 +331,23 @@ fn a_source_that_sends_next_to_no_rays_is_named() {
     assert!(note.contains("'pilot lamp' sends 1 of the") && note.contains("`rays`"), "{note}");
     assert_eq!(notes("rays = 10_000"), "");
 }
+
+/// The power of a source that is weak beside another is right where whole quanta can tell it, and else this is told.
+#[test]
+fn a_source_that_is_weak_beside_another_keeps_its_power_or_is_named() {
+    let mut world = World::default();
+    world.sphere("ball", Point::new(50.0, 0.0, 0.0), 1.0);
+    for (weak, share, is_told) in [(1e-3, 1e-6, false), (1e-7, 1e-3, true)] {
+        let text = format!(
+            "[run]\nrays = 20_000\n[[material]]\nsurface = 'absorber'\n\
+             [[source]]\nkind = 'cone'\nhalf_angle_deg = 10\npower = 1e6\n\
+             [[source]]\nname = 'weak'\nkind = 'cone'\nhalf_angle_deg = 10\ndirection = [0, 0, -1]\npower = {weak:e}\nrays = 20_000\n\
+             [[receiver]]\nname = 'down'\nat = [0, 0, -10]\nsize = [10, 10]\n"
+        );
+        let found = world.run(&text, |_| ());
+        let power = found.receivers[0].power;
+        assert!((power / weak - 1.0).abs() < share, "{weak}: {power}");
+        let notes = found.notes.join("; ");
+        assert_eq!(notes.contains("the light of the source 'weak' is counted as"), is_told, "{weak}: {notes}");
+    }
+}

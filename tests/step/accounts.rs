@@ -26,6 +26,18 @@ fn a_face_tells_its_layer_kind_area_and_a_point_on_it() {
     assert_eq!(text[0]["solids"][0]["faces"][0]["kind"], "plane");
 }
 
+/// A file whose instances all come again, with the same numbers, has each of them once.
+#[test]
+fn instances_that_come_again_are_placed_once() {
+    let product = "#100=PRODUCT_DEFINITION('','',$,$);\n#101=PRODUCT_DEFINITION_SHAPE('','',#100);\n\
+                   #102=SHAPE_DEFINITION_REPRESENTATION(#101,#6);\n";
+    let data = square(FORWARD, IN_ORDER) + product;
+    let once = import(&data);
+    let twice = read(&format!("{data}{data}"));
+    assert_eq!([once.model.placed_face_count(), twice.model.placed_face_count()], [1, 1]);
+    assert!(twice.report.problems.iter().any(|p| p.contains("#900") && p.contains("earlier instance")));
+}
+
 #[test]
 fn the_shape_of_an_aspect_is_no_second_face() {
     let product = "#100=PRODUCT_DEFINITION('','',$,$);\n#101=PRODUCT_DEFINITION_SHAPE('','',#100);\n\

@@ -73,7 +73,7 @@ pub(crate) fn run(
     say_step("trace", what, s.trace);
     if let Some(check) = &run.check {
         let what = format!("{} ray segments asked again of BVH and exact spline", grouped(check.rays));
-        say_step("check", what, run.check_seconds);
+        say_step("check", what, s.check);
     }
     let remarks = RunRemarks { sentences: reference_comparison(r), ..RunRemarks::default() };
     let start = std::time::Instant::now();

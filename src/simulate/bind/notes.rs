@@ -52,18 +52,10 @@ fn range_note(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<S
     let outside = |[a, b]: &[f64; 2]| *a < from * (1.0 - ROUNDING) || *b > to * (1.0 + ROUNDING);
     // One sentence a table: the first source that is beyond it stands for all.
     let (source, [a, b]) = light.iter().enumerate().find(|(_, range)| outside(range))?;
-    let whose = source_label(scene, source);
+    let whose = scene.source_label(source);
     let light = if a == b { format!("{a} nm") } else { format!("{a} to {b} nm") };
     let known_for = if from == to { format!("{from} nm alone") } else { format!("{from} to {to} nm") };
     Some(format!("{} is known for {known_for}, but {whose} has light of {light}: {}", known.what, known.beyond))
-}
-
-/// Returns a source as sentences name it: by its name, or by its number from 1 where it has none.
-fn source_label(scene: &Scene, source: usize) -> String {
-    match scene.sources.get(source).map(|s| s.name.as_str()) {
-        Some(name) if !name.is_empty() => format!("the source '{name}'"),
-        _ => format!("[[source]] {}", source + 1),
-    }
 }
 
 /// Returns one sentence about the sources whose power is in lumens though the eye sees nothing of their light, naming the first; `None`
@@ -79,7 +71,7 @@ pub(super) fn invisible_light_note(scene: &Scene, light: &[[f64; 2]]) -> Option<
     let others = if invisible.len() > 1 { format!(" (and {} more)", invisible.len() - 1) } else { String::new() };
     Some(format!(
         "the power of {}{others} is in lumens, but the eye sees nothing of light of {} nm: give it in watts, without `unit = \"lm\"` in [run]",
-        source_label(scene, first),
+        scene.source_label(first),
         light[first][0]
     ))
 }
@@ -101,7 +93,7 @@ pub(super) fn source_file_notes(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec
     let mut sentences = Vec::new();
     for (index, loaded) in loaded.iter().enumerate() {
         let Some(Loaded::Rays(list)) = loaded else { continue };
-        sentences.extend(list.notes.iter().map(|note| format!("{}: {note}", source_label(scene, index))));
+        sentences.extend(list.notes.iter().map(|note| format!("{}: {note}", scene.source_label(index))));
     }
     sentences
 }
@@ -206,7 +198,7 @@ pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> 
         !e.media_stated && bodies.iter().any(reaches)
     };
     let asked = (0..bound.emitters.len()).find(|&k| within(k)).map_or_else(String::new, |k| {
-        let source = source_label(&bound.scene, k);
+        let source = bound.scene.source_label(k);
         format!("; {source} is in its box, and each ray is asked what it starts in, many times the work: say what by `inside`")
     });
     Some(format!(

@@ -170,6 +170,14 @@ impl Scene {
         self.origin.folder.join(file)
     }
 
+    /// Returns a source as sentences name it: by its name, or by its number from 1 where it has none.
+    pub(crate) fn source_label(&self, source: usize) -> String {
+        match self.sources.get(source).map(|s| s.name.as_str()) {
+            Some(name) if !name.is_empty() => format!("the source '{name}'"),
+            _ => format!("[[source]] {}", source + 1),
+        }
+    }
+
     /// Returns the error that the colour at a place of the scene is none.
     pub(super) fn not_a_colour(&self, at: &[Key<'_>]) -> Error {
         self.error(ErrorKind::Value, at, "not a colour")

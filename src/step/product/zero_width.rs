@@ -185,7 +185,8 @@ fn edges_coincide(a: &TrimmedEdge, b: &TrimmedEdge, units: Units) -> bool {
         return true;
     }
     let size = first.bounds().union(second.bounds()).diagonal();
-    let tolerance = coincidence_tolerance(a, b) + units.accuracy_on_face(size);
+    // Each may be as far from the truth as the file says.
+    let tolerance = coincidence_tolerance(a, b) + 2.0 * units.accuracy_on_face(size);
     let follows = |curve: &Curve, other: &Curve| {
         let [t0, t1] = curve.domain();
         let point = |k: usize| curve.evaluate(t0 + (t1 - t0) * k as f64 / (COMPARED_POINTS - 1) as f64);

@@ -1,5 +1,6 @@
 //! Finds the cause of each difference between the hits on facets and on the spline.
 
+use super::face_facets::FaceFacets;
 use super::placed_surface::PlacedSurface;
 use super::verdict::{Cause, Defect};
 use crate::intersect::{Certainty, Hit};
@@ -34,7 +35,7 @@ pub(super) struct Classifier<'a> {
     placed: Vec<PlacedFace<'a>>,
     surfaces: Vec<OnceLock<Option<PlacedSurface>>>,
     /// The facets of each face.
-    facets: Vec<Vec<u32>>,
+    facets: Vec<FaceFacets>,
     /// How far facets without a proof stray from the spline, mm, measured when it is first asked for: the same for all rays.
     measured: Vec<OnceLock<f64>>,
     fallback: f64,
@@ -47,7 +48,7 @@ impl<'a> Classifier<'a> {
     pub(super) fn new(model: &'a Model, mesh: &'a FacetMesh, fallback: f64) -> Self {
         // Surfaces are moved into place only for faces that differ: most never do.
         let placed: Vec<_> = model.placed_faces().collect();
-        let mut facets = vec![Vec::new(); placed.len()];
+        let mut facets: Vec<FaceFacets> = placed.iter().map(|_| FaceFacets::default()).collect();
         for (i, facet) in (0u32..).zip(&mesh.facets) {
             if let Some(own) = facets.get_mut(facet.face.index()) {
                 own.push(i);
@@ -86,15 +87,8 @@ impl<'a> Classifier<'a> {
     /// Returns the largest sag, mm, of those facets of a face that the ray's line passes within their own sag and `gap`; of all when it
     /// passes none, as beside a border or over a hole.
     pub(super) fn band(&self, face: FaceId, ray: &Ray, gap: f64) -> f64 {
-        let near = |&i: &u32| {
-            let sag = self.sag(i);
-            let bounds = Aabb::from_points(self.mesh.corners(i as usize)).grown(sag + gap + self.rounding);
-            let everywhere = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
-            bounds.clip(&everywhere).map(|_| sag)
-        };
-        let Some(all) = self.facets.get(face.index()) else { return self.fallback };
-        let passed = all.iter().filter_map(near).reduce(f64::max);
-        passed.unwrap_or_else(|| all.iter().map(|&i| self.sag(i)).fold(0.0, f64::max))
+        let Some(facets) = self.facets.get(face.index()) else { return self.fallback };
+        facets.largest_sag(self.mesh, ray, gap + self.rounding, |i| self.sag(i))
     }
 
     /// Measures how far, mm, facets without a proved sag stray from the spline that may be why a ray was answered differently: the facet
@@ -102,7 +96,7 @@ impl<'a> Classifier<'a> {
     fn unproved_sag(&self, ray: &Ray, first: &Hit, facet: Option<&Hit>) -> f64 {
         let everywhere = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
         let of_hit = facet.map(|f| (f.face, f.primitive));
-        let of_face = self.facets.get(first.face.index()).into_iter().flatten();
+        let of_face = self.facets.get(first.face.index()).into_iter().flat_map(FaceFacets::all);
         let doubtful = of_hit.into_iter().chain(of_face.map(|&i| (first.face, i)));
         doubtful
             .filter(|(_, i)| self.proved_sag(*i).is_none())
@@ -191,7 +185,7 @@ impl<'a> Classifier<'a> {
         let (first, other) = if facet_first { (facet, exact) } else { (exact, facet) };
         let Some(first) = first else { return Cause::Unexplained(Defect::Inconclusive) };
         // A face that could not be meshed has no facets to hit.
-        if self.facets.get(first.face.index()).is_none_or(|f| f.is_empty()) {
+        if self.facets.get(first.face.index()).is_none_or(|f| f.all().is_empty()) {
             return Cause::Unmeshed;
         }
         let Some(surface) = self.surface(first.face) else { return Cause::NoSurface };

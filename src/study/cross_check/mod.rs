@@ -12,6 +12,7 @@
 
 mod border;
 mod classify;
+mod face_facets;
 mod fold;
 mod grouped;
 mod measure;
