@@ -169,3 +169,20 @@ fn folders_of_outputs_are_made() {
     }
     assert!(["one/two/a.stl", "three/all.rays", "four/odd.rays"].iter().all(|file| path.join(file).is_file()));
 }
+
+/// What a run finds out about itself is told once on the terminal, of merged parts too, not on the page alone.
+#[test]
+fn what_a_run_finds_is_told_on_the_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let scene = "[run]\nrays = 10_000\n[[source]]\npower = 1000\n[[source]]\nname = 'pilot lamp'\nat = [0, 0, 9]\npower = 0.001\n\
+                 [[receiver]]\nname = 'all'\nkind = 'far_field'\n";
+    fs::write(path.join("scene.toml"), scene).unwrap();
+    let told = "the source 'pilot lamp' sends 1 of the";
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "-o", "out", "--no-report"]);
+    assert!(code == 0 && err.matches(told).count() == 1, "{code} {err}");
+    let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "-o", "all.tally", "--shard", "1/1"]);
+    assert_eq!(code, 0, "{err}");
+    let (code, _, err) = lampyris_in(path, &["merge", "all.tally", "-o", "merged", "--no-report"]);
+    assert!(code == 0 && err.matches(told).count() == 1, "{code} {err}");
+}

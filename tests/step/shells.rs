@@ -401,7 +401,9 @@ fn a_face_thinner_than_the_accuracy_of_its_file_is_left_out() {
             let text = cube_with_a_doubled_edge(&curve(width), surface);
             let stated = text.replacen("GLOBAL_UNIT_ASSIGNED_CONTEXT", coarse, 1).replacen("DATA;\n", accuracy, 1);
             let import = read(&stated);
-            assert_closes(&import);
+            if has_none {
+                assert_closes(&import);
+            }
             assert_eq!(faces_without_width(&import), if has_none { vec![100_066] } else { Vec::new() }, "{width}");
             // Of a file that states nothing it is a face.
             assert!(faces_without_width(&read(&text)).is_empty());

@@ -3,12 +3,15 @@
 use crate::files::{corpus, fixture, read_model, step_files};
 use lampyris::intersect::bvh::{self, Bvh};
 use lampyris::intersect::octree::{self, Octree};
+use lampyris::math::{Point, Vector};
 use lampyris::model::Model;
+use lampyris::nurbs::{Curve, sweep};
 use lampyris::study::accuracy_target::{AccuracyTarget, meet_target};
 use lampyris::study::cross_check::{Cause, CrossCheck, Intersectors, Settings, cross_check};
 use lampyris::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
-use lampyris::study::{MeshSource, ModelMeshSource};
+use lampyris::study::{MeshSource, ModelMeshSource, sample_models};
 use lampyris::tessellate;
+use std::f64::consts::FRAC_PI_2;
 
 /// A third of the rays from a camera, a third at random, a third bouncing inside.
 fn cross_checked(model: &Model, rays: u64) -> CrossCheck {
@@ -60,6 +63,33 @@ fn line(name: &str, c: &CrossCheck) -> String {
         );
     }
     text
+}
+
+/// A sheet that runs along a quarter of a circle, around a loop, and back 0.01 mm beside itself, closer than the sag of its facets: these
+/// may be met in the other order than the two sides, which face opposite ways.
+#[test]
+fn the_sides_of_a_hairpin_change_their_order() {
+    let on_arc = |angle: f64, radius: f64, way: f64| {
+        let (sin, cos) = angle.sin_cos();
+        (radius * Point::new(cos, sin, 0.0), way * Vector::new(-sin, cos, 0.0))
+    };
+    let there = (0..=6).map(|k| on_arc(f64::from(k) / 6.0 * FRAC_PI_2, 10.0, 1.0));
+    let around = [([-3.0, 11.5], Vector::Y), ([-2.0, 13.0], Vector::X), ([-1.0, 11.5], -Vector::Y)];
+    let around = around.map(|([x, y], along)| (Point::new(x, y, 0.0), along));
+    // In other steps on the way back, so that facets of one side don't lie beside those of the other.
+    let back = (0..=9).map(|k| on_arc((1.0 - f64::from(k) / 9.0) * FRAC_PI_2, 10.01, -1.0));
+    let places: Vec<(Point, Vector)> = there.chain(around).chain(back).collect();
+    let mut parameters = vec![0.0];
+    parameters.extend(places.windows(2).scan(0.0, |way, pair| {
+        *way += pair[0].0.distance(pair[1].0);
+        Some(*way)
+    }));
+    let (positions, derivatives): (Vec<Point>, Vec<Vector>) = places.into_iter().unzip();
+    let curve = Curve::hermite(&parameters, &positions, &derivatives);
+    let sheet = sweep::extrusion(&curve, Vector::Z, [0.0, 5.0]);
+    let found = cross_checked(&sample_models::model("hairpin", [sheet]), 30_000);
+    let f = &found.facets_vs_exact;
+    assert!(f.unexplained == 0 && f.explained.coincident > 0, "{}", line("hairpin", &found));
 }
 
 #[test]

@@ -111,6 +111,8 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
             return Err(failure.with_help(saved.unwrap_or("nothing is lost: the parts are as they were".into())));
         }
     };
+    lost_rays::warn(&prepared, console);
+    lost_rays::warn_of_run(&run.results, &prepared, console);
     closing::print_listings(&run, &prepared, console)?;
     closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
     let refused = input_files::report_refusals(&prepared.job.loaded, command.limits.max_refused, console)

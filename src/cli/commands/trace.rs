@@ -230,6 +230,7 @@ fn trace_whole(
     let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { remarks.sentences };
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     verdicts::say_verdicts(&run, prepared, console)?;
+    lost_rays::warn_of_run(&run.results, prepared, console);
     closing::print_listings(&run, prepared, console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     // Last of all, for it may fail where the results did not.

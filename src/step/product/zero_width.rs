@@ -144,7 +144,8 @@ pub(super) fn remove_faces_without_width(
     removed
 }
 
-/// Whether a loop along one edge and back may mean the whole of a surface, as it does of a sphere: of one that is closed or ends in a pole.
+/// Whether a loop along one edge and back may mean the whole of a surface, as it does of a sphere: of one that is closed or ends in two
+/// poles. A single pole in the corner of a spline is where its net runs together.
 fn may_be_whole(geometry: &GeometryReader<'_, '_>, surface: u64, edge: &TrimmedEdge) -> bool {
     if geometry.file.entity(surface).is_some_and(|s| s.is_one_of(&UNBOUNDED)) {
         return false;
@@ -152,7 +153,7 @@ fn may_be_whole(geometry: &GeometryReader<'_, '_>, surface: u64, edge: &TrimmedE
     let Some(curve) = &edge.curve else { return true };
     let extent = FaceExtent::from_bounds(curve.bounds(), &[]);
     // A surface that cannot be read is refused where its face is.
-    geometry.chart(surface, extent, 0).map_or(true, |c| c.period != [None, None] || !c.poles.is_empty())
+    geometry.chart(surface, extent, 0).map_or(true, |c| c.period != [None, None] || c.poles.len() > 1)
 }
 
 /// Returns the two edges of a face that have a length, and whether its loop runs against them; `None` where it has more or fewer, or one

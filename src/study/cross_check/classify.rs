@@ -144,7 +144,8 @@ impl<'a> Classifier<'a> {
         let steep = |h: &Hit| h.geometric_normal.dot(ray.direction).abs() > 0.3;
         let opposite = f.geometric_normal.dot(e.geometric_normal) < 0.0 && steep(f) && steep(e);
         if opposite && !self.is_folded(ray, f, e) {
-            return Some(Cause::Unexplained(Defect::Orientation));
+            let is_other = self.is_on_another_sheet(ray, f, e);
+            return Some(if is_other { Cause::Coincident } else { Cause::Unexplained(Defect::Orientation) });
         }
         (apart > self.rounding).then_some(Cause::WithinSag)
     }
@@ -156,6 +157,17 @@ impl<'a> Classifier<'a> {
             let band = self.widest(surface, self.band(facet.face, ray, surface.gap));
             surface.normal(exact.uv).dot(exact.geometric_normal) > 0.0
                 && surface.looks_around(exact.uv, band, facet.geometric_normal)
+        })
+    }
+
+    /// Whether the facet stands for another sheet of the surface than the one that the spline was hit on, as of a spring whose coils touch:
+    /// near its own parameters the surface lies within its sag and faces as it does.
+    fn is_on_another_sheet(&self, ray: &Ray, facet: &Hit, exact: &Hit) -> bool {
+        self.surface(facet.face).is_some_and(|surface| {
+            let foot = surface.foot(ray.point_at(facet.t), facet.uv, ray.direction);
+            foot.offset.abs() <= self.widest(surface, self.sag(facet.primitive))
+                && surface.normal(foot.uv).dot(facet.geometric_normal) > 0.0
+                && surface.normal(exact.uv).dot(exact.geometric_normal) > 0.0
         })
     }
 

@@ -16,7 +16,7 @@ pub enum Cause {
     Silhouette,
     /// Inside the band the ray passes the border of the face, where facets and trim curve differ by up to the sag.
     TrimEdge,
-    /// Two faces lie closer together than their sags, and the order of the hits is swapped.
+    /// Two faces, or two sheets of one, lie closer together than their sags, and the order of the hits is swapped.
     Coincident,
     /// The spline's hit is a touch within 1e-9 mm.
     Tangent,
