@@ -260,8 +260,9 @@ fn grows_unasked(settings: &RunSettings) -> bool {
 }
 
 /// Returns the quanta of an average ray: [`QUANTA`], halved until the heaviest ray is a whole number that is exact and no sum of a
-/// replicate, or of the squares of so many, overflows; doubled, as far as these allow, until the lightest ray is fine. `weights` are the rays of each source and what one of them weighs against the
-/// average; they are divided into so many parts, one where they are those of each replicate.
+/// replicate, or of the squares of so many, overflows; doubled, as far as these allow, until the lightest ray is fine. `weights` are the
+/// rays of each source and what one of them weighs against the average; they are divided into so many parts, one where they are those of
+/// each replicate.
 fn average_quanta(weights: &[(u64, f64)], parts: u32) -> f64 {
     let in_smallest = |&(rays, weight): &(u64, f64)| weight * weight_among(rays / u64::from(parts), rays, parts);
     let heaviest = weights.iter().map(in_smallest).fold(0.0, f64::max);

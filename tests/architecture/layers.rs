@@ -538,6 +538,10 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "study/cross_check",
+        &["border", "verdict", "placed_surface", "fold", "face_facets", "classify", "grouped", "measure"],
+    ),
+    (
         "tessellate",
         &[
             "nodes",

@@ -1,5 +1,6 @@
 //! Where instances stand in the file's order: by their ids, and by the names of their records.
 
+use super::Instance;
 use rustc_hash::FxHashMap;
 use std::collections::hash_map::Entry;
 
@@ -12,8 +13,24 @@ pub(super) enum Index {
 }
 
 impl Index {
-    /// Makes the index of instances by their ids, the first where several have one; returns the positions of the others too.
-    pub(super) fn new(ids: impl ExactSizeIterator<Item = u64> + Clone) -> (Self, Vec<usize>) {
+    /// Makes the index of instances by their ids; takes those out of the list, and returns them, that repeat the id of an earlier one: what
+    /// looks for instances by their kind would find the earlier one twice.
+    pub(super) fn take_repeated(instances: &mut Vec<Instance>) -> (Self, Vec<Instance>) {
+        let (index, positions) = Self::new(instances.iter().map(|i| i.id));
+        if positions.is_empty() {
+            return (index, Vec::new());
+        }
+        let (mut position, mut positions) = (0.., positions.into_iter().peekable());
+        let is_repeated = |_: &mut Instance| {
+            let position = position.next();
+            positions.next_if(|repeated| Some(*repeated) == position).is_some()
+        };
+        let repeated = instances.extract_if(.., is_repeated).collect();
+        (Self::new(instances.iter().map(|i| i.id)).0, repeated)
+    }
+
+    /// Makes the index of instances by their ids, the first where several have one; returns the positions of the others too, ascending.
+    fn new(ids: impl ExactSizeIterator<Item = u64> + Clone) -> (Self, Vec<usize>) {
         let largest = ids.clone().fold(0, u64::max);
         let mut repeated = Vec::new();
         // Writers number nearly without gaps: a table is smaller and quicker then. One number of 10¹⁸ must not make one of that size.

@@ -41,21 +41,10 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     if !marked && p.instances.is_empty() {
         return Err(Error::new(ErrorKind::NotStep { file: name.into() }));
     }
-    let (mut index, repeated) = Index::new(p.instances.iter().map(|i| i.id));
-    for &position in &repeated {
-        let instance = p.instances[position];
+    let (index, repeated) = Index::take_repeated(&mut p.instances);
+    for instance in repeated {
         let start = p.records[instance.first as usize].name.start as usize;
         p.note(start, Some(instance.id), "its number stands for an earlier instance already; this one is left out");
-    }
-    if !repeated.is_empty() {
-        // Out of the list too: what looks for instances by their kind would take the earlier one twice.
-        let mut left_out = repeated.into_iter().peekable();
-        let mut position = 0..;
-        p.instances.retain(|_| {
-            let position = position.next();
-            left_out.next_if(|at| Some(*at) == position).is_none()
-        });
-        index = Index::new(p.instances.iter().map(|i| i.id)).0;
     }
     let names = (0u32..).zip(&p.instances).flat_map(|(position, i)| {
         let records = &p.records[i.first as usize..][..i.count as usize];

@@ -161,12 +161,12 @@ impl<'a> Classifier<'a> {
     }
 
     /// Whether the facet stands for another sheet of the surface than the one that the spline was hit on, as of a spring whose coils touch:
-    /// near its own parameters the surface lies within its sag and faces as it does.
+    /// the surface lies within its sag, and at its own parameters it faces as it does.
     fn is_on_another_sheet(&self, ray: &Ray, facet: &Hit, exact: &Hit) -> bool {
         self.surface(facet.face).is_some_and(|surface| {
             let foot = surface.foot(ray.point_at(facet.t), facet.uv, ray.direction);
             foot.offset.abs() <= self.widest(surface, self.sag(facet.primitive))
-                && surface.normal(foot.uv).dot(facet.geometric_normal) > 0.0
+                && surface.normal(facet.uv).dot(facet.geometric_normal) > 0.0
                 && surface.normal(exact.uv).dot(exact.geometric_normal) > 0.0
         })
     }

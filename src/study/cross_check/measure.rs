@@ -1,6 +1,6 @@
 //! Alternating timing of intersectors over the same rays.
 
-use super::PerIntersector;
+use super::verdict::PerIntersector;
 use crate::intersect::{Cost, Intersector};
 use crate::math::Ray;
 use crate::study::{Rounds, Timing};
