@@ -22,7 +22,7 @@ pub enum ErrorKind {
     },
     /// The bytes are no Part 21 text.
     #[error(
-        "{file}: line 1: 'ISO-10303-21;' is missing, this is not a STEP file (Part 21 clear text); export the model as STEP"
+        "{file}: line 1: 'ISO-10303-21;' is missing, this is not a STEP file (Part 21 clear text in ASCII or UTF-8); export the model as STEP"
     )]
     NotStep {
         /// Name of the file.
