@@ -55,7 +55,7 @@ use std::sync::Arc;
 /// let scene = lampyris::simulate::Scene::parse(text, "scene.toml", std::path::Path::new("."))?;
 /// assert_eq!(scene.receivers[0].name, "wall");
 /// let slip = lampyris::simulate::Scene::parse("[run]\nray = 5", "scene.toml", std::path::Path::new(".")).unwrap_err();
-/// assert!(slip.to_string().contains("scene.toml:2:1") && slip.to_string().contains("`rays`"), "{slip}");
+/// assert!(slip.to_string().contains("scene.toml:2:1") && slip.to_string().contains("'rays'"), "{slip}");
 /// # Ok::<(), lampyris::simulate::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
