@@ -103,8 +103,8 @@ fn recheck(
     if rays.is_empty() {
         return (None, pilot);
     }
-    let surfaces = in_stage(monitor, Stage::BuildingCheck("the spline"), || prepared.surfaces_for_few_rays());
-    let exact = true_intersector(prepared.facets.instancing.as_deref(), &surfaces);
+    let surfaces = in_stage(monitor, Stage::BuildingCheck("the spline"), || prepared.surfaces_of_choice());
+    let exact = true_intersector(prepared.facets.instancing.as_deref(), surfaces);
     let check = check_rays(prepared, intersector, &*exact, &rays, monitor);
     (Some(check), pilot.or_else(|| facet_effects(prepared, results, [intersector, &*exact])))
 }

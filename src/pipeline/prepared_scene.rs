@@ -12,15 +12,15 @@ use super::monitor::{Monitor, Stage};
 use super::scene_job::SceneJob;
 use super::settings::IntersectorKind;
 use super::turn::Turn;
-use crate::intersect::Intersector;
 use crate::intersect::exact;
 use crate::intersect::octree::{self, Octree};
+use crate::intersect::{Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::{Instancing, Model};
 use crate::simulate::scene::PowerUnit;
 use crate::simulate::{
-    BoundScene, Fingerprint, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, replicate_range,
-    trace,
+    BoundScene, Fingerprint, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, grows,
+    replicate_range, trace,
 };
 use crate::study::default_accuracy::Chosen;
 use crate::tessellate::{self, GroupedFacets};
@@ -31,6 +31,9 @@ use std::time::Duration;
 
 /// Facets that are made before it is chosen how to trace: a second or two. Far more of them cost more than the spline does.
 const MOST_BEFORE_CHOICE: f64 = 1e5;
+
+/// Segments of a ray, by which true surfaces are made for a run: two to five in most scenes.
+const SEGMENTS_A_RAY: u64 = 4;
 
 /// Ray paths kept for pictures.
 const RECORDED_PATHS: u64 = 2000;
@@ -56,8 +59,10 @@ pub struct PreparedScene {
     pub rays: Option<u64>,
     /// Why it is traced as it is, where nobody asked for it.
     pub chosen: Option<Chosen>,
-    /// Built once for pilot, run and check.
+    /// Built once for the run, where that asks the spline.
     surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
+    /// Built once for pilot and check.
+    few_ray_surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
 }
 
 /// How to trace beside the settings.
@@ -111,6 +116,7 @@ impl PreparedScene {
             rays: None,
             chosen: None,
             surfaces: OnceLock::new(),
+            few_ray_surfaces: OnceLock::new(),
         };
         // Whoever asks for anything of how it is traced gets just that.
         let is_open =
@@ -224,7 +230,7 @@ impl PreparedScene {
     /// Chooses the facets or the spline that a pilot finds sufficient. May put finer facets in place of those that were made. `excess` is
     /// the number of facets that the default tolerance would make, where those were too many to be tried.
     fn choose_accuracy(&mut self, run: RunSettings, excess: Option<f64>, monitor: &dyn Monitor) -> Chosen {
-        let surfaces = || self.true_surfaces();
+        let surfaces = || self.surfaces_for_few_rays();
         let facets = (&self.facets, &self.mesh_settings);
         let model = (&self.job.loaded.model, &surfaces as &dyn Fn() -> _);
         let (mut chosen, finer) = default_accuracy::choose(model, &self.bound, &run, facets, monitor);
@@ -246,19 +252,34 @@ impl PreparedScene {
         self.facets.instancing.as_ref().map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups)
     }
 
-    /// Returns the true surface of each group, built when first asked for.
+    /// Returns the true surface of each group for a run on the spline, or whose hits are moved to it, built when first asked for: of many
+    /// patches for few rays as coarse as these are worth.
     fn true_surfaces(&self) -> &[Arc<TrueSurface>] {
-        self.surfaces.get_or_init(|| self.build_surfaces(&exact::Settings::default()))
+        self.surfaces.get_or_init(|| {
+            let run = self.run_settings();
+            // How many rays a run has that grows is not known, and all of its parts have one structure.
+            let may_grow = self.rays.is_some() || grows(&self.bound, &run);
+            let settings = if may_grow {
+                exact::Settings::default()
+            } else {
+                exact::Settings::for_rays(run.rays.saturating_mul(SEGMENTS_A_RAY))
+            };
+            self.build_surfaces(&settings)
+        })
     }
 
-    /// Returns true surfaces for some thousands of rays: those of pilot or run, else ones that are built sooner and not kept.
-    pub(super) fn surfaces_for_few_rays(&self) -> Vec<Arc<TrueSurface>> {
-        // Those of the pilot too where another process had it: the last digits of the check are then the same. On faces that are flat
-        // there is no pilot.
-        if self.chosen.as_ref().is_some_and(|c| c.pilot_rays > 0 || c.intersector == "exact") {
-            return self.true_surfaces().to_vec();
-        }
-        self.surfaces.get().cloned().unwrap_or_else(|| self.build_surfaces(&exact::Settings::for_few_rays()))
+    /// Returns the true surface of each group for the thousands of rays of a pilot or a check, built when first asked for. One for millions
+    /// of rays takes eight times as long, more than many runs.
+    fn surfaces_for_few_rays(&self) -> &[Arc<TrueSurface>] {
+        self.few_ray_surfaces.get_or_init(|| self.build_surfaces(&exact::Settings::for_few_rays()))
+    }
+
+    /// Returns the true surfaces that the run is traced on, or that its hits on facets are moved to, and that it is checked with. Which
+    /// these are goes by its choice alone, so that merged parts have the digits of one run.
+    pub(super) fn surfaces_of_choice(&self) -> &[Arc<TrueSurface>] {
+        let is_asked =
+            self.choice.intersector == IntersectorKind::Exact || self.choice.normals == NormalMode::Exact;
+        if is_asked { self.true_surfaces() } else { self.surfaces_for_few_rays() }
     }
 
     /// Builds the true surface of each group.
@@ -326,7 +347,7 @@ impl PreparedScene {
             }
             None => Octree::build(meshes[group], settings),
         };
-        let builders = intersectors::Builders { octree: &octree, surfaces: &|| self.true_surfaces().to_vec() };
+        let builders = intersectors::Builders { octree: &octree, surfaces: &|| self.surfaces_of_choice().to_vec() };
         let facets = (meshes.as_slice(), self.facets.instancing.as_deref());
         intersectors::with_built_intersector(self.choice, builders, facets, monitor, |intersector, footprint| {
             work(intersector, footprint.build_seconds)
