@@ -1,6 +1,6 @@
 //! Faces: a surface with trimming loops, or a ready mesh.
 
-use super::EdgeId;
+use super::edge::EdgeId;
 use crate::math::{Frame, Uv};
 use crate::mesh::FacetMesh;
 use crate::nurbs::{Surface, UvCurve, area_within, least_area_within};

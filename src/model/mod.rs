@@ -11,6 +11,7 @@
 
 mod account;
 mod bounds;
+mod edge;
 mod face;
 mod instancing;
 mod near_parts;
@@ -21,8 +22,9 @@ mod removal;
 mod tight_box;
 
 pub use account::{FaceAccount, PartAccount, SolidAccount};
+pub use edge::{Edge, EdgeId, VertexId};
 pub use face::{Analytic, Colour, EdgeUse, Face, SurfaceKind, TessellatedFace, TrimLoop};
 pub use instancing::{Instancing, Placement};
-pub use part::{Edge, EdgeId, Part, PartId, Shell, VertexId};
+pub use part::{Part, PartId, Shell};
 pub(crate) use placed::are_shared;
 pub use placed::{Instance, Model, PlacedFace};

@@ -1,18 +1,10 @@
 //! Parts: shells of faces over common edges and vertices.
 
+use super::edge::Edge;
 use super::{Colour, Face, TessellatedFace};
 use crate::math::Point;
-use crate::nurbs::Curve;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
-
-/// Index into [`Part::edges`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct EdgeId(pub u32);
-
-/// Index into [`Part::vertices`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct VertexId(pub u32);
 
 /// Index into [`super::Model::parts`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -33,17 +25,6 @@ pub struct Part {
     pub shells: Vec<Shell>,
     /// Faces that are meshes in the file.
     pub tessellated: Vec<TessellatedFace>,
-}
-
-/// An edge in space, cut to its ends.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Edge {
-    /// The curve; its domain is the edge's parameter interval.
-    pub curve: Curve,
-    /// Vertices at the start and end of the domain; equal for a closed edge.
-    pub vertices: [VertexId; 2],
-    /// The `#id` of the edge in its file, when it came from one.
-    pub entity: Option<u64>,
 }
 
 /// A set of faces.

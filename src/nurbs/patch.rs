@@ -47,20 +47,20 @@ macro_rules! as_wide_as_needed {
     };
 }
 
-impl BezierPatch {
-    /// All patches of a surface over its knot rectangles that are not empty, v fastest, by knot insertion.
-    pub(super) fn extract(surface: &Surface) -> Vec<Self> {
-        let [p, q] = surface.degree;
-        let [nu, nv] = surface.counts();
-        let (us, vs) = (surface.breakpoints(0), surface.breakpoints(1));
+impl Surface {
+    /// Returns the Bézier patches over the knot rectangles that are not empty, v fastest, by knot insertion.
+    pub fn bezier_patches(&self) -> Vec<BezierPatch> {
+        let [p, q] = self.degree;
+        let [nu, nv] = self.counts();
+        let (us, vs) = (self.breakpoints(0), self.breakpoints(1));
         // First in u, then each row in v: knot insertion in one direction does not see the other.
         let mut line: Vec<Homogeneous> = Vec::with_capacity(nu.max(nv));
         // Bézier points in u of every column of control points, column by column.
         let mut in_u = Vec::with_capacity(nv * (us.len() - 1) * (p + 1));
         for j in 0..nv {
             line.clear();
-            line.extend((0..nu).map(|i| surface.points[i * nv + j]));
-            append_bezier_pieces(p, &surface.knots[0], &line, &mut in_u);
+            line.extend((0..nu).map(|i| self.points[i * nv + j]));
+            append_bezier_pieces(p, &self.knots[0], &line, &mut in_u);
         }
         let column = (us.len() - 1) * (p + 1);
         let mut patches = Vec::with_capacity((us.len() - 1) * (vs.len() - 1));
@@ -71,18 +71,24 @@ impl BezierPatch {
             for i in 0..=p {
                 line.clear();
                 line.extend(in_u.iter().skip(a * (p + 1) + i).step_by(column));
-                append_bezier_pieces(q, &surface.knots[1], &line, &mut rows);
+                append_bezier_pieces(q, &self.knots[1], &line, &mut rows);
             }
             let row = (vs.len() - 1) * (q + 1);
             for b in 0..vs.len() - 1 {
                 let mut points = Vec::with_capacity((p + 1) * (q + 1));
                 rows.chunks_exact(row).for_each(|r| points.extend_from_slice(&r[b * (q + 1)..][..=q]));
-                patches.push(Self { degree: [p, q], points, domain: [[us[a], us[a + 1]], [vs[b], vs[b + 1]]] });
+                patches.push(BezierPatch {
+                    degree: [p, q],
+                    points,
+                    domain: [[us[a], us[a + 1]], [vs[b], vs[b + 1]]],
+                });
             }
         }
         patches
     }
+}
 
+impl BezierPatch {
     /// Homogeneous `[S, S_u, S_v]`, derivatives by the local parameters, not the surface's. These are in `[0, 1]²`; beyond it the
     /// polynomial goes on.
     pub fn local_jet(&self, local: Uv) -> [Homogeneous; 3] {

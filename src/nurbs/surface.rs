@@ -1,7 +1,7 @@
 //! Rational B-spline surfaces: evaluation, derivatives, normals also at poles, isolines, parts.
 
 use super::basis::{BROAD, MIDDLE, NARROW, WIDE, basis, find_span};
-use super::{BezierPatch, ControlPoint, Curve};
+use super::{ControlPoint, Curve};
 use crate::math::{Aabb, Homogeneous, Point, Uv, Vector};
 use serde::{Deserialize, Serialize};
 
@@ -288,11 +288,6 @@ impl Surface {
     pub fn transformed(&self, place: impl Fn(Point) -> Point) -> Self {
         let points = self.points.iter().map(|p| Homogeneous::weighted(place(p.project()), p.w)).collect();
         Self { points, ..self.clone() }
-    }
-
-    /// The Bézier patches over the non-empty knot rectangles, v fastest.
-    pub fn bezier_patches(&self) -> Vec<BezierPatch> {
-        BezierPatch::extract(self)
     }
 }
 

@@ -272,7 +272,9 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "model",
         &[
-            "part face",
+            "edge",
+            "face",
+            "part",
             "placed",
             "removal",
             "outline",
@@ -421,7 +423,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "mod",
             "curve",
             "blossom",
-            "surface patch",
+            "surface",
+            "patch",
             "conic",
             "curvature",
             "fit",

@@ -1,8 +1,15 @@
-//! Where instances stand in the file's order: by their ids, and by the names of their records.
+//! Instances, and where they stand in the file's order: by their ids, and by the names of their records.
 
-use super::Instance;
 use rustc_hash::FxHashMap;
 use std::collections::hash_map::Entry;
+
+/// The records of one instance: several for a complex instance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Instance {
+    pub(super) id: u64,
+    pub(super) first: u32,
+    pub(super) count: u32,
+}
 
 /// Positions of instances by id.
 #[derive(Debug)]

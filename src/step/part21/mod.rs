@@ -15,7 +15,7 @@ mod text;
 
 pub(super) use parser::parse;
 
-use index::{Index, Kinds};
+use index::{Index, Instance, Kinds};
 use short_names::Keyword;
 use span::Span;
 
@@ -52,14 +52,6 @@ pub(super) enum Value {
 pub(super) struct Record {
     name: Keyword,
     values: Span,
-}
-
-/// The records of one instance: several for a complex instance.
-#[derive(Clone, Copy, Debug)]
-struct Instance {
-    id: u64,
-    first: u32,
-    count: u32,
 }
 
 /// A statement that was not understood and was skipped.

@@ -1,11 +1,11 @@
 //! The one pass over the text: statements into the arena of values, faults noted and stepped over.
 
-use super::index::{Index, Kinds};
+use super::index::{Index, Instance, Kinds};
 use super::number::number;
 use super::sections::section_besides_data;
 use super::short_names::Keyword;
 use super::span::Span;
-use super::{Fault, File, Instance, Record, Value};
+use super::{Fault, File, Record, Value};
 use crate::step::{Error, ErrorKind};
 
 /// Deepest nesting of lists; schemas need 3, real files have shown 4.

@@ -11,8 +11,8 @@
 //! T and Q has a free one within it for all that lies so near to them. What shares a corner with T has no distance, and is judged by its
 //! normals ([`Sheet`]).
 
+use super::lines::{BOX_ROOM, LINES, Lines, lines_around};
 use super::sheet::Sheet;
-use super::{BOX_ROOM, LINES, Lines, lines_around};
 use crate::intersect::octree::node::{Link, Target};
 use crate::intersect::octree::tree::Tree;
 use crate::math::{Aabb, Point, Vector};

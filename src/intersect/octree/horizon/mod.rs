@@ -10,11 +10,12 @@
 //! Guarantee: conservative; heights up to the reach of a start, a picometre for a lamp, count as nothing.
 
 mod cone;
+mod lines;
 mod sheet;
 mod skyline;
 
 use super::tree::Tree;
-use crate::math::{Point, Vector, orthonormal_pair};
+use crate::math::{Vector, orthonormal_pair};
 use skyline::{Horizon, sector};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::OnceLock;
@@ -39,33 +40,6 @@ const CONE_ROOM: f64 = 0.5;
 const COSINE_ROOM: f32 = 1e-6;
 /// Directions are gathered in such steps.
 const DIRECTION_STEP: f64 = 1.0 / (1 << 20) as f64;
-
-/// By how much boxes are grown, relative to their size, for the rounding of f32 bounds: sixteen roundings.
-const BOX_ROOM: f64 = 1e-6;
-
-/// Three sides and three corners.
-const LINES: usize = 6;
-/// Lines in the plane of a triangle: the direction across each, away from the triangle, and where the line is, from its first corner.
-type Lines = [(Vector, f64); LINES];
-
-/// The unit normal of a triangle, and the lines in its plane through its sides and corners, which have it on one side; `None` without
-/// area.
-fn lines_around(corners: [Point; 3]) -> Option<(Vector, Lines)> {
-    let [a, b, c] = corners;
-    let normal = (b - a).cross(c - a).try_normalize()?;
-    let mut sides = [Vector::ZERO; 3];
-    for k in 0..3 {
-        sides[k] = (corners[(k + 1) % 3] - corners[k]).cross(normal).try_normalize()?;
-    }
-    let mut lines = [(Vector::ZERO, 0.0); LINES];
-    for k in 0..3 {
-        lines[k] = (sides[k], sides[k].dot(corners[k] - a));
-        // At a corner between the sides that meet there.
-        let across = (sides[k] + sides[(k + 2) % 3]).try_normalize()?;
-        lines[k + 3] = (across, across.dot(corners[k] - a));
-    }
-    Some((normal, lines))
-}
 
 /// The free cones and horizons of the facets that many rays have left.
 pub(super) struct Horizons {

@@ -7,7 +7,7 @@
 //!
 //! Weakness: eight sectors of one angle each, so that out of a narrow shaft no ray is seen to be free.
 
-use super::{BOX_ROOM, LINES, Lines, lines_around};
+use super::lines::{BOX_ROOM, LINES, Lines, lines_around};
 use crate::intersect::octree::node::{Link, Target};
 use crate::intersect::octree::tree::Tree;
 use crate::math::{Aabb, Point, Vector, orthonormal_pair};

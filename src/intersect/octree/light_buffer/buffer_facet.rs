@@ -1,6 +1,6 @@
 //! Facets as the rays of a source ask them.
 
-use super::View;
+use super::view::View;
 use crate::intersect::facet::{FacetRay, Line, Nearest};
 use crate::intersect::octree::facet_pair::Corners;
 use crate::math::{Point, Ray, huge_pages};

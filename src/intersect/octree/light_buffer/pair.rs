@@ -4,7 +4,7 @@
 //! the other, what the processor guesses wrong costs more than the test of the second. The arithmetic is that of [`Line::test_quad`], step
 //! by step, so that the hits are the same; where an edge function is zero that decides.
 
-use super::BufferFacet;
+use super::buffer_facet::BufferFacet;
 use crate::intersect::facet::{Line, Nearest};
 use crate::intersect::octree::facet_pair::Edges;
 use crate::intersect::octree::lanes::Lanes;

@@ -4,7 +4,9 @@
 //! sides, or, where the facet is wholly in front, its two triangles as the source sees them pass the square by. Squares are wider than
 //! they are by far more than a ray's place can be wrong.
 
-use super::{BufferFacet, DIVIDED, DIVISIONS, Entry, LightBuffer, PLANE_ROOM, Square, View};
+use super::buffer_facet::BufferFacet;
+use super::squares::{DIVIDED, DIVISIONS, Entry, LightBuffer, Square};
+use super::view::{PLANE_ROOM, View};
 use crate::intersect::facet::is_usable;
 use crate::math::Point;
 use crate::mesh::FacetMesh;
