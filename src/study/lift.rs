@@ -32,34 +32,20 @@ impl<'a> Lift<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::intersect::{Certainty, Footprint, Hit};
-    use crate::math::{FaceId, Uv};
-
-    /// Nothing above, or a surface at that height.
-    struct Ceiling(Option<f64>);
-    impl Intersector for Ceiling {
-        fn intersect(&self, _: &Ray, _: &mut Cost) -> Option<Hit> {
-            self.0.map(|t| Hit {
-                t,
-                normal: Vector::Z,
-                geometric_normal: Vector::Z,
-                face: FaceId(0),
-                primitive: 0,
-                triangle: None,
-                uv: Uv::ZERO,
-                certainty: Certainty::Certified,
-            })
-        }
-        fn footprint(&self) -> Footprint {
-            Footprint::default()
-        }
-    }
+    use crate::intersect::exact::{self, Exact};
+    use crate::math::Frame;
+    use crate::nurbs::sweep;
+    use crate::study::sample_models;
 
     #[test]
     fn a_ray_begins_clear_of_its_surface_and_within_its_wall() {
         let ray = Ray::new(Point::new(1.0, 2.0, 3.0), Vector::new(0.6, 0.0, 0.8));
         for (ceiling, height) in [(None, 0.8), (Some(10.0), 0.8), (Some(3.2), 0.8), (Some(1.0), 0.25)] {
-            let start = Lift::new(&Ceiling(ceiling), 0.2).start(&ray, Vector::Z);
+            // So far over the start.
+            let above = ceiling.map(|z| sweep::plane(&Frame::translation((3.0 + z) * Vector::Z), [[-5.0, 5.0]; 2]));
+            let ceiling_model = sample_models::model("ceiling", above);
+            let exact = Exact::build(&ceiling_model, &exact::Settings::default());
+            let start = Lift::new(&exact, 0.2).start(&ray, Vector::Z);
             assert!((start - ray.origin - height * Vector::Z).length() < 1e-15, "{ceiling:?}: {start}");
         }
     }

@@ -7,7 +7,7 @@ use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::appearance;
 use crate::cli::output::json::{json_text, json_value};
-use crate::cli::output::sentences::sentence_lines;
+use crate::cli::output::sentences::plain_sentence_lines;
 use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::contenders::{Contenders, Structures};
 use crate::cli::work::input_files::{self, Input};
@@ -320,7 +320,7 @@ fn spread_text(q: &Summary, unit: &str) -> String {
 fn check_summary(c: &CrossCheck, normals: NormalMode, width: usize) -> String {
     let f = &c.facets_vs_exact;
     let e = &f.explained;
-    let mut text = sentence_lines("  ", 2, &verdict(c).replace("**", ""), width) + "\n";
+    let mut text = plain_sentence_lines(&verdict(c), width) + "\n";
     let mut line = |name: &str, what: String| text += &format!("  {name:<12} {what}\n");
     line(
         "rays",

@@ -111,8 +111,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
             return Err(failure.with_help(saved.unwrap_or("nothing is lost: the parts are as they were".into())));
         }
     };
-    lost_rays::warn(&prepared, console);
-    lost_rays::warn_of_run(&run.results, &prepared, console);
+    closing::say_notes(&run.results.notes, &[], console);
     closing::print_listings(&run, &prepared, console)?;
     closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
     let refused = input_files::report_refusals(&prepared.job.loaded, command.limits.max_refused, console)
@@ -235,12 +234,18 @@ fn read_part(path: &Path) -> Result<Vec<u8>, Failure> {
     crate::formats::read_bytes(path).map_err(|e| input_failure(path, e))
 }
 
-/// Says why a part cannot be added to the `earlier` ones, and which of them holds the same.
-fn not_merged(path: &Path, message: String, earlier: &[(&Path, Vec<u32>)], part: &PartialRun) -> Failure {
-    let shares = |done: &[u32]| part.done.iter().any(|replicate| done.binary_search(replicate).is_ok());
+/// Says why a part cannot be added to the `earlier` ones, which `read` reads again, and which of them holds the same.
+fn not_merged(
+    path: &Path,
+    message: String,
+    earlier: &[PathBuf],
+    part: &PartialRun,
+    read: impl Fn(&Path) -> Result<PartialRun, Failure>,
+) -> Failure {
+    let shares = |other: &PartialRun| part.done.iter().any(|k| other.done.binary_search(k).is_ok());
     let failure = input_failure(path, message);
-    match earlier.iter().find(|(file, done)| *file != path && shares(done)) {
-        Some((file, _)) => failure.with_help(format!("{} holds it too: leave one of the two out", file.display())),
+    match earlier.iter().find(|file| read(file).is_ok_and(|other| shares(&other))) {
+        Some(file) => failure.with_help(format!("{} holds it too: leave one of the two out", file.display())),
         None => failure,
     }
 }
@@ -281,16 +286,15 @@ fn sum_parts(
             format!("it is part of another run ({}) than the first one", h.command)
         })
     };
+    let read = |path: &Path| {
+        PartialRun::read(&read_part(path)?, check, &prepared.bound).map_err(|m| input_failure(path, m))
+    };
     let mut sum: Option<PartialRun> = None;
     let files = part_files(command.parts)?;
-    // The replicates of each file before, for a message.
-    let mut earlier: Vec<(&Path, Vec<u32>)> = Vec::with_capacity(files.len());
-    for path in &files {
-        let part =
-            PartialRun::read(&read_part(path)?, check, &prepared.bound).map_err(|m| input_failure(path, m))?;
-        earlier.push((path, part.done.clone()));
+    for (k, path) in files.iter().enumerate() {
+        let part = read(path)?;
         match &mut sum {
-            Some(sum) => sum.merge(&part).map_err(|m| not_merged(path, m, &earlier, &part))?,
+            Some(sum) => sum.merge(&part).map_err(|m| not_merged(path, m, &files[..k], &part, read))?,
             None => sum = Some(part),
         }
     }

@@ -5,7 +5,7 @@ use super::demo;
 use crate::cli::arguments::command::{PageOption, PlacedLimit, StudyKind};
 use crate::cli::console::{Console, print, show_progress};
 use crate::cli::output::json::{json_text, json_value};
-use crate::cli::output::sentences::sentence_lines;
+use crate::cli::output::sentences::plain_sentence_lines;
 use crate::cli::output::{octree_shape, terminal_tables};
 use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::output_place::OutputPlace;
@@ -191,7 +191,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         print(&text)?;
     } else {
         let tables = terminal_tables::study_tables(&report, console.width());
-        let answer = sentence_lines("  ", 2, &report.answer.replace("**", ""), console.width());
+        let answer = plain_sentence_lines(&report.answer, console.width());
         print(&format!("{tables}\n{answer}\n"))?;
         if command.page.is_wanted() {
             console.say(format_args!("  {}", console.bold(&folder.join("report.html").display().to_string())));

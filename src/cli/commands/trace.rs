@@ -99,7 +99,7 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     };
     let mut prepared = PreparedScene::new(job, &monitor)?;
     extra.ends.as_deref().map_or(Ok(()), |file| end_file::check_rays(&prepared, file))?;
-    lost_rays::warn(&prepared, console);
+    closing::say_notes(prepared.bound.notes(), &[], console);
     if extra.dry_run {
         return dry_run::run(&prepared, folder, console);
     }
@@ -230,7 +230,7 @@ fn trace_whole(
     let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { remarks.sentences };
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     verdicts::say_verdicts(&run, prepared, console)?;
-    lost_rays::warn_of_run(&run.results, prepared, console);
+    closing::say_notes(&run.results.notes, prepared.bound.notes(), console);
     closing::print_listings(&run, prepared, console)?;
     closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
     // Last of all, for it may fail where the results did not.

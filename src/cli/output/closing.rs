@@ -2,7 +2,7 @@
 
 use super::face_tables::print_faces;
 use super::json::json_text;
-use super::sentences::sentence_lines;
+use super::sentences::plain_sentence_lines;
 use super::sequence_tables::print_sequences;
 use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
@@ -53,10 +53,15 @@ pub(crate) fn print_results(
     Ok(())
 }
 
+/// Says what whoever reads the results of a run must know, a line each, without what was `said` before it.
+pub(crate) fn say_notes(notes: &[String], said: &[String], console: &Console) {
+    notes.iter().filter(|note| !said.contains(note)).for_each(|note| console.say(note));
+}
+
 /// Says the last lines of a traced scene: what was found, and which files to open.
 fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: bool, console: &Console) {
     console.say("");
-    console.say(sentence_lines("  ", 2, &answer.replace("**", ""), console.width().min(LINE_LENGTH)));
+    console.say(plain_sentence_lines(answer, console.width().min(LINE_LENGTH)));
     let mut files = notable_files(folder, results);
     // Without a page its line, the first one, is left out.
     if !with_page {

@@ -54,17 +54,6 @@ pub(crate) fn write(folder: &Path, results: &Results, prepared: &PreparedScene) 
     Ok(true)
 }
 
-/// Says what is open in the scene, or beyond its tables, a line each.
-pub(crate) fn warn(prepared: &PreparedScene, console: &Console) {
-    prepared.bound.notes().iter().for_each(|note| console.say(note));
-}
-
-/// Says what the run found that whoever reads its results must know, a line each, without what [`warn`] says.
-pub(crate) fn warn_of_run(results: &Results, prepared: &PreparedScene, console: &Console) {
-    let known = prepared.bound.notes();
-    results.notes.iter().filter(|note| !known.contains(note)).for_each(|note| console.say(note));
-}
-
 /// Says so, and is incomplete, where a larger share of the light was lost than `max_lost`, or the power is no finite number.
 pub(crate) fn report_lost_light(
     results: &Results,

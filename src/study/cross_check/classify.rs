@@ -96,7 +96,7 @@ impl<'a> Classifier<'a> {
     fn unproved_sag(&self, ray: &Ray, first: &Hit, facet: Option<&Hit>) -> f64 {
         let everywhere = ray.with_range(f64::NEG_INFINITY, f64::INFINITY);
         let of_hit = facet.map(|f| (f.face, f.primitive));
-        let of_face = self.facets.get(first.face.index()).into_iter().flat_map(FaceFacets::all);
+        let of_face = self.facets.get(first.face.index()).into_iter().flat_map(FaceFacets::facets);
         let doubtful = of_hit.into_iter().chain(of_face.map(|&i| (first.face, i)));
         doubtful
             .filter(|(_, i)| self.proved_sag(*i).is_none())
@@ -197,7 +197,7 @@ impl<'a> Classifier<'a> {
         let (first, other) = if facet_first { (facet, exact) } else { (exact, facet) };
         let Some(first) = first else { return Cause::Unexplained(Defect::Inconclusive) };
         // A face that could not be meshed has no facets to hit.
-        if self.facets.get(first.face.index()).is_none_or(|f| f.all().is_empty()) {
+        if self.facets.get(first.face.index()).is_none_or(|f| f.facets().is_empty()) {
             return Cause::Unmeshed;
         }
         let Some(surface) = self.surface(first.face) else { return Cause::NoSurface };

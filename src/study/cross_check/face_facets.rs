@@ -18,7 +18,7 @@ struct Group {
 /// The facets of a face.
 #[derive(Default)]
 pub(super) struct FaceFacets {
-    all: Vec<u32>,
+    facets: Vec<u32>,
     /// Every [`GROUP`] of them, made when first asked for: most faces never are.
     groups: OnceLock<Vec<Group>>,
 }
@@ -26,12 +26,12 @@ pub(super) struct FaceFacets {
 impl FaceFacets {
     /// Adds a facet; all are added before any line is asked about.
     pub(super) fn push(&mut self, facet: u32) {
-        self.all.push(facet);
+        self.facets.push(facet);
     }
 
     /// Returns the facets, in the order of the mesh.
-    pub(super) fn all(&self) -> &[u32] {
-        &self.all
+    pub(super) fn facets(&self) -> &[u32] {
+        &self.facets
     }
 
     /// Returns the largest sag, mm, of the facets that a ray's line passes within their own sag and `margin`; of all when it passes none,
@@ -44,8 +44,8 @@ impl FaceFacets {
             bounds: facets.iter().map(|&i| corners(i)).fold(Aabb::EMPTY, Aabb::union),
             sag: facets.iter().map(|&i| sag(i)).fold(0.0, f64::max),
         };
-        let groups = self.groups.get_or_init(|| self.all.chunks(GROUP).map(group).collect());
-        let passed = groups.iter().zip(self.all.chunks(GROUP)).filter(|(g, _)| is_passed(g.bounds, g.sag));
+        let groups = self.groups.get_or_init(|| self.facets.chunks(GROUP).map(group).collect());
+        let passed = groups.iter().zip(self.facets.chunks(GROUP)).filter(|(g, _)| is_passed(g.bounds, g.sag));
         let sags =
             passed.flat_map(|(_, facets)| facets).filter(|&&i| is_passed(corners(i), sag(i))).map(|&i| sag(i));
         sags.reduce(f64::max).unwrap_or_else(|| groups.iter().map(|g| g.sag).fold(0.0, f64::max))
@@ -78,9 +78,9 @@ mod tests {
                 let corners: [Point; 4] = mesh.corners(*i as usize);
                 Aabb::from_points(corners).grown(sag(*i) + 0.01).clip(&line).is_some()
             };
-            let passed = face.all().iter().filter(|i| passes(i)).map(|&i| sag(i)).reduce(f64::max);
+            let passed = face.facets().iter().filter(|i| passes(i)).map(|&i| sag(i)).reduce(f64::max);
             missed += usize::from(passed.is_none());
-            let all = face.all().iter().map(|&i| sag(i)).fold(0.0, f64::max);
+            let all = face.facets().iter().map(|&i| sag(i)).fold(0.0, f64::max);
             assert_eq!(face.largest_sag(&mesh, &ray, 0.01, sag), passed.unwrap_or(all));
         }
         assert!((10..400).contains(&missed), "{missed} of 500");
