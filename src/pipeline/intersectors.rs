@@ -84,6 +84,11 @@ impl TrueSurface {
         Self { exact, meshes }
     }
 
+    /// Whether it is coarser than one for any number of rays.
+    pub(super) fn is_shallow(&self) -> bool {
+        self.exact.is_shallow()
+    }
+
     /// Returns what answers rays on it; `farthest_start`, mm, is that of [`farthest_start`] for its group.
     fn intersector(&self, farthest_start: f64) -> Box<dyn Intersector + '_> {
         if self.meshes.facets.is_empty() {

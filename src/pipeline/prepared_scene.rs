@@ -34,6 +34,8 @@ const MOST_BEFORE_CHOICE: f64 = 1e5;
 
 /// Segments of a ray, by which true surfaces are made for a run: two to five in most scenes.
 const SEGMENTS_A_RAY: u64 = 4;
+/// Segments of a pilot or a check, by which true surfaces are made for those.
+const FEW_SEGMENTS: u64 = 65_536;
 
 /// Ray paths kept for pictures.
 const RECORDED_PATHS: u64 = 2000;
@@ -55,13 +57,13 @@ pub struct PreparedScene {
     pub choice: IntersectorChoice,
     /// Threads that trace.
     pub threads: usize,
-    /// Rays to trace from the first on, in place of what the settings and the scene say.
+    /// Rays to trace from the first on, in place of what the settings and the scene say: of a run that is to grow, or has grown.
     pub rays: Option<u64>,
     /// Why it is traced as it is, where nobody asked for it.
     pub chosen: Option<Chosen>,
     /// Built once for the run, where that asks the spline.
     surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
-    /// Built once for pilot and check.
+    /// Built once for pilot and check; a run on the spline takes those of them that are not coarser than its own.
     few_ray_surfaces: OnceLock<Vec<Arc<TrueSurface>>>,
 }
 
@@ -252,26 +254,24 @@ impl PreparedScene {
         self.facets.instancing.as_ref().map_or(slice::from_ref(&self.job.loaded.model), |i| &i.groups)
     }
 
+    /// Whether the run may get more rays than it has: how many is not known, and all of its parts have one structure.
+    fn may_grow(&self) -> bool {
+        self.rays.is_some() || grows(&self.bound, &self.run_settings())
+    }
+
     /// Returns the true surface of each group for a run on the spline, or whose hits are moved to it, built when first asked for: of many
     /// patches for few rays as coarse as these are worth.
     fn true_surfaces(&self) -> &[Arc<TrueSurface>] {
         self.surfaces.get_or_init(|| {
-            let run = self.run_settings();
-            // How many rays a run has that grows is not known, and all of its parts have one structure.
-            let may_grow = self.rays.is_some() || grows(&self.bound, &run);
-            let settings = if may_grow {
-                exact::Settings::default()
-            } else {
-                exact::Settings::for_rays(run.rays.saturating_mul(SEGMENTS_A_RAY))
-            };
-            self.build_surfaces(&settings)
+            let rays = if self.may_grow() { u64::MAX } else { self.run_settings().rays };
+            self.build_surfaces(rays.saturating_mul(SEGMENTS_A_RAY).max(FEW_SEGMENTS))
         })
     }
 
     /// Returns the true surface of each group for the thousands of rays of a pilot or a check, built when first asked for. One for millions
-    /// of rays takes eight times as long, more than many runs.
+    /// of rays may take eight times as long, more than many runs.
     fn surfaces_for_few_rays(&self) -> &[Arc<TrueSurface>] {
-        self.few_ray_surfaces.get_or_init(|| self.build_surfaces(&exact::Settings::for_few_rays()))
+        self.few_ray_surfaces.get_or_init(|| self.build_surfaces(FEW_SEGMENTS))
     }
 
     /// Returns the true surfaces that the run is traced on, or that its hits on facets are moved to, and that it is checked with. Which
@@ -282,12 +282,18 @@ impl PreparedScene {
         if is_asked { self.true_surfaces() } else { self.surfaces_for_few_rays() }
     }
 
-    /// Builds the true surface of each group.
-    fn build_surfaces(&self, settings: &exact::Settings) -> Vec<Arc<TrueSurface>> {
+    /// Builds the true surface of each group for so many segments, no fewer than [`FEW_SEGMENTS`], or takes one for few that is no coarser.
+    fn build_surfaces(&self, segments: u64) -> Vec<Arc<TrueSurface>> {
         let groups = self.models().iter().zip(self.facets.meshes()).enumerate();
-        let surface = |(group, (model, mesh)): (usize, (&Model, &FacetMesh))| {
-            let farthest_start = farthest_start(self.facets.instancing.as_deref(), group);
-            Arc::new(TrueSurface::new(model, mesh, &exact::Settings { farthest_start, ..*settings }))
+        let for_few =
+            |group: usize| self.few_ray_surfaces.get()?.get(group).filter(|surface| !surface.is_shallow());
+        let surface = |(group, (model, mesh)): (usize, (&Model, &FacetMesh))| match for_few(group) {
+            Some(surface) => surface.clone(),
+            None => {
+                let farthest_start = farthest_start(self.facets.instancing.as_deref(), group);
+                let settings = exact::Settings { farthest_start, ..exact::Settings::for_rays(segments) };
+                Arc::new(TrueSurface::new(model, mesh, &settings))
+            }
         };
         groups.map(surface).collect()
     }

@@ -48,7 +48,7 @@ fn prepared(model: &Model, text: &str, intersector: IntersectorKind, normals: No
 fn in_one_piece(prepared: &PreparedScene) -> Results {
     let (model, settings) = (&prepared.job.loaded.model, &prepared.mesh_settings);
     let mesh = tessellate(model, settings).mesh;
-    let exact = || Exact::build(model, &exact::Settings::for_few_rays());
+    let exact = || Exact::build(model, &exact::Settings::for_rays(10_000));
     let normals = prepared.choice.normals.on_facets();
     let octree = Octree::build(&mesh, &octree::Settings { normals, ..Default::default() });
     let trace =

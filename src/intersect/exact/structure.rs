@@ -29,8 +29,8 @@ pub struct Settings {
     /// Largest coordinate that starts were rounded at, mm, where that is not the model's own: of a part in its own coordinates that
     /// stands far away. 0 otherwise.
     pub farthest_start: f64,
-    /// Most leaves: a model that takes more is cut as [`Settings::for_few_rays`] says, each patch halved so often that its share of them
-    /// is used, between two and eight times. `None` for any number.
+    /// Most leaves: a model that takes more is cut into leaves four times less flat, each patch halved so often that its share of them is
+    /// used, between two and eight times. `None` for any number.
     pub most_leaves: Option<usize>,
 }
 
@@ -49,25 +49,23 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// For some thousands of rays, where building costs more than asking: leaves four times less flat. Of a thousand lenses the
-    /// structure takes 1.4 s and 0.24 GB instead of 11 s and 2.3 GB, and certifies the same rays.
-    pub fn for_few_rays() -> Self {
-        Self { flatness: 1.0, ..Self::default() }
-    }
-
-    /// Chooses by the number of rays to come: the default with one leaf for every sixteen of them at most. A face that is folded
-    /// where it was offset took 35,000 leaves of 416 patches otherwise, 40 MB, and no ray was answered sooner.
+    /// Chooses by the number of rays to come: the default with one leaf for every sixteen of them at most. Of a thousand lenses the
+    /// structure for thousands of rays takes 1.4 s and 0.24 GB instead of 11 s and 2.3 GB, and certifies the same rays. A face that is
+    /// folded where it was offset took 35,000 leaves of 416 patches otherwise, 40 MB, and no ray was answered sooner.
     pub fn for_rays(rays: u64) -> Self {
         Self { most_leaves: Some((rays / RAYS_OF_LEAF) as usize), ..Self::default() }
     }
 
-    /// [`Settings::for_few_rays`] for so many patches that are to have `most` leaves.
+    /// For so many patches that are to have `most` leaves, where the default makes more.
     fn shallow(patches: usize, most: usize) -> Self {
         let share = (most / patches.max(1)).max(1);
-        Self { depth: share.ilog2().clamp(FEWEST_HALVINGS, MOST_HALVINGS), ..Self::for_few_rays() }
+        let depth = share.ilog2().clamp(FEWEST_HALVINGS, MOST_HALVINGS);
+        Self { flatness: LOOSE_FLATNESS, depth, ..Self::default() }
     }
 }
 
+/// [`Settings::flatness`] for few rays, where building costs more than asking.
+const LOOSE_FLATNESS: f64 = 1.0;
 /// Halvings of a patch for few rays: with none a ray takes up to four times as long on nacelles and spheres, with two half as long again;
 /// and beside poles leaves stay as steep as they are however often they are halved.
 const FEWEST_HALVINGS: u32 = 2;
@@ -107,6 +105,8 @@ pub struct Exact {
     pub(super) net_places: Vec<NetPlace>,
     pub(super) tree: Tree,
     pub(super) settings: Settings,
+    /// Whether [`Settings::most_leaves`] made it coarser.
+    is_shallow: bool,
     pub(super) build_seconds: f64,
 }
 
@@ -118,7 +118,8 @@ impl Exact {
     pub fn build(model: &Model, settings: &Settings) -> Self {
         let start = Instant::now();
         let mut geometry = Geometry::new(model, settings.trim_band, settings.farthest_start);
-        let PatchLeaves { leaves, linearizations, boxes, nets } = subdivide(&geometry, settings);
+        let (cut, is_shallow) = subdivide(&geometry, settings);
+        let PatchLeaves { leaves, linearizations, boxes, nets } = cut;
         geometry.nets.reserve_exact(nets.len());
         geometry.nets.extend(nets);
         geometry.nets.shrink_to_fit();
@@ -126,7 +127,17 @@ impl Exact {
         let net_places = leaves.iter().map(NetPlace::new).collect();
         let labels = leaves.iter().map(|l| HitLabel::new(l, &geometry)).collect();
         let build_seconds = start.elapsed().as_secs_f64();
-        Self { geometry, leaves, linearizations, labels, net_places, tree, settings: *settings, build_seconds }
+        Self {
+            geometry,
+            leaves,
+            linearizations,
+            labels,
+            net_places,
+            tree,
+            settings: *settings,
+            is_shallow,
+            build_seconds,
+        }
     }
 
     /// Placed faces that are not traced: ready meshes, and surfaces that are not usable.
@@ -144,6 +155,11 @@ impl Exact {
         self.leaves.len()
     }
 
+    /// Whether it is coarser than without [`Settings::most_leaves`].
+    pub(crate) fn is_shallow(&self) -> bool {
+        self.is_shallow
+    }
+
     /// Bytes of patches, leaves, hierarchy and trims, without copies of the model's surfaces and edges.
     pub(super) fn bytes(&self) -> usize {
         let patches = size_of_val(&*self.geometry.patches) + size_of_val(&*self.geometry.nets);
@@ -155,8 +171,8 @@ impl Exact {
 }
 
 /// Cuts all patches into leaves of `settings.flatness`, or of down to [`FLATTEST`] of it while they are fewer than `settings.leaves`, or
-/// as for few rays where there would be more than `settings.most_leaves`.
-fn subdivide(geometry: &Geometry, settings: &Settings) -> PatchLeaves {
+/// as for few rays where there would be more than `settings.most_leaves`; returns whether that was so.
+fn subdivide(geometry: &Geometry, settings: &Settings) -> (PatchLeaves, bool) {
     let mut flatness = Flatness { deviation: settings.flatness, depth: settings.depth };
     let most = settings.most_leaves.unwrap_or(usize::MAX);
     // A patch in two leaves is the least that flatness could ask for.
@@ -165,7 +181,7 @@ fn subdivide(geometry: &Geometry, settings: &Settings) -> PatchLeaves {
     let Some(mut cut) = cut else {
         let shallow = Settings::shallow(geometry.patches.len(), most);
         let loose = Flatness { deviation: shallow.flatness, depth: shallow.depth.min(settings.depth) };
-        return subdivision::subdivide_all(geometry, loose);
+        return (subdivision::subdivide_all(geometry, loose), true);
     };
     let flattest = FLATTEST * settings.flatness;
     // Five per cent over the flattest: a further round would change next to nothing.
@@ -173,7 +189,7 @@ fn subdivide(geometry: &Geometry, settings: &Settings) -> PatchLeaves {
         flatness.deviation = (FLATTER * flatness.deviation).max(flattest);
         cut = subdivision::subdivide_all(geometry, flatness);
     }
-    cut
+    (cut, false)
 }
 
 #[cfg(test)]
@@ -201,7 +217,7 @@ mod tests {
             let face = Face::whole(Surface { degree: [3, 3], knots: [knots.clone(), knots], points });
             let shells = vec![Shell { faces: vec![face], ..Shell::default() }];
             let model = Model::from_part(Part { shells, ..Part::default() });
-            let cut = subdivide(&Geometry::new(&model, 1e-6, 0.0), &Settings::default());
+            let (cut, _) = subdivide(&Geometry::new(&model, 1e-6, 0.0), &Settings::default());
             for (ends, corner) in corners {
                 let is_at_corner = |leaf: &Leaf| (0..2).all(|d| leaf.rect[d][ends[d]] == ends[d] as f64);
                 let k = cut.leaves.iter().position(is_at_corner).unwrap();
@@ -240,8 +256,10 @@ mod tests {
         let fine = Settings { leaves: 0, ..Settings::default() };
         let build = |most_leaves| Exact::build(&model, &Settings { most_leaves, ..fine });
         let all = build(None).leaf_count();
-        assert_eq!(build(Some(all)).leaf_count(), all);
+        let enough = build(Some(all));
+        assert_eq!((enough.leaf_count(), enough.is_shallow()), (all, false));
         let few = build(Some(all - 1));
+        assert!(few.is_shallow());
         let loose = Settings { leaves: 0, ..Settings::shallow(few.patch_count(), all - 1) };
         assert_eq!(few.leaf_count(), Exact::build(&model, &loose).leaf_count());
         assert!(2 * few.leaf_count() < all, "{} of {all}", few.leaf_count());
