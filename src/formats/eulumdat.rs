@@ -61,6 +61,9 @@ pub fn parse_eulumdat(path: &Path, text: &str) -> Result<Photometry, Error> {
         return Err(malformed("the C-planes do not fit the symmetry the file states".into()));
     }
     let first = ldt.lamp_sets.first();
+    if let Some(flux) = first.map(|s| s.total_luminous_flux).filter(|flux| *flux < 0.0) {
+        return Err(malformed(format!("its lamps have a flux of {flux} lm, which must be zero or more")));
+    }
     // Zero lumens stand in files without a lamp; intensities then are taken for a lamp of 1000 lm, which leaves
     // them as written.
     let lumens = first.map(|s| s.total_luminous_flux).filter(|f| *f > 0.0);
@@ -302,6 +305,8 @@ mod tests {
             let error = with(line, "wide").unwrap_err().to_string();
             assert!(error.contains(&format!("a.ldt:{line}: ")) && error.contains("'wide'"), "{error}");
         }
+        let error = with(29, "-500").unwrap_err().to_string();
+        assert!(error.contains("-500 lm"), "{error}");
     }
 
     /// Of equal light everywhere half goes down, of a lamp of twice the flux half comes out.

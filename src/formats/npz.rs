@@ -3,6 +3,7 @@
 use super::{Error, ErrorKind, write_atomic};
 use std::io::{self, Cursor, Write};
 use std::path::Path;
+use zip::CompressionMethod;
 use zip::write::{SimpleFileOptions, ZipWriter};
 
 /// One `f64` array of an NPZ file, in C order.
@@ -21,6 +22,20 @@ pub struct NpyArray<'a> {
 /// # Errors
 /// When a shape does not hold its data, and when the file cannot be written.
 pub fn write_npz(path: &Path, arrays: &[NpyArray]) -> Result<(), Error> {
+    // The least effort: what is dark shrinks all the same, and the digits of what is lit never do.
+    let deflated = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
+    write_packed(path, arrays, deflated.compression_level(Some(1)))
+}
+
+/// As [`write_npz`], not compressed: as large as its numbers are, whatever they are.
+///
+/// # Errors
+/// As [`write_npz`].
+pub(super) fn write_plain_npz(path: &Path, arrays: &[NpyArray]) -> Result<(), Error> {
+    write_packed(path, arrays, SimpleFileOptions::default().compression_method(CompressionMethod::Stored))
+}
+
+fn write_packed(path: &Path, arrays: &[NpyArray], options: SimpleFileOptions) -> Result<(), Error> {
     if let Some(wrong) = arrays.iter().find(|a| a.shape.iter().product::<usize>() != a.data.len()) {
         let message = format!("array '{}' of shape {:?} has {} values", wrong.name, wrong.shape, wrong.data.len());
         return Err(Error::new(path, ErrorKind::Malformed(message)));
@@ -28,10 +43,6 @@ pub fn write_npz(path: &Path, arrays: &[NpyArray]) -> Result<(), Error> {
     // Packed in memory: the ZIP writer seeks back to sizes that it learns late, and grids of receivers are small.
     let pack = || -> Result<Vec<u8>, zip::result::ZipError> {
         let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-        let options = SimpleFileOptions::default()
-            .compression_method(zip::CompressionMethod::Deflated)
-            // The least effort: what is dark shrinks all the same, and the digits of what is lit never do.
-            .compression_level(Some(1));
         for array in arrays {
             zip.start_file(format!("{}.npy", array.name), options)?;
             zip.write_all(&header("<f8", &array.shape))?;

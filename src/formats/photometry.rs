@@ -5,6 +5,9 @@ use crate::math::Vector;
 /// Angles this near to each other are one, degrees: files write them with three decimals, sums and mirrors round them to 1e-13.
 pub(crate) const SAME_ANGLE_DEG: f64 = 1e-9;
 
+/// Steps between planes that may lie between the last one and the whole turn without a word: one plane may have been left out.
+const MOST_CLOSED_STEPS: f64 = 2.0;
+
 /// Luminous intensity over two angles: what an IES LM-63 or EULUMDAT file holds.
 ///
 /// ```
@@ -142,6 +145,27 @@ impl Photometry {
             horizontal_deg.push(360.0);
         }
         self.with_intensities(horizontal_deg, self.vertical_deg.clone(), candela)
+    }
+
+    /// Tells of planes C that leave a part of the turn open which no symmetry of the formats fills, and what it is taken for; `None` where
+    /// none is.
+    pub(crate) fn open_turn(&self) -> Option<String> {
+        let is_one_turn = self.kind == PhotometricType::C && self.horizontal_deg.len() > 1;
+        let planes = self.horizontal_deg.as_slice();
+        let (&first, &last) = planes.first().zip(planes.last()).filter(|_| is_one_turn)?;
+        let all = self.expanded().horizontal_deg;
+        if all[all.len() - 1] - all[0] < 360.0 - SAME_ANGLE_DEG {
+            return Some(format!(
+                "its planes run from C {first}° to {last}°, which no symmetry makes a whole turn: there is no light in the others"
+            ));
+        }
+        // The last plane before the first one, which closes the turn.
+        let widest = planes.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+        let is_closed = all.len() == planes.len() + 1 && 360.0 - last > MOST_CLOSED_STEPS * widest;
+        is_closed.then(|| {
+            format!("its planes end at C {last}°, which no symmetry makes a whole turn: from there to C 360° its light goes over into \
+                 that of C 0°")
+        })
     }
 
     /// The same luminaire with other angles and intensities; nothing of its own is copied, of which fine far fields have much.
@@ -315,6 +339,21 @@ pub(super) mod tests {
         assert_eq!((beam.horizontal_deg.as_slice(), beam.candela[1]), ([-10.0, 0.0, 10.0].as_slice(), 15.0));
         let open = photometry_of(PhotometricType::C, &steps(0.0, 345.0, 23), &[0.0, 90.0], |_, _| 1.0);
         assert_eq!(open.expanded().horizontal_deg.last(), Some(&360.0));
+    }
+
+    #[test]
+    fn planes_that_leave_the_turn_open_are_told_of() {
+        let of = |planes: &[f64]| photometry_of(PhotometricType::C, planes, &[0.0, 90.0], |_, _| 1.0).open_turn();
+        let whole: [&[f64]; 6] =
+            [&[0.0], &[0.0, 90.0], &[0.0, 90.0, 180.0], &[0.0, 120.0, 240.0], &[90.0, 180.0, 270.0], &[0.0, 360.0]];
+        assert!(whole.into_iter().all(|planes| of(planes).is_none()));
+        assert!(of(&steps(0.0, 345.0, 23)).is_none());
+        assert!(of(&[0.0, 45.0]).unwrap().contains("end at C 45°"));
+        for dark in [&[180.0, 270.0, 360.0], &[-90.0, 0.0, 90.0]] {
+            assert!(of(dark).unwrap().contains("no light in the others"));
+        }
+        // Types A and B are beams, and may end anywhere.
+        assert!(photometry_of(PhotometricType::A, &[-10.0, 10.0], &[0.0, 5.0], |_, _| 1.0).open_turn().is_none());
     }
 
     #[test]

@@ -129,7 +129,8 @@ impl<'a> ArrayReader<'a> {
         // Saturating: a shape of 2⁶⁰ rows must be refused, not wrapped.
         let wanted = dims[0].saturating_mul(width as u64).saturating_mul(bytes);
         *budget = budget.checked_sub(wanted).ok_or_else(|| {
-            format!("shape ({shape}) takes {wanted} bytes, more than a file of this size can hold of rays")
+            format!("shape ({shape}) takes {wanted} bytes, more than a file of this size can hold of rays; written without \
+                 compression (numpy.savez) it is read")
         })?;
         Ok(Self { entry, bytes, width, rows: dims[0], done: 0 })
     }

@@ -1,7 +1,8 @@
 //! Light rays: origin, direction, power and wavelength; lists of them written as CSV or NPZ.
 
 use super::file_names::lower_extension;
-use super::{Error, ErrorKind, NpyArray, write_atomic, write_npz};
+use super::npz::write_plain_npz;
+use super::{Error, ErrorKind, NpyArray, write_atomic};
 use crate::math::units::WAVELENGTHS_NM;
 use crate::math::{Point, Vector};
 use std::fmt::Write as _;
@@ -139,7 +140,8 @@ pub fn write_rays(path: &Path, rays: &[LightRay]) -> Result<(), Error> {
             if spectral {
                 arrays.push(NpyArray { name: "wavelength_nm", shape: vec![n], data: &wavelengths });
             }
-            write_npz(path, &arrays)
+            // A compressed list of rays that are all alike would be taken for one made to fill the memory.
+            write_plain_npz(path, &arrays)
         }
         "csv" | "txt" => write_atomic(path, |w| {
             writeln!(w, "{}", COLUMNS[..if spectral { 8 } else { 7 }].join(","))?;

@@ -32,6 +32,11 @@ impl LoadedModel {
         [faces().map(|faces| faces.refused).sum(), faces().map(|faces| faces.found).sum()]
     }
 
+    /// Returns the names of the files without a face that light could meet.
+    pub fn empty_files(&self) -> impl Iterator<Item = &str> {
+        self.reports.iter().filter(|report| report.faces_placed.converted == 0).map(|report| report.file.as_str())
+    }
+
     /// Whether the model is what the files of the scene held when they were read, so that they stand for it; one without parts needs none.
     pub(super) fn is_from_files(&self, scene: &Scene) -> bool {
         let files = scene.models.len();

@@ -105,6 +105,9 @@ impl PreparedScene {
         let own_rays = job.tracing.own_rays_note(&job.scene)?;
         let mut bound = job.scene.bind(&job.loaded.model)?;
         bound.notes.extend(own_rays);
+        bound.notes.extend(job.loaded.empty_files().map(|file| {
+            format!("{file} holds no face that light could meet; `lampyris info` on it shows what it holds")
+        }));
         let mesh_settings = mesh_settings(&job.meshing, Some(&job.scene), &job.loaded.model)?;
         let instancing = Instancing::new(&job.loaded.model, mesh_settings.glue_mm).map(Arc::new);
         let mut prepared = Self {

@@ -103,6 +103,9 @@ fn kind_of(d: &Disagreement) -> &'static str {
 
 /// Writes in a sentence whether octree and BVH agree, and how many differences from the spline are unexplained.
 pub fn verdict(check: &CrossCheck) -> String {
+    if check.scene.facets == 0 {
+        return "Nothing was checked: there are no facets.".into();
+    }
     let f = &check.facets_vs_exact;
     let between = match check.octree_vs_bvh.disagree {
         0 => "octree and BVH agree on every one".to_owned(),

@@ -153,7 +153,7 @@ impl SimulationReport<'_> {
             self.geometric.map(|g| errors::facet_limits(g, self.results, self.figures, &self.power.by_body)),
         );
         text.extend(self.chosen.map(errors::choice_sentence));
-        if let Some(check) = self.check {
+        if let Some(check) = self.check.filter(|check| check.scene.facets > 0) {
             text += &verdict(check);
         }
         text

@@ -335,7 +335,7 @@ impl Reader<'_, '_, '_> {
         report.faces.found += found;
         report.faces.refused += refused.len();
         report.faces.converted += found - refused.len().min(found);
-        report.faces.repaired += repaired.len();
+        let repaired_ids: FxHashSet<u64> = repaired.iter().map(|r| r.id).collect();
         let note = |r: Refusal| Note { id: r.id, entity: r.entity, reason: r.reason };
         report.refusals.extend(refused.into_iter().map(note));
         report.repairs.extend(repaired.into_iter().map(note));
@@ -344,6 +344,8 @@ impl Reader<'_, '_, '_> {
         for face in part.shells.iter().flat_map(|s| &s.faces).filter(|f| f.entity.is_none_or(|e| counted.insert(e)))
         {
             report.by_surface.count(face.analytic.kind());
+            // Shells are repaired too, and a face may be in more than one way.
+            report.faces.repaired += usize::from(face.entity.is_some_and(|id| repaired_ids.contains(&id)));
             report.gap_max_mm = report.gap_max_mm.max(face.gap);
         }
         report.by_surface.tessellated += part.tessellated.len();

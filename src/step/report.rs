@@ -40,7 +40,7 @@ pub struct ImportReport {
     pub hidden: Vec<Note>,
     /// Names of parts and instances.
     pub names: Vec<String>,
-    /// Faces that were repaired, and how.
+    /// Faces and shells that were repaired, and how; a face once for each way.
     pub repairs: Vec<Note>,
     /// Largest distance between an edge and a face it bounds, mm of the part.
     pub gap_max_mm: f64,

@@ -82,9 +82,9 @@ fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
     }
 }
 
-/// Adds to the report the numbers of open and closed shells and of edges that are open, touch, are turned, or are shared by more than two
-/// facets; returns whether every shell of the model is closed. Shells that the file calls open are not examined; they, and ready meshes,
-/// count as not closed only in what is returned.
+/// Adds to the report the numbers of open and closed shells, of sheets, which is what the file calls open, and of edges that are open, touch,
+/// are turned, or are shared by more than two facets; returns whether every shell of the model is closed. Sheets are not examined; they, and
+/// ready meshes, count as not closed only in what is returned.
 fn count_shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
     let facets = &made.mesh.facets;
     let mut all = true;
@@ -98,6 +98,7 @@ fn count_shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool
             let end = facets.partition_point(|f| f.face.0 < next);
             face = next;
             if !shell.closed {
+                report.shells.sheets += 1;
                 all = false;
                 continue;
             }

@@ -43,7 +43,7 @@ pub struct Report {
     pub area_mm2: f64,
     /// Enclosed volume; `None` unless every shell is closed.
     pub volume_mm3: Option<f64>,
-    /// Of the placed shells that the file calls closed: how many are, and how many are not.
+    /// How many of the placed shells that the file calls closed are, and how many it calls open.
     pub shells: ShellCounts,
     /// Edges with one facet, in shells that the file calls closed.
     pub open_edges: usize,
@@ -111,13 +111,15 @@ pub struct NotCertified {
     pub gap_mm: f64,
 }
 
-/// Shells that the file calls closed.
+/// Placed shells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ShellCounts {
     /// Closed and consistently oriented.
     pub closed: usize,
-    /// Not so.
+    /// Not so, though the file calls them closed.
     pub open: usize,
+    /// Those that the file calls open: they bound no volume, and are not examined.
+    pub sheets: usize,
 }
 
 /// Placed faces by outcome.

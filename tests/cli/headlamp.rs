@@ -126,6 +126,7 @@ fn until_settled_traces_on_or_says_what_it_cannot() {
     let (code, found, err) = grown("30_000");
     let rows = found["regulations"][0]["rows"].as_array().unwrap();
     assert!(code == 4 && rows.iter().any(|row| row["verdict"] == "unsure"), "{err}");
+    assert!(err.contains("Not settled") && err.contains("unsure at the most rays"), "{err}");
     assert_eq!(found["rays"], 30_000);
 }
 
@@ -138,7 +139,11 @@ fn what_no_rays_settle_is_not_waited_for() {
         [[regulation]]\nid = 'UN R148-01 rear-position-R1'\n";
     std::fs::write(folder.path().join("lamp.toml"), scene).unwrap();
     let arguments = ["trace", "lamp.toml", "--until-settled", "--rays", "4_000_000", "--json", "--no-report"];
-    let (_, out, err) = lampyris_in(folder.path(), &arguments);
+    let (code, out, err) = lampyris_in(folder.path(), &arguments);
+    assert!(code == 4 && err.contains("beyond the far field") && !err.contains("most rays"), "{err}");
+    let (code, out_of_quiet, why) =
+        lampyris_in(folder.path(), &["trace", "lamp.toml", "--until-settled", "-q", "-o", "quiet"]);
+    assert!(code == 4 && out_of_quiet.is_empty() && why.starts_with("Not settled: "), "{out_of_quiet}{why}");
     let found: Value = serde_json::from_str(&out).unwrap();
     let rows = found["regulations"][0]["rows"].as_array().unwrap();
     assert!(rows.iter().any(|row| row["verdict"] == "unsure" && row["unseen"].as_u64() > Some(0)), "{rows:?}");

@@ -1,6 +1,6 @@
 //! What somebody with a STEP file and no scene does first.
 
-use crate::files::fixture;
+use crate::files::{fixture, part21};
 use crate::support::{lampyris, lampyris_in};
 use serde_json::Value;
 use std::fs;
@@ -185,4 +185,23 @@ fn what_a_run_finds_is_told_on_the_terminal() {
     assert_eq!(code, 0, "{err}");
     let (code, _, err) = lampyris_in(path, &["merge", "all.tally", "-o", "merged", "--no-report"]);
     assert!(code == 0 && err.matches(told).count() == 1, "{code} {err}");
+}
+
+/// Darkness is no answer for a lamp whose file holds none of it.
+#[test]
+fn a_file_without_a_face_is_not_traced_in_silence() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    fs::write(path.join("points.stp"), part21("#1=CARTESIAN_POINT('',(0.,0.,0.));")).unwrap();
+    fs::write(
+        path.join("scene.toml"),
+        "model = [{ file = 'points.stp' }]\n[[source]]\n[[receiver]]\nname = 'all'\nkind = 'far_field'\n",
+    )
+    .unwrap();
+    let (code, out, err) =
+        lampyris_in(path, &["trace", "scene.toml", "-q", "--rays", "2000", "--no-report", "-o", "out"]);
+    assert!(code == 4 && out.is_empty() && err.contains("points.stp"), "{code} {out} {err}");
+    let results = fs::read_to_string(path.join("out/results.json")).unwrap();
+    let notes = serde_json::from_str::<Value>(&results).unwrap()["notes"].to_string();
+    assert!(notes.contains("points.stp holds no face"), "{notes}");
 }

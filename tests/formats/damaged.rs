@@ -186,6 +186,17 @@ fn a_file_of_rays_that_unpacks_to_far_more_than_it_is_refused() {
     assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
 }
 
+/// A million equal rays would shrink to a thousandth.
+#[test]
+fn a_file_of_equal_rays_is_read_again_however_many_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("equal.npz");
+    let ray = formats::LightRay { origin: Vector::ZERO, direction: Vector::Z, power: 1.0, wavelength_nm: None };
+    let rays = vec![ray; 1_300_000];
+    formats::write_rays(&path, &rays).unwrap();
+    assert_eq!(read_rays(&path).unwrap().len(), rays.len());
+}
+
 /// Files without an end are refused before they are opened: a pipe would wait for a writer for ever.
 #[test]
 #[cfg(target_os = "linux")]

@@ -486,4 +486,6 @@ fn the_shell_of_a_solid_that_is_inside_out_is_turned() {
     assert_eq!(sides(&good), sides(&mended));
     assert!(!good.report.repairs.iter().any(|r| r.reason.contains("inside out")));
     assert_eq!(mended.report.repairs.iter().filter(|r| r.reason.contains("inside out")).count(), 1);
+    // A shell is no face.
+    assert_eq!(mended.report.faces.repaired, 0);
 }

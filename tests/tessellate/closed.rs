@@ -2,10 +2,10 @@
 
 use crate::support::config;
 use crate::support::sheets::two_sheets;
-use lampyris::math::Uv;
+use lampyris::math::{Frame, Uv};
 use lampyris::model::{Edge, EdgeId, EdgeUse, Face, Model, Part, Shell, TrimLoop, VertexId};
 use lampyris::nurbs::{Surface, UvCurve};
-use lampyris::tessellate::{Settings, tessellate};
+use lampyris::tessellate::{Settings, ShellCounts, tessellate};
 use proptest::prelude::*;
 use std::collections::HashMap;
 
@@ -111,4 +111,14 @@ proptest! {
         let slack = 0.3 * r.area_mm2 + 0.01 * want.abs();
         prop_assert!((r.volume_mm3.unwrap() - want).abs() < slack, "{:?} for {want} +- {slack}", r.volume_mm3);
     }
+}
+
+/// A sheet bounds no volume, and is no broken solid.
+#[test]
+fn a_sheet_is_counted_as_a_sheet() {
+    let surface = lampyris::nurbs::sweep::plane(&Frame::IDENTITY, [[0.0, 1.0]; 2]);
+    let shells = vec![Shell { faces: vec![Face::whole(surface)], ..Shell::default() }];
+    let report = tessellate(&Model::from_part(Part { shells, ..Part::default() }), &Settings::default()).report;
+    assert_eq!(report.shells, ShellCounts { sheets: 1, ..ShellCounts::default() });
+    assert_eq!(report.volume_mm3, None);
 }

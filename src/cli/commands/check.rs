@@ -185,7 +185,7 @@ fn refuse_intersector(tracing: &TracingOptions) -> Result<(), Failure> {
 fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     let disagreements = found.octree_vs_bvh.disagree;
     let defects = [
-        (found.scene.facets == 0, "nothing was checked: the model has no facets".to_owned()),
+        (found.scene.facets == 0, verdict(found)),
         (disagreements > 0, format!("octree and BVH answer {} differently", count_of(disagreements, "ray"))),
         (found.facets_vs_exact.unexplained > 0, unexplained(found)),
     ];

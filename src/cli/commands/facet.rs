@@ -213,10 +213,14 @@ fn meshing_summary(r: &Report) -> String {
     }
     let volume = r.volume_mm3.map_or("open".to_owned(), |v| format!("{} mm³", figures(v, 6)));
     line("size", format!("area {} mm², volume {volume}", figures(r.area_mm2, 6)));
+    let sheets = match r.shells.sheets as u64 {
+        0 => String::new(),
+        n => format!("; {}, which {} no volume", count_of(n, "sheet"), if n == 1 { "bounds" } else { "bound" }),
+    };
     line(
         "shells",
         format!(
-            "{} closed, {} not; {} open and {} ambiguous edges",
+            "{} closed, {} not; {} open and {} ambiguous edges{sheets}",
             r.shells.closed, r.shells.open, r.open_edges, r.nonmanifold_edges
         ),
     );

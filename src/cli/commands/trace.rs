@@ -225,9 +225,10 @@ fn trace_whole(
     // Rays that cannot be traced again for their paths alone are not lost with these.
     paths_written?;
     // What was missed comes before what was found.
-    let unsettled = extra.until_settled && verdicts::are_unsettled(&document);
-    let missed = remarks.target.as_ref().is_some_and(|result| !result.reached) || unsettled;
-    let sentences = if unsettled { vec![verdicts::UNSETTLED.to_owned()] } else { remarks.sentences };
+    let unsettled = if extra.until_settled { verdicts::unsettled_sentence(&document) } else { None };
+    unsettled.iter().for_each(|sentence| console.insist(sentence.replace("**", "")));
+    let missed = remarks.target.as_ref().is_some_and(|result| !result.reached) || unsettled.is_some();
+    let sentences = unsettled.map_or(remarks.sentences, |sentence| vec![sentence]);
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
     verdicts::say_verdicts(&run, prepared, console)?;
     closing::say_notes(&run.results.notes, prepared.bound.notes(), console);

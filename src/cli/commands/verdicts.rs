@@ -5,11 +5,8 @@ use crate::cli::failure::Failure;
 use crate::cli::output::verdict::summary;
 use crate::pipeline::{PreparedScene, SceneResults};
 use crate::simulate::Scene;
+use crate::text::count_of;
 use serde_json::Value;
-
-/// What is said where --until-settled did not settle every row.
-pub(super) const UNSETTLED: &str = "**Not settled**: rows stay unsure, by the facets or at the most rays; the column 'settled by' says what \
-    would do, and --intersector exact takes the errors of the facets away.";
 
 /// Says every verdict of the run on stderr.
 ///
@@ -22,11 +19,25 @@ pub(super) fn say_verdicts(run: &SceneResults, prepared: &PreparedScene, console
     Ok(())
 }
 
-/// Whether a row of any verdict in a document of results is unsure; false without regulations.
-pub(super) fn are_unsettled(document: &Value) -> bool {
+/// Says in Markdown how many rows of the verdicts in a document of results stay unsure, and why; `None` where none is.
+pub(super) fn unsettled_sentence(document: &Value) -> Option<String> {
     let verdicts = document["regulations"].as_array().into_iter().flatten();
-    let mut rows = verdicts.flat_map(|v| v["rows"].as_array()).flatten();
-    rows.any(|row| row["verdict"] == "unsure")
+    let rows = verdicts.flat_map(|v| v["rows"].as_array()).flatten().filter(|row| row["verdict"] == "unsure");
+    let (beyond, within): (Vec<&Value>, Vec<&Value>) = rows.partition(|row| row["unseen"] != 0);
+    let mut reasons = Vec::new();
+    if !within.is_empty() {
+        reasons.push(format!(
+            "{} unsure at the most rays, or by the facets, whose errors --intersector exact takes away; the column 'settled by' says \
+             what would do",
+            count_of(within.len() as u64, "row")
+        ));
+    }
+    if !beyond.is_empty() {
+        let rows = count_of(beyond.len() as u64, "row");
+        reasons
+            .push(format!("{rows} beyond the far field, which wider `h_deg` and `v_deg` settle, and no rays do"));
+    }
+    (!reasons.is_empty()).then(|| format!("**Not settled**: {}.", reasons.join("; ")))
 }
 
 /// Checks that more rays can settle the verdicts of a scene.

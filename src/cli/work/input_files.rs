@@ -60,7 +60,7 @@ pub(crate) fn is_too_much_missing([refused, found]: [usize; 2], is_cut_off: bool
 }
 
 /// Says what could not be read of the files, what they hide and how many faces were refused, if any; incomplete where the refused are a
-/// larger share of all faces than `max_refused`, or a file was cut off.
+/// larger share of all faces than `max_refused`, or a file was cut off or holds no face.
 pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &Console) -> Completion {
     let [refused, found] = loaded.refused_faces();
     let problems: Vec<&String> = loaded.reports.iter().flat_map(|r| &r.problems).collect();
@@ -87,7 +87,12 @@ pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &
             console.say(message)
         }
     }
-    Completion::incomplete_if(is_incomplete)
+    let mut is_empty = false;
+    for file in loaded.empty_files() {
+        console.insist(format_args!("nothing of {file} is traced: it holds no face"));
+        is_empty = true;
+    }
+    Completion::incomplete_if(is_incomplete || is_empty && max_refused < 1.0)
 }
 
 /// Says how many faces of a run that is traced on facets have none, if any: light passes where they are. Incomplete where that is a larger

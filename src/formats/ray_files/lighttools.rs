@@ -84,8 +84,13 @@ pub(super) fn read(path: &Path, most_in_memory: u64) -> Result<RayFile, Error> {
         return Err(file.malformed("LTRFEND is missing behind the rays; it was cut short"));
     }
     let mut set = rays.finish(Some(flux))?;
-    set.notes = notes;
     // The rays' numbers average to the total: each says how much its ray weighs beside the mean one.
+    if !(stated > 0.0 && stated.is_finite()) {
+        notes.push(format!(
+            "the header states a flux of {stated}: its rays' weights are taken for {flux}; `power` sets it"
+        ));
+    }
+    set.notes = notes;
     set.scale_to(Some(f64::from(stated)));
     Ok(set)
 }
@@ -126,6 +131,18 @@ pub(super) mod tests {
         let set = read_ray_set(&path, Flux::Radiant).unwrap();
         assert_eq!((set.rays[0].wavelength_nm, set.rays[0].power), (Some(550.0), 0.5));
         assert!(set.notes.is_empty());
+    }
+
+    #[test]
+    fn a_flux_that_is_none_is_told_of() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("source.ray");
+        for stated in [0.0, f32::NAN] {
+            std::fs::write(&path, file([2, 0, 1, 0, 0, 1], stated, &RAYS)).unwrap();
+            let set = read_ray_set(&path, Flux::Radiant).unwrap();
+            assert_eq!([set.rays[0].power, set.rays[1].power], [0.5, 1.5]);
+            assert!(set.notes[0].contains("taken for lumens"), "{:?}", set.notes);
+        }
     }
 
     #[test]

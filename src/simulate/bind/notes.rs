@@ -88,12 +88,16 @@ pub(super) fn unused_media_note(scene: &Scene) -> Option<String> {
     })
 }
 
-/// Returns what the readers of ray files changed or supposed, each sentence with its source in front.
+/// Returns what the readers of sources' files changed or supposed, each sentence with its source in front.
 pub(super) fn source_file_notes(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<String> {
     let mut sentences = Vec::new();
     for (index, loaded) in loaded.iter().enumerate() {
-        let Some(Loaded::Rays(list)) = loaded else { continue };
-        sentences.extend(list.notes.iter().map(|note| format!("{}: {note}", scene.source_label(index))));
+        let notes = match loaded {
+            Some(Loaded::Rays(list)) => list.notes.as_slice(),
+            Some(Loaded::Intensity { note, .. }) => note.as_slice(),
+            None => &[],
+        };
+        sentences.extend(notes.iter().map(|note| format!("{}: {note}", scene.source_label(index))));
     }
     sentences
 }

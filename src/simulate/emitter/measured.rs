@@ -9,8 +9,13 @@ use crate::simulate::{Error, ErrorKind};
 /// What the file of a source holds.
 #[derive(Clone, Debug)]
 pub(crate) enum Loaded {
-    /// A measured intensity, the type of its angles, and its flux in the file's unit.
-    Intensity(IntensitySampler, PhotometricType, f64),
+    /// A measured intensity, the type of its angles, its flux in the file's unit, and what was supposed of it.
+    Intensity {
+        sampler: IntensitySampler,
+        kind: PhotometricType,
+        flux: f64,
+        note: Option<String>,
+    },
     Rays(RayList),
 }
 
@@ -33,7 +38,7 @@ pub(crate) fn load(scene: &Scene, index: usize, source: &Source) -> Result<Optio
                 format!("the light of this file is no finite power: {flux}"),
             ));
         }
-        Ok(Some(Loaded::Intensity(sampler, p.kind, flux)))
+        Ok(Some(Loaded::Intensity { sampler, kind: p.kind, flux, note: p.open_turn() }))
     };
     let list = |file: RayFile| match RayList::new(file, source, scene.run.unit) {
         Ok(list) => Ok(Some(Loaded::Rays(list))),

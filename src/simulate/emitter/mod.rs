@@ -113,7 +113,7 @@ impl Emitter {
         let mut list_spectrum = None;
         let mut coloured_list = false;
         match loaded {
-            Some(Loaded::Intensity(sampler, kind, flux)) => {
+            Some(Loaded::Intensity { sampler, kind, flux, .. }) => {
                 if kind == PhotometricType::C {
                     // C runs counterclockwise for one who looks along the light: the plan of a luminaire that shines down.
                     frame.y = -frame.y;

@@ -10,7 +10,7 @@ pub use sweep::accuracy;
 use super::hit_errors::slope;
 use super::mesh_source::FacetTree;
 use crate::intersect::NormalMode;
-use crate::text::count_of;
+use crate::text::{count_of, figures};
 use serde::Serialize;
 
 /// Direction errors below this are rounding, degrees: 8e6 units in the last place of a radian.
@@ -242,8 +242,9 @@ pub fn sentence(rows: &[Row], target: f64) -> String {
         None => format!("{settings}: {} {job}", cost(facets)),
     };
     format!(
-        "For {target}° take {choice}. On the facets 99 % of the mirrored rays keep that direction error ({:.2e}° reached). Times are \
+        "For {target}° take {choice}. On the facets 99 % of the mirrored rays keep that direction error ({}° reached). Times are \
          those of {} rays, tracing taken in proportion.",
-        facets.direction_error_deg_p99, facets.rays
+        figures(facets.direction_error_deg_p99, 3),
+        facets.rays
     )
 }

@@ -43,7 +43,7 @@ impl LightBuffer {
         size_of_val(&*self.squares) + size_of_val(&*self.entries) + size_of_val(&*self.facets)
     }
 
-    /// The facets that a ray may meet through a place, from 0 to 1, in a square of the buffer, the nearest first; empty where it meets none.
+    /// The facets that a ray may meet through a place, from 0 to 1, in a square of the buffer, the nearest first; none where it meets none.
     #[inline(always)]
     pub(super) fn entries(&self, square: u32, [mut x, mut y]: [f64; 2]) -> &[Entry] {
         let mut square = self.squares[square as usize];
