@@ -2,6 +2,7 @@
 
 mod accounts;
 mod arcs;
+mod bounded_curves;
 mod corpus;
 mod faces;
 #[path = "../support/files.rs"]

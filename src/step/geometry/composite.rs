@@ -1,13 +1,14 @@
 //! Bounded curves as splines: trimmed, composite, and whole curves.
 
-use super::curves::{CurveShape, DirectedCurve, MAX_DEPTH, first_pcurve, polyline_lengths};
+use super::curves::{
+    COMPOSITES, CurveShape, DirectedCurve, MAX_DEPTH, SPLINES, SURFACE_CURVES, polyline_lengths, space_curve,
+};
 use super::tolerances::SEAM_SHARE;
 use super::{GeometryReader, Outcome, Refusal};
-use crate::math::{Homogeneous, Point};
+use crate::math::{Frame, Homogeneous, Point};
 use crate::nurbs::Curve;
 use crate::step::part21::{Args, Entity};
 use rustc_hash::FxHashMap;
-use std::f64::consts::PI;
 
 /// Most segments of one composite curve, those of its segments counted with them.
 const MAX_SEGMENTS: u64 = 100_000;
@@ -27,58 +28,86 @@ const AROUND_SEGMENTS: [&str; 12] = [
     "INTERSECTION_CURVE",
 ];
 
+/// Kinds of entities whose parameter is that of the curve which they trim, move or place.
+const KEEP_PARAMETER: [&str; 3] = ["TRIMMED_CURVE", "OFFSET_CURVE_3D", "CURVE_REPLICA"];
+/// Kinds of entities whose parameter a rational spline has at its knots alone.
+const CONICS: [&str; 4] = ["CIRCLE", "ELLIPSE", "HYPERBOLA", "PARABOLA"];
+
+/// A part of a curve.
+struct CurvePart {
+    /// The curve, and the direction in which its part is run.
+    directed: DirectedCurve,
+    /// First and last parameter of the part, ascending.
+    range: [f64; 2],
+}
+
 impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads a bounded curve, mm, as a spline in its own direction; conics that are closed become one turn. Refuses unbounded curves, and
     /// chains of more than [`MAX_DEPTH`] references, of which `depth` are behind.
     pub(crate) fn bounded_curve(&self, id: u64, depth: usize) -> Outcome<Curve> {
+        let CurvePart { directed: DirectedCurve { shape, reversed }, range: [from, to] } =
+            self.curve_part(id, depth)?;
+        let curve = shape.segment(from, to);
+        Ok(if reversed { curve.reversed() } else { curve })
+    }
+
+    /// Reads a bounded curve as the part of a curve that it is; see [`Self::bounded_curve`].
+    fn curve_part(&self, id: u64, depth: usize) -> Outcome<CurvePart> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
             return Err(Refusal::new(e, "curves refer to each other too deeply"));
         }
         if let Some(trimmed) = e.attributes("TRIMMED_CURVE", 1) {
-            return self.trimmed_curve(e, trimmed, depth);
+            return self.trimmed_part(e, trimmed, depth);
         }
-        if e.is_one_of(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
-            // In a complex instance the curve is the first of its own attributes; in a simple one it stands behind
-            // the name.
-            let curve = e.attributes("SURFACE_CURVE", 1).and_then(|a| a.id(0)).or_else(|| e.args().id(1));
-            let basis = self.resolve(e, curve.or_else(|| first_pcurve(e)), "curve_3d of the surface curve")?;
-            return self.bounded_curve(basis.id, depth + 1);
+        if e.is_one_of(&SURFACE_CURVES) {
+            let basis = self.resolve(e, space_curve(e), "curve_3d of the surface curve")?;
+            return self.curve_part(basis.id, depth + 1);
         }
-        if e.is_one_of(&["PCURVE", "BOUNDED_PCURVE"]) {
-            return self.pcurve(e, depth);
+        if let Some(own) = e.attributes("OFFSET_CURVE_3D", 1) {
+            let basis = self.resolve(e, own.id(0), "basis curve")?;
+            let part = self.curve_part(basis.id, depth + 1)?;
+            let directed = self.offset_basis(e, own, part.directed, Some(part.range))?;
+            // What was fitted is the part alone.
+            let range = match &directed.shape {
+                CurveShape::Spline { curve, .. } => curve.domain(),
+                _ => part.range,
+            };
+            return Ok(CurvePart { directed, range });
         }
-        let DirectedCurve { shape, reversed } = self.curve(id, depth)?;
-        let whole = match &shape {
-            CurveShape::Ellipse { .. } => shape.segment(0.0, 2.0 * PI),
-            CurveShape::Spline { curve, .. } => curve.clone(),
-            _ => return Err(Refusal::new(e, "an unbounded curve where a bounded one is needed")),
+        if let Some(own) = e.attributes("CURVE_REPLICA", 1) {
+            let (parent, placement) = self.replica(e, own)?;
+            let CurvePart { directed: DirectedCurve { shape, reversed }, range } =
+                self.curve_part(parent.id, depth + 1)?;
+            return Ok(CurvePart { directed: DirectedCurve { shape: shape.placed(&placement), reversed }, range });
+        }
+        let directed = self.curve(id, depth)?;
+        let range = match &directed.shape {
+            CurveShape::Spline { curve, .. } => Some(curve.domain()),
+            shape => shape.period().map(|period| [0.0, period]),
         };
-        Ok(if reversed { whole.reversed() } else { whole })
+        let range = range.ok_or_else(|| Refusal::new(e, "an unbounded curve where a bounded one is needed"))?;
+        Ok(CurvePart { directed, range })
     }
 
     /// Returns the part of a basis curve between the two trimming values of a TRIMMED_CURVE, whose attributes are `args`. On closed curves
     /// equal values mean once around; elsewhere they are refused.
-    fn trimmed_curve(&self, e: Entity<'f, 'a>, args: Args<'f, 'a>, depth: usize) -> Outcome<Curve> {
+    fn trimmed_part(&self, e: Entity<'f, 'a>, args: Args<'f, 'a>, depth: usize) -> Outcome<CurvePart> {
         let basis = self.resolve(e, args.id(0), "basis curve")?;
         let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;
         let sense = args.flag(3) != Some(false);
         let by_point = args.word(4) == Some("CARTESIAN");
-        // Conics are parametrised by angles, which files give in a unit of their own.
-        let scale = match &shape {
-            CurveShape::Ellipse { .. } => self.units.angle,
-            _ => 1.0,
-        };
-        let limit = |list: Args<'f, 'a>| -> Option<f64> {
+        let limit = |list: Args<'f, 'a>| -> Outcome<f64> {
             let point = || (0..list.len()).find_map(|i| self.point(list.id(i)?).ok()).map(|p| shape.parameter(p));
-            let number =
-                || (0..list.len()).find_map(|i| list.real(i)).map(|x| self.curve_parameter(basis, x) * scale);
             // The file says which of its two trimming values it means; writers that give only the other are understood too.
-            if by_point { point().or_else(number) } else { number().or_else(point) }
+            if by_point && let Some(t) = point() {
+                return Ok(t);
+            }
+            let number = (0..list.len()).find_map(|i| list.real(i));
+            let number = number.ok_or_else(|| Refusal::new(e, "a trimming value is missing"));
+            number.and_then(|x| self.curve_parameter(basis, &shape, x)).or_else(|refusal| point().ok_or(refusal))
         };
-        let (Some(t1), Some(t2)) = (limit(args.list(1)), limit(args.list(2))) else {
-            return Err(Refusal::new(e, "a trimming value is missing"));
-        };
+        let (t1, t2) = (limit(args.list(1))?, limit(args.list(2))?);
         let (from, mut to) = if sense { (t1, t2) } else { (t2, t1) };
         // On a closed curve the second end lies ahead of the first; both in one place mean once around.
         if let Some(period) = shape.period() {
@@ -90,18 +119,54 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         if !(to > from) {
             return Err(Refusal::new(e, "trimming values are in the wrong order or equal"));
         }
-        let curve = shape.segment(from, to);
-        Ok(if sense == reversed { curve.reversed() } else { curve })
+        Ok(CurvePart { directed: DirectedCurve { shape, reversed: sense == reversed }, range: [from, to] })
     }
 
-    /// Returns the parameter of our curve for one of the file's: a POLYLINE's counts points, and ours is its arc length, mm.
-    fn curve_parameter(&self, basis: Entity<'f, 'a>, x: f64) -> f64 {
-        let points = basis.attributes("POLYLINE", 1).and_then(|a| self.points(basis, a.list(0)).ok());
-        let Some(lengths) = points.map(|p| polyline_lengths(&p)).filter(|l| l.len() > 1) else { return x };
+    /// Returns the parameter on `shape`, which is what `basis` was read as, for one of the file's: on a conic an angle in the file's unit,
+    /// on a POLYLINE a count of points, where ours is its arc length, mm, on a composite curve 0 where ours is that of its first segment.
+    /// Refuses parameters that ours does not follow: of conics that became splines, and of composite curves of conics or polylines.
+    fn curve_parameter(&self, basis: Entity<'f, 'a>, shape: &CurveShape, x: f64) -> Outcome<f64> {
+        let curve = match shape {
+            CurveShape::Spline { curve, .. } => curve,
+            CurveShape::Ellipse { .. } => return Ok(x * self.units.angle),
+            _ => return Ok(x),
+        };
+        let owner = self.parameter_owner(basis);
+        if owner.is_one_of(&CONICS) {
+            return Err(Refusal::new(basis, "its parameters cannot be taken over: they are those of a conic"));
+        }
+        if owner.is_one_of(&COMPOSITES) {
+            require_kept_parameter(owner)?;
+            return Ok(x + curve.domain()[0]);
+        }
+        let points = owner.attributes("POLYLINE", 1).and_then(|a| self.points(owner, a.list(0)).ok());
+        let Some(lengths) = points.map(|p| polyline_lengths(&p)).filter(|l| l.len() > 1) else { return Ok(x) };
         let last = (lengths.len() - 1) as f64;
         let x = x.clamp(0.0, last);
         let k = x.floor().min(last - 1.0) as usize;
-        lengths[k] + (lengths[k + 1] - lengths[k]) * (x - k as f64)
+        Ok(lengths[k] + (lengths[k + 1] - lengths[k]) * (x - k as f64))
+    }
+
+    /// Returns the curve whose parameter a curve has: what it trims, moves or places in turn, itself where it does not.
+    fn parameter_owner(&self, curve: Entity<'f, 'a>) -> Entity<'f, 'a> {
+        let mut owner = curve;
+        for _ in 0..MAX_DEPTH {
+            let basis = if owner.is_one_of(&SURFACE_CURVES) {
+                space_curve(owner)
+            } else {
+                KEEP_PARAMETER.into_iter().find_map(|name| owner.attributes(name, 1)).and_then(|a| a.id(0))
+            };
+            let Some(basis) = basis.and_then(|id| self.file.entity(id)) else { break };
+            owner = basis;
+        }
+        owner
+    }
+
+    /// Returns the parent curve of a CURVE_REPLICA with attributes `own`, and where it is placed.
+    pub(super) fn replica(&self, e: Entity<'f, 'a>, own: Args<'f, 'a>) -> Outcome<(Entity<'f, 'a>, Frame)> {
+        let parent = self.resolve(e, own.id(0), "parent curve")?;
+        let placement = self.transformation(self.resolve(e, own.id(1), "transformation")?.id)?;
+        Ok((parent, placement))
     }
 
     /// Returns how many segments a composite curve has, also inside of its segments; 1 for any other curve. `known` holds the numbers of
@@ -128,11 +193,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Returns the segments of a composite curve, in its order, turned around where that joins them clearly better than the file's own
     /// senses. Gaps stay.
     pub(crate) fn segments(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Vec<Curve>> {
-        let own = ["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"]
-            .into_iter()
-            .find_map(|n| e.attributes(n, 1).filter(|a| a.list(0).len() > 0));
-        let Some(own) = own else { return Err(Refusal::new(e, "composite curve without segments")) };
-        let list = own.list(0);
+        let Some(list) = segment_list(e) else { return Err(Refusal::new(e, "composite curve without segments")) };
         // Six lines can name a million segments: they are counted before one is read.
         if self.segment_count(e, 0, &mut FxHashMap::default()) > MAX_SEGMENTS {
             return Err(Refusal::new(e, "composite curve with too many segments"));
@@ -140,7 +201,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let mut curves: Vec<Curve> = Vec::with_capacity(list.len());
         for i in 0..list.len() {
             let segment = self.resolve(e, list.id(i), "segment")?;
-            let args = segment.attributes("COMPOSITE_CURVE_SEGMENT", 0).unwrap_or_else(|| segment.args());
+            let args = segment_attributes(segment);
             let parent = self.resolve(segment, args.id(2), "parent curve")?;
             let curve = if parent.is_one_of(&["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE"]) && depth < MAX_DEPTH
             {
@@ -186,6 +247,54 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let parts = segments.iter().map(|c| elevate_degree(c, degree)).collect();
         Curve::join(parts).ok_or_else(|| Refusal::new(e, "composite curve without segments"))
     }
+
+    /// Reads a composite curve by the parameter that the file gives it, which runs through its segments' from 0 on; refused where ours is
+    /// another: of conics and polylines.
+    pub(super) fn counted_composite(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
+        let curve = self.composite_curve(e, depth + 1)?;
+        require_kept_parameter(e)?;
+        let [a, b] = curve.domain();
+        Ok(curve.reparametrised([0.0, b - a]))
+    }
+}
+
+/// Returns the list of the segments of a composite curve; `None` of one without any, and of any other curve.
+fn segment_list<'f, 'a>(e: Entity<'f, 'a>) -> Option<Args<'f, 'a>> {
+    COMPOSITES.into_iter().find_map(|name| e.attributes(name, 1).map(|a| a.list(0)).filter(|list| list.len() > 0))
+}
+
+/// Returns the attributes of a segment of a composite curve: transition, sense and parent curve.
+fn segment_attributes<'f, 'a>(segment: Entity<'f, 'a>) -> Args<'f, 'a> {
+    segment.attributes("COMPOSITE_CURVE_SEGMENT", 0).unwrap_or_else(|| segment.args())
+}
+
+/// Refuses a composite curve through which our parameter, but for its start, does not run as the file's, which goes through its segments'
+/// from 0 on: one with segments other than of lines and splines, or with a parameter of their own.
+fn require_kept_parameter(e: Entity<'_, '_>) -> Outcome<()> {
+    let list = segment_list(e);
+    if list.is_some_and(|list| (0..list.len()).filter_map(|i| list.entity(i)).all(keeps_parameter)) {
+        return Ok(());
+    }
+    Err(Refusal::new(e, "its parameters cannot be taken over: they count those of conics or polylines"))
+}
+
+/// Whether a segment of a composite curve has the parameter of its parent curve, and that is ours.
+fn keeps_parameter(segment: Entity<'_, '_>) -> bool {
+    if segment.is_a("REPARAMETRISED_COMPOSITE_CURVE_SEGMENT") {
+        return false;
+    }
+    segment_attributes(segment).entity(2).is_some_and(|parent| is_part_of_line(parent) || is_part_of_spline(parent))
+}
+
+/// Whether a curve is a part of a line of the file.
+fn is_part_of_line(curve: Entity<'_, '_>) -> bool {
+    curve.attributes("TRIMMED_CURVE", 1).and_then(|a| a.entity(0)).is_some_and(|basis| basis.is_a("LINE"))
+}
+
+/// Whether a curve is a B-spline of the file, or a part of one.
+pub(super) fn is_part_of_spline(curve: Entity<'_, '_>) -> bool {
+    let trimmed = curve.attributes("TRIMMED_CURVE", 1).and_then(|a| a.entity(0));
+    trimmed.unwrap_or(curve).keywords().any(|k| SPLINES.contains(&k))
 }
 
 /// Returns the same curve with a higher degree, piecewise Bézier; `degree` is not below its own.
@@ -223,7 +332,6 @@ pub(crate) fn coincident(a: Point, b: Point, tolerance: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Frame;
     use crate::nurbs::conic;
 
     #[test]

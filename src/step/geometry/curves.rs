@@ -4,11 +4,21 @@ use super::tolerances::{CLOSED_MM, CLOSED_SHARE, CONVERGED_ANGLE, MERGED_POINTS_
 use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Frame, Homogeneous, Point, Vector};
 use crate::nurbs::{ControlPoint, Curve, conic, project, sanitise};
-use crate::step::part21::Entity;
+use crate::step::part21::{Args, Entity};
 use std::f64::consts::PI;
 
 /// Deepest chain of curves that refer to curves.
 pub(crate) const MAX_DEPTH: usize = 16;
+
+/// Names of curves on surfaces, which stand for the curve in space that they hold.
+pub(super) const SURFACE_CURVES: [&str; 4] =
+    ["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"];
+/// Names of curves of several segments.
+pub(super) const COMPOSITES: [&str; 4] =
+    ["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"];
+/// Names of splines, whose parameters are the file's.
+pub(super) const SPLINES: [&str; 5] =
+    ["B_SPLINE_CURVE", "B_SPLINE_CURVE_WITH_KNOTS", "BEZIER_CURVE", "UNIFORM_CURVE", "QUASI_UNIFORM_CURVE"];
 
 /// A curve in space, mm, not yet cut; parameters of conics are radians or pure numbers, as in ISO 10303-42.
 #[derive(Clone, Debug)]
@@ -40,6 +50,25 @@ impl CurveShape {
         let size = curve.bounds().diagonal();
         let closed = (curve.evaluate(a) - curve.evaluate(b)).length() <= CLOSED_SHARE * size + CLOSED_MM;
         Self::Spline { curve, closed }
+    }
+
+    /// Returns the curve as a placement moves, turns, mirrors and scales it, with the same parameter.
+    pub(super) fn placed(self, placement: &Frame) -> Self {
+        let scale = placement.scale;
+        let carried = |frame: Frame| placed_frame(placement, frame);
+        match self {
+            Self::Line { origin, direction } => {
+                Self::Line { origin: placement.point(origin), direction: placement.vector(direction) }
+            }
+            Self::Ellipse { frame, a, b } => Self::Ellipse { frame: carried(frame), a: scale * a, b: scale * b },
+            Self::Hyperbola { frame, a, b } => {
+                Self::Hyperbola { frame: carried(frame), a: scale * a, b: scale * b }
+            }
+            Self::Parabola { frame, f } => Self::Parabola { frame: carried(frame), f: scale * f },
+            Self::Spline { curve, closed } => {
+                Self::Spline { curve: map_points(curve, |p| placement.point(p)), closed }
+            }
+        }
     }
 
     /// Returns the parameter difference after which the curve repeats; `None` for an open one.
@@ -114,6 +143,13 @@ impl CurveShape {
     }
 }
 
+/// Returns the frame of a conic that a placement carries along, which scales its sizes. It is right-handed also where the placement
+/// mirrors: a conic lies in x and y alone.
+fn placed_frame(placement: &Frame, conic: Frame) -> Frame {
+    let Frame { origin, x, y, .. } = placement.compose(&conic);
+    Frame { origin, x, y, z: x.cross(y), scale: 1.0 }
+}
+
 /// Returns a closed spline over `[s0, s1]`, which may run past the end of its domain by one period.
 fn segment_over_seam(curve: &Curve, s0: f64, s1: f64) -> Curve {
     let [a, b] = curve.domain();
@@ -158,26 +194,29 @@ fn ellipse_angle(q: Point, a: f64, b: f64) -> f64 {
     t
 }
 
-/// Returns the id of the first PCURVE of a surface curve, for one without a curve in space; `None` if it has none.
-pub(crate) fn first_pcurve(e: Entity<'_, '_>) -> Option<u64> {
-    let list = e.attributes("SURFACE_CURVE", 1).map_or_else(|| e.args().list(2), |a| a.list(1));
-    let mut curves = (0..list.len()).filter_map(|i| list.entity(i));
-    curves.find(|c| c.is_one_of(&["PCURVE", "BOUNDED_PCURVE"])).map(|c| c.id)
+/// Returns the id of the curve in space of a surface curve, of its first PCURVE where it has none; `None` if it has neither.
+pub(super) fn space_curve(e: Entity<'_, '_>) -> Option<u64> {
+    // In a complex instance the curve is the first of its own attributes; in a simple one it stands behind the name.
+    let own = e.attributes("SURFACE_CURVE", 1);
+    let first_pcurve = || {
+        let list = own.map_or_else(|| e.args().list(2), |a| a.list(1));
+        let mut curves = (0..list.len()).filter_map(|i| list.entity(i));
+        curves.find(|c| c.is_one_of(&["PCURVE", "BOUNDED_PCURVE"])).map(|c| c.id)
+    };
+    own.and_then(|a| a.id(0)).or_else(|| e.args().id(1)).or_else(first_pcurve)
 }
 
 impl<'f, 'a> GeometryReader<'f, 'a> {
-    /// Reads a curve in space with its direction. Trimming is left to the caller's vertices, except where only the cut curve has a meaning
-    /// (composite, offset, replica). Refuses kinds that are not supported, and chains of more than [`MAX_DEPTH`] references.
+    /// Reads a curve in space with its direction. Trimming is left to the caller's vertices, except of the segments of composite curves.
+    /// Refuses kinds that are not supported, and chains of more than [`MAX_DEPTH`] references.
     pub(crate) fn curve(&self, id: u64, depth: usize) -> Outcome<DirectedCurve> {
         let e = self.entity(id)?;
         if depth > MAX_DEPTH {
             return Err(Refusal::new(e, "curves refer to each other too deeply"));
         }
         let ahead = |shape| Ok(DirectedCurve { shape, reversed: false });
-        if e.is_one_of(&["SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE", "BOUNDED_SURFACE_CURVE"]) {
-            let own = e.attributes("SURFACE_CURVE", 1).and_then(|a| a.id(0));
-            let curve = own.or_else(|| e.args().id(1));
-            let basis = self.resolve(e, curve.or_else(|| first_pcurve(e)), "curve_3d of the surface curve")?;
+        if e.is_one_of(&SURFACE_CURVES) {
+            let basis = self.resolve(e, space_curve(e), "curve_3d of the surface curve")?;
             return self.curve(basis.id, depth + 1);
         }
         if e.is_one_of(&["PCURVE", "BOUNDED_PCURVE"]) {
@@ -192,15 +231,13 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             curve.reversed ^= trimmed.flag(3) == Some(false);
             return Ok(curve);
         }
-        if e.is_one_of(&["COMPOSITE_CURVE", "COMPOSITE_CURVE_ON_SURFACE", "BOUNDARY_CURVE", "OUTER_BOUNDARY_CURVE"])
-        {
+        if e.is_one_of(&COMPOSITES) {
             return ahead(CurveShape::spline(self.composite_curve(e, depth + 1)?));
         }
         if let Some(own) = e.attributes("CURVE_REPLICA", 1) {
-            let parent = self.resolve(e, own.id(0), "parent curve")?;
-            let frame = self.transformation(self.resolve(e, own.id(1), "transformation")?.id)?;
-            let bounded = self.bounded_curve(parent.id, depth + 1)?;
-            return ahead(CurveShape::spline(map_points(bounded, |p| frame.point(p))));
+            let (parent, placement) = self.replica(e, own)?;
+            let DirectedCurve { shape, reversed } = self.curve(parent.id, depth + 1)?;
+            return Ok(DirectedCurve { shape: shape.placed(&placement), reversed });
         }
         ahead(self.elementary_curve(e)?)
     }
@@ -248,13 +285,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
                 .map(CurveShape::spline)
                 .ok_or_else(|| Refusal::new(e, "polyline without length"));
         }
-        if e.is_one_of(&[
-            "B_SPLINE_CURVE",
-            "B_SPLINE_CURVE_WITH_KNOTS",
-            "BEZIER_CURVE",
-            "UNIFORM_CURVE",
-            "QUASI_UNIFORM_CURVE",
-        ]) {
+        if e.is_one_of(&SPLINES) {
             return self.spline_curve(e).map(CurveShape::spline);
         }
         Err(Refusal::new(e, "this kind of curve is not supported"))
@@ -358,10 +389,7 @@ impl KnotForm {
 }
 
 /// Returns the knot vector of multiplicities and distinct knots; `None` where they are no numbers or do not fit each other.
-pub(crate) fn explicit_knots(
-    multiplicities: crate::step::part21::Args<'_, '_>,
-    knots: crate::step::part21::Args<'_, '_>,
-) -> Option<Vec<f64>> {
+pub(crate) fn explicit_knots(multiplicities: Args<'_, '_>, knots: Args<'_, '_>) -> Option<Vec<f64>> {
     let m: Vec<usize> = (0..multiplicities.len()).map(|i| multiplicities.count(i)).collect::<Option<_>>()?;
     sanitise::expand_knots(&knots.reals()?, &m)
 }

@@ -12,6 +12,8 @@ use crate::nurbs::Curve;
 
 /// What is told of a line that passes a vertex by.
 const PASSED_BY: &str = "the line of an edge passes one of its vertices by: it runs between them";
+/// What is told of an edge whose sense is wrong.
+const WRONG_SENSE: &str = "the sense of an edge contradicts its vertices: it runs from the first to the second";
 /// Longest chain of edges that are parts of edges.
 const MAX_PARENTS: usize = 4;
 
@@ -47,7 +49,10 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let own = owner.attributes("EDGE_CURVE", 3);
         let (curve, sense) = own.map_or((None, true), |a| (a.id(0), a.flag(1) != Some(false)));
         let [first, last] = if swapped { [1, 0] } else { [0, 1] };
-        self.edge_between(e.id, [vertices.id(first), vertices.id(last)], curve, (sense, alone))
+        let edge = self.edge_between(e.id, [vertices.id(first), vertices.id(last)], curve, (sense, alone))?;
+        // A part of an edge may run either way along it.
+        let repair = edge.repair.filter(|&repair| owner.id == e.id || repair != WRONG_SENSE);
+        Ok(TrimmedEdge { repair, ..edge })
     }
 
     /// Reads edge #`id` from its first to its second vertex, mm: that part of `curve`, or all of a closed one where both vertices are one
@@ -79,9 +84,9 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
 }
 
 /// Returns the edge from `p` to `q` along a curve, the whole of it if `closed`; `sense` is whether the edge runs along the curve as the
-/// file names it, which is corrected on an open curve. A line that passes a vertex by is replaced by the segment between both; an edge
-/// whose vertices coincide has no curve. `None` where nothing of the curve lies between vertices that are apart, or its numbers are not
-/// finite.
+/// file names it, which is corrected on an open curve, and told. A line that passes a vertex by is replaced by the segment between both;
+/// an edge whose vertices coincide has no curve. `None` where nothing of the curve lies between vertices that are apart, or its numbers
+/// are not finite.
 pub(crate) fn trim_to_vertices(
     directed: &DirectedCurve,
     p: Point,
@@ -143,7 +148,9 @@ pub(crate) fn trim_to_vertices(
             if tb < ta {
                 // The sense flag is wrong, which real files show now and then: the vertices decide.
                 let curve = shape.segment(tb, ta);
-                return finish_edge(curve, !forward, p, q);
+                // Rounding alone may turn an edge between vertices that may be one.
+                let repair = (!coincident(p, q, LOOSE_VERTEX_MM)).then_some(WRONG_SENSE);
+                return finish_edge(curve, !forward, p, q).map(|edge| TrimmedEdge { repair, ..edge });
             }
             if !(tb - ta > 0.0) || (a - b).length() < EQUAL_POINTS_MM && matches!(shape, CurveShape::Line { .. }) {
                 return coincident(p, q, LOOSE_VERTEX_MM).then(TrimmedEdge::default);

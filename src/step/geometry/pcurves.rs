@@ -14,7 +14,8 @@ use crate::step::part21::{Args, Entity};
 
 impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Reads an OFFSET_CURVE_3D with attributes `own`: the basis moved along the reference direction × its tangent. Lines, and circles in
-    /// their plane, stay exact, all else is fitted as by [`fit_pieces`]; refuses hyperbolas and parabolas.
+    /// their plane, stay exact, all else is fitted as by [`fit_pieces`]; refuses hyperbolas and parabolas. Trimming of the basis is left to
+    /// the caller, as by [`Self::curve`].
     pub(crate) fn offset_curve(
         &self,
         e: Entity<'f, 'a>,
@@ -22,11 +23,23 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         depth: usize,
     ) -> Outcome<DirectedCurve> {
         let basis = self.resolve(e, own.id(0), "basis curve")?;
+        let curve = self.curve(basis.id, depth + 1)?;
+        self.offset_basis(e, own, curve, None)
+    }
+
+    /// Offsets the basis curve of the OFFSET_CURVE_3D `e` with attributes `own`; of one that has to be fitted only what lies over `range`,
+    /// all of it where there is none. Lines and circles keep their parameter, and so does what is fitted, over its range.
+    pub(super) fn offset_basis(
+        &self,
+        e: Entity<'f, 'a>,
+        own: Args<'f, 'a>,
+        DirectedCurve { shape, reversed }: DirectedCurve,
+        range: Option<[f64; 2]>,
+    ) -> Outcome<DirectedCurve> {
         let distance = own.real(1).map(|d| d * self.units.length).filter(|d| d.is_finite());
         let distance = distance.ok_or_else(|| Refusal::new(e, "its distance is missing"))?;
         let across = self.direction(own.id(3)).and_then(|d| d.try_normalize());
         let across = across.ok_or_else(|| Refusal::new(e, "its reference direction is missing"))?;
-        let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;
         // Run against its basis, the curve has its other side on the left.
         let sign = if reversed { -distance } else { distance };
         let shape = match shape {
@@ -43,14 +56,15 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
                 }
                 CurveShape::Ellipse { frame, a: radius, b: radius }
             }
-            CurveShape::Hyperbola { .. } | CurveShape::Parabola { .. } => {
-                return Err(Refusal::new(e, "an offset of an unbounded conic is not supported"));
-            }
             shape => {
-                let curve = match shape {
-                    CurveShape::Spline { curve, .. } => curve,
-                    other => other.segment(0.0, 2.0 * std::f64::consts::PI),
+                let whole = match &shape {
+                    CurveShape::Spline { curve, .. } => Some(curve.domain()),
+                    other => other.period().map(|period| [0.0, period]),
                 };
+                let Some([from, to]) = range.or(whole) else {
+                    return Err(Refusal::new(e, "an offset of an unbounded conic is not supported"));
+                };
+                let curve = shape.segment(from, to);
                 let moved = |piece: &Curve, t: f64| {
                     let aside = across.cross(direction(piece, t)).try_normalize();
                     // A curve that stands still throughout stays where it is.

@@ -1,5 +1,6 @@
 //! Surfaces of revolution and of linear extrusion; those of circles, and of lines parallel to the axis, in closed form.
 
+use super::composite::is_part_of_spline;
 use super::curves::{CurveShape, DirectedCurve};
 use super::extent::FaceExtent;
 use super::meridian::keep_face_side_of_axis;
@@ -13,10 +14,6 @@ use crate::nurbs::Curve;
 use crate::step::chart::{Chart, Kind};
 use crate::step::part21::{Args, Entity};
 use std::f64::consts::PI;
-
-/// Names of splines, whose parameters are the file's.
-const SPLINES: [&str; 5] =
-    ["B_SPLINE_CURVE", "B_SPLINE_CURVE_WITH_KNOTS", "BEZIER_CURVE", "UNIFORM_CURVE", "QUASI_UNIFORM_CURVE"];
 
 impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Returns the curve that a surface sweeps, cut to what can matter within the face's extent, as a spline, mm; for a line of a face with
@@ -37,7 +34,9 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         if by_parameters && e.is_a("COMPOSITE_CURVE") {
             return Ok((self.counted_composite(e, depth)?, None));
         }
-        if e.is_one_of(&["TRIMMED_CURVE", "COMPOSITE_CURVE", "POLYLINE"])
+        // Of an offset with edges the whole has a closed form more often than the part.
+        let is_bounded_offset = by_parameters && e.is_a("OFFSET_CURVE_3D");
+        if (is_bounded_offset || e.is_one_of(&["TRIMMED_CURVE", "COMPOSITE_CURVE", "POLYLINE", "CURVE_REPLICA"]))
             && let Ok(curve) = self.bounded_curve(id, depth + 1)
         {
             return Ok((curve, None));
@@ -118,7 +117,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             return Ok(chart);
         }
         let (side, has_two_normals) = keep_face_side_of_axis(&frame, curve, reach);
-        let sweeps_spline = self.is_spline(profile);
+        let sweeps_spline = is_part_of_spline(profile);
         Ok(Chart { has_two_normals, sweeps_spline, ..Chart::revolution(frame, side) })
     }
 
@@ -144,34 +143,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         });
         let d = base_point.map_or(0.0, |b| (b - reach.center).length());
         let (base, _) = self.swept_curve(profile.id, reach.grown_by(d), 0, depth)?;
-        let sweeps_spline = self.is_spline(profile);
+        let sweeps_spline = is_part_of_spline(profile);
         Ok(Chart { sweeps_spline, ..Chart::new(Kind::Extrusion { base, direction }, Analytic::Extrusion) })
-    }
-
-    /// Whether a swept curve is a B-spline of the file, or a part of one.
-    fn is_spline(&self, profile: Entity<'f, 'a>) -> bool {
-        let trimmed = profile.attributes("TRIMMED_CURVE", 1).and_then(|a| a.entity(0));
-        trimmed.unwrap_or(profile).keywords().any(|k| SPLINES.contains(&k))
-    }
-
-    /// Reads a COMPOSITE_CURVE by the parameter that the file gives it, which runs through its segments' from 0 on; refused where ours is
-    /// another: of conics and polylines.
-    fn counted_composite(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
-        let parents = e.attributes("COMPOSITE_CURVE", 1).map(|a| a.list(0));
-        let parents =
-            parents.iter().flat_map(|list| (0..list.len()).filter_map(|i| list.entity(i)?.args().entity(2)));
-        let is_line = |parent: Entity<'f, 'a>| {
-            parent.attributes("TRIMMED_CURVE", 1).and_then(|a| a.entity(0)).is_some_and(|basis| basis.is_a("LINE"))
-        };
-        if !parents.clone().all(|parent| is_line(parent) || self.is_spline(parent)) {
-            return Err(Refusal::new(
-                e,
-                "its parameters cannot be taken over: they count those of conics or polylines",
-            ));
-        }
-        let curve = self.composite_curve(e, depth + 1)?;
-        let [a, b] = curve.domain();
-        Ok(curve.reparametrised([0.0, b - a]))
     }
 }
 
