@@ -1,4 +1,5 @@
-//! A tree of boxes: which of very many a ray crosses, about the nearest first, and which of them another box meets.
+//! A tree of boxes: which of very many a ray crosses, about the nearest first, which of them another box meets, and which of them meet
+//! each other.
 //!
 //! Guarantee: no box is left out that a box meets, or that a ray crosses by more than rounding: whoever looks for what touches a side
 //! grows the boxes first, see [`Aabb::with_room`]. The tree depends on the boxes and their order alone.
@@ -114,6 +115,24 @@ impl BoxTree {
             }
         }
         false
+    }
+
+    /// Finds the pairs `[i, j]`, `i` below `j`, of boxes that meet or touch, in the order in which a loop over all pairs would: by `i`,
+    /// then by `j`. Boxes that are empty meet none. Where the boxes are small beside the space that they fill, be it a plane or a line, a
+    /// box takes log n steps and one for each pair. The pairs with one `i` are held at a time.
+    pub(crate) fn meeting_pairs(boxes: &[Aabb]) -> impl Iterator<Item = [usize; 2]> {
+        let tree = Self::new(boxes);
+        boxes.iter().enumerate().flat_map(move |(i, bounds)| {
+            let mut later: Vec<usize> = Vec::new();
+            tree.any_meeting(bounds, |k| {
+                if k as usize > i {
+                    later.push(k as usize);
+                }
+                false
+            });
+            later.sort_unstable();
+            later.into_iter().map(move |j| [i, j])
+        })
     }
 
     /// Starts a walk through the boxes that a ray crosses from its `t_min` on. Where it ends is told to [`BoxWalk::next`]; its `t_max` does
@@ -307,6 +326,28 @@ mod tests {
             assert_eq!(tree.any_meeting(&around, |_| true), boxes.iter().any(meets));
         }
         assert!(!BoxTree::new(&[]).any_meeting(&Aabb::from_points([Point::ZERO]), |_| true));
+    }
+
+    #[test]
+    fn boxes_that_meet_are_those_of_all_pairs_in_the_same_order() {
+        let mut r = Random(11);
+        // The second lot is flat in x, as an array of parts in a plane is.
+        for extent in [Vector::ONE, Vector::new(0.0, 1.0, 1.0)] {
+            let mut boxes: Vec<Aabb> = (0..200)
+                .map(|_| {
+                    // At whole numbers, so that some touch in a side, an edge or a corner alone.
+                    let corner: Point = (20.0 * r.vector()).round() * extent;
+                    Aabb::from_points([corner, corner + (4.0 * r.vector()).round() * extent])
+                })
+                .collect();
+            boxes[17] = Aabb::EMPTY;
+            let all = (0..boxes.len()).flat_map(|i| (i + 1..boxes.len()).map(move |j| [i, j]));
+            let meeting: Vec<[usize; 2]> =
+                all.filter(|&[i, j]| !boxes[i].intersection(boxes[j]).is_empty()).collect();
+            assert!(!meeting.is_empty());
+            assert_eq!(BoxTree::meeting_pairs(&boxes).collect::<Vec<_>>(), meeting);
+        }
+        assert_eq!(BoxTree::meeting_pairs(&[]).next(), None);
     }
 
     #[test]

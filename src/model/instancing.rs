@@ -76,8 +76,10 @@ impl Instancing {
         if counts.values().all(|&n| n < FEWEST) {
             return None;
         }
-        let is_often = |part: PartId| counts.iter().any(|((p, _), &n)| *p == part && n >= FEWEST);
-        let often: Vec<bool> = (0..model.parts.len() as u32).map(|k| is_often(PartId(k))).collect();
+        let mut often = vec![false; model.parts.len()];
+        for ((part, _), _) in counts.iter().filter(|(_, n)| **n >= FEWEST) {
+            often[part.0 as usize] = true;
+        }
         let near = near_another(model, &often, glue_mm);
         for (i, _) in model.instances.iter().zip(&near).filter(|(_, near)| **near) {
             counts.entry(kind(i)).and_modify(|n| *n -= 1);

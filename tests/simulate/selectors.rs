@@ -314,6 +314,10 @@ fn receivers_that_overlap_in_one_plane_are_named() {
     for apart in ["at = [3, 0, 20]", "at = [0, 0, 20.01]", "at = [0, 0, 20]\nnormal = [0, 1, 1]"] {
         assert_eq!(notes("", apart), "", "{apart}");
     }
+    // To the last digits one plane, whichever way it stands.
+    for (normal, second) in [("[1, 0, 0]", "at = [1e-9, 1, 20]"), ("[0, 1, 0]", "at = [1, 1e-9, 20]")] {
+        assert!(notes(&format!("normal = {normal}"), second).contains("'a' and 'b' lie in one plane"), "{second}");
+    }
     let back_to_back = notes("one_sided = true", "at = [0, 0, 20]\nnormal = [0, 0, -1]");
     assert_eq!(back_to_back, "");
 }

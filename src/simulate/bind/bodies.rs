@@ -58,13 +58,8 @@ pub(super) fn find_bodies(
         bodies[body].bounds = bodies[body].bounds.union(face_bounds(&f));
         of_face[f.id.index()] = body as u32;
     }
-    // Sweep along x: behind the first box that begins beyond this one, none meets it.
-    let mut order: Vec<Aabb> = bodies[1..].iter().map(|b| b.bounds.grown(scene.run.glue_mm)).collect();
-    order.sort_by(|a, b| a.min.x.total_cmp(&b.min.x));
-    let meets = |(i, a): (usize, &Aabb)| {
-        order[i + 1..].iter().take_while(|b| b.min.x <= a.max.x).any(|b| !a.intersection(*b).is_empty())
-    };
-    let nested = order.iter().enumerate().any(meets);
+    let boxes: Vec<Aabb> = bodies[1..].iter().map(|b| b.bounds.grown(scene.run.glue_mm)).collect();
+    let nested = BoxTree::meeting_pairs(&boxes).next().is_some();
     Ok((bodies, of_face, nested))
 }
 

@@ -2,7 +2,7 @@
 
 use super::nearest::{Nearest, face_bounds};
 use crate::math::polygon::is_inside_polygons;
-use crate::math::{Aabb, Point, Uv};
+use crate::math::{Aabb, BoxTree, Point, Uv};
 use crate::model::{Model, PlacedFace};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::scene::Scene;
@@ -14,20 +14,17 @@ use crate::simulate::trim_loops::trim_polygons;
 pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u32]) -> (Vec<bool>, Vec<[u32; 2]>) {
     // Each box is grown by half of the glue, so that two within its whole meet.
     let boxed = |f: PlacedFace<'_>| (f.id.index(), face_bounds(&f).grown(0.5 * scene.run.glue_mm));
-    let mut faces: Vec<(usize, Aabb)> =
-        model.placed_faces().filter(|f| of_face[f.id.index()] != AMBIENT).map(boxed).collect();
-    faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
+    let (faces, boxes): (Vec<usize>, Vec<Aabb>) =
+        model.placed_faces().filter(|f| of_face[f.id.index()] != AMBIENT).map(boxed).unzip();
     let (mut touching, mut pairs) = (vec![false; of_face.len()], Vec::new());
-    for (i, (a, box_a)) in faces.iter().enumerate() {
-        // Sorted along x: from the first box that begins behind this one on, none meets it.
-        for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
-            if of_face[*a] != of_face[*b] && !box_a.intersection(*box_b).is_empty() {
-                (touching[*a], touching[*b]) = (true, true);
-                let pair = [of_face[*a], of_face[*b]];
-                // Neighbouring faces of the same two bodies come one after another; others twice do no harm.
-                if pairs.last() != Some(&pair) {
-                    pairs.push(pair);
-                }
+    for meeting in BoxTree::meeting_pairs(&boxes) {
+        let [a, b] = meeting.map(|k| faces[k]);
+        if of_face[a] != of_face[b] {
+            (touching[a], touching[b]) = (true, true);
+            let pair = [of_face[a], of_face[b]];
+            // Neighbouring faces of the same two bodies come one after another; others twice do no harm.
+            if pairs.last() != Some(&pair) {
+                pairs.push(pair);
             }
         }
     }
@@ -38,22 +35,18 @@ pub(super) fn touching_bodies(scene: &Scene, model: &Model, of_face: &[u32]) -> 
 /// whether the shells touch is found where light crosses there.
 pub(super) fn touching_siblings(scene: &Scene, model: &Model, of_face: &[u32]) -> Vec<bool> {
     let mut siblings = vec![false; of_face.len()];
-    let mut faces: Vec<(usize, Option<usize>, PlacedFace<'_>)> = (model.placed_faces())
+    let mut faces: Vec<PlacedFace<'_>> = (model.placed_faces())
         // Parts of one shell have no siblings.
         .filter(|f| of_face[f.id.index()] != AMBIENT && model.part(f.part).shells.len() > 1)
-        .map(|f| (f.id.index(), f.shell, f))
         .collect();
-    faces.sort_by_key(|(id, ..)| of_face[*id]);
-    for body in faces.chunk_by(|a, b| of_face[a.0] == of_face[b.0]) {
-        let boxed = |f: &PlacedFace<'_>| face_bounds(f).grown(0.5 * scene.run.glue_mm);
-        let mut body: Vec<(usize, Option<usize>, Aabb)> = body.iter().map(|(i, s, f)| (*i, *s, boxed(f))).collect();
-        body.sort_by(|a, b| a.2.min.x.total_cmp(&b.2.min.x));
-        for (i, (a, shell, box_a)) in body.iter().enumerate() {
-            for (b, other, box_b) in body[i + 1..].iter().take_while(|(.., b)| b.min.x <= box_a.max.x) {
-                // By boxes alone: whether the shells really touch at a point is asked where light crosses there.
-                if shell != other && !box_a.intersection(*box_b).is_empty() {
-                    (siblings[*a], siblings[*b]) = (true, true);
-                }
+    faces.sort_by_key(|f| of_face[f.id.index()]);
+    for body in faces.chunk_by(|a, b| of_face[a.id.index()] == of_face[b.id.index()]) {
+        let boxes: Vec<Aabb> = body.iter().map(|f| face_bounds(f).grown(0.5 * scene.run.glue_mm)).collect();
+        for meeting in BoxTree::meeting_pairs(&boxes) {
+            let [a, b] = meeting.map(|k| &body[k]);
+            // By boxes alone: whether the shells really touch at a point is asked where light crosses there.
+            if a.shell != b.shell {
+                (siblings[a.id.index()], siblings[b.id.index()]) = (true, true);
             }
         }
     }
@@ -82,34 +75,36 @@ pub(super) fn media_on_opaque(scene: &Scene, model: &Model, of_face: &[u32], opa
         .filter(|f| of_face[f.id.index()] != AMBIENT || opaque[f.id.index()])
         .map(|f| (f.id.index(), box_of(f)))
         .collect();
+    // By their lower x: the order of the pairs tells which of them are marked unasked.
     faces.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
+    let (faces, boxes): (Vec<usize>, Vec<Aabb>) = faces.into_iter().unzip();
     let mut nearest = Nearest::new(model);
     let mut samples: Vec<Option<Vec<Point>>> = vec![None; placed.len()];
     let mut distances = 0;
-    for (i, (a, box_a)) in faces.iter().enumerate() {
-        for (b, box_b) in faces[i + 1..].iter().take_while(|(_, b)| b.min.x <= box_a.max.x) {
-            let mixed = (of_face[*a] == AMBIENT) != (of_face[*b] == AMBIENT);
-            if !mixed || (on_opaque[*a] && on_opaque[*b]) || box_a.intersection(*box_b).is_empty() {
-                continue;
-            }
-            // Flat faces are decided by their planes: a seat or a rim can be narrower than any samples are apart.
-            let mut touch = nearest.are_in_one_plane([*a, *b], box_a.intersection(*box_b), glue);
-            // Both ways: the points of a large face may all miss a small one that lies on it.
-            for (one, other, around) in [(*a, *b, box_b), (*b, *a, box_a)] {
-                if touch {
-                    break;
-                }
-                let points = samples[one].get_or_insert_with(|| inner_points(&placed[one]));
-                let near = around.grown(glue);
-                touch = points.iter().filter(|p| near.contains(**p)).any(|p| {
-                    distances += 1;
-                    // Out of work, boxes decide: a face that is marked in vain costs time, one that is missed costs rays.
-                    distances > MOST_DISTANCES || nearest.is_within(other, *p, glue)
-                });
-            }
+    for meeting in BoxTree::meeting_pairs(&boxes) {
+        let [a, b] = meeting.map(|k| faces[k]);
+        let [box_a, box_b] = meeting.map(|k| boxes[k]);
+        let mixed = (of_face[a] == AMBIENT) != (of_face[b] == AMBIENT);
+        if !mixed || (on_opaque[a] && on_opaque[b]) {
+            continue;
+        }
+        // Flat faces are decided by their planes: a seat or a rim can be narrower than any samples are apart.
+        let mut touch = nearest.are_in_one_plane([a, b], box_a.intersection(box_b), glue);
+        // Both ways: the points of a large face may all miss a small one that lies on it.
+        for (one, other, around) in [(a, b, box_b), (b, a, box_a)] {
             if touch {
-                (on_opaque[*a], on_opaque[*b]) = (true, true);
+                break;
             }
+            let points = samples[one].get_or_insert_with(|| inner_points(&placed[one]));
+            let near = around.grown(glue);
+            touch = points.iter().filter(|p| near.contains(**p)).any(|p| {
+                distances += 1;
+                // Out of work, boxes decide: a face that is marked in vain costs time, one that is missed costs rays.
+                distances > MOST_DISTANCES || nearest.is_within(other, *p, glue)
+            });
+        }
+        if touch {
+            (on_opaque[a], on_opaque[b]) = (true, true);
         }
     }
     on_opaque

@@ -2,12 +2,12 @@
 
 use super::nearest::{Nearest, face_bounds};
 use super::select::select_faces;
-use crate::math::Aabb;
+use crate::math::{Aabb, BoxTree};
 use crate::model::{Model, PlacedFace};
 use crate::simulate::emitter::{Area, Cover, CoveredArea};
 use crate::simulate::scene::{Key, Scene};
 use crate::simulate::{Error, ErrorKind};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 /// Share of the named area from which on it is told that it is covered: a sample of a thousand on one of a few faces.
@@ -20,87 +20,120 @@ pub(super) struct Luminous {
     pub(super) note: Option<String>,
 }
 
-/// Returns the faces that a source shines from, ready for points to be drawn on them; `None` for a source that is not on faces. `opaque`
-/// says which placed faces let no light through, `labels` what to call the instances.
-///
-/// # Errors
-/// When its selector means no face, faces without area, or faces that are covered throughout.
-pub(super) fn luminous_faces(
-    scene: &Scene,
-    index: usize,
-    model: &Model,
-    opaque: &[bool],
-    labels: &[String],
-) -> Result<Option<Luminous>, Error> {
-    let Some(on) = &scene.sources[index].on else { return Ok(None) };
-    let base = [Key::Name("source"), Key::Index(index), Key::Name("on")];
-    let chosen = select_faces(scene, &base, on, model, &mut Nearest::new(model))?;
-    let covers = possible_covers(scene, model, &chosen, opaque);
-    let Some(area) = Area::new(model, &chosen, &covers) else {
-        return Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from"));
-    };
-    if covers.is_empty() {
-        return Ok(Some(Luminous { area, note: None }));
-    }
-    let measured = area.measure_cover();
-    let [whole, free] =
-        [|a: &CoveredArea| a.whole, |a: &CoveredArea| a.free].map(|f| measured.iter().map(f).sum::<f64>());
-    if free <= 0.0 {
-        let message = "opaque faces of other solids lie against all of these faces, so that no light gets out";
-        let error = scene.error(ErrorKind::NoMatch, &base, message);
-        return Err(error.help("name faces that are free, or give what lies against them a `medium`"));
-    }
-    let share = 1.0 - free / whole;
-    let name = &scene.sources[index].name;
-    let source = if name.is_empty() { format!("[[source]] {}", index + 1) } else { format!("'{name}'") };
-    let note = (share >= TOLD_SHARE).then(|| covered_note(&source, model, labels, &measured, share));
-    Ok(Some(Luminous { area, note }))
+/// Finds the faces that the sources of a scene shine from, and the opaque faces that lie against these.
+pub(super) struct LuminousSearch<'m> {
+    scene: &'m Scene,
+    model: &'m Model,
+    nearest: Nearest<'m>,
+    /// The opaque faces with geometry, by the lower x of their boxes.
+    faces: Vec<PlacedFace<'m>>,
+    /// Boxes around these, mm.
+    boxes: Vec<Aabb>,
+    tree: BoxTree,
+    /// Of each placed face its place in `faces`; `None` for one that is not there.
+    places: Vec<Option<usize>>,
+    /// What was made of opaque faces to cover others, by their places; `None` for a ready mesh.
+    covers: HashMap<usize, Option<Arc<Cover>>>,
 }
 
-/// Returns for each chosen face that is opaque the opaque faces of other shells that come within the glue distance of its box, by the
-/// numbers of placed faces; faces without any are left out. What lets light in, or is the boundary of a medium, covers nothing: light goes
-/// on there.
-fn possible_covers(
-    scene: &Scene,
-    model: &Model,
-    chosen: &[usize],
-    opaque: &[bool],
-) -> HashMap<usize, Vec<Arc<Cover>>> {
-    let mut shines = vec![false; opaque.len()];
-    for &face in chosen.iter().filter(|&&face| opaque[face]) {
-        shines[face] = true;
+impl<'m> LuminousSearch<'m> {
+    /// Prepares the search; `None` where no source shines from faces. `opaque` says which placed faces let no light through.
+    pub(super) fn new(scene: &'m Scene, model: &'m Model, opaque: &[bool]) -> Option<Self> {
+        if scene.sources.iter().all(|source| source.on.is_none()) {
+            return None;
+        }
+        let mut boxed: Vec<(PlacedFace<'m>, Aabb)> = (model.placed_faces())
+            .filter(|f| opaque[f.id.index()])
+            .map(|f| (f, face_bounds(&f)))
+            .filter(|(_, bounds)| !bounds.is_empty())
+            .collect();
+        boxed.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
+        let (faces, boxes): (Vec<PlacedFace<'m>>, Vec<Aabb>) = boxed.into_iter().unzip();
+        let mut places = vec![None; opaque.len()];
+        for (place, face) in faces.iter().enumerate() {
+            places[face.id.index()] = Some(place);
+        }
+        let (nearest, tree) = (Nearest::new(model), BoxTree::new(&boxes));
+        Some(Self { scene, model, nearest, faces, boxes, tree, places, covers: HashMap::new() })
     }
-    let mut boxes: Vec<(PlacedFace<'_>, Aabb)> =
-        model.placed_faces().filter(|f| opaque[f.id.index()]).map(|f| (f, face_bounds(&f))).collect();
-    boxes.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));
-    let glue = scene.run.glue_mm;
-    let mut made: HashMap<usize, Option<Arc<Cover>>> = HashMap::new();
-    let mut covers: HashMap<usize, Vec<Arc<Cover>>> = HashMap::new();
-    let mut note_cover = |over: &(PlacedFace<'_>, Aabb), under: usize| {
-        let (placed, bounds) = over;
-        let cover = made.entry(placed.id.index()).or_insert_with(|| {
-            let closed = placed.shell.is_some_and(|s| model.part(placed.part).shells[s].closed);
-            Cover::new(placed, closed, *bounds, glue).map(Arc::new)
-        });
-        covers.entry(under).or_default().extend(cover.clone());
-    };
-    for (i, a) in boxes.iter().enumerate() {
-        // Sorted along x: from the first box that begins behind this one on, none meets it.
-        for b in boxes[i + 1..].iter().take_while(|b| b.1.min.x <= a.1.max.x + glue) {
-            let [one, other] = [a, b].map(|f| f.0.id.index());
-            let same_shell = a.0.instance == b.0.instance && a.0.shell == b.0.shell;
-            if same_shell || !(shines[one] || shines[other]) || a.1.grown(glue).intersection(b.1).is_empty() {
-                continue;
-            }
-            if shines[one] {
-                note_cover(b, one);
-            }
-            if shines[other] {
-                note_cover(a, other);
+
+    /// Returns the faces that a source shines from, ready for points to be drawn on them; `None` for a source that is not on faces.
+    /// `labels` says what to call the instances.
+    ///
+    /// # Errors
+    /// When its selector means no face, faces without area, or faces that are covered throughout.
+    pub(super) fn luminous_faces(&mut self, index: usize, labels: &[String]) -> Result<Option<Luminous>, Error> {
+        let (scene, model) = (self.scene, self.model);
+        let Some(on) = &scene.sources[index].on else { return Ok(None) };
+        let base = [Key::Name("source"), Key::Index(index), Key::Name("on")];
+        let chosen = select_faces(scene, &base, on, model, &mut self.nearest)?;
+        let covers = self.possible_covers(&chosen);
+        let Some(area) = Area::new(model, &chosen, &covers) else {
+            return Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from"));
+        };
+        if covers.is_empty() {
+            return Ok(Some(Luminous { area, note: None }));
+        }
+        let measured = area.measure_cover();
+        let [whole, free] =
+            [|a: &CoveredArea| a.whole, |a: &CoveredArea| a.free].map(|f| measured.iter().map(f).sum::<f64>());
+        if free <= 0.0 {
+            let message = "opaque faces of other solids lie against all of these faces, so that no light gets out";
+            let error = scene.error(ErrorKind::NoMatch, &base, message);
+            return Err(error.help("name faces that are free, or give what lies against them a `medium`"));
+        }
+        let share = 1.0 - free / whole;
+        let name = &scene.sources[index].name;
+        let source = if name.is_empty() { format!("[[source]] {}", index + 1) } else { format!("'{name}'") };
+        let note = (share >= TOLD_SHARE).then(|| covered_note(&source, model, labels, &measured, share));
+        Ok(Some(Luminous { area, note }))
+    }
+
+    /// Returns for each chosen face that is opaque the opaque faces of other shells that come within the glue distance of its box, by the
+    /// numbers of placed faces; faces without any are left out. What lets light in, or is the boundary of a medium, covers nothing: light
+    /// goes on there.
+    fn possible_covers(&mut self, chosen: &[usize]) -> HashMap<usize, Vec<Arc<Cover>>> {
+        // A set: two points of a selector may mean one face.
+        let shining: BTreeSet<usize> = chosen.iter().filter_map(|&face| self.places[face]).collect();
+        let mut covers: HashMap<usize, Vec<Arc<Cover>>> = HashMap::new();
+        for place in shining {
+            let against = self.places_against(place);
+            if !against.is_empty() {
+                let over: Vec<Arc<Cover>> = against.into_iter().filter_map(|other| self.cover(other)).collect();
+                covers.insert(self.faces[place].id.index(), over);
             }
         }
+        covers
     }
-    covers
+
+    /// Returns the places of the opaque faces of other shells whose boxes come within the glue distance of that of an opaque face.
+    fn places_against(&self, place: usize) -> Vec<usize> {
+        let glue = self.scene.run.glue_mm;
+        let shell = |place: usize| (self.faces[place].instance, self.faces[place].shell);
+        let mut against = Vec::new();
+        // With room for rounding: of two boxes the one of the lower place is grown, whichever of both shines.
+        self.tree.any_meeting(&self.boxes[place].grown(glue).with_room(), |other| {
+            let other = other as usize;
+            let [low, high] = [place.min(other), place.max(other)].map(|place| self.boxes[place]);
+            if shell(place) != shell(other) && !low.grown(glue).intersection(high).is_empty() {
+                against.push(other);
+            }
+            false
+        });
+        against.sort_unstable();
+        against
+    }
+
+    /// Returns an opaque face, by its place, ready to cover others, made when it is first asked for; `None` for a ready mesh.
+    fn cover(&mut self, place: usize) -> Option<Arc<Cover>> {
+        let (model, glue) = (self.model, self.scene.run.glue_mm);
+        let (placed, bounds) = (self.faces[place], self.boxes[place]);
+        let cover = self.covers.entry(place).or_insert_with(|| {
+            let closed = placed.shell.is_some_and(|s| model.part(placed.part).shells[s].closed);
+            Cover::new(&placed, closed, bounds, glue).map(Arc::new)
+        });
+        cover.clone()
+    }
 }
 
 /// Returns the sentence about the share of its area that a source has covered, naming the face of which most is.

@@ -8,11 +8,65 @@ use crate::simulate::scene::{Key, Material, Scene, SurfaceKind};
 use crate::simulate::surfaces::{Coated, Surface};
 use crate::simulate::{Error, ErrorKind};
 
+/// Index in a [`SurfaceTable`] of the bare boundary of a medium.
+pub(super) const BARE_INTERFACE: u16 = 1;
+
+/// The distinct surfaces of a scene, which faces name by index. That of a rule is made once, when the first face asks for it: a lobe is
+/// tabulated in hundreds of rings.
+pub(super) struct SurfaceTable<'s> {
+    scene: &'s Scene,
+    surfaces: Vec<Surface>,
+    /// The index of each rule's surface, and last of `default_surface`; `None` where no face has asked: the values of a rule that decides
+    /// no face need not go together.
+    of_rules: Vec<Option<u16>>,
+}
+
+impl<'s> SurfaceTable<'s> {
+    pub(super) fn new(scene: &'s Scene) -> Self {
+        // These two come first, in places that nothing else takes: most scenes use them.
+        let surfaces = vec![Surface::Absorber, Surface::Interface];
+        Self { scene, surfaces, of_rules: vec![None; scene.materials.len() + 1] }
+    }
+
+    /// Returns the index of the surface that a rule gives, by its index in `scene.materials`; of the scene's `default_surface` without one.
+    ///
+    /// # Errors
+    /// When the rule gives a surface of values that do not go together, or there are more surfaces than can be told apart.
+    pub(super) fn index(&mut self, rule: Option<usize>) -> Result<u16, Error> {
+        let scene = self.scene;
+        let place = rule.unwrap_or(scene.materials.len());
+        if let Some(index) = self.of_rules[place] {
+            return Ok(index);
+        }
+        let made = match rule {
+            Some(rule) => surface(scene, &scene.materials[rule])?,
+            None => surface(scene, &Material { surface: Some(scene.default_surface), ..Material::default() })?,
+        };
+        let index = surface_index(&mut self.surfaces, made).ok_or_else(|| {
+            let at = [Key::Name("material")];
+            let error = scene.error(ErrorKind::Value, &at, "more than 65,536 different surfaces");
+            error.help("give faces that are to behave alike the same values")
+        })?;
+        self.of_rules[place] = Some(index);
+        Ok(index)
+    }
+
+    /// Whether no light passes the surface with this index.
+    pub(super) fn is_opaque(&self, index: u16) -> bool {
+        self.surfaces[usize::from(index)].is_opaque()
+    }
+
+    /// Returns the surfaces, by index.
+    pub(super) fn into_surfaces(self) -> Vec<Surface> {
+        self.surfaces
+    }
+}
+
 /// Returns the surface that a rule gives, an interface where it names none. A mirror or diffuse face that reflects nothing is an absorber.
 ///
 /// # Errors
 /// When the rule's optical values do not go together or are out of range.
-pub(super) fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> {
+fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> {
     let (coating, scatter) = rule.optics().map_err(|(_, e)| scene.error(ErrorKind::Value, &[], e))?;
     let kind = rule.surface.unwrap_or(SurfaceKind::Interface);
     // What scatters nothing and reflects nothing is named neither rough nor a mirror.
@@ -33,7 +87,7 @@ pub(super) fn surface(scene: &Scene, rule: &Material) -> Result<Surface, Error> 
 
 /// Returns the index of a surface in the table, appending it where it is not there yet; `None` where there are as many as an index can
 /// name.
-pub(super) fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> Option<u16> {
+fn surface_index(surfaces: &mut Vec<Surface>, surface: Surface) -> Option<u16> {
     // Few surfaces are used by many faces: the table stays so short that a linear look is fastest.
     let found = surfaces.iter().position(|s| *s == surface).unwrap_or_else(|| {
         surfaces.push(surface);

@@ -23,7 +23,7 @@ mod wavelengths;
 use super::body::{AMBIENT, Body};
 use super::emitter::{self, Emitter, Loaded};
 use super::receiver::Receiver;
-use super::scene::{Key, Material, ReceiverKind, Scene};
+use super::scene::{Key, ReceiverKind, Scene};
 use super::surfaces::{FaceOptics, Surface};
 use super::{Error, ErrorKind};
 use crate::math::{Aabb, Frame, Vector};
@@ -32,6 +32,8 @@ pub use bound_scene::{BoundScene, RuleFaces};
 use chosen::ChosenRules;
 pub use face_selectors::face_selectors;
 pub use left_out::LeftOut;
+use luminous::LuminousSearch;
+use materials::{BARE_INTERFACE, SurfaceTable};
 
 /// What the box of a scene is grown by, as a share of its diagonal: room for what facets and rounding put outside the splines' boxes.
 const REGION_MARGIN: f64 = 1e-3;
@@ -75,10 +77,11 @@ impl Scene {
             (0..self.sources.len()).map(|i| source_frame(self, model, i)).collect::<Result<_, _>>()?;
         let is_opaque = |f: &FaceOptics| f.body == AMBIENT && surfaces[f.surface as usize].is_opaque();
         let opaque: Vec<bool> = faces.iter().map(is_opaque).collect();
+        let mut search = LuminousSearch::new(self, model, &opaque);
         let mut emitters = Vec::new();
         let mut cover_notes = Vec::new();
         for (i, loaded) in loaded.into_iter().enumerate() {
-            let luminous = luminous::luminous_faces(self, i, model, &opaque, &labels)?;
+            let luminous = search.as_mut().map_or(Ok(None), |search| search.luminous_faces(i, &labels))?;
             let area = luminous.map(|luminous| {
                 cover_notes.extend(luminous.note);
                 luminous.area
@@ -153,28 +156,18 @@ fn bind_faces(
         (vec![false; chosen.len()], Vec::new())
     };
     let siblings = contacts::touching_siblings(scene, model, body_of_face);
-    let default = Material { surface: Some(scene.default_surface), ..Material::default() };
-    // These two come first, in places that nothing else takes: most scenes use them.
-    let mut surfaces = vec![Surface::Absorber, Surface::Interface];
+    let mut surfaces = SurfaceTable::new(scene);
     let mut faces = Vec::with_capacity(chosen.len());
     let mut opaque_outside = Vec::with_capacity(chosen.len());
     for ((f, (rule, _)), &body) in model.placed_faces().zip(chosen).zip(body_of_face) {
         // A face with a medium and no surface is the bare boundary of that medium; one with neither has the scene's
         // default.
-        let surface = match rule.map(|r| &scene.materials[r]) {
-            Some(rule) => materials::surface(scene, rule)?,
-            None if body != AMBIENT => Surface::Interface,
-            None => materials::surface(scene, &default)?,
-        };
+        let is_bare = rule.is_none() && body != AMBIENT;
+        let surface = if is_bare { BARE_INTERFACE } else { surfaces.index(*rule)? };
         let closed = f.shell.is_some_and(|s| model.part(f.part).shells[s].closed);
         // Opaque from outside: what a body with a medium does behind its face is the medium's affair.
-        let opaque = body == AMBIENT && surface.is_opaque();
+        let opaque = body == AMBIENT && surfaces.is_opaque(surface);
         opaque_outside.push(opaque);
-        let surface = materials::surface_index(&mut surfaces, surface).ok_or_else(|| {
-            let at = [Key::Name("material")];
-            let error = scene.error(ErrorKind::Value, &at, "more than 65,536 different surfaces".to_string());
-            error.help("give faces that are to behave alike the same values")
-        })?;
         faces.push(FaceOptics {
             surface,
             body,
@@ -188,7 +181,7 @@ fn bind_faces(
     for (face, on_opaque) in faces.iter_mut().zip(on_opaque) {
         face.medium_on_opaque = on_opaque;
     }
-    Ok(Faces { faces, surfaces, touching_pairs })
+    Ok(Faces { faces, surfaces: surfaces.into_surfaces(), touching_pairs })
 }
 
 /// Lets the rays of sources that are far away start beside the scene, which lies in a box. Surroundings that absorb or scatter take a part

@@ -213,7 +213,8 @@ impl Scene {
         self.models.iter().enumerate().try_for_each(|(i, m)| m.check(self, i))?;
         medium::check(self)?;
         surface::check(self)?;
-        self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i))?;
+        let all_rays = self.sources.iter().filter_map(|source| source.rays).fold(0, u64::saturating_add);
+        self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i, all_rays))?;
         self.receivers.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
         self.check_receiver_names()?;
         self.regulations.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;

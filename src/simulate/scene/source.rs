@@ -122,12 +122,12 @@ impl Source {
         matches!(self.kind, SourceKind::Rays | SourceKind::Data1)
     }
 
-    /// Refuses a source with the first of its faults; `index` is its place in the scene.
-    pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
+    /// Refuses a source with the first of its faults; `index` is its place in the scene, `all_rays` the sum of the `rays` of all sources.
+    pub(super) fn check(&self, scene: &Scene, index: usize, all_rays: u64) -> Result<(), Error> {
         let fault = (self.power_fault())
             .or_else(|| self.file_fault())
             .or_else(|| self.geometry_fault())
-            .or_else(|| self.light_fault(scene))
+            .or_else(|| self.light_fault(scene, all_rays))
             .or_else(|| self.lobe_fault());
         if let Some((key, message)) = fault {
             let at = [Key::Name("source"), Key::Index(index), Key::Name(key)];
@@ -231,10 +231,10 @@ impl Source {
         None
     }
 
-    /// Returns the first that is wrong with the number of rays, the spectrum or the polarisation; `None` where nothing is.
-    fn light_fault(&self, scene: &Scene) -> Fault {
-        let all = scene.sources.iter().filter_map(|source| source.rays).fold(0, u64::saturating_add);
-        if self.rays.is_some_and(|rays| rays == 0 || all > MOST_RAYS) {
+    /// Returns the first that is wrong with the number of rays, of which all sources name `all_rays`, the spectrum or the polarisation;
+    /// `None` where nothing is.
+    fn light_fault(&self, scene: &Scene, all_rays: u64) -> Fault {
+        if self.rays.is_some_and(|rays| rays == 0 || all_rays > MOST_RAYS) {
             return Some(("rays", "`rays` must be positive, and those of all sources 2e13 at most".into()));
         }
         if let Some(Err(message)) = self.spectrum.as_ref().map(|s| s.wavelengths(scene.run.unit)) {

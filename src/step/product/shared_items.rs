@@ -83,8 +83,9 @@ impl SharedItems {
 
     /// Returns the shapes of a representation but those in `left_out`, in its order.
     pub(crate) fn items(&self, representation: u64, left_out: &[u64]) -> Vec<u64> {
+        let left_out: FxHashSet<u64> = left_out.iter().copied().collect();
         let items = self.items.get(&representation).into_iter().flatten();
-        items.filter(|item| !left_out.contains(item)).copied().collect()
+        items.copied().filter(|item| !left_out.contains(item)).collect()
     }
 
     /// Returns the shapes of a placed representation that stand already, brought to this place by another representation, and notes that

@@ -1,7 +1,7 @@
 //! Which curved face of one solid lies on a face of another, wholly or in part.
 
 use super::trimmed::{CARRIER_SHARE, FaceKey, TrimmedFace};
-use crate::math::Aabb;
+use crate::math::{Aabb, BoxTree};
 use crate::model::{Analytic, Model};
 use crate::tessellate::assemble::PartMesh;
 use crate::tessellate::placed_part::PlacedPart;
@@ -49,14 +49,13 @@ pub(super) fn contacts<'m>(
 ) -> (Vec<Contact>, FxHashMap<FaceKey, TrimmedFace<'m>>) {
     let glue = settings.glue_mm;
     let faces = curved_face_boxes(model, parts, glue);
+    let boxes: Vec<Aabb> = faces.iter().map(|f| f.bounds).collect();
     let mut pairs: Vec<[FaceKey; 2]> = Vec::new();
-    // Sorted along x: from the first box that begins behind this one on, none meets it.
-    for (i, a) in faces.iter().enumerate() {
-        for b in faces[i + 1..].iter().take_while(|b| b.bounds.min.x <= a.bounds.max.x) {
-            let other_solid = a.key.instance != b.key.instance || a.shell != b.shell;
-            if other_solid && !a.bounds.intersection(b.bounds).is_empty() {
-                pairs.push([a.key.min(b.key), a.key.max(b.key)]);
-            }
+    for meeting in BoxTree::meeting_pairs(&boxes) {
+        let [a, b] = meeting.map(|k| &faces[k]);
+        let other_solid = a.key.instance != b.key.instance || a.shell != b.shell;
+        if other_solid {
+            pairs.push([a.key.min(b.key), a.key.max(b.key)]);
         }
     }
     pairs.sort_unstable();
@@ -167,7 +166,7 @@ fn with_one_role_each(mut all: Vec<Contact>) -> Vec<Contact> {
 }
 
 /// Returns the boxes of the curved faces of all instances that may share facets, meshed and not repaired ones: in the model's coordinates,
-/// grown by half of `glue`, mm, and sorted by their lower x.
+/// grown by half of `glue`, mm, and in the order of instances and faces.
 fn curved_face_boxes(model: &Model, parts: &[Option<PartMesh>], glue: f64) -> Vec<BoxedFace> {
     let mut out = Vec::new();
     for (i, instance) in model.instances.iter().enumerate() {
@@ -187,6 +186,5 @@ fn curved_face_boxes(model: &Model, parts: &[Option<PartMesh>], glue: f64) -> Ve
             out.push(BoxedFace { key: FaceKey { instance: i, face: k }, shell, bounds });
         }
     }
-    out.sort_by(|a, b| a.bounds.min.x.total_cmp(&b.bounds.min.x));
     out
 }
