@@ -33,6 +33,7 @@ mod spectrum;
 mod table;
 #[cfg(test)]
 mod testing;
+mod wavelengths;
 
 pub use abg::Abg;
 pub(crate) use cie_observer::observer_range;
@@ -48,5 +49,6 @@ pub use media::{Absorption, Index, Medium, line};
 pub use phase::BulkScatter;
 pub use refraction::{reflect, refract, refract_with_cosine};
 pub use scatter::{Lobe, Scatter};
-pub use spectrum::{Spectrum, Wavelengths, WhiteLed};
+pub use spectrum::{Spectrum, WhiteLed};
 pub use table::Table;
+pub use wavelengths::Wavelengths;

@@ -224,6 +224,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "intensity",
             "media",
             "catalogue",
+            "wavelengths",
             "spectrum",
         ],
     ),
