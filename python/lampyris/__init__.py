@@ -20,8 +20,7 @@ from .materials import Material, Selector, coating, diffuse, glass, absorber, in
 from .mesh import Mesh
 from .model import Account, Model, read_step
 from .part import Interrupted, Part
-from .receivers import Receiver as ReceiverTable
-from .receivers import absorbed, disc, far_field, plane, sphere
+from .receivers import ReceiverTable, absorbed, disc, far_field, plane, sphere
 from .results import Ends, Figure, Receiver, Run
 from .scene import Scene, media, scene_schema
 from .sources import Source, collimated, cone, cosine, eulumdat, ies, lambertian, led, point, ray_file, rays

@@ -220,7 +220,7 @@ def trace(
     if before is not None:
         # Refused here if it is of another run; and of this one from now on, whatever its number of rays was found by.
         before = scene.read_part(before.to_bytes(), **settings)
-    if not any(settings.get(k) for k in ("tolerance", "accuracy_deg", "parts", "faces", "roles")) and summary["chosen"]:
+    if summary["chosen"] and not _asks_for_facets(settings):
         chosen = {k: summary[k] for k in ("intersector", "normals")}
         asked: Settings = {**settings, **chosen, "tolerance": tuple(summary["tolerance_mm"])}
     else:
@@ -245,6 +245,12 @@ def trace(
     with _unhurried():
         _keep(scene, parts, before, settings)
     return scene.trace(resume=True, progress=progress, **settings)
+
+
+def _asks_for_facets(settings: Settings) -> bool:
+    """Whether the settings say how fine facets are; a dict of no names does not."""
+    has_bound = any(settings.get(name) is not None for name in ("tolerance", "accuracy_deg"))
+    return has_bound or any(settings.get(name) for name in ("parts", "faces", "roles"))
 
 
 def _keep(scene: Scene, parts: list[bytes], before: Part | None, settings: Settings) -> None:

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
+import stat
+from contextlib import suppress
 from typing import Any
 
 from ._lampyris import InputError
+
+#: Characters of its final name that an unfinished file has: of four bytes each, they and what follows stay below the 255 bytes of a name.
+NAME_CHARACTERS = 50
 
 
 class MissingFileError(InputError, FileNotFoundError):
@@ -40,13 +46,44 @@ def existing_file(path: Any, name: str = "path", what: str = "") -> str:
 
 
 def write_file(path: Any, content: bytes | str) -> None:
-    """Writes a file; :class:`InputError` where that cannot be, :class:`MissingFileError` without its folder."""
+    """Writes a file; :class:`InputError` where that cannot be, :class:`MissingFileError` without its folder.
+
+    An older file of that name is replaced once the new one is whole, with its permissions kept; behind a link it is that file which is
+    replaced. A pipe or device is written as it is.
+    """
     text = writable_file(path)
+    data = content.encode() if isinstance(content, str) else content
     try:
-        with open(text, "wb") as file:
-            file.write(content.encode() if isinstance(content, str) else content)
+        if os.path.exists(text) and not os.path.isfile(text):
+            with open(text, "wb") as stream:
+                stream.write(data)
+        else:
+            _replace_file(os.path.realpath(text), data)
     except OSError as e:
         raise InputError(f"{text}: cannot be written: {e.strerror}; check its folder and the permissions") from e
+
+
+def _replace_file(target: str, data: bytes) -> None:
+    """Writes a file beside its final name and renames it when it is whole; ``OSError`` leaves an older file as it was."""
+    mode = stat.S_IMODE(os.stat(target).st_mode) if os.path.exists(target) else None
+    if mode is not None and not os.access(target, os.W_OK):
+        # A rename would replace what its owner has protected.
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), target)
+    folder, name = os.path.split(target)
+    beside = os.path.join(folder, f".{name[:NAME_CHARACTERS]}.{secrets.token_hex(8)}.part")
+    file = open(beside, "xb")
+    try:
+        with file:
+            if mode is not None:
+                # Before anything is in it: what its owner alone may read stays so. Some file systems have no permissions.
+                with suppress(OSError):
+                    os.chmod(beside, mode)
+            file.write(data)
+        os.replace(beside, target)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(beside)
+        raise
 
 
 def writable_file(path: Any) -> str:

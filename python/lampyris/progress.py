@@ -6,8 +6,14 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-#: Called with the stage, what is done, the total (0 where it is not known) and messages; it stops the work by raising.
+#: Called with the stage, what is done, the total (0 where it is not known) and messages; it stops the work by raising. What is done is
+#: counted in rays in the stages :data:`RAY_STAGES`, in thousandths of the work in others.
 ProgressCallback = Callable[[str, int, int, list[str]], None]
+
+#: Stages that count rays.
+RAY_STAGES = ("tracing", "checking")
+#: tqdm's bar without the count: thousandths say no more than the percentage before the bar.
+SHARE_FORMAT = "{l_bar}{bar}| [{elapsed}<{remaining}]"
 
 
 class Progress:
@@ -26,22 +32,33 @@ class Progress:
             self._tqdm = tqdm
 
     def __call__(self, stage: str, done: int, total: int, messages: list[str]) -> None:
-        if self._messages:
+        if self._messages and messages:
+            # A bar would stand in the line of the first message; it is made anew below.
+            self.close()
             for message in messages:
                 print(message, file=sys.stderr)
-        if stage != self._stage:
+        if stage != self._stage or total == 0:
             self.close()
             self._stage = stage
-            if self._tqdm is not None and total > 0:
-                self._bar = self._tqdm(total=total, desc=stage, unit=" rays", unit_scale=True, leave=False)
-        if self._bar is not None:
-            self._bar.total = total
-            self._bar.update(max(0, done - self._bar.n))
-        elif self._tqdm is None and total > 0 and sys.stderr.isatty():
+        if total == 0:
+            return
+        if self._tqdm is not None:
+            self._show_bar(done, total)
+        elif sys.stderr.isatty():
             percent = 100 * done // total
             if percent != self._shown:
                 self._shown = percent
                 print(f"\r{stage} {percent:3d} %", end="", file=sys.stderr, flush=True)
+
+    def _show_bar(self, done: int, total: int) -> None:
+        """Moves tqdm's bar, made where there is none: a stage may learn its total late."""
+        if self._bar is None:
+            look = {"unit": " rays", "unit_scale": True} if self._stage in RAY_STAGES else {"bar_format": SHARE_FORMAT}
+            self._bar = self._tqdm(total=total, desc=self._stage, leave=False, **look)
+        elif total != self._bar.total or done < self._bar.n:
+            # A run that goes on with more rays begins again from its first; a resumed one learns its total late.
+            self._bar.reset(total)
+        self._bar.update(done - self._bar.n)
 
     def close(self) -> None:
         """Takes the bar away."""

@@ -13,17 +13,17 @@ from .settings import real_number, word
 
 
 @dataclass(frozen=True)
-class Receiver:
+class ReceiverTable:
     """Keys of a ``[[receiver]]``."""
 
     #: Its keys in the scene file.
     table: Table
 
 
-def _receiver(kind: str, name: str, keys: dict[str, Any], **own: Any) -> Receiver:
+def _receiver(kind: str, name: str, keys: dict[str, Any], **own: Any) -> ReceiverTable:
     word("name", name)
     require_given(kind, own)
-    return Receiver(plain({"name": name, "kind": kind, **own, **keys}))
+    return ReceiverTable(plain({"name": name, "kind": kind, **own, **keys}))
 
 
 def plane(
@@ -33,7 +33,7 @@ def plane(
     size: Vector = (100.0, 100.0),
     cells: Cells = (100, 100),
     **keys: Any,
-) -> Receiver:
+) -> ReceiverTable:
     """A rectangle in space, power per area; light ends there unless ``absorbs=False``."""
     return _receiver("plane", name, keys, at=at, normal=normal, size=size, cells=cells)
 
@@ -45,7 +45,7 @@ def far_field(
     cells: Cells | None = None,
     step_deg: float | None = None,
     **keys: Any,
-) -> Receiver:
+) -> ReceiverTable:
     """All light that leaves the scene by direction, power per solid angle.
 
     An angle that is not given goes from −90° to 90°; with ``angles="C"``, C from 0° to 360° and γ from 0° to 180°.
@@ -72,16 +72,16 @@ def disc(
     normal: Vector = (0.0, 0.0, 1.0),
     cells: Cells = (100, 100),
     **keys: Any,
-) -> Receiver:
+) -> ReceiverTable:
     """A round detector in space, power per area; ``cells`` are those of the square around it."""
     return _receiver("disc", name, keys, at=at, normal=normal, radius=radius, cells=cells)
 
 
-def sphere(name: str, at: Vector, radius: float, cells: Cells = (180, 90), **keys: Any) -> Receiver:
+def sphere(name: str, at: Vector, radius: float, cells: Cells = (180, 90), **keys: Any) -> ReceiverTable:
     """A sphere in space by direction from its centre, power per area."""
     return _receiver("sphere", name, keys, at=at, radius=radius, cells=cells)
 
 
-def absorbed(name: str, part: str | Sequence[str] | None = None, **keys: Any) -> Receiver:
+def absorbed(name: str, part: str | Sequence[str] | None = None, **keys: Any) -> ReceiverTable:
     """What the faces of a part absorb."""
     return _receiver("absorbed", name, keys, part=part, cells=[1, 1])

@@ -7,7 +7,6 @@ import hashlib
 import json
 import os
 import pathlib
-import shutil
 import tempfile
 import warnings
 from collections.abc import Iterable
@@ -21,7 +20,7 @@ from .mesh import Mesh
 from .model import Model
 from .part import Interrupted, Part, part_bytes, part_core
 from .progress import ProgressCallback, callback
-from .receivers import Receiver
+from .receivers import ReceiverTable
 from .results import Ends, Run
 from .settings import Settings, trace_settings, whole_number, word
 from .sources import Source
@@ -120,12 +119,12 @@ class Scene:
                 media.append(dict(material.medium))
         self.tables.setdefault("material", []).append({**selector, **material.table})
 
-    def add(self, *things: Source | Receiver) -> Scene:
+    def add(self, *things: Source | ReceiverTable) -> Scene:
         """Adds sources and receivers."""
         for thing in things:
             if isinstance(thing, Source):
                 self._add_source(thing)
-            elif isinstance(thing, Receiver):
+            elif isinstance(thing, ReceiverTable):
                 self.tables.setdefault("receiver", []).append(dict(thing.table))
             else:
                 raise TypeError(f"a source or a receiver is needed, as lampyris.led(…), not {type(thing).__name__}")
@@ -159,7 +158,7 @@ class Scene:
             if self._ray_folder is not None and file.parent == pathlib.Path(self._ray_folder.name):
                 # The folder for temporary files goes with this process.
                 kept = scene_file.with_name(f"{scene_file.stem}-{file.name}")
-                shutil.copyfile(file, kept)
+                write_file(kept, file.read_bytes())
                 entry["file"] = kept.name
             else:
                 entry["file"] = str(file)

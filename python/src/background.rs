@@ -4,8 +4,10 @@ use crate::errors::Defect;
 use lampyris::pipeline::{Monitor, Stage, TracingSettings};
 use lampyris::study;
 use lampyris::study::default_accuracy::Chosen;
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use std::backtrace::{Backtrace, BacktraceStatus};
+use std::ffi::CString;
 use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -16,12 +18,18 @@ use std::time::Duration;
 
 /// How often to look for signals and to tell how far the work is: below what a person notices.
 const LOOK_EVERY: Duration = Duration::from_millis(40);
+/// The total of work that is no number of rays: what is done of it is told in thousandths.
+const SHARES: u64 = 1000;
+/// The caller of the Python function that called the extension: warnings are shown with its line.
+const CALLER: i32 = 2;
 
 /// How far the work is, written by its threads and read by the one that waits.
 #[derive(Default)]
 pub(crate) struct SharedProgress {
     stage: Mutex<&'static str>,
     messages: Mutex<Vec<String>>,
+    /// What went wrong that changes no result: warnings of Python when the work ends.
+    warnings: Mutex<Vec<String>>,
     done: AtomicU64,
     total: AtomicU64,
     stops: AtomicBool,
@@ -32,6 +40,15 @@ pub(crate) struct SharedProgress {
 impl SharedProgress {
     fn say(&self, message: String) {
         locked(&self.messages).push(message);
+    }
+
+    /// Begins a stage of so many rays, or of a total that is not known yet: 0.
+    pub(crate) fn begin_stage(&self, name: &'static str, total: u64) {
+        // Held until the numbers are those of the stage: whoever tells of it reads all three.
+        let mut stage = locked(&self.stage);
+        *stage = name;
+        self.done.store(0, Ordering::Relaxed);
+        self.total.store(total, Ordering::Relaxed);
     }
 }
 
@@ -52,9 +69,7 @@ impl Monitor for SharedProgress {
             Stage::Checking(rays) => ("checking", rays),
             _ => ("working", 0),
         };
-        *locked(&self.stage) = name;
-        self.done.store(0, Ordering::Relaxed);
-        self.total.store(total, Ordering::Relaxed);
+        self.begin_stage(name, total);
         self.is_tracing.store(matches!(stage, Stage::Tracing(_)), Ordering::SeqCst);
     }
 
@@ -65,13 +80,16 @@ impl Monitor for SharedProgress {
     }
 
     fn study_progress(&self, progress: &study::Progress) {
-        const SHARES: f64 = 1000.0;
-        self.total.store(SHARES as u64, Ordering::Relaxed);
-        self.done.store((SHARES * progress.done.clamp(0.0, 1.0)) as u64, Ordering::Relaxed);
+        self.total.store(SHARES, Ordering::Relaxed);
+        self.done.store((SHARES as f64 * progress.done.clamp(0.0, 1.0)) as u64, Ordering::Relaxed);
     }
 
     fn end(&self) {
         self.is_tracing.store(false, Ordering::SeqCst);
+    }
+
+    fn warns(&self, message: &str) {
+        locked(&self.warnings).push(message.to_owned());
     }
 
     fn chosen(&self, chosen: &Chosen) {
@@ -86,6 +104,11 @@ impl Monitor for SharedProgress {
         self.say(answer.to_owned());
     }
 
+    fn unsettled(&self, rows: usize, rays: u64) {
+        let rows = if rows == 1 { "1 row is".to_owned() } else { format!("{rows} rows are") };
+        self.say(format!("{rows} unsure: going on with {rays} rays"));
+    }
+
     fn grows(&self, found_percent: Option<f64>, rays: u64) {
         let found = found_percent.map_or("nothing arrives".to_owned(), |e| format!("{e:.2} %"));
         self.say(format!("{found}: going on with {rays} rays"));
@@ -98,7 +121,8 @@ pub(crate) struct Outcome<T> {
     pub(crate) stopped: Option<PyErr>,
 }
 
-/// Does the work; `progress(stage, done, total, messages)` is called now and then, and stops the work by raising.
+/// Does the work; `progress(stage, done, total, messages)` is called now and then, and stops the work by raising. What the work warns of
+/// are warnings of Python at its end; one that is an exception by the caller's filters stops like a signal that comes then.
 ///
 /// # Errors
 /// The exception of a signal or of `progress` where the work cannot be stopped: it is left to end by itself. [`Defect`] where it panics.
@@ -125,7 +149,9 @@ pub(crate) fn interruptible<T: Send + 'static>(
                 // What was said at the end is said too, and a signal that came at the end is heard here rather than by the caller, who
                 // would lose what was made.
                 let last = || py.check_signals().and_then(|()| tell(py, &shared, progress)).err();
-                return Ok(Outcome { made, stopped: stopped.or_else(last) });
+                let stopped = stopped.or_else(last);
+                let warned = warn(py, &shared).err();
+                return Ok(Outcome { made, stopped: stopped.or(warned) });
             }
             Ok(Err(panic)) => return Err(defect(panic.as_ref())),
             Err(RecvTimeoutError::Disconnected) => return Err(Defect::new_err("the work ended without a result")),
@@ -214,10 +240,21 @@ fn is_forked() -> bool {
 
 fn tell(py: Python<'_>, shared: &SharedProgress, progress: Option<&Py<PyAny>>) -> PyResult<()> {
     let Some(progress) = progress else { return Ok(()) };
-    let stage = *locked(&shared.stage);
     let messages = std::mem::take(&mut *locked(&shared.messages));
-    let [done, total] = [&shared.done, &shared.total].map(|n| n.load(Ordering::Relaxed));
+    let (stage, [done, total]) = {
+        let stage = locked(&shared.stage);
+        (*stage, [&shared.done, &shared.total].map(|n| n.load(Ordering::Relaxed)))
+    };
     progress.call1(py, (stage, done, total, messages)).map(|_| ())
+}
+
+fn warn(py: Python<'_>, shared: &SharedProgress) -> PyResult<()> {
+    let warnings = std::mem::take(&mut *locked(&shared.warnings));
+    warnings.into_iter().try_for_each(|message| {
+        // The C interface of Python ends a text at its first zero byte.
+        let text = CString::new(message.replace('\0', " "))?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, CALLER)
+    })
 }
 
 /// Where the last panic was: its exception says it, and nothing is printed before that.

@@ -11,7 +11,7 @@ use lampyris::intersect::octree::{self, Octree};
 use lampyris::model::Model as Splines;
 use lampyris::pipeline::Monitor;
 use lampyris::study::cross_check::{self, Intersectors, cross_check};
-use lampyris::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
+use lampyris::study::rays::mixed_rays;
 use lampyris::study::{FacetTree, MeshSource, ModelMeshSource, Progress, accuracy, interpolation};
 use lampyris::tessellate::{self, tessellate};
 use pyo3::prelude::*;
@@ -28,6 +28,9 @@ struct Request {
     repetitions: Option<usize>,
     seed: u64,
 }
+
+/// Works out the document of a study.
+type Run = fn(&Splines, &Request, &dyn Monitor) -> serde_json::Result<Value>;
 
 /// Runs a study on a model and gives its document as JSON: `accuracy`, `interpolation` or `check`.
 #[pyfunction]
@@ -50,15 +53,18 @@ pub(crate) fn study(
     let normals =
         normals.map(|n| n.iter().map(|name| normal_mode(name)).collect::<PyResult<Vec<_>>>()).transpose()?;
     let request = Request { name, tolerances, normals, rays, repetitions, seed };
-    let run: fn(&Splines, &Request, &dyn Monitor) -> serde_json::Result<Value> = match kind {
-        "accuracy" => study_accuracy,
-        "interpolation" => study_interpolation,
-        "check" => study_check,
+    let (stage, run): (&'static str, Run) = match kind {
+        "accuracy" => ("accuracy study", study_accuracy),
+        "interpolation" => ("interpolation study", study_interpolation),
+        "check" => ("cross-check", study_check),
         _ => return Err(SceneError::new_err(format!("study {kind}: use accuracy, interpolation or check"))),
     };
     let import = Arc::clone(&model.import);
-    let outcome =
-        interruptible(py, progress.as_ref(), threads, move |monitor| run(&import.model, &request, monitor))?;
+    let outcome = interruptible(py, progress.as_ref(), threads, move |shared| {
+        // How much there is to do is known once the study tells how far it is.
+        shared.begin_stage(stage, 0);
+        run(&import.model, &request, shared)
+    })?;
     match outcome.stopped {
         Some(e) => Err(e),
         None => Ok(outcome.made.map_err(of_json)?.to_string()),
@@ -102,13 +108,7 @@ fn study_check(model: &Splines, request: &Request, monitor: &dyn Monitor) -> ser
     let bvh = Bvh::build(&mesh, &bvh::Settings::default());
     let exact = Exact::build(model, &exact::Settings::default());
     let count = request.rays.unwrap_or(100_000);
-    let (bounds, third) = (mesh.bounds(), (count / 3).max(1));
-    let camera = Camera::new(&bounds, third.min(count));
-    let uniform = Uniform::new(&bounds, request.seed, third.min(count - camera.len()));
-    let remaining = count - camera.len() - uniform.len();
-    let bounces = Bounces::new(&bounds, &octree, mesher.loosest(), request.seed, remaining);
-    let chain = Chain(vec![&camera, &uniform, &bounces]);
-    let rays = chain.rays(0..chain.len());
+    let rays = mixed_rays(&mesh.bounds(), &octree, mesher.loosest(), request.seed, count);
     let settings = cross_check::Settings { fallback_band_mm: mesher.loosest(), ..cross_check::Settings::default() };
     let intersectors = Intersectors { model, mesh: &mesh, octree: &octree, bvh: &bvh, exact: &exact };
     let progress = |p: Progress| monitor.study_progress(&p);

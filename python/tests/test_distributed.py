@@ -13,6 +13,7 @@ import threading
 import time
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import SCENES
 
@@ -61,6 +62,23 @@ def test_wrong_arguments_are_told_what_to_do() -> None:
             trace(scene, workers)
         with pytest.raises(ValueError, match="connect a new"):
             trace(scene, client)
+
+
+def test_settings_of_facets_may_be_arrays() -> None:
+    from lampyris.distributed import _asks_for_facets, trace
+
+    tolerance = np.array([0.05, 0.2])
+    asked: dict[str, Any]
+    for asked in ({"tolerance": tolerance}, {"tolerance": 0.1}, {"accuracy_deg": 0.1}, {"parts": {"lens": tolerance}}):
+        assert _asks_for_facets(asked)
+    for asked in ({}, {"rays": 5}, {"tolerance": None}, {"accuracy_deg": None, "parts": None}, {"faces": {}}):
+        assert not _asks_for_facets(asked)
+    scene = lp.Scene.from_toml(SCENE)
+    expected = scene.trace(rays=20_000, tolerance=(0.05, 0.2), progress=False)
+    with distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None) as workers:
+        with distributed.Client(workers) as client:
+            run = trace(scene, client, shards=2, rays=20_000, tolerance=tolerance, progress=False)
+    assert run.digest == expected.digest
 
 
 @pytest.mark.parametrize("number", [1, 2])
