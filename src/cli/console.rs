@@ -65,6 +65,11 @@ impl Console {
         let _ = writeln!(io::stderr().lock(), "{}", self.shown(&message.to_string()));
     }
 
+    /// Writes a message for people to stderr, quiet or not where it is why the exit code is not 0.
+    pub(crate) fn say_or_insist(&self, is_reason: bool, message: impl std::fmt::Display) {
+        if is_reason { self.insist(message) } else { self.say(message) }
+    }
+
     /// Returns the text as a terminal may be given it: names are data, so that all it would obey is written out, but for our own emphasis.
     pub(crate) fn shown(&self, text: &str) -> String {
         if !self.colour {

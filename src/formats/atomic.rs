@@ -50,6 +50,20 @@ pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
     })
 }
 
+/// Tries whether [`write_atomic`] could write a file: makes an empty one beside it, under the name of an unfinished one, and removes it.
+///
+/// # Errors
+/// When the folder cannot be written or no file can have such a name.
+pub(crate) fn try_write(path: &Path) -> Result<(), Error> {
+    let beside = unfinished(path);
+    let attempt = || -> io::Result<()> {
+        let _registered = Unfinished::register(&beside);
+        File::create(&beside)?;
+        fs::remove_file(&beside)
+    };
+    attempt().map_err(|e| Error::new(path, ErrorKind::Write(e)))
+}
+
 /// Whether something is there, by its links, that is neither a file nor a folder: a rename would put a file in the place of a device, and
 /// whoever reads a pipe would wait for ever.
 fn is_stream(path: &Path) -> bool {

@@ -76,7 +76,8 @@ pub(super) fn write_vtu(path: &Path, facets: &Facets) -> Result<(), Error> {
         writeln!(w, r#"<PointData Normals="normal">"#)?;
         write_data_array(w, "normal", 3, Array::F64(&normals))?;
         write_data_array(w, "uv", 2, Array::F64(&uv))?;
-        writeln!(w, r#"</PointData><CellData Scalars="sag_mm">"#)?;
+        let scalars = if mesh.sag.len() == count { r#" Scalars="sag_mm""# } else { "" };
+        writeln!(w, "</PointData><CellData{scalars}>")?;
         for (name, data) in [
             ("sag_mm", &mesh.sag),
             ("normal_error_deg", &facets.normal_error_deg),

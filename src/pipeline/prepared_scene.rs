@@ -1,7 +1,7 @@
 //! A scene that is bound and faceted, and the tracing of it.
 
 use super::cache::{CachedFacets, group_keys};
-use super::default_accuracy;
+use super::default_accuracy::{self, is_accuracy_asked};
 use super::error::Error;
 use super::expected_facets::expected_facets;
 use super::facets::mesh_settings;
@@ -124,8 +124,7 @@ impl PreparedScene {
             few_ray_surfaces: OnceLock::new(),
         };
         // Whoever asks for anything of how it is traced gets just that.
-        let is_open =
-            !default_accuracy::is_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene);
+        let is_open = !is_accuracy_asked(&prepared.job.meshing, &prepared.job.tracing, &prepared.job.scene);
         let known = if is_open { prepared.known_choice(monitor) } else { None };
         if let Some(chosen) = known {
             // Before any facets are made: it says how fine they are.

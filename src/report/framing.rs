@@ -91,7 +91,12 @@ pub(super) fn lit_part(grid: &Grid) -> Option<Grid> {
         let edge = |k: usize| axis.range[0] + axis.step() * k as f64;
         Axis { range: [edge(from), edge(to)], cells: to - from, ..axis.clone() }
     };
-    let layer = |l: &Layer| Layer { values: cut(&l.values), error: cut(&l.error), ..l.clone() };
+    let layer = |l: &Layer| Layer {
+        values: cut(&l.values),
+        error: cut(&l.error),
+        geometric: l.geometric.as_deref().map(cut),
+        ..l.clone()
+    };
     Some(Grid {
         axes: [axis(&grid.axes[0], columns), axis(&grid.axes[1], rows)],
         values: cut(&grid.values),

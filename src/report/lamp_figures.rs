@@ -102,8 +102,11 @@ fn add_assessment(table: &mut Table, assessment: &Assessment, degrees: impl Fn([
 }
 
 /// Returns the intensity straight ahead and its error: of the cell there, or the mean of those that meet there; `None` where the grid does
-/// not reach there.
+/// not reach there, or not all around a pole that is there.
 fn value_ahead(grid: &Grid) -> Option<[Cell; 2]> {
+    if grid.axes[0].label == "C" && !is_all_around(grid) {
+        return None;
+    }
     let cells = |axis: &crate::formats::Axis| -> Vec<usize> {
         // An even number of cells has none in the middle: two or four meet there, to rounding.
         (0..axis.cells).filter(|&k| axis.center(k).abs() <= 0.5 * axis.step() * (1.0 + 1e-9)).collect()
@@ -159,15 +162,17 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
     // A few stray rays far away would press the curve of all others against its axis.
     let lit = summed.partition_point(|p| p[1] < FRAMED_PERCENT) + 1;
     let (framed, beyond) = summed.split_at(lit.min(summed.len()));
-    let coarse = if radius_of(95.0) < FEW_CELLS * a.step() {
+    let step = f64::max(a.step(), b.step());
+    let coarse = if radius_of(95.0) < FEW_CELLS * step {
         " These are few cells: smaller ones, by `cells` or `size` of the receiver, show more."
     } else {
         ""
     };
     let rest = beyond.last().map_or(String::new(), |last| format!(", all within {} mm", figures(last[0], 3)));
     let caption = format!(
-        "Around the mean position of the light, cell by cell ({} mm): 50 % within {} mm, 80 % within {} mm, 95 % within {} mm{rest}.{coarse}",
+        "Around the mean position of the light, cell by cell ({} × {} mm): 50 % within {} mm, 80 % within {} mm, 95 % within {} mm{rest}.{coarse}",
         figures(a.step(), 2),
+        figures(b.step(), 2),
         figures(radius_of(50.0), 3),
         figures(radius_of(80.0), 3),
         figures(radius_of(95.0), 3)
@@ -223,6 +228,7 @@ pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::Axis;
     use crate::intersect::octree::{self, Octree};
     use crate::mesh::FacetMesh;
     use crate::model::Model;
@@ -255,6 +261,26 @@ mod tests {
         // Of 178,000 rays on the disc a third falls there: 0.11 % if they came by chance, and they are spread more evenly.
         let share = within.iter().copied().fold(0.0, f64::max);
         assert!((share - 100.0 / PI).abs() < 0.4, "{share} {within:?}");
+    }
+
+    /// Planes C that do not go all around have no pole where they meet, and what lies at C 0°, γ 0° in them is not straight ahead alone.
+    #[test]
+    fn a_part_of_the_planes_c_has_no_value_ahead() {
+        let grid = |label: &str, last: f64| {
+            let axis = |label: &str, range| Axis { label: label.into(), unit: "deg".into(), range, cells: 4 };
+            Grid {
+                name: "far".into(),
+                quantity: "luminous intensity".into(),
+                unit: "cd".into(),
+                axes: [axis(label, [0.0, last]), axis("gamma", [0.0, 90.0])],
+                values: vec![1.0; 16],
+                error: None,
+                geometric: None,
+                layers: Vec::new(),
+            }
+        };
+        assert!(value_ahead(&grid("C", 90.0)).is_none());
+        assert!(value_ahead(&grid("C", 360.0)).is_some() && value_ahead(&grid("H", 90.0)).is_some());
     }
 
     /// For left-hand traffic the tables are read in a mirror, and here the lamp was aimed 0.5° aside and 0.25° up.

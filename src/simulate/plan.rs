@@ -39,6 +39,9 @@ pub const GROWING_REPLICATE: u64 = 5_000;
 /// Fewest replicates of a fixed size for which a run is divided into them unasked.
 const FEWEST_GROWING: u64 = 128;
 
+/// Most sources of a run that is divided into replicates of a fixed size without being asked to: 50 rays each in one of these.
+const MOST_SOURCES: usize = 100;
+
 /// How the rays of a run are divided among sources and replicates.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
@@ -71,7 +74,7 @@ impl Plan {
     /// be more than the settings ask for.
     pub(crate) fn new(bound: &BoundScene, settings: &RunSettings) -> Self {
         let emitted: f64 = bound.emitters.iter().map(|e| e.power).sum();
-        let grows = can_grow(bound) && (settings.grows || grows_unasked(settings));
+        let grows = can_grow(bound) && (settings.grows || grows_unasked(settings, bound.emitters.len()));
         let asked = settings.rays.clamp(1, MOST_RAYS);
         // A run that can grow is divided replicate by replicate, source by source within each; any other source by source.
         let counts = rays_of_sources(bound, if grows { GROWING_REPLICATE } else { asked }, emitted);
@@ -253,10 +256,14 @@ pub(crate) fn can_grow(bound: &BoundScene) -> bool {
     bound.emitters.iter().all(|e| e.rays.is_none())
 }
 
-/// Whether a run is large and round enough to be divided into replicates of a fixed size without being asked to.
-fn grows_unasked(settings: &RunSettings) -> bool {
+/// Whether a run is large and round enough to be divided into replicates of a fixed size without being asked to, and its sources few
+/// enough: each has a ray in every replicate, which of thousands would be several times the rays that were asked for.
+fn grows_unasked(settings: &RunSettings, sources: usize) -> bool {
     let usual = settings.replicates == RunSettings::default().replicates;
-    usual && settings.rays >= FEWEST_GROWING * GROWING_REPLICATE && settings.rays.is_multiple_of(GROWING_REPLICATE)
+    usual
+        && sources <= MOST_SOURCES
+        && settings.rays >= FEWEST_GROWING * GROWING_REPLICATE
+        && settings.rays.is_multiple_of(GROWING_REPLICATE)
 }
 
 /// Returns the quanta of an average ray: [`QUANTA`], halved until the heaviest ray is a whole number that is exact and no sum of a

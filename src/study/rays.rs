@@ -204,6 +204,17 @@ impl RaySource for Chain<'_> {
     }
 }
 
+/// Makes a third each of a camera's, random and bouncing rays: coherent and incoherent ones find different faults. Of fewer than three rays
+/// the camera's come first. `guide` finds the points that bounces leave; `tolerance` is the loosest of the facets, mm.
+pub fn mixed_rays(bounds: &Aabb, guide: &dyn Intersector, tolerance: f64, seed: u64, count: u64) -> Vec<Ray> {
+    let third = (count / 3).max(1);
+    let camera = Camera::new(bounds, third.min(count));
+    let uniform = Uniform::new(bounds, seed, third.min(count - camera.len()));
+    let bounces = Bounces::new(bounds, guide, tolerance, seed, count - camera.len() - uniform.len());
+    let chain = Chain(vec![&camera, &uniform, &bounces]);
+    chain.rays(0..chain.len())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -82,8 +82,8 @@ fn name_uncertified(report: &mut Report, made: &Tessellation, model: &Model) {
     }
 }
 
-/// Adds to the report the numbers of open and closed shells, of sheets, which is what the file calls open, and of edges that are open, touch,
-/// are turned, or are shared by more than two facets; returns whether every shell of the model is closed. Sheets are not examined; they, and
+/// Adds to the report the numbers of open and closed shells, of sheets, which the file calls open, and of edges that are open, touch, are
+/// turned, or are shared by more than two facets; returns whether every shell of the model is closed. Sheets are not examined; they, and
 /// ready meshes, count as not closed only in what is returned.
 fn count_shells(report: &mut Report, made: &Tessellation, model: &Model) -> bool {
     let facets = &made.mesh.facets;

@@ -202,6 +202,11 @@ fn a_file_without_a_face_is_not_traced_in_silence() {
         lampyris_in(path, &["trace", "scene.toml", "-q", "--rays", "2000", "--no-report", "-o", "out"]);
     assert!(code == 4 && out.is_empty() && err.contains("points.stp"), "{code} {out} {err}");
     let results = fs::read_to_string(path.join("out/results.json")).unwrap();
+    // Nor is the mesh of a file that was cut off, its last words missing.
+    let whole = fs::read_to_string(fixture("step/lens_planoconvex_nurbs.stp")).unwrap();
+    fs::write(path.join("cut.stp"), &whole[..whole.rfind("ENDSEC").unwrap()]).unwrap();
+    let (code, _, err) = lampyris_in(path, &["facet", "cut.stp", "-q"]);
+    assert!(code == 4 && err.contains("ends before its end section"), "{code} {err}");
     let notes = serde_json::from_str::<Value>(&results).unwrap()["notes"].to_string();
     assert!(notes.contains("points.stp holds no face"), "{notes}");
 }

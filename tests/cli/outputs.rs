@@ -147,3 +147,23 @@ fn nothing_of_an_earlier_run_stays_in_a_folder() {
         assert!(stays(name), "{name}");
     }
 }
+
+/// A place is tried before the work, under a name that is nobody's.
+#[test]
+fn what_is_beside_an_output_stays_and_long_names_are_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let model = fixture("step/lens_planoconvex_nurbs.stp");
+    fs::write(path.join("y.obj.try"), "mine").unwrap();
+    let long = format!("{}.obj", "n".repeat(249));
+    for name in ["y.obj", &long] {
+        let (code, _, err) = lampyris_in(path, &["facet", model.to_str().unwrap(), "-o", name]);
+        assert!(code == 0 && path.join(name).is_file(), "{code} {err}");
+    }
+    assert_eq!(fs::read(path.join("y.obj.try")).unwrap(), b"mine");
+    // Neither a replay nor a plan of a run settles anything.
+    let scene = list();
+    for other in ["--until-settled", "--dry-run"] {
+        refused(scene.path(), &["trace", "scene.toml", "--replay", "5", other], &["--replay", other]);
+    }
+}

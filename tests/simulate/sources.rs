@@ -3,8 +3,10 @@
 use crate::support::World;
 use lampyris::formats::{LightRay, PhotometricType, Photometry, write_data1, write_ies, write_rays};
 use lampyris::math::{Point, Vector};
-use lampyris::simulate::{RunSettings, Scene, simulate};
+use lampyris::model::Model;
+use lampyris::simulate::{RunSettings, Scene, rays_of_run, simulate};
 use std::f64::consts::PI;
+use std::path::Path;
 
 const ALL: &str = "[[receiver]]\nname = 'all'\nkind = 'far_field'\nh_deg = [-180, 180]\ncells = [4, 2]\n";
 
@@ -349,5 +351,17 @@ fn a_source_that_is_weak_beside_another_keeps_its_power_or_is_named() {
         assert!((power / weak - 1.0).abs() < share, "{weak}: {power}");
         let notes = found.notes.join("; ");
         assert_eq!(notes.contains("the light of the source 'weak' is counted as"), is_told, "{weak}: {notes}");
+    }
+}
+
+/// Each source has a ray in every part of a run: in 200 parts for as many replicates twenty thousand would have four million.
+#[test]
+fn many_sources_trace_as_many_rays_as_are_asked_for() {
+    let source = "[[source]]\nkind = 'isotropic'\n";
+    let scene = Scene::parse(&source.repeat(20_000), "many.toml", Path::new(".")).unwrap();
+    let bound = scene.bind(&Model::default()).unwrap();
+    for rays in [999_999, 1_000_000] {
+        let traced = rays_of_run(&bound, &RunSettings { rays, ..RunSettings::default() });
+        assert!(traced.abs_diff(rays) < 1000, "{traced} for {rays}");
     }
 }

@@ -297,7 +297,7 @@ pub(crate) struct TraceOptions {
     #[arg(long, value_name = "N", value_parser = parse_listed, allow_negative_numbers = true)]
     pub(crate) faces: Option<u32>,
     /// Trace one ray again and show its path; a lost_rays.csv for all the rays in it; may be given several times
-    #[arg(long, value_name = "RAY|FILE", conflicts_with_all = ["shard", "resume", "until_error", "verify_pruning", "paths"])]
+    #[arg(long, value_name = "RAY|FILE", conflicts_with_all = ["shard", "resume", "until_error", "until_settled", "verify_pruning", "paths", "dry_run"])]
     pub(crate) replay: Vec<String>,
     /// Run the full kernel too and compare every tally bit by bit
     #[arg(long, conflicts_with_all = ["shard", "resume"])]

@@ -29,7 +29,7 @@ use crate::report::{CheckReport, unexplained, verdict};
 use crate::simulate::{RunSettings, Scene, simulate};
 use crate::study::accuracy_target::AccuracyResult;
 use crate::study::cross_check::{self, CrossCheck};
-use crate::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
+use crate::study::rays::mixed_rays;
 use crate::study::receivers::PowerComparison;
 use crate::study::{Lift, Progress, Quantiles, Summary, records};
 use crate::text::{count_of, figures, grouped};
@@ -69,6 +69,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     if given.is_some() && scene.is_none() {
         refuse_unused_options(&command.tracing)?;
     }
+    let _owned = command.output.as_deref().map(OutputPlace::folder).transpose()?;
     let model = &loaded.model;
     let monitor = TerminalMonitor::new(console);
     let requested = (command.meshing.settings(), command.tracing.settings());
@@ -152,9 +153,8 @@ fn judge(contenders: &Contenders<'_>, rays: &[Ray], loosest: f64, console: &Cons
     found
 }
 
-/// Writes `check.json`, which is `text`, and the page if it is wanted, into a folder of this run's own.
+/// Writes `check.json`, which is `text`, and the page if it is wanted, into a folder.
 fn write_folder(folder: &Path, report: &CheckReport, with_page: bool, text: &str) -> Result<(), Failure> {
-    let _owned = OutputPlace::folder(folder)?;
     if with_page {
         report.report().write(folder)?;
     }
@@ -191,7 +191,7 @@ fn report_defects(found: &CrossCheck, console: &Console) -> Completion {
     ];
     let mut completion = Completion::Complete;
     for (_, defect) in defects.iter().filter(|(is_found, _)| *is_found) {
-        console.say(defect);
+        console.insist(defect);
         completion = Completion::Incomplete;
     }
     completion
@@ -268,14 +268,7 @@ fn own_rays(
 ) -> Result<Vec<Ray>, Failure> {
     let count = tracing.rays().unwrap_or(RAYS);
     let Some(scene) = scene else {
-        let seed = tracing.seed.unwrap_or(1);
-        // A third each: coherent, random and bouncing rays find different faults.
-        let third = (count / 3).max(1);
-        let camera = Camera::new(bounds, third.min(count));
-        let uniform = Uniform::new(bounds, seed, third.min(count - camera.len()));
-        let bounces = Bounces::new(bounds, octree, loosest, seed, count - camera.len() - uniform.len());
-        let chain = Chain(vec![&camera, &uniform, &bounces]);
-        return Ok(chain.rays(0..chain.len()));
+        return Ok(mixed_rays(bounds, octree, loosest, tracing.seed.unwrap_or(1), count));
     };
     let bound = scene.bind(model)?;
     // About four segments a ray; a few more rays, so that there are enough.

@@ -45,7 +45,7 @@ const LOOK_AGAIN: Duration = Duration::from_millis(500);
 /// Puts the parts together, waiting for missing ones if asked to, and writes the results of the whole run, or the sum where the place is a
 /// `.tally`. Incomplete where light was lost or faces refused beyond the limits, or the error asked for was not reached.
 pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completion, Failure> {
-    let patience = Patience::new(command.wait)?;
+    let patience = Patience::new(command.wait);
     // Before any part is waited for.
     command.until_error.map(ErrorTarget::parse).transpose()?;
     // A sum in the place of a part: merged once more, their rays would count twice or be lost.
@@ -155,14 +155,10 @@ struct Patience {
 }
 
 impl Patience {
-    /// Starts the clock; `None` does not wait. Fails for what is no number of seconds.
-    fn new(seconds: Option<f64>) -> Result<Self, Failure> {
-        let limit = match seconds {
-            Some(s) => Duration::try_from_secs_f64(s)
-                .map_err(|_| Failure::arguments(format!("--wait {s}: not a number of seconds")))?,
-            None => Duration::ZERO,
-        };
-        Ok(Self { start: Instant::now(), limit })
+    /// Starts the clock; `None` does not wait, and what no clock counts to waits for ever.
+    fn new(seconds: Option<f64>) -> Self {
+        let limit = |s| Duration::try_from_secs_f64(s).unwrap_or(Duration::MAX);
+        Self { start: Instant::now(), limit: seconds.map_or(Duration::ZERO, limit) }
     }
 
     /// Waits [`LOOK_AGAIN`] and returns true; false, at once, when the time is over. With -v says what is missing.
@@ -348,4 +344,16 @@ fn missing_rays(whole: &PartialRun) -> Vec<String> {
         next = replicate + 1;
     }
     ranges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patience_is_as_long_as_the_seconds_and_without_end_for_inf() {
+        let limit = |seconds| Patience::new(seconds).limit;
+        assert_eq!([None, Some(2.5)].map(limit), [Duration::ZERO, Duration::from_millis(2500)]);
+        assert_eq!(limit(Some(f64::INFINITY)), Duration::MAX);
+    }
 }

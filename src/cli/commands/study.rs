@@ -21,8 +21,8 @@ use crate::intersect::exact::{
 use crate::intersect::octree::{self, Octree};
 use crate::model::Model;
 use crate::pipeline::{
-    IntersectorChoice, LoadedModel, MeshingSettings, TracingSettings, mesh_settings, tessellate_model,
-    with_intersector,
+    IntersectorChoice, LoadedModel, MeshingSettings, TracingSettings, mesh_settings, refuse_facet_normals,
+    tessellate_model, with_intersector,
 };
 use crate::report::{Section, View, study_report, tolerance_text};
 use crate::simulate::{RunSettings, Scene};
@@ -377,6 +377,7 @@ fn study_effects(command: &StudyCommand, threads: usize, console: &Console) -> R
     let settings = mesh_settings(&command.meshing, Some(&scene), &loaded.model)?;
     let (made, _) = tessellate_model(&loaded.model, &settings, &TerminalMonitor::new(console));
     let choice = IntersectorChoice::new(&command.tracing, Some(&scene))?;
+    refuse_facet_normals(&command.tracing, Some(&scene))?;
     let mut run = RunSettings { threads, ..RunSettings::from(&scene.run) };
     run.rays = command.tracing.rays().unwrap_or(run.rays.min(1_000_000));
     run.seed = command.tracing.seed.unwrap_or(run.seed);

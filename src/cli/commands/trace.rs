@@ -19,7 +19,7 @@ use crate::cli::work::threads::set_threads;
 use crate::cli::work::{end_file, input_files, lost_rays, results_folder, shards, tally_file};
 use crate::pipeline::{
     AccurateSettings, ErrorTarget, MeshingSettings, PreparedScene, SceneJob, SceneResults, TraceRequest,
-    TracingSettings, read_cached_scene, refuse_facet_normals, settings_for_accuracy,
+    TracingSettings, is_accuracy_asked, read_cached_scene, refuse_facet_normals, settings_for_accuracy,
 };
 use crate::report::seconds;
 use crate::simulate::{PartialRun, PathSink, PathVertex, Scene};
@@ -89,11 +89,13 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let requested = (command.meshing.clone(), tracing);
     let AccurateSettings { meshing, tracing, plan } =
         settings_for_accuracy(accuracy, requested, Some(&scene), &loaded.model, &monitor)?;
+    // A part that is told how to trace need not read what the others chose.
+    let chooses_as_part = is_part && !is_accuracy_asked(&meshing, &tracing, &scene);
     let job = SceneJob {
         meshing,
         tracing,
         accuracy: plan,
-        chosen: if is_part { tally_file::choice_of_parts(folder) } else { None },
+        chosen: if chooses_as_part { tally_file::choice_of_parts(folder) } else { None },
         cache,
         ..SceneJob::new(scene, loaded)
     };
@@ -222,8 +224,6 @@ fn trace_whole(
         Ok(written) => written,
         Err(failure) => return Err(rescue_results(&mut run, &remarks, &checkpoint, with_page, failure)),
     };
-    // Rays that cannot be traced again for their paths alone are not lost with these.
-    paths_written?;
     // What was missed comes before what was found.
     let unsettled = if extra.until_settled { verdicts::unsettled_sentence(&document) } else { None };
     unsettled.iter().for_each(|sentence| console.insist(sentence.replace("**", "")));
@@ -238,6 +238,8 @@ fn trace_whole(
     let ends_written = end_file::write(prepared, extra.ends.as_deref(), console);
     // Only after everything was written: until then it is all that would be left.
     checkpoint.remove();
+    // Rays that cannot be traced again for their paths alone are not lost with these.
+    paths_written?;
     ends_written?;
     let lost = lost_rays::report_lost_light(&run.results, prepared, extra.max_lost, folder, console);
     Ok(lost.and(Completion::incomplete_if(missed)))

@@ -119,7 +119,10 @@ fn sequence_view(results: &Results, facets: &Facets) -> View {
         let name = format!("{} {}", results.receivers[receiver].name, rank + 1);
         view = view.lines(&name, &near, colour);
     }
-    view.caption("Numbers are those of the tables; a way too rare to be among the recorded paths has no line.")
+    view.caption(
+        "Numbers are those of the tables. Lines are recorded paths that met the same faces in the same manner, whichever source they come from and \
+         wherever they end; a way too rare to be among them has none.",
+    )
 }
 
 /// Adds each sequence in words to the document of the results, as `way`; nothing where light was not grouped.

@@ -81,11 +81,10 @@ pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &
         let message =
             format!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons");
         // Few enough to be allowed they are no more than a remark, which a file that was cut off does not make graver.
-        if is_too_much_missing([refused, found], false, max_refused) {
-            console.insist(message)
-        } else {
-            console.say(message)
-        }
+        console.say_or_insist(is_too_much_missing([refused, found], false, max_refused), message);
+    }
+    if is_cut_off && max_refused < 1.0 {
+        console.insist("a file ends before its end section: what is missing, nothing tells");
     }
     let mut is_empty = false;
     for file in loaded.empty_files() {
@@ -102,8 +101,10 @@ pub(crate) fn report_bare_faces(prepared: &PreparedScene, max_refused: f64, cons
     if bare == 0 {
         return Completion::Complete;
     }
-    console.say(format_args!(
+    let is_incomplete = bare as f64 > max_refused * all as f64;
+    let message = format!(
         "{bare} of {all} faces have no facets, and light passes where they are; `lampyris facet` names them with the reasons"
-    ));
-    Completion::incomplete_if(bare as f64 > max_refused * all as f64)
+    );
+    console.say_or_insist(is_incomplete, message);
+    Completion::incomplete_if(is_incomplete)
 }

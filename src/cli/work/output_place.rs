@@ -2,7 +2,7 @@
 
 use crate::cli::failure::Failure;
 use crate::cli::machine;
-use crate::formats::{file_name, write_atomic};
+use crate::formats::{file_name, try_write};
 use std::fs::{self, File, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -155,10 +155,7 @@ pub(crate) fn try_file(file: &Path) -> Result<(), Failure> {
     if file.exists() && !file.is_file() {
         return Ok(());
     }
-    let beside = file.with_file_name(format!("{}.try", file_name(file)));
-    write_atomic(&beside, |_| Ok(()))?;
-    fs::remove_file(&beside)?;
-    Ok(())
+    Ok(try_write(file)?)
 }
 
 /// Returns the folder that a file is in; `.` for a bare name.

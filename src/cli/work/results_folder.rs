@@ -10,7 +10,7 @@ use crate::cli::output::closing::{LEDGER, target_sentence};
 use crate::cli::output::face_tables;
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table, sequence_tables};
-use crate::formats::{ColourMap, Facets, Polylines, read_text, write_atomic, write_facets, write_vtp};
+use crate::formats::{ColourMap, Facets, Polylines, read_text, try_write, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
 use crate::mesh::FacetMesh;
 use crate::pipeline::{IntersectorKind, PreparedScene, SceneResults, TargetResult};
@@ -50,9 +50,7 @@ pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_page: boo
     require_space(folder, page + cells.saturating_mul(CELL_BYTES) + facets * FACET_BYTES)?;
     for receiver in &scene.receivers {
         // By the names of the results: one may be too long or forbidden.
-        let file = folder.join(format!("{}.try", file_stem(&receiver.name)));
-        write_atomic(&file, |_| Ok(()))?;
-        std::fs::remove_file(&file)?;
+        try_write(&folder.join(format!("{}.csv", file_stem(&receiver.name))))?;
     }
     Ok(())
 }

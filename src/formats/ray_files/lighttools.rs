@@ -137,7 +137,7 @@ pub(super) mod tests {
     fn a_flux_that_is_none_is_told_of() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("source.ray");
-        for stated in [0.0, f32::NAN] {
+        for stated in [0.0, f32::NAN, f32::INFINITY] {
             std::fs::write(&path, file([2, 0, 1, 0, 0, 1], stated, &RAYS)).unwrap();
             let set = read_ray_set(&path, Flux::Radiant).unwrap();
             assert_eq!([set.rays[0].power, set.rays[1].power], [0.5, 1.5]);

@@ -255,10 +255,10 @@ impl RayFile {
     }
 
     /// Scales the rays to the total flux that a header states, and adds a note, where they differ by more than rounding; does nothing where
-    /// it states none, no positive one, or the rays are dark.
+    /// it states none, no positive finite one, or the rays are dark.
     pub(super) fn scale_to(&mut self, stated: Option<f64>) {
         let sum = self.sum;
-        let Some(stated) = stated.filter(|s| *s > 0.0) else { return };
+        let Some(stated) = stated.filter(|s| *s > 0.0 && s.is_finite()) else { return };
         // Dark sets cannot be scaled, and differences of rounding should not be.
         if sum <= 0.0 || (sum / stated - 1.0).abs() <= TOTAL_ROUNDING {
             return;

@@ -1,16 +1,14 @@
 //! Tolerance × normals × intersector: the cost–accuracy front, the slopes beside their theory, where the time goes.
 
+use super::Parts;
 use super::rows::{distinct, number, text};
-use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table, seconds};
+use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table};
 use crate::study::slope;
 use crate::text::figures;
 use serde_json::Value;
 
 /// Direction errors below it are rounding of unit vectors in double precision, degrees.
 const ROUNDING_DEG: f64 = 1e-7;
-
-/// The direction error that the answer speaks about, degrees.
-const WANTED_DEG: f64 = 0.05;
 
 /// A row as a point of cost against error, seconds and degrees.
 struct Point<'a> {
@@ -58,8 +56,8 @@ impl<'a> Point<'a> {
     }
 }
 
-/// Makes title, answer and sections of the accuracy study, from the rows of the most threads.
-pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
+/// Makes title and sections of the accuracy study, from the rows of the most threads.
+pub(super) fn report(rows: &[&Value]) -> Parts {
     let model = distinct(rows, "model").join(", ");
     // Facts at the largest number of threads: that is what a user waits for.
     let threads = rows.iter().filter_map(|r| r["threads"].as_u64()).max().unwrap_or(1);
@@ -73,31 +71,7 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
         .with_block(slope_chart(&chosen))
         .with_block(front_table(&points));
     let time = Section::new("Where the time goes").with_block(time_chart(&chosen));
-    (title, answer(&points), vec![section, time])
-}
-
-/// Writes which facets reach a p99 direction error of [`WANTED_DEG`] in the least time, or that none does, and what the spline costs.
-fn answer(points: &[Point]) -> String {
-    let best = (points.iter())
-        .filter(|p| p.error <= WANTED_DEG && text(p.row, "intersector") != "exact")
-        .min_by(|a, b| a.seconds.total_cmp(&b.seconds));
-    let exact = (points.iter())
-        .filter(|p| text(p.row, "intersector") == "exact")
-        .min_by(|a, b| a.seconds.total_cmp(&b.seconds));
-    let beside = exact.map_or(String::new(), |e| format!(" The exact spline costs **{}**.", seconds(e.seconds)));
-    match best {
-        Some(p) => format!(
-            "For a direction error of {WANTED_DEG}° (99th percentile) take **{}**: **{}** in all, {}° reached.{beside}",
-            p.label(),
-            seconds(p.seconds),
-            figures(p.error, 2)
-        ),
-        None => {
-            format!(
-                "No combination measured here reaches a direction error of {WANTED_DEG}° (99th percentile).{beside}"
-            )
-        }
-    }
+    (title, vec![section, time])
 }
 
 /// Whether another combination is at least as good in both time and error, and better in one.

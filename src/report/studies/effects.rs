@@ -1,8 +1,8 @@
 //! What each effect costs on a scene: the smallest kernel, each effect added alone, everything.
 
+use super::Parts;
 use super::rows::{number, text};
-use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table, seconds};
-use crate::text::figures;
+use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table};
 use serde_json::Value;
 
 /// Writes what the kernel of a row can do: the effect added, or all that it was asked for.
@@ -17,26 +17,10 @@ fn label(row: &Value) -> String {
     }
 }
 
-/// Makes title, answer and sections of the effects study; the first row must be the pruned kernel's, the last the full one's.
-pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
+/// Makes title and sections of the effects study.
+pub(super) fn report(rows: &[&Value]) -> Parts {
     let categories: Vec<String> = rows.iter().map(|r| label(r)).collect();
     let times: Vec<Option<f64>> = rows.iter().map(|r| number(r, "seconds_trace_median")).collect();
-    let answer = match (times.first(), times.last()) {
-        (Some(&Some(pruned)), Some(&Some(full))) if pruned > 0.0 && full > 0.0 => format!(
-            "What the scene needs takes **{}**, everything together {}: leaving out what is not called for is **{} ×** as \
-             fast, with {} results.",
-            seconds(pruned),
-            seconds(full),
-            figures(full / pruned, 3),
-            // Rows that do not say it count as the same.
-            if rows.iter().all(|r| r["identical"].as_bool() != Some(false)) {
-                "bit-identical"
-            } else {
-                "DIFFERENT"
-            }
-        ),
-        _ => String::new(),
-    };
     let columns = [
         ("what the kernel can do", ""),
         ("kernel", ""),
@@ -66,5 +50,5 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let caption =
         "Median time of the trace by what the kernel can do; what the scene does not call for changes no result.";
     let chart = Chart { content, ..Chart::series("effects", "Time by effect", caption, axes, Vec::new()) };
-    ("What each effect costs".into(), answer, vec![Section::new("Time").with_block(chart).with_block(table)])
+    ("What each effect costs".into(), vec![Section::new("Time").with_block(chart).with_block(table)])
 }

@@ -1,14 +1,12 @@
 //! The smaller studies: one picture of the comparison each, and the published figures beside ours where there are some.
 
+use super::Parts;
 use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, Table};
 use crate::study::interpolation::{Ratios, Row};
-use crate::text::{figures, grouped};
+use crate::text::grouped;
 use serde::Deserialize;
 use serde_json::Value;
-
-/// Title, answer and sections.
-type Parts = (String, String, Vec<Section>);
 
 /// Draws bars of the number under `value`: a category for every text under `by`, a layer for every text under `split`; the last row of a
 /// pair counts, and a pair without a row has no bar.
@@ -37,7 +35,7 @@ fn bar_chart(
     Chart { content, ..Chart::series(name, title, caption, axes, Vec::new()) }
 }
 
-/// Makes title, answer and sections of the interpolation study: tables and charts of normal errors.
+/// Makes title and sections of the interpolation study: tables and charts of normal errors.
 pub(super) fn interpolation(rows: &[&Value]) -> Parts {
     let columns = [
         ("model", ""),
@@ -77,7 +75,7 @@ pub(super) fn interpolation(rows: &[&Value]) -> Parts {
         .with_block(times)
         .with_block(ratio_table(rows))
         .with_block(table);
-    (title, "Nothing was measured.".into(), vec![section])
+    (title, vec![section])
 }
 
 /// Makes a table of the ratios of errors from nearest to bilinear to cubic normals, by model, the paper's beside them; a model without all
@@ -118,7 +116,7 @@ fn ratio_table(rows: &[&Value]) -> Table {
 /// The seed paper's table 1: share of time saved, percent.
 const PAPER_COMPLEXITY: [f64; 3] = [18.75, 25.45, 46.65];
 
-/// Makes title, answer and sections of the complexity study, beside the paper's; the answer is empty without a row of the octree.
+/// Makes title and sections of the complexity study, beside the paper's.
 pub(super) fn complexity(rows: &[&Value]) -> Parts {
     let mut table = Table::new(
         "complexity",
@@ -155,18 +153,6 @@ pub(super) fn complexity(rows: &[&Value]) -> Parts {
             paper.copied().into(),
         ]);
     }
-    let best = (rows.iter())
-        .filter(|r| text(r, "method") == "octree")
-        .filter_map(|r| Some((number(r, "ratio_to_traditional")?, *r)))
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    let answer = best.map_or(String::new(), |(ratio, row)| {
-        format!(
-            "On **{}** the facets in the octree are **{} ×** as fast as intersecting every spline surface, tessellation and \
-             build included; the paper reports 1.87 × on its most intricate lamp.",
-            text(row, "model"),
-            figures(ratio, 3)
-        )
-    });
     let keys = ["model", "method", "ratio_to_traditional"];
     let title = "How many times as fast as the traditional way";
     let caption = "Preparing and tracing together, against intersecting every spline surface with every ray (1 ×). Longer is better.";
@@ -174,7 +160,7 @@ pub(super) fn complexity(rows: &[&Value]) -> Parts {
     chart.y.label = "times as fast".into();
     let section =
         Section::new("Before and after").with_block(chart).with_block(growth_chart(rows)).with_block(table);
-    ("Three lamps, before and after".into(), answer, vec![section])
+    ("Three lamps, before and after".into(), vec![section])
 }
 
 /// Draws the seconds of a million rays over the number of spline patches, a line for each method; rows without these are left out.
@@ -195,25 +181,8 @@ fn growth_chart(rows: &[&Value]) -> Chart {
     Chart::series("growth", "How the time grows with the lamp", caption, axes, series)
 }
 
-/// Makes title, answer and sections of the benchmark against obvhs: rates by kind of rays and number of facets.
+/// Makes title and sections of the benchmark against obvhs: rates by kind of rays and number of facets.
 pub(super) fn bvh(rows: &[&Value]) -> Parts {
-    let rate = |name: &str, kind: &str| {
-        let fits = |r: &&&Value| text(r, "intersector") == name && text(r, "rays_kind") == kind;
-        // The best of calls and threads.
-        rows.iter().filter(fits).filter_map(|r| number(r, "mrays_per_s_median")).fold(0.0, f64::max)
-    };
-    let (octree, cwbvh) = (rate("octree", "incoherent"), rate("cwbvh", "incoherent"));
-    let answer = if octree > 0.0 && cwbvh > 0.0 {
-        format!(
-            "On incoherent rays the octree answers **{} million rays/s**, obvhs' CwBvh {}: **{} ×** (best call and number \
-             of threads of each, medians of alternating rounds).",
-            figures(octree, 3),
-            figures(cwbvh, 3),
-            figures(octree / cwbvh, 3)
-        )
-    } else {
-        "Octree against bounding-volume hierarchies on the same facets and rays.".into()
-    };
     let mut section = Section::new("Rates");
     for kind in distinct(rows, "rays_kind") {
         let of: Vec<&Value> = rows.iter().copied().filter(|r| text(r, "rays_kind") == kind).collect();
@@ -252,7 +221,7 @@ pub(super) fn bvh(rows: &[&Value]) -> Parts {
         section = section.with_block(chart);
     }
     section = section.with_block(rate_table(rows));
-    ("Octree against bounding-volume hierarchies".into(), answer, vec![section])
+    ("Octree against bounding-volume hierarchies".into(), vec![section])
 }
 
 /// Makes a table of every rate beside the octree's on the same model, rays, facets, call and threads; no ratio where the octree was not

@@ -1,12 +1,12 @@
 //! Right, flagged and wrong: per intersector, and per hard case.
 
+use super::Parts;
 use super::rows::{distinct, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table};
-use crate::text::grouped;
 use serde_json::Value;
 
-/// Makes title, answer and sections of the stability study: the right, flagged and wrong answers of its rows, by intersector and by case.
-pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
+/// Makes title and sections of the stability study: the right, flagged and wrong answers of its rows, by intersector and by case.
+pub(super) fn report(rows: &[&Value]) -> Parts {
     let sum = |name: &str, key: &str| -> u64 {
         rows.iter().filter(|r| text(r, "intersector") == name).filter_map(|r| r[key].as_u64()).sum()
     };
@@ -18,9 +18,6 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
         let counts = ["rays", "right", "flagged", "wrong"].map(|key| Cell::from(sum(name, key)));
         table.row(std::iter::once(Cell::from(*name)).chain(counts));
     }
-    let verdicts: Vec<String> =
-        names.iter().map(|n| format!("{n} **{}** wrong of {}", sum(n, "wrong"), grouped(sum(n, "rays")))).collect();
-    let answer = format!("Rays through edges, vertices, tangents and other trouble: {}.", verdicts.join(", "));
     let layers =
         ["flagged", "wrong"].map(|key| (key.to_owned(), names.iter().map(|n| Some(sum(n, key) as f64)).collect()));
     let content = Content::Bars {
@@ -33,7 +30,6 @@ pub(super) fn report(rows: &[&Value]) -> (String, String, Vec<Section>) {
     let chart = Chart { content, ..Chart::series("verdicts", "Flagged and wrong", caption, axes, Vec::new()) };
     (
         "Numerical stability".into(),
-        answer,
         vec![Section::new("Verdicts").with_block(chart).with_block(table).with_block(case_table(rows))],
     )
 }

@@ -41,7 +41,8 @@ pub struct Receiver {
     pub absorbs: bool,
     /// Counts light that comes against `normal` only, and lets the other pass unseen.
     pub one_sided: bool,
-    /// Counts only light that has interacted exactly this many times: at faces, or by scattering in a medium.
+    /// Counts only light that has interacted exactly this many times: at faces, those that it goes straight through among them, or by
+    /// scattering in a medium.
     pub interactions: Option<u32>,
     /// Angles of a far field: for one who looks along `normal`, positive H lies to the right and positive V up; C 0 lies to the right
     /// and C 90 up.

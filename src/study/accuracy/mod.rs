@@ -243,8 +243,8 @@ pub fn sentence(rows: &[Row], target: f64) -> String {
     };
     format!(
         "For {target}° take {choice}. On the facets 99 % of the mirrored rays keep that direction error ({}° reached). Times are \
-         those of {} rays, tracing taken in proportion.",
+         those of {}, tracing taken in proportion.",
         figures(facets.direction_error_deg_p99, 3),
-        facets.rays
+        count_of(facets.rays, "ray")
     )
 }
