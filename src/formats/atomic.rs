@@ -54,7 +54,7 @@ pub fn write_atomic(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
 ///
 /// # Errors
 /// When the folder cannot be written or no file can have such a name.
-pub(crate) fn try_write(path: &Path) -> Result<(), Error> {
+pub fn try_write(path: &Path) -> Result<(), Error> {
     let beside = unfinished(path);
     let attempt = || -> io::Result<()> {
         let _registered = Unfinished::register(&beside);

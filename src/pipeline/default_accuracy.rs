@@ -17,7 +17,7 @@ use std::slice;
 use std::sync::Arc;
 
 /// Whether settings or scene say how fine the facets are, what normals they carry or what finds the hits.
-pub(crate) fn is_accuracy_asked(meshing: &MeshingSettings, tracing: &TracingSettings, scene: &Scene) -> bool {
+pub fn is_accuracy_asked(meshing: &MeshingSettings, tracing: &TracingSettings, scene: &Scene) -> bool {
     let accuracy = &scene.accuracy;
     let in_scene = accuracy.tolerance_mm.is_some()
         || accuracy.angle_deg.is_some()

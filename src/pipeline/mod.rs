@@ -44,7 +44,7 @@ mod verdicts;
 
 pub use accuracy_target::{AccurateSettings, settings_for_accuracy, settings_for_accurate_facets};
 pub use cache::{Cache, CacheEntry};
-pub(crate) use default_accuracy::is_accuracy_asked;
+pub use default_accuracy::is_accuracy_asked;
 pub use error::{Error, ErrorKind, Excerpt};
 pub use error_target::{ErrorTarget, TargetResult};
 pub use facets::{mesh_settings, tessellate_by_part, tessellate_model};
