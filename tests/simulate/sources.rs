@@ -357,7 +357,7 @@ fn a_source_that_is_weak_beside_another_keeps_its_power_or_is_named() {
 /// Each source has a ray in every part of a run: in 200 parts for as many replicates twenty thousand would have four million.
 #[test]
 fn many_sources_trace_as_many_rays_as_are_asked_for() {
-    let source = "[[source]]\nkind = 'isotropic'\n";
+    let source = "[[source]]\nkind = 'point'\n";
     let scene = Scene::parse(&source.repeat(20_000), "many.toml", Path::new(".")).unwrap();
     let bound = scene.bind(&Model::default()).unwrap();
     for rays in [999_999, 1_000_000] {
