@@ -136,8 +136,8 @@ fn gaussian(x: f64, width: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optics::chromaticity;
     use crate::optics::testing::numbers;
+    use crate::optics::{chromaticity, xyz_of_watt};
 
     fn xy(s: &Spectrum) -> [f64; 2] {
         chromaticity(s.sampler().unwrap().xyz()).unwrap()
