@@ -52,10 +52,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     // Before any work: a folder that cannot be made would cost it.
     let outputs = outputs_of(command);
     let guard = InputGuard::new(command.rays_in.iter().map(PathBuf::as_path).chain([command.file.as_path()]));
-    for (option, path) in &outputs {
-        guard.refuse(option, path)?;
-        try_file(path)?;
-    }
+    outputs.iter().try_for_each(|(option, path)| guard.refuse(option, path).and_then(|()| try_file(path)))?;
     let threads = threads::set_threads(command.tracing.threads)?;
     let given = command.rays_in.as_deref().map(read_rays).transpose()?;
     let input = input_files::scene_or_model(&command.file, command.placed, console)?;

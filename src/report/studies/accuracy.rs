@@ -1,6 +1,5 @@
 //! Tolerance × normals × intersector: the cost–accuracy front, the slopes beside their theory, where the time goes.
 
-use super::Parts;
 use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table};
 use crate::study::slope;
@@ -57,7 +56,7 @@ impl<'a> Point<'a> {
 }
 
 /// Makes title and sections of the accuracy study, from the rows of the most threads.
-pub(super) fn report(rows: &[&Value]) -> Parts {
+pub(super) fn report(rows: &[&Value]) -> (String, Vec<Section>) {
     let model = distinct(rows, "model").join(", ");
     // Facts at the largest number of threads: that is what a user waits for.
     let threads = rows.iter().filter_map(|r| r["threads"].as_u64()).max().unwrap_or(1);

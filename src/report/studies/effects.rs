@@ -1,6 +1,5 @@
 //! What each effect costs on a scene: the smallest kernel, each effect added alone, everything.
 
-use super::Parts;
 use super::rows::{number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table};
 use serde_json::Value;
@@ -18,7 +17,7 @@ fn label(row: &Value) -> String {
 }
 
 /// Makes title and sections of the effects study.
-pub(super) fn report(rows: &[&Value]) -> Parts {
+pub(super) fn report(rows: &[&Value]) -> (String, Vec<Section>) {
     let categories: Vec<String> = rows.iter().map(|r| label(r)).collect();
     let times: Vec<Option<f64>> = rows.iter().map(|r| number(r, "seconds_trace_median")).collect();
     let columns = [

@@ -10,9 +10,6 @@ mod stability;
 use super::{Cell, Provenance, Report, Section, Table};
 use serde_json::Value;
 
-/// Title and sections of a study's report.
-type Parts = (String, Vec<Section>);
-
 /// Makes the report of a study document as `lampyris study … --json` prints it. What is missing in it, or of an unknown study, is left out.
 pub fn study_report(document: &Value, provenance: Provenance) -> Report {
     // Whatever is missing in the document is an empty list: a kept file of an older program is drawn as far as it

@@ -1,6 +1,5 @@
 //! The smaller studies: one picture of the comparison each, and the published figures beside ours where there are some.
 
-use super::Parts;
 use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, Table};
 use crate::study::interpolation::{Ratios, Row};
@@ -36,7 +35,7 @@ fn bar_chart(
 }
 
 /// Makes title and sections of the interpolation study: tables and charts of normal errors.
-pub(super) fn interpolation(rows: &[&Value]) -> Parts {
+pub(super) fn interpolation(rows: &[&Value]) -> (String, Vec<Section>) {
     let columns = [
         ("model", ""),
         ("algorithm", ""),
@@ -117,7 +116,7 @@ fn ratio_table(rows: &[&Value]) -> Table {
 const PAPER_COMPLEXITY: [f64; 3] = [18.75, 25.45, 46.65];
 
 /// Makes title and sections of the complexity study, beside the paper's.
-pub(super) fn complexity(rows: &[&Value]) -> Parts {
+pub(super) fn complexity(rows: &[&Value]) -> (String, Vec<Section>) {
     let mut table = Table::new(
         "complexity",
         "Before and after",
@@ -182,7 +181,7 @@ fn growth_chart(rows: &[&Value]) -> Chart {
 }
 
 /// Makes title and sections of the benchmark against obvhs: rates by kind of rays and number of facets.
-pub(super) fn bvh(rows: &[&Value]) -> Parts {
+pub(super) fn bvh(rows: &[&Value]) -> (String, Vec<Section>) {
     let mut section = Section::new("Rates");
     for kind in distinct(rows, "rays_kind") {
         let of: Vec<&Value> = rows.iter().copied().filter(|r| text(r, "rays_kind") == kind).collect();

@@ -1,12 +1,11 @@
 //! Right, flagged and wrong: per intersector, and per hard case.
 
-use super::Parts;
 use super::rows::{distinct, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Table};
 use serde_json::Value;
 
 /// Makes title and sections of the stability study: the right, flagged and wrong answers of its rows, by intersector and by case.
-pub(super) fn report(rows: &[&Value]) -> Parts {
+pub(super) fn report(rows: &[&Value]) -> (String, Vec<Section>) {
     let sum = |name: &str, key: &str| -> u64 {
         rows.iter().filter(|r| text(r, "intersector") == name).filter_map(|r| r[key].as_u64()).sum()
     };
