@@ -4,6 +4,7 @@ use super::bind::BoundScene;
 use super::emitter::{Portion, RaySampler};
 use super::outcome::{Event, PathVertex};
 use super::plan::Plan;
+use super::receiver::Receiver;
 use super::results::Results;
 use super::settings::RunSettings;
 use crate::formats::LightRay;
@@ -29,26 +30,12 @@ pub fn arrivals(bound: &BoundScene, settings: &RunSettings, receiver: usize, res
     let mut rays = Vec::new();
     for path in results.paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
         let first = rays.len();
-        for pair in path.windows(2) {
-            let [a, b] = [&pair[0], &pair[1]];
-            // Vertices may coincide, as where a path splits.
-            let Some(direction) = (b.point - a.point).try_normalize() else { continue };
-            // The filters of the receiver itself: bounces that it counts, and, where it ends light, segments that
-            // end on it.
-            if receiver.interactions.is_some_and(|n| n != b.bounce)
-                || receiver.absorbs && b.event != Event::Received
-            {
-                continue;
-            }
+        for crossing in crossings(receiver, path) {
+            let [a, b] = crossing.segment;
             // A receiver that lets light pass counts it before the next face takes its part.
             let power = if receiver.absorbs { b.power } else { a.power } * share;
-            let (ray, end) = (Ray::new(a.point, direction), segment_end(a, b, receiver.absorbs));
-            let mut after = 0.0;
-            // A sphere may be crossed twice by one segment.
-            while let Some(t) = receiver.crossing(&ray, after, end) {
-                rays.push(LightRay { origin: ray.point_at(t), direction, power, wavelength_nm: None });
-                after = t;
-            }
+            let (origin, direction) = (crossing.point(), crossing.ray.direction);
+            rays.push(LightRay { origin, direction, power, wavelength_nm: None });
         }
         // On its way light keeps the wavelength that its source gave it.
         let wavelength_nm = if rays.len() > first { wavelength(bound, settings, &plan, path[0].ray) } else { None };
@@ -60,6 +47,47 @@ pub fn arrivals(bound: &BoundScene, settings: &RunSettings, receiver: usize, res
         rays.iter_mut().for_each(|ray| ray.power *= counted.power / sum);
     }
     rays
+}
+
+/// Where a recorded path crosses a receiver.
+pub(super) struct Crossing<'p> {
+    /// Place in the path of the vertex before it.
+    pub(super) first: usize,
+    /// The vertices before it and after it.
+    pub(super) segment: [&'p PathVertex; 2],
+    /// The way from the one to the other.
+    ray: Ray,
+    /// Distance from the vertex before, mm.
+    distance: f64,
+}
+
+impl Crossing<'_> {
+    /// Where it is, mm.
+    pub(super) fn point(&self) -> Point {
+        self.ray.point_at(self.distance)
+    }
+}
+
+/// Returns the crossings of a recorded path with a plane, disc or sphere that counts them; none for any other receiver.
+pub(super) fn crossings<'p>(receiver: &Receiver, path: &'p [PathVertex]) -> Vec<Crossing<'p>> {
+    let mut found = Vec::new();
+    for (first, pair) in path.windows(2).enumerate() {
+        let segment @ [a, b] = [&pair[0], &pair[1]];
+        // Vertices may coincide, as where a path splits.
+        let Some(direction) = (b.point - a.point).try_normalize() else { continue };
+        // The filters of the receiver itself: bounces that it counts, and, where it ends light, segments that end on it.
+        if receiver.interactions.is_some_and(|n| n != b.bounce) || receiver.absorbs && b.event != Event::Received {
+            continue;
+        }
+        let (ray, end) = (Ray::new(a.point, direction), segment_end(a, b, receiver.absorbs));
+        let mut after = 0.0;
+        // A sphere may be crossed twice by one segment.
+        while let Some(distance) = receiver.crossing(&ray, after, end) {
+            found.push(Crossing { first, segment, ray, distance });
+            after = distance;
+        }
+    }
+    found
 }
 
 /// Returns the wavelength of a ray, nm, drawn again as its source did; `None` in a run of one wavelength, or for a ray that it does not

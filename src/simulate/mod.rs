@@ -44,6 +44,7 @@ mod power_scale;
 pub mod random;
 mod receiver;
 mod receiver_results;
+mod recorded_ways;
 mod recorder;
 mod results;
 mod run;
@@ -78,13 +79,14 @@ pub use plan::GROWING_REPLICATE;
 #[cfg(feature = "report")]
 pub(crate) use pole_rings::PoleRings;
 pub use receiver_results::{ChannelResult, ReceiverResult};
+pub use recorded_ways::{RecordedWay, recorded_ways};
 pub use results::{Absorbed, EffectsUsed, Power, Results};
 pub use run::{
     ask_again, grows, rays_of_run, replay, replicate_range, replicates, shard_replicates, simulate, trace,
 };
 pub use scene::{MOST_RAYS, Scene};
 pub use seconds::{MergedSeconds, Seconds};
-pub use sequence::{MOST_STEPS, RecordedWay, Sequence, SequenceStep, SequenceSums, recorded_ways};
+pub use sequence::{MOST_STEPS, Sequence, SequenceStep, SequenceSums};
 pub use sequence_results::{ReceiverSequences, SequenceResult};
 pub(crate) use settings::machine_threads;
 pub use settings::{KernelChoice, RunSettings};

@@ -5,7 +5,6 @@ use super::outcome::{Event, PathVertex};
 use super::random::split_branch;
 use super::receiver::Shape;
 use super::tally::Sum;
-use crate::math::Point;
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -36,6 +35,25 @@ pub struct Sequence {
     pub more: bool,
 }
 
+impl Sequence {
+    /// Makes the way of light that a receiver counted after these steps.
+    pub(super) fn new(receiver: u32, source: u32, mut steps: Vec<SequenceStep>) -> Self {
+        let more = steps.len() > MOST_STEPS;
+        steps.truncate(MOST_STEPS);
+        Self { receiver, source, steps, more }
+    }
+
+    /// Makes the way of light that a face took after these steps.
+    pub(super) fn absorbed(receiver: u32, source: u32, steps: Vec<SequenceStep>, face: u32) -> Self {
+        let mut sequence = Self::new(receiver, source, steps);
+        // A way that was cut does not tell how it ended.
+        if !sequence.more {
+            sequence.steps.push(SequenceStep { face: Some(face), event: Event::Absorbed });
+        }
+        sequence
+    }
+}
+
 /// Where some light of a recorded path was counted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum DepositPlace {
@@ -62,11 +80,11 @@ pub(crate) type SequenceTally = BTreeMap<Sequence, u128>;
 pub type SequenceSums = BTreeMap<Sequence, Sum>;
 
 /// The vertices of one ray by the path that split off it; each list in the order of the path.
-struct RayPaths<'v>(FxHashMap<u32, Vec<&'v PathVertex>>);
+pub(super) struct RayPaths<'v>(FxHashMap<u32, Vec<&'v PathVertex>>);
 
 impl<'v> RayPaths<'v> {
     /// Groups the vertices of one ray by branch.
-    fn new(vertices: &'v [PathVertex]) -> Self {
+    pub(super) fn new(vertices: &'v [PathVertex]) -> Self {
         let mut by_branch: FxHashMap<u32, Vec<&PathVertex>> = FxHashMap::default();
         vertices.iter().for_each(|v| by_branch.entry(v.branch).or_default().push(v));
         Self(by_branch)
@@ -74,7 +92,7 @@ impl<'v> RayPaths<'v> {
 
     /// Returns what happened to the light of a branch before its hit of this number, from the source on; empty for a branch without
     /// vertices.
-    fn steps(&self, branch: u32, bounce: u32) -> Vec<SequenceStep> {
+    pub(super) fn steps(&self, branch: u32, bounce: u32) -> Vec<SequenceStep> {
         let Some(vertices) = self.0.get(&branch) else { return Vec::new() };
         let mut steps = match vertices.first() {
             Some(first) if first.event == Event::Split => self.steps_before_split(branch, first.bounce),
@@ -115,53 +133,17 @@ pub(crate) fn add_ray(
     // Light that is counted several times on its way, as by receivers that let it pass, is in a sequence of each.
     let paths = RayPaths::new(vertices);
     for deposit in deposits {
-        let mut steps = paths.steps(deposit.branch, deposit.bounce);
-        let more = steps.len() > MOST_STEPS;
-        steps.truncate(MOST_STEPS);
-        let mut add = |receiver: u32, steps: Vec<SequenceStep>| {
-            *tally.entry(Sequence { receiver, source, steps, more }).or_default() += u128::from(deposit.quanta);
-        };
+        let steps = paths.steps(deposit.branch, deposit.bounce);
+        let mut add = |sequence: Sequence| *tally.entry(sequence).or_default() += u128::from(deposit.quanta);
         match deposit.place {
-            DepositPlace::Receiver(receiver) => add(receiver, steps),
+            DepositPlace::Receiver(receiver) => add(Sequence::new(receiver, source, steps)),
             DepositPlace::Face(face) => {
-                // A way that was cut does not tell how it ended.
-                if !more {
-                    steps.push(SequenceStep { face: Some(face), event: Event::Absorbed });
-                }
-                for (r, receiver) in bound.receivers.iter().enumerate() {
+                for (r, receiver) in (0..).zip(&bound.receivers) {
                     if matches!(&receiver.shape, Shape::Absorbed { faces } if faces.binary_search(&face).is_ok()) {
-                        add(r as u32, steps.clone());
+                        add(Sequence::absorbed(r, source, steps.clone(), face));
                     }
                 }
             }
         }
     }
-}
-
-/// A recorded path and what happened on it.
-#[derive(Clone, Debug)]
-pub struct RecordedWay {
-    /// What happened, in the order of the path.
-    pub steps: Vec<SequenceStep>,
-    /// Its vertices, mm; of a path that split off those from there on.
-    pub points: Vec<Point>,
-}
-
-/// Returns the way of each recorded path from its source, at most [`MOST_STEPS`] steps. Vertices must stand in the order of rays, branches
-/// and hits.
-pub fn recorded_ways(vertices: &[PathVertex]) -> Vec<RecordedWay> {
-    let mut ways = Vec::new();
-    for ray in vertices.chunk_by(|a, b| a.ray == b.ray) {
-        let paths = RayPaths::new(ray);
-        for path in ray.chunk_by(|a, b| a.branch == b.branch) {
-            let last = &path[path.len() - 1];
-            let mut steps = paths.steps(last.branch, last.bounce);
-            if last.event == Event::Absorbed {
-                steps.push(SequenceStep { face: last.face, event: Event::Absorbed });
-            }
-            steps.truncate(MOST_STEPS);
-            ways.push(RecordedWay { steps, points: path.iter().map(|v| v.point).collect() });
-        }
-    }
-    ways
 }

@@ -6,6 +6,7 @@ use lampyris::simulate::{
     Event, Hooks, MOST_STEPS, PartialRun, Results, RunSettings, Scene, SequenceResult, arrivals, recorded_ways,
     trace,
 };
+use std::collections::BTreeSet;
 use std::path::Path;
 
 const GLASS: &str = "[[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart = 'glass'\nmedium = 'glass'\n";
@@ -140,9 +141,12 @@ fn scattering_in_a_body_is_a_step_in_its_place() {
     let text = "[run]\nrays = 500\n[[medium]]\nname = 'fog'\nindex = 1.5\nscatter_per_mm = 0.1\n\
                 [[material]]\npart = 'fog'\nmedium = 'fog'\n[[source]]\nkind = 'point'\nat = [0, 0, 0]\n\
                 [[receiver]]\nname = 'all'\nkind = 'sphere'\nat = [0, 0, 0]\nradius = 40\n";
-    let paths = world.run(text, |s| s.path_samples = s.rays).paths;
+    let results = world.run(text, |s| s.path_samples = s.rays);
+    let paths = &results.paths;
     assert!(paths.iter().filter(|v| v.event == Event::Scattered).count() > 200);
-    let ways = recorded_ways(&paths);
+    let scene = Scene::parse(text, "test.toml", Path::new(".")).unwrap();
+    let ways = recorded_ways(&scene.bind(&world.model).unwrap(), &RunSettings::from(&scene.run), 0, &results);
+    assert_eq!(ways.len(), 500);
     for (path, way) in paths.chunk_by(|a, b| a.ray == b.ray).zip(&ways) {
         let [first, hits @ .., last] = path else { panic!("{path:?}") };
         // The source, then the hits by their number, then the receiver: outside the ball, so that the last hit is of its face.
@@ -150,7 +154,35 @@ fn scattering_in_a_body_is_a_step_in_its_place() {
         assert!(hits.iter().enumerate().all(|(k, hit)| hit.bounce as usize == k), "{hits:?}");
         assert_eq!(hits.last().unwrap().event, Event::Transmitted);
         let told: Vec<_> = hits.iter().map(|hit| (hit.face, hit.event)).take(MOST_STEPS).collect();
-        assert_eq!(way.steps.iter().map(|s| (s.face, s.event)).collect::<Vec<_>>(), told);
+        assert_eq!(way.sequence.steps.iter().map(|s| (s.face, s.event)).collect::<Vec<_>>(), told);
+    }
+}
+
+/// Where every ray is recorded its ways are the sequences that were counted: those of each receiver, from their source, and no others.
+#[test]
+fn recorded_ways_are_the_sequences_that_were_counted() {
+    let (world, text) = world();
+    let far =
+        "[[receiver]]\nname = 'up'\nkind = 'far_field'\nnormal = [0, 1, 0]\nh_deg = [-80, 80]\nv_deg = [-80, 80]\n";
+    let ball = text.find("[[receiver]]\nname = 'ball'").unwrap();
+    let mirror = text.find("[[receiver]]\nname = 'mirror'").unwrap();
+    let open = [&text[..ball], far, &text[mirror..]].concat();
+    for (text, interfaces) in [(&text, "roulette"), (&text, "split"), (&open, "roulette"), (&open, "split")] {
+        let text = text
+            .replace("[run]", &format!("[run]\ninterfaces = '{interfaces}'\nsplit_floor = 0.01"))
+            .replace("rays = 20000", "rays = 3000");
+        let results = world.run(&text, |s| s.path_samples = s.rays);
+        let scene = Scene::parse(&text, "test.toml", Path::new(".")).unwrap();
+        let bound = scene.bind(&world.model).unwrap();
+        let settings = RunSettings::from(&scene.run);
+        let ways = |r| recorded_ways(&bound, &settings, r, &results);
+        let recorded: BTreeSet<_> = (0..4).flat_map(ways).map(|way| way.sequence).collect();
+        let counted: BTreeSet<_> = results.tallies.sequences.keys().cloned().collect();
+        assert!(counted.len() > 20 && recorded == counted, "{interfaces}: {} {}", recorded.len(), counted.len());
+        // They end where they were counted: the planes stand across z.
+        for (r, z) in [(0, 30.0), (1, -7.0)] {
+            assert!(ways(r).iter().all(|way| (way.points.last().unwrap().z - z).abs() < 1e-9));
+        }
     }
 }
 

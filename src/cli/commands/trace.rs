@@ -8,6 +8,7 @@ use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
 use crate::cli::output::json::json_text;
+use crate::cli::output::sentences::plain_sentence;
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, continued_settings, refuse_overwriting};
 use crate::cli::work::input_guard::InputGuard;
@@ -226,7 +227,7 @@ fn trace_whole(
     };
     // What was missed comes before what was found.
     let unsettled = if extra.until_settled { verdicts::unsettled_sentence(&document) } else { None };
-    unsettled.iter().for_each(|sentence| console.insist(sentence.replace("**", "")));
+    unsettled.iter().for_each(|sentence| console.insist(plain_sentence(sentence)));
     let missed = remarks.target.as_ref().is_some_and(|result| !result.reached) || unsettled.is_some();
     let sentences = unsettled.map_or(remarks.sentences, |sentence| vec![sentence]);
     let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };

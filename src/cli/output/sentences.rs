@@ -25,9 +25,14 @@ pub(crate) fn sentence_lines(label: &str, indent: usize, sentence: &str, width: 
     label.to_owned() + &lines.join(&format!("\n{:indent$}", "")) + "\n"
 }
 
+/// Returns a sentence of Markdown without its emphasis.
+pub(crate) fn plain_sentence(markdown: &str) -> String {
+    markdown.replace("**", "")
+}
+
 /// Returns a sentence of Markdown in such lines below one another, without its emphasis, set in by two columns.
 pub(crate) fn plain_sentence_lines(markdown: &str, width: usize) -> String {
-    sentence_lines("  ", 2, &markdown.replace("**", ""), width)
+    sentence_lines("  ", 2, &plain_sentence(markdown), width)
 }
 
 #[cfg(test)]

@@ -5,8 +5,9 @@ use crate::cli::console::{Console, print};
 use crate::cli::output::terminal_tables::table_text;
 use crate::formats::{Facets, Polylines};
 use crate::model::{Model, PlacedFace};
+use crate::pipeline::PreparedScene;
 use crate::report::{Cell, Section, Table, View, file_stem};
-use crate::simulate::{Event, Results, SequenceResult, recorded_ways};
+use crate::simulate::{Event, Results, Sequence, SequenceResult, recorded_ways};
 use crate::text::{count_of, figures};
 use serde_json::Value;
 use std::io;
@@ -93,18 +94,17 @@ fn sequence_tables(results: &Results, model: &Model, unit: &str) -> Vec<Table> {
 }
 
 /// Returns the section of a page with view and tables; `None` where light was not grouped.
-pub(crate) fn sequence_section(results: &Results, model: &Model, facets: &Facets, unit: &str) -> Option<Section> {
-    let tables = sequence_tables(results, model, unit);
+pub(crate) fn sequence_section(prepared: &PreparedScene, results: &Results, facets: &Facets) -> Option<Section> {
+    let tables = sequence_tables(results, &prepared.job.loaded.model, prepared.power_unit());
     if tables.is_empty() {
         return None;
     }
-    let section = Section::new("Ways of light").with_block(sequence_view(results, facets));
+    let section = Section::new("Ways of light").with_block(sequence_view(prepared, results, facets));
     Some(tables.into_iter().fold(section, Section::with_block))
 }
 
 /// Draws recorded paths of the first sequences of each receiver, a colour for each; cut a little outside of the model, mm.
-fn sequence_view(results: &Results, facets: &Facets) -> View {
-    let ways = recorded_ways(&results.paths);
+fn sequence_view(prepared: &PreparedScene, results: &Results, facets: &Facets) -> View {
     let mut view = View::of_facets("sequences", "Paths of the first ways", facets).faded(0.35);
     // Rank by rank, so that every receiver has its first way drawn before any has its second.
     let first = (0..DRAWN.len()).flat_map(|rank| {
@@ -112,16 +112,21 @@ fn sequence_view(results: &Results, facets: &Facets) -> View {
         of_rank.filter_map(move |(r, found)| Some((r, rank, found.first.get(rank)?)))
     });
     for ((receiver, rank, sequence), colour) in first.zip(DRAWN) {
+        let ways = recorded_ways(&prepared.bound, &prepared.run_settings(), receiver, results);
+        let is_same = |way: &Sequence| {
+            (way.source, way.more) == (sequence.source, sequence.more) && way.steps == sequence.steps
+        };
         let mut lines = Polylines::default();
-        let same = ways.iter().filter(|w| w.steps == sequence.steps);
-        same.take(MOST_DRAWN).for_each(|w| lines.push(w.points.iter().copied()));
+        ways.iter()
+            .filter(|w| is_same(&w.sequence))
+            .take(MOST_DRAWN)
+            .for_each(|w| lines.push(w.points.iter().copied()));
         let near = lines.near(&facets.mesh.bounds());
         let name = format!("{} {}", results.receivers[receiver].name, rank + 1);
         view = view.lines(&name, &near, colour);
     }
     view.caption(
-        "Numbers are those of the tables. Lines are recorded paths that met the same faces in the same manner, whichever source they come from and \
-         wherever they end; a way too rare to be among them has none.",
+        "Numbers are those of the tables. Lines are recorded paths up to where the receiver counted them; a way too rare to be among them has none.",
     )
 }
 

@@ -75,16 +75,16 @@ pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &
     if hidden > 0 {
         console.say(format_args!("light meets {hidden} items that the model hides; `lampyris info` lists them"));
     }
-    let is_cut_off = loaded.reports.iter().any(|r| r.cut_off);
-    let is_incomplete = is_too_much_missing([refused, found], is_cut_off, max_refused);
+    let cut_off: Vec<&str> = loaded.reports.iter().filter(|r| r.cut_off).map(|r| r.file.as_str()).collect();
+    let is_incomplete = is_too_much_missing([refused, found], !cut_off.is_empty(), max_refused);
     if refused > 0 {
         let message =
             format!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons");
         // Few enough to be allowed they are no more than a remark, which a file that was cut off does not make graver.
         console.say_or_insist(is_too_much_missing([refused, found], false, max_refused), message);
     }
-    if is_cut_off && max_refused < 1.0 {
-        console.insist("a file ends before its end section: what is missing, nothing tells");
+    for file in cut_off.iter().filter(|_| max_refused < 1.0) {
+        console.insist(format_args!("{file} ends before its end section: what is missing, nothing tells"));
     }
     let mut is_empty = false;
     for file in loaded.empty_files() {

@@ -9,6 +9,7 @@ use crate::cli::machine;
 use crate::cli::output::closing::{LEDGER, target_sentence};
 use crate::cli::output::face_tables;
 use crate::cli::output::json::{json_text, json_value};
+use crate::cli::output::sentences::plain_sentence;
 use crate::cli::output::{appearance, octree_shape, receiver_files, rule_table, sequence_tables};
 use crate::formats::{ColourMap, Facets, Polylines, read_text, try_write, write_atomic, write_facets, write_vtp};
 use crate::intersect::octree::Octree;
@@ -119,7 +120,7 @@ impl RunRemarks {
     pub(crate) fn say_target(target: Option<TargetResult>, console: &Console) -> Self {
         let sentences: Vec<String> = target.iter().map(target_sentence).collect();
         let is_missed = target.as_ref().is_some_and(|target| !target.reached);
-        for sentence in sentences.iter().map(|sentence| sentence.replace("**", "")) {
+        for sentence in sentences.iter().map(|sentence| plain_sentence(sentence)) {
             if is_missed {
                 console.insist(sentence);
             } else if console.json {
@@ -249,15 +250,10 @@ fn report_page<'a>(
         power,
         chosen: prepared.chosen.as_ref(),
         verdicts,
-        sections: sequence_tables::sequence_section(
-            &run.results,
-            &prepared.job.loaded.model,
-            facets,
-            prepared.power_unit(),
-        )
-        .into_iter()
-        .chain(face_tables::face_section(run, prepared))
-        .collect(),
+        sections: sequence_tables::sequence_section(prepared, &run.results, facets)
+            .into_iter()
+            .chain(face_tables::face_section(run, prepared))
+            .collect(),
         views: Vec::new(),
         tables: [
             (!prepared.bound.rules().is_empty())
