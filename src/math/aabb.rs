@@ -1,6 +1,6 @@
 //! Axis-aligned boxes and where rays cross them.
 
-use super::{Point, Ray, Vector};
+use super::{Frame, Point, Ray, Vector};
 
 /// An axis-aligned box `[min, max]`; empty when any `min > max`.
 ///
@@ -85,6 +85,14 @@ impl Aabb {
     pub fn with_room(self) -> Self {
         let largest = self.min.abs().max(self.max.abs()).max_element();
         self.grown(ROOM[0] * self.diagonal() + ROOM[1] * largest)
+    }
+
+    /// The smallest box around this one where a placement puts it; an empty one stays empty.
+    pub fn placed(&self, placement: &Frame) -> Self {
+        if self.is_empty() {
+            return Self::EMPTY;
+        }
+        Self::from_points(self.corners().map(|p| placement.point(p)))
     }
 
     /// The eight corners; bit 0, 1 or 2 of the index is set where x, y or z is the upper one.

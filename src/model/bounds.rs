@@ -68,7 +68,7 @@ impl Model {
             let whole = &hulls[instance.part.0 as usize].whole;
             // A part without shapes reaches nowhere.
             if !whole.is_empty() {
-                placed_hulls.push((placed(whole, &instance.placement), i));
+                placed_hulls.push((whole.placed(&instance.placement), i));
             }
         }
         let mut bounds = Aabb::EMPTY;
@@ -111,7 +111,7 @@ impl<'m> PartHulls<'m> {
     fn grow(&self, mut bounds: Aabb, side: Side, placement: &Frame) -> Aabb {
         let mut reaches: Vec<(f64, usize)> = Vec::with_capacity(self.shapes.len());
         for (k, (_, hull)) in self.shapes.iter().enumerate() {
-            reaches.push((side.reach(&placed(hull, placement)), k));
+            reaches.push((side.reach(&hull.placed(placement)), k));
         }
         reaches.sort_by(|a, b| b.0.total_cmp(&a.0));
         for (reach, k) in reaches {
@@ -129,11 +129,6 @@ impl<'m> PartHulls<'m> {
         }
         bounds
     }
-}
-
-/// A box around a box where a placement puts it.
-fn placed(local: &Aabb, placement: &Frame) -> Aabb {
-    Aabb::from_points(local.corners().map(|p| placement.point(p)))
 }
 
 /// Whether a box holds another wholly.

@@ -112,8 +112,7 @@ impl Instancing {
                     boxes.len() as u32 - 1
                 });
                 let frame = Frame { scale: 1.0, ..instance.placement };
-                let corners = boxes[group as usize].corners().map(|p| frame.point(p));
-                let bounds = Aabb::from_points(corners).with_room();
+                let bounds = boxes[group as usize].placed(&frame).with_room();
                 instancing.placements.push(Placement { group, frame, bounds, first_face: first });
                 (0, instancing.placements.len() as u32 - 1)
             };

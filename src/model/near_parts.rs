@@ -37,7 +37,7 @@ pub(super) fn near_another(model: &Model, often: &[bool], glue_mm: f64) -> Vec<b
     let (mut boxes, mut owners) = (Vec::new(), Vec::new());
     for (k, instance) in model.instances.iter().enumerate() {
         for face in &faces[instance.part.0 as usize] {
-            boxes.push(placed(face, &instance.placement).grown(room));
+            boxes.push(face.placed(&instance.placement).grown(room));
             owners.push(k as u32);
         }
     }
@@ -60,17 +60,12 @@ fn curved(part: &Part) -> impl Iterator<Item = &Face> {
     faces.filter(|f| !matches!(f.analytic, Analytic::Plane { .. }))
 }
 
-/// Returns a box around a box where a placement puts it.
-fn placed(bounds: &Aabb, placement: &Frame) -> Aabb {
-    Aabb::from_points(bounds.corners().map(|p| placement.point(p)))
-}
-
 impl NearSearch {
     /// Marks the instances that a placed face, which may stray from its edges by its gap, comes near to.
     fn mark_near_face(&mut self, face: &Face, placement: &Frame) {
         let room = face.gap * placement.scale;
         // Before the face is cut: most come near nothing.
-        if self.meets_unmarked(&placed(&face.surface.bounds(), placement).grown(room)) {
+        if self.meets_unmarked(&face.surface.bounds().placed(placement).grown(room)) {
             for patch in face.surface.bezier_patches() {
                 self.mark_near_patch(&patch, (placement, room), 2 * HALVINGS);
             }
@@ -81,7 +76,7 @@ impl NearSearch {
     /// patch's placement and how far, mm, its face may stray.
     fn mark_near_patch(&mut self, patch: &BezierPatch, place: (&Frame, f64), halvings: usize) {
         let (placement, room) = place;
-        let bounds = placed(&patch.bounds(), placement).grown(room);
+        let bounds = patch.bounds().placed(placement).grown(room);
         if !self.meets_unmarked(&bounds) {
             return;
         }

@@ -1,7 +1,7 @@
 //! The model: parts where they stand, and their faces in the order of their ids.
 
 use super::{Colour, Face, Part, PartId, SurfaceKind, TessellatedFace};
-use crate::math::{FaceId, Frame};
+use crate::math::{Aabb, FaceId, Frame};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 
@@ -69,7 +69,24 @@ pub struct PlacedFace<'a> {
     pub placement: &'a Frame,
 }
 
+impl PlacedFace<'_> {
+    /// Returns a box around it in the model's coordinates, mm: of its whole surface, trims left out; empty for a face without geometry.
+    pub fn bounds(&self) -> Aabb {
+        let local = match (self.face, self.tessellated) {
+            (Some(face), _) => face.surface.bounds(),
+            (None, Some(ready)) => ready.mesh.bounds(),
+            (None, None) => Aabb::EMPTY,
+        };
+        local.placed(self.placement)
+    }
+}
+
 impl Model {
+    /// Returns a box around the surfaces of all placed faces, mm, trims left out; [`Model::bounds`] is that of the faces themselves.
+    pub fn surface_bounds(&self) -> Aabb {
+        self.placed_faces().map(|face| face.bounds()).fold(Aabb::EMPTY, Aabb::union)
+    }
+
     /// A model of one part that stands where it is, with the part's name for both model and instance.
     pub fn from_part(part: Part) -> Self {
         let name = part.name.clone();

@@ -19,7 +19,7 @@ impl Part {
         let ready = self.tessellated.iter().map(|t| t.mesh.bounds());
         let vertices = Aabb::from_points(self.vertices.iter().copied());
         let whole = faces.chain(ready).fold(vertices, Aabb::union);
-        Aabb::from_points(whole.corners().map(|p| frame.point(p)))
+        whole.placed(&frame)
     }
 }
 

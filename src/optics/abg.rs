@@ -2,6 +2,7 @@
 
 use super::error::{Error, ErrorKind, require};
 use crate::math::Vector;
+use crate::math::quadrature::GAUSS;
 use std::f64::consts::PI;
 
 /// The ABg model of polished surfaces: `BSDF = A/(B + |β − β₀|^g)`, β the direction cosines in the surface.
@@ -112,14 +113,8 @@ impl Abg {
     /// Share scattered between two radii, the integral of the weight, by Gauss–Legendre with five points: 1e-13 of the whole on these
     /// rings.
     fn ring(&self, from: f64, to: f64) -> f64 {
-        const NODES: [(f64, f64); 3] = [
-            (0.0, 128.0 / 225.0),
-            (0.538_469_310_105_683, 0.478_628_670_499_366_5),
-            (0.906_179_845_938_664, 0.236_926_885_056_189_1),
-        ];
-        let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-        let pair = |x: f64| self.weight(middle - half * x) + self.weight(middle + half * x);
-        half * (NODES[0].1 * self.weight(middle) + NODES[1].1 * pair(NODES[1].0) + NODES[2].1 * pair(NODES[2].0))
+        let width = to - from;
+        width * GAUSS.iter().map(|&(x, weight)| weight * self.weight(from + width * x)).sum::<f64>()
     }
 
     /// Fills `radii` and `shares` by adding up the weight ring by ring, in rings that grow by one factor.

@@ -4,6 +4,7 @@ use super::dispersion::Dispersion;
 use super::error::{Error, require};
 use super::phase::BulkScatter;
 use super::table::Table;
+use std::ops::RangeInclusive;
 
 /// What light travels through.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +90,9 @@ impl Index {
         }
     }
 
+    /// Indices of media that light is traced through.
+    pub const RANGE: RangeInclusive<f64> = 0.1..=10.0;
+
     /// Returns the same index.
     ///
     /// # Errors
@@ -99,7 +103,7 @@ impl Index {
             require(
                 "a refractive index",
                 n,
-                (0.1..=10.0).contains(&n),
+                Self::RANGE.contains(&n),
                 "between 0.1 and 10 at every wavelength in use",
             )?;
         }

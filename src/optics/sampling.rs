@@ -57,21 +57,6 @@ pub fn disk([u, v]: [f64; 2]) -> Uv {
     Uv::new(r * angle.cos(), r * angle.sin())
 }
 
-/// Maps a pair in `[0, 1)²` to a uniform unit direction of the whole sphere.
-pub fn sphere([u, v]: [f64; 2]) -> Vector {
-    let z = 1.0 - 2.0 * u;
-    let r = ((1.0 - z) * (1.0 + z)).sqrt();
-    let (s, c) = sin_cos_turns(v);
-    Vector::new(r * c, r * s, z)
-}
-
-/// Maps a pair in `[0, 1)²` to a uniform unit direction of the cone of half-angle `acos(cos_max)` about the unit vector `axis`.
-pub fn cone(axis: Vector, cos_max: f64, [u, v]: [f64; 2]) -> Vector {
-    // 1 - cos is kept, so that narrow cones lose no digits.
-    let one_minus = u * (1.0 - cos_max);
-    direction_about(axis, 1.0 - one_minus, (one_minus * (2.0 - one_minus)).sqrt(), v)
-}
-
 /// Maps a pair in `[0, 1)²` to a unit direction with density `cos θ/π` per steradian about the unit vector `n`: Lambert's law.
 pub fn lambertian(n: Vector, u: [f64; 2]) -> Vector {
     let p = disk(u);
@@ -124,14 +109,10 @@ mod tests {
     fn moments_of_directions() {
         let axis = Vector::new(0.36, 0.48, -0.8);
         let five_sigma = 5.0 * 0.6 / (N as f64).sqrt();
-        assert!(mean(pairs(N).map(|u| sphere(u).dot(axis))).abs() < five_sigma);
-        assert!((mean(pairs(N).map(|u| sphere(u).dot(axis).powi(2))) - 1.0 / 3.0).abs() < five_sigma);
         assert!((mean(pairs(N).map(|u| lambertian(axis, u).dot(axis))) - 2.0 / 3.0).abs() < five_sigma);
-        assert!((mean(pairs(N).map(|u| cone(axis, 0.9, u).dot(axis))) - 0.95).abs() < five_sigma);
         // Mean of cos under cosᵐ: (m + 1)/(m + 2).
         assert!((mean(pairs(N).map(|u| cosine_power(axis, 6.0, u).dot(axis))) - 7.0 / 8.0).abs() < five_sigma);
         assert!((mean(pairs(N).map(|u| disk(u).length_squared())) - 0.5).abs() < five_sigma);
-        assert!(pairs(1000).all(|u| cone(axis, 1.0 - 1e-14, u).cross(axis).length() < 1.5e-7));
     }
 
     #[test]
@@ -150,14 +131,6 @@ mod tests {
                 assert!(sigma < 0.0012);
             }
         }
-    }
-
-    #[test]
-    fn isotropic_light_escapes_through_the_cone() {
-        // (1 - √(1 - 1/n²))/2 of a sphere for one face of n = 1.5.
-        let critical = (1.0 - 1.0 / 2.25f64).sqrt();
-        let share = mean(pairs(N).map(|u| f64::from(u8::from(sphere(u).z > critical))));
-        assert!((share - 0.127322).abs() < 4.0 * (0.1273f64 * 0.8727 / N as f64).sqrt());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Files of rays that a command is told to ask: records as `check --rays-out` writes them, lists and measured ray sets.
 
 use crate::cli::failure::Failure;
-use crate::formats::{Flux, open_file, read_ray_set};
+use crate::formats::{Flux, lower_extension, open_file, read_ray_set};
 use crate::math::Ray;
 use crate::study::records;
 use std::io::BufReader;
@@ -13,9 +13,7 @@ const RAY_SETS: [&str; 7] = ["csv", "txt", "npz", "tm25ray", "dat", "sdf", "ray"
 /// Reads the rays of a file, mm, in the order they stand there; by its extension a list or measured set, else records. Fails if there are
 /// none.
 pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
-    // A name without an extension is one of the others.
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let rays: Vec<Ray> = if RAY_SETS.contains(&extension.as_str()) {
+    let rays: Vec<Ray> = if RAY_SETS.contains(&lower_extension(path).as_str()) {
         // Which flux a set has says nothing about where its rays run.
         let set = read_ray_set(path, Flux::Radiant).map_err(|e| Failure::input(e.to_string()))?;
         set.rays.iter().map(|ray| Ray::new(ray.origin, ray.direction)).collect()

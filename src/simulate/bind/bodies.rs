@@ -2,7 +2,6 @@
 
 use super::bound_scene::BoundScene;
 use super::chosen::ChosenRules;
-use super::nearest::face_bounds;
 use super::notes::belongs_to_open_shell;
 use crate::math::{Aabb, BoxTree};
 use crate::model::Model;
@@ -55,7 +54,7 @@ pub(super) fn find_bodies(
             }
         };
         bodies[body].open |= belongs_to_open_shell(&f, model);
-        bodies[body].bounds = bodies[body].bounds.union(face_bounds(&f));
+        bodies[body].bounds = bodies[body].bounds.union(f.bounds());
         of_face[f.id.index()] = body as u32;
     }
     let boxes: Vec<Aabb> = bodies[1..].iter().map(|b| b.bounds.grown(scene.run.glue_mm)).collect();
@@ -68,7 +67,7 @@ pub(super) fn find_bodies(
 pub(super) fn solids(bound: &BoundScene, model: &Model, margin: f64) -> BoxTree {
     let bodies = bound.bodies.iter().skip(1).map(|body| body.bounds);
     let opaque = model.placed_faces().filter(|f| bound.faces[f.id.index()].opaque_solid);
-    let boxes: Vec<Aabb> = bodies.chain(opaque.map(|f| face_bounds(&f))).map(|b| b.grown(margin)).collect();
+    let boxes: Vec<Aabb> = bodies.chain(opaque.map(|f| f.bounds())).map(|b| b.grown(margin)).collect();
     BoxTree::new(&boxes)
 }
 

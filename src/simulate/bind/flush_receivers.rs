@@ -2,7 +2,6 @@
 //! does so before it meets the face.
 
 use super::bound_scene::BoundScene;
-use super::nearest::face_bounds;
 use crate::math::{Aabb, Uv, Vector};
 use crate::model::{Analytic, Model, PlacedFace};
 use crate::simulate::body::AMBIENT;
@@ -55,5 +54,5 @@ fn is_flush(face: &PlacedFace<'_>, receiver: &FlatShape<'_>) -> bool {
     if height.abs() > near || frame.z.cross(normal).length() > FLUSH {
         return false;
     }
-    !Aabb::from_points(receiver.corners()).grown(near).intersection(face_bounds(face)).is_empty()
+    !Aabb::from_points(receiver.corners()).grown(near).intersection(face.bounds()).is_empty()
 }

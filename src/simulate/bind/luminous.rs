@@ -1,6 +1,6 @@
 //! The faces that a source shines from, and what lies against them.
 
-use super::nearest::{Nearest, face_bounds};
+use super::nearest::Nearest;
 use super::select::select_faces;
 use crate::math::{Aabb, BoxTree};
 use crate::model::{Model, PlacedFace};
@@ -44,7 +44,7 @@ impl<'m> LuminousSearch<'m> {
         }
         let mut boxed: Vec<(PlacedFace<'m>, Aabb)> = (model.placed_faces())
             .filter(|f| opaque[f.id.index()])
-            .map(|f| (f, face_bounds(&f)))
+            .map(|f| (f, f.bounds()))
             .filter(|(_, bounds)| !bounds.is_empty())
             .collect();
         boxed.sort_by(|a, b| a.1.min.x.total_cmp(&b.1.min.x));

@@ -90,7 +90,7 @@ impl Scene {
             emitters.push(Emitter::new(self, i, &bodies, &light, loaded, area)?.placed(&source_frames[i]));
         }
         let receivers = bind_receivers(self, model)?;
-        let faces_box = model.placed_faces().map(|f| nearest::face_bounds(&f)).fold(Aabb::EMPTY, Aabb::union);
+        let faces_box = model.surface_bounds();
         let scene_box = receivers.iter().map(Receiver::bounds).fold(faces_box, Aabb::union);
         start_near(self, &mut emitters, &source_frames, &bodies[AMBIENT as usize], &scene_box)?;
         let region = emitters.iter().map(Emitter::extent).fold(faces_box, Aabb::union);

@@ -58,7 +58,7 @@ const PARALLEL: f64 = 0.99;
 impl<'a> Nearest<'a> {
     pub(super) fn new(model: &'a Model) -> Self {
         let faces: Vec<_> = model.placed_faces().collect();
-        let bounds = faces.iter().map(face_bounds).collect();
+        let bounds = faces.iter().map(PlacedFace::bounds).collect();
         let samples = vec![None; faces.len()];
         let slabs = vec![None; faces.len()];
         let pieces = vec![None; faces.len()];
@@ -157,16 +157,6 @@ impl<'a> Nearest<'a> {
         };
         in_part * placed.placement.scale
     }
-}
-
-/// Returns a box around a placed face in scene coordinates, mm: of its whole surface, trims left out; empty for a face without geometry.
-pub(super) fn face_bounds(f: &PlacedFace<'_>) -> Aabb {
-    let local = match (f.face, f.tessellated) {
-        (Some(face), _) => face.surface.bounds(),
-        (None, Some(t)) => t.mesh.bounds(),
-        (None, None) => Aabb::EMPTY,
-    };
-    if local.is_empty() { local } else { Aabb::from_points(local.corners().map(|c| f.placement.point(c))) }
 }
 
 #[cfg(test)]

@@ -1,14 +1,11 @@
 //! The wavelengths of the sources, and whether every medium has an index there.
 
-use crate::optics::Wavelengths;
+use crate::optics::{Index, Wavelengths};
 use crate::simulate::body::Body;
 use crate::simulate::emitter::{Loaded, RayList};
 use crate::simulate::scene::{Key, Scene};
 use crate::simulate::surfaces::SceneLight;
 use crate::simulate::{Error, ErrorKind};
-
-/// Indices that a medium may have.
-const INDICES: std::ops::RangeInclusive<f64> = 0.1..=10.0;
 
 /// Wavelengths of a continuous spectrum at which the index of each medium is looked at.
 const PROBES: u32 = 64;
@@ -85,7 +82,7 @@ pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[
         wavelengths.dedup();
         // A dispersion formula may fail in the middle of a spectrum, so that its ends do not tell.
         for nm in wavelengths {
-            let wrong = bodies.iter().find(|b| !INDICES.contains(&b.index(Some(nm))));
+            let wrong = bodies.iter().find(|b| !Index::RANGE.contains(&b.index(Some(nm))));
             if let Some(body) = wrong {
                 let message = format!("'{}' has no index at {nm} nm, a wavelength of this source", body.medium);
                 let at = [Key::Name("source"), Key::Index(i), Key::Name("spectrum")];

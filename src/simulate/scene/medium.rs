@@ -252,13 +252,13 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
         if scene.media[..i].iter().any(|o| o.name == m.name) {
             return Err(scene.error(ErrorKind::Value, &at("name"), format!("two media are called '{}'", m.name)));
         }
-        if m.index.is_some_and(|n| !(0.1..=10.0).contains(&n)) {
+        if m.index.is_some_and(|n| !Index::RANGE.contains(&n)) {
             return Err(scene.error(ErrorKind::Value, &at("index"), "`index` must be from 0.1 to 10"));
         }
         let medium = m.optics().map_err(|(key, e)| scene.error(ErrorKind::Value, &at(key), e))?;
         // A formula may leave the range where it is used, though its coefficients look well.
         let n = medium.index.value(scene.run.wavelength_nm);
-        if !(0.1..=10.0).contains(&n) {
+        if !Index::RANGE.contains(&n) {
             let message =
                 format!("the index of '{}' at {} nm is {n}, not from 0.1 to 10", m.name, scene.run.wavelength_nm);
             return Err(scene.error(ErrorKind::Value, &at("name"), message));

@@ -4,11 +4,12 @@
 //! then winds around the face, its facets are slivers along it, and faces of other solids that touch it find no sides in common. The vertex
 //! of a circle that no other edge ends at may lie anywhere on it.
 
-use super::solid_recipes::{map_control_points, rotated};
+use super::solid_recipes::rotated;
 use super::topology::{EdgeKey, FacePlan};
 use super::zero_width::vertex_ids;
 use crate::math::{Frame, Point};
 use crate::nurbs::Curve;
+use crate::step::geometry::curves::map_points;
 use crate::step::geometry::edges::TrimmedEdge;
 use crate::step::geometry::{GeometryReader, Outcome};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -94,7 +95,7 @@ pub(super) fn align_rims(
             if let Ok(TrimmedEdge { curve: Some(curve), .. }) = &mut edges[rim]
                 && 2.0 * radius * (0.5 * turn).sin().abs() > CIRCLE_MM
             {
-                *curve = map_control_points(curve, |p| rotated(axis, turn, p));
+                *curve = map_points(curve.clone(), |p| rotated(axis, turn, p));
                 moved.extend(geometry.vertex(vertex).ok().map(|p| (vertex, rotated(axis, turn, p))));
             }
         }

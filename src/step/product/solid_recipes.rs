@@ -5,10 +5,11 @@
 //! a profile is believed by area only (the largest loop is the outer one), and booleans of CSG are refused.
 
 use super::topology::{EdgeKey, read_face};
-use crate::math::{Frame, Homogeneous, Point, Vector};
+use crate::math::{Frame, Point, Vector};
 use crate::model::Analytic;
-use crate::nurbs::{ControlPoint, Curve, conic};
+use crate::nurbs::{Curve, conic};
 use crate::step::chart::{Chart, Kind};
+use crate::step::geometry::curves::map_points;
 use crate::step::geometry::{GeometryReader, Outcome, Refusal, references};
 use crate::step::part21::{Args, Entity};
 use std::f64::consts::TAU;
@@ -255,7 +256,7 @@ fn extrude(profile: Profile, by: Vector) -> Option<SolidRecipe> {
     for curves in &profile.loops {
         let n = curves.len();
         let bottom: Vec<usize> = curves.iter().map(|c| solid.add_edge(c.clone())).collect();
-        let top: Vec<usize> = curves.iter().map(|c| solid.add_edge(map_control_points(c, |p| p + by))).collect();
+        let top: Vec<usize> = curves.iter().map(|c| solid.add_edge(map_points(c.clone(), |p| p + by))).collect();
         let start = |c: &Curve| c.evaluate(c.domain()[0]);
         // The edges from the corners of the profile up: each is shared by two sides.
         let posts: Vec<usize> =
@@ -307,7 +308,7 @@ fn revolve(profile: Profile, axis: &Frame, angle: f64) -> Option<SolidRecipe> {
         let last: Vec<usize> = curves
             .iter()
             .zip(&first)
-            .map(|(c, &edge)| if whole || on_axis(c) { edge } else { solid.add_edge(map_control_points(c, turn)) })
+            .map(|(c, &edge)| if whole || on_axis(c) { edge } else { solid.add_edge(map_points(c.clone(), turn)) })
             .collect();
         let mut arcs: Vec<Option<usize>> = Vec::with_capacity(n);
         // Each corner runs along an arc; two sides share it. A corner on the axis stays a point.
@@ -353,10 +354,4 @@ fn axis_distance(axis: &Frame, p: Point) -> f64 {
 pub(super) fn rotated(axis: &Frame, angle: f64, p: Point) -> Point {
     let (q, (sin, cos)) = (axis.local_point(p), angle.sin_cos());
     axis.point(Point::new(cos * q.x - sin * q.y, sin * q.x + cos * q.y, q.z))
-}
-
-/// Returns the curve with its control points moved by `place`, which must be affine.
-pub(super) fn map_control_points(curve: &Curve, place: impl Fn(Point) -> Point) -> Curve {
-    let points = curve.points.iter().map(|p| Homogeneous::weighted(place(p.project()), p.w)).collect();
-    Curve { points, ..curve.clone() }
 }

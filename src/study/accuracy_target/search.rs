@@ -5,7 +5,7 @@ use super::survey::{Survey, tolerance_factor};
 use super::trial_rays::{DirectionErrors, ReferenceRays};
 use super::{AccuracyResult, AccuracyTarget, Trial};
 use crate::intersect::{Cost, Intersector, NormalMode};
-use crate::math::{Aabb, FaceId, Ray};
+use crate::math::{FaceId, Ray};
 use crate::model::Model;
 use crate::study::Progress;
 use crate::study::mesh_source::{FacetTree, MeshSource, with_intersectors};
@@ -58,8 +58,7 @@ pub fn meet_target(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<AccuracyResult, String> {
     // Of the surfaces, not of facets: there are none yet.
-    let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
-    let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
+    let bounds = model.surface_bounds();
     let uniform = |_: &dyn Intersector, seed: u64, count: u64| {
         let source = Uniform::new(&bounds, seed, count);
         source.rays(0..source.len())
@@ -156,8 +155,7 @@ pub fn meet_target_for_light(
 
 /// Returns the coarse end of what users ask for, mm: 0.2, or 1/500 of the diagonal of a small model.
 fn coarse_tolerance(model: &Model) -> f64 {
-    let corners = model.placed_faces().filter_map(|p| p.face.map(|f| (p, f.surface.bounds().corners())));
-    let bounds = Aabb::from_points(corners.flat_map(|(p, corners)| corners.map(|c| p.placement.point(c))));
+    let bounds = model.surface_bounds();
     (bounds.diagonal() / SMALL_MODEL).clamp(FINEST_COARSE, COARSEST)
 }
 
