@@ -103,20 +103,31 @@ impl Spectrum {
             }
             Self::WhiteLed(led) => {
                 require("the blue share", led.blue_share, (0.0..=1.0).contains(&led.blue_share), "from 0 to 1")?;
-                for nm in [led.blue_nm, led.phosphor_nm, led.blue_width_nm, led.phosphor_width_nm] {
-                    require("a wavelength or width of the LED", nm, nm > 0.0 && nm < 1e4, "positive, in nm")?;
+                let [first, last] = LED_RANGE_NM;
+                for nm in [led.blue_nm, led.phosphor_nm] {
+                    require("a peak of the LED", nm, (first..=last).contains(&nm), "from 380 to 780 nm")?;
                 }
-                let parts = [
-                    (led.blue_nm, led.blue_width_nm, led.blue_share),
-                    (led.phosphor_nm, led.phosphor_width_nm, 1.0 - led.blue_share),
-                ];
-                let power =
-                    |nm: f64| parts.iter().map(|&(at, width, share)| share * gaussian(nm - at, width)).sum();
-                Wavelengths::continuous(Table::sampled([380.0, 780.0], 800, power))
+                for nm in [led.blue_width_nm, led.phosphor_width_nm] {
+                    require("a width of the LED", nm, (1.0..1e4).contains(&nm), "1 nm or more, below 10,000")?;
+                }
+                let peak = |at, width| {
+                    let gaussian = move |nm: f64| gaussian(nm - at, width);
+                    // What lies beyond the range is missing from it, and each peak is to have its share all the same.
+                    let whole = Table::sampled(LED_RANGE_NM, LED_STEPS, gaussian).integral();
+                    move |nm: f64| gaussian(nm) / whole
+                };
+                let blue = peak(led.blue_nm, led.blue_width_nm);
+                let phosphor = peak(led.phosphor_nm, led.phosphor_width_nm);
+                let power = |nm: f64| led.blue_share * blue(nm) + (1.0 - led.blue_share) * phosphor(nm);
+                Wavelengths::continuous(Table::sampled(LED_RANGE_NM, LED_STEPS, power))
             }
         }
     }
 }
+
+/// What the light of a white LED is cut to, nm, and the even steps of its table.
+const LED_RANGE_NM: [f64; 2] = [380.0, 780.0];
+const LED_STEPS: usize = 800;
 
 /// Ratios that a wider one is divided into: of 0.3 % at most.
 const RATIOS: usize = 4000;
@@ -164,6 +175,18 @@ mod tests {
         assert!(near(xy(&led), [0.3451, 0.3516], 0.012), "{:?}", xy(&led));
         let efficacy = led.sampler().unwrap().efficacy();
         assert!((280.0..360.0).contains(&efficacy), "{efficacy}");
+    }
+
+    #[test]
+    fn the_blue_of_an_led_has_its_share_though_the_phosphor_reaches_out_of_the_table() {
+        // Half of the phosphor's Gaussian lies above 780 nm.
+        let led = WhiteLed { phosphor_nm: 780.0, blue_share: 0.22, ..WhiteLed::default() };
+        let sampler = Spectrum::WhiteLed(led).sampler().unwrap();
+        let blue = (0..4000).filter(|i| sampler.sample((*i as f64 + 0.5) / 4000.0) < 560.0).count();
+        assert!((blue as f64 / 4000.0 - 0.22).abs() < 1e-3, "{blue}");
+        for wrong in [WhiteLed { phosphor_nm: 800.0, ..led }, WhiteLed { blue_width_nm: 0.5, ..led }] {
+            assert!(Spectrum::WhiteLed(wrong).sampler().is_err());
+        }
     }
 
     #[test]

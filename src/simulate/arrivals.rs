@@ -2,6 +2,7 @@
 
 use super::bind::BoundScene;
 use super::emitter::{Portion, RaySampler};
+use super::kernel::in_front;
 use super::outcome::{Event, PathVertex};
 use super::plan::Plan;
 use super::receiver::Receiver;
@@ -9,9 +10,6 @@ use super::results::Results;
 use super::settings::RunSettings;
 use crate::formats::LightRay;
 use crate::math::{Point, Ray, Vector};
-
-/// Share of its length by which a segment that ends on a receiver may fall short of it: 10^6 times the rounding of its vertices.
-const ROUNDING: f64 = 1e-9;
 
 /// Returns one ray for each time a recorded path crossed a plane, disc or sphere that counts it: the point (mm, scene coordinates), the
 /// direction, and a power scaled so that the sum over all recorded paths is what the run emitted: an estimate of what the receiver counted.
@@ -79,8 +77,8 @@ pub(super) fn crossings<'p>(receiver: &Receiver, path: &'p [PathVertex]) -> Vec<
         if receiver.interactions.is_some_and(|n| n != b.bounce) || receiver.absorbs && b.event != Event::Received {
             continue;
         }
-        let (ray, end) = (Ray::new(a.point, direction), segment_end(a, b, receiver.absorbs));
-        let mut after = 0.0;
+        let ray = Ray::new(a.point, direction);
+        let [mut after, end] = counted_range(&ray, a, b, receiver.absorbs);
         // A sphere may be crossed twice by one segment.
         while let Some(distance) = receiver.crossing(&ray, after, end) {
             found.push(Crossing { first, segment, ray, distance });
@@ -104,13 +102,14 @@ fn wavelength(bound: &BoundScene, settings: &RunSettings, plan: &Plan, ray: u64)
     sampler.single_ray(emitter, (ray - first) as u32, &mut start).1.wavelength
 }
 
-/// Returns how far from `a`, mm, a recorded segment may meet a receiver: its length, infinite where it escapes at `b`, and lengthened by
-/// the rounding of its vertices where it ends on an absorbing receiver.
-fn segment_end(a: &PathVertex, b: &PathVertex, absorbs: bool) -> f64 {
+/// Returns between which distances from `a`, mm, a recorded segment to `b` meets a receiver as the kernel has it: one that lies in a face is
+/// in front of it, and light that it ends is recorded as much before it.
+fn counted_range(ray: &Ray, a: &PathVertex, b: &PathVertex, absorbs: bool) -> [f64; 2] {
     let length = (b.point - a.point).length();
-    match b.event {
-        Event::Escaped => f64::INFINITY,
-        Event::Received if absorbs => length * (1.0 + ROUNDING),
-        _ => length,
+    if absorbs {
+        // Twice, for the way back is rounded too.
+        return [0.0, length + 2.0 * in_front(ray, length)];
     }
+    let end = if b.event == Event::Escaped { f64::INFINITY } else { length + in_front(ray, length) };
+    [in_front(ray, 0.0), end]
 }

@@ -256,6 +256,12 @@ impl Tallies {
         }
     }
 
+    /// Returns the share of the emitted power that was left on paths that were lost; NaN where none was emitted.
+    pub fn lost_share(&self) -> f64 {
+        let [emitted, .., lost] = self.ends;
+        lost.total as f64 / emitted.total as f64
+    }
+
     /// Adds what a whole replicate gathered, once it is [finished](ReplicateTally::finish), and empties it; paths are left unsorted.
     pub(crate) fn take(&mut self, replicate: &mut ReplicateTally, bound: &BoundScene) {
         self.replicates += 1;

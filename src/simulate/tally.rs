@@ -8,15 +8,17 @@
 //! replicates, which is honest for random numbers, nets and split rays alike (batch means; with 128 replicates the
 //! error of the error is 6 %).
 
-use crate::math::{variance_from_residuals, variance_of_sum};
+use crate::math::variance_from_residuals;
 use serde::{Deserialize, Serialize};
 
 /// Quanta of an average ray when it leaves its source: 9.1e-13 of a ray is the finest share of power. Fewer, by a power of two, in runs
 /// with rays so heavy, or so many, that sums of as many would not fit their words.
 pub const QUANTA: f64 = (1u64 << 40) as f64;
 
-/// Squares are kept of numbers cut by this many bits, so that a replicate of 2³⁰ rays cannot overflow.
-const CUT: u32 = 10;
+/// Squares are kept without these lowest bits of theirs, so that a replicate of 2³⁰ rays cannot overflow.
+const SQUARE_CUT: u32 = 20;
+/// What half of these bits cut from a number whose square would fill two words.
+const CUT: u32 = SQUARE_CUT / 2;
 
 /// What added to a number below 2⁵¹ leaves the nearest whole number in the lowest bits.
 const SHIFT: f64 = 6_755_399_441_055_744.0;
@@ -62,12 +64,15 @@ impl Sum {
     /// Adds what one whole replicate gathered.
     pub fn add_replicate(&mut self, quanta: u128) {
         self.total += quanta;
-        // Nearly all fit a word, whose square is one multiplication; what does not fit at all has no error, as `error` says.
-        let square = match u64::try_from(quanta >> CUT) {
-            Ok(cut) => u128::from(cut) * u128::from(cut),
-            Err(_) => u128::MAX,
+        let square = |x: u64| u128::from(x) * u128::from(x);
+        // Nearly all fit a word, whose square is one multiplication. The square is cut, and not what is squared: that would show in the
+        // error of replicates that differ by less than 1e-6. What does not fit at all has no error, as `error` says.
+        let cut = match (u64::try_from(quanta), u64::try_from(quanta >> CUT)) {
+            (Ok(quanta), _) => square(quanta) >> SQUARE_CUT,
+            (_, Ok(half_cut)) => square(half_cut),
+            _ => u128::MAX,
         };
-        self.squares = self.squares.saturating_add(square);
+        self.squares = self.squares.saturating_add(cut);
     }
 
     /// Adds the sum of other replicates.
@@ -77,13 +82,18 @@ impl Sum {
     }
 
     /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates. The total itself of a single one,
-    /// and where the sum of squares is full: both tell nothing of the spread.
+    /// and where the sums are full: both tell nothing of the spread.
     pub fn error(&self, replicates: u32) -> f64 {
-        if self.squares == u128::MAX {
-            return self.total as f64;
-        }
-        let squares = self.squares as f64 * f64::from(1u32 << (2 * CUT));
-        variance_of_sum(squares, self.total as f64, replicates as usize).sqrt()
+        let n = u128::from(replicates.max(2));
+        let (mean, rest) = (self.total / n, self.total % n);
+        let (false, Ok(mean)) = (self.squares == u128::MAX, u64::try_from(mean)) else { return self.total as f64 };
+        // In whole numbers: of replicates that differ by 1e-8 of themselves, as those of a smooth figure do, nothing would be left in an
+        // `f64`. With the total T = m·n + r, T²/n is m·(T + r) + r²/n, of which the last term is far below the unit of squares.
+        let sum = self.total + rest;
+        let [high, low] = [sum >> 64, sum & u128::from(u64::MAX)].map(|word| word * u128::from(mean));
+        let expected = (high << (64 - SQUARE_CUT)) + (low >> SQUARE_CUT);
+        let residuals = self.squares.saturating_sub(expected) as f64 * f64::from(1u32 << SQUARE_CUT);
+        variance_from_residuals(residuals, replicates as usize).sqrt()
     }
 }
 
@@ -153,7 +163,7 @@ impl Moments {
 }
 
 /// How power and moments go together from replicate to replicate: what the errors of mean positions and spot sizes are worked out
-/// from. Products of numbers cut to 51 and 59 bits, exact, so that these errors are order-free as well.
+/// from. Products of whole numbers, cut, so that these errors are order-free as well.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MomentSpread {
     /// For both coordinates of the first moments, then of the second: Σ m·p and Σ m² over replicates.
@@ -166,10 +176,12 @@ const CUT_MOMENT: u32 = 34;
 impl MomentSpread {
     /// Adds what one whole replicate gathered: its power in quanta and its moments.
     pub fn add_replicate(&mut self, quanta: u128, m: &Moments) {
-        let power = (quanta >> CUT) as i128;
+        let power = i128::try_from(quanta).unwrap_or(i128::MAX);
         for (sums, moment) in self.products.iter_mut().zip(m.as_list()) {
             let moment = moment >> CUT_MOMENT;
-            sums[0] = sums[0].saturating_add(moment.saturating_mul(power));
+            // As squares of the power are: the product is cut, and not what is multiplied.
+            let product = moment.checked_mul(power).map_or(i128::MAX, |product| product >> CUT);
+            sums[0] = sums[0].saturating_add(product);
             sums[1] = sums[1].saturating_add(moment.saturating_mul(moment));
         }
     }
@@ -225,6 +237,17 @@ mod tests {
         (0..100).for_each(|i| s.add_replicate((1 + 2 * (i % 2)) << 40));
         let expected = (100.0f64 * 100.0 / 99.0).sqrt() * (1u64 << 40) as f64;
         assert!((s.error(100) / expected - 1.0).abs() < 1e-12);
+    }
+
+    /// Of 128 replicates half lie `d` above 2⁵⁰, down to 1.5e-11 of it, half as much below: the total's error is d·n/√(n − 1).
+    #[test]
+    fn replicates_that_are_nearly_equal_keep_their_error() {
+        for d in [1u128 << 14, 1 << 22, 1 << 30] {
+            let mut s = Sum::default();
+            (0..128).for_each(|k| s.add_replicate(if k % 2 == 0 { (1 << 50) + d } else { (1 << 50) - d }));
+            let expected = d as f64 * 128.0 / 127.0f64.sqrt();
+            assert!((s.error(128) / expected - 1.0).abs() < 2e-3, "{d}: {} {expected}", s.error(128));
+        }
     }
 
     #[test]

@@ -676,6 +676,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "receiver_results",
             "results",
             "arrivals",
+            "recorded_ways",
             "run",
             "verify",
         ],

@@ -64,7 +64,7 @@ fn a_file_of_the_other_unit_is_refused_with_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("source.dat");
     for (flux, unit, says, advice) in [
-        (Flux::Luminous, "W", "gives lumens, but the run counts watts", "unit = \"lm\""),
+        (Flux::Luminous, "W", "gives lumens and no wavelengths, but the run counts watts", "unit = \"lm\""),
         (Flux::Radiant, "lm", "gives watts and no wavelengths", "unit = \"W\""),
     ] {
         write_tm25(&path, &Tm25::from_rays(&rays([None; 2]), flux)).unwrap();

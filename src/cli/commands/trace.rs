@@ -316,8 +316,11 @@ fn say_verification(run: &SceneResults, console: &Console) -> Result<(), Failure
     Ok(())
 }
 
-/// Traces a shard (index from 0, count), or goes on with it, into its file; one that is done already is not traced again. Fails when
-/// interrupted, with what was done saved.
+/// Traces a shard (index from 0, count), or goes on with it, into its file; one that is done already is not traced again. Incomplete where
+/// light was lost beyond the limit.
+///
+/// # Errors
+/// When interrupted, with what was done saved, or where the file cannot be written.
 fn trace_shard(
     prepared: &PreparedScene,
     command: &TraceCommand,
@@ -335,7 +338,7 @@ fn trace_shard(
     if let Some(portion) = from.as_ref().filter(|p| shards::is_shard_done(p, replicates.clone(), shard)) {
         console.say("traced already: nothing is left to do");
         say_shard(&checkpoint.file, portion, shard, console)?;
-        return Ok(Completion::Complete);
+        return Ok(lost_rays::report_light_lost_in_part(portion, prepared, command.extra.max_lost, console));
     }
     if !command.extra.resume {
         refuse_overwriting(&checkpoint.file)?;
@@ -362,7 +365,7 @@ fn trace_shard(
         );
     }
     say_shard(&checkpoint.file, &portion, shard, console)?;
-    Ok(Completion::Complete)
+    Ok(lost_rays::report_light_lost_in_part(&portion, prepared, command.extra.max_lost, console))
 }
 
 /// Says, or with `--json` prints, what a finished shard (index from 0, count) holds.

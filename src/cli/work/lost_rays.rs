@@ -6,7 +6,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::closing::LEDGER;
 use crate::formats::{csv_quoted_text, printable_line, write_atomic};
 use crate::pipeline::PreparedScene;
-use crate::simulate::Results;
+use crate::simulate::{LostRay, PartialRun, Results};
 use crate::text::figures;
 use std::path::Path;
 
@@ -73,16 +73,43 @@ pub(crate) fn report_lost_light(
     }
     let recorded = results.ledger.len();
     let is_cut = results.lost_rays as usize > recorded;
-    let (counted, listed) = if is_cut {
-        (format!("of the first {recorded} paths "), format!("the first {recorded} of them"))
-    } else {
-        (String::new(), "them all".into())
-    };
+    let listed = if is_cut { format!("the first {recorded} of them") } else { "them all".into() };
+    let reasons = reasons(&results.ledger, results.lost_rays, prepared);
+    let file = folder.join(LEDGER);
     console.insist(format_args!(
-        "{} % of the energy was lost, more than --max-lost allows: {counted}{}; {} lists {listed}",
+        "{} % of the energy was lost, more than --max-lost allows: {reasons}; {} lists {listed}",
         figures(100.0 * share, 2),
-        prepared.bound.loss_reasons(&results.ledger).join("; "),
-        folder.join(LEDGER).display(),
+        file.display(),
     ));
     Completion::Incomplete
+}
+
+/// Says so, and is incomplete, where a larger share of the light of a part of a run was lost than `max_lost`.
+pub(crate) fn report_light_lost_in_part(
+    part: &PartialRun,
+    prepared: &PreparedScene,
+    max_lost: f64,
+    console: &Console,
+) -> Completion {
+    let share = part.tallies.lost_share();
+    // Of no light there is no share.
+    if share <= max_lost || share.is_nan() {
+        return Completion::Complete;
+    }
+    console.insist(format_args!(
+        "{} % of the energy of this part was lost, more than --max-lost allows: {}; `lampyris merge` lists the lost rays",
+        figures(100.0 * share, 2),
+        reasons(&part.tallies.ledger, part.tallies.counts.lost, prepared),
+    ));
+    Completion::Incomplete
+}
+
+/// Returns why rays were lost, by how many of those that are recorded of so many.
+fn reasons(recorded: &[LostRay], lost_rays: u64, prepared: &PreparedScene) -> String {
+    let of = if lost_rays as usize > recorded.len() {
+        format!("of the first {} paths ", recorded.len())
+    } else {
+        String::new()
+    };
+    of + &prepared.bound.loss_reasons(recorded).join("; ")
 }

@@ -7,6 +7,7 @@ use crate::model::{Model, PlacedFace};
 use crate::simulate::emitter::{Area, Cover, CoveredArea};
 use crate::simulate::scene::{Key, Scene};
 use crate::simulate::{Error, ErrorKind};
+use crate::text::{count_of, figures};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
@@ -16,8 +17,8 @@ const TOLD_SHARE: f64 = 1e-3;
 /// The luminous faces of a source.
 pub(super) struct Luminous {
     pub(super) area: Area,
-    /// One sentence about the area that is covered; `None` where all is free.
-    pub(super) note: Option<String>,
+    /// Sentences about what of the named faces does not shine.
+    pub(super) notes: Vec<String>,
 }
 
 /// Finds the faces that the sources of a scene shine from, and the opaque faces that lie against these.
@@ -71,8 +72,11 @@ impl<'m> LuminousSearch<'m> {
         let Some(area) = Area::new(model, &chosen, &covers) else {
             return Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from"));
         };
+        let name = &scene.sources[index].name;
+        let source = if name.is_empty() { format!("[[source]] {}", index + 1) } else { format!("'{name}'") };
+        let dark = dark_note(&source, model, &chosen);
         if covers.is_empty() {
-            return Ok(Some(Luminous { area, note: None }));
+            return Ok(Some(Luminous { area, notes: dark.into_iter().collect() }));
         }
         let measured = area.measure_cover();
         let [whole, free] =
@@ -83,10 +87,8 @@ impl<'m> LuminousSearch<'m> {
             return Err(error.help("name faces that are free, or give what lies against them a `medium`"));
         }
         let share = 1.0 - free / whole;
-        let name = &scene.sources[index].name;
-        let source = if name.is_empty() { format!("[[source]] {}", index + 1) } else { format!("'{name}'") };
-        let note = (share >= TOLD_SHARE).then(|| covered_note(&source, model, labels, &measured, share));
-        Ok(Some(Luminous { area, note }))
+        let covered = (share >= TOLD_SHARE).then(|| covered_note(&source, model, labels, &measured, share));
+        Ok(Some(Luminous { area, notes: dark.into_iter().chain(covered).collect() }))
     }
 
     /// Returns for each chosen face that is opaque the opaque faces of other shells that come within the glue distance of its box, by the
@@ -134,6 +136,23 @@ impl<'m> LuminousSearch<'m> {
         });
         cover.clone()
     }
+}
+
+/// Returns the sentence about the faces that a source names and that do not shine, being ready meshes; `None` where there are none.
+fn dark_note(source: &str, model: &Model, chosen: &[usize]) -> Option<String> {
+    let chosen: BTreeSet<usize> = chosen.iter().copied().collect();
+    let named = || model.placed_faces().filter(|f| chosen.contains(&f.id.index()));
+    let dark: Vec<f64> =
+        named().filter_map(|f| Some(f.tessellated?.mesh.area() * f.placement.scale.powi(2))).collect();
+    if dark.is_empty() {
+        return None;
+    }
+    let (all, area) = (chosen.len(), figures(dark.iter().sum(), 3));
+    Some(format!(
+        "{} of the {} that {source} names do not shine, being ready meshes ({area} mm²): all of the power leaves from the rest",
+        dark.len(),
+        count_of(all as u64, "face"),
+    ))
 }
 
 /// Returns the sentence about the share of its area that a source has covered, naming the face of which most is.

@@ -83,7 +83,7 @@ impl Scene {
         for (i, loaded) in loaded.into_iter().enumerate() {
             let luminous = search.as_mut().map_or(Ok(None), |search| search.luminous_faces(i, &labels))?;
             let area = luminous.map(|luminous| {
-                cover_notes.extend(luminous.note);
+                cover_notes.extend(luminous.notes);
                 luminous.area
             });
             // Emitters need bodies: a source says by name what it lies in.

@@ -27,8 +27,8 @@ fn block_rays(rays: u64) -> usize {
 #[derive(Clone, Debug)]
 pub(crate) struct RayList {
     file: Arc<RayFile>,
-    /// Lumens to a watt of the file, where it gives watts and the run counts lumens.
-    efficacy: Efficacy,
+    /// What makes power in the unit of the run of that in the file's.
+    conversion: Conversion,
     /// Spectrum that the file gives for all its rays, in the unit of the run; no ray has a wavelength of its own then.
     pub(crate) spectrum: Option<Wavelengths>,
     /// What the reader changed or supposed, for people.
@@ -43,12 +43,15 @@ pub(crate) struct RayList {
     pub(crate) own_wavelengths: Arc<OwnWavelengths>,
 }
 
-/// What the powers of a list are multiplied by.
+/// What makes power in one unit of power in another.
 #[derive(Clone, Copy, Debug)]
-enum Efficacy {
-    Constant(f64),
-    /// That of the eye at each ray's own wavelength, lm/W.
-    OfEachRay,
+enum Conversion {
+    /// One factor for all rays.
+    Factor(f64),
+    /// Lumens of watts, by what the eye sees at each ray's own wavelength.
+    LumensOfEachRay,
+    /// Watts of lumens, likewise.
+    WattsOfEachRay,
 }
 
 /// The block of a [`RayList`] that was read last, for one who draws rays.
@@ -84,23 +87,13 @@ impl RayList {
     pub(super) fn new(mut file: RayFile, source: &Source, unit: PowerUnit) -> Result<Self, Fault> {
         let mut notes = std::mem::take(&mut file.notes);
         let table = file_spectrum(&file)?;
-        let mut efficacy = Efficacy::Constant(1.0);
-        match (file.flux, unit) {
-            (Some(Flux::Radiant), PowerUnit::Lumen) => {
-                if let Some((lumens, note)) = to_lumens(&file, table.as_ref(), source)? {
-                    efficacy = lumens;
-                    notes.push(note);
-                }
-            }
-            // Relative powers will do where the scene says how much the source emits.
-            (Some(Flux::Luminous), PowerUnit::Watt) if source.power.is_none() => {
-                return Err(Fault::new(
-                    "this file gives lumens, but the run counts watts",
-                    "set `unit = \"lm\"` in [run], or give the source's `power` in watts",
-                ));
-            }
-            _ => {}
-        }
+        let is_other = matches!(
+            (file.flux, unit),
+            (Some(Flux::Radiant), PowerUnit::Lumen) | (Some(Flux::Luminous), PowerUnit::Watt)
+        );
+        let converted = if is_other { conversion(&file, table.as_ref(), source, unit)? } else { None };
+        let (conversion, note) = converted.unzip();
+        notes.extend(note);
         let spectrum = match unit {
             PowerUnit::Watt => table,
             PowerUnit::Lumen => table.map(|t| t.photometric()).transpose().map_err(|_| {
@@ -111,7 +104,7 @@ impl RayList {
         let mut list = Self {
             block: block_rays(file.len()),
             file: Arc::new(file),
-            efficacy,
+            conversion: conversion.unwrap_or(Conversion::Factor(1.0)),
             spectrum,
             notes,
             sums: Arc::default(),
@@ -191,13 +184,19 @@ impl RayList {
     /// The power of a ray of a block in the unit of the run.
     fn power_of(&self, block: &RayBlock, k: usize) -> f64 {
         let power = self.file.power(block, k);
-        match self.efficacy {
-            Efficacy::Constant(efficacy) => power * efficacy,
-            Efficacy::OfEachRay => {
-                let nm = self.file.ray(block, k).ok().and_then(|ray| ray.wavelength_nm);
-                power * nm.map_or(0.0, |nm| xyz_of_watt(nm)[1])
-            }
+        match self.conversion {
+            Conversion::Factor(factor) => power * factor,
+            // No power at all is none in any unit, also where the eye sees nothing.
+            _ if power == 0.0 => 0.0,
+            Conversion::LumensOfEachRay => power * self.lumens_of_watt(block, k),
+            Conversion::WattsOfEachRay => power / self.lumens_of_watt(block, k),
         }
+    }
+
+    /// The lumens of a watt at the wavelength of a ray of a block; 0 for one without.
+    fn lumens_of_watt(&self, block: &RayBlock, k: usize) -> f64 {
+        let nm = self.file.ray(block, k).ok().and_then(|ray| ray.wavelength_nm);
+        nm.map_or(0.0, |nm| xyz_of_watt(nm)[1])
     }
 
     /// Reads a block, and its sums, if it is not the cursor's already; `false` when the file cannot be read any more.
@@ -260,34 +259,44 @@ fn file_spectrum(file: &RayFile) -> Result<Option<Wavelengths>, Fault> {
     sampler.map(Some).map_err(|e| Fault::new(e.to_string(), "give the source a `spectrum` and mend the file's"))
 }
 
-/// Returns what makes lumens of a file's watts: lm/W of the scene's spectrum, else the file's, else of each ray's own wavelength, and a
-/// note that says so; `None` where there are no wavelengths but the scene gives the source's power.
+/// Returns what makes lumens of a file's watts, or watts of its lumens, whichever `unit` is: the lumens to a watt of the scene's spectrum, else of
+/// the file's, else of each ray's own wavelength, and a note that says so; `None` where there are no wavelengths but the scene gives the
+/// source's power.
 ///
 /// # Errors
 /// When there are neither wavelengths nor such a power.
-fn to_lumens(
+fn conversion(
     file: &RayFile,
     table: Option<&Wavelengths>,
     source: &Source,
-) -> Result<Option<(Efficacy, String)>, Fault> {
+    unit: PowerUnit,
+) -> Result<Option<(Conversion, String)>, Fault> {
+    let [from, to, other] = match unit {
+        PowerUnit::Lumen => ["watts", "lumens", "W"],
+        PowerUnit::Watt => ["lumens", "watts", "lm"],
+    };
     let of_scene = source.spectrum.as_ref().and_then(|key| key.optics().ok()?.sampler().ok());
     if let Some(spectrum) = of_scene.as_ref().or(table) {
-        let efficacy = spectrum.xyz()[1];
+        let lumens = spectrum.xyz()[1];
         let whose = if of_scene.is_some() { "the scene's" } else { "the file's" };
-        let note = format!("its watts were made lumens by {whose} spectrum, {efficacy:.4} lm/W");
-        return Ok(Some((Efficacy::Constant(efficacy), note)));
+        let factor = if unit == PowerUnit::Lumen { lumens } else { 1.0 / lumens };
+        let note = format!("its {from} were made {to} by {whose} spectrum, {lumens:.4} lm/W");
+        return Ok(Some((Conversion::Factor(factor), note)));
     }
     if file.spectral_rays() == file.len() {
-        let note = "its watts were made lumens, each ray by its wavelength".to_owned();
-        return Ok(Some((Efficacy::OfEachRay, note)));
+        let conversion = match unit {
+            PowerUnit::Lumen => Conversion::LumensOfEachRay,
+            PowerUnit::Watt => Conversion::WattsOfEachRay,
+        };
+        return Ok(Some((conversion, format!("its {from} were made {to}, each ray by its wavelength"))));
     }
     // Nothing tells how bright the light of a watt is; the scene's own power makes that a matter of proportion.
     if source.power.is_some() {
         return Ok(None);
     }
     Err(Fault::new(
-        "this file gives watts and no wavelengths, but the run counts lumens",
-        "set `unit = \"W\"` in [run], or give the source's `spectrum`, or its `power` in lumens",
+        format!("this file gives {from} and no wavelengths, but the run counts {to}"),
+        format!("set `unit = \"{other}\"` in [run], or give the source's `spectrum`, or its `power` in {to}"),
     ))
 }
 
@@ -296,6 +305,30 @@ mod tests {
     use super::*;
     use crate::formats::write_rays;
     use crate::math::{Point, Vector};
+
+    /// A lumen of deep blue is many watts: V(λ) of 1924 is 0.038 at 450 nm and 1.000 at 555 nm. With the source's power too they keep their
+    /// proportion.
+    #[test]
+    fn lumens_with_wavelengths_are_watts() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rays.csv");
+        let ray = |nm| LightRay { origin: Point::ZERO, direction: Vector::Z, power: 1.0, wavelength_nm: Some(nm) };
+        write_rays(&path, &[ray(450.0), ray(555.0)]).unwrap();
+        for power in [None, Some(3.0)] {
+            let mut file = RayFile::open(&path, Flux::Radiant).unwrap();
+            file.flux = Some(Flux::Luminous);
+            let source = Source { power, ..Source::default() };
+            let list =
+                RayList::new(file, &source, PowerUnit::Watt).unwrap_or_else(|fault| panic!("{}", fault.message));
+            let mut cursor = ListCursor::default();
+            let [blue, green] = [0, 1].map(|k| list.ray(k, &mut cursor).unwrap().power);
+            assert!(
+                (683.0 * green - 1.0).abs() < 1e-3 && (blue / green * 0.038 - 1.0).abs() < 5e-3,
+                "{blue} {green}"
+            );
+            assert!(list.notes[0].contains("each ray by its wavelength"), "{:?}", list.notes);
+        }
+    }
 
     /// The ray at a share is the first whose running sum of powers, added from the first ray on, passes it, in whichever order shares are
     /// asked for and wherever the list is kept: 140,000 rays are more than memory takes.

@@ -29,3 +29,4 @@ mod wavefront;
 pub(crate) use context::Context;
 pub(crate) use path::RaySelection;
 pub(crate) use simd_dispatch::trace;
+pub(super) use tolerances::in_front;

@@ -4,7 +4,7 @@ use super::context::Context;
 use super::path::{NO_RECEIVER, Path, SCATTERS};
 use super::payload::RayPayload;
 use super::receiver_index::Candidates;
-use super::tolerances::{LONGEST_SEGMENT, rounding};
+use super::tolerances::{LONGEST_SEGMENT, in_front};
 use super::tracer::{Tracer, remaining_quanta};
 use crate::intersect::Hit;
 use crate::math::{Point, Ray};
@@ -12,13 +12,6 @@ use crate::simulate::random::Purpose;
 use crate::simulate::receiver::{Receiver, Spot};
 use crate::simulate::sequence::DepositPlace;
 use crate::simulate::tally::{quanta_as_integer, round_quanta};
-
-/// Returns how far in front of a face, mm, a receiver that lies in it is taken to be, at distance `t` of a ray: the rounding of a place
-/// there.
-#[inline(always)]
-fn in_front(ray: &Ray, t: f64) -> f64 {
-    rounding(t + ray.origin.abs().max_element())
-}
 
 /// Sets `ray.t_max` and `path.receiver` to the next scattering, or to the nearest receiver among the faces that stops light; leaves the ray
 /// unclipped where there is neither. A face may still come first.

@@ -1,6 +1,6 @@
 //! Lengths and cosines within which the kernel takes two places, or two directions, for one.
 
-use crate::math::Point;
+use crate::math::{Point, Ray};
 
 /// Rounding of a place near the origin, mm: far more than its last digit, far less than any facet.
 const ROUNDING_MM: f64 = 1e-9;
@@ -22,6 +22,13 @@ pub(super) fn rounding(distance: f64) -> f64 {
 #[inline(always)]
 pub(super) fn rounding_at(point: Point) -> f64 {
     rounding(point.abs().max_element())
+}
+
+/// Returns how far in front of a face, mm, a receiver that lies in it is taken to be, at distance `t`, mm, of a ray: the rounding of a place
+/// there.
+#[inline(always)]
+pub(in crate::simulate) fn in_front(ray: &Ray, t: f64) -> f64 {
+    rounding(t + ray.origin.abs().max_element())
 }
 
 /// Returns the way of a ray through a layer of the glue distance, mm, for the cosine between ray and normal. Below a cosine of 1e-3 (0.06°
