@@ -83,7 +83,7 @@ fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
         (folder.join("report.html"), "open this in a browser: pictures, tables, cross-check".to_owned()),
         (folder.join("results.json"), "every number of the run".into()),
     ];
-    for r in results.receivers.iter().filter(|r| !r.files.is_empty()) {
+    for r in results.receivers.iter().filter(|r| r.files.iter().any(|file| file.ends_with(".csv"))) {
         files.push((
             folder.join(format!("{}.csv", file_stem(&r.name))),
             format!("{} cell by cell (also .npz .png .vti and more)", printable_line(&r.name)),

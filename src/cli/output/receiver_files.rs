@@ -15,16 +15,30 @@ use std::path::Path;
 /// A far field whose ends are this near to those of all directions holds all of them, degrees.
 const WHOLE_RANGE_DEG: f64 = 1e-9;
 
-/// Writes all files of a receiver into a folder and returns their names, none for a receiver without cells. `geometric` are the errors of
-/// its cells from the facets, where they are known, and those of its further channels; `rays` are the sample that it counted.
+/// Writes all files of a receiver into a folder and returns their names: those of its cells where it has several, and those of its rays.
+/// `geometric` are the errors of its cells from the facets, where they are known, and those of its further channels; `rays` are the sample
+/// that it counted.
 pub(crate) fn write(
     folder: &Path,
     receiver: &ReceiverResult,
     geometric: Vec<Option<Vec<f64>>>,
     rays: Vec<LightRay>,
 ) -> Result<Vec<String>, Failure> {
-    let Some(grid) = receiver_grid(receiver) else { return Ok(Vec::new()) };
-    let mut grid = grid;
+    let mut names = match receiver_grid(receiver) {
+        Some(grid) => write_grid(folder, receiver, grid, geometric)?,
+        None => Vec::new(),
+    };
+    names.extend(write_rays(folder, receiver, rays)?);
+    Ok(names)
+}
+
+/// Writes the cells of a receiver, and the distribution of a far field as lamp files have it; returns the names of the files.
+fn write_grid(
+    folder: &Path,
+    receiver: &ReceiverResult,
+    mut grid: Grid,
+    geometric: Vec<Option<Vec<f64>>>,
+) -> Result<Vec<String>, Failure> {
     // The first layer is that of the grid itself, the others are those of its channels.
     let mut layers = geometric.into_iter().map(|layer| {
         let full = layer.filter(|g| g.len() == grid.values.len());
@@ -53,18 +67,6 @@ pub(crate) fn write(
         names.push(format!("{stem}-colours.png"));
         write_png(&folder.join(format!("{stem}-colours.png")), &picture)?;
     }
-    if matches!(receiver.kind, "plane" | "disc") {
-        names.push(format!("{stem}.tm25ray"));
-        write_tm25(&folder.join(format!("{stem}.tm25ray")), &sampled_rays(receiver, &rays))?;
-    }
-    // A Data_3 holds a rectangle.
-    if receiver.kind == "plane" {
-        names.push(format!("{stem}.data3"));
-        // Data_3 gives rows first.
-        let size = [receiver.grid[1], receiver.grid[0]];
-        let data = Data3 { size, results: receiver.cells.clone(), rays };
-        write_data3(&folder.join(format!("{stem}.data3")), &data)?;
-    }
     // Both formats hold whole distributions alone, and those of half a sphere.
     let photometry = match receiver.unit {
         "cd" => photometry(receiver, &pictured, receiver.power),
@@ -82,6 +84,25 @@ pub(crate) fn write(
             names.push(format!("{stem}.ldt"));
             write_eulumdat(&folder.join(format!("{stem}.ldt")), &photometry)?;
         }
+    }
+    Ok(names)
+}
+
+/// Writes the sampled rays of a plane or disc; returns the names of the files.
+fn write_rays(folder: &Path, receiver: &ReceiverResult, rays: Vec<LightRay>) -> Result<Vec<String>, Failure> {
+    let stem = file_stem(&receiver.name);
+    let mut names = Vec::new();
+    if matches!(receiver.kind, "plane" | "disc") {
+        names.push(format!("{stem}.tm25ray"));
+        write_tm25(&folder.join(format!("{stem}.tm25ray")), &sampled_rays(receiver, &rays))?;
+    }
+    // A Data_3 holds a rectangle.
+    if receiver.kind == "plane" {
+        names.push(format!("{stem}.data3"));
+        // Data_3 gives rows first.
+        let size = [receiver.grid[1], receiver.grid[0]];
+        let data = Data3 { size, results: receiver.cells.clone(), rays };
+        write_data3(&folder.join(format!("{stem}.data3")), &data)?;
     }
     Ok(names)
 }
