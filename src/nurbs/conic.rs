@@ -57,7 +57,8 @@ pub fn parameter_of_angle(range: [f64; 2], angle: f64) -> f64 {
 }
 
 /// Angle, radians, of a spline parameter on the arc over `range`: the inverse of [`parameter_of_angle`].
-pub fn angle_of_parameter(range: [f64; 2], parameter: f64) -> f64 {
+#[cfg(test)]
+pub(crate) fn angle_of_parameter(range: [f64; 2], parameter: f64) -> f64 {
     in_piece(range, parameter, |tau, half| 2.0 * (tau / half * (0.5 * half).tan()).atan())
 }
 

@@ -33,7 +33,7 @@ fn enclosed(record: &str, corners: &[[f64; 2]]) -> Import {
 }
 
 /// The context of [`MILLIMETRES`] with angles in degrees.
-fn degrees() -> String {
+pub(crate) fn degrees() -> String {
     let radian = "#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n";
     let degree = "#3=(CONVERSION_BASED_UNIT('DEGREE',#4)NAMED_UNIT(*)PLANE_ANGLE_UNIT());\n\
                   #4=PLANE_ANGLE_MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE(0.017453292519943295),#5);\n";

@@ -11,6 +11,7 @@ mod fixtures;
 mod nurbs_properties;
 mod occurrences;
 mod offsets;
+mod parameters;
 mod rare_forms;
 mod recipes;
 mod revolved_conics;

@@ -4,7 +4,7 @@ use crate::faces::{area, close, import, points};
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
 /// A face #900 on #34 between the arcs #35 and #36, with corners #12 to #15, and straight edges between them.
-const QUARTER: &str = "\
+pub(crate) const QUARTER: &str = "\
           #40=VERTEX_POINT('',#12);\n#41=VERTEX_POINT('',#13);\n#42=VERTEX_POINT('',#14);\n#43=VERTEX_POINT('',#15);\n\
           #50=EDGE_CURVE('',#40,#41,#35,.T.);\n#51=EDGE_CURVE('',#41,#42,$,.T.);\n\
           #52=EDGE_CURVE('',#43,#42,#36,.T.);\n#53=EDGE_CURVE('',#43,#40,$,.T.);\n\

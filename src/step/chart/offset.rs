@@ -17,7 +17,7 @@ pub(crate) const TOLERANCE: f64 = 1e-6;
 /// has no ends, or no fit within [`WORST_FIT_MM`] is found; the error of a fit is in the chart.
 pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
     let mut chart = match &basis.kind {
-        // Elementary surfaces stay what they are, and exact.
+        // Elementary surfaces stay what they are, exact and with their parameters.
         Kind::Plane { frame } => {
             let mut frame = *frame;
             frame.origin += distance * frame.z;
@@ -25,19 +25,21 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
         }
         Kind::Cone { frame, radius, half_angle } => {
             let (mut frame, half_angle) = (*frame, *half_angle);
-            // Seen across the axis a step along the tilted normal is longer by 1/cos: the moved slant line cuts the radius there.
-            let mut radius = radius + distance / half_angle.cos();
-            if !(radius > 0.0) {
-                if half_angle == 0.0 || radius.is_nan() {
-                    return None;
-                }
-                // The apex has passed the origin: what is left of the cone is counted from there.
-                frame.origin -= radius / half_angle.tan() * frame.z;
-                radius = 0.0;
+            // Each point keeps its parameters (ISO 10303-42) and moves along the tilted normal: by the cosine outwards, by the sine down.
+            let (sin, cos) = half_angle.sin_cos();
+            frame.origin -= distance * sin * frame.z;
+            let radius = radius + distance * cos;
+            if !radius.is_finite() || half_angle == 0.0 && radius <= 0.0 {
+                return None;
             }
-            let analytic = match half_angle {
-                0.0 => Analytic::Cylinder { frame, radius },
-                _ => Analytic::Cone { frame, radius, half_angle },
+            let analytic = if half_angle == 0.0 {
+                Analytic::Cylinder { frame, radius }
+            } else if radius >= 0.0 {
+                Analytic::Cone { frame, radius, half_angle }
+            } else {
+                // Height 0 lies beyond the apex: what is told of the cone counts from there.
+                let origin = frame.origin - radius / half_angle.tan() * frame.z;
+                Analytic::Cone { frame: Frame { origin, ..frame }, radius: 0.0, half_angle }
             };
             Chart::new(Kind::Cone { frame, radius, half_angle }, analytic)
         }

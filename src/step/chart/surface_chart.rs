@@ -13,7 +13,7 @@ pub(in crate::step) enum Kind {
     Plane {
         frame: Frame,
     },
-    /// Radius `radius + v·tan(half_angle)` about z at height v; a cylinder when the angle is 0. Angles in radians.
+    /// Radius `radius + v·tan(half_angle)` about z at height v, negative beyond the apex; a cylinder of angle 0. Angles in radians.
     Cone {
         frame: Frame,
         radius: f64,

@@ -18,6 +18,7 @@ mod tolerances;
 pub(super) mod units;
 
 pub(super) use self::tolerances::EMPTY_EDGE_MM;
+use self::tolerances::PARALLEL_AXIS;
 use self::units::Units;
 use crate::math::{Frame, Point, Vector};
 use crate::step::part21::{Args, Entity, File};
@@ -181,8 +182,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 
     /// Reads a placement, or a CARTESIAN_TRANSFORMATION_OPERATOR_3D, which may scale and mirror, as a frame, mm: the target of a mapped
-    /// item, or what takes one representation into another. A missing origin, scale or axis is that of the space, the third axis the
-    /// product of the first two where both are given. Refuses scales that are not positive and operators of two dimensions.
+    /// item, or what takes one representation into another. A missing origin or scale is that of the space, axes are those of
+    /// [`base_axes`]. Refuses scales that are not positive and operators of two dimensions.
     pub(crate) fn transformation(&self, id: u64) -> Outcome<Frame> {
         let e = self.entity(id)?;
         if e.is_a("CARTESIAN_TRANSFORMATION_OPERATOR_2D") {
@@ -208,17 +209,57 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         } else {
             args.id(4)
         };
-        let axis1 = self.direction(args.id(0));
-        let axis2 = self.direction(args.id(1));
-        // Without its third axis the operator takes what the other two leave, as OpenCASCADE does; with fewer, the Z of the space, which
-        // `base_axis` of ISO 10303-42 would take at once.
-        let z = self.direction(axis3).or_else(|| Some(axis1?.cross(axis2?))).unwrap_or(Vector::Z);
-        // As of a placement.
-        let mut frame = Frame::from_axis(origin, z, Some(axis1.unwrap_or(Vector::X)));
-        // An operator may mirror; its second axis says so.
-        if axis2.is_some_and(|y| y.dot(frame.y) < 0.0) {
-            frame.y = -frame.y;
+        let axes = [args.id(0), args.id(1), axis3].map(|id| self.direction(id));
+        Ok(Frame { scale, ..base_axes(origin, axes) })
+    }
+}
+
+/// Returns the axes of an operator from its three directions, of any length: a missing one is that of the space, the first is projected
+/// across the third and the second across both, so that it may mirror (ISO 10303-42, `base_axis`).
+///
+/// Where nothing is left of the second, which the standard leaves open, the axes are right-handed; about a third axis that is not given
+/// they are those of the first two.
+fn base_axes(origin: Point, [axis1, axis2, axis3]: [Option<Vector>; 3]) -> Frame {
+    let product = axis1.zip(axis2).map(|(x, y)| x.normalize().cross(y.normalize()));
+    let z = axis3.or(product.filter(|n| n.z.abs() <= PARALLEL_AXIS)).unwrap_or(Vector::Z);
+    let mut frame = Frame::from_axis(origin, z, Some(axis1.unwrap_or(Vector::X)));
+    if axis2.unwrap_or(Vector::Y).normalize().dot(frame.y) < -PARALLEL_AXIS {
+        frame.y = -frame.y;
+    }
+    frame
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All eight combinations about axes of the space, with each sign that makes a difference.
+    #[test]
+    fn axes_that_an_operator_lacks_are_those_of_the_standard() {
+        let (x, y, z) = (Vector::X, Vector::Y, Vector::Z);
+        for (given, expected) in [
+            ([None, None, None], [x, y, z]),
+            ([Some(-x), None, None], [-x, y, z]),
+            ([None, Some(-y), None], [x, -y, z]),
+            ([None, None, Some(-z)], [x, y, -z]),
+            ([Some(-x), Some(y), None], [-x, y, z]),
+            ([Some(y), Some(x), None], [y, x, z]),
+            ([Some(x), None, Some(-z)], [x, y, -z]),
+            ([Some(x), None, Some(z)], [x, y, z]),
+            ([None, Some(-y), Some(-z)], [x, -y, -z]),
+            ([Some(y), Some(z), Some(x)], [y, z, x]),
+            ([Some(z), Some(y), Some(x)], [z, y, x]),
+            // Nothing is left of the space's Y, or of its Z.
+            ([None, None, Some(x)], [y, z, x]),
+            ([Some(y), None, Some(z)], [y, -x, z]),
+            ([Some(x), Some(z), None], [x, z, -y]),
+        ] {
+            let frame = base_axes(Point::ZERO, given.map(|axis| axis.map(|a| 3.0 * a)));
+            let off = [frame.x - expected[0], frame.y - expected[1], frame.z - expected[2]];
+            assert!(off.iter().all(|d| d.length() < 1e-15), "{given:?}: {frame:?}");
         }
-        Ok(Frame { scale, ..frame })
+        // Across each other only after they are projected: z = (0.6, 0, 0.8) leaves (0.8, 0, -0.6) of X and all of Y.
+        let frame = base_axes(Point::ZERO, [None, Some(z - y), Some(Vector::new(0.6, 0.0, 0.8))]);
+        assert!((frame.x - Vector::new(0.8, 0.0, -0.6)).length() < 1e-15 && (frame.y + y).length() < 1e-15);
     }
 }

@@ -87,9 +87,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
 
     /// Reads a B-spline surface in any of its forms; small faults of knots and weights are mended, others refused.
     fn spline_surface(&self, e: Entity<'f, 'a>) -> Outcome<Chart> {
-        let simple = !e.keyword().is_empty();
         let base = e.attributes("B_SPLINE_SURFACE", 1).unwrap_or_else(|| e.args());
-        let shift = usize::from(simple && e.keyword() != "B_SPLINE_SURFACE");
+        let shift = usize::from(!e.keyword().is_empty() && e.keyword() != "B_SPLINE_SURFACE");
         let (Some(p), Some(q)) = (base.count(shift), base.count(shift + 1)) else {
             return Err(Refusal::new(e, "a degree is missing"));
         };
@@ -106,7 +105,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             }
             points.extend(row);
         }
-        let weights = e.attributes("RATIONAL_B_SPLINE_SURFACE", 7).map(|a| {
+        let weights = e.attributes("RATIONAL_B_SPLINE_SURFACE", 8).map(|a| {
             let rows = a.list(0);
             (0..rows.len()).map(|i| rows.list(i).reals()).collect::<Option<Vec<_>>>().map(|w| w.concat())
         });
@@ -116,12 +115,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             None => None,
         };
         let form = knot_form(e, "SURFACE");
-        // A simple instance has one attribute more before its knots than a complex one: the name.
-        let knots = match e.attributes("B_SPLINE_SURFACE_WITH_KNOTS", 7) {
-            Some(a) => (
-                explicit_knots(a.list(if simple { 1 } else { 0 }), a.list(if simple { 3 } else { 2 })),
-                explicit_knots(a.list(if simple { 2 } else { 1 }), a.list(if simple { 4 } else { 3 })),
-            ),
+        let knots = match e.attributes("B_SPLINE_SURFACE_WITH_KNOTS", 8) {
+            Some(a) => (explicit_knots(a.list(0), a.list(2)), explicit_knots(a.list(1), a.list(3))),
             None => (form.knots(degree[0], nu), form.knots(degree[1], nv)),
         };
         let (Some(ku), Some(kv)) = knots else {

@@ -16,9 +16,9 @@ use crate::step::part21::{Args, Entity};
 use std::f64::consts::PI;
 
 impl<'f, 'a> GeometryReader<'f, 'a> {
-    /// Returns the curve that a surface sweeps, cut to what can matter within the face's extent, as a spline, mm; for a line of a face with
-    /// edges, its origin and direction too. Without edges its parameter is the file's, and one without ends is cut to the range of the
-    /// surface's parameter `swept`, 0 for u, or refused where there is none.
+    /// Returns the curve that a surface sweeps, cut to what can matter within the face's extent, as a spline, mm; for a line of a face
+    /// with edges, its origin and the direction in which it is run too. Without edges its parameter is the file's, and one without ends
+    /// is cut to the range of the surface's parameter `swept`, 0 for u, or refused where there is none.
     fn swept_curve(
         &self,
         id: u64,
@@ -47,6 +47,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             let reach = REACH_MARGIN * radius.max(SMALLEST_REACH_MM) / speed;
             directed.shape.segment(t - reach, t + reach)
         };
+        let mut line = None;
         let curve = match &directed.shape {
             CurveShape::Line { .. } | CurveShape::Parabola { .. } if by_parameters => {
                 let range = parameters.map(|p| p[swept]).filter(|[a, b]| a < b && (b - a).is_finite());
@@ -54,9 +55,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
                 directed.shape.segment(a, b)
             }
             CurveShape::Line { origin, direction } => {
-                let curve = around(directed.shape.parameter(center), direction.length());
-                let line = Some((*origin, *direction));
-                return Ok((curve, line));
+                line = Some((*origin, if directed.reversed { -*direction } else { *direction }));
+                around(directed.shape.parameter(center), direction.length())
             }
             CurveShape::Ellipse { .. } => directed.shape.segment(0.0, 2.0 * PI),
             CurveShape::Hyperbola { a, b, .. } => {
@@ -72,7 +72,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             }
             CurveShape::Spline { curve, .. } => curve.clone(),
         };
-        Ok((if directed.reversed { curve.reversed() } else { curve }, None))
+        Ok((if directed.reversed { curve.reversed() } else { curve }, line))
     }
 
     /// Reads a POLYLINE by the parameter that the file gives it, which counts its points from 0; refused where two of them in a row
