@@ -472,6 +472,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "loops",
             "task",
             "touching",
+            "obstacles",
             "seam_path",
             "holes",
             "boundary",

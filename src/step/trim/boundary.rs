@@ -3,7 +3,8 @@
 
 use super::holes::place_hole;
 use super::loops::{Chain, Piece, Source};
-use super::seam_path::{Goals, Obstacles, SeamPath, unrolled_polygon};
+use super::obstacles::{Obstacles, unrolled_polygon};
+use super::seam_path::{Goals, SeamPath};
 use super::tolerances::{EMPTY_LOOP_SHARE, SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
 use crate::math::Uv;
 use crate::math::polygon::signed_area;

@@ -1,18 +1,27 @@
 //! The way of a seam from one loop to another past the holes between them: straight where something straight is free, otherwise the
 //! shortest way by corners of boxes around the holes.
 //!
-//! Source: shortest paths by visibility graphs, after Lozano-Pérez and Wesley 1979, expanded by Dijkstra only as far as needed. Known
-//! weakness: a hole so near to a border or another hole that the smallest box around it touches them leaves no way between.
+//! Source: shortest paths by visibility graphs, after Lozano-Pérez and Wesley 1979, expanded by Dijkstra only as far as needed. Holes are
+//! taken in where a way crosses them: most faces of hundreds have a way past a few. Known weakness: a hole so near to a border or another
+//! hole that the smallest box around it touches them leaves no way between.
 
-use super::tolerances::CROSSING_NOISE;
-use crate::math::Uv;
+use super::obstacles::{HoleCopy, Obstacles, turns_of};
+use crate::math::{Point, Uv, distance_to_segment};
 use crate::nurbs::Derivatives;
-use std::ops::RangeInclusive;
+use rustc_hash::FxHashSet;
 
 /// How far a box stands off its hole, as shares of the hole's size; the first with which there is a way.
 const MARGINS: [f64; 4] = [0.2, 0.06, 0.015, 0.004];
-/// Most corners that are tried: beyond them a face has too many holes for a search that is quadratic in them.
+/// Corners of one hole's box.
+const CORNERS_OF_BOX: usize = 4;
+/// Copies of a hole that stand beside a seam: itself and those by one displacement to both sides.
+const COPIES: [i32; 3] = [0, -1, 1];
+/// Corners that are tried with each margin at first: the search is quadratic in them, and takes less than a second with so many.
+const FEW_CORNERS: usize = 800;
+/// Most corners that are tried, those of the holes nearest to the seam.
 const MAX_CORNERS: usize = 4000;
+/// Holes that are taken in at least where those that were met leave no way.
+const FEWEST_MORE: usize = 8;
 
 /// Places along each side of the strip between two loops that are in each other's way.
 const LATTICE: f64 = 24.0;
@@ -23,10 +32,6 @@ const PLACES_BETWEEN: usize = 1000;
 const LEAST_PLACES: usize = 8;
 /// Where they lie between a side of the hole and its next copy: no slot is likely to be just so wide that they lie on its other side.
 const BETWEEN: [f64; 4] = [0.23, 0.41, 0.59, 0.77];
-/// Most turns of a hole that are looked at.
-const MOST_TURNS: i32 = 64;
-/// Sides of a chain that one box is around.
-const SIDES_OF_RUN: usize = 16;
 
 /// A seam's way: the numbers of its start and goal, and its places in parameters, both ends included.
 pub(super) struct SeamPath {
@@ -43,26 +48,6 @@ pub(super) enum Goals<'g> {
     Line(&'g dyn Fn(Uv) -> Uv),
 }
 
-/// What a seam must not cross, with its copies by multiples of the displacement: closed holes and open borders, in parameters.
-pub(super) struct Obstacles<'o> {
-    holes: &'o [Vec<Uv>],
-    borders: &'o [Vec<Uv>],
-    displacement: Uv,
-    chains: Vec<Chain<'o>>,
-}
-
-/// Places one after the other, in parameters, with boxes around runs of the sides between them.
-struct Chain<'o> {
-    places: &'o [Uv],
-    closed: bool,
-    /// What it is copied by; without one it stands once.
-    period: Uv,
-    /// The least and the most of its places along the period, in periods.
-    along: [f64; 2],
-    /// Lowest and highest corner around each [`SIDES_OF_RUN`] sides.
-    boxes: Vec<[Uv; 2]>,
-}
-
 /// A corner on the way.
 struct Node {
     place: Uv,
@@ -73,113 +58,53 @@ struct Node {
     settled: bool,
 }
 
-impl<'o> Obstacles<'o> {
-    pub(super) fn new(holes: &'o [Vec<Uv>], borders: &'o [Vec<Uv>], displacement: Uv) -> Self {
-        let closed = holes.iter().map(|places| Chain::new(places, true, displacement));
-        let chains = closed.chain(borders.iter().map(|places| Chain::new(places, false, displacement))).collect();
-        Self { holes, borders, displacement, chains }
-    }
+/// A search for a way from one of the starts to a goal.
+struct Search<'s> {
+    obstacles: &'s Obstacles<'s>,
+    starts: &'s [Uv],
+    goals: &'s Goals<'s>,
+    /// What lengths on the surface are measured by.
+    metric: &'s Derivatives,
+}
 
-    /// Whether the straight line between two places crosses no hole, no border and no copy of these.
-    pub(super) fn leave_free(&self, from: Uv, to: Uv) -> bool {
-        !self.chains.iter().any(|chain| chain.is_crossed(from, to))
-    }
-
+impl Obstacles<'_> {
     /// Returns the shortest way found from one of the starts to a goal, by lengths on the surface near the first start; `None` where holes
     /// and borders leave none.
     pub(super) fn way_around(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives) -> Option<SeamPath> {
+        let search = Search { obstacles: self, starts, goals, metric };
+        let by_places = |places: Vec<Uv>| {
+            let way = search.way_by(&places, &|_| true)?;
+            self.is_simple(&way.points).then_some(way)
+        };
         // Beside a hole of several turns no corner of a box helps.
         let between = Some(self.between_turns()).filter(|places| !places.is_empty());
-        let mut around_holes = between.into_iter().chain(MARGINS.iter().map(|margin| self.corners(*margin)));
-        let found = around_holes.find_map(|corners| self.way_by(starts, goals, metric, corners));
-        // Where the loops themselves are in the way, by places between them.
-        found.or_else(|| {
-            let everywhere = [self.corners(MARGINS[MARGINS.len() - 1]), self.lattice()].concat();
-            self.way_by(starts, goals, metric, everywhere)
+        if let Some(way) = between.and_then(by_places) {
+            return Some(way);
+        }
+        let nearest = search.copies_by_distance();
+        let has_few = nearest.len() * CORNERS_OF_BOX <= FEW_CORNERS;
+        let mosts: &[usize] = if has_few { &[FEW_CORNERS] } else { &[FEW_CORNERS, MAX_CORNERS] };
+        let mut tries = mosts.iter().flat_map(|most| MARGINS.iter().map(move |margin| (*most, *margin)));
+        tries.find_map(|(most, margin)| search.way_past(&nearest, margin, most)).or_else(|| {
+            // Where the loops themselves are in the way, by places between them.
+            let near = nearest.iter().take(MAX_CORNERS / CORNERS_OF_BOX);
+            let corners = near.flat_map(|copy| self.corners(*copy, MARGINS[MARGINS.len() - 1]));
+            by_places(corners.chain(self.lattice()).collect())
         })
     }
 
-    /// Returns how many displacements the longest hole reaches over, beyond the one in which a seam has room beside a short one: as many
-    /// turns a seam may have to make with it.
-    pub(super) fn turns(&self) -> i32 {
-        self.holes.iter().map(|hole| turns_of(hole, self.displacement)).max().unwrap_or(0)
-    }
-
-    /// Returns the shortest way from a start to a goal by way of these corners that nothing bars; `None` without one, and where it would
-    /// cross its own copies.
-    fn way_by(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives, corners: Vec<Uv>) -> Option<SeamPath> {
-        let length = |a: Uv, b: Uv| (metric.du * (b.x - a.x) + metric.dv * (b.y - a.y)).length();
-        let node = |place: Uv, length: f64| Node { place, length, before: None, settled: false };
-        // Dijkstra's algorithm over the corners that see each other; the last leg is tried from each that is settled.
-        let mut nodes: Vec<Node> = starts.iter().map(|p| node(*p, 0.0)).collect();
-        nodes.extend(corners.into_iter().map(|p| node(p, f64::INFINITY)));
-        // Shortest complete way so far: its length, last node, goal and end.
-        let mut best: Option<(f64, usize, usize, Uv)> = None;
-        loop {
-            let open = (0..nodes.len()).filter(|&i| !nodes[i].settled && nodes[i].length.is_finite());
-            let Some(i) = open.min_by(|&a, &b| nodes[a].length.total_cmp(&nodes[b].length)) else { break };
-            let (place, so_far) = (nodes[i].place, nodes[i].length);
-            // Nodes are settled in order of length: what is left is longer than the best whole way.
-            if best.is_some_and(|b| b.0 <= so_far) {
-                break;
-            }
-            nodes[i].settled = true;
-            let mut reach = |goal: usize, end: Uv| {
-                let whole = so_far + length(place, end);
-                if best.is_none_or(|b| whole < b.0) && self.leave_free(place, end) {
-                    best = Some((whole, i, goal, end));
-                }
-            };
-            match goals {
-                Goals::Points(points) => points.iter().for_each(|(goal, end)| reach(*goal, *end)),
-                Goals::Line(foot) => reach(0, foot(place)),
-            }
-            for k in 0..nodes.len() {
-                let whole = so_far + length(place, nodes[k].place);
-                if !nodes[k].settled && whole < nodes[k].length && self.leave_free(place, nodes[k].place) {
-                    nodes[k].length = whole;
-                    nodes[k].before = Some(i);
-                }
-            }
-        }
-        let (_, last, goal, end) = best?;
-        let mut points = vec![end];
-        let mut at = last;
-        loop {
-            points.push(nodes[at].place);
-            match nodes[at].before {
-                Some(before) => at = before,
-                None => break,
-            }
-        }
-        points.reverse();
-        // A way that crosses itself is no seam.
-        self.is_simple(&points).then_some(SeamPath { start: at, goal, points })
-    }
-
-    /// Returns the corners of boxes around the holes, larger by a share of their size, and around their next copies; [`MAX_CORNERS`] at
-    /// most.
-    fn corners(&self, margin: f64) -> Vec<Uv> {
-        let mut corners = Vec::new();
-        for hole in self.holes {
-            let lo = hole.iter().fold(Uv::INFINITY, |m, p| m.min(*p));
-            let hi = hole.iter().fold(Uv::NEG_INFINITY, |m, p| m.max(*p));
-            let off = margin * (hi - lo);
-            for copy in [0.0, -1.0, 1.0] {
-                let by = self.displacement * copy;
-                let [a, b] = [lo - off + by, hi + off + by];
-                corners.extend([a, Uv::new(b.x, a.y), b, Uv::new(a.x, b.y)]);
-            }
-        }
-        corners.truncate(MAX_CORNERS);
-        corners
+    /// Returns the corners of the box around a copy of a hole, larger by a share of its size.
+    fn corners(&self, HoleCopy { hole, copy }: HoleCopy, margin: f64) -> [Uv; CORNERS_OF_BOX] {
+        let [lo, hi] = bounds(&self.holes[hole]);
+        let off = margin * (hi - lo);
+        let by = self.displacement * f64::from(copy);
+        let [a, b] = [lo - off + by, hi + off + by];
+        [a, Uv::new(b.x, a.y), b, Uv::new(a.x, b.y)]
     }
 
     /// Returns the places, in parameters, of a square lattice over the box of the borders, [`LATTICE`] steps each way.
     fn lattice(&self) -> Vec<Uv> {
-        let points = || self.borders.iter().flatten();
-        let lo = points().fold(Uv::INFINITY, |m, p| m.min(*p));
-        let hi = points().fold(Uv::NEG_INFINITY, |m, p| m.max(*p));
+        let [lo, hi] = bounds(self.borders.iter().flatten());
         let cell = (hi - lo) / LATTICE;
         let mut places = Vec::new();
         for i in 0..=LATTICE as usize {
@@ -206,104 +131,124 @@ impl<'o> Obstacles<'o> {
         places.truncate(MAX_CORNERS);
         places
     }
-
-    /// Whether a way misses its copies on both sides: the cut surface then lies in one sheet.
-    fn is_simple(&self, points: &[Uv]) -> bool {
-        let chain = Chain::new(points, false, Uv::ZERO);
-        let crosses_copy = |side: &[Uv]| {
-            [-1.0, 1.0].iter().any(|&copy| {
-                let by = self.displacement * copy;
-                chain.is_crossed(side[0] + by, side[1] + by)
-            })
-        };
-        !points.windows(2).any(crosses_copy)
-    }
 }
 
-/// Returns the polygon of a chain that winds, with its end point, which is one displacement from its start.
-pub(super) fn unrolled_polygon(polygon: &[Uv], displacement: Uv) -> Vec<Uv> {
-    let mut open = polygon.to_vec();
-    open.push(polygon[0] + displacement);
-    open
-}
-
-/// Returns the least and the most of some places along `period`, in periods.
-fn range_along(places: &[Uv], period: Uv) -> [f64; 2] {
-    let along = places.iter().map(|p| p.dot(period) / period.length_squared());
-    along.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)])
-}
-
-/// Returns over how many whole periods a hole reaches; [`MOST_TURNS`] at most.
-fn turns_of(hole: &[Uv], period: Uv) -> i32 {
-    let [lo, hi] = range_along(hole, period);
-    (hi - lo).clamp(0.0, f64::from(MOST_TURNS)) as i32
-}
-
-impl<'o> Chain<'o> {
-    fn new(places: &'o [Uv], closed: bool, period: Uv) -> Self {
-        let n = places.len();
-        let sides = if closed { n } else { n.saturating_sub(1) };
-        let around = |first: usize| {
-            let run = || (first..=(first + SIDES_OF_RUN).min(sides)).map(|k| places[k % n]);
-            [run().fold(Uv::INFINITY, Uv::min), run().fold(Uv::NEG_INFINITY, Uv::max)]
-        };
-        let boxes = (0..sides).step_by(SIDES_OF_RUN).map(around).collect();
-        Self { places, closed, period, along: range_along(places, period), boxes }
-    }
-
-    /// Whether the segment between two places crosses the chain or a copy of it; touching does not count, a corner between both sides does.
-    fn is_crossed(&self, a: Uv, b: Uv) -> bool {
-        let slack = CROSSING_NOISE * (b - a).length();
-        self.copies_beside([a, b]).any(|copy| {
-            let by = self.period * f64::from(copy);
-            let (lo, hi) = (a.min(b) - by - slack, a.max(b) - by + slack);
-            let meets = |[low, high]: [Uv; 2]| high.cmpge(lo).all() && low.cmple(hi).all();
-            let near = self.boxes.iter().enumerate().filter(|(_, around)| meets(**around));
-            let mut sides = near.flat_map(|(run, _)| (run * SIDES_OF_RUN..self.sides()).take(SIDES_OF_RUN));
-            sides.any(|side| self.side_is_crossed(side, [a - by, b - by]))
-        })
-    }
-
-    /// Returns how many sides it has.
-    fn sides(&self) -> usize {
-        if self.closed { self.places.len() } else { self.places.len() - 1 }
-    }
-
-    /// Returns by how many periods copies of it are moved that may meet a segment.
-    fn copies_beside(&self, segment: [Uv; 2]) -> RangeInclusive<i32> {
-        if self.period == Uv::ZERO {
-            return 0..=0;
+impl Search<'_> {
+    /// Returns the shortest way past the holes by corners of boxes that stand off them by `margin`: the straight one first, then by the
+    /// corners of the holes that this one crosses, and so on until it crosses none. Where those leave no way, more are taken in, in the
+    /// order of `nearest`. `None` without a way by `most` corners, and where it would cross its own copies.
+    fn way_past(&self, nearest: &[HoleCopy], margin: f64, most: usize) -> Option<SeamPath> {
+        let mut met: FxHashSet<HoleCopy> = FxHashSet::default();
+        let mut corners: Vec<Uv> = Vec::new();
+        loop {
+            let way = self.way_by(&corners, &|hole| met.contains(&hole));
+            let crossed = match &way {
+                Some(way) => self.obstacles.crossed_by(&way.points),
+                None => {
+                    let others = nearest.iter().filter(|copy| !met.contains(*copy));
+                    others.take(met.len().max(FEWEST_MORE)).copied().collect()
+                }
+            };
+            if crossed.is_empty() {
+                return way.filter(|way| self.obstacles.is_simple(&way.points));
+            }
+            let before = corners.len();
+            for copy in crossed {
+                if corners.len() + CORNERS_OF_BOX <= most && met.insert(copy) {
+                    corners.extend(self.obstacles.corners(copy, margin));
+                }
+            }
+            if corners.len() == before {
+                return None;
+            }
         }
-        let [lo, hi] = self.along;
-        let [from, to] = range_along(&segment, self.period);
-        let first = (from - hi - CROSSING_NOISE).ceil().max(f64::from(-MOST_TURNS));
-        let last = (to - lo + CROSSING_NOISE).floor().min(f64::from(MOST_TURNS));
-        first as i32..=last as i32
     }
 
-    /// Whether a segment crosses the side that begins at so many places.
-    fn side_is_crossed(&self, i: usize, [a, b]: [Uv; 2]) -> bool {
-        let n = self.places.len();
-        let (p, q) = (self.places[i], self.places[(i + 1) % n]);
-        // Segments cross where each has the ends of the other on opposite sides.
-        let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
-        let (s1, s2, s3, s4) = (side(a, b, p), side(a, b, q), side(p, q, a), side(p, q, b));
-        let noise = CROSSING_NOISE * (b - a).length() * (q - p).length();
-        let ends_apart = s3 > noise && s4 < -noise || s3 < -noise && s4 > noise;
-        if s2.abs() <= noise && ends_apart {
-            // Through a corner: between what comes before it and what comes after it.
-            let rest = if self.closed { n } else { n - 2 - i };
-            let next = (2..=rest).map(|k| self.places[(i + k) % n]).find(|x| side(a, b, *x).abs() > noise);
-            return next.is_some_and(|x| s1.abs() > noise && side(a, b, x) * s1 < 0.0);
+    /// Returns the holes, and their copies beside them, those first that are nearest to the straight line from the first start to a goal.
+    fn copies_by_distance(&self) -> Vec<HoleCopy> {
+        let Some(start) = self.starts.first() else { return Vec::new() };
+        let goal = match self.goals {
+            Goals::Points(points) => points.first().map_or(*start, |(_, goal)| *goal),
+            Goals::Line(foot) => foot(*start),
+        };
+        let place = |p: Uv| -> Point { self.metric.du * p.x + self.metric.dv * p.y };
+        let mut copies = Vec::with_capacity(COPIES.len() * self.obstacles.holes.len());
+        for (hole, polygon) in self.obstacles.holes.iter().enumerate() {
+            let [lo, hi] = bounds(polygon);
+            for copy in COPIES {
+                let middle = 0.5 * (lo + hi) + self.obstacles.displacement * f64::from(copy);
+                let distance = distance_to_segment(place(middle), place(*start), place(goal));
+                copies.push((distance, HoleCopy { hole, copy }));
+            }
         }
-        (s1 > noise && s2 < -noise || s1 < -noise && s2 > noise) && ends_apart
+        copies.sort_by(|a, b| a.0.total_cmp(&b.0));
+        copies.into_iter().map(|(_, copy)| copy).collect()
     }
+
+    /// Returns the shortest way from a start to a goal by way of these corners that no border bars, and no hole that `is_met`; `None`
+    /// without one.
+    fn way_by(&self, corners: &[Uv], is_met: &dyn Fn(HoleCopy) -> bool) -> Option<SeamPath> {
+        let is_free = |from: Uv, to: Uv| !self.obstacles.any_crossed(from, to, |hole| hole.is_none_or(is_met));
+        let length = |a: Uv, b: Uv| (self.metric.du * (b.x - a.x) + self.metric.dv * (b.y - a.y)).length();
+        let node = |place: Uv, length: f64| Node { place, length, before: None, settled: false };
+        // Dijkstra's algorithm over the corners that see each other; the last leg is tried from each that is settled.
+        let mut nodes: Vec<Node> = self.starts.iter().map(|p| node(*p, 0.0)).collect();
+        nodes.extend(corners.iter().map(|p| node(*p, f64::INFINITY)));
+        // Shortest complete way so far: its length, last node, goal and end.
+        let mut best: Option<(f64, usize, usize, Uv)> = None;
+        loop {
+            let open = (0..nodes.len()).filter(|&i| !nodes[i].settled && nodes[i].length.is_finite());
+            let Some(i) = open.min_by(|&a, &b| nodes[a].length.total_cmp(&nodes[b].length)) else { break };
+            let (place, so_far) = (nodes[i].place, nodes[i].length);
+            // Nodes are settled in order of length: what is left is longer than the best whole way.
+            if best.is_some_and(|b| b.0 <= so_far) {
+                break;
+            }
+            nodes[i].settled = true;
+            let mut reach = |goal: usize, end: Uv| {
+                let whole = so_far + length(place, end);
+                if best.is_none_or(|b| whole < b.0) && is_free(place, end) {
+                    best = Some((whole, i, goal, end));
+                }
+            };
+            match self.goals {
+                Goals::Points(points) => points.iter().for_each(|(goal, end)| reach(*goal, *end)),
+                Goals::Line(foot) => reach(0, foot(place)),
+            }
+            for k in 0..nodes.len() {
+                let whole = so_far + length(place, nodes[k].place);
+                if !nodes[k].settled && whole < nodes[k].length && is_free(place, nodes[k].place) {
+                    nodes[k].length = whole;
+                    nodes[k].before = Some(i);
+                }
+            }
+        }
+        let (_, last, goal, end) = best?;
+        let mut points = vec![end];
+        let mut at = last;
+        loop {
+            points.push(nodes[at].place);
+            match nodes[at].before {
+                Some(before) => at = before,
+                None => break,
+            }
+        }
+        points.reverse();
+        Some(SeamPath { start: at, goal, points })
+    }
+}
+
+/// Returns the lowest and highest corner of the box around places.
+fn bounds<'p>(places: impl IntoIterator<Item = &'p Uv>) -> [Uv; 2] {
+    let places = places.into_iter();
+    places.fold([Uv::INFINITY, Uv::NEG_INFINITY], |[lo, hi], p| [lo.min(*p), hi.max(*p)])
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::obstacles::unrolled_polygon;
     use super::*;
-    use crate::math::{Point, Vector};
+    use crate::math::Vector;
 
     /// A unit strip with a hole in the way of its only straight seam.
     #[test]
@@ -326,7 +271,7 @@ mod tests {
         );
         assert!(path.points.len() > 2 && path.points.windows(2).all(|s| obstacles.leave_free(s[0], s[1])));
         // A hole whose corners lie on the straight seam is in its way as well.
-        let turned: Vec<Uv> = obstacles.holes[0].iter().map(|p| *p + Uv::new(1.0, 0.0)).collect();
+        let turned: Vec<Uv> = holes[0].iter().map(|p| *p + Uv::new(1.0, 0.0)).collect();
         let through = [turned];
         let obstacles = Obstacles::new(&through, &borders, turn);
         assert!(!obstacles.leave_free(Uv::new(1.0, 0.0), Uv::new(1.0, 1.0)));
@@ -361,5 +306,32 @@ mod tests {
         // The slot's middle leans by 24 from its lower end to its upper one: three whole turns at least.
         let end = path.points[path.points.len() - 1];
         assert!((end - start).x >= 18.0, "{end}");
+    }
+    /// Rows of staggered windows, each over 0.3 of the pitch to both sides of its middle: a seam from row to row winds between them, past
+    /// windows that stand in no order.
+    #[test]
+    fn a_seam_winds_through_rows_of_staggered_windows() {
+        let (across, rows) = (16i32, 14i32);
+        let turn = Uv::new(f64::from(across), 0.0);
+        let line = |v: f64| unrolled_polygon(&[Uv::new(0.0, v), Uv::new(8.0, v)], turn);
+        let window = |i: i32, j: i32| {
+            let middle = Uv::new(f64::from(i) + 0.5 * f64::from(j % 2), f64::from(j) + 0.5);
+            [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]].map(|p| middle + Uv::from_array(p)).to_vec()
+        };
+        let all = |k: i32| window(k * 5 % across, k / across);
+        let holes: Vec<Vec<Uv>> = (0..across * rows).map(all).collect();
+        let borders = [line(0.0), line(f64::from(rows))];
+        let obstacles = Obstacles::new(&holes, &borders, turn);
+        let (start, goal) = (Uv::ZERO, Uv::new(0.0, f64::from(rows)));
+        let metric = Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y };
+        assert_eq!(obstacles.crossed_by(&[start, goal]).len(), 7);
+        let path = obstacles.way_around(&[start], &Goals::Points(&[(0, goal)]), &metric).expect("a way");
+        let ends = [path.points[0], path.points[path.points.len() - 1]];
+        assert_eq!((ends, obstacles.crossed_by(&path.points)), ([start, goal], Vec::new()));
+        // Beside boxes of half side 0.42: at ±0.42 through even rows and at ±0.08 through odd ones, 0.84 along each but the last, which
+        // leaves the straight way to the goal free, and from row to row across by 0.34 within 0.16.
+        let length: f64 = path.points.windows(2).map(|side| (side[1] - side[0]).length()).sum();
+        let expected = 0.42f64.hypot(0.08) + 13.0 * (0.84 + 0.34f64.hypot(0.16)) + 0.08f64.hypot(0.92);
+        assert!((length - expected).abs() < 1e-9, "{length} for {expected}");
     }
 }
