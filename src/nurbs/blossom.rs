@@ -188,7 +188,7 @@ impl<P: ControlPoint> Spline<P> {
 
 impl Curve {
     /// Joins this curve and another of its degree that starts where it ends, both clamped; the parameter runs on at the joint, from where
-    /// `tail` keeps its speed. Where the two do not meet, the end of this one is kept.
+    /// `tail` keeps its speed. Where the two do not meet, the end of this one is kept, which changes the shape of `tail`.
     pub fn joined_with(&self, tail: &Self) -> Self {
         let p = self.degree;
         debug_assert_eq!(p, tail.degree, "curves of unequal degrees are joined after one is raised");

@@ -119,3 +119,44 @@ fn an_operator_without_a_second_axis_may_mirror() {
     let [lo, hi] = import.report.bbox_mm.expect("a shape");
     assert!(lo[1].abs() < 1e-9 && (hi[1] - 4.0).abs() < 1e-9, "{lo:?} {hi:?}");
 }
+
+/// Half a disc of radius 5 whose second quarter stands `gap` mm to the left, along one edge and the straight one back.
+fn parted_quarters(gap: f64) -> Import {
+    let (center, end) = (-gap, -5.0 - gap);
+    read(&format!(
+        "#20=CIRCLE('',#14,5.);\n#22=CARTESIAN_POINT('',({center:?},0.,0.));\n#23=AXIS2_PLACEMENT_3D('',#22,#13,#11);\n#24=CIRCLE('',#23,5.);\n\
+         #21=TRIMMED_CURVE('',#20,(PARAMETER_VALUE(0.)),(PARAMETER_VALUE(1.5707963267948966)),.T.,.PARAMETER.);\n\
+         #25=TRIMMED_CURVE('',#24,(PARAMETER_VALUE(1.5707963267948966)),(PARAMETER_VALUE(3.141592653589793)),.T.,.PARAMETER.);\n\
+         #26=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#21);\n#27=COMPOSITE_CURVE_SEGMENT(.DISCONTINUOUS.,.T.,#25);\n\
+         #28=COMPOSITE_CURVE('',(#26,#27),.F.);\n#30=CARTESIAN_POINT('',(5.,0.,0.));\n#31=CARTESIAN_POINT('',({end:?},0.,0.));\n\
+         #32=VERTEX_POINT('',#30);\n#33=VERTEX_POINT('',#31);\n#40=EDGE_CURVE('',#32,#33,#28,.T.);\n#41=EDGE_CURVE('',#33,#32,$,.T.);\n\
+         #42=ORIENTED_EDGE('',*,*,#40,.T.);\n#43=ORIENTED_EDGE('',*,*,#41,.T.);\n#44=EDGE_LOOP('',(#42,#43));\n\
+         #45=FACE_OUTER_BOUND('',#44,.T.);\n#71=PLANE('',#14);\n#72=ADVANCED_FACE('',(#45),#71,.T.);\n#73=OPEN_SHELL('',(#72));\n\
+         #900=SHELL_BASED_SURFACE_MODEL('',(#73));\n"
+    ))
+}
+
+#[test]
+fn segments_that_lie_apart_keep_their_shapes_and_are_told() {
+    for (gap, repaired) in [(0.0, 0), (0.005, 1)] {
+        let import = parted_quarters(gap);
+        assert_eq!((import.report.faces.converted, import.report.faces.repaired), (1, repaired), "{gap}");
+        let edge = import.model.parts[0].edges.iter().find(|e| e.entity == Some(40)).expect("the edge");
+        let [a, b] = edge.curve.domain();
+        for k in 0..=200 {
+            let p = edge.curve.evaluate(a + (b - a) * f64::from(k) / 200.0);
+            let off = if p.x > 0.0 {
+                p.length() - 5.0
+            } else if p.x < -gap {
+                (p + gap * lampyris::math::Vector::X).length() - 5.0
+            } else {
+                p.y - 5.0
+            };
+            assert!(off.abs() < 1e-9, "{gap}: {p}");
+        }
+    }
+    let wide = parted_quarters(0.5);
+    assert_eq!(wide.model.placed_face_count(), 0);
+    let refusals = &wide.report.refusals;
+    assert!(refusals.iter().any(|r| r.reason.contains("its segments are 5.000e-1 mm apart")), "{refusals:?}");
+}

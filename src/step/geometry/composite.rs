@@ -3,9 +3,9 @@
 use super::curves::{
     COMPOSITES, CurveShape, DirectedCurve, MAX_DEPTH, SPLINES, SURFACE_CURVES, polyline_lengths, space_curve,
 };
-use super::tolerances::SEAM_SHARE;
+use super::tolerances::{ACCURACY_MM, SEAM_SHARE};
 use super::{GeometryReader, Outcome, Refusal};
-use crate::math::{Frame, Homogeneous, Point};
+use crate::math::{Aabb, Frame, Homogeneous, Point};
 use crate::nurbs::Curve;
 use crate::step::part21::{Args, Entity};
 use rustc_hash::FxHashMap;
@@ -136,7 +136,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             return Err(Refusal::new(basis, "its parameters cannot be taken over: they are those of a conic"));
         }
         if owner.is_one_of(&COMPOSITES) {
-            require_kept_parameter(owner)?;
+            self.require_kept_parameter(owner)?;
             return Ok(x + curve.domain()[0]);
         }
         let points = owner.attributes("POLYLINE", 1).and_then(|a| self.points(owner, a.list(0)).ok());
@@ -236,15 +236,31 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 
     /// Reads a composite curve, mm, as one spline, of the highest degree of its segments. Segments are turned around as in
-    /// [`Self::segments`]; at gaps, however wide, each begins where the one before ends. Refuses a curve without segments, one with more
-    /// than [`MAX_SEGMENTS`], and chains of more than [`MAX_DEPTH`] references, of which `depth` are behind.
+    /// [`Self::segments`]; a straight piece bridges a gap that is wider than the file's accuracy. Refuses a curve without segments, one
+    /// with more than [`MAX_SEGMENTS`] or a gap that no stated accuracy allows, and chains of more than [`MAX_DEPTH`] references, of which
+    /// `depth` are behind.
     pub(crate) fn composite_curve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         if depth > MAX_DEPTH {
             return Err(Refusal::new(e, "curves refer to each other too deeply"));
         }
         let segments = self.segments(e, depth)?;
-        let degree = segments.iter().map(|c| c.degree).max().unwrap_or(1);
-        let parts = segments.iter().map(|c| elevate_degree(c, degree)).collect();
+        let accuracy = self.accuracy_along(&segments);
+        let mut pieces: Vec<Curve> = Vec::with_capacity(segments.len());
+        for segment in segments {
+            if let Some(last) = pieces.last() {
+                let [from, to] = gap_between(last, &segment);
+                let width = (to - from).length();
+                if width > ACCURACY_MM[1] {
+                    return Err(Refusal::new(e, format!("its segments are {width:.3e} mm apart")));
+                }
+                if width > accuracy {
+                    pieces.push(Curve::line(from, to, [0.0, width]));
+                }
+            }
+            pieces.push(segment);
+        }
+        let degree = pieces.iter().map(|c| c.degree).max().unwrap_or(1);
+        let parts = pieces.iter().map(|c| elevate_degree(c, degree)).collect();
         Curve::join(parts).ok_or_else(|| Refusal::new(e, "composite curve without segments"))
     }
 
@@ -252,10 +268,53 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     /// another: of conics and polylines.
     pub(super) fn counted_composite(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
         let curve = self.composite_curve(e, depth + 1)?;
-        require_kept_parameter(e)?;
+        self.require_kept_parameter(e)?;
         let [a, b] = curve.domain();
         Ok(curve.reparametrised([0.0, b - a]))
     }
+
+    /// Returns the distance, mm, within which ends of these segments are one.
+    fn accuracy_along(&self, segments: &[Curve]) -> f64 {
+        let bounds = segments.iter().fold(Aabb::EMPTY, |sum, c| sum.union(c.bounds()));
+        self.units.accuracy_on_face(bounds.diagonal())
+    }
+
+    /// Whether a curve is a composite curve, or a part or copy of one, whose segments lie farther apart than the file's accuracy.
+    pub(super) fn is_bridged(&self, curve: Entity<'f, 'a>) -> bool {
+        let owner = self.parameter_owner(curve);
+        if !owner.is_one_of(&COMPOSITES) {
+            return false;
+        }
+        self.segments(owner, 0).is_ok_and(|segments| {
+            let accuracy = self.accuracy_along(&segments);
+            segments.windows(2).any(|pair| {
+                let [from, to] = gap_between(&pair[0], &pair[1]);
+                !coincident(from, to, accuracy)
+            })
+        })
+    }
+
+    /// Refuses a composite curve through which our parameter, but for its start, does not run as the file's, which goes through its
+    /// segments' from 0 on: one with segments other than of lines and splines, with a parameter of their own, or with bridged gaps.
+    fn require_kept_parameter(&self, e: Entity<'f, 'a>) -> Outcome<()> {
+        let list = segment_list(e);
+        let are_kept = list.is_some_and(|list| (0..list.len()).filter_map(|i| list.entity(i)).all(keeps_parameter));
+        if !are_kept {
+            return Err(Refusal::new(
+                e,
+                "its parameters cannot be taken over: they count those of conics or polylines",
+            ));
+        }
+        if self.is_bridged(e) {
+            return Err(Refusal::new(e, "its parameters cannot be taken over: its segments lie apart"));
+        }
+        Ok(())
+    }
+}
+
+/// Returns where one curve ends and the next one begins.
+fn gap_between(before: &Curve, after: &Curve) -> [Point; 2] {
+    [before.evaluate(before.domain()[1]), after.evaluate(after.domain()[0])]
 }
 
 /// Returns the list of the segments of a composite curve; `None` of one without any, and of any other curve.
@@ -266,16 +325,6 @@ fn segment_list<'f, 'a>(e: Entity<'f, 'a>) -> Option<Args<'f, 'a>> {
 /// Returns the attributes of a segment of a composite curve: transition, sense and parent curve.
 fn segment_attributes<'f, 'a>(segment: Entity<'f, 'a>) -> Args<'f, 'a> {
     segment.attributes("COMPOSITE_CURVE_SEGMENT", 0).unwrap_or_else(|| segment.args())
-}
-
-/// Refuses a composite curve through which our parameter, but for its start, does not run as the file's, which goes through its segments'
-/// from 0 on: one with segments other than of lines and splines, or with a parameter of their own.
-fn require_kept_parameter(e: Entity<'_, '_>) -> Outcome<()> {
-    let list = segment_list(e);
-    if list.is_some_and(|list| (0..list.len()).filter_map(|i| list.entity(i)).all(keeps_parameter)) {
-        return Ok(());
-    }
-    Err(Refusal::new(e, "its parameters cannot be taken over: they count those of conics or polylines"))
 }
 
 /// Whether a segment of a composite curve has the parameter of its parent curve, and that is ours.

@@ -14,6 +14,8 @@ use crate::nurbs::Curve;
 const PASSED_BY: &str = "the line of an edge passes one of its vertices by: it runs between them";
 /// What is told of an edge whose sense is wrong.
 const WRONG_SENSE: &str = "the sense of an edge contradicts its vertices: it runs from the first to the second";
+/// What is told of an edge whose curve was in pieces.
+const BRIDGED: &str = "segments of the curve of an edge lie apart: straight pieces join them";
 /// Longest chain of edges that are parts of edges.
 const MAX_PARENTS: usize = 4;
 
@@ -78,8 +80,10 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let directed = self.curve(curve, 0)?;
         // A loop of one edge encloses something: next to nothing of the curve cannot be meant.
         let closed = closed || alone && directed.shape.period().is_some() && coincident(p, q, LOOSE_VERTEX_MM);
-        trim_to_vertices(&directed, p, q, closed, sense)
-            .ok_or_else(|| Refusal::new(e, "its vertices leave nothing of its curve"))
+        let edge = trim_to_vertices(&directed, p, q, closed, sense)
+            .ok_or_else(|| Refusal::new(e, "its vertices leave nothing of its curve"))?;
+        let bridged = || self.is_bridged(self.file.entity(curve)?).then_some(BRIDGED);
+        Ok(TrimmedEdge { repair: edge.repair.or_else(bridged), ..edge })
     }
 }
 

@@ -1,6 +1,7 @@
 //! Loops whose uses do not follow each other: wrong orientation flags and shuffled lists, put right by their ends.
 
 use crate::math::Point;
+use rustc_hash::FxHashMap;
 
 /// An edge use with the points between which it runs.
 #[derive(Clone, Copy, Debug)]
@@ -106,17 +107,27 @@ pub(super) fn drop_opposite_loops(loops: &mut Vec<Vec<(usize, bool)>>) -> Option
         // The same cycle from some place on, backwards.
         n == b.len() && (0..n).any(|k| (0..n).all(|i| a[i] == (b[(k + n - i) % n].0, !b[(k + n - i) % n].1)))
     };
-    let mut k = 0;
-    while k < loops.len() {
-        let twin = (k + 1..loops.len()).find(|&l| is_opposite(&loops[k], &loops[l]));
-        match twin {
-            Some(l) if loops.len() > 2 => {
-                loops.remove(l);
-                loops.remove(k);
-            }
-            _ => k += 1,
+    // Both run along the same edges: only loops of the same least edge are compared.
+    let least: Vec<Option<usize>> = loops.iter().map(|uses| uses.iter().map(|(edge, _)| *edge).min()).collect();
+    let mut of_edge: FxHashMap<Option<usize>, Vec<usize>> = FxHashMap::default();
+    for (k, edge) in least.iter().enumerate() {
+        of_edge.entry(*edge).or_default().push(k);
+    }
+    let mut dropped = vec![false; before];
+    let mut left = before;
+    for (k, edge) in least.iter().enumerate() {
+        if dropped[k] || left <= 2 {
+            continue;
+        }
+        let mut others = of_edge[edge].iter().copied().filter(|&l| l > k && !dropped[l]);
+        if let Some(l) = others.find(|&l| is_opposite(&loops[k], &loops[l])) {
+            dropped[k] = true;
+            dropped[l] = true;
+            left -= 2;
         }
     }
+    let mut is_dropped = dropped.into_iter();
+    loops.retain(|_| is_dropped.next() == Some(false));
     (loops.len() < before).then_some("two bounds along the same edges in opposite directions enclose nothing")
 }
 
@@ -176,5 +187,15 @@ mod tests {
             let mut loops = kept.clone();
             assert!(drop_opposite_loops(&mut loops).is_none() && loops == kept);
         }
+    }
+
+    #[test]
+    fn pairs_among_many_loops_go_and_the_rest_keep_their_order() {
+        let single = |k: usize| vec![(3 * k, false), (3 * k + 1, true)];
+        let opposite = |k: usize| vec![(3 * k + 1, false), (3 * k, true)];
+        let mut loops: Vec<Vec<(usize, bool)>> = (0..300).map(single).collect();
+        loops.extend((0..300).filter(|k| k % 3 == 0).map(opposite));
+        assert!(drop_opposite_loops(&mut loops).is_some());
+        assert_eq!(loops, (0..300).filter(|k| k % 3 != 0).map(single).collect::<Vec<_>>());
     }
 }

@@ -1,7 +1,7 @@
 //! From chains to the boundary of a region without periods: chains that wind around the surface are joined by seams,
 //! lone ones run to a pole or a natural border, closed surfaces get their outer boundary, holes move inside it.
 
-use super::holes::place_hole;
+use super::holes::{Border, place_hole};
 use super::loops::{Chain, Piece, Source};
 use super::obstacles::{Obstacles, unrolled_polygon};
 use super::seam_path::{Goals, SeamPath};
@@ -10,6 +10,11 @@ use crate::math::Uv;
 use crate::math::polygon::signed_area;
 use crate::nurbs::UvCurve;
 use crate::step::chart::Chart;
+
+/// Most pairs of ends that a straight seam is tried between: each costs a look at all obstacles.
+const MOST_PAIRS: usize = 4096;
+/// Counterparts of a start that are kept at least, the best ones: rims of thousands of edges have millions of pairs.
+const LEAST_PAIRS_OF_START: usize = 16;
 
 /// The boundary of a face in the plane of its chart.
 pub(crate) struct Boundary {
@@ -76,7 +81,8 @@ pub(crate) fn bound_region(
 
 /// Adds to `out` an outer loop and its holes, moved into it.
 fn add_with_holes(outer: Chain, holes: impl IntoIterator<Item = Chain>, chart: &Chart, out: &mut Boundary) {
-    let holes: Vec<Chain> = holes.into_iter().map(|h| place_hole(h, &outer, chart, &mut out.repairs)).collect();
+    let border = Border::new(&outer);
+    let holes: Vec<Chain> = holes.into_iter().map(|h| place_hole(h, &border, chart, &mut out.repairs)).collect();
     out.loops.push(outer);
     out.loops.extend(holes);
 }
@@ -286,8 +292,13 @@ fn join_winding_pair(
     let starts_b: Vec<Uv> = b.pieces.iter().map(Piece::start).collect();
     let along = usize::from(a.winding[0] == 0);
     let mut pairs: Vec<(f64, usize, usize, Uv)> = Vec::new();
+    let by_cost = |x: &(f64, usize, usize, Uv), y: &(f64, usize, usize, Uv)| {
+        x.0.total_cmp(&y.0).then_with(|| (x.1, x.2).cmp(&(y.1, y.2)))
+    };
+    let kept = LEAST_PAIRS_OF_START.max(MOST_PAIRS / starts_a.len());
     for (i, &p) in starts_a.iter().enumerate() {
         let d = chart.derivatives(p);
+        let first = pairs.len();
         for (j, &q) in starts_b.iter().enumerate() {
             // The nearest of all copies: a seam never needs to go around the surface.
             let mut q = chart.nearest_representative(q, p);
@@ -308,10 +319,13 @@ fn join_winding_pair(
             let slant = if slant < STRAIGHT_SEAM_SHARE { 0.0 } else { slant + 0.01 };
             pairs.push((slant * chart.size + SEAM_LENGTH_WEIGHT * length, i, j, q));
         }
+        if pairs.len() > first + kept {
+            pairs[first..].select_nth_unstable_by(kept, by_cost);
+            pairs.truncate(first + kept);
+        }
     }
-    pairs.sort_by(|x, y| x.0.total_cmp(&y.0));
-    // Each pair costs a look at all obstacles; the best few thousand will do.
-    pairs.truncate(4096);
+    pairs.sort_unstable_by(by_cost);
+    pairs.truncate(MOST_PAIRS);
     let borders = [border_a, border_b];
     let obstacles = Obstacles::new(holes, &borders, displacement);
     let straight = pairs.iter().find(|(_, i, _, q)| obstacles.leave_free(starts_a[*i], *q));

@@ -4,6 +4,7 @@ use super::loops::{Chain, contains};
 use crate::math::Uv;
 use crate::math::polygon::signed_area;
 use crate::step::chart::Chart;
+use std::cell::OnceCell;
 
 /// Places of a hole that are looked for inside the border.
 const PLACES: usize = 5;
@@ -12,6 +13,25 @@ const MOST_PERIODS: f64 = 64.0;
 /// How much finer the border's polygon is where the first one has a hole outside: a hexagon in a circle 1.5 % wider stood out of the
 /// 16-sided polygon of that circle.
 const FINE_DENSITY: usize = 16;
+
+/// The border into which holes are moved, as a polygon that is made once.
+pub(super) struct Border<'c> {
+    outer: &'c Chain,
+    coarse: Vec<Uv>,
+    /// Made for the first hole that is not whole in the coarse one.
+    fine: OnceCell<Vec<Uv>>,
+}
+
+impl<'c> Border<'c> {
+    pub(super) fn new(outer: &'c Chain) -> Self {
+        Self { outer, coarse: outer.polygon(), fine: OnceCell::new() }
+    }
+
+    /// Returns the polygon of [`FINE_DENSITY`].
+    fn fine(&self) -> &[Uv] {
+        self.fine.get_or_init(|| self.outer.polygon_of_density(FINE_DENSITY))
+    }
+}
 
 /// By how many periods a hole may be moved along `axis` so that it reaches into a border, the fewest first: a border that is cut along a
 /// helix leans over several.
@@ -30,7 +50,12 @@ fn period_counts(hole: &[Uv], border: &[Uv], axis: usize, period: f64) -> Vec<i3
 
 /// Moves a hole by periods into the border, and turns it clockwise; one that lies in no place inside is a loop of its own and turned the
 /// other way. Notes what was turned.
-pub(super) fn place_hole(mut hole: Chain, outer: &Chain, chart: &Chart, repairs: &mut Vec<&'static str>) -> Chain {
+pub(super) fn place_hole(
+    mut hole: Chain,
+    border: &Border<'_>,
+    chart: &Chart,
+    repairs: &mut Vec<&'static str>,
+) -> Chain {
     let polygon = hole.polygon();
     // Most of a few places decide, for one may lie on the border; a shift with all of them inside is the better one.
     let shift_into = |border: &[Uv], least: usize| {
@@ -43,11 +68,10 @@ pub(super) fn place_hole(mut hole: Chain, outer: &Chain, chart: &Chart, repairs:
         };
         shifts.map(|count| chart.whole_periods(count)).find(inside)
     };
-    let coarse = outer.polygon();
-    // Nearly all holes are whole in the coarse border: the fine one is made for few.
-    let shift = shift_into(&coarse, PLACES).or_else(|| {
-        let fine = outer.polygon_of_density(FINE_DENSITY);
-        let tries = [(&fine, PLACES), (&coarse, PLACES / 2 + 1), (&fine, PLACES / 2 + 1)];
+    let coarse = border.coarse.as_slice();
+    let shift = shift_into(coarse, PLACES).or_else(|| {
+        let fine = border.fine();
+        let tries = [(fine, PLACES), (coarse, PLACES / 2 + 1), (fine, PLACES / 2 + 1)];
         tries.into_iter().find_map(|(border, least)| shift_into(border, least))
     });
     match shift {

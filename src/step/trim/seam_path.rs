@@ -307,6 +307,7 @@ mod tests {
         let end = path.points[path.points.len() - 1];
         assert!((end - start).x >= 18.0, "{end}");
     }
+
     /// Rows of staggered windows, each over 0.3 of the pitch to both sides of its middle: a seam from row to row winds between them, past
     /// windows that stand in no order.
     #[test]
