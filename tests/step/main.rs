@@ -2,6 +2,7 @@
 
 mod accounts;
 mod arcs;
+mod assemblies;
 mod bounded_curves;
 mod corpus;
 mod faces;

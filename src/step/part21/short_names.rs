@@ -1,7 +1,7 @@
 //! The short names of entities, as some writers give them in place of the long ones: `ADVFC` for `ADVANCED_FACE`.
 //!
 //! Source: ISO 10303-21:2016, 7.3.4 (either may stand), and the annexes of short names of ISO 10303-41, -42, -43, -44, -46 and -203. Only
-//! names that the reader asks for are listed.
+//! names that the reader asks for, whole or by their ends, are listed.
 
 use super::span::Span;
 
@@ -42,13 +42,11 @@ impl Keyword {
 }
 
 /// Short and long names, in the order of the short ones.
-const LONG_NAMES: [(&str, &str); 158] = [
+const LONG_NAMES: [(&str, &str); 149] = [
     ("A2PL2D", "AXIS2_PLACEMENT_2D"),
     ("A2PL3D", "AXIS2_PLACEMENT_3D"),
     ("ABSR", "ADVANCED_BREP_SHAPE_REPRESENTATION"),
     ("ADVFC", "ADVANCED_FACE"),
-    ("AEIA", "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT"),
-    ("APDCRF", "APPLIED_DOCUMENT_REFERENCE"),
     ("ASCMUS", "ASSEMBLY_COMPONENT_USAGE"),
     ("AX1PLC", "AXIS1_PLACEMENT"),
     ("BLNRSL", "BOOLEAN_RESULT"),
@@ -81,8 +79,6 @@ const LONG_NAMES: [(&str, &str); 158] = [
     ("CTO3", "CARTESIAN_TRANSFORMATION_OPERATOR_3D"),
     ("CYLSRF", "CYLINDRICAL_SURFACE"),
     ("DCMFL", "DOCUMENT_FILE"),
-    ("DCMNT", "DOCUMENT"),
-    ("DCMTYP", "DOCUMENT_TYPE"),
     ("DGTRSR", "DEGENERATE_TOROIDAL_SURFACE"),
     ("DPDC", "DRAUGHTING_PRE_DEFINED_COLOUR"),
     ("DRCTN", "DIRECTION"),
@@ -94,7 +90,6 @@ const LONG_NAMES: [(&str, &str); 158] = [
     ("ELMSRF", "ELEMENTARY_SURFACE"),
     ("EXARSL", "EXTRUDED_AREA_SOLID"),
     ("EXFCSL", "EXTRUDED_FACE_SOLID"),
-    ("EXTSRC", "EXTERNAL_SOURCE"),
     ("FBSR", "FACETED_BREP_SHAPE_REPRESENTATION"),
     ("FCBND", "FACE_BOUND"),
     ("FCOTBN", "FACE_OUTER_BOUND"),
@@ -103,12 +98,10 @@ const LONG_NAMES: [(&str, &str); 158] = [
     ("GBSSR", "GEOMETRICALLY_BOUNDED_SURFACE_SHAPE_REPRESENTATION"),
     ("GBWSR", "GEOMETRICALLY_BOUNDED_WIREFRAME_SHAPE_REPRESENTATION"),
     ("GC", "GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT"),
-    ("GMRPCN", "GEOMETRIC_REPRESENTATION_CONTEXT"),
     ("GMTST", "GEOMETRIC_SET"),
     ("GUAC", "GLOBAL_UNIT_ASSIGNED_CONTEXT"),
     ("HLSPSL", "HALF_SPACE_SOLID"),
     ("HYPRBL", "HYPERBOLA"),
-    ("IDNRL", "IDENTIFICATION_ROLE"),
     ("INTCRV", "INTERSECTION_CURVE"),
     ("ITDFTR", "ITEM_DEFINED_TRANSFORMATION"),
     ("LNGUNT", "LENGTH_UNIT"),
@@ -119,7 +112,6 @@ const LONG_NAMES: [(&str, &str); 158] = [
     ("MSSR", "MANIFOLD_SURFACE_SHAPE_REPRESENTATION"),
     ("MSWTUN", "MEASURE_WITH_UNIT"),
     ("NAUO", "NEXT_ASSEMBLY_USAGE_OCCURRENCE"),
-    ("NMDUNT", "NAMED_UNIT"),
     ("NMSSR", "NON_MANIFOLD_SURFACE_SHAPE_REPRESENTATION"),
     ("OFCR3D", "OFFSET_CURVE_3D"),
     ("OFFSRF", "OFFSET_SURFACE"),
@@ -169,7 +161,6 @@ const LONG_NAMES: [(&str, &str); 158] = [
     ("RGANWD", "RIGHT_ANGULAR_WEDGE"),
     ("RGCRCN", "RIGHT_CIRCULAR_CONE"),
     ("RGCRCY", "RIGHT_CIRCULAR_CYLINDER"),
-    ("RPRCNT", "REPRESENTATION_CONTEXT"),
     ("RPRITM", "REPRESENTATION_ITEM"),
     ("RPRMP", "REPRESENTATION_MAP"),
     ("RPRRLT", "REPRESENTATION_RELATIONSHIP"),

@@ -26,10 +26,10 @@ use crate::step::trim::task::{FaceTask, TaskEdge};
 use rayon::prelude::*;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// Ends of edges this many of their gaps apart are one, up to a gap of [`LARGEST_GAP_MM`].
-const GAPS: f64 = 2.0;
-/// See [`GAPS`]; mm.
-const LARGEST_GAP_MM: f64 = 0.05;
+/// Ends of edges this many of their gaps apart are one, up to a gap of [`LARGEST_JOINED_GAP_MM`].
+const JOINED_GAPS: f64 = 2.0;
+/// See [`JOINED_GAPS`]; mm.
+const LARGEST_JOINED_GAP_MM: f64 = 0.05;
 /// Edges of a face whose points are asked for where a surface is sized by them.
 const ASKED_EDGES: usize = 64;
 
@@ -278,7 +278,7 @@ fn convert_face(
 
     // Points are one within what the file states, or more where an edge leaves gaps.
     let accuracy = geometry.units.accuracy_on_face(bounds.diagonal());
-    let with_gap = |gap: f64| accuracy.max(GAPS * gap.min(LARGEST_GAP_MM));
+    let with_gap = |gap: f64| accuracy.max(JOINED_GAPS * gap.min(LARGEST_JOINED_GAP_MM));
     let edges = curves.iter().map(|(&k, &(curve, gap))| (k, TaskEdge { curve, accuracy: with_gap(gap) })).collect();
     let task = FaceTask {
         chart,

@@ -9,9 +9,9 @@ use crate::step::trim::loops::Source;
 /// Ends of a seam this near to a vertex of the face are that vertex, mm; gaps of the file add to it.
 const SEAM_END_MM: f64 = 1e-5;
 /// How many gaps they may lie apart, and the largest gap that counts, mm.
-const GAPS: f64 = 4.0;
-/// See [`GAPS`].
-const LARGEST_GAP_MM: f64 = 0.1;
+const SEAM_END_GAPS: f64 = 4.0;
+/// See [`SEAM_END_GAPS`].
+const LARGEST_SEAM_END_GAP_MM: f64 = 0.1;
 
 /// A part with the account of its conversion.
 #[derive(Debug, Default)]
@@ -44,7 +44,7 @@ pub(crate) fn add_face(
     known.dedup();
     // A seam ends on edges, and these may miss their vertices themselves.
     let missed = sources().map(|e| distance_to_vertices(part, e)).fold(0.0, f64::max);
-    let near = SEAM_END_MM + GAPS * built.gap.max(missed).min(LARGEST_GAP_MM);
+    let near = SEAM_END_MM + SEAM_END_GAPS * built.gap.max(missed).min(LARGEST_SEAM_END_GAP_MM);
     // A seam ends at vertices of the face, or shells would have a crack there.
     let seams: Vec<EdgeId> = built
         .seams

@@ -1,9 +1,12 @@
 //! Children of products that representations place: by mapped items and by relationships with a transformation.
 //!
-//! Source: ISO 10303-44 with AP214: a usage may stand beside a mapped item that places the same child, without a placement of its own.
+//! Source: ISO 10303-44 with AP214: a usage may stand beside a mapped item that places the same child, without a placement of its own or
+//! with the same one.
 
 use super::assembly::Assembly;
+use super::places::UsagePlaces;
 use super::usage_names::Usage;
+use crate::math::Frame;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 impl Assembly<'_, '_> {
@@ -29,6 +32,23 @@ impl Assembly<'_, '_> {
         children.into_iter().filter(is_shown).collect()
     }
 
+    /// Returns where the usages of a product that stands at `placement` put the representations of their children.
+    pub(super) fn usage_places(&self, usages: &[Usage], placement: &Frame) -> UsagePlaces {
+        let mut of_children: FxHashMap<u64, Vec<Frame>> = FxHashMap::default();
+        for usage in usages {
+            if let Some(local) = self.placements.get(&usage.id).copied().flatten() {
+                of_children.entry(usage.child).or_default().push(placement.compose(&local));
+            }
+        }
+        let mut placements: FxHashMap<u64, Vec<Frame>> = FxHashMap::default();
+        for (child, frames) in &of_children {
+            for representation in self.representations(*child) {
+                placements.entry(representation).or_default().extend(frames);
+            }
+        }
+        UsagePlaces::new(placements)
+    }
+
     /// Leaves out the relationships that lead unmoved to the representation of a product, which its own usages place. Of 20,000 products
     /// with one shape each would be asked for all the others: 23 s.
     pub(super) fn leave_out_links_to_products(&mut self) {
@@ -51,12 +71,17 @@ impl Assembly<'_, '_> {
     }
 
     /// Returns the representations of a product, and those that stand unmoved in one of them and are no other product's.
-    fn representations(&self, definition: u64) -> Vec<u64> {
-        let mut found = self.shapes.get(&definition).cloned().unwrap_or_else(Vec::new);
+    pub(super) fn representations(&self, definition: u64) -> Vec<u64> {
+        self.unmoved(self.shapes.get(&definition).into_iter().flatten().copied().collect())
+    }
+
+    /// Returns representations, and those that stand unmoved in one of them and are no product's.
+    pub(super) fn unmoved(&self, mut found: Vec<u64>) -> Vec<u64> {
+        let mut known: FxHashSet<u64> = found.iter().copied().collect();
         let mut at = 0;
         while at < found.len() {
             for link in self.links.get(&found[at]).into_iter().flatten() {
-                if !link.is_moved() && !self.owned.contains(&link.to) && !found.contains(&link.to) {
+                if !link.is_moved() && !self.owned.contains(&link.to) && known.insert(link.to) {
                     found.push(link.to);
                 }
             }
@@ -66,7 +91,7 @@ impl Assembly<'_, '_> {
     }
 
     /// Returns the representation that a MAPPED_ITEM shows; `None` for any other item.
-    fn mapped_representation(&self, item: u64) -> Option<u64> {
+    pub(super) fn mapped_representation(&self, item: u64) -> Option<u64> {
         let map = self.file.entity(item)?.attributes("MAPPED_ITEM", 1)?.entity(0)?;
         map.attributes("REPRESENTATION_MAP", 0)?.id(1)
     }

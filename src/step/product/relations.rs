@@ -4,18 +4,31 @@ use crate::math::Frame;
 use crate::step::part21::{Args, Entity};
 
 /// The entities that relate products, representations and their shapes.
-pub(super) const RELATIONS: [&str; 5] = [
+pub(super) const RELATIONS: [&str; 9] = [
     "SHAPE_DEFINITION_REPRESENTATION",
     "NEXT_ASSEMBLY_USAGE_OCCURRENCE",
+    "QUANTIFIED_ASSEMBLY_COMPONENT_USAGE",
+    "PROMISSORY_USAGE_OCCURRENCE",
+    "ASSEMBLY_COMPONENT_USAGE",
     "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION",
     "SHAPE_REPRESENTATION_RELATIONSHIP",
     "REPRESENTATION_RELATIONSHIP",
+    WITH_TRANSFORMATION,
+];
+
+/// The usages of ISO 10303-44 that put a component into an assembly.
+const USAGES: [&str; 4] = [
+    "NEXT_ASSEMBLY_USAGE_OCCURRENCE",
+    "QUANTIFIED_ASSEMBLY_COMPONENT_USAGE",
+    "PROMISSORY_USAGE_OCCURRENCE",
+    "ASSEMBLY_COMPONENT_USAGE",
 ];
 
 /// What states where one of two related representations stands in the other; without it both stand in the same place.
 pub(super) const WITH_TRANSFORMATION: &str = "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
 
-/// A directed relationship: the representation it leads to, and how that is placed; `None` where that cannot be read.
+/// A directed relationship, or what a mapped item shows: the representation it leads to, and how that is placed; `None` where that cannot
+/// be read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Link {
     pub(super) to: u64,
@@ -29,6 +42,12 @@ impl Link {
     }
 }
 
+/// A representation that shows a usage of a product.
+pub(super) struct OccurrenceShape {
+    pub(super) usage: u64,
+    pub(super) representation: u64,
+}
+
 /// Returns the attributes of a property definition, the third of which is what it describes; subtypes add none.
 pub(super) fn property_attributes<'f, 'a>(definition: Entity<'f, 'a>) -> Args<'f, 'a> {
     definition.attributes("PROPERTY_DEFINITION", 0).unwrap_or_else(|| definition.args())
@@ -40,9 +59,23 @@ fn own_or_inherited<'f, 'a>(e: Entity<'f, 'a>, name: &str, supertype: &str) -> O
     Some(e.attributes(supertype, 0).unwrap_or(own))
 }
 
-/// Returns the attributes of a NEXT_ASSEMBLY_USAGE_OCCURRENCE: id, name, description, parent and child; `None` of any other entity.
+/// Returns the attributes of a usage that puts a component into an assembly: id, name, description, parent and child; `None` of any other
+/// entity, as of a higher usage.
 pub(super) fn usage_attributes<'f, 'a>(e: Entity<'f, 'a>) -> Option<Args<'f, 'a>> {
-    own_or_inherited(e, "NEXT_ASSEMBLY_USAGE_OCCURRENCE", "PRODUCT_DEFINITION_RELATIONSHIP")
+    if is_higher_usage(e) {
+        return None;
+    }
+    USAGES.iter().find_map(|name| own_or_inherited(e, name, "PRODUCT_DEFINITION_RELATIONSHIP"))
+}
+
+/// Whether a usage describes once more, as a higher assembly sees it, what usages below put there: it adds no component.
+pub(super) fn is_higher_usage(e: Entity<'_, '_>) -> bool {
+    e.is_a("SPECIFIED_HIGHER_USAGE_OCCURRENCE")
+}
+
+/// Whether a usage puts a component into an assembly whose subassemblies are yet to be defined: it counts where nothing else uses it.
+pub(super) fn is_promise(e: Entity<'_, '_>) -> bool {
+    e.is_a("PROMISSORY_USAGE_OCCURRENCE")
 }
 
 /// Returns the attributes of a SHAPE_DEFINITION_REPRESENTATION: definition and representation; `None` of any other entity.

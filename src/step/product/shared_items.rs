@@ -4,13 +4,13 @@
 //! one, whichever representation brings it there.
 
 use super::assembly::{Assembly, PlacedRepresentation};
-use super::topology::ShapeItems;
-use crate::math::Frame;
+use super::places::{PlacementKey, placement_key};
+use super::topology::{FACES, ShapeItems};
 use crate::step::part21::File;
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// What may hold one another, from the lowest rank to the highest.
-const FACES: [&str; 4] = ["ADVANCED_FACE", "FACE_SURFACE", "SUBFACE", "ORIENTED_FACE"];
+/// What may hold one another besides [`FACES`], which are the lowest, from the lowest rank to the highest.
+const ORIENTED_FACES: [&str; 1] = ["ORIENTED_FACE"];
 const SHELLS: [&str; 3] = ["OPEN_SHELL", "CLOSED_SHELL", "CONNECTED_FACE_SET"];
 const ORIENTED_SHELLS: [&str; 2] = ["ORIENTED_OPEN_SHELL", "ORIENTED_CLOSED_SHELL"];
 const MODELS: [&str; 5] = [
@@ -21,10 +21,7 @@ const MODELS: [&str; 5] = [
     "FACE_BASED_SURFACE_MODEL",
 ];
 /// Rank of [`MODELS`].
-const MODEL_RANK: usize = 3;
-
-/// A placement that can be a key: its bits, with one zero.
-type PlacementKey = [u64; 13];
+const MODEL_RANK: usize = 4;
 
 /// The shapes that are named by more than one of the placed representations, and where they stand so far.
 pub(crate) struct SharedItems {
@@ -49,7 +46,7 @@ impl SharedItems {
                 // stand for nothing.
                 let mut listed = FxHashSet::default();
                 ids.retain(|&id| listed.insert(id) && is_shape(file, id));
-                outermost_items(file, ids)
+                outermost_items(file, assembly.without_pictures(ids))
             });
         }
         let shapes: FxHashSet<u64> = items.values().flatten().copied().collect();
@@ -119,7 +116,7 @@ impl SharedItems {
 fn outermost_items(file: &File<'_>, mut items: Vec<u64>) -> Vec<u64> {
     // What holds others is of a higher rank than they are, so that nothing holds itself.
     let rank = |id: &u64| -> Option<usize> {
-        let ranks: [&[&str]; 4] = [&FACES, &SHELLS, &ORIENTED_SHELLS, &MODELS];
+        let ranks: [&[&str]; 5] = [&FACES, &ORIENTED_FACES, &SHELLS, &ORIENTED_SHELLS, &MODELS];
         let e = file.entity(*id)?;
         ranks.iter().position(|kinds| e.is_one_of(kinds))
     };
@@ -149,15 +146,4 @@ fn is_shape(file: &File<'_>, id: u64) -> bool {
     let mut items = ShapeItems::default();
     items.add(file, id);
     !items.is_empty()
-}
-
-/// Returns the numbers of a placement as a key.
-fn placement_key(f: &Frame) -> PlacementKey {
-    let numbers = [f.origin, f.x, f.y, f.z].map(|v| v.to_array()).concat();
-    let mut key = [0; 13];
-    for (k, x) in key.iter_mut().zip(numbers.into_iter().chain([f.scale])) {
-        // Adding 0 makes −0 and 0 one.
-        *k = (x + 0.0).to_bits();
-    }
-    key
 }

@@ -8,7 +8,7 @@ use crate::step::part21::{Args, Entity};
 use rustc_hash::FxHashSet;
 
 /// Deepest nesting of tessellated items.
-const MAX_DEPTH: usize = 8;
+pub(super) const DEEPEST_MESHES: usize = 8;
 
 /// What the leaves of a tessellated item gave.
 #[derive(Default)]
@@ -26,7 +26,7 @@ const SETS: [&str; 3] = ["TESSELLATED_SOLID", "TESSELLATED_SHELL", "TESSELLATED_
 struct Layout {
     /// Position, among the attributes, of the one of this name.
     pnindex: usize,
-    /// Position of the link to an exact face, of a leaf that has one.
+    /// Position of the link to an exact face or a surface, of a leaf that has one.
     link: Option<usize>,
     /// Whether triangles are listed as strips and fans.
     strips: bool,
@@ -44,22 +44,31 @@ fn leaf_layout(keyword: &str) -> Option<Layout> {
     })
 }
 
+/// Returns the exact shape, or the surface, that a tessellated item says it shows; `None` where it says nothing.
+pub(super) fn shown_shape<'f, 'a>(e: Entity<'f, 'a>) -> Option<Entity<'f, 'a>> {
+    if let Some(layout) = leaf_layout(e.keyword()) {
+        return layout.link.and_then(|at| e.args().entity(at));
+    }
+    SETS.iter().find_map(|kind| e.attributes(kind, 1))?.entity(1)
+}
+
+/// Returns the list of a tessellated item that holds others; `None` of any other.
+pub(super) fn inner_items<'f, 'a>(e: Entity<'f, 'a>) -> Option<Args<'f, 'a>> {
+    SETS.iter().find_map(|kind| e.attributes(kind, 1)).map(|set| set.list(0))
+}
+
 impl<'f, 'a> GeometryReader<'f, 'a> {
-    /// Collects the triangulated faces of a tessellated item, and refusals of those that are broken, in `into`, each once. A solid, shell
-    /// or face that is linked to an exact shape is only its picture and gives nothing; nor do points and wires.
+    /// Collects the triangulated faces of a tessellated item, and refusals of those that are broken, in `into`, each once. Points and wires
+    /// give nothing.
     pub(crate) fn collect_meshes(&self, id: u64, depth: usize, into: &mut TessellatedItems) {
         let Ok(e) = self.entity(id) else { return };
         // A kilobyte can list a shell in itself a hundred times to any depth.
         if !into.visited.insert(id) {
             return;
         }
-        let set = SETS.iter().find_map(|kind| e.attributes(kind, 1));
         if e.is_a("REPOSITIONED_TESSELLATED_ITEM") {
             into.refused.push(Refusal::new(e, "a mesh with a place of its own is not converted"));
         } else if let Some(layout) = leaf_layout(e.keyword()) {
-            if self.is_picture_of_face(e, &layout) {
-                return;
-            }
             match self.triangles(e, &layout) {
                 Ok(mesh) => {
                     let name = e.args().name(0);
@@ -67,11 +76,10 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
                 }
                 Err(refusal) => into.refused.push(refusal),
             }
-        } else if let Some(set) = set {
-            if depth >= MAX_DEPTH {
+        } else if let Some(list) = inner_items(e) {
+            if depth >= DEEPEST_MESHES {
                 into.refused.push(Refusal::new(e, "meshes are nested too deeply"));
-            } else if set.entity(1).is_none() {
-                let list = set.list(0);
+            } else {
                 let items = list.refs().unwrap_or_else(|| {
                     into.refused.push(Refusal::no_reference(e));
                     list.ids()
@@ -83,13 +91,6 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         } else if e.keywords().any(|k| k.contains("TRIANGULATED")) {
             into.refused.push(Refusal::new(e, "this kind of mesh is not converted"));
         }
-    }
-
-    /// Whether a leaf names the exact face that it shows. One that names a surface shows a part of it that nothing else bounds.
-    fn is_picture_of_face(&self, e: Entity<'f, 'a>, layout: &Layout) -> bool {
-        // Of the kinds of leaves, faces alone have a link: before their indices.
-        let link = layout.link.and_then(|at| e.args().entity(at));
-        link.is_some_and(|face| face.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE", "SUBFACE", "ORIENTED_FACE"]))
     }
 
     /// Returns the triangles of a leaf as a mesh, mm, with the file's normals where it gives them, else flat ones; triangles without area

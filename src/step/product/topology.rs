@@ -30,6 +30,8 @@ const RECIPES: [&str; 22] = [
     "SOLID_REPLICA",
 ];
 
+/// Names of faces.
+pub(super) const FACES: [&str; 3] = ["ADVANCED_FACE", "FACE_SURFACE", "SUBFACE"];
 /// Longest chain of faces that are parts of faces.
 const MAX_PARENTS: usize = 4;
 /// Times that an edge may bound a face: a seam does so from both sides.
@@ -143,7 +145,7 @@ impl ShapeItems {
             "ORIENTED_CLOSED_SHELL",
         ]) {
             self.add_shell(file, Some(id), &name, &[], false, e);
-        } else if e.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE", "SUBFACE"]) {
+        } else if e.is_one_of(&FACES) {
             // A face alone is an open shell of one face.
             let faces = vec![(id, false)];
             self.shells.push(ShellPlan { name, faces, whole: true, ..ShellPlan::default() });
@@ -254,7 +256,7 @@ impl ShapeItems {
 }
 
 /// Whether a keyword is that of a tessellated solid, shell, face or set.
-fn is_tessellated(keyword: &str) -> bool {
+pub(super) fn is_tessellated(keyword: &str) -> bool {
     matches!(
         keyword,
         "TESSELLATED_SOLID"

@@ -14,7 +14,7 @@ use rustc_hash::FxHashMap;
 /// Distance within which points of two edges coincide, mm, besides what the edges miss their vertices by.
 const COINCIDENT_MM: f64 = 1e-6;
 /// Most that an edge's own gap adds to that, mm: more is no rounding of a writer.
-const LARGEST_GAP_MM: f64 = 1e-3;
+const LARGEST_COINCIDENT_GAP_MM: f64 = 1e-3;
 /// Ends of a curve nearer than this are one: no edge is shorter.
 const CLOSED_MM: f64 = 1e-9;
 /// Points that are compared along two edges.
@@ -173,7 +173,7 @@ fn two_edges(
 
 /// Returns the distance, mm, within which points of two edges coincide: with what they miss their vertices by.
 pub(super) fn coincidence_tolerance(a: &TrimmedEdge, b: &TrimmedEdge) -> f64 {
-    COINCIDENT_MM + a.gap.min(LARGEST_GAP_MM) + b.gap.min(LARGEST_GAP_MM)
+    COINCIDENT_MM + a.gap.min(LARGEST_COINCIDENT_GAP_MM) + b.gap.min(LARGEST_COINCIDENT_GAP_MM)
 }
 
 /// Whether two edges between the same vertices coincide: both are straight, or no point of either is farther from the other than points

@@ -1,0 +1,176 @@
+//! How representations stand in each other: by relationships, by mapped items, and by the usages whose shapes they are.
+
+use super::assembly::Assembly;
+use super::places::is_one_place;
+use super::relations::{
+    Link, OccurrenceShape, WITH_TRANSFORMATION, is_higher_usage, property_attributes, related_representations,
+    usage_attributes,
+};
+use super::usage_ends::UsageEnds;
+use crate::math::Frame;
+use crate::step::part21::Entity;
+use rustc_hash::FxHashSet;
+
+impl<'f, 'a> Assembly<'f, 'a> {
+    /// Returns how the first of two representations stands in the second by the transformation of their relationship; `None`, which is
+    /// reported, where that cannot be read.
+    fn transformation(&mut self, e: Entity<'f, 'a>, [first, second]: [u64; 2]) -> Option<Frame> {
+        let stated = e.attributes(WITH_TRANSFORMATION, 4).and_then(|a| a.entity(0));
+        let placement = stated.and_then(|t| {
+            // An operator takes the first representation into the second by itself (ISO 10303-43, functionally_defined_transformation).
+            if t.keywords().any(|k| k.starts_with("CARTESIAN_TRANSFORMATION_OPERATOR")) {
+                return self.geometry_reader(second).transformation(t.id).ok();
+            }
+            let args = t.attributes("ITEM_DEFINED_TRANSFORMATION", 0)?;
+            let (from, to) = (args.id(2)?, args.id(3)?);
+            // Each placement is in the units of the representation that holds it.
+            let (mut holder_from, mut holder_to) = (first, second);
+            if self.is_item(to, first) && self.is_item(from, second) {
+                (holder_from, holder_to) = (second, first);
+            }
+            let from = self.geometry_reader(holder_from).placement(from).ok()?;
+            let to = self.geometry_reader(holder_to).placement(to).ok()?;
+            let whole = to.compose(&from.inverse());
+            Some(if holder_from == first { whole } else { whole.inverse() })
+        });
+        if placement.is_none() {
+            self.problems.push(format!("#{}: its transformation cannot be read; what it places is left out", e.id));
+        }
+        placement
+    }
+
+    /// Reads where the children of usages stand in their parents, by CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs. Returns the relationships
+    /// that these name.
+    pub(super) fn read_contextual(&mut self, entities: &[Entity<'f, 'a>]) -> FxHashSet<u64> {
+        let mut used = FxHashSet::default();
+        let mut higher = Vec::new();
+        for &e in entities {
+            let args = e.args();
+            let usage = args.entity(1).and_then(|shape| property_attributes(shape).entity(2));
+            let (Some(relation), Some(usage)) = (args.entity(0), usage) else {
+                self.problems.push(format!(
+                    "#{}: its relationship or its usage is not in the file: it places nothing",
+                    e.id
+                ));
+                continue;
+            };
+            // That of anything else stands for itself.
+            if is_higher_usage(usage) || usage_attributes(usage).is_some() {
+                used.insert(relation.id);
+                if is_higher_usage(usage) {
+                    higher.push((e, relation, usage));
+                } else {
+                    self.read_usage_place(e, relation, usage);
+                }
+            }
+        }
+        // What they should agree with is known now.
+        for (e, relation, usage) in higher {
+            self.compare_higher_usage(e, relation, usage);
+        }
+        used
+    }
+
+    /// Reads where the child of a usage stands in the parent, by the relationship that `e` names.
+    fn read_usage_place(&mut self, e: Entity<'f, 'a>, relation: Entity<'f, 'a>, usage: Entity<'f, 'a>) {
+        let Some([first, second]) = related_representations(relation) else {
+            self.problems.push(format!("#{}: its relationship lacks a representation: it places nothing", e.id));
+            return;
+        };
+        if !relation.is_a(WITH_TRANSFORMATION) {
+            return;
+        }
+        let mut placement = self.transformation(relation, [first, second]);
+        // The first representation is the child's; some writers swap them.
+        if let Some((parent, child)) = usage_attributes(usage).and_then(|a| Some((a.id(3)?, a.id(4)?))) {
+            let has = |product: u64, r: u64| self.shapes.get(&product).is_some_and(|s| s.contains(&r));
+            if has(parent, first) && has(child, second) && !has(child, first) {
+                placement = placement.map(|p| p.inverse());
+            }
+        }
+        self.place_usage(e.id, usage.id, placement);
+    }
+
+    /// Notes where the child of a usage stands in the parent, as the entity `by` says; the first such entity counts.
+    fn place_usage(&mut self, by: u64, usage: u64, placement: Option<Frame>) {
+        let known = *self.placements.entry(usage).or_insert(placement);
+        let is_same = match (known, placement) {
+            (Some(known), Some(placement)) => is_one_place(&known, &placement),
+            (known, placement) => known.is_none() && placement.is_none(),
+        };
+        if !is_same {
+            self.problems.push(format!("#{by}: usage #{usage} has another place already, which counts alone"));
+        }
+    }
+
+    /// Tells where a usage that a higher assembly sees has another place than the usages that it is made of.
+    fn compare_higher_usage(&mut self, e: Entity<'f, 'a>, relation: Entity<'f, 'a>, usage: Entity<'f, 'a>) {
+        let made_of = usage.attributes("SPECIFIED_HIGHER_USAGE_OCCURRENCE", 6);
+        let ends = related_representations(relation).filter(|_| relation.is_a(WITH_TRANSFORMATION));
+        let (Some(made_of), Some(ends)) = (made_of, ends) else { return };
+        let Some(stated) = self.transformation(relation, ends) else { return };
+        // A usage without a placement stands where its parent does.
+        let place = |i: usize| {
+            made_of.id(i).and_then(|id| self.placements.get(&id).copied().flatten()).unwrap_or(Frame::IDENTITY)
+        };
+        let composed = place(0).compose(&place(1));
+        self.placements.insert(usage.id, Some(composed));
+        if !is_one_place(&composed, &stated) && !is_one_place(&composed, &stated.inverse()) {
+            self.problems.push(format!(
+                "#{}: usage #{} has another place than the usages that it is made of, which count alone",
+                e.id, usage.id
+            ));
+        }
+    }
+
+    /// Reads where the child of a usage stands in the parent by a mapped item of the usage's own shape, as AP214 allows.
+    pub(super) fn read_occurrence_shape(&mut self, shape: &OccurrenceShape) {
+        let child = self.file.entity(shape.usage).and_then(usage_attributes).and_then(|a| a.id(4));
+        let Some(child) = child else { return };
+        let items: Vec<u64> = self.items(shape.representation);
+        let links = items.into_iter().filter_map(|item| Some((item, self.mapping(item, shape.representation)?)));
+        let links: Vec<(u64, Link)> = links.collect();
+        if links.is_empty() {
+            return;
+        }
+        let of_child = self.representations(child);
+        for (item, link) in links.into_iter().filter(|(_, link)| of_child.contains(&link.to)) {
+            if link.placement.is_none() {
+                let told = "its placement cannot be read; what this MAPPED_ITEM places is left out";
+                self.problems.push(format!("#{item}: {told}"));
+            }
+            self.place_usage(item, shape.usage, link.placement);
+        }
+    }
+
+    /// Links the two representations of a relationship: one way by its transformation, or both ways, unmoved, if it has none. Where the
+    /// product of the first uses that of the second, their ends are swapped.
+    pub(super) fn read_relationship(&mut self, e: Entity<'f, 'a>, ends: &UsageEnds) {
+        let Some([first, second]) = related_representations(e) else { return };
+        if !e.is_a(WITH_TRANSFORMATION) {
+            let placement = Some(Frame::IDENTITY);
+            self.links.entry(second).or_default().push(Link { to: first, placement });
+            self.links.entry(first).or_default().push(Link { to: second, placement });
+            return;
+        }
+        let placement = self.transformation(e, [first, second]);
+        if ends.uses(first, second) && !ends.uses(second, first) {
+            let placement = placement.map(|p| p.inverse());
+            self.links.entry(first).or_default().push(Link { to: second, placement });
+        } else {
+            self.links.entry(second).or_default().push(Link { to: first, placement });
+        }
+    }
+
+    /// Returns what a MAPPED_ITEM of the representation `holder` shows, and where that stands there; `None` for any other item.
+    pub(super) fn mapping(&self, item: u64, holder: u64) -> Option<Link> {
+        let mapped = self.file.entity(item)?.attributes("MAPPED_ITEM", 1)?;
+        let map = mapped.entity(0)?.attributes("REPRESENTATION_MAP", 0)?;
+        let to = map.id(1)?;
+        let origin = map.id(0).and_then(|origin| self.geometry_reader(to).placement(origin).ok());
+        let target = mapped.id(1).and_then(|target| self.geometry_reader(holder).transformation(target).ok());
+        // The origin of the mapped representation comes to lie on the target.
+        let placement = target.zip(origin).map(|(target, origin)| target.compose(&origin.inverse()));
+        Some(Link { to, placement })
+    }
+}

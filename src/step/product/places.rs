@@ -1,0 +1,62 @@
+//! Placements as keys of tables, and placements that are one to rounding.
+
+use crate::math::Frame;
+use rustc_hash::FxHashMap;
+
+/// Share of a coordinate, and part of an axis, by which two placements of one thing may differ: each comes of a few products of doubles,
+/// which hold 16 digits, on different ways through the file.
+const PLACE_ROUNDING: f64 = 1e-9;
+/// The same at the origin, mm: where ways that lead far out come back, little but rounding is left.
+const PLACE_ROUNDING_MM: f64 = 1e-9;
+
+/// A placement that can be a key: its bits, with one zero.
+pub(super) type PlacementKey = [u64; 13];
+
+/// Returns the numbers of a placement as a key.
+pub(super) fn placement_key(f: &Frame) -> PlacementKey {
+    let numbers = [f.origin, f.x, f.y, f.z].map(|v| v.to_array()).concat();
+    let mut key = [0; 13];
+    for (k, x) in key.iter_mut().zip(numbers.into_iter().chain([f.scale])) {
+        // Adding 0 makes −0 and 0 one.
+        *k = (x + 0.0).to_bits();
+    }
+    key
+}
+
+/// Returns how far the origins of two placements may lie apart that are one, mm; `f` is either.
+fn origin_tolerance(f: &Frame) -> f64 {
+    PLACE_ROUNDING_MM + PLACE_ROUNDING * f.origin.abs().max_element()
+}
+
+/// Whether two placements are one to rounding.
+pub(super) fn is_one_place(a: &Frame, b: &Frame) -> bool {
+    let axes = [(a.x, b.x), (a.y, b.y), (a.z, b.z)];
+    (a.origin - b.origin).abs().max_element() <= origin_tolerance(a)
+        && axes.iter().all(|(a, b)| (*a - *b).abs().max_element() <= PLACE_ROUNDING)
+        && (a.scale - b.scale).abs() <= PLACE_ROUNDING * a.scale
+}
+
+/// Where usages put the representations of the children of a product.
+#[derive(Default)]
+pub(super) struct UsagePlaces {
+    /// Placements by representation, ascending by the x of their origins.
+    placements: FxHashMap<u64, Vec<Frame>>,
+}
+
+impl UsagePlaces {
+    /// Collects placements by representation.
+    pub(super) fn new(mut placements: FxHashMap<u64, Vec<Frame>>) -> Self {
+        placements.values_mut().for_each(|all| all.sort_by(|a, b| a.origin.x.total_cmp(&b.origin.x)));
+        Self { placements }
+    }
+
+    /// Whether a usage puts a representation there, to rounding.
+    pub(super) fn holds(&self, representation: u64, placement: &Frame) -> bool {
+        let Some(all) = self.placements.get(&representation) else { return false };
+        let tolerance = origin_tolerance(placement);
+        // Of ten thousand places of one screw few have the same x.
+        let first = all.partition_point(|f| f.origin.x < placement.origin.x - tolerance);
+        let mut near = all[first..].iter().take_while(|f| f.origin.x <= placement.origin.x + tolerance);
+        near.any(|f| is_one_place(placement, f))
+    }
+}

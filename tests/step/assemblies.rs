@@ -1,0 +1,234 @@
+//! How often, and where, a part of an assembly stands that several entities of the file speak of.
+
+use crate::files::{MILLIMETRES, part21};
+use lampyris::step::{Import, Settings, read_bytes};
+
+/// Placements #20 at the origin, #21 at x = 10, #22 at x = 20 and #23 at x = 30, and a block #24 of 1 mm at the origin.
+fn read(data: &str) -> Import {
+    let text = part21(&format!(
+        "{MILLIMETRES}\
+         #10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=CARTESIAN_POINT('',(10.,0.,0.));\n#12=CARTESIAN_POINT('',(20.,0.,0.));\n\
+         #13=DIRECTION('',(0.,0.,1.));\n#14=DIRECTION('',(1.,0.,0.));\n#15=CARTESIAN_POINT('',(30.,0.,0.));\n\
+         #20=AXIS2_PLACEMENT_3D('',#10,#13,#14);\n#21=AXIS2_PLACEMENT_3D('',#11,#13,#14);\n\
+         #22=AXIS2_PLACEMENT_3D('',#12,#13,#14);\n#23=AXIS2_PLACEMENT_3D('',#15,#13,#14);\n\
+         #25=BLOCK('',#20,1.,1.,1.);\n#24=CSG_SOLID('',#25);\n\
+         {data}"
+    ));
+    read_bytes("assemblies.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
+}
+
+/// A product whose definition is #`id` and whose representation is #`representation`; takes the ids up to `id` + 4.
+fn product(id: u32, name: &str, representation: u32) -> String {
+    let [formation, product, shape, definition] = [id + 1, id + 2, id + 3, id + 4];
+    format!(
+        "#{id}=PRODUCT_DEFINITION('','',#{formation},$);\n#{formation}=PRODUCT_DEFINITION_FORMATION('','',#{product});\n\
+         #{product}=PRODUCT('{name}','{name}','',());\n#{shape}=PRODUCT_DEFINITION_SHAPE('','',#{id});\n\
+         #{definition}=SHAPE_DEFINITION_REPRESENTATION(#{shape},#{representation});\n"
+    )
+}
+
+/// A usage #`id` of this kind and these attributes, and its shape, #`id` + 1.
+fn usage(id: u32, kind: &str, ends: &str) -> String {
+    format!("#{id}={kind}('{id}','','',{ends});\n#{}=PRODUCT_DEFINITION_SHAPE('','',#{id});\n", id + 1)
+}
+
+/// A relationship #`id` of two representations that puts the placement `from` on `to`; takes `id` + 1 as well.
+fn relation(id: u32, [first, second]: [u32; 2], [from, to]: [u32; 2]) -> String {
+    format!(
+        "#{}=ITEM_DEFINED_TRANSFORMATION('','',#{from},#{to});\n\
+         #{id}=(REPRESENTATION_RELATIONSHIP('','',#{first},#{second})REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{})\
+         SHAPE_REPRESENTATION_RELATIONSHIP());\n",
+        id + 1,
+        id + 1
+    )
+}
+
+/// An assembly #200, whose representation #300 has `items`, #21 and #22, and a part #100, whose representation #110 is the block.
+fn assembly(items: &str, data: &str) -> Import {
+    let products = product(200, "asm", 300) + &product(100, "part", 110);
+    read(&format!(
+        "{products}#300=SHAPE_REPRESENTATION('',({items}#21,#22),#1);\n\
+         #110=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#24,#20),#1);\n{data}"
+    ))
+}
+
+/// The place of the part in the assembly by usage #400, at x = 10.
+const PLACED: &str = "#420=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#410,#401);\n";
+
+const NEXT: &str = "NEXT_ASSEMBLY_USAGE_OCCURRENCE";
+
+/// Asserts the x of all places, in any order, and that nothing is told.
+fn assert_places(import: &Import, expected: &[f64], case: &str) {
+    let mut x: Vec<f64> = import.model.instances.iter().map(|i| i.placement.origin.x).collect();
+    x.sort_by(f64::total_cmp);
+    assert_eq!(x, expected, "{case}");
+    assert_eq!(import.report.problems, Vec::<String>::new(), "{case}");
+}
+
+#[test]
+fn several_ways_of_relationships_lead_to_one_shape() {
+    let linked = |relations: &str| {
+        read(&format!(
+            "{}#110=SHAPE_REPRESENTATION('',(#20),#1);\n#111=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#24,#20),#1);\n\
+             #112=SHAPE_REPRESENTATION('third',(#20),#1);\n#120=SHAPE_REPRESENTATION_RELATIONSHIP('','',#110,#111);\n{relations}",
+            product(100, "part", 110)
+        ))
+    };
+    for relations in [
+        "#121=SHAPE_REPRESENTATION_RELATIONSHIP('','',#110,#111);\n",
+        "#121=SHAPE_REPRESENTATION_RELATIONSHIP('','',#111,#110);\n",
+        "#121=SHAPE_REPRESENTATION_RELATIONSHIP('','',#110,#112);\n#122=SHAPE_REPRESENTATION_RELATIONSHIP('','',#111,#112);\n",
+    ] {
+        let import = linked(relations);
+        assert_places(&import, &[0.0], relations);
+        assert_eq!(import.model.placed_face_count(), 6, "{relations}");
+    }
+}
+
+/// The mapped item at x = 10 says what the usage says; that at x = 20 is another place of the part.
+#[test]
+fn a_usage_and_a_mapped_item_in_one_place_are_one() {
+    let mapped = "#30=REPRESENTATION_MAP(#20,#110);\n#31=MAPPED_ITEM('',#30,#21);\n#32=MAPPED_ITEM('',#30,#22);\n";
+    let data = [mapped, &usage(400, NEXT, "#200,#100,$"), &relation(410, [110, 300], [20, 21]), PLACED].concat();
+    assert_places(&assembly("#31,", &data), &[10.0], "one place");
+    assert_places(&assembly("#31,#32,", &data), &[10.0, 20.0], "two places");
+}
+
+#[test]
+fn every_usage_of_a_component_places_it() {
+    for (kind, ends) in [
+        (NEXT, "#200,#100,$"),
+        ("ASSEMBLY_COMPONENT_USAGE", "#200,#100,$"),
+        ("PROMISSORY_USAGE_OCCURRENCE", "#200,#100,$"),
+        ("QUANTIFIED_ASSEMBLY_COMPONENT_USAGE", "#200,#100,$,#430"),
+    ] {
+        let unit = "#430=MEASURE_WITH_UNIT(COUNT_MEASURE(1.),#431);\n#431=CONTEXT_DEPENDENT_UNIT(#432,'each');\n\
+                    #432=DIMENSIONAL_EXPONENTS(0.,0.,0.,0.,0.,0.,0.);\n";
+        let data = usage(400, kind, ends) + &relation(410, [110, 300], [20, 21]) + PLACED + unit;
+        assert_places(&assembly("", &data), &[10.0], kind);
+    }
+    // What is promised adds nothing to what is used.
+    let promised = usage(440, "PROMISSORY_USAGE_OCCURRENCE", "#200,#100,$");
+    let data = usage(400, NEXT, "#200,#100,$") + &relation(410, [110, 300], [20, 21]) + PLACED + &promised;
+    assert_places(&assembly("", &data), &[10.0], "a promise");
+}
+
+#[test]
+fn a_placement_in_a_rare_form_counts() {
+    let used = usage(400, NEXT, "#200,#100,$");
+    let own_shape = "#30=REPRESENTATION_MAP(#20,#110);\n#31=MAPPED_ITEM('',#30,#21);\n#32=SHAPE_REPRESENTATION('place',(#31),#1);\n\
+                     #33=SHAPE_DEFINITION_REPRESENTATION(#401,#32);\n";
+    let simple = "#411=ITEM_DEFINED_TRANSFORMATION('','',#20,#21);\n\
+                  #410=REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION('','',#110,#300,#411);\n";
+    let swapped = relation(410, [300, 110], [20, 21]);
+    let swapped_of_usage = [swapped.as_str(), PLACED].concat();
+    for data in [own_shape, simple, &swapped, &swapped_of_usage] {
+        assert_places(&assembly("", &format!("{used}{data}")), &[10.0], data);
+    }
+    assert_places(&assembly("", &used), &[0.0], "without a placement");
+}
+
+/// The assembly #200 uses #500 at x = 20, which uses the part at x = 10: #440 sees the part from #200.
+#[test]
+fn a_higher_usage_adds_nothing() {
+    let data = |to: u32| {
+        product(500, "sub", 510)
+            + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
+            + &usage(400, NEXT, "#200,#500,$")
+            + &relation(410, [510, 300], [20, 22])
+            + PLACED
+            + &usage(450, NEXT, "#500,#100,$")
+            + &relation(460, [110, 510], [20, 21])
+            + "#470=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#460,#451);\n"
+            + &usage(440, "SPECIFIED_HIGHER_USAGE_OCCURRENCE", "#200,#100,$,#400,#450")
+            + &relation(480, [110, 300], [20, to])
+            + "#490=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#480,#441);\n"
+    };
+    assert_places(&assembly("", &data(23)), &[30.0], "the same place");
+    let other = assembly("", &data(21));
+    assert_eq!(other.model.instances.len(), 1);
+    let problems = &other.report.problems;
+    assert!(problems.len() == 1 && problems[0].starts_with("#490: usage #440 has another place"), "{problems:?}");
+}
+
+/// A part whose exact body is `exact`, and a mesh #71 of one triangle with these corners, which names what it shows.
+fn with_mesh(exact: &str, corners: &str, shown: &str) -> Import {
+    read(&format!(
+        "{}#110=SHAPE_REPRESENTATION('',(#20),#1);\n#111=ADVANCED_BREP_SHAPE_REPRESENTATION('',({exact}#20),#1);\n\
+         #112=TESSELLATED_SHAPE_REPRESENTATION('',(#71),#1);\n#120=SHAPE_REPRESENTATION_RELATIONSHIP('','',#110,#111);\n\
+         #121=SHAPE_REPRESENTATION_RELATIONSHIP('','',#110,#112);\n#26=CSG_SOLID('',#25);\n\
+         #70=COORDINATES_LIST('',3,({corners}));\n#71=TESSELLATED_SOLID('',(#72),{shown});\n\
+         #72=TRIANGULATED_FACE('',#70,3,((0.,0.,1.)),$,(),((1,2,3)));\n",
+        product(100, "part", 110)
+    ))
+}
+
+const HALF_A_SIDE: &str = "(0.,0.,0.),(1.,0.,0.),(0.,1.,0.)";
+
+#[test]
+fn an_unlinked_mesh_of_the_body_is_its_picture() {
+    let picture = with_mesh("#24,", HALF_A_SIDE, "$");
+    assert_eq!((picture.model.placed_face_count(), picture.report.by_surface.tessellated), (6, 0));
+    let left_out = &picture.report.left_out;
+    assert_eq!(left_out.len(), 1);
+    assert!(
+        left_out[0].id == 112 && left_out[0].reason.starts_with("its mesh #71 TESSELLATED_SOLID"),
+        "{left_out:?}"
+    );
+    for (exact, corners, faces) in [
+        ("", HALF_A_SIDE, 1),
+        // Beside the body, and a small one in it.
+        ("#24,", "(2.,0.,0.),(3.,0.,0.),(2.,1.,0.)", 7),
+        ("#24,", "(0.4,0.4,0.5),(0.6,0.4,0.5),(0.4,0.6,0.5)", 7),
+    ] {
+        let import = with_mesh(exact, corners, "$");
+        assert_eq!((import.model.placed_face_count(), import.report.left_out.len()), (faces, 0), "{corners}");
+    }
+}
+
+/// The solid #26 stands nowhere: its mesh is all that there is of it.
+#[test]
+fn a_linked_mesh_is_left_out_where_what_it_shows_stands() {
+    for (shown, faces) in [("#24", 6), ("#26", 7)] {
+        let import = with_mesh("#24,", HALF_A_SIDE, shown);
+        assert_eq!((import.model.placed_face_count(), import.report.left_out.len()), (faces, 0), "{shown}");
+    }
+}
+
+/// A part in so many assemblies around each other, each of which moves what is in it by 10 mm.
+fn nested(levels: u32) -> Import {
+    let mut data = product(100, "part", 110) + "#110=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#24,#20),#1);\n";
+    let [mut child, mut inner] = [100, 110];
+    for level in 0..levels {
+        let id = 1000 + 20 * level;
+        let [whole, target] = [id + 5, id + 6];
+        data += &product(id, &format!("a{level}"), whole);
+        data += &format!("#{whole}=SHAPE_REPRESENTATION('',(#20,#{target}),#1);\n");
+        data += &format!("#{target}=AXIS2_PLACEMENT_3D('',#11,#13,#14);\n");
+        data += &usage(id + 7, NEXT, &format!("#{id},#{child},$"));
+        data += &relation(id + 9, [inner, whole], [20, target]);
+        data += &format!("#{}=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{},#{});\n", id + 11, id + 9, id + 8);
+        [child, inner] = [id, whole];
+    }
+    read(&data)
+}
+
+#[test]
+fn deep_assemblies_are_no_cycles() {
+    for levels in [70, 1000] {
+        assert_places(&nested(levels), &[10.0 * f64::from(levels)], &format!("{levels} levels"));
+    }
+    // Beyond the limit what is left out is told, and stands nowhere else.
+    let import = nested(1100);
+    assert_eq!(import.model.instances.len(), 0);
+    let told = import.report.problems.iter().filter(|p| p.contains("nested more than 1024 deep")).count();
+    assert_eq!(told, 1, "{:?}", import.report.problems);
+}
+
+#[test]
+fn products_in_a_circle_are_told() {
+    let data = product(500, "b", 510) + "#510=SHAPE_REPRESENTATION('',(#24),#1);\n";
+    let data = data + &usage(600, NEXT, "#200,#500,$") + &usage(602, NEXT, "#500,#200,$");
+    let problems = assembly("", &data).report.problems;
+    assert!(problems.iter().any(|p| p.ends_with("products contain each other")), "{problems:?}");
+}
