@@ -78,7 +78,7 @@ impl Assembly<'_, '_> {
 
     /// Returns the solids, shells and faces that representations hold.
     fn exact_shapes(&self, representations: &[u64]) -> FxHashSet<u64> {
-        let mut standing = FxHashSet::default();
+        let mut standing: FxHashSet<u64> = FxHashSet::default();
         for &representation in representations {
             let items = self.shape_items(representation);
             for shell in &items.shells {
