@@ -5,7 +5,7 @@ use super::select::select_faces;
 use crate::math::{Aabb, BoxTree};
 use crate::model::{Model, PlacedFace};
 use crate::simulate::emitter::{Area, Cover, CoveredArea};
-use crate::simulate::scene::{Key, Scene};
+use crate::simulate::scene::{Key, Scene, SourceKind};
 use crate::simulate::{Error, ErrorKind};
 use crate::text::{count_of, figures};
 use std::collections::{BTreeSet, HashMap};
@@ -74,9 +74,10 @@ impl<'m> LuminousSearch<'m> {
         };
         let name = &scene.sources[index].name;
         let source = if name.is_empty() { format!("[[source]] {}", index + 1) } else { format!("'{name}'") };
-        let dark = dark_note(&source, model, &chosen);
+        let even = (scene.sources[index].kind == SourceKind::Point).then(|| even_note(&source));
+        let mut notes: Vec<String> = even.into_iter().chain(dark_note(&source, model, &chosen)).collect();
         if covers.is_empty() {
-            return Ok(Some(Luminous { area, notes: dark.into_iter().collect() }));
+            return Ok(Some(Luminous { area, notes }));
         }
         let measured = area.measure_cover();
         let [whole, free] =
@@ -87,8 +88,8 @@ impl<'m> LuminousSearch<'m> {
             return Err(error.help("name faces that are free, or give what lies against them a `medium`"));
         }
         let share = 1.0 - free / whole;
-        let covered = (share >= TOLD_SHARE).then(|| covered_note(&source, model, labels, &measured, share));
-        Ok(Some(Luminous { area, notes: dark.into_iter().chain(covered).collect() }))
+        notes.extend((share >= TOLD_SHARE).then(|| covered_note(&source, model, labels, &measured, share)));
+        Ok(Some(Luminous { area, notes }))
     }
 
     /// Returns for each chosen face that is opaque the opaque faces of other shells that come within the glue distance of its box, by the
@@ -136,6 +137,14 @@ impl<'m> LuminousSearch<'m> {
         });
         cover.clone()
     }
+}
+
+/// Returns the sentence about a source on faces of the kind that none is given for.
+fn even_note(source: &str) -> String {
+    format!(
+        "{source} shines from each point of its faces with the same intensity in every direction, as `kind = \"point\"` has it, which no kind \
+         means too; faces of lamps mostly shine by the cosine law, `kind = \"lambertian\"`"
+    )
 }
 
 /// Returns the sentence about the faces that a source names and that do not shine, being ready meshes; `None` where there are none.
