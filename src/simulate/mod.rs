@@ -54,6 +54,7 @@ mod seconds;
 mod sequence;
 mod sequence_recorder;
 mod sequence_results;
+mod sequence_sums;
 mod settings;
 mod source_share;
 mod surfaces;
@@ -86,8 +87,9 @@ pub use run::{
 };
 pub use scene::{MOST_RAYS, Scene};
 pub use seconds::{MergedSeconds, Seconds};
-pub use sequence::{MOST_STEPS, Sequence, SequenceStep, SequenceSums};
+pub use sequence::{MOST_STEPS, Sequence, SequenceStep};
 pub use sequence_results::{ReceiverSequences, SequenceResult};
+pub use sequence_sums::SequenceSums;
 pub(crate) use settings::machine_threads;
 pub use settings::{KernelChoice, RunSettings};
 pub use tallies::{ReplicateTally, Tallies};

@@ -9,6 +9,7 @@ use super::digest::Fnv;
 use super::outcome::{Counts, LostRay, PathVertex};
 use super::path_sample::PathSample;
 use super::sequence::Sequence;
+use super::sequence_sums::SequenceSums;
 use super::tallies::{ReplicateTally, Tallies};
 use super::tally::{Moments, Sum};
 use serde::Serialize;
@@ -31,7 +32,7 @@ pub struct PartialRun {
 }
 
 /// Begins a file of this version.
-const MAGIC: &[u8] = b"lampyris tally 9\n";
+const MAGIC: &[u8] = b"lampyris tally 10\n";
 
 impl PartialRun {
     /// Makes a part with no replicate done, of a run that does not grow.
@@ -131,7 +132,8 @@ impl PartialRun {
             t.paths.iter().map(|v| (bare(v), coordinate_bits(&[v.point]), v.power.to_bits())).collect();
         out.extend(t.paths.mask().to_le_bytes());
         append_block(&mut out, &serde_json::to_vec(&paths)?);
-        let sequences: Vec<_> = t.sequences.iter().collect();
+        out.extend((t.sequences.limit() as u32).to_le_bytes());
+        let sequences: Vec<_> = t.sequences.held().collect();
         append_block(&mut out, &serde_json::to_vec(&sequences)?);
         to.write_all(&out)?;
         // The hash over all that stands before: a file that was cut or damaged on its way is refused, not added up.
@@ -305,7 +307,10 @@ impl<'a> Reader<'a> {
         let ledger: Vec<(LostRay, [[u64; 3]; 2])> = self.json()?;
         let mask = self.u64()?;
         let paths: Vec<(PathVertex, [[u64; 3]; 1], u64)> = self.json()?;
-        t.sequences = self.json::<Vec<(Sequence, Sum)>>()?.into_iter().collect();
+        let limit = self.u32()? as usize;
+        let sequences: Vec<(Sequence, Sum)> = self.json()?;
+        t.sequences =
+            SequenceSums::restored(limit, sequences).ok_or("its sequences have no known limit of steps")?;
         // Bits, not decimals: what was written comes back exactly.
         let point = |bits: [u64; 3]| bits.map(f64::from_bits).into();
         t.ledger = ledger

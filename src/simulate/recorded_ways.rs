@@ -20,8 +20,8 @@ pub struct RecordedWay {
     pub points: Vec<Point>,
 }
 
-/// Returns the recorded paths whose light a receiver counted, each once for each time that it did. `settings` are those of the run. Empty
-/// for a number without a receiver, and for results without recorded paths.
+/// Returns the recorded paths whose light a receiver counted, each once for each time that it did, by as many steps as the results tell
+/// apart. `settings` are those of the run. Empty for a number without a receiver, and for results without recorded paths.
 pub fn recorded_ways(
     bound: &BoundScene,
     settings: &RunSettings,
@@ -30,6 +30,7 @@ pub fn recorded_ways(
 ) -> Vec<RecordedWay> {
     let Some(shape) = bound.receivers.get(receiver) else { return Vec::new() };
     let (plan, number) = (Plan::new(bound, settings), receiver as u32);
+    let limit = results.tallies.sequences.limit();
     let mut ways = Vec::new();
     for ray in results.paths.chunk_by(|a, b| a.ray == b.ray) {
         let Some((source, _)) = plan.locate(ray[0].ray) else { continue };
@@ -42,7 +43,7 @@ pub fn recorded_ways(
                     None => Sequence::new(number, source as u32, steps),
                 };
                 let vertices = path[..end.vertices].iter().map(|v| v.point);
-                RecordedWay { sequence, points: vertices.chain(end.beyond).collect() }
+                RecordedWay { sequence: sequence.cut(limit), points: vertices.chain(end.beyond).collect() }
             });
             ways.extend(ends);
         }

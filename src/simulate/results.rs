@@ -12,7 +12,7 @@ use super::power_scale::PowerScale;
 use super::receiver::Receiver;
 use super::receiver_results::ReceiverResult;
 use super::seconds::Seconds;
-use super::sequence_results::ReceiverSequences;
+use super::sequence_results::{ReceiverSequences, cut_sequences_note};
 use super::settings::RunSettings;
 use super::tallies::Tallies;
 use super::tally::Sum;
@@ -177,7 +177,7 @@ impl Results {
             .chain(bound.scarce_sources_note(&plan))
             .chain(bound.rounded_sources_note(&plan));
         let found = found.chain(bound.uncounted_light_notes(&tallies.receivers));
-        let found = found.chain(few_replicates(tallies.replicates));
+        let found = found.chain(cut_sequences_note(&tallies.sequences)).chain(few_replicates(tallies.replicates));
         let mut notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
         let scale = PowerScale { quantum, replicates: partial.done.len() as u32 };
         let receiver = |(i, r): (usize, &Receiver)| {

@@ -2,15 +2,14 @@
 
 use super::bind::BoundScene;
 use super::outcome::{Event, PathVertex};
-use super::random::split_branch;
+use super::random::split_parents;
 use super::receiver::Shape;
-use super::tally::Sum;
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
-/// Steps of a sequence that are told apart. Light that went on, caught in a guide or a cavity, is in the sequence of its first steps:
-/// without a limit nearly every path of such a scene would be a sequence of its own.
+/// Most steps of a sequence that are told apart; fewer in runs of very many sequences, see [`SequenceSums`](super::SequenceSums). Light
+/// that went on, caught in a guide or a cavity, is in the sequence of its first steps: without a limit nearly every path of such a scene
+/// would be a sequence of its own.
 pub const MOST_STEPS: usize = 32;
 
 /// One thing that happened to light on its way.
@@ -37,20 +36,25 @@ pub struct Sequence {
 
 impl Sequence {
     /// Makes the way of light that a receiver counted after these steps.
-    pub(super) fn new(receiver: u32, source: u32, mut steps: Vec<SequenceStep>) -> Self {
-        let more = steps.len() > MOST_STEPS;
-        steps.truncate(MOST_STEPS);
-        Self { receiver, source, steps, more }
+    pub(super) fn new(receiver: u32, source: u32, steps: Vec<SequenceStep>) -> Self {
+        Self { receiver, source, steps, more: false }.cut(MOST_STEPS)
     }
 
     /// Makes the way of light that a face took after these steps.
-    pub(super) fn absorbed(receiver: u32, source: u32, steps: Vec<SequenceStep>, face: u32) -> Self {
-        let mut sequence = Self::new(receiver, source, steps);
-        // A way that was cut does not tell how it ended.
-        if !sequence.more {
-            sequence.steps.push(SequenceStep { face: Some(face), event: Event::Absorbed });
+    pub(super) fn absorbed(receiver: u32, source: u32, mut steps: Vec<SequenceStep>, face: u32) -> Self {
+        steps.push(SequenceStep { face: Some(face), event: Event::Absorbed });
+        Self::new(receiver, source, steps)
+    }
+
+    /// Returns the sequence of so many first steps that it belongs to where no more are told apart.
+    pub(super) fn cut(mut self, limit: usize) -> Self {
+        if self.steps.len() > limit {
+            self.steps.truncate(limit);
+            // Of a long path the room that the others took would stay.
+            self.steps.shrink_to_fit();
+            self.more = true;
         }
-        sequence
+        self
     }
 }
 
@@ -73,12 +77,6 @@ pub(crate) struct Deposit {
     pub(crate) quanta: u64,
 }
 
-/// Power by sequence, quanta of one replicate.
-pub(crate) type SequenceTally = BTreeMap<Sequence, u128>;
-
-/// Power by sequence over replicates.
-pub type SequenceSums = BTreeMap<Sequence, Sum>;
-
 /// The vertices of one ray by the path that split off it; each list in the order of the path.
 pub(super) struct RayPaths<'v>(FxHashMap<u32, Vec<&'v PathVertex>>);
 
@@ -90,8 +88,8 @@ impl<'v> RayPaths<'v> {
         Self(by_branch)
     }
 
-    /// Returns what happened to the light of a branch before its hit of this number, from the source on; empty for a branch without
-    /// vertices.
+    /// Returns what happened to the light of a branch before its hit of this number, from the source on, as far as it is told apart and one
+    /// step more; empty for a branch without vertices.
     pub(super) fn steps(&self, branch: u32, bounce: u32) -> Vec<SequenceStep> {
         let Some(vertices) = self.0.get(&branch) else { return Vec::new() };
         let mut steps = match vertices.first() {
@@ -99,7 +97,7 @@ impl<'v> RayPaths<'v> {
             _ => Vec::new(),
         };
         let happened = vertices.iter().filter(|v| v.bounce < bounce);
-        steps.extend(happened.filter_map(|v| {
+        let further = happened.filter_map(|v| {
             let event = match v.event {
                 // What splits off is what the face reflects.
                 Event::Split => Event::Reflected,
@@ -107,25 +105,27 @@ impl<'v> RayPaths<'v> {
                 _ => return None,
             };
             Some(SequenceStep { face: v.face, event })
-        }));
+        });
+        // One too many says that there are more.
+        steps.extend(further.take((MOST_STEPS + 1).saturating_sub(steps.len())));
         steps
     }
 
     /// Returns the steps of the path that a branch split off from, up to there; empty where that path was not recorded. Branches are
     /// numbered by the splits before alone.
     fn steps_before_split(&self, branch: u32, bounce: u32) -> Vec<SequenceStep> {
-        let parent = self.0.keys().find(|&&p| p != branch && split_branch(p, bounce) == branch);
-        parent.map_or_else(Vec::new, |&p| self.steps(p, bounce))
+        let parent = split_parents(branch, bounce).find(|p| *p != branch && self.0.contains_key(p));
+        parent.map_or_else(Vec::new, |p| self.steps(p, bounce))
     }
 }
 
-/// Adds the light of one ray, counted at `deposits`, to its sequences in `tally`. `vertices` are all of its paths.
+/// Calls `add` with the sequence and the quanta of all light of one ray, counted at `deposits`. `vertices` are all of its paths.
 pub(crate) fn add_ray(
     bound: &BoundScene,
     source: u32,
     vertices: &[PathVertex],
     deposits: &[Deposit],
-    tally: &mut SequenceTally,
+    mut add: impl FnMut(Sequence, u64),
 ) {
     if deposits.is_empty() {
         return;
@@ -134,13 +134,12 @@ pub(crate) fn add_ray(
     let paths = RayPaths::new(vertices);
     for deposit in deposits {
         let steps = paths.steps(deposit.branch, deposit.bounce);
-        let mut add = |sequence: Sequence| *tally.entry(sequence).or_default() += u128::from(deposit.quanta);
         match deposit.place {
-            DepositPlace::Receiver(receiver) => add(Sequence::new(receiver, source, steps)),
+            DepositPlace::Receiver(receiver) => add(Sequence::new(receiver, source, steps), deposit.quanta),
             DepositPlace::Face(face) => {
                 for (r, receiver) in (0..).zip(&bound.receivers) {
                     if matches!(&receiver.shape, Shape::Absorbed { faces } if faces.binary_search(&face).is_ok()) {
-                        add(Sequence::absorbed(r, source, steps.clone(), face));
+                        add(Sequence::absorbed(r, source, steps.clone(), face), deposit.quanta);
                     }
                 }
             }

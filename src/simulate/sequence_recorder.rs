@@ -30,7 +30,9 @@ impl<'c, 'a> SequenceRecorder<'c, 'a> {
             dispatch::trace(self.kind, self.context, RaySelection::Ray(ray), &mut self.tally);
             let deposits = self.tally.deposits.as_deref().unwrap_or(&[]);
             let vertices = &self.tally.paths;
-            sequence::add_ray(self.context.bound, source as u32, vertices, deposits, &mut tally.sequences);
+            sequence::add_ray(self.context.bound, source as u32, vertices, deposits, |sequence, quanta| {
+                tally.sequences.add(sequence, quanta);
+            });
             self.tally.paths.clear();
             self.tally.deposits.iter_mut().for_each(Vec::clear);
         }

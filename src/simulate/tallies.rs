@@ -6,7 +6,8 @@ use super::outcome::{Counts, LostRay, PathSink, PathVertex};
 use super::path_sample::PathSample;
 use super::plan::Plan;
 use super::receiver::Shape;
-use super::sequence::{Deposit, SequenceSums, SequenceTally};
+use super::sequence::Deposit;
+use super::sequence_sums::{SequenceSums, SequenceTally};
 use super::tally::{MomentSpread, Moments, Sum, quanta_as_integer};
 use crate::math::FaceId;
 use serde::{Deserialize, Serialize};
@@ -78,7 +79,7 @@ impl ReplicateTally {
             paths: Vec::new(),
             sample: Vec::new(),
             deposits: None,
-            sequences: SequenceTally::new(),
+            sequences: SequenceTally::default(),
         }
     }
 
@@ -95,7 +96,7 @@ impl ReplicateTally {
         self.paths.clear();
         self.sample.clear();
         self.deposits.iter_mut().for_each(Vec::clear);
-        self.sequences.clear();
+        self.sequences = SequenceTally::default();
     }
 
     /// Fills the receivers of absorbed power from their faces and adds what waits, so that it can be read; once for each replicate, or that
@@ -301,9 +302,7 @@ impl Tallies {
         self.counts.add(&std::mem::take(&mut replicate.counts));
         self.ledger.append(&mut replicate.ledger);
         trim_ledger(&mut self.ledger);
-        for (sequence, quanta) in std::mem::take(&mut replicate.sequences) {
-            self.sequences.entry(sequence).or_default().add_replicate(quanta);
-        }
+        self.sequences.take(&mut replicate.sequences);
         self.paths.append(&mut replicate.sample);
         self.paths.append(&mut replicate.paths);
     }
@@ -326,9 +325,7 @@ impl Tallies {
         self.counts.add(&o.counts);
         self.ledger.extend(o.ledger.iter().cloned());
         trim_ledger(&mut self.ledger);
-        for (sequence, sum) in &o.sequences {
-            self.sequences.entry(sequence.clone()).or_default().merge(sum);
-        }
+        self.sequences.merge(&o.sequences);
         self.paths.merge(&o.paths);
         self.sort_paths();
     }

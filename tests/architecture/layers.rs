@@ -663,6 +663,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "lost_light",
             "run_notes",
             "sequence",
+            "sequence_sums",
             "path_sample",
             "tallies",
             "digest",

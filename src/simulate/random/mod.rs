@@ -99,9 +99,36 @@ pub(crate) fn split_branch(branch: u32, bounce: u32) -> u32 {
     (mixed ^ mixed >> 15).max(1)
 }
 
+/// The inverse of the factor of [`split_branch`], modulo 2³².
+const SPLIT_INVERSE: u32 = 0xa5cb_9243;
+
+/// Returns the numbers of the paths that path `branch` may have split off at their hit `bounce`: one, as [`split_branch`] is a permutation,
+/// and for branch 1 that of 0 too.
+pub(crate) fn split_parents(branch: u32, bounce: u32) -> impl Iterator<Item = u32> {
+    let zero = (branch == 1).then_some(0);
+    std::iter::once(branch).chain(zero).map(move |hashed| {
+        let mixed = hashed ^ hashed >> 15 ^ hashed >> 30;
+        mixed.wrapping_mul(SPLIT_INVERSE).wrapping_sub(0x7f4a_7c15) ^ bounce.wrapping_mul(0x9e37_79b9)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_split_path_knows_its_parent() {
+        for bounce in [0, 1, 7, 1000, u32::MAX] {
+            for parent in [0, 1, 2, 0xdead_beef, u32::MAX] {
+                let branch = split_branch(parent, bounce);
+                assert!(split_parents(branch, bounce).any(|p| p == parent), "{parent} {bounce}");
+            }
+            // Of the two parents of branch 1, both have it as a child.
+            let parents: Vec<u32> = split_parents(1, bounce).collect();
+            assert_eq!(parents.len(), 2);
+            assert!(parents.iter().all(|&p| split_branch(p, bounce) == 1), "{parents:?}");
+        }
+    }
 
     #[test]
     fn numbers_are_uniform_and_differ_by_every_part_of_the_key() {
