@@ -3,9 +3,11 @@
 use super::pole_rings::PoleRings;
 use super::power_scale::PowerScale;
 use super::receiver::{Receiver, Shape};
+use super::run_notes::NAMED;
 use super::scene::{FarFieldType, PowerUnit};
 use super::tallies::Tallies;
 use super::tally::{Moments, Sum};
+use crate::text::{count_of, first_sentences};
 use serde::Serialize;
 use std::borrow::Cow;
 
@@ -278,7 +280,7 @@ impl ReceiverResult {
     }
 
     /// Returns one sentence where light came and none of it is of wavelengths that its channels count; `None` where it has none.
-    pub(super) fn unseen_light_note(&self) -> Option<String> {
+    fn unseen_light_note(&self) -> Option<String> {
         let is_unseen =
             self.power > 0.0 && !self.channels.is_empty() && self.channels.iter().all(|c| c.total == 0.0);
         is_unseen.then(|| {
@@ -299,6 +301,14 @@ impl ReceiverResult {
     pub fn cell(&self, i: usize, j: usize) -> f64 {
         self.cells[j * self.grid[0] + i]
     }
+}
+
+/// Returns sentences about receivers to which light came of which none is of wavelengths that their channels count: one for each of the
+/// first, and one that counts the others.
+pub(super) fn unseen_light_notes(receivers: &[ReceiverResult]) -> Vec<String> {
+    first_sentences(receivers.iter().filter_map(ReceiverResult::unseen_light_note), NAMED, |further| {
+        format!("the same holds for {}", count_of(further as u64, "more receiver"))
+    })
 }
 
 /// Number of rays from which on their own spread tells how well a mean place is known.

@@ -10,7 +10,7 @@ use super::outcome::{Counts, LostRay, PathVertex};
 use super::plan::Plan;
 use super::power_scale::PowerScale;
 use super::receiver::Receiver;
-use super::receiver_results::ReceiverResult;
+use super::receiver_results::{ReceiverResult, unseen_light_notes};
 use super::seconds::Seconds;
 use super::sequence_results::{ReceiverSequences, cut_sequences_note};
 use super::settings::RunSettings;
@@ -184,7 +184,7 @@ impl Results {
             ReceiverResult::new(r, i, &tallies, (&scale, plan.heaviest_ray()), bound.scene.run.unit)
         };
         let receivers: Vec<ReceiverResult> = bound.receivers.iter().enumerate().map(receiver).collect();
-        notes.extend(receivers.iter().filter_map(ReceiverResult::unseen_light_note));
+        notes.extend(unseen_light_notes(&receivers));
         let power = tallies.ends.each_ref().map(|s| scale.power(s));
         let errors = tallies.ends.each_ref().map(|s| scale.error(s));
         let digest = digest(&tallies);

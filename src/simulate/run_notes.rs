@@ -5,13 +5,15 @@ use super::outcome::{Counts, LostRay};
 use super::plan::Plan;
 use super::receiver::{Receiver, Shape};
 use super::tally::Sum;
-use crate::text::{count_of, figures};
+use crate::text::{count_of, figures, first_sentences};
 
 /// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
 /// one scene once in 10^6 segments.
 const OVERLAP_SEGMENTS: u64 = 10_000;
 /// Rays of a source below which next to nothing is known of its light.
 const SCARCE_RAYS: u64 = 64;
+/// Receivers that are named; of more the number is told.
+pub(super) const NAMED: usize = 3;
 /// Share of a source's power from which on what rounding changes of it is told.
 const ROUNDED: f64 = 1e-5;
 /// Share of the mean power of a source below which it is told: among thousands alike each has few rays, and all together enough.
@@ -92,24 +94,24 @@ impl BoundScene {
         })
     }
 
-    /// Returns one sentence for each receiver that ends light but counts that of so many interactions alone, and got none: `counted` says
-    /// what each got. Mostly light met it on the way to where it was to interact.
-    pub(crate) fn uncounted_light_notes(&self, counted: &[Sum]) -> impl Iterator<Item = String> + use<> {
+    /// Returns sentences about receivers that end light but count that of so many interactions alone, and got none: `counted` says what
+    /// each got. Mostly light met them on the way to where it was to interact. One for each of the first, and one that counts the others.
+    pub(crate) fn uncounted_light_notes(&self, counted: &[Sum]) -> Vec<String> {
         let ends_light =
             |r: &Receiver| r.absorbs && !matches!(r.shape, Shape::FarField { .. } | Shape::Absorbed { .. });
         let dark = self.receivers.iter().zip(counted).filter(|(r, sum)| ends_light(r) && sum.total == 0);
-        let notes: Vec<String> = dark
-            .filter_map(|(r, _)| {
-                let n = r.interactions.filter(|&n| n > 0)?;
-                Some(format!(
-                    "'{}' counts light after exactly {} alone, and none came: what meets it before ends there uncounted, \
-                     unless it has `absorbs = false`",
-                    r.name,
-                    count_of(n.into(), "interaction")
-                ))
-            })
-            .collect();
-        notes.into_iter()
+        let sentences = dark.filter_map(|(r, _)| {
+            let n = r.interactions.filter(|&n| n > 0)?;
+            Some(format!(
+                "'{}' counts light after exactly {} alone, and none came: what meets it before ends there uncounted, \
+                 unless it has `absorbs = false`",
+                r.name,
+                count_of(n.into(), "interaction")
+            ))
+        });
+        first_sentences(sentences, NAMED, |further| {
+            format!("the same holds for {}", count_of(further as u64, "more receiver"))
+        })
     }
 
     /// Returns one sentence about lost light: where most of it was, and why; `None` where the ledger is empty. `lost` counts those beyond

@@ -321,3 +321,26 @@ fn receivers_that_overlap_in_one_plane_are_named() {
     let back_to_back = notes("one_sided = true", "at = [0, 0, 20]\nnormal = [0, 0, -1]");
     assert_eq!(back_to_back, "");
 }
+
+/// Of many receivers in one plane, or in one face, three notes name some and one counts the others: of `n` that all overlap there are
+/// n (n − 1)/2 pairs, of which a thousand are counted.
+#[test]
+fn receivers_that_are_alike_are_named_three_times_and_counted() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 3.0));
+    let mut model = world.model;
+    model.parts[0].shells[0].faces[5].analytic = Analytic::Plane { frame: Frame::translation(Vector::Z * 3.0) };
+    let notes = |count: usize, keys: &str| {
+        let receiver = |k: usize| format!("[[receiver]]\nname = 'r{k}'\ncells = [1, 1]\nsize = [2, 2]\n{keys}\n");
+        bound(&model, &(0..count).map(receiver).collect::<String>()).unwrap().notes().to_vec()
+    };
+    for (count, rest) in [(3, None), (5, Some("for 7 more pairs")), (50, Some("for at least 997 more pairs"))] {
+        let told = notes(count, "at = [0, 0, 20]");
+        assert_eq!(told.iter().filter(|note| note.contains("lie in one plane")).count(), 3, "{count}");
+        assert_eq!(told.len(), 3 + rest.iter().count(), "{told:?}");
+        assert!(rest.is_none_or(|rest| told[3].contains(rest)), "{told:?}");
+    }
+    let flush = notes(5, "at = [1, 2, 3]\nabsorbs = false");
+    assert_eq!(flush.iter().filter(|note| note.contains("lies in face 5 of 'plate'")).count(), 3, "{flush:?}");
+    assert!(flush.len() == 4 && flush[3].contains("for 2 more receivers"), "{flush:?}");
+}

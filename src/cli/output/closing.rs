@@ -12,6 +12,7 @@ use crate::report::file_stem;
 use crate::simulate::Results;
 use crate::text::{figures, grouped};
 use serde_json::Value;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Longest line of the closing paragraph, characters.
@@ -55,6 +56,7 @@ pub(crate) fn print_results(
 
 /// Says what whoever reads the results of a run must know, a line each, without what was `said` before it.
 pub(crate) fn say_notes(notes: &[String], said: &[String], console: &Console) {
+    let said: HashSet<&String> = said.iter().collect();
     notes.iter().filter(|note| !said.contains(note)).for_each(|note| console.say(note));
 }
 

@@ -2,27 +2,40 @@
 //! does so before it meets the face.
 
 use super::bound_scene::BoundScene;
-use crate::math::{Aabb, Uv, Vector};
+use crate::math::{Aabb, BoxTree, Point, Uv, Vector};
 use crate::model::{Analytic, Model, PlacedFace};
 use crate::simulate::body::AMBIENT;
-use crate::simulate::receiver::{FLUSH, FlatShape};
+use crate::simulate::receiver::{FLUSH, FlatShape, Receiver};
+use crate::text::{count_of, first_sentences};
 
-/// Returns a sentence for each receiver that lies in a flat face of the model, naming the first such face; of one that absorbs, in a face
-/// that lets light out of a body.
+/// Receivers that are named; of more the number is told.
+const NAMED: usize = 3;
+
+/// Returns sentences about receivers that lie in a flat face of the model, each naming the first such face; of those that absorb, in a face
+/// that lets light out of a body. One for each of the first receivers, and one that counts the others.
 pub(super) fn flush_receiver_notes(bound: &BoundScene, model: &Model) -> Vec<String> {
-    // On an opaque face the receiver takes what would have met the face, as it is meant to.
-    let lets_light_out = |face: &PlacedFace<'_>| {
-        let optics = &bound.faces[face.id.index()];
-        optics.body != AMBIENT && !bound.surfaces[usize::from(optics.surface)].is_opaque()
-    };
-    let notes = bound.receivers.iter().filter_map(|receiver| {
-        let flat = receiver.flat()?;
-        // One that counts what comes from outside alone lets the light that leaves pass unseen.
-        let stops_leaving = |face: &PlacedFace<'_>| {
-            lets_light_out(face) && !(flat.is_one_sided && outward(face).is_some_and(|n| n.dot(flat.frame.z) > 0.0))
-        };
-        let mut faces = model.placed_faces().filter(|face| is_flush(face, &flat));
-        let face = faces.find(|face| !receiver.absorbs || stops_leaving(face))?;
+    let flat: Vec<(&Receiver, FlatShape<'_>)> =
+        bound.receivers.iter().filter_map(|receiver| Some((receiver, receiver.flat()?))).collect();
+    if flat.is_empty() {
+        return Vec::new();
+    }
+    let boxes: Vec<Aabb> = flat.iter().map(|(receiver, flat)| receiver.bounds().grown(flat.near())).collect();
+    let tree = BoxTree::new(&boxes);
+    let mut flush: Vec<Option<PlacedFace<'_>>> = vec![None; flat.len()];
+    let planes = model.placed_faces().filter_map(|face| Some((face, plane_of(&face)?)));
+    for (face, plane) in planes {
+        tree.any_meeting(&face.bounds(), |k| {
+            let (receiver, shape) = &flat[k as usize];
+            let first = &mut flush[k as usize];
+            let matters = || !receiver.absorbs || stops_leaving(bound, shape, &face);
+            if first.is_none() && is_in_plane(&plane, shape) && matters() {
+                *first = Some(face);
+            }
+            false
+        });
+    }
+    let sentences = flat.iter().zip(&flush).filter_map(|((receiver, _), face)| {
+        let face = face.as_ref()?;
         let what = face.entity().map_or_else(|| format!("face {}", face.id.0), |id| format!("face #{id}"));
         let part = &bound.instances[face.instance];
         let consequence = if receiver.absorbs {
@@ -34,7 +47,18 @@ pub(super) fn flush_receiver_notes(bound: &BoundScene, model: &Model) -> Vec<Str
         };
         Some(format!("the receiver '{}' lies in {what} of '{part}': {consequence}", receiver.name))
     });
-    notes.collect()
+    first_sentences(sentences, NAMED, |further| {
+        format!("the same holds for {}, each in a face of the model", count_of(further as u64, "more receiver"))
+    })
+}
+
+/// Whether an absorbing receiver in a face ends light that would have left a body through it. On an opaque face the receiver takes what
+/// would have met the face, as it is meant to.
+fn stops_leaving(bound: &BoundScene, flat: &FlatShape<'_>, face: &PlacedFace<'_>) -> bool {
+    let optics = &bound.faces[face.id.index()];
+    let lets_light_out = optics.body != AMBIENT && !bound.surfaces[usize::from(optics.surface)].is_opaque();
+    // One that counts what comes from outside alone lets the light that leaves pass unseen.
+    lets_light_out && !(flat.is_one_sided && outward(face).is_some_and(|n| n.dot(flat.frame.z) > 0.0))
 }
 
 /// Returns the normal of a flat face out of its body; `None` for a ready mesh.
@@ -45,14 +69,20 @@ fn outward(face: &PlacedFace<'_>) -> Option<Vector> {
     Some(face.placement.normal(if spline.reversed { -normal } else { normal }))
 }
 
-/// Whether a flat face lies in the plane of a receiver and meets its rectangle.
-fn is_flush(face: &PlacedFace<'_>, receiver: &FlatShape<'_>) -> bool {
-    let Some(Analytic::Plane { frame: plane }) = face.face.map(|f| &f.analytic) else { return false };
-    let (near, frame) = (receiver.near(), receiver.frame);
-    let normal = face.placement.direction(plane.z);
-    let height = frame.local_point(face.placement.point(plane.origin)).z;
-    if height.abs() > near || frame.z.cross(normal).length() > FLUSH {
-        return false;
-    }
-    !Aabb::from_points(receiver.corners()).grown(near).intersection(face.bounds()).is_empty()
+/// A point of a flat face and its normal, where it is placed, mm.
+struct FacePlane {
+    origin: Point,
+    normal: Vector,
+}
+
+/// Returns the plane of a face; `None` for one that is not flat.
+fn plane_of(face: &PlacedFace<'_>) -> Option<FacePlane> {
+    let Some(Analytic::Plane { frame }) = face.face.map(|f| &f.analytic) else { return None };
+    Some(FacePlane { origin: face.placement.point(frame.origin), normal: face.placement.direction(frame.z) })
+}
+
+/// Whether a plane is that of a receiver.
+fn is_in_plane(plane: &FacePlane, receiver: &FlatShape<'_>) -> bool {
+    let height = receiver.frame.local_point(plane.origin).z;
+    height.abs() <= receiver.near() && receiver.frame.z.cross(plane.normal).length() <= FLUSH
 }

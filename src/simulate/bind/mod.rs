@@ -119,7 +119,7 @@ impl Scene {
         bound.notes.extend(notes::replaced_rules_note(&bound.rules));
         bound.solids = (bound.emitters.len() >= MANY_SOURCES).then(|| bodies::solids(&bound, model, margin));
         bound.notes.extend(file_notes);
-        bound.notes.extend(cover_notes);
+        bound.notes.extend(notes::first_cover_notes(cover_notes));
         bound.notes.extend(notes::opening_note(&bound, model));
         bound.notes.extend(notes::shut_body_note(&bound, &chosen));
         bound.notes.extend(notes::thin_body_note(&bound));

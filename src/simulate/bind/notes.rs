@@ -9,10 +9,14 @@ use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::Loaded;
 use crate::simulate::scene::{ByWavelength, Material, PowerUnit, Reflectance, Scene, medium};
 use crate::simulate::surfaces::FaceOptics;
+use crate::text::{count_of, first_sentences};
 use std::collections::BTreeSet;
 
 /// Share of a wavelength that the end of a table may be missed by: a unit that was converted to nm and back.
 const ROUNDING: f64 = 1e-9;
+
+/// Tables, media and remarks on files that are named; of more the number is told.
+const NAMED: usize = 8;
 
 /// A property that is known between two wavelengths alone, nm, and what it is called in a sentence.
 struct KnownRange {
@@ -27,8 +31,8 @@ const ENDS: &str = "its first and last values are used there";
 /// Words for what is taken beyond a formula's wavelengths.
 const FORMULA: &str = "the formula is used all the same there";
 
-/// Returns one sentence for each table or formula in use that the light of a source goes beyond; `light` is first and last wavelength of
-/// each source, nm.
+/// Returns one sentence for each of the first tables and formulas in use that the light of a source goes beyond, and one that counts the
+/// others; `light` is first and last wavelength of each source, nm.
 pub(super) fn range_notes(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 2]]) -> Vec<String> {
     let media = chosen.iter().filter_map(|(_, rule)| scene.materials.get((*rule)?)?.medium.as_deref());
     let media: BTreeSet<&str> = media.chain(scene.ambient.as_deref()).collect();
@@ -42,7 +46,9 @@ pub(super) fn range_notes(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 2]
             beyond: ENDS,
         }));
     }
-    known.iter().filter_map(|k| range_note(scene, k, light)).collect()
+    first_sentences(known.iter().filter_map(|k| range_note(scene, k, light)), NAMED, |further| {
+        format!("the light of sources goes beyond {} or formulas too", count_of(further as u64, "more table"))
+    })
 }
 
 /// Returns the sentence about a table that the light of a source goes beyond, naming the first such source; `None` where no source does.
@@ -81,25 +87,35 @@ pub(super) fn unused_media_note(scene: &Scene) -> Option<String> {
     let named = scene.materials.iter().filter_map(|rule| rule.medium.as_deref());
     let named: BTreeSet<&str> = named.chain(scene.ambient.as_deref()).collect();
     let unused = scene.media.iter().map(|medium| medium.name.as_str()).filter(|name| !named.contains(name));
-    let quoted: Vec<String> = unused.map(|name| format!("'{name}'")).collect();
+    let quoted =
+        first_sentences(unused.map(|name| format!("'{name}'")), NAMED, |further| format!("{further} more"));
     let verb = if quoted.len() == 1 { "is" } else { "are" };
     (!quoted.is_empty()).then(|| {
         format!("of [[medium]] {} {verb} in no use: no [[material]] names it as its `medium`", quoted.join(", "))
     })
 }
 
-/// Returns what the readers of sources' files changed or supposed, each sentence with its source in front.
+/// Returns what the readers of sources' files changed or supposed: the first sentences, each with its source in front, and one that counts
+/// the others.
 pub(super) fn source_file_notes(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec<String> {
-    let mut sentences = Vec::new();
-    for (index, loaded) in loaded.iter().enumerate() {
+    let sentences = loaded.iter().enumerate().flat_map(|(index, loaded)| {
         let notes = match loaded {
             Some(Loaded::Rays(list)) => list.notes.as_slice(),
             Some(Loaded::Intensity { note, .. }) => note.as_slice(),
             None => &[],
         };
-        sentences.extend(notes.iter().map(|note| format!("{}: {note}", scene.source_label(index))));
-    }
-    sentences
+        notes.iter().map(move |note| format!("{}: {note}", scene.source_label(index)))
+    });
+    first_sentences(sentences, NAMED, |further| {
+        format!("the files of sources lead to {}", count_of(further as u64, "more remark"))
+    })
+}
+
+/// Returns the first of these sentences about sources whose area is covered, and one that counts the others.
+pub(super) fn first_cover_notes(sentences: Vec<String>) -> Vec<String> {
+    first_sentences(sentences, NAMED, |further| {
+        format!("areas of {} are covered in the same way", count_of(further as u64, "more source"))
+    })
 }
 
 /// Returns the least and the greatest of these wavelengths; `None` without any.

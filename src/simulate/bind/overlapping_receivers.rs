@@ -3,6 +3,7 @@
 use super::bound_scene::BoundScene;
 use crate::math::{Aabb, BoxTree, Point};
 use crate::simulate::receiver::{FlatShape, Receiver};
+use crate::text::{count_of, first_sentences};
 
 /// A flat receiver.
 struct Candidate<'r> {
@@ -35,21 +36,34 @@ impl<'r> Candidate<'r> {
     }
 }
 
-/// Returns a sentence for each two flat receivers, of which at least one absorbs, that overlap in one plane.
+/// Pairs that are named; of more the number is told.
+const NAMED: usize = 3;
+
+/// Pairs that are counted, and pairs of boxes that are asked for them, a tenth of a second of work: of a thousand receivers at one place
+/// there are half a million.
+const MOST_COUNTED: usize = 1000;
+const MOST_ASKED: usize = 1 << 19;
+
+/// Returns sentences about flat receivers, of which at least one of two absorbs, that overlap in one plane: one for each of the first
+/// pairs, and one that counts the others, up to [`MOST_COUNTED`].
 pub(super) fn overlapping_receiver_notes(bound: &BoundScene) -> Vec<String> {
     let flat: Vec<Candidate<'_>> = bound.receivers.iter().filter_map(Candidate::new).collect();
     let boxes: Vec<Aabb> = flat.iter().map(|c| c.receiver.bounds().grown(c.flat.near())).collect();
-    let mut notes = Vec::new();
-    for meeting in BoxTree::meeting_pairs(&boxes) {
-        let [first, second] = meeting.map(|k| &flat[k]);
-        // Rectangles overlap where neither lies beyond a side of the other.
-        if first.competes_with(second) && first.is_under(second) && second.is_under(first) {
-            notes.push(format!(
-                "the receivers '{}' and '{}' lie in one plane and overlap: light that would meet both ends on one of them, and the \
-                 other counts none of it; `absorbs = false` for both, or a hundredth of a millimetre between them, lets each count it",
-                first.receiver.name, second.receiver.name
-            ));
-        }
-    }
-    notes
+    let pairs = BoxTree::meeting_pairs(&boxes).take(MOST_ASKED).map(|meeting| meeting.map(|k| &flat[k]));
+    // Rectangles overlap where neither lies beyond a side of the other.
+    let overlapping: Vec<[&Candidate<'_>; 2]> = pairs
+        .filter(|[first, second]| first.competes_with(second) && first.is_under(second) && second.is_under(first))
+        .take(MOST_COUNTED)
+        .collect();
+    let sentences = overlapping.iter().map(|[first, second]| {
+        format!(
+            "the receivers '{}' and '{}' lie in one plane and overlap: light that would meet both ends on one of them, and the other \
+             counts none of it; `absorbs = false` for both, or a hundredth of a millimetre between them, lets each count it",
+            first.receiver.name, second.receiver.name
+        )
+    });
+    let at_least = if overlapping.len() == MOST_COUNTED { "at least " } else { "" };
+    first_sentences(sentences, NAMED, |further| {
+        format!("the same holds for {at_least}{} of receivers", count_of(further as u64, "more pair"))
+    })
 }
