@@ -56,6 +56,26 @@ fn what_is_no_colour_is_refused_in_rules_sources_and_receivers() {
     }
 }
 
+/// An empty list of points would mean no face, and the rule nothing, without a word.
+#[test]
+fn an_empty_list_of_points_is_refused_in_rules_sources_receivers_and_models() {
+    let model = twins();
+    let refused = |error: Option<Error>, table: &str| {
+        let error = error.map(|e| e.to_string()).unwrap_or_default();
+        assert!(error.contains("an empty list of points") && error.contains("s.toml:"), "{table}: {error}");
+    };
+    for table in [
+        "[[material]]\non = { at = [] }\nsurface = 'mirror'",
+        "[[material]]\npart = 'pair'\nat = []\nsurface = 'mirror'",
+        "[[source]]\nkind = 'lambertian'\non = { at = [] }",
+        "[[receiver]]\nname = 'lit'\nkind = 'absorbed'\non = { at = [] }",
+    ] {
+        refused(bound(&model, table).err(), table);
+    }
+    let text = "[[model]]\nfile = 'a.stp'\nwithout = [{ at = [] }]\n";
+    refused(Scene::parse(text, "s.toml", Path::new(".")).unwrap().left_out(0, &model).err(), text);
+}
+
 /// Beside one that fits, a number that nothing has would be lost without a word; a part that is placed nowhere has nothing to select.
 #[test]
 fn what_nothing_in_the_model_has_is_refused_beside_what_something_has() {

@@ -1,7 +1,6 @@
 //! Which rule of the scene gives each face its surface, and which its medium.
 
-use super::nearest::Nearest;
-use super::select;
+use super::select::{FaceSearch, select_faces};
 use crate::model::{Model, PlacedFace};
 use crate::simulate::Error;
 use crate::simulate::scene::{Key, Scene};
@@ -18,11 +17,11 @@ pub(super) type ChosenRules = Vec<(Option<usize>, Option<usize>)>;
 /// When the selector of a rule means no face.
 pub(super) fn choose_rules(scene: &Scene, model: &Model) -> Result<ChosenRules, Error> {
     let mut chosen: ChosenRules = vec![(None, None); model.placed_face_count()];
-    let mut nearest = Nearest::new(model);
+    let mut search = FaceSearch::new(model);
     for (i, rule) in scene.materials.iter().enumerate() {
         let base = [Key::Name("material"), Key::Index(i), Key::Name("on")];
         let base = if rule.on.is_some() { &base[..] } else { &base[..2] };
-        for face in select::select_faces(scene, base, &rule.faces(), model, &mut nearest)? {
+        for face in select_faces(scene, base, &rule.faces(), &mut search)? {
             // A later rule stands above an earlier one, for surfaces and media apart.
             if rule.surface.is_some() || rule.scatter.is_some() {
                 chosen[face].0 = Some(i);

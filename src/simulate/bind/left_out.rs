@@ -1,7 +1,6 @@
 //! What `without` of a `[[model]]` leaves out.
 
-use super::nearest::Nearest;
-use super::select::select_faces;
+use super::select::{FaceSearch, select_faces};
 use crate::model::Model;
 use crate::simulate::Error;
 use crate::simulate::scene::{Key, Scene};
@@ -34,12 +33,12 @@ impl Scene {
         if selectors.is_empty() {
             return Ok(Vec::new());
         }
-        let mut nearest = Nearest::new(model);
+        let mut search = FaceSearch::new(model);
         let labels = model.labels();
         let instance_of_face: Vec<usize> = model.placed_faces().map(|f| f.instance).collect();
         let left_out = |(k, selector)| {
             let base = [Key::Name("model"), Key::Index(index), Key::Name("without"), Key::Index(k)];
-            let mut faces = select_faces(self, &base, selector, model, &mut nearest)?;
+            let mut faces = select_faces(self, &base, selector, &mut search)?;
             // Two points may mean one face.
             faces.sort_unstable();
             faces.dedup();

@@ -1,7 +1,6 @@
 //! The faces that a source shines from, and what lies against them.
 
-use super::nearest::Nearest;
-use super::select::select_faces;
+use super::select::{FaceSearch, select_faces};
 use crate::math::{Aabb, BoxTree};
 use crate::model::{Model, PlacedFace};
 use crate::simulate::emitter::{Area, Cover, CoveredArea};
@@ -25,7 +24,7 @@ pub(super) struct Luminous {
 pub(super) struct LuminousSearch<'m> {
     scene: &'m Scene,
     model: &'m Model,
-    nearest: Nearest<'m>,
+    search: FaceSearch<'m>,
     /// The opaque faces with geometry, by the lower x of their boxes.
     faces: Vec<PlacedFace<'m>>,
     /// Boxes around these, mm.
@@ -54,8 +53,8 @@ impl<'m> LuminousSearch<'m> {
         for (place, face) in faces.iter().enumerate() {
             places[face.id.index()] = Some(place);
         }
-        let (nearest, tree) = (Nearest::new(model), BoxTree::new(&boxes));
-        Some(Self { scene, model, nearest, faces, boxes, tree, places, covers: HashMap::new() })
+        let (search, tree) = (FaceSearch::new(model), BoxTree::new(&boxes));
+        Some(Self { scene, model, search, faces, boxes, tree, places, covers: HashMap::new() })
     }
 
     /// Returns the faces that a source shines from, ready for points to be drawn on them; `None` for a source that is not on faces.
@@ -67,7 +66,7 @@ impl<'m> LuminousSearch<'m> {
         let (scene, model) = (self.scene, self.model);
         let Some(on) = &scene.sources[index].on else { return Ok(None) };
         let base = [Key::Name("source"), Key::Index(index), Key::Name("on")];
-        let chosen = select_faces(scene, &base, on, model, &mut self.nearest)?;
+        let chosen = select_faces(scene, &base, on, &mut self.search)?;
         let covers = self.possible_covers(&chosen);
         let Some(area) = Area::new(model, &chosen, &covers) else {
             return Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from"));

@@ -34,6 +34,7 @@ pub use face_selectors::face_selectors;
 pub use left_out::LeftOut;
 use luminous::LuminousSearch;
 use materials::{BARE_INTERFACE, SurfaceTable};
+use select::FaceSearch;
 
 /// What the box of a scene is grown by, as a share of its diagonal: room for what facets and rounding put outside the splines' boxes.
 const REGION_MARGIN: f64 = 1e-3;
@@ -222,10 +223,11 @@ fn source_frame(scene: &Scene, model: &Model, index: usize) -> Result<Frame, Err
 /// # Errors
 /// When one selects no face, or its `frame` names no single instance.
 fn bind_receivers(scene: &Scene, model: &Model) -> Result<Vec<Receiver>, Error> {
+    let mut search = FaceSearch::new(model);
     let mut receivers = Vec::new();
     for (i, r) in scene.receivers.iter().enumerate() {
         let faces = match r.kind {
-            ReceiverKind::Absorbed => select::absorbing_faces(scene, i, model)?,
+            ReceiverKind::Absorbed => select::absorbing_faces(scene, i, &mut search)?,
             _ => Vec::new(),
         };
         let of = [Key::Name("receiver"), Key::Index(i)];

@@ -6,6 +6,7 @@ use crate::model::{Instance, Model, PlacedFace, SurfaceKind};
 use crate::simulate::scene::{FaceSelector, Key, OneOrMany, Scene, SolidKey};
 use crate::simulate::{Error, ErrorKind};
 use crate::text;
+use rustc_hash::FxHashSet;
 
 /// Difference up to which two shares of a colour are the same: half a step of `#rrggbb`, 1/255.
 const COLOUR_STEP: f64 = 2e-3;
@@ -59,7 +60,17 @@ fn is_same_radius(wanted: f64, have: f64) -> bool {
     (wanted - have).abs() <= RADIUS_ROUNDING * have
 }
 
-/// Whether a face has everything that a selector asks for; points (`at`) are not asked.
+/// Returns the indices of the placed faces that have everything that a selector asks for; points (`at`) are not asked.
+fn matching_faces(rule: &FaceSelector, model: &Model) -> Vec<usize> {
+    // A list may name thousands of faces.
+    let entities: Option<FxHashSet<u64>> = rule.entity.as_ref().map(|e| e.as_slice().iter().copied().collect());
+    let is_named =
+        |f: &PlacedFace<'_>| entities.as_ref().is_none_or(|e| f.entity().is_some_and(|id| e.contains(&id)));
+    let matching = model.placed_faces().filter(|f| is_named(f) && matches_selector(rule, f, model));
+    matching.map(|f| f.id.index()).collect()
+}
+
+/// Whether a face has everything that a selector asks for; its `#id` and points (`at`) are not asked.
 fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -> bool {
     let same_colour =
         |wanted: [f64; 3], have: [f64; 3]| have.iter().zip(wanted).all(|(a, b)| (a - b).abs() < COLOUR_STEP);
@@ -67,7 +78,6 @@ fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -
         && model.instances[face.instance].names().any(|name| matches_any(&rule.instance, name))
         && matches_any(&rule.face, face.name())
         && matches_any(&rule.kind, face.kind().word())
-        && rule.entity.as_ref().is_none_or(|e| face.entity().is_some_and(|id| e.as_slice().contains(&id)))
         && (rule.layer.is_none() || face.layer().is_some_and(|layer| matches_any(&rule.layer, layer)))
         && rule.radius_mm.as_ref().is_none_or(|radii| {
             face.radius().is_some_and(|have| radii.as_slice().iter().any(|wanted| is_same_radius(*wanted, have)))
@@ -78,28 +88,83 @@ fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -
         })
 }
 
+/// The faces of a model as selectors ask for them: what is worked out for one is kept for all.
+pub(super) struct FaceSearch<'m> {
+    model: &'m Model,
+    nearest: Option<Nearest<'m>>,
+    /// The names of each key of [`NAMES`], each once.
+    names: [Option<Vec<&'m str>>; NAMES.len()],
+    numbers: Option<FaceNumbers>,
+}
+
+/// The numbers that the faces of a model have, each once.
+#[derive(Default)]
+struct FaceNumbers {
+    entities: FxHashSet<u64>,
+    solids: FxHashSet<usize>,
+    /// Rising, mm.
+    radii: Vec<f64>,
+}
+
+impl<'m> FaceSearch<'m> {
+    pub(super) fn new(model: &'m Model) -> Self {
+        Self { model, nearest: None, names: Default::default(), numbers: None }
+    }
+
+    /// Returns the names of a key of [`NAMES`], each once, in the order of the model.
+    fn names(&mut self, key: usize) -> &[&'m str] {
+        let model = self.model;
+        self.names[key].get_or_insert_with(|| {
+            let mut seen = FxHashSet::default();
+            let mut names = NAMES[key].1(model);
+            names.retain(|name| seen.insert(*name));
+            names
+        })
+    }
+
+    fn numbers(&mut self) -> &FaceNumbers {
+        let model = self.model;
+        self.numbers.get_or_insert_with(|| {
+            let mut numbers = FaceNumbers::default();
+            for face in model.placed_faces() {
+                numbers.entities.extend(face.entity());
+                numbers.solids.insert(face.solid);
+                numbers.radii.extend(face.radius());
+            }
+            numbers.radii.sort_by(f64::total_cmp);
+            numbers.radii.dedup();
+            numbers
+        })
+    }
+}
+
 /// Returns the indices of the placed faces that a selector means; with points, for each of them the nearest of these, which may repeat.
 /// `base` is where the selector stands in the scene, for messages.
 ///
 /// # Errors
-/// When no face fits, a name or number in it fits nothing in the model, or a point lies farther from the faces than they are large.
+/// When no face fits, a name or number in it fits nothing in the model, its list of points is empty, or a point lies farther from the faces
+/// than they are large.
 pub(super) fn select_faces(
     scene: &Scene,
     base: &[Key<'_>],
     rule: &FaceSelector,
-    model: &Model,
-    nearest: &mut Nearest<'_>,
+    search: &mut FaceSearch<'_>,
 ) -> Result<Vec<usize>, Error> {
     let path = |key| base.iter().copied().chain([Key::Name(key)]).collect::<Vec<_>>();
-    let candidates: Vec<usize> =
-        model.placed_faces().filter(|f| matches_selector(rule, f, model)).map(|f| f.id.index()).collect();
+    if rule.at.as_ref().is_some_and(|points| points.as_slice().is_empty()) {
+        let error = scene.error(ErrorKind::NoMatch, &path("at"), "an empty list of points means no face");
+        return Err(error.help("give a point on each face that is meant, or leave `at` out"));
+    }
     // Before the count: a name that nothing has is the better message than that nothing matches.
-    refuse_what_nothing_has(scene, base, rule, model)?;
+    refuse_what_nothing_has(scene, base, rule, search)?;
+    let model = search.model;
+    let candidates = matching_faces(rule, model);
     if candidates.is_empty() {
         let message = "this matches no face of the model";
         return Err(scene.error(ErrorKind::NoMatch, base, message).help("loosen its selectors, or remove it"));
     }
     let Some(points) = &rule.at else { return Ok(candidates) };
+    let nearest = search.nearest.get_or_insert_with(|| Nearest::new(model));
     let bounds = nearest.bounds(&candidates);
     let mut chosen = Vec::new();
     for p in points.as_slice() {
@@ -144,7 +209,7 @@ fn refuse_what_nothing_has(
     scene: &Scene,
     base: &[Key<'_>],
     rule: &FaceSelector,
-    model: &Model,
+    search: &mut FaceSearch<'_>,
 ) -> Result<(), Error> {
     let path = |key| base.iter().copied().chain([Key::Name(key)]).collect::<Vec<_>>();
     if rule.colour.as_ref().is_some_and(|c| c.rgb().is_none()) {
@@ -158,34 +223,37 @@ fn refuse_what_nothing_has(
         OneOrMany::Many(names.collect())
     });
     let asked = [&rule.part, &rule.instance, &rule.face, &rule.layer, &solid_names, &rule.kind];
-    for ((key, names_of), patterns) in NAMES.into_iter().zip(asked) {
+    for (place, ((key, _), patterns)) in NAMES.into_iter().zip(asked).enumerate() {
         let Some(patterns) = patterns else { continue };
-        let names = names_of(model);
+        let names = search.names(place);
         let fits_nothing = |pattern: &&String| !names.iter().any(|name| matches_pattern(pattern, name));
         if let Some(pattern) = patterns.as_slice().iter().find(fits_nothing) {
             let error = scene.error(ErrorKind::NoMatch, &path(key), format!("no {key} is called '{pattern}'"));
-            return Err(error.help(advice(pattern, names)));
+            return Err(error.help(advice(pattern, names.iter().copied())));
         }
     }
+    if rule.entity.is_none() && rule.solid.is_none() && rule.radius_mm.is_none() {
+        return Ok(());
+    }
+    let numbers = search.numbers();
     let refuse = |key: &'static str, message: String| {
         let error = scene.error(ErrorKind::NoMatch, &path(key), message);
         Err(error.help("`lampyris info FILE --faces` lists the faces of a model"))
     };
-    let any = |fits: &dyn Fn(&PlacedFace<'_>) -> bool| model.placed_faces().any(|face| fits(&face));
     for id in rule.entity.iter().flat_map(OneOrMany::as_slice) {
-        if !any(&|face| face.entity() == Some(*id)) {
+        if !numbers.entities.contains(id) {
             return refuse("entity", format!("no face is #{id} in its file"));
         }
     }
     for key in rule.solid.iter().flat_map(OneOrMany::as_slice) {
         if let SolidKey::Number(number) = key
-            && !any(&|face| face.solid == *number)
+            && !numbers.solids.contains(number)
         {
             return refuse("solid", format!("no part has a solid {number}"));
         }
     }
     for radius in rule.radius_mm.iter().flat_map(OneOrMany::as_slice) {
-        if !any(&|face| face.radius().is_some_and(|have| is_same_radius(*radius, have))) {
+        if !numbers.radii.iter().any(|have| is_same_radius(*radius, *have)) {
             return refuse("radius_mm", format!("no face has a radius of {radius} mm"));
         }
     }
@@ -197,11 +265,11 @@ fn refuse_what_nothing_has(
 ///
 /// # Errors
 /// When these mean no face.
-pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Result<Vec<u32>, Error> {
+pub(super) fn absorbing_faces(scene: &Scene, index: usize, search: &mut FaceSearch<'_>) -> Result<Vec<u32>, Error> {
     let receiver = &scene.receivers[index];
     if let Some(on) = &receiver.on {
         let base = [Key::Name("receiver"), Key::Index(index), Key::Name("on")];
-        let mut chosen = select_faces(scene, &base, on, model, &mut Nearest::new(model))?;
+        let mut chosen = select_faces(scene, &base, on, search)?;
         // Two points on one face name it twice: what it absorbs counts once.
         chosen.sort_unstable();
         chosen.dedup();
@@ -213,9 +281,9 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, model: &Model) -> Res
         ..FaceSelector::default()
     };
     let at = [Key::Name("receiver"), Key::Index(index)];
-    refuse_what_nothing_has(scene, &at, &rule, model)?;
-    let faces: Vec<u32> =
-        model.placed_faces().filter(|f| matches_selector(&rule, f, model)).map(|f| f.id.0).collect();
+    refuse_what_nothing_has(scene, &at, &rule, search)?;
+    let model = search.model;
+    let faces: Vec<u32> = matching_faces(&rule, model).into_iter().map(|f| f as u32).collect();
     if faces.is_empty() {
         let error = scene.error(ErrorKind::NoMatch, &at, "this receiver matches no face of the model");
         let names = model.instances.iter().flat_map(|i| [model.part(i.part).name.as_str(), i.name.as_str()]);
