@@ -126,6 +126,8 @@ fn what_means_nothing_is_refused_by_name() {
         ("[run]\nmax_bounces = -1".into(), "expected a whole number, 0 or more", 2),
         (format!("{PLANE}cells = [-1, 5]"), "expected a whole number, 0 or more", 4),
         (format!("{PLANE}cells = [10]"), "write cells = […, …]", 4),
+        ("title = 'x'\ndefault_surface = 'metal'".into(), "`default_surface` cannot give", 2),
+        ("default_surface = 'coating'".into(), "write `absorber`, `mirror`, `diffuse` or `interface`", 1),
         ("medium = [1]".into(), "[[medium]]", 1),
         ("receiver = [1]".into(), "[[receiver]]", 1),
         ("[accuracy]\nintersector = 'otree'".into(), "octree", 2),

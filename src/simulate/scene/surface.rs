@@ -159,11 +159,18 @@ fn coating_from_grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Co
     CoatingTable::new(angles, nm, cells).map(Coating::Table).map_err(|e| e.to_string())
 }
 
-/// Refuses surroundings of a medium that is not known, and materials that say nothing, select twice, have values that do not go together,
-/// or name a medium or a colour that is not known.
+/// Refuses surroundings of a medium that is not known, a default surface that needs values, and materials that say nothing, select twice,
+/// have values that do not go together, or name a medium or a colour that is not known.
 pub(super) fn check(scene: &Scene) -> Result<(), Error> {
     if let Some(name) = &scene.ambient {
         medium::find(scene, name, &[Key::Name("ambient")])?;
+    }
+    if matches!(scene.default_surface, SurfaceKind::Coating | SurfaceKind::Metal) {
+        let message = "this surface needs values, which `default_surface` cannot give";
+        let error = scene.error(ErrorKind::Value, &[Key::Name("default_surface")], message);
+        return Err(error.help(
+            "write `absorber`, `mirror`, `diffuse` or `interface`, and give other surfaces to faces by a [[material]]",
+        ));
     }
     for (i, m) in scene.materials.iter().enumerate() {
         let at = |key| [Key::Name("material"), Key::Index(i), Key::Name(key)];
