@@ -131,6 +131,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "lost_rays",
             "results_folder",
             "tally_file",
+            "part_sum",
             "checkpoint",
         ],
     ),

@@ -11,6 +11,7 @@ use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, saved_header};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::OutputPlace;
+use crate::cli::work::part_sum::{AskedRun, PartSum, input_failure, read_part};
 use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::shards::is_tally;
 use crate::cli::work::tally_file::TallyHeader;
@@ -21,7 +22,6 @@ use crate::cli::work::{input_files, lost_rays, results_folder};
 use crate::pipeline::{ErrorTarget, PreparedScene, SceneJob, TraceRequest, read_cached_scene};
 use crate::simulate::{GROWING_REPLICATE, PartialRun, shard_replicates};
 use serde_json::json;
-use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -76,11 +76,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     while let Some(absent) = part_files(command.parts)?.into_iter().find(|file| !file.exists())
         && patience.wait_again(console, &format!("{} is not there yet", absent.display()))
     {}
-    let (mut whole, mut usage) = sum_parts(command, &header, &prepared)?;
-    // Looked at again as a whole: parts may grow while they are waited for.
-    while !whole.is_whole() && patience.wait_again(console, &missing_parts(&whole, &header)) {
-        (whole, usage) = sum_parts(command, &header, &prepared)?;
-    }
+    let (whole, usage) = sum_parts(command, &header, &prepared, &patience, console)?;
     if is_tally(command.folder) {
         // A merge into a tally sums up what is there, whole or not.
         return write_sum(command, &prepared, &scene_path, (&whole, usage), console);
@@ -119,6 +115,29 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)
         .and(refused)
         .and(Completion::incomplete_if(remarks.target.is_some_and(|result| !result.reached))))
+}
+
+/// Sums up the parts that are there, waiting for missing ones if asked to, and the usage of their processes.
+fn sum_parts(
+    command: &MergeCommand,
+    header: &TallyHeader,
+    prepared: &PreparedScene,
+    patience: &Patience,
+    console: &Console,
+) -> Result<(PartialRun, Usage), Failure> {
+    let mut sum = PartSum::new(AskedRun {
+        first: header.clone(),
+        fingerprint: prepared.fingerprint()?.0,
+        scene: command.scene.map(Path::to_path_buf),
+        rays: command.rays,
+    });
+    // Listed anew each time: parts may come, and grow, while they are waited for.
+    loop {
+        let there = sum.add_new(&part_files(command.parts)?, &prepared.bound)?;
+        if there.is_whole() || !patience.wait_again(console, &missing_parts(there, header)) {
+            return Ok(sum.into_total());
+        }
+    }
 }
 
 /// Writes the sum of the parts, whole or not, as a tally for a merge of merges, and says so, or with `--json` prints what it holds.
@@ -218,99 +237,6 @@ fn part_files(arguments: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         files.extend(inside);
     }
     Ok(files)
-}
-
-/// Returns the failure of an input file.
-fn input_failure(path: &Path, message: impl std::fmt::Display) -> Failure {
-    Failure::input(format!("{}: {message}", path.display()))
-}
-
-/// Returns the bytes of a part.
-fn read_part(path: &Path) -> Result<Vec<u8>, Failure> {
-    crate::formats::read_bytes(path).map_err(|e| input_failure(path, e))
-}
-
-/// Says why a part cannot be added to the `earlier` ones, which `read` reads again, and which of them holds the same.
-fn not_merged(
-    path: &Path,
-    message: String,
-    earlier: &[PathBuf],
-    part: &PartialRun,
-    read: impl Fn(&Path) -> Result<PartialRun, Failure>,
-) -> Failure {
-    let shares = |other: &PartialRun| part.done.iter().any(|k| other.done.binary_search(k).is_ok());
-    let failure = input_failure(path, message);
-    match earlier.iter().find(|file| read(file).is_ok_and(|other| shares(&other))) {
-        Some(file) => failure.with_help(format!("{} holds it too: leave one of the two out", file.display())),
-        None => failure,
-    }
-}
-
-/// Sums up all parts that the arguments mean, each of which must be of the run that the first one's header names, and the usage of their
-/// processes. `--rays` sets how long a run that grows is to be.
-fn sum_parts(
-    command: &MergeCommand,
-    header: &TallyHeader,
-    prepared: &PreparedScene,
-) -> Result<(PartialRun, Usage), Failure> {
-    let expected = prepared.fingerprint()?.0;
-    let usage = RefCell::new(Usage::default());
-    let check = |h: &TallyHeader| {
-        if h.fingerprint == expected {
-            usage.borrow_mut().add(&h.usage);
-            return Ok(());
-        }
-        Err(if h.fingerprint == header.fingerprint {
-            match command.scene {
-                Some(given) => format!(
-                    "--scene {} is not the scene that this part was traced from, or another version of the program traced it",
-                    given.display()
-                ),
-                None => {
-                    format!(
-                        "the scene {} or the program has changed since this part was traced",
-                        h.scene().display()
-                    )
-                }
-            }
-        } else if h.accuracy != header.accuracy {
-            format!(
-                "it is part of another run ({}): traced with {}, the first part with {}; give both the same",
-                h.command, h.accuracy, header.accuracy
-            )
-        } else {
-            format!("it is part of another run ({}) than the first one", h.command)
-        })
-    };
-    let read = |path: &Path| {
-        PartialRun::read(&read_part(path)?, check, &prepared.bound).map_err(|m| input_failure(path, m))
-    };
-    let mut sum: Option<PartialRun> = None;
-    let files = part_files(command.parts)?;
-    for (k, path) in files.iter().enumerate() {
-        let part = read(path)?;
-        match &mut sum {
-            Some(sum) => sum.merge(&part).map_err(|m| not_merged(path, m, &files[..k], &part, read))?,
-            None => sum = Some(part),
-        }
-    }
-    let mut sum = sum.ok_or_else(|| Failure::arguments("merge: no parts given"))?;
-    if let Some(rays) = command.rays {
-        // As many whole replicates as hold these rays.
-        let replicates = u32::try_from(rays.div_ceil(GROWING_REPLICATE)).unwrap_or(u32::MAX);
-        if !sum.grows || replicates < sum.replicates {
-            let there = u64::from(sum.replicates) * GROWING_REPLICATE;
-            let (message, help) = if sum.grows {
-                (format!("the parts reach to ray {there}"), format!("give {there} or more, or leave --rays out"))
-            } else {
-                let help = "leave --rays out: parts of `lampyris trace --rays A..B` grow";
-                ("the run does not grow".into(), help.into())
-            };
-            return Err(Failure::arguments(format!("--rays {rays}: {message}")).with_help(help));
-        }
-        sum.replicates = replicates;
-    }
-    Ok((sum, usage.into_inner()))
 }
 
 /// Returns a text of how many replicates are missing, and which shards or, of a run that grows, which rays they are.

@@ -11,6 +11,7 @@ pub(super) mod input_guard;
 pub(super) mod lost_rays;
 pub(super) mod output_place;
 pub(super) mod paired_receivers;
+pub(super) mod part_sum;
 pub(super) mod path_file;
 pub(super) mod ray_input;
 pub(super) mod results_folder;

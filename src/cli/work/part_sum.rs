@@ -1,0 +1,211 @@
+//! The sum of the parts of a run that are there: each file is read once, though the folder is looked at again and again.
+
+use super::tally_file::TallyHeader;
+use super::usage::Usage;
+use crate::cli::failure::Failure;
+use crate::simulate::{BoundScene, GROWING_REPLICATE, PartialRun};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+/// What tells that a file was written anew: its length and when that was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Stamp {
+    length: u64,
+    modified: Option<SystemTime>,
+}
+
+impl Stamp {
+    /// `None` for a file that is not there.
+    fn new(path: &Path) -> Option<Self> {
+        let metadata = std::fs::metadata(path).ok()?;
+        Some(Self { length: metadata.len(), modified: metadata.modified().ok() })
+    }
+}
+
+/// What parts of a run must agree with, and how far it is to go.
+pub(crate) struct AskedRun {
+    /// Header of the first part.
+    pub(crate) first: TallyHeader,
+    /// Fingerprint of the scene as it is.
+    pub(crate) fingerprint: String,
+    /// The scene, where the command line names it.
+    pub(crate) scene: Option<PathBuf>,
+    /// How long a run that grows is to be; `None` for as long as its parts say.
+    pub(crate) rays: Option<u64>,
+}
+
+/// Parts of a run and their sum.
+pub(crate) struct PartSum {
+    asked: AskedRun,
+    /// The files that are in the sum, as they were when they were read.
+    files: BTreeMap<PathBuf, Option<Stamp>>,
+    total: PartialRun,
+    usage: Usage,
+}
+
+impl PartSum {
+    pub(crate) fn new(asked: AskedRun) -> Self {
+        Self { asked, files: BTreeMap::new(), total: PartialRun::default(), usage: Usage::default() }
+    }
+
+    /// Adds those of these files that are not in the sum yet, and returns it; begins anew where one that is has changed or is no longer
+    /// among them.
+    ///
+    /// # Errors
+    /// When there is no file, one cannot be read, is of another run or holds what another one does, or the parts reach beyond the rays that
+    /// were asked for.
+    pub(crate) fn add_new(&mut self, files: &[PathBuf], bound: &BoundScene) -> Result<&PartialRun, Failure> {
+        // Before they are read: what is written meanwhile is seen the next time.
+        let stamped: Vec<(&PathBuf, Option<Stamp>)> = files.iter().map(|file| (file, Stamp::new(file))).collect();
+        let present: BTreeMap<&PathBuf, Option<Stamp>> = stamped.iter().copied().collect();
+        if self.files.iter().any(|(file, stamp)| stamp.is_none() || present.get(file) != Some(stamp)) {
+            // Nothing can be taken out of a sum.
+            self.files.clear();
+            (self.total, self.usage) = Default::default();
+        }
+        // A file that is named twice is read twice, and refused.
+        let new: Vec<_> = stamped.into_iter().filter(|(file, _)| !self.files.contains_key(*file)).collect();
+        for (file, stamp) in new {
+            let (part, usage) = self.read(file, bound)?;
+            if self.files.is_empty() {
+                self.total = part;
+            } else {
+                self.total.merge(&part).map_err(|message| self.not_merged(file, message, &part, bound))?;
+            }
+            self.usage.add(&usage);
+            self.files.insert(file.clone(), stamp);
+        }
+        if self.files.is_empty() {
+            return Err(Failure::arguments("merge: no parts given"));
+        }
+        self.reach_asked_rays()?;
+        Ok(&self.total)
+    }
+
+    /// Returns the sum, and what its parts took.
+    pub(crate) fn into_total(self) -> (PartialRun, Usage) {
+        (self.total, self.usage)
+    }
+
+    /// Reads a part, and what it took.
+    fn read(&self, path: &Path, bound: &BoundScene) -> Result<(PartialRun, Usage), Failure> {
+        let mut usage = Usage::default();
+        let check = |header: &TallyHeader| {
+            usage.add(&header.usage);
+            self.check(header)
+        };
+        let part = PartialRun::read(&read_part(path)?, check, bound).map_err(|m| input_failure(path, m))?;
+        Ok((part, usage))
+    }
+
+    /// Checks that a part is of the run that the first one's header names, traced from the scene as it is.
+    fn check(&self, header: &TallyHeader) -> Result<(), String> {
+        let AskedRun { first, fingerprint, scene, .. } = &self.asked;
+        if header.fingerprint == *fingerprint {
+            return Ok(());
+        }
+        Err(if header.fingerprint == first.fingerprint {
+            match scene {
+                Some(given) => format!(
+                    "--scene {} is not the scene that this part was traced from, or another version of the program traced it",
+                    given.display()
+                ),
+                None => format!(
+                    "the scene {} or the program has changed since this part was traced",
+                    header.scene().display()
+                ),
+            }
+        } else if header.accuracy != first.accuracy {
+            format!(
+                "it is part of another run ({}): traced with {}, the first part with {}; give both the same",
+                header.command, header.accuracy, first.accuracy
+            )
+        } else {
+            format!("it is part of another run ({}) than the first one", header.command)
+        })
+    }
+
+    /// Says why a part cannot be added to the others, which are read again, and which of them holds the same.
+    fn not_merged(&self, path: &Path, message: String, part: &PartialRun, bound: &BoundScene) -> Failure {
+        let shares = |other: &PartialRun| part.done.iter().any(|k| other.done.binary_search(k).is_ok());
+        let failure = input_failure(path, message);
+        match self.files.keys().find(|file| self.read(file, bound).is_ok_and(|(other, _)| shares(&other))) {
+            Some(file) => failure.with_help(format!("{} holds it too: leave one of the two out", file.display())),
+            None => failure,
+        }
+    }
+
+    /// Sets how long a run that grows is to be, where that was asked for.
+    fn reach_asked_rays(&mut self) -> Result<(), Failure> {
+        let Some(rays) = self.asked.rays else { return Ok(()) };
+        // As many whole replicates as hold these rays.
+        let replicates = u32::try_from(rays.div_ceil(GROWING_REPLICATE)).unwrap_or(u32::MAX);
+        let sum = &mut self.total;
+        if !sum.grows || replicates < sum.replicates {
+            let there = u64::from(sum.replicates) * GROWING_REPLICATE;
+            let (message, help) = if sum.grows {
+                (format!("the parts reach to ray {there}"), format!("give {there} or more, or leave --rays out"))
+            } else {
+                let help = "leave --rays out: parts of `lampyris trace --rays A..B` grow";
+                ("the run does not grow".into(), help.into())
+            };
+            return Err(Failure::arguments(format!("--rays {rays}: {message}")).with_help(help));
+        }
+        sum.replicates = replicates;
+        Ok(())
+    }
+}
+
+/// Returns the failure of an input file.
+pub(crate) fn input_failure(path: &Path, message: impl std::fmt::Display) -> Failure {
+    Failure::input(format!("{}: {message}", path.display()))
+}
+
+/// Returns the bytes of a part.
+pub(crate) fn read_part(path: &Path) -> Result<Vec<u8>, Failure> {
+    crate::formats::read_bytes(path).map_err(|e| input_failure(path, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+    use crate::simulate::{RunSettings, Scene, replicates};
+
+    fn header() -> TallyHeader {
+        let fields = serde_json::json!({"fingerprint": "f", "scene": "s", "part": [], "command": "c"});
+        serde_json::from_value(fields).unwrap()
+    }
+
+    #[test]
+    fn a_part_is_read_once_and_anew_where_it_has_changed() {
+        let text = "[run]\nrays = 1000\n[[source]]\nkind = 'point'\nat = [0, 0, 0]\n";
+        let bound = Scene::parse(text, "s.toml", Path::new(".")).unwrap().bind(&Model::default()).unwrap();
+        let of_run = replicates(&bound, &RunSettings::from(&bound.scene().run));
+        let folder = tempfile::tempdir().unwrap();
+        let files = ["a.tally", "b.tally"].map(|name| folder.path().join(name));
+        for (replicate, file) in (0..).zip(&files) {
+            let part =
+                PartialRun { done: vec![replicate], ..PartialRun::done_elsewhere(&bound, of_run, Vec::new()) };
+            part.write(&header(), &mut std::fs::File::create(file).unwrap()).unwrap();
+        }
+        let asked = AskedRun { first: header(), fingerprint: "f".into(), scene: None, rays: None };
+        let mut sum = PartSum::new(asked);
+        let done = |sum: &mut PartSum, files: &[PathBuf]| sum.add_new(files, &bound).map(|sum| sum.done.clone());
+        assert_eq!(done(&mut sum, &files[..1]).ok(), Some(vec![0]));
+        // Of the same length and time it is not looked into again, though nobody could read it.
+        let length = std::fs::metadata(&files[0]).unwrap().len() as usize;
+        let modified = std::fs::metadata(&files[0]).unwrap().modified().unwrap();
+        std::fs::write(&files[0], vec![b'x'; length]).unwrap();
+        let handle = std::fs::File::options().write(true).open(&files[0]).unwrap();
+        handle.set_modified(modified).unwrap();
+        assert_eq!(done(&mut sum, &files).ok(), Some(vec![0, 1]));
+        // One that is gone is no longer in the sum, and one that has changed is read.
+        assert_eq!(done(&mut sum, &files[1..]).ok(), Some(vec![1]));
+        assert!(done(&mut sum, &files).is_err());
+        // The same file twice would count its rays twice.
+        let twice = [files[1].clone(), files[1].clone()];
+        assert!(PartSum::new(AskedRun { rays: None, ..sum.asked }).add_new(&twice, &bound).is_err());
+    }
+}
