@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 const STATISTICAL: [&str; 2] = ["statistical", "standard_error"];
 const GEOMETRIC: &str = "geometric";
 
+/// Columns of luminous intensity as runs write them: by itself, and as the Y of CIE values.
+const LUMINOUS: [&str; 2] = ["luminous_intensity_cd", "Y_cd"];
+
 /// Digits to which coordinates of cells are one: centres of neighbours differ by far more.
 const SAME_CENTRE_DEG: f64 = 1e-7;
 
@@ -32,7 +35,7 @@ impl Columns {
     /// Finds the columns that a header names.
     ///
     /// # Errors
-    /// When one but that of geometric errors is missing.
+    /// When one but that of geometric errors is missing, or several may be the intensity.
     fn new(header: &str) -> Result<Self, String> {
         let names: Vec<&str> = header.split(',').map(str::trim).collect();
         let place = |wanted: &dyn Fn(&str) -> bool| names.iter().position(|n| wanted(n));
@@ -41,8 +44,7 @@ impl Columns {
         };
         let h = needed(place(&|n| n == "H_deg"), "H_deg")?;
         let v = needed(place(&|n| n == "V_deg"), "V_deg")?;
-        let intensity = place(&|n| n.ends_with("_cd"))
-            .ok_or("no column of candela: set `unit = \"lm\"` in [run] and trace again")?;
+        let intensity = place_of_intensity(&names)?;
         // Of a run in watts the intensity is a channel, with errors of its own beside those of the power.
         let own = |error: &str| place(&|n| n.strip_prefix(names[intensity]).is_some_and(|rest| rest == error));
         let of_channel = own("_standard_error");
@@ -53,15 +55,39 @@ impl Columns {
     }
 }
 
+/// Returns the place of the column of luminous intensity among these: one that is named as runs name it, else the only one of candela.
+///
+/// # Errors
+/// When there is none, or there are several.
+fn place_of_intensity(names: &[&str]) -> Result<usize, String> {
+    let known = LUMINOUS.iter().find_map(|known| names.iter().position(|name| name == known));
+    let candela: Vec<usize> = (0..names.len()).filter(|&k| names[k].ends_with("_cd")).collect();
+    match (known, &candela[..]) {
+        (Some(place), _) | (None, &[place]) => Ok(place),
+        (None, []) => Err("no column of candela: set `unit = \"lm\"` in [run] and trace again".into()),
+        (None, several) => {
+            let several: Vec<&str> = several.iter().map(|&k| names[k]).collect();
+            Err(format!(
+                "the columns {} are all in candela: call the luminous intensity {}",
+                several.join(", "),
+                LUMINOUS[0]
+            ))
+        }
+    }
+}
+
 impl IntensityMap {
     /// Makes a map of the text of a far-field receiver's CSV file: columns `H_deg`, `V_deg`, an intensity in cd and its standard error, and
     /// if there is one, its geometric error; a cell a line, in any order. Without that column nothing is known of what facets change: see
-    /// [`Self::of_spline`].
+    /// [`Self::of_spline`]. Of several columns in cd `luminous_intensity_cd` is read, or else `Y_cd`.
+    ///
+    /// Angles are taken for those of type A, as regulations have them. Those of a receiver with `angles = "B"` stand under the same names:
+    /// the file does not tell them apart.
     ///
     /// `rays` are those of the run, where they are known: what few of them leave open.
     ///
     /// # Errors
-    /// When a column is missing, a cell stands twice or the cells make no regular grid; the message names the line where one is at fault.
+    /// When a column is missing, none or several may be the intensity, a cell stands twice or the cells make no regular grid; the message names the line where one is at fault.
     pub fn from_csv(text: &str, rays: Option<RaySample>) -> Result<Self, String> {
         let mut lines = lines_of_cells(text);
         let (_, header) = lines.next().ok_or("the file is empty")?;
@@ -174,6 +200,17 @@ mod tests {
         }
     }
 
+    /// Of CIE values Y is the luminous intensity, and X stands first.
+    #[test]
+    fn of_cie_values_the_second_is_read() {
+        let header = "H_deg,V_deg,radiant_intensity_W_per_sr,standard_error,X_cd,X_cd_standard_error,Y_cd,Y_cd_standard_error,Z_cd,\
+                      Z_cd_standard_error\n";
+        let cells = ["0,0", "1,0", "0,1", "1,1"].map(|at| format!("{at},0.5,0.05,100,10,300,30,900,90\n")).concat();
+        let map = IntensityMap::from_csv(&format!("{header}{cells}"), None).unwrap();
+        let read = map.read(&map.measure(Sensor { half_deg: 0.2, round: false }, 0.0, 0.0).unwrap());
+        assert!((read.value - 300.0).abs() < 1e-9 && (read.statistical - 30.0).abs() < 1e-9, "{}", read.value);
+    }
+
     #[test]
     fn what_is_no_far_field_is_refused() {
         for (text, message) in [
@@ -192,6 +229,7 @@ mod tests {
             ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,1,1\n", "V has one value"),
             ("H_deg,V_deg,radiant_intensity_W_per_sr,standard_error\n0,0,1,1\n", "unit = \"lm\""),
             ("H_deg,V_deg,i_cd,standard_error\n", "no cells"),
+            ("H_deg,V_deg,a_cd,b_cd,standard_error\n0,0,1,1,1\n", "a_cd, b_cd are all in candela"),
             ("H_deg,V_deg,i_cd,standard_error\n0,0,1,1\n1,0,NaN,1\n0,1,1,1\n1,1,1,1\n", "finite"),
         ] {
             let error = IntensityMap::from_csv(text, None).unwrap_err();
