@@ -87,7 +87,8 @@ impl IntensityMap {
     /// `rays` are those of the run, where they are known: what few of them leave open.
     ///
     /// # Errors
-    /// When a column is missing, none or several may be the intensity, a cell stands twice or the cells make no regular grid; the message names the line where one is at fault.
+    /// When a column is missing, several may be the intensity, a cell stands twice or the cells make no regular grid; the message names the
+    /// line where one is at fault.
     pub fn from_csv(text: &str, rays: Option<RaySample>) -> Result<Self, String> {
         let mut lines = lines_of_cells(text);
         let (_, header) = lines.next().ok_or("the file is empty")?;

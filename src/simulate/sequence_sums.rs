@@ -15,7 +15,7 @@ use super::tally::Sum;
 use std::collections::BTreeMap;
 
 /// Most sequences that are told apart: with all that they may be cut to they take some 40 MB.
-pub(super) const MOST_SEQUENCES: usize = 1 << 15;
+const MOST_SEQUENCES: usize = 1 << 15;
 
 /// Power by sequence, quanta of one replicate.
 #[derive(Debug)]
