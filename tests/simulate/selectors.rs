@@ -330,6 +330,8 @@ fn receivers_that_overlap_in_one_plane_are_named() {
     for overlapping in ["at = [0, 0, 20]", "at = [2.9, 4.9, 20]", "at = [0, 0, 20]\nnormal = [0, 0, -1]"] {
         assert!(notes("", overlapping).contains("'a' and 'b' lie in one plane"), "{overlapping}");
         assert_eq!(notes("absorbs = false", overlapping), "", "{overlapping}");
+        // One that lets light pass counts it on its way to the other.
+        assert_eq!(notes("", &format!("{overlapping}\nabsorbs = false")), "", "{overlapping}");
     }
     for apart in ["at = [3, 0, 20]", "at = [0, 0, 20.01]", "at = [0, 0, 20]\nnormal = [0, 1, 1]"] {
         assert_eq!(notes("", apart), "", "{apart}");

@@ -28,11 +28,12 @@ impl<'r> Candidate<'r> {
         seen.iter().all(|p| p.z.abs() <= near) && reaches(|p| p.x, half[0]) && reaches(|p| p.y, half[1])
     }
 
-    /// Whether light that meets both may end on one of them: not where each looks away from the other.
+    /// Whether light that meets both ends on one of them before the other counts it: not where one lets it pass, nor where each looks away
+    /// from the other.
     fn competes_with(&self, other: &Self) -> bool {
         let are_back_to_back =
             self.flat.is_one_sided && other.flat.is_one_sided && self.flat.frame.z.dot(other.flat.frame.z) < 0.0;
-        (self.receiver.absorbs || other.receiver.absorbs) && !are_back_to_back
+        self.receiver.absorbs && other.receiver.absorbs && !are_back_to_back
     }
 }
 
@@ -44,8 +45,8 @@ const NAMED: usize = 3;
 const MOST_COUNTED: usize = 1000;
 const MOST_ASKED: usize = 1 << 19;
 
-/// Returns sentences about flat receivers, of which at least one of two absorbs, that overlap in one plane: one for each of the first
-/// pairs, and one that counts the others, up to [`MOST_COUNTED`].
+/// Returns sentences about flat receivers that both absorb and overlap in one plane: one for each of the first pairs, and one that counts
+/// the others, up to [`MOST_COUNTED`].
 pub(super) fn overlapping_receiver_notes(bound: &BoundScene) -> Vec<String> {
     let flat: Vec<Candidate<'_>> = bound.receivers.iter().filter_map(Candidate::new).collect();
     let boxes: Vec<Aabb> = flat.iter().map(|c| c.receiver.bounds().grown(c.flat.near())).collect();
@@ -58,7 +59,7 @@ pub(super) fn overlapping_receiver_notes(bound: &BoundScene) -> Vec<String> {
     let sentences = overlapping.iter().map(|[first, second]| {
         format!(
             "the receivers '{}' and '{}' lie in one plane and overlap: light that would meet both ends on one of them, and the other \
-             counts none of it; `absorbs = false` for both, or a hundredth of a millimetre between them, lets each count it",
+             counts none of it; `absorbs = false` for one of them, or a hundredth of a millimetre between them, lets each count it",
             first.receiver.name, second.receiver.name
         )
     });
