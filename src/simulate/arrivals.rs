@@ -102,8 +102,8 @@ fn wavelength(bound: &BoundScene, settings: &RunSettings, plan: &Plan, ray: u64)
     sampler.single_ray(emitter, (ray - first) as u32, &mut start).1.wavelength
 }
 
-/// Returns between which distances from `a`, mm, a recorded segment to `b` meets a receiver as the kernel has it: one that lies in a face is
-/// in front of it, and light that it ends is recorded as much before it.
+/// Returns between which distances from `a`, mm, a recorded segment to `b` meets a receiver as the kernel has it: one that lies in a face
+/// is in front of it, and light that it ends is recorded as much before it.
 fn counted_range(ray: &Ray, a: &PathVertex, b: &PathVertex, absorbs: bool) -> [f64; 2] {
     let length = (b.point - a.point).length();
     if absorbs {

@@ -259,9 +259,9 @@ fn file_spectrum(file: &RayFile) -> Result<Option<Wavelengths>, Fault> {
     sampler.map(Some).map_err(|e| Fault::new(e.to_string(), "give the source a `spectrum` and mend the file's"))
 }
 
-/// Returns what makes lumens of a file's watts, or watts of its lumens, whichever `unit` is: the lumens to a watt of the scene's spectrum, else of
-/// the file's, else of each ray's own wavelength, and a note that says so; `None` where there are no wavelengths but the scene gives the
-/// source's power.
+/// Returns what makes lumens of a file's watts, or watts of its lumens, whichever `unit` is: the lumens to a watt of the scene's spectrum,
+/// else of the file's, else of each ray's own wavelength, and a note that says so; `None` where there are no wavelengths but the scene
+/// gives the source's power.
 ///
 /// # Errors
 /// When there are neither wavelengths nor such a power.
@@ -306,8 +306,8 @@ mod tests {
     use crate::formats::write_rays;
     use crate::math::{Point, Vector};
 
-    /// A lumen of deep blue is many watts: V(λ) of 1924 is 0.038 at 450 nm and 1.000 at 555 nm. With the source's power too they keep their
-    /// proportion.
+    /// A lumen of deep blue is many watts: V(λ) of 1924 is 0.038 at 450 nm and 1.000 at 555 nm. With the source's power too they keep
+    /// their proportion.
     #[test]
     fn lumens_with_wavelengths_are_watts() {
         let folder = tempfile::tempdir().unwrap();

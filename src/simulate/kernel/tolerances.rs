@@ -24,8 +24,8 @@ pub(super) fn rounding_at(point: Point) -> f64 {
     rounding(point.abs().max_element())
 }
 
-/// Returns how far in front of a face, mm, a receiver that lies in it is taken to be, at distance `t`, mm, of a ray: the rounding of a place
-/// there.
+/// Returns how far in front of a face, mm, a receiver that lies in it is taken to be, at distance `t`, mm, of a ray: the rounding of a
+/// place there.
 #[inline(always)]
 pub(in crate::simulate) fn in_front(ray: &Ray, t: f64) -> f64 {
     rounding(t + ray.origin.abs().max_element())
