@@ -2,7 +2,6 @@
 
 use super::Chart;
 use super::framing::lit_part;
-use super::maps::spoken;
 use crate::formats::{Grid, Picture, file_stem};
 use crate::optics::{linear_srgb, srgb_byte};
 use crate::text::figures;
@@ -67,7 +66,7 @@ pub(super) fn colour_chart(grid: &Grid) -> Option<Chart> {
          of white. Colours beyond those of a screen are cut.",
         figures(white, 3)
     );
-    let title = format!("{}: colours", spoken(&grid.name));
+    let title = format!("{}: colours", grid.name);
     Some(Chart::picture(
         &format!("{}-colours", file_stem(&grid.name)),
         &title,

@@ -1,6 +1,5 @@
 //! Both errors of every figure, for people: what stands behind a ±, what limits the answer, what the next halving costs.
 
-use super::maps::spoken;
 use super::number::{unit_in_words, with_unit};
 use super::{Cell, Table, seconds};
 use crate::intersect::NormalMode;
@@ -113,7 +112,7 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
     if parts.is_empty() && r.map.geometric > 3.0 * r.map.noise && r.map.geometric > r.map.statistical {
         parts.push(format!("{} % of the light (rms) falls into other cells", figures(100.0 * r.map.geometric, 2)));
     }
-    if parts.is_empty() { String::new() } else { format!("on {} {}", spoken(&r.name), parts.join(", ")) }
+    if parts.is_empty() { String::new() } else { format!("on {} {}", r.name, parts.join(", ")) }
 }
 
 /// Writes what facets change of the power that a body or medium took, as far as it is beyond doubt and limits that figure; else nothing.
@@ -123,9 +122,9 @@ fn absorbed_sentence(error: &GeometricError, absorbed: &Absorbed, figure: &Figur
         Some(e) if e.power.spline > 0.0 => {
             let change = 100.0 * (e.power.facets / e.power.spline - 1.0);
             let (by, how) = (figures(change.abs(), 2), if change < 0.0 { "less" } else { "more" });
-            format!("{} absorbs {by} % {how} power in {}", spoken(&e.name), e.r#in)
+            format!("{} absorbs {by} % {how} power in {}", e.name, e.r#in)
         }
-        Some(e) => format!("{} absorbs power in {} where it would none", spoken(&e.name), e.r#in),
+        Some(e) => format!("{} absorbs power in {} where it would none", e.name, e.r#in),
         None => String::new(),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::even_poles::{brightest_direction, direction_text, is_all_around};
 use super::half_width::half_width;
-use super::maps::{peak_error, spoken};
+use super::maps::peak_error;
 use super::peak_lines::{Line, lines_through_peak};
 use super::verdicts::multiple_text;
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
@@ -46,7 +46,7 @@ pub(super) struct Counted<'a> {
 /// Makes a table of the figures of a far field in candela, with the points of a regulation where it was judged by one.
 pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: Option<&Assessment>) -> Table {
     let Counted { receiver, figures: of_receiver, grid } = *counted;
-    let title = format!("{}: figures of the lamp", spoken(&receiver.name));
+    let title = format!("{}: figures of the lamp", receiver.name);
     let name = format!("{}-lamp", crate::formats::file_stem(&receiver.name));
     let mut table = Table::new(
         &name,
@@ -184,7 +184,7 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
     points.extend(framed.last());
     let series = vec![Series { points, style: SeriesStyle::Line, ..Series::default() }];
     let name = format!("{}-encircled", crate::formats::file_stem(&receiver.name));
-    let title = format!("{}: encircled power", spoken(&receiver.name));
+    let title = format!("{}: encircled power", receiver.name);
     let axes = [AxisStyle::linear("radius", "mm"), AxisStyle::linear("power within", "%")];
     Some(Chart::series(&name, &title, &caption, axes, series))
 }
@@ -217,7 +217,7 @@ pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
     };
     let series = vec![plane("C 0–180", 0.0), plane("C 90–270", 90.0)];
     let name = format!("{}-polar", crate::formats::file_stem(&receiver.name));
-    let title = format!("{}: polar diagram", spoken(&receiver.name));
+    let title = format!("{}: polar diagram", receiver.name);
     let unit = grid.unit.as_str();
     let axes = [AxisStyle::linear("intensity, sideways", unit), AxisStyle::linear("intensity up", unit)];
     let caption =

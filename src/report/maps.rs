@@ -156,7 +156,7 @@ pub(super) fn cuts(grid: &Grid) -> Option<Chart> {
     if part.is_some() {
         caption += LIT_PART_SHOWN;
     }
-    let title = format!("{}: cuts through the peak", spoken(&grid.name));
+    let title = format!("{}: cuts through the peak", grid.name);
     Some(Chart::series(&name, &title, &caption, axes, series.into()))
 }
 
@@ -204,11 +204,6 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid, max: Option<&Figure>) -> 
     let size = if steps[0] == steps[1] { steps[0].clone() } else { steps.join(" × ") };
     let cells = format!("{} × {} cells of {size}.", r.grid[0], r.grid[1]);
     [peak, error, Some(cells)].into_iter().flatten().collect()
-}
-
-/// Returns a name as words: with spaces in place of underscores.
-pub(super) fn spoken(name: &str) -> String {
-    name.replace('_', " ")
 }
 
 #[cfg(test)]

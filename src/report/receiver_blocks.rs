@@ -3,7 +3,7 @@
 use super::colour_picture::colour_chart;
 use super::framing::{LIT_PART_SHOWN, joined_cells, lit_part};
 use super::lamp_figures::{Counted, encircled_power, lamp_table, polar};
-use super::maps::{reading, spoken};
+use super::maps::reading;
 use super::number::unit_in_words;
 use super::{Block, Chart};
 use crate::formats::file_stem;
@@ -13,7 +13,7 @@ use crate::simulate::Results;
 /// Draws the map of a receiver, framed around its light; the caption says where that is a part of it.
 pub(super) fn framed_map(counted: &Counted<'_>) -> Chart {
     let Counted { receiver: r, figures, grid } = *counted;
-    let title = format!("{}: {} ({})", spoken(&r.name), grid.quantity, grid.unit);
+    let title = format!("{}: {} ({})", r.name, grid.quantity, grid.unit);
     let stem = file_stem(&r.name);
     // Candela and lux beside watts: the unit tells the files apart.
     let name = if grid.unit == unit_in_words(r.unit) { stem } else { format!("{stem}-{}", grid.unit) };

@@ -3,7 +3,7 @@
 use super::cross_check::{self, verdict};
 use super::even_poles::{brightest_direction, with_joined_slivers};
 use super::lamp_figures::Counted;
-use super::maps::{cuts, grids, receiver_grid, spoken};
+use super::maps::{cuts, grids, receiver_grid};
 use super::number::{counted, unit_in_words};
 use super::verdicts::{self, verdict_sentence};
 use super::{Block, Cell, Provenance, Report, Section, Table, View};
@@ -109,7 +109,7 @@ impl SimulationReport<'_> {
             .map(|(x, f)| {
                 let power = errors::with_errors(&f.power, 4);
                 let channels = errors::channel_totals(f);
-                format!("**{power}** ({}) reach {}{channels}", self.share(x.power), spoken(&x.name))
+                format!("**{power}** ({}) reach {}{channels}", self.share(x.power), x.name)
             })
             .collect();
         text += &if parts.is_empty() { "none is counted by a receiver".into() } else { parts.join("; ") };
@@ -123,7 +123,7 @@ impl SimulationReport<'_> {
             brightest.into_iter().filter(|(_, max)| max.statistical < MOST_UNCERTAIN_PEAK * max.value)
         {
             if let Some((direction, _)) = brightest_direction(&with_joined_slivers(&grid)) {
-                let of = if several { format!(" of {}", spoken(&grid.name)) } else { String::new() };
+                let of = if several { format!(" of {}", grid.name) } else { String::new() };
                 let value = errors::with_errors(max, 3);
                 text += &format!("The brightest direction{of} is {direction} with **{value}**. ");
             }
@@ -357,7 +357,8 @@ impl SimulationReport<'_> {
             ));
         for (list, word) in [(&used.simulated, "yes"), (&used.not_simulated, "no")] {
             for b in list {
-                table.row([spoken(b.effect.name()).into(), word.into(), b.because.as_str().into()]);
+                let effect = b.effect.name().replace('_', " ");
+                table.row([effect.into(), word.into(), b.because.as_str().into()]);
             }
         }
         Section::new("What was simulated, what not, and why").with_block(table)

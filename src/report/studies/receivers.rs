@@ -38,7 +38,7 @@ fn chart(rows: &[&Value], receiver: &str) -> Chart {
         normals. Points below the noise cannot be told from the spline with these rays.";
     let axes = [AxisStyle::log("tolerance", "mm"), AxisStyle::log("change of the map", "%")];
     let name = format!("receiver-{}", file_stem(receiver));
-    Chart::series(&name, &format!("{}: what the facets change", receiver.replace('_', " ")), caption, axes, series)
+    Chart::series(&name, &format!("{receiver}: what the facets change"), caption, axes, series)
 }
 
 /// Makes a table of all rows: each receiver's geometric and statistical errors, per cent, by tolerance and normals.
