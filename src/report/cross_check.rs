@@ -106,6 +106,23 @@ pub fn verdict(check: &CrossCheck) -> String {
     if check.scene.facets == 0 {
         return "Nothing was checked: there are no facets.".into();
     }
+    format!("Of {} ray segments checked, {}.", grouped(check.rays), findings(check))
+}
+
+/// Writes the verdict on segments of a run; one that was traced `on_spline` used no facets.
+pub(super) fn run_verdict(check: &CrossCheck, on_spline: bool) -> String {
+    if on_spline && check.scene.facets > 0 {
+        return format!(
+            "{} ray segments were asked again on facets, which the run did not use: {}.",
+            grouped(check.rays),
+            findings(check)
+        );
+    }
+    verdict(check)
+}
+
+/// Writes whether octree and BVH agree, and how many differences from the spline are unexplained.
+fn findings(check: &CrossCheck) -> String {
     let f = &check.facets_vs_exact;
     let between = match check.octree_vs_bvh.disagree {
         0 => "octree and BVH agree on every one".to_owned(),
@@ -123,7 +140,7 @@ pub fn verdict(check: &CrossCheck) -> String {
         ),
         _ => format!("**{}**", unexplained(check)),
     };
-    format!("Of {} ray segments checked, {between}, and {beside}.", grouped(check.rays))
+    format!("{between}, and {beside}")
 }
 
 /// Writes how many differences from the spline are unexplained, at least one, and what is wrong with those that were kept.

@@ -68,8 +68,8 @@ pub(super) fn facet_limits(
         return String::new();
     }
     format!(
-        "**The facets limit this answer**: {} ({} rays traced on both). --intersector exact takes that away, a tighter --tolerance \
-         lessens it. ",
+        "**The facets limit this answer**: {} ({} rays traced on both). --intersector exact takes that away, a smaller --tolerance or \
+         --accuracy lessens it. ",
         said.join("; "),
         grouped(error.rays)
     )
@@ -142,7 +142,7 @@ pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) ->
         format!("To halve the statistical errors takes at most {} more", seconds(cost.statistical_seconds));
     if let (Some(finer), Some(spline)) = (cost.geometric_seconds, cost.spline_seconds) {
         text += &format!(
-            ", to halve those from the facets a run at half the tolerance of about {}, to take them away a run on the spline of about {}",
+            ". A run at half the tolerance, which halves the errors from the facets, takes about {}; one on the spline, which has none, about {}",
             seconds(finer),
             seconds(spline)
         );
@@ -152,6 +152,9 @@ pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) ->
 
 /// Writes what the run was traced on, the facets' tolerance in mm, and why it was chosen.
 pub(super) fn choice_sentence(chosen: &Chosen) -> String {
+    if chosen.has_no_surface() {
+        return format!("Nothing was met, because {}. ", chosen.because);
+    }
     let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));
     let how = match (chosen.intersector, chosen.normals) {
         ("exact", _) => "**on the true surfaces**".to_owned(),
@@ -265,8 +268,9 @@ pub(super) fn change_table(error: &GeometricError, results: &Results, unit: &str
         ("unit", ""),
     ];
     let caption = format!(
-        "{} rays of the run, traced on the facets and on the true surfaces with the same random numbers. A width is the root mean square \
-         distance from the mean position; cells that few rays reach are judged with their neighbours.",
+        "{0} rays of the run, traced on the facets and on the true surfaces with the same random numbers; max is the largest value of these \
+         {0} rays alone, not of the run. A width is the root mean square distance from the mean position; cells that few rays reach are \
+         judged with their neighbours.",
         grouped(error.rays)
     );
     let mut table = Table::new("faceting", "What the facets change", &columns).caption(caption);

@@ -1,6 +1,6 @@
 //! The report of a traced scene: where the light went, how it looks, what was checked, what was left out and why.
 
-use super::cross_check::{self, verdict};
+use super::cross_check::{self, run_verdict};
 use super::even_poles::{brightest_direction, with_joined_slivers};
 use super::lamp_figures::Counted;
 use super::maps::{cuts, grids, receiver_grid};
@@ -35,6 +35,8 @@ pub struct SimulationReport<'a> {
     pub facets: &'a Facets<'a>,
     /// Facets that were traced: more than those drawn where parts are placed often.
     pub facet_count: usize,
+    /// Whether the run was traced on the true surfaces, and not on these facets.
+    pub on_spline: bool,
     /// What the view of the facets shows.
     pub drawn: String,
     /// Unit of powers: `W` or `lm`.
@@ -112,7 +114,11 @@ impl SimulationReport<'_> {
                 format!("**{power}** ({}) reach {}{channels}", self.share(x.power), x.name)
             })
             .collect();
-        text += &if parts.is_empty() { "none is counted by a receiver".into() } else { parts.join("; ") };
+        text += &if parts.is_empty() {
+            "none is counted: **the scene has no receiver**; add a [[receiver]]".into()
+        } else {
+            parts.join("; ")
+        };
         text += ". ";
         let directions = r.receivers.iter().zip(self.figures).filter(|(x, _)| x.kind == "far_field");
         let brightest: Vec<_> =
@@ -154,7 +160,7 @@ impl SimulationReport<'_> {
         );
         text.extend(self.chosen.map(errors::choice_sentence));
         if let Some(check) = self.check.filter(|check| check.scene.facets > 0) {
-            text += &verdict(check);
+            text += &run_verdict(check, self.on_spline);
         }
         text
     }

@@ -244,7 +244,7 @@ fn few_replicates(replicates: u32) -> Option<String> {
     }
     let t = STUDENT.get(replicates.checked_sub(2)? as usize)?;
     Some(format!(
-        "errors are worked out from {replicates} replicates alone, so that 95 % of runs lie within {t} of them, not within 2"
+        "errors are worked out from {replicates} replicates alone, so that the truth lies within {t} of them in 95 % of runs, not within 2"
     ))
 }
 

@@ -18,6 +18,7 @@ use crate::intersect::{Intersector, NormalMode};
 use crate::model::{Face, Model};
 use crate::simulate::{BoundScene, RunSettings};
 use crate::tessellate::GroupedFacets;
+use crate::text::grouped;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -40,6 +41,10 @@ const READY_OR_FLAT: &str = "all faces are ready meshes or flat, so that facets 
     from its own original is not known";
 const FLAT: &str = "all faces are flat, so that facets are the surface itself";
 
+/// Why nothing can be met: without a face, and where no face has facets.
+const NO_MODEL: &str = "there is no model";
+const NO_FACETS: &str = "no face has facets";
+
 /// What a run is traced with, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Chosen {
@@ -61,6 +66,13 @@ pub struct Chosen {
     /// What the facets that were taken change of the figures; `None` on the spline.
     #[serde(skip)]
     pub geometric: Option<GeometricError>,
+}
+
+impl Chosen {
+    /// Whether there is nothing that light could meet, so that it is traced on neither facets nor spline; [`Self::because`] says why.
+    pub fn has_no_surface(&self) -> bool {
+        [NO_MODEL, NO_FACETS].contains(&self.because.as_str())
+    }
 }
 
 /// One way to trace the run.
@@ -138,7 +150,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     let settings = undecided.pilot_settings();
     // Standard errors are foretold for as many rays as the run has, or will have grown to.
     let scale = undecided.judged_rays() as f64 / settings.rays as f64;
-    let as_grown = if undecided.run.grows { "; a run that grows is judged as one of 10⁸ rays" } else { "" };
+    let judged = undecided.judged_note();
     let spline = trace_replicates(bound, undecided.source.exact(), &settings);
     let emitted = spline.results.power.emitted;
     let on_facets = trace_replicates(bound, &*undecided.source.octree(undecided.facets), &settings);
@@ -163,7 +175,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     let unjudged = error.unjudged(scale, emitted).map(|name| name.to_owned());
     if worst.ratio <= 1.0 && unjudged.is_none() {
         let because =
-            format!("facets change no figure by more than its statistical error ({}{as_grown})", worst.in_words());
+            format!("facets change no figure by more than its statistical error ({}{judged})", worst.in_words());
         return (chosen(ON_FACETS, tolerance, because, alternatives, Some(error)), None);
     }
     // What the spline loses is an error too, and one that more rays do not mend.
@@ -196,7 +208,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
         alternatives.insert(alternatives.len() - 1, record);
         let passes = tried_worst.ratio <= 1.0;
         if passes && tried.unfit.is_none() {
-            let because = format!("{} ({}{as_grown})", way.reason(), worst.in_words());
+            let because = format!("{} ({}{judged})", way.reason(), worst.in_words());
             let chosen = chosen(way.traced_with(), tried.tolerance_mm, because, alternatives, Some(tried.error));
             return (chosen, tried.finer);
         }
@@ -204,7 +216,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
     }
     let worst = worst.in_words();
     let unfit = unfit.map(|why| format!("; {why}")).unwrap_or_default();
-    let because = format!("facets change the answer by more than its statistical error ({worst}{as_grown}){unfit}");
+    let because = format!("facets change the answer by more than its statistical error ({worst}{judged}){unfit}");
     (chosen(ON_SPLINE, tolerance, because, alternatives, None), None)
 }
 
@@ -248,7 +260,7 @@ impl Undecided<'_> {
     fn without_pilot(&self) -> Option<Chosen> {
         // What is cheap to ask comes first.
         let ((intersector, normals), because) = if self.facets.is_empty() {
-            (ON_FACETS, "there is no surface to meet")
+            (ON_FACETS, if self.faces().next().is_none() { NO_MODEL } else { NO_FACETS })
         } else if self.is_flat() {
             let has_mesh = self.faces().any(|face| face.is_none());
             (ON_FACETS, if has_mesh { READY_OR_FLAT } else { FLAT })
@@ -298,6 +310,14 @@ impl Undecided<'_> {
     /// Returns the number of rays whose statistical error facets must stay below.
     fn judged_rays(&self) -> u64 {
         if self.run.grows { GROWN_RAYS } else { self.run.rays }
+    }
+
+    /// Writes for how many rays the run is judged: those of the errors that a reason tells, which may be more than were traced in the end.
+    fn judged_note(&self) -> String {
+        if self.run.grows {
+            return "; a run that grows is judged as one of 10⁸ rays".into();
+        }
+        format!("; judged for a run of {} rays", grouped(self.run.rays))
     }
 
     /// Returns the run's settings with the pilot's number of rays, from the first one on, its own replicates and no shard.

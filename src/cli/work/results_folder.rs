@@ -242,6 +242,7 @@ fn report_page<'a>(
         results: &run.results,
         facets,
         facet_count: prepared.facets.facet_count(),
+        on_spline: prepared.choice.intersector == IntersectorKind::Exact,
         drawn: drawn_note(facets.mesh.facets.len(), prepared.facets.facet_count()),
         unit: prepared.power_unit(),
         check: run.check.as_ref(),
