@@ -51,6 +51,10 @@ pub(crate) fn run(command: &FacetCommand, console: &Console) -> Result<Completio
     let (mut made, _) = tessellate_model(&loaded.model, &settings, &monitor);
     made.report.seconds.read = loaded.seconds;
     made.report.peak_bytes = peak_bytes();
+    // The faces have tolerances of their own; that of the settings is for those without.
+    if let Some(plan) = &meshing.plan {
+        [made.report.tolerance_mm.min, made.report.tolerance_mm.max] = plan.tolerance_mm();
+    }
     let mut facets = appearance::grouped_facets(&loaded.model, &made.mesh, None);
     // Only VTU has a place for them, and they cost a look at every facet.
     if command.output.iter().any(|path| lower_extension(path) == "vtu") {

@@ -3,6 +3,7 @@
 use super::path_file::PathFile;
 use crate::cli::console::{Console, show_progress};
 use crate::cli::interruption::{self, SaveableRun};
+use crate::cli::output::sentences::plain_sentence_lines;
 use crate::intersect::NormalMode;
 use crate::pipeline::{Monitor, Stage};
 use crate::report::tolerance_text;
@@ -119,7 +120,7 @@ impl Monitor for TerminalMonitor<'_> {
     }
 
     fn aimed(&self, answer: &str) {
-        self.console.say(answer);
+        self.console.say(plain_sentence_lines(answer, self.console.width()).trim_end());
     }
 
     fn unsettled(&self, rows: usize, rays: u64) {

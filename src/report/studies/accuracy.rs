@@ -3,7 +3,7 @@
 use super::rows::{distinct, number, text};
 use crate::report::{AxisStyle, Cell, Chart, Content, Section, Series, SeriesStyle, Table};
 use crate::study::slope;
-use crate::text::figures;
+use crate::text::{figures, grouped};
 use serde_json::Value;
 
 /// Direction errors below it are rounding of unit vectors in double precision, degrees.
@@ -93,8 +93,14 @@ fn front_table(points: &[Point]) -> Table {
         ("trace", "s"),
         ("in all", "s"),
     ];
-    let mut table = Table::new("front", "The combinations that none beats", &columns)
-        .caption("Each is the cheapest for its error. Prepare: tessellate and build.");
+    let rays = points.iter().find_map(|p| p.row["rays"].as_u64());
+    let title = rays.map_or_else(
+        || "The combinations that none beats".to_owned(),
+        |rays| format!("The combinations that none beats for {} rays", grouped(rays)),
+    );
+    let mut table = Table::new("front", &title, &columns).caption(
+        "Each is the cheapest for its error with so many rays; of more rays others are. Prepare: tessellate and build.",
+    );
     let mut front: Vec<&Point> = points.iter().filter(|p| !is_dominated(p, points)).collect();
     front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
     let three = |x: f64| Cell::Number(x, 3);

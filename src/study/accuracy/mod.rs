@@ -241,10 +241,13 @@ pub fn sentence(rows: &[Row], target: f64) -> String {
         Some(e) => format!("{settings}: {} {job}; the exact spline costs {}", cost(facets), cost(e)),
         None => format!("{settings}: {} {job}", cost(facets)),
     };
+    let reached = match facets.direction_error_deg_p99 {
+        rounding if rounding <= ROUNDING_DEG => "exact but for rounding".to_owned(),
+        error => format!("{}° reached", figures(error, 3)),
+    };
     format!(
-        "For {target}° take {choice}. On the facets 99 % of the mirrored rays keep that direction error ({}° reached). Times are \
+        "For {target}° take {choice}. On the facets 99 % of the mirrored rays keep that direction error ({reached}). Times are \
          those of {}, tracing taken in proportion.",
-        figures(facets.direction_error_deg_p99, 3),
         count_of(facets.rays, "ray")
     )
 }

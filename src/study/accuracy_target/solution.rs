@@ -4,7 +4,7 @@ use super::AccuracyTarget;
 use crate::intersect::{Cost, NormalMode};
 use crate::study::counted_work::{CUBIC_HIT, FACET, FACET_HIT, MOVED_HIT, SPLINE_HIT, longer_on};
 use crate::study::tolerance_plan::TolerancePlan;
-use crate::text::figures;
+use crate::text::{figures, grouped};
 
 /// An error is accepted with this much to spare, so that other rays than the judge's find it kept too.
 const ACCEPTED: f64 = 0.96;
@@ -109,16 +109,17 @@ impl Solution {
     /// many to be tried.
     pub(super) fn answer_sentence(&self, target: &AccuracyTarget, gave_up: bool) -> String {
         let [low, high] = self.plan.tolerance_mm();
-        let [low, high] = [low, high].map(|mm| figures(mm, 3));
+        let [low, high] = [low, high].map(|mm| figures(mm, 4));
         let range = if low == high { format!("{low} mm") } else { format!("{low} to {high} mm") };
         let reached = match self.reached.zip(self.largest) {
             Some(_) if self.checked == 0 => {
                 format!("reached 0° (fresh rays met flat faces alone{})", self.without_angle())
             }
             Some((reached, largest)) => format!(
-                "reached {}° (99th percentile of {} hits of fresh rays on curved faces, the worse of facets and spline{}; the largest {}°{})",
+                "reached {}° (99th percentile of {} hits on curved faces, the larger of those of fresh rays traced on the facets and of others on the \
+                 spline{}; the largest {}°{})",
                 figures(reached, 3),
-                self.checked,
+                grouped(self.checked),
                 self.with_few_rays(),
                 figures(largest, 3),
                 self.without_angle()
@@ -132,7 +133,9 @@ impl Solution {
         };
         format!(
             "Asked {}°, {reached} with {} normals on {} facets within {range}{shortfall}.",
-            target.angle_deg, self.normals, self.facets
+            target.angle_deg,
+            self.normals,
+            grouped(self.facets as u64)
         )
     }
 }
@@ -159,7 +162,7 @@ mod tests {
             };
             solution.answer_sentence(&AccuracyTarget::for_angle_deg(1.0), false)
         };
-        let of_both = "hits of fresh rays on curved faces, the worse of facets and spline";
+        let of_both = "hits on curved faces, the larger of those of fresh rays traced on the facets and of others on the spline";
         assert!(answer(24).contains(&format!("of 24 {of_both}, too few to be sure of it; the largest 0.75°)")));
         assert!(answer(2000).contains(&format!("of 2000 {of_both}; the largest 0.75°)")));
     }
