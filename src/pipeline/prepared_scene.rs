@@ -17,7 +17,6 @@ use crate::intersect::octree::{self, Octree};
 use crate::intersect::{Intersector, NormalMode};
 use crate::mesh::FacetMesh;
 use crate::model::{Instancing, Model};
-use crate::simulate::scene::PowerUnit;
 use crate::simulate::{
     BoundScene, Fingerprint, Hooks, PartialRun, PathSink, Progress, RunSettings, Scene, Traced, grows,
     replicate_range, trace,
@@ -332,10 +331,7 @@ impl PreparedScene {
 
     /// Returns the unit of powers: `W` or `lm`.
     pub fn power_unit(&self) -> &'static str {
-        match self.job.scene.run.unit {
-            PowerUnit::Lumen => "lm",
-            PowerUnit::Watt => "W",
-        }
+        self.job.scene.run.unit.symbol()
     }
 
     /// Traces the replicates that are asked for, of the request's shard, and returns their sums with those it goes on from; fewer where the

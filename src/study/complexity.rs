@@ -238,14 +238,18 @@ fn sentence(rows: &[Row]) -> String {
     } else {
         format!(" The certified spline tracer, which needs no facets, is {} times as fast.", ratios(&exact))
     };
+    // Less than half of the last digit that is printed.
+    let same = match 100.0 * difference {
+        none if none < 5e-4 => "the same".to_owned(),
+        percent => format!("the same within {percent:.3} %"),
+    };
     format!(
         "Facets in an octree, meshing included, are **{} times** as fast as the traditional way of intersecting every spline surface \
-         with every ray, on lamps of {} patches and for {} rays. The light on the wall of the {} lamp is the same within \
-         {:.3} %.{beside} The seed paper's savings make 1.23 / 1.34 / 1.87 times on its own three lamps.",
+         with every ray, on lamps of {} patches and for {} rays. The light on the wall of the {} lamp is {same}.{beside} \
+         The seed paper's savings make 1.23 / 1.34 / 1.87 times on its own three lamps.",
         ratios(&octree),
         patches.join(" / "),
         apart(rays),
-        row.model,
-        100.0 * difference
+        row.model
     )
 }

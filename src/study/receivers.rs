@@ -35,6 +35,8 @@ pub struct Row {
     pub seconds_trace_exact: f64,
     /// Power on the receiver.
     pub power: f64,
+    /// Unit of `power`: `W` or `lm`.
+    pub unit: String,
     /// What facets change of it, relative; `None` where the receiver is dark on the spline, as for the next three.
     pub power_geometric: Option<f64>,
     /// Its standard error, relative.
@@ -151,6 +153,7 @@ pub(super) fn receivers(
         }
     }
     countdown.stage("done", Some(0.0));
+    rows.iter_mut().for_each(|row| row.unit = bound.scene.run.unit.symbol().into());
     rows
 }
 

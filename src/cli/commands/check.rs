@@ -101,6 +101,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let receivers = scene.zip(bound.as_ref()).map_or_else(Vec::new, |(scene, bound)| {
         paired_receivers::trace_both(scene, bound, [on_facets, exact], &tracing, console)
     });
+    let unit = scene.map(|scene| scene.run.unit).unwrap_or_default();
     let text = json_text(&json_document(&found, normals, scene.map(|_| &receivers[..]), reached.as_ref())?)?;
     if let Some(folder) = &command.output {
         let drawn = facets.drawn(MOST_DRAWN);
@@ -109,7 +110,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
             check: &found,
             facets: &appearance::grouped_facets(model, &drawn, bound.as_ref()),
             normals: &normals.to_string(),
-            tables: if receivers.is_empty() { Vec::new() } else { vec![paired_receivers::table(&receivers)] },
+            tables: if receivers.is_empty() { Vec::new() } else { vec![paired_receivers::table(&receivers, unit)] },
             also: reached.iter().map(|a| a.answer.clone()).collect(),
             provenance: console.provenance(Some(tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1)), threads),
         };

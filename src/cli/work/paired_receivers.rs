@@ -4,6 +4,7 @@ use crate::cli::console::Console;
 use crate::intersect::Intersector;
 use crate::pipeline::TracingSettings;
 use crate::report::{Cell, Table};
+use crate::simulate::scene::PowerUnit;
 use crate::simulate::{BoundScene, RunSettings, Scene};
 use crate::study::receivers::{PowerComparison, compare_power};
 use crate::text::figures;
@@ -33,11 +34,11 @@ pub(crate) fn trace_both(
     found
 }
 
-/// Makes the report's table of what facets change of every receiver, in per cent of its power on the spline.
-pub(crate) fn table(pairs: &[PowerComparison]) -> Table {
+/// Makes the report's table of what facets change of every receiver, in per cent of its power on the spline; `unit` is that of powers.
+pub(crate) fn table(pairs: &[PowerComparison], unit: PowerUnit) -> Table {
     let columns = [
         ("receiver", ""),
-        ("power on the spline", "W or lm"),
+        ("power on the spline", unit.symbol()),
         ("changed by facets", "%"),
         ("± (1σ, same rays)", "%"),
         ("± (1σ, alone)", "%"),
@@ -86,7 +87,7 @@ mod tests {
             difference: 1e-3,
             ..PowerComparison::default()
         };
-        let table = table(&[lit_by_facets_alone]);
+        let table = table(&[lit_by_facets_alone], PowerUnit::Lumen);
         assert_eq!(table.rows[0][2..], [Cell::Text("dark".into()), Cell::Empty, Cell::Empty]);
     }
 }

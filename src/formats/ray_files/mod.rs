@@ -37,14 +37,23 @@ impl RayFile {
     /// [`read_rays`] knows it, and looks at each ray once. `preferred` chooses the flux where the file holds both.
     ///
     /// # Errors
-    /// When the file cannot be read or is not what its first bytes promise, the message names the byte or the ray; when a long list of text
-    /// or packed arrays finds no place in the folder for temporary files.
+    /// When the file cannot be read, holds no rays or is not what its first bytes promise, the message names the byte or the ray; when a long
+    /// list of text or packed arrays finds no place in the folder for temporary files.
     pub fn open(path: &Path, preferred: Flux) -> Result<Self, Error> {
         Self::open_within(path, preferred, MOST_IN_MEMORY)
     }
 
     /// As [`RayFile::open`], with at most `most_in_memory` rays of a list in memory; further ones go to a scratch file.
     fn open_within(path: &Path, preferred: Flux, most_in_memory: u64) -> Result<Self, Error> {
+        let file = Self::open_any(path, preferred, most_in_memory)?;
+        if file.is_empty() {
+            return Err(Error::new(path, ErrorKind::Malformed("no rays in it".into())));
+        }
+        Ok(file)
+    }
+
+    /// As [`RayFile::open_within`]; a file without rays is no error.
+    fn open_any(path: &Path, preferred: Flux, most_in_memory: u64) -> Result<Self, Error> {
         let mut start = [0; 4];
         let mut file = open_file(path).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
         // A file of fewer than four bytes is none of the binary formats; the reader of lists says what it lacks.
@@ -189,6 +198,8 @@ mod tests {
         std::fs::write(&path, "0,0,0,0,0,1,2\n").unwrap();
         let set = read_ray_set(&path, Flux::Radiant).unwrap();
         assert_eq!((set.rays.len(), set.flux), (1, None));
+        std::fs::write(&path, "").unwrap();
+        assert!(read_ray_set(&path, Flux::Radiant).unwrap_err().to_string().contains("no rays in it"));
         std::fs::write(&path, "1").unwrap();
         assert!(read_ray_set(&path, Flux::Radiant).unwrap_err().to_string().contains("1 columns"));
     }

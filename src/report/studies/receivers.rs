@@ -43,11 +43,13 @@ fn chart(rows: &[&Value], receiver: &str) -> Chart {
 
 /// Makes a table of all rows: each receiver's geometric and statistical errors, per cent, by tolerance and normals.
 fn table(rows: &[&Value]) -> Table {
+    // All are of one scene; what an earlier version kept does not say.
+    let unit = rows.iter().map(|row| text(row, "unit")).find(|unit| !unit.is_empty()).unwrap_or("W or lm");
     let columns = [
         ("receiver", ""),
         ("tolerance", "mm"),
         ("normals", ""),
-        ("power", "W or lm"),
+        ("power", unit),
         ("power, geometric", "%"),
         ("power, statistical", "%"),
         ("map, geometric", "%"),

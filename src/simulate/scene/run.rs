@@ -116,6 +116,16 @@ pub enum PowerUnit {
     Lumen,
 }
 
+impl PowerUnit {
+    /// Returns its symbol, `W` or `lm`.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Watt => "W",
+            Self::Lumen => "lm",
+        }
+    }
+}
+
 /// How a source is sampled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
