@@ -2,7 +2,8 @@
 
 use crate::formats::{printable, printable_line};
 use crate::report::Provenance;
-use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use crate::text::grouped;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
 use std::time::{Instant, SystemTime};
@@ -120,12 +121,15 @@ impl Console {
             return bar;
         }
         let template =
-            format!("  {{msg:<12}} {{bar:30}} {{percent:>3}} %  {{human_pos}} {unit}  {{rate}}  {{eta}} left");
+            format!("  {{msg:<12}} {{bar:30}} {{percent:>3}} %  {{count}} {unit}  {{rate}}  {{eta}} left");
         let rate = |state: &ProgressState, text: &mut dyn std::fmt::Write| {
-            let _ = write!(text, "{}/s", HumanCount(state.per_sec() as u64));
+            let _ = write!(text, "{}/s", grouped(state.per_sec() as u64));
+        };
+        let count = |state: &ProgressState, text: &mut dyn std::fmt::Write| {
+            let _ = write!(text, "{}", grouped(state.pos()));
         };
         let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        let style = style.with_key("rate", rate);
+        let style = style.with_key("rate", rate).with_key("count", count);
         bar.set_style(style.progress_chars("━╸ "));
         bar.set_message(printable_line(label).into_owned());
         bar
@@ -190,17 +194,19 @@ pub(crate) fn print(text: &str) -> io::Result<()> {
 
 /// Returns the command line, whose first word is the program's name, as a person would type it again.
 fn command_line(line: &[OsString]) -> String {
-    let quote = |word: &OsString| {
-        let word = word.to_string_lossy();
-        let plain = |c: char| c.is_alphanumeric() || "-_./=,:%@+".contains(c);
-        // Letters of any script need no quotes; what a shell reads as more does.
-        if !word.is_empty() && word.chars().all(plain) {
-            word.into_owned()
-        } else {
-            format!("'{}'", word.replace('\'', r"'\''"))
-        }
-    };
-    std::iter::once("lampyris".to_owned()).chain(line.iter().skip(1).map(quote)).collect::<Vec<_>>().join(" ")
+    let words = line.iter().skip(1).map(|word| shell_word(&word.to_string_lossy()));
+    std::iter::once("lampyris".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns a word as a POSIX shell takes it for one, in quotes where it needs them.
+pub(crate) fn shell_word(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./=,:%@+".contains(c);
+    // Letters of any script need no quotes; what a shell reads as more does.
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
 }
 
 /// Sets a stage bar to a study's progress: its stage, the remaining time if known, and its share, cut to 1.

@@ -299,10 +299,13 @@ impl CheckReport<'_> {
         columns.extend([("spline: face", ""), ("spline: t", "mm")]);
         columns.extend(["origin x", "origin y", "origin z"].map(|c| (c, "mm")));
         columns.extend(["direction x", "direction y", "direction z"].map(|c| (c, "")));
+        let listed = if all.len() > LISTED {
+            format!("{LISTED} of {} rays, evenly over all", grouped(all.len() as u64))
+        } else {
+            "All of these rays".to_owned()
+        };
         let caption = format!(
-            "{} of {} rays, evenly; t is the distance from the ray's origin. --disagreements FILE writes all of them, --replay FILE asks them again.",
-            all.len().min(LISTED),
-            grouped(all.len() as u64)
+            "{listed}; t is the distance from the ray's origin. --disagreements FILE writes all of them, --replay FILE asks them again."
         );
         let mut table = Table::new("odd-rays", "The rays themselves", &columns).caption(caption);
         for d in all.iter().step_by(all.len().div_ceil(LISTED).max(1)) {

@@ -26,7 +26,7 @@ pub(super) fn brightest_direction(grid: &Grid) -> Option<(String, f64)> {
     let poles = pole_rings(grid).has_poles(grid.values.len());
     let pole = ends.iter().zip(poles).find(|((end, _), is_pole)| *is_pole && row == *end);
     let direction = match pole {
-        Some(((_, angle), _)) => format!("{} {}°", gamma.label, coordinate_figures(*angle)),
+        Some(((_, angle), _)) => format!("{} {}°", symbol(&gamma.label), coordinate_figures(*angle)),
         None => direction_text(grid, [h, v]),
     };
     Some((direction, value))
@@ -35,7 +35,12 @@ pub(super) fn brightest_direction(grid: &Grid) -> Option<(String, f64)> {
 /// Returns a direction of a far field, degrees, in words.
 pub(super) fn direction_text(grid: &Grid, at: [f64; 2]) -> String {
     let [h, v] = at.map(|x| coordinate_figures(without_rounding(x)));
-    format!("{} {h}°, {} {v}°", grid.axes[0].label, grid.axes[1].label)
+    format!("{} {h}°, {} {v}°", grid.axes[0].label, symbol(&grid.axes[1].label))
+}
+
+/// Returns the name of an axis as people write it; files have it in plain letters.
+fn symbol(label: &str) -> &str {
+    if label == "gamma" { "γ" } else { label }
 }
 
 /// Returns a grid in which all cells of the ring at a pole (γ 0° and 180°) have the mean of the ring, with the error of that, in its

@@ -76,8 +76,10 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
         ]);
     }
     if let Some([value, error]) = value_ahead(grid) {
-        let place = if is_all_around(grid) { "γ 0°" } else { "H 0°, V 0° as placed" };
-        table.row(["HV".into(), value, error, "cd".into(), place.into()]);
+        // Luminaires know no HV.
+        let [name, place] =
+            if is_all_around(grid) { ["ahead", "γ 0°"] } else { ["HV", "H 0°, V 0° as placed"] };
+        table.row([name.into(), value, error, "cd".into(), place.into()]);
     }
     if let Some(assessment) = assessment {
         add_assessment(&mut table, assessment, |at| direction_text(grid, at));

@@ -3,7 +3,7 @@
 use super::material_rules::{MOST_PLACES, instance_names, material_text, rule_texts, toml_number, toml_string};
 use crate::cli::arguments::command::{PlacedLimit, RefusalLimit};
 use crate::cli::completion::Completion;
-use crate::cli::console::{Console, print};
+use crate::cli::console::{Console, print, shell_word};
 use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
 use crate::cli::work::input_files;
@@ -62,10 +62,8 @@ pub(crate) fn run(
         print(&json_text(&json!({"scene": scene_file.display().to_string()}))?)?;
     } else {
         console.say(format_args!("wrote {}", scene_file.display()));
-        console.say(
-            console
-                .dim(&format!("  say what the parts are made of, then `lampyris trace {}`", scene_file.display())),
-        );
+        let scene = shell_word(&scene_file.display().to_string());
+        console.say(console.dim(&format!("  say what the parts are made of, then `lampyris trace {scene}`")));
     }
     // Last, for the scene counts although faces are missing.
     Ok(input_files::report_refusals(&loaded, limits.max_refused, console))

@@ -1,18 +1,53 @@
 //! Sentences in lines that fit a terminal.
 
+/// Longest unit that is kept beside its number, characters.
+const LONGEST_UNIT: usize = 4;
+
+/// Whether two words stand in one line: a number and its unit, an angle and its name, a value and its error.
+fn belong_together(word: &str, next: &str) -> bool {
+    let is_number = |word: &str| {
+        let word = word.trim_start_matches(['(', '−', '-', '±']);
+        word.starts_with(|c: char| c.is_ascii_digit())
+    };
+    let unit = next.trim_end_matches(['.', ',', ';', ':', ')']);
+    if is_number(word) && word.ends_with(|c: char| c.is_ascii_digit()) {
+        return unit.chars().count() <= LONGEST_UNIT;
+    }
+    ["H", "V", "C", "γ", "±", "×"].contains(&word.trim_start_matches('(')) && is_number(next)
+}
+
+/// Returns the words of a text; those that [`belong_together`] are one, as far as it has at most `width` characters.
+fn words(text: &str, width: usize) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let mut before = "";
+    // At spaces and line breaks alone: the narrow one within a number does not break it.
+    for word in text.split([' ', '\n']).filter(|word| !word.is_empty()) {
+        match words.last_mut() {
+            Some(last)
+                if belong_together(before, word) && last.chars().count() + 1 + word.chars().count() <= width =>
+            {
+                last.push(' ');
+                last.push_str(word);
+            }
+            _ => words.push(word.to_owned()),
+        }
+        before = word;
+    }
+    words
+}
+
 /// Breaks a text into lines of at most `width` characters; a longer word has a line to itself. An empty text is one empty line.
 fn wrapped_lines(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];
-    // At spaces and line breaks alone: the narrow one within a number does not break it.
-    for word in text.split([' ', '\n']).filter(|word| !word.is_empty()) {
+    for word in words(text, width) {
         let line = lines.last_mut().map(|l| (l.chars().count(), l));
         match line {
-            Some((0, line)) => line.push_str(word),
+            Some((0, line)) => line.push_str(&word),
             Some((n, line)) if n + 1 + word.chars().count() <= width => {
                 line.push(' ');
-                line.push_str(word);
+                line.push_str(&word);
             }
-            _ => lines.push(word.to_owned()),
+            _ => lines.push(word),
         }
     }
     lines
@@ -43,6 +78,14 @@ mod tests {
     fn a_sentence_does_not_break_within_a_number() {
         let text = format!("of  {} rays\nand more", crate::text::grouped(16_384));
         assert_eq!(wrapped_lines(&text, 7), ["of", crate::text::grouped(16_384).as_str(), "rays", "and", "more"]);
+    }
+
+    #[test]
+    fn a_number_keeps_its_unit_and_an_angle_its_name() {
+        let lines = |text: &str| wrapped_lines(text, 12).join("|");
+        assert_eq!(lines("the share (75.57 %) of it"), "the share|(75.57 %) of|it");
+        assert_eq!(lines("no more than H 0.45° is"), "no more than|H 0.45° is");
+        assert_eq!(lines("power is 3.1 ± 0.2 lm."), "power is|3.1 ± 0.2|lm.");
     }
 
     #[test]

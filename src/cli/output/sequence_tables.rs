@@ -77,13 +77,16 @@ fn sequence_tables(results: &Results, model: &Model, unit: &str) -> Vec<Table> {
         let receiver = &results.receivers[k];
         let share = |power: f64| Cell::Number(100.0 * power / receiver.power, SHARE_DIGITS);
         let name = format!("{}-sequences", file_stem(&receiver.name));
-        let caption = format!(
-            "Of {} all others together brought {} {unit}.",
-            count_of(found.count as u64, "way"),
-            figures(found.rest, SHARE_DIGITS)
-        );
         let title = format!("{}: ways of its light", receiver.name);
-        let mut table = Table::new(&name, &title, &columns).caption(caption);
+        let mut table = Table::new(&name, &title, &columns);
+        // Nothing is left where the table has all.
+        if found.count > found.first.len() {
+            table = table.caption(format!(
+                "Of {} all others together brought {} {unit}.",
+                count_of(found.count as u64, "way"),
+                figures(found.rest, SHARE_DIGITS)
+            ));
+        }
         for (rank, s) in found.first.iter().enumerate() {
             let power = Cell::Number(s.power, 6);
             table.row([(rank + 1).into(), power, s.power_error.into(), share(s.power), way_text(s, &names).into()]);

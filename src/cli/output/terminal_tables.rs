@@ -26,8 +26,30 @@ pub(crate) fn table_text(table: &Table, width: usize) -> String {
 
 /// Columns of a terminal that a table's column has beside its text.
 const PADDING: usize = 3;
-/// Longest word that is kept whole: longer ones are paths and names.
-const LONGEST_WORD: usize = 14;
+/// Longest word that is kept whole, as the name of a row: longer ones are paths.
+const LONGEST_WORD: usize = 24;
+/// Longest selector that is kept in one line, so that it can be copied.
+const LONGEST_SELECTOR: usize = 60;
+
+/// How a selector of faces begins.
+const SELECTOR: &str = "on = {";
+
+/// Returns what a cell shows, of several selectors each in a line of its own.
+fn shown_text(cell: &Cell) -> String {
+    let text = cell.shown();
+    if text.contains(SELECTOR) { text.replace("} | on", "} |\non").replace("} and ", "}\nand ") } else { text }
+}
+
+/// Returns the width at which no word of a text is broken, and no selector, but for long ones.
+fn unbroken_width(text: &str) -> usize {
+    let longest = |line: &str| {
+        if line.starts_with(SELECTOR) {
+            return line.chars().count().min(LONGEST_SELECTOR);
+        }
+        line.split(' ').map(|word| word.chars().count()).max().unwrap_or(0).min(LONGEST_WORD)
+    };
+    text.lines().map(longest).max().unwrap_or(0)
+}
 
 /// A column of a table, and what it takes on a terminal.
 struct Column<'t> {
@@ -48,9 +70,8 @@ impl<'t> Column<'t> {
         let is_text = |cell: &&Cell| matches!(cell, Cell::Text(_));
         let numbers = cells.iter().filter(|cell| !is_text(cell)).map(|cell| cell.shown().chars().count());
         let least = numbers.max().unwrap_or(1);
-        let words = |text: &str| text.split([' ', '\n']).map(|word| word.chars().count()).max().unwrap_or(0);
-        let of_texts = cells.iter().filter(|cell| is_text(cell)).map(|cell| words(&cell.shown()));
-        let longest = of_texts.fold(words(&heading), usize::max).min(LONGEST_WORD);
+        let of_texts = cells.iter().filter(|cell| is_text(cell)).map(|cell| unbroken_width(&shown_text(cell)));
+        let longest = of_texts.fold(unbroken_width(&heading), usize::max);
         Self { is_words: cells.iter().any(is_text), heading, cells, least, easy: longest.max(least) }
     }
 }
@@ -84,7 +105,7 @@ fn grid_text(table: &Table, columns: &[&Column<'_>], width: usize) -> String {
     let mut grid = blank_table(width);
     grid.set_header(columns.iter().map(|c| &c.heading));
     for row in 0..table.rows.len() {
-        grid.add_row(columns.iter().map(|c| c.cells.get(row).map_or_else(String::new, |cell| cell.shown())));
+        grid.add_row(columns.iter().map(|c| c.cells.get(row).map_or_else(String::new, |cell| shown_text(cell))));
     }
     let is_easy = columns.iter().map(|c| c.easy + PADDING).sum::<usize>() <= width;
     for (shown, column) in grid.column_iter_mut().zip(columns) {
@@ -136,6 +157,20 @@ mod tests {
             }
             assert_eq!(text.contains("absorbed") && text.contains("facets"), has_words, "{width}: {text}");
         }
+    }
+
+    /// A selector can be copied as it stands: in one line.
+    #[test]
+    fn selectors_are_not_broken() {
+        let mut table = Table::new("t", "Rules", &[("selects", ""), ("gives", ""), ("which", "")]);
+        let [one, two] = [7590, 7710].map(|id| format!("on = {{ instance = \"led_0\", entity = {id} }}"));
+        table.row([
+            "part = \"led\" and much that follows".into(),
+            "surface absorber".into(),
+            format!("{one} | {two} and 30 more").into(),
+        ]);
+        let text = table_text(&table, 80);
+        assert!(text.contains(&one) && text.contains(&two), "{text}");
     }
 
     /// What has no room beside the others stands in a table below, behind the names of the rows.
