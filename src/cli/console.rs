@@ -4,8 +4,10 @@ use crate::formats::{printable, printable_line};
 use crate::report::Provenance;
 use crate::text::grouped;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
+use std::sync::Mutex;
 use std::time::{Instant, SystemTime};
 
 /// Bold, dim, and normal again (ECMA-48, SGR).
@@ -32,6 +34,8 @@ pub(crate) struct Console {
     pub(crate) started: Instant,
     colour: bool,
     terminal: bool,
+    /// What is not said a second time.
+    said: Mutex<BTreeSet<String>>,
 }
 
 impl Console {
@@ -50,6 +54,7 @@ impl Console {
             started: Instant::now(),
             colour: terminal && !no_colour && !dumb,
             terminal: terminal && !dumb,
+            said: Mutex::default(),
         }
     }
 
@@ -57,6 +62,14 @@ impl Console {
     pub(crate) fn say(&self, message: impl std::fmt::Display) {
         if !self.quiet {
             self.insist(message);
+        }
+    }
+
+    /// Writes a message as [`Self::say`] does, once however often it comes.
+    pub(crate) fn say_once(&self, message: &str) {
+        let is_new = self.said.lock().unwrap_or_else(|e| e.into_inner()).insert(message.to_owned());
+        if is_new {
+            self.say(message);
         }
     }
 

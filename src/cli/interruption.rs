@@ -1,10 +1,16 @@
-//! What SIGINT, SIGTERM and SIGHUP do: a run that can be saved is stopped and saved; anything else ends at once, without
-//! unfinished files left behind. SIGXFSZ, of a file beyond its limit of size, does nothing: that write fails, and is answered as on a
+//! What SIGINT, SIGTERM and SIGHUP do: a run that can be saved is stopped and saved; anything else says so and ends at once, without
+//! unfinished files or locks left behind. SIGXFSZ, of a file beyond its limit of size, does nothing: that write fails, and is answered as on a
 //! full disk.
 
+use std::path::{Path, PathBuf};
 #[cfg(unix)]
 use std::sync::Arc;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Time for a line on stderr: a terminal takes a millisecond.
+#[cfg(unix)]
+const LONGEST_WRITE: std::time::Duration = std::time::Duration::from_millis(200);
 
 /// Runs that are being traced and can be saved.
 static SAVEABLE_RUNS: AtomicUsize = AtomicUsize::new(0);
@@ -28,6 +34,32 @@ impl Drop for SaveableRun {
     }
 }
 
+/// Files that are removed when a signal ends the command.
+static LOCKS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// The lock file of a place that is written, removed too where a signal ends the command while this value lives.
+#[derive(Debug)]
+pub(crate) struct WatchedLock(PathBuf);
+
+impl WatchedLock {
+    /// Has the file removed when a signal ends the command.
+    pub(crate) fn new(file: PathBuf) -> Self {
+        LOCKS.lock().unwrap_or_else(|e| e.into_inner()).push(file.clone());
+        Self(file)
+    }
+
+    /// Returns the file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for WatchedLock {
+    fn drop(&mut self) {
+        LOCKS.lock().unwrap_or_else(|e| e.into_inner()).retain(|file| *file != self.0);
+    }
+}
+
 /// Whether a signal asked the run to stop.
 pub(crate) fn is_requested() -> bool {
     REQUESTED.load(Ordering::SeqCst)
@@ -47,17 +79,33 @@ pub(crate) fn watch() {
             // The second signal ends the command at once, whatever is being saved.
             let is_first = !REQUESTED.swap(true, Ordering::SeqCst);
             if is_first && SAVEABLE_RUNS.load(Ordering::SeqCst) > 0 {
-                let message = "\nstopping: what is being traced is finished and saved; once more stops at once\n";
-                let _ = std::io::Write::write_all(&mut std::io::stderr().lock(), message.as_bytes());
+                say("\nstopping: what is being traced is finished and saved; once more stops at once\n");
                 continue;
             }
+            say("\ninterrupted: what was not saved is lost\n");
             // Files that were begun are named by the process: they would stay for ever.
             crate::formats::remove_unfinished_files();
+            for lock in LOCKS.lock().unwrap_or_else(|e| e.into_inner()).drain(..) {
+                let _ = std::fs::remove_file(lock);
+            }
             // As the signal would have done: the shell sees a process that was stopped.
             let _ = signal_hook::low_level::emulate_default_handler(signal);
         }
     };
     let _ = std::thread::Builder::new().name("signals".into()).spawn(listen);
+}
+
+/// Writes to stderr, and waits no longer than [`LONGEST_WRITE`]: a reader that has stopped must not keep the command alive.
+#[cfg(unix)]
+fn say(message: &'static str) {
+    let (done, written) = std::sync::mpsc::channel();
+    let write = move || {
+        let _ = std::io::Write::write_all(&mut std::io::stderr(), message.as_bytes());
+        let _ = done.send(());
+    };
+    if std::thread::Builder::new().spawn(write).is_ok() {
+        let _ = written.recv_timeout(LONGEST_WRITE);
+    }
 }
 
 #[cfg(not(unix))]

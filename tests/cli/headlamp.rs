@@ -50,6 +50,9 @@ fn a_low_beam_goes_from_step_to_verdict() {
     for (a, b) in rows.iter().zip(again["rows"].as_array().unwrap()) {
         assert_eq!((&a["id"], &a["verdict"]), (&b["id"], &b["verdict"]));
     }
+    // By default by the regulation that the scene names.
+    let (code, by_default, err) = lampyris_in(folder.path(), &["assess", "out", "--json"]);
+    assert!(code == 0 && by_default == out, "{code} {err}");
     // The page shows the verdict, the pictures of the trade and their words.
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     for word in [

@@ -339,3 +339,29 @@ fn a_source_in_an_opaque_part_and_an_unknown_medium_are_told() {
     let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out"]);
     assert!(code == 2 && err.contains("lampyris media") && err.contains("name = \"D-ZK3\""), "{code} {err}");
 }
+
+/// A command that cannot be saved says that it was interrupted, and leaves no lock.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_demo_says_so_and_leaves_no_lock() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["demo", "-o", "out", "--tolerance", "0.5", "--normals", "flat", "--rays", "2e10"];
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
+        .current_dir(folder.path())
+        .args(arguments)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lock = folder.path().join("out/.lampyris.lock");
+    let begun = (0..600).any(|_| {
+        std::thread::sleep(Duration::from_millis(100));
+        lock.exists()
+    });
+    let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let mut err = String::new();
+    std::io::Read::read_to_string(&mut child.stderr.take().unwrap(), &mut err).unwrap();
+    let status = child.wait().unwrap();
+    assert!(begun && interrupted.success(), "{err}");
+    assert_eq!(std::os::unix::process::ExitStatusExt::signal(&status), Some(2), "{err}");
+    assert!(err.contains("interrupted: what was not saved is lost") && !lock.exists(), "{err}");
+}

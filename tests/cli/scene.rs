@@ -24,6 +24,39 @@ fn left_behind(folder: &Path) -> Vec<String> {
 }
 
 #[test]
+fn a_value_of_the_wrong_form_is_answered_by_the_right_one() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, says) in [
+        ("[[source]]\nkind = 'point'\nat = [0, 0, 25,000]\n", "25000 or 25_000"),
+        ("[[receiver]]\nname = 'w'\nsize = [1, 1]\ncells = 100\n", "write cells = […, …]"),
+        ("[[receiver]]\nname = 'w'\nsize = [1]\n", "write size = […, …]"),
+        ("material = [{ at = [0, 0], surface = 'mirror' }]\n", "a point has three numbers"),
+    ] {
+        std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+        let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out"]);
+        assert!(code == 2 && err.contains(says), "{code} {err}");
+    }
+}
+
+/// Without a model, or without a receiver, a run says what it lacks.
+#[test]
+fn a_run_says_what_the_scene_lacks() {
+    let folder = tempfile::tempdir().unwrap();
+    let trace = |text: &str| {
+        std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+        let arguments = ["trace", "scene.toml", "-o", "out", "--rays", "1000", "--no-report"];
+        let (code, _, err) = lampyris_in(folder.path(), &arguments);
+        assert_eq!(code, 0, "{err}");
+        err.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let err = trace("[[source]]\nkind = 'point'\n[[receiver]]\nname = 'far_wall'\nsize = [9, 9]\nat = [0, 0, 9]\n");
+    assert!(err.contains("Nothing was met, because there is no model.") && !err.contains("facets of"), "{err}");
+    // By the name that the scene gives it.
+    assert!(err.contains("reach far_wall"), "{err}");
+    assert!(trace("[[source]]\nkind = 'point'\n").contains("the scene has no receiver"));
+}
+
+#[test]
 fn mistakes_in_a_scene_end_with_2_show_the_line_and_leave_nothing() {
     for (from, to, says) in [
         ("[[receiver]]", "[[reciever]]", &["scene.toml:", "reciever", "receiver"][..]),

@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     /// Print nothing but results and the reason for a non-zero exit code
     #[arg(short, long, global = true, display_order = 902, help_heading = EVERYWHERE)]
     pub(crate) quiet: bool,
-    /// Say more; twice for everything
+    /// Say more
     #[arg(short, long, global = true, action = clap::ArgAction::Count, display_order = 903, help_heading = EVERYWHERE)]
     pub(crate) verbose: u8,
 }
@@ -145,10 +145,9 @@ pub(crate) enum Command {
     /// Judge a far field by a lamp regulation: pass, fail or unsure, row by row
     Assess {
         /// Results of a run: its folder or results.json
-        #[arg(required_unless_present = "list")]
         result: Option<PathBuf>,
-        /// The regulation and function, such as "UN R149-01 C passing"
-        #[arg(long, value_name = "ID", required_unless_present = "list")]
+        /// The regulation and function, such as "UN R149-01 C passing"; by default the one that the results were judged by
+        #[arg(long, value_name = "ID")]
         regulation: Option<String>,
         /// Name of the far field, where the run has several
         #[arg(long, value_name = "NAME")]

@@ -6,6 +6,7 @@ use crate::cli::output::verdict::summary;
 use crate::cli::work::output_place::folder_of;
 use crate::cli::{completion::Completion, failure::Failure};
 use crate::regulation::{Assumptions, IntensityMap, RaySample, Regulation, Traffic, assess};
+use crate::text::nearest_or_listed;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -36,11 +37,19 @@ pub(crate) fn list(console: &Console) -> Result<Completion, Failure> {
 /// Judges a far field by a regulation and prints the verdict, or with `--json` its document. It is complete whatever the verdict; it fails
 /// on unknown regulations, results that cannot be read, and far fields that the tables cannot be asked of.
 pub(crate) fn run(command: &AssessCommand, console: &Console) -> Result<Completion, Failure> {
-    // The parser asks for both, but for --list.
-    let name = command.regulation.ok_or_else(|| Failure::arguments("no --regulation is given"))?;
-    let regulation = Regulation::find(name).map_err(Failure::arguments)?;
-    let given = command.result.ok_or_else(|| Failure::arguments("no result is given"))?;
+    let given = command.result.ok_or_else(|| {
+        let failure = Failure::arguments("assess: no results are given");
+        failure.with_help(
+            "give the folder that `lampyris trace` wrote; `lampyris assess --list` lists the regulations",
+        )
+    })?;
+    // A wrong name is said before anything is read.
+    let named = command.regulation.map(Regulation::find).transpose().map_err(Failure::arguments)?;
     let run = ResultsFile::read(given)?;
+    let regulation = match named {
+        Some(regulation) => regulation,
+        None => run.regulation()?,
+    };
     let receiver = run.far_field(command.receiver)?;
     let map = run.intensities(receiver)?;
     let assumptions = Assumptions {
@@ -94,12 +103,16 @@ impl ResultsFile {
         // The second one tells whether there is a choice to make.
         match (found.next(), found.next()) {
             (Some(one), None) => Ok(one),
-            (None, _) => Err(failure(&match name {
-                Some(name) => {
-                    format!("no far field '{name}' in candela over H and V; its receivers are {}", self.receivers())
-                }
-                None => "no far field in candela over H and V".into(),
-            })),
+            (None, _) => {
+                let Some(name) = name else { return Err(failure("no far field in candela over H and V")) };
+                let failure = failure(&format!("no far field '{name}' in candela over H and V"));
+                let receivers = self.results["receivers"].as_array().into_iter().flatten().filter(fits);
+                let advice = nearest_or_listed(name, receivers.filter_map(|r| r["name"].as_str()));
+                Err(match advice {
+                    Some(advice) => failure.with_help(advice),
+                    None => failure,
+                })
+            }
             (Some(a), Some(b)) => Err(failure(&format!(
                 "several far fields: choose one by --receiver {} or {}",
                 a["name"], b["name"]
@@ -107,11 +120,21 @@ impl ResultsFile {
         }
     }
 
-    /// Lists the names of the receivers.
-    fn receivers(&self) -> String {
-        let receivers = self.results["receivers"].as_array().into_iter().flatten();
-        let names: Vec<&str> = receivers.filter_map(|r| r["name"].as_str()).collect();
-        names.join(", ")
+    /// Returns the regulation that the results were judged by; fails where there is none, or several.
+    fn regulation(&self) -> Result<Regulation, Failure> {
+        let judged = self.results["regulations"].as_array().into_iter().flatten();
+        let mut names: Vec<&str> = judged.filter_map(|r| r["regulation"].as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        let failure = match &names[..] {
+            [name] => return Regulation::find(name).map_err(Failure::arguments),
+            [] => Failure::arguments(format!("{}: judged by no regulation yet", self.path.display())),
+            several => {
+                let judged = format!("{}: judged by {}", self.path.display(), several.join(", "));
+                Failure::arguments(judged)
+            }
+        };
+        Err(failure.with_help("name one with --regulation ID; `lampyris assess --list` lists them"))
     }
 
     /// Returns how many rays were traced, on which the prediction of errors for more rays rests; fails where the results do not say.

@@ -1,6 +1,7 @@
 //! Where results go: tried before any work is done, and owned by one process at a time.
 
 use crate::cli::failure::Failure;
+use crate::cli::interruption::WatchedLock;
 use crate::cli::machine;
 use crate::formats::{file_name, try_write};
 use std::fs::{self, File, TryLockError};
@@ -18,7 +19,7 @@ const LOCK_BYTES: u64 = 300;
 /// however that ends, so that no lock outlives its owner. Known weakness: network file systems without locks.
 #[derive(Debug)]
 pub(crate) struct OutputPlace {
-    lock: PathBuf,
+    lock: WatchedLock,
     // Held for its lock alone.
     _file: File,
 }
@@ -70,7 +71,7 @@ impl OutputPlace {
             }
             let written = file.set_len(0).and_then(|()| write!(file, "{} {}", std::process::id(), machine::name()));
             written.map_err(unwritable)?;
-            return Ok(Self { lock, _file: file });
+            return Ok(Self { lock: WatchedLock::new(lock), _file: file });
         }
     }
 }
@@ -78,7 +79,7 @@ impl OutputPlace {
 impl Drop for OutputPlace {
     fn drop(&mut self) {
         // Where it cannot be removed it is stale, which the next owner notices.
-        let _ = fs::remove_file(&self.lock);
+        let _ = fs::remove_file(self.lock.path());
     }
 }
 

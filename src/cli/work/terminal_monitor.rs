@@ -99,7 +99,7 @@ impl Monitor for TerminalMonitor<'_> {
     }
 
     fn warns(&self, message: &str) {
-        self.console.say(message);
+        self.console.say_once(message);
     }
 
     fn chosen(&self, chosen: &Chosen) {

@@ -72,6 +72,14 @@ const LISTS: [(&str, &str); 10] = [
 /// What to write for a line of a STEP file.
 const ENTITY: &str = "write the number of the file's line without its `#`, as in entity = 39, or a list of them";
 
+/// What to write for a point near a face.
+const POINT: &str = "a point has three numbers, as in at = [0, 0, 25]; several points are a list of such";
+
+/// Returns what to write for a list of so many values.
+fn list_help(key: &str, count: usize) -> String {
+    format!("write {key} = [{}]", vec!["…"; count].join(", "))
+}
+
 /// Returns the bytes of the value at a path, or of the deepest table on the way when the value is not written; `None` where not even its
 /// first key is, or the text is no TOML.
 pub(super) fn span(text: &str, path: &[Key<'_>]) -> Option<Range<usize>> {
@@ -132,13 +140,18 @@ fn type_error(message: &str, key: &str) -> Error {
     if let Some((given, wanted)) = lengths.and_then(|(given, wanted)| Some((given, wanted.parse::<usize>().ok()?)))
     {
         let error = Error::new(ErrorKind::Syntax, format!("{given} in a list where {wanted} values belong"));
-        let values = vec!["…"; wanted].join(", ");
-        return if key.is_empty() { error } else { error.help(format!("write {key} = [{values}]")) };
+        return if key.is_empty() { error } else { error.help(list_help(key, wanted)) };
     }
     // The key is asked first: a list has its own form, which the type does not tell.
     if let Some((_, help)) = LISTS.iter().find(|(list, _)| *list == key) {
         let message = message.replace("a sequence", "a list").replace("an array", "a list");
         return Error::new(ErrorKind::Syntax, message).help(*help);
+    }
+    let scalar =
+        message.strip_prefix("invalid type: ").and_then(|m| m.split_once(", expected an array of length "));
+    if let Some((given, wanted)) = scalar.and_then(|(given, wanted)| Some((given, wanted.parse::<usize>().ok()?))) {
+        let error = Error::new(ErrorKind::Syntax, format!("{given} where a list of {wanted} values belongs"));
+        return if key.is_empty() { error } else { error.help(list_help(key, wanted)) };
     }
     if let Some((form, example)) = TABLES.iter().find(|(form, _)| message.ends_with(&format!("expected {form}"))) {
         let what = if form.starts_with("struct") { "a table" } else { "a list" };
@@ -157,7 +170,11 @@ fn type_error(message: &str, key: &str) -> Error {
     ] {
         if message.contains(form) {
             let error = Error::new(ErrorKind::Syntax, format!("this is {plain}"));
-            return if key == "entity" { error.help(ENTITY) } else { error };
+            return match key {
+                "entity" => error.help(ENTITY),
+                "at" => error.help(POINT),
+                _ => error,
+            };
         }
     }
     let plain = PLAIN_TYPES.iter().fold(message.to_owned(), |m, (form, plain)| m.replace(form, plain));
@@ -233,6 +250,14 @@ pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>) -> 
         }
     } else {
         type_error(message, e.span().map_or("", |span| key_before(text, span.start)))
+    };
+    // `[0, 0, 25,000]`: what follows the comma is taken for a value of its own.
+    let is_behind_comma =
+        |at: usize| text.get(..at).is_some_and(|before| before.trim_end_matches('0').ends_with(','));
+    let error = if message.contains("leading zero") && e.span().is_some_and(|span| is_behind_comma(span.start)) {
+        error.help("a comma parts two values: write thousands as 25000 or 25_000")
+    } else {
+        error
     };
     error.located(file, text, e.span())
 }

@@ -43,7 +43,10 @@ impl RegulationUse {
         };
         let regulation = match Regulation::find(&self.id) {
             Ok(regulation) => regulation,
-            Err(message) => return fail("id", message, "`lampyris assess --list` shows what there is"),
+            Err(message) => {
+                let at = [Key::Name("regulation"), Key::Index(index), Key::Name("id")];
+                return Err(scene.error(ErrorKind::Value, &at, message));
+            }
         };
         if scene.run.unit != PowerUnit::Lumen {
             let message = "a regulation asks for candela, but the run counts watts".into();

@@ -137,7 +137,8 @@ impl Source {
         let photometric = matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);
         if photometric && self.power.is_none() && scene.run.unit != PowerUnit::Lumen {
             let at = [Key::Name("source"), Key::Index(index), Key::Name("file")];
-            let error = scene.error(ErrorKind::Value, &at, "this file gives lumens, but the run counts watts");
+            let error =
+                scene.error(ErrorKind::Value, &at, "a photometric file gives lumens, but the run counts watts");
             return Err(error.help("set `unit = \"lm\"` in [run], or give the source's `power` in watts"));
         }
         Ok(())
