@@ -1,6 +1,6 @@
 //! What SIGINT, SIGTERM and SIGHUP do: a run that can be saved is stopped and saved; anything else says so and ends at once, without
-//! unfinished files or locks left behind. SIGXFSZ, of a file beyond its limit of size, does nothing: that write fails, and is answered as on a
-//! full disk.
+//! unfinished files or locks left behind. SIGXFSZ, of a file beyond its limit of size, does nothing: that write fails, and is answered as
+//! on a full disk.
 
 use std::path::{Path, PathBuf};
 #[cfg(unix)]

@@ -56,6 +56,18 @@ fn a_run_says_what_the_scene_lacks() {
     assert!(trace("[[source]]\nkind = 'point'\n").contains("the scene has no receiver"));
 }
 
+/// An error that was asked for and reached is told once, in the answer.
+#[test]
+fn a_reached_error_is_part_of_the_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "[[source]]\nkind = 'point'\n[[receiver]]\nname = 'far_wall'\nsize = [9, 9]\nat = [0, 0, 9]\n";
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    let arguments = ["trace", "scene.toml", "-o", "out", "--until-error", "50%@far_wall", "--no-report"];
+    let (code, _, err) = lampyris_in(folder.path(), &arguments);
+    let said = err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(code == 0 && said.matches("on far_wall: reached").count() == 1, "{err}");
+}
+
 #[test]
 fn mistakes_in_a_scene_end_with_2_show_the_line_and_leave_nothing() {
     for (from, to, says) in [

@@ -207,7 +207,10 @@ fn photometry(receiver: &ReceiverResult, grid: &Grid, lumens: f64) -> Option<Pho
     // A dark far field has no flux to be scaled to.
     if factor.is_finite() {
         photometry.candela.iter_mut().for_each(|c| *c *= factor);
-        let said = format!("values of the cells times {}, to have their flux between them", figures(factor, 5));
+        let said = format!(
+            "cell values times {}: the flux interpolated between them is that of the receiver",
+            figures(factor, 5)
+        );
         photometry.keywords.push(("OTHER".to_owned(), said));
     }
     Some(photometry)

@@ -220,7 +220,10 @@ pub(crate) fn write(
         report.with_views(facet_views(prepared, &facets)).report().write(folder)?;
     }
     spinner.finish_and_clear();
-    Ok((document, answer))
+    // That an error was missed is said by whoever fails for it.
+    let reached = remarks.target.as_ref().filter(|target| target.reached);
+    let reached = reached.map_or_else(String::new, |target| target_sentence(target) + " ");
+    Ok((document, reached + &answer))
 }
 
 /// Returns the page of a traced scene; `sentences` compare it with what was asked for or others found.

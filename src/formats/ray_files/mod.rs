@@ -37,8 +37,8 @@ impl RayFile {
     /// [`read_rays`] knows it, and looks at each ray once. `preferred` chooses the flux where the file holds both.
     ///
     /// # Errors
-    /// When the file cannot be read, holds no rays or is not what its first bytes promise, the message names the byte or the ray; when a long
-    /// list of text or packed arrays finds no place in the folder for temporary files.
+    /// When the file cannot be read, holds no rays or is not what its first bytes promise, the message names the byte or the ray; when a
+    /// long list of text or packed arrays finds no place in the folder for temporary files.
     pub fn open(path: &Path, preferred: Flux) -> Result<Self, Error> {
         Self::open_within(path, preferred, MOST_IN_MEMORY)
     }
