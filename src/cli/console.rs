@@ -84,6 +84,11 @@ impl Console {
         if is_reason { self.insist(message) } else { self.say(message) }
     }
 
+    /// Whether a run ends with lines for people, which give its answer: neither in silence nor with a document on stdout.
+    pub(crate) fn has_closing_lines(&self) -> bool {
+        !self.quiet && !self.json
+    }
+
     /// Returns the text as a terminal may be given it: names are data, so that all it would obey is written out, but for our own emphasis.
     pub(crate) fn shown(&self, text: &str) -> String {
         if !self.colour {

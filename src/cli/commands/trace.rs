@@ -227,10 +227,15 @@ fn trace_whole(
     };
     // What was missed comes before what was found.
     let unsettled = if extra.until_settled { verdicts::unsettled_sentence(&document) } else { None };
-    unsettled.iter().for_each(|sentence| console.insist(plain_sentence(sentence)));
     let missed = remarks.target.as_ref().is_some_and(|result| !result.reached) || unsettled.is_some();
-    let sentences = unsettled.map_or(remarks.sentences, |sentence| vec![sentence]);
-    let answer = if missed { format!("{} {answer}", sentences.join(" ")) } else { answer };
+    let answer = match unsettled {
+        Some(sentence) if console.has_closing_lines() => format!("{sentence} {answer}"),
+        Some(sentence) => {
+            console.insist(plain_sentence(&sentence));
+            answer
+        }
+        None => answer,
+    };
     verdicts::say_verdicts(&run, prepared, console)?;
     closing::say_notes(&run.results.notes, prepared.bound.notes(), console);
     closing::print_listings(&run, prepared, console)?;

@@ -115,17 +115,13 @@ pub(crate) struct RunRemarks {
 }
 
 impl RunRemarks {
-    /// Puts what came of an error that was asked for into a sentence, which is among the closing lines; says it here where there are none,
-    /// and quiet or not where it is why the exit code is not 0. Nothing where nothing was asked.
+    /// Puts what came of an error that was asked for into a sentence, which leads the closing lines; says it here where there are none,
+    /// quiet or not where it is why the exit code is not 0. Nothing where nothing was asked.
     pub(crate) fn say_target(target: Option<TargetResult>, console: &Console) -> Self {
         let sentences: Vec<String> = target.iter().map(target_sentence).collect();
         let is_missed = target.as_ref().is_some_and(|target| !target.reached);
-        for sentence in sentences.iter().map(|sentence| plain_sentence(sentence)) {
-            if is_missed {
-                console.insist(sentence);
-            } else if console.json {
-                console.say(sentence);
-            }
+        for sentence in sentences.iter().filter(|_| !console.has_closing_lines()) {
+            console.say_or_insist(is_missed, plain_sentence(sentence));
         }
         Self { sentences, target, first_command: None }
     }
@@ -220,10 +216,8 @@ pub(crate) fn write(
         report.with_views(facet_views(prepared, &facets)).report().write(folder)?;
     }
     spinner.finish_and_clear();
-    // That an error was missed is said by whoever fails for it.
-    let reached = remarks.target.as_ref().filter(|target| target.reached);
-    let reached = reached.map_or_else(String::new, |target| target_sentence(target) + " ");
-    Ok((document, reached + &answer))
+    let asked = remarks.target.as_ref().map_or_else(String::new, |target| target_sentence(target) + " ");
+    Ok((document, asked + &answer))
 }
 
 /// Returns the page of a traced scene; `sentences` compare it with what was asked for or others found.

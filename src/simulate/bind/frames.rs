@@ -39,7 +39,9 @@ pub(super) fn frame(scene: &Scene, model: &Model, of: [Key<'_>; 2], name: Option
             let message = format!("'{name}' is placed {} times, each with a frame of its own", named.len());
             let help = match named.iter().find(|(_, path)| !path.is_empty()) {
                 None => "name an instance that there is once".to_owned(),
-                Some((_, path)) => format!("name one by its path, as '{path}'; `lampyris info --faces` lists them"),
+                Some((_, path)) => {
+                    format!("name one by its path, as '{path}'; `lampyris info FILE --faces` lists them")
+                }
             };
             Err(scene.error(ErrorKind::NoMatch, &at, message).help(help))
         }
