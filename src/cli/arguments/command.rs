@@ -63,7 +63,7 @@ pub(crate) enum Command {
     #[command(after_help = help_text::FACET, after_long_help = help_text::FACET_LONG)]
     Facet(FacetCommand),
     /// Simulate a scene and write a report, results.json and the receiver files
-    #[command(after_help = help_text::TRACE)]
+    #[command(after_help = help_text::TRACE, mut_args(help_text::explain_trace_option))]
     Trace {
         /// Scene file
         scene: PathBuf,
@@ -81,11 +81,11 @@ pub(crate) enum Command {
     #[command(after_help = help_text::CHECK, after_long_help = help_text::CHECK_LONG)]
     Check(Box<CheckCommand>),
     /// Measure what accuracy costs in time
-    #[command(after_help = help_text::STUDY)]
+    #[command(after_help = help_text::STUDY, mut_args(help_text::explain_study_option))]
     Study {
         /// Which question
         kind: StudyKind,
-        /// STEP file or scene; the built-in lamp by default
+        /// STEP file or scene, the built-in lamp by default; `effects` takes a scene alone, `complexity` and `stability` take none
         file: Option<PathBuf>,
         /// Folder for report, rows and pictures
         #[arg(short, long, value_name = "DIR")]
@@ -213,7 +213,7 @@ pub(crate) struct FacetCommand {
     /// Mesh the model by truck-meshalgo too, at the tight end of the tolerance, and set it beside ours
     #[arg(long)]
     pub(crate) baseline: bool,
-    /// Number of threads, at most 16 for each core; as many as there are cores by default
+    /// Number of threads; as many as there are cores by default, and never more than 16 for each core, however many are asked for
     #[arg(long, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     #[command(flatten)]

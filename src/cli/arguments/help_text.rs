@@ -1,4 +1,7 @@
-//! What the help and the manual pages say beyond the options: examples to type, and the keys of the JSON documents.
+//! What the help and the manual pages say beyond the options: examples to type, the keys of the JSON documents, and what an option that
+//! several commands share means in one of them.
+
+use clap::Arg;
 
 macro_rules! facet {
     () => {
@@ -77,3 +80,43 @@ does not apply. accuracy has 'slopes' and, for a scene, 'receivers' beside the r
 facets change (geometric) beside the noise of the rays (statistical). The rows of bvh count rays answered otherwise than by the \
 octree under 'differs', those of them that were wrong by arithmetic of twice the digits under 'wrong', and those that even it could \
 not tell under 'undecided'.";
+
+/// Says of a shared option what `trace` alone takes.
+pub(super) fn explain_trace_option(option: Arg) -> Arg {
+    match option.get_id().as_str() {
+        "ray_range" => option.value_name("N|A..B").help(
+            "Number of rays, such as 10k, 5M, 2G, 1_000_000 or 1e6; by default what the scene says; sources with `rays` of their own \
+             keep them. A..B: the rays from A up to B, whose tally joins those of the rays before it",
+        ),
+        _ => option,
+    }
+}
+
+/// Says of a shared option which studies take it; the others refuse it.
+pub(super) fn explain_study_option(option: Arg) -> Arg {
+    let help = match option.get_id().as_str() {
+        "tolerance" => {
+            "`accuracy`, `bvh`: the only distance from facets to the surface, mm, in place of several; `complexity`: that distance, \
+             0.05..0.2 by default; `effects`: that of the scene's facets, tight where curved and loose where flat"
+        }
+        "angle" => "`effects`: largest angle between facet and surface normal, degrees; off by default",
+        "part" => "`effects`: tolerance of one part, by name; may be given several times",
+        "face" => {
+            "`effects`: tolerance of one face, by its name or the number of its entity in the file; may be given several times, and \
+             wins over that of its part"
+        }
+        "role" => {
+            "`effects`: tolerance of all faces of one optical role in the scene: mirror, interface, coated or absorber; may be given \
+             several times"
+        }
+        "ray_range" => {
+            "All but `stability`: number of rays, such as 10k, 5M, 1_000_000 or 1e6; by default what suits the study; not beside \
+             --rays-in"
+        }
+        "seed" => "All but `stability`: seed of all random numbers",
+        "intersector" => "`effects`: what finds the hits",
+        "normals" => "`effects`: how the normal at a hit is got; exact moves the hit to the spline",
+        _ => return option,
+    };
+    option.help(help)
+}

@@ -73,13 +73,13 @@ pub(crate) struct CacheOption {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(crate) struct TracingOptions {
     /// Number of rays, such as 10k, 5M, 2G, 1_000_000 or 1e6; by default what the scene says, or what suits the command; sources with
-    /// `rays` of their own keep them. For trace also A..B: the rays from A up to B, whose tally joins those of the rays before it
+    /// `rays` of their own keep them
     #[arg(long = "rays", help_heading = "Rays", value_name = "N", value_parser = parse_ray_range, allow_hyphen_values = true)]
     pub(crate) ray_range: Option<RayRange>,
     /// Seed of all random numbers
     #[arg(long, help_heading = "Rays", value_name = "S", value_parser = parse_seed, allow_negative_numbers = true)]
     pub(crate) seed: Option<u64>,
-    /// Number of threads, at most 16 for each core; as many as there are cores by default
+    /// Number of threads; as many as there are cores by default, and never more than 16 for each core, however many are asked for
     #[arg(long, help_heading = "Rays", value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     /// What finds the hits; octree by default, in a traced scene chosen by a pilot
@@ -195,9 +195,11 @@ fn parse_seed(text: &str) -> Result<u64, String> {
     parse_whole(text, 0, u64::MAX)
 }
 
-/// Reads a number of threads; how many of so many are of use is decided where they are started.
+/// Reads a number of threads, 1 or more; how many of so many are of use is decided where they are started.
 pub(crate) fn parse_threads(text: &str) -> Result<usize, String> {
-    parse_whole(text, 1, u64::from(u32::MAX)).map(|threads| threads as usize)
+    let threads = text.trim().parse::<u64>().ok().filter(|threads| *threads >= 1);
+    let threads = threads.ok_or_else(|| format!("a whole number from 1 on is wanted, not '{text}'"))?;
+    Ok(usize::try_from(threads).unwrap_or(usize::MAX))
 }
 
 /// Reads how many there are to be of something that is listed.
@@ -323,7 +325,8 @@ mod tests {
         assert_eq!((parse_seed("0"), parse_threads("4"), parse_seconds("0.5")), (Ok(0), Ok(4), Ok(0.5)));
         assert_eq!(parse_seed("18446744073709551615"), Ok(u64::MAX));
         assert!(parse_seed("-1").unwrap_err().contains("from 0 to 18446744073709551615"));
-        assert!(["x", "0", "1.5", "5000000000"].iter().all(|text| parse_threads(text).is_err()));
+        assert!(["x", "0", "1.5", "-1"].iter().all(|text| parse_threads(text).unwrap_err().contains("from 1 on")));
+        assert!(parse_threads("5000000000").is_ok());
         assert!(["nan", "-1", "soon"].iter().all(|text| parse_seconds(text).is_err()));
     }
 
