@@ -1,4 +1,4 @@
-//! The JSON Schema of a scene as a page for people: every table, every key, what it means and what it is where it is not given.
+//! The JSON Schema of a scene as a page for people: every table, every key, what it means and its default.
 
 use serde_json::{Map, Value};
 
@@ -35,10 +35,23 @@ fn description_text(value: &Value) -> String {
     value["description"].as_str().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the row of a key: what it means, the words that it may be, and what it is unless given.
+/// Returns what follows the meaning of a key: the words that it may be, or the key at the top of the page that has the same words.
+fn word_list(schema: &Value, property: &Value) -> String {
+    let Some(choice) = definition(schema, property) else { return String::new() };
+    let allowed = allowed_words(choice);
+    if allowed.is_empty() {
+        return String::new();
+    }
+    let mut top = table_keys(schema).into_iter().flatten();
+    match top.find(|(_, known)| definition(schema, known) == Some(choice)) {
+        Some((key, known)) if known != property => format!(" The words are those of `{key}` at the top."),
+        _ => format!(" {}.", allowed.join("; ")),
+    }
+}
+
+/// Returns the row of a key: what it means, the words that it may be, and its default.
 fn key_row(schema: &Value, key: &str, property: &Value) -> String {
-    let allowed = definition(schema, property).map(allowed_words).unwrap_or_default();
-    let allowed = if allowed.is_empty() { String::new() } else { format!(" {}.", allowed.join("; ")) };
+    let allowed = word_list(schema, property);
     let default = match &property["default"] {
         Value::Null => String::new(),
         Value::String(s) if s.is_empty() => String::new(),
@@ -55,7 +68,7 @@ fn key_row(schema: &Value, key: &str, property: &Value) -> String {
 /// Returns the keys as a table of Markdown.
 fn key_table<'s>(schema: &'s Value, keys: impl Iterator<Item = (&'s String, &'s Value)>) -> String {
     let rows: String = keys.map(|(key, property)| key_row(schema, key, property)).collect();
-    format!("\n| key | what it says | unless given |\n| --- | --- | --- |\n{rows}")
+    format!("\n| key | what it says | default |\n| --- | --- | --- |\n{rows}")
 }
 
 /// Returns the page about a scene's schema, as Markdown.
@@ -83,8 +96,30 @@ pub(crate) fn schema_page(schema: &Value) -> String {
     page
 }
 
-/// Returns a section about one table of the file.
+/// Returns the key whose value is a table of keys that `table` has too, as `on` has the selectors of a rule, and these keys.
+fn repeated_keys<'s>(
+    schema: &'s Value,
+    table: &'s Map<String, Value>,
+) -> Option<(&'s str, &'s Map<String, Value>)> {
+    table.iter().find_map(|(key, property)| {
+        let inner = definition(schema, property).and_then(table_keys)?;
+        let is_repeated = inner.iter().all(|(name, meaning)| table.get(name) == Some(meaning));
+        is_repeated.then_some((key.as_str(), inner))
+    })
+}
+
+/// Returns a section about one table of the file; keys that a table in it has too are explained in the section of that one.
 fn table_section(schema: &Value, heading: &str, definition: &Value) -> String {
-    let rows = key_table(schema, table_keys(definition).into_iter().flatten());
-    format!("\n## `{heading}`\n\n{}\n{rows}", description_text(definition))
+    let mut page = format!("\n## `{heading}`\n\n{}\n", description_text(definition));
+    let Some(table) = table_keys(definition) else { return page };
+    let repeated = repeated_keys(schema, table);
+    if let Some((key, inner)) = repeated {
+        let names: Vec<String> = inner.keys().map(|name| format!("`{name}`")).collect();
+        page += &format!(
+            "\nKeys of `{key} = {{ … }}` below may stand in it directly: {}. The others:\n",
+            names.join(", ")
+        );
+    }
+    let is_explained = |key: &str| repeated.is_none_or(|(_, inner)| !inner.contains_key(key));
+    page + &key_table(schema, table.iter().filter(|(key, _)| is_explained(key)))
 }

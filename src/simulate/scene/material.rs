@@ -91,9 +91,9 @@ impl Default for Placement {
 pub struct Material {
     /// Name of the part.
     pub part: Option<OneOrMany<String>>,
-    /// Name of the instance, or its path through the assembly, as `left/led`; `lampyris info --faces` shows both.
+    /// Name of the instance, or its path through the assembly, as `left/led`; `lampyris info FILE --faces` shows both.
     pub instance: Option<OneOrMany<String>>,
-    /// Number of the solid in its part, from 0 as `lampyris info --faces` counts, or its name.
+    /// Number of the solid in its part, from 0 as `lampyris info FILE --faces` counts, or its name.
     pub solid: Option<OneOrMany<SolidKey>>,
     /// Name of the face.
     pub face: Option<OneOrMany<String>>,

@@ -68,8 +68,9 @@ pub struct Run {
     /// Faces of two solids at most this far apart are one interface, mm.
     #[cfg_attr(feature = "schema", schemars(range(min = 1e-9, max = 1)))]
     pub glue_mm: f64,
-    /// Independent parts the run is divided into; errors are computed from how much they differ. At least 16 rays go into each. With the
-    /// default, runs of a multiple of 5000 rays from 640,000 on have one for every 5000, so that further rays can follow.
+    /// Independent parts the run is divided into, at least 2; errors are computed from how much they differ. At least 16 rays go into each
+    /// where there are 32 or more. With the default, runs of a multiple of 5000 rays from 640,000 on have one for every 5000, so that
+    /// further rays can follow.
     #[cfg_attr(feature = "schema", schemars(range(min = 2, max = 65536)))]
     pub replicates: u32,
     /// Group light by the faces it met and what happened there, and list so many of these sequences for each receiver; 0 for none. Each
