@@ -13,6 +13,23 @@ import lampyris.distributed
 
 PAGE = pathlib.Path(__file__).with_name("api.md")
 
+#: Names of types in the signatures, and what they stand for.
+TYPES = {
+    "Path": "A `str` or `os.PathLike`.",
+    "Vector": "Numbers in a list, tuple or array: three of a point (mm) or direction, two of sides (mm) or of a range of angles (degrees).",
+    "Cells": "Two whole numbers: cells along the first and the second axis.",
+    "Tolerance": "A length in mm, or two, the tighter one first: `0.1`, `(0.05, 0.2)`.",
+    "Tolerances": "A dict of tolerances by name: `{'cover': 0.01}`.",
+    "FaceTolerances": "A dict of tolerances by name of the face, or by its `#id` in the file: `{'lens': 0.01, 3979: (0.01, 0.05)}`.",
+    "Grid": "Rows of numbers, as a list of lists or an array.",
+    "Reflectance": "A share from 0 to 1, or rows `[angle_deg, share]` or `[angle_deg, nm, share]` over a full grid.",
+    "Table": "A dict with the keys of a table of the scene file.",
+    "FloatArray": "A NumPy array of float64.",
+    "ProgressCallback": "A function `f(stage, done, total, messages)`: `done` and `total` are rays in the stages `tracing` and `checking`, "
+    "thousandths of the work in others, a total of 0 is not known yet, `messages` is a list of sentences. It stops the work by raising.",
+    "Settings": "A dict: `rays`, `seed`, `threads`, `tolerance_mm`, `facets`, `intersector`, `normals`, `unit`, `chosen`, `notes`, `accounts`.",
+}
+
 
 def signature(thing: Any) -> str:
     try:
@@ -59,6 +76,8 @@ def page() -> str:
     things = [(n, t) for n, t in things if not isinstance(t, str) and not inspect.ismodule(t)]
     studies = [(f"lampyris.study.{n}", getattr(lampyris.study, n)) for n in ("Study", "accuracy", "check", "interpolation")]
     shared = [("lampyris.distributed.trace", lampyris.distributed.trace)]
+    lines += ["## Types in signatures", "", "| type | what it is |", "|---|---|"]
+    lines += [f"| `{name}` | {meaning} |" for name, meaning in TYPES.items()] + [""]
     lines += ["## `lampyris.__version__`", "", "The version, as a text; that of the command.", ""]
     for name, thing in things + studies + shared:
         lines += entry(name, thing, "##")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import numbers
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
@@ -17,6 +18,9 @@ Vector = Union[Sequence[float], npt.NDArray[Any]]
 Cells = Union[Sequence[int], npt.NDArray[Any]]
 Tolerance = Union[float, Sequence[float], npt.NDArray[Any]]
 Tolerances = Mapping[str, Tolerance]
+FaceTolerances = Union[Tolerances, Mapping[int, Tolerance], Mapping[Union[str, int], Tolerance]]
+Grid = Union[Sequence[Sequence[float]], npt.NDArray[Any]]
+Reflectance = Union[float, Grid]
 Table = dict[str, Any]
 
 #: Whole numbers of TOML have 64 bits with a sign.
@@ -36,15 +40,25 @@ def tolerance_range(tolerance: Tolerance) -> tuple[float, float]:
     return (float(ends[0]), float(ends[-1]))
 
 
-def tolerance_list(tolerances: Tolerances | None, name: str) -> list[tuple[str, tuple[float, float]]]:
-    """Tolerances by name as the extension takes them."""
+def tolerance_list(tolerances: FaceTolerances | None, name: str) -> list[tuple[str, tuple[float, float]]]:
+    """Tolerances by name as the extension takes them; faces may be named by their ``#id`` in the file, as 17, "17" or "#17"."""
     if tolerances is None:
         return []
-    if not isinstance(tolerances, Mapping) or not all(isinstance(key, str) for key in tolerances):
-        raise TypeError(f"{name}: a dict of names and tolerances is needed, as {{'cover': 0.01}}, not {tolerances!r}")
-    if "" in tolerances:
-        raise ValueError(f"{name}: '' is no name: it would stand for all that have none; name them by number, as '#17', or set `tolerance`")
-    return [(key, tolerance_range(t)) for key, t in tolerances.items()]
+    words, example = ("names or numbers", "{'cover': 0.01, 17: 0.01}") if name == "faces" else ("names", "{'cover': 0.01}")
+    advice = f"{name}: a dict of {words} and tolerances is needed, as {example}, not {tolerances!r}"
+    if not isinstance(tolerances, Mapping):
+        raise TypeError(advice)
+    named: list[tuple[str, tuple[float, float]]] = []
+    for key, tolerance in tolerances.items():
+        if name == "faces" and isinstance(key, numbers.Integral) and not isinstance(key, bool):
+            key = f"#{key}"
+        if not isinstance(key, str):
+            raise TypeError(advice)
+        if key == "":
+            by_number = "name them by number, as '#17', or " if name == "faces" else ""
+            raise ValueError(f"{name}: '' is no name: it would stand for all that have none; {by_number}set `tolerance`")
+        named.append((key, tolerance_range(tolerance)))
+    return named
 
 
 def table_to_json(tables: Table) -> str:

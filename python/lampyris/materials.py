@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ._types import Table, Vector, plain
+from ._types import Grid, Reflectance, Table, Vector, plain
+from .settings import real_number
 
 
 @dataclass(frozen=True)
@@ -21,17 +22,18 @@ class Selector:
 def select(
     *,
     part: str | Sequence[str] | None = None,
-    solid: str | Sequence[str] | None = None,
+    solid: int | str | Sequence[int | str] | None = None,
     instance: str | Sequence[str] | None = None,
     face: str | Sequence[str] | None = None,
     colour: str | Vector | None = None,
     layer: str | Sequence[str] | None = None,
     kind: str | Sequence[str] | None = None,
-    radius_mm: float | None = None,
+    radius_mm: float | Sequence[float] | None = None,
     entity: int | Sequence[int] | None = None,
     at: Vector | Sequence[Vector] | None = None,
 ) -> Selector:
-    """Faces by part, solid, instance, name, colour, layer, kind and radius of surface, ``#id`` in the file, or nearest to points (mm)."""
+    """Faces by part, solid (its number in the part, from 0, or its name), instance, name, colour, layer, kind and radius of surface,
+    ``#id`` in the file, or nearest to points (mm)."""
     given = {
         "part": part, "solid": solid, "instance": instance, "face": face, "colour": colour, "layer": layer, "kind": kind,
         "radius_mm": radius_mm, "entity": entity, "at": at,
@@ -51,14 +53,14 @@ class Material:
     medium: Table | None = None
 
 
-def mirror(reflectance: float | Sequence[Sequence[float]] = 1.0, scatter: Table | None = None) -> Material:
-    """A mirror of this share, or of a table ``[[angle_deg, share], …]``."""
+def mirror(reflectance: Reflectance = 1.0, scatter: Table | None = None) -> Material:
+    """A mirror of this share, or of a table ``[[angle_deg, share], …]`` or ``[[angle_deg, nm, share], …]``."""
     return Material(plain({"surface": "mirror", "reflectance": reflectance, "scatter": scatter}))
 
 
-def diffuse(reflectance: float = 1.0) -> Material:
-    """Reflects this share by Lambert's law."""
-    return Material({"surface": "diffuse", "reflectance": reflectance})
+def diffuse(reflectance: Reflectance = 1.0) -> Material:
+    """Reflects this share by Lambert's law, or that of a table ``[[angle_deg, share], …]`` or ``[[angle_deg, nm, share], …]``."""
+    return Material(plain({"surface": "diffuse", "reflectance": reflectance}))
 
 
 def absorber() -> Material:
@@ -73,15 +75,18 @@ def interface() -> Material:
 
 def metal(n: float, k: float) -> Material:
     """A polished metal of the index n + ik."""
-    return Material({"surface": "metal", "metal": [n, k]})
+    return Material({"surface": "metal", "metal": [real_number("n", n), real_number("k", k)]})
 
 
 def coating(
-    reflectance: float | None = None,
+    reflectance: Reflectance | None = None,
     transmittance: float | None = None,
-    rows: Sequence[Sequence[float]] | None = None,
+    rows: Grid | None = None,
 ) -> Material:
-    """A coated boundary: shares, or rows ``[angle_deg, nm, R, T]`` over a full grid."""
+    """A coated boundary: shares, or rows ``[angle_deg, nm, R, T]`` or ``[angle_deg, nm, Rs, Rp, Ts, Tp]`` over a full grid.
+
+    ``reflectance`` may be a table, as that of :func:`mirror`.
+    """
     if reflectance is None and transmittance is None and rows is None:
         raise ValueError("coating: say what it does, by reflectance and transmittance or by rows; what takes all light is absorber()")
     keys = {"surface": "coating", "reflectance": reflectance, "transmittance": transmittance, "coating": rows}

@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from . import _html, _lampyris
-from ._types import Path, Tolerance, Tolerances, tolerance_list, tolerance_range
+from ._types import FaceTolerances, Path, Tolerance, Tolerances, tolerance_list, tolerance_range
 from .errors import existing_file
 from .mesh import Mesh
 from .settings import flag, real_number
@@ -79,13 +79,14 @@ class Model:
         *,
         angle_deg: float | None = None,
         parts: Tolerances | None = None,
-        faces: Tolerances | None = None,
+        faces: FaceTolerances | None = None,
         measure: bool = False,
     ) -> Mesh:
         """Quad facets within a proved distance of the splines.
 
         ``tolerance`` is one length or two in mm, tight where curved and loose where flat, (0.05, 0.2) unless said otherwise; ``parts``
-        and ``faces`` overrule it by name. ``measure`` samples the distance too.
+        overrules it by name, ``faces`` by name or ``#id`` in the file (``{3979: 0.01}``). ``angle_deg`` is the largest angle between facet
+        and surface normal. ``measure`` samples the distance too.
         """
         asked = None if tolerance is None else tolerance_range(tolerance)
         angle = None if angle_deg is None else real_number("angle_deg", angle_deg)

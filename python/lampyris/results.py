@@ -247,7 +247,8 @@ class Run(Mapping[str, Receiver]):
 
     @property
     def digest(self) -> str:
-        """Hash of all tallies: equal if and only if all of them are, bit by bit; that of ``lampyris trace --json``."""
+        """Hash of the sums and counts behind the figures, not of sequences, paths or the list of lost rays: runs whose sums agree bit for bit
+        have the same, that of ``lampyris trace --json``."""
         return self._results.digest
 
     @property
@@ -257,8 +258,13 @@ class Run(Mapping[str, Receiver]):
 
     @property
     def power(self) -> dict[str, float]:
-        """Where the power went: emitted, received, absorbed, escaped, cut_off, lost."""
+        """Where the power went, in :attr:`unit`: emitted, received, absorbed, escaped, cut_off, lost."""
         return dict(self.document["power"])
+
+    @property
+    def unit(self) -> str:
+        """Unit of :attr:`power`: ``W`` or ``lm``."""
+        return str(self.document["power_figures"]["received"]["unit"])
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -375,8 +381,14 @@ class Run(Mapping[str, Receiver]):
         return Run(self._results, copy.deepcopy(self.until, memo))
 
     def __repr__(self) -> str:
-        return f"<lampyris.Run: {self.rays} rays, receivers {', '.join(self)}, digest {self.digest}>"
+        receivers = f"receivers {', '.join(self)}" if len(self) else "no receivers"
+        return f"<lampyris.Run: {self.rays} rays, {receivers}, digest {self.digest}>"
 
     def _repr_html_(self) -> str:
-        power = _html.table(("power", ""), self.power.items())
+        errors, figures = self.document["power_errors"], self.document.get("power_figures", {})
+        rows = [
+            (name, value, errors.get(name), figures.get(name, {}).get("geometric"), self.unit)
+            for name, value in self.power.items()
+        ]
+        power = _html.table(("power", "value", "± rays", "± facets", "unit"), rows)
         return power + "".join(receiver._repr_html_() for receiver in self.values())

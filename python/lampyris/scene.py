@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from . import _lampyris
-from ._types import Path, Table, Tolerance, Tolerances, plain, table_from_json, table_to_json
+from ._types import FaceTolerances, Path, Table, Tolerance, Tolerances, plain, table_from_json, table_to_json
 from .errors import existing_file, file_path, writable_file, write_file
 from .materials import Material, Selector
 from .mesh import Mesh
@@ -33,6 +33,9 @@ class Scene:
     """A scene: models, materials, sources, receivers, as the tables of a scene file.
 
     ``models`` are STEP files or models that were read; ``unit`` is ``"W"`` or ``"lm"``; further keywords are those of ``[run]``.
+
+    What is built call by call is checked when it is used, by :meth:`prepare`, :meth:`trace` and what else needs the facets: files that are
+    not there, keys and parts that nobody knows. A scene that is read (:meth:`from_toml`, :meth:`parse`) has its keys checked at once.
     """
 
     def __init__(
@@ -205,7 +208,7 @@ class Scene:
         angle_deg: float | None = None,
         accuracy_deg: float | None = None,
         parts: Tolerances | None = None,
-        faces: Tolerances | None = None,
+        faces: FaceTolerances | None = None,
         roles: Tolerances | None = None,
         normals: str | None = None,
         intersector: str | None = None,
@@ -214,9 +217,25 @@ class Scene:
     ) -> Run:
         """Traces the scene: so many ``rays``, or as many as an error asks for, as ``until="1%@far"``.
 
-        The % of an error may be left out. What is not said the scene says; without tolerance, normals and intersector a pilot of the run's own rays chooses them. The bits
-        are those of ``lampyris trace`` with the same settings, for any number of threads. Ctrl-C raises :class:`Interrupted`;
-        the same call with ``resume=True`` then goes on, ``resume=part`` from any part of the run. The GIL is free meanwhile.
+        What is not said the scene says; without ``tolerance``, ``accuracy_deg``, ``normals`` and ``intersector`` a pilot of the run's own
+        rays chooses them. The bits are those of ``lampyris trace`` with the same settings, for any number of threads.
+
+        - ``until``: the statistical error (1σ) of a receiver's power in percent, ``"1%@far"``, or with ``:cells`` that of its cells,
+          weighted by their light; the % may be left out. ``rays`` are then the most to trace.
+        - ``seed``: of all random numbers. ``threads``: all cores unless given, and never more than 16 for each core.
+        - ``tolerance``: distance from facets to the surface, mm: one number, or two, ``(0.05, 0.2)``, tight where curved and loose where
+          flat. ``parts``, ``faces`` and ``roles`` overrule it: dicts of such tolerances by name of the part, by name or ``#id`` of the face
+          (``{3979: 0.01}``), by role (``mirror``, ``interface``, ``coated``, ``absorber``).
+        - ``angle_deg``: largest angle between facet and surface normal, degrees.
+        - ``accuracy_deg``: direction error in degrees, the 99th percentile at curved faces, in place of ``tolerance``; tolerance and
+          normals are searched for.
+        - ``normals``: ``flat``, ``nearest``, ``bilinear``, ``cubic``, or ``exact``, which moves hits to the spline. ``intersector``:
+          ``octree``, ``bvh2``, ``cwbvh`` or ``exact``, the spline itself.
+        - ``progress``: ``True`` for a bar, ``False`` for silence, or a function ``f(stage, done, total, messages)``, which stops the run by
+          raising.
+
+        Ctrl-C raises :class:`Interrupted`; the same call with ``resume=True`` then goes on, ``resume=part`` from any part of the run. The
+        GIL is free meanwhile.
         """
         settings = trace_settings(dict(
             rays=rays, seed=seed, threads=threads, tolerance=tolerance, angle_deg=angle_deg, accuracy_deg=accuracy_deg,

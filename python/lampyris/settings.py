@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import numbers
 from typing import Any
 
@@ -16,7 +17,7 @@ Settings = dict[str, Any]
 MOST_RAYS = 20_000_000_000_000
 #: Seeds are unsigned integers of 64 bits.
 LARGEST_SEED = (1 << 64) - 1
-#: Numbers of threads are unsigned integers of 32 bits at least; no more are started than are of use.
+#: Numbers of threads are unsigned integers of 32 bits at least; no more than 16 for each core are started.
 MOST_THREADS = (1 << 32) - 1
 
 TOLERANCES = ("parts", "faces", "roles")
@@ -25,14 +26,16 @@ WORDS = ("normals", "intersector")
 NAMES = ("rays", "seed", "threads", "tolerance", *ANGLES, *TOLERANCES, *WORDS)
 
 
-def whole_number(name: str, value: Any, least: int, most: int) -> int:
-    """A whole number between ``least`` and ``most``; ``1e6`` is one."""
+def whole_number(name: str, value: Any, least: int, most: int | None) -> int:
+    """A whole number between ``least`` and ``most``, or from ``least`` on; ``1e6`` is one."""
     is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
     if not is_number:
         raise TypeError(f"{name}: a whole number is needed, not {value!r}")
-    # Neither NaN nor infinity is equal to its whole part.
-    if not least <= value <= most or value != int(value):
-        raise ValueError(f"{name} = {value!r}: it must be a whole number, at least {least} and at most {most}")
+    # NaN lies in no range, and infinity has no whole part.
+    is_within = least <= value < math.inf and (most is None or value <= most)
+    if not is_within or value != int(value):
+        limit = "" if most is None else f" and at most {most}"
+        raise ValueError(f"{name} = {value!r}: it must be a whole number, at least {least}{limit}")
     return int(value)
 
 
@@ -59,7 +62,7 @@ def word(name: str, value: Any) -> str:
 
 def count_of_threads(threads: Any) -> int | None:
     """A number of threads, or ``None`` for all."""
-    return None if threads is None else whole_number("threads", threads, 1, MOST_THREADS)
+    return None if threads is None else min(whole_number("threads", threads, 1, None), MOST_THREADS)
 
 
 def trace_settings(asked: Settings) -> Settings:

@@ -38,6 +38,10 @@ class Study(dict[str, npt.NDArray[Any]]):
 
         return pandas.DataFrame(dict(self))
 
+    def __repr__(self) -> str:
+        rows = self.document.get("rows", [])
+        return f"<lampyris.Study: {len(rows)} rows of {', '.join(self) or 'nothing'}>"
+
     def _repr_html_(self) -> str:
         from . import _html
 

@@ -1,9 +1,11 @@
 //! Work that runs without the GIL on a thread of its own, while this one tells how far it is and listens for Ctrl-C.
 
 use crate::errors::Defect;
+use lampyris::intersect::NormalMode;
 use lampyris::pipeline::{Monitor, Stage, TracingSettings};
 use lampyris::study;
 use lampyris::study::default_accuracy::Chosen;
+use lampyris::text::figures;
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use std::backtrace::{Backtrace, BacktraceStatus};
@@ -20,6 +22,8 @@ use std::time::Duration;
 const LOOK_EVERY: Duration = Duration::from_millis(40);
 /// The total of work that is no number of rays: what is done of it is told in thousandths.
 const SHARES: u64 = 1000;
+/// Significant digits of a tolerance in a message.
+const TOLERANCE_DIGITS: usize = 4;
 /// The caller of the Python function that called the extension: warnings are shown with its line.
 const CALLER: i32 = 2;
 
@@ -80,8 +84,14 @@ impl Monitor for SharedProgress {
     }
 
     fn study_progress(&self, progress: &study::Progress) {
+        let done = (SHARES as f64 * progress.done.clamp(0.0, 1.0)) as u64;
+        if done == 0 {
+            // Nothing is known yet: a bar would stand at its beginning.
+            return;
+        }
+        // Forecasts that grow do not take back what is done.
+        self.done.fetch_max(done, Ordering::Relaxed);
         self.total.store(SHARES, Ordering::Relaxed);
-        self.done.store((SHARES as f64 * progress.done.clamp(0.0, 1.0)) as u64, Ordering::Relaxed);
     }
 
     fn end(&self) {
@@ -93,9 +103,13 @@ impl Monitor for SharedProgress {
     }
 
     fn chosen(&self, chosen: &Chosen) {
-        let how = match chosen.intersector {
-            "exact" => "on the spline".to_owned(),
-            _ => format!("on facets of {}..{} mm", chosen.tolerance_mm[0], chosen.tolerance_mm[1]),
+        // In the words of the command.
+        let [low, high] = chosen.tolerance_mm.map(|tolerance| figures(tolerance, TOLERANCE_DIGITS));
+        let tolerance = if low == high { low } else { format!("{low}..{high}") };
+        let how = match (chosen.intersector, chosen.normals) {
+            ("exact", _) => "on the spline".to_owned(),
+            (_, NormalMode::Exact) => format!("on facets of {tolerance} mm with hits moved to the spline"),
+            _ => format!("on facets of {tolerance} mm with {} normals", chosen.normals),
         };
         self.say(format!("tracing {how}: {}", chosen.because));
     }

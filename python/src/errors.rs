@@ -10,9 +10,21 @@ create_exception!(lampyris, SceneError, PyValueError, "A scene or a setting asks
 create_exception!(lampyris, InputError, PyOSError, "A file cannot be read, or is not what it should be.");
 create_exception!(lampyris, Defect, PyRuntimeError, "lampyris itself went wrong: please report it.");
 
+/// Settings whose keyword in Python has another name; a message begins with the setting that it is about.
+const KEYWORDS: [(&str, &str); 5] = [
+    ("until_error", "until"),
+    ("accuracy", "accuracy_deg"),
+    ("part", "parts"),
+    ("face", "faces"),
+    ("role", "roles"),
+];
+
 /// The exception of a job that cannot be done, with the line of the scene that is at fault.
 pub(crate) fn of_pipeline(e: pipeline::Error) -> PyErr {
     let mut text = e.to_string();
+    if let Some((setting, keyword)) = KEYWORDS.iter().find(|(setting, _)| e.setting_name() == Some(*setting)) {
+        text = text.replacen(*setting, keyword, 1);
+    }
     if let Some(excerpt) = e.excerpt() {
         let before = excerpt.text.get(..excerpt.span.start).unwrap_or("");
         let line = excerpt.text.lines().nth(before.matches('\n').count()).unwrap_or("");

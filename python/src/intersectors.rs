@@ -232,7 +232,7 @@ impl Tracer {
         let n = length(&origins);
         if n != length(&directions) {
             return Err(PyValueError::new_err(format!(
-                "origins and directions must have as many rows, not {n} and {}; numpy.broadcast_to repeats one row",
+                "origins and directions must have the same number of rows, not {n} and {}; numpy.broadcast_to repeats one row",
                 length(&directions)
             )));
         }

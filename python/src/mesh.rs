@@ -93,9 +93,13 @@ impl Mesh {
             of_points: table(normals, "normals", 3, count)?,
             own: table(corners, "corners", 5, 4 * facet_count)?,
         };
-        let is_short = |length: usize| length != facet_count;
-        if faces.as_ref().is_some_and(|f| is_short(f.len())) || sag.as_ref().is_some_and(|s| is_short(s.len())) {
-            return Err(PyValueError::new_err(format!("faces and sag: there must be {facet_count}, one a facet")));
+        // `faces` is the argument `face` of the Python side.
+        for (name, given) in [("face", faces.as_ref().map(Vec::len)), ("sag", sag.as_ref().map(Vec::len))] {
+            if let Some(length) = given.filter(|length| *length != facet_count) {
+                return Err(PyValueError::new_err(format!(
+                    "{name}: there must be {facet_count}, one a facet, not {length}"
+                )));
+            }
         }
         let faces = faces.unwrap_or_else(|| (0..facet_count as u32).collect());
         require_together(&faces)?;

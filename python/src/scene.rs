@@ -87,10 +87,15 @@ pub(crate) fn write_ray_file(path: PathBuf, rays: &Bound<'_, PyAny>) -> PyResult
     }
     let ray = |(k, row): (usize, &[f64])| {
         let direction = Vector::new(row[3], row[4], row[5]);
-        if direction == Vector::ZERO || row[6] < 0.0 || row.get(7).is_some_and(|nm| *nm <= 0.0) {
-            return Err(PyValueError::new_err(format!(
-                "rays[{k}] cannot be traced: the direction must have a length, the power be zero or more, the wavelength positive"
-            )));
+        let refuse = |what: String| Err(PyValueError::new_err(format!("rays[{k}] {what}; leave such rows out")));
+        if direction == Vector::ZERO {
+            return refuse("has a direction without length".into());
+        }
+        if row[6] < 0.0 {
+            return refuse(format!("has the power {}: it must be zero or more", row[6]));
+        }
+        if let Some(nm) = row.get(7).filter(|nm| **nm <= 0.0) {
+            return refuse(format!("has the wavelength {nm} nm: it must be positive"));
         }
         let origin = Vector::new(row[0], row[1], row[2]);
         Ok(LightRay { origin, direction, power: row[6], wavelength_nm: row.get(7).copied() })

@@ -80,7 +80,7 @@ def test_arrays_in_one_piece_are_read_where_they_lie_and_no_other_is_changed() -
     [
         (np.zeros((3, 2)), np.ones((3, 3)), ValueError, r"origins: the shape must be \(n, 3\)"),
         (np.zeros(3), np.ones((1, 3)), ValueError, r"a single row is origins\[None, :\]"),
-        (np.zeros((2, 3)), np.ones((3, 3)), ValueError, "as many rows"),
+        (np.zeros((2, 3)), np.ones((3, 3)), ValueError, "the same number of rows, not 2 and 3"),
         (np.array([["a", "b", "c"]]), np.ones((1, 3)), TypeError, "float64"),
         (np.zeros((1, 3), dtype=complex), np.ones((1, 3)), TypeError, "float64"),
         (np.array([[object()] * 3]), np.ones((1, 3)), TypeError, "float64"),
@@ -294,7 +294,7 @@ def test_polygons_of_pyvista_are_facets() -> None:
         ({"normals": np.zeros((6, 4, 2))}, r"shape \(6, 4, 3\) are needed for the corners"),
         ({"normals": np.full((6, 4, 3), np.nan)}, "must be finite"),
         ({"face": [0, 1, 0, 2, 3, 4]}, "stand together"),
-        ({"face": [0, 1, 2]}, "one a facet"),
+        ({"face": [0, 1, 2]}, "face: there must be 6, one a facet, not 3"),
         ({"face": [0.5] * 6}, "whole numbers"),
         ({"face": [-1] * 6}, "whole numbers"),
     ],

@@ -11,7 +11,7 @@ import pytest
 for module in ("pandas", "xarray", "pyvista", "trimesh", "distributed"):
     pytest.importorskip(module)
 DOCS = pathlib.Path(__file__).parents[1] / "docs"
-PAGES = sorted(page for page in DOCS.glob("*.md") if page.stem != "api")
+PAGES = [*sorted(page for page in DOCS.glob("*.md") if page.stem != "api"), DOCS.parent / "README.md"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -20,11 +20,16 @@ import lampyris as lp
         (lambda s: s.trace(tolerance=(1, 2, 3)), ValueError, "one number of mm or two"),
         (lambda s: s.trace(normals="round"), ValueError, "normals"),
         (lambda s: s.trace(intersector="quadtree"), ValueError, "octree, bvh2, cwbvh, exact"),
-        (lambda s: s.trace(threads=0), ValueError, "threads = 0: .* at least 1"),
+        (lambda s: s.trace(threads=0), ValueError, "threads = 0: it must be a whole number, at least 1$"),
+        (lambda s: s.trace(threads=float("inf")), ValueError, "threads = inf: it must be a whole number"),
         (lambda s: s.trace(threads="two"), TypeError, "threads"),
         (lambda s: s.trace(seed=-1), ValueError, "seed = -1: .* at least 0"),
-        (lambda s: s.trace(parts={"huosing": 0.1}), ValueError, "did you mean 'housing'"),
-        (lambda s: s.trace(until="1%@fra"), ValueError, "did you mean 'far'"),
+        (lambda s: s.trace(parts={"huosing": 0.1}), ValueError, "parts huosing: .* did you mean 'housing'"),
+        (lambda s: s.trace(until="1%@fra"), ValueError, "until 1%@fra: .* did you mean 'far'"),
+        (lambda s: s.trace(until="x"), ValueError, "until x: write P%@RECEIVER"),
+        (lambda s: s.trace(faces={-1: 0.1}), ValueError, "faces #-1: "),
+        (lambda s: s.trace(faces=0.1), TypeError, "faces: a dict of names or numbers and tolerances"),
+        (lambda s: s.trace(parts={17: 0.1}), TypeError, "parts: a dict of names and tolerances"),
         (lambda s: s.trace(resume=True), ValueError, "no trace of this scene was interrupted"),
         (lambda s: s.__setitem__("housing", 0.9), TypeError, r"lampyris.mirror\(0.9\)"),
         (lambda s: s.add("light"), TypeError, "source or a receiver"),
@@ -131,6 +136,10 @@ def test_wrong_materials_are_told_what_to_do() -> None:
             lp.glass(medium)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="coating: say what it does"):
         lp.coating()
+    wrong_index: Any
+    for wrong_index in (("gold", 1), (1, None)):
+        with pytest.raises(TypeError, match="(n|k): a number is needed"):
+            lp.metal(*wrong_index)
     for key in ("index", "catalogue", "name"):
         with pytest.raises(ValueError, match=f"leave {key} out"):
             lp.glass(1.5, **{key: 1.6})
@@ -231,12 +240,54 @@ def test_masked_and_wrong_rays_are_refused() -> None:
     beam = np.array([[0.0, 0, 0, 0, 0, 1, 1, 550], [0, 0, 0, 0, 0, 1, 1, 0.55]])
     with pytest.raises(ValueError, match=r"rays\[1\] has the wavelength 0.55 nm: .*one in µm"):
         lp.rays(beam)
+    for row, says in (
+        ([0, 0, 0, 0, 0, 0, 1], r"rays\[1\] has a direction without length"),
+        ([0, 0, 0, 0, 0, 1, -1], r"rays\[1\] has the power -1: it must be zero or more"),
+    ):
+        with pytest.raises(ValueError, match=says):
+            lp.Scene().add(lp.rays([[0, 0, 0, 0, 0, 1, 1], row]))
     wrong: Any
     for wrong, says in ((np.ones((1, 3), dtype=complex), "origins.real"), ([[None] * 3], "replace what is no number")):
         with pytest.raises(TypeError, match=says):
             lp.Octree(mesh).intersect(wrong, np.ones((1, 3)))
     with pytest.raises(TypeError, match="exponent: a number"):
         lamp(500).trace(progress=False)["far"].to_png("a")  # type: ignore[arg-type]
+
+
+def test_a_demo_replaces_no_file_of_another_content(tmp_path: pathlib.Path) -> None:
+    scene = pathlib.Path(lp.write_demo(tmp_path))
+    assert lp.write_demo(tmp_path) == str(scene)
+    (tmp_path / "lamp.stp").unlink()
+    scene.write_text("mine")
+    with pytest.raises(FileExistsError, match=r"lamp\.toml: it is there already"):
+        lp.write_demo(tmp_path)
+    assert scene.read_text() == "mine" and not (tmp_path / "lamp.stp").exists()
+
+
+def test_faces_are_named_by_number(lens: pathlib.Path) -> None:
+    model = lp.read_step(lens)
+    number = model.faces()[0]["id"]
+    keys: list[Any] = [number, str(number), f"#{number}", np.int64(number)]
+    counts = {len(model.tessellate(0.2, faces={key: 0.01})) for key in keys}
+    assert len(counts) == 1 and counts.pop() > len(model.tessellate(0.2))
+
+
+def test_tables_of_shares_are_materials() -> None:
+    table: list[list[float]] = [[0, 0.1], [90, 1]]
+    for material in (lp.diffuse(table), lp.diffuse(np.array(table)), lp.coating(reflectance=table), lp.mirror(table)):
+        scene = lamp(500)
+        scene[lp.select(part="housing", solid=0)] = material
+        assert material.table["reflectance"] == table and scene.trace(progress=False).rays == 500
+
+
+def test_what_is_shown_of_results(lens: pathlib.Path) -> None:
+    scene = lp.Scene(rays=500).add(lp.point(at=(0, 0, 0)))
+    run = scene.trace(progress=False)
+    assert "500 rays, no receivers, digest" in repr(run) and run.unit == "W"
+    page = lamp(500).trace(progress=False)._repr_html_()
+    assert "<th>± rays</th>" in page and "<td>emitted</td><td>100</td><td>0</td><td>–</td><td>lm</td>" in page
+    study = lp.study.accuracy(lp.read_step(lens), [0.4], normals=["flat"], rays=500, repetitions=1, progress=False)
+    assert repr(study).startswith(f"<lampyris.Study: {len(study['normals'])} rows of model, tolerance_mm, ")
 
 
 def test_what_faces_absorb_has_no_angles() -> None:

@@ -6,6 +6,7 @@ import pathlib
 from typing import Any
 
 import pytest
+from conftest import ROOT
 
 import lampyris as lp
 from lampyris.progress import Progress
@@ -92,10 +93,24 @@ def test_a_study_tells_how_far_it_is(kind: str, lens: pathlib.Path) -> None:
         lp.study.accuracy(model, [0.4], normals=["flat"], rays=2000, repetitions=1, progress=tell)
     else:
         lp.study.check(model, rays=2000, progress=tell)
+    shares = [done for _, done, _ in told]
+    assert shares == sorted(shares)
     name = {"accuracy": "accuracy study", "check": "cross-check"}[kind]
     assert {stage for stage, _, _ in told} <= {"", name}
     stage, done, total = told[-1]
     assert stage == name and 0 <= done <= total == 1000
+
+
+def test_how_a_scene_is_traced_is_told_in_the_words_of_the_command() -> None:
+    said: list[str] = []
+    scene = lp.Scene.from_toml(ROOT / "fixtures" / "scenes" / "demo.toml")
+    run = scene.trace(rays=100_000, progress=lambda stage, done, total, messages: said.extend(messages))
+    assert run.chosen is not None
+    how = "on the spline"
+    if run.chosen["intersector"] != "exact":
+        is_moved = run.chosen["normals"] == "exact"
+        how = "mm with hits moved to the spline" if is_moved else f"mm with {run.chosen['normals']} normals"
+    assert [message for message in said if message.startswith("tracing on") and f"{how}: {run.chosen['because']}" in message]
 
 
 def test_tqdm_takes_what_it_is_given() -> None:
