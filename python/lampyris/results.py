@@ -247,8 +247,8 @@ class Run(Mapping[str, Receiver]):
 
     @property
     def digest(self) -> str:
-        """Hash of the sums and counts behind the figures, not of sequences, paths or the list of lost rays: runs whose sums agree bit for bit
-        have the same, that of ``lampyris trace --json``."""
+        """Hash of the sums and counts behind the figures, not of sequences, paths or the list of lost rays: runs whose sums agree bit for
+        bit have the same, that of ``lampyris trace --json``."""
         return self._results.digest
 
     @property
