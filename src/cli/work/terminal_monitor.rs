@@ -129,7 +129,7 @@ impl Monitor for TerminalMonitor<'_> {
     }
 
     fn grows(&self, found_percent: Option<f64>, rays: u64) {
-        let found = found_percent.map_or("nothing arrives".into(), |e| figures(e, 2));
-        self.console.say(format_args!("{found} %: going on with {} rays", grouped(rays)));
+        let found = found_percent.map_or("nothing arrives".into(), |e| format!("{} %", figures(e, 2)));
+        self.console.say(format_args!("{found}: going on with {} rays", grouped(rays)));
     }
 }
