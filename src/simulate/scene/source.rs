@@ -41,7 +41,7 @@ pub struct Source {
     pub direction: [f64; 3],
     /// Direction of the first side of `size`, as far as `direction` lets it.
     pub x: Option<[f64; 3]>,
-    /// Radius of a disc, mm.
+    /// Radius of a disc, mm; a `frame` that enlarges moves the source and leaves it.
     #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
     pub radius: Option<f64>,
     /// Sides of a rectangle, mm.
