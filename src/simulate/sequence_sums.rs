@@ -95,16 +95,16 @@ impl SequenceSums {
         self.lower_limit(limit);
         let mut limit = self.limit;
         let mut cut = cut_all(quanta, limit);
+        let mut add = |(sequence, quanta): (&Sequence, &u128)| {
+            self.sums.entry(sequence.clone()).or_default().add_replicate(*quanta);
+        };
         // Each sequence once at every limit: a replicate is one sample of all of them.
-        while !cut.is_empty() {
-            for (sequence, quanta) in &cut {
-                self.sums.entry(sequence.clone()).or_default().add_replicate(*quanta);
-            }
-            if limit == 0 {
-                break;
-            }
+        cut.iter().for_each(&mut add);
+        while limit > 0 {
             limit /= 2;
-            cut = cut_all(cut.into_iter().filter(|(sequence, _)| sequence.steps.len() > limit), limit);
+            cut = cut_all(cut, limit);
+            // Those that are no longer than this are held already.
+            cut.iter().filter(|(sequence, _)| sequence.more && sequence.steps.len() == limit).for_each(&mut add);
         }
         self.make_room();
     }

@@ -322,10 +322,7 @@ fn say_verification(run: &SceneResults, console: &Console) -> Result<(), Failure
 }
 
 /// Traces a shard (index from 0, count), or goes on with it, into its file; one that is done already is not traced again. Incomplete where
-/// light was lost beyond the limit.
-///
-/// # Errors
-/// When interrupted, with what was done saved, or where the file cannot be written.
+/// light was lost beyond the limit. Fails when interrupted, with what was done saved.
 fn trace_shard(
     prepared: &PreparedScene,
     command: &TraceCommand,

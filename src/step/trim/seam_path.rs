@@ -329,8 +329,8 @@ mod tests {
         let path = obstacles.way_around(&[start], &Goals::Points(&[(0, goal)]), &metric).expect("a way");
         let ends = [path.points[0], path.points[path.points.len() - 1]];
         assert_eq!((ends, obstacles.crossed_by(&path.points)), ([start, goal], Vec::new()));
-        // No longer than a way beside boxes of half side 0.42: at ±0.42 through even rows and at ±0.08 through odd ones, 0.84 along each but
-        // the last, which leaves the straight way to the goal free, and from row to row across by 0.34 within 0.16.
+        // No longer than a way beside boxes of half side 0.42: at ±0.42 through even rows and at ±0.08 through odd ones, 0.84 along each
+        // but the last, which leaves the straight way to the goal free, and from row to row across by 0.34 within 0.16.
         let length: f64 = path.points.windows(2).map(|side| (side[1] - side[0]).length()).sum();
         let winding = 0.42f64.hypot(0.08) + 13.0 * (0.84 + 0.34f64.hypot(0.16)) + 0.08f64.hypot(0.92);
         assert!((f64::from(rows)..winding).contains(&length), "{length} for {winding}");
