@@ -85,7 +85,7 @@ def test_rays_of_an_array_are_a_source() -> None:
     ]:
         with pytest.raises(kind, match=says):
             lp.rays(wrong)
-    with pytest.raises(ValueError, match="a length"):
+    with pytest.raises(ValueError, match=r"rays\[0\] has a direction without length"):
         scene.add(lp.rays(np.zeros((1, 7))))
 
 
