@@ -110,16 +110,16 @@ impl Spectrum {
                 for nm in [led.blue_width_nm, led.phosphor_width_nm] {
                     require("a width of the LED", nm, (1.0..1e4).contains(&nm), "1 nm or more, below 10,000")?;
                 }
-                let peak = |at, width| {
-                    let gaussian = move |nm: f64| gaussian(nm - at, width);
-                    // What lies beyond the range is missing from it, and each peak is to have its share all the same.
-                    let whole = Table::sampled(LED_RANGE_NM, LED_STEPS, gaussian).integral();
-                    move |nm: f64| gaussian(nm) / whole
+                let sampled = |power: &dyn Fn(f64) -> f64| {
+                    Wavelengths::continuous(Table::sampled(LED_RANGE_NM, LED_STEPS, power))
                 };
-                let blue = peak(led.blue_nm, led.blue_width_nm);
-                let phosphor = peak(led.phosphor_nm, led.phosphor_width_nm);
-                let power = |nm: f64| led.blue_share * blue(nm) + (1.0 - led.blue_share) * phosphor(nm);
-                Wavelengths::continuous(Table::sampled(LED_RANGE_NM, LED_STEPS, power))
+                let [blue, phosphor] = [(led.blue_nm, led.blue_width_nm), (led.phosphor_nm, led.phosphor_width_nm)]
+                    .map(|(at, width)| move |nm: f64| gaussian(nm - at, width));
+                // What lies beyond the range is missing from it, and each peak is to have its share all the same.
+                let (in_blue, in_phosphor) = (sampled(&blue)?.total(), sampled(&phosphor)?.total());
+                sampled(&|nm| {
+                    led.blue_share * blue(nm) / in_blue + (1.0 - led.blue_share) * phosphor(nm) / in_phosphor
+                })
             }
         }
     }

@@ -47,12 +47,6 @@ impl Table {
         if s == 0.0 { self.y[i] } else { self.y[i] + s * (self.y[i + 1] - self.y[i]) }
     }
 
-    /// The integral of the piecewise linear function over its points.
-    pub(super) fn integral(&self) -> f64 {
-        let pieces = self.x.windows(2).zip(self.y.windows(2));
-        pieces.map(|(x, y)| 0.5 * (x[1] - x[0]) * (y[0] + y[1])).sum()
-    }
-
     /// First and last abscissa.
     pub fn range(&self) -> [f64; 2] {
         [self.x[0], self.x[self.x.len() - 1]]

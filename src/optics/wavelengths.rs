@@ -72,7 +72,7 @@ impl Wavelengths {
     }
 
     /// Power of the whole, before normalisation.
-    fn total(&self) -> f64 {
+    pub(super) fn total(&self) -> f64 {
         self.sums[self.sums.len() - 1]
     }
 

@@ -7,6 +7,9 @@ use super::scene::{self, FarFieldType, ReceiverKind};
 use crate::math::{Aabb, Frame, Point, Ray, Vector};
 use std::f64::consts::TAU;
 
+/// Receivers that notes about receivers that are alike name; of more they tell the number.
+pub(super) const NAMED_RECEIVERS: usize = 3;
+
 /// Share of a flat receiver's half side, and sine of an angle to its plane, below which another surface lies in that plane.
 pub(crate) const FLUSH: f64 = 1e-9;
 

@@ -2,8 +2,7 @@
 
 use super::pole_rings::PoleRings;
 use super::power_scale::PowerScale;
-use super::receiver::{Receiver, Shape};
-use super::run_notes::NAMED;
+use super::receiver::{NAMED_RECEIVERS, Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
 use super::tallies::Tallies;
 use super::tally::{Moments, Sum};
@@ -306,7 +305,7 @@ impl ReceiverResult {
 /// Returns sentences about receivers to which light came of which none is of wavelengths that their channels count: one for each of the
 /// first, and one that counts the others.
 pub(super) fn unseen_light_notes(receivers: &[ReceiverResult]) -> Vec<String> {
-    first_sentences(receivers.iter().filter_map(ReceiverResult::unseen_light_note), NAMED, |further| {
+    first_sentences(receivers.iter().filter_map(ReceiverResult::unseen_light_note), NAMED_RECEIVERS, |further| {
         format!("the same holds for {}", count_of(further as u64, "more receiver"))
     })
 }

@@ -3,7 +3,7 @@
 use super::bind::BoundScene;
 use super::outcome::{Counts, LostRay};
 use super::plan::Plan;
-use super::receiver::{Receiver, Shape};
+use super::receiver::{NAMED_RECEIVERS, Receiver, Shape};
 use super::tally::Sum;
 use crate::text::{count_of, figures, first_sentences};
 
@@ -12,8 +12,6 @@ use crate::text::{count_of, figures, first_sentences};
 const OVERLAP_SEGMENTS: u64 = 10_000;
 /// Rays of a source below which next to nothing is known of its light.
 const SCARCE_RAYS: u64 = 64;
-/// Receivers that are named; of more the number is told.
-pub(super) const NAMED: usize = 3;
 /// Share of a source's power from which on what rounding changes of it is told.
 const ROUNDED: f64 = 1e-5;
 /// Share of the mean power of a source below which it is told: among thousands alike each has few rays, and all together enough.
@@ -109,7 +107,7 @@ impl BoundScene {
                 count_of(n.into(), "interaction")
             ))
         });
-        first_sentences(sentences, NAMED, |further| {
+        first_sentences(sentences, NAMED_RECEIVERS, |further| {
             format!("the same holds for {}", count_of(further as u64, "more receiver"))
         })
     }

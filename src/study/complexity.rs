@@ -11,6 +11,7 @@ use super::{Progress, Rounds, Timing};
 use crate::intersect::Intersector;
 use crate::model::Model;
 use crate::simulate::{BoundScene, Error, RunSettings, Scene, simulate};
+use crate::text::grouped;
 use serde::Serialize;
 use std::cell::Cell;
 use std::path::Path;
@@ -226,13 +227,7 @@ fn sentence(rows: &[Row]) -> String {
     let Some((row, rays, difference)) = compared else {
         return "Nothing to compare: the traditional method or the octree was not run.".into();
     };
-    let apart = |n: u64| {
-        let text = n.to_string();
-        let groups: Vec<&str> =
-            text.as_bytes().rchunks(3).rev().filter_map(|c| std::str::from_utf8(c).ok()).collect();
-        groups.join("\u{202f}")
-    };
-    let patches: Vec<String> = octree.iter().filter_map(|r| r.patches).map(|n| apart(n as u64)).collect();
+    let patches: Vec<String> = octree.iter().filter_map(|r| r.patches).map(|n| grouped(n as u64)).collect();
     let beside = if exact.is_empty() {
         String::new()
     } else {
@@ -249,7 +244,7 @@ fn sentence(rows: &[Row]) -> String {
          The seed paper's savings make 1.23 / 1.34 / 1.87 times on its own three lamps.",
         ratios(&octree),
         patches.join(" / "),
-        apart(rays),
+        grouped(rays),
         row.model
     )
 }

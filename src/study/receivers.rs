@@ -142,6 +142,7 @@ pub(super) fn receivers(
             for (f, e) in found.receivers.iter().zip(&truth.receivers) {
                 rows.push(Row {
                     scene: name.into(),
+                    unit: bound.scene.run.unit.symbol().into(),
                     tolerance_mm: tolerance,
                     normals: normals.name().into(),
                     rays: found.rays,
@@ -153,7 +154,6 @@ pub(super) fn receivers(
         }
     }
     countdown.stage("done", Some(0.0));
-    rows.iter_mut().for_each(|row| row.unit = bound.scene.run.unit.symbol().into());
     rows
 }
 

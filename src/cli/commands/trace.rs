@@ -228,14 +228,10 @@ fn trace_whole(
     // What was missed comes before what was found.
     let unsettled = if extra.until_settled { verdicts::unsettled_sentence(&document) } else { None };
     let missed = remarks.target.as_ref().is_some_and(|result| !result.reached) || unsettled.is_some();
-    let answer = match unsettled {
-        Some(sentence) if console.has_closing_lines() => format!("{sentence} {answer}"),
-        Some(sentence) => {
-            console.insist(plain_sentence(&sentence));
-            answer
-        }
-        None => answer,
-    };
+    if let Some(sentence) = unsettled.as_ref().filter(|_| !console.has_closing_lines()) {
+        console.insist(plain_sentence(sentence));
+    }
+    let answer = unsettled.map_or(String::new(), |sentence| sentence + " ") + &answer;
     verdicts::say_verdicts(&run, prepared, console)?;
     closing::say_notes(&run.results.notes, prepared.bound.notes(), console);
     closing::print_listings(&run, prepared, console)?;

@@ -7,9 +7,10 @@ use crate::formats::{Facets, Polylines};
 use crate::model::{Model, PlacedFace};
 use crate::pipeline::PreparedScene;
 use crate::report::{Cell, Section, Table, View, file_stem};
-use crate::simulate::{Event, Results, Sequence, SequenceResult, recorded_ways};
+use crate::simulate::{Event, RecordedWay, Results, Sequence, SequenceResult, recorded_ways};
 use crate::text::{count_of, figures};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::io;
 
 /// Sequences whose paths are drawn, and their colours.
@@ -114,8 +115,12 @@ fn sequence_view(prepared: &PreparedScene, results: &Results, facets: &Facets) -
         let of_rank = results.sequences.iter().enumerate();
         of_rank.filter_map(move |(r, found)| Some((r, rank, found.first.get(rank)?)))
     });
+    let settings = prepared.run_settings();
+    let mut of_receiver: BTreeMap<usize, Vec<RecordedWay>> = BTreeMap::new();
     for ((receiver, rank, sequence), colour) in first.zip(DRAWN) {
-        let ways = recorded_ways(&prepared.bound, &prepared.run_settings(), receiver, results);
+        let ways = of_receiver
+            .entry(receiver)
+            .or_insert_with(|| recorded_ways(&prepared.bound, &settings, receiver, results));
         let is_same = |way: &Sequence| {
             (way.source, way.more) == (sequence.source, sequence.more) && way.steps == sequence.steps
         };

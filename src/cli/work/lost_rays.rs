@@ -68,20 +68,13 @@ pub(crate) fn report_lost_light(
         return Completion::Incomplete;
     }
     let share = results.power.lost / results.power.emitted;
-    if share <= max_lost {
-        return Completion::Complete;
-    }
     let recorded = results.ledger.len();
     let is_cut = results.lost_rays as usize > recorded;
     let listed = if is_cut { format!("the first {recorded} of them") } else { "them all".into() };
-    let reasons = reasons(&results.ledger, results.lost_rays, prepared);
-    let file = folder.join(LEDGER);
-    console.insist(format_args!(
-        "{} % of the energy was lost, more than --max-lost allows: {reasons}; {} lists {listed}",
-        figures(100.0 * share, 2),
-        file.display(),
-    ));
-    Completion::Incomplete
+    say_beyond([share, max_lost], "the energy", console, || {
+        let reasons = reasons(&results.ledger, results.lost_rays, prepared);
+        format!("{reasons}; {} lists {listed}", folder.join(LEDGER).display())
+    })
 }
 
 /// Says so, and is incomplete, where a larger share of the light of a part of a run was lost than `max_lost`.
@@ -91,16 +84,26 @@ pub(crate) fn report_light_lost_in_part(
     max_lost: f64,
     console: &Console,
 ) -> Completion {
-    let share = part.tallies.lost_share();
-    // Of no light there is no share.
-    if share <= max_lost || share.is_nan() {
+    // Of no light, whose share is no number, none was lost.
+    let share = part.tallies.lost_share().max(0.0);
+    say_beyond([share, max_lost], "the energy of this part", console, || {
+        let reasons = reasons(&part.tallies.ledger, part.tallies.counts.lost, prepared);
+        format!("{reasons}; `lampyris merge` lists the lost rays")
+    })
+}
+
+/// Says that a share of `what` was lost beyond the largest that is allowed, with its `reasons`, and is incomplete then.
+fn say_beyond(
+    [share, most]: [f64; 2],
+    what: &str,
+    console: &Console,
+    reasons: impl FnOnce() -> String,
+) -> Completion {
+    if share <= most {
         return Completion::Complete;
     }
-    console.insist(format_args!(
-        "{} % of the energy of this part was lost, more than --max-lost allows: {}; `lampyris merge` lists the lost rays",
-        figures(100.0 * share, 2),
-        reasons(&part.tallies.ledger, part.tallies.counts.lost, prepared),
-    ));
+    let percent = figures(100.0 * share, 2);
+    console.insist(format_args!("{percent} % of {what} was lost, more than --max-lost allows: {}", reasons()));
     Completion::Incomplete
 }
 

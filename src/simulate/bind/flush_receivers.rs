@@ -5,11 +5,8 @@ use super::bound_scene::BoundScene;
 use crate::math::{Aabb, BoxTree, Point, Uv, Vector};
 use crate::model::{Analytic, Model, PlacedFace};
 use crate::simulate::body::AMBIENT;
-use crate::simulate::receiver::{FLUSH, FlatShape, Receiver};
+use crate::simulate::receiver::{FLUSH, FlatShape, NAMED_RECEIVERS, Receiver};
 use crate::text::{count_of, first_sentences};
-
-/// Receivers that are named; of more the number is told.
-const NAMED: usize = 3;
 
 /// Returns sentences about receivers that lie in a flat face of the model, each naming the first such face; of those that absorb, in a face
 /// that lets light out of a body. One for each of the first receivers, and one that counts the others.
@@ -47,7 +44,7 @@ pub(super) fn flush_receiver_notes(bound: &BoundScene, model: &Model) -> Vec<Str
         };
         Some(format!("the receiver '{}' lies in {what} of '{part}': {consequence}", receiver.name))
     });
-    first_sentences(sentences, NAMED, |further| {
+    first_sentences(sentences, NAMED_RECEIVERS, |further| {
         format!("the same holds for {}, each in a face of the model", count_of(further as u64, "more receiver"))
     })
 }

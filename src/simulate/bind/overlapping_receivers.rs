@@ -2,7 +2,7 @@
 
 use super::bound_scene::BoundScene;
 use crate::math::{Aabb, BoxTree, Point};
-use crate::simulate::receiver::{FlatShape, Receiver};
+use crate::simulate::receiver::{FlatShape, NAMED_RECEIVERS, Receiver};
 use crate::text::{count_of, first_sentences};
 
 /// A flat receiver.
@@ -37,9 +37,6 @@ impl<'r> Candidate<'r> {
     }
 }
 
-/// Pairs that are named; of more the number is told.
-const NAMED: usize = 3;
-
 /// Pairs that are counted, and pairs of boxes that are asked for them, a tenth of a second of work: of a thousand receivers at one place
 /// there are half a million.
 const MOST_COUNTED: usize = 1000;
@@ -64,7 +61,7 @@ pub(super) fn overlapping_receiver_notes(bound: &BoundScene) -> Vec<String> {
         )
     });
     let at_least = if overlapping.len() == MOST_COUNTED { "at least " } else { "" };
-    first_sentences(sentences, NAMED, |further| {
+    first_sentences(sentences, NAMED_RECEIVERS, |further| {
         format!("the same holds for {at_least}{} of receivers", count_of(further as u64, "more pair"))
     })
 }

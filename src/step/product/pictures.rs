@@ -142,7 +142,17 @@ impl Assembly<'_, '_> {
         let mut kept: FxHashSet<u64> = FxHashSet::default();
         let mut pictures: FxHashSet<u64> = FxHashSet::default();
         let groups = self.shapes.keys().map(|product| self.representations(*product));
-        for mut group in groups.chain(orphans.iter().map(|orphan| self.unmoved(vec![*orphan]))) {
+        let mut seen: FxHashSet<u64> = FxHashSet::default();
+        // Orphans that stand in one another are one group.
+        let of_orphans = orphans.iter().filter_map(|orphan| {
+            if seen.contains(orphan) {
+                return None;
+            }
+            let group = self.unmoved(vec![*orphan]);
+            seen.extend(&group);
+            Some(group)
+        });
+        for mut group in groups.chain(of_orphans) {
             group.retain(|id| placed.contains(id));
             let own: Vec<ListedMesh> = group.iter().filter_map(|id| meshes.get(id)).flatten().copied().collect();
             if own.is_empty() {

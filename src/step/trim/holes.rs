@@ -14,17 +14,21 @@ const MOST_PERIODS: f64 = 64.0;
 /// 16-sided polygon of that circle.
 const FINE_DENSITY: usize = 16;
 
-/// The border into which holes are moved, as a polygon that is made once.
+/// The border into which holes are moved, as polygons that are made once, when they are first asked for.
 pub(super) struct Border<'c> {
     outer: &'c Chain,
-    coarse: Vec<Uv>,
-    /// Made for the first hole that is not whole in the coarse one.
+    coarse: OnceCell<Vec<Uv>>,
     fine: OnceCell<Vec<Uv>>,
 }
 
 impl<'c> Border<'c> {
     pub(super) fn new(outer: &'c Chain) -> Self {
-        Self { outer, coarse: outer.polygon(), fine: OnceCell::new() }
+        Self { outer, coarse: OnceCell::new(), fine: OnceCell::new() }
+    }
+
+    /// Returns the polygon in which nearly all holes are whole.
+    fn coarse(&self) -> &[Uv] {
+        self.coarse.get_or_init(|| self.outer.polygon())
     }
 
     /// Returns the polygon of [`FINE_DENSITY`].
@@ -68,7 +72,7 @@ pub(super) fn place_hole(
         };
         shifts.map(|count| chart.whole_periods(count)).find(inside)
     };
-    let coarse = border.coarse.as_slice();
+    let coarse = border.coarse();
     let shift = shift_into(coarse, PLACES).or_else(|| {
         let fine = border.fine();
         let tries = [(fine, PLACES), (coarse, PLACES / 2 + 1), (fine, PLACES / 2 + 1)];

@@ -64,24 +64,36 @@ impl<'o> Obstacles<'o> {
 
     /// Whether the straight line between two places crosses no hole, no border and no copy of these.
     pub(super) fn leave_free(&self, from: Uv, to: Uv) -> bool {
-        !self.any_crossed(from, to, |_| true)
+        !self.crosses_any(from, to, |_| true)
     }
 
     /// Returns the holes, and copies of them, that a way through these places crosses; some may be told more than once.
     pub(super) fn crossed_by(&self, places: &[Uv]) -> Vec<HoleCopy> {
         let mut crossed = Vec::new();
         for side in places.windows(2) {
-            self.any_crossed(side[0], side[1], |hole| {
-                crossed.extend(hole);
+            self.any_beside(side[0], side[1], |hole, is_crossed| {
+                crossed.extend(hole.filter(|_| is_crossed()));
                 false
             });
         }
         crossed
     }
 
-    /// Whether the straight line between two places crosses something that is wanted; `is_wanted` is asked of each hole that is crossed,
-    /// and with `None` of a border, up to the first. Touching does not count, a corner between both sides does.
-    pub(super) fn any_crossed(&self, a: Uv, b: Uv, mut is_wanted: impl FnMut(Option<HoleCopy>) -> bool) -> bool {
+    /// Whether the straight line between two places crosses something that is wanted; `is_wanted` is asked of each hole beside it, and
+    /// with `None` of a border. Touching does not count, a corner between both sides does.
+    pub(super) fn crosses_any(&self, a: Uv, b: Uv, is_wanted: impl Fn(Option<HoleCopy>) -> bool) -> bool {
+        // Nine holes in ten are not wanted, and to ask that is cheaper.
+        self.any_beside(a, b, |hole, is_crossed| is_wanted(hole) && is_crossed())
+    }
+
+    /// Whether `is_found` says so of something beside the straight line between two places: it is given the hole, `None` for a border, and
+    /// what works out whether the line crosses it.
+    fn any_beside(
+        &self,
+        a: Uv,
+        b: Uv,
+        mut is_found: impl FnMut(Option<HoleCopy>, &dyn Fn() -> bool) -> bool,
+    ) -> bool {
         let slack = CROSSING_NOISE * (b - a).length();
         self.copies_beside([a, b]).any(|copy| {
             let by = self.displacement * f64::from(copy);
@@ -90,7 +102,7 @@ impl<'o> Obstacles<'o> {
             self.tree.any_meeting(&around, |k| {
                 let Run { chain, first_side } = self.runs[k as usize];
                 let hole = (chain < self.holes.len()).then_some(HoleCopy { hole: chain, copy });
-                self.chains[chain].run_is_crossed(first_side, moved) && is_wanted(hole)
+                is_found(hole, &|| self.chains[chain].run_is_crossed(first_side, moved))
             })
         })
     }

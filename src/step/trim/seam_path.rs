@@ -188,7 +188,7 @@ impl Search<'_> {
     /// Returns the shortest way from a start to a goal by way of these corners that no border bars, and no hole that `is_met`; `None`
     /// without one.
     fn way_by(&self, corners: &[Uv], is_met: &dyn Fn(HoleCopy) -> bool) -> Option<SeamPath> {
-        let is_free = |from: Uv, to: Uv| !self.obstacles.any_crossed(from, to, |hole| hole.is_none_or(is_met));
+        let is_free = |from: Uv, to: Uv| !self.obstacles.crosses_any(from, to, |hole| hole.is_none_or(is_met));
         let length = |a: Uv, b: Uv| (self.metric.du * (b.x - a.x) + self.metric.dv * (b.y - a.y)).length();
         let node = |place: Uv, length: f64| Node { place, length, before: None, settled: false };
         // Dijkstra's algorithm over the corners that see each other; the last leg is tried from each that is settled.
