@@ -8,7 +8,7 @@
 //! replicates, which is honest for random numbers, nets and split rays alike (batch means; with 128 replicates the
 //! error of the error is 6 %).
 
-use crate::math::variance_from_residuals;
+use crate::math::{variance_from_residuals, variance_of_sum};
 use serde::{Deserialize, Serialize};
 
 /// Quanta of an average ray when it leaves its source: 9.1e-13 of a ray is the finest share of power. Fewer, by a power of two, in runs
@@ -82,11 +82,18 @@ impl Sum {
     }
 
     /// Returns the standard error of the total, in quanta, from the spread of `replicates` replicates. The total itself of a single one,
-    /// and where the sums are full: both tell nothing of the spread.
+    /// and where the sum of squares is full: both tell nothing of the spread.
     pub fn error(&self, replicates: u32) -> f64 {
+        if self.squares == u128::MAX {
+            return self.total as f64;
+        }
         let n = u128::from(replicates.max(2));
         let (mean, rest) = (self.total / n, self.total % n);
-        let (false, Ok(mean)) = (self.squares == u128::MAX, u64::try_from(mean)) else { return self.total as f64 };
+        // Light that passes a receiver many times counts for more than was emitted: what no word holds is known to 1e-8.
+        let Ok(mean) = u64::try_from(mean) else {
+            let squares = self.squares as f64 * f64::from(1u32 << SQUARE_CUT);
+            return variance_of_sum(squares, self.total as f64, replicates as usize).sqrt();
+        };
         // In whole numbers: of replicates that differ by 1e-8 of themselves, as those of a smooth figure do, nothing would be left in an
         // `f64`. With the total T = m·n + r, T²/n is m·(T + r) + r²/n, of which the last term is far below the unit of squares.
         let sum = self.total + rest;
@@ -180,7 +187,10 @@ impl MomentSpread {
         for (sums, moment) in self.products.iter_mut().zip(m.as_list()) {
             let moment = moment >> CUT_MOMENT;
             // As squares of the power are: the product is cut, and not what is multiplied.
-            let product = moment.checked_mul(power).map_or(i128::MAX, |product| product >> CUT);
+            let product = match moment.checked_mul(power) {
+                Some(product) => product >> CUT,
+                None => moment.saturating_mul(power >> CUT),
+            };
             sums[0] = sums[0].saturating_add(product);
             sums[1] = sums[1].saturating_add(moment.saturating_mul(moment));
         }
@@ -248,6 +258,24 @@ mod tests {
             let expected = d as f64 * 128.0 / 127.0f64.sqrt();
             assert!((s.error(128) / expected - 1.0).abs() < 2e-3, "{d}: {} {expected}", s.error(128));
         }
+    }
+
+    /// Replicates of 2⁶⁵ and 2⁶⁵ + 2⁵⁵ quanta, more than words hold: the error of the sum is their difference.
+    #[test]
+    fn replicates_beyond_a_word_have_an_error() {
+        let (d, mut sum) = (1u128 << 55, Sum::default());
+        [1 << 65, (1 << 65) + d].iter().for_each(|quanta| sum.add_replicate(*quanta));
+        assert!((sum.error(2) / d as f64 - 1.0).abs() < 1e-6, "{}", sum.error(2));
+    }
+
+    /// A moment below zero times a power may be more than two words hold: the sum stays below zero.
+    #[test]
+    fn products_keep_their_sign_where_they_are_cut_first() {
+        let m = Moments { first: [-(1 << 104), 1 << 104], ..Moments::default() };
+        let mut spread = MomentSpread::default();
+        spread.add_replicate(1 << 60, &m);
+        let expected = 1i128 << (104 - CUT_MOMENT + 60 - CUT);
+        assert_eq!([0, 1].map(|axis| spread.products[axis][0]), [-expected, expected]);
     }
 
     #[test]
