@@ -67,8 +67,9 @@ struct CountedEnd {
 fn ends_at(receiver: &Receiver, path: &[PathVertex]) -> Vec<CountedEnd> {
     match &receiver.shape {
         Shape::Absorbed { faces } => {
-            // Faces that take nothing end ways without light.
-            let taken = path.iter().enumerate().filter_map(|(k, vertex)| Some((k, vertex, vertex.face?)));
+            // Faces that take nothing end ways without light. What splits off there, was taken from the path that it splits off.
+            let own = path.iter().enumerate().filter(|(_, vertex)| vertex.event != Event::Split);
+            let taken = own.filter_map(|(k, vertex)| Some((k, vertex, vertex.face?)));
             let counted = taken.filter(|(_, _, face)| faces.binary_search(face).is_ok());
             let end = |(k, vertex, face): (usize, &PathVertex, u32)| CountedEnd {
                 bounce: vertex.bounce,

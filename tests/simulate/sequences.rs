@@ -187,6 +187,22 @@ fn recorded_ways_are_the_sequences_that_were_counted() {
     }
 }
 
+/// What splits off at a face was there before: a face that takes a tenth of each ray that it splits ends one way for each.
+#[test]
+fn a_ray_that_splits_at_an_absorbing_face_has_one_way_there() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-9.0, -9.0, 0.0), Point::new(9.0, 9.0, 1.0));
+    let text = "[run]\nrays = 100\ninterfaces = 'split'\n\
+                [[material]]\npart = 'plate'\nsurface = 'coating'\nreflectance = 0.3\ntransmittance = 0.6\n\
+                [[source]]\nkind = 'collimated'\nat = [0, 0, -20]\ndirection = [0, 0, 1]\n\
+                [[receiver]]\nname = 'taken'\nkind = 'absorbed'\non = { part = 'plate', face = 'z0' }\n";
+    let results = world.run(text, |s| s.path_samples = s.rays);
+    let scene = Scene::parse(text, "test.toml", Path::new(".")).unwrap();
+    let ways = recorded_ways(&scene.bind(&world.model).unwrap(), &RunSettings::from(&scene.run), 0, &results);
+    let straight = ways.iter().filter(|way| way.sequence.steps.len() == 1).count();
+    assert!(straight == 100 && ways.iter().all(|way| way.points.len() > 1), "{straight} of {}", ways.len());
+}
+
 /// What recorded paths brought to a receiver that lets light pass is what it counted, whatever the medium and the faces after it take.
 #[test]
 fn arrivals_at_a_passing_receiver_have_the_power_that_it_counted() {
