@@ -109,6 +109,15 @@ fn faces_that_shine_as_points_do_are_told_of() {
         let notes = world.run(&text, |_| ()).notes;
         assert_eq!(notes.iter().any(|n| n.contains("the same intensity in every direction")), is_told, "{notes:?}");
     }
+    // Of many the others are counted, by what they do.
+    let source = "[[source]]\non = { part = 'chip', face = 'z1' }\n";
+    let notes = world.run(&format!("[run]\nrays = 100\n{}{FAR}", source.repeat(11)), |_| ()).notes;
+    assert_eq!(
+        notes.iter().filter(|n| n.contains("the same intensity in every direction")).count(),
+        8,
+        "{notes:?}"
+    );
+    assert!(notes.iter().any(|n| n.starts_with("3 more sources shine evenly")), "{notes:?}");
 }
 
 /// A chip of 2 × 2 × 1 mm lying on a wide black board with all its faces named: the one it lies on does not shine. Of the power a third

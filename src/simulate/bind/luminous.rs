@@ -1,23 +1,28 @@
 //! The faces that a source shines from, and what lies against them.
 
+use super::notes::NAMED;
 use super::select::{FaceSearch, select_faces};
 use crate::math::{Aabb, BoxTree};
 use crate::model::{Model, PlacedFace};
 use crate::simulate::emitter::{Area, Cover, CoveredArea};
 use crate::simulate::scene::{Key, Scene, SourceKind};
 use crate::simulate::{Error, ErrorKind};
-use crate::text::{count_of, figures};
+use crate::text::{count_of, figures, first_sentences};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 /// Share of the named area from which on it is told that it is covered: a sample of a thousand on one of a few faces.
 const TOLD_SHARE: f64 = 1e-3;
 
-/// The luminous faces of a source.
-pub(super) struct Luminous {
-    pub(super) area: Area,
-    /// Sentences about what of the named faces does not shine.
-    pub(super) notes: Vec<String>,
+/// Sentences about luminous faces, by what they say.
+#[derive(Default)]
+struct LuminousNotes {
+    /// Sources that shine evenly in all directions.
+    even: Vec<String>,
+    /// Faces that do not shine, being ready meshes.
+    dark: Vec<String>,
+    /// Areas that are covered.
+    covered: Vec<String>,
 }
 
 /// Finds the faces that the sources of a scene shine from, and the opaque faces that lie against these.
@@ -34,6 +39,7 @@ pub(super) struct LuminousSearch<'m> {
     places: Vec<Option<usize>>,
     /// What was made of opaque faces to cover others, by their places; `None` for a ready mesh.
     covers: HashMap<usize, Option<Arc<Cover>>>,
+    notes: LuminousNotes,
 }
 
 impl<'m> LuminousSearch<'m> {
@@ -54,7 +60,17 @@ impl<'m> LuminousSearch<'m> {
             places[face.id.index()] = Some(place);
         }
         let (search, tree) = (FaceSearch::new(model), BoxTree::new(&boxes));
-        Some(Self { scene, model, search, faces, boxes, tree, places, covers: HashMap::new() })
+        Some(Self {
+            scene,
+            model,
+            search,
+            faces,
+            boxes,
+            tree,
+            places,
+            covers: HashMap::new(),
+            notes: LuminousNotes::default(),
+        })
     }
 
     /// Returns the faces that a source shines from, ready for points to be drawn on them; `None` for a source that is not on faces.
@@ -62,7 +78,7 @@ impl<'m> LuminousSearch<'m> {
     ///
     /// # Errors
     /// When its selector means no face, faces without area, or faces that are covered throughout.
-    pub(super) fn luminous_faces(&mut self, index: usize, labels: &[String]) -> Result<Option<Luminous>, Error> {
+    pub(super) fn luminous_faces(&mut self, index: usize, labels: &[String]) -> Result<Option<Area>, Error> {
         let (scene, model) = (self.scene, self.model);
         let Some(on) = &scene.sources[index].on else { return Ok(None) };
         let base = [Key::Name("source"), Key::Index(index), Key::Name("on")];
@@ -71,12 +87,11 @@ impl<'m> LuminousSearch<'m> {
         let Some(area) = Area::new(model, &chosen, &covers) else {
             return Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from"));
         };
-        let name = &scene.sources[index].name;
-        let source = if name.is_empty() { format!("[[source]] {}", index + 1) } else { format!("'{name}'") };
-        let even = (scene.sources[index].kind == SourceKind::Point).then(|| even_note(&source));
-        let mut notes: Vec<String> = even.into_iter().chain(dark_note(&source, model, &chosen)).collect();
+        let source = scene.source_label(index);
+        self.notes.even.extend((scene.sources[index].kind == SourceKind::Point).then(|| even_note(&source)));
+        self.notes.dark.extend(dark_note(&source, model, &chosen));
         if covers.is_empty() {
-            return Ok(Some(Luminous { area, notes }));
+            return Ok(Some(area));
         }
         let measured = area.measure_cover();
         let [whole, free] =
@@ -87,8 +102,25 @@ impl<'m> LuminousSearch<'m> {
             return Err(error.help("name faces that are free, or give what lies against them a `medium`"));
         }
         let share = 1.0 - free / whole;
-        notes.extend((share >= TOLD_SHARE).then(|| covered_note(&source, model, labels, &measured, share)));
-        Ok(Some(Luminous { area, notes }))
+        let note = (share >= TOLD_SHARE).then(|| covered_note(&source, model, labels, &measured, share));
+        self.notes.covered.extend(note);
+        Ok(Some(area))
+    }
+
+    /// Returns what is to be told of the faces that were found: of each kind the first sentences, and one that counts the others.
+    pub(super) fn into_notes(self) -> Vec<String> {
+        let LuminousNotes { even, dark, covered } = self.notes;
+        let kinds = [
+            (even, "shine evenly in all directions too"),
+            (dark, "name ready meshes too, which do not shine"),
+            (covered, "have areas that are covered in the same way"),
+        ];
+        let told = |(sentences, what): (Vec<String>, &str)| {
+            first_sentences(sentences, NAMED, |further| {
+                format!("{} {what}", count_of(further as u64, "more source"))
+            })
+        };
+        kinds.into_iter().flat_map(told).collect()
     }
 
     /// Returns for each chosen face that is opaque the opaque faces of other shells that come within the glue distance of its box, by the
@@ -138,11 +170,11 @@ impl<'m> LuminousSearch<'m> {
     }
 }
 
-/// Returns the sentence about a source on faces of the kind that none is given for.
+/// Returns the sentence about a source on faces of the default kind.
 fn even_note(source: &str) -> String {
     format!(
-        "{source} shines from each point of its faces with the same intensity in every direction, as `kind = \"point\"` has it, which no kind \
-         means too; faces of lamps mostly shine by the cosine law, `kind = \"lambertian\"`"
+        "{source} shines from each point of its faces with the same intensity in every direction (`kind = \"point\"`, the default); most \
+         luminous faces follow the cosine law: `kind = \"lambertian\"`"
     )
 }
 

@@ -80,16 +80,12 @@ impl Scene {
         let opaque: Vec<bool> = faces.iter().map(is_opaque).collect();
         let mut search = LuminousSearch::new(self, model, &opaque);
         let mut emitters = Vec::new();
-        let mut cover_notes = Vec::new();
         for (i, loaded) in loaded.into_iter().enumerate() {
-            let luminous = search.as_mut().map_or(Ok(None), |search| search.luminous_faces(i, &labels))?;
-            let area = luminous.map(|luminous| {
-                cover_notes.extend(luminous.notes);
-                luminous.area
-            });
+            let area = search.as_mut().map_or(Ok(None), |search| search.luminous_faces(i, &labels))?;
             // Emitters need bodies: a source says by name what it lies in.
             emitters.push(Emitter::new(self, i, &bodies, &light, loaded, area)?.placed(&source_frames[i]));
         }
+        let luminous_notes = search.map_or_else(Vec::new, LuminousSearch::into_notes);
         let receivers = bind_receivers(self, model)?;
         let faces_box = model.surface_bounds();
         let scene_box = receivers.iter().map(Receiver::bounds).fold(faces_box, Aabb::union);
@@ -120,7 +116,7 @@ impl Scene {
         bound.notes.extend(notes::replaced_rules_note(&bound.rules));
         bound.solids = (bound.emitters.len() >= MANY_SOURCES).then(|| bodies::solids(&bound, model, margin));
         bound.notes.extend(file_notes);
-        bound.notes.extend(notes::first_cover_notes(cover_notes));
+        bound.notes.extend(luminous_notes);
         bound.notes.extend(notes::opening_note(&bound, model));
         bound.notes.extend(notes::shut_body_note(&bound, &chosen));
         bound.notes.extend(notes::thin_body_note(&bound));

@@ -15,8 +15,8 @@ use std::collections::BTreeSet;
 /// Share of a wavelength that the end of a table may be missed by: a unit that was converted to nm and back.
 const ROUNDING: f64 = 1e-9;
 
-/// Tables, media and remarks on files that are named; of more the number is told.
-const NAMED: usize = 8;
+/// Tables, media, sources and remarks on files that are named; of more the number is told.
+pub(super) const NAMED: usize = 8;
 
 /// A property that is known between two wavelengths alone, nm, and what it is called in a sentence.
 struct KnownRange {
@@ -108,13 +108,6 @@ pub(super) fn source_file_notes(scene: &Scene, loaded: &[Option<Loaded>]) -> Vec
     });
     first_sentences(sentences, NAMED, |further| {
         format!("the files of sources lead to {}", count_of(further as u64, "more remark"))
-    })
-}
-
-/// Returns the first of these sentences about sources whose area is covered, and one that counts the others.
-pub(super) fn first_cover_notes(sentences: Vec<String>) -> Vec<String> {
-    first_sentences(sentences, NAMED, |further| {
-        format!("areas of {} are covered in the same way", count_of(further as u64, "more source"))
     })
 }
 
