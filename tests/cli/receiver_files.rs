@@ -205,6 +205,23 @@ fn the_rays_of_data_3_are_those_that_arrived() {
     }
 }
 
+/// One cell is no map, but rays came there all the same.
+#[test]
+fn a_receiver_of_one_cell_has_files_of_its_rays() {
+    let (folder, found) = trace(
+        "lm",
+        "[[receiver]]\nname = 'plane'\nat = [0, 0, 100]\nsize = [300, 200]\ncells = [1, 1]\nabsorbs = false\n\
+         [[receiver]]\nname = 'disc'\nkind = 'disc'\nat = [0, 0, 200]\nradius = 300\ncells = [1, 1]\n",
+    );
+    for (k, files) in [&["plane.tm25ray", "plane.data3"][..], &["disc.tm25ray"]].into_iter().enumerate() {
+        let receiver = &found["receivers"][k];
+        assert_eq!(receiver["files"], serde_json::json!(files));
+        let file = read_tm25(&folder.path().join("out").join(files[0])).unwrap();
+        let expected = receiver["power"].as_f64().unwrap();
+        assert!(file.header.rays > 100 && (f64::from(file.header.luminous_flux) / expected - 1.0).abs() < 1e-6);
+    }
+}
+
 /// What a far field wrote as LM-63 is the same light again as a source, the right way round.
 #[test]
 fn an_ies_file_read_as_a_source_is_the_light_it_was_written_from() {

@@ -72,6 +72,16 @@ fn the_spline_and_a_ready_mesh_answer_together() {
     assert!(note.contains("'net' (#7)") && note.contains("not known"), "{note}");
 }
 
+/// A source on the ball and the mesh of 16 × 16 mm shines from the ball alone, and says so.
+#[test]
+fn a_ready_mesh_does_not_shine() {
+    let text = "[[source]]\nkind = 'lambertian'\non = { part = '*' }\n";
+    let scene = Scene::parse(text, "mesh.toml", Path::new(".")).unwrap();
+    let notes = scene.bind(&with_ready_plate(with_ball())).unwrap().notes().join("\n");
+    assert!(notes.contains("1 of the 2 faces that [[source]] 1 names do not shine"), "{notes}");
+    assert!(notes.contains("(256 mm²)"), "{notes}");
+}
+
 /// The ball is round: facets change its light, whatever else the model holds.
 #[test]
 fn a_ready_mesh_takes_no_error_from_curved_faces() {

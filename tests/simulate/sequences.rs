@@ -235,6 +235,25 @@ fn arrivals_at_a_passing_receiver_have_the_power_that_it_counted() {
     }
 }
 
+/// A receiver ends light a rounding before itself: rays that come from a tenth of a millimetre before it arrive all the same, near the
+/// origin and a kilometre off.
+#[test]
+fn arrivals_right_before_a_receiver_are_all_there() {
+    for x in [0.0, 1e6] {
+        let text = format!(
+            "[run]\nrays = 1000\n[[source]]\nkind = 'cone'\nhalf_angle_deg = 20\nat = [{x}, 0, 0]\n\
+             [[receiver]]\nname = 'near'\nat = [{x}, 0, 0.1]\nsize = [1, 1]\n"
+        );
+        let world = World::default();
+        let results = world.run(&text, |s| s.path_samples = s.rays);
+        let scene = Scene::parse(&text, "test.toml", Path::new(".")).unwrap();
+        let bound = scene.bind(&world.model).unwrap();
+        let rays = arrivals(&bound, &RunSettings::from(&scene.run), 0, &results);
+        let arrived: f64 = rays.iter().map(|ray| ray.power).sum();
+        assert!(rays.len() == 1000 && (arrived - 1.0).abs() < 1e-9, "{x}: {} rays, {arrived} W", rays.len());
+    }
+}
+
 /// Where every ray is recorded those of a wavelength bring what its bin counted, from two sources of three lines.
 #[test]
 fn arrivals_have_the_wavelengths_that_were_counted() {
