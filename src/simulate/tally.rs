@@ -87,21 +87,38 @@ impl Sum {
         if self.squares == u128::MAX {
             return self.total as f64;
         }
-        let n = u128::from(replicates.max(2));
-        let (mean, rest) = (self.total / n, self.total % n);
         // Light that passes a receiver many times counts for more than was emitted: what no word holds is known to 1e-8.
-        let Ok(mean) = u64::try_from(mean) else {
+        let Some(residuals) = self.residuals(replicates) else {
             let squares = self.squares as f64 * f64::from(1u32 << SQUARE_CUT);
             return variance_of_sum(squares, self.total as f64, replicates as usize).sqrt();
         };
-        // In whole numbers: of replicates that differ by 1e-8 of themselves, as those of a smooth figure do, nothing would be left in an
-        // `f64`. With the total T = m·n + r, T²/n is m·(T + r) + r²/n, of which the last term is far below the unit of squares.
-        let sum = self.total + rest;
-        let [high, low] = [sum >> 64, sum & u128::from(u64::MAX)].map(|word| word * u128::from(mean));
-        let expected = (high << (64 - SQUARE_CUT)) + (low >> SQUARE_CUT);
-        let residuals = self.squares.saturating_sub(expected) as f64 * f64::from(1u32 << SQUARE_CUT);
         variance_from_residuals(residuals, replicates as usize).sqrt()
     }
+
+    /// Returns the sum of the squares of the replicates' distances from their mean, in quanta²; `None` where no words hold what is needed.
+    ///
+    /// In whole numbers: of replicates that differ by 1e-8 of themselves, as those of a smooth figure do, an `f64` would leave nothing.
+    fn residuals(&self, replicates: u32) -> Option<f64> {
+        let n = u128::from(replicates.max(2));
+        let (mean, rest) = (self.total / n, self.total % n);
+        // With the total T = m·n + r, T²/n is m·(T + r) + r²/n, of which the last term is far below the unit of squares.
+        let expected = cut_product(u64::try_from(mean).ok()?, self.total + rest, SQUARE_CUT)?;
+        Some(self.squares.saturating_sub(expected) as f64 * f64::from(1u32 << SQUARE_CUT))
+    }
+}
+
+/// Returns a product without so many of its lowest bits, up to 63; `None` where it would be more than two words.
+fn cut_product(a: u64, b: u128, cut: u32) -> Option<u128> {
+    let [high, low] = [b >> 64, b & u128::from(u64::MAX)].map(|word| word * u128::from(a));
+    high.checked_mul(1 << (64 - cut))?.checked_add(low >> cut)
+}
+
+/// Returns what a sum of products over `n` replicates would be if all of them were equal: a·b/n of the sums `a` and `b` of the factors,
+/// without so many of its lowest bits; `None` where no words hold it.
+fn product_of_equal_parts(a: u128, b: u128, n: u128, cut: u32) -> Option<u128> {
+    let [mean_a, mean_b] = [a / n, b / n].map(|mean| u64::try_from(mean).ok());
+    // With a = m·n + r, a·b/n is m·b + r·b/n.
+    cut_product(mean_a?, b, cut)?.checked_add(cut_product(mean_b?, a % n, cut)?)
 }
 
 /// First and second moments of where light arrives, in fixed point, so that spot sizes are order-free too.
@@ -207,7 +224,6 @@ impl MomentSpread {
     pub fn errors(&self, power: &Sum, m: &Moments, replicates: u32) -> [f64; 4] {
         let total = power.total.max(1) as f64;
         let unit = [f64::from(1u32 << CUT), 2f64.powi(CUT_MOMENT as i32) / GRAIN];
-        let squares = power.squares as f64 * unit[0] * unit[0];
         let moments = m.as_list();
         let full = |sum: i128| sum == i128::MAX || sum == i128::MIN;
         std::array::from_fn(|i| {
@@ -219,12 +235,35 @@ impl MomentSpread {
                 return 1.0;
             }
             let mean = moments[i] as f64 / GRAIN / total;
-            let [with_power, with_self] = self.products[i].map(|x| x as f64 * unit[1]);
+            // What no words hold is known to 1e-8, as it is of the power.
+            let [with_power, with_self, squares] =
+                self.residuals(i, moments[i], power, replicates).unwrap_or_else(|| {
+                    let [with_power, with_self] = self.products[i].map(|x| x as f64);
+                    [with_power, with_self, power.squares as f64 * unit[0] * unit[0]]
+                });
+            let [with_power, with_self] = [with_power * unit[1], with_self * unit[1]];
             // First order in the fluctuations of a ratio (the delta method): the moment less the mean times the
             // power.
             let spread = with_self * unit[1] - 2.0 * mean * with_power * unit[0] + mean * mean * squares;
             variance_from_residuals(spread.max(0.0), replicates as usize).sqrt() / total
         })
+    }
+
+    /// Returns the products of moment `i`, whose sum is `moment`, with the power and with itself, in their units, and the squares of the
+    /// power in quanta², each less what replicates that are all equal would have: all three terms of a spread lose the same by that, and
+    /// their difference keeps its digits, as in [`Sum::residuals`]. `None` where no words hold what is needed.
+    fn residuals(&self, i: usize, moment: i128, power: &Sum, replicates: u32) -> Option<[f64; 3]> {
+        let n = u128::from(replicates.max(2));
+        let moment = moment >> CUT_MOMENT;
+        let size = moment.unsigned_abs();
+        let of_power = i128::try_from(product_of_equal_parts(size, power.total, n, CUT)?).ok()? * moment.signum();
+        let of_self = i128::try_from(product_of_equal_parts(size, size, n, 0)?).ok()?;
+        let [with_power, with_self] = self.products[i];
+        Some([
+            with_power.checked_sub(of_power)? as f64,
+            with_self.checked_sub(of_self)? as f64,
+            power.residuals(replicates)?,
+        ])
     }
 }
 
@@ -324,6 +363,28 @@ mod tests {
         }
         for (found, expected) in spread.errors(&power, &whole, 2).into_iter().zip([0.125, 0.0, 0.09375, 0.0]) {
             assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+    }
+
+    /// Half of 128 replicates lie `d` half sides on one side of their mean, half as much on the other: the mean's error is d/√127, down to
+    /// 1e-10 of it.
+    #[test]
+    fn places_that_are_nearly_equal_keep_their_error() {
+        for bits in [20, 27, 33] {
+            let (mut whole, mut spread, mut power) = (Moments::default(), MomentSpread::default(), Sum::default());
+            for k in 0..128 {
+                let (middle, d) = (1i128 << 81, 1i128 << (82 - bits));
+                let x = if k % 2 == 0 { middle + d } else { middle - d };
+                let first = [x, -x];
+                let m = Moments { first, second: first.map(i128::unsigned_abs), farthest: 0 };
+                spread.add_replicate(1 << 50, &m);
+                power.add_replicate(1 << 50);
+                whole.merge(&m);
+            }
+            let expected = 0.5f64.powi(bits) / 127f64.sqrt();
+            for error in spread.errors(&power, &whole, 128) {
+                assert!((error / expected - 1.0).abs() < 2e-3, "{bits}: {error} {expected}");
+            }
         }
     }
 
