@@ -717,6 +717,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "own_wavelengths",
             "running_sums",
+            "flux_conversion",
             "ray_list",
             "measured",
             "stream",

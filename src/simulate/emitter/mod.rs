@@ -5,6 +5,7 @@
 mod area;
 mod cover;
 mod far;
+mod flux_conversion;
 mod measured;
 mod mixed_packet;
 mod own_wavelengths;

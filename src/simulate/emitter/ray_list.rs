@@ -1,10 +1,11 @@
 //! Measured rays as a source draws them, in the unit that the run counts.
 
+use super::flux_conversion::{Conversion, Fault, conversion, file_spectrum, unseen_light, unseen_lumens};
 use super::own_wavelengths::OwnWavelengths;
 use super::running_sums::RunningSums;
 use crate::formats::{self, Flux, LightRay, RayBlock, RayFile};
 use crate::math::Aabb;
-use crate::optics::{Spectrum, Table, Wavelengths, xyz_of_watt};
+use crate::optics::{Wavelengths, xyz_of_watt};
 use crate::simulate::scene::{PowerUnit, Source};
 use std::sync::Arc;
 
@@ -43,17 +44,6 @@ pub(crate) struct RayList {
     pub(crate) own_wavelengths: Arc<OwnWavelengths>,
 }
 
-/// What makes power in one unit of power in another.
-#[derive(Clone, Copy, Debug)]
-enum Conversion {
-    /// One factor for all rays.
-    Factor(f64),
-    /// Lumens of watts, by what the eye sees at each ray's own wavelength.
-    LumensOfEachRay,
-    /// Watts of lumens, likewise.
-    WattsOfEachRay,
-}
-
 /// The block of a [`RayList`] that was read last, for one who draws rays.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ListCursor {
@@ -64,36 +54,23 @@ pub(crate) struct ListCursor {
     sums: Vec<f64>,
 }
 
-/// What is wrong with a ray file, and what to do about it.
-pub(super) struct Fault {
-    pub(super) message: String,
-    pub(super) help: String,
-}
-
-impl Fault {
-    fn new(message: impl Into<String>, help: impl Into<String>) -> Self {
-        Self { message: message.into(), help: help.into() }
-    }
-}
-
 impl RayList {
     /// Makes the rays of a file the source of a run that counts in `unit`.
     ///
-    /// Watts become lumens where the file or the scene gives wavelengths; a note says so.
+    /// Watts become lumens, and lumens watts, where the file or the scene gives wavelengths; a note says so.
     ///
     /// # Errors
     /// When the unit cannot be converted and the scene does not give the source's power (with it, the file's powers are relative), when the
-    /// eye sees nothing of the file's spectrum, or when the powers add up to 0 or to no finite number.
+    /// eye sees nothing of the light of a run that counts lumens, or when the powers add up to 0 or to no finite number.
     pub(super) fn new(mut file: RayFile, source: &Source, unit: PowerUnit) -> Result<Self, Fault> {
-        let mut notes = std::mem::take(&mut file.notes);
+        let notes = std::mem::take(&mut file.notes);
         let table = file_spectrum(&file)?;
         let is_other = matches!(
             (file.flux, unit),
             (Some(Flux::Radiant), PowerUnit::Lumen) | (Some(Flux::Luminous), PowerUnit::Watt)
         );
         let converted = if is_other { conversion(&file, table.as_ref(), source, unit)? } else { None };
-        let (conversion, note) = converted.unzip();
-        notes.extend(note);
+        let (conversion, mut note) = converted.unzip();
         let spectrum = match unit {
             PowerUnit::Watt => table,
             PowerUnit::Lumen => table.map(|t| t.photometric()).transpose().map_err(|_| {
@@ -111,33 +88,63 @@ impl RayList {
             origins: Aabb::EMPTY,
             own_wavelengths: Arc::default(),
         };
-        list.survey()?;
+        if let Some(nm) = list.survey()? {
+            if source.power.is_none() {
+                return Err(unseen_lumens("the light of one of its rays", [nm; 2]));
+            }
+            list.conversion = Conversion::Factor(1.0);
+            list.survey()?;
+            let light = unseen_light("the light of one of its rays", [nm; 2]);
+            note = Some(format!("its lumens were taken as they are for the proportions of its rays, as {light}"));
+        }
+        list.notes.extend(note);
         let sum = list.power();
         if !sum.is_finite() {
             let message = "the powers of this list add up to no finite number";
             return Err(Fault::new(message, "give powers in the unit of the run"));
         }
         if sum <= 0.0 {
-            return Err(Fault::new("the rays of this list carry no power", "give another file"));
+            return Err(list.darkness());
         }
         Ok(list)
     }
 
-    /// Reads the whole list once: adds up its powers, and notes where the rays start and which wavelengths they have.
+    /// Returns why a list whose powers add up to 0 is refused.
+    fn darkness(&self) -> Fault {
+        let is_unseen = |nm: &f64| xyz_of_watt(*nm)[1] == 0.0;
+        match self.own_wavelengths.range() {
+            Some(range)
+                if matches!(self.conversion, Conversion::LumensOfEachRay)
+                    && self.own_wavelengths.ascending().iter().all(is_unseen) =>
+            {
+                let light = unseen_light("the light of this list", range);
+                Fault::new(format!("this run counts lumens, and {light}"), "set `unit = \"W\"` in [run]")
+            }
+            _ => Fault::new("the rays of this list carry no power", "give another file"),
+        }
+    }
+
+    /// Reads the whole list once: adds up its powers, and notes where the rays start and which wavelengths they have. Returns the
+    /// wavelength, nm, of the first ray whose lumens cannot be made watts, as the eye sees nothing of it; `None` where there is none.
     ///
     /// # Errors
     /// When the file cannot be read.
-    fn survey(&mut self) -> Result<(), Fault> {
+    fn survey(&mut self) -> Result<Option<f64>, Fault> {
         let changed = |e: formats::Error| Fault::new(e.to_string(), "leave the file as it is while it is in use");
         let mut sums = Vec::new();
         let mut wavelengths = OwnWavelengths::default();
         let mut block = RayBlock::default();
         let mut sum = 0.0;
+        let mut unseen = None;
         for first in (0..self.len()).step_by(SURVEYED) {
             self.file.read_block(first, SURVEYED, &mut block).map_err(changed)?;
             for k in 0..block.len() {
                 let ray = self.file.ray(&block, k).map_err(changed)?;
-                sum += self.power_of(&block, k);
+                let power = self.power_of(&block, k);
+                if power.is_infinite() && matches!(self.conversion, Conversion::WattsOfEachRay) {
+                    unseen = unseen.or(ray.wavelength_nm.filter(|nm| xyz_of_watt(*nm)[1] == 0.0));
+                }
+                sum += power;
                 self.origins = self.origins.union(Aabb::from_points([ray.origin]));
                 ray.wavelength_nm.into_iter().for_each(|nm| wavelengths.add(nm));
                 let read = first + k as u64 + 1;
@@ -148,7 +155,7 @@ impl RayList {
         }
         self.sums = Arc::new(RunningSums::new(sums));
         self.own_wavelengths = Arc::new(wavelengths);
-        Ok(())
+        Ok(unseen)
     }
 
     /// Number of rays.
@@ -245,61 +252,6 @@ impl RayList {
     }
 }
 
-/// Returns the spectrum that a file gives for all its rays, by its watts; `None` where it gives none.
-///
-/// # Errors
-/// When its rows are no spectrum.
-fn file_spectrum(file: &RayFile) -> Result<Option<Wavelengths>, Fault> {
-    let Some(pairs) = &file.spectrum else { return Ok(None) };
-    let spectrum = match pairs[..] {
-        [[nm, _]] => Ok(Spectrum::line(nm)),
-        _ => Table::new("the spectrum of this file", pairs.iter().map(|p| (p[0], p[1]))).map(Spectrum::Table),
-    };
-    let sampler = spectrum.and_then(|s| s.sampler());
-    sampler.map(Some).map_err(|e| Fault::new(e.to_string(), "give the source a `spectrum` and mend the file's"))
-}
-
-/// Returns what makes lumens of a file's watts, or watts of its lumens, whichever `unit` is: the lumens to a watt of the scene's spectrum,
-/// else of the file's, else of each ray's own wavelength, and a note that says so; `None` where there are no wavelengths but the scene
-/// gives the source's power.
-///
-/// # Errors
-/// When there are neither wavelengths nor such a power.
-fn conversion(
-    file: &RayFile,
-    table: Option<&Wavelengths>,
-    source: &Source,
-    unit: PowerUnit,
-) -> Result<Option<(Conversion, String)>, Fault> {
-    let [from, to, other] = match unit {
-        PowerUnit::Lumen => ["watts", "lumens", "W"],
-        PowerUnit::Watt => ["lumens", "watts", "lm"],
-    };
-    let of_scene = source.spectrum.as_ref().and_then(|key| key.optics().ok()?.sampler().ok());
-    if let Some(spectrum) = of_scene.as_ref().or(table) {
-        let lumens = spectrum.xyz()[1];
-        let whose = if of_scene.is_some() { "the scene's" } else { "the file's" };
-        let factor = if unit == PowerUnit::Lumen { lumens } else { 1.0 / lumens };
-        let note = format!("its {from} were made {to} by {whose} spectrum, {lumens:.4} lm/W");
-        return Ok(Some((Conversion::Factor(factor), note)));
-    }
-    if file.spectral_rays() == file.len() {
-        let conversion = match unit {
-            PowerUnit::Lumen => Conversion::LumensOfEachRay,
-            PowerUnit::Watt => Conversion::WattsOfEachRay,
-        };
-        return Ok(Some((conversion, format!("its {from} were made {to}, each ray by its wavelength"))));
-    }
-    // Nothing tells how bright the light of a watt is; the scene's own power makes that a matter of proportion.
-    if source.power.is_some() {
-        return Ok(None);
-    }
-    Err(Fault::new(
-        format!("this file gives {from} and no wavelengths, but the run counts {to}"),
-        format!("set `unit = \"{other}\"` in [run], or give the source's `spectrum`, or its `power` in {to}"),
-    ))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -328,6 +280,39 @@ mod tests {
             );
             assert!(list.notes[0].contains("each ray by its wavelength"), "{:?}", list.notes);
         }
+    }
+
+    /// No watts can be made of lumens that the eye sees nothing of: with the source's power they are proportions, without they are refused.
+    #[test]
+    fn lumens_that_the_eye_does_not_see_are_proportions_at_best() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rays.csv");
+        let list = |own: [Option<f64>; 2], spectrum: Option<[f64; 2]>, power: Option<f64>, unit: PowerUnit| {
+            let ray =
+                |wavelength_nm| LightRay { origin: Point::ZERO, direction: Vector::Z, power: 1.0, wavelength_nm };
+            write_rays(&path, &own.map(ray)).unwrap();
+            let mut file = RayFile::open(&path, Flux::Radiant).unwrap();
+            file.flux = Some(if unit == PowerUnit::Watt { Flux::Luminous } else { Flux::Radiant });
+            file.spectrum = spectrum.map(|line| vec![line]);
+            RayList::new(file, &Source { power, ..Source::default() }, unit)
+        };
+        for (own, spectrum) in [([Some(555.0), Some(940.0)], None), ([None; 2], Some([940.0, 1.0]))] {
+            let fault = list(own, spectrum, None, PowerUnit::Watt).unwrap_err();
+            assert!(fault.message.contains("940 nm") && fault.help.contains("`power`"), "{}", fault.message);
+            let list =
+                list(own, spectrum, Some(3.0), PowerUnit::Watt).unwrap_or_else(|fault| panic!("{}", fault.message));
+            let mut cursor = ListCursor::default();
+            assert_eq!([0, 1].map(|k| list.ray(k, &mut cursor).unwrap().power), [1.0; 2]);
+            // One spectrum for all leaves the proportions as they are.
+            assert_eq!(
+                list.notes.iter().any(|note| note.contains("940 nm")),
+                spectrum.is_none(),
+                "{:?}",
+                list.notes
+            );
+        }
+        let dark = list([Some(940.0); 2], None, None, PowerUnit::Lumen).unwrap_err();
+        assert!(dark.message.contains("940 nm"), "{}", dark.message);
     }
 
     /// The ray at a share is the first whose running sum of powers, added from the first ray on, passes it, in whichever order shares are
