@@ -344,6 +344,26 @@ fn receivers_that_overlap_in_one_plane_are_named() {
     assert_eq!(back_to_back, "");
 }
 
+/// Of 1030 receivers whose boxes all meet there are more pairs than are compared: 530 thousand.
+#[test]
+fn receivers_that_are_too_many_to_be_compared_are_told() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 3.0));
+    let told = |keys: fn(usize) -> String| {
+        let receiver =
+            |k: usize| format!("[[receiver]]\nname = 'r{k}'\ncells = [1, 1]\nat = [0, 0, 20]\n{}\n", keys(k));
+        bound(&world.model, &(0..1030).map(receiver).collect::<String>()).unwrap().notes().join("\n")
+    };
+    let crossing = told(|k| format!("size = [2, 2]\nnormal = [1, 0, {}]", k as f64 / 500.0));
+    assert!(crossing.contains("more receivers than are named may lie in one plane"), "{crossing}");
+    assert!(!crossing.contains("at least"), "{crossing}");
+    // Those that let light pass are no rivals of any.
+    assert_eq!(told(|_| "size = [2, 2]\nabsorbs = false".into()), "");
+    // The first five lie in one plane: ten pairs, and others may come behind what is compared.
+    let late = told(|k| format!("size = [2, 2]\nnormal = [1, 0, {}]", if k > 4 { k as f64 / 500.0 } else { 0.0 }));
+    assert!(late.contains("for at least 7 more pairs of receivers"), "{late}");
+}
+
 /// Of many receivers in one plane, or in one face, three notes name some and one counts the others: of `n` that all overlap there are
 /// n (n − 1)/2 pairs, of which a thousand are counted.
 #[test]

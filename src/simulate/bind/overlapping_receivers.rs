@@ -3,18 +3,19 @@
 use super::bound_scene::BoundScene;
 use crate::math::{Aabb, BoxTree, Point};
 use crate::simulate::receiver::{FlatShape, NAMED_RECEIVERS, Receiver};
-use crate::text::{count_of, first_sentences};
+use crate::text::{count_of, first_sentences, grouped};
 
-/// A flat receiver.
+/// A flat receiver that ends light.
 struct Candidate<'r> {
     receiver: &'r Receiver,
     flat: FlatShape<'r>,
 }
 
 impl<'r> Candidate<'r> {
-    /// `None` for a receiver that is not flat.
+    /// `None` for a receiver that is not flat or lets light pass.
     fn new(receiver: &'r Receiver) -> Option<Self> {
-        Some(Self { receiver, flat: receiver.flat()? })
+        let flat = receiver.flat().filter(|_| receiver.absorbs)?;
+        Some(Self { receiver, flat })
     }
 
     /// Whether another one lies in its plane and beyond none of its sides.
@@ -28,12 +29,11 @@ impl<'r> Candidate<'r> {
         seen.iter().all(|p| p.z.abs() <= near) && reaches(|p| p.x, half[0]) && reaches(|p| p.y, half[1])
     }
 
-    /// Whether light that meets both ends on one of them before the other counts it: not where one lets it pass, nor where each looks away
-    /// from the other.
+    /// Whether light that meets both ends on one of them before the other counts it: not where each looks away from the other.
     fn competes_with(&self, other: &Self) -> bool {
         let are_back_to_back =
             self.flat.is_one_sided && other.flat.is_one_sided && self.flat.frame.z.dot(other.flat.frame.z) < 0.0;
-        self.receiver.absorbs && other.receiver.absorbs && !are_back_to_back
+        !are_back_to_back
     }
 }
 
@@ -43,13 +43,15 @@ const MOST_COUNTED: usize = 1000;
 const MOST_ASKED: usize = 1 << 19;
 
 /// Returns sentences about flat receivers that both absorb and overlap in one plane: one for each of the first pairs, and one that counts
-/// the others, up to [`MOST_COUNTED`].
+/// the others, up to [`MOST_COUNTED`], or says that not all were compared.
 pub(super) fn overlapping_receiver_notes(bound: &BoundScene) -> Vec<String> {
     let flat: Vec<Candidate<'_>> = bound.receivers.iter().filter_map(Candidate::new).collect();
     let boxes: Vec<Aabb> = flat.iter().map(|c| c.receiver.bounds().grown(c.flat.near())).collect();
-    let pairs = BoxTree::meeting_pairs(&boxes).take(MOST_ASKED).map(|meeting| meeting.map(|k| &flat[k]));
+    let mut asked = 0;
+    let pairs = BoxTree::meeting_pairs(&boxes).take(MOST_ASKED).inspect(|_| asked += 1);
     // Rectangles overlap where neither lies beyond a side of the other.
     let overlapping: Vec<[&Candidate<'_>; 2]> = pairs
+        .map(|meeting| meeting.map(|k| &flat[k]))
         .filter(|[first, second]| first.competes_with(second) && first.is_under(second) && second.is_under(first))
         .take(MOST_COUNTED)
         .collect();
@@ -60,8 +62,15 @@ pub(super) fn overlapping_receiver_notes(bound: &BoundScene) -> Vec<String> {
             first.receiver.name, second.receiver.name
         )
     });
-    let at_least = if overlapping.len() == MOST_COUNTED { "at least " } else { "" };
-    first_sentences(sentences, NAMED_RECEIVERS, |further| {
+    let at_least = if overlapping.len() == MOST_COUNTED || asked == MOST_ASKED { "at least " } else { "" };
+    let mut notes = first_sentences(sentences, NAMED_RECEIVERS, |further| {
         format!("the same holds for {at_least}{} of receivers", count_of(further as u64, "more pair"))
-    })
+    });
+    if asked == MOST_ASKED && overlapping.len() <= NAMED_RECEIVERS {
+        notes.push(format!(
+            "more receivers than are named may lie in one plane and overlap: of the pairs whose boxes meet only the first {} were compared",
+            grouped(MOST_ASKED as u64)
+        ));
+    }
+    notes
 }
