@@ -104,6 +104,9 @@ impl Monitor for SharedProgress {
 
     fn chosen(&self, chosen: &Chosen) {
         // In the words of the command.
+        if chosen.has_no_surface {
+            return self.say(format!("{}, and nothing is met", chosen.because));
+        }
         let [low, high] = chosen.tolerance_mm.map(|tolerance| figures(tolerance, TOLERANCE_DIGITS));
         let tolerance = if low == high { low } else { format!("{low}..{high}") };
         let how = match (chosen.intersector, chosen.normals) {

@@ -113,6 +113,13 @@ def test_how_a_scene_is_traced_is_told_in_the_words_of_the_command() -> None:
     assert [message for message in said if message.startswith("tracing on") and f"{how}: {run.chosen['because']}" in message]
 
 
+def test_a_scene_without_a_surface_is_traced_on_none() -> None:
+    said: list[str] = []
+    scene = lp.Scene.parse("[run]\nrays = 300\n[[source]]\nkind = 'point'\n")
+    scene.trace(progress=lambda stage, done, total, messages: said.extend(messages))
+    assert "there is no model, and nothing is met" in said and not any("facets" in message for message in said)
+
+
 def test_tqdm_takes_what_it_is_given() -> None:
     tqdm: Any = pytest.importorskip("tqdm")
     progress = Progress()

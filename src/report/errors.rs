@@ -152,7 +152,7 @@ pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) ->
 
 /// Writes what the run was traced on, the facets' tolerance in mm, and why it was chosen.
 pub(super) fn choice_sentence(chosen: &Chosen) -> String {
-    if chosen.has_no_surface() {
+    if chosen.has_no_surface {
         return format!("Nothing was met, because {}. ", chosen.because);
     }
     let [low, high] = chosen.tolerance_mm.map(|t| figures(t, 2));

@@ -57,6 +57,9 @@ pub struct Chosen {
     pub intersector: &'static str,
     /// Why it was chosen, as the end of a sentence.
     pub because: String,
+    /// Whether there is nothing that light could meet, so that it is traced on neither facets nor spline; [`Self::because`] says why.
+    #[serde(skip)]
+    pub has_no_surface: bool,
     /// Rays of the pilot; 0 where none was needed.
     pub pilot_rays: u64,
     /// Seconds of the pilot.
@@ -66,13 +69,6 @@ pub struct Chosen {
     /// What the facets that were taken change of the figures; `None` on the spline.
     #[serde(skip)]
     pub geometric: Option<GeometricError>,
-}
-
-impl Chosen {
-    /// Whether there is nothing that light could meet, so that it is traced on neither facets nor spline; [`Self::because`] says why.
-    pub fn has_no_surface(&self) -> bool {
-        [NO_MODEL, NO_FACETS].contains(&self.because.as_str())
-    }
 }
 
 /// One way to trace the run.
@@ -167,6 +163,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
             normals,
             intersector,
             because,
+            has_no_surface: false,
             pilot_rays: settings.rays,
             pilot_seconds: start.elapsed().as_secs_f64(),
             alternatives,
@@ -259,7 +256,8 @@ impl Undecided<'_> {
     /// pilot is needed.
     fn without_pilot(&self) -> Option<Chosen> {
         // What is cheap to ask comes first.
-        let ((intersector, normals), because) = if self.facets.is_empty() {
+        let has_no_surface = self.facets.is_empty();
+        let ((intersector, normals), because) = if has_no_surface {
             (ON_FACETS, if self.faces().next().is_none() { NO_MODEL } else { NO_FACETS })
         } else if self.is_flat() {
             let has_mesh = self.faces().any(|face| face.is_none());
@@ -279,6 +277,7 @@ impl Undecided<'_> {
             normals,
             intersector,
             because,
+            has_no_surface,
             pilot_rays: 0,
             pilot_seconds: 0.0,
             alternatives: Vec::new(),

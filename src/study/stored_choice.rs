@@ -12,7 +12,7 @@ use super::geometric_error::{
 use crate::intersect::NormalMode;
 
 /// The first word; what begins with another is of another version.
-const FORM: u64 = 5;
+const FORM: u64 = 6;
 /// What a choice can name, by its number.
 const INTERSECTORS: [&str; 2] = ["octree", "exact"];
 /// What positions on a receiver are counted in, by its number.
@@ -35,6 +35,7 @@ impl Chosen {
             normals: NormalMode::default(),
             intersector: INTERSECTORS[0],
             because: String::new(),
+            has_no_surface: false,
             pilot_rays: 0,
             pilot_seconds: 0.0,
             alternatives: Vec::new(),
@@ -85,12 +86,22 @@ impl Words for Reader<'_> {
 /// Writes or reads a choice.
 fn exchange_choice(words: &mut dyn Words, choice: &mut Chosen) -> Option<()> {
     // Taken apart, here and below, so that a new field is not forgotten.
-    let Chosen { tolerance_mm, normals, intersector, because, pilot_rays, pilot_seconds, alternatives, geometric } =
-        choice;
+    let Chosen {
+        tolerance_mm,
+        normals,
+        intersector,
+        because,
+        has_no_surface,
+        pilot_rays,
+        pilot_seconds,
+        alternatives,
+        geometric,
+    } = choice;
     exchange_numbers(words, tolerance_mm)?;
     exchange_name(words, normals, &NormalMode::ALL)?;
     exchange_name(words, intersector, &INTERSECTORS)?;
     exchange_text(words, because)?;
+    exchange_name(words, has_no_surface, &[false, true])?;
     words.word(pilot_rays)?;
     exchange_number(words, pilot_seconds)?;
     let blank = Alternative {
@@ -354,6 +365,7 @@ mod tests {
             normals: NormalMode::Bilinear,
             intersector: "octree",
             because: "facets change nothing".into(),
+            has_no_surface: true,
             pilot_rays: 4096,
             pilot_seconds: 1.0 / 3.0,
             alternatives: vec![Alternative { geometric_share: None, ..alternative.clone() }, alternative],

@@ -106,7 +106,7 @@ impl Monitor for TerminalMonitor<'_> {
         if !self.is_tracing {
             return;
         }
-        if chosen.has_no_surface() {
+        if chosen.has_no_surface {
             return self.console.say(format_args!("{}, and nothing is met", chosen.because));
         }
         let tolerance = tolerance_text(chosen.tolerance_mm);
