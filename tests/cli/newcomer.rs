@@ -144,7 +144,8 @@ fn selectors_are_pasted_and_shown_with_their_faces() {
     assert_eq!(rules[1]["gives"], "surface diffuse");
     let unnamed = rules.last().unwrap();
     assert!(unnamed["rule"].is_null() && unnamed["gives"].as_str().unwrap().contains("absorber"), "{unnamed}");
-    let (_, out, _) = lampyris_in(path, &["trace", "s.toml", "--dry-run"]);
+    let (_, out, _) = lampyris_in(path, &["trace", "s.toml", "--dry-run", "--threads", "1"]);
+    assert!(out.contains(" on 1 thread "), "{out}");
     assert!(out.contains("Rules and their faces") && out.contains("no rule names them"), "{out}");
     // The page has the table, and the selector of every face for its 3-D view.
     let (code, _, err) = lampyris_in(path, &["trace", "s.toml", "-o", "out"]);

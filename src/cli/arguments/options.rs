@@ -197,9 +197,7 @@ fn parse_seed(text: &str) -> Result<u64, String> {
 
 /// Reads a number of threads, 1 or more; how many of so many are of use is decided where they are started.
 pub(crate) fn parse_threads(text: &str) -> Result<usize, String> {
-    let threads = text.trim().parse::<u64>().ok().filter(|threads| *threads >= 1);
-    let threads = threads.ok_or_else(|| format!("a whole number from 1 on is wanted, not '{text}'"))?;
-    Ok(usize::try_from(threads).unwrap_or(usize::MAX))
+    parse_whole(text, 1, u64::MAX).map(|threads| usize::try_from(threads).unwrap_or(usize::MAX))
 }
 
 /// Reads how many there are to be of something that is listed.
@@ -325,7 +323,9 @@ mod tests {
         assert_eq!((parse_seed("0"), parse_threads("4"), parse_seconds("0.5")), (Ok(0), Ok(4), Ok(0.5)));
         assert_eq!(parse_seed("18446744073709551615"), Ok(u64::MAX));
         assert!(parse_seed("-1").unwrap_err().contains("from 0 to 18446744073709551615"));
-        assert!(["x", "0", "1.5", "-1"].iter().all(|text| parse_threads(text).unwrap_err().contains("from 1 on")));
+        let beyond = "18446744073709551616";
+        let is_told = |text: &&str| parse_threads(text).unwrap_err().contains("from 1 to 18446744073709551615");
+        assert!(["x", "0", "1.5", "-1", beyond].iter().all(is_told));
         assert!(parse_threads("5000000000").is_ok());
         assert!(["nan", "-1", "soon"].iter().all(|text| parse_seconds(text).is_err()));
     }

@@ -10,7 +10,7 @@ use crate::model::Part;
 use crate::pipeline::{IntersectorKind, PreparedScene};
 use crate::report::{bytes, seconds};
 use crate::simulate::{Required, rays_of_run};
-use crate::text::grouped;
+use crate::text::count_of;
 use serde_json::json;
 use std::path::Path;
 
@@ -33,21 +33,22 @@ pub(super) fn run(prepared: &PreparedScene, folder: &Path, console: &Console) ->
         print(&json_text(&document)?)?;
         return Ok(Completion::Complete);
     }
-    let made = format!("{} facets ({})", grouped(facets.facet_count() as u64), bytes(facets.bytes() as u64));
+    let made = format!("{} ({})", count_of(facets.facet_count() as u64, "facet"), bytes(facets.bytes() as u64));
+    let faces = count_of(faces as u64, "face");
     let traced_on = match prepared.choice.intersector {
         IntersectorKind::Exact => {
-            format!("on the splines of {faces} faces ({made} are for pictures and the check alone)")
+            format!("on the splines of {faces} ({made} are for pictures and the check alone)")
         }
         on_facets => {
-            format!("through {made} of {faces} faces, {on_facets} with {} normals", prepared.choice.normals)
+            format!("through {made} of {faces}, {on_facets} with {} normals", prepared.choice.normals)
         }
     };
     print(&format!(
-        "would trace {} rays (seed {}) on {} threads {traced_on},\n\
+        "would trace {} (seed {}) on {} {traced_on},\n\
          and write into {}; reading took {}, tessellation {}\n",
-        grouped(rays),
+        count_of(rays, "ray"),
         settings.seed,
-        prepared.threads,
+        count_of(prepared.threads as u64, "thread"),
         folder.display(),
         seconds(loaded.seconds),
         seconds(prepared.tessellation_seconds)
