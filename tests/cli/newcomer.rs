@@ -202,6 +202,8 @@ fn a_file_without_a_face_is_not_traced_in_silence() {
     let (code, out, err) =
         lampyris_in(path, &["trace", "scene.toml", "-q", "--rays", "2000", "--no-report", "-o", "out"]);
     assert!(code == 4 && out.is_empty() && err.contains("points.stp"), "{code} {out} {err}");
+    let (code, out, err) = lampyris_in(path, &["trace", "scene.toml", "-q", "--dry-run"]);
+    assert!(code == 4 && out.contains("would trace") && err.contains("it holds no face"), "{code} {out} {err}");
     let results = fs::read_to_string(path.join("out/results.json")).unwrap();
     // Nor is the mesh of a file that was cut off, its last words missing.
     let whole = fs::read_to_string(fixture("step/lens_planoconvex_nurbs.stp")).unwrap();

@@ -103,11 +103,11 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     let mut prepared = PreparedScene::new(job, &monitor)?;
     extra.ends.as_deref().map_or(Ok(()), |file| end_file::check_rays(&prepared, file))?;
     closing::say_notes(prepared.bound.notes(), &[], console);
-    if extra.dry_run {
-        return dry_run::run(&prepared, folder, console);
-    }
     let refused = input_files::report_refusals(&prepared.job.loaded, extra.limits.max_refused, console)
         .and(input_files::report_bare_faces(&prepared, extra.limits.max_refused, console));
+    if extra.dry_run {
+        return Ok(dry_run::run(&prepared, folder, console)?.and(refused));
+    }
     // A replay traces single rays and writes no results.
     if !replay.is_empty() {
         replay::run(&prepared, &replay, folder, console)?;
