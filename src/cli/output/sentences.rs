@@ -1,7 +1,10 @@
 //! Sentences in lines that fit a terminal.
 
-/// Longest unit that is kept beside its number, characters.
-const LONGEST_UNIT: usize = 4;
+/// What is kept beside a number: units of what is printed, and signs between two numbers.
+const UNITS: [&str; 25] = [
+    "%", "°", "±", "×", "nm", "µm", "mm", "m", "mm²", "sr", "µs", "ms", "s", "min", "B", "kB", "MB", "GB", "W",
+    "lm", "cd", "lx", "W/m²", "W/sr", "lm/W",
+];
 
 /// Whether two words stand in one line: a number and its unit, an angle and its name, a value and its error.
 fn belong_together(word: &str, next: &str) -> bool {
@@ -11,7 +14,7 @@ fn belong_together(word: &str, next: &str) -> bool {
     };
     let unit = next.trim_end_matches(['.', ',', ';', ':', ')']);
     if is_number(word) && word.ends_with(|c: char| c.is_ascii_digit()) {
-        return unit.chars().count() <= LONGEST_UNIT;
+        return UNITS.contains(&unit);
     }
     ["H", "V", "C", "γ", "±", "×"].contains(&word.trim_start_matches('(')) && is_number(next)
 }
@@ -86,6 +89,8 @@ mod tests {
         assert_eq!(lines("the share (75.57 %) of it"), "the share|(75.57 %) of|it");
         assert_eq!(lines("no more than H 0.45° is"), "no more than|H 0.45° is");
         assert_eq!(lines("power is 3.1 ± 0.2 lm."), "power is|3.1 ± 0.2|lm.");
+        // A short word is no unit.
+        assert_eq!(lines("between 5 and 7 of them"), "between 5|and 7 of|them");
     }
 
     #[test]
