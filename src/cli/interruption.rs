@@ -82,7 +82,9 @@ pub(crate) fn watch() {
                 say("\nstopping: what is being traced is finished and saved; once more stops at once\n");
                 continue;
             }
-            say("\ninterrupted: what was not saved is lost\n");
+            // Who writes results owns the place where they go.
+            let writes = !LOCKS.lock().unwrap_or_else(|e| e.into_inner()).is_empty();
+            say(if writes { "\ninterrupted: what was not saved is lost\n" } else { "\ninterrupted\n" });
             // Files that were begun are named by the process: they would stay for ever.
             crate::formats::remove_unfinished_files();
             for lock in LOCKS.lock().unwrap_or_else(|e| e.into_inner()).drain(..) {

@@ -1,14 +1,37 @@
-//! A run has no more threads than are asked for, from the reading of its files on.
+//! A run has no more threads than are asked for, from the reading of its files on, and one that listens to signals.
 #![cfg(target_os = "linux")]
 
 use crate::files::fixture;
 use std::fs;
+use std::os::unix::process::ExitStatusExt;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// Names of the threads of a process, as the system has them; none once it has ended.
 fn threads(process: u32) -> Vec<String> {
     let Ok(folder) = fs::read_dir(format!("/proc/{process}/task")) else { return Vec::new() };
     folder.flatten().filter_map(|task| fs::read_to_string(task.path().join("comm")).ok()).collect()
+}
+
+/// A command that writes no results says that it was interrupted, and of nothing that it is lost.
+#[test]
+fn an_interrupted_check_loses_nothing() {
+    let mut check = Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
+        .args(["check", "--tolerance", "0.002"])
+        .arg(fixture("step/lamp_multicavity.stp"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let listens = |process: u32| threads(process).iter().any(|name| name.trim() == "signals");
+    while check.try_wait().unwrap().is_none() && !listens(check.id()) {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(Command::new("kill").args(["-TERM", &check.id().to_string()]).status().unwrap().success());
+    let output = check.wait_with_output().unwrap();
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.signal(), Some(15), "{err}");
+    assert!(err.contains("interrupted") && !err.contains("lost"), "{err}");
 }
 
 #[test]
