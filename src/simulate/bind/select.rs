@@ -106,6 +106,15 @@ struct FaceNumbers {
     radii: Vec<f64>,
 }
 
+impl FaceNumbers {
+    /// Whether a face has this radius, mm.
+    fn has_radius(&self, wanted: f64) -> bool {
+        // The first that is not too small: those behind it are farther off.
+        let place = self.radii.partition_point(|have| *have < wanted && !is_same_radius(wanted, *have));
+        self.radii.get(place).is_some_and(|have| is_same_radius(wanted, *have))
+    }
+}
+
 impl<'m> FaceSearch<'m> {
     pub(super) fn new(model: &'m Model) -> Self {
         Self { model, nearest: None, names: Default::default(), numbers: None }
@@ -253,7 +262,7 @@ fn refuse_what_nothing_has(
         }
     }
     for radius in rule.radius_mm.iter().flat_map(OneOrMany::as_slice) {
-        if !numbers.radii.iter().any(|have| is_same_radius(*radius, *have)) {
+        if !numbers.has_radius(*radius) {
             return refuse("radius_mm", format!("no face has a radius of {radius} mm"));
         }
     }
@@ -299,7 +308,17 @@ pub(super) fn advice<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -
 
 #[cfg(test)]
 mod tests {
-    use super::matches_pattern;
+    use super::{FaceNumbers, is_same_radius, matches_pattern};
+
+    #[test]
+    fn a_radius_is_found_as_every_one_that_is_compared_finds_it() {
+        let numbers = FaceNumbers { radii: vec![0.5, 1.0, 1.00015, 1.0003, 40.0], ..FaceNumbers::default() };
+        let near = (0..2000).map(|k| 0.9995 + f64::from(k) * 1e-6);
+        for wanted in near.chain([0.0, 0.4999, 0.49996, 39.997, 40.003, 40.005, 41.0]) {
+            let expected = numbers.radii.iter().any(|have| is_same_radius(wanted, *have));
+            assert_eq!(numbers.has_radius(wanted), expected, "{wanted}");
+        }
+    }
 
     #[test]
     fn stars_stand_for_anything() {
