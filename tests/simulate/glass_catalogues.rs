@@ -1,7 +1,7 @@
 //! Glass catalogues in AGF form: what a data sheet says comes out of a scene.
 
 use crate::support::World;
-use lampyris::math::Point;
+use lampyris::math::{Point, Vector};
 use lampyris::simulate::Scene;
 use std::path::Path;
 
@@ -124,6 +124,26 @@ fn light_beyond_the_transmittances_of_a_glass_is_noted() {
     let said = "the transmittance of 'N-BK7' is known for 400 to 700 nm";
     assert!(beyond.contains(said) && beyond.contains("850 nm") && beyond.lines().count() == 1, "{beyond}");
     assert_eq!((notes(650.0, ""), notes(850.0, "absorption_per_mm = 0.001")), (String::new(), String::new()));
+}
+
+/// Eight tables that light goes beyond are named, and of more the number is told.
+#[test]
+fn many_ranges_that_light_goes_beyond_are_counted() {
+    for (count, rest) in [(8, None), (9, Some("beyond 1 more range of")), (10, Some("beyond 2 more ranges of"))] {
+        let mut world = World::default();
+        let mut text = "[run]\nwavelength_nm = 700\n[[source]]\nkind = 'collimated'\nat = [0, 0, -5]\n".to_owned();
+        for k in 0..count {
+            let low = Point::new(20.0 * f64::from(k), 0.0, 0.0);
+            world.cuboid(&format!("p{k}"), low, low + Vector::splat(10.0));
+            text += &format!("[[medium]]\nname = 'm{k}'\nindex_table = [[500, 1.5], [600, 1.49]]\n");
+            text += &format!("[[material]]\npart = 'p{k}'\nmedium = 'm{k}'\n");
+        }
+        let scene = Scene::parse(&text, "test.toml", Path::new(".")).unwrap();
+        let notes = scene.bind(&world.model).unwrap().notes().to_vec();
+        assert_eq!(notes.iter().filter(|note| note.contains("is known for 500 to 600 nm")).count(), 8, "{notes:?}");
+        assert_eq!(notes.len(), 8 + rest.iter().count(), "{notes:?}");
+        assert!(rest.is_none_or(|rest| notes[8].contains(rest)), "{notes:?}");
+    }
 }
 
 #[test]

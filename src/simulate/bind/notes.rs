@@ -47,7 +47,10 @@ pub(super) fn range_notes(scene: &Scene, chosen: &ChosenRules, light: &[[f64; 2]
         }));
     }
     first_sentences(known.iter().filter_map(|k| range_note(scene, k, light)), NAMED, |further| {
-        format!("the light of sources goes beyond {} or formulas too", count_of(further as u64, "more table"))
+        format!(
+            "the light of sources goes beyond {} of tables and formulas too",
+            count_of(further as u64, "more range")
+        )
     })
 }
 
