@@ -39,6 +39,8 @@ pub(super) struct LuminousSearch<'m> {
     places: Vec<Option<usize>>,
     /// What was made of opaque faces to cover others, by their places; `None` for a ready mesh.
     covers: HashMap<usize, Option<Arc<Cover>>>,
+    /// For each source whether the scene gives it a kind; empty where that is not known.
+    written_kinds: Vec<bool>,
     notes: LuminousNotes,
 }
 
@@ -69,6 +71,7 @@ impl<'m> LuminousSearch<'m> {
             tree,
             places,
             covers: HashMap::new(),
+            written_kinds: scene.written_kinds(),
             notes: LuminousNotes::default(),
         })
     }
@@ -88,7 +91,10 @@ impl<'m> LuminousSearch<'m> {
             return Err(scene.error(ErrorKind::NoMatch, &base, "these faces have no area to shine from"));
         };
         let source = scene.source_label(index);
-        self.notes.even.extend((scene.sources[index].kind == SourceKind::Point).then(|| even_note(&source)));
+        // Whoever writes the kind means it.
+        let is_written = self.written_kinds.get(index).copied().unwrap_or(false);
+        let is_default = scene.sources[index].kind == SourceKind::Point && !is_written;
+        self.notes.even.extend(is_default.then(|| even_note(&source)));
         self.notes.dark.extend(dark_note(&source, model, &chosen));
         if covers.is_empty() {
             return Ok(Some(area));
@@ -170,7 +176,7 @@ impl<'m> LuminousSearch<'m> {
     }
 }
 
-/// Returns the sentence about a source on faces of the default kind.
+/// Returns the sentence about a source on faces whose kind the scene leaves to the default.
 fn even_note(source: &str) -> String {
     format!(
         "{source} shines from each point of its faces with the same intensity in every direction (`kind = \"point\"`, the default); most \

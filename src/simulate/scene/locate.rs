@@ -102,6 +102,15 @@ pub(super) fn span(text: &str, path: &[Key<'_>]) -> Option<Range<usize>> {
     span
 }
 
+/// Returns for each table of a list whether a key is written in it; empty where the text has no such list.
+pub(super) fn tables_with(text: &str, list: &str, key: &str) -> Vec<bool> {
+    let Ok(root) = DeTable::parse(text) else { return Vec::new() };
+    let Some(DeValue::Array(tables)) = root.get_ref().get(list).map(Spanned::get_ref) else { return Vec::new() };
+    let has_key =
+        |table: &Spanned<DeValue<'_>>| matches!(table.get_ref(), DeValue::Table(t) if t.contains_key(key));
+    tables.iter().map(has_key).collect()
+}
+
 /// What the reader expected, and how to write it.
 const TABLES: [(&str, &str); 14] = [
     ("struct SpectrumKey", "spectrum = { kind = \"d65\" }"),

@@ -178,6 +178,11 @@ impl Scene {
         }
     }
 
+    /// Returns for each source whether its text gives it a `kind`; empty for a scene that was not parsed from text.
+    pub(crate) fn written_kinds(&self) -> Vec<bool> {
+        self.origin.text.as_deref().map_or_else(Vec::new, |text| locate::tables_with(text, "source", "kind"))
+    }
+
     /// Returns the error that the colour at a place of the scene is none.
     pub(super) fn not_a_colour(&self, at: &[Key<'_>]) -> Error {
         self.error(ErrorKind::Value, at, "not a colour")
