@@ -37,7 +37,8 @@ pub struct Run {
     #[serde(deserialize_with = "lenient::count")]
     #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::count_schema"))]
     pub rays: u64,
-    /// Seed of all random numbers. Scenes of one seed share theirs: variants differ by less noise, and are wrong together by chance.
+    /// Seed of all random numbers. Two variants of a scene with the same seed use the same random numbers, so that their difference is less
+    /// noisy than either; for a result that is independent of an earlier one, take another seed.
     pub seed: u64,
     /// How places, directions and wavelengths are chosen at the sources.
     pub sampling: Sampling,
