@@ -161,6 +161,7 @@ fn what_means_nothing_is_refused_by_name() {
             4,
         ),
         ("[[material]]\npart = 'x'\nscatter = { lobe = 'abg', abg = 0.1 }".into(), "A, B and g", 3),
+        ("[[material]]\npart = 'x'\nmetal = ['gold', 1]".into(), "expected a number", 3),
         ("[[medium]]\nname = 'g'\nindex_table = 1.5".into(), "index_table = [[450", 3),
         ("[[medium]]\nname = 'g'\nindex_table = [[450, 1.5], 3]".into(), "index_table = [[450", 3),
         ("[[medium]]\nname = 'g'\ngradient_index = [1, 2]".into(), "gradient index is not simulated", 3),

@@ -153,7 +153,7 @@ fn type_error(message: &str, key: &str) -> Error {
     }
     // The key is asked first: a list has its own form, which the type does not tell.
     if let Some((_, help)) = LISTS.iter().find(|(list, _)| *list == key) {
-        let message = message.replace("a sequence", "a list").replace("an array", "a list");
+        let message = plain_types(message).replace("a sequence", "a list").replace("an array", "a list");
         return Error::new(ErrorKind::Syntax, message).help(*help);
     }
     let scalar =
@@ -186,8 +186,12 @@ fn type_error(message: &str, key: &str) -> Error {
             };
         }
     }
-    let plain = PLAIN_TYPES.iter().fold(message.to_owned(), |m, (form, plain)| m.replace(form, plain));
-    Error::new(ErrorKind::Syntax, plain)
+    Error::new(ErrorKind::Syntax, plain_types(message))
+}
+
+/// Returns a message of the reader with numbers called as people do.
+fn plain_types(message: &str) -> String {
+    PLAIN_TYPES.iter().fold(message.to_owned(), |m, (form, plain)| m.replace(form, plain))
 }
 
 /// Returns the key whose value stands at byte `at` of the text, by its line; empty where there is none.
