@@ -81,7 +81,7 @@ def test_a_run_that_goes_on_with_more_rays_shows_them(shown: Progress, capsys: p
     assert (bar.n, bar.total) == (50, 9000)
 
 
-@pytest.mark.parametrize("kind", ["accuracy", "check"])
+@pytest.mark.parametrize("kind", ["accuracy", "interpolation", "check"])
 def test_a_study_tells_how_far_it_is(kind: str, lens: pathlib.Path) -> None:
     told: list[tuple[str, int, int]] = []
 
@@ -91,11 +91,13 @@ def test_a_study_tells_how_far_it_is(kind: str, lens: pathlib.Path) -> None:
     model = lp.read_step(lens)
     if kind == "accuracy":
         lp.study.accuracy(model, [0.4], normals=["flat"], rays=2000, repetitions=1, progress=tell)
+    elif kind == "interpolation":
+        lp.study.interpolation(model, rays=500, repetitions=4, progress=tell)
     else:
         lp.study.check(model, rays=2000, progress=tell)
     shares = [done for _, done, _ in told]
     assert shares == sorted(shares)
-    name = {"accuracy": "accuracy study", "check": "cross-check"}[kind]
+    name = {"accuracy": "accuracy study", "interpolation": "interpolation study", "check": "cross-check"}[kind]
     assert {stage for stage, _, _ in told} <= {"", name}
     stage, done, total = told[-1]
     assert stage == name and 0 <= done <= total == 1000

@@ -12,6 +12,8 @@ use std::sync::Mutex;
 
 /// The search for a number of facets stays within these tolerances, mm: from a nanometre to a kilometre.
 const TOLERANCES_MM: [f64; 2] = [1e-6, 1e6];
+/// Share of the work on a model that its facets and rays take; the rest is rounds of rays.
+const PREPARATION: f64 = 0.1;
 /// Mean error of bilinear normals below which a face is flat: far above rounding (1e-16), far below any curved facet.
 const FLAT: f64 = 1e-9;
 
@@ -80,8 +82,8 @@ pub fn interpolation(
     let clock = Clock::new(progress);
     let mut rows = Vec::new();
     for (i, (name, mesh_source)) in models.iter().enumerate() {
-        clock.report(name, i as f64 / models.len() as f64);
-        rows.extend(rows_of_model(name, *mesh_source, settings));
+        let tell = |share: f64| clock.report(name, (i as f64 + share) / models.len() as f64);
+        rows.extend(rows_of_model(name, *mesh_source, settings, &tell));
     }
     let answer = sentence(&rows);
     rows.extend(PAPER.map(|(algorithm, error, seconds)| Row {
@@ -114,10 +116,13 @@ pub(super) fn mesh_of(mesh_source: &dyn MeshSource, facets: usize) -> MeasuredMe
     meshed
 }
 
-/// Measures errors and times of all kinds of normals on one model, on facets of about the wanted number; a row for each.
-fn rows_of_model(name: &str, mesh_source: &dyn MeshSource, settings: &Settings) -> Vec<Row> {
+/// Measures errors and times of all kinds of normals on one model, on facets of about the wanted number; a row for each. Calls `tell` with
+/// the share that is done.
+fn rows_of_model(name: &str, mesh_source: &dyn MeshSource, settings: &Settings, tell: &dyn Fn(f64)) -> Vec<Row> {
+    tell(0.0);
     let meshed = mesh_of(mesh_source, settings.facets);
     let (rays, truth) = rays_that_hit(mesh_source, &meshed, settings);
+    tell(PREPARATION);
     let hits = ALGORITHMS.map(|_| Mutex::new(vec![None; rays.len()]));
     let timings = with_intersectors(mesh_source, &meshed.mesh, &[FacetTree::Octree], &ALGORITHMS, |trees| {
         let mut rounds = Rounds::default();
@@ -129,7 +134,7 @@ fn rows_of_model(name: &str, mesh_source: &dyn MeshSource, settings: &Settings) 
                 }
             });
         }
-        rounds.run(settings.repetitions)
+        rounds.run_telling(settings.repetitions, |share| tell(PREPARATION + (1.0 - PREPARATION) * share))
     });
     let row = |((algorithm, hits), (_, timing)): ((NormalMode, &Mutex<Vec<Option<Hit>>>), _)| {
         let timing: super::Timing = timing;

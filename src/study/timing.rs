@@ -64,12 +64,19 @@ impl<'a> Rounds<'a> {
     }
 
     /// Runs every contender once untimed and then `rounds` times; results in the order of adding.
-    pub fn run(mut self, rounds: usize) -> Vec<(String, Timing)> {
+    pub fn run(self, rounds: usize) -> Vec<(String, Timing)> {
+        self.run_telling(rounds, |_| ())
+    }
+
+    /// As [`Self::run`], and calls `tell` with the share that is done after each round, the untimed one among them.
+    pub(super) fn run_telling(mut self, rounds: usize, tell: impl Fn(f64)) -> Vec<(String, Timing)> {
+        let tell_rounds = |done: usize| tell(done as f64 / (rounds + 1) as f64);
         let mut seconds = vec![Vec::with_capacity(rounds); self.contenders.len()];
         // Untimed: caches, pages and clock frequencies settle.
         for (_, run) in &mut self.contenders {
             run();
         }
+        tell_rounds(1);
         for round in 0..rounds {
             let order: Vec<usize> = if round % 2 == 0 {
                 (0..self.contenders.len()).collect()
@@ -81,6 +88,7 @@ impl<'a> Rounds<'a> {
                 (self.contenders[i].1)();
                 seconds[i].push(start.elapsed().as_secs_f64());
             }
+            tell_rounds(round + 2);
         }
         self.contenders.into_iter().zip(seconds).map(|((name, _), s)| (name, Timing::from_seconds(s))).collect()
     }
@@ -162,7 +170,9 @@ mod tests {
         let mut rounds = Rounds::default();
         rounds.add("a", || log.borrow_mut().push('a'));
         rounds.add("b", || log.borrow_mut().push('b'));
-        let timings = rounds.run(2);
+        let told = RefCell::new(Vec::new());
+        let timings = rounds.run_telling(2, |share| told.borrow_mut().push(share));
+        assert_eq!(told.into_inner(), [1.0 / 3.0, 2.0 / 3.0, 1.0]);
         assert_eq!(log.borrow().as_str(), "ababba");
         assert_eq!(timings[1].0, "b");
         assert_eq!(timings[1].1.runs, 2);

@@ -9,9 +9,10 @@ use lampyris::nurbs::{Curve, sweep};
 use lampyris::study::accuracy_target::{AccuracyTarget, meet_target};
 use lampyris::study::cross_check::{Cause, CrossCheck, Intersectors, Settings, cross_check};
 use lampyris::study::rays::{Bounces, Camera, Chain, RaySource, Uniform};
-use lampyris::study::{MeshSource, ModelMeshSource, sample_models};
+use lampyris::study::{MeshSource, ModelMeshSource, Progress, interpolation, sample_models};
 use lampyris::tessellate;
 use std::f64::consts::FRAC_PI_2;
+use std::sync::Mutex;
 
 /// A third of the rays from a camera, a third at random, a third bouncing inside.
 fn cross_checked(model: &Model, rays: u64) -> CrossCheck {
@@ -27,6 +28,20 @@ fn cross_checked(model: &Model, rays: u64) -> CrossCheck {
     let subjects = Intersectors { model, mesh: &made.mesh, octree: &octree, bvh: &bvh, exact: product.exact() };
     assert_eq!(chain.len(), rays / 3 * 3);
     cross_check(&subjects, &chain, &Settings::default(), &|_| ())
+}
+
+/// The rounds on one model take seconds, and are told one by one.
+#[test]
+fn the_study_of_normals_tells_how_far_it_is_within_a_model() {
+    let model = read_model(&fixture("step/lens_planoconvex_nurbs.stp")).unwrap();
+    let source = ModelMeshSource::new(&model);
+    let settings = interpolation::Settings { facets: 300, rays: 100, repetitions: 3, ..Default::default() };
+    let told = Mutex::new(Vec::new());
+    let tell = |progress: Progress| told.lock().unwrap().push(progress.done);
+    interpolation::interpolation(&[("lens", &source as &dyn MeshSource)], &settings, &tell);
+    let told = told.into_inner().unwrap();
+    let within = told.iter().filter(|share| **share > 0.0 && **share < 1.0).count();
+    assert!(told.is_sorted() && within == 4 && told.last() == Some(&1.0), "{told:?}");
 }
 
 fn line(name: &str, c: &CrossCheck) -> String {
