@@ -114,6 +114,11 @@ fn what_means_nothing_is_refused_by_name() {
         ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nangles = 'C'\nh_deg = [-90, 90]".into(), "h_deg", 5),
         (format!("{PLANE}instance = 'x'"), "instance", 4),
         ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nsize = [1, 1]".into(), "size", 4),
+        (
+            "[[receiver]]\nname = 'r'\nkind = 'sphere'\nradius = 1\none_sided = true".into(),
+            "leave `one_sided` out",
+            5,
+        ),
         ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nabsorbs = false".into(), "absorbs", 4),
         ("[[receiver]]\nname = 'r'\nkind = 'absorbed'\npart = 'x'\ninteractions = 7".into(), "interactions", 5),
         (format!("{PLANE}cells = [4000, 4000]\nbins_nm = [400, 500, 600, 700]"), "cells", 4),

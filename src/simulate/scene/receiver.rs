@@ -218,7 +218,9 @@ impl Receiver {
             return fail("name", "this receiver has no `name`");
         }
         if let Some((key, whose)) = self.misplaced() {
-            return fail(key, &format!("`{key}` belongs to a receiver of kind {whose}"));
+            let refused = fail(key, &format!("`{key}` belongs to a receiver of kind {whose}"));
+            let help = format!("leave `{key}` out, or give the receiver another `kind`");
+            return refused.map_err(|error| error.help(help));
         }
         if self.cells.contains(&0) || u64::from(self.cells[0]) * u64::from(self.cells[1]) > 1 << 24 {
             return fail("cells", "`cells` must be at least 1 and at most 16 million in all");
