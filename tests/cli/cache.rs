@@ -83,8 +83,20 @@ fn a_cache_is_shown_limited_and_cleared() {
         assert_eq!(code, 0, "{err}");
         serde_json::from_str::<Value>(&out).unwrap()
     };
-    assert_eq!(show(&[])["entries"].as_array().unwrap().len(), 0);
+    for options in [&[][..], &["--clear"]] {
+        let (code, out, err) = lampyris_in(path, &[&["cache", "--cache", "kept"], options].concat());
+        assert!(code == 3 && out.is_empty() && err.contains("kept: there is no such folder"), "{code} {out} {err}");
+    }
     assert_eq!(lampyris_in(path, &["cache"]).0, 2);
+    // One that the environment names is made by the first run that needs it.
+    let output = std::process::Command::new(assert_cmd::cargo::cargo_bin("lampyris"))
+        .current_dir(path)
+        .args(["cache", "--json"])
+        .env("LAMPYRIS_CACHE", "kept")
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["entries"].as_array().unwrap().len(), 0);
     traced(path, &["--cache", "kept"]);
     std::fs::write(path.join("kept/of others.octree"), "stays").unwrap();
     let shown = show(&[]);
