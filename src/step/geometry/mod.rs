@@ -18,7 +18,7 @@ mod tolerances;
 pub(super) mod units;
 
 pub(super) use self::tolerances::EMPTY_EDGE_MM;
-use self::tolerances::PARALLEL_AXIS;
+use self::tolerances::{PARALLEL_AXIS, UPRIGHT_AXIS};
 use self::units::Units;
 use crate::math::{Frame, Point, Vector};
 use crate::step::part21::{Args, Entity, File};
@@ -217,11 +217,16 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
 /// Returns the axes of an operator from its three directions, of any length: a missing one is that of the space, the first is projected
 /// across the third and the second across both, so that it may mirror (ISO 10303-42, `base_axis`).
 ///
-/// Where nothing is left of the second, which the standard leaves open, the axes are right-handed; about a third axis that is not given
-/// they are those of the first two.
+/// Where nothing is left of the second, which the standard leaves open, the axes are right-handed. The standard takes the space's Z for a
+/// third axis that is not given whatever the first two are, and thereby loses their tilt: where both are given and do not lie in the
+/// space's xy plane, it is their product instead, as in OpenCASCADE, so that the second keeps its direction. In that plane the product
+/// would be Z or its opposite: there the standard is followed, which may mirror, as OpenCASCADE never does.
 fn base_axes(origin: Point, [axis1, axis2, axis3]: [Option<Vector>; 3]) -> Frame {
     let product = axis1.zip(axis2).map(|(x, y)| x.normalize().cross(y.normalize()));
-    let z = axis3.or(product.filter(|n| n.z.abs() <= PARALLEL_AXIS)).unwrap_or(Vector::Z);
+    // Of parallel axes the product is rounding.
+    let normal = product.filter(|n| n.length() > PARALLEL_AXIS).and_then(|n| n.try_normalize());
+    let tilted = normal.filter(|n| n.cross(Vector::Z).length() > UPRIGHT_AXIS);
+    let z = axis3.or(tilted).unwrap_or(Vector::Z);
     let mut frame = Frame::from_axis(origin, z, Some(axis1.unwrap_or(Vector::X)));
     if axis2.unwrap_or(Vector::Y).normalize().dot(frame.y) < -PARALLEL_AXIS {
         frame.y = -frame.y;
@@ -237,6 +242,7 @@ mod tests {
     #[test]
     fn axes_that_an_operator_lacks_are_those_of_the_standard() {
         let (x, y, z) = (Vector::X, Vector::Y, Vector::Z);
+        let (tilted, rounded) = (Vector::new(0.0, 0.6, 0.8), Vector::new(0.0, 1e-8, 1.0));
         for (given, expected) in [
             ([None, None, None], [x, y, z]),
             ([Some(-x), None, None], [-x, y, z]),
@@ -253,6 +259,13 @@ mod tests {
             ([None, None, Some(x)], [y, z, x]),
             ([Some(y), None, Some(z)], [y, -x, z]),
             ([Some(x), Some(z), None], [x, z, -y]),
+            // Out of the xy plane by any angle the second axis keeps its direction; rounding of either changes no more than its digits.
+            ([Some(x), Some(tilted), None], [x, tilted, Vector::new(0.0, -0.8, 0.6)]),
+            ([Some(x), Some(rounded), None], [x, rounded, Vector::new(0.0, -1.0, 1e-8)]),
+            ([Some(x), Some(-rounded), None], [x, -rounded, Vector::new(0.0, 1.0, -1e-8)]),
+            // The third axis decides where it is given, and parallel axes have no product.
+            ([Some(x), Some(tilted), Some(z)], [x, y, z]),
+            ([Some(x), Some(x), None], [x, y, z]),
         ] {
             let frame = base_axes(Point::ZERO, given.map(|axis| axis.map(|a| 3.0 * a)));
             let off = [frame.x - expected[0], frame.y - expected[1], frame.z - expected[2]];

@@ -60,6 +60,8 @@ pub(super) const SMALLEST_REACH_MM: f64 = 1e-3;
 pub(super) const COPLANAR_MM: f64 = 1e-9;
 /// Unit vectors whose product is below this are parallel, or across each other.
 pub(super) const PARALLEL_AXIS: f64 = 1e-9;
+/// A product of two axes whose part across the space's Z is below this is that Z or its opposite: directions in files have six digits.
+pub(super) const UPRIGHT_AXIS: f64 = 1e-6;
 /// A unit vector whose part across the axis is below this runs along it and tells no side.
 pub(super) const STEEP_RADIUS: f64 = 1e-6;
 
