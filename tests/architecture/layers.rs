@@ -494,6 +494,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "units",
             "mod",
             "extent",
+            "joints",
             "curves",
             "composite",
             "edges",

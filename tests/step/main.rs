@@ -9,6 +9,7 @@ mod faces;
 #[path = "../support/files.rs"]
 mod files;
 mod fixtures;
+mod joints;
 mod nurbs_properties;
 mod occurrences;
 mod offsets;

@@ -3,9 +3,10 @@
 use super::curves::{
     COMPOSITES, CurveShape, DirectedCurve, MAX_DEPTH, SPLINES, SURFACE_CURVES, polyline_lengths, space_curve,
 };
-use super::tolerances::{ACCURACY_MM, SEAM_SHARE};
+use super::joints::{JoinedCurve, Joint, join_segments};
+use super::tolerances::SEAM_SHARE;
 use super::{GeometryReader, Outcome, Refusal};
-use crate::math::{Aabb, Frame, Homogeneous, Point};
+use crate::math::{Aabb, Frame, Point};
 use crate::nurbs::Curve;
 use crate::step::part21::{Args, Entity};
 use rustc_hash::FxHashMap;
@@ -42,13 +43,29 @@ struct CurvePart {
 }
 
 impl<'f, 'a> GeometryReader<'f, 'a> {
-    /// Reads a bounded curve, mm, as a spline in its own direction; conics that are closed become one turn. Refuses unbounded curves, and
-    /// chains of more than [`MAX_DEPTH`] references, of which `depth` are behind.
+    /// Reads a bounded curve, mm, as a spline in its own direction; conics that are closed become one turn. Refuses unbounded curves, parts
+    /// of composite curves that run over a joint too wide to be bridged, and chains of more than [`MAX_DEPTH`] references, of which `depth`
+    /// are behind.
     pub(crate) fn bounded_curve(&self, id: u64, depth: usize) -> Outcome<Curve> {
-        let CurvePart { directed: DirectedCurve { shape, reversed }, range: [from, to] } =
-            self.curve_part(id, depth)?;
-        let curve = shape.segment(from, to);
-        Ok(if reversed { curve.reversed() } else { curve })
+        let JoinedCurve { curve, joints } = self.joined_part(id, depth)?;
+        self.require_joined(&joints)?;
+        Ok(curve)
+    }
+
+    /// Reads a bounded curve as [`Self::bounded_curve`] does, with the joints that it runs over, of any width.
+    pub(super) fn joined_part(&self, id: u64, depth: usize) -> Outcome<JoinedCurve> {
+        let CurvePart { directed: DirectedCurve { shape, reversed }, range } = self.curve_part(id, depth)?;
+        let [from, to] = range;
+        let part = JoinedCurve { curve: shape.segment(from, to), joints: shape.joints_along(range) };
+        Ok(if reversed { part.reversed() } else { part })
+    }
+
+    /// Refuses a curve that runs over these joints where one of them is too wide to be bridged, in the name of its composite curve.
+    pub(super) fn require_joined(&self, joints: &[Joint]) -> Outcome<()> {
+        match joints.iter().find(|joint| joint.is_too_wide()) {
+            Some(joint) => Err(Refusal::new(self.entity(joint.owner)?, joint.reason())),
+            None => Ok(()),
+        }
     }
 
     /// Reads a bounded curve as the part of a curve that it is; see [`Self::bounded_curve`].
@@ -126,8 +143,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     /// on a POLYLINE a count of points, where ours is its arc length, mm, on a composite curve 0 where ours is that of its first segment.
     /// Refuses parameters that ours does not follow: of conics that became splines, and of composite curves of conics or polylines.
     fn curve_parameter(&self, basis: Entity<'f, 'a>, shape: &CurveShape, x: f64) -> Outcome<f64> {
-        let curve = match shape {
-            CurveShape::Spline { curve, .. } => curve,
+        let (curve, joints) = match shape {
+            CurveShape::Spline { curve, joints, .. } => (curve, joints),
             CurveShape::Ellipse { .. } => return Ok(x * self.units.angle),
             _ => return Ok(x),
         };
@@ -136,7 +153,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             return Err(Refusal::new(basis, "its parameters cannot be taken over: they are those of a conic"));
         }
         if owner.is_one_of(&COMPOSITES) {
-            self.require_kept_parameter(owner)?;
+            require_kept_parameter(owner, joints)?;
             return Ok(x + curve.domain()[0]);
         }
         let points = owner.attributes("POLYLINE", 1).and_then(|a| self.points(owner, a.list(0)).ok());
@@ -191,14 +208,21 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 
     /// Returns the segments of a composite curve, in its order, turned around where that joins them clearly better than the file's own
-    /// senses. Gaps stay.
+    /// senses. Gaps stay; a segment that is composite itself is refused where one is too wide to be bridged.
     pub(crate) fn segments(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Vec<Curve>> {
+        let segments = self.joined_segments(e, depth)?;
+        segments.iter().try_for_each(|segment| self.require_joined(&segment.joints))?;
+        Ok(segments.into_iter().map(|segment| segment.curve).collect())
+    }
+
+    /// Returns the segments of a composite curve as [`Self::segments`] does, with joints of any width in them.
+    fn joined_segments(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Vec<JoinedCurve>> {
         let Some(list) = segment_list(e) else { return Err(Refusal::new(e, "composite curve without segments")) };
         // Six lines can name a million segments: they are counted before one is read.
         if self.segment_count(e, 0, &mut FxHashMap::default()) > MAX_SEGMENTS {
             return Err(Refusal::new(e, "composite curve with too many segments"));
         }
-        let mut curves: Vec<Curve> = Vec::with_capacity(list.len());
+        let mut curves: Vec<JoinedCurve> = Vec::with_capacity(list.len());
         for i in 0..list.len() {
             let segment = self.resolve(e, list.id(i), "segment")?;
             let args = segment_attributes(segment);
@@ -207,14 +231,14 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             {
                 self.composite_curve(parent, depth + 1)?
             } else {
-                self.bounded_curve(parent.id, depth + 1)?
+                self.joined_part(parent.id, depth + 1)?
             };
             curves.push(if args.flag(1) == Some(false) { curve.reversed() } else { curve });
         }
         // Senses are often wrong: turn a segment around when that joins it better.
-        let ends = |c: &Curve| {
-            let [a, b] = c.domain();
-            (c.evaluate(a), c.evaluate(b))
+        let ends = |c: &JoinedCurve| {
+            let [a, b] = c.curve.domain();
+            (c.curve.evaluate(a), c.curve.evaluate(b))
         };
         if let [first, second, ..] = &curves[..] {
             let (a, b) = ends(second);
@@ -235,86 +259,46 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         Ok(curves)
     }
 
-    /// Reads a composite curve, mm, as one spline, of the highest degree of its segments. Segments are turned around as in
-    /// [`Self::segments`]; a straight piece bridges a gap that is wider than the file's accuracy. Refuses a curve without segments, one
-    /// with more than [`MAX_SEGMENTS`] or a gap that no stated accuracy allows, and chains of more than [`MAX_DEPTH`] references, of which
+    /// Reads a composite curve, mm, as one spline, of the highest degree of its segments. These are turned around as in [`Self::segments`]
+    /// and joined as by [`join_segments`], however far apart they are: which joints a part of the curve runs over is for its reader to ask.
+    /// Refuses a curve without segments, one with more than [`MAX_SEGMENTS`], and chains of more than [`MAX_DEPTH`] references, of which
     /// `depth` are behind.
-    pub(crate) fn composite_curve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
+    pub(super) fn composite_curve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<JoinedCurve> {
         if depth > MAX_DEPTH {
             return Err(Refusal::new(e, "curves refer to each other too deeply"));
         }
-        let segments = self.segments(e, depth)?;
-        let accuracy = self.accuracy_along(&segments);
-        let mut pieces: Vec<Curve> = Vec::with_capacity(segments.len());
-        for segment in segments {
-            if let Some(last) = pieces.last() {
-                let [from, to] = gap_between(last, &segment);
-                let width = (to - from).length();
-                if width > ACCURACY_MM[1] {
-                    return Err(Refusal::new(e, format!("its segments are {width:.3e} mm apart")));
-                }
-                if width > accuracy {
-                    pieces.push(Curve::line(from, to, [0.0, width]));
-                }
-            }
-            pieces.push(segment);
-        }
-        let degree = pieces.iter().map(|c| c.degree).max().unwrap_or(1);
-        let parts = pieces.iter().map(|c| elevate_degree(c, degree)).collect();
-        Curve::join(parts).ok_or_else(|| Refusal::new(e, "composite curve without segments"))
+        let segments = self.joined_segments(e, depth)?;
+        let bounds = segments.iter().fold(Aabb::EMPTY, |sum, segment| sum.union(segment.curve.bounds()));
+        let size = bounds.diagonal();
+        join_segments(e.id, segments, self.units.accuracy_on_face(size), self.units.widest_bridge(size))
+            .ok_or_else(|| Refusal::new(e, "composite curve without segments"))
     }
 
     /// Reads a composite curve by the parameter that the file gives it, which runs through its segments' from 0 on; refused where ours is
-    /// another: of conics and polylines.
+    /// another: of conics and polylines, and of segments that lie apart.
     pub(super) fn counted_composite(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
-        let curve = self.composite_curve(e, depth + 1)?;
-        self.require_kept_parameter(e)?;
+        let JoinedCurve { curve, joints } = self.composite_curve(e, depth + 1)?;
+        require_kept_parameter(e, &joints)?;
         let [a, b] = curve.domain();
         Ok(curve.reparametrised([0.0, b - a]))
     }
-
-    /// Returns the distance, mm, within which ends of these segments are one.
-    fn accuracy_along(&self, segments: &[Curve]) -> f64 {
-        let bounds = segments.iter().fold(Aabb::EMPTY, |sum, c| sum.union(c.bounds()));
-        self.units.accuracy_on_face(bounds.diagonal())
-    }
-
-    /// Whether a curve is a composite curve, or a part or copy of one, whose segments lie farther apart than the file's accuracy.
-    pub(super) fn is_bridged(&self, curve: Entity<'f, 'a>) -> bool {
-        let owner = self.parameter_owner(curve);
-        if !owner.is_one_of(&COMPOSITES) {
-            return false;
-        }
-        self.segments(owner, 0).is_ok_and(|segments| {
-            let accuracy = self.accuracy_along(&segments);
-            segments.windows(2).any(|pair| {
-                let [from, to] = gap_between(&pair[0], &pair[1]);
-                !coincident(from, to, accuracy)
-            })
-        })
-    }
-
-    /// Refuses a composite curve through which our parameter, but for its start, does not run as the file's, which goes through its
-    /// segments' from 0 on: one with segments other than of lines and splines, with a parameter of their own, or with bridged gaps.
-    fn require_kept_parameter(&self, e: Entity<'f, 'a>) -> Outcome<()> {
-        let list = segment_list(e);
-        let are_kept = list.is_some_and(|list| (0..list.len()).filter_map(|i| list.entity(i)).all(keeps_parameter));
-        if !are_kept {
-            return Err(Refusal::new(
-                e,
-                "its parameters cannot be taken over: they count those of conics or polylines",
-            ));
-        }
-        if self.is_bridged(e) {
-            return Err(Refusal::new(e, "its parameters cannot be taken over: its segments lie apart"));
-        }
-        Ok(())
-    }
 }
 
-/// Returns where one curve ends and the next one begins.
-fn gap_between(before: &Curve, after: &Curve) -> [Point; 2] {
-    [before.evaluate(before.domain()[1]), after.evaluate(after.domain()[0])]
+/// Refuses a composite curve through which our parameter, but for its start, does not run as the file's, which goes through its segments'
+/// from 0 on: one with segments other than of lines and splines, with a parameter of their own, or with `joints`.
+fn require_kept_parameter(e: Entity<'_, '_>, joints: &[Joint]) -> Outcome<()> {
+    let list = segment_list(e);
+    let are_kept = list.is_some_and(|list| (0..list.len()).filter_map(|i| list.entity(i)).all(keeps_parameter));
+    if !are_kept {
+        return Err(Refusal::new(
+            e,
+            "its parameters cannot be taken over: they count those of conics or polylines",
+        ));
+    }
+    if !joints.is_empty() {
+        return Err(Refusal::new(e, "its parameters cannot be taken over: its segments lie apart"));
+    }
+    Ok(())
 }
 
 /// Returns the list of the segments of a composite curve; `None` of one without any, and of any other curve.
@@ -346,51 +330,7 @@ pub(super) fn is_part_of_spline(curve: Entity<'_, '_>) -> bool {
     trimmed.unwrap_or(curve).keywords().any(|k| SPLINES.contains(&k))
 }
 
-/// Returns the same curve with a higher degree, piecewise Bézier; `degree` is not below its own.
-fn elevate_degree(curve: &Curve, degree: usize) -> Curve {
-    if curve.degree == degree {
-        return curve.clone();
-    }
-    let mut points: Vec<Homogeneous> = Vec::new();
-    for mut piece in curve.bezier_pieces() {
-        while piece.len() <= degree {
-            let n = piece.len();
-            let mut up = vec![piece[0]];
-            // Degree elevation: the new points divide the legs of the polygon at i/n.
-            up.extend(
-                (1..n).map(|i| piece[i - 1] * (i as f64 / n as f64) + piece[i] * (1.0 - i as f64 / n as f64)),
-            );
-            up.push(piece[n - 1]);
-            piece = up;
-        }
-        // At a joint both pieces have one control point.
-        points.extend(&piece[usize::from(!points.is_empty())..]);
-    }
-    let breaks = curve.breakpoints();
-    let mut knots = vec![breaks[0]];
-    knots.extend(breaks.iter().flat_map(|&b| std::iter::repeat_n(b, degree)));
-    knots.push(breaks[breaks.len() - 1]);
-    Curve { degree, knots, points }
-}
-
 /// Whether two points are at most `tolerance`, mm, apart.
 pub(crate) fn coincident(a: Point, b: Point, tolerance: f64) -> bool {
     (a - b).length() <= tolerance
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::nurbs::conic;
-
-    #[test]
-    fn elevation_keeps_the_curve() {
-        let c = conic::arc(&Frame::IDENTITY, 2.0, [0.0, 5.0]);
-        let e = elevate_degree(&c, 4);
-        assert_eq!(e.knots.len(), e.points.len() + 5);
-        for i in 0..=40 {
-            let t = 0.125 * f64::from(i);
-            assert!((c.evaluate(t) - e.evaluate(t)).length() < 1e-13);
-        }
-    }
 }

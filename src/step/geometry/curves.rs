@@ -1,6 +1,7 @@
 //! Curves of the file: closed forms where there is one, rational splines for the rest.
 
-use super::tolerances::{CLOSED_MM, CLOSED_SHARE, CONVERGED_ANGLE, MERGED_POINTS_MM, SEAM_SHARE, SHORTEST_TAIL};
+use super::joints::{JoinedCurve, Joint, crossed_joints, segment_over_seam};
+use super::tolerances::{CLOSED_MM, CLOSED_SHARE, CONVERGED_ANGLE, MERGED_POINTS_MM};
 use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Frame, Homogeneous, Point, Vector};
 use crate::nurbs::{ControlPoint, Curve, conic, project, sanitise};
@@ -31,8 +32,8 @@ pub(crate) enum CurveShape {
     Hyperbola { frame: Frame, a: f64, b: f64 },
     /// `(f t², 2 f t)`.
     Parabola { frame: Frame, f: f64 },
-    /// A spline over its domain.
-    Spline { curve: Curve, closed: bool },
+    /// A spline over its domain; `joints` are those of a composite curve.
+    Spline { curve: Curve, closed: bool, joints: Vec<Joint> },
 }
 
 /// A curve with the direction in which it is run.
@@ -46,10 +47,23 @@ pub(crate) struct DirectedCurve {
 impl CurveShape {
     /// Wraps a spline, and finds out whether its ends meet.
     pub(crate) fn spline(curve: Curve) -> Self {
+        Self::joined(JoinedCurve { curve, joints: Vec::new() })
+    }
+
+    /// Wraps a spline, as [`Self::spline`] does, with the joints of its segments.
+    pub(super) fn joined(JoinedCurve { curve, joints }: JoinedCurve) -> Self {
         let [a, b] = curve.domain();
         let size = curve.bounds().diagonal();
         let closed = (curve.evaluate(a) - curve.evaluate(b)).length() <= CLOSED_SHARE * size + CLOSED_MM;
-        Self::Spline { curve, closed }
+        Self::Spline { curve, closed, joints }
+    }
+
+    /// Returns the joints that the piece over a range runs over, by the parameter of the piece.
+    pub(super) fn joints_along(&self, range: [f64; 2]) -> Vec<Joint> {
+        match self {
+            Self::Spline { curve, joints, .. } => crossed_joints(joints, curve.domain()[0], self.period(), range),
+            _ => Vec::new(),
+        }
     }
 
     /// Returns the curve as a placement moves, turns, mirrors and scales it, with the same parameter.
@@ -65,8 +79,8 @@ impl CurveShape {
                 Self::Hyperbola { frame: carried(frame), a: scale * a, b: scale * b }
             }
             Self::Parabola { frame, f } => Self::Parabola { frame: carried(frame), f: scale * f },
-            Self::Spline { curve, closed } => {
-                Self::Spline { curve: map_points(curve, |p| placement.point(p)), closed }
+            Self::Spline { curve, closed, joints } => {
+                Self::Spline { curve: map_points(curve, |p| placement.point(p)), closed, joints }
             }
         }
     }
@@ -75,7 +89,7 @@ impl CurveShape {
     pub(crate) fn period(&self) -> Option<f64> {
         match self {
             Self::Ellipse { .. } => Some(2.0 * PI),
-            Self::Spline { curve, closed: true } => {
+            Self::Spline { curve, closed: true, .. } => {
                 let [a, b] = curve.domain();
                 Some(b - a)
             }
@@ -128,7 +142,7 @@ impl CurveShape {
                 let points = [at(t0, t0), at(t0, t1), at(t1, t1)].map(|p| Homogeneous::weighted(p, 1.0)).to_vec();
                 Curve { degree: 2, knots: vec![t0, t0, t0, t1, t1, t1], points }
             }
-            Self::Spline { curve, closed } => {
+            Self::Spline { curve, closed, .. } => {
                 let [a, b] = curve.domain();
                 let period = b - a;
                 if *closed && (t1 > b || t0 < a) {
@@ -148,23 +162,6 @@ impl CurveShape {
 fn placed_frame(placement: &Frame, conic: Frame) -> Frame {
     let Frame { origin, x, y, .. } = placement.compose(&conic);
     Frame { origin, x, y, z: x.cross(y), scale: 1.0 }
-}
-
-/// Returns a closed spline over `[s0, s1]`, which may run past the end of its domain by one period.
-fn segment_over_seam(curve: &Curve, s0: f64, s1: f64) -> Curve {
-    let [a, b] = curve.domain();
-    let period = b - a;
-    if s1 <= b {
-        return curve.restricted(s0, s1);
-    }
-    // A start on the seam: all of the range lies behind it.
-    if b - s0 <= SEAM_SHARE * period {
-        let end = (s1 - period).max(a + SHORTEST_TAIL * period);
-        return curve.restricted(a, end.min(b)).reparametrised([b, b + (end - a)]);
-    }
-    let head = curve.restricted(s0, b);
-    let tail = curve.restricted(a, (s1 - period).clamp(a + SHORTEST_TAIL * period, b));
-    head.joined_with(&tail)
 }
 
 /// Returns a spline with its control points moved by `map`, which must be affine.
@@ -220,7 +217,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             return self.curve(basis.id, depth + 1);
         }
         if e.is_one_of(&["PCURVE", "BOUNDED_PCURVE"]) {
-            return ahead(CurveShape::spline(self.pcurve(e, depth + 1)?));
+            return ahead(CurveShape::joined(self.pcurve(e, depth + 1)?));
         }
         if let Some(own) = e.attributes("OFFSET_CURVE_3D", 1) {
             return self.offset_curve(e, own, depth);
@@ -232,7 +229,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             return Ok(curve);
         }
         if e.is_one_of(&COMPOSITES) {
-            return ahead(CurveShape::spline(self.composite_curve(e, depth + 1)?));
+            return ahead(CurveShape::joined(self.composite_curve(e, depth + 1)?));
         }
         if let Some(own) = e.attributes("CURVE_REPLICA", 1) {
             let (parent, placement) = self.replica(e, own)?;

@@ -16,6 +16,8 @@ const PASSED_BY: &str = "the line of an edge passes one of its vertices by: it r
 const WRONG_SENSE: &str = "the sense of an edge contradicts its vertices: it runs from the first to the second";
 /// What is told of an edge whose curve was in pieces.
 const BRIDGED: &str = "segments of the curve of an edge lie apart: straight pieces join them";
+/// What is told of an edge along whose curve some is there twice.
+const CUT: &str = "segments of the curve of an edge overlap: what they have in common is cut off one of them";
 /// Longest chain of edges that are parts of edges.
 const MAX_PARENTS: usize = 4;
 
@@ -59,7 +61,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
 
     /// Reads edge #`id` from its first to its second vertex, mm: that part of `curve`, or all of a closed one where both vertices are one
     /// place; the straight line where the file gives no curve, none where it has no length. `sense` is whether it runs along `curve`; a
-    /// wrong one is corrected. Refuses missing vertices, and vertices that leave nothing of the curve but lie apart.
+    /// wrong one is corrected. Refuses missing vertices, vertices that leave nothing of the curve but lie apart, and a part of a composite
+    /// curve with segments too far apart to be joined.
     fn edge_between(
         &self,
         id: u64,
@@ -82,8 +85,11 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let closed = closed || alone && directed.shape.period().is_some() && coincident(p, q, LOOSE_VERTEX_MM);
         let edge = trim_to_vertices(&directed, p, q, closed, sense)
             .ok_or_else(|| Refusal::new(e, "its vertices leave nothing of its curve"))?;
-        let bridged = || self.is_bridged(self.file.entity(curve)?).then_some(BRIDGED);
-        Ok(TrimmedEdge { repair: edge.repair.or_else(bridged), ..edge })
+        // A trimmed curve has the parameter of the whole one, also where it is run backwards.
+        let joints = edge.curve.as_ref().map_or_else(Vec::new, |part| directed.shape.joints_along(part.domain()));
+        self.require_joined(&joints)?;
+        let told = joints.first().map(|joint| if joint.overlaps { CUT } else { BRIDGED });
+        Ok(TrimmedEdge { repair: edge.repair.or(told), ..edge })
     }
 }
 

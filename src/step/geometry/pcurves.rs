@@ -2,9 +2,8 @@
 
 use super::curves::{CurveShape, DirectedCurve};
 use super::extent::FaceExtent;
-use super::tolerances::{
-    CURVE_ERROR_MM, DIFFERENCE_STEP, LIMIT_STEP, PARALLEL_AXIS, STILL_SHARE, WORST_CURVE_ERROR_MM,
-};
+use super::joints::{JoinedCurve, direction};
+use super::tolerances::{CURVE_ERROR_MM, DIFFERENCE_STEP, PARALLEL_AXIS, WORST_CURVE_ERROR_MM};
 use super::units::Units;
 use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Aabb, Point, Uv, Vector};
@@ -78,14 +77,17 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
                     let (lo, hi) = ((t - h).max(a), (t + h).min(b));
                     (moved(piece, t), (moved(piece, hi) - moved(piece, lo)) / (hi - lo))
                 };
-                CurveShape::spline(fit_pieces(e, &curve, at)?)
+                // Over its range it keeps its parameter, and with that its joints.
+                let joints = shape.joints_along([from, to]);
+                CurveShape::joined(JoinedCurve { curve: fit_pieces(e, &curve, at)?, joints })
             }
         };
         Ok(DirectedCurve { shape, reversed })
     }
 
-    /// Reads a PCURVE as a curve in space, mm, fitted as by [`fit_pieces`]; refuses surfaces whose parameters the chart does not keep.
-    pub(crate) fn pcurve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<Curve> {
+    /// Reads a PCURVE as a curve in space, mm, fitted as by [`fit_pieces`], with the joints of what is composite in the parameter plane;
+    /// refuses surfaces whose parameters the chart does not keep.
+    pub(super) fn pcurve(&self, e: Entity<'f, 'a>, depth: usize) -> Outcome<JoinedCurve> {
         let own = e.attributes("PCURVE", 1).unwrap_or_else(|| e.args());
         let basis = self.resolve(e, own.id(0), "basis surface")?;
         let definition = self.resolve(e, own.id(1), "curve in the parameter plane")?;
@@ -93,7 +95,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let item = self.resolve(definition, representation.list(1).id(0), "curve in the parameter plane")?;
         // Parameters are pure numbers; only angles of conics keep their unit.
         let plane = GeometryReader { file: self.file, units: Units { length: 1.0, ..self.units } };
-        let curve = plane.bounded_curve(item.id, depth + 1)?;
+        let JoinedCurve { curve, joints } = plane.joined_part(item.id, depth + 1)?;
         let Aabb { min, max } = curve.bounds();
         let ranges =
             [[min.x, max.x], [min.y, max.y]].map(|[a, b]| [Some(a), Some(if a < b { b } else { a + 1.0 })]);
@@ -101,18 +103,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let Some(scale) = chart.parameter_scale(self.units.length, self.units.angle) else {
             return Err(Refusal::new(e, "its parameters cannot be taken over to the surface's closed form"));
         };
-        lift_to_surface(e, &chart, &curve, scale)
+        Ok(JoinedCurve { curve: lift_to_surface(e, &chart, &curve, scale)?, joints })
     }
-}
-
-/// Returns a vector along a curve at `t`: its derivative or, where that vanishes, the one a little nearer to the middle.
-fn direction(curve: &Curve, t: f64) -> Vector {
-    let [a, b] = curve.domain();
-    let first = curve.derivatives(t).first;
-    if first.length() * (b - a) > STILL_SHARE * curve.bounds().diagonal() {
-        return first;
-    }
-    curve.derivatives(t + LIMIT_STEP * (0.5 * (a + b) - t)).first
 }
 
 /// Returns a curve of a chart's parameter plane as a curve in space, fitted; `scale` turns the curve's u and v into the chart's.

@@ -70,7 +70,10 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
                 let reach = t.abs() + (2.0 * radius / f).sqrt().max(radius / f);
                 directed.shape.segment(-reach, reach)
             }
-            CurveShape::Spline { curve, .. } => curve.clone(),
+            CurveShape::Spline { curve, joints, .. } => {
+                self.require_joined(joints)?;
+                curve.clone()
+            }
         };
         Ok((if directed.reversed { curve.reversed() } else { curve }, line))
     }

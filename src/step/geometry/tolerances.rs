@@ -38,6 +38,15 @@ pub(super) const EMPTY_SHARE: f64 = 1e-9;
 pub(super) const LOOSE_VERTEX_MM: f64 = 1e-3;
 /// Least and most that a file's stated accuracy counts for: zero and metres are both written.
 pub(super) const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
+/// A gap between segments of a composite curve up to this share of the curve's size may be a writer's inaccuracy.
+pub(super) const BRIDGE_SHARE: f64 = 1e-2;
+/// The accuracy that a file states counts for such gaps up to this share of the curve's size: metres would join anything.
+pub(super) const STATED_BRIDGE_SHARE: f64 = 0.1;
+/// A step between segments runs against one of them where the cosine of the angle between them is below minus this: steps to the side,
+/// which rounding turns, do not.
+pub(super) const BACKWARD_COSINE: f64 = 0.1;
+/// A vertex of an edge along one of two segments that overlap may lie on the other by this many times the distance of their ends.
+pub(super) const OVERLAP_ROOM: f64 = 2.0;
 /// Points nearer than this are equal.
 pub(super) const EQUAL_POINTS_MM: f64 = 1e-12;
 /// A range of parameters below this share of their sum is rounding.

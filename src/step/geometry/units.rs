@@ -1,6 +1,6 @@
 //! Units of a representation context: one file may mix several.
 
-use super::tolerances::ACCURACY_MM;
+use super::tolerances::{ACCURACY_MM, BRIDGE_SHARE, STATED_BRIDGE_SHARE};
 use crate::math::units::{DEGREE, INCH, METRE, si_prefix};
 use crate::step::part21::{Args, Entity, File};
 
@@ -34,6 +34,13 @@ impl Units {
     pub(crate) fn accuracy_on_face(&self, size: f64) -> f64 {
         let stated = self.accuracy.unwrap_or(ACCURACY_MM[0]).clamp(ACCURACY_MM[0], ACCURACY_MM[1]);
         stated.min(ACCURACY_SHARE * size.max(SMALLEST_FACE_MM)).max(ACCURACY_MM[0])
+    }
+
+    /// Returns the widest gap, mm, between segments of a composite curve of this size, mm, that may be bridged: what the file states, less
+    /// on small curves, or a share of the size where that is more.
+    pub(crate) fn widest_bridge(&self, size: f64) -> f64 {
+        let stated = self.accuracy.unwrap_or(0.0).min(STATED_BRIDGE_SHARE * size);
+        stated.max(BRIDGE_SHARE * size).max(ACCURACY_MM[1])
     }
 }
 

@@ -1,0 +1,167 @@
+//! Composite curves whose segments do not meet: gaps are bridged or refused where an edge runs over them, overlaps are cut off. The same
+//! decisions in files of any unit.
+
+use crate::files::part21;
+use crate::silence::{area, close};
+use lampyris::math::{Point, Vector};
+use lampyris::nurbs::Curve;
+use lampyris::step::{Import, Settings, read_bytes};
+use std::f64::consts::PI;
+
+/// A unit of length in which a file is written.
+#[derive(Clone, Copy)]
+struct Unit {
+    name: &'static str,
+    /// Its size.
+    mm: f64,
+    /// Its record #2 and those that this refers to.
+    records: &'static str,
+}
+
+const UNITS: [Unit; 3] = [
+    Unit { name: "mm", mm: 1.0, records: "#2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n" },
+    Unit {
+        name: "inch",
+        mm: 25.4,
+        records: "#2=(CONVERSION_BASED_UNIT('INCH',#5)LENGTH_UNIT()NAMED_UNIT(*));\n\
+                  #5=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#7);\n#7=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n",
+    },
+    Unit { name: "m", mm: 1e3, records: "#2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.));\n" },
+];
+
+/// Accuracies that files state, mm: a thousandth of an inch, and next to nothing.
+const COARSE: f64 = 0.0254;
+const FINE: f64 = 1e-6;
+
+/// Half a disc of radius 5 whose second quarter stands `gap` to the left, along edge #40 and the straight one back, in a file that states
+/// its accuracy. The curve of the edge goes on with a line that begins `beyond` below its end, where that is given. All lengths are in mm.
+fn half_disc(unit: Unit, accuracy: f64, gap: f64, beyond: Option<f64>) -> Import {
+    let records = unit.records;
+    let real = |mm: f64| format!("{:.18}", mm / unit.mm);
+    let place = |x: f64, y: f64| format!("CARTESIAN_POINT('',({},{},0.))", real(x), real(y));
+    let radius = real(5.0);
+    let end = -5.0 - gap;
+    let more = beyond.map_or_else(String::new, |beyond| {
+        format!(
+            "#50={};\n#51={};\n#52=POLYLINE('',(#50,#51));\n#53=COMPOSITE_CURVE_SEGMENT(.DISCONTINUOUS.,.T.,#52);\n",
+            place(end, -beyond),
+            place(end, -beyond - 3.0)
+        )
+    });
+    let list = if beyond.is_some() { "#26,#27,#53" } else { "#26,#27" };
+    let text = part21(&format!(
+        "#1=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT((#4))GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3))REPRESENTATION_CONTEXT('',''));\n\
+         {records}#3=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\n#4=UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE({}),#2,'','');\n\
+         #6=SHAPE_REPRESENTATION('',(#900),#1);\n#10={};\n#11=DIRECTION('',(1.,0.,0.));\n#13=DIRECTION('',(0.,0.,1.));\n\
+         #14=AXIS2_PLACEMENT_3D('',#10,#13,#11);\n#20=CIRCLE('',#14,{radius});\n#22={};\n#23=AXIS2_PLACEMENT_3D('',#22,#13,#11);\n\
+         #24=CIRCLE('',#23,{radius});\n\
+         #21=TRIMMED_CURVE('',#20,(PARAMETER_VALUE(0.)),(PARAMETER_VALUE(1.5707963267948966)),.T.,.PARAMETER.);\n\
+         #25=TRIMMED_CURVE('',#24,(PARAMETER_VALUE(1.5707963267948966)),(PARAMETER_VALUE(3.141592653589793)),.T.,.PARAMETER.);\n\
+         #26=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#21);\n#27=COMPOSITE_CURVE_SEGMENT(.DISCONTINUOUS.,.T.,#25);\n\
+         {more}#28=COMPOSITE_CURVE('',({list}),.F.);\n#30={};\n#31={};\n\
+         #32=VERTEX_POINT('',#30);\n#33=VERTEX_POINT('',#31);\n#40=EDGE_CURVE('',#32,#33,#28,.T.);\n#41=EDGE_CURVE('',#33,#32,$,.T.);\n\
+         #42=ORIENTED_EDGE('',*,*,#40,.T.);\n#43=ORIENTED_EDGE('',*,*,#41,.T.);\n#44=EDGE_LOOP('',(#42,#43));\n\
+         #45=FACE_OUTER_BOUND('',#44,.T.);\n#71=PLANE('',#14);\n#72=ADVANCED_FACE('',(#45),#71,.T.);\n#73=OPEN_SHELL('',(#72));\n\
+         #900=SHELL_BASED_SURFACE_MODEL('',(#73));\n",
+        real(accuracy),
+        place(0.0, 0.0),
+        place(-gap, 0.0),
+        place(5.0, 0.0),
+        place(end, 0.0),
+    ));
+    read_bytes("joints.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
+}
+
+/// The curve of edge #40.
+fn arc(import: &Import) -> &Curve {
+    &import.model.parts[0].edges.iter().find(|e| e.entity == Some(40)).expect("the edge").curve
+}
+
+/// Asserts that the face is there, of this area, and was repaired for this reason or not at all.
+fn assert_read(import: &Import, reason: Option<&str>, expected: f64, what: &str) {
+    let faces = &import.report.faces;
+    assert_eq!((faces.converted, faces.repaired), (1, usize::from(reason.is_some())), "{what}");
+    let repairs = &import.report.repairs;
+    assert!(repairs.iter().all(|r| reason.is_some_and(|reason| r.reason.contains(reason))), "{what}: {repairs:?}");
+    // The quadrature walks a polygon of chords.
+    close(area(import), expected, 1e-4);
+}
+
+#[test]
+fn segments_that_lie_apart_keep_their_shapes_and_are_told() {
+    for (gap, reason) in [(0.0, None), (0.005, Some("lie apart"))] {
+        let import = half_disc(UNITS[0], FINE, gap, None);
+        assert_read(&import, reason, 12.5 * PI + 5.0 * gap, &format!("{gap}"));
+        let curve = arc(&import);
+        let [a, b] = curve.domain();
+        for k in 0..=200 {
+            let p = curve.evaluate(a + (b - a) * f64::from(k) / 200.0);
+            let off = if p.x > 0.0 {
+                p.length() - 5.0
+            } else if p.x < -gap {
+                (p + gap * Vector::X).length() - 5.0
+            } else {
+                p.y - 5.0
+            };
+            assert!(off.abs() < 1e-9, "{gap}: {p}");
+        }
+    }
+}
+
+/// The widest gap is 1 % of the curve, 0.11 mm here, or what the file states.
+#[test]
+fn a_gap_within_what_a_writer_may_miss_is_bridged_in_any_unit() {
+    for unit in UNITS {
+        for (accuracy, gap) in [(COARSE, 0.02), (FINE, 0.02), (FINE, 0.09), (0.3, 0.2)] {
+            let import = half_disc(unit, accuracy, gap, None);
+            assert_read(&import, Some("lie apart"), 12.5 * PI + 5.0 * gap, &format!("{} {gap}", unit.name));
+        }
+        for accuracy in [FINE, COARSE] {
+            // 5 % of the curve.
+            let import = half_disc(unit, accuracy, 0.6, None);
+            assert_eq!(import.report.faces.converted, 0, "{}", unit.name);
+            let refusals = &import.report.refusals;
+            let told = "#28 COMPOSITE_CURVE: its segments are 6.000e-1 mm apart";
+            assert!(refusals.iter().any(|r| r.reason.contains(told)), "{}: {refusals:?}", unit.name);
+        }
+    }
+}
+
+/// A file that states an accuracy of its own size would join anything.
+#[test]
+fn an_accuracy_of_metres_bridges_no_curve() {
+    assert_eq!(half_disc(UNITS[0], 1e3, 2.0, None).report.faces.converted, 0);
+}
+
+#[test]
+fn a_gap_beyond_the_edge_is_neither_refused_nor_told() {
+    for unit in UNITS {
+        for beyond in [0.005, 0.05, 1.0] {
+            let import = half_disc(unit, FINE, 0.0, Some(beyond));
+            assert_read(&import, None, 12.5 * PI, &format!("{} {beyond}", unit.name));
+        }
+        // A gap that it does run over is told all the same.
+        let both = half_disc(unit, FINE, 0.02, Some(1.0));
+        assert_read(&both, Some("lie apart"), 12.5 * PI + 0.1, unit.name);
+    }
+}
+
+/// The second quarter begins before the end of the first: without a step back from the one to the other the edge runs counter-clockwise
+/// throughout.
+#[test]
+fn an_edge_over_segments_that_overlap_does_not_double_back() {
+    for unit in UNITS {
+        let name = unit.name;
+        let import = half_disc(unit, FINE, -0.005, None);
+        assert_read(&import, Some("overlap"), 12.5 * PI - 0.025, name);
+        let curve = arc(&import);
+        let [a, b] = curve.domain();
+        for k in 0..=4000 {
+            let d = curve.derivatives(a + (b - a) * f64::from(k) / 4000.0);
+            assert!(d.point.cross(d.first).z > 0.0, "{name}: back at {}", d.point);
+            let off = [0.0, 0.005].map(|x| ((d.point - Point::new(x, 0.0, 0.0)).length() - 5.0).abs());
+            // The quarters are 2.5e-6 mm apart where the one passes the end of the other.
+            assert!(off[0].min(off[1]) < 5e-6, "{name}: {}", d.point);
+        }
+    }
+}
