@@ -452,6 +452,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "places",
             "assembly",
             "links",
+            "usages",
             "placed_children",
             "placed_count",
             "shared_items",

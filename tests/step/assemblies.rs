@@ -113,6 +113,62 @@ fn every_usage_of_a_component_places_it() {
     assert_places(&assembly("", &data), &[10.0], "a promise");
 }
 
+/// What counts a component, or is of no stated kind, means the occurrence beside it, which is placed or stands with its parent.
+#[test]
+fn a_usage_that_counts_a_component_adds_nothing_to_its_occurrences() {
+    let placed = usage(400, NEXT, "#200,#100,$") + &relation(410, [110, 300], [20, 21]) + PLACED;
+    let unplaced = usage(400, NEXT, "#200,#100,$");
+    for (kind, ends) in
+        [("QUANTIFIED_ASSEMBLY_COMPONENT_USAGE", "#200,#100,$,$"), ("ASSEMBLY_COMPONENT_USAGE", "#200,#100,$")]
+    {
+        let counted = usage(440, kind, ends);
+        for data in [format!("{placed}{counted}"), format!("{counted}{placed}")] {
+            let import = assembly("", &data);
+            assert_places(&import, &[10.0], kind);
+            // Of one occurrence there is nothing to be numbered.
+            assert_eq!(import.model.instances[0].name, "part");
+        }
+        assert_places(&assembly("", &format!("{unplaced}{counted}")), &[0.0], kind);
+        // One that is placed, or stands in another assembly, is an occurrence of its own.
+        let own = usage(440, kind, ends)
+            + &relation(450, [110, 300], [20, 22])
+            + "#460=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#450,#441);\n";
+        assert_places(&assembly("", &format!("{placed}{own}")), &[10.0, 20.0], kind);
+        let elsewhere = product(500, "other", 510)
+            + "#510=SHAPE_REPRESENTATION('',(#20),#1);\n"
+            + &usage(440, kind, &ends.replace("#200", "#500"));
+        assert_places(&assembly("", &format!("{placed}{elsewhere}")), &[0.0, 10.0], kind);
+    }
+}
+
+/// Two items in two places are two occurrences; one that is listed in its place again is no third.
+#[test]
+fn each_mapped_item_of_a_usage_is_an_occurrence() {
+    let placed_by = |items: &str| {
+        let used = usage(400, NEXT, "#200,#100,$");
+        let data = format!(
+            "{used}#30=REPRESENTATION_MAP(#20,#110);\n#31=MAPPED_ITEM('',#30,#21);\n#34=MAPPED_ITEM('',#30,#22);\n\
+             #35=MAPPED_ITEM('',#30,#22);\n#36=MAPPED_ITEM('',#30,#10);\n#32=SHAPE_REPRESENTATION('place',({items}),#1);\n\
+             #33=SHAPE_DEFINITION_REPRESENTATION(#401,#32);\n"
+        );
+        assembly("", &data)
+    };
+    for items in ["#31,#34", "#34,#31,#35"] {
+        let import = placed_by(items);
+        assert_places(&import, &[10.0, 20.0], items);
+        let mut names: Vec<&str> = import.model.instances.iter().map(|i| i.name.as_str()).collect();
+        names.sort_unstable();
+        assert_eq!(names, ["part:1", "part:2"]);
+    }
+    // One that cannot be read is told, and the other stands.
+    let broken = placed_by("#36,#34");
+    assert_eq!(broken.model.instances.iter().map(|i| i.placement.origin.x).collect::<Vec<_>>(), [20.0]);
+    let problems = &broken.report.problems;
+    assert!(problems.iter().any(|p| p.contains("#36: its placement cannot be read")), "{problems:?}");
+    // With nothing but that the part stands nowhere.
+    assert_eq!(placed_by("#36").model.instances.len(), 0);
+}
+
 #[test]
 fn a_placement_in_a_rare_form_counts() {
     let used = usage(400, NEXT, "#200,#100,$");

@@ -3,11 +3,11 @@
 //! Source: ISO 10303-43, -44 and -41: usages of products, and the relationships of their representations.
 
 use super::relations::{
-    Link, OccurrenceShape, RELATIONS, is_higher_usage, is_promise, property_attributes,
-    shape_definition_attributes, usage_attributes,
+    Link, OccurrenceShape, RELATIONS, is_higher_usage, property_attributes, shape_definition_attributes,
+    usage_attributes,
 };
 use super::usage_ends::UsageEnds;
-use super::usage_names::{ProductNames, Usage, name_usages};
+use super::usage_names::{ProductNames, Usage};
 use crate::math::Frame;
 use crate::step::geometry::GeometryReader;
 use crate::step::geometry::units::Units;
@@ -49,8 +49,9 @@ pub(crate) struct Assembly<'f, 'a> {
     /// Product definition → its children.
     pub(super) usages: FxHashMap<u64, Arc<[Usage]>>,
     pub(super) products: ProductNames,
-    /// Usage → placement of the child in the parent; `None` where that cannot be read.
-    pub(super) placements: FxHashMap<u64, Option<Frame>>,
+    /// Usage → placements of the child in the parent, of which a mapped item each may state several; empty where none can be read. They
+    /// pass to [`Assembly::usages`] when all are known.
+    pub(super) placements: FxHashMap<u64, Vec<Frame>>,
     pub(super) links: FxHashMap<u64, Vec<Link>>,
     /// Representations, or some of their items, that are not the shape of a product, and what they are.
     pub(crate) left_out: Vec<(u64, String)>,
@@ -96,40 +97,18 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 relations.push(e);
             }
         }
-        a.read_usages(&usages);
+        let usages = Self::read_usages(&usages);
         let used = a.read_contextual(&contextual);
-        let ends = UsageEnds::new(&a.shapes, &a.usages);
+        let ends = UsageEnds::new(&a.shapes, &usages);
         for e in relations {
             if !used.contains(&e.id) {
                 a.read_relationship(e, &ends);
             }
         }
         a.leave_out_links_to_products();
-        for shape in &occurrence_shapes {
-            a.read_occurrence_shape(shape);
-        }
+        a.read_occurrence_shapes(&occurrence_shapes);
+        a.settle_usages(usages);
         a
-    }
-
-    /// Reads which products use which, and what their usages are called.
-    fn read_usages(&mut self, entities: &[Entity<'f, 'a>]) {
-        let mut usages: FxHashMap<u64, Vec<Usage>> = FxHashMap::default();
-        let mut used: FxHashSet<u64> = FxHashSet::default();
-        // A promise comes last, for it counts where nothing else uses its component.
-        let (promises, others): (Vec<Entity<'f, 'a>>, Vec<Entity<'f, 'a>>) =
-            entities.iter().copied().partition(|e| is_promise(*e));
-        for (e, is_promise) in others.iter().map(|e| (e, false)).chain(promises.iter().map(|e| (e, true))) {
-            let ends = usage_attributes(*e).and_then(|args| Some((args.id(3)?, args.id(4)?)));
-            let Some((parent, child)) = ends else { continue };
-            if !is_promise || !used.contains(&child) {
-                usages.entry(parent).or_default().push(Usage { child, name: String::new(), id: e.id });
-            }
-            if !is_promise {
-                used.insert(child);
-            }
-        }
-        usages.values_mut().for_each(|usages| name_usages(self.file, &mut self.products, usages));
-        self.usages = usages.into_iter().map(|(parent, usages)| (parent, usages.into())).collect();
     }
 
     /// Returns the units of a representation's context; `fallback` where it names none or one that assigns none.

@@ -1,7 +1,7 @@
 //! How representations stand in each other: by relationships, by mapped items, and by the usages whose shapes they are.
 
 use super::assembly::Assembly;
-use super::places::is_one_place;
+use super::places::{PlaceList, PlacementKey, is_one_place, placement_key};
 use super::relations::{
     Link, OccurrenceShape, WITH_TRANSFORMATION, is_higher_usage, property_attributes, related_representations,
     usage_attributes,
@@ -9,7 +9,7 @@ use super::relations::{
 use super::usage_ends::UsageEnds;
 use crate::math::Frame;
 use crate::step::part21::Entity;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 impl<'f, 'a> Assembly<'f, 'a> {
     /// Returns how the first of two representations stands in the second by the transformation of their relationship; `None`, which is
@@ -93,14 +93,22 @@ impl<'f, 'a> Assembly<'f, 'a> {
 
     /// Notes where the child of a usage stands in the parent, as the entity `by` says; the first such entity counts.
     fn place_usage(&mut self, by: u64, usage: u64, placement: Option<Frame>) {
-        let known = *self.placements.entry(usage).or_insert(placement);
-        let is_same = match (known, placement) {
-            (Some(known), Some(placement)) => is_one_place(&known, &placement),
+        let Some(known) = self.placements.get(&usage) else {
+            self.placements.insert(usage, Vec::from_iter(placement));
+            return;
+        };
+        let is_same = match (known.first(), placement) {
+            (Some(known), Some(placement)) => is_one_place(known, &placement),
             (known, placement) => known.is_none() && placement.is_none(),
         };
         if !is_same {
-            self.problems.push(format!("#{by}: usage #{usage} has another place already, which counts alone"));
+            self.tell_other_place(by, usage);
         }
+    }
+
+    /// Tells that an entity gives a usage another place than those that count.
+    fn tell_other_place(&mut self, by: u64, usage: u64) {
+        self.problems.push(format!("#{by}: usage #{usage} has another place already, which counts alone"));
     }
 
     /// Tells where a usage that a higher assembly sees has another place than the usages that it is made of.
@@ -111,10 +119,11 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let Some(stated) = self.transformation(relation, ends) else { return };
         // A usage without a placement stands where its parent does.
         let place = |i: usize| {
-            made_of.id(i).and_then(|id| self.placements.get(&id).copied().flatten()).unwrap_or(Frame::IDENTITY)
+            let stated = made_of.id(i).and_then(|id| self.placements.get(&id)?.first().copied());
+            stated.unwrap_or(Frame::IDENTITY)
         };
         let composed = place(0).compose(&place(1));
-        self.placements.insert(usage.id, Some(composed));
+        self.placements.insert(usage.id, vec![composed]);
         if !is_one_place(&composed, &stated) && !is_one_place(&composed, &stated.inverse()) {
             self.problems.push(format!(
                 "#{}: usage #{} has another place than the usages that it is made of, which count alone",
@@ -123,24 +132,51 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
     }
 
-    /// Reads where the child of a usage stands in the parent by a mapped item of the usage's own shape, as AP214 allows.
-    pub(super) fn read_occurrence_shape(&mut self, shape: &OccurrenceShape) {
-        let child = self.file.entity(shape.usage).and_then(usage_attributes).and_then(|a| a.id(4));
-        let Some(child) = child else { return };
-        let items: Vec<u64> = self.items(shape.representation);
-        let links = items.into_iter().filter_map(|item| Some((item, self.mapping(item, shape.representation)?)));
-        let links: Vec<(u64, Link)> = links.collect();
+    /// Reads where the children of usages stand in their parents by mapped items of the usages' own shapes, as AP214 allows: each item of
+    /// the first shape is an occurrence.
+    pub(super) fn read_occurrence_shapes(&mut self, shapes: &[OccurrenceShape]) {
+        let mut known: FxHashMap<u64, PlaceList> = FxHashMap::default();
+        for &OccurrenceShape { usage, representation } in shapes {
+            let items = self.mapped_occurrences(usage, representation);
+            let Some(stated) = self.placements.get(&usage) else {
+                if !items.is_empty() {
+                    // An item that comes again in its place is no second one.
+                    let mut standing: FxHashSet<PlacementKey> = FxHashSet::default();
+                    let frames = items.into_iter().filter_map(|(_, placement)| placement);
+                    let distinct = frames.filter(|frame| standing.insert(placement_key(frame))).collect();
+                    self.placements.insert(usage, distinct);
+                }
+                continue;
+            };
+            let known = known.entry(usage).or_insert_with(|| PlaceList::new(stated.clone()));
+            let is_new = |placement: &Option<Frame>| match placement {
+                Some(placement) => !known.holds(placement),
+                None => !known.is_empty(),
+            };
+            for (item, _) in items.iter().filter(|(_, placement)| is_new(placement)) {
+                self.tell_other_place(*item, usage);
+            }
+        }
+    }
+
+    /// Returns the mapped items of a usage's own shape that show its child, and where each puts it in the parent; `None`, which is told,
+    /// where that cannot be read.
+    fn mapped_occurrences(&mut self, usage: u64, shape: u64) -> Vec<(u64, Option<Frame>)> {
+        let child = self.file.entity(usage).and_then(usage_attributes).and_then(|a| a.id(4));
+        let Some(child) = child else { return Vec::new() };
+        let items = self.items(shape).into_iter();
+        let mut links: Vec<(u64, Link)> =
+            items.filter_map(|item| Some((item, self.mapping(item, shape)?))).collect();
         if links.is_empty() {
-            return;
+            return Vec::new();
         }
         let of_child = self.representations(child);
-        for (item, link) in links.into_iter().filter(|(_, link)| of_child.contains(&link.to)) {
-            if link.placement.is_none() {
-                let told = "its placement cannot be read; what this MAPPED_ITEM places is left out";
-                self.problems.push(format!("#{item}: {told}"));
-            }
-            self.place_usage(item, shape.usage, link.placement);
+        links.retain(|(_, link)| of_child.contains(&link.to));
+        for (item, _) in links.iter().filter(|(_, link)| link.placement.is_none()) {
+            let told = "its placement cannot be read; what this MAPPED_ITEM places is left out";
+            self.problems.push(format!("#{item}: {told}"));
         }
+        links.into_iter().map(|(item, link)| (item, link.placement)).collect()
     }
 
     /// Links the two representations of a relationship: one way by its transformation, or both ways, unmoved, if it has none. Where the

@@ -1,8 +1,8 @@
 //! From instances of the file to parts, and to where they stand.
 //!
-//! Source: ISO 10303-43/44. An assembly places representations (`assembly` with its `relations`, `links`, `usage_names` and `usage_ends`;
-//! `walk` with `places`, `placed_children` and `placed_count`; `shared_items` and `pictures` say which of their items, `asides` what a
-//! viewer would not show); a representation is shells of faces
+//! Source: ISO 10303-43/44. An assembly places representations (`assembly` with its `relations`, `links`, `usages`, `usage_names` and
+//! `usage_ends`; `walk` with `places`, `placed_children` and `placed_count`; `shared_items` and `pictures` say which of their items,
+//! `asides` what a viewer would not show); a representation is shells of faces
 //! (`topology`, with loops put in order by `swapped_vertices`, `face_edges` and `loop_order`, shells turned by `orientation`, and what
 //! has no extent left out by `zero_width` and `spikes`), surfaces without a face and ready meshes (`free_surfaces`, `tessellated`), solids
 //! given as recipes (`solid_recipes`, `recipe_parts`); all of it with its colours and layers (`styles`) becomes one part (`numbering`,
@@ -34,5 +34,6 @@ mod tessellated;
 pub(super) mod topology;
 mod usage_ends;
 mod usage_names;
+mod usages;
 mod walk;
 mod zero_width;

@@ -5,14 +5,14 @@
 
 use super::assembly::Assembly;
 use super::places::UsagePlaces;
-use super::usage_names::Usage;
+use super::usage_names::{Usage, UsagePlacement};
 use crate::math::Frame;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 impl Assembly<'_, '_> {
     /// Returns those children of a product, among `usages` without a placement, that its own representations place.
     pub(super) fn placed_within(&self, definition: u64, usages: &[Usage]) -> FxHashSet<u64> {
-        let unplaced = |usage: &&Usage| !self.placements.contains_key(&usage.id);
+        let unplaced = |usage: &&Usage| usage.placement == UsagePlacement::Unstated;
         let children: FxHashSet<u64> = usages.iter().filter(unplaced).map(|usage| usage.child).collect();
         if children.is_empty() {
             return children;
@@ -36,7 +36,7 @@ impl Assembly<'_, '_> {
     pub(super) fn usage_places(&self, usages: &[Usage], placement: &Frame) -> UsagePlaces {
         let mut of_children: FxHashMap<u64, Vec<Frame>> = FxHashMap::default();
         for usage in usages {
-            if let Some(local) = self.placements.get(&usage.id).copied().flatten() {
+            if let UsagePlacement::Stated(local) = usage.placement {
                 of_children.entry(usage.child).or_default().push(placement.compose(&local));
             }
         }

@@ -36,27 +36,49 @@ pub(super) fn is_one_place(a: &Frame, b: &Frame) -> bool {
         && (a.scale - b.scale).abs() <= PLACE_ROUNDING * a.scale
 }
 
+/// A list of placements, in which one is found to rounding.
+pub(super) struct PlaceList {
+    /// Ascending by the x of their origins.
+    placements: Vec<Frame>,
+}
+
+impl PlaceList {
+    /// Sorts placements.
+    pub(super) fn new(mut placements: Vec<Frame>) -> Self {
+        placements.sort_by(|a, b| a.origin.x.total_cmp(&b.origin.x));
+        Self { placements }
+    }
+
+    /// Whether there is none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.placements.is_empty()
+    }
+
+    /// Whether one of them is this placement, to rounding.
+    pub(super) fn holds(&self, placement: &Frame) -> bool {
+        let tolerance = origin_tolerance(placement);
+        // Of ten thousand places of one screw few have the same x.
+        let first = self.placements.partition_point(|f| f.origin.x < placement.origin.x - tolerance);
+        let mut near = self.placements[first..].iter().take_while(|f| f.origin.x <= placement.origin.x + tolerance);
+        near.any(|f| is_one_place(placement, f))
+    }
+}
+
 /// Where usages put the representations of the children of a product.
 #[derive(Default)]
 pub(super) struct UsagePlaces {
-    /// Placements by representation, ascending by the x of their origins.
-    placements: FxHashMap<u64, Vec<Frame>>,
+    by_representation: FxHashMap<u64, PlaceList>,
 }
 
 impl UsagePlaces {
     /// Collects placements by representation.
-    pub(super) fn new(mut placements: FxHashMap<u64, Vec<Frame>>) -> Self {
-        placements.values_mut().for_each(|all| all.sort_by(|a, b| a.origin.x.total_cmp(&b.origin.x)));
-        Self { placements }
+    pub(super) fn new(placements: FxHashMap<u64, Vec<Frame>>) -> Self {
+        let sorted = placements.into_iter().map(|(representation, all)| (representation, PlaceList::new(all)));
+        Self { by_representation: sorted.collect() }
     }
 
     /// Whether a usage puts a representation there, to rounding.
     pub(super) fn holds(&self, representation: u64, placement: &Frame) -> bool {
-        let Some(all) = self.placements.get(&representation) else { return false };
-        let tolerance = origin_tolerance(placement);
-        // Of ten thousand places of one screw few have the same x.
-        let first = all.partition_point(|f| f.origin.x < placement.origin.x - tolerance);
-        let mut near = all[first..].iter().take_while(|f| f.origin.x <= placement.origin.x + tolerance);
-        near.any(|f| is_one_place(placement, f))
+        self.by_representation.get(&representation).is_some_and(|places| places.holds(placement))
     }
 }

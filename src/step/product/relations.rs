@@ -6,7 +6,7 @@ use crate::step::part21::{Args, Entity};
 /// The entities that relate products, representations and their shapes.
 pub(super) const RELATIONS: [&str; 9] = [
     "SHAPE_DEFINITION_REPRESENTATION",
-    "NEXT_ASSEMBLY_USAGE_OCCURRENCE",
+    INDIVIDUAL_USAGE,
     "QUANTIFIED_ASSEMBLY_COMPONENT_USAGE",
     "PROMISSORY_USAGE_OCCURRENCE",
     "ASSEMBLY_COMPONENT_USAGE",
@@ -18,11 +18,14 @@ pub(super) const RELATIONS: [&str; 9] = [
 
 /// The usages of ISO 10303-44 that put a component into an assembly.
 const USAGES: [&str; 4] = [
-    "NEXT_ASSEMBLY_USAGE_OCCURRENCE",
+    INDIVIDUAL_USAGE,
     "QUANTIFIED_ASSEMBLY_COMPONENT_USAGE",
     "PROMISSORY_USAGE_OCCURRENCE",
     "ASSEMBLY_COMPONENT_USAGE",
 ];
+
+/// The usage that means one occurrence of its component; the others may mean what such ones place.
+pub(super) const INDIVIDUAL_USAGE: &str = "NEXT_ASSEMBLY_USAGE_OCCURRENCE";
 
 /// What states where one of two related representations stands in the other; without it both stand in the same place.
 pub(super) const WITH_TRANSFORMATION: &str = "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";

@@ -2,7 +2,6 @@
 
 use super::usage_names::Usage;
 use rustc_hash::{FxHashMap, FxHashSet};
-use std::sync::Arc;
 
 /// Which products use which, asked by their representations: writers swap the ends of relationships.
 pub(super) struct UsageEnds {
@@ -14,14 +13,14 @@ pub(super) struct UsageEnds {
 
 impl UsageEnds {
     /// Collects the products of `shapes` by their representations, and the ends of `usages`.
-    pub(super) fn new(shapes: &FxHashMap<u64, Vec<u64>>, usages: &FxHashMap<u64, Arc<[Usage]>>) -> Self {
+    pub(super) fn new(shapes: &FxHashMap<u64, Vec<u64>>, usages: &FxHashMap<u64, Vec<Usage>>) -> Self {
         let mut owners: FxHashMap<u64, Option<u64>> = FxHashMap::default();
         for (&product, shapes) in shapes {
             for shape in shapes {
                 owners.entry(*shape).and_modify(|owner| *owner = None).or_insert(Some(product));
             }
         }
-        let children = |(parent, usages): (&u64, &Arc<[Usage]>)| -> Vec<[u64; 2]> {
+        let children = |(parent, usages): (&u64, &Vec<Usage>)| -> Vec<[u64; 2]> {
             usages.iter().map(|usage| [*parent, usage.child]).collect()
         };
         Self { owners, pairs: usages.iter().flat_map(children).collect() }

@@ -3,6 +3,7 @@
 //! Writers often leave the name of a NEXT_ASSEMBLY_USAGE_OCCURRENCE blank, or give the same one to all.
 
 use super::relations::usage_attributes;
+use crate::math::Frame;
 use crate::step::part21::File;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -10,11 +11,23 @@ use std::sync::Arc;
 /// What a common translator calls every usage.
 const DEFAULT_NAME: &str = "Next assembly relationship";
 
-/// A child of a product: its definition, what its place is called, and the `#id` of the usage.
+/// A child of a product: its definition, what its place is called, the `#id` of the usage, and where it stands.
 pub(super) struct Usage {
     pub(super) child: u64,
     pub(super) name: String,
     pub(super) id: u64,
+    pub(super) placement: UsagePlacement,
+}
+
+/// Where a usage puts its child in the parent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum UsagePlacement {
+    /// The file does not say: where the parent stands, unless a representation of the parent places the child.
+    Unstated,
+    /// The file says it in a form that cannot be read.
+    Unreadable,
+    /// In the coordinates of the parent.
+    Stated(Frame),
 }
 
 /// What a placed representation is called, and what it is placed by.

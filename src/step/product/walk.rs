@@ -8,7 +8,7 @@ use super::assembly::{Assembly, MAX_DEPTH, PlacedRepresentation};
 use super::places::{PlacementKey, UsagePlaces, placement_key};
 use super::purpose::{holds_mesh, is_shape_representation, purpose_besides_shape};
 use super::relations::Link;
-use super::usage_names::{Occurrence, Usage, name_in_path};
+use super::usage_names::{Occurrence, Usage, UsagePlacement, name_in_path};
 use crate::math::Frame;
 use crate::step::geometry::FARTHEST_MM;
 use rustc_hash::FxHashSet;
@@ -173,16 +173,15 @@ impl Walk<'_, '_> {
                 open.pop();
                 continue;
             };
-            let stated = self.assembly.placements.get(&usage.id).copied();
-            // A mapped item or a relationship places it already; at the parent's origin it would stand once more.
-            if stated.is_none() && product.placed_within.contains(&usage.child) {
-                continue;
-            }
-            // Without a placement of its own the child stands where the parent does.
-            let local = stated.unwrap_or(Some(Frame::IDENTITY));
-            let placement = product.placement.compose(&local.unwrap_or(Frame::IDENTITY));
+            let local = match usage.placement {
+                // A mapped item or a relationship places it already; at the parent's origin it would stand once more.
+                UsagePlacement::Unstated if product.placed_within.contains(&usage.child) => continue,
+                UsagePlacement::Unstated | UsagePlacement::Unreadable => Frame::IDENTITY,
+                UsagePlacement::Stated(local) => local,
+            };
+            let placement = product.placement.compose(&local);
             // Walked all the same, but not shown: else it would come back as a shape that no product reaches.
-            let is_shown = product.is_shown && local.is_some();
+            let is_shown = product.is_shown && usage.placement != UsagePlacement::Unreadable;
             let child = self.assembly.products.name(self.assembly.file, usage.child);
             let name = name_in_path(usage, &child);
             let outer = product.path.as_deref();

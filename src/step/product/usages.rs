@@ -1,0 +1,73 @@
+//! The usages of products: which of them count, what they are called, and where they put their components.
+//!
+//! Source: ISO 10303-44. Several entities may speak of one component in one assembly: those that promise or count it add none to those that
+//! place it.
+
+use super::assembly::Assembly;
+use super::relations::{INDIVIDUAL_USAGE, is_promise, usage_attributes};
+use super::usage_names::{Usage, UsagePlacement, name_usages};
+use crate::math::Frame;
+use crate::step::part21::Entity;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+impl<'f, 'a> Assembly<'f, 'a> {
+    /// Returns usages by their parents; their names and placements are not known yet.
+    pub(super) fn read_usages(entities: &[Entity<'f, 'a>]) -> FxHashMap<u64, Vec<Usage>> {
+        let mut usages: FxHashMap<u64, Vec<Usage>> = FxHashMap::default();
+        let mut used: FxHashSet<u64> = FxHashSet::default();
+        // A promise comes last, for it counts where nothing else uses its component.
+        let (promises, others): (Vec<Entity<'f, 'a>>, Vec<Entity<'f, 'a>>) =
+            entities.iter().copied().partition(|e| is_promise(*e));
+        for (e, is_promise) in others.iter().map(|e| (e, false)).chain(promises.iter().map(|e| (e, true))) {
+            let ends = usage_attributes(*e).and_then(|args| Some((args.id(3)?, args.id(4)?)));
+            let Some((parent, child)) = ends else { continue };
+            if !is_promise || !used.contains(&child) {
+                let usage = Usage { child, name: String::new(), id: e.id, placement: UsagePlacement::Unstated };
+                usages.entry(parent).or_default().push(usage);
+            }
+            if !is_promise {
+                used.insert(child);
+            }
+        }
+        usages
+    }
+
+    /// Takes over the usages that count, each with its placement, once for each where it has several, and with its name.
+    pub(super) fn settle_usages(&mut self, mut usages: FxHashMap<u64, Vec<Usage>>) {
+        for usages in usages.values_mut() {
+            *usages = self.placed_usages(std::mem::take(usages));
+        }
+        for usages in usages.values_mut() {
+            self.leave_out_counts(usages);
+            name_usages(self.file, &mut self.products, usages);
+        }
+        self.usages = usages.into_iter().map(|(parent, usages)| (parent, usages.into())).collect();
+    }
+
+    /// Returns usages with their placements: one that has several once for each.
+    fn placed_usages(&mut self, usages: Vec<Usage>) -> Vec<Usage> {
+        let mut placed = Vec::with_capacity(usages.len());
+        for usage in usages {
+            let Usage { child, id, .. } = usage;
+            let at =
+                |frame: Frame| Usage { child, name: String::new(), id, placement: UsagePlacement::Stated(frame) };
+            match self.placements.remove(&id) {
+                None => placed.push(usage),
+                Some(frames) if frames.is_empty() => {
+                    placed.push(Usage { placement: UsagePlacement::Unreadable, ..usage });
+                }
+                Some(frames) => placed.extend(frames.into_iter().map(at)),
+            }
+        }
+        placed
+    }
+
+    /// Leaves out usages of one product that place nothing, and only count or promise a component that another one puts there.
+    fn leave_out_counts(&self, usages: &mut Vec<Usage>) {
+        let is_individual = |id: u64| self.file.entity(id).is_some_and(|e| e.is_a(INDIVIDUAL_USAGE));
+        let stands = |usage: &Usage| usage.placement != UsagePlacement::Unstated || is_individual(usage.id);
+        let standing: FxHashSet<u64> =
+            usages.iter().filter(|usage| stands(usage)).map(|usage| usage.child).collect();
+        usages.retain(|usage| stands(usage) || !standing.contains(&usage.child));
+    }
+}
