@@ -451,6 +451,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "usage_ends",
             "places",
             "assembly",
+            "lost_usages",
             "links",
             "usages",
             "placed_children",

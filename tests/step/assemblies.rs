@@ -184,6 +184,58 @@ fn a_placement_in_a_rare_form_counts() {
     assert_places(&assembly("", &used), &[0.0], "without a placement");
 }
 
+/// The relationship of a usage that is not in the file still says where its component stands, with all that is in it.
+#[test]
+fn a_relationship_without_its_usage_places_the_component() {
+    let lost = "#401=PRODUCT_DEFINITION_SHAPE('','',#400);\n";
+    let part = [lost, &relation(410, [110, 300], [20, 21]), PLACED].concat();
+    let sub = product(500, "sub", 510)
+        + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
+        + &usage(450, NEXT, "#500,#100,$")
+        + &relation(460, [110, 510], [20, 21])
+        + "#470=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#460,#451);\n"
+        + lost
+        + &relation(410, [510, 300], [20, 22])
+        + PLACED;
+    // A representation of no product stands by its relationship alone, the part with its assembly.
+    let no_product = "#26=CSG_SOLID('',#25);\n#111=SHAPE_REPRESENTATION('',(#26,#20),#1);\n";
+    let alone =
+        [no_product, &usage(430, NEXT, "#200,#100,$"), lost, &relation(410, [111, 300], [20, 21]), PLACED].concat();
+    let another = usage(400, NEXT, "#200,#100,$") + &relation(410, [110, 300], [20, 21]) + PLACED;
+    let twice = another + "#421=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#410,#403);\n";
+    let unrelated = usage(400, NEXT, "#200,#100,$") + "#420=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#410,#401);\n";
+    for (data, expected, told) in [
+        (
+            &part,
+            &[10.0][..],
+            "#420: its usage #400 is not in the file; its relationship #410 places product #100 in #200 all the same",
+        ),
+        (
+            &sub,
+            &[30.0][..],
+            "#420: its usage #400 is not in the file; its relationship #410 places product #500 in #200 all the same",
+        ),
+        (
+            &alone,
+            &[0.0, 10.0][..],
+            "#420: its usage #400 is not in the file; its relationship #410 counts without it",
+        ),
+        (
+            &twice,
+            &[10.0][..],
+            "#421: its PRODUCT_DEFINITION_SHAPE #403 is not in the file; its relationship #410 is that of another usage, which counts",
+        ),
+        (&unrelated, &[0.0][..], "#420: its relationship #410 is not in the file: it places nothing"),
+    ] {
+        let import = assembly("", data);
+        let mut x: Vec<f64> = import.model.instances.iter().map(|i| i.placement.origin.x).collect();
+        x.sort_by(f64::total_cmp);
+        let problems = &import.report.problems;
+        assert_eq!(x, expected, "{problems:?}");
+        assert_eq!(problems.iter().filter(|p| p.ends_with(told)).count(), 1, "{told}: {problems:?}");
+    }
+}
+
 /// The assembly #200 uses #500 at x = 20, which uses the part at x = 10: #440 sees the part from #200.
 #[test]
 fn a_higher_usage_adds_nothing() {

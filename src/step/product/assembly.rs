@@ -12,7 +12,7 @@ use crate::math::Frame;
 use crate::step::geometry::GeometryReader;
 use crate::step::geometry::units::Units;
 use crate::step::part21::{Args, Entity, File};
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
 /// Deepest nesting of products, and of representations, that is followed: each place holds the names and ids of all that is around it,
@@ -44,8 +44,8 @@ pub(crate) struct Assembly<'f, 'a> {
     fallback: Units,
     /// Product definition → its representations.
     pub(super) shapes: FxHashMap<u64, Vec<u64>>,
-    /// Representations that stand for a product.
-    pub(super) owned: FxHashSet<u64>,
+    /// Representations that stand for a product, and for which; `None` for several.
+    pub(super) owned: FxHashMap<u64, Option<u64>>,
     /// Product definition → its children.
     pub(super) usages: FxHashMap<u64, Arc<[Usage]>>,
     pub(super) products: ProductNames,
@@ -71,7 +71,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             units,
             fallback,
             shapes: FxHashMap::default(),
-            owned: FxHashSet::default(),
+            owned: FxHashMap::default(),
             usages: FxHashMap::default(),
             products: ProductNames::default(),
             placements: FxHashMap::default(),
@@ -98,16 +98,16 @@ impl<'f, 'a> Assembly<'f, 'a> {
             }
         }
         let usages = Self::read_usages(&usages);
-        let used = a.read_contextual(&contextual);
-        let ends = UsageEnds::new(&a.shapes, &usages);
+        let ends = UsageEnds::new(&usages);
+        let places = a.read_contextual(&contextual, &ends);
         for e in relations {
-            if !used.contains(&e.id) {
+            if !places.relations.contains(&e.id) {
                 a.read_relationship(e, &ends);
             }
         }
         a.leave_out_links_to_products();
         a.read_occurrence_shapes(&occurrence_shapes);
-        a.settle_usages(usages);
+        a.settle_usages(usages, places.lost);
         a
     }
 
@@ -123,6 +123,12 @@ impl<'f, 'a> Assembly<'f, 'a> {
     /// Returns a reader of geometry in the units of a representation.
     pub(super) fn geometry_reader(&self, representation: u64) -> GeometryReader<'f, 'a> {
         GeometryReader { file: self.file, units: self.units_of(representation) }
+    }
+
+    /// Returns the products that two representations stand for; `None` where one stands for none or several, or both for the same.
+    pub(super) fn products_of(&self, representations: [u64; 2]) -> Option<[u64; 2]> {
+        let [first, second] = representations.map(|r| self.owned.get(&r).copied().flatten());
+        Some([first?, second?]).filter(|[first, second]| first != second)
     }
 
     /// Returns the ids of the items of a representation; empty when the file does not have it.
@@ -161,7 +167,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         if !shapes.contains(&representation) {
             shapes.push(representation);
         }
-        self.owned.insert(representation);
+        let owner = self.owned.entry(representation).or_insert(Some(target.id));
+        *owner = owner.filter(|owner| *owner == target.id);
         None
     }
 }

@@ -1,6 +1,7 @@
 //! How representations stand in each other: by relationships, by mapped items, and by the usages whose shapes they are.
 
 use super::assembly::Assembly;
+use super::lost_usages::LostUsage;
 use super::places::{PlaceList, PlacementKey, is_one_place, placement_key};
 use super::relations::{
     Link, OccurrenceShape, WITH_TRANSFORMATION, is_higher_usage, property_attributes, related_representations,
@@ -11,10 +12,18 @@ use crate::math::Frame;
 use crate::step::part21::Entity;
 use rustc_hash::{FxHashMap, FxHashSet};
 
+/// What CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs tell besides the placements of usages.
+#[derive(Default)]
+pub(super) struct ContextualPlaces {
+    /// The relationships that are those of usages.
+    pub(super) relations: FxHashSet<u64>,
+    pub(super) lost: Vec<LostUsage>,
+}
+
 impl<'f, 'a> Assembly<'f, 'a> {
     /// Returns how the first of two representations stands in the second by the transformation of their relationship; `None`, which is
     /// reported, where that cannot be read.
-    fn transformation(&mut self, e: Entity<'f, 'a>, [first, second]: [u64; 2]) -> Option<Frame> {
+    pub(super) fn transformation(&mut self, e: Entity<'f, 'a>, [first, second]: [u64; 2]) -> Option<Frame> {
         let stated = e.attributes(WITH_TRANSFORMATION, 4).and_then(|a| a.entity(0));
         let placement = stated.and_then(|t| {
             // An operator takes the first representation into the second by itself (ISO 10303-43, functionally_defined_transformation).
@@ -39,24 +48,21 @@ impl<'f, 'a> Assembly<'f, 'a> {
         placement
     }
 
-    /// Reads where the children of usages stand in their parents, by CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs. Returns the relationships
-    /// that these name.
-    pub(super) fn read_contextual(&mut self, entities: &[Entity<'f, 'a>]) -> FxHashSet<u64> {
-        let mut used = FxHashSet::default();
+    /// Reads where the children of usages stand in their parents, by CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs.
+    pub(super) fn read_contextual(&mut self, entities: &[Entity<'f, 'a>], ends: &UsageEnds) -> ContextualPlaces {
+        let mut places = ContextualPlaces::default();
         let mut higher = Vec::new();
+        let mut broken = Vec::new();
         for &e in entities {
             let args = e.args();
             let usage = args.entity(1).and_then(|shape| property_attributes(shape).entity(2));
             let (Some(relation), Some(usage)) = (args.entity(0), usage) else {
-                self.problems.push(format!(
-                    "#{}: its relationship or its usage is not in the file: it places nothing",
-                    e.id
-                ));
+                broken.push(e);
                 continue;
             };
             // That of anything else stands for itself.
             if is_higher_usage(usage) || usage_attributes(usage).is_some() {
-                used.insert(relation.id);
+                places.relations.insert(relation.id);
                 if is_higher_usage(usage) {
                     higher.push((e, relation, usage));
                 } else {
@@ -68,7 +74,13 @@ impl<'f, 'a> Assembly<'f, 'a> {
         for (e, relation, usage) in higher {
             self.compare_higher_usage(e, relation, usage);
         }
-        used
+        for e in broken {
+            if let Some(lost) = self.lost_usage(e, ends, &places.relations) {
+                places.relations.insert(lost.relation);
+                places.lost.push(lost);
+            }
+        }
+        places
     }
 
     /// Reads where the child of a usage stands in the parent, by the relationship that `e` names.
@@ -190,7 +202,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             return;
         }
         let placement = self.transformation(e, [first, second]);
-        if ends.uses(first, second) && !ends.uses(second, first) {
+        if self.products_of([first, second]).is_some_and(|products| ends.are_swapped(products)) {
             let placement = placement.map(|p| p.inverse());
             self.links.entry(first).or_default().push(Link { to: second, placement });
         } else {

@@ -53,14 +53,14 @@ impl Assembly<'_, '_> {
     /// with one shape each would be asked for all the others: 23 s.
     pub(super) fn leave_out_links_to_products(&mut self) {
         let Self { links, owned, .. } = self;
-        links.values_mut().for_each(|links| links.retain(|link| link.is_moved() || !owned.contains(&link.to)));
+        links.values_mut().for_each(|links| links.retain(|link| link.is_moved() || !owned.contains_key(&link.to)));
     }
 
     /// Returns the product definitions, by id, one of whose representations another product's representation places by a relationship with
     /// a transformation; mapped items are not looked at.
     pub(super) fn products_placed_by_others(&self) -> FxHashSet<u64> {
         let mut places: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
-        for (from, links) in self.links.iter().filter(|(from, _)| self.owned.contains(from)) {
+        for (from, links) in self.links.iter().filter(|(from, _)| self.owned.contains_key(from)) {
             for link in links.iter().filter(|link| link.is_moved()) {
                 places.entry(link.to).or_default().push(*from);
             }
@@ -81,7 +81,7 @@ impl Assembly<'_, '_> {
         let mut at = 0;
         while at < found.len() {
             for link in self.links.get(&found[at]).into_iter().flatten() {
-                if !link.is_moved() && !self.owned.contains(&link.to) && known.insert(link.to) {
+                if !link.is_moved() && !self.owned.contains_key(&link.to) && known.insert(link.to) {
                     found.push(link.to);
                 }
             }

@@ -111,7 +111,7 @@ impl Counter<'_, '_, '_> {
     fn open_group(&mut self, first: u64) -> OpenCount {
         let assembly = self.assembly;
         // That of a product is a group of its own: many may stand in one that is no product's.
-        let is_owned = assembly.owned.contains(&first);
+        let is_owned = assembly.owned.contains_key(&first);
         let members = if is_owned { vec![first] } else { assembly.unmoved(vec![first]) };
         let mut children = Vec::new();
         let mut beside: FxHashSet<u64> = FxHashSet::default();
@@ -135,7 +135,7 @@ impl Counter<'_, '_, '_> {
         if let Some(first) = self.groups.get(&id) {
             return *first;
         }
-        if self.assembly.owned.contains(&id) {
+        if self.assembly.owned.contains_key(&id) {
             return id;
         }
         self.groups.extend(self.assembly.unmoved(vec![id]).into_iter().map(|member| (member, id)));

@@ -4,6 +4,7 @@
 //! place it.
 
 use super::assembly::Assembly;
+use super::lost_usages::LostUsage;
 use super::relations::{INDIVIDUAL_USAGE, is_promise, usage_attributes};
 use super::usage_names::{Usage, UsagePlacement, name_usages};
 use crate::math::Frame;
@@ -32,11 +33,13 @@ impl<'f, 'a> Assembly<'f, 'a> {
         usages
     }
 
-    /// Takes over the usages that count, each with its placement, once for each where it has several, and with its name.
-    pub(super) fn settle_usages(&mut self, mut usages: FxHashMap<u64, Vec<Usage>>) {
+    /// Takes over the usages that count, each with its placement, once for each where it has several, and with its name; `lost` are those
+    /// that are not in the file.
+    pub(super) fn settle_usages(&mut self, mut usages: FxHashMap<u64, Vec<Usage>>, lost: Vec<LostUsage>) {
         for usages in usages.values_mut() {
             *usages = self.placed_usages(std::mem::take(usages));
         }
+        self.restore_usages(&mut usages, lost);
         for usages in usages.values_mut() {
             self.leave_out_counts(usages);
             name_usages(self.file, &mut self.products, usages);

@@ -357,7 +357,7 @@ impl Walk<'_, '_> {
     /// shown.
     fn linked_visit(&self, outer: &Visit, link: &Link) -> Option<Visit> {
         // One of another product whose place cannot be read is placed by its own usage.
-        if link.placement.is_none() && self.assembly.owned.contains(&link.to) {
+        if link.placement.is_none() && self.assembly.owned.contains_key(&link.to) {
             return None;
         }
         let placement = outer.placement.compose(&link.placement.unwrap_or(Frame::IDENTITY));
