@@ -184,6 +184,34 @@ fn a_placement_in_a_rare_form_counts() {
     assert_places(&assembly("", &used), &[0.0], "without a placement");
 }
 
+/// An assembly #200 at x = 30 in #500; relationships put the part into it, one of which moves nothing. Placements that turn, as #27 by 30°,
+/// leave rounding where they are taken back.
+#[test]
+fn a_transformation_that_moves_nothing_places_as_others_do() {
+    let outer = product(500, "top", 510)
+        + "#510=SHAPE_REPRESENTATION('',(#23),#1);\n"
+        + &usage(400, NEXT, "#500,#200,$")
+        + &relation(410, [300, 510], [20, 23])
+        + PLACED;
+    let turned = "#26=DIRECTION('',(0.866025403784,0.5,0.));\n#27=AXIS2_PLACEMENT_3D('',#12,#13,#26);\n";
+    let still = relation(430, [110, 300], [21, 21]);
+    for (still, case) in
+        [(still.clone(), "still"), (turned.to_owned() + &relation(430, [110, 300], [27, 27]), "turned")]
+    {
+        let inner = assembly("", &format!("{outer}{still}"));
+        assert_eq!(inner.model.instances.len(), 1, "{case}");
+        assert!((inner.model.instances[0].placement.origin.x - 30.0).abs() < 1e-12, "{case}");
+        assert_eq!((inner.model.parts[0].name.as_str(), inner.report.problems.len()), ("part", 0), "{case}");
+    }
+    let both = still.clone() + &relation(440, [110, 300], [20, 21]);
+    assert_places(&assembly("", &both), &[0.0, 10.0], "two relationships");
+    // Beside a usage without a placement it says what the usage does, which gives the name.
+    let named = "#400=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','lens','',#200,#100,$);\n";
+    let import = assembly("", &format!("{named}{still}"));
+    assert_places(&import, &[0.0], "a usage");
+    assert_eq!(import.model.instances[0].name, "lens");
+}
+
 /// The relationship of a usage that is not in the file still says where its component stands, with all that is in it.
 #[test]
 fn a_relationship_without_its_usage_places_the_component() {

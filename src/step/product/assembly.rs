@@ -105,7 +105,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 a.read_relationship(e, &ends);
             }
         }
-        a.leave_out_links_to_products();
+        a.leave_out_links_to_products(&ends);
         a.read_occurrence_shapes(&occurrence_shapes);
         a.settle_usages(usages, places.lost);
         a

@@ -196,17 +196,16 @@ impl<'f, 'a> Assembly<'f, 'a> {
     pub(super) fn read_relationship(&mut self, e: Entity<'f, 'a>, ends: &UsageEnds) {
         let Some([first, second]) = related_representations(e) else { return };
         if !e.is_a(WITH_TRANSFORMATION) {
-            let placement = Some(Frame::IDENTITY);
-            self.links.entry(second).or_default().push(Link { to: first, placement });
-            self.links.entry(first).or_default().push(Link { to: second, placement });
+            self.links.entry(second).or_default().push(Link::plain(first));
+            self.links.entry(first).or_default().push(Link::plain(second));
             return;
         }
         let placement = self.transformation(e, [first, second]);
         if self.products_of([first, second]).is_some_and(|products| ends.are_swapped(products)) {
             let placement = placement.map(|p| p.inverse());
-            self.links.entry(first).or_default().push(Link { to: second, placement });
+            self.links.entry(first).or_default().push(Link::transformed(second, placement));
         } else {
-            self.links.entry(second).or_default().push(Link { to: first, placement });
+            self.links.entry(second).or_default().push(Link::transformed(first, placement));
         }
     }
 
@@ -219,6 +218,6 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let target = mapped.id(1).and_then(|target| self.geometry_reader(holder).transformation(target).ok());
         // The origin of the mapped representation comes to lie on the target.
         let placement = target.zip(origin).map(|(target, origin)| target.compose(&origin.inverse()));
-        Some(Link { to, placement })
+        Some(Link::transformed(to, placement))
     }
 }

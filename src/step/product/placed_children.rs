@@ -5,6 +5,7 @@
 
 use super::assembly::Assembly;
 use super::places::UsagePlaces;
+use super::usage_ends::UsageEnds;
 use super::usage_names::{Usage, UsagePlacement};
 use crate::math::Frame;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -21,6 +22,7 @@ impl Assembly<'_, '_> {
         for representation in self.representations(definition) {
             let mapped = self.items(representation).into_iter().filter_map(|item| self.mapped_representation(item));
             shown.extend(mapped);
+            // One that moves nothing puts it where its usage does, which has a name.
             let links = self.links.get(&representation).into_iter().flatten();
             shown.extend(links.filter(|link| link.is_moved()).map(|link| link.to));
         }
@@ -32,13 +34,22 @@ impl Assembly<'_, '_> {
         children.into_iter().filter(is_shown).collect()
     }
 
-    /// Returns where the usages of a product that stands at `placement` put the representations of their children.
-    pub(super) fn usage_places(&self, usages: &[Usage], placement: &Frame) -> UsagePlaces {
+    /// Returns where the usages of a product that stands at `placement` put the representations of their children, but those in
+    /// `placed_within`.
+    pub(super) fn usage_places(
+        &self,
+        usages: &[Usage],
+        placement: &Frame,
+        placed_within: &FxHashSet<u64>,
+    ) -> UsagePlaces {
         let mut of_children: FxHashMap<u64, Vec<Frame>> = FxHashMap::default();
         for usage in usages {
-            if let UsagePlacement::Stated(local) = usage.placement {
-                of_children.entry(usage.child).or_default().push(placement.compose(&local));
-            }
+            let local = match usage.placement {
+                UsagePlacement::Stated(local) => local,
+                UsagePlacement::Unstated if !placed_within.contains(&usage.child) => Frame::IDENTITY,
+                UsagePlacement::Unstated | UsagePlacement::Unreadable => continue,
+            };
+            of_children.entry(usage.child).or_default().push(placement.compose(&local));
         }
         let mut placements: FxHashMap<u64, Vec<Frame>> = FxHashMap::default();
         for (child, frames) in &of_children {
@@ -49,11 +60,19 @@ impl Assembly<'_, '_> {
         UsagePlaces::new(placements)
     }
 
-    /// Leaves out the relationships that lead unmoved to the representation of a product, which its own usages place. Of 20,000 products
-    /// with one shape each would be asked for all the others: 23 s.
-    pub(super) fn leave_out_links_to_products(&mut self) {
-        let Self { links, owned, .. } = self;
-        links.values_mut().for_each(|links| links.retain(|link| link.is_moved() || !owned.contains_key(&link.to)));
+    /// Leaves out the relationships that lead unmoved to the representation of a product, which its own usages place, but those by which a
+    /// transformation puts one product without children into another. Of 20,000 products with one shape each would be asked for all the
+    /// others: 23 s.
+    pub(super) fn leave_out_links_to_products(&mut self, ends: &UsageEnds) {
+        let mut links = std::mem::take(&mut self.links);
+        for (from, links) in &mut links {
+            links.retain(|link| {
+                let child = || self.products_of([*from, link.to]).map(|[_, child]| child);
+                let is_placed = || link.has_transformation && child().is_some_and(|child| !ends.is_assembly(child));
+                link.is_moved() || !self.owned.contains_key(&link.to) || is_placed()
+            });
+        }
+        self.links = links;
     }
 
     /// Returns the product definitions, by id, one of whose representations another product's representation places by a relationship with
@@ -61,7 +80,7 @@ impl Assembly<'_, '_> {
     pub(super) fn products_placed_by_others(&self) -> FxHashSet<u64> {
         let mut places: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
         for (from, links) in self.links.iter().filter(|(from, _)| self.owned.contains_key(from)) {
-            for link in links.iter().filter(|link| link.is_moved()) {
+            for link in links.iter().filter(|link| link.has_transformation) {
                 places.entry(link.to).or_default().push(*from);
             }
         }

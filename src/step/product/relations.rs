@@ -1,5 +1,6 @@
 //! What stands in the entities that relate representations, products and their properties.
 
+use super::places::is_one_place;
 use crate::math::Frame;
 use crate::step::part21::{Args, Entity};
 
@@ -36,12 +37,25 @@ pub(super) const WITH_TRANSFORMATION: &str = "REPRESENTATION_RELATIONSHIP_WITH_T
 pub(super) struct Link {
     pub(super) to: u64,
     pub(super) placement: Option<Frame>,
+    /// Whether a transformation states the placement, be it one that moves nothing; without one both ends are shapes of the same thing.
+    pub(super) has_transformation: bool,
 }
 
 impl Link {
+    /// Makes the link to another shape of the same thing.
+    pub(super) fn plain(to: u64) -> Self {
+        Self { to, placement: Some(Frame::IDENTITY), has_transformation: false }
+    }
+
+    /// Makes the link of a transformation; `None` where that cannot be read.
+    pub(super) fn transformed(to: u64, placement: Option<Frame>) -> Self {
+        Self { to, placement, has_transformation: true }
+    }
+
     /// Whether it leads to another place, or to one that cannot be read.
     pub(super) fn is_moved(&self) -> bool {
-        self.placement.is_none_or(|p| !p.is_identity())
+        // A placement taken onto itself leaves rounding.
+        self.placement.is_none_or(|p| !is_one_place(&p, &Frame::IDENTITY))
     }
 }
 

@@ -7,6 +7,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 pub(super) struct UsageEnds {
     /// Parents with their children.
     pairs: FxHashSet<[u64; 2]>,
+    parents: FxHashSet<u64>,
 }
 
 impl UsageEnds {
@@ -15,7 +16,12 @@ impl UsageEnds {
         let children = |(parent, usages): (&u64, &Vec<Usage>)| -> Vec<[u64; 2]> {
             usages.iter().map(|usage| [*parent, usage.child]).collect()
         };
-        Self { pairs: usages.iter().flat_map(children).collect() }
+        Self { pairs: usages.iter().flat_map(children).collect(), parents: usages.keys().copied().collect() }
+    }
+
+    /// Whether a product uses others.
+    pub(super) fn is_assembly(&self, product: u64) -> bool {
+        self.parents.contains(&product)
     }
 
     /// Whether the first of two products uses the second, and is not used by it: in a relationship the second is the parent.

@@ -56,6 +56,8 @@ struct Visit {
     representation: u64,
     placement: Frame,
     owners: Arc<[u64]>,
+    /// The product that it shows, where a relationship leads to that of another one.
+    product: Option<u64>,
     /// As [`OpenProduct::is_shown`].
     is_shown: bool,
     /// Whether a relationship leads to it.
@@ -221,11 +223,11 @@ impl Walk<'_, '_> {
         let product = self.assembly.products.name(self.assembly.file, definition);
         let shown = Occurrence { product: &product, ..*used };
         let usages = self.assembly.usages.get(&definition).cloned().unwrap_or_default();
+        let placed_within = self.assembly.placed_within(definition, &usages);
         if let Some(shapes) = self.assembly.shapes.get(&definition).cloned() {
-            let by_usages = self.assembly.usage_places(&usages, &placement);
+            let by_usages = self.assembly.usage_places(&usages, &placement, &placed_within);
             self.place_representations(&shapes, placement, &shown, is_shown, &by_usages);
         }
-        let placed_within = self.assembly.placed_within(definition, &usages);
         Some(OpenProduct {
             definition,
             placement,
@@ -251,7 +253,8 @@ impl Walk<'_, '_> {
         let mut standing: FxHashSet<(u64, PlacementKey)> = FxHashSet::default();
         let mut open: Vec<OpenRepresentation> = Vec::new();
         for &representation in representations {
-            let first = Visit { representation, placement, owners: used.owners.into(), is_shown, is_linked: false };
+            let owners = used.owners.into();
+            let first = Visit { representation, placement, owners, product: None, is_shown, is_linked: false };
             let mut visit = Some(first);
             loop {
                 if let Some(visit) = visit.take() {
@@ -320,12 +323,15 @@ impl Walk<'_, '_> {
             self.assembly.problems.push(problem);
         }
         if visit.is_shown {
+            let file = self.assembly.file;
+            let linked = visit.product.map(|product| self.assembly.products.name(file, product));
+            let linked = linked.filter(|name| !name.is_empty());
             self.placed.push(PlacedRepresentation {
                 representation: id,
                 placement: visit.placement,
                 name: used.name.to_string(),
                 path: used.path.map_or_else(String::new, str::to_owned),
-                product: used.product.to_string(),
+                product: linked.as_deref().unwrap_or(used.product).to_string(),
                 owners: visit.owners.to_vec(),
                 orphan: self.in_orphans,
             });
@@ -350,7 +356,8 @@ impl Walk<'_, '_> {
         };
         let owners = [&outer.owners[..], &[item]].concat().into();
         let placement = outer.placement.compose(&local);
-        Some(Visit { representation: link.to, placement, owners, is_shown: outer.is_shown, is_linked: false })
+        let Visit { product, is_shown, .. } = *outer;
+        Some(Visit { representation: link.to, placement, owners, product, is_shown, is_linked: false })
     }
 
     /// Returns the visit of what a relationship of a placed representation leads to; one whose place cannot be read is reached, but not
@@ -362,7 +369,10 @@ impl Walk<'_, '_> {
         }
         let placement = outer.placement.compose(&link.placement.unwrap_or(Frame::IDENTITY));
         let is_shown = outer.is_shown && link.placement.is_some();
-        Some(Visit { representation: link.to, placement, owners: outer.owners.clone(), is_shown, is_linked: true })
+        let product = self.assembly.products_of([outer.representation, link.to]).map(|[_, child]| child);
+        let product = product.or(outer.product);
+        let owners = outer.owners.clone();
+        Some(Visit { representation: link.to, placement, owners, product, is_shown, is_linked: true })
     }
 
     /// Notes that what is too deep is reached, with all that it holds: it would come back as a product or a shape that nothing uses.
