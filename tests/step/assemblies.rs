@@ -94,6 +94,35 @@ fn a_usage_and_a_mapped_item_in_one_place_are_one() {
     assert_places(&assembly("#31,#32,", &data), &[10.0, 20.0], "two places");
 }
 
+/// The usage and the mapped item give one place with other numbers of digits; a thousandth of a millimetre, or of a radian, is another.
+#[test]
+fn a_place_that_is_printed_with_few_digits_is_one() {
+    let placement = |id: u32, x: &str, axis: &str| {
+        let [point, direction] = [id + 1, id + 2];
+        format!(
+            "#{id}=AXIS2_PLACEMENT_3D('',#{point},#13,#{direction});\n#{point}=CARTESIAN_POINT('',({x},0.,0.));\n\
+             #{direction}=DIRECTION('',({axis},0.));\n"
+        )
+    };
+    // Cosine and sine of 30°, and of a milliradian more.
+    let [axis, turned] = ["0.86602540378443865,0.5", "0.86552497066,0.50086577541"];
+    for (x, axis, instances) in
+        [("123.456726", axis, 1), ("123.4567", axis, 1), ("123.4577", axis, 2), ("123.456726", turned, 2)]
+    {
+        let data = [
+            "#30=REPRESENTATION_MAP(#20,#110);\n#31=MAPPED_ITEM('',#30,#50);\n",
+            &placement(40, "123.4567", "0.8660254,0.5"),
+            &placement(50, x, axis),
+            &usage(400, NEXT, "#200,#100,$"),
+            &relation(410, [110, 300], [20, 40]),
+            PLACED,
+        ]
+        .concat();
+        let import = assembly("#31,", &data);
+        assert_eq!(import.model.instances.len(), instances, "{x} {axis}: {:?}", import.report.problems);
+    }
+}
+
 #[test]
 fn every_usage_of_a_component_places_it() {
     for (kind, ends) in [

@@ -3,11 +3,12 @@
 use crate::math::Frame;
 use rustc_hash::FxHashMap;
 
-/// Share of a coordinate, and part of an axis, by which two placements of one thing may differ: each comes of a few products of doubles,
-/// which hold 16 digits, on different ways through the file.
-const PLACE_ROUNDING: f64 = 1e-9;
-/// The same at the origin, mm: where ways that lead far out come back, little but rounding is left.
-const PLACE_ROUNDING_MM: f64 = 1e-9;
+/// Share of a coordinate, and part of an axis, by which two placements of one thing may differ: of a number that a file prints with seven
+/// digits the last is off by 5e-7 of it at most, in either placement. Parts differ by more: 500 mm from the origin, places 0.6 µm apart are
+/// two.
+const PLACE_ROUNDING: f64 = 1e-6;
+/// The same at the origin, mm: with six decimals each number is off by 5e-7, and a way through an assembly adds up several of them.
+const PLACE_ROUNDING_MM: f64 = 1e-5;
 
 /// A placement that can be a key: its bits, with one zero.
 pub(super) type PlacementKey = [u64; 13];
