@@ -1,10 +1,10 @@
 //! How often, and where, a part of an assembly stands that several entities of the file speak of.
 
 use crate::files::{MILLIMETRES, part21};
-use lampyris::step::{Import, Settings, read_bytes};
+use lampyris::step::{ErrorKind, Import, Settings, read_bytes};
 
 /// Placements #20 at the origin, #21 at x = 10, #22 at x = 20 and #23 at x = 30, and a block #24 of 1 mm at the origin.
-fn read(data: &str) -> Import {
+pub(crate) fn read(data: &str) -> Import {
     let text = part21(&format!(
         "{MILLIMETRES}\
          #10=CARTESIAN_POINT('',(0.,0.,0.));\n#11=CARTESIAN_POINT('',(10.,0.,0.));\n#12=CARTESIAN_POINT('',(20.,0.,0.));\n\
@@ -18,7 +18,7 @@ fn read(data: &str) -> Import {
 }
 
 /// A product whose definition is #`id` and whose representation is #`representation`; takes the ids up to `id` + 4.
-fn product(id: u32, name: &str, representation: u32) -> String {
+pub(crate) fn product(id: u32, name: &str, representation: u32) -> String {
     let [formation, product, shape, definition] = [id + 1, id + 2, id + 3, id + 4];
     format!(
         "#{id}=PRODUCT_DEFINITION('','',#{formation},$);\n#{formation}=PRODUCT_DEFINITION_FORMATION('','',#{product});\n\
@@ -316,50 +316,6 @@ fn a_higher_usage_adds_nothing() {
     assert!(problems.len() == 1 && problems[0].starts_with("#490: usage #440 has another place"), "{problems:?}");
 }
 
-/// A part whose exact body is `exact`, and a mesh #71 of one triangle with these corners, which names what it shows.
-fn with_mesh(exact: &str, corners: &str, shown: &str) -> Import {
-    read(&format!(
-        "{}#110=SHAPE_REPRESENTATION('',(#20),#1);\n#111=ADVANCED_BREP_SHAPE_REPRESENTATION('',({exact}#20),#1);\n\
-         #112=TESSELLATED_SHAPE_REPRESENTATION('',(#71),#1);\n#120=SHAPE_REPRESENTATION_RELATIONSHIP('','',#110,#111);\n\
-         #121=SHAPE_REPRESENTATION_RELATIONSHIP('','',#110,#112);\n#26=CSG_SOLID('',#25);\n\
-         #70=COORDINATES_LIST('',3,({corners}));\n#71=TESSELLATED_SOLID('',(#72),{shown});\n\
-         #72=TRIANGULATED_FACE('',#70,3,((0.,0.,1.)),$,(),((1,2,3)));\n",
-        product(100, "part", 110)
-    ))
-}
-
-const HALF_A_SIDE: &str = "(0.,0.,0.),(1.,0.,0.),(0.,1.,0.)";
-
-#[test]
-fn an_unlinked_mesh_of_the_body_is_its_picture() {
-    let picture = with_mesh("#24,", HALF_A_SIDE, "$");
-    assert_eq!((picture.model.placed_face_count(), picture.report.by_surface.tessellated), (6, 0));
-    let left_out = &picture.report.left_out;
-    assert_eq!(left_out.len(), 1);
-    assert!(
-        left_out[0].id == 112 && left_out[0].reason.starts_with("its mesh #71 TESSELLATED_SOLID"),
-        "{left_out:?}"
-    );
-    for (exact, corners, faces) in [
-        ("", HALF_A_SIDE, 1),
-        // Beside the body, and a small one in it.
-        ("#24,", "(2.,0.,0.),(3.,0.,0.),(2.,1.,0.)", 7),
-        ("#24,", "(0.4,0.4,0.5),(0.6,0.4,0.5),(0.4,0.6,0.5)", 7),
-    ] {
-        let import = with_mesh(exact, corners, "$");
-        assert_eq!((import.model.placed_face_count(), import.report.left_out.len()), (faces, 0), "{corners}");
-    }
-}
-
-/// The solid #26 stands nowhere: its mesh is all that there is of it.
-#[test]
-fn a_linked_mesh_is_left_out_where_what_it_shows_stands() {
-    for (shown, faces) in [("#24", 6), ("#26", 7)] {
-        let import = with_mesh("#24,", HALF_A_SIDE, shown);
-        assert_eq!((import.model.placed_face_count(), import.report.left_out.len()), (faces, 0), "{shown}");
-    }
-}
-
 /// A part in so many assemblies around each other, each of which moves what is in it by 10 mm.
 fn nested(levels: u32) -> Import {
     let mut data = product(100, "part", 110) + "#110=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#24,#20),#1);\n";
@@ -396,4 +352,33 @@ fn products_in_a_circle_are_told() {
     let data = data + &usage(600, NEXT, "#200,#500,$") + &usage(602, NEXT, "#500,#200,$");
     let problems = assembly("", &data).report.problems;
     assert!(problems.iter().any(|p| p.ends_with("products contain each other")), "{problems:?}");
+}
+
+/// So many products that each use all the others, each with a block of its own.
+fn knot(products: u32) -> String {
+    let mut data = String::new();
+    for a in 0..products {
+        let id = 1000 + 100 * a;
+        let [shape, solid] = [id + 5, id + 6];
+        data += &product(id, &format!("p{a}"), shape);
+        data += &format!("#{shape}=SHAPE_REPRESENTATION('',(#{solid}),#1);\n#{solid}=CSG_SOLID('',#25);\n");
+        for b in (0..products).filter(|b| *b != a) {
+            data += &usage(id + 10 + 2 * b, NEXT, &format!("#{id},#{},$", 1000 + 100 * b));
+        }
+    }
+    data
+}
+
+/// From the first of four there are 1 + 3 + 3·2 + 3·2·1 ways that meet no product twice, each of which places a block. Those of fourteen
+/// are more than 10¹⁰: the walk ends at the first visit beyond the limit.
+#[test]
+fn products_in_circles_are_placed_on_every_way_to_them() {
+    let import = read(&knot(4));
+    assert_eq!(import.model.instances.len(), 16);
+    let told = import.report.problems.iter().filter(|p| p.ends_with("products contain each other")).count();
+    assert_eq!((told, import.report.problems.len()), (4, 4), "{:?}", import.report.problems);
+    let text = part21(&format!("{MILLIMETRES}#24=CSG_SOLID('',#25);\n{}", knot(14)));
+    let settings = Settings { max_placed: 10_000, ..Settings::default() };
+    let refused = read_bytes("knot.stp", text.as_bytes(), &settings).expect_err("too many");
+    assert!(matches!(refused.kind(), ErrorKind::TooManyPlaced { count: 10_001, .. }), "{refused}");
 }

@@ -1,4 +1,4 @@
-//! Children of products that representations place: by mapped items and by relationships with a transformation.
+//! Children of products that representations place, by mapped items and by relationships with a transformation, and what these hold.
 //!
 //! Source: ISO 10303-44 with AP214: a usage may stand beside a mapped item that places the same child, without a placement of its own or
 //! with the same one.
@@ -107,6 +107,31 @@ impl Assembly<'_, '_> {
             at += 1;
         }
         found
+    }
+
+    /// Returns representations, those of products, and all that they hold by usages, relationships and mapped items, but `known` ones and
+    /// what is reached through these alone.
+    pub(super) fn held_representations(
+        &self,
+        mut products: Vec<u64>,
+        mut representations: Vec<u64>,
+        known: &FxHashSet<u64>,
+    ) -> FxHashSet<u64> {
+        let mut seen: FxHashSet<u64> = products.iter().copied().collect();
+        while let Some(product) = products.pop() {
+            representations.extend(self.shapes.get(&product).into_iter().flatten());
+            let usages = self.usages.get(&product).into_iter().flat_map(|usages| usages.iter());
+            products.extend(usages.map(|usage| usage.child).filter(|child| seen.insert(*child)));
+        }
+        let mut held: FxHashSet<u64> = FxHashSet::default();
+        while let Some(id) = representations.pop() {
+            if !known.contains(&id) && held.insert(id) {
+                representations.extend(self.links.get(&id).into_iter().flatten().map(|link| link.to));
+                let items = self.items(id).into_iter();
+                representations.extend(items.filter_map(|item| self.mapped_representation(item)));
+            }
+        }
+        held
     }
 
     /// Returns the representation that a MAPPED_ITEM shows; `None` for any other item.

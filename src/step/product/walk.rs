@@ -157,17 +157,24 @@ impl Walk<'_, '_> {
         }
     }
 
-    /// Counts a visit with so many entities around it; whether there may be one more.
+    /// Counts a visit with so many entities around it, and tells whether there may be one; beyond the limit none is counted any more.
     fn is_within_limit(&mut self, owners: usize) -> bool {
-        self.visited += 1 + (owners / OWNERS_PER_VISIT) as u64;
-        self.visited <= self.limit
+        if !self.is_exhausted() {
+            self.visited += 1 + (owners / OWNERS_PER_VISIT) as u64;
+        }
+        !self.is_exhausted()
+    }
+
+    /// Whether the limit of visits is passed: what is still open is given up.
+    fn is_exhausted(&self) -> bool {
+        self.visited > self.limit
     }
 
     /// Places a product that nothing uses at the origin, with all that it uses.
     fn place_product(&mut self, root: u64) {
         let mut open: Vec<OpenProduct> = Vec::new();
         open.extend(self.open_product(root, Frame::IDENTITY, &Occurrence::ROOT, true, &[]));
-        while let Some(product) = open.last_mut() {
+        while let Some(product) = open.last_mut().filter(|_| !self.is_exhausted()) {
             let usages = product.usages.clone();
             let k = product.next;
             product.next += 1;
@@ -267,7 +274,7 @@ impl Walk<'_, '_> {
                         open.push(self.open_representation(visit));
                     }
                 }
-                let Some(outer) = open.last_mut() else { break };
+                let Some(outer) = open.last_mut().filter(|_| !self.is_exhausted()) else { break };
                 let k = outer.next;
                 outer.next += 1;
                 let inner = if let Some(item) = outer.mapped_items.get(k) {
@@ -377,21 +384,9 @@ impl Walk<'_, '_> {
 
     /// Notes that what is too deep is reached, with all that it holds: it would come back as a product or a shape that nothing uses.
     fn reach_what_is_cut_off(&mut self) {
-        let mut products = std::mem::take(&mut self.cut_off_products);
-        let mut representations = std::mem::take(&mut self.cut_off_representations);
-        let mut seen: FxHashSet<u64> = products.iter().copied().collect();
-        while let Some(product) = products.pop() {
-            representations.extend(self.assembly.shapes.get(&product).into_iter().flatten());
-            let usages = self.assembly.usages.get(&product).into_iter().flat_map(|usages| usages.iter());
-            products.extend(usages.map(|usage| usage.child).filter(|child| seen.insert(*child)));
-        }
-        while let Some(id) = representations.pop() {
-            if self.reached.insert(id) {
-                let links = self.assembly.links.get(&id).into_iter().flatten();
-                representations.extend(links.map(|link| link.to));
-                let items = self.assembly.items(id).into_iter();
-                representations.extend(items.filter_map(|item| self.assembly.mapped_representation(item)));
-            }
-        }
+        let products = std::mem::take(&mut self.cut_off_products);
+        let representations = std::mem::take(&mut self.cut_off_representations);
+        let held = self.assembly.held_representations(products, representations, &self.reached);
+        self.reached.extend(held);
     }
 }
