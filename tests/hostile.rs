@@ -251,7 +251,10 @@ fn a_number_used_twice_is_named_and_its_first_instance_stands() {
     // Beside that it names no unit of length.
     let problems = &import.report.problems;
     assert!(problems.len() == 3 && problems[2].contains("no unit of length"), "{problems:?}");
-    assert!(problems[0].contains("#10 ") && problems[1].contains("#900 "), "{problems:?}");
+    assert!(
+        problems[0].contains(": #10: its number") && problems[1].contains(": #900: its number"),
+        "{problems:?}"
+    );
 }
 
 #[test]

@@ -80,7 +80,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     };
     report.schema = schema_names(&file);
     for fault in &file.faults {
-        let id = fault.id.map_or_else(String::new, |id| format!(" #{id}"));
+        let id = fault.id.map_or_else(String::new, |id| format!(" #{id}:"));
         report.problems.push(format!("{name}: line {}:{id} {}", fault.line, fault.what));
     }
     if file.fault_count > file.faults.len() {
@@ -184,7 +184,7 @@ fn convert_assembly(
     }
     report.problems.extend(void_directions(file, name));
     report.left_out.extend(external_files(file, name));
-    report.problems.extend(assembly.problems.iter().cloned());
+    report.problems.extend(assembly.problems.iter().map(|problem| format!("{name}: {problem}")));
     let mut reader = Reader {
         file,
         styles: Styles::read(file),

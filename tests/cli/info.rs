@@ -117,7 +117,7 @@ fn a_number_used_twice_is_named_by_every_command_that_reads_the_file() {
         }));
     }
     for text in &told[0] {
-        assert_eq!(text.matches("#10 its number stands for an earlier instance already").count(), 1, "{text}");
+        assert_eq!(text.matches("#10: its number stands for an earlier instance already").count(), 1, "{text}");
     }
     for text in &told[1][1..] {
         assert!(text.matches("its number").count() == 3 && text.contains("and 2 more problems"), "{text}");

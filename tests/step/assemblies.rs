@@ -313,7 +313,10 @@ fn a_higher_usage_adds_nothing() {
     let other = assembly("", &data(21));
     assert_eq!(other.model.instances.len(), 1);
     let problems = &other.report.problems;
-    assert!(problems.len() == 1 && problems[0].starts_with("#490: usage #440 has another place"), "{problems:?}");
+    assert!(
+        problems.len() == 1 && problems[0].starts_with("assemblies.stp: #490: usage #440 has another place"),
+        "{problems:?}"
+    );
 }
 
 /// A part in so many assemblies around each other, each of which moves what is in it by 10 mm.

@@ -88,7 +88,7 @@ fn a_second_place_of_one_usage_is_told() {
     let import = read("", &[SHAPE, USAGE, RELATION, PLACED, second].concat());
     assert_places(&import, &[100.0]);
     assert!(
-        import.report.problems.iter().any(|p| p.starts_with("#213: usage #110")),
+        import.report.problems.iter().any(|p| p.starts_with("assembly.stp: #213: usage #110")),
         "{:?}",
         import.report.problems
     );

@@ -110,7 +110,7 @@ fn sections_besides_the_data_are_no_damage() {
     let import = read_sections(sections, "#900", block);
     assert_eq!(import.report.faces.converted, 6);
     let problems = &import.report.problems;
-    let told = "silence.stp: line 11: #5000 stands in another file, which is not read with this one";
+    let told = "silence.stp: line 11: #5000: stands in another file, which is not read with this one";
     assert_eq!(problems.as_slice(), [told]);
     let import = read_sections("", "#900", &format!("{block}ENDSEC;\nSIGNATURE;\nMIIBg6=#(;)\nab'c\n"));
     assert_eq!(

@@ -55,7 +55,7 @@ pub(crate) struct Assembly<'f, 'a> {
     pub(super) links: FxHashMap<u64, Vec<Link>>,
     /// Representations, or some of their items, that are not the shape of a product, and what they are.
     pub(crate) left_out: Vec<(u64, String)>,
-    /// Things that could not be placed.
+    /// Things that could not be placed, by their ids.
     pub(crate) problems: Vec<String>,
     /// Representations of what is no product (shape aspects, datums, …), and the entity that they describe.
     pub(super) aspects: FxHashMap<u64, u64>,
