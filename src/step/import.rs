@@ -3,7 +3,7 @@
 use super::geometry::Refusal;
 use super::geometry::units::{Units, contexts};
 use super::part21::{File, parse};
-use super::product::asides::{HiddenItems, external_files, void_directions};
+use super::product::asides::{HiddenItems, absent_shapes, external_files, void_directions};
 use super::product::assembly::{Assembly, PlacedRepresentation};
 use super::product::conversion::convert;
 use super::product::numbering::ConvertedPart;
@@ -19,9 +19,6 @@ use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use std::hash::Hasher;
 use std::path::Path;
 use std::time::Instant;
-
-/// Entities that are listed of a file without shapes.
-const LISTED_ENTITIES: usize = 5;
 
 /// A model and the account of how it was read.
 #[derive(Clone, Debug)]
@@ -173,7 +170,7 @@ fn convert_assembly(
     if count > limit {
         return Err(too_many(count));
     }
-    let (placed, assembly) = assembly.walk(limit).map_err(too_many)?;
+    let (placed, mut assembly) = assembly.walk(limit).map_err(too_many)?;
     for (id, reason) in &assembly.left_out {
         // Those without shapes would have given nothing.
         let mut items = ShapeItems::default();
@@ -185,14 +182,39 @@ fn convert_assembly(
     report.problems.extend(void_directions(file, name));
     report.left_out.extend(external_files(file, name));
     report.problems.extend(assembly.problems.iter().map(|problem| format!("{name}: {problem}")));
+    // Whether what pictures show can be converted is known only afterwards.
+    let before = assembly.has_pictures().then(|| (placed.clone(), report.clone()));
+    let mut model = convert_placed(file, settings, &assembly, placed, report);
+    if let Some((placed, before)) = before {
+        let refused: FxHashSet<u64> = report.refusals.iter().map(|refusal| refusal.id).collect();
+        if !refused.is_empty() && assembly.bring_back_pictures(&placed, &refused) {
+            *report = before;
+            model = convert_placed(file, settings, &assembly, placed, report);
+        }
+    }
+    count_model(&model, report);
+    if report.faces.found == 0 {
+        report.problems.push(format!("{name}: {}", absent_shapes(file)));
+    }
+    Ok(model)
+}
+
+/// Converts representations where they are placed, with all counts and notes in `report`.
+fn convert_placed(
+    file: &File<'_>,
+    settings: &Settings,
+    assembly: &Assembly<'_, '_>,
+    placed: Vec<PlacedRepresentation>,
+    report: &mut ImportReport,
+) -> Model {
     let mut reader = Reader {
         file,
         styles: Styles::read(file),
         settings,
-        model: Model { name: name.to_string(), ..Model::default() },
+        model: Model { name: report.file.clone(), ..Model::default() },
         report,
     };
-    let mut shared = SharedItems::new(file, &assembly, &placed);
+    let mut shared = SharedItems::new(file, assembly, &placed);
     let mut hidden = HiddenItems::new(file);
     // What a representation adds becomes a part where it is placed first; it adds less where another has brought the same.
     let mut parts: FxHashMap<(u64, Vec<u64>), Option<PartFaces>> = FxHashMap::default();
@@ -218,11 +240,7 @@ fn convert_assembly(
     let faces = model.parts.iter().flat_map(|p| &p.shells).flat_map(|s| &s.faces);
     hidden.find_among(faces.filter_map(|f| f.entity.as_ref()));
     report.hidden = hidden.notes(file);
-    count_model(&model, report);
-    if report.faces.found == 0 {
-        report.problems.push(format!("{name}: {}", absent_shapes(file)));
-    }
-    Ok(model)
+    model
 }
 
 /// Numbers instances whose paths are alike from 2 on, as `left/led:2`, in the file's order, so that each path means one.
@@ -246,25 +264,6 @@ fn number_alike_paths(instances: &mut [Instance]) {
             *count += 1;
         }
     }
-}
-
-/// Tells of a file without a face what it holds instead: the entities that it has most of.
-fn absent_shapes(file: &File<'_>) -> String {
-    let mut counts: FxHashMap<&str, usize> = FxHashMap::default();
-    file.entities().flat_map(|e| e.keywords()).for_each(|k| *counts.entry(k).or_default() += 1);
-    let mut most: Vec<(&str, usize)> = counts.into_iter().collect();
-    // By name where counts are equal, for tables of hashes have no order.
-    most.sort_unstable_by_key(|&(name, count)| (std::cmp::Reverse(count), name));
-    let listed: Vec<String> = most.iter().take(LISTED_ENTITIES).map(|(name, n)| format!("{name} ({n})")).collect();
-    let commonest =
-        if listed.is_empty() { "it has no entity".into() } else { format!("commonest are {}", listed.join(", ")) };
-    let faces = file.entities_named(&["ADVANCED_FACE", "FACE_SURFACE"]).count();
-    let found = if faces == 0 {
-        "no face, surface or mesh was found".into()
-    } else {
-        format!("the file has faces ({faces}), but no representation of a shape leads to one")
-    };
-    format!("{found}; {commonest}; export solids or surfaces")
 }
 
 /// Fills in the report's counts of parts with a face, instances, shells and converted placed faces, and adds the names, each once.

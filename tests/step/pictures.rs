@@ -3,14 +3,16 @@
 use crate::assemblies::{product, read};
 use lampyris::step::Import;
 
-/// A part whose exact body is `exact`, and a mesh #71 of one triangle with these corners, which names what it shows.
+/// A part whose exact body is `exact`, and a mesh #71 of one triangle with these corners, which names what it shows. The only face #29 of
+/// the solid #27 has no surface.
 fn with_mesh(exact: &str, corners: &str, shown: &str) -> Import {
     read(&format!(
         "{}#110=SHAPE_REPRESENTATION('',(#20),#1);\n#111=ADVANCED_BREP_SHAPE_REPRESENTATION('',({exact}#20),#1);\n\
          #112=TESSELLATED_SHAPE_REPRESENTATION('',(#71),#1);\n#120=SHAPE_REPRESENTATION_RELATIONSHIP('','',#110,#111);\n\
          #121=SHAPE_REPRESENTATION_RELATIONSHIP('','',#110,#112);\n#26=CSG_SOLID('',#25);\n\
          #70=COORDINATES_LIST('',3,({corners}));\n#71=TESSELLATED_SOLID('',(#72),{shown});\n\
-         #72=TRIANGULATED_FACE('',#70,3,((0.,0.,1.)),$,(),((1,2,3)));\n",
+         #72=TRIANGULATED_FACE('',#70,3,((0.,0.,1.)),$,(),((1,2,3)));\n\
+         #27=MANIFOLD_SOLID_BREP('',#28);\n#28=CLOSED_SHELL('',(#29));\n#29=ADVANCED_FACE('',(),$,.T.);\n",
         product(100, "part", 110)
     ))
 }
@@ -44,5 +46,23 @@ fn a_linked_mesh_is_left_out_where_what_it_shows_stands() {
     for (shown, faces) in [("#24", 6), ("#26", 7)] {
         let import = with_mesh("#24,", HALF_A_SIDE, shown);
         assert_eq!((import.model.placed_face_count(), import.report.left_out.len()), (faces, 0), "{shown}");
+    }
+}
+
+/// The mesh of a solid without a face that can be converted is all that there is of it; what is refused is told once.
+#[test]
+fn a_mesh_of_what_is_refused_stands_in_its_place() {
+    for (exact, faces) in [("#27,", 1), ("#24,#27,", 7)] {
+        for shown in ["#27", "#29"] {
+            let import = with_mesh(exact, HALF_A_SIDE, shown);
+            let report = &import.report;
+            assert_eq!(
+                (import.model.placed_face_count(), report.by_surface.tessellated),
+                (faces, 1),
+                "{exact} {shown}"
+            );
+            let refused: Vec<u64> = report.refusals.iter().map(|r| r.id).collect();
+            assert_eq!((refused, report.faces.refused, report.left_out.len()), (vec![29], 1, 0), "{exact} {shown}");
+        }
     }
 }

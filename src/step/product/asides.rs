@@ -1,10 +1,14 @@
-//! What few entities of a file say beside its shapes: what it hides, which other files it needs, which directions point nowhere.
+//! What few entities of a file say beside its shapes: what it hides, which other files it needs, which directions point nowhere, and what
+//! it holds without any shape.
 
 use crate::formats::lower_extension;
 use crate::step::part21::{Entity, File};
 use crate::step::report::Note;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::path::Path;
+
+/// Entities that are listed of a file without shapes.
+const LISTED_ENTITIES: usize = 5;
 
 /// Tells of directions that point nowhere, how many there are and which is the first; `None` where there is none. `name` is the file's.
 pub(crate) fn void_directions(file: &File<'_>, name: &str) -> Option<String> {
@@ -31,6 +35,25 @@ pub(crate) fn external_files(file: &File<'_>, own: &str) -> Vec<Note> {
         }
     }
     notes
+}
+
+/// Tells of a file without a face what it holds instead: the entities that it has most of.
+pub(crate) fn absent_shapes(file: &File<'_>) -> String {
+    let mut counts: FxHashMap<&str, usize> = FxHashMap::default();
+    file.entities().flat_map(|e| e.keywords()).for_each(|k| *counts.entry(k).or_default() += 1);
+    let mut most: Vec<(&str, usize)> = counts.into_iter().collect();
+    // By name where counts are equal, for tables of hashes have no order.
+    most.sort_unstable_by_key(|&(name, count)| (std::cmp::Reverse(count), name));
+    let listed: Vec<String> = most.iter().take(LISTED_ENTITIES).map(|(name, n)| format!("{name} ({n})")).collect();
+    let commonest =
+        if listed.is_empty() { "it has no entity".into() } else { format!("commonest are {}", listed.join(", ")) };
+    let faces = file.entities_named(&["ADVANCED_FACE", "FACE_SURFACE"]).count();
+    let found = if faces == 0 {
+        "no face, surface or mesh was found".into()
+    } else {
+        format!("the file has faces ({faces}), but no representation of a shape leads to one")
+    };
+    format!("{found}; {commonest}; export solids or surfaces")
 }
 
 /// Whether a DIRECTION has no component that is a number and not 0.

@@ -1,8 +1,9 @@
 //! Meshes that are pictures of exact shapes: both would stand in one place, and light would meet the shape twice.
 //!
-//! A tessellated item that names the exact shape which it shows is left out where that stands. One that names none is left out, by name,
-//! where it lies within the exact body of the same product and is about as large. Known weakness: a mesh that is no picture but lies
-//! in the body, and is half as large, is taken for one; and the bodies of such products are converted twice, once for their boxes.
+//! A tessellated item that names the exact shape which it shows is left out where that stands; it is brought back where none of the
+//! shape's faces could be converted, for it is all that there is then. One that names none is left out, by name, where it lies within the
+//! exact body of the same product and is about as large. Known weakness: a mesh that is no picture but lies in the body, and is half as
+//! large, is taken for one; and the bodies of such products are converted twice, once for their boxes.
 
 use super::assembly::{Assembly, PlacedRepresentation};
 use super::conversion::convert;
@@ -52,42 +53,81 @@ impl Assembly<'_, '_> {
         if self.file.entities_of_kind(is_tessellated).next().is_none() {
             return;
         }
-        let mut representations: Vec<u64> = placed.iter().map(|p| p.representation).collect();
-        let mut known = FxHashSet::default();
-        representations.retain(|id| known.insert(*id));
-        let standing = self.exact_shapes(&representations);
+        let representations = distinct_representations(placed);
+        let standing = self.exact_shapes(&representations, &FxHashSet::default());
         let mut unlinked = Vec::new();
-        for &representation in &representations {
-            for item in self.items(representation) {
-                if !self.file.entity(item).is_some_and(|e| e.keywords().any(is_tessellated)) {
-                    continue;
-                }
-                let rest = self.mesh_rest(item, 0, &standing, &mut FxHashSet::default());
-                if rest.has_pictures {
-                    self.read_instead.insert(item, rest.items);
-                } else if !rest.is_linked {
-                    unlinked.push(ListedMesh { representation, item });
-                }
+        for mesh in self.listed_meshes(&representations) {
+            let rest = self.mesh_rest(mesh.item, 0, &standing, &mut FxHashSet::default());
+            if rest.has_pictures {
+                self.read_instead.insert(mesh.item, rest.items);
+            } else if !rest.is_linked {
+                unlinked.push(mesh);
             }
         }
         if !unlinked.is_empty() {
+            let known: FxHashSet<u64> = representations.into_iter().collect();
             let orphans: Vec<u64> = placed.iter().filter(|p| p.orphan).map(|p| p.representation).collect();
             self.leave_out_unlinked(&known, &orphans, &unlinked);
         }
     }
 
-    /// Returns the solids, shells and faces that representations hold.
-    fn exact_shapes(&self, representations: &[u64]) -> FxHashSet<u64> {
+    /// Whether some meshes are left out as pictures.
+    pub(crate) fn has_pictures(&self) -> bool {
+        !self.read_instead.is_empty()
+    }
+
+    /// Brings back the meshes that name as what they show nothing but `refused` faces and solids, which could not be converted. Whether
+    /// there are some.
+    pub(crate) fn bring_back_pictures(
+        &mut self,
+        placed: &[PlacedRepresentation],
+        refused: &FxHashSet<u64>,
+    ) -> bool {
+        let representations = distinct_representations(placed);
+        let standing = self.exact_shapes(&representations, refused);
+        let mut is_changed = false;
+        for mesh in self.listed_meshes(&representations) {
+            let Some(known) = self.read_instead.get(&mesh.item) else { continue };
+            let rest = self.mesh_rest(mesh.item, 0, &standing, &mut FxHashSet::default());
+            // One that names nothing was compared with what could be converted.
+            if !rest.is_linked || rest.items == *known {
+                continue;
+            }
+            is_changed = true;
+            if rest.has_pictures {
+                self.read_instead.insert(mesh.item, rest.items);
+            } else {
+                self.read_instead.remove(&mesh.item);
+            }
+        }
+        is_changed
+    }
+
+    /// Returns the tessellated items of representations.
+    fn listed_meshes(&self, representations: &[u64]) -> Vec<ListedMesh> {
+        let is_mesh = |item: u64| self.file.entity(item).is_some_and(|e| e.keywords().any(is_tessellated));
+        let listed = representations.iter().flat_map(|&representation| {
+            self.items(representation).into_iter().map(move |item| ListedMesh { representation, item })
+        });
+        listed.filter(|mesh| is_mesh(mesh.item)).collect()
+    }
+
+    /// Returns the solids, shells and faces that representations hold, but `refused` faces and solids, and what has no others.
+    fn exact_shapes(&self, representations: &[u64], refused: &FxHashSet<u64>) -> FxHashSet<u64> {
         let mut standing: FxHashSet<u64> = FxHashSet::default();
         for &representation in representations {
             let items = self.shape_items(representation);
             for shell in &items.shells {
-                standing.extend(&shell.owners);
-                standing.extend(shell.faces.iter().map(|face| face.0));
+                let mut faces = shell.faces.iter().map(|face| face.0).filter(|id| !refused.contains(id)).peekable();
+                if faces.peek().is_some() {
+                    standing.extend(&shell.owners);
+                    standing.extend(faces);
+                }
             }
             let geometry = self.geometry_reader(representation);
             let is_read = |id: &u64| geometry.entity(*id).and_then(|e| geometry.solid_recipe(e)).is_ok();
-            standing.extend(items.recipes.iter().copied().filter(is_read));
+            let recipes = items.recipes.iter().copied().filter(|id| !refused.contains(id));
+            standing.extend(recipes.filter(is_read));
         }
         standing
     }
@@ -219,6 +259,12 @@ impl Assembly<'_, '_> {
         self.geometry_reader(mesh.representation).collect_meshes(mesh.item, 0, &mut leaves);
         Aabb::from_points(leaves.faces.iter().flat_map(|face| face.mesh.positions.iter().copied()))
     }
+}
+
+/// Returns the representations that are placed, each once, in the order of their first places.
+fn distinct_representations(placed: &[PlacedRepresentation]) -> Vec<u64> {
+    let mut known = FxHashSet::default();
+    placed.iter().map(|p| p.representation).filter(|id| known.insert(*id)).collect()
 }
 
 /// Whether an exact shape, or the face that it turns, is among those that stand.
