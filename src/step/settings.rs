@@ -9,7 +9,8 @@ pub struct Settings {
     /// Allowed distance between a uv curve on its surface and the foot points of its edge, mm. Halving it adds about
     /// a fifth to the pieces of each curve.
     pub uv_tolerance: f64,
-    /// Surface evaluations that one face may take before it is refused; 1e6 are about a second.
+    /// Surface evaluations that one face may take before it is refused; 1e6 are about a second. The search for a way of its seam past its
+    /// holes counts as evaluations that take as long.
     pub face_budget: u64,
     /// Most products and shapes that the assemblies of a file may place; each takes about 500 bytes. Beyond it the file is refused.
     pub max_placed: u64,

@@ -481,6 +481,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "task",
             "touching",
             "obstacles",
+            "visibility",
+            "way_search",
             "seam_path",
             "holes",
             "boundary",

@@ -1,15 +1,17 @@
 //! From chains to the boundary of a region without periods: chains that wind around the surface are joined by seams,
 //! lone ones run to a pole or a natural border, closed surfaces get their outer boundary, holes move inside it.
 
+use super::fit::Budget;
 use super::holes::{Border, place_hole};
 use super::loops::{Chain, Piece, Source};
 use super::obstacles::{Obstacles, unrolled_polygon};
-use super::seam_path::{Goals, SeamPath};
 use super::tolerances::{EMPTY_LOOP_SHARE, SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
+use super::way_search::{Goals, SeamPath};
 use crate::math::Uv;
 use crate::math::polygon::signed_area;
 use crate::nurbs::UvCurve;
 use crate::step::chart::Chart;
+use rustc_hash::FxHashSet;
 
 /// Most pairs of ends that a straight seam is tried between: each costs a look at all obstacles.
 const MOST_PAIRS: usize = 4096;
@@ -26,12 +28,23 @@ pub(crate) struct Boundary {
     pub(crate) repairs: Vec<&'static str>,
 }
 
+/// What seams are laid through.
+struct SeamDomain<'c> {
+    chart: &'c Chart,
+    /// The holes that seams miss, in parameters.
+    holes: Vec<Vec<Uv>>,
+    /// What the search for a way past them takes its work from.
+    budget: &'c Budget,
+}
+
 /// Arranges the chains of a face, given with the material on their left, to closed loops; without chains the face is the whole surface.
-/// Fails where chains wind in a way that bounds nothing. `implicit_outer`: the surface's own border is the outer loop.
+/// Fails where chains wind in a way that bounds nothing, and where the budget is used up. `implicit_outer`: the surface's own border is
+/// the outer loop.
 pub(crate) fn bound_region(
     mut chains: Vec<Chain>,
     chart: &Chart,
     implicit_outer: bool,
+    budget: &Budget,
 ) -> Result<Boundary, &'static str> {
     chains.retain(|c| !c.pieces.is_empty());
     let mut out = Boundary { loops: Vec::new(), seams: Vec::new(), repairs: Vec::new() };
@@ -54,11 +67,9 @@ pub(crate) fn bound_region(
         bound_without_winding(&mut plain, chart, &mut out, implicit_outer)?;
         return Ok(out);
     }
-    let obstacles: Vec<Vec<Uv>> = plain.iter().map(Chain::polygon).collect();
+    let domain = SeamDomain { chart, holes: plain.iter().map(Chain::polygon).collect(), budget };
     let mut outer = match winding.len() {
-        1 => {
-            extend_to_border(winding.into_iter().next().ok_or("no loop")?, chart, &obstacles, &mut out.seams, true)?
-        }
+        1 => extend_to_border(winding.into_iter().next().ok_or("no loop")?, &domain, &mut out.seams, true)?,
         2 => {
             let mut two = winding.into_iter();
             let (Some(a), Some(b)) = (two.next(), two.next()) else { return Err("no loop") };
@@ -66,7 +77,7 @@ pub(crate) fn bound_region(
             if a.winding != b.winding.map(|w| -w) {
                 return Err("two loops wind around the surface in the same sense");
             }
-            join_winding_pair(a, b, chart, &obstacles, &mut out.seams)?
+            join_winding_pair(a, b, &domain, &mut out.seams)?
         }
         _ => return Err("more than two loops wind around the surface"),
     };
@@ -199,11 +210,11 @@ fn free_start(d: usize, base: f64, period: f64, holes: &[Vec<Uv>]) -> Option<f64
 /// `seams`. A loop that has nothing there is turned around if it may be; else fails.
 fn extend_to_border(
     chain: Chain,
-    chart: &Chart,
-    holes: &[Vec<Uv>],
+    domain: &SeamDomain<'_>,
     seams: &mut Vec<[Uv; 2]>,
     may_turn: bool,
 ) -> Result<Chain, &'static str> {
+    let chart = domain.chart;
     // Winding along +u has its material at larger v; along +v at smaller u.
     let (along, forward) = match chain.winding {
         [1, 0] => (0, true),
@@ -227,7 +238,7 @@ fn extend_to_border(
         None if chart.period[across].is_none() && may_turn && !chart.poles.is_empty() => {
             let mut turned = chain;
             turned.reverse();
-            return extend_to_border(turned, chart, holes, seams, false);
+            return extend_to_border(turned, domain, seams, false);
         }
         None => return Err("a loop winds around an unbounded surface and nothing closes it"),
     };
@@ -235,7 +246,7 @@ fn extend_to_border(
     // Straight across from a vertex that sees the border, or around the holes before it.
     let starts: Vec<Uv> = chain.pieces.iter().map(Piece::start).collect();
     let borders = [unrolled_polygon(&polygon, displacement)];
-    let obstacles = Obstacles::new(holes, &borders, displacement);
+    let obstacles = Obstacles::new(&domain.holes, &borders, displacement);
     let foot_of = |p: Uv| {
         let mut foot = p;
         foot[across] = at;
@@ -247,7 +258,7 @@ fn extend_to_border(
         None => {
             let metric = chart.derivatives(starts[0]);
             obstacles
-                .way_around(&starts, &Goals::Line(&foot_of), &metric)
+                .way_around(&starts, &Goals::Line(&foot_of), &metric, domain.budget)?
                 .ok_or("no way from the loop to the pole past the holes")?
         }
     };
@@ -281,10 +292,10 @@ fn started_at(mut chain: Chain, first: usize, displacement: Uv) -> Chain {
 fn join_winding_pair(
     a: Chain,
     b: Chain,
-    chart: &Chart,
-    holes: &[Vec<Uv>],
+    domain: &SeamDomain<'_>,
     seams: &mut Vec<[Uv; 2]>,
 ) -> Result<Chain, &'static str> {
+    let chart = domain.chart;
     let displacement = a.displacement(chart);
     let border_a = unrolled_polygon(&a.polygon(), displacement);
     let border_b = unrolled_polygon(&b.polygon(), -displacement);
@@ -327,20 +338,15 @@ fn join_winding_pair(
     pairs.sort_unstable_by(by_cost);
     pairs.truncate(MOST_PAIRS);
     let borders = [border_a, border_b];
-    let obstacles = Obstacles::new(holes, &borders, displacement);
+    let obstacles = Obstacles::new(&domain.holes, &borders, displacement);
     let straight = pairs.iter().find(|(_, i, _, q)| obstacles.leave_free(starts_a[*i], *q));
     let seam = match straight {
         Some(&(_, i, j, q)) => SeamPath { start: i, goal: j, points: vec![starts_a[i], q] },
         None => {
-            // Beside a hole of several turns, such as a slot along a helix, the seam ends as many turns on.
-            let turns = -obstacles.turns()..=obstacles.turns();
-            let copies = |&(_, _, j, q): &(f64, usize, usize, Uv)| {
-                turns.clone().map(move |turn| (j, q + displacement * f64::from(turn)))
-            };
-            let goals: Vec<(usize, Uv)> = pairs.iter().flat_map(copies).collect();
+            let goals = seam_goals(pairs.iter().map(|&(_, _, j, q)| (j, q)), &obstacles);
             let metric = chart.derivatives(starts_a[0]);
             obstacles
-                .way_around(&starts_a, &Goals::Points(&goals), &metric)
+                .way_around(&starts_a, &Goals::Points(&goals), &metric, domain.budget)?
                 .ok_or("no seam between the two loops misses the holes")?
         }
     };
@@ -356,6 +362,17 @@ fn join_winding_pair(
     pieces.extend(b.pieces);
     pieces.extend(run_back(up));
     Ok(Chain { bridged: a.bridged.max(b.bridged), ..Chain::closed(pieces) })
+}
+
+/// Returns where a seam may end, each place once: at these places, by their number in the second loop, and beside a hole of several turns,
+/// such as a slot along a helix, as many turns on.
+fn seam_goals(ends: impl Iterator<Item = (usize, Uv)>, obstacles: &Obstacles<'_>) -> Vec<(usize, Uv)> {
+    let (displacement, turns) = (obstacles.displacement, obstacles.turns());
+    let copies = |(j, q): (usize, Uv)| (-turns..=turns).map(move |turn| (j, q + displacement * f64::from(turn)));
+    let mut goals: Vec<(usize, Uv)> = ends.flat_map(copies).collect();
+    let mut seen = FxHashSet::default();
+    goals.retain(|(j, q)| seen.insert((*j, q.to_array().map(f64::to_bits))));
+    goals
 }
 
 /// Makes a straight piece of seam between each two of `points`, in parameters, and appends each to the list of seams.

@@ -82,7 +82,8 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
     if bridged > 0.0 {
         repairs.push(format!("edges of a loop are {bridged:.3e} mm apart"));
     }
-    let Boundary { mut loops, mut seams, repairs: turned } = bound_region(chains, chart, task.implicit_outer)?;
+    let Boundary { mut loops, mut seams, repairs: turned } =
+        bound_region(chains, chart, task.implicit_outer, &task.budget)?;
     repairs.extend(turned.into_iter().map(String::from));
     let (domain, shift) = domain_of(&loops, chart)?;
     loops.iter_mut().for_each(|l| l.shift(shift));

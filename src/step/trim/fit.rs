@@ -16,20 +16,33 @@ use std::cell::Cell;
 /// Deepest halving of a Bézier span of the edge.
 const MAX_DEPTH: u32 = 12;
 
-/// Evaluations that a face has left, so that none takes for ever.
+/// Steps of a search, each a look at one box or place, that take as long as an evaluation: 2 ns to 1 µs.
+const STEPS_OF_EVALUATION: u64 = 512;
+
+/// Work that a face has left, in steps, so that none takes for ever.
 #[derive(Debug)]
 pub(crate) struct Budget(Cell<u64>);
 
 impl Budget {
-    pub(crate) fn new(steps: u64) -> Self {
-        Self(Cell::new(steps))
+    pub(crate) fn new(evaluations: u64) -> Self {
+        Self(Cell::new(evaluations.saturating_mul(STEPS_OF_EVALUATION)))
     }
 
     /// Takes one evaluation; fails when none is left.
     pub(super) fn spend(&self) -> Result<(), Overrun> {
+        self.spend_steps(STEPS_OF_EVALUATION)
+    }
+
+    /// Takes so many steps of a search; fails when fewer are left.
+    pub(super) fn spend_steps(&self, steps: u64) -> Result<(), Overrun> {
         let left = self.0.get();
-        self.0.set(left.saturating_sub(1));
-        if left == 0 { Err(Overrun) } else { Ok(()) }
+        self.0.set(left.saturating_sub(steps));
+        if left < steps { Err(Overrun) } else { Ok(()) }
+    }
+
+    #[cfg(test)]
+    pub(super) fn steps_left(&self) -> u64 {
+        self.0.get()
     }
 }
 

@@ -1,9 +1,10 @@
 //! From the loops of a face to one trimmed spline.
 //!
 //! Every edge is located in the parameters of the face's surface (`fit`, `task`, `touching`); the loops are chained and unwrapped
-//! (`loops`), joined and closed over poles and by seams (`boundary`, `seam_path`, `obstacles`); the rectangle that they cover becomes one
-//! rational B-spline (`region`), in whose parameters the seams and edges are found anew (`seams`, `face`). Of `tolerances`, `fit`,
-//! `loops`, `task`, `touching`, `obstacles`, `seam_path`, `boundary`, `region`, `seams` and `face` each sees only those before it.
+//! (`loops`), joined and closed over poles and by seams (`boundary`), which go past holes (`seam_path`, `way_search`, `visibility`,
+//! `obstacles`); the rectangle that they cover becomes one rational B-spline (`region`), in whose parameters the seams and edges are found
+//! anew (`seams`, `face`). Of `tolerances`, `fit`, `loops`, `task`, `touching`, `obstacles`, `visibility`, `way_search`, `seam_path`,
+//! `boundary`, `region`, `seams` and `face` each sees only those before it.
 
 mod boundary;
 pub(super) mod face;
@@ -17,3 +18,5 @@ mod seams;
 pub(super) mod task;
 mod tolerances;
 mod touching;
+mod visibility;
+mod way_search;

@@ -3,13 +3,19 @@
 //! Boxes around runs of sides stand in a tree, so that a piece is compared with what is beside it alone.
 
 use super::tolerances::CROSSING_NOISE;
+use crate::math::polygon::polygon_sides;
 use crate::math::{Aabb, BoxTree, Uv};
-use std::ops::RangeInclusive;
+use std::cell::Cell;
+use std::ops::{Range, RangeInclusive};
 
 /// Most turns of a hole that are looked at.
 const MOST_TURNS: i32 = 64;
 /// Sides of a chain that one box is around.
 const SIDES_OF_RUN: usize = 16;
+/// Corners of one hole's box.
+pub(super) const CORNERS_OF_BOX: usize = 4;
+/// Boxes that a walk through the tree looks at, the runs that it meets apart: four levels of four, as of a few hundred runs.
+const STEPS_OF_WALK: u64 = 16;
 
 /// A hole by its number, moved by so many displacements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -30,41 +36,89 @@ pub(super) struct Obstacles<'o> {
     runs: Vec<Run>,
     /// Around the runs, by their index.
     tree: BoxTree,
+    /// Boxes that were looked at since [`Self::take_steps`].
+    steps: Cell<u64>,
 }
 
 /// Places one after the other, in parameters.
 struct Chain<'o> {
     places: &'o [Uv],
     closed: bool,
+    /// Those of all its sides.
+    runs: Range<usize>,
 }
 
 /// Up to [`SIDES_OF_RUN`] sides of a chain.
 struct Run {
     chain: usize,
     first_side: usize,
+    /// Lowest and highest corner of the box around them.
+    bounds: [Uv; 2],
+}
+
+/// A straight line between two places.
+pub(super) struct Segment {
+    ends: [Uv; 2],
+    /// What counts as touching, in parameters.
+    slack: f64,
+    /// Lowest and highest corner of the box around it, larger by the slack.
+    bounds: [Uv; 2],
+}
+
+impl Segment {
+    pub(super) fn new(ends: [Uv; 2]) -> Self {
+        let [a, b] = ends;
+        let slack = CROSSING_NOISE * (b - a).length();
+        Self { ends, slack, bounds: [a.min(b) - slack, a.max(b) + slack] }
+    }
+
+    /// Whether it may cross something inside a box, given by its lowest and highest corner.
+    pub(super) fn may_meet(&self, [lo, hi]: [Uv; 2]) -> bool {
+        if lo.cmpgt(self.bounds[1]).any() || hi.cmplt(self.bounds[0]).any() {
+            return false;
+        }
+        // Corners of a box farther off than half its extent across the line lie on one side of it.
+        let along = self.ends[1] - self.ends[0];
+        let half = 0.5 * (hi - lo) + self.slack;
+        let off = along.perp_dot(0.5 * (lo + hi) - self.ends[0]);
+        off.abs() <= along.x.abs() * half.y + along.y.abs() * half.x
+    }
 }
 
 impl<'o> Obstacles<'o> {
     pub(super) fn new(holes: &'o [Vec<Uv>], borders: &'o [Vec<Uv>], displacement: Uv) -> Self {
-        let closed = holes.iter().map(|places| Chain { places, closed: true });
-        let chains: Vec<Chain<'o>> =
-            closed.chain(borders.iter().map(|places| Chain { places, closed: false })).collect();
+        let closed = holes.iter().map(|places| Chain { places, closed: true, runs: 0..0 });
+        let open = borders.iter().map(|places| Chain { places, closed: false, runs: 0..0 });
+        let mut chains: Vec<Chain<'o>> = closed.chain(open).collect();
         let mut along = [f64::INFINITY, f64::NEG_INFINITY];
-        let (mut runs, mut boxes) = (Vec::new(), Vec::new());
-        for (chain, c) in chains.iter().enumerate() {
+        let mut runs: Vec<Run> = Vec::new();
+        for (chain, c) in chains.iter_mut().enumerate() {
             let [lo, hi] = range_along(c.places, displacement);
             along = [along[0].min(lo), along[1].max(hi)];
+            let first_run = runs.len();
             for first_side in (0..c.sides()).step_by(SIDES_OF_RUN) {
-                boxes.push(c.box_of_run(first_side));
-                runs.push(Run { chain, first_side });
+                runs.push(Run { chain, first_side, bounds: c.bounds_of_run(first_side) });
             }
+            c.runs = first_run..runs.len();
         }
-        Self { holes, borders, displacement, chains, along, runs, tree: BoxTree::new(&boxes) }
+        let boxes: Vec<Aabb> = runs.iter().map(|run| flat_box(run.bounds)).collect();
+        let tree = BoxTree::new(&boxes);
+        Self { holes, borders, displacement, chains, along, runs, tree, steps: Cell::new(0) }
+    }
+
+    /// Returns how many boxes were looked at since this was last asked: the measure of a search's work.
+    pub(super) fn take_steps(&self) -> u64 {
+        self.steps.take()
+    }
+
+    /// Adds looks at boxes to those that [`Self::take_steps`] returns.
+    pub(super) fn count_steps(&self, steps: u64) {
+        self.steps.set(self.steps.get() + steps);
     }
 
     /// Whether the straight line between two places crosses no hole, no border and no copy of these.
     pub(super) fn leave_free(&self, from: Uv, to: Uv) -> bool {
-        !self.crosses_any(from, to, |_| true)
+        !self.any_beside(from, to, |_, is_crossed| is_crossed())
     }
 
     /// Returns the holes, and copies of them, that a way through these places crosses; some may be told more than once.
@@ -79,11 +133,47 @@ impl<'o> Obstacles<'o> {
         crossed
     }
 
-    /// Whether the straight line between two places crosses something that is wanted; `is_wanted` is asked of each hole beside it, and
-    /// with `None` of a border. Touching does not count, a corner between both sides does.
-    pub(super) fn crosses_any(&self, a: Uv, b: Uv, is_wanted: impl Fn(Option<HoleCopy>) -> bool) -> bool {
-        // Nine holes in ten are not wanted, and to ask that is cheaper.
-        self.any_beside(a, b, |hole, is_crossed| is_wanted(hole) && is_crossed())
+    /// Whether the straight line between two places crosses a copy of a hole. Touching does not count, a corner between both sides does.
+    pub(super) fn hole_is_crossed(&self, HoleCopy { hole, copy }: HoleCopy, ends: [Uv; 2]) -> bool {
+        let by = self.displacement * f64::from(copy);
+        let segment = Segment::new(ends.map(|p| p - by));
+        let runs = self.chains[hole].runs.clone();
+        self.count_steps(runs.len() as u64);
+        self.runs[runs].iter().any(|run| self.run_is_crossed(run, &segment))
+    }
+
+    /// Returns what of the straight line from `a` to `b` lies between holes that it crosses one after the other, in order and as shares of
+    /// it: what comes before the first one and after the last one is left out.
+    pub(super) fn gaps_between_holes(&self, a: Uv, b: Uv) -> Vec<[f64; 2]> {
+        let crossed = self.crossed_by(&[a, b]);
+        let mut spans: Vec<[f64; 2]> = crossed.into_iter().map(|hole| self.span_across(hole, [a, b])).collect();
+        spans.sort_by(|x, y| x[0].total_cmp(&y[0]));
+        let Some(&[_, mut end]) = spans.first() else { return Vec::new() };
+        let mut gaps = Vec::new();
+        for [first, last] in spans {
+            if first > end + CROSSING_NOISE {
+                gaps.push([end, first]);
+            }
+            end = end.max(last);
+        }
+        gaps
+    }
+
+    /// Returns where the straight line from `a` to `b` first and last crosses a side of a hole, as shares of it: an end where it does so
+    /// beyond that.
+    fn span_across(&self, HoleCopy { hole, copy }: HoleCopy, [a, b]: [Uv; 2]) -> [f64; 2] {
+        let (from, along) = (a - self.displacement * f64::from(copy), b - a);
+        let mut span = [f64::INFINITY, f64::NEG_INFINITY];
+        for [p, q] in polygon_sides(&self.holes[hole]) {
+            // Distances of the side's ends from the line, of opposite signs where it crosses.
+            let (off_p, off_q) = (along.perp_dot(p - from), along.perp_dot(q - from));
+            if off_p * off_q <= 0.0 && off_p != off_q {
+                let crossing = p + (q - p) * (off_p / (off_p - off_q));
+                let share = ((crossing - from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+                span = [span[0].min(share), span[1].max(share)];
+            }
+        }
+        span
     }
 
     /// Whether `is_found` says so of something beside the straight line between two places: it is given the hole, `None` for a border, and
@@ -94,17 +184,37 @@ impl<'o> Obstacles<'o> {
         b: Uv,
         mut is_found: impl FnMut(Option<HoleCopy>, &dyn Fn() -> bool) -> bool,
     ) -> bool {
-        let slack = CROSSING_NOISE * (b - a).length();
         self.copies_beside([a, b]).any(|copy| {
             let by = self.displacement * f64::from(copy);
-            let moved = [a - by, b - by];
-            let around = Aabb::from_points(moved.map(|p| p.extend(0.0))).grown(slack);
-            self.tree.any_meeting(&around, |k| {
-                let Run { chain, first_side } = self.runs[k as usize];
-                let hole = (chain < self.holes.len()).then_some(HoleCopy { hole: chain, copy });
-                is_found(hole, &|| self.chains[chain].run_is_crossed(first_side, moved))
+            let segment = Segment::new([a - by, b - by]);
+            self.count_steps(STEPS_OF_WALK);
+            self.tree.any_meeting(&flat_box(segment.bounds), |k| {
+                self.count_steps(1);
+                let run = &self.runs[k as usize];
+                let hole = (run.chain < self.holes.len()).then_some(HoleCopy { hole: run.chain, copy });
+                is_found(hole, &|| self.run_is_crossed(run, &segment))
             })
         })
+    }
+
+    /// Whether a segment crosses a side of a run.
+    fn run_is_crossed(&self, run: &Run, segment: &Segment) -> bool {
+        segment.may_meet(run.bounds) && self.chains[run.chain].run_is_crossed(run.first_side, segment.ends)
+    }
+
+    /// Returns the lowest and highest corner of the box around a copy of a hole.
+    pub(super) fn bounds_of(&self, HoleCopy { hole, copy }: HoleCopy) -> [Uv; 2] {
+        let by = self.displacement * f64::from(copy);
+        bounds(&self.holes[hole]).map(|corner| corner + by)
+    }
+
+    /// Returns the corners of the box around a copy of a hole, larger by a share of its size.
+    pub(super) fn corners(&self, HoleCopy { hole, copy }: HoleCopy, margin: f64) -> [Uv; CORNERS_OF_BOX] {
+        let [lo, hi] = bounds(&self.holes[hole]);
+        let off = margin * (hi - lo);
+        let by = self.displacement * f64::from(copy);
+        let [a, b] = [lo - off + by, hi + off + by];
+        [a, Uv::new(b.x, a.y), b, Uv::new(a.x, b.y)]
     }
 
     /// Returns how many displacements the longest hole reaches over, beyond the one in which a seam has room beside a short one: as many
@@ -139,6 +249,25 @@ impl<'o> Obstacles<'o> {
     }
 }
 
+/// Whether a way crosses itself.
+pub(super) fn crosses_itself(places: &[Uv]) -> bool {
+    let way = [places.to_vec()];
+    let itself = Obstacles::new(&[], &way, Uv::ZERO);
+    places.windows(2).any(|side| !itself.leave_free(side[0], side[1]))
+}
+
+/// Returns the lowest and highest corner of the box around places.
+pub(super) fn bounds<'p>(places: impl IntoIterator<Item = &'p Uv>) -> [Uv; 2] {
+    let places = places.into_iter();
+    places.fold([Uv::INFINITY, Uv::NEG_INFINITY], |[lo, hi], p| [lo.min(*p), hi.max(*p)])
+}
+
+/// Returns a box, given by its lowest and highest corner, as one of height 0.
+fn flat_box(bounds: [Uv; 2]) -> Aabb {
+    let [min, max] = bounds.map(|p| p.extend(0.0));
+    Aabb { min, max }
+}
+
 /// Returns the polygon of a chain that winds, with its end point, which is one displacement from its start.
 pub(super) fn unrolled_polygon(polygon: &[Uv], displacement: Uv) -> Vec<Uv> {
     let mut open = polygon.to_vec();
@@ -164,10 +293,10 @@ impl Chain<'_> {
         if self.closed { self.places.len() } else { self.places.len().saturating_sub(1) }
     }
 
-    /// Returns the box, of height 0, around the run of sides that begins with side `first`.
-    fn box_of_run(&self, first: usize) -> Aabb {
+    /// Returns the lowest and highest corner of the box around the run of sides that begins with side `first`.
+    fn bounds_of_run(&self, first: usize) -> [Uv; 2] {
         let last = (first + SIDES_OF_RUN).min(self.sides());
-        Aabb::from_points((first..=last).map(|k| self.places[k % self.places.len()].extend(0.0)))
+        bounds((first..=last).map(|k| &self.places[k % self.places.len()]))
     }
 
     /// Whether a segment crosses one of the run of sides that begins with side `first`.

@@ -1,27 +1,19 @@
-//! The way of a seam from one loop to another past the holes between them: straight where something straight is free, otherwise the
-//! shortest way by corners of boxes around the holes.
+//! The way of a seam from one loop to another past the holes between them: the shortest one by corners of boxes around the holes.
 //!
-//! Source: shortest paths by visibility graphs, after Lozano-Pérez and Wesley 1979, expanded by Dijkstra only as far as needed. Holes are
-//! taken in where a way crosses them: most faces of hundreds have a way past a few. Known weakness: a hole so near to a border or another
-//! hole that the smallest box around it touches them leaves no way between.
+//! Among too many holes for that, as in a tube with thousands of staggered windows, a straight line is divided between holes that it
+//! crosses, and each stage gets its own shortest way: the work then grows with the holes on the line. Guarantee: all work is taken from the
+//! face's budget. Known weakness: where the loops themselves bar every straight line, only the holes nearest to it are passed.
 
-use super::obstacles::{HoleCopy, Obstacles, turns_of};
-use crate::math::{Point, Uv, distance_to_segment};
+use super::fit::{Budget, Overrun};
+use super::obstacles::{CORNERS_OF_BOX, Obstacles, bounds, crosses_itself, turns_of};
+use super::way_search::{COPIES, Goals, MARGINS, MOST_CORNERS, SeamPath, Search};
+use crate::math::Uv;
 use crate::nurbs::Derivatives;
-use rustc_hash::FxHashSet;
 
-/// How far a box stands off its hole, as shares of the hole's size; the first with which there is a way.
-const MARGINS: [f64; 4] = [0.2, 0.06, 0.015, 0.004];
-/// Corners of one hole's box.
-const CORNERS_OF_BOX: usize = 4;
-/// Copies of a hole that stand beside a seam: itself and those by one displacement to both sides.
-const COPIES: [i32; 3] = [0, -1, 1];
-/// Corners that are tried with each margin at first: the search is quadratic in them, and takes less than a second with so many.
-const FEW_CORNERS: usize = 800;
-/// Most corners that are tried, those of the holes nearest to the seam.
-const MAX_CORNERS: usize = 4000;
-/// Holes that are taken in at least where those that were met leave no way.
-const FEWEST_MORE: usize = 8;
+/// Most places by which a way is sought past everything at once.
+const MOST_PLACES: usize = 4000;
+/// Holes that the line of a stage may cross: past so many staggered windows a way takes in some thirty.
+const HOLES_OF_STAGE: usize = 4;
 
 /// Places along each side of the strip between two loops that are in each other's way.
 const LATTICE: f64 = 24.0;
@@ -33,73 +25,37 @@ const LEAST_PLACES: usize = 8;
 /// Where they lie between a side of the hole and its next copy: no slot is likely to be just so wide that they lie on its other side.
 const BETWEEN: [f64; 4] = [0.23, 0.41, 0.59, 0.77];
 
-/// A seam's way: the numbers of its start and goal, and its places in parameters, both ends included.
-pub(super) struct SeamPath {
-    pub(super) start: usize,
-    pub(super) goal: usize,
-    pub(super) points: Vec<Uv>,
-}
-
-/// Where a seam may end.
-pub(super) enum Goals<'g> {
-    /// At one of these, each with its number.
-    Points(&'g [(usize, Uv)]),
-    /// On a line, at the foot that a place has there; its number is 0.
-    Line(&'g dyn Fn(Uv) -> Uv),
-}
-
-/// A corner on the way.
-struct Node {
-    place: Uv,
-    /// Length of the way to it, mm; infinite while none is known.
-    length: f64,
-    /// The node before it; starts have none.
-    before: Option<usize>,
-    settled: bool,
-}
-
-/// A search for a way from one of the starts to a goal.
-struct Search<'s> {
-    obstacles: &'s Obstacles<'s>,
-    starts: &'s [Uv],
-    goals: &'s Goals<'s>,
-    /// What lengths on the surface are measured by.
-    metric: &'s Derivatives,
-}
-
 impl Obstacles<'_> {
     /// Returns the shortest way found from one of the starts to a goal, by lengths on the surface near the first start; `None` where holes
-    /// and borders leave none.
-    pub(super) fn way_around(&self, starts: &[Uv], goals: &Goals<'_>, metric: &Derivatives) -> Option<SeamPath> {
-        let search = Search { obstacles: self, starts, goals, metric };
-        let by_places = |places: Vec<Uv>| {
-            let way = search.way_by(&places, &|_| true)?;
-            self.is_simple(&way.points).then_some(way)
-        };
+    /// and borders leave none. Fails when the budget is used up.
+    pub(super) fn way_around(
+        &self,
+        starts: &[Uv],
+        goals: &Goals<'_>,
+        metric: &Derivatives,
+        budget: &Budget,
+    ) -> Result<Option<SeamPath>, Overrun> {
+        let borders = Obstacles::new(&[], self.borders, self.displacement);
+        let search = Search { obstacles: self, borders: &borders, starts, goals, metric, budget };
         // Beside a hole of several turns no corner of a box helps.
-        let between = Some(self.between_turns()).filter(|places| !places.is_empty());
-        if let Some(way) = between.and_then(by_places) {
-            return Some(way);
+        let between = self.between_turns();
+        if !between.is_empty()
+            && let Some(way) = search.way_by_all(&between)?
+        {
+            return Ok(Some(way));
         }
-        let nearest = search.copies_by_distance();
-        let has_few = nearest.len() * CORNERS_OF_BOX <= FEW_CORNERS;
-        let mosts: &[usize] = if has_few { &[FEW_CORNERS] } else { &[FEW_CORNERS, MAX_CORNERS] };
-        let mut tries = mosts.iter().flat_map(|most| MARGINS.iter().map(move |margin| (*most, *margin)));
-        tries.find_map(|(most, margin)| search.way_past(&nearest, margin, most)).or_else(|| {
-            // Where the loops themselves are in the way, by places between them.
-            let near = nearest.iter().take(MAX_CORNERS / CORNERS_OF_BOX);
-            let corners = near.flat_map(|copy| self.corners(*copy, MARGINS[MARGINS.len() - 1]));
-            by_places(corners.chain(self.lattice()).collect())
-        })
-    }
-
-    /// Returns the corners of the box around a copy of a hole, larger by a share of its size.
-    fn corners(&self, HoleCopy { hole, copy }: HoleCopy, margin: f64) -> [Uv; CORNERS_OF_BOX] {
-        let [lo, hi] = bounds(&self.holes[hole]);
-        let off = margin * (hi - lo);
-        let by = self.displacement * f64::from(copy);
-        let [a, b] = [lo - off + by, hi + off + by];
-        [a, Uv::new(b.x, a.y), b, Uv::new(a.x, b.y)]
+        if let Some(way) = search.way_by_boxes()? {
+            return Ok(Some(way));
+        }
+        let has_few = COPIES.len() * self.holes.len() * CORNERS_OF_BOX <= MOST_CORNERS;
+        if !has_few && let Some(way) = search.way_in_stages()? {
+            return Ok(Some(way));
+        }
+        // Where the loops themselves are in the way, by places between them.
+        let near = search.copies_by_distance().into_iter().take(MOST_PLACES / CORNERS_OF_BOX);
+        let corners = near.flat_map(|copy| self.corners(copy, MARGINS[MARGINS.len() - 1]));
+        let places: Vec<Uv> = corners.chain(self.lattice()).collect();
+        search.way_by_all(&places)
     }
 
     /// Returns the places, in parameters, of a square lattice over the box of the borders, [`LATTICE`] steps each way.
@@ -128,127 +84,93 @@ impl Obstacles<'_> {
                 places.extend((0..count).map(|k| hole[k * hole.len() / count] + by));
             }
         }
-        places.truncate(MAX_CORNERS);
+        places.truncate(MOST_PLACES);
         places
+    }
+
+    /// Returns a way without those of its places whose neighbours see each other.
+    fn pulled_taut(&self, places: &[Uv]) -> Vec<Uv> {
+        let mut taut: Vec<Uv> = Vec::with_capacity(places.len());
+        for &place in places {
+            while taut.len() > 1 && self.leave_free(taut[taut.len() - 2], place) {
+                taut.pop();
+            }
+            taut.push(place);
+        }
+        taut
     }
 }
 
 impl Search<'_> {
-    /// Returns the shortest way past the holes by corners of boxes that stand off them by `margin`: the straight one first, then by the
-    /// corners of the holes that this one crosses, and so on until it crosses none. Where those leave no way, more are taken in, in the
-    /// order of `nearest`. `None` without a way by `most` corners, and where it would cross its own copies.
-    fn way_past(&self, nearest: &[HoleCopy], margin: f64, most: usize) -> Option<SeamPath> {
-        let mut met: FxHashSet<HoleCopy> = FxHashSet::default();
-        let mut corners: Vec<Uv> = Vec::new();
-        loop {
-            let way = self.way_by(&corners, &|hole| met.contains(&hole));
-            let crossed = match &way {
-                Some(way) => self.obstacles.crossed_by(&way.points),
-                None => {
-                    let others = nearest.iter().filter(|copy| !met.contains(*copy));
-                    others.take(met.len().max(FEWEST_MORE)).copied().collect()
-                }
+    /// Returns a way along a straight line, by stages; `None` where borders bar every line or a stage has no way, and where it would cross
+    /// itself or its own copies.
+    fn way_in_stages(&self) -> Result<Option<SeamPath>, Overrun> {
+        let Some(SeamPath { start, goal, points: line }) = self.line_past_borders() else { return Ok(None) };
+        let Some(places) = self.places_between(line[0], line[1])? else { return Ok(None) };
+        // The ends of stages help no further.
+        let points = self.obstacles.pulled_taut(&places);
+        let is_sound = self.obstacles.is_simple(&points) && !crosses_itself(&points);
+        Ok(is_sound.then_some(SeamPath { start, goal, points }))
+    }
+
+    /// Returns the straight line from a start to the goal nearest to it that no border bars and that crosses the fewest holes, the first of
+    /// several.
+    fn line_past_borders(&self) -> Option<SeamPath> {
+        let lines = self.starts.iter().enumerate().filter_map(|(start, &from)| {
+            let (goal, end) = match self.goals {
+                Goals::Points(points) => *points
+                    .iter()
+                    .min_by(|(_, p), (_, q)| self.length(from, *p).total_cmp(&self.length(from, *q)))?,
+                Goals::Line(foot) => (0, foot(from)),
             };
-            if crossed.is_empty() {
-                return way.filter(|way| self.obstacles.is_simple(&way.points));
-            }
-            let before = corners.len();
-            for copy in crossed {
-                if corners.len() + CORNERS_OF_BOX <= most && met.insert(copy) {
-                    corners.extend(self.obstacles.corners(copy, margin));
-                }
-            }
-            if corners.len() == before {
-                return None;
-            }
-        }
+            self.borders.leave_free(from, end).then(|| SeamPath { start, goal, points: vec![from, end] })
+        });
+        lines.min_by_key(|line| self.obstacles.crossed_by(&line.points).len())
     }
 
-    /// Returns the holes, and their copies beside them, those first that are nearest to the straight line from the first start to a goal.
-    fn copies_by_distance(&self) -> Vec<HoleCopy> {
-        let Some(start) = self.starts.first() else { return Vec::new() };
-        let goal = match self.goals {
-            Goals::Points(points) => points.first().map_or(*start, |(_, goal)| *goal),
-            Goals::Line(foot) => foot(*start),
-        };
-        let place = |p: Uv| -> Point { self.metric.du * p.x + self.metric.dv * p.y };
-        let mut copies = Vec::with_capacity(COPIES.len() * self.obstacles.holes.len());
-        for (hole, polygon) in self.obstacles.holes.iter().enumerate() {
-            let [lo, hi] = bounds(polygon);
-            for copy in COPIES {
-                let middle = 0.5 * (lo + hi) + self.obstacles.displacement * f64::from(copy);
-                let distance = distance_to_segment(place(middle), place(*start), place(goal));
-                copies.push((distance, HoleCopy { hole, copy }));
+    /// Returns the places of a way from `a` to `b`, both included: the shortest one where the line between them crosses few holes, else by
+    /// way of a place on the line between two of these.
+    fn places_between(&self, a: Uv, b: Uv) -> Result<Option<Vec<Uv>>, Overrun> {
+        let gaps = self.obstacles.gaps_between_holes(a, b);
+        if gaps.len() < HOLES_OF_STAGE {
+            let (starts, ends) = ([a], [(0, b)]);
+            let goals = Goals::Points(&ends);
+            let Self { obstacles, borders, metric, budget, .. } = *self;
+            let stage = Search { obstacles, borders, starts: &starts, goals: &goals, metric, budget };
+            if let Some(way) = stage.way_by_boxes()? {
+                return Ok(Some(way.points));
             }
         }
-        copies.sort_by(|a, b| a.0.total_cmp(&b.0));
-        copies.into_iter().map(|(_, copy)| copy).collect()
+        // The widest gap, of those that leave a quarter of the holes on either side.
+        let middle = &gaps[gaps.len() / 4..(3 * gaps.len()).div_ceil(4)];
+        let widest = middle.iter().max_by(|x, y| (x[1] - x[0]).total_cmp(&(y[1] - y[0])));
+        let Some([from, to]) = widest else { return Ok(None) };
+        let place = a + (b - a) * (0.5 * (from + to));
+        let Some(mut places) = self.places_between(a, place)? else { return Ok(None) };
+        let Some(others) = self.places_between(place, b)? else { return Ok(None) };
+        places.extend_from_slice(&others[1..]);
+        Ok(Some(places))
     }
-
-    /// Returns the shortest way from a start to a goal by way of these corners that no border bars, and no hole that `is_met`; `None`
-    /// without one.
-    fn way_by(&self, corners: &[Uv], is_met: &dyn Fn(HoleCopy) -> bool) -> Option<SeamPath> {
-        let is_free = |from: Uv, to: Uv| !self.obstacles.crosses_any(from, to, |hole| hole.is_none_or(is_met));
-        let length = |a: Uv, b: Uv| (self.metric.du * (b.x - a.x) + self.metric.dv * (b.y - a.y)).length();
-        let node = |place: Uv, length: f64| Node { place, length, before: None, settled: false };
-        // Dijkstra's algorithm over the corners that see each other; the last leg is tried from each that is settled.
-        let mut nodes: Vec<Node> = self.starts.iter().map(|p| node(*p, 0.0)).collect();
-        nodes.extend(corners.iter().map(|p| node(*p, f64::INFINITY)));
-        // Shortest complete way so far: its length, last node, goal and end.
-        let mut best: Option<(f64, usize, usize, Uv)> = None;
-        loop {
-            let open = (0..nodes.len()).filter(|&i| !nodes[i].settled && nodes[i].length.is_finite());
-            let Some(i) = open.min_by(|&a, &b| nodes[a].length.total_cmp(&nodes[b].length)) else { break };
-            let (place, so_far) = (nodes[i].place, nodes[i].length);
-            // Nodes are settled in order of length: what is left is longer than the best whole way.
-            if best.is_some_and(|b| b.0 <= so_far) {
-                break;
-            }
-            nodes[i].settled = true;
-            let mut reach = |goal: usize, end: Uv| {
-                let whole = so_far + length(place, end);
-                if best.is_none_or(|b| whole < b.0) && is_free(place, end) {
-                    best = Some((whole, i, goal, end));
-                }
-            };
-            match self.goals {
-                Goals::Points(points) => points.iter().for_each(|(goal, end)| reach(*goal, *end)),
-                Goals::Line(foot) => reach(0, foot(place)),
-            }
-            for k in 0..nodes.len() {
-                let whole = so_far + length(place, nodes[k].place);
-                if !nodes[k].settled && whole < nodes[k].length && is_free(place, nodes[k].place) {
-                    nodes[k].length = whole;
-                    nodes[k].before = Some(i);
-                }
-            }
-        }
-        let (_, last, goal, end) = best?;
-        let mut points = vec![end];
-        let mut at = last;
-        loop {
-            points.push(nodes[at].place);
-            match nodes[at].before {
-                Some(before) => at = before,
-                None => break,
-            }
-        }
-        points.reverse();
-        Some(SeamPath { start: at, goal, points })
-    }
-}
-
-/// Returns the lowest and highest corner of the box around places.
-fn bounds<'p>(places: impl IntoIterator<Item = &'p Uv>) -> [Uv; 2] {
-    let places = places.into_iter();
-    places.fold([Uv::INFINITY, Uv::NEG_INFINITY], |[lo, hi], p| [lo.min(*p), hi.max(*p)])
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::obstacles::unrolled_polygon;
     use super::*;
-    use crate::math::Vector;
+    use crate::math::{Point, Vector};
+
+    /// Returns the way in a plane, and how many steps it took to find it.
+    fn way_and_steps(obstacles: &Obstacles<'_>, starts: &[Uv], goals: &Goals<'_>) -> (SeamPath, u64) {
+        let metric = Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y };
+        let budget = Budget::new(u64::MAX);
+        let before = budget.steps_left();
+        let way = obstacles.way_around(starts, goals, &metric, &budget).expect("no budget is used up");
+        (way.expect("a way"), before - budget.steps_left())
+    }
+
+    fn way(obstacles: &Obstacles<'_>, starts: &[Uv], goals: &Goals<'_>) -> SeamPath {
+        way_and_steps(obstacles, starts, goals).0
+    }
 
     /// A unit strip with a hole in the way of its only straight seam.
     #[test]
@@ -258,13 +180,12 @@ mod tests {
         let hole: Vec<Uv> = (0..16)
             .map(|k| Uv::from_angle(f64::from(k) * std::f64::consts::FRAC_PI_8) * 0.3 + Uv::new(0.0, 0.5))
             .collect();
-        let metric = Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y };
         let holes = [hole];
         let borders = [line(0.0), line(1.0)];
         let obstacles = Obstacles::new(&holes, &borders, turn);
         let (start, goal) = (Uv::ZERO, Uv::new(0.0, 1.0));
         assert!(!obstacles.leave_free(start, goal));
-        let path = obstacles.way_around(&[start], &Goals::Points(&[(7, goal)]), &metric).expect("a way");
+        let path = way(&obstacles, &[start], &Goals::Points(&[(7, goal)]));
         assert_eq!(
             (path.start, path.goal, path.points[0], path.points[path.points.len() - 1]),
             (0, 7, start, goal)
@@ -278,7 +199,7 @@ mod tests {
         assert!(obstacles.leave_free(Uv::new(1.3, 0.0), Uv::new(1.3, 1.0)), "a hole that is touched");
         let obstacles = Obstacles::new(&holes, &borders, turn);
         let foot = |p: Uv| Uv::new(p.x, 1.0);
-        let border = obstacles.way_around(&[start], &Goals::Line(&foot), &metric).expect("a way to the border");
+        let border = way(&obstacles, &[start], &Goals::Line(&foot));
         assert_eq!(border.points[border.points.len() - 1].y, 1.0);
     }
 
@@ -300,39 +221,87 @@ mod tests {
         }
         let start = Uv::new(1.0, 0.0);
         let goals: Vec<(usize, Uv)> = (-4..=4).map(|turn| (0, Uv::new(6.0 * f64::from(turn) + 1.0, 6.5))).collect();
-        let metric = Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y };
-        let path = obstacles.way_around(&[start], &Goals::Points(&goals), &metric).expect("a way");
+        let path = way(&obstacles, &[start], &Goals::Points(&goals));
         assert!(path.points.windows(2).all(|s| obstacles.leave_free(s[0], s[1])));
         // The slot's middle leans by 24 from its lower end to its upper one: three whole turns at least.
         let end = path.points[path.points.len() - 1];
         assert!((end - start).x >= 18.0, "{end}");
     }
 
-    /// Rows of staggered windows, each over 0.3 of the pitch to both sides of its middle: a seam from row to row winds between them, past
-    /// windows that stand in no order.
-    #[test]
-    fn a_seam_winds_through_rows_of_staggered_windows() {
-        let (across, rows) = (16i32, 14i32);
-        let turn = Uv::new(f64::from(across), 0.0);
-        let line = |v: f64| unrolled_polygon(&[Uv::new(0.0, v), Uv::new(8.0, v)], turn);
+    /// Rows of staggered windows in a unit pitch, each over 0.3 to both sides of its middle, in no order.
+    fn staggered_windows(across: i32, rows: i32) -> Vec<Vec<Uv>> {
         let window = |i: i32, j: i32| {
             let middle = Uv::new(f64::from(i) + 0.5 * f64::from(j % 2), f64::from(j) + 0.5);
             [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]].map(|p| middle + Uv::from_array(p)).to_vec()
         };
-        let all = |k: i32| window(k * 5 % across, k / across);
-        let holes: Vec<Vec<Uv>> = (0..across * rows).map(all).collect();
-        let borders = [line(0.0), line(f64::from(rows))];
-        let obstacles = Obstacles::new(&holes, &borders, turn);
+        (0..across * rows).map(|k| window(k * 5 % across, k / across)).collect()
+    }
+
+    /// The unrolled borders of a tube that is so far around and high.
+    fn rims(across: i32, rows: i32) -> [Vec<Uv>; 2] {
+        let turn = Uv::new(f64::from(across), 0.0);
+        [0.0, f64::from(rows)].map(|v| unrolled_polygon(&[Uv::new(0.0, v), Uv::new(0.5 * turn.x, v)], turn))
+    }
+
+    fn length(path: &SeamPath) -> f64 {
+        path.points.windows(2).map(|side| (side[1] - side[0]).length()).sum()
+    }
+
+    /// A seam from row to row winds between the windows.
+    #[test]
+    fn a_seam_winds_through_rows_of_staggered_windows() {
+        let (across, rows) = (16, 14);
+        let (holes, borders) = (staggered_windows(across, rows), rims(across, rows));
+        let obstacles = Obstacles::new(&holes, &borders, Uv::new(f64::from(across), 0.0));
         let (start, goal) = (Uv::ZERO, Uv::new(0.0, f64::from(rows)));
-        let metric = Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y };
         assert_eq!(obstacles.crossed_by(&[start, goal]).len(), 7);
-        let path = obstacles.way_around(&[start], &Goals::Points(&[(0, goal)]), &metric).expect("a way");
+        let path = way(&obstacles, &[start], &Goals::Points(&[(0, goal)]));
         let ends = [path.points[0], path.points[path.points.len() - 1]];
         assert_eq!((ends, obstacles.crossed_by(&path.points)), ([start, goal], Vec::new()));
         // No longer than a way beside boxes of half side 0.42: at ±0.42 through even rows and at ±0.08 through odd ones, 0.84 along each
         // but the last, which leaves the straight way to the goal free, and from row to row across by 0.34 within 0.16.
-        let length: f64 = path.points.windows(2).map(|side| (side[1] - side[0]).length()).sum();
         let winding = 0.42f64.hypot(0.08) + 13.0 * (0.84 + 0.34f64.hypot(0.16)) + 0.08f64.hypot(0.92);
+        let length = length(&path);
         assert!((f64::from(rows)..winding).contains(&length), "{length} for {winding}");
+    }
+
+    /// The corners of 200 holes lead past 32 rows of 32 windows and not past 64: there the seam goes by stages. For each window and each
+    /// doubling of their number it took 500 to 3000 steps.
+    #[test]
+    fn the_work_grows_little_faster_than_the_number_of_windows() {
+        const STEPS: f64 = 1e4;
+        for n in [8, 16, 32, 64] {
+            let (holes, borders) = (staggered_windows(n, n), rims(n, n));
+            let obstacles = Obstacles::new(&holes, &borders, Uv::new(f64::from(n), 0.0));
+            let (start, goal) = (Uv::ZERO, Uv::new(0.0, f64::from(n)));
+            let (path, steps) = way_and_steps(&obstacles, &[start], &Goals::Points(&[(0, goal)]));
+            assert!(path.points.windows(2).all(|side| obstacles.leave_free(side[0], side[1])), "{n} rows");
+            assert_eq!([path.points[0], path.points[path.points.len() - 1]], [start, goal]);
+            // A row is no longer than beside boxes of half side 0.42.
+            let length = length(&path);
+            assert!(length < f64::from(n) * (0.84 + 0.34f64.hypot(0.16)) + 1.0, "{length} past {n} rows");
+            let windows = f64::from(n * n);
+            let most = STEPS * windows * windows.log2();
+            assert!((steps as f64) < most, "{steps} steps for {most} past {n} rows");
+        }
+    }
+
+    /// Holes in no order, of which one is crossed in two arms and another one is only touched.
+    #[test]
+    fn a_line_is_free_between_the_holes_that_it_crosses() {
+        let square = |u: f64, v: f64| {
+            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|p| Uv::new(u, v) + Uv::from_array(p)).to_vec()
+        };
+        let fork =
+            [[4.0, -1.0], [7.0, -1.0], [7.0, 0.5], [6.0, 0.5], [6.0, -0.5], [5.0, -0.5], [5.0, 0.5], [4.0, 0.5]];
+        let holes = [fork.map(Uv::from_array).to_vec(), square(1.0, -0.5), square(2.5, 0.0), square(8.0, -0.25)];
+        let obstacles = Obstacles::new(&holes, &[], Uv::ZERO);
+        let gaps = obstacles.gaps_between_holes(Uv::ZERO, Uv::new(10.0, 0.0));
+        let expected = [[0.2, 0.4], [0.7, 0.8]];
+        assert_eq!(gaps.len(), expected.len(), "{gaps:?}");
+        for (share, wanted) in gaps.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((share - wanted).abs() < 1e-12, "{gaps:?}");
+        }
+        assert!(obstacles.gaps_between_holes(Uv::new(0.0, 2.0), Uv::new(10.0, 2.0)).is_empty());
     }
 }
