@@ -14,6 +14,7 @@ mod nurbs_properties;
 mod occurrences;
 mod offsets;
 mod parameters;
+mod perforated;
 mod pictures;
 mod rare_forms;
 mod recipes;
