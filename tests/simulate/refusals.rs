@@ -123,12 +123,6 @@ fn what_means_nothing_is_refused_by_name() {
         ("[[receiver]]\nname = 'r'\nkind = 'absorbed'\npart = 'x'\ninteractions = 7".into(), "interactions", 5),
         (format!("{PLANE}cells = [4000, 4000]\nbins_nm = [400, 500, 600, 700]"), "cells", 4),
         ("[[model]]\nname = 'x'".into(), "file", 1),
-        (
-            "[[model]]\nfile = 'a.stp'\nname = 'x'\n[[model]]\nfile = 'b.stp'\nname = 'x'".into(),
-            "two models are called 'x'",
-            6,
-        ),
-        ("[run]\nsplit_floor = 0.01".into(), "write `interfaces = \"split\"`", 2),
         ("[[model]]\nfile = 'x.stp'\nplacement = { z = [0, 0, 0] }".into(), "z", 3),
         ("[[model]]\nfile = 'x.stp'\nplacement = { at = [nan, 0, 0] }".into(), "at", 3),
         ("[run]\nrays = 1.5".into(), "1e6", 2),

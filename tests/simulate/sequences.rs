@@ -15,9 +15,6 @@ const GLASS: &str = "[[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart
 const BELOW: u32 = 4;
 const ABOVE: u32 = 5;
 
-/// Interfaces that divide rays; without, each goes one of both ways.
-const SPLIT: &str = "interfaces = 'split'\nsplit_floor = 0.01";
-
 fn steps(sequence: &SequenceResult) -> Vec<(u32, Event)> {
     sequence.steps.iter().map(|s| (s.face.unwrap(), s.event)).collect()
 }
@@ -73,8 +70,8 @@ fn world() -> (World, String) {
 #[test]
 fn sequences_add_up_to_their_receiver_and_change_nothing_else() {
     let (world, text) = world();
-    for interfaces in ["", SPLIT] {
-        let text = text.replace("[run]", &format!("[run]\n{interfaces}"));
+    for interfaces in ["roulette", "split"] {
+        let text = text.replace("[run]", &format!("[run]\ninterfaces = '{interfaces}'\nsplit_floor = 0.01"));
         let with = world.run(&text, |_| ());
         let without = world.run(&text.replace("sequences = 5", ""), |_| ());
         assert_eq!((&with.digest, with.segments), (&without.digest, without.segments));
@@ -171,8 +168,10 @@ fn recorded_ways_are_the_sequences_that_were_counted() {
     let ball = text.find("[[receiver]]\nname = 'ball'").unwrap();
     let mirror = text.find("[[receiver]]\nname = 'mirror'").unwrap();
     let open = [&text[..ball], far, &text[mirror..]].concat();
-    for (text, interfaces) in [(&text, ""), (&text, SPLIT), (&open, ""), (&open, SPLIT)] {
-        let text = text.replace("[run]", &format!("[run]\n{interfaces}")).replace("rays = 20000", "rays = 3000");
+    for (text, interfaces) in [(&text, "roulette"), (&text, "split"), (&open, "roulette"), (&open, "split")] {
+        let text = text
+            .replace("[run]", &format!("[run]\ninterfaces = '{interfaces}'\nsplit_floor = 0.01"))
+            .replace("rays = 20000", "rays = 3000");
         let results = world.run(&text, |s| s.path_samples = s.rays);
         let scene = Scene::parse(&text, "test.toml", Path::new(".")).unwrap();
         let bound = scene.bind(&world.model).unwrap();

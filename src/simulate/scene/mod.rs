@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use source::POWERS;
 pub use source::{Source, SourceKind};
 pub use spectrum::{SpectrumKey, SpectrumName};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -216,7 +216,6 @@ impl Scene {
         self.run.check(self)?;
         self.accuracy.check(self)?;
         self.models.iter().enumerate().try_for_each(|(i, m)| m.check(self, i))?;
-        self.check_model_names()?;
         medium::check(self)?;
         surface::check(self)?;
         let all_rays = self.sources.iter().filter_map(|source| source.rays).fold(0, u64::saturating_add);
@@ -231,19 +230,6 @@ impl Scene {
             let at: &[Key<'_>] = at.as_ref().map_or(&[], |at| at);
             let message = format!("the receivers have {sums} cells with all their channels, more than {MOST_SUMS}");
             return Err(self.error(ErrorKind::Value, at, message).help("use fewer `cells` or fewer `bins_nm`"));
-        }
-        Ok(())
-    }
-
-    /// Refuses two models of one name: selectors and frames by it would mean either.
-    fn check_model_names(&self) -> Result<(), Error> {
-        let mut names: HashSet<&str> = HashSet::new();
-        for (i, ModelUse { name, .. }) in self.models.iter().enumerate() {
-            if !name.is_empty() && !names.insert(name) {
-                let at = [Key::Name("model"), Key::Index(i), Key::Name("name")];
-                let error = self.error(ErrorKind::Value, &at, format!("two models are called '{name}'"));
-                return Err(error.help("give each a name of its own; a pattern such as 'lens*' selects several"));
-            }
         }
         Ok(())
     }

@@ -213,11 +213,6 @@ impl Run {
             r if r.replicates < 2 || r.replicates > 1 << 16 => fail("replicates", "must be from 2 to 65536"),
             r if !(0.0..1.0).contains(&r.power_floor) => fail("power_floor", "must be in [0, 1)"),
             r if !(0.0..=1.0).contains(&r.split_floor) => fail("split_floor", "must be in [0, 1]"),
-            r if r.interfaces == Interfaces::Roulette && r.split_floor != SPLIT_FLOOR => {
-                let refused =
-                    fail("split_floor", "belongs to `interfaces = \"split\"`: no ray is split without it");
-                refused.map_err(|error| error.help("write `interfaces = \"split\"`, or leave `split_floor` out"))
-            }
             r if r.max_length_mm.is_nan() || r.max_length_mm <= 0.0 => fail("max_length_mm", "must be positive"),
             r if !WAVELENGTHS_NM.contains(&r.wavelength_nm) => {
                 fail("wavelength_nm", "must be from 1 to 1e6 nm; 0.55 µm are 550 nm")
