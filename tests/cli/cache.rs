@@ -83,10 +83,10 @@ fn a_cache_is_shown_limited_and_cleared() {
         assert_eq!(code, 0, "{err}");
         serde_json::from_str::<Value>(&out).unwrap()
     };
-    for options in [&[][..], &["--clear"]] {
-        let (code, out, err) = lampyris_in(path, &[&["cache", "--cache", "kept"], options].concat());
-        assert!(code == 3 && out.is_empty() && err.contains("kept: there is no such folder"), "{code} {out} {err}");
-    }
+    let (code, out, err) = lampyris_in(path, &["cache", "--cache", "kept"]);
+    assert!(code == 3 && out.is_empty() && err.contains("kept: there is no such folder"), "{code} {out} {err}");
+    // What is to be emptied may be gone already.
+    assert_eq!(lampyris_in(path, &["cache", "--cache", "kept", "--clear"]).0, 0);
     assert_eq!(lampyris_in(path, &["cache"]).0, 2);
     // One that the environment names is made by the first run that needs it.
     let output = std::process::Command::new(assert_cmd::cargo::cargo_bin("lampyris"))

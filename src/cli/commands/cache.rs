@@ -11,14 +11,14 @@ use crate::text::grouped;
 use serde_json::json;
 
 /// Prints what the folder of the cache holds, after emptying it if `clear`; fails where no cache is named, or the option names a folder
-/// that does not exist. The environment may name one that no run has needed yet: it is empty.
+/// that does not exist and is not to be emptied. The environment may name one that no run has needed yet: it is empty.
 pub(crate) fn run(option: &CacheOption, clear: bool, console: &Console) -> Result<Completion, Failure> {
     let Some(cache) = cache_folder::cache(option)? else {
         let failure = Failure::arguments("there is no cache: nothing is kept from one run to the next");
         return Err(failure
             .with_help(format!("--cache DIR or the variable {FOLDER_VARIABLE} names the folder to keep it in")));
     };
-    if let Some(folder) = option.cache.as_deref().filter(|folder| !folder.try_exists().unwrap_or(true)) {
+    if let Some(folder) = option.cache.as_deref().filter(|folder| !clear && !folder.try_exists().unwrap_or(true)) {
         let failure = Failure::input(format!("{}: there is no such folder", folder.display()));
         return Err(
             failure.with_help("check the path; a run with --cache makes the folder when it first keeps something")

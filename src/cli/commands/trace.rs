@@ -221,10 +221,8 @@ fn trace_whole(
     let remarks =
         RunRemarks { first_command: checkpoint.first_command(), ..RunRemarks::say_target(result, console) };
     let written = results_folder::write(prepared, folder, &mut run, &remarks, with_page, console);
-    let (document, answer) = match written {
-        Ok(written) => written,
-        Err(failure) => return Err(rescue_results(&mut run, &remarks, &checkpoint, with_page, failure)),
-    };
+    let (document, answer) =
+        written.map_err(|failure| rescue_results(&mut run, &remarks, &checkpoint, with_page, failure))?;
     // What was missed comes before what was found.
     let unsettled = if extra.until_settled { verdicts::unsettled_sentence(&document) } else { None };
     let missed = remarks.target.as_ref().is_some_and(|result| !result.reached) || unsettled.is_some();

@@ -31,9 +31,7 @@ impl<'r> Candidate<'r> {
 
     /// Whether light that meets both ends on one of them before the other counts it: not where each looks away from the other.
     fn competes_with(&self, other: &Self) -> bool {
-        let are_back_to_back =
-            self.flat.is_one_sided && other.flat.is_one_sided && self.flat.frame.z.dot(other.flat.frame.z) < 0.0;
-        !are_back_to_back
+        !(self.flat.is_one_sided && other.flat.is_one_sided && self.flat.frame.z.dot(other.flat.frame.z) < 0.0)
     }
 }
 
@@ -68,7 +66,7 @@ pub(super) fn overlapping_receiver_notes(bound: &BoundScene) -> Vec<String> {
     });
     if asked == MOST_ASKED && overlapping.len() <= NAMED_RECEIVERS {
         notes.push(format!(
-            "more receivers than are named may lie in one plane and overlap: of the pairs whose boxes meet only the first {} were compared",
+            "only the first {} of the pairs of receivers whose boxes meet were compared: others may lie in one plane and overlap",
             grouped(MOST_ASKED as u64)
         ));
     }

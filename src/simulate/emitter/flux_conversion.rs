@@ -8,6 +8,10 @@ use crate::text::figures;
 /// Significant digits of a wavelength in a message: of files in single precision all that mean something.
 const WAVELENGTH_DIGITS: usize = 6;
 
+/// What there is to do about a file whose powers can be taken as proportions, for all its light has one spectrum.
+pub(super) const GIVE_POWER: &str =
+    "give the source's `power` in watts, for the file's powers to be proportions alone";
+
 /// What makes power in the unit of a run of the power that a file gives.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Conversion {
@@ -67,7 +71,7 @@ pub(super) fn conversion(
         let whose = if of_scene.is_some() { "the scene's" } else { "the file's" };
         if unit == PowerUnit::Watt && lumens == 0.0 {
             // One spectrum for all leaves the proportions as they are.
-            let fault = unseen_lumens(&format!("{whose} spectrum"), spectrum.range_nm());
+            let fault = unseen_lumens(&format!("{whose} spectrum"), spectrum.range_nm(), GIVE_POWER);
             return if source.power.is_some() { Ok(None) } else { Err(fault) };
         }
         let factor = if unit == PowerUnit::Lumen { lumens } else { 1.0 / lumens };
@@ -99,9 +103,10 @@ pub(super) fn unseen_light(what: &str, range_nm: [f64; 2]) -> String {
 }
 
 /// Returns why lumens of some light that the eye sees nothing of, as [`unseen_light`] names it, are refused where watts are counted.
-pub(super) fn unseen_lumens(what: &str, range_nm: [f64; 2]) -> Fault {
+/// `way_out` is what there is to do besides counting lumens.
+pub(super) fn unseen_lumens(what: &str, range_nm: [f64; 2], way_out: &str) -> Fault {
     Fault::new(
         format!("this file gives lumens, of which no watts can be made: {}", unseen_light(what, range_nm)),
-        "give the source's `power` in watts, for the file's powers to be proportions alone, or set `unit = \"lm\"` in [run]",
+        format!("{way_out}, or set `unit = \"lm\"` in [run]"),
     )
 }

@@ -1,6 +1,8 @@
 //! Measured rays as a source draws them, in the unit that the run counts.
 
-use super::flux_conversion::{Conversion, Fault, conversion, file_spectrum, unseen_light, unseen_lumens};
+use super::flux_conversion::{
+    Conversion, Fault, GIVE_POWER, conversion, file_spectrum, unseen_light, unseen_lumens,
+};
 use super::own_wavelengths::OwnWavelengths;
 use super::running_sums::RunningSums;
 use crate::formats::{self, Flux, LightRay, RayBlock, RayFile};
@@ -89,13 +91,18 @@ impl RayList {
             own_wavelengths: Arc::default(),
         };
         if let Some(nm) = list.survey()? {
-            if source.power.is_none() {
-                return Err(unseen_lumens("the light of one of its rays", [nm; 2]));
+            let is_of_one_wavelength = list.own_wavelengths.range() == Some([nm; 2]);
+            if !is_of_one_wavelength {
+                let way_out = "leave such rays out of the file";
+                return Err(unseen_lumens("the light of one of its rays", [nm; 2], way_out));
             }
+            if source.power.is_none() {
+                return Err(unseen_lumens("the light of its rays", [nm; 2], GIVE_POWER));
+            }
+            // One wavelength for all leaves the proportions as they are.
             list.conversion = Conversion::Factor(1.0);
+            note = None;
             list.survey()?;
-            let light = unseen_light("the light of one of its rays", [nm; 2]);
-            note = Some(format!("its lumens were taken as they are for the proportions of its rays, as {light}"));
         }
         list.notes.extend(note);
         let sum = list.power();
@@ -104,13 +111,13 @@ impl RayList {
             return Err(Fault::new(message, "give powers in the unit of the run"));
         }
         if sum <= 0.0 {
-            return Err(list.darkness());
+            return Err(list.why_no_power());
         }
         Ok(list)
     }
 
     /// Returns why a list whose powers add up to 0 is refused.
-    fn darkness(&self) -> Fault {
+    fn why_no_power(&self) -> Fault {
         let is_unseen = |nm: &f64| xyz_of_watt(*nm)[1] == 0.0;
         match self.own_wavelengths.range() {
             Some(range)
@@ -284,7 +291,7 @@ mod tests {
 
     /// No watts can be made of lumens that the eye sees nothing of: with the source's power they are proportions, without they are refused.
     #[test]
-    fn lumens_that_the_eye_does_not_see_are_proportions_at_best() {
+    fn lumens_that_the_eye_does_not_see_are_proportions_where_all_have_one_spectrum() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rays.csv");
         let list = |own: [Option<f64>; 2], spectrum: Option<[f64; 2]>, power: Option<f64>, unit: PowerUnit| {
@@ -296,20 +303,23 @@ mod tests {
             file.spectrum = spectrum.map(|line| vec![line]);
             RayList::new(file, &Source { power, ..Source::default() }, unit)
         };
-        for (own, spectrum) in [([Some(555.0), Some(940.0)], None), ([None; 2], Some([940.0, 1.0]))] {
+        let mixed = [Some(555.0), Some(940.0)];
+        for power in [None, Some(3.0)] {
+            let fault = list(mixed, None, power, PowerUnit::Watt).unwrap_err();
+            assert!(
+                fault.message.contains("940 nm") && fault.help.contains("leave such rays out"),
+                "{}",
+                fault.help
+            );
+        }
+        for (own, spectrum) in [([Some(940.0); 2], None), ([None; 2], Some([940.0, 1.0]))] {
             let fault = list(own, spectrum, None, PowerUnit::Watt).unwrap_err();
             assert!(fault.message.contains("940 nm") && fault.help.contains("`power`"), "{}", fault.message);
             let list =
                 list(own, spectrum, Some(3.0), PowerUnit::Watt).unwrap_or_else(|fault| panic!("{}", fault.message));
             let mut cursor = ListCursor::default();
             assert_eq!([0, 1].map(|k| list.ray(k, &mut cursor).unwrap().power), [1.0; 2]);
-            // One spectrum for all leaves the proportions as they are.
-            assert_eq!(
-                list.notes.iter().any(|note| note.contains("940 nm")),
-                spectrum.is_none(),
-                "{:?}",
-                list.notes
-            );
+            assert!(list.notes.is_empty(), "{:?}", list.notes);
         }
         let dark = list([Some(940.0); 2], None, None, PowerUnit::Lumen).unwrap_err();
         assert!(dark.message.contains("940 nm"), "{}", dark.message);

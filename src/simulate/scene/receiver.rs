@@ -208,6 +208,28 @@ impl Receiver {
         keys.into_iter().find(|(_, given, kinds, _)| *given && !kinds.contains(&self.kind)).map(|k| (k.0, k.3))
     }
 
+    /// Returns what is wrong with the division of the light by wavelength in a run that counts powers in `unit`, and its key.
+    fn spectral_fault(&self, unit: PowerUnit) -> Option<(&'static str, &'static str)> {
+        if self.channels.is_some() && self.bins_nm.is_some() {
+            return Some(("bins_nm", "a receiver has `channels` or `bins_nm`, not both"));
+        }
+        if self.channels.is_some() && unit == PowerUnit::Lumen {
+            return Some(("channels", "this run counts lumens already: `channels` are for powers in watts"));
+        }
+        if let Some(edges) = &self.bins_nm {
+            if edges.len() < 2 || edges.len() > 1000 || !edges.windows(2).all(|w| w[0] < w[1]) {
+                return Some(("bins_nm", "`bins_nm` must be 2 to 1000 rising wavelengths"));
+            }
+            // Light of the last bin ends there: edges in micrometres lie below all light.
+            if edges.last().is_some_and(|last| !WAVELENGTHS_NM.contains(last)) {
+                return Some(("bins_nm", "`bins_nm` must end between 1 and 1e6 nm; 0.55 µm are 550 nm"));
+            }
+        }
+        let is_divided = self.channels.is_some() || self.bins_nm.is_some();
+        (is_divided && self.kind == ReceiverKind::Absorbed)
+            .then_some(("channels", "absorbed flux is counted as power alone"))
+    }
+
     /// Refuses a receiver whose values contradict each other, or leave it without a place or cells; `index` is its place in the scene.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
@@ -236,25 +258,8 @@ impl Receiver {
                 );
             }
         }
-        if self.channels.is_some() && self.bins_nm.is_some() {
-            return fail("bins_nm", "a receiver has `channels` or `bins_nm`, not both");
-        }
-        if self.channels.is_some() && scene.run.unit == PowerUnit::Lumen {
-            return fail("channels", "this run counts lumens already: `channels` are for powers in watts");
-        }
-        if let Some(b) = &self.bins_nm
-            && (b.len() < 2 || b.len() > 1000 || !b.windows(2).all(|w| w[0] < w[1]))
-        {
-            return fail("bins_nm", "`bins_nm` must be 2 to 1000 rising wavelengths");
-        }
-        // Light of the last bin ends there: edges in micrometres lie below all light.
-        if let Some([.., last]) = self.bins_nm.as_deref()
-            && !WAVELENGTHS_NM.contains(last)
-        {
-            return fail("bins_nm", "`bins_nm` must end between 1 and 1e6 nm; 0.55 µm are 550 nm");
-        }
-        if (self.channels.is_some() || self.bins_nm.is_some()) && self.kind == ReceiverKind::Absorbed {
-            return fail("channels", "absorbed flux is counted as power alone");
+        if let Some((key, message)) = self.spectral_fault(scene.run.unit) {
+            return fail(key, message);
         }
         match self.kind {
             ReceiverKind::Plane => match self.size {

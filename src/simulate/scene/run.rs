@@ -38,13 +38,13 @@ pub struct Run {
     #[cfg_attr(feature = "schema", schemars(schema_with = "super::conditions::count_schema"))]
     pub rays: u64,
     /// Seed of all random numbers. Two variants of a scene with the same seed use the same random numbers, so that their difference is less
-    /// noisy than either; for a result that is independent of an earlier one, take another seed.
+    /// noisy than with two seeds, the more so the less they differ; for a result that is independent of an earlier one, take another seed.
     pub seed: u64,
     /// How places, directions and wavelengths are chosen at the sources.
     pub sampling: Sampling,
     /// What happens to a ray at a partly reflecting interface.
     pub interfaces: Interfaces,
-    /// Below this share of a ray's first power an interface no longer splits the ray but chooses a side.
+    /// With `interfaces = "split"`: below this share of a ray's first power an interface no longer splits the ray but chooses a side.
     #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1)))]
     pub split_floor: f64,
     /// Whether the polarisation of each ray is followed; otherwise light is unpolarised at every hit.
