@@ -485,6 +485,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "way_search",
             "seam_path",
             "holes",
+            "lobes",
             "boundary",
             "region",
             "seams",

@@ -5,6 +5,7 @@ mod arcs;
 mod assemblies;
 mod bounded_curves;
 mod corpus;
+mod eights;
 mod faces;
 #[path = "../support/files.rs"]
 mod files;

@@ -3,9 +3,10 @@
 
 use super::fit::Budget;
 use super::holes::{Border, place_hole};
+use super::lobes::{cancelling_lobes, drop_empty_loops};
 use super::loops::{Chain, Piece, Source};
 use super::obstacles::{Obstacles, unrolled_polygon};
-use super::tolerances::{EMPTY_LOOP_SHARE, SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
+use super::tolerances::{SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
 use super::way_search::{Goals, SeamPath};
 use crate::math::Uv;
 use crate::math::polygon::signed_area;
@@ -53,8 +54,7 @@ pub(crate) fn bound_region(
     // A seam that the file runs forth and back bounds nothing by intent, other edges do not.
     let has_edges = plain.iter().any(|c| !c.is_cut_open());
     // Loops without extent: a vertex, or an edge run forth and back.
-    let scale = plain.iter().map(|c| signed_area(&c.polygon()).abs()).fold(0.0, f64::max);
-    plain.retain(|c| signed_area(&c.polygon()).abs() > EMPTY_LOOP_SHARE * scale);
+    drop_empty_loops(&mut plain, chart);
     // Nothing winds around: without any loop the face is the whole surface, else the loops bound it by themselves.
     if winding.is_empty() {
         if plain.is_empty() {
@@ -99,14 +99,19 @@ fn add_with_holes(outer: Chain, holes: impl IntoIterator<Item = Chain>, chart: &
 }
 
 /// Adds loops that wind around nothing to `out`: the largest is the outer one, except on a closed surface, where loops that all run
-/// clockwise leave the rest of the surface as the face. Empties `plain`.
+/// clockwise leave the rest of the surface as the face, and one that bounds as much either way tells nothing. Empties `plain`.
 fn bound_without_winding(
     plain: &mut Vec<Chain>,
     chart: &Chart,
     out: &mut Boundary,
     implicit_outer: bool,
 ) -> Result<(), &'static str> {
-    let areas: Vec<f64> = plain.iter().map(Chain::area).collect();
+    // The sign of an area that cancels is rounding.
+    let lobes: Vec<Option<f64>> = plain.iter().map(cancelling_lobes).collect();
+    if !implicit_outer && is_closed(chart) && lobes.iter().any(Option::is_some) {
+        return Err("its loop crosses itself");
+    }
+    let areas: Vec<f64> = plain.iter().zip(lobes).map(|(c, lobes)| lobes.unwrap_or_else(|| c.area())).collect();
     // A loop that runs along an edge twice was cut open by the file: it goes around the face, not around a hole.
     let all_holes = areas.iter().all(|&a| a < 0.0) && !plain.iter().any(Chain::is_cut_open);
     if implicit_outer || all_holes && is_closed(chart) {

@@ -25,8 +25,14 @@ pub(super) const SCORE_NOISE: f64 = 1e-9;
 /// turns of a spring are, and neighbouring places of an edge are not.
 pub(super) const TORN: f64 = 100.0;
 
-/// A loop whose area is below this share of the largest one is an edge run forth and back.
+/// A loop whose area is below this share of the largest one is an edge run forth and back, or one whose lobes cancel.
 pub(super) const EMPTY_LOOP_SHARE: f64 = 1e-12;
+/// Lobes below this share of the square of their loop's size are none: far above the noise of fits, 1e-6 mm beside an edge, and far below
+/// what anybody draws.
+pub(super) const EMPTY_LOBES_SHARE: f64 = 1e-6;
+/// A signed area below this share of what its loop encloses is the rounding of lobes that cancel: fits of edges leave 1e-7 of their
+/// length.
+pub(super) const CANCELLED_SHARE: f64 = 1e-6;
 /// Products of lengths below this share count as touching, not as crossing.
 pub(super) const CROSSING_NOISE: f64 = 1e-9;
 /// A seam whose ends differ by less than this share of the period runs straight across.

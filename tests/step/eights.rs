@@ -1,0 +1,44 @@
+//! Faces whose loop crosses itself like an eight of equal lobes, whose signed areas cancel.
+
+use crate::faces::{close, points, read, square};
+use crate::silence;
+use lampyris::step::Import;
+use lampyris::tessellate::{Settings, tessellate};
+
+/// The area of the facets of the only face: that of a face is signed, and its lobes cancel.
+fn area(import: &Import) -> f64 {
+    let faces = import.report.faces;
+    assert_eq!((faces.converted, faces.refused), (1, 0), "{:?}", import.report.refusals);
+    tessellate(&import.model, &Settings::default()).mesh.area()
+}
+
+/// The unit square of [`square`] with two corners exchanged: its border crosses itself in the middle.
+fn eight() -> String {
+    let whole = square([".T."; 4], [0, 1, 2, 3]);
+    let corners = points(&[(10, [0., 0., 0.]), (11, [1., 0., 0.]), (12, [1., 1., 0.]), (13, [0., 1., 0.])]);
+    let exchanged = points(&[(10, [0., 0., 0.]), (11, [1., 1., 0.]), (12, [0., 1., 0.]), (13, [1., 0., 0.])]);
+    assert!(whole.starts_with(&corners));
+    whole.replace(&corners, &exchanged)
+}
+
+/// Two triangles of base 1 and height 1/2, and not the patch of 16 mm² that they lie on.
+#[test]
+fn an_eight_of_equal_lobes_bounds_both() {
+    let patch = points(&[(70, [-2., -2., 0.]), (71, [-2., 2., 0.]), (72, [2., -2., 0.]), (73, [2., 2., 0.])])
+        + "#21=B_SPLINE_SURFACE_WITH_KNOTS('',1,1,((#70,#71),(#72,#73)),.UNSPECIFIED.,.F.,.F.,.F.,(2,2),(2,2),(0.,1.),(0.,1.),\
+           .UNSPECIFIED.);";
+    for surface in ["#21=PLANE('',#20);", &patch] {
+        let import = read(&eight().replace("#21=PLANE('',#20);", surface));
+        close(area(&import), 0.5, 1e-6);
+        assert_eq!(import.report.faces.repaired, 0, "{:?}", import.report.repairs);
+    }
+}
+
+/// A plate of 100 mm² with the eight of two triangles of 1 mm² for a hole.
+#[test]
+fn a_hole_like_an_eight_stays_open() {
+    let corners = ["4.,4.", "6.,6.", "4.,6.", "6.,4."];
+    let points: String = (0..4).map(|k| format!("#8{k}=CARTESIAN_POINT('',({},0.));\n", corners[k])).collect();
+    let whole = silence::plate(0.0).replace("#68=EDGE_LOOP('',(#69))", "#68=POLY_LOOP('',(#80,#81,#82,#83))");
+    close(area(&silence::read(&(points + &whole))), 98.0, 1e-6);
+}
