@@ -91,10 +91,14 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     }
     let missing = file.missing_ids();
     if let Some(first) = missing.first() {
-        let count = missing.len();
-        report
-            .problems
-            .push(format!("{name}: #{first} is referred to but is not in the file; there are {count} such"));
+        // A statement that was skipped stands in the file all the same.
+        let is_skipped = file.faults.iter().any(|fault| fault.id == Some(*first));
+        let why = if is_skipped { "could not be read" } else { "is not in the file" };
+        let others = match missing.len() {
+            1 => String::new(),
+            count => format!("; there are {count} such"),
+        };
+        report.problems.push(format!("{name}: #{first} is referred to but {why}{others}"));
     }
     let model = convert_assembly(&file, name, settings, &mut report)?;
     let bounds = if settings.measure_box { model.bounds() } else { Aabb::EMPTY };

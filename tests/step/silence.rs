@@ -354,4 +354,9 @@ fn references_that_lead_nowhere_are_told() {
     let problems = &import.report.problems;
     assert!(problems.len() == 1 && problems[0].contains("2 such") && problems[0].contains("#9998"), "{problems:?}");
     assert_eq!(read(&plate(0.0)).report.problems, Vec::<String>::new());
+    let one = read(&(plate(0.0) + "#80=PRODUCT('','','',(#9999));\n")).report.problems;
+    assert!(one.len() == 1 && one[0].ends_with("#9999 is referred to but is not in the file"), "{one:?}");
+    // The statement is skipped, and told of as well.
+    let broken = read(&(plate(0.0) + "#80=PRODUCT('','','',(#81));\n#81=VECTOR('',#11;\n")).report.problems;
+    assert!(broken.iter().any(|p| p.ends_with("#81 is referred to but could not be read")), "{broken:?}");
 }

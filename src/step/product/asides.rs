@@ -15,8 +15,9 @@ pub(crate) fn void_directions(file: &File<'_>, name: &str) -> Option<String> {
     let mut void = file.entities_named(&["DIRECTION"]).filter(|e| is_void(*e));
     let first = void.next()?.id;
     let count = 1 + void.count();
+    let others = if count == 1 { String::new() } else { format!("; there are {count} such") };
     Some(format!(
-        "{name}: #{first} DIRECTION points nowhere; there are {count} such. Placements with one take the axis that they would have without"
+        "{name}: #{first} DIRECTION points nowhere{others}. Placements with one take the axis that they would have without"
     ))
 }
 

@@ -81,8 +81,7 @@ fn trim_faces(
             budget: Budget::new(settings.face_budget),
             implicit_outer: false,
         };
-        let refused =
-            |reason: &'static str| Refusal { id, entity: geometry.file.entity_name(id), reason: reason.into() };
+        let refused = |reason: String| Refusal { id, entity: geometry.file.entity_name(id), reason };
         built.push(build_face(task).map_err(refused)?);
     }
     Ok((edges, built))

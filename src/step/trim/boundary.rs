@@ -39,8 +39,7 @@ struct SeamDomain<'c> {
 }
 
 /// Arranges the chains of a face, given with the material on their left, to closed loops; without chains the face is the whole surface.
-/// Fails where chains wind in a way that bounds nothing, and where the budget is used up. `implicit_outer`: the surface's own border is
-/// the outer loop.
+/// Fails where chains bound nothing, and where the budget is used up. `implicit_outer`: the surface's own border is the outer loop.
 pub(crate) fn bound_region(
     mut chains: Vec<Chain>,
     chart: &Chart,
@@ -53,6 +52,7 @@ pub(crate) fn bound_region(
     let (winding, mut plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);
     // A seam that the file runs forth and back bounds nothing by intent, other edges do not.
     let has_edges = plain.iter().any(|c| !c.is_cut_open());
+    let is_given = !plain.is_empty();
     // Loops without extent: a vertex, or an edge run forth and back.
     drop_empty_loops(&mut plain, chart);
     // Nothing winds around: without any loop the face is the whole surface, else the loops bound it by themselves.
@@ -61,11 +61,11 @@ pub(crate) fn bound_region(
             if has_edges {
                 out.repairs.push("its loops enclose nothing: the whole of its surface is taken");
             }
-            out.loops.push(natural_boundary(chart, &[], &mut out.seams)?);
+            let whole = natural_boundary(chart, &[], &mut out.seams);
+            out.loops.push(whole.map_err(|reason| if is_given { "its loops enclose nothing" } else { reason })?);
             return Ok(out);
         }
-        bound_without_winding(&mut plain, chart, &mut out, implicit_outer)?;
-        return Ok(out);
+        return bound_without_winding(&mut plain, chart, &mut out, implicit_outer).map(|()| out);
     }
     let domain = SeamDomain { chart, holes: plain.iter().map(Chain::polygon).collect(), budget };
     let mut outer = match winding.len() {
@@ -244,6 +244,9 @@ fn extend_to_border(
             let mut turned = chain;
             turned.reverse();
             return extend_to_border(turned, domain, seams, false);
+        }
+        None if chart.period[across].is_some() => {
+            return Err("one loop winds around a surface closed both ways and bounds nothing there");
         }
         None => return Err("a loop winds around an unbounded surface and nothing closes it"),
     };

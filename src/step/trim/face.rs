@@ -12,6 +12,7 @@ use crate::math::polygon::signed_area;
 use crate::model::{Analytic, EdgeId, EdgeUse, TrimLoop};
 use crate::nurbs::{ControlPoint, Surface, UvCurve};
 use crate::step::chart::{Chart, offset};
+use crate::text::figures;
 use rustc_hash::FxHashMap;
 
 /// Most periods that a face beside a pole may span: azimuths there mean little.
@@ -45,10 +46,16 @@ impl From<Overrun> for &'static str {
     }
 }
 
+impl From<Overrun> for String {
+    fn from(overrun: Overrun) -> Self {
+        <&'static str>::from(overrun).into()
+    }
+}
+
 /// Builds a face, mm: fits its edges in the chart's parameters, closes its loops to a bounded region, with seams where they wind, and
 /// cuts the spline over it. A sphere may be turned first. Fails with a reason in words where edges lie off the surface, loops bound no
 /// region (nothing, too many turns, holes that leave no seam), or the work budget is used up.
-pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static str> {
+pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, String> {
     // Edges in the parameters of the chart.
     task.turn_sphere();
     let task = task;
@@ -58,7 +65,7 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
     task.keep_to_sheets(&mut fits)?;
     let mut gap = fits.values().fold(0f64, |g, f| g.max(f.gap));
     if !(gap <= LARGEST_GAP_SHARE * task.extent()) {
-        return Err("its edges were not found on its surface");
+        return Err("its edges were not found on its surface".into());
     }
     let mut repairs: Vec<String> = Vec::new();
     if chart.error > offset::TOLERANCE {
@@ -78,12 +85,9 @@ pub(crate) fn build_face(mut task: FaceTask<'_>) -> Result<BuiltFace, &'static s
             chains = turned;
         }
     }
-    let bridged = chains.iter().fold(0f64, |b, c| b.max(c.bridged));
-    if bridged > 0.0 {
-        repairs.push(format!("edges of a loop are {bridged:.3e} mm apart"));
-    }
-    let Boundary { mut loops, mut seams, repairs: turned } =
-        bound_region(chains, chart, task.implicit_outer, &task.budget)?;
+    let bridged = bridged_step(&chains);
+    let Boundary { mut loops, mut seams, repairs: turned } = bound_chains(&task, chains, bridged.as_deref())?;
+    repairs.extend(bridged);
     repairs.extend(turned.into_iter().map(String::from));
     let (domain, shift) = domain_of(&loops, chart)?;
     loops.iter_mut().for_each(|l| l.shift(shift));
@@ -164,6 +168,20 @@ fn chain_loops(task: &FaceTask<'_>, fits: &FxHashMap<usize, Fit>, same_sense: bo
         chains.push(close_loop(pieces, &task.chart, tolerance));
     }
     chains
+}
+
+/// Tells of the largest step between edges of loops that had to be bridged; `None` where all meet.
+fn bridged_step(chains: &[Chain]) -> Option<String> {
+    let bridged = chains.iter().fold(0f64, |b, c| b.max(c.bridged));
+    (bridged > 0.0).then(|| format!("edges of a loop are {} mm apart", figures(bridged, 3)))
+}
+
+/// Arranges the chains of a face by [`bound_region`]; where they bound nothing, a step between their edges may be why, and is told too.
+fn bound_chains(task: &FaceTask<'_>, chains: Vec<Chain>, step: Option<&str>) -> Result<Boundary, String> {
+    bound_region(chains, &task.chart, task.implicit_outer, &task.budget).map_err(|reason| match step {
+        Some(step) => format!("{reason}; {step}"),
+        None => reason.into(),
+    })
 }
 
 /// Whether the largest of loops that do not wind around the surface runs clockwise; false where one winds.
