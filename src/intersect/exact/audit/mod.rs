@@ -25,6 +25,9 @@ use smallvec::SmallVec;
 
 pub use hit::AuditHit;
 
+/// Share of a face's domain below which the signed area of its loops is rounding.
+const NO_AREA: f64 = 1e-12;
+
 /// Every patch of a model, to be clipped against rays.
 #[derive(Debug)]
 pub struct Audit {
@@ -83,12 +86,15 @@ impl Audit {
             for patch in surface.bezier_patches() {
                 split(patch, faces.len() as u32, &mut pieces);
             }
+            let domain = face.surface.domain();
+            let domain_area = (domain[0][1] - domain[0][0]) * (domain[1][1] - domain[1][0]);
             faces.push(AuditFace {
                 id: placed.id,
-                domain: face.surface.domain(),
+                domain,
                 trims: trims(&face.loops),
                 // Along whole curves, where the tracer goes by its own pieces: a fault in one of the two does not hide in the other.
-                holes_alone: face.loops.iter().map(TrimLoop::signed_area).sum::<f64>() < 0.0,
+                // That of lobes that cancel is rounding.
+                holes_alone: face.loops.iter().map(TrimLoop::signed_area).sum::<f64>() < -NO_AREA * domain_area,
             });
         }
         let boxes: Vec<Aabb> = pieces.iter().map(|(_, p)| p.bounds()).collect();
