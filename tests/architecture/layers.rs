@@ -456,6 +456,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "usages",
             "placed_children",
             "placed_count",
+            "orphans",
             "shared_items",
             "tessellated",
             "numbering",

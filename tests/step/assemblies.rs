@@ -33,7 +33,7 @@ fn usage(id: u32, kind: &str, ends: &str) -> String {
 }
 
 /// A relationship #`id` of two representations that puts the placement `from` on `to`; takes `id` + 1 as well.
-fn relation(id: u32, [first, second]: [u32; 2], [from, to]: [u32; 2]) -> String {
+pub(crate) fn relation(id: u32, [first, second]: [u32; 2], [from, to]: [u32; 2]) -> String {
     format!(
         "#{}=ITEM_DEFINED_TRANSFORMATION('','',#{from},#{to});\n\
          #{id}=(REPRESENTATION_RELATIONSHIP('','',#{first},#{second})REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{})\
@@ -58,7 +58,7 @@ const PLACED: &str = "#420=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#410,#401);\n"
 const NEXT: &str = "NEXT_ASSEMBLY_USAGE_OCCURRENCE";
 
 /// Asserts the x of all places, in any order, and that nothing is told.
-fn assert_places(import: &Import, expected: &[f64], case: &str) {
+pub(crate) fn assert_places(import: &Import, expected: &[f64], case: &str) {
     let mut x: Vec<f64> = import.model.instances.iter().map(|i| i.placement.origin.x).collect();
     x.sort_by(f64::total_cmp);
     assert_eq!(x, expected, "{case}");

@@ -14,6 +14,7 @@ mod joints;
 mod nurbs_properties;
 mod occurrences;
 mod offsets;
+mod orphans;
 mod parameters;
 mod perforated;
 mod pictures;

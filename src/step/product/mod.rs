@@ -1,11 +1,11 @@
 //! From instances of the file to parts, and to where they stand.
 //!
 //! Source: ISO 10303-43/44. An assembly places representations (`assembly` with its `relations`, `links`, `usages`, `usage_names`,
-//! `usage_ends` and `lost_usages`; `walk` with `places`, `placed_children` and `placed_count`; `shared_items` and `pictures` say which of
-//! their items, `asides` what a viewer would not show); a representation is shells of faces (`topology`, with loops put in order by
-//! `swapped_vertices`, `face_edges` and `loop_order`, shells turned by `orientation`, and what has no extent left out by `zero_width` and
-//! `spikes`), surfaces without a face and ready meshes (`free_surfaces`, `tessellated`), solids given as recipes (`solid_recipes`,
-//! `recipe_parts`); all of it with its colours and layers (`styles`) becomes one part (`numbering`, `conversion`).
+//! `usage_ends` and `lost_usages`; `walk` with `places`, `placed_children`, `orphans` and `placed_count`; `shared_items` and `pictures`
+//! say which of their items, `asides` what a viewer would not show); a representation is shells of faces (`topology`, with loops put in
+//! order by `swapped_vertices`, `face_edges` and `loop_order`, shells turned by `orientation`, and what has no extent left out by
+//! `zero_width` and `spikes`), surfaces without a face and ready meshes (`free_surfaces`, `tessellated`), solids given as recipes
+//! (`solid_recipes`, `recipe_parts`); all of it with its colours and layers (`styles`) becomes one part (`numbering`, `conversion`).
 
 pub(super) mod asides;
 pub(super) mod assembly;
@@ -17,6 +17,7 @@ mod loop_order;
 mod lost_usages;
 pub(super) mod numbering;
 mod orientation;
+mod orphans;
 mod pictures;
 mod placed_children;
 mod placed_count;

@@ -6,7 +6,7 @@
 
 use super::assembly::{Assembly, MAX_DEPTH, PlacedRepresentation};
 use super::places::{PlacementKey, UsagePlaces, placement_key};
-use super::purpose::{holds_mesh, is_shape_representation, purpose_besides_shape};
+use super::purpose::{holds_mesh, purpose_besides_shape};
 use super::relations::Link;
 use super::usage_names::{Occurrence, Usage, UsagePlacement, name_in_path};
 use crate::math::Frame;
@@ -129,11 +129,9 @@ impl Walk<'_, '_> {
         // From here on what products reach is closed: an orphan that leads to it would show it twice.
         self.by_products = self.reached.clone();
         let file = self.assembly.file;
-        let candidates: Vec<u64> = file.entities_of_kind(is_shape_representation).map(|e| e.id).collect();
-        let maps = file.entities_named(&["REPRESENTATION_MAP"]);
-        let mapped: FxHashSet<u64> = maps.filter_map(|e| e.attributes("REPRESENTATION_MAP", 0)?.id(1)).collect();
-        for id in candidates {
-            if self.reached.contains(&id) || mapped.contains(&id) {
+        for id in self.assembly.orphans(&self.reached) {
+            // One that was placed before may have led here.
+            if self.reached.contains(&id) {
                 continue;
             }
             // A ready mesh is named by its aspect alone.

@@ -1,0 +1,38 @@
+//! Representations that no product reaches, in the order in which they are placed.
+
+use super::assembly::Assembly;
+use super::purpose::is_shape_representation;
+use rustc_hash::FxHashSet;
+
+impl Assembly<'_, '_> {
+    /// Returns the representations that no product has `reached` and no item maps: in the order of the file, first those that no other of
+    /// them places by a transformation. Whoever places them in this order, and each only where nothing has reached it by then, places none
+    /// once more at the origin; what is left to the end is parts of cycles.
+    pub(super) fn orphans(&self, reached: &FxHashSet<u64>) -> Vec<u64> {
+        let shapes = self.file.entities_of_kind(is_shape_representation).map(|e| e.id);
+        let unreached: Vec<u64> = shapes.filter(|id| !reached.contains(id)).collect();
+        let moved = self.moved_by(&unreached);
+        let maps = self.file.entities_named(&["REPRESENTATION_MAP"]);
+        let mapped: FxHashSet<u64> = maps.filter_map(|e| e.attributes("REPRESENTATION_MAP", 0)?.id(1)).collect();
+        let unmapped = unreached.into_iter().filter(|id| !mapped.contains(id));
+        let (inner, mut orphans): (Vec<u64>, Vec<u64>) = unmapped.partition(|id| moved.contains(id));
+        orphans.extend(inner);
+        orphans
+    }
+
+    /// Returns what transformations put into these representations, with all other shapes of the same things.
+    fn moved_by(&self, representations: &[u64]) -> FxHashSet<u64> {
+        let links = |id: u64| self.links.get(&id).into_iter().flatten();
+        let mut open: Vec<u64> = Vec::new();
+        for &id in representations {
+            open.extend(links(id).filter(|link| link.has_transformation && link.to != id).map(|link| link.to));
+        }
+        let mut moved = FxHashSet::default();
+        while let Some(id) = open.pop() {
+            if moved.insert(id) {
+                open.extend(links(id).filter(|link| !link.has_transformation).map(|link| link.to));
+            }
+        }
+        moved
+    }
+}

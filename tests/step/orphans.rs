@@ -1,0 +1,49 @@
+//! Shapes without a product that stand in each other: each is placed where its relationships say, whatever the order of the file.
+
+use crate::assemblies::{assert_places, read, relation};
+
+/// A representation #`id` of a block of its own, the solid #`id` + 1.
+fn block(id: u32) -> String {
+    let solid = id + 1;
+    format!("#{solid}=CSG_SOLID('',#25);\n#{id}=SHAPE_REPRESENTATION('',(#{solid},#20,#21,#22),#1);\n")
+}
+
+/// A representation without a shape.
+fn empty(id: u32) -> String {
+    format!("#{id}=SHAPE_REPRESENTATION('',(#20,#21,#22),#1);\n")
+}
+
+#[test]
+fn the_order_of_ids_places_nothing_twice() {
+    for [child, parent] in [[110, 120], [120, 110]] {
+        let placed = relation(410, [child, parent], [20, 21]);
+        let case = format!("#{child} in #{parent}");
+        assert_places(&read(&(block(child) + &empty(parent) + &placed)), &[10.0], &case);
+        assert_places(&read(&(block(child) + &block(parent) + &placed)), &[0.0, 10.0], &case);
+        // Another shape of the child stands with it.
+        let plain = "#430=SHAPE_REPRESENTATION_RELATIONSHIP('','',#100,#";
+        let data = block(100) + &empty(child) + &empty(parent) + &placed + &format!("{plain}{child});\n");
+        assert_places(&read(&data), &[10.0], &case);
+    }
+}
+
+/// The innermost stands at x = 10 in the middle one, which stands at x = 20 in the outermost.
+#[test]
+fn each_of_a_chain_stands_once() {
+    for [inner, middle, outer] in
+        [[110, 120, 130], [110, 130, 120], [120, 110, 130], [120, 130, 110], [130, 110, 120], [130, 120, 110]]
+    {
+        let placed = relation(410, [inner, middle], [20, 21]) + &relation(420, [middle, outer], [20, 22]);
+        let case = format!("#{inner} in #{middle} in #{outer}");
+        assert_places(&read(&(block(inner) + &empty(middle) + &empty(outer) + &placed)), &[30.0], &case);
+        let blocks = block(inner) + &block(middle) + &block(outer);
+        assert_places(&read(&(blocks + &placed)), &[0.0, 20.0, 30.0], &case);
+    }
+}
+
+/// Of two that stand in each other the first is the outermost.
+#[test]
+fn shapes_in_a_circle_stand_all_the_same() {
+    let placed = relation(410, [110, 120], [20, 21]) + &relation(420, [120, 110], [20, 22]);
+    assert_places(&read(&(block(110) + &block(120) + &placed)), &[0.0, 20.0], "a circle");
+}
