@@ -468,6 +468,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "rims",
             "face_edges",
             "swapped_vertices",
+            "repeated_faces",
             "conversion",
             "pictures",
             "walk",

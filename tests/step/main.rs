@@ -20,6 +20,7 @@ mod perforated;
 mod pictures;
 mod rare_forms;
 mod recipes;
+mod repeated_faces;
 mod revolved_conics;
 mod rims;
 mod seams;

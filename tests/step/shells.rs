@@ -12,7 +12,7 @@ const SIDE: f64 = 10.0;
 const APART: f64 = 2e-5;
 
 /// Reads what [`solid_text`] writes.
-fn solid(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: Option<[usize; 2]>) -> Import {
+pub(crate) fn solid(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: Option<[usize; 2]>) -> Import {
     read(&solid_text(corners, faces, senses, tiny))
 }
 
@@ -99,7 +99,7 @@ fn solid_text(corners: &[[f64; 3]], faces: &[&[usize]], senses: &[&str], tiny: O
 }
 
 /// Corners of a cube; the last one stands a little before the one at (0, 10, 10) on the edge from (0, 0, 10).
-fn cube_corners() -> Vec<[f64; 3]> {
+pub(crate) fn cube_corners() -> Vec<[f64; 3]> {
     let s = SIDE;
     vec![
         [0.0, 0.0, 0.0],
@@ -114,10 +114,10 @@ fn cube_corners() -> Vec<[f64; 3]> {
     ]
 }
 
-const CUBE: [&[usize]; 6] =
+pub(crate) const CUBE: [&[usize]; 6] =
     [&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
 
-fn assert_closes(import: &Import) {
+pub(crate) fn assert_closes(import: &Import) {
     assert_eq!(
         (import.report.faces.converted, import.report.faces.refused),
         (6, 0),

@@ -4,8 +4,9 @@
 //! `usage_ends` and `lost_usages`; `walk` with `places`, `placed_children`, `orphans` and `placed_count`; `shared_items` and `pictures`
 //! say which of their items, `asides` what a viewer would not show); a representation is shells of faces (`topology`, with loops put in
 //! order by `swapped_vertices`, `face_edges` and `loop_order`, shells turned by `orientation`, and what has no extent left out by
-//! `zero_width` and `spikes`), surfaces without a face and ready meshes (`free_surfaces`, `tessellated`), solids given as recipes
-//! (`solid_recipes`, `recipe_parts`); all of it with its colours and layers (`styles`) becomes one part (`numbering`, `conversion`).
+//! `zero_width` and `spikes`, what is there twice by `repeated_faces`), surfaces without a face and ready meshes (`free_surfaces`,
+//! `tessellated`), solids given as recipes (`solid_recipes`, `recipe_parts`); all of it with its colours and layers (`styles`) becomes one
+//! part (`numbering`, `conversion`).
 
 pub(super) mod asides;
 pub(super) mod assembly;
@@ -25,6 +26,7 @@ mod places;
 mod purpose;
 mod recipe_parts;
 mod relations;
+mod repeated_faces;
 mod rims;
 pub(super) mod shared_items;
 mod solid_recipes;
