@@ -1,8 +1,10 @@
 //! Rims whose vertices lie anywhere on them: the seams between them run straight.
 
+use crate::faces::{area, close, import, points};
 use crate::files::{MILLIMETRES, part21};
 use lampyris::math::Point;
 use lampyris::step::{Settings, read_bytes};
+use std::f64::consts::PI;
 use std::fmt::Write;
 
 /// A stepped shaft without seams, as a shell of cylinders and rings: rims at the given heights and radii, each with its vertex at an
@@ -99,5 +101,72 @@ fn seams_between_rims_are_straight() {
         assert!(rims.iter().any(|rim| (rim[0] - z).abs() < 1e-12 && (rim[1] - radius).abs() < 1e-12));
         let opposite = edge.curve.evaluate(0.5 * (a + b));
         assert!((opposite - Point::new(-ends[0].x, -ends[0].y, z)).length() < 1e-12);
+    }
+}
+
+/// A face of `surface`, at the origin, between two circles of this radius that both run the same way: a bound of its own for each, which
+/// has `flag` and the given centre, axis and start of its circle.
+fn between_rings(surface: &str, radius: f64, rings: [[[f64; 3]; 3]; 2], flag: &str) -> String {
+    let mut data = points(&[(10, [0.0; 3])])
+        + &format!(
+            "#11=DIRECTION('',(0.,0.,1.));#12=DIRECTION('',(1.,0.,0.));#13=AXIS2_PLACEMENT_3D('',#10,#11,#12);#14={surface};\n"
+        );
+    for (n, [center, axis, start]) in [100, 200].into_iter().zip(rings) {
+        let vertex = [0, 1, 2].map(|d| center[d] + radius * start[d]);
+        data += &points(&[(n, center), (n + 1, vertex)]);
+        let [x, y, z] = axis;
+        let [a, b, c] = start;
+        writeln!(
+            data,
+            "#{}=DIRECTION('',({x:?},{y:?},{z:?}));#{}=DIRECTION('',({a:?},{b:?},{c:?}));",
+            n + 2,
+            n + 3
+        )
+        .unwrap();
+        writeln!(
+            data,
+            "#{placement}=AXIS2_PLACEMENT_3D('',#{n},#{},#{});#{circle}=CIRCLE('',#{placement},{radius:?});\
+             #{vertex}=VERTEX_POINT('',#{});#{edge}=EDGE_CURVE('',#{vertex},#{vertex},#{circle},.T.);\
+             #{oriented}=ORIENTED_EDGE('',*,*,#{edge},.T.);#{ring}=EDGE_LOOP('',(#{oriented}));#{}=FACE_BOUND('',#{ring},{flag});",
+            n + 2,
+            n + 3,
+            n + 1,
+            n + 10,
+            placement = n + 4,
+            circle = n + 5,
+            vertex = n + 6,
+            edge = n + 7,
+            oriented = n + 8,
+            ring = n + 9,
+        )
+        .unwrap();
+    }
+    data + "#900=ADVANCED_FACE('',(#110,#210),#14,.T.);\n"
+}
+
+/// A tube of radius 2 and height 3; and three quarters of a torus of radii 5 and 1.5, or the quarter that its first ring has on its left.
+#[test]
+fn the_second_of_two_rings_that_run_alike_is_turned_around() {
+    let told = |data: &str, expected: f64| {
+        let import = import(data);
+        close(area(&import), expected, 1e-5);
+        assert_eq!(import.report.faces.repaired, 1, "{:?}", import.report.repairs);
+    };
+    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let ends = [[[0.0; 3], z, x], [[0.0, 0.0, 3.0], z, x]];
+    for flag in [".T.", ".F."] {
+        told(&between_rings("CYLINDRICAL_SURFACE('',#13,2.)", 2.0, ends, flag), 12.0 * PI);
+    }
+    // Both run up on the outside, where the face is on their left at smaller azimuths.
+    let first = [[5.0, 0.0, 0.0], [0.0, -1.0, 0.0], x];
+    let second = [[0.0, 5.0, 0.0], x, y];
+    let whole = 4.0 * PI * PI * 5.0 * 1.5;
+    for (rings, flag, share) in [
+        ([first, second], ".T.", 0.75),
+        ([second, first], ".T.", 0.25),
+        ([first, second], ".F.", 0.25),
+        ([second, first], ".F.", 0.75),
+    ] {
+        told(&between_rings("TOROIDAL_SURFACE('',#13,5.,1.5)", 1.5, rings, flag), share * whole);
     }
 }

@@ -2,7 +2,7 @@
 //! lone ones run to a pole or a natural border, closed surfaces get their outer boundary, holes move inside it.
 
 use super::fit::Budget;
-use super::holes::{Border, place_hole};
+use super::holes::{Border, free_start, place_hole};
 use super::lobes::{cancelling_lobes, drop_empty_loops};
 use super::loops::{Chain, Piece, Source};
 use super::obstacles::{Obstacles, unrolled_polygon};
@@ -72,10 +72,15 @@ pub(crate) fn bound_region(
         1 => extend_to_border(winding.into_iter().next().ok_or("no loop")?, &domain, &mut out.seams, true)?,
         2 => {
             let mut two = winding.into_iter();
-            let (Some(a), Some(b)) = (two.next(), two.next()) else { return Err("no loop") };
-            // One must run each way, or the material would lie on the same side of both.
-            if a.winding != b.winding.map(|w| -w) {
-                return Err("two loops wind around the surface in the same sense");
+            let (Some(a), Some(mut b)) = (two.next(), two.next()) else { return Err("no loop") };
+            // One must run each way, or the material would lie on the same side of both. On a surface closed both ways the first
+            // one tells which side is meant.
+            if a.winding == b.winding {
+                b.reverse();
+                out.repairs
+                    .push("two loops wind around the surface in the same sense: the second was turned around");
+            } else if a.winding != b.winding.map(|w| -w) {
+                return Err("two loops wind around the surface in different directions");
             }
             join_winding_pair(a, b, &domain, &mut out.seams)?
         }
@@ -183,32 +188,6 @@ fn natural_boundary(chart: &Chart, holes: &[Vec<Uv>], seams: &mut Vec<[Uv; 2]>) 
         piece(top, corner[3], corner[2], true),
         piece(left, corner[0], corner[3], true),
     ]))
-}
-
-/// Returns where a period of direction `d` may start so that no hole spans it: in the middle of the widest gap between them, `base` without
-/// holes. `None` where there is no gap.
-fn free_start(d: usize, base: f64, period: f64, holes: &[Vec<Uv>]) -> Option<f64> {
-    if holes.is_empty() {
-        return Some(base);
-    }
-    let mut spans: Vec<(f64, f64)> = Vec::new();
-    for hole in holes {
-        let lo = hole.iter().map(|p| p[d]).fold(f64::INFINITY, f64::min);
-        let hi = hole.iter().map(|p| p[d]).fold(f64::NEG_INFINITY, f64::max);
-        let start = (lo - base).rem_euclid(period);
-        spans.push((start, start + (hi - lo)));
-    }
-    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // What reaches over the end of the period lies at its start too.
-    let mut end = spans.iter().map(|s| s.1 - period).fold(f64::NEG_INFINITY, f64::max);
-    let mut best = (0.0, 0.0);
-    for &(a, b) in &spans {
-        if a - end > best.1 {
-            best = (0.5 * (a + end), a - end);
-        }
-        end = end.max(b);
-    }
-    (best.1 > 0.0).then_some(base + best.0)
 }
 
 /// Closes one loop that winds around: to the pole or natural border on its left, by a seam run both ways, and adds what it makes to

@@ -52,6 +52,32 @@ fn period_counts(hole: &[Uv], border: &[Uv], axis: usize, period: f64) -> Vec<i3
     counts
 }
 
+/// Returns where a period of direction `d` may start so that no hole spans it: in the middle of the widest gap between them, `base` without
+/// holes. `None` where there is no gap.
+pub(super) fn free_start(d: usize, base: f64, period: f64, holes: &[Vec<Uv>]) -> Option<f64> {
+    if holes.is_empty() {
+        return Some(base);
+    }
+    let mut spans: Vec<(f64, f64)> = Vec::new();
+    for hole in holes {
+        let lo = hole.iter().map(|p| p[d]).fold(f64::INFINITY, f64::min);
+        let hi = hole.iter().map(|p| p[d]).fold(f64::NEG_INFINITY, f64::max);
+        let start = (lo - base).rem_euclid(period);
+        spans.push((start, start + (hi - lo)));
+    }
+    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // What reaches over the end of the period lies at its start too.
+    let mut end = spans.iter().map(|s| s.1 - period).fold(f64::NEG_INFINITY, f64::max);
+    let mut best = (0.0, 0.0);
+    for &(a, b) in &spans {
+        if a - end > best.1 {
+            best = (0.5 * (a + end), a - end);
+        }
+        end = end.max(b);
+    }
+    (best.1 > 0.0).then_some(base + best.0)
+}
+
 /// Moves a hole by periods into the border, and turns it clockwise; one that lies in no place inside is a loop of its own and turned the
 /// other way. Notes what was turned.
 pub(super) fn place_hole(
