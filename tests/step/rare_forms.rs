@@ -1,5 +1,6 @@
 //! More of what files say in rare forms: what a standard leaves to its defaults, what is hidden, listed twice or stands elsewhere.
 
+use crate::faces;
 use crate::silence::{area, assert_refused, close, plate, read, read_sections, trimmed};
 use lampyris::step::Import;
 use std::f64::consts::PI;
@@ -119,4 +120,49 @@ fn sections_besides_the_data_are_no_damage() {
         "{:?}",
         import.report.problems
     );
+}
+
+/// The outer upper quarter of a tube of radius 10, bent by a quarter turn of radius 50; its edges run counter-clockwise from outside.
+fn bend(radii: &str, flag: &str) -> String {
+    faces::points(&[
+        (10, [0., 0., 0.]),
+        (11, [0., 0., 10.]),
+        (12, [0., 50., 0.]),
+        (13, [50., 0., 0.]),
+        (14, [60., 0., 0.]),
+        (15, [0., 60., 0.]),
+        (16, [0., 50., 10.]),
+        (17, [50., 0., 10.]),
+    ]) + &format!(
+        "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n#22=DIRECTION('',(0.,1.,0.));\n#23=DIRECTION('',(0.,-1.,0.));\n\
+         #30=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n#31=TOROIDAL_SURFACE('',#30,{radii});\n#32=CIRCLE('',#30,60.);\n\
+         #33=AXIS2_PLACEMENT_3D('',#11,#20,#21);\n#34=CIRCLE('',#33,50.);\n\
+         #35=AXIS2_PLACEMENT_3D('',#12,#21,#22);\n#36=CIRCLE('',#35,10.);\n\
+         #37=AXIS2_PLACEMENT_3D('',#13,#23,#21);\n#38=CIRCLE('',#37,10.);\n\
+         #40=VERTEX_POINT('',#14);\n#41=VERTEX_POINT('',#15);\n#42=VERTEX_POINT('',#16);\n#43=VERTEX_POINT('',#17);\n\
+         #50=EDGE_CURVE('',#40,#41,#32,.T.);\n#51=EDGE_CURVE('',#41,#42,#36,.T.);\n\
+         #52=EDGE_CURVE('',#43,#42,#34,.T.);\n#53=EDGE_CURVE('',#40,#43,#38,.T.);\n\
+         #60=ORIENTED_EDGE('',*,*,#50,.T.);\n#61=ORIENTED_EDGE('',*,*,#51,.T.);\n\
+         #62=ORIENTED_EDGE('',*,*,#52,.F.);\n#63=ORIENTED_EDGE('',*,*,#53,.F.);\n\
+         #70=EDGE_LOOP('',(#60,#61,#62,#63));\n#71=FACE_OUTER_BOUND('',#70,.T.);\n#900=ADVANCED_FACE('',(#71),#31,{flag});\n"
+    )
+}
+
+/// ISO 10303-42 asks for positive radii; by its formula a negative major one turns the normal inwards, a negative minor one does not.
+#[test]
+fn a_torus_of_negative_radii_has_the_normal_of_its_formula() {
+    for (radii, flag) in [("50.,10.", ".T."), ("50.,-10.", ".T."), ("-50.,10.", ".F."), ("-50.,-10.", ".F.")] {
+        let import = faces::import(&bend(radii, flag));
+        close(faces::area(&import), 0.5 * PI * (50.0 * 10.0 * 0.5 * PI + 100.0), 1e-5);
+        assert_eq!(import.report.faces.repaired, 0, "{radii}: {:?}", import.report.repairs);
+        assert!(!import.model.parts[0].shells[0].faces[0].reversed, "{radii}");
+    }
+    let trimmed_by_angles =
+        |radii: &str| trimmed(&format!("#20=TOROIDAL_SURFACE('',#14,{radii});\n"), "0.,1.,0.,1.");
+    close(area(&read(&trimmed_by_angles("50.,10."))), 500.0 + 100.0 * 1f64.sin(), 1e-6);
+    // Their angles count from elsewhere.
+    for radii in ["50.,-10.", "-50.,10."] {
+        assert_refused(&trimmed_by_angles(radii), "cannot be taken over");
+    }
+    assert_refused(&trimmed_by_angles("50.,0."), "minor radius is zero");
 }

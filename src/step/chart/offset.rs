@@ -73,6 +73,7 @@ pub(crate) fn offset(basis: &Chart, distance: f64) -> Option<Chart> {
         }
     };
     chart.flipped = basis.flipped;
+    chart.has_other_angles = basis.has_other_angles;
     Some(chart)
 }
 

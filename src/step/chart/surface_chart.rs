@@ -54,6 +54,8 @@ pub(in crate::step) struct Chart {
     pub(in crate::step) size: f64,
     /// Whether `Su × Sv` is opposite to that of the file's surface.
     pub(in crate::step) flipped: bool,
+    /// Whether the angles of a torus run or begin otherwise than in the file's surface.
+    pub(in crate::step) has_other_angles: bool,
     /// Whether the file's surface has every place twice, with opposite normals, as a profile turned about its own axis of symmetry has:
     /// only how a face's edges run tells which is meant.
     pub(in crate::step) has_two_normals: bool,
@@ -87,6 +89,7 @@ impl Chart {
             poles: Vec::new(),
             size: 1.0,
             flipped: false,
+            has_other_angles: false,
             has_two_normals: false,
             sweeps_spline: false,
             error: 0.0,
@@ -285,7 +288,7 @@ impl Chart {
             Kind::Plane { .. } => Some([length; 2]),
             Kind::Cone { .. } => Some([angle, length]),
             // A lemon's angles run the other way here, and from another place.
-            Kind::Torus { major, .. } => (*major >= 0.0).then_some([angle; 2]),
+            Kind::Torus { major, .. } => (*major >= 0.0 && !self.has_other_angles).then_some([angle; 2]),
             Kind::Revolution { meridian, .. } => direct(meridian).then_some([angle, 1.0]),
             Kind::Extrusion { base, .. } => direct(base).then_some([1.0; 2]),
             Kind::Spline(_) => Some([1.0; 2]),

@@ -87,14 +87,20 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
 
     /// Returns the chart of a torus; `stated` is the part of a self-touching one that the file names. Without it the points of the face
     /// tell, and a face on both parts becomes a surface of revolution. Refuses radii that leave no surface.
+    ///
+    /// With C + (R + r·cos v)·e(u) + r·sin v·z the normal Su × Sv is R + r·cos v times the vector from the tube's middle: a negative r
+    /// shifts v by half a turn and leaves the normal, R below −|r| makes the torus of |R| with its normal inwards.
     fn torus(&self, s: &Elementary<'f, 'a>, stated: Option<TorusRegion>, extent: FaceExtent<'_>) -> Outcome<Chart> {
         let frame = s.frame;
-        let major = self.size(s, 0).unwrap_or(f64::NAN);
-        let minor = self.positive_size(s, 1, "minor radius")?;
-        // A negative major radius, which real files hold, is the inner part of a self-touching torus.
-        if !(major.abs() > 0.0 && major > -minor) {
-            return Err(Refusal::new(s.entity, "major radius leaves no surface"));
-        }
+        let stated_minor = self.size(s, 1).filter(|r| *r != 0.0);
+        let stated_minor =
+            stated_minor.ok_or_else(|| Refusal::new(s.entity, "minor radius is zero or no number"))?;
+        let stated_major = self.size(s, 0).filter(|r| *r != 0.0);
+        let stated_major = stated_major.ok_or_else(|| Refusal::new(s.entity, "major radius leaves no surface"))?;
+        let minor = stated_minor.abs();
+        // A negative major radius above −minor, which real files hold, is the inner part of a self-touching torus.
+        let is_inverted = stated_major <= -minor;
+        let major = if is_inverted { -stated_major } else { stated_major };
         let mut region = TorusRegion::Apple;
         if major > 0.0 && major < minor {
             // A plain torus may touch itself too; then the edges say on which part the face lies.
@@ -109,7 +115,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             Kind::Torus { frame, major: signed, minor },
             Analytic::Torus { frame, major: signed, minor },
         );
-        chart.flipped = region == TorusRegion::Lemon;
+        chart.flipped = is_inverted || region == TorusRegion::Lemon;
+        chart.has_other_angles = is_inverted || stated_minor < 0.0;
         Ok(chart)
     }
 }
