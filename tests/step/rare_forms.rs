@@ -166,3 +166,36 @@ fn a_torus_of_negative_radii_has_the_normal_of_its_formula() {
     }
     assert_refused(&trimmed_by_angles("50.,0."), "minor radius is zero");
 }
+
+/// A square of 10 mm with u along x and v along y, and a bound without an edge.
+const SQUARE: &str = "#20=B_SPLINE_SURFACE_WITH_KNOTS('',1,1,((#10,#21),(#22,#23)),.UNSPECIFIED.,.F.,.F.,.F.,(2,2),(2,2),(0.,1.),(0.,1.),.UNSPECIFIED.);\n\
+    #21=CARTESIAN_POINT('',(0.,10.,0.));\n#22=CARTESIAN_POINT('',(10.,0.,0.));\n#23=CARTESIAN_POINT('',(10.,10.,0.));\n\
+    #30=VERTEX_POINT('',#10);\n#31=VERTEX_LOOP('',#30);\n#32=FACE_OUTER_BOUND('',#31,.T.);\n";
+
+#[test]
+fn a_face_without_a_loop_ends_where_its_surface_is_trimmed() {
+    let half = "#40=RECTANGULAR_TRIMMED_SURFACE('',#20,0.,0.5,0.,1.,.T.,.T.);\n";
+    let triangle = "#40=CURVE_BOUNDED_SURFACE('',#20,(#41),.F.);\n#41=OUTER_BOUNDARY_CURVE('',(#42),.F.);\n\
+                    #42=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#43);\n#43=POLYLINE('',(#10,#44,#45,#10));\n\
+                    #44=CARTESIAN_POINT('',(5.,0.,0.));\n#45=CARTESIAN_POINT('',(5.,5.,0.));\n";
+    // Without their trims these two have no end.
+    let on_plane = triangle.replace("#20", "#46") + "#46=PLANE('',#14);\n";
+    let tube = "#40=RECTANGULAR_TRIMMED_SURFACE('',#46,0.,6.283185307179586,0.,10.,.T.,.T.);\n\
+                #46=CYLINDRICAL_SURFACE('',#14,2.5);\n";
+    for (surface, expected) in [(half, 50.0), (triangle, 12.5), (on_plane.as_str(), 12.5), (tube, 50.0 * PI)] {
+        for (bounds, sense, reversed) in [("", ".T.", false), ("#32", ".T.", false), ("#32", ".F.", true)] {
+            let record = format!("#900=ADVANCED_FACE('window',({bounds}),#40,{sense});\n");
+            let import = read(&format!("{SQUARE}{surface}{record}"));
+            close(area(&import), expected, 1e-4);
+            let faces = &import.model.parts[0].shells[0].faces;
+            assert_eq!(faces.len(), 1);
+            assert_eq!((faces[0].name.as_str(), faces[0].entity), ("window", Some(900)));
+            assert_eq!(faces[0].reversed, reversed, "{surface}{record}");
+            let repairs = &import.report.repairs;
+            assert!(!repairs.iter().any(|r| r.reason.contains("ran against")), "{repairs:?}");
+            assert_eq!(crate::support::violations(&import.model.parts[0], &faces[0]), Vec::<String>::new());
+        }
+    }
+    let outside = half.replace("0.5", "1.5");
+    assert_refused(&format!("{SQUARE}{outside}#900=ADVANCED_FACE('',(#32),#40,.T.);\n"), "leave the surface");
+}

@@ -1,7 +1,7 @@
 //! One representation as a part: edges first, then faces, both in parallel, numbered in the order of the file.
 
 use super::face_edges::{FaceEdges, face_edges};
-use super::free_surfaces::convert_free_surfaces;
+use super::free_surfaces::{Bounded, convert_free_surfaces, convert_trimmed_face, number_boundaries};
 use super::numbering::{ConvertedPart, add_face};
 use super::orientation::{faces_against_neighbours, is_inside_out};
 use super::recipe_parts::convert_recipes;
@@ -14,14 +14,14 @@ use super::topology::{EdgeKey, FacePlan, ShapeItems, number_edges, read_face};
 use super::zero_width::{joined_vertex, remove_faces_without_width, vertex_ids, vertices_of_empty_edges};
 use crate::math::Point;
 use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
-use crate::nurbs::Curve;
+use crate::nurbs::{Curve, Surface};
 use crate::step::geometry::edges::TrimmedEdge;
 use crate::step::geometry::extent::FaceExtent;
 use crate::step::geometry::units::Units;
 use crate::step::geometry::{EMPTY_EDGE_MM, FARTHEST_MM, GeometryReader, Outcome, Refusal};
 use crate::step::part21::File;
 use crate::step::settings::Settings;
-use crate::step::trim::face::{BuiltFace, build_face};
+use crate::step::trim::face::build_face;
 use crate::step::trim::fit::Budget;
 use crate::step::trim::task::{FaceTask, TaskEdge};
 use rayon::prelude::*;
@@ -82,7 +82,7 @@ pub(crate) fn convert(
         let plan = plans[id].as_ref().map_err(Refusal::clone);
         (*id, plan.and_then(|plan| convert_face(&geometry, *id, plan, &edges, &index, settings)))
     };
-    let built: Vec<(u64, Outcome<BuiltFace>)> = ids.par_iter().map(convert_one).collect();
+    let built: Vec<(u64, Outcome<Bounded>)> = ids.par_iter().map(convert_one).collect();
 
     // Edges move into the part only now: a second copy of them, and of the faces below, took the peak of a 30 MB file
     // from 103 to 117 MiB.
@@ -91,12 +91,15 @@ pub(crate) fn convert(
     let mut faces: FxHashMap<u64, Face> = FxHashMap::default();
     for (id, outcome) in built {
         match outcome {
-            Ok(built) => {
+            Ok((built, boundaries)) => {
                 if !built.repairs.is_empty() {
                     out.repaired.push(repair_note(file, id, built.repairs.join("; ")));
                 }
                 let name = plans[&id].as_ref().map_or_else(|_| String::new(), |p| p.name.clone());
-                faces.insert(id, add_face(built, id, name, &mut part, &numbers, styles));
+                // A face that trims of its surface bound has edges of its own.
+                let own = number_boundaries(boundaries, &mut part);
+                let numbers = if own.is_empty() { &numbers } else { &own };
+                faces.insert(id, add_face(built, id, name, &mut part, numbers, styles));
             }
             Err(refusal) => out.refused.push(refusal),
         }
@@ -247,6 +250,12 @@ fn is_sized_by_edges(file: &File<'_>, surface: u64) -> bool {
     file.entity(surface).is_some_and(|e| !e.keywords().any(known))
 }
 
+/// Whether all of a surface lies within [`FARTHEST_MM`].
+fn is_in_reach(surface: &Surface) -> bool {
+    let bounds = surface.bounds();
+    bounds.min.abs().max(bounds.max.abs()).max_element() <= FARTHEST_MM
+}
+
 /// Makes the refusal of a face whose surface reaches farther than numbers tell places apart.
 fn beyond_rounding(geometry: &GeometryReader<'_, '_>, id: u64, plan: &FacePlan) -> Refusal {
     let surface = geometry.file.entity_name(plan.surface);
@@ -257,8 +266,8 @@ fn beyond_rounding(geometry: &GeometryReader<'_, '_>, id: u64, plan: &FacePlan) 
     Refusal { id, entity: geometry.file.entity_name(id), reason }
 }
 
-/// Converts one face of a plan: its edges joined to loops, its chart, and the trims on it. `edges` are all of the part, found by `index`; a
-/// refusal names the face and, in its reason, what below it is to blame.
+/// Converts one face of a plan: its edges joined to loops, its chart, and the trims on it. `edges` are all of the part, found by `index`;
+/// boundaries come with a face that its surface's own trims bound. A refusal names the face and, in its reason, what below it is to blame.
 fn convert_face(
     geometry: &GeometryReader<'_, '_>,
     id: u64,
@@ -266,7 +275,7 @@ fn convert_face(
     edges: &[Outcome<TrimmedEdge>],
     index: &FxHashMap<EdgeKey, usize>,
     settings: &Settings,
-) -> Outcome<BuiltFace> {
+) -> Outcome<Bounded> {
     let entity = geometry.entity(id)?;
     // What is refused is the face; what is wrong may be an edge far below it.
     let blame = |r: &Refusal| Refusal {
@@ -275,6 +284,17 @@ fn convert_face(
         reason: format!("#{} {}: {}", r.id, r.entity, r.reason),
     };
     let FaceEdges { curves, loops, bounds, gap, repairs } = face_edges(plan, edges, index).map_err(blame)?;
+
+    // Without a loop the face ends where its surface is trimmed.
+    let trims = loops.is_empty().then(|| convert_trimmed_face(geometry, plan.surface, plan.same_sense, settings));
+    if let Some(bounded) = trims.flatten() {
+        let (mut built, boundaries) = bounded.map_err(|r| blame(&r))?;
+        if !is_in_reach(&built.surface) {
+            return Err(beyond_rounding(geometry, id, plan));
+        }
+        built.repairs.extend(repairs.into_iter().map(String::from));
+        return Ok((built, boundaries));
+    }
 
     // The surface, as much of it as the edges need.
     geometry.entity(plan.surface)?;
@@ -311,10 +331,9 @@ fn convert_face(
         Refusal { id, entity: entity.name(), reason: format!("#{} {surface}: {reason}", plan.surface) }
     })?;
     // The chart was in reach; the part of it that the edges need may not be.
-    let reach = built.surface.bounds();
-    if !(reach.min.abs().max(reach.max.abs()).max_element() <= FARTHEST_MM) {
+    if !is_in_reach(&built.surface) {
         return Err(beyond_rounding(geometry, id, plan));
     }
     built.repairs.extend(repairs.into_iter().map(String::from));
-    Ok(built)
+    Ok((built, Vec::new()))
 }

@@ -1,4 +1,4 @@
-//! Surfaces without a face (bare, CURVE_BOUNDED_SURFACE, RECTANGULAR_TRIMMED_SURFACE), and ready meshes.
+//! Surfaces that no loop of a face bounds (bare, CURVE_BOUNDED_SURFACE, RECTANGULAR_TRIMMED_SURFACE), and ready meshes.
 
 use super::numbering::{ConvertedPart, add_face};
 use super::styles::Styles;
@@ -18,6 +18,8 @@ use crate::step::trim::task::{FaceTask, TaskEdge};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+/// Names of surfaces that are parts of others.
+const TRIMMED_SURFACES: [&str; 2] = ["CURVE_BOUNDED_SURFACE", "RECTANGULAR_TRIMMED_SURFACE"];
 /// Boundaries of geometric sets meet loosely: real files leave 1e-3 mm.
 const LOOSE_BOUNDARY_MM: f64 = 1e-3;
 /// A rectangle short of a whole period by less than this share of it is whole.
@@ -27,7 +29,7 @@ const PERIOD_SLACK: f64 = 1e-9;
 const RANGE_SLACK: f64 = 1e-5;
 
 /// A built face with its boundary curves, loop by loop.
-type Bounded = (BuiltFace, Vec<Vec<Curve>>);
+pub(super) type Bounded = (BuiltFace, Vec<Vec<Curve>>);
 
 /// Converts what is not a face of a shell: each surface becomes a shell of one face in the part, and each mesh a tessellated face. Counts
 /// and refusals go to `out`.
@@ -69,7 +71,7 @@ pub(crate) fn convert_free_surfaces(
 }
 
 /// Adds boundary curves to the part as edges; ends that follow on each other in a boundary share a vertex. Returns their numbers, in order.
-fn number_boundaries(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option<EdgeId>> {
+pub(super) fn number_boundaries(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option<EdgeId>> {
     let mut numbers = Vec::new();
     for boundary in boundaries {
         let first = part.vertices.len() as u32;
@@ -83,6 +85,21 @@ fn number_boundaries(boundaries: Vec<Vec<Curve>>, part: &mut Part) -> Vec<Option
         }
     }
     numbers
+}
+
+/// Builds a face without a loop of its own on a surface with trims: these bound it. `None` for a surface of another kind.
+pub(super) fn convert_trimmed_face(
+    geometry: &GeometryReader<'_, '_>,
+    surface: u64,
+    same_sense: bool,
+    settings: &Settings,
+) -> Option<Outcome<Bounded>> {
+    geometry.file.entity(surface).filter(|e| e.is_one_of(&TRIMMED_SURFACES))?;
+    Some(convert_surface(geometry, surface, settings).map(|(mut built, boundaries)| {
+        // Trims have the surface on their left about its own normal, whichever way the face looks.
+        built.reversed ^= !same_sense;
+        (built, boundaries)
+    }))
 }
 
 /// Builds the face of one surface with its boundaries; without any, of the whole surface or of its rectangle of parameters.
