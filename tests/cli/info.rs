@@ -213,6 +213,34 @@ fn faces_are_listed_with_the_places_of_their_own_part() {
     );
 }
 
+/// Why faces are missing from the list is told beside it, with -q too, and in the document as `info` has it without the list.
+#[test]
+fn faces_that_were_refused_are_told_beside_the_list() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = std::fs::read_to_string(step("lens_planoconvex_nurbs.stp")).unwrap();
+    let broken = lens.replace("-2.094395102393,0.,2.094395102393", "2.094395102393,0.,-2.094395102393");
+    for (text, is_broken) in [(&broken, true), (&lens, false)] {
+        let path = written(folder.path(), "lens.stp", text.as_bytes()).display().to_string();
+        let path = path.as_str();
+        let documents = [&["info", path, "--json"][..], &["info", path, "--json", "--faces"][..]]
+            .map(|arguments| serde_json::from_str::<Value>(&lampyris(arguments).1).unwrap());
+        for key in ["refusals", "problems"] {
+            assert!(documents[1][key].is_array() && documents[0][key] == documents[1][key], "{key}: {documents:?}");
+        }
+        for option in ["-v", "-q"] {
+            let (code, _, err) = lampyris(&["info", path, "--faces", option]);
+            assert_eq!(
+                (code, err.contains("faces were refused")),
+                (if is_broken { 4 } else { 0 }, is_broken),
+                "{err}"
+            );
+            let refusals = documents[0]["refusals"].as_array().unwrap();
+            assert_eq!(refusals.is_empty(), !is_broken);
+            assert!(refusals.iter().all(|r| err.contains(r["reason"].as_str().unwrap())), "{err}");
+        }
+    }
+}
+
 /// Cut between two records, where nothing else tells of it: what is missing is not known, so that the whole is not there either.
 #[test]
 fn a_file_that_was_cut_off_is_told_and_incomplete() {

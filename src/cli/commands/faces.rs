@@ -5,6 +5,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::json::{json_text, json_value};
 use crate::model::{FaceAccount, Model, PartAccount, PlacedFace, SolidAccount, are_shared};
 use crate::simulate::face_selectors;
+use crate::step::ImportReport;
 use crate::text::{figures, grouped};
 use serde_json::json;
 
@@ -17,12 +18,17 @@ const SHOWN_PLACES: usize = 12;
 /// Coordinates below this are rounding of what the file has as 0, mm.
 const ROUNDING_MM: f64 = 1e-9;
 
-/// Prints the parts, solids and faces of a model as a tree; with `--json` the document that holds the same.
-pub(crate) fn print_faces(model: &Model, console: &Console) -> Result<(), Failure> {
+/// Prints the parts, solids and faces of a model as a tree; with `--json` the document that holds the same, with the refusals and problems of
+/// the report.
+pub(crate) fn print_faces(model: &Model, report: &ImportReport, console: &Console) -> Result<(), Failure> {
     let parts = model.account();
     let mut selectors = part_selectors(model).into_iter();
     if console.json {
-        let mut document = json!({"parts": json_value(&parts)?});
+        let mut document = json!({
+            "parts": json_value(&parts)?,
+            "refusals": json_value(&report.refusals)?,
+            "problems": json_value(&report.problems)?,
+        });
         for (k, places) in model.labels_of_parts().into_iter().enumerate() {
             document["parts"][k]["places"] = places.into();
         }

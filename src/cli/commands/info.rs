@@ -29,18 +29,45 @@ pub(crate) fn run(
 ) -> Result<Completion, Failure> {
     let import = input_files::step_file(path, &placed.settings(), console)?;
     let report = import.report;
+    // Zero of zero faces are no excess.
+    let is_incomplete = report.faces.found == 0
+        || input_files::is_too_much_missing(
+            [report.faces.refused, report.faces.found],
+            report.cut_off,
+            limits.max_refused,
+        );
     if faces {
-        print_faces(&import.model, console)?;
+        print_faces(&import.model, &report, console)?;
+        // The document has them itself.
+        if !console.json {
+            say_losses(&report, is_incomplete, console);
+        }
     } else if console.json {
         print(&json_text(&report)?)?;
     } else {
         print(&import_summary(&report, console))?;
     }
-    let faces = report.faces;
-    // Zero of zero faces are no excess.
-    let is_incomplete = faces.found == 0
-        || input_files::is_too_much_missing([faces.refused, faces.found], report.cut_off, limits.max_refused);
     Ok(Completion::incomplete_if(is_incomplete))
+}
+
+/// Says how many faces were refused, which and why, and what else could not be read, quiet or not where that is why the exit code
+/// is not 0; lists are cut off without -v.
+fn say_losses(r: &ImportReport, is_incomplete: bool, console: &Console) {
+    let say = |message: String| console.say_or_insist(is_incomplete, message);
+    if r.faces.refused > 0 {
+        say(format!("{} of {} faces were refused", r.faces.refused, r.faces.found));
+    }
+    let most = if console.verbose > 0 { usize::MAX } else { SHOWN_NOTES };
+    for note in r.refusals.iter().take(most) {
+        say(format!("refused: #{} {}: {}", note.id, note.entity, note.reason));
+    }
+    for problem in r.problems.iter().take(most) {
+        say(format!("problem: {problem}"));
+    }
+    let rest = r.refusals.len().saturating_sub(most) + r.problems.len().saturating_sub(most);
+    if rest > 0 {
+        say(format!("and {rest} more; -v shows all, --json too"));
+    }
 }
 
 /// Returns the report of an import as lines for people; lists are cut off without -v.
