@@ -38,6 +38,9 @@ pub enum Defect {
     /// Knots and control points do not fit together.
     #[error("the number of knots does not fit the control points and the degree")]
     Counts,
+    /// There is not one weight for each control point.
+    #[error("the number of weights does not fit the control points")]
+    WeightCount,
     /// Knots decrease or are no numbers.
     #[error("knots decrease or are not finite")]
     Knots,
@@ -139,10 +142,14 @@ pub fn surface(
 }
 
 /// Homogeneous control points of positions and weights, 1 where there are none; weights beyond 10⁶ or below 10⁻⁶ at their largest are
-/// scaled to a largest of 1. An error where one is not positive beside the largest, or a coordinate is not finite or beyond 1e15 mm.
+/// scaled to a largest of 1. An error where their number is another, one is not positive beside the largest, or a coordinate is not
+/// finite or beyond 1e15 mm.
 fn homogeneous(points: &[Point], weights: Option<&[f64]>) -> Result<Vec<Homogeneous>, Defect> {
-    if points.len() > MAX_POINTS || weights.is_some_and(|w| w.len() != points.len()) {
+    if points.len() > MAX_POINTS {
         return Err(Defect::Counts);
+    }
+    if weights.is_some_and(|w| w.len() != points.len()) {
+        return Err(Defect::WeightCount);
     }
     // Only ratios of weights matter: scaled so that the largest is 1.
     let largest = weights.map_or(1.0, |w| w.iter().copied().fold(0.0, f64::max));
@@ -367,6 +374,7 @@ mod tests {
         assert_eq!(curve(2, vec![0.0; 6], &p, None).unwrap_err(), Defect::Domain);
         let knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
         assert_eq!(curve(2, knots.clone(), &p, Some(&[1.0, 0.0, 1.0])).unwrap_err(), Defect::Weights);
+        assert_eq!(curve(2, knots.clone(), &p, Some(&[1.0, 1.0])).unwrap_err(), Defect::WeightCount);
         assert_eq!(curve(2, vec![0.0, 0.0, 1.0, 0.0, 1.0, 1.0], &p, None).unwrap_err(), Defect::Knots);
         let far = [Point::ZERO, Point::splat(f64::NAN), Point::ONE];
         assert_eq!(curve(2, knots, &far, None).unwrap_err(), Defect::Points);

@@ -106,6 +106,7 @@ fn a_curve_whose_weights_are_no_numbers_is_no_polynomial() {
     // accounts are sums over a few nodes.
     close(area(&read(&trimmed(&curve("1."), "0.,1.,0.,1."))), 15.0 * (5f64.sqrt() + 0.5 * 2f64.asinh()), 1e-8);
     assert_refused(&trimmed(&curve("$"), "0.,1.,0.,1."), "weights are no numbers");
+    assert_refused(&trimmed(&curve("1.,1."), "0.,1.,0.,1."), "the number of weights does not fit");
 }
 
 /// A square of 10 mm with a round hole of radius 2 whose edge has two vertices, `apart` mm from each other; #70 is the hole's bound, #68
