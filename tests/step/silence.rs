@@ -251,6 +251,15 @@ fn kinds_of_shapes_that_are_not_read_are_refused() {
     }
 }
 
+/// A face of a shell that only turns another is refused as one that lacks it, not for its kind.
+#[test]
+fn an_oriented_face_without_a_face_is_refused() {
+    let oriented =
+        |face: &str| plate(0.0).replace("(#72));", &format!("(#74));\n#74=ORIENTED_FACE('',*,{face},.F.);"));
+    close(area(&read(&oriented("#72"))), 100.0 - 4.0 * PI, 1e-4);
+    assert_refused(&oriented("$"), "its face is missing");
+}
+
 /// Composite curves of composite curves, eight to eight: counted before they are read.
 #[test]
 fn composite_curves_that_multiply_are_refused() {

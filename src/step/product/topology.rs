@@ -123,8 +123,7 @@ impl ShapeItems {
                 return;
             }
             self.add_shell(file, a.id(0), &name, &[id], true, e);
-            // Of a complex instance the voids are attributes of their own; of a simple one they stand behind the
-            // shell.
+            // Of a complex instance the voids are attributes of their own; of a simple one they stand behind the shell.
             if let Some(v) = e.attributes("BREP_WITH_VOIDS", 2) {
                 self.add_voids(file, e, v.list(0), &name);
             }
@@ -311,7 +310,9 @@ pub(crate) fn read_face(file: &File<'_>, id: u64) -> Outcome<FacePlan> {
     } else if owner.is_one_of(&["ADVANCED_FACE", "FACE_SURFACE"]) {
         (owner.args().id(2), owner.args().flag(3))
     } else {
-        return Err(Refusal::new(e, "this kind of face is not supported"));
+        let why =
+            if owner.is_a("ORIENTED_FACE") { "its face is missing" } else { "this kind of face is not supported" };
+        return Err(Refusal::new(e, why));
     };
     let Some(surface) = surface else { return Err(Refusal::new(e, "its surface is missing")) };
     let mut loops = Vec::new();
