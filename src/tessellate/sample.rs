@@ -6,6 +6,7 @@ use super::triangle_frame::TriangleFrame;
 use crate::math::{Point, Uv, Vector};
 use crate::mesh::FacetMesh;
 use crate::model::Model;
+use crate::nurbs::Surface;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
@@ -49,6 +50,9 @@ const UNEVEN: f64 = 0.05;
 const GRID: usize = 8;
 /// Share of a triangle's size within which places of a pole are one.
 const SAME_PLACE: f64 = 1e-9;
+
+/// Share of the domain within which a place is on a knot, and share of the way into the facet by which its normal is taken beside it.
+const BESIDE_KNOT: f64 = 1e-9;
 
 /// Samples every facet, in parallel; facets of ready meshes give zeros. Vertices need their `uv`.
 pub(super) fn sample_mesh(mesh: &FacetMesh, model: &Model) -> Vec<Sampled> {
@@ -147,14 +151,30 @@ fn sample_facet(
     out.sag = farthest_foot(surface, &mut feet, &pieces, out.sag);
     let area: f64 = flat.iter().map(TriangleFrame::doubled_area).sum();
     out.mean = feet.iter().map(|f| f.weight * f.away).sum::<f64>() / area;
+    let middle = uv.into_iter().sum::<Uv>() * 0.25;
     for foot in &feet {
-        if let (Some(a), Some(e)) = (foot.normal.try_normalize(), surface.spline.normal(foot.uv)) {
+        let at = beside_knots(surface.spline, foot.uv, middle);
+        if let (Some(a), Some(e)) = (foot.normal.try_normalize(), surface.spline.normal(at)) {
             // The arctangent keeps its digits at small angles, where a cosine has none.
             out.normal_errors.push(a.cross(e).length().atan2(a.dot(e)) as f32);
         }
     }
     out.evaluations = surface.evaluations();
     out
+}
+
+/// Returns parameters `at`, moved a little towards `middle` off knots inside the domain: there the spline may have a crease, of which it is
+/// evaluated on the far side. Ends of the domain stay, as poles may lie on them.
+fn beside_knots(spline: &Surface, mut at: Uv, middle: Uv) -> Uv {
+    for (d, [low, high]) in spline.domain().into_iter().enumerate() {
+        let near = BESIDE_KNOT * (high - low);
+        let first = spline.knots[d].partition_point(|&k| k < at[d] - near);
+        let knot = spline.knots[d].get(first).copied().filter(|&k| k <= at[d] + near && low < k && k < high);
+        if let Some(knot) = knot {
+            at[d] = knot + BESIDE_KNOT * (middle[d] - knot);
+        }
+    }
+    at
 }
 
 /// Returns the largest distance of the feet, or `least` where none is farther; feet beyond it are looked for again over the triangles
@@ -216,7 +236,7 @@ mod tests {
     use super::*;
     use crate::math::Frame;
     use crate::model::{Face, Part, Shell};
-    use crate::nurbs::{Surface, sweep};
+    use crate::nurbs::sweep;
     use crate::tessellate::{Settings, tessellate};
 
     const RADIUS: f64 = 10.0;
@@ -286,6 +306,27 @@ mod tests {
             let away = farthest_foot(&surface, &mut [foot(&surface, x, uv[2])], &[uv], 1e-6);
             assert!(away <= 1e-6, "{b:?}: {away}");
         }
+    }
+
+    /// Two flat pieces at a right angle, whose facets are exact, and so are their normals up to the crease.
+    #[test]
+    fn normals_at_a_crease_are_those_of_the_facets_own_side() {
+        let profile = [Point::ZERO, Point::X, Point::X + Point::Z];
+        let points = profile.iter().flat_map(|&p| [p, p + Point::Y]).map(|p| p.extend(1.0)).collect();
+        let knots = [vec![0.0, 0.0, 1.0, 2.0, 2.0], vec![0.0, 0.0, 1.0, 1.0]];
+        let surface = Surface { degree: [1, 1], knots, points };
+        for (side, normal) in [(0.5, Vector::Z), (1.5, -Vector::X)] {
+            let at = beside_knots(&surface, Uv::new(1.0, 0.0), Uv::new(side, 0.5));
+            assert!(
+                surface.normal(at).is_some_and(|n| (n - normal).length() < 1e-12) && at.y == 0.0,
+                "{side}: {at}"
+            );
+        }
+        let shells = vec![Shell { faces: vec![Face::whole(surface)], ..Shell::default() }];
+        let model = Model::from_part(Part { shells, ..Part::default() });
+        let mesh = tessellate(&model, &Settings::uniform(1e-2)).mesh;
+        let errors: Vec<f32> = sample_mesh(&mesh, &model).into_iter().flat_map(|s| s.normal_errors).collect();
+        assert!(!errors.is_empty() && errors.iter().all(|e| *e < 1e-6), "{errors:?}");
     }
 
     /// Returns the corners of a surface's domain, in turn.
