@@ -113,7 +113,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let basis = self.resolve(e, args.id(0), "basis curve")?;
         let DirectedCurve { shape, reversed } = self.curve(basis.id, depth + 1)?;
         let sense = args.flag(3) != Some(false);
-        let by_point = args.word(4) == Some("CARTESIAN");
+        let by_point = args.word(4).as_deref() == Some("CARTESIAN");
         let limit = |list: Args<'f, 'a>| -> Outcome<f64> {
             let point = || (0..list.len()).find_map(|i| self.point(list.id(i)?).ok()).map(|p| shape.parameter(p));
             // The file says which of its two trimming values it means; writers that give only the other are understood too.

@@ -142,10 +142,10 @@ fn unit_factor(unit: Entity<'_, '_>, depth: usize) -> Option<(Kind, f64, String)
 /// Returns kind, size in mm or rad, and name of an SI_UNIT with these attributes; `None` for anything but metres and radians.
 fn si_unit(args: Args<'_, '_>) -> Option<(Kind, f64, String)> {
     let prefix = args.word(0);
-    let factor = prefix.map_or(Some(1.0), si_prefix)?;
+    let factor = prefix.as_deref().map_or(Some(1.0), si_prefix)?;
     let base = args.word(1)?;
     let name = prefix.map_or_else(|| base.to_string(), |p| format!("{p} {base}"));
-    match base {
+    match &*base {
         "METRE" => Some((Kind::Length, factor * METRE, name)),
         "RADIAN" => Some((Kind::Angle, factor, name)),
         _ => None,
@@ -191,6 +191,21 @@ mod tests {
             );
             let file = part21::parse("units.stp", text.as_bytes()).unwrap();
             assert_eq!(read_context(file.entity(1).unwrap()).units.accuracy, expected, "{list}");
+        }
+    }
+
+    #[test]
+    fn a_unit_in_small_letters_keeps_its_size() {
+        for (unit, expected) in [("$,.metre.", 1000.0), (".centi.,.Metre.", 10.0)] {
+            let text = format!(
+                "ISO-10303-21;\nDATA;\n#1=(GLOBAL_UNIT_ASSIGNED_CONTEXT((#2))REPRESENTATION_CONTEXT('',''));\n\
+                 #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT({unit}));\n#3=ORIENTED_EDGE(.t.,.False.,.u.,$);\nENDSEC;\n"
+            );
+            let file = part21::parse("units.stp", text.as_bytes()).unwrap();
+            let assigned = read_context(file.entity(1).unwrap());
+            assert_eq!((assigned.units.length, assigned.unreadable), (expected, vec![]), "{unit}");
+            let flags = file.entity(3).unwrap().args();
+            assert_eq!([0, 1, 2, 3].map(|i| flags.flag(i)), [Some(true), Some(false), None, None]);
         }
     }
 

@@ -18,6 +18,7 @@ pub(super) use parser::parse;
 use index::{Index, Instance, Kinds};
 use short_names::Keyword;
 use span::Span;
+use std::borrow::Cow;
 
 /// Reals below this that stand for a count are exact: 2⁵³ is 9e15.
 const EXACT_COUNT: f64 = 1e15;
@@ -278,17 +279,18 @@ impl<'f, 'a> Args<'f, 'a> {
         self.text(i).unwrap_or_default()
     }
 
-    /// Returns an enumeration value without its dots; `None` for anything else.
-    pub(super) fn word(&self, i: usize) -> Option<&'a str> {
-        match self.value(i)? {
-            Value::Enum(span) => std::str::from_utf8(self.file.bytes(span)).ok(),
-            _ => None,
-        }
+    /// Returns an enumeration value in capitals, without its dots; `None` for anything else.
+    pub(super) fn word(&self, i: usize) -> Option<Cow<'a, str>> {
+        let Value::Enum(span) = self.value(i)? else { return None };
+        let written = std::str::from_utf8(self.file.bytes(span)).ok()?;
+        // Part 21 has capitals alone; a few writers give small letters.
+        let is_small = written.bytes().any(|c| c.is_ascii_lowercase());
+        Some(if is_small { Cow::Owned(written.to_ascii_uppercase()) } else { Cow::Borrowed(written) })
     }
 
     /// Returns a truth value, `.T.` or `.F.`; `None` for anything else, `.U.` too.
     pub(super) fn flag(&self, i: usize) -> Option<bool> {
-        match self.word(i)? {
+        match &*self.word(i)? {
             "T" | "TRUE" => Some(true),
             "F" | "FALSE" => Some(false),
             _ => None,
