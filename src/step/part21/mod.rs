@@ -5,6 +5,7 @@
 //! its line; nesting, memory and time are bounded by the length of the input. Known weakness: one thread, and
 //! sources beyond 4 GiB are refused, because spans are 32 bits.
 
+mod faults;
 mod index;
 mod number;
 mod parser;
@@ -129,7 +130,7 @@ impl<'a> File<'a> {
 
     /// Returns the parameters of the first header record of this name, such as `FILE_SCHEMA`.
     pub(super) fn header(&self, name: &str) -> Option<Args<'_, 'a>> {
-        let record = self.header.iter().find(|r| self.name(r) == name.as_bytes())?;
+        let record = self.header.iter().find(|r| self.name(r).eq_ignore_ascii_case(name.as_bytes()))?;
         Some(self.args(record.values))
     }
 

@@ -1,19 +1,18 @@
 //! The one pass over the text: statements into the arena of values, faults noted and stepped over.
 
+use super::faults::Faults;
 use super::index::{Index, Instance, Kinds};
 use super::number::number;
 use super::sections::section_besides_data;
 use super::short_names::Keyword;
 use super::span::Span;
-use super::{Fault, File, Record, Value};
+use super::{File, Record, Value};
 use crate::step::{Error, ErrorKind};
 
 /// Deepest nesting of lists; schemas need 3, real files have shown 4.
 const MAX_DEPTH: usize = 32;
 /// Stands for the byte behind the last one; a NUL in the text is an unexpected byte as well.
 const END: u8 = 0;
-/// Faults that are kept with their lines; the rest is counted.
-const MAX_FAULTS: usize = 100;
 
 /// Parses a whole file, `name` being for messages. Fails only for 4 GiB and more, and for bytes that are no Part 21 file at all.
 pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a>, Error> {
@@ -30,9 +29,7 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
         instances: Vec::with_capacity(source.len() / 64),
         header: Vec::new(),
         stack: Vec::new(),
-        faults: Vec::new(),
-        fault_count: 0,
-        lines: (0, 1),
+        faults: Faults::new(source),
         rewound: 0,
         is_ended: false,
     };
@@ -44,7 +41,11 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     let (index, repeated) = Index::take_repeated(&mut p.instances);
     for instance in repeated {
         let start = p.records[instance.first as usize].name.start as usize;
-        p.note(start, Some(instance.id), "its number stands for an earlier instance already; this one is left out");
+        p.faults.note(
+            start,
+            Some(instance.id),
+            "its number stands for an earlier instance already; this one is left out",
+        );
     }
     let names = (0u32..).zip(&p.instances).flat_map(|(position, i)| {
         let records = &p.records[i.first as usize..][..i.count as usize];
@@ -60,8 +61,8 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
         header: p.header,
         index,
         kinds,
-        faults: p.faults,
-        fault_count: p.fault_count,
+        faults: p.faults.first,
+        fault_count: p.faults.count,
         is_ended: p.is_ended,
     })
 }
@@ -76,10 +77,7 @@ struct Parser<'a> {
     header: Vec<Record>,
     /// Values of the lists that are still open.
     stack: Vec<Value>,
-    faults: Vec<Fault>,
-    fault_count: usize,
-    /// A position and its line, so that lines are counted once.
-    lines: (usize, usize),
+    faults: Faults<'a>,
     /// Bytes read again because of faults; bounded, so that time stays linear in the input.
     rewound: usize,
     /// See [`File::is_ended`].
@@ -110,15 +108,15 @@ impl Parser<'_> {
                 }
                 c if c.is_ascii_alphabetic() => {
                     let name = Keyword::new(self.source, self.identifier());
-                    marked |= name.bytes(self.source) == b"ISO-10303-21";
-                    self.is_ended |= name.bytes(self.source) == b"END-ISO-10303-21";
+                    marked |= name.bytes(self.source).eq_ignore_ascii_case(b"ISO-10303-21");
+                    self.is_ended |= name.bytes(self.source).eq_ignore_ascii_case(b"END-ISO-10303-21");
                     // A long word at the very beginning is some other kind of file.
                     if !marked && self.instances.is_empty() && self.at - start > 64 {
                         return false;
                     }
                     if let Some(section) = section_besides_data(name.bytes(self.source), &self.source[self.at..]) {
                         for (at, id) in section.elsewhere {
-                            self.note(
+                            self.faults.note(
                                 self.at + at,
                                 Some(id),
                                 "stands in another file, which is not read with this one",
@@ -152,7 +150,7 @@ impl Parser<'_> {
     #[cold]
     fn fault(&mut self, start: usize, id: Option<u64>, what: &'static str) {
         self.stack.clear();
-        self.note(start, id, what);
+        self.faults.note(start, id, what);
         // Behind the next ';' that ends a line or a statement; an open text must not swallow the statements after it.
         let mut i = start;
         while let Some(offset) = self.source[i..].iter().position(|&b| b == b';') {
@@ -170,18 +168,6 @@ impl Parser<'_> {
         self.rewound += self.at.saturating_sub(next);
         // More than 8 passes over the file: it is damaged on purpose.
         self.at = if self.rewound > 8 * self.source.len() { self.source.len() } else { next };
-    }
-
-    /// Counts a fault, and lists it with its line while there are at most [`MAX_FAULTS`].
-    fn note(&mut self, start: usize, id: Option<u64>, what: &'static str) {
-        self.fault_count += 1;
-        if self.faults.len() < MAX_FAULTS {
-            // Faults come in the order of the file but for numbers used twice, which are found at the end.
-            let (from, line) = if self.lines.0 <= start { self.lines } else { (0, 1) };
-            let newlines = self.source[from..start].iter().filter(|&&b| b == b'\n').count();
-            self.lines = (start, line + newlines);
-            self.faults.push(Fault { line: line + newlines, id, what });
-        }
     }
 
     /// Skips whitespace, comments and print directives.

@@ -13,12 +13,12 @@ pub(super) struct Section {
 
 /// Returns what the section whose first word is `name` holds of `rest`, the bytes behind that word; `None` for any other word.
 pub(super) fn section_besides_data(name: &[u8], rest: &[u8]) -> Option<Section> {
-    if ![&b"ANCHOR"[..], b"REFERENCE", b"SIGNATURE"].contains(&name) {
+    if ![&b"ANCHOR"[..], b"REFERENCE", b"SIGNATURE"].iter().any(|word| name.eq_ignore_ascii_case(word)) {
         return None;
     }
-    let length = rest.windows(END.len()).position(|w| w == END).unwrap_or(rest.len());
+    let length = rest.windows(END.len()).position(|w| w.eq_ignore_ascii_case(END)).unwrap_or(rest.len());
     let mut elsewhere = Vec::new();
-    if name == b"REFERENCE" {
+    if name.eq_ignore_ascii_case(b"REFERENCE") {
         let mut at = 0;
         // Each statement is `#12 = <other.stp#name>;`, or begins with `@` for a value.
         for statement in rest[..length].split_inclusive(|c| *c == b';') {

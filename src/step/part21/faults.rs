@@ -1,0 +1,65 @@
+//! Faults of a text, with their lines.
+
+use super::Fault;
+
+/// Faults that are kept with their lines; the rest is counted.
+const MAX_FAULTS: usize = 100;
+
+/// What was noted of a source so far.
+pub(super) struct Faults<'a> {
+    source: &'a [u8],
+    /// The first ones.
+    pub(super) first: Vec<Fault>,
+    /// How many there are in all.
+    pub(super) count: usize,
+    /// A position and its line, so that lines are counted once.
+    lines: (usize, usize),
+}
+
+impl<'a> Faults<'a> {
+    /// Returns an empty list for a source.
+    pub(super) fn new(source: &'a [u8]) -> Self {
+        Self { source, first: Vec::new(), count: 0, lines: (0, 1) }
+    }
+
+    /// Counts a fault at byte `start`, and lists it with its line while there are at most [`MAX_FAULTS`].
+    pub(super) fn note(&mut self, start: usize, id: Option<u64>, what: &'static str) {
+        self.count += 1;
+        if self.first.len() < MAX_FAULTS {
+            // Faults come in the order of the file but for a few, which are found at the end.
+            let (from, line) = if self.lines.0 <= start { self.lines } else { (0, 1) };
+            let newlines = self.source[from..start].iter().filter(|&&b| b == b'\n').count();
+            self.lines = (start, line + newlines);
+            self.first.push(Fault { line: line + newlines, id, what });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::step::part21::parse;
+
+    /// Asserts which instances are read of a file with these statements, whether it is whole, and which lines have a fault of which words.
+    fn assert_read(statements: &str, ids: &[u64], is_ended: bool, faults: &[(usize, &str)]) {
+        let text = format!("ISO-10303-21;\nDATA;\n{statements}");
+        let file = parse("faults.stp", text.as_bytes()).unwrap();
+        let said: Vec<(usize, &str)> = file.faults.iter().map(|fault| (fault.line, fault.what)).collect();
+        assert_eq!(file.entities().map(|e| e.id).collect::<Vec<_>>(), ids, "{text}: {said:?}");
+        assert_eq!((file.is_ended, said.len()), (is_ended, faults.len()), "{text}: {said:?}");
+        for ((line, what), (expected_line, words)) in said.iter().zip(faults) {
+            assert!(line == expected_line && what.contains(words), "{text}: {said:?}");
+        }
+    }
+
+    #[test]
+    fn keywords_in_small_letters_are_keywords() {
+        assert_read("#1=A();\nendsec;\nend-iso-10303-21;\n", &[1], true, &[]);
+        assert_read("#1=A();\nendsec;\n", &[1], false, &[]);
+        assert_read(
+            "reference;\n#2=<b.stp#x>;\nendsec;\n#1=A();\nEnd-Iso-10303-21;\n",
+            &[1],
+            true,
+            &[(4, "another file")],
+        );
+    }
+}
