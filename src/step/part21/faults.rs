@@ -35,6 +35,21 @@ impl<'a> Faults<'a> {
     }
 }
 
+/// Returns where to go on behind a fault in the statement that began at `start` and was read up to `at`: the next ';' that ends a line or a
+/// statement, for an open text must not swallow the statements after it.
+pub(super) fn next_statement(source: &[u8], start: usize, at: usize) -> usize {
+    let mut i = start;
+    while let Some(offset) = source[i..].iter().position(|&b| b == b';') {
+        i += offset + 1;
+        let next = source[i..].iter().position(|b| *b > b' ').map(|k| source[i + k]);
+        // Behind the place of the fault any ';' will do.
+        if matches!(next, None | Some(b'#' | b'E' | b'/' | b'D')) || i >= at {
+            return i;
+        }
+    }
+    if i == start { source.len() } else { i }
+}
+
 #[cfg(test)]
 mod tests {
     use crate::step::part21::parse;
@@ -61,5 +76,14 @@ mod tests {
             true,
             &[(4, "another file")],
         );
+    }
+
+    #[test]
+    fn nothing_behind_the_end_of_a_file_is_read() {
+        let file = "#1=A();\nENDSEC;\nEND-ISO-10303-21;\n";
+        assert_read(&format!("{file} /* blanks and #2=B(); */\n\x1a"), &[1], true, &[]);
+        assert_read(&format!("{file}SIGNATURE;\nMIIB#2=(;)\nENDSEC;\n"), &[1], true, &[]);
+        let second = format!("{file}ISO-10303-21;\nDATA;\n#1=A();\n#2=B();\nENDSEC;\nEND-ISO-10303-21;\n");
+        assert_read(&second, &[1], true, &[(6, "behind the end")]);
     }
 }

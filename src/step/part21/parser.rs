@@ -1,9 +1,9 @@
 //! The one pass over the text: statements into the arena of values, faults noted and stepped over.
 
-use super::faults::Faults;
+use super::faults::{Faults, next_statement};
 use super::index::{Index, Instance, Kinds};
 use super::number::number;
-use super::sections::section_besides_data;
+use super::sections::{section_besides_data, signature_length};
 use super::short_names::Keyword;
 use super::span::Span;
 use super::{File, Record, Value};
@@ -109,7 +109,10 @@ impl Parser<'_> {
                 c if c.is_ascii_alphabetic() => {
                     let name = Keyword::new(self.source, self.identifier());
                     marked |= name.bytes(self.source).eq_ignore_ascii_case(b"ISO-10303-21");
-                    self.is_ended |= name.bytes(self.source).eq_ignore_ascii_case(b"END-ISO-10303-21");
+                    if name.bytes(self.source).eq_ignore_ascii_case(b"END-ISO-10303-21") {
+                        self.finish(start);
+                        return marked;
+                    }
                     // A long word at the very beginning is some other kind of file.
                     if !marked && self.instances.is_empty() && self.at - start > 64 {
                         return false;
@@ -146,25 +149,27 @@ impl Parser<'_> {
         }
     }
 
+    /// Reads on from the word at `start` that ends the file: its ';' and signatures. Anything else is noted and left, as a second file is.
+    fn finish(&mut self, start: usize) {
+        self.is_ended = true;
+        if let Err(what) = self.end() {
+            self.faults.note(start, None, what);
+        }
+        while self.peek() != END {
+            let Some(length) = signature_length(&self.source[self.at..]) else {
+                self.faults.note(self.at, None, "text behind the end of the file is not read");
+                return;
+            };
+            self.at += length;
+        }
+    }
+
     /// Notes a fault of the statement that began at `start`, and goes on behind that statement.
     #[cold]
     fn fault(&mut self, start: usize, id: Option<u64>, what: &'static str) {
         self.stack.clear();
         self.faults.note(start, id, what);
-        // Behind the next ';' that ends a line or a statement; an open text must not swallow the statements after it.
-        let mut i = start;
-        while let Some(offset) = self.source[i..].iter().position(|&b| b == b';') {
-            i += offset + 1;
-            let next = self.source[i..].iter().position(|b| *b > b' ').map(|k| self.source[i + k]);
-            if matches!(next, None | Some(b'#' | b'E' | b'/' | b'D')) {
-                break;
-            }
-            // Behind the place of the fault any ';' will do.
-            if i >= self.at {
-                break;
-            }
-        }
-        let next = if i == start { self.source.len() } else { i };
+        let next = next_statement(self.source, start, self.at);
         self.rewound += self.at.saturating_sub(next);
         // More than 8 passes over the file: it is damaged on purpose.
         self.at = if self.rewound > 8 * self.source.len() { self.source.len() } else { next };

@@ -16,7 +16,7 @@ pub(super) fn section_besides_data(name: &[u8], rest: &[u8]) -> Option<Section> 
     if ![&b"ANCHOR"[..], b"REFERENCE", b"SIGNATURE"].iter().any(|word| name.eq_ignore_ascii_case(word)) {
         return None;
     }
-    let length = rest.windows(END.len()).position(|w| w.eq_ignore_ascii_case(END)).unwrap_or(rest.len());
+    let length = last_word(rest);
     let mut elsewhere = Vec::new();
     if name.eq_ignore_ascii_case(b"REFERENCE") {
         let mut at = 0;
@@ -32,4 +32,21 @@ pub(super) fn section_besides_data(name: &[u8], rest: &[u8]) -> Option<Section> 
         }
     }
     Some(Section { length, elsewhere })
+}
+
+/// Returns the length of the signature that `rest` begins with, up to the ';' at its end; `None` for anything else. Signatures are all that
+/// follows the end of a file (ISO 10303-21:2016).
+pub(super) fn signature_length(rest: &[u8]) -> Option<usize> {
+    const NAME: &[u8] = b"SIGNATURE";
+    if !rest.get(..NAME.len())?.eq_ignore_ascii_case(NAME) {
+        return None;
+    }
+    let last = last_word(rest);
+    let semicolon = rest[last..].iter().position(|c| *c == b';');
+    Some(semicolon.map_or(rest.len(), |offset| last + offset + 1))
+}
+
+/// Returns where the word that ends a section stands in `bytes`; their end where it is missing.
+fn last_word(bytes: &[u8]) -> usize {
+    bytes.windows(END.len()).position(|w| w.eq_ignore_ascii_case(END)).unwrap_or(bytes.len())
 }
