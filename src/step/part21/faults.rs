@@ -86,4 +86,11 @@ mod tests {
         let second = format!("{file}ISO-10303-21;\nDATA;\n#1=A();\n#2=B();\nENDSEC;\nEND-ISO-10303-21;\n");
         assert_read(&second, &[1], true, &[(6, "behind the end")]);
     }
+
+    #[test]
+    fn a_number_beyond_64_bits_is_no_instance() {
+        let statements = "#99999999999999999999=A();\n#88888888888888888888=B();\n#18446744073709551614=C(#99999999999999999999);\n";
+        let faults = [(3, "too large"), (4, "too large")];
+        assert_read(&format!("{statements}END-ISO-10303-21;\n"), &[u64::MAX - 1], true, &faults);
+    }
 }

@@ -13,6 +13,8 @@ use crate::step::{Error, ErrorKind};
 const MAX_DEPTH: usize = 32;
 /// Stands for the byte behind the last one; a NUL in the text is an unexpected byte as well.
 const END: u8 = 0;
+/// Stands for all ids beyond 64 bits, which no instance has.
+const TOO_LARGE: u64 = u64::MAX;
 
 /// Parses a whole file, `name` being for messages. Fails only for 4 GiB and more, and for bytes that are no Part 21 file at all.
 pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a>, Error> {
@@ -228,7 +230,7 @@ impl Parser<'_> {
         Span { start: start as u32, len: (self.at - start) as u32 }
     }
 
-    /// Reads the digits of an id behind '#'; numbers beyond 64 bits are damage and all become `u64::MAX`. Fails where there is no digit.
+    /// Reads the digits of an id behind '#'; numbers beyond 64 bits are damage and become [`TOO_LARGE`]. Fails where there is no digit.
     fn unsigned(&mut self) -> Parsed<u64> {
         let start = self.at;
         let mut x = 0u64;
@@ -243,6 +245,9 @@ impl Parser<'_> {
     fn instance(&mut self, id_out: &mut Option<u64>) -> Parsed<()> {
         self.at += 1;
         let id = self.unsigned()?;
+        if id == TOO_LARGE {
+            return Err("its number is too large");
+        }
         *id_out = Some(id);
         if self.peek() != b'=' {
             return Err("'=' is missing behind the instance's number");
