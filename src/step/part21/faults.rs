@@ -50,6 +50,15 @@ pub(super) fn next_statement(source: &[u8], start: usize, at: usize) -> usize {
     if i == start { source.len() } else { i }
 }
 
+/// Returns how many bytes of `rest`, which belong to no statement, stand before the next one: up to a '#' or ';', or behind a stray `*/`.
+pub(super) fn stray_length(rest: &[u8]) -> usize {
+    // What ends a comment that none began costs nothing else, as the word behind it may end the file.
+    if rest.starts_with(b"*/") {
+        return 2;
+    }
+    rest.iter().position(|b| matches!(b, b'#' | b';')).unwrap_or(rest.len())
+}
+
 #[cfg(test)]
 mod tests {
     use crate::step::part21::parse;
@@ -85,6 +94,20 @@ mod tests {
         assert_read(&format!("{file}SIGNATURE;\nMIIB#2=(;)\nENDSEC;\n"), &[1], true, &[]);
         let second = format!("{file}ISO-10303-21;\nDATA;\n#1=A();\n#2=B();\nENDSEC;\nEND-ISO-10303-21;\n");
         assert_read(&second, &[1], true, &[(6, "behind the end")]);
+    }
+
+    #[test]
+    fn what_ends_no_comment_costs_no_instance() {
+        let stray = &[(4, "neither '#' nor a letter")];
+        assert_read("#1=A();\n/* a /* b */ */\n#2=B();\nEND-ISO-10303-21;\n", &[1, 2], true, stray);
+        assert_read("#1=A();\n/* a /* b */ */\nEND-ISO-10303-21;\n", &[1], true, stray);
+        assert_read(
+            "#1=A();\n/* /* */ b */\n#2=B();\nEND-ISO-10303-21;\n",
+            &[1, 2],
+            true,
+            &[(4, "';' is missing")],
+        );
+        assert_read("#1=A();\n) $\n#2=B();\nEND-ISO-10303-21;\n", &[1, 2], true, stray);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The one pass over the text: statements into the arena of values, faults noted and stepped over.
 
-use super::faults::{Faults, next_statement};
+use super::faults::{Faults, next_statement, stray_length};
 use super::index::{Index, Instance, Kinds};
 use super::number::number;
 use super::sections::{section_besides_data, signature_length};
@@ -130,13 +130,13 @@ impl Parser<'_> {
                         self.at += section.length;
                         continue;
                     }
-                    let outcome = if self.peek() == b'(' {
-                        self.list(0).map(|values| self.header.push(Record { name, values }))
-                    } else {
-                        Ok(())
-                    };
-                    if let Err(what) = outcome.and_then(|()| self.end()) {
-                        self.fault(start, None, what);
+                    if self.peek() == b'(' {
+                        let outcome = self.list(0).map(|values| self.header.push(Record { name, values }));
+                        if let Err(what) = outcome.and_then(|()| self.end()) {
+                            self.fault(start, None, what);
+                        }
+                    } else if let Err(what) = self.end() {
+                        self.pass_stray(start, what);
                     }
                 }
                 b';' => self.at += 1,
@@ -145,7 +145,7 @@ impl Parser<'_> {
                     if !marked && self.instances.is_empty() {
                         return false;
                     }
-                    self.fault(start, None, "a statement starts with neither '#' nor a letter")
+                    self.pass_stray(start, "a statement starts with neither '#' nor a letter");
                 }
             }
         }
@@ -175,6 +175,13 @@ impl Parser<'_> {
         self.rewound += self.at.saturating_sub(next);
         // More than 8 passes over the file: it is damaged on purpose.
         self.at = if self.rewound > 8 * self.source.len() { self.source.len() } else { next };
+    }
+
+    /// Notes bytes from `start` on that belong to no statement, and goes on where the next one may start.
+    #[cold]
+    fn pass_stray(&mut self, start: usize, what: &'static str) {
+        self.faults.note(start, None, what);
+        self.at += stray_length(&self.source[self.at..]);
     }
 
     /// Skips whitespace, comments and print directives.
