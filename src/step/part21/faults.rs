@@ -111,6 +111,13 @@ mod tests {
     }
 
     #[test]
+    fn a_comment_that_does_not_end_is_told() {
+        assert_read("#1=A();\n\n/* open\n#2=B();\nEND-ISO-10303-21;\n", &[1], false, &[(5, "does not end")]);
+        let faults = [(4, "inside a list"), (4, "does not end")];
+        assert_read("#1=A();\n#2=B(/* open\n#3=C();\nEND-ISO-10303-21;\n", &[1], true, &faults);
+    }
+
+    #[test]
     fn a_number_beyond_64_bits_is_no_instance() {
         let statements = "#99999999999999999999=A();\n#88888888888888888888=B();\n#18446744073709551614=C(#99999999999999999999);\n";
         let faults = [(3, "too large"), (4, "too large")];

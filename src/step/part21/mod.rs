@@ -5,6 +5,7 @@
 //! its line; nesting, memory and time are bounded by the length of the input. Known weakness: one thread, and
 //! sources beyond 4 GiB are refused, because spans are 32 bits.
 
+mod blanks;
 mod faults;
 mod index;
 mod number;

@@ -9,6 +9,17 @@ const POWERS: [f64; 23] = [
     1e20, 1e21, 1e22,
 ];
 
+/// Stands for all ids beyond 64 bits, which no instance has.
+pub(super) const TOO_LARGE: u64 = u64::MAX;
+
+/// Reads the digits of an id at byte `at` and returns it with the position after it, [`TOO_LARGE`] beyond 64 bits; `None` without digits.
+pub(super) fn unsigned(source: &[u8], at: usize) -> Option<(u64, usize)> {
+    let digits = source[at..].iter().take_while(|c| c.is_ascii_digit());
+    let (id, count) = digits
+        .fold((0u64, 0), |(id, count), c| (id.saturating_mul(10).saturating_add(u64::from(c - b'0')), count + 1));
+    (count > 0).then_some((id, at + count))
+}
+
 /// Reads an integer or real at byte `at` and returns it with the position after it.
 ///
 /// Integers beyond 64 bits become reals, and FORTRAN's `D` marks an exponent too. `None` without digits, or where the value overflows.

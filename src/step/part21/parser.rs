@@ -1,8 +1,9 @@
 //! The one pass over the text: statements into the arena of values, faults noted and stepped over.
 
+use super::blanks::skip_blanks;
 use super::faults::{Faults, next_statement, stray_length};
 use super::index::{Index, Instance, Kinds};
-use super::number::number;
+use super::number::{TOO_LARGE, number, unsigned};
 use super::sections::{section_besides_data, signature_length};
 use super::short_names::Keyword;
 use super::span::Span;
@@ -13,8 +14,6 @@ use crate::step::{Error, ErrorKind};
 const MAX_DEPTH: usize = 32;
 /// Stands for the byte behind the last one; a NUL in the text is an unexpected byte as well.
 const END: u8 = 0;
-/// Stands for all ids beyond 64 bits, which no instance has.
-const TOO_LARGE: u64 = u64::MAX;
 
 /// Parses a whole file, `name` being for messages. Fails only for 4 GiB and more, and for bytes that are no Part 21 file at all.
 pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a>, Error> {
@@ -33,12 +32,16 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
         stack: Vec::new(),
         faults: Faults::new(source),
         rewound: 0,
+        open_comment: None,
         is_ended: false,
     };
     let marked = p.statements();
     // A lost first line is forgiven to a file that goes on with instances.
     if !marked && p.instances.is_empty() {
         return Err(Error::new(ErrorKind::NotStep { file: name.into() }));
+    }
+    if let Some(start) = p.open_comment {
+        p.faults.note(start, None, "a comment that begins here does not end");
     }
     let (index, repeated) = Index::take_repeated(&mut p.instances);
     for instance in repeated {
@@ -82,6 +85,8 @@ struct Parser<'a> {
     faults: Faults<'a>,
     /// Bytes read again because of faults; bounded, so that time stays linear in the input.
     rewound: usize,
+    /// Where the first comment begins that does not end.
+    open_comment: Option<usize>,
     /// See [`File::is_ended`].
     is_ended: bool,
 }
@@ -186,20 +191,9 @@ impl Parser<'_> {
 
     /// Skips whitespace, comments and print directives.
     fn skip(&mut self) {
-        loop {
-            while self.at < self.source.len() && self.source[self.at] <= b' ' {
-                self.at += 1;
-            }
-            let rest = &self.source[self.at..];
-            if rest.starts_with(b"/*") {
-                let end = rest[2..].windows(2).position(|w| w == b"*/");
-                self.at = end.map_or(self.source.len(), |p| self.at + p + 4);
-            } else if rest.starts_with(b"\\N\\") || rest.starts_with(b"\\F\\") {
-                self.at += 3;
-            } else {
-                return;
-            }
-        }
+        let (next, open_comment) = skip_blanks(self.source, self.at);
+        self.at = next;
+        self.open_comment = self.open_comment.or(open_comment);
     }
 
     /// Skips blanks, comments and print directives and returns the next byte without taking it; [`END`] at the end.
@@ -239,13 +233,9 @@ impl Parser<'_> {
 
     /// Reads the digits of an id behind '#'; numbers beyond 64 bits are damage and become [`TOO_LARGE`]. Fails where there is no digit.
     fn unsigned(&mut self) -> Parsed<u64> {
-        let start = self.at;
-        let mut x = 0u64;
-        while let Some(c) = self.source.get(self.at).filter(|c| c.is_ascii_digit()) {
-            x = x.saturating_mul(10).saturating_add(u64::from(c - b'0'));
-            self.at += 1;
-        }
-        if self.at == start { Err("digits are missing behind '#'") } else { Ok(x) }
+        let (id, next) = unsigned(self.source, self.at).ok_or("digits are missing behind '#'")?;
+        self.at = next;
+        Ok(id)
     }
 
     /// Reads an instance, simple or complex, from its '#' on; sets `id_out` once its number is known. A missing ';' before '#' is forgiven.
