@@ -2,13 +2,12 @@
 
 use super::border::edge_chords::EdgeSide;
 use super::border::edges::{self, Division, OwnDivision};
-use super::crossing_chords::MeetingSamples;
 use super::face::{self, FaceInput, Unmeshed};
 use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::fallback;
 use super::limits;
-use super::nodes::Position;
+use super::nodes::{MeetingSamples, Position};
 use super::placed_part::PlacedPart;
 use super::previous_round::PreviousRound;
 use super::remesh_budget::RemeshBudget;

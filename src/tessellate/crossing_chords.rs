@@ -5,7 +5,7 @@
 //! themselves cross, both get a corner there.
 
 use super::face_surface::FaceSurface;
-use super::nodes::{Nodes, edge_key};
+use super::nodes::{MeetingSamples, Nodes, edge_key};
 use crate::math::{Point, Uv};
 use crate::model::{EdgeId, Part, TrimLoop};
 use crate::nurbs::{Curve, UvCurve};
@@ -32,9 +32,6 @@ const NEAREST_STEPS: usize = 34;
 /// Steps in which the place where two edges cross is found: each leaves a share of what was missing, about the angle by
 /// which edges turn from their chords, in radians. From a half, 50 steps reach rounding.
 const MEETING_STEPS: usize = 50;
-
-/// Two samples, by edge and parameter, in the one place where their edges cross.
-pub(super) type MeetingSamples = [(EdgeId, f64); 2];
 
 /// A chord, by its nodes, and the edge that it follows.
 type FollowedChord = ([u32; 2], Followed);

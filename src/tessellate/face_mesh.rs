@@ -1,7 +1,6 @@
 //! The facets of one face in its part's coordinates.
 
-use super::crossing_chords::MeetingSamples;
-use super::nodes::Position;
+use super::nodes::{MeetingSamples, Position};
 use super::report::Repair;
 use crate::math::{Point, Uv, Vector};
 use crate::model::EdgeId;

@@ -18,8 +18,8 @@ const SHOWN_PLACES: usize = 12;
 /// Coordinates below this are rounding of what the file has as 0, mm.
 const ROUNDING_MM: f64 = 1e-9;
 
-/// Prints the parts, solids and faces of a model as a tree; with `--json` the document that holds the same, with the refusals and problems of
-/// the report.
+/// Prints the parts, solids and faces of a model as a tree; with `--json` the document that holds the same, with what the
+/// report tells of refusals and problems.
 pub(crate) fn print_faces(model: &Model, report: &ImportReport, console: &Console) -> Result<(), Failure> {
     let parts = model.account();
     let mut selectors = part_selectors(model).into_iter();

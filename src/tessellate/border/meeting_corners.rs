@@ -3,9 +3,8 @@
 use super::polygons::{BorderPolygons, BorderSide};
 use crate::math::Point;
 use crate::model::{EdgeId, TrimLoop};
-use crate::tessellate::crossing_chords::MeetingSamples;
 use crate::tessellate::face_surface::FaceSurface;
-use crate::tessellate::nodes::Position;
+use crate::tessellate::nodes::{MeetingSamples, Position};
 use rustc_hash::FxHashMap;
 
 /// Share of the domain within which the parameters of two samples in one place are one: the trims' own rounding.
