@@ -438,6 +438,10 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "step/part21",
+        &["span", "blanks", "text", "short_names", "index", "mod", "sections", "number", "faults", "parser"],
+    ),
+    (
         "step/product",
         &[
             "loop_order",

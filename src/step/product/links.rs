@@ -34,7 +34,9 @@ impl<'f, 'a> Assembly<'f, 'a> {
             let (from, to) = (args.id(2)?, args.id(3)?);
             // Each placement is in the units of the representation that holds it.
             let (mut holder_from, mut holder_to) = (first, second);
-            if self.is_item(to, first) && self.is_item(from, second) {
+            let is_swapped = self.is_item(to, first) && self.is_item(from, second);
+            // Where both representations hold both placements, the relationship tells which is whose.
+            if is_swapped && !(self.is_item(from, first) && self.is_item(to, second)) {
                 (holder_from, holder_to) = (second, first);
             }
             let from = self.geometry_reader(holder_from).placement(from).ok()?;
