@@ -612,20 +612,6 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "tessellate/border",
-        &[
-            "curve_chords",
-            "edge_chords",
-            "opposite_sides",
-            "edges",
-            "enclosure",
-            "polygons",
-            "cusps",
-            "meeting_corners",
-            "mod",
-        ],
-    ),
-    (
         "tessellate/cells",
         &[
             "cell",
