@@ -3,6 +3,7 @@
 //! A loop like an eight of equal lobes has the signed area 0 of an edge run forth and back, and encloses both lobes.
 
 use super::loops::Chain;
+use super::obstacles::bounds;
 use super::tolerances::{CANCELLED_SHARE, EMPTY_LOBES_SHARE, EMPTY_LOOP_SHARE};
 use crate::math::Uv;
 use crate::math::polygon::{polygon_sides, row_crossing, signed_area};
@@ -48,11 +49,6 @@ fn has_lobes(polygon: &[Uv], chart: &Chart) -> bool {
     let scaled: Vec<Uv> = polygon.iter().map(|p| (*p - first) * speed).collect();
     let [lo, hi] = bounds(&scaled);
     enclosed_area(&scaled) > EMPTY_LOBES_SHARE * (hi - lo).length_squared()
-}
-
-/// Returns the lower and the upper corner of the box around places.
-fn bounds(places: &[Uv]) -> [Uv; 2] {
-    places.iter().fold([Uv::INFINITY, Uv::NEG_INFINITY], |[lo, hi], p| [lo.min(*p), hi.max(*p)])
 }
 
 /// Returns the area that a polygon encloses by the even–odd rule, as the sum over [`ROWS`] rows.
