@@ -165,7 +165,7 @@ impl Kernel for Draw<'_> {
             }
             let mut scrambles = [[0; PACKET]; 4];
             for k in 0..PACKET {
-                let key = Key { seed: packet.seed, ray, branch: packet.sources[k], bounce: block as u32 };
+                let key = Key { seed: packet.seed, ray, branch: packet.sources[k], bounce: block as u32, stratified: false };
                 let words = key.words_in_loop(Purpose::Scramble);
                 for d in 0..4 {
                     scrambles[d][k] = words[d];

@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::payload::RayPayload;
 use crate::simulate::random::{Key, split_branch};
+use crate::simulate::scene::Sampling;
 
 /// Which rays to trace.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +64,14 @@ impl<C: RayPayload> Path<C> {
     /// Returns the key of the random numbers of its present vertex.
     #[inline(always)]
     pub(super) fn key(&self, context: &Context<'_>) -> Key {
-        Key { seed: context.settings.seed, ray: self.ray, branch: self.branch, bounce: self.bounce }
+        let settings = context.settings;
+        Key {
+            seed: settings.seed,
+            ray: self.ray,
+            branch: self.branch,
+            bounce: self.bounce,
+            stratified: settings.sampling == Sampling::Sobol,
+        }
     }
 
     /// Notes that it has just met what is no total reflection; does nothing without media.

@@ -2,17 +2,20 @@
 //!
 //! A number is a function of (seed, ray, branch, bounce, purpose) alone. So a result does not depend on threads, batches or
 //! shards, and a kernel that skips an effect draws the same numbers for all other effects as one that does not.
-//! Philox 4×32-10 (Salmon et al., SC 2011) for everything behind the source; at the source a Sobol net with Owen scrambling,
-//! or Philox as well.
+//! Philox 4×32-10 (Salmon et al., SC 2011) for everything behind the source, there in Latin hypercubes of [`STRATA`] rays
+//! (McKay, Beckman, Conover, Technometrics 21, 1979) unless asked otherwise; at the source a Sobol net with Owen scrambling, or Philox as
+//! well.
 //!
 //! Known weakness: a Sobol index has 32 bits, so a replicate may hold at most 2³² rays of one source.
 
 mod philox;
 mod sobol;
+mod strata;
 
 pub use philox::philox4x32;
 pub use sobol::{BLOCK, DIMENSIONS, scrambled, scrambled_block};
 pub(crate) use sobol::{LOW_INDICES, scrambled_low};
+pub use strata::STRATA;
 
 /// What a random number is for; part of its key, so that adding an effect shifts no other number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -35,6 +38,9 @@ pub enum Purpose {
     BulkDirection = 8,
 }
 
+/// Hits of a path whose numbers are stratified: of the rays of a block few go the same way for longer.
+const STRATIFIED_HITS: u32 = 8;
+
 /// The key of one vertex of one path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Key {
@@ -46,6 +52,9 @@ pub struct Key {
     pub branch: u32,
     /// Number of hits before this one.
     pub bounce: u32,
+    /// Whether, of [`STRATA`] rays from a multiple of that on, one has its number in each stratum of the unit interval, or square, at the
+    /// first surfaces that they meet; else numbers of different rays are independent.
+    pub stratified: bool,
 }
 
 impl Key {
@@ -53,17 +62,36 @@ impl Key {
     #[inline]
     pub fn pair(&self, purpose: Purpose) -> [f64; 2] {
         let [a, b, c, d] = self.words(purpose);
-        [unit(a, b), unit(c, d)]
+        let [mut x, mut y] = [joined(a, b), joined(c, d)];
+        if self.is_stratified(purpose) {
+            [x, y] = strata::within_square(self.stratum(purpose), [x, y]);
+        }
+        [unit(x), unit(y)]
     }
 
-    /// Returns one uniform number in `[0, 1)`, 53 bits: the first of [`Key::pair`].
+    /// Returns one uniform number in `[0, 1)`, 53 bits; the same for the same key and purpose.
     #[inline]
     pub fn unit(&self, purpose: Purpose) -> f64 {
         let [a, b, ..] = self.words(purpose);
-        unit(a, b)
+        let x = joined(a, b);
+        unit(if self.is_stratified(purpose) { strata::within_interval(self.stratum(purpose), x) } else { x })
     }
 
-    /// Returns 128 random bits, a function of key and purpose alone.
+    #[inline]
+    fn is_stratified(&self, purpose: Purpose) -> bool {
+        // In a body light scatters at distances of its own: there strata gain nothing.
+        let at_surface = matches!(purpose, Purpose::Interface | Purpose::Scatter | Purpose::Lobe);
+        self.stratified && at_surface && self.bounce < STRATIFIED_HITS
+    }
+
+    /// Returns which stratum the ray has among those of its block.
+    #[inline]
+    fn stratum(&self, purpose: Purpose) -> u8 {
+        let vertex = (self.ray / STRATA) << 8 | u64::from(self.bounce % STRATIFIED_HITS) << 4 | purpose as u64;
+        strata::permuted(self.ray as u8, strata::order([self.seed, vertex, u64::from(self.branch)]))
+    }
+
+    /// Returns 128 random bits, a function of key and purpose alone, independent of those of other rays.
     #[inline]
     pub fn words(&self, purpose: Purpose) -> [u32; 4] {
         let (counter, key) = self.philox_input(purpose);
@@ -86,11 +114,17 @@ impl Key {
     }
 }
 
+/// Returns two words as one.
+#[inline]
+fn joined(high: u32, low: u32) -> u64 {
+    u64::from(high) << 32 | u64::from(low)
+}
+
 /// Returns a number in `[0, 1)` from the first 53 of these 64 bits.
 #[inline]
-fn unit(a: u32, b: u32) -> f64 {
+fn unit(bits: u64) -> f64 {
     // 53 bits: all that an `f64` below 1 has.
-    ((u64::from(a) << 32 | u64::from(b)) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    (bits >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
 }
 
 /// Returns the number, never 0, of the path that splits off path `branch` at its hit `bounce`: a hash, the same on every run.
@@ -132,7 +166,7 @@ mod tests {
 
     #[test]
     fn numbers_are_uniform_and_differ_by_every_part_of_the_key() {
-        let key = Key { seed: 9, ray: 1 << 40, branch: 0, bounce: 3 };
+        let key = Key { seed: 9, ray: 1 << 40, branch: 0, bounce: 3, stratified: false };
         let u = key.unit(Purpose::Interface);
         for other in [
             Key { seed: 10, ..key },
@@ -155,5 +189,52 @@ mod tests {
         // Means 1/2 and 1/4 with standard errors 6.5e-4 and 7e-4 (4 sigma).
         assert!((sum / (2 * n) as f64 - 0.5).abs() < 2.6e-3);
         assert!((sum2 / n as f64 - 0.25).abs() < 2.8e-3);
+    }
+    #[test]
+    fn of_the_rays_of_a_block_each_has_its_stratum() {
+        for (seed, block, bounce) in [(1, 0, 0), (9, 1 << 30, 3), (u64::MAX, 12_345, 1)] {
+            let key = |ray: u64| Key { seed, ray: block * STRATA + ray, branch: 0, bounce, stratified: true };
+            let mut intervals: Vec<u64> =
+                (0..STRATA).map(|r| (key(r).unit(Purpose::Lobe) * 256.0) as u64).collect();
+            let cell = |[x, y]: [f64; 2]| (x * 16.0) as u64 * 16 + (y * 16.0) as u64;
+            let mut squares: Vec<u64> = (0..STRATA).map(|r| cell(key(r).pair(Purpose::Scatter))).collect();
+            for strata in [&mut intervals, &mut squares] {
+                assert!(!strata.is_sorted());
+                strata.sort_unstable();
+                assert!(strata.iter().copied().eq(0..STRATA));
+            }
+        }
+    }
+
+    /// Sums over whole blocks hold next to no chance; over the blocks a ray's number is uniform and independent of its neighbour's and of
+    /// the same ray's at the next hit.
+    #[test]
+    fn stratified_numbers_are_uniform_and_independent_over_blocks() {
+        let n = 40_000;
+        let at = |block, ray, bounce| {
+            Key { seed: 5, ray: block * STRATA + ray, branch: 0, bounce, stratified: true }.unit(Purpose::Interface)
+        };
+        for ray in [0, 1, 77, 128, 255] {
+            let mut sums = [0.0; 5];
+            for block in 0..n {
+                let [u, beside, later] =
+                    [at(block, ray, 0), at(block, ray ^ 1, 0), at(block, ray, 1)].map(|u| u - 0.5);
+                for (sum, x) in sums.iter_mut().zip([
+                    u,
+                    u * u - 1.0 / 12.0,
+                    u * beside + 1.0 / (12.0 * 255.0),
+                    u * later,
+                    later,
+                ]) {
+                    *sum += x;
+                }
+            }
+            // Standard deviations of u, of its square and of products of two.
+            let deviations =
+                [12f64.sqrt().recip(), 180f64.sqrt().recip(), 1.0 / 12.0, 1.0 / 12.0, 12f64.sqrt().recip()];
+            for (sum, deviation) in sums.into_iter().zip(deviations) {
+                assert!(sum.abs() < 4.5 * deviation * (n as f64).sqrt(), "ray {ray}: {sum}");
+            }
+        }
     }
 }
