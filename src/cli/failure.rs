@@ -55,6 +55,13 @@ impl Failure {
         self
     }
 
+    /// Adds advice on a line of its own below any there was before.
+    pub(crate) fn with_further_help(self, help: impl Into<String>) -> Self {
+        let further = help.into();
+        let help = self.help.as_ref().map_or_else(|| further.clone(), |first| format!("{first}\n{further}"));
+        self.with_help(help)
+    }
+
     /// Adds a stretch of a text file, bytes `span` of its `text`, to be shown with a label.
     pub(crate) fn with_excerpt(mut self, file: &str, text: &str, span: Range<usize>, label: &str) -> Self {
         // A span beyond the text, which only a message about another file could have, is cut to it.
@@ -171,6 +178,14 @@ impl From<std::io::Error> for Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn further_help_stands_below_the_first() {
+        let help = |failure: Failure| failure.with_further_help("nothing is lost").help;
+        assert_eq!(help(Failure::running("no room")).as_deref(), Some("nothing is lost"));
+        let failure = Failure::running("no room").with_help("make room");
+        assert_eq!(help(failure).as_deref(), Some("make room\nnothing is lost"));
+    }
 
     #[test]
     fn long_messages_are_broken_at_spaces_and_keep_their_lines() {

@@ -218,6 +218,18 @@ fn there_may_be_more_parts_than_replicates() {
     in_parts("2_000", 12);
 }
 
+/// A scene that its parts name and that cannot be read is refused with what the scene itself is to be mended by, and where else it may be.
+#[test]
+fn merge_keeps_the_advice_on_a_scene_that_cannot_be_read() {
+    let folder = lens("1_000");
+    let path = folder.path();
+    trace(path, &["-o", "parts", "--shard", "1/2"]);
+    let scene = std::fs::read_to_string(path.join("scene.toml")).unwrap();
+    std::fs::write(path.join("scene.toml"), scene.replace("title =", "titel =")).unwrap();
+    let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "out"]);
+    assert!(code == 2 && err.contains("'title'") && err.contains("--scene FILE says where it is"), "{code} {err}");
+}
+
 /// A thousand processes, merged in one go and by a tree of merges.
 #[test]
 #[ignore = "starts a thousand processes"]

@@ -61,7 +61,9 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let read = read_cached_scene(&scene_path, cache.as_ref(), &monitor);
     let (mut scene, loaded) = read.map_err(|error| match command.scene {
         Some(_) => Failure::from(error),
-        None => Failure::from(error).with_help("where the scene has moved since, --scene FILE says where it is"),
+        None => {
+            Failure::from(error).with_further_help("where the scene has moved since, --scene FILE says where it is")
+        }
     })?;
     scene.run.sequences = header.sequences;
     scene.run.faces = header.faces;
@@ -104,7 +106,9 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
         Err(failure) => {
             let place = results_folder::write_anywhere(&prepared, &mut run, &remarks, command.with_page, console);
             let saved = place.map(|folder| format!("nothing is lost: the results are in {}", folder.display()));
-            return Err(failure.with_help(saved.unwrap_or("nothing is lost: the parts are as they were".into())));
+            return Err(
+                failure.with_further_help(saved.unwrap_or("nothing is lost: the parts are as they were".into()))
+            );
         }
     };
     closing::say_notes(&run.results.notes, &[], console);

@@ -281,15 +281,15 @@ fn rescue_results(
 ) -> Failure {
     let (prepared, console) = (checkpoint.prepared, checkpoint.console);
     if let Some(folder) = results_folder::write_anywhere(prepared, run, remarks, with_page, console) {
-        return failure.with_help(format!("nothing is lost: the results are in {}", folder.display()));
+        return failure.with_further_help(format!("nothing is lost: the results are in {}", folder.display()));
     }
     let Some(sums) = run.sums() else { return failure };
     match checkpoint.save_anywhere(&sums) {
-        Ok(file) => failure.with_help(format!(
+        Ok(file) => failure.with_further_help(format!(
             "nothing is lost: `lampyris merge {} -o DIR` writes the results into another folder",
             file.display()
         )),
-        Err(_) => failure.with_help("nor could the sums be saved anywhere else"),
+        Err(_) => failure.with_further_help("nor could the sums be saved anywhere else"),
     }
 }
 
