@@ -1,6 +1,7 @@
 //! What each effect costs: the smallest kernel a scene calls for, each other effect added alone, and everything together.
 
-use super::{Rounds, Timing};
+use super::timing::Clock;
+use super::{Progress, Rounds, Timing};
 use crate::intersect::Intersector;
 use crate::optics::{Effect, Effects};
 use crate::simulate::{BoundScene, KernelChoice, Results, RunSettings, kernel_name, simulate};
@@ -37,14 +38,16 @@ pub struct Row {
 }
 
 /// Times the kernel pruned for a scene, those with one further effect each, and the full one, in alternating rounds, and compares their
-/// results with the pruned kernel's, bit by bit. Rows come in this order; choices that end at one kernel share its times.
+/// results with the pruned kernel's, bit by bit. Rows come in this order; choices that end at one kernel share its times. Calls `progress`
+/// after each round.
 pub fn effects(
     name: &str,
-    bound: &BoundScene,
+    (bound, settings): (&BoundScene, &RunSettings),
     intersector: &dyn Intersector,
-    settings: &RunSettings,
     rounds: usize,
+    progress: &(dyn Fn(Progress) + Sync),
 ) -> Vec<Row> {
+    let clock = Clock::new(progress);
     let needed = Effects::required_by(bound);
     let with = |kernel| RunSettings { kernel, ..settings.clone() };
     let mut choices = vec![("pruned", None, KernelChoice::Pruned)];
@@ -70,7 +73,7 @@ pub fn effects(
             }
         });
     }
-    let timings = race.run(rounds);
+    let timings = race.run_telling(rounds, |share| clock.report(name, share));
     let ran = |run: &RunSettings| -> Option<(Timing, &'static str, u64, String)> {
         let called = kernel_name(bound, run);
         let k = kernels.iter().position(|(known, ..)| *known == called)?;
@@ -116,4 +119,30 @@ pub fn answer(rows: &[Row]) -> String {
         full.kernel,
         if rows.iter().all(|r| r.identical) { "the same, bit by bit" } else { "NOT the same" }
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intersect::octree::{self, Octree};
+    use crate::mesh::FacetMesh;
+    use crate::model::Model;
+    use crate::simulate::Scene;
+    use std::path::Path;
+
+    /// A round takes as long as all kernels together, minutes on a large scene.
+    #[test]
+    fn each_round_is_told() {
+        let scene = Scene::parse("[run]\nrays = 100\n[[source]]\n", "s.toml", Path::new(".")).unwrap();
+        let bound = scene.bind(&Model::default()).unwrap();
+        let mesh = FacetMesh::default();
+        let nothing = Octree::build(&mesh, &octree::Settings::default());
+        let told = Mutex::new(Vec::new());
+        let tell = |progress: Progress| told.lock().unwrap().push((progress.stage, progress.done));
+        let rows = effects("dark", (&bound, &RunSettings::from(&scene.run)), &nothing, 3, &tell);
+        assert!(rows.len() >= 2 && rows.iter().all(|row| row.identical), "{rows:?}");
+        // One round more than those that are timed.
+        let shares = [0.25, 0.5, 0.75, 1.0].map(|share| ("dark".to_owned(), share));
+        assert_eq!(told.into_inner().unwrap(), shares);
+    }
 }

@@ -52,6 +52,9 @@ pub(crate) struct StudyCommand<'a> {
 /// Rays of a scene in the study of its accuracy: enough that the geometric error of a coarse mesh stands above the noise.
 const SCENE_RAYS: u64 = 200_000;
 
+/// Timed rounds of the study of effects.
+const EFFECT_ROUNDS: usize = 5;
+
 /// Rows with the sentence that the study made of them.
 struct StudyResult {
     rows: Value,
@@ -154,7 +157,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
             shapes = benchmark.shapes;
             StudyResult::new(&benchmark.rows, benchmark.answer)?
         }
-        StudyKind::Effects => study_effects(command, threads, console)?,
+        StudyKind::Effects => study_effects(command, threads, console, &progress)?,
     };
     bar.finish_and_clear();
     let seed = found.seed.unwrap_or(seed);
@@ -367,7 +370,12 @@ fn study_stability(progress: Report) -> Result<StudyResult, Failure> {
 }
 
 /// Measures what each optical effect costs on a scene, with at most a million rays unless `--rays` says more; fails for a bare model.
-fn study_effects(command: &StudyCommand, threads: usize, console: &Console) -> Result<StudyResult, Failure> {
+fn study_effects(
+    command: &StudyCommand,
+    threads: usize,
+    console: &Console,
+    progress: Report,
+) -> Result<StudyResult, Failure> {
     let (scene, loaded, name) = read_model(command.file, console)?;
     let Some(scene) = scene else {
         let failure = Failure::arguments("study effects needs a scene: a STEP file alone has no light");
@@ -383,7 +391,7 @@ fn study_effects(command: &StudyCommand, threads: usize, console: &Console) -> R
     run.seed = command.tracing.seed.unwrap_or(run.seed);
     let rows =
         with_intersector(choice, &loaded.model, &made.mesh, &TerminalMonitor::new(console), |intersector, _| {
-            effects::effects(&name, &bound, intersector, &run, 5)
+            effects::effects(&name, (&bound, &run), intersector, EFFECT_ROUNDS, progress)
         });
     Ok(StudyResult { seed: Some(run.seed), ..StudyResult::new(&rows, effects::answer(&rows))? })
 }
