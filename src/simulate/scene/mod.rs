@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use source::POWERS;
 pub use source::{Source, SourceKind};
 pub use spectrum::{SpectrumKey, SpectrumName};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -220,6 +220,7 @@ impl Scene {
         surface::check(self)?;
         let all_rays = self.sources.iter().filter_map(|source| source.rays).fold(0, u64::saturating_add);
         self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i, all_rays))?;
+        self.check_source_names()?;
         self.receivers.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
         self.check_receiver_names()?;
         self.regulations.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
@@ -230,6 +231,20 @@ impl Scene {
             let at: &[Key<'_>] = at.as_ref().map_or(&[], |at| at);
             let message = format!("the receivers have {sums} cells with all their channels, more than {MOST_SUMS}");
             return Err(self.error(ErrorKind::Value, at, message).help("use fewer `cells` or fewer `bins_nm`"));
+        }
+        Ok(())
+    }
+
+    /// Refuses two sources of one name, which results and notes could not tell apart; several may have none.
+    fn check_source_names(&self) -> Result<(), Error> {
+        let mut names = HashSet::new();
+        let named = self.sources.iter().enumerate().filter(|(_, source)| !source.name.is_empty());
+        for (i, Source { name, .. }) in named {
+            if !names.insert(name.as_str()) {
+                let at = [Key::Name("source"), Key::Index(i), Key::Name("name")];
+                let error = self.error(ErrorKind::Value, &at, format!("two sources are called '{name}'"));
+                return Err(error.help("give each a name of its own, or leave `name` out"));
+            }
         }
         Ok(())
     }

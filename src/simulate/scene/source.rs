@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Source {
-    /// Name for the report.
+    /// Name for the report; no two sources have the same.
     pub name: String,
     /// How the light leaves.
     pub kind: SourceKind,
