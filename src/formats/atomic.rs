@@ -120,9 +120,9 @@ pub(super) fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!("{}{}-{serial}.part", unfinished_prefix(path), Writer::this()))
 }
 
-/// Removes what processes that are no more have left unfinished of this file. Of another machine's, and where the system does not tell
-/// which processes are, that is what has stood still for a day.
-pub(super) fn remove_stale(path: &Path) {
+/// Removes what processes that are no more have left unfinished of this file, as [`write_atomic`] does. Of another machine's, and where the
+/// system does not tell which processes are, that is what has stood still for a day. Failures are passed over.
+pub fn remove_stale(path: &Path) {
     static LAST: Mutex<Option<PartListing>> = Mutex::new(None);
     let name = unfinished_prefix(path);
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

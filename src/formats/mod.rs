@@ -41,7 +41,7 @@ mod vtk;
 mod writer;
 
 pub use agf::{AgfGlass, read_agf};
-pub use atomic::{file_stem, remove_unfinished_files, try_write, write_atomic};
+pub use atomic::{file_stem, remove_stale, remove_unfinished_files, try_write, write_atomic};
 pub use base64::base64;
 pub use data1::{read_data1, write_data1};
 pub use data2::{Data2Facet, read_data2};

@@ -340,6 +340,24 @@ fn a_source_in_an_opaque_part_and_an_unknown_medium_are_told() {
     assert!(code == 2 && err.contains("lampyris media") && err.contains("name = \"D-ZK3\""), "{code} {err}");
 }
 
+/// Killed while it saved, a run leaves half a checkpoint, which the next one there removes though it is too short to save anything.
+#[test]
+fn half_a_checkpoint_of_a_killed_run_is_removed() {
+    let folder = lens(|scene| scene);
+    fs::create_dir(folder.path().join("out")).unwrap();
+    // Without the mark of a machine, as earlier versions wrote them: only the age tells whether its process is gone.
+    let [stale, fresh] = [7, 8].map(|process| format!(".checkpoint.tally.{process}-0.part"));
+    for (name, age) in [(&stale, 2 * 86_400), (&fresh, 0)] {
+        let file = fs::File::create(folder.path().join("out").join(name)).unwrap();
+        file.set_modified(std::time::SystemTime::now() - Duration::from_secs(age)).unwrap();
+    }
+    let options = ["--tolerance", "0.1", "--normals", "bilinear", "--no-report", "-o", "out"];
+    let (code, _, err) = lampyris_in(folder.path(), &[&["trace", "scene.toml"][..], &options].concat());
+    assert_eq!(code, 0, "{err}");
+    let left = names(&folder.path().join("out"));
+    assert!(!left.contains(&stale) && left.contains(&fresh), "{left:?}");
+}
+
 /// A command that cannot be saved says that it was interrupted, and leaves no lock.
 #[cfg(unix)]
 #[test]

@@ -6,7 +6,7 @@ use super::usage::Usage;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::machine;
-use crate::formats::{read_bytes, write_atomic};
+use crate::formats::{read_bytes, remove_stale, write_atomic};
 use crate::pipeline::{PreparedScene, RayRange, TracingSettings};
 use crate::simulate::PartialRun;
 use crate::text::grouped;
@@ -36,7 +36,7 @@ pub(crate) struct Checkpoint<'a> {
 
 impl<'a> Checkpoint<'a> {
     /// Makes the checkpoint of a run, or of a shard of it, that is about to be traced into `file`; saves at most every so many seconds.
-    /// Nothing is written yet.
+    /// Nothing is written yet, and what dead processes left half saved there is removed.
     ///
     /// # Errors
     /// When a file of the scene can no longer be read.
@@ -50,6 +50,8 @@ impl<'a> Checkpoint<'a> {
     ) -> Result<Self, Failure> {
         // Made before tracing: the files of the scene may be gone when it ends.
         let header = TallyHeader::new(prepared, scene, shard, console)?;
+        // Here, for a run that is short or done saves nothing, which would remove them too.
+        remove_stale(&file);
         // Seconds without end mean never.
         let every = Duration::try_from_secs_f64(every_seconds).unwrap_or(Duration::MAX);
         Ok(Self {
