@@ -41,7 +41,7 @@ pub struct Results {
     pub mrays_per_s: f64,
     /// Million segments per second of `trace`.
     pub msegments_per_s: f64,
-    /// Threads used.
+    /// Threads used; of a merged run those of the part that had most.
     pub threads: usize,
     /// What was simulated and what not.
     pub effects: EffectsUsed,

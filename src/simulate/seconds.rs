@@ -31,4 +31,6 @@ pub struct MergedSeconds {
     pub cpu: Option<f64>,
     /// Seconds of the slowest part.
     pub slowest: f64,
+    /// Threads of the part that had most; absent where none tells.
+    pub threads: Option<u32>,
 }

@@ -149,9 +149,10 @@ fn shards_merge_to_the_bits_of_one_run() {
         document(path, &["merge", "part3.tally", "part1.tally", "part2.tally", "-o", "merged", "--json"], 0);
     assert_eq!(whole["digest"], merged["digest"]);
     assert_eq!(whole["power"], merged["power"]);
-    // Three processes of one machine.
+    // Three processes of one machine, each on one thread.
     let took = &merged["seconds"]["merged"];
-    assert_eq!((&took["parts"], &took["machines"]), (&3.into(), &1.into()), "{took}");
+    let numbers = [&took["parts"], &took["machines"], &took["threads"], &merged["threads"]];
+    assert_eq!(numbers.map(Value::as_u64), [3, 1, 1, 1].map(Some), "{took}");
     assert!(took["slowest"].as_f64().unwrap() > 0.0 && took["cpu"].as_f64().is_none_or(|cpu| cpu > 0.0));
     assert_eq!(merged["check"]["octree_vs_bvh"]["disagree"], 0);
     // Every number of the document but times and what made it: cross-check and figures of both errors too.

@@ -98,7 +98,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     results_folder::try_folder(&prepared, command.folder, command.with_page)?;
     let request = TraceRequest { from: Some(whole), ..TraceRequest::default() };
     let mut run = prepared.trace(request, &monitor).map_err(|_| Failure::running("merge: the run is not whole"))?;
-    run.results.seconds.merged = usage.total();
+    usage.note_in(&mut run.results);
     let remarks = RunRemarks::say_target(target.map(|target| target.result(&run.results)), console);
     let written = results_folder::write(&prepared, command.folder, &mut run, &remarks, command.with_page, console);
     let (document, answer) = match written {

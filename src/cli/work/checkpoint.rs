@@ -159,7 +159,7 @@ impl<'a> Checkpoint<'a> {
 
     /// Returns the header with what the run took so far, earlier processes included, and the command that began it.
     fn header_now(&self) -> TallyHeader {
-        let usage = Usage::of_process(self.console.started.elapsed().as_secs_f64());
+        let usage = Usage::of_process(self.console.started.elapsed().as_secs_f64(), self.prepared.threads);
         let earlier = self.earlier();
         let Some(earlier) = earlier.as_ref() else { return self.header.with_usage(usage) };
         // A run that goes on counts what it took before, and is the run that was asked for first.
