@@ -2,8 +2,9 @@
 
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
-use lampyris::simulate::Results;
+use lampyris::simulate::{Results, Scene};
 use std::f64::consts::PI;
+use std::path::Path;
 
 const GLASS: &str = "[[medium]]\nname = 'glass'\nindex = 1.5\n[[material]]\npart = 'glass'\nmedium = 'glass'\n";
 
@@ -187,4 +188,30 @@ fn a_diffuse_enclosure_is_lit_by_itself() {
         let error = 0.5 * inside.power_error / 96.0;
         assert!((again - lux).abs() < 4.0 * error + 0.006, "{rho}: {again} ± {error}, not {lux}");
     }
+}
+
+/// A closed void holds what is around the solid: water, where the scene lies in water. In air nobody expects anything else.
+#[test]
+fn a_void_within_a_scene_under_water_is_told_to_be_full_of_it() {
+    let ball = |radius, outward| Shape::Sphere { centre: Point::ZERO, radius, outward };
+    let mut hollow = World::default();
+    hollow.part("glass", true, &[("outside", ball(5.0, true))]);
+    hollow.part("void", true, &[("inside", ball(3.0, false))]);
+    hollow.model.instances.pop();
+    let mut void = hollow.model.parts.pop().unwrap().shells.pop().unwrap();
+    void.void = true;
+    hollow.model.parts[0].shells.push(void);
+    let notes = |world: &World, surroundings: &str| {
+        let text = format!("{surroundings}\n{GLASS}[[source]]\nat = [0, 0, 20]\n");
+        let text =
+            if world.shapes.len() > 2 { text + "[[material]]\npart = 'core'\nmedium = 'PMMA'\n" } else { text };
+        Scene::parse(&text, "void.toml", Path::new(".")).unwrap().bind(&world.model).unwrap().notes().join("\n")
+    };
+    let water = "ambient = 'water'";
+    let told = notes(&hollow, water);
+    assert!(told.contains("the closed void in 'glass' (glass) holds 'water'"), "{told}");
+    assert_eq!(notes(&hollow, "ambient = 'air'\n[[medium]]\nname = 'air'\nindex = 1.0003"), "");
+    // A solid that fills the void.
+    hollow.sphere("core", Point::ZERO, 3.0);
+    assert_eq!(notes(&hollow, water), "");
 }

@@ -10,13 +10,16 @@ use crate::simulate::emitter::Loaded;
 use crate::simulate::scene::{ByWavelength, Material, PowerUnit, Reflectance, Scene, medium};
 use crate::simulate::surfaces::FaceOptics;
 use crate::text::{count_of, first_sentences};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of a wavelength that the end of a table may be missed by: a unit that was converted to nm and back.
 const ROUNDING: f64 = 1e-9;
 
 /// Tables, media, sources and remarks on files that are named; of more the number is told.
 pub(super) const NAMED: usize = 8;
+
+/// Index beyond which the surroundings are no gas: vapours at normal pressure have up to 1.0018 (benzene).
+const MOST_OF_GAS: f64 = 1.002;
 
 /// A property that is known between two wavelengths alone, nm, and what it is called in a sentence.
 struct KnownRange {
@@ -220,6 +223,34 @@ pub(super) fn opening_note(bound: &BoundScene, model: &Model) -> Option<String> 
     Some(format!(
         "'{instance}'{others} has the medium '{medium}' but no closed shell{sheet}: light that passes its opening is lost; close it in \
          the model, or give it a surface instead of a medium{asked}"
+    ))
+}
+
+/// Returns one sentence about the closed voids in bodies, naming the first, that hold the medium of the surroundings, where this is no gas;
+/// `None` where there is none, or another body comes near each.
+pub(super) fn filled_void_note(bound: &BoundScene, model: &Model) -> Option<String> {
+    let ambient = bound.scene.ambient.as_ref()?;
+    if bound.bodies[AMBIENT as usize].index(None) <= MOST_OF_GAS {
+        return None;
+    }
+    // The body around each void, by instance and shell; none where a face is opaque or may touch what fills the void.
+    let mut voids: BTreeMap<(usize, usize), Option<u32>> = BTreeMap::new();
+    for f in model.placed_faces() {
+        let is_of_void = |shell: &usize| {
+            let shell = &model.part(f.part).shells[*shell];
+            shell.void && shell.closed
+        };
+        let Some(shell) = f.shell.filter(is_of_void) else { continue };
+        let around = bound.entered_body(f.id).filter(|_| !bound.faces[f.id.index()].touches_body);
+        let body = voids.entry((f.instance, shell)).or_insert(around);
+        *body = body.and(around);
+    }
+    let filled: Vec<u32> = voids.into_values().flatten().collect();
+    let [instance, medium] = bound.body_names(*filled.first()?)?;
+    let others = if filled.len() > 1 { format!(" (and {} more)", filled.len() - 1) } else { String::new() };
+    Some(format!(
+        "the closed void in '{instance}' ({medium}){others} holds '{ambient}', the `ambient` medium: anything else in it has to be a solid of \
+         its own with a `medium`"
     ))
 }
 
