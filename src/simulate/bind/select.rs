@@ -60,17 +60,32 @@ fn is_same_radius(wanted: f64, have: f64) -> bool {
     (wanted - have).abs() <= RADIUS_ROUNDING * have
 }
 
+/// Whether a radius is one of the wanted, rising, mm.
+fn is_any_radius(wanted: &[f64], have: f64) -> bool {
+    // The first that is not too small: those behind it are farther off.
+    let place = wanted.partition_point(|wanted| *wanted < have && !is_same_radius(*wanted, have));
+    wanted.get(place).is_some_and(|wanted| is_same_radius(*wanted, have))
+}
+
 /// Returns the indices of the placed faces that have everything that a selector asks for; points (`at`) are not asked.
 fn matching_faces(rule: &FaceSelector, model: &Model) -> Vec<usize> {
-    // A list may name thousands of faces.
+    // Lists may name thousands of faces and of radii.
     let entities: Option<FxHashSet<u64>> = rule.entity.as_ref().map(|e| e.as_slice().iter().copied().collect());
     let is_named =
         |f: &PlacedFace<'_>| entities.as_ref().is_none_or(|e| f.entity().is_some_and(|id| e.contains(&id)));
-    let matching = model.placed_faces().filter(|f| is_named(f) && matches_selector(rule, f, model));
-    matching.map(|f| f.id.index()).collect()
+    let radii: Option<Vec<f64>> = rule.radius_mm.as_ref().map(|radii| {
+        let mut rising = radii.as_slice().to_vec();
+        rising.sort_by(f64::total_cmp);
+        rising
+    });
+    let has_radius = |f: &PlacedFace<'_>| {
+        radii.as_ref().is_none_or(|wanted| f.radius().is_some_and(|have| is_any_radius(wanted, have)))
+    };
+    let matches = |f: &PlacedFace<'_>| is_named(f) && has_radius(f) && matches_selector(rule, f, model);
+    model.placed_faces().filter(matches).map(|f| f.id.index()).collect()
 }
 
-/// Whether a face has everything that a selector asks for; its `#id` and points (`at`) are not asked.
+/// Whether a face has everything that a selector asks for; its `#id`, radius and points (`at`) are not asked.
 fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -> bool {
     let same_colour =
         |wanted: [f64; 3], have: [f64; 3]| have.iter().zip(wanted).all(|(a, b)| (a - b).abs() < COLOUR_STEP);
@@ -79,9 +94,6 @@ fn matches_selector(rule: &FaceSelector, face: &PlacedFace<'_>, model: &Model) -
         && matches_any(&rule.face, face.name())
         && matches_any(&rule.kind, face.kind().word())
         && (rule.layer.is_none() || face.layer().is_some_and(|layer| matches_any(&rule.layer, layer)))
-        && rule.radius_mm.as_ref().is_none_or(|radii| {
-            face.radius().is_some_and(|have| radii.as_slice().iter().any(|wanted| is_same_radius(*wanted, have)))
-        })
         && matches_solid(&rule.solid, face, model)
         && rule.colour.as_ref().is_none_or(|wanted| {
             wanted.rgb().zip(face.colour(model)).is_some_and(|(wanted, have)| same_colour(wanted, have.0))
@@ -308,7 +320,7 @@ pub(super) fn advice<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -
 
 #[cfg(test)]
 mod tests {
-    use super::{FaceNumbers, is_same_radius, matches_pattern};
+    use super::{FaceNumbers, is_any_radius, is_same_radius, matches_pattern};
 
     #[test]
     fn a_radius_is_found_as_every_one_that_is_compared_finds_it() {
@@ -317,6 +329,9 @@ mod tests {
         for wanted in near.chain([0.0, 0.4999, 0.49996, 39.997, 40.003, 40.005, 41.0]) {
             let expected = numbers.radii.iter().any(|have| is_same_radius(wanted, *have));
             assert_eq!(numbers.has_radius(wanted), expected, "{wanted}");
+            // The same numbers the other way round: a list that is asked for, and the radius of a face.
+            let expected = numbers.radii.iter().any(|asked| is_same_radius(*asked, wanted));
+            assert_eq!(is_any_radius(&numbers.radii, wanted), expected, "{wanted}");
         }
     }
 
