@@ -54,9 +54,7 @@ pub(crate) fn run(
 /// is not 0; lists are cut off without -v.
 fn say_losses(r: &ImportReport, is_incomplete: bool, console: &Console) {
     let say = |message: String| console.say_or_insist(is_incomplete, message);
-    if r.faces.refused > 0 {
-        say(format!("{} of {} faces were refused", r.faces.refused, r.faces.found));
-    }
+    input_files::say_refused_faces([r.faces.refused, r.faces.found], is_incomplete, "", console);
     let most = if console.verbose > 0 { usize::MAX } else { SHOWN_NOTES };
     for note in r.refusals.iter().take(most) {
         say(format!("refused: #{} {}: {}", note.id, note.entity, note.reason));

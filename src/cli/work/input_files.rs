@@ -8,6 +8,7 @@ use crate::formats::lower_extension;
 use crate::pipeline::{LoadedModel, PreparedScene, read_scene};
 use crate::simulate::Scene;
 use crate::step::{self, Import};
+use crate::text::grouped;
 use std::path::Path;
 use std::time::Instant;
 
@@ -59,6 +60,15 @@ pub(crate) fn is_too_much_missing([refused, found]: [usize; 2], is_cut_off: bool
     refused as f64 > most * found as f64 || is_cut_off && most < 1.0
 }
 
+/// Says how many of the faces found were refused, if any, quiet or not where that is why the exit code is not 0; `listing` goes on with
+/// where they are named.
+pub(crate) fn say_refused_faces([refused, found]: [usize; 2], is_reason: bool, listing: &str, console: &Console) {
+    if refused > 0 {
+        let [refused, found] = [refused, found].map(|count| grouped(count as u64));
+        console.say_or_insist(is_reason, format!("{refused} of {found} faces were refused{listing}"));
+    }
+}
+
 /// Says what could not be read of the files, what they hide and how many faces were refused, if any; incomplete where the refused are a
 /// larger share of all faces than `max_refused`, or a file was cut off or holds no face.
 pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &Console) -> Completion {
@@ -77,12 +87,9 @@ pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &
     }
     let cut_off: Vec<&str> = loaded.reports.iter().filter(|r| r.cut_off).map(|r| r.file.as_str()).collect();
     let is_incomplete = is_too_much_missing([refused, found], !cut_off.is_empty(), max_refused);
-    if refused > 0 {
-        let message =
-            format!("{refused} of {found} faces were refused; `lampyris info` lists them with the reasons");
-        // Few enough to be allowed they are no more than a remark, which a file that was cut off does not make graver.
-        console.say_or_insist(is_too_much_missing([refused, found], false, max_refused), message);
-    }
+    // Few enough to be allowed they are no more than a remark, which a file that was cut off does not make graver.
+    let is_reason = is_too_much_missing([refused, found], false, max_refused);
+    say_refused_faces([refused, found], is_reason, "; `lampyris info` lists them with the reasons", console);
     for file in cut_off.iter().filter(|_| max_refused < 1.0) {
         console.insist(format_args!("{file} ends before its end section: what is missing, nothing tells"));
     }
