@@ -9,11 +9,14 @@ use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::Loaded;
 use crate::simulate::scene::{ByWavelength, Material, PowerUnit, Reflectance, Scene, medium};
 use crate::simulate::surfaces::FaceOptics;
-use crate::text::{count_of, first_sentences};
+use crate::text::{count_of, figures, first_sentences};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Share of a wavelength that the end of a table may be missed by: a unit that was converted to nm and back.
-const ROUNDING: f64 = 1e-9;
+/// Share of a wavelength that the end of a table may be missed by: single precision rounds by half of 2⁻²³, a change of units by less.
+const ROUNDING: f64 = 1e-7;
+
+/// Digits of a wavelength: as many as single precision keeps, so that what is beyond [`ROUNDING`] can be told apart.
+const WAVELENGTH_DIGITS: usize = 7;
 
 /// Tables, media, sources and remarks on files that are named; of more the number is told.
 pub(super) const NAMED: usize = 8;
@@ -65,9 +68,18 @@ fn range_note(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<S
     // One sentence a table: the first source that is beyond it stands for all.
     let (source, [a, b]) = light.iter().enumerate().find(|(_, range)| outside(range))?;
     let whose = scene.source_label(source);
-    let light = if a == b { format!("{a} nm") } else { format!("{a} to {b} nm") };
-    let known_for = if from == to { format!("{from} nm alone") } else { format!("{from} to {to} nm") };
-    Some(format!("{} is known for {known_for}, but {whose} has light of {light}: {}", known.what, known.beyond))
+    let alone = if from == to { " alone" } else { "" };
+    let [known_for, light] = [[from, to], [*a, *b]].map(range_text);
+    Some(format!(
+        "{} is known for {known_for}{alone}, but {whose} has light of {light}: {}",
+        known.what, known.beyond
+    ))
+}
+
+/// Writes the wavelengths from the first to the second, nm, or the only one.
+fn range_text([first, last]: [f64; 2]) -> String {
+    let [from, to] = [first, last].map(|nm| figures(nm, WAVELENGTH_DIGITS));
+    if from == to { format!("{from} nm") } else { format!("{from} to {to} nm") }
 }
 
 /// Returns one sentence about the sources whose power is in lumens though the eye sees nothing of their light, naming the first; `None`
@@ -82,9 +94,9 @@ pub(super) fn invisible_light_note(scene: &Scene, light: &[[f64; 2]]) -> Option<
     let first = *invisible.first()?;
     let others = if invisible.len() > 1 { format!(" (and {} more)", invisible.len() - 1) } else { String::new() };
     Some(format!(
-        "the power of {}{others} is in lumens, but the eye sees nothing of light of {} nm: give it in watts, without `unit = \"lm\"` in [run]",
+        "the power of {}{others} is in lumens, but the eye sees nothing of light of {}: give it in watts, without `unit = \"lm\"` in [run]",
         scene.source_label(first),
-        light[first][0]
+        range_text(light[first])
     ))
 }
 
@@ -308,4 +320,26 @@ pub(super) fn thin_body_note(bound: &BoundScene) -> Option<String> {
          are one: light may pass it by or be lost; set glue_mm to {:.0e}",
         0.1 * thick
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// 587.5618 nm of a file in single precision is 587.56182861328125, and 0.7003 µm are 700.3000000000001 nm.
+    #[test]
+    fn wavelengths_have_the_digits_that_are_known() {
+        let scene = Scene::parse("[run]\nunit = 'lm'\n[[source]]\n", "s.toml", Path::new(".")).unwrap();
+        let note = |range: [f64; 2], light: [f64; 2]| {
+            range_note(&scene, &KnownRange { what: "the table".into(), range, beyond: ENDS }, &[light])
+        };
+        let single = f64::from(587.5618f32);
+        let said = note([0.7003 * 1000.0, 1200.0], [single, single]).unwrap();
+        assert!(said.contains("known for 700.3 to 1200 nm") && said.contains("light of 587.5618 nm:"), "{said}");
+        // At the end of the table but for rounding.
+        assert_eq!(note([500.0, 587.5618], [single, single]), None);
+        let said = invisible_light_note(&scene, &[[0.9403 * 1000.0, 0.9803 * 1000.0]]).unwrap();
+        assert!(said.contains("light of 940.3 to 980.3 nm:"), "{said}");
+    }
 }
