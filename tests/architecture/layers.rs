@@ -720,7 +720,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "notes",
             "luminous",
             "bodies",
-            "wavelengths",
+            "source_light",
             "mod",
         ],
     ),

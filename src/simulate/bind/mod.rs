@@ -18,7 +18,7 @@ mod overlapping_receivers;
 mod role;
 mod rule_table;
 mod select;
-mod wavelengths;
+mod source_light;
 
 use super::body::{AMBIENT, Body};
 use super::emitter::{self, Emitter, Loaded};
@@ -57,15 +57,15 @@ impl Scene {
         // Light first: media are tabulated at its wavelengths.
         let loaded: Vec<Option<Loaded>> =
             self.sources.iter().enumerate().map(|(i, s)| emitter::load(self, i, s)).collect::<Result<_, _>>()?;
-        let light = wavelengths::scene_light(self, &loaded);
-        let ranges = wavelengths::source_ranges(self, &loaded);
+        let light = source_light::scene_light(self, &loaded);
+        let ranges = source_light::source_ranges(self, &loaded);
         let file_notes = notes::source_file_notes(self, &loaded);
         // Bodies, from the rules that give media.
         let chosen = chosen::choose_rules(self, model)?;
         let labels = model.labels();
         let (mut bodies, body_of_face, nested) = bodies::find_bodies(self, model, &chosen, &light, &labels)?;
         materials::check_interfaces(self, model, &chosen, &body_of_face)?;
-        wavelengths::check_indices(self, &loaded, &bodies)?;
+        source_light::check_indices(self, &loaded, &bodies)?;
         // Faces, from the rules that give surfaces and from what lies against what.
         let Faces { faces, surfaces, touching_pairs } = bind_faces(self, model, &chosen, &body_of_face, nested)?;
         bodies::set_trapped_lengths(self, &mut bodies, &touching_pairs);
