@@ -29,7 +29,7 @@ pub(super) fn with_unit(number: &str, unit: &str) -> String {
     format!("{number}{space}{}", unit_in_words(unit))
 }
 
-/// Writes a duration given in seconds: `1.23 s`, `45 ms`, `2 min 5 s`; a dash where it is not finite.
+/// Writes a duration given in seconds: `1.23 s`, `45 ms`, `2 min 5 s`, `3 h 20 min`; a dash where it is not finite.
 pub fn seconds(value: f64) -> String {
     // The unit is that of what is printed: 0.9996 s are 1 s, not 1000 ms.
     let printed = value * ROUNDS_UP;
@@ -38,10 +38,14 @@ pub fn seconds(value: f64) -> String {
         v if printed < MILLI => format!("{} µs", figures(v * MEGA, 3)),
         v if printed < 1.0 => format!("{} ms", figures(v * KILO, 3)),
         v if v.round() < 120.0 => format!("{} s", figures(v, 3)),
-        v => {
-            // Rounded before it is divided: 59.6 s are a minute more, not 60 s.
+        // Rounded before they are divided: 59.6 s are a minute more, not 60 s.
+        v if v.round() < 7200.0 => {
             let whole = v.round();
             format!("{} min {} s", (whole / 60.0).floor(), whole % 60.0)
+        }
+        v => {
+            let minutes = (v / 60.0).round();
+            format!("{} h {} min", (minutes / 60.0).floor(), minutes % 60.0)
         }
     }
 }
@@ -88,6 +92,8 @@ mod tests {
             ("45.1 ms".into(), "75 s".into(), "2 min 5 s".into())
         );
         assert_eq!((seconds(179.6), seconds(179.4)), ("3 min 0 s".into(), "2 min 59 s".into()));
+        assert_eq!((seconds(7199.4), seconds(7199.6)), ("119 min 59 s".into(), "2 h 0 min".into()));
+        assert_eq!((seconds(12_000.0), seconds(86_399.0)), ("3 h 20 min".into(), "24 h 0 min".into()));
         assert_eq!(bytes(12_345_678), "12.3 MB");
         // A unit is left where rounding reaches the next, and not before.
         assert_eq!((seconds(0.9996), seconds(0.9994)), ("1 s".into(), "999 ms".into()));
