@@ -14,7 +14,7 @@ use crate::simulate::{Event, PathVertex, Results};
 use crate::study::figures::{Figure, ReceiverFigures};
 use crate::study::model_figures::PowerFigures;
 use crate::study::{cross_check::CrossCheck, default_accuracy::Chosen, geometric_error::GeometricError};
-use crate::text::{figures, grouped};
+use crate::text::{count_of, figures, grouped};
 
 /// Share of the power from which on light that limits cut off is spoken of: below it no figure of four digits changes.
 const WORTH_A_SENTENCE: f64 = 1e-4;
@@ -175,14 +175,14 @@ impl SimulationReport<'_> {
         let why = match (r.caught_rays, r.cut_off_rays - r.caught_rays) {
             (0, _) => "at a limit of [run]: max_bounces, max_length_mm or power_floor".into(),
             (caught, 0) => format!(
-                "because {} paths went round in a clear body by total reflection without end ([run] caught_after); a medium that \
+                "because {} went round in a clear body by total reflection without end ([run] caught_after); a medium that \
                  absorbs, as all real ones do, says where this light ends",
-                grouped(caught)
+                count_of(caught, "path")
             ),
             (caught, others) => format!(
-                "{} paths that went round in a clear body by total reflection without end ([run] caught_after), {} at \
+                "{} that went round in a clear body by total reflection without end ([run] caught_after), {} at \
                  another limit: max_bounces, max_length_mm or power_floor",
-                grouped(caught),
+                count_of(caught, "path"),
                 grouped(others)
             ),
         };

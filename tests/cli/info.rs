@@ -107,7 +107,7 @@ fn a_number_used_twice_is_named_by_every_command_that_reads_the_file() {
     let (data, end) = whole.split_at(whole.rfind("ENDSEC").unwrap());
     let count = |n: usize| "#10=CARTESIAN_POINT('',(0.,0.,0.));\n".repeat(n);
     let mut told = Vec::new();
-    for n in [1, 5] {
+    for n in [1, 5, 4] {
         let text = format!("{data}{}{end}", count(n));
         let file = written(folder.path(), "twice.stp", text.as_bytes()).display().to_string();
         told.push(["info", "facet", "check"].map(|command| {
@@ -122,6 +122,7 @@ fn a_number_used_twice_is_named_by_every_command_that_reads_the_file() {
     for text in &told[1][1..] {
         assert!(text.matches("its number").count() == 3 && text.contains("and 2 more problems"), "{text}");
     }
+    assert!(told[2][1..].iter().all(|text| text.contains("and 1 more problem;")), "{:?}", told[2]);
 }
 
 #[test]

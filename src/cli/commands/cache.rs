@@ -7,7 +7,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output::json::json_text;
 use crate::cli::work::cache_folder::{self, FOLDER_VARIABLE};
 use crate::report::bytes;
-use crate::text::grouped;
+use crate::text::count_of;
 use serde_json::json;
 
 /// Prints what the folder of the cache holds, after emptying it if `clear`; fails where no cache is named, or the option names a folder
@@ -43,12 +43,12 @@ pub(crate) fn run(option: &CacheOption, clear: bool, console: &Console) -> Resul
         return Ok(Completion::Complete);
     }
     if clear {
-        console.say(format_args!("removed {} files", grouped(removed as u64)));
+        console.say(format_args!("removed {}", count_of(removed as u64, "file")));
     }
     print(&format!(
-        "{}: {} models, facets and octrees, {} of at most {}\n",
+        "{}: {} of models, facets and octrees, {} of at most {}\n",
         cache.folder().display(),
-        entries.len(),
+        count_of(entries.len() as u64, "file"),
         bytes(total),
         bytes(cache.limit())
     ))?;

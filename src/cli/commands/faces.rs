@@ -6,7 +6,7 @@ use crate::cli::output::json::{json_text, json_value};
 use crate::model::{FaceAccount, Model, PartAccount, PlacedFace, SolidAccount, are_shared};
 use crate::simulate::face_selectors;
 use crate::step::ImportReport;
-use crate::text::{figures, grouped};
+use crate::text::{count_of, figures};
 use serde_json::json;
 
 /// Faces of a solid that are listed without -v; of more, the first ones and how many there are.
@@ -107,20 +107,20 @@ fn solid_text(solid: &SolidAccount, most: usize, selectors: &mut impl Iterator<I
     let closed = if solid.closed { "closed" } else { "open" };
     let name = if solid.name.is_empty() { String::new() } else { format!(" {}", quoted_name(&solid.name)) };
     let area: f64 = solid.faces.iter().map(|f| f.area_mm2).sum();
-    let count = grouped(solid.faces.len() as u64);
+    let count = count_of(solid.faces.len() as u64, "face");
     let size = solid.size_mm().map(|x| figures(x, 4)).join(" × ");
     let colour = solid.colour().map_or(String::new(), |c| format!(", {c}"));
     let area = figures(area, 5);
-    let mut text =
-        format!("  solid {}{name}: {closed}, {count} faces, {area} mm², in {size} mm{colour}\n", solid.index);
+    let mut text = format!("  solid {}{name}: {closed}, {count}, {area} mm², in {size} mm{colour}\n", solid.index);
     // Every selector is taken, shown or not, or the next solid would get those of this one.
     for (k, (face, selector)) in solid.faces.iter().zip(selectors).enumerate() {
         if k < most {
             text += &face_text(face, selector.as_deref());
         }
     }
-    if solid.faces.len() > most {
-        text += &format!("    and {} more faces; -v shows all, --json too\n", solid.faces.len() - most);
+    let rest = solid.faces.len().saturating_sub(most);
+    if rest > 0 {
+        text += &format!("    and {}; -v shows all, --json too\n", count_of(rest as u64, "more face"));
     }
     text
 }

@@ -183,7 +183,7 @@ fn meshing_summary(r: &Report) -> String {
         sag += &format!("; sampled: at most {} mm, mean {} mm", figures(max, 4), figures(mean, 3));
     }
     if let Some(over) = r.over_tolerance {
-        sag += &format!("; {over} facets over their tolerance");
+        sag += &format!("; {} over the tolerance", count_of(over as u64, "facet"));
     }
     if r.unsampled > 0 {
         sag += &format!("; sampled on {} of {} facets", n(r.facets - r.unsampled), n(r.facets));

@@ -128,8 +128,9 @@ fn import_summary(r: &ImportReport, console: &Console) -> String {
     for problem in r.problems.iter().take(most) {
         text += &format!("  problem: {problem}\n");
     }
-    if r.problems.len() > most {
-        text += &format!("  and {} more problems; -v shows all\n", r.problems.len() - most);
+    let rest = r.problems.len().saturating_sub(most);
+    if rest > 0 {
+        text += &format!("  and {}; -v shows all\n", count_of(rest as u64, "more problem"));
     }
     text
 }

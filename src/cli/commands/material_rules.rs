@@ -18,7 +18,7 @@ pub(super) const MOST_PLACES: usize = 6;
 pub(super) fn material_text(rules: &[String]) -> String {
     let rest = rules.len().saturating_sub(MOST_RULES);
     let more = if rest > 0 {
-        format!("    # … and {rest} more solids: `lampyris info FILE --faces` names them\n")
+        format!("    # … and {}: `lampyris info FILE --faces` names them\n", count_of(rest as u64, "more solid"))
     } else {
         String::new()
     };

@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::pipeline::{PreparedScene, SceneResults};
 use crate::report::{Cell, Section, Table};
 use crate::simulate::{FaceResult, Results};
-use crate::text::{figures, grouped};
+use crate::text::{count_of, figures};
 use serde_json::Value;
 use std::io;
 
@@ -40,9 +40,9 @@ fn face_table(run: &SceneResults, prepared: &PreparedScene) -> Option<Table> {
         ("± facets", unit),
     ];
     let caption = format!(
-        "{} faces were met by light; those that are not listed absorbed {} {unit} and let {} {unit} out. Light that passes a face several \
+        "Light met {}; those that are not listed absorbed {} {unit} and let {} {unit} out. Light that passes a face several \
          times counts each time. Errors (1σ) are those of the rays and, where facets were compared with the spline on the face, of the facets.",
-        grouped(found.count as u64),
+        count_of(found.count as u64, "face"),
         figures(found.rest_absorbed, SAID_DIGITS),
         figures(found.rest_left, SAID_DIGITS)
     );

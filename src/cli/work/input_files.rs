@@ -8,7 +8,7 @@ use crate::formats::lower_extension;
 use crate::pipeline::{LoadedModel, PreparedScene, read_scene};
 use crate::simulate::Scene;
 use crate::step::{self, Import};
-use crate::text::grouped;
+use crate::text::{count_of, grouped};
 use std::path::Path;
 use std::time::Instant;
 
@@ -77,13 +77,14 @@ pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &
     for problem in problems.iter().take(NAMED_PROBLEMS) {
         console.say(format_args!("problem: {problem}"));
     }
-    if problems.len() > NAMED_PROBLEMS {
-        console
-            .say(format_args!("and {} more problems; `lampyris info` lists them", problems.len() - NAMED_PROBLEMS));
+    let rest = problems.len().saturating_sub(NAMED_PROBLEMS);
+    if rest > 0 {
+        console.say(format_args!("and {}; `lampyris info` lists them", count_of(rest as u64, "more problem")));
     }
     let hidden: usize = loaded.reports.iter().map(|r| r.hidden.len()).sum();
     if hidden > 0 {
-        console.say(format_args!("light meets {hidden} items that the model hides; `lampyris info` lists them"));
+        let items = count_of(hidden as u64, "item");
+        console.say(format_args!("light meets {items} that the model hides; `lampyris info` lists them"));
     }
     let cut_off: Vec<&str> = loaded.reports.iter().filter(|r| r.cut_off).map(|r| r.file.as_str()).collect();
     let is_incomplete = is_too_much_missing([refused, found], !cut_off.is_empty(), max_refused);
