@@ -258,6 +258,16 @@ fn a_file_that_was_cut_off_is_told_and_incomplete() {
     }
 }
 
+/// A scene in the place of its model.
+#[test]
+fn a_scene_is_refused_as_one_where_a_step_file_is_needed() {
+    let scene = fixture("scenes/s1_lens.toml").display().to_string();
+    for command in ["info", "facet", "init"] {
+        let (code, _, err) = lampyris(&[command, &scene]);
+        assert!(code == 3 && err.contains("a scene, where a STEP file is needed"), "{command}: {code} {err}");
+    }
+}
+
 #[test]
 fn lengths_without_a_unit_are_said_to_be_taken_as_mm() {
     let folder = tempfile::tempdir().unwrap();

@@ -28,7 +28,16 @@ pub(crate) fn step_file(path: &Path, settings: &step::Settings, console: &Consol
     let spinner = console.spinner(&format!("reading {}", path.display()));
     let import = step::read(path, settings);
     spinner.finish_and_clear();
-    Ok(import?)
+    // That it is to be exported as STEP would be no advice on a scene.
+    let is_scene = lower_extension(path) == "toml" && path.is_file();
+    import.map_err(|error| if is_scene { scene_in_place_of_step(path) } else { error.into() })
+}
+
+/// Returns the failure of a command that takes STEP files alone and was given a scene.
+fn scene_in_place_of_step(path: &Path) -> Failure {
+    let failure = Failure::input(format!("{}: a scene, where a STEP file is needed", path.display()));
+    failure
+        .with_help("give the `file` of its [[model]]; `lampyris trace`, `check` and `study` take the scene itself")
 }
 
 /// Reads a STEP file as a model, in mm; fails where it holds no face that can be traced.
