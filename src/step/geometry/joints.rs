@@ -180,11 +180,16 @@ fn inner_foot(curve: &Curve, near: f64, point: Point) -> Option<f64> {
     (t > a + shortest && t < b - shortest).then_some(t)
 }
 
-/// Whether the step from one segment to the next runs against either of them.
+/// Whether the step from one segment to the next runs against either of them. Behind an acute tip, where they run against each other, any
+/// step does: there the one that it runs along more than against the other only lacks its tip.
 fn doubles_back(earlier: &Curve, later: &Curve) -> bool {
     let step = step_between(earlier, later);
-    let along = [direction(earlier, earlier.domain()[1]), direction(later, later.domain()[0])];
-    along.into_iter().any(|d| step.dot(d) < -BACKWARD_COSINE * step.length() * d.length())
+    let [from, to] = [direction(earlier, earlier.domain()[1]), direction(later, later.domain()[0])]
+        .map(|along| along / along.length());
+    if from.dot(to) < -BACKWARD_COSINE && step.dot(from + to) > 0.0 {
+        return false;
+    }
+    [from, to].into_iter().any(|along| step.dot(along) < -BACKWARD_COSINE * step.length())
 }
 
 /// Returns the step from the end of one segment to the start of the next, mm.
@@ -341,5 +346,22 @@ mod tests {
         assert_joined([[[0.0, 0.0], [5.004, 0.0]], [[5.0, 0.003], [5.0, 4.0]]], &corner);
         let turn = [[0.0, 0.0], [5.0, 0.0], [5.0, 0.008], [0.0, 0.008]];
         assert_joined([[[0.0, 0.0], [5.0, 0.0]], [[5.004, 0.008], [0.0, 0.008]]], &turn);
+        // Past a tip of 37°, by the first segment.
+        let tip = [[0.0, 0.0], [5.0, 0.0], [1.0, 3.0]];
+        assert_joined([[[0.0, 0.0], [5.01, 0.0]], [[5.0, 0.0], [1.0, 3.0]]], &tip);
+    }
+
+    /// A tip of 37° that the second segment lacks, or the first.
+    #[test]
+    fn a_gap_behind_an_acute_tip_is_bridged() {
+        for (end, start) in [([5.0, 0.0], [4.96, 0.03]), ([4.95, 0.0], [5.0, 0.0])] {
+            let segments = vec![line([0.0, 0.0], end, [0.0, 1.0]), line(start, [1.0, 3.0], [0.0, 1.0])];
+            let joined = join_segments(1, segments, 1e-6, 0.1).expect("two segments");
+            assert!(joined.joints.len() == 1 && !joined.joints[0].overlaps, "{end:?}");
+            let corners: Vec<Point> = joined.curve.points.iter().map(|p| p.truncate() / p.w).collect();
+            let expected = [[0.0, 0.0], end, start, [1.0, 3.0]].map(|[x, y]| Point::new(x, y, 0.0));
+            assert!(corners.iter().zip(expected).all(|(p, q)| (*p - q).length() < 1e-12), "{corners:?}");
+            assert_eq!(corners.len(), 4);
+        }
     }
 }
