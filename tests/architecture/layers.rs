@@ -508,6 +508,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "joints",
             "curves",
             "composite",
+            "closing",
             "edges",
             "meridian",
             "pcurves",

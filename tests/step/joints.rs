@@ -2,7 +2,7 @@
 //! decisions in files of any unit.
 
 use crate::files::part21;
-use crate::silence::{area, close};
+use crate::silence::{area, close, read};
 use lampyris::math::{Point, Vector};
 use lampyris::nurbs::Curve;
 use lampyris::step::{Import, Settings, read_bytes};
@@ -163,5 +163,73 @@ fn an_edge_over_segments_that_overlap_does_not_double_back() {
             // The quarters are 2.5e-6 mm apart where the one passes the end of the other.
             assert!(off[0].min(off[1]) < 5e-6, "{name}: {}", d.point);
         }
+    }
+}
+
+/// A disc of radius 5 along two half circles of a composite curve, the second of which ends `gap` before the start of the first and with
+/// this transition, between vertices at these angles on it; a straight edge leads back to the first vertex where `is_slit`.
+fn disc(gap: f64, transition: &str, angles: &[f64], is_slit: bool) -> Import {
+    let end = 2.0 * PI - gap / 5.0;
+    let mut data = format!(
+        "#20=CIRCLE('',#14,5.);\n#21=TRIMMED_CURVE('',#20,(PARAMETER_VALUE(0.)),(PARAMETER_VALUE({PI:?})),.T.,.PARAMETER.);\n\
+         #22=TRIMMED_CURVE('',#20,(PARAMETER_VALUE({PI:?})),(PARAMETER_VALUE({end:?})),.T.,.PARAMETER.);\n\
+         #23=COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,.T.,#21);\n#24=COMPOSITE_CURVE_SEGMENT(.{transition}.,.T.,#22);\n\
+         #25=COMPOSITE_CURVE('',(#23,#24),.F.);\n"
+    );
+    let mut uses = Vec::new();
+    for (k, angle) in angles.iter().enumerate() {
+        let (sin, cos) = angle.sin_cos();
+        let next = (k + 1) % angles.len();
+        let curve = if is_slit && next == 0 { "$" } else { "#25" };
+        data += &format!(
+            "#3{k}=CARTESIAN_POINT('',({:?},{:?},0.));\n#4{k}=VERTEX_POINT('',#3{k});\n#5{k}=EDGE_CURVE('',#4{k},#4{next},{curve},.T.);\n\
+             #6{k}=ORIENTED_EDGE('',*,*,#5{k},.T.);\n",
+            5.0 * cos,
+            5.0 * sin
+        );
+        uses.push(format!("#6{k}"));
+    }
+    let list = uses.join(",");
+    read(&format!(
+        "{data}#70=EDGE_LOOP('',({list}));\n#71=PLANE('',#14);\n#72=FACE_OUTER_BOUND('',#70,.T.);\n\
+         #73=ADVANCED_FACE('',(#72),#71,.T.);\n#74=OPEN_SHELL('',(#73));\n#900=SHELL_BASED_SURFACE_MODEL('',(#74));\n"
+    ))
+}
+
+/// By one edge from a vertex to the same, whatever the file says of the curve's end, and by two of which one runs over it.
+#[test]
+fn a_composite_curve_whose_ends_nearly_meet_is_closed_and_told() {
+    for (gap, reason) in
+        [(0.0, None), (2e-3, Some("lie apart")), (0.05, Some("lie apart")), (-0.05, Some("overlap"))]
+    {
+        for transition in ["CONTINUOUS", "DISCONTINUOUS"] {
+            let what = format!("{gap} {transition}");
+            assert_read(&disc(gap, transition, &[0.0], false), reason, 25.0 * PI, &what);
+        }
+        let halves = disc(gap, "CONTINUOUS", &[0.5 * PI, 1.5 * PI], false);
+        assert_read(&halves, reason, 25.0 * PI, &format!("{gap}, two edges"));
+    }
+}
+
+/// 5 % of the curve.
+#[test]
+fn an_edge_over_ends_too_far_apart_is_refused() {
+    for angles in [&[0.0][..], &[0.5 * PI, 1.5 * PI]] {
+        let import = disc(0.5, "CONTINUOUS", angles, false);
+        assert_eq!(import.report.faces.converted, 0, "{angles:?}");
+        let refusals = &import.report.refusals;
+        assert!(refusals.iter().any(|r| r.reason.contains("it runs over the ends of its curve")), "{refusals:?}");
+    }
+}
+
+/// A slit of 5 µm between the ends of a curve along which one edge runs from the one to the other.
+#[test]
+fn an_edge_between_the_ends_of_its_curve_does_not_close_it() {
+    for transition in ["CONTINUOUS", "DISCONTINUOUS"] {
+        let import = disc(0.005, transition, &[0.0, 2.0 * PI - 0.001], true);
+        assert_read(&import, None, 25.0 * PI, transition);
+        let edge = import.model.parts[0].edges.iter().find(|e| e.entity == Some(50)).expect("the edge");
+        let [a, b] = edge.curve.domain();
+        assert!((edge.curve.evaluate(b) - edge.curve.evaluate(a)).length() > 4.9e-3, "{transition}");
     }
 }

@@ -165,7 +165,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
     }
 
     /// Returns the curve whose parameter a curve has: what it trims, moves or places in turn, itself where it does not.
-    fn parameter_owner(&self, curve: Entity<'f, 'a>) -> Entity<'f, 'a> {
+    pub(super) fn parameter_owner(&self, curve: Entity<'f, 'a>) -> Entity<'f, 'a> {
         let mut owner = curve;
         for _ in 0..MAX_DEPTH {
             let basis = if owner.is_one_of(&SURFACE_CURVES) {
@@ -304,6 +304,12 @@ fn require_kept_parameter(e: Entity<'_, '_>, joints: &[Joint]) -> Outcome<()> {
 /// Returns the list of the segments of a composite curve; `None` of one without any, and of any other curve.
 fn segment_list<'f, 'a>(e: Entity<'f, 'a>) -> Option<Args<'f, 'a>> {
     COMPOSITES.into_iter().find_map(|name| e.attributes(name, 1).map(|a| a.list(0)).filter(|list| list.len() > 0))
+}
+
+/// Whether the file lets the last segment of a composite curve go on to the first: it does not end it with a discontinuity.
+pub(super) fn is_closed_by_file(e: Entity<'_, '_>) -> bool {
+    let last = segment_list(e).and_then(|list| list.entity(list.len() - 1));
+    last.is_some_and(|segment| segment_attributes(segment).word(0).as_deref() != Some("DISCONTINUOUS"))
 }
 
 /// Returns the attributes of a segment of a composite curve: transition, sense and parent curve.

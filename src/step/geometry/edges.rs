@@ -1,7 +1,9 @@
 //! Edges: curves cut to their vertices, running from the start vertex to the end vertex.
 
+use super::closing::CurveUse;
 use super::composite::coincident;
 use super::curves::{CurveShape, DirectedCurve};
+use super::joints::Joint;
 use super::tolerances::{
     ACCURACY_MM, EMPTY_EDGE_MM, EMPTY_PARAMETER, EMPTY_SHARE, EQUAL_POINTS_MM, LOOSE_VERTEX_MM, VERTEX_MM,
     VERTEX_SHARE,
@@ -18,6 +20,11 @@ const WRONG_SENSE: &str = "the sense of an edge contradicts its vertices: it run
 const BRIDGED: &str = "segments of the curve of an edge lie apart: straight pieces join them";
 /// What is told of an edge along whose curve some is there twice.
 const CUT: &str = "segments of the curve of an edge overlap: what they have in common is cut off one of them";
+/// What is told of an edge over the ends of a curve that do not meet.
+const CLOSED: &str = "the ends of the curve of an edge lie apart: a straight piece joins them";
+/// What is told of an edge over the ends of a curve that overlap.
+const CLOSED_BY_CUT: &str =
+    "the ends of the curve of an edge overlap: what they have in common is cut off one of them";
 /// Longest chain of edges that are parts of edges.
 const MAX_PARENTS: usize = 4;
 
@@ -61,8 +68,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
 
     /// Reads edge #`id` from its first to its second vertex, mm: that part of `curve`, or all of a closed one where both vertices are one
     /// place; the straight line where the file gives no curve, none where it has no length. `sense` is whether it runs along `curve`; a
-    /// wrong one is corrected. Refuses missing vertices, vertices that leave nothing of the curve but lie apart, and a part of a composite
-    /// curve with segments too far apart to be joined.
+    /// wrong one is corrected. Refuses missing vertices, vertices that leave nothing of the curve but lie apart, and a part of a curve with
+    /// segments, or ends, too far apart to be joined.
     fn edge_between(
         &self,
         id: u64,
@@ -81,6 +88,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             return Ok(TrimmedEdge { curve, ..TrimmedEdge::default() });
         };
         let directed = self.curve(curve, 0)?;
+        let usage = CurveUse { vertices: [p, q], sense, is_closed: closed, is_alone: alone };
+        let directed = self.close_for_edge(e, curve, directed, &usage)?;
         // A loop of one edge encloses something: next to nothing of the curve cannot be meant.
         let closed = closed || alone && directed.shape.period().is_some() && coincident(p, q, LOOSE_VERTEX_MM);
         let edge = trim_to_vertices(&directed, p, q, closed, sense)
@@ -88,8 +97,18 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         // A trimmed curve has the parameter of the whole one, also where it is run backwards.
         let joints = edge.curve.as_ref().map_or_else(Vec::new, |part| directed.shape.joints_along(part.domain()));
         self.require_joined(&joints)?;
-        let told = joints.first().map(|joint| if joint.overlaps { CUT } else { BRIDGED });
+        let told = joints.first().map(told_of_joint);
         Ok(TrimmedEdge { repair: edge.repair.or(told), ..edge })
+    }
+}
+
+/// Returns what is told of an edge that runs over a joint.
+fn told_of_joint(joint: &Joint) -> &'static str {
+    match (joint.is_closing, joint.overlaps) {
+        (false, false) => BRIDGED,
+        (false, true) => CUT,
+        (true, false) => CLOSED,
+        (true, true) => CLOSED_BY_CUT,
     }
 }
 

@@ -6,24 +6,27 @@
 //! bends it.
 
 use super::tolerances::{
-    ACCURACY_MM, BACKWARD_COSINE, LIMIT_STEP, LOOSE_VERTEX_MM, OVERLAP_ROOM, SEAM_SHARE, SHORTEST_TAIL, STILL_SHARE,
+    ACCURACY_MM, BACKWARD_COSINE, EMPTY_SHARE, LIMIT_STEP, LOOSE_VERTEX_MM, OVERLAP_ROOM, SEAM_SHARE,
+    SHORTEST_TAIL, STILL_SHARE,
 };
 use crate::math::{Homogeneous, Point, Vector};
 use crate::nurbs::{Curve, project};
 
-/// Where two segments of a composite curve, one behind the other, do not meet within the file's accuracy.
+/// Where two segments of a composite curve, one behind the other, or both ends of a curve, do not meet within the file's accuracy.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Joint {
     /// The entity of the composite curve.
     pub(super) owner: u64,
     /// Whether the segments overlap, and are cut; a straight piece bridges those that do not.
     pub(super) overlaps: bool,
+    /// Whether it joins the end of the curve to its start.
+    pub(super) is_closing: bool,
     /// Distance between the ends of the segments, mm.
-    width: f64,
+    pub(super) width: f64,
     /// Largest distance that a writer's inaccuracy explains, mm.
-    limit: f64,
+    pub(super) limit: f64,
     /// A part of the curve runs over the joint if it begins before the first of these parameters and ends behind the second.
-    crossing: [f64; 2],
+    pub(super) crossing: [f64; 2],
 }
 
 impl Joint {
@@ -69,12 +72,21 @@ impl JoinedCurve {
 }
 
 /// Returns those of a curve's joints that its part over `range` runs over, by the parameter of that part. The curve's parameter begins at
-/// `start`; that of a closed curve repeats after `period`, and the range may begin in any period and be as long as one.
+/// `start`; that of a closed curve repeats after `period`, and the range may begin in any period and be as long as one: a whole turn runs
+/// over all joints, also one on which it begins.
 pub(super) fn crossed_joints(joints: &[Joint], start: f64, period: Option<f64>, range: [f64; 2]) -> Vec<Joint> {
     let first = period.map_or(0.0, |period| ((range[0] - start) / period).floor() * period);
     let shifts = std::iter::once(first).chain(period.map(|period| first + period));
-    let shifted = shifts.flat_map(|shift| joints.iter().map(move |joint| joint.shifted(shift)));
-    shifted.filter(|joint| joint.is_crossed_by(range)).collect()
+    let is_whole = period.is_some_and(|period| range[1] - range[0] > (1.0 - EMPTY_SHARE) * period);
+    let mut crossed = Vec::new();
+    for joint in joints {
+        let known = crossed.len();
+        crossed.extend(shifts.clone().map(|shift| joint.shifted(shift)).filter(|joint| joint.is_crossed_by(range)));
+        if is_whole && crossed.len() == known {
+            crossed.push(joint.shifted(first));
+        }
+    }
+    crossed
 }
 
 /// Joins the segments of the composite curve #`owner` to one spline, of the highest degree of them; `None` of none. Ends within `accuracy`,
@@ -122,8 +134,7 @@ impl SegmentChain {
     /// Puts the last segment back, and what joins the next one to it; of either is cut off what they have in common.
     fn meet(&mut self, mut last: Curve, next: &mut Curve) {
         let width = step_between(&last, next).length();
-        // A vertex as near to a segment's end as this may stand for it.
-        let margin = self.accuracy.max(LOOSE_VERTEX_MM.min(0.5 * width));
+        let margin = joint_margin(self.accuracy, width);
         let overlaps = width > ACCURACY_MM[0] && width <= self.limit && doubles_back(&last, next);
         if overlaps {
             self.end -= cut_overlap(&mut last, next, margin);
@@ -135,16 +146,9 @@ impl SegmentChain {
         let step = step_between(&last, next).length();
         let is_bridged = !overlaps || step > margin && !doubles_back(&last, next);
         let length = if is_bridged { step } else { 0.0 };
-        let crossing = if overlaps {
-            // The vertices of an edge along one segment may lie on the other.
-            let room = OVERLAP_ROOM * width;
-            let before = parameter_length(&last, last.domain()[1], room);
-            let behind = parameter_length(next, next.domain()[0], room);
-            [self.end - before, self.end + length + behind]
-        } else {
-            [self.end + length - margin, self.end + margin]
-        };
-        self.joints.push(Joint { owner: self.owner, overlaps, width, limit: self.limit, crossing });
+        let crossing = joint_crossing([&last, &*next], overlaps.then_some(width), self.end, length, margin);
+        let (owner, limit) = (self.owner, self.limit);
+        self.joints.push(Joint { owner, overlaps, is_closing: false, width, limit, crossing });
         let ends = [end_point(&last), start_point(next)];
         self.pieces.push(last);
         if is_bridged {
@@ -154,10 +158,32 @@ impl SegmentChain {
     }
 }
 
+/// Returns how near to a segment's end, mm, a vertex may stand for it at a joint of this width.
+pub(super) fn joint_margin(accuracy: f64, width: f64) -> f64 {
+    accuracy.max(LOOSE_VERTEX_MM.min(0.5 * width))
+}
+
+/// Returns the parameters before and behind which a part that runs over a joint begins and ends: the earlier segment ends at `end`, a
+/// straight piece of `length` follows; `overlap` is by how much, mm, the segments overlapped, if they did.
+pub(super) fn joint_crossing(
+    [earlier, later]: [&Curve; 2],
+    overlap: Option<f64>,
+    end: f64,
+    length: f64,
+    margin: f64,
+) -> [f64; 2] {
+    let Some(width) = overlap else { return [end + length - margin, end + margin] };
+    // The vertices of an edge along one segment may lie on the other.
+    let room = OVERLAP_ROOM * width;
+    let before = parameter_length(earlier, earlier.domain()[1], room);
+    let behind = parameter_length(later, later.domain()[0], room);
+    [end - before, end + length + behind]
+}
+
 /// Cuts off what two segments, of which the later one begins before the end of the earlier, have in common: the later one then begins
 /// beside that end and, where a step of more than `margin`, mm, still doubles back, the earlier one ends beside that start. A segment of
 /// which nothing would be left stays. Returns by how much the earlier one's parameter ends before.
-fn cut_overlap(earlier: &mut Curve, later: &mut Curve, margin: f64) -> f64 {
+pub(super) fn cut_overlap(earlier: &mut Curve, later: &mut Curve, margin: f64) -> f64 {
     let [start, end] = later.domain();
     if let Some(t) = inner_foot(later, start, end_point(earlier)) {
         *later = later.restricted(t, end);
@@ -182,7 +208,7 @@ fn inner_foot(curve: &Curve, near: f64, point: Point) -> Option<f64> {
 
 /// Whether the step from one segment to the next runs against either of them. Behind an acute tip, where they run against each other, any
 /// step does: there the one that it runs along more than against the other only lacks its tip.
-fn doubles_back(earlier: &Curve, later: &Curve) -> bool {
+pub(super) fn doubles_back(earlier: &Curve, later: &Curve) -> bool {
     let step = step_between(earlier, later);
     let [from, to] = [direction(earlier, earlier.domain()[1]), direction(later, later.domain()[0])]
         .map(|along| along / along.length());
@@ -193,15 +219,15 @@ fn doubles_back(earlier: &Curve, later: &Curve) -> bool {
 }
 
 /// Returns the step from the end of one segment to the start of the next, mm.
-fn step_between(earlier: &Curve, later: &Curve) -> Vector {
+pub(super) fn step_between(earlier: &Curve, later: &Curve) -> Vector {
     start_point(later) - end_point(earlier)
 }
 
-fn start_point(curve: &Curve) -> Point {
+pub(super) fn start_point(curve: &Curve) -> Point {
     curve.evaluate(curve.domain()[0])
 }
 
-fn end_point(curve: &Curve) -> Point {
+pub(super) fn end_point(curve: &Curve) -> Point {
     curve.evaluate(curve.domain()[1])
 }
 
@@ -239,7 +265,7 @@ pub(super) fn segment_over_seam(curve: &Curve, s0: f64, s1: f64) -> Curve {
 }
 
 /// Returns the same curve with a higher degree, piecewise Bézier; `degree` is not below its own.
-fn elevate_degree(curve: &Curve, degree: usize) -> Curve {
+pub(super) fn elevate_degree(curve: &Curve, degree: usize) -> Curve {
     if curve.degree == degree {
         return curve.clone();
     }
@@ -309,6 +335,11 @@ mod tests {
         // Of a closed curve the second turn has the joint at the same place.
         let in_turn = |range: [f64; 2]| crossed_joints(&joined.joints, 2.0, Some(10.0), range).len();
         assert_eq!([[9.0, 16.0], [9.0, 18.0], [18.0, 21.0], [7.5, 17.5]].map(in_turn), [0, 1, 0, 2]);
+        // A turn from one end of the joint to it is whole.
+        let on_joint = [Joint { crossing: [6.0, 9.0], ..joined.joints[0] }];
+        let whole =
+            |from: f64, length: f64| crossed_joints(&on_joint, 2.0, Some(10.0), [from, from + length]).len();
+        assert_eq!([whole(7.0, 10.0), whole(7.0, 9.5), whole(3.0, 10.0)], [1, 0, 1]);
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! Curves and surfaces of the file, in mm and radians.
 //!
 //! Source: ISO 10303-42. A curve becomes a closed form where there is one and a rational spline else (`curves`, `composite`, `joints`,
-//! `pcurves`), an edge the part of its curve between its vertices (`edges`), a surface a chart (`surfaces`, `elementary`,
+//! `pcurves`), an edge the part of its curve between its vertices (`edges`, `closing`), a surface a chart (`surfaces`, `elementary`,
 //! `swept_surfaces`). What cannot be had is a [`Refusal`] that names the entity and the reason. Curves may lie on surfaces and surfaces
 //! be swept from curves: the readers call each other as methods of [`GeometryReader`], their types do not depend on each other.
 
+mod closing;
 pub(super) mod composite;
 pub(super) mod curves;
 pub(super) mod edges;
