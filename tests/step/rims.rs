@@ -170,3 +170,29 @@ fn the_second_of_two_rings_that_run_alike_is_turned_around() {
         told(&between_rings("TOROIDAL_SURFACE('',#13,5.,1.5)", 1.5, rings, flag), share * whole);
     }
 }
+
+/// A tube of radius 2 and height 3 in one loop along its seam, whose rims are run with these senses: right where they differ.
+#[test]
+fn a_rim_that_runs_the_wrong_way_is_turned_and_told() {
+    for (rims, repaired) in [(["T", "F"], 0), (["T", "T"], 1), (["F", "F"], 1)] {
+        let [bottom, top] = rims;
+        let data = points(&[(10, [0.0; 3]), (11, [0., 0., 3.]), (12, [2., 0., 0.]), (13, [2., 0., 3.])])
+            + &format!(
+                "#20=DIRECTION('',(0.,0.,1.));\n#21=DIRECTION('',(1.,0.,0.));\n#22=AXIS2_PLACEMENT_3D('',#10,#20,#21);\n\
+                 #23=AXIS2_PLACEMENT_3D('',#11,#20,#21);\n#24=CYLINDRICAL_SURFACE('',#22,2.);\n#25=CIRCLE('',#22,2.);\n\
+                 #26=CIRCLE('',#23,2.);\n#30=VERTEX_POINT('',#12);\n#31=VERTEX_POINT('',#13);\n\
+                 #40=EDGE_CURVE('',#30,#30,#25,.T.);\n#41=EDGE_CURVE('',#31,#31,#26,.T.);\n#42=EDGE_CURVE('',#30,#31,$,.T.);\n\
+                 #50=ORIENTED_EDGE('',*,*,#40,.{bottom}.);\n#51=ORIENTED_EDGE('',*,*,#42,.T.);\n\
+                 #52=ORIENTED_EDGE('',*,*,#41,.{top}.);\n#53=ORIENTED_EDGE('',*,*,#42,.F.);\n\
+                 #60=EDGE_LOOP('',(#50,#51,#52,#53));\n#61=FACE_OUTER_BOUND('',#60,.T.);\n#900=ADVANCED_FACE('',(#61),#24,.T.);\n"
+            );
+        let import = import(&data);
+        close(area(&import), 12.0 * PI, 1e-5);
+        assert_eq!(import.report.faces.repaired, repaired, "{rims:?}");
+        let repairs = &import.report.repairs;
+        assert!(
+            repairs.iter().all(|r| r.reason.contains("one of its edges that do was turned around")),
+            "{repairs:?}"
+        );
+    }
+}

@@ -48,6 +48,9 @@ pub(crate) fn bound_region(
 ) -> Result<Boundary, &'static str> {
     chains.retain(|c| !c.pieces.is_empty());
     let mut out = Boundary { loops: Vec::new(), seams: Vec::new(), repairs: Vec::new() };
+    if chains.iter().any(|c| c.is_edge_turned) {
+        out.repairs.push("a loop winds around the surface twice: one of its edges that do was turned around");
+    }
     // In the unwrapped plane a loop around a closed surface ends whole periods from its start: alone it bounds no region.
     let (winding, mut plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);
     // A seam that the file runs forth and back bounds nothing by intent, other edges do not.

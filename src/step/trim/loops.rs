@@ -98,12 +98,14 @@ pub(crate) struct Chain {
     pub(crate) bridged: f64,
     /// Whether it was run backwards, since its sides at a pole fit no other way.
     pub(crate) is_against_sense: bool,
+    /// Whether one of its edges, which runs all around by itself, was turned around.
+    pub(crate) is_edge_turned: bool,
 }
 
 impl Chain {
     /// Pieces that close without winding.
     pub(crate) fn closed(pieces: Vec<Piece>) -> Self {
-        Self { pieces, winding: [0, 0], bridged: 0.0, is_against_sense: false }
+        Self { pieces, winding: [0, 0], bridged: 0.0, is_against_sense: false, is_edge_turned: false }
     }
 
     /// Returns a polygon of points along the chain, without the end.
@@ -165,7 +167,7 @@ pub(crate) fn contains(polygon: &[Uv], p: Uv) -> bool {
 /// or after a straight step.
 ///
 /// Loops whose sides at a pole do not fit the sense in which they wind are tried with the sides run the other way: such
-/// loops run against their face's orientation.
+/// loops run against their face's orientation. Of a loop that winds twice one edge that runs all around is turned.
 pub(crate) fn close_loop(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Chain {
     let first = chain_uses(uses.clone(), chart, tolerance, false);
     // On a surface with one pole nothing could close a loop that touches it and winds around it all the same.
@@ -174,6 +176,9 @@ pub(crate) fn close_loop(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Cha
     if first.winding.iter().all(|w| w.abs() <= allowed) {
         return first;
     }
+    if let Some(turned) = turn_closed_edge(&uses, first.winding, chart, tolerance) {
+        return turned;
+    }
     let mut second = chain_uses(uses, chart, tolerance, true);
     if second.is_winding() {
         return first;
@@ -181,6 +186,27 @@ pub(crate) fn close_loop(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Cha
     second.reverse();
     second.is_against_sense = true;
     second
+}
+
+/// Chains the uses of a loop that winds twice with one of them turned around, which closes it: both rims of a wall with a seam between run
+/// the same way then. Of such uses, each of which runs all around by itself, the one is turned that leaves the material on the left; `None`
+/// where none closes the loop.
+fn turn_closed_edge(uses: &[Piece], winding: [i32; 2], chart: &Chart, tolerance: f64) -> Option<Chain> {
+    let along = (0..2).find(|&d| winding[d].abs() == 2 && winding[1 - d] == 0)?;
+    let turn = 0.5 * f64::from(winding[along]) * chart.period[along]?;
+    let runs_around = |piece: &Piece| {
+        let (start, end) = (piece.start(), piece.end());
+        let [p, q] = [start, end].map(|uv| chart.derivatives(uv).point);
+        let is_turn = ((end - start)[along] / turn).round() == 1.0;
+        matches!(piece.source, Source::Edge(_)) && is_turn && (q - p).length() <= 10.0 * tolerance
+    };
+    let turned = |k: usize| {
+        let mut uses = uses.to_vec();
+        uses[k].reversed = !uses[k].reversed;
+        Chain { is_edge_turned: true, ..chain_uses(uses, chart, tolerance, false) }
+    };
+    let closed = (0..uses.len()).filter(|&k| runs_around(&uses[k])).map(turned).filter(|chain| !chain.is_winding());
+    closed.max_by(|a, b| a.area().total_cmp(&b.area()))
 }
 
 /// Puts uses one behind the other by whole periods, and counts how often the loop winds around; `turned` runs sides at a pole the other
