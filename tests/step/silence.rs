@@ -146,6 +146,29 @@ fn a_hole_whose_vertices_differ_by_rounding_stays_open() {
     }
 }
 
+/// A plate whose lower side is moved up to the hole, which reaches down to 3, and half a millimetre into it.
+#[test]
+fn a_hole_that_stands_out_of_its_face_is_told() {
+    for (bottom, repaired) in [("0.", 0), ("2.9", 0), ("3.5", 1)] {
+        let data = plate(0.0)
+            .replace("(0.0,0.0,0.)", &format!("(0.,{bottom},0.)"))
+            .replace("(10.0,0.0,0.)", &format!("(10.,{bottom},0.)"));
+        let import = read(&data);
+        let report = &import.report;
+        assert_eq!(
+            (report.faces.converted, report.faces.repaired),
+            (1, repaired),
+            "{bottom}: {:?}",
+            report.repairs
+        );
+        assert!(
+            report.repairs.iter().all(|r| r.reason.contains("stands out of the outer loop")),
+            "{:?}",
+            report.repairs
+        );
+    }
+}
+
 #[test]
 fn a_face_that_lacks_a_bound_is_refused() {
     let whole = plate(0.0);

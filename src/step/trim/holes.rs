@@ -2,7 +2,7 @@
 
 use super::loops::{Chain, contains};
 use crate::math::Uv;
-use crate::math::polygon::signed_area;
+use crate::math::polygon::{nearest_on_side, polygon_sides, signed_area};
 use crate::step::chart::Chart;
 use std::cell::OnceCell;
 
@@ -13,6 +13,9 @@ const MOST_PERIODS: f64 = 64.0;
 /// How much finer the border's polygon is where the first one has a hole outside: a hexagon in a circle 1.5 % wider stood out of the
 /// 16-sided polygon of that circle.
 const FINE_DENSITY: usize = 16;
+/// A hole stands out of its border where it does so by more than this share of the border's size in u or v: the fine polygon of a circle
+/// misses it by 1e-4 of its size, and holes may touch their border.
+const OUTSIDE_SHARE: f64 = 1e-3;
 
 /// The border into which holes are moved, as polygons that are made once, when they are first asked for.
 pub(super) struct Border<'c> {
@@ -35,6 +38,37 @@ impl<'c> Border<'c> {
     fn fine(&self) -> &[Uv] {
         self.fine.get_or_init(|| self.outer.polygon_of_density(FINE_DENSITY))
     }
+}
+
+/// Returns the lowest and highest parameters of a polygon.
+fn corners_of_box(polygon: &[Uv]) -> [Uv; 2] {
+    polygon.iter().fold([Uv::INFINITY, Uv::NEG_INFINITY], |[lo, hi], &p| [lo.min(p), hi.max(p)])
+}
+
+/// Whether the box of a hole, moved by `shift`, stands out of that of a border by more than [`OUTSIDE_SHARE`].
+fn leaves_box(hole: &[Uv], border: &[Uv], shift: Uv) -> bool {
+    let ([hole_lo, hole_hi], [lo, hi]) = (corners_of_box(hole), corners_of_box(border));
+    let room = OUTSIDE_SHARE * (hi - lo);
+    ((hole_lo + shift).cmplt(lo - room) | (hole_hi + shift).cmpgt(hi + room)).any()
+}
+
+/// Whether a place lies outside of a border by more than [`OUTSIDE_SHARE`].
+fn is_outside(place: Uv, border: &[Uv]) -> bool {
+    let [lo, hi] = corners_of_box(border);
+    let size = hi - lo;
+    let distance = |side: [Uv; 2]| {
+        let [a, b, p] = [side[0], side[1], place].map(|q| q / size);
+        (nearest_on_side([a, b], p) - p).length()
+    };
+    !contains(border, place) && polygon_sides(border).map(distance).fold(f64::INFINITY, f64::min) > OUTSIDE_SHARE
+}
+
+/// Whether a hole, moved by `shift`, stands out of its border, as its box or one of a few places tell.
+fn stands_out(hole: &[Uv], border: &Border<'_>, shift: Uv) -> bool {
+    let is_beside = |border: &[Uv]| leaves_box(hole, border, shift);
+    let places = || (0..PLACES).map(|k| hole[k * hole.len() / PLACES] + shift);
+    is_beside(border.coarse()) && is_beside(border.fine())
+        || places().any(|p| !contains(border.coarse(), p) && is_outside(p, border.fine()))
 }
 
 /// By how many periods a hole may be moved along `axis` so that it reaches into a border, the fewest first: a border that is cut along a
@@ -79,7 +113,7 @@ pub(super) fn free_start(d: usize, base: f64, period: f64, holes: &[Vec<Uv>]) ->
 }
 
 /// Moves a hole by periods into the border, and turns it clockwise; one that lies in no place inside is a loop of its own and turned the
-/// other way. Notes what was turned.
+/// other way. Notes what was turned, and a hole that stands out of the border.
 pub(super) fn place_hole(
     mut hole: Chain,
     border: &Border<'_>,
@@ -107,6 +141,9 @@ pub(super) fn place_hole(
     match shift {
         Some(shift) => {
             hole.shift(shift);
+            if stands_out(&polygon, border, shift) {
+                repairs.push("a hole stands out of the outer loop of its face");
+            }
             if signed_area(&polygon) > 0.0 {
                 hole.reverse();
                 repairs.push("a hole was turned around");
@@ -125,6 +162,25 @@ pub(super) fn place_hole(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::step::trim::loops::Piece;
+
+    fn square(low: Uv, size: f64) -> Vec<Uv> {
+        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|p| low + size * Uv::from_array(p)).to_vec()
+    }
+
+    /// A square of 10 by 10 and another of 2 by 2: inside, on a side, beyond it by half, and inside once moved.
+    #[test]
+    fn a_hole_stands_out_of_its_border_where_it_leaves_it() {
+        let sides = polygon_sides(&square(Uv::ZERO, 10.0)).map(|[a, b]| Piece::straight(a, b)).collect();
+        let outer = Chain::closed(sides);
+        let border = Border::new(&outer);
+        for (low, shift, expected) in
+            [(1.0, 0.0, false), (8.0, 0.0, false), (8.005, 0.0, false), (9.0, 0.0, true), (29.0, -22.0, false)]
+        {
+            let hole = square(Uv::new(low, 4.0), 2.0);
+            assert_eq!(stands_out(&hole, &border, Uv::new(shift, 0.0)), expected, "{low}");
+        }
+    }
 
     /// A hole of 1 by 1 and a border from 30 to 33 along u, of a period of 2π: four of them lead before it, five into it, none across.
     #[test]
