@@ -2,8 +2,9 @@
 //!
 //! Boxes around runs of sides stand in a tree, so that a piece is compared with what is beside it alone.
 
+use super::segment::{Contact, Segment};
 use super::tolerances::CROSSING_NOISE;
-use crate::math::polygon::polygon_sides;
+use crate::math::polygon::{is_inside_sides, polygon_sides};
 use crate::math::{Aabb, BoxTree, Uv};
 use std::cell::Cell;
 use std::ops::{Range, RangeInclusive};
@@ -12,8 +13,6 @@ use std::ops::{Range, RangeInclusive};
 const MOST_TURNS: i32 = 64;
 /// Sides of a chain that one box is around.
 const SIDES_OF_RUN: usize = 16;
-/// Corners of one hole's box.
-pub(super) const CORNERS_OF_BOX: usize = 4;
 /// Boxes that a walk through the tree looks at, the runs that it meets apart: four levels of four, as of a few hundred runs.
 const STEPS_OF_WALK: u64 = 16;
 
@@ -36,6 +35,8 @@ pub(super) struct Obstacles<'o> {
     runs: Vec<Run>,
     /// Around the runs, by their index.
     tree: BoxTree,
+    /// Around the holes, by their number.
+    hole_tree: BoxTree,
     /// Boxes that were looked at since [`Self::take_steps`].
     steps: Cell<u64>,
 }
@@ -56,35 +57,6 @@ struct Run {
     bounds: [Uv; 2],
 }
 
-/// A straight line between two places.
-pub(super) struct Segment {
-    ends: [Uv; 2],
-    /// What counts as touching, in parameters.
-    slack: f64,
-    /// Lowest and highest corner of the box around it, larger by the slack.
-    bounds: [Uv; 2],
-}
-
-impl Segment {
-    pub(super) fn new(ends: [Uv; 2]) -> Self {
-        let [a, b] = ends;
-        let slack = CROSSING_NOISE * (b - a).length();
-        Self { ends, slack, bounds: [a.min(b) - slack, a.max(b) + slack] }
-    }
-
-    /// Whether it may cross something inside a box, given by its lowest and highest corner.
-    pub(super) fn may_meet(&self, [lo, hi]: [Uv; 2]) -> bool {
-        if lo.cmpgt(self.bounds[1]).any() || hi.cmplt(self.bounds[0]).any() {
-            return false;
-        }
-        // Corners of a box farther off than half its extent across the line lie on one side of it.
-        let along = self.ends[1] - self.ends[0];
-        let half = 0.5 * (hi - lo) + self.slack;
-        let off = along.perp_dot(0.5 * (lo + hi) - self.ends[0]);
-        off.abs() <= along.x.abs() * half.y + along.y.abs() * half.x
-    }
-}
-
 impl<'o> Obstacles<'o> {
     pub(super) fn new(holes: &'o [Vec<Uv>], borders: &'o [Vec<Uv>], displacement: Uv) -> Self {
         let closed = holes.iter().map(|places| Chain { places, closed: true, runs: 0..0 });
@@ -103,7 +75,9 @@ impl<'o> Obstacles<'o> {
         }
         let boxes: Vec<Aabb> = runs.iter().map(|run| flat_box(run.bounds)).collect();
         let tree = BoxTree::new(&boxes);
-        Self { holes, borders, displacement, chains, along, runs, tree, steps: Cell::new(0) }
+        let hole_boxes: Vec<Aabb> = holes.iter().map(|hole| flat_box(bounds(hole))).collect();
+        let hole_tree = BoxTree::new(&hole_boxes);
+        Self { holes, borders, displacement, chains, along, runs, tree, hole_tree, steps: Cell::new(0) }
     }
 
     /// Returns how many boxes were looked at since this was last asked: the measure of a search's work.
@@ -133,13 +107,22 @@ impl<'o> Obstacles<'o> {
         crossed
     }
 
-    /// Whether the straight line between two places crosses a copy of a hole. Touching does not count, a corner between both sides does.
+    /// Whether the straight line between two places crosses a copy of a hole, or runs through it from side to side. Touching it from
+    /// outside does not count, a corner between both sides does.
     pub(super) fn hole_is_crossed(&self, HoleCopy { hole, copy }: HoleCopy, ends: [Uv; 2]) -> bool {
         let by = self.displacement * f64::from(copy);
         let segment = Segment::new(ends.map(|p| p - by));
         let runs = self.chains[hole].runs.clone();
         self.count_steps(runs.len() as u64);
-        self.runs[runs].iter().any(|run| self.run_is_crossed(run, &segment))
+        let mut is_touched = false;
+        for run in &self.runs[runs] {
+            match self.run_contact(run, &segment) {
+                Contact::Crossing => return true,
+                Contact::Touching => is_touched = true,
+                Contact::Apart => {}
+            }
+        }
+        is_touched && segment.runs_through(&self.holes[hole])
     }
 
     /// Returns what of the straight line from `a` to `b` lies between holes that it crosses one after the other, in order and as shares of
@@ -192,29 +175,74 @@ impl<'o> Obstacles<'o> {
                 self.count_steps(1);
                 let run = &self.runs[k as usize];
                 let hole = (run.chain < self.holes.len()).then_some(HoleCopy { hole: run.chain, copy });
-                is_found(hole, &|| self.run_is_crossed(run, &segment))
+                is_found(hole, &|| self.run_bars(run, &segment))
             })
         })
     }
 
-    /// Whether a segment crosses a side of a run.
-    fn run_is_crossed(&self, run: &Run, segment: &Segment) -> bool {
-        segment.may_meet(run.bounds) && self.chains[run.chain].run_is_crossed(run.first_side, segment.ends)
+    /// Whether a segment crosses a side of a run, or touches one and runs through its hole.
+    fn run_bars(&self, run: &Run, segment: &Segment) -> bool {
+        match self.run_contact(run, segment) {
+            Contact::Crossing => true,
+            Contact::Touching => self.holes.get(run.chain).is_some_and(|hole| segment.runs_through(hole)),
+            Contact::Apart => false,
+        }
+    }
+
+    /// Returns how a segment meets the sides of a run.
+    fn run_contact(&self, run: &Run, segment: &Segment) -> Contact {
+        if !segment.may_meet(run.bounds) {
+            return Contact::Apart;
+        }
+        let chain = &self.chains[run.chain];
+        let mut contact = Contact::Apart;
+        for side in chain.sides_of_run(run.first_side) {
+            contact = contact.max(chain.side_contact(side, segment.ends));
+            if contact == Contact::Crossing {
+                break;
+            }
+        }
+        contact
+    }
+
+    /// Whether a place is in a hole or a copy of one; on a side either answer may come.
+    pub(super) fn lies_in_hole(&self, place: Uv) -> bool {
+        self.copies_beside([place, place]).any(|copy| {
+            let p = place - self.displacement * f64::from(copy);
+            self.count_steps(STEPS_OF_WALK);
+            self.hole_tree.any_meeting(&flat_box([p, p]), |k| {
+                let hole = &self.holes[k as usize];
+                self.count_steps(hole.len() as u64);
+                is_inside_sides(polygon_sides(hole), p)
+            })
+        })
+    }
+
+    /// Whether `is_wanted` says so of a side near a box, given by its lowest and highest corner: it is given the side and its hole, `None`
+    /// of a border. All that meet the box are asked for, in no order, up to the first.
+    pub(super) fn any_side_near(
+        &self,
+        [lo, hi]: [Uv; 2],
+        mut is_wanted: impl FnMut(Option<HoleCopy>, [Uv; 2]) -> bool,
+    ) -> bool {
+        self.copies_beside([lo, hi]).any(|copy| {
+            let by = self.displacement * f64::from(copy);
+            self.count_steps(STEPS_OF_WALK);
+            self.tree.any_meeting(&flat_box([lo - by, hi - by]), |k| {
+                let run = &self.runs[k as usize];
+                let hole = (run.chain < self.holes.len()).then_some(HoleCopy { hole: run.chain, copy });
+                let chain = &self.chains[run.chain];
+                let mut sides = chain.sides_of_run(run.first_side);
+                self.count_steps(sides.len() as u64);
+                sides.any(|side| is_wanted(hole, chain.side(side).map(|p| p + by)))
+            })
+        })
     }
 
     /// Returns the lowest and highest corner of the box around a copy of a hole.
     pub(super) fn bounds_of(&self, HoleCopy { hole, copy }: HoleCopy) -> [Uv; 2] {
         let by = self.displacement * f64::from(copy);
         bounds(&self.holes[hole]).map(|corner| corner + by)
-    }
-
-    /// Returns the corners of the box around a copy of a hole, larger by a share of its size.
-    pub(super) fn corners(&self, HoleCopy { hole, copy }: HoleCopy, margin: f64) -> [Uv; CORNERS_OF_BOX] {
-        let [lo, hi] = bounds(&self.holes[hole]);
-        let off = margin * (hi - lo);
-        let by = self.displacement * f64::from(copy);
-        let [a, b] = [lo - off + by, hi + off + by];
-        [a, Uv::new(b.x, a.y), b, Uv::new(a.x, b.y)]
     }
 
     /// Returns how many displacements the longest hole reaches over, beyond the one in which a seam has room beside a short one: as many
@@ -299,26 +327,37 @@ impl Chain<'_> {
         bounds((first..=last).map(|k| &self.places[k % self.places.len()]))
     }
 
-    /// Whether a segment crosses one of the run of sides that begins with side `first`.
-    fn run_is_crossed(&self, first: usize, segment: [Uv; 2]) -> bool {
-        (first..self.sides()).take(SIDES_OF_RUN).any(|side| self.side_is_crossed(side, segment))
+    /// Returns the sides of the run that begins with side `first`.
+    fn sides_of_run(&self, first: usize) -> Range<usize> {
+        first..(first + SIDES_OF_RUN).min(self.sides())
     }
 
-    /// Whether a segment crosses the side that begins at so many places.
-    fn side_is_crossed(&self, i: usize, [a, b]: [Uv; 2]) -> bool {
-        let n = self.places.len();
-        let (p, q) = (self.places[i], self.places[(i + 1) % n]);
+    /// Returns the ends of side `i`.
+    fn side(&self, i: usize) -> [Uv; 2] {
+        [self.places[i], self.places[(i + 1) % self.places.len()]]
+    }
+
+    /// Returns how a segment meets side `i`.
+    fn side_contact(&self, i: usize, [a, b]: [Uv; 2]) -> Contact {
+        let [p, q] = self.side(i);
         // Segments cross where each has the ends of the other on opposite sides.
         let side = |o: Uv, d: Uv, x: Uv| (d - o).perp_dot(x - o);
         let (s1, s2, s3, s4) = (side(a, b, p), side(a, b, q), side(p, q, a), side(p, q, b));
         let noise = CROSSING_NOISE * (b - a).length() * (q - p).length();
-        let ends_apart = s3 > noise && s4 < -noise || s3 < -noise && s4 > noise;
-        if s2.abs() <= noise && ends_apart {
+        let are_together = |x: f64, y: f64| x > noise && y > noise || x < -noise && y < -noise;
+        if are_together(s1, s2) || are_together(s3, s4) {
+            return Contact::Apart;
+        }
+        let are_opposite = |x: f64, y: f64| x > noise && y < -noise || x < -noise && y > noise;
+        let is_crossed = if s2.abs() <= noise && are_opposite(s3, s4) {
             // Through a corner: between what comes before it and what comes after it.
+            let n = self.places.len();
             let rest = if self.closed { n } else { n - 2 - i };
             let next = (2..=rest).map(|k| self.places[(i + k) % n]).find(|x| side(a, b, *x).abs() > noise);
-            return next.is_some_and(|x| s1.abs() > noise && side(a, b, x) * s1 < 0.0);
-        }
-        (s1 > noise && s2 < -noise || s1 < -noise && s2 > noise) && ends_apart
+            next.is_some_and(|x| s1.abs() > noise && side(a, b, x) * s1 < 0.0)
+        } else {
+            are_opposite(s1, s2) && are_opposite(s3, s4)
+        };
+        if is_crossed { Contact::Crossing } else { Contact::Touching }
     }
 }

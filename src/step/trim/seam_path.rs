@@ -4,8 +4,9 @@
 //! crosses, and each stage gets its own shortest way: the work then grows with the holes on the line. Guarantee: all work is taken from the
 //! face's budget. Known weakness: where the loops themselves bar every straight line, only the holes nearest to it are passed.
 
+use super::clearance::{CORNERS_OF_BOX, NEAR_SHARE};
 use super::fit::{Budget, Overrun};
-use super::obstacles::{CORNERS_OF_BOX, Obstacles, bounds, crosses_itself, turns_of};
+use super::obstacles::{Obstacles, bounds, crosses_itself, turns_of};
 use super::way_search::{COPIES, Goals, MARGINS, MOST_CORNERS, SeamPath, Search};
 use crate::math::Uv;
 use crate::nurbs::Derivatives;
@@ -35,6 +36,19 @@ impl Obstacles<'_> {
         metric: &Derivatives,
         budget: &Budget,
     ) -> Result<Option<SeamPath>, Overrun> {
+        let way = self.way_by_any_search(starts, goals, metric, budget)?;
+        // A seam through a hole would make a wrong face of one that can be refused.
+        Ok(way.filter(|way| way.points.windows(2).all(|leg| self.leave_free(leg[0], leg[1]))))
+    }
+
+    /// Returns the way of the first search that finds one.
+    fn way_by_any_search(
+        &self,
+        starts: &[Uv],
+        goals: &Goals<'_>,
+        metric: &Derivatives,
+        budget: &Budget,
+    ) -> Result<Option<SeamPath>, Overrun> {
         let borders = Obstacles::new(&[], self.borders, self.displacement);
         let search = Search { obstacles: self, borders: &borders, starts, goals, metric, budget };
         // Beside a hole of several turns no corner of a box helps.
@@ -58,7 +72,7 @@ impl Obstacles<'_> {
         search.way_by_all(&places)
     }
 
-    /// Returns the places, in parameters, of a square lattice over the box of the borders, [`LATTICE`] steps each way.
+    /// Returns the places, in parameters, that are clear of a square lattice over the box of the borders, [`LATTICE`] steps each way.
     fn lattice(&self) -> Vec<Uv> {
         let [lo, hi] = bounds(self.borders.iter().flatten());
         let cell = (hi - lo) / LATTICE;
@@ -68,11 +82,12 @@ impl Obstacles<'_> {
                 places.push(lo + cell * Uv::new(i as f64, j as f64));
             }
         }
+        places.retain(|&place| self.is_clear(place, NEAR_SHARE * cell));
         places
     }
 
     /// Returns places between each hole of more than one turn, such as a slot along a helix, and its next copy, in all turns that the hole
-    /// has.
+    /// has, as far as they are clear.
     fn between_turns(&self) -> Vec<Uv> {
         let mut places = Vec::new();
         for hole in self.holes {
@@ -85,6 +100,7 @@ impl Obstacles<'_> {
             }
         }
         places.truncate(MOST_PLACES);
+        places.retain(|&place| self.is_clear(place, Uv::ZERO));
         places
     }
 
@@ -141,11 +157,16 @@ impl Search<'_> {
                 return Ok(Some(way.points));
             }
         }
-        // The widest gap, of those that leave a quarter of the holes on either side.
+        // The widest gap whose middle is clear, of those that leave a quarter of the holes on either side.
+        let middle_of = |gap: [f64; 2]| a + (b - a) * (0.5 * (gap[0] + gap[1]));
+        let is_clear = |gap: &[f64; 2]| {
+            let room = NEAR_SHARE * (gap[1] - gap[0]) * (b - a).abs();
+            self.obstacles.is_clear(middle_of(*gap), room)
+        };
         let middle = &gaps[gaps.len() / 4..(3 * gaps.len()).div_ceil(4)];
-        let widest = middle.iter().max_by(|x, y| (x[1] - x[0]).total_cmp(&(y[1] - y[0])));
-        let Some([from, to]) = widest else { return Ok(None) };
-        let place = a + (b - a) * (0.5 * (from + to));
+        let clear = middle.iter().copied().filter(is_clear);
+        let widest = clear.max_by(|x, y| (x[1] - x[0]).total_cmp(&(y[1] - y[0])));
+        let Some(place) = widest.map(middle_of) else { return Ok(None) };
         let Some(mut places) = self.places_between(a, place)? else { return Ok(None) };
         let Some(others) = self.places_between(place, b)? else { return Ok(None) };
         places.extend_from_slice(&others[1..]);
@@ -283,6 +304,43 @@ mod tests {
             let windows = f64::from(n * n);
             let most = STEPS * windows * windows.log2();
             assert!((steps as f64) < most, "{steps} steps for {most} past {n} rows");
+        }
+    }
+
+    /// Unit windows whose webs are as wide as a box stands off, between them and before the rims: its corners lie on other windows.
+    #[test]
+    fn a_seam_misses_windows_whose_webs_are_as_wide_as_a_box_stands_off() {
+        let (across, rows) = (6, 4);
+        for &web in &MARGINS[..3] {
+            for stagger in [0.0, 0.5, 1.0 / 3.0] {
+                let pitch = 1.0 + web;
+                let middle = |i: i32, j: i32| {
+                    Uv::new(f64::from(i) + stagger * f64::from(j), f64::from(j)) * pitch + Uv::new(0.0, web + 0.5)
+                };
+                let window = |i: i32, j: i32| {
+                    let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]];
+                    corners.map(|p| middle(i, j) + Uv::from_array(p)).to_vec()
+                };
+                let holes: Vec<Vec<Uv>> = (0..across * rows).map(|k| window(k % across, k / across)).collect();
+                let turn = Uv::new(f64::from(across) * pitch, 0.0);
+                let height = f64::from(rows) * pitch + web;
+                let rim = |v: f64| unrolled_polygon(&[Uv::new(0.0, v), Uv::new(0.5 * turn.x, v)], turn);
+                let borders = [rim(0.0), rim(height)];
+                let obstacles = Obstacles::new(&holes, &borders, turn);
+                let path = way(&obstacles, &[Uv::ZERO], &Goals::Points(&[(0, Uv::new(0.0, height))]));
+                let is_in_window = |place: Uv| {
+                    (0..rows).any(|j| {
+                        let off = place - middle(0, j);
+                        let around = off.x - pitch * (off.x / pitch).round();
+                        around.abs().max(off.y.abs()) < 0.5 - 1e-9
+                    })
+                };
+                for leg in path.points.windows(2) {
+                    let mut places = (0..=100).map(|k| leg[0].lerp(leg[1], f64::from(k) / 100.0));
+                    assert!(!places.any(is_in_window), "{leg:?} with webs of {web}, staggered by {stagger}");
+                    assert!(leg[0].y > 0.0 || leg[1].y > 0.0, "along the rim with webs of {web}");
+                }
+            }
         }
     }
 

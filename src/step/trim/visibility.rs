@@ -2,7 +2,8 @@
 //!
 //! Holes are only ever added, so that what is barred remains so, and what was free is compared with the new ones alone.
 
-use super::obstacles::{HoleCopy, Obstacles, Segment};
+use super::obstacles::{HoleCopy, Obstacles};
+use super::segment::Segment;
 use crate::math::Uv;
 use rustc_hash::FxHashSet;
 

@@ -4,8 +4,9 @@
 //! taken in where a way crosses them: most faces of hundreds have a way past a few. Known weakness: a hole so near to a border or another
 //! hole that the smallest box around it touches them leaves no way between.
 
+use super::clearance::CORNERS_OF_BOX;
 use super::fit::{Budget, Overrun};
-use super::obstacles::{CORNERS_OF_BOX, HoleCopy, Obstacles, bounds};
+use super::obstacles::{HoleCopy, Obstacles, bounds};
 use super::visibility::{Leg, Visibility};
 use crate::math::{Point, Uv, distance_to_segment};
 use crate::nurbs::Derivatives;
@@ -17,6 +18,8 @@ pub(super) const COPIES: [i32; 3] = [0, -1, 1];
 /// Most corners by which a way past holes is sought: the search is quadratic in them, and looks at 1.6e7 boxes to find that so many do not
 /// lead past staggered windows.
 pub(super) const MOST_CORNERS: usize = 800;
+/// Most holes that a search takes in.
+const MOST_HOLES: usize = MOST_CORNERS / CORNERS_OF_BOX;
 /// Holes that are taken in at least where those that were met leave no way.
 const FEWEST_MORE: usize = 8;
 
@@ -100,13 +103,14 @@ impl Search<'_> {
             if crossed.is_empty() {
                 return Ok(way.filter(|way| self.obstacles.is_simple(&way.points)));
             }
-            let before = corners.len();
+            // A hole bars legs though it may have no corner that is clear.
+            let before = visibility.met_count();
             for copy in crossed {
-                if corners.len() + CORNERS_OF_BOX <= MOST_CORNERS && visibility.meet(copy) {
+                if visibility.met_count() < MOST_HOLES && visibility.meet(copy) {
                     corners.extend(self.obstacles.corners(copy, margin));
                 }
             }
-            if corners.len() == before {
+            if visibility.met_count() == before {
                 return Ok(None);
             }
         }
