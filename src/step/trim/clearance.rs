@@ -1,14 +1,26 @@
 //! Places beside holes at which a seam may turn: clear of all holes and borders.
+//!
+//! Corners of a box around a hole serve among squares and circles. In a honeycomb they lie in the neighbours; there the places stand off
+//! the corners of the hole itself, each by a share of the way to what is nearest to it.
 
 use super::obstacles::{HoleCopy, Obstacles};
 use super::segment::Segment;
 use crate::math::Uv;
+use crate::math::polygon::{nearest_on_side, polygon_sides, signed_area};
 
 /// Corners of one hole's box.
 pub(super) const CORNERS_OF_BOX: usize = 4;
 /// A place nearer to a side than this share of the size of what it stands beside counts as on it: far above the noise of fits, 1e-6 mm, and
 /// far below the least share by which places are off.
 pub(super) const NEAR_SHARE: f64 = 1e-4;
+/// A hole has a corner wherever its outline has turned by so much since the last one, rad: a circle has at most 18.
+const TURN_OF_CORNER: f64 = 0.34;
+/// Most corners of one outline; of more every second or third is taken.
+const MOST_OF_OUTLINE: usize = 24;
+/// How far from a corner other holes and borders are looked for, as a share of the hole's size.
+const FARTHEST: f64 = 0.5;
+/// Share of the way to the nearest of them by which a place stands off a corner. At the half, places of neighbours would be the same.
+const SHARE_OF_CLEARANCE: f64 = 0.4;
 
 impl Obstacles<'_> {
     /// Whether a place is in no hole, and no side of a hole or border meets the box around it that reaches over `room` to each side.
@@ -25,6 +37,71 @@ impl Obstacles<'_> {
         let corners: [Uv; CORNERS_OF_BOX] = [a, Uv::new(b.x, a.y), b, Uv::new(a.x, b.y)];
         corners.into_iter().filter(|&corner| self.is_clear(corner, NEAR_SHARE * size)).collect()
     }
+
+    /// Returns places off the corners of a copy of a hole, those that are clear.
+    pub(super) fn outline(&self, HoleCopy { hole, copy }: HoleCopy) -> Vec<Uv> {
+        let own = HoleCopy { hole, copy: 0 };
+        let [lo, hi] = self.bounds_of(own);
+        let size = hi - lo;
+        if !(size.min_element() > 0.0) {
+            return Vec::new();
+        }
+        // Angles and distances are those in a box of sides 1: directions in parameters have units of their own.
+        let polygon: Vec<Uv> = self.holes[hole].iter().map(|p| (*p - lo) / size).collect();
+        let corners = outline_corners(&polygon);
+        let by = self.displacement * f64::from(copy);
+        let mut places = Vec::new();
+        for corner in corners.iter().step_by(corners.len().div_ceil(MOST_OF_OUTLINE).max(1)) {
+            let off = SHARE_OF_CLEARANCE * self.clearance(own, lo + corner.place * size, size);
+            let place = lo + (corner.place + corner.outward * off) * size;
+            if self.is_clear(place, NEAR_SHARE * size) {
+                places.push(place + by);
+            }
+        }
+        places
+    }
+
+    /// Returns the distance from a place to the nearest side of another hole or of a border, as a share of `size`; [`FARTHEST`] at most.
+    fn clearance(&self, own: HoleCopy, place: Uv, size: Uv) -> f64 {
+        let reach = FARTHEST * size;
+        let mut nearest = FARTHEST;
+        self.any_side_near([place - reach, place + reach], |hole, side| {
+            let side = side.map(|p| (p - place) / size);
+            if hole != Some(own) && side[0] != side[1] {
+                nearest = nearest.min(nearest_on_side(side, Uv::ZERO).length());
+            }
+            false
+        });
+        nearest
+    }
+}
+
+/// A corner of a hole's outline.
+struct OutlineCorner {
+    place: Uv,
+    /// Of length 1.
+    outward: Uv,
+}
+
+/// Returns where a polygon has turned by [`TURN_OF_CORNER`] since the last such place.
+fn outline_corners(polygon: &[Uv]) -> Vec<OutlineCorner> {
+    let sides: Vec<[Uv; 2]> = polygon_sides(polygon).filter(|[a, b]| a != b).collect();
+    let directions: Vec<Uv> = sides.iter().map(|[a, b]| (*b - *a).normalize()).collect();
+    let sense = signed_area(polygon).signum();
+    let mut corners = Vec::new();
+    let mut turned = 0.0f64;
+    for (k, [place, _]) in sides.iter().enumerate() {
+        let (before, after) = (directions[(k + sides.len() - 1) % sides.len()], directions[k]);
+        turned += before.perp_dot(after).atan2(before.dot(after));
+        if turned.abs() < TURN_OF_CORNER {
+            continue;
+        }
+        turned = 0.0;
+        // Between what is outward on both sides; the tip of a spike points outward.
+        let outward = (-sense * (before + after).perp()).try_normalize().unwrap_or(before);
+        corners.push(OutlineCorner { place: *place, outward });
+    }
+    corners
 }
 
 #[cfg(test)]
@@ -65,5 +142,40 @@ mod tests {
         assert_eq!(corners(0.5), [[-0.5, -0.5], [-0.5, 1.5]].map(Uv::from));
         assert_eq!(corners(0.25), [[-0.25, -0.25], [-0.25, 1.25]].map(Uv::from));
         assert_eq!(corners(0.125).len(), CORNERS_OF_BOX);
+    }
+
+    /// A diamond of half diagonals 1 and, 0.5 to its right, a wall; one corner is in the middle of a side.
+    #[test]
+    fn places_of_an_outline_stand_off_its_corners() {
+        let diamond = [[1., 0.], [0.5, 0.5], [0., 1.], [-1., 0.], [0., -1.]].map(Uv::from);
+        let wall = [[1.5, -9.], [2., -9.], [2., 9.], [1.5, 9.]].map(Uv::from).to_vec();
+        for turned in [false, true] {
+            let mut hole = diamond.to_vec();
+            if turned {
+                hole.reverse();
+            }
+            let holes = [hole, wall.clone()];
+            let obstacles = Obstacles::new(&holes, &[], Uv::ZERO);
+            let places = obstacles.outline(HoleCopy { hole: 0, copy: 0 });
+            // Nothing but the wall at the right corner is nearer than half of the size, which is 2.
+            for (u, v) in [(1.2, 0.0), (0.0, 1.4), (-1.4, 0.0), (0.0, -1.4)] {
+                let nearest = places.iter().map(|p| (*p - Uv::new(u, v)).length()).fold(f64::INFINITY, f64::min);
+                assert!(nearest < 1e-12, "({u}, {v}): {places:?}");
+            }
+            assert_eq!(places.len(), 4, "{places:?}");
+        }
+    }
+
+    /// Of a polygon of a hundred corners on a circle of radius 1 every sixth is taken, and stands off by a fifth of the diameter.
+    #[test]
+    fn the_outline_of_a_circle_has_places_all_around() {
+        let circle = |k: i32| Uv::from_angle(f64::from(k) * std::f64::consts::TAU / 100.0);
+        let holes = [(0..100).map(circle).collect::<Vec<Uv>>()];
+        let obstacles = Obstacles::new(&holes, &[], Uv::ZERO);
+        let places = obstacles.outline(HoleCopy { hole: 0, copy: 0 });
+        assert_eq!(places.len(), 16, "{places:?}");
+        for pair in places.windows(2) {
+            assert!((pair[0].length() - 1.4).abs() < 1e-12 && pair[0].angle_to(pair[1]) < 0.4, "{places:?}");
+        }
     }
 }

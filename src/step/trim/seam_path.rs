@@ -1,4 +1,5 @@
-//! The way of a seam from one loop to another past the holes between them: the shortest one by corners of boxes around the holes.
+//! The way of a seam from one loop to another past the holes between them: the shortest one by corners of boxes around the holes, else by
+//! corners of the holes.
 //!
 //! Among too many holes for that, as in a tube with thousands of staggered windows, a straight line is divided between holes that it
 //! crosses, and each stage gets its own shortest way: the work then grows with the holes on the line. Guarantee: all work is taken from the
@@ -7,7 +8,7 @@
 use super::clearance::{CORNERS_OF_BOX, NEAR_SHARE};
 use super::fit::{Budget, Overrun};
 use super::obstacles::{Obstacles, bounds, crosses_itself, turns_of};
-use super::way_search::{COPIES, Goals, MARGINS, MOST_CORNERS, SeamPath, Search};
+use super::way_search::{COPIES, Goals, MARGINS, MOST_HOLES, SeamPath, Search};
 use crate::math::Uv;
 use crate::nurbs::Derivatives;
 
@@ -15,6 +16,8 @@ use crate::nurbs::Derivatives;
 const MOST_PLACES: usize = 4000;
 /// Holes that the line of a stage may cross: past so many staggered windows a way takes in some thirty.
 const HOLES_OF_STAGE: usize = 4;
+/// Most holes that a stage takes in.
+const MOST_HOLES_OF_STAGE: usize = 64;
 
 /// Places along each side of the strip between two loops that are in each other's way.
 const LATTICE: f64 = 24.0;
@@ -50,7 +53,8 @@ impl Obstacles<'_> {
         budget: &Budget,
     ) -> Result<Option<SeamPath>, Overrun> {
         let borders = Obstacles::new(&[], self.borders, self.displacement);
-        let search = Search { obstacles: self, borders: &borders, starts, goals, metric, budget };
+        let most_holes = MOST_HOLES;
+        let search = Search { obstacles: self, borders: &borders, starts, goals, metric, budget, most_holes };
         // Beside a hole of several turns no corner of a box helps.
         let between = self.between_turns();
         if !between.is_empty()
@@ -61,8 +65,11 @@ impl Obstacles<'_> {
         if let Some(way) = search.way_by_boxes()? {
             return Ok(Some(way));
         }
-        let has_few = COPIES.len() * self.holes.len() * CORNERS_OF_BOX <= MOST_CORNERS;
+        let has_few = COPIES.len() * self.holes.len() <= MOST_HOLES;
         if !has_few && let Some(way) = search.way_in_stages()? {
+            return Ok(Some(way));
+        }
+        if let Some(way) = search.way_by_outlines()? {
             return Ok(Some(way));
         }
         // Where the loops themselves are in the way, by places between them.
@@ -152,8 +159,12 @@ impl Search<'_> {
             let (starts, ends) = ([a], [(0, b)]);
             let goals = Goals::Points(&ends);
             let Self { obstacles, borders, metric, budget, .. } = *self;
-            let stage = Search { obstacles, borders, starts: &starts, goals: &goals, metric, budget };
+            let most_holes = MOST_HOLES_OF_STAGE;
+            let stage = Search { obstacles, borders, starts: &starts, goals: &goals, metric, budget, most_holes };
             if let Some(way) = stage.way_by_boxes()? {
+                return Ok(Some(way.points));
+            }
+            if let Some(way) = stage.way_by_outlines()? {
                 return Ok(Some(way.points));
             }
         }

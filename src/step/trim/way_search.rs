@@ -1,8 +1,9 @@
 //! The shortest way from one of some starts to a goal by corners that see each other.
 //!
 //! Source: shortest paths by visibility graphs, after Lozano-Pérez and Wesley 1979, expanded by Dijkstra only as far as needed. Holes are
-//! taken in where a way crosses them: most faces of hundreds have a way past a few. Known weakness: a hole so near to a border or another
-//! hole that the smallest box around it touches them leaves no way between.
+//! taken in where a way crosses them: most faces of hundreds have a way past a few. Where corners of boxes leave no way, as in a honeycomb,
+//! whose boxes overlap, the corners of the holes themselves are tried. Known weakness: arcs with less than a fortieth of their diameter
+//! between them leave a way only where boxes do.
 
 use super::clearance::CORNERS_OF_BOX;
 use super::fit::{Budget, Overrun};
@@ -17,9 +18,9 @@ pub(super) const MARGINS: [f64; 4] = [0.2, 0.06, 0.015, 0.004];
 pub(super) const COPIES: [i32; 3] = [0, -1, 1];
 /// Most corners by which a way past holes is sought: the search is quadratic in them, and looks at 1.6e7 boxes to find that so many do not
 /// lead past staggered windows.
-pub(super) const MOST_CORNERS: usize = 800;
+const MOST_CORNERS: usize = 800;
 /// Most holes that a search takes in.
-const MOST_HOLES: usize = MOST_CORNERS / CORNERS_OF_BOX;
+pub(super) const MOST_HOLES: usize = MOST_CORNERS / CORNERS_OF_BOX;
 /// Holes that are taken in at least where those that were met leave no way.
 const FEWEST_MORE: usize = 8;
 
@@ -70,23 +71,30 @@ pub(super) struct Search<'s> {
     pub(super) metric: &'s Derivatives,
     /// What its work is taken from.
     pub(super) budget: &'s Budget,
+    /// Most holes that it takes in, [`MOST_HOLES`] or fewer.
+    pub(super) most_holes: usize,
 }
 
 impl Search<'_> {
     /// Returns the shortest way past the holes by corners of boxes around those in its way; `None` without one by [`MOST_CORNERS`].
     pub(super) fn way_by_boxes(&self) -> Result<Option<SeamPath>, Overrun> {
         for margin in MARGINS {
-            if let Some(way) = self.way_past(margin)? {
+            if let Some(way) = self.way_past(&|hole| self.obstacles.corners(hole, margin))? {
                 return Ok(Some(way));
             }
         }
         Ok(None)
     }
 
-    /// Returns the shortest way past the holes by corners of boxes that stand off them by `margin`: the straight one first, then by the
-    /// corners of the holes that this one crosses, and so on until it crosses none. Where those leave no way, more are taken in, the
-    /// nearest first. `None` without a way by [`MOST_CORNERS`], and where it would cross its own copies.
-    fn way_past(&self, margin: f64) -> Result<Option<SeamPath>, Overrun> {
+    /// Returns the shortest way past the holes by places off the corners of those in its way; `None` without one by [`MOST_CORNERS`].
+    pub(super) fn way_by_outlines(&self) -> Result<Option<SeamPath>, Overrun> {
+        self.way_past(&|hole| self.obstacles.outline(hole))
+    }
+
+    /// Returns the shortest way past the holes by the corners that `corners_of` gives them: the straight one first, then by the corners of
+    /// the holes that this one crosses, and so on until it crosses none. Where those leave no way, more are taken in, the nearest first.
+    /// `None` without a way by [`MOST_CORNERS`], and where it would cross its own copies.
+    fn way_past(&self, corners_of: &dyn Fn(HoleCopy) -> Vec<Uv>) -> Result<Option<SeamPath>, Overrun> {
         let mut visibility = Visibility::new(self.obstacles, self.borders);
         let mut corners: Vec<Uv> = Vec::new();
         let mut nearest: Option<Vec<HoleCopy>> = None;
@@ -106,8 +114,9 @@ impl Search<'_> {
             // A hole bars legs though it may have no corner that is clear.
             let before = visibility.met_count();
             for copy in crossed {
-                if visibility.met_count() < MOST_HOLES && visibility.meet(copy) {
-                    corners.extend(self.obstacles.corners(copy, margin));
+                let has_room = visibility.met_count() < self.most_holes && corners.len() < MOST_CORNERS;
+                if has_room && visibility.meet(copy) {
+                    corners.extend(corners_of(copy));
                 }
             }
             if visibility.met_count() == before {
@@ -201,5 +210,83 @@ impl Search<'_> {
         }
         points.reverse();
         Ok(Some(SeamPath { start: at, goal, points }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::obstacles::unrolled_polygon;
+    use super::*;
+    use crate::math::Vector;
+
+    const ACROSS: i32 = 6;
+    const ROWS: i32 = 5;
+
+    /// Returns the way by outlines up a tube of height `height` past `ACROSS` by `ROWS` holes of unit pitch, and checks that there is none
+    /// by boxes.
+    fn way_by_outlines(height: f64, hole: impl Fn(i32, i32) -> Vec<Uv>) -> SeamPath {
+        let turn = Uv::new(f64::from(ACROSS), 0.0);
+        let rim = |v: f64| unrolled_polygon(&[Uv::new(0.0, v), Uv::new(0.5 * turn.x, v)], turn);
+        let holes: Vec<Vec<Uv>> = (0..ACROSS * ROWS).map(|k| hole(k % ACROSS, k / ACROSS)).collect();
+        let rims = [rim(0.0), rim(height)];
+        let (obstacles, borders) = (Obstacles::new(&holes, &rims, turn), Obstacles::new(&[], &rims, turn));
+        let ends = [(0, Uv::new(0.0, height))];
+        let search = Search {
+            obstacles: &obstacles,
+            borders: &borders,
+            starts: &[Uv::ZERO],
+            goals: &Goals::Points(&ends),
+            metric: &Derivatives { point: Point::ZERO, du: Vector::X, dv: Vector::Y },
+            budget: &Budget::new(u64::MAX),
+            most_holes: MOST_HOLES,
+        };
+        assert!(search.way_by_boxes().expect("no budget is used up").is_none(), "a way by boxes");
+        search.way_by_outlines().expect("no budget is used up").expect("a way by outlines")
+    }
+
+    /// Whether a place of a way, of a hundred on each leg, is within a hole: nearer to the middle of one than `radius` by some norm.
+    fn enters(way: &SeamPath, middle: impl Fn(i32, i32) -> Uv, norm: impl Fn(Uv) -> f64, radius: f64) -> bool {
+        let mut middles = Vec::new();
+        for i in -3..ACROSS + 3 {
+            middles.extend((0..ROWS).map(|j| middle(i, j)));
+        }
+        let is_in_hole = |place: Uv| middles.iter().any(|m| norm(place - *m) < radius - 1e-9);
+        way.points.windows(2).any(|leg| {
+            let mut places = (0..=100).map(|k| leg[0].lerp(leg[1], f64::from(k) / 100.0));
+            places.any(is_in_hole)
+        })
+    }
+
+    fn length(way: &SeamPath) -> f64 {
+        way.points.windows(2).map(|leg| (leg[1] - leg[0]).length()).sum()
+    }
+
+    /// A honeycomb with webs of a tenth of the pitch. From row to row along the webs it is as far as two sides of a cell of the pitch.
+    #[test]
+    fn a_seam_goes_along_the_webs_of_a_honeycomb() {
+        let (row, apothem) = (0.75f64.sqrt(), 0.45);
+        let middle =
+            |i: i32, j: i32| Uv::new(f64::from(i) + 0.5 * f64::from(j % 2), row * (f64::from(j) + 0.5) + 0.3);
+        let corner = |k: i32| Uv::from_angle((f64::from(k) + 0.5) * std::f64::consts::FRAC_PI_3) * (apothem / row);
+        let way =
+            way_by_outlines(row * f64::from(ROWS) + 0.6, |i, j| (0..6).map(|k| middle(i, j) + corner(k)).collect());
+        // The largest distance along the normals of a cell's sides.
+        let across = |p: Uv| p.x.abs().max((0.5 * p.x + row * p.y).abs()).max((0.5 * p.x - row * p.y).abs());
+        assert!(!enters(&way, middle, across, apothem), "{:?}", way.points);
+        let along_webs = f64::from(ROWS) / row;
+        assert!(length(&way) < along_webs + 2.0, "{} for {along_webs}", length(&way));
+    }
+
+    /// Diamonds in a square lattice that stands on its corner, a tenth of the pitch from tip to tip. From row to row it is half a diagonal.
+    #[test]
+    fn a_seam_goes_along_the_webs_between_diamonds() {
+        let half = 0.45;
+        let middle = |i: i32, j: i32| Uv::new(f64::from(i) + 0.5 * f64::from(j % 2), 0.5 * f64::from(j) + 0.7);
+        let way = way_by_outlines(0.5 * f64::from(ROWS - 1) + 1.4, |i, j| {
+            [Uv::X, Uv::Y, Uv::NEG_X, Uv::NEG_Y].map(|tip| middle(i, j) + half * tip).to_vec()
+        });
+        assert!(!enters(&way, middle, |p| p.x.abs() + p.y.abs(), half), "{:?}", way.points);
+        let along_webs = f64::from(ROWS) * 0.5f64.sqrt();
+        assert!(length(&way) < along_webs + 2.0, "{} for {along_webs}", length(&way));
     }
 }
