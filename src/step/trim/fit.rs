@@ -16,7 +16,7 @@ use std::cell::Cell;
 /// Deepest halving of a Bézier span of the edge.
 const MAX_DEPTH: u32 = 12;
 
-/// Steps of a search, each a look at one box or place, that take as long as an evaluation: 2 ns to 1 µs.
+/// Steps of a search, each a look at one box, side or place, that take as long as an evaluation: 2 ns to 1 µs.
 const STEPS_OF_EVALUATION: u64 = 512;
 
 /// Work that a face has left, in steps, so that none takes for ever.

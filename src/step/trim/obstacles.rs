@@ -37,7 +37,7 @@ pub(super) struct Obstacles<'o> {
     tree: BoxTree,
     /// Around the holes, by their number.
     hole_tree: BoxTree,
-    /// Boxes that were looked at since [`Self::take_steps`].
+    /// Boxes and sides that were looked at since [`Self::take_steps`].
     steps: Cell<u64>,
 }
 
@@ -80,12 +80,12 @@ impl<'o> Obstacles<'o> {
         Self { holes, borders, displacement, chains, along, runs, tree, hole_tree, steps: Cell::new(0) }
     }
 
-    /// Returns how many boxes were looked at since this was last asked: the measure of a search's work.
+    /// Returns how many boxes and sides were looked at since this was last asked: the measure of a search's work.
     pub(super) fn take_steps(&self) -> u64 {
         self.steps.take()
     }
 
-    /// Adds looks at boxes to those that [`Self::take_steps`] returns.
+    /// Adds looks at boxes and sides to those that [`Self::take_steps`] returns.
     pub(super) fn count_steps(&self, steps: u64) {
         self.steps.set(self.steps.get() + steps);
     }
@@ -122,7 +122,7 @@ impl<'o> Obstacles<'o> {
                 Contact::Apart => {}
             }
         }
-        is_touched && segment.runs_through(&self.holes[hole])
+        is_touched && self.runs_through(&segment, hole)
     }
 
     /// Returns what of the straight line from `a` to `b` lies between holes that it crosses one after the other, in order and as shares of
@@ -184,7 +184,7 @@ impl<'o> Obstacles<'o> {
     fn run_bars(&self, run: &Run, segment: &Segment) -> bool {
         match self.run_contact(run, segment) {
             Contact::Crossing => true,
-            Contact::Touching => self.holes.get(run.chain).is_some_and(|hole| segment.runs_through(hole)),
+            Contact::Touching => run.chain < self.holes.len() && self.runs_through(segment, run.chain),
             Contact::Apart => false,
         }
     }
@@ -196,13 +196,22 @@ impl<'o> Obstacles<'o> {
         }
         let chain = &self.chains[run.chain];
         let mut contact = Contact::Apart;
+        let mut compared = 0;
         for side in chain.sides_of_run(run.first_side) {
+            compared += 1;
             contact = contact.max(chain.side_contact(side, segment.ends));
             if contact == Contact::Crossing {
                 break;
             }
         }
+        self.count_steps(compared);
         contact
+    }
+
+    /// Whether a segment runs through a hole that it touches.
+    fn runs_through(&self, segment: &Segment, hole: usize) -> bool {
+        self.count_steps(self.holes[hole].len() as u64);
+        segment.runs_through(&self.holes[hole])
     }
 
     /// Whether a place is in a hole or a copy of one; on a side either answer may come.
@@ -359,5 +368,27 @@ impl Chain<'_> {
             are_opposite(s1, s2) && are_opposite(s3, s4)
         };
         if is_crossed { Contact::Crossing } else { Contact::Touching }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A circle of 16 sides: past its box no side is compared, over a corner of the box all are, and from the middle on the first one that
+    /// is crossed is the last.
+    #[test]
+    fn every_side_that_is_compared_is_a_step() {
+        let circle: Vec<Uv> = (0..16).map(|k| Uv::from_angle(f64::from(k) * std::f64::consts::FRAC_PI_8)).collect();
+        let holes = [circle];
+        let obstacles = Obstacles::new(&holes, &[], Uv::ZERO);
+        let steps = |a: [f64; 2], b: [f64; 2]| {
+            obstacles.hole_is_crossed(HoleCopy { hole: 0, copy: 0 }, [a, b].map(Uv::from));
+            obstacles.take_steps()
+        };
+        assert_eq!(steps([1.5, 0.9], [0.9, 1.5]), 1);
+        assert_eq!(steps([1.2, 0.7], [0.7, 1.2]), 1 + 16);
+        // Sides 0 to 4: the fifth one goes from the top to the left.
+        assert_eq!(steps([-0.1, 0.0], [-0.1, 2.0]), 1 + 5);
     }
 }
