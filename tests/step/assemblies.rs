@@ -28,7 +28,7 @@ pub(crate) fn product(id: u32, name: &str, representation: u32) -> String {
 }
 
 /// A usage #`id` of this kind and these attributes, and its shape, #`id` + 1.
-fn usage(id: u32, kind: &str, ends: &str) -> String {
+pub(crate) fn usage(id: u32, kind: &str, ends: &str) -> String {
     format!("#{id}={kind}('{id}','','',{ends});\n#{}=PRODUCT_DEFINITION_SHAPE('','',#{id});\n", id + 1)
 }
 
@@ -44,7 +44,7 @@ pub(crate) fn relation(id: u32, [first, second]: [u32; 2], [from, to]: [u32; 2])
 }
 
 /// An assembly #200, whose representation #300 has `items`, #21 and #22, and a part #100, whose representation #110 is the block.
-fn assembly(items: &str, data: &str) -> Import {
+pub(crate) fn assembly(items: &str, data: &str) -> Import {
     let products = product(200, "asm", 300) + &product(100, "part", 110);
     read(&format!(
         "{products}#300=SHAPE_REPRESENTATION('',({items}#21,#22),#1);\n\
@@ -53,9 +53,9 @@ fn assembly(items: &str, data: &str) -> Import {
 }
 
 /// The place of the part in the assembly by usage #400, at x = 10.
-const PLACED: &str = "#420=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#410,#401);\n";
+pub(crate) const PLACED: &str = "#420=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#410,#401);\n";
 
-const NEXT: &str = "NEXT_ASSEMBLY_USAGE_OCCURRENCE";
+pub(crate) const NEXT: &str = "NEXT_ASSEMBLY_USAGE_OCCURRENCE";
 
 /// Asserts the x of all places, in any order, and that nothing is told.
 pub(crate) fn assert_places(import: &Import, expected: &[f64], case: &str) {

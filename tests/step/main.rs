@@ -11,6 +11,7 @@ mod faces;
 mod files;
 mod fixtures;
 mod joints;
+mod near_places;
 mod nurbs_properties;
 mod occurrences;
 mod offsets;

@@ -24,6 +24,8 @@ pub(super) const MAX_DEPTH: usize = 1024;
 pub(crate) struct PlacedRepresentation {
     pub(crate) representation: u64,
     pub(crate) placement: Frame,
+    /// How far the same place may lie off it, mm: see [`Place`](super::places::Place).
+    pub(super) rounding: f64,
     /// Name of the occurrence, empty when it had none.
     pub(crate) name: String,
     /// Names of the occurrences from the outermost down to its own, joined by `/`; of those without a name that of their product.

@@ -2,7 +2,7 @@
 
 use super::assembly::Assembly;
 use super::lost_usages::LostUsage;
-use super::places::{PlaceList, PlacementKey, is_one_place, placement_key};
+use super::places::{Place, PlaceTable, is_one_place};
 use super::relations::{
     Link, OccurrenceShape, WITH_TRANSFORMATION, is_higher_usage, property_attributes, related_representations,
     usage_attributes,
@@ -10,7 +10,7 @@ use super::relations::{
 use super::usage_ends::UsageEnds;
 use crate::math::Frame;
 use crate::step::part21::Entity;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashSet;
 
 /// What CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs tell besides the placements of usages.
 #[derive(Default)]
@@ -149,23 +149,35 @@ impl<'f, 'a> Assembly<'f, 'a> {
     /// Reads where the children of usages stand in their parents by mapped items of the usages' own shapes, as AP214 allows: each item of
     /// the first shape is an occurrence.
     pub(super) fn read_occurrence_shapes(&mut self, shapes: &[OccurrenceShape]) {
-        let mut known: FxHashMap<u64, PlaceList> = FxHashMap::default();
+        // Usages in their places within their parents.
+        let mut known = PlaceTable::default();
+        let mut listed: FxHashSet<u64> = FxHashSet::default();
+        let place = |frame: &Frame| Place::of_parent(Frame::IDENTITY).inner(frame);
         for &OccurrenceShape { usage, representation } in shapes {
             let items = self.mapped_occurrences(usage, representation);
             let Some(stated) = self.placements.get(&usage) else {
                 if !items.is_empty() {
+                    listed.insert(usage);
                     // An item that comes again in its place is no second one.
-                    let mut standing: FxHashSet<PlacementKey> = FxHashSet::default();
-                    let frames = items.into_iter().filter_map(|(_, placement)| placement);
-                    let distinct = frames.filter(|frame| standing.insert(placement_key(frame))).collect();
-                    self.placements.insert(usage, distinct);
+                    let mut frames: Vec<Frame> = items.into_iter().filter_map(|(_, placement)| placement).collect();
+                    frames.retain(|frame| {
+                        let is_new = !known.holds(usage, &place(frame));
+                        if is_new {
+                            known.insert(usage, place(frame));
+                        }
+                        is_new
+                    });
+                    self.placements.insert(usage, frames);
                 }
                 continue;
             };
-            let known = known.entry(usage).or_insert_with(|| PlaceList::new(stated.clone()));
+            if listed.insert(usage) {
+                stated.iter().for_each(|frame| known.insert(usage, place(frame)));
+            }
+            let is_unplaced = stated.is_empty();
             let is_new = |placement: &Option<Frame>| match placement {
-                Some(placement) => !known.holds(placement),
-                None => !known.is_empty(),
+                Some(placement) => !known.holds(usage, &place(placement)),
+                None => !is_unplaced,
             };
             for (item, _) in items.iter().filter(|(_, placement)| is_new(placement)) {
                 self.tell_other_place(*item, usage);

@@ -4,7 +4,7 @@
 //! with the same one.
 
 use super::assembly::Assembly;
-use super::places::UsagePlaces;
+use super::places::{Place, PlaceTable};
 use super::usage_ends::UsageEnds;
 use super::usage_names::{Usage, UsagePlacement};
 use crate::math::Frame;
@@ -34,30 +34,29 @@ impl Assembly<'_, '_> {
         children.into_iter().filter(is_shown).collect()
     }
 
-    /// Returns where the usages of a product that stands at `placement` put the representations of their children, but those in
-    /// `placed_within`.
+    /// Returns where the usages of a product in the place `parent` put the representations of their children, but those in `placed_within`.
     pub(super) fn usage_places(
         &self,
         usages: &[Usage],
-        placement: &Frame,
+        parent: &Place,
         placed_within: &FxHashSet<u64>,
-    ) -> UsagePlaces {
-        let mut of_children: FxHashMap<u64, Vec<Frame>> = FxHashMap::default();
+    ) -> PlaceTable {
+        let mut of_children: FxHashMap<u64, Vec<Place>> = FxHashMap::default();
         for usage in usages {
             let local = match usage.placement {
                 UsagePlacement::Stated(local) => local,
                 UsagePlacement::Unstated if !placed_within.contains(&usage.child) => Frame::IDENTITY,
                 UsagePlacement::Unstated | UsagePlacement::Unreadable => continue,
             };
-            of_children.entry(usage.child).or_default().push(placement.compose(&local));
+            of_children.entry(usage.child).or_default().push(parent.inner(&local));
         }
-        let mut placements: FxHashMap<u64, Vec<Frame>> = FxHashMap::default();
-        for (child, frames) in &of_children {
+        let mut table = PlaceTable::default();
+        for (child, places) in &of_children {
             for representation in self.representations(*child) {
-                placements.entry(representation).or_default().extend(frames);
+                places.iter().for_each(|place| table.insert(representation, *place));
             }
         }
-        UsagePlaces::new(placements)
+        table
     }
 
     /// Leaves out the relationships that lead unmoved to the representation of a product, which its own usages place, but those by which a

@@ -1,7 +1,10 @@
-//! Placements as keys of tables, and placements that are one to rounding.
+//! Places of things, and whether two are one to rounding.
+//!
+//! Only the digits of the placement within a parent count, wherever the parent stands: in an assembly a kilometre from the origin, things
+//! half a millimetre apart are two.
 
 use crate::math::Frame;
-use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 
 /// Share of a coordinate, and part of an axis, by which two placements of one thing may differ: of a number that a file prints with seven
 /// digits the last is off by 5e-7 of it at most, in either placement. Parts differ by more: 500 mm from the origin, places 0.6 µm apart are
@@ -9,77 +12,142 @@ use rustc_hash::FxHashMap;
 const PLACE_ROUNDING: f64 = 1e-6;
 /// The same at the origin, mm: with six decimals each number is off by 5e-7, and a way through an assembly adds up several of them.
 const PLACE_ROUNDING_MM: f64 = 1e-5;
-
-/// A placement that can be a key: its bits, with one zero.
-pub(super) type PlacementKey = [u64; 13];
-
-/// Returns the numbers of a placement as a key.
-pub(super) fn placement_key(f: &Frame) -> PlacementKey {
-    let numbers = [f.origin, f.x, f.y, f.z].map(|v| v.to_array()).concat();
-    let mut key = [0; 13];
-    for (k, x) in key.iter_mut().zip(numbers.into_iter().chain([f.scale])) {
-        // Adding 0 makes −0 and 0 one.
-        *k = (x + 0.0).to_bits();
-    }
-    key
-}
+/// Share of a coordinate in the whole that is lost where placements are composed: some fifty roundings of a double.
+const COMPOSITION_ROUNDING: f64 = 1e-14;
+/// What places are sorted along: across it lie no rows of things, as across each axis.
+const SORTING_LINE: [f64; 3] = [1.0, 0.618, 0.414];
 
 /// Returns how far the origins of two placements may lie apart that are one, mm; `f` is either.
 fn origin_tolerance(f: &Frame) -> f64 {
     PLACE_ROUNDING_MM + PLACE_ROUNDING * f.origin.abs().max_element()
 }
 
-/// Whether two placements are one to rounding.
-pub(super) fn is_one_place(a: &Frame, b: &Frame) -> bool {
+/// Whether two placements are turned and scaled alike, to rounding.
+fn are_alike(a: &Frame, b: &Frame) -> bool {
     let axes = [(a.x, b.x), (a.y, b.y), (a.z, b.z)];
-    (a.origin - b.origin).abs().max_element() <= origin_tolerance(a)
-        && axes.iter().all(|(a, b)| (*a - *b).abs().max_element() <= PLACE_ROUNDING)
+    axes.iter().all(|(a, b)| (*a - *b).abs().max_element() <= PLACE_ROUNDING)
         && (a.scale - b.scale).abs() <= PLACE_ROUNDING * a.scale
 }
 
-/// A list of placements, in which one is found to rounding.
-pub(super) struct PlaceList {
-    /// Ascending by the x of their origins.
-    placements: Vec<Frame>,
+/// Whether two placements in one parent are one to rounding.
+pub(super) fn is_one_place(a: &Frame, b: &Frame) -> bool {
+    (a.origin - b.origin).abs().max_element() <= origin_tolerance(a) && are_alike(a, b)
 }
 
-impl PlaceList {
-    /// Sorts placements.
-    pub(super) fn new(mut placements: Vec<Frame>) -> Self {
-        placements.sort_by(|a, b| a.origin.x.total_cmp(&b.origin.x));
-        Self { placements }
+/// Where a thing stands in the whole, and how well its file says so.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) frame: Frame,
+    /// How far the same place may lie off it, mm, for the digits of the placement within its parent.
+    pub(super) rounding: f64,
+}
+
+impl Place {
+    /// The place of what others are placed in, which itself stands there exactly.
+    pub(super) fn of_parent(frame: Frame) -> Self {
+        Self::rounded(frame, frame.scale * PLACE_ROUNDING_MM)
     }
 
-    /// Whether there is none.
-    pub(super) fn is_empty(&self) -> bool {
-        self.placements.is_empty()
+    /// Returns the place of what stands at `local` in the thing of this place; unmoved it stands in the same parent as that.
+    pub(super) fn inner(&self, local: &Frame) -> Self {
+        if local.is_identity() {
+            return *self;
+        }
+        Self::rounded(self.frame.compose(local), self.frame.scale * origin_tolerance(local))
     }
 
-    /// Whether one of them is this placement, to rounding.
-    pub(super) fn holds(&self, placement: &Frame) -> bool {
-        let tolerance = origin_tolerance(placement);
-        // Of ten thousand places of one screw few have the same x.
-        let first = self.placements.partition_point(|f| f.origin.x < placement.origin.x - tolerance);
-        let mut near = self.placements[first..].iter().take_while(|f| f.origin.x <= placement.origin.x + tolerance);
-        near.any(|f| is_one_place(placement, f))
+    fn rounded(frame: Frame, digits: f64) -> Self {
+        Self { frame, rounding: digits + COMPOSITION_ROUNDING * frame.origin.abs().max_element() }
+    }
+
+    /// Whether two places are one to rounding.
+    fn is_one_with(&self, other: &Self) -> bool {
+        let apart = (self.frame.origin - other.frame.origin).abs().max_element();
+        apart <= self.rounding.max(other.rounding) && are_alike(&self.frame, &other.frame)
+    }
+
+    /// Returns how far along [`SORTING_LINE`] it lies, times the line's length.
+    fn along(&self) -> f64 {
+        let origin = self.frame.origin.to_array();
+        origin.iter().zip(SORTING_LINE).map(|(x, slope)| x * slope).sum()
     }
 }
 
-/// Where usages put the representations of the children of a product.
+/// Things, by their ids, in places, of which one is found to rounding.
 #[derive(Default)]
-pub(super) struct UsagePlaces {
-    by_representation: FxHashMap<u64, PlaceList>,
+pub(super) struct PlaceTable {
+    /// By thing, by the position along [`SORTING_LINE`], and by the number of the entry.
+    entries: BTreeMap<(u64, i64, usize), Place>,
+    /// The largest rounding of an entry, mm.
+    widest: f64,
 }
 
-impl UsagePlaces {
-    /// Collects placements by representation.
-    pub(super) fn new(placements: FxHashMap<u64, Vec<Frame>>) -> Self {
-        let sorted = placements.into_iter().map(|(representation, all)| (representation, PlaceList::new(all)));
-        Self { by_representation: sorted.collect() }
+impl PlaceTable {
+    /// Adds a thing in a place; the entries are numbered from 0.
+    pub(super) fn insert(&mut self, thing: u64, place: Place) {
+        self.entries.insert((thing, ordered(place.along()), self.entries.len()), place);
+        self.widest = self.widest.max(place.rounding);
     }
 
-    /// Whether a usage puts a representation there, to rounding.
-    pub(super) fn holds(&self, representation: u64, placement: &Frame) -> bool {
-        self.by_representation.get(&representation).is_some_and(|places| places.holds(placement))
+    /// Returns the number of an entry that has the thing in this place, to rounding; `None` where there is none.
+    pub(super) fn find(&self, thing: u64, place: &Place) -> Option<usize> {
+        // What is too far out for a number is refused by those who ask.
+        let along = place.along();
+        if !along.is_finite() {
+            return None;
+        }
+        // Of ten thousand places of one screw few lie abreast.
+        let reach = self.widest.max(place.rounding) * SORTING_LINE.iter().sum::<f64>();
+        let [low, high] = [along - reach, along + reach].map(ordered);
+        let mut near = self.entries.range((thing, low, 0)..=(thing, high, usize::MAX));
+        near.find(|(_, other)| place.is_one_with(other)).map(|((_, _, number), _)| *number)
+    }
+
+    /// Whether the thing stands in this place, to rounding.
+    pub(super) fn holds(&self, thing: u64, place: &Place) -> bool {
+        self.find(thing, place).is_some()
+    }
+}
+
+/// Returns an integer in the order of [`f64::total_cmp`].
+fn ordered(x: f64) -> i64 {
+    let bits = x.to_bits().cast_signed();
+    // Of a negative number the larger has the smaller amount.
+    if bits < 0 { bits ^ i64::MAX } else { bits }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vector;
+
+    fn shift(x: f64) -> Frame {
+        Frame::translation(Vector::new(x, 0.0, 0.0))
+    }
+
+    #[test]
+    fn digits_within_the_parent_count_wherever_that_stands() {
+        for far in [0.0, 1e6, -1e6] {
+            let parent = Place::of_parent(shift(far));
+            let mut table = PlaceTable::default();
+            table.insert(7, parent.inner(&shift(12.5)));
+            table.insert(7, parent.inner(&shift(1234.567_84)));
+            assert!(!table.holds(7, &parent.inner(&shift(13.0))), "{far}");
+            assert_eq!(table.find(7, &parent.inner(&shift(12.500_001))), Some(0), "{far}");
+            // Printed with seven digits.
+            assert_eq!(table.find(7, &parent.inner(&shift(1234.568))), Some(1), "{far}");
+            assert!(!table.holds(8, &parent.inner(&shift(12.5))), "{far}");
+        }
+        // A parent that takes the coordinates back leaves the rounding of its child's.
+        let back = Place::of_parent(shift(-1234.568));
+        let mut table = PlaceTable::default();
+        table.insert(7, back.inner(&shift(1234.567_84)));
+        assert!(table.holds(7, &back.inner(&shift(1234.568))));
+    }
+
+    #[test]
+    fn numbers_are_in_order() {
+        let numbers = [f64::NEG_INFINITY, -2.0, -1.0, -1e-300, 0.0, 1e-300, 1.0, 2.0, f64::INFINITY];
+        assert!(numbers.map(ordered).is_sorted_by(|a, b| a < b));
     }
 }

@@ -4,7 +4,7 @@
 //! one, whichever representation brings it there.
 
 use super::assembly::{Assembly, PlacedRepresentation};
-use super::places::{PlacementKey, placement_key};
+use super::places::{Place, PlaceTable};
 use super::topology::{FACES, ShapeItems};
 use crate::step::part21::File;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -29,8 +29,10 @@ pub(crate) struct SharedItems {
     items: FxHashMap<u64, Vec<u64>>,
     /// The items of a representation that are a shared shape or hold some, with those that they bring.
     brings: FxHashMap<u64, Vec<(u64, Vec<u64>)>>,
-    /// Shared shapes with the places where they stand, and the representation that brought each there first.
-    standing: FxHashMap<(u64, PlacementKey), u64>,
+    /// Shared shapes in the places where they stand.
+    standing: PlaceTable,
+    /// The representation that brought each of these there first.
+    brought_by: Vec<u64>,
     /// Shared shapes that products have brought anywhere.
     of_products: FxHashSet<u64>,
 }
@@ -75,7 +77,13 @@ impl SharedItems {
             named.retain(|(_, ids)| !ids.is_empty());
         }
         brings.retain(|_, named| !named.is_empty());
-        Self { items, brings, standing: FxHashMap::default(), of_products: FxHashSet::default() }
+        Self {
+            items,
+            brings,
+            standing: PlaceTable::default(),
+            brought_by: Vec::new(),
+            of_products: FxHashSet::default(),
+        }
     }
 
     /// Returns the shapes of a representation but those in `left_out`, in its order.
@@ -90,20 +98,23 @@ impl SharedItems {
     pub(crate) fn place(&mut self, p: &PlacedRepresentation) -> Vec<u64> {
         let mut left_out = Vec::new();
         let Some(named) = self.brings.get(&p.representation) else { return left_out };
-        let place = placement_key(&p.placement);
-        // A product that is used twice in one place stands there twice, as its file says: only others' shapes are left out.
-        let is_of_another = |owner: Option<&u64>| owner.is_some_and(|o| *o != p.representation);
-        let mut added = Vec::new();
+        let place = Place { frame: p.placement, rounding: p.rounding };
+        let mut added: Vec<u64> = Vec::new();
         for (item, ids) in named {
             let is_repeated = p.orphan && self.of_products.contains(item);
-            if is_repeated || is_of_another(self.standing.get(&(*item, place))) {
+            let owner = self.standing.find(*item, &place).map(|number| self.brought_by[number]);
+            // A product that is used twice in one place stands there twice, as its file says: only others' shapes are left out.
+            if is_repeated || owner.is_some_and(|owner| owner != p.representation) {
                 left_out.push(*item);
             } else {
                 added.extend(ids);
             }
         }
         for id in added {
-            self.standing.entry((id, place)).or_insert(p.representation);
+            if !self.standing.holds(id, &place) {
+                self.standing.insert(id, place);
+                self.brought_by.push(p.representation);
+            }
             if !p.orphan {
                 self.of_products.insert(id);
             }

@@ -5,7 +5,7 @@
 //! early is told: a cycle, the depth of [`MAX_DEPTH`], or the number of visits.
 
 use super::assembly::{Assembly, MAX_DEPTH, PlacedRepresentation};
-use super::places::{PlacementKey, UsagePlaces, placement_key};
+use super::places::{Place, PlaceTable};
 use super::purpose::{holds_mesh, purpose_besides_shape};
 use super::relations::Link;
 use super::usage_names::{Occurrence, Usage, UsagePlacement, name_in_path};
@@ -54,7 +54,7 @@ struct OpenProduct {
 /// A representation that is to be placed.
 struct Visit {
     representation: u64,
-    placement: Frame,
+    place: Place,
     owners: Arc<[u64]>,
     /// The product that it shows, where a relationship leads to that of another one.
     product: Option<u64>,
@@ -141,7 +141,7 @@ impl Walk<'_, '_> {
                 let reason = format!("describes {what}, which is no product: its shape is named by its product");
                 self.assembly.left_out.push((id, reason));
             } else {
-                let nowhere = UsagePlaces::default();
+                let nowhere = PlaceTable::default();
                 self.place_representations(&[id], Frame::IDENTITY, &Occurrence::ROOT, true, &nowhere);
                 self.reach_what_is_cut_off();
             }
@@ -230,7 +230,7 @@ impl Walk<'_, '_> {
         let usages = self.assembly.usages.get(&definition).cloned().unwrap_or_default();
         let placed_within = self.assembly.placed_within(definition, &usages);
         if let Some(shapes) = self.assembly.shapes.get(&definition).cloned() {
-            let by_usages = self.assembly.usage_places(&usages, &placement, &placed_within);
+            let by_usages = self.assembly.usage_places(&usages, &Place::of_parent(placement), &placed_within);
             self.place_representations(&shapes, placement, &shown, is_shown, &by_usages);
         }
         Some(OpenProduct {
@@ -253,21 +253,21 @@ impl Walk<'_, '_> {
         placement: Frame,
         used: &Occurrence<'_>,
         is_shown: bool,
-        by_usages: &UsagePlaces,
+        by_usages: &PlaceTable,
     ) {
-        let mut standing: FxHashSet<(u64, PlacementKey)> = FxHashSet::default();
+        let mut standing = PlaceTable::default();
         let mut open: Vec<OpenRepresentation> = Vec::new();
         for &representation in representations {
             let owners = used.owners.into();
-            let first = Visit { representation, placement, owners, product: None, is_shown, is_linked: false };
+            let place = Place::of_parent(placement);
+            let first = Visit { representation, place, owners, product: None, is_shown, is_linked: false };
             let mut visit = Some(first);
             loop {
                 if let Some(visit) = visit.take() {
-                    let key = (visit.representation, placement_key(&visit.placement));
-                    let is_repeated = visit.is_linked && standing.contains(&key);
+                    let is_repeated = visit.is_linked && standing.holds(visit.representation, &visit.place);
                     if !is_repeated && self.place_representation(&visit, used, &open) {
                         if visit.is_shown {
-                            standing.insert(key);
+                            standing.insert(visit.representation, visit.place);
                         }
                         open.push(self.open_representation(visit));
                     }
@@ -283,7 +283,7 @@ impl Walk<'_, '_> {
                     open.pop();
                     continue;
                 };
-                visit = inner.filter(|v| !by_usages.holds(v.representation, &v.placement));
+                visit = inner.filter(|v| !by_usages.holds(v.representation, &v.place));
             }
         }
     }
@@ -309,7 +309,7 @@ impl Walk<'_, '_> {
             self.cut_off_representations.push(id);
             return false;
         }
-        if !(visit.placement.origin.abs().max_element() <= FARTHEST_MM) {
+        if !(visit.place.frame.origin.abs().max_element() <= FARTHEST_MM) {
             if self.reached.insert(id) {
                 self.assembly.problems.push(format!(
                     "#{id}: stands beyond {FARTHEST_MM:e} mm, too far out for double precision to hold a shape; it is left out"
@@ -333,7 +333,8 @@ impl Walk<'_, '_> {
             let linked = linked.filter(|name| !name.is_empty());
             self.placed.push(PlacedRepresentation {
                 representation: id,
-                placement: visit.placement,
+                placement: visit.place.frame,
+                rounding: visit.place.rounding,
                 name: used.name.to_string(),
                 path: used.path.map_or_else(String::new, str::to_owned),
                 product: linked.as_deref().unwrap_or(used.product).to_string(),
@@ -360,9 +361,9 @@ impl Walk<'_, '_> {
             return None;
         };
         let owners = [&outer.owners[..], &[item]].concat().into();
-        let placement = outer.placement.compose(&local);
+        let place = outer.place.inner(&local);
         let Visit { product, is_shown, .. } = *outer;
-        Some(Visit { representation: link.to, placement, owners, product, is_shown, is_linked: false })
+        Some(Visit { representation: link.to, place, owners, product, is_shown, is_linked: false })
     }
 
     /// Returns the visit of what a relationship of a placed representation leads to; one whose place cannot be read is reached, but not
@@ -372,12 +373,12 @@ impl Walk<'_, '_> {
         if link.placement.is_none() && self.assembly.owned.contains_key(&link.to) {
             return None;
         }
-        let placement = outer.placement.compose(&link.placement.unwrap_or(Frame::IDENTITY));
+        let place = outer.place.inner(&link.placement.unwrap_or(Frame::IDENTITY));
         let is_shown = outer.is_shown && link.placement.is_some();
         let product = self.assembly.products_of([outer.representation, link.to]).map(|[_, child]| child);
         let product = product.or(outer.product);
         let owners = outer.owners.clone();
-        Some(Visit { representation: link.to, placement, owners, product, is_shown, is_linked: true })
+        Some(Visit { representation: link.to, place, owners, product, is_shown, is_linked: true })
     }
 
     /// Notes that what is too deep is reached, with all that it holds: it would come back as a product or a shape that nothing uses.
