@@ -56,3 +56,19 @@ fn a_place_with_fewer_digits_is_no_second_one() {
     let shared = read(&(product(200, "asm", 300) + shapes + &places + &twice([111, 112])));
     assert_eq!(shared.model.placed_face_count(), 6, "{:?}", shared.report.problems);
 }
+
+/// A usage that is not in the file, beside one that puts the part to the same place: what is known of it is that place.
+#[test]
+fn a_lost_usage_in_the_place_of_another_adds_nothing() {
+    let placed = usage(400, NEXT, "#200,#100,$") + &relation(410, [110, 300], [20, 21]) + PLACED;
+    for (to, expected) in [(21, &[10.0][..]), (22, &[10.0, 20.0])] {
+        let lost = relation(430, [110, 300], [20, to]) + "#440=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#430,$);\n";
+        let import = assembly("", &format!("{placed}{lost}"));
+        let mut x: Vec<f64> = import.model.instances.iter().map(|i| i.placement.origin.x).collect();
+        x.sort_by(f64::total_cmp);
+        let problems = &import.report.problems;
+        assert_eq!(x, expected, "{problems:?}");
+        let told = "usage #400 puts product #100 where its relationship #430 does, and counts alone";
+        assert_eq!(problems.iter().any(|p| p.ends_with(told)), to == 21, "{problems:?}");
+    }
+}

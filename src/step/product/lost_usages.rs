@@ -1,6 +1,7 @@
 //! Usages that are referred to but are not in the file: their relationships still tell where a component stands, and in which product.
 
 use super::assembly::Assembly;
+use super::places::is_one_place;
 use super::relations::{WITH_TRANSFORMATION, property_attributes, related_representations};
 use super::usage_ends::UsageEnds;
 use super::usage_names::{Usage, UsagePlacement};
@@ -69,7 +70,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         Some(LostUsage { by: e.id, relation: relation.id, absence, parent, child, placement })
     }
 
-    /// Lets lost usages place their components: each by a usage of the same two products that has no placement, or else by one of its own.
+    /// Lets lost usages place their components, but where a usage puts them already: each by a usage of the same two products that has no
+    /// placement, or else by one of its own.
     pub(super) fn restore_usages(&mut self, usages: &mut FxHashMap<u64, Vec<Usage>>, lost: Vec<LostUsage>) {
         // Usages without a placement by parent and child, the last first.
         let mut free: FxHashMap<[u64; 2], Vec<usize>> = FxHashMap::default();
@@ -84,7 +86,13 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
         for LostUsage { by, relation, absence, parent, child, placement } in lost {
             let own = usages.entry(parent).or_default();
-            let told = if let Some(k) = free.get_mut(&[parent, child]).and_then(Vec::pop) {
+            let is_same = |usage: &&Usage| usage.child == child && are_one_place(usage.placement, placement);
+            let told = if let Some(same) = own.iter().find(is_same) {
+                format!(
+                    "usage #{} puts product #{child} where its relationship #{relation} does, and counts alone",
+                    same.id
+                )
+            } else if let Some(k) = free.get_mut(&[parent, child]).and_then(Vec::pop) {
                 own[k].placement = placement;
                 format!("usage #{}, which has no place, takes that of its relationship #{relation}", own[k].id)
             } else {
@@ -94,4 +102,9 @@ impl<'f, 'a> Assembly<'f, 'a> {
             self.problems.push(format!("#{by}: {absence}; {told}"));
         }
     }
+}
+
+/// Whether two usages of one component in one assembly put it into the same place.
+fn are_one_place(a: UsagePlacement, b: UsagePlacement) -> bool {
+    matches!((a, b), (UsagePlacement::Stated(a), UsagePlacement::Stated(b)) if is_one_place(&a, &b))
 }
