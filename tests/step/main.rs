@@ -27,4 +27,5 @@ mod rims;
 mod seams;
 mod shells;
 mod silence;
+mod subassemblies;
 mod support;

@@ -1,11 +1,11 @@
 //! How representations stand in each other: by relationships, by mapped items, and by the usages whose shapes they are.
 
-use super::assembly::Assembly;
+use super::assembly::{Assembly, MAX_DEPTH};
 use super::lost_usages::LostUsage;
 use super::places::{Place, PlaceTable, is_one_place};
 use super::relations::{
-    Link, OccurrenceShape, WITH_TRANSFORMATION, is_higher_usage, property_attributes, related_representations,
-    usage_attributes,
+    HIGHER_USAGE, Link, OccurrenceShape, WITH_TRANSFORMATION, is_higher_usage, property_attributes,
+    related_representations, usage_attributes,
 };
 use super::usage_ends::UsageEnds;
 use crate::math::Frame;
@@ -127,23 +127,32 @@ impl<'f, 'a> Assembly<'f, 'a> {
 
     /// Tells where a usage that a higher assembly sees has another place than the usages that it is made of.
     fn compare_higher_usage(&mut self, e: Entity<'f, 'a>, relation: Entity<'f, 'a>, usage: Entity<'f, 'a>) {
-        let made_of = usage.attributes("SPECIFIED_HIGHER_USAGE_OCCURRENCE", 6);
         let ends = related_representations(relation).filter(|_| relation.is_a(WITH_TRANSFORMATION));
-        let (Some(made_of), Some(ends)) = (made_of, ends) else { return };
-        let Some(stated) = self.transformation(relation, ends) else { return };
-        // A usage without a placement stands where its parent does.
-        let place = |i: usize| {
-            let stated = made_of.id(i).and_then(|id| self.placements.get(&id)?.first().copied());
-            stated.unwrap_or(Frame::IDENTITY)
-        };
-        let composed = place(0).compose(&place(1));
-        self.placements.insert(usage.id, vec![composed]);
+        let Some(stated) = ends.and_then(|ends| self.transformation(relation, ends)) else { return };
+        let Some(composed) = self.composed_place(usage) else { return };
         if !is_one_place(&composed, &stated) && !is_one_place(&composed, &stated.inverse()) {
             self.problems.push(format!(
                 "#{}: usage #{} has another place than the usages that it is made of, which count alone",
                 e.id, usage.id
             ));
         }
+    }
+
+    /// Returns where the usages that a higher one is made of put its component: the upper one, which may be a higher usage itself, with or
+    /// without a place of its own, and the next one in it. `None` where one is missing, or they are made of each other.
+    fn composed_place(&self, usage: Entity<'f, 'a>) -> Option<Frame> {
+        // A usage without a placement stands where its parent does.
+        let place = |id: u64| self.placements.get(&id).and_then(|p| p.first().copied()).unwrap_or(Frame::IDENTITY);
+        let mut composed = Frame::IDENTITY;
+        let mut outer = usage;
+        for _ in 0..MAX_DEPTH {
+            let Some(made_of) = outer.attributes(HIGHER_USAGE, 6) else {
+                return Some(place(outer.id).compose(&composed));
+            };
+            composed = place(made_of.id(1)?).compose(&composed);
+            outer = made_of.entity(0)?;
+        }
+        None
     }
 
     /// Reads where the children of usages stand in their parents by mapped items of the usages' own shapes, as AP214 allows: each item of

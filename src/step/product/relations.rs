@@ -28,6 +28,9 @@ const USAGES: [&str; 4] = [
 /// The usage that means one occurrence of its component; the others may mean what such ones place.
 pub(super) const INDIVIDUAL_USAGE: &str = "NEXT_ASSEMBLY_USAGE_OCCURRENCE";
 
+/// What names once more, as a higher assembly sees it, what usages below put there.
+pub(super) const HIGHER_USAGE: &str = "SPECIFIED_HIGHER_USAGE_OCCURRENCE";
+
 /// What states where one of two related representations stands in the other; without it both stand in the same place.
 pub(super) const WITH_TRANSFORMATION: &str = "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
 
@@ -87,7 +90,7 @@ pub(super) fn usage_attributes<'f, 'a>(e: Entity<'f, 'a>) -> Option<Args<'f, 'a>
 
 /// Whether a usage describes once more, as a higher assembly sees it, what usages below put there: it adds no component.
 pub(super) fn is_higher_usage(e: Entity<'_, '_>) -> bool {
-    e.is_a("SPECIFIED_HIGHER_USAGE_OCCURRENCE")
+    e.is_a(HIGHER_USAGE)
 }
 
 /// Whether a usage puts a component into an assembly whose subassemblies are yet to be defined: it counts where nothing else uses it.
