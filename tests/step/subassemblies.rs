@@ -37,3 +37,25 @@ fn a_higher_usage_of_a_later_one_is_where_their_usages_put_it() {
     let told = assembly("", &(chain + &upper + &seen(22))).report.problems;
     assert!(told.len() == 1 && told[0].contains("#744: usage #740 has another place than the usages"), "{told:?}");
 }
+
+/// The part is promised to #200, which may hold the assembly #500 at x = 20, in which a usage puts the part to x = 10.
+#[test]
+fn a_promise_counts_unless_usages_below_keep_it() {
+    let other = product(500, "other", 510)
+        + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
+        + &usage(600, NEXT, "#500,#100,$")
+        + &relation(602, [110, 510], [20, 21])
+        + &contextual(604, 602, 600);
+    let below = usage(610, NEXT, "#200,#500,$") + &relation(612, [510, 300], [20, 22]) + &contextual(614, 612, 610);
+    let promise = usage(620, "PROMISSORY_USAGE_OCCURRENCE", "#200,#100,$");
+    let place = relation(622, [110, 300], [20, 22]) + &contextual(624, 622, 620);
+    let elsewhere = format!("{other}{promise}");
+    assert_places(&assembly("", &elsewhere), &[10.0], "without a place, used elsewhere");
+    assert_places(&assembly("", &format!("{elsewhere}{place}")), &[10.0, 20.0], "with a place, used elsewhere");
+    assert_places(&assembly("", &format!("{elsewhere}{below}")), &[30.0], "without a place, used below");
+    let kept = assembly("", &format!("{elsewhere}{below}{place}"));
+    let x: Vec<f64> = kept.model.instances.iter().map(|i| i.placement.origin.x).collect();
+    let told = &kept.report.problems;
+    assert_eq!((x, told.len()), (vec![30.0], 1), "{told:?}");
+    assert!(told[0].ends_with("#620: promises product #100, which other usages put into #200: these count alone"));
+}

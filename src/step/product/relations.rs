@@ -93,7 +93,7 @@ pub(super) fn is_higher_usage(e: Entity<'_, '_>) -> bool {
     e.is_a(HIGHER_USAGE)
 }
 
-/// Whether a usage puts a component into an assembly whose subassemblies are yet to be defined: it counts where nothing else uses it.
+/// Whether a usage puts a component into an assembly whose subassemblies are yet to be defined.
 pub(super) fn is_promise(e: Entity<'_, '_>) -> bool {
     e.is_a("PROMISSORY_USAGE_OCCURRENCE")
 }

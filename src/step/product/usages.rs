@@ -12,25 +12,58 @@ use crate::step::part21::Entity;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 impl<'f, 'a> Assembly<'f, 'a> {
-    /// Returns usages by their parents; their names and placements are not known yet.
+    /// Returns usages by their parents, promises last; their names and placements are not known yet.
     pub(super) fn read_usages(entities: &[Entity<'f, 'a>]) -> FxHashMap<u64, Vec<Usage>> {
         let mut usages: FxHashMap<u64, Vec<Usage>> = FxHashMap::default();
-        let mut used: FxHashSet<u64> = FxHashSet::default();
-        // A promise comes last, for it counts where nothing else uses its component.
         let (promises, others): (Vec<Entity<'f, 'a>>, Vec<Entity<'f, 'a>>) =
             entities.iter().copied().partition(|e| is_promise(*e));
-        for (e, is_promise) in others.iter().map(|e| (e, false)).chain(promises.iter().map(|e| (e, true))) {
-            let ends = usage_attributes(*e).and_then(|args| Some((args.id(3)?, args.id(4)?)));
+        for e in others.into_iter().chain(promises) {
+            let ends = usage_attributes(e).and_then(|args| Some((args.id(3)?, args.id(4)?)));
             let Some((parent, child)) = ends else { continue };
-            if !is_promise || !used.contains(&child) {
-                let usage = Usage { child, name: String::new(), id: e.id, placement: UsagePlacement::Unstated };
-                usages.entry(parent).or_default().push(usage);
-            }
-            if !is_promise {
-                used.insert(child);
-            }
+            let usage = Usage { child, name: String::new(), id: e.id, placement: UsagePlacement::Unstated };
+            usages.entry(parent).or_default().push(usage);
         }
         usages
+    }
+
+    /// Leaves out promises that are kept, where other usages below the same assembly use the component, which is told of one that has a
+    /// place; and those without a place of what is used anywhere else.
+    fn leave_out_promises(&mut self, usages: &mut FxHashMap<u64, Vec<Usage>>) {
+        let file = self.file;
+        let is_promised = |usage: &Usage| file.entity(usage.id).is_some_and(is_promise);
+        let mut parents: Vec<u64> =
+            usages.iter().filter(|(_, own)| own.iter().any(is_promised)).map(|(parent, _)| *parent).collect();
+        if parents.is_empty() {
+            return;
+        }
+        parents.sort_unstable();
+        let mut used: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
+        for (parent, own) in &*usages {
+            let children = own.iter().filter(|usage| !is_promised(usage)).map(|usage| usage.child);
+            used.insert(*parent, children.collect());
+        }
+        let used_anywhere: FxHashSet<u64> = used.values().flatten().copied().collect();
+        for parent in parents {
+            let Some(own) = usages.get_mut(&parent) else { continue };
+            if !own.iter().any(|usage| is_promised(usage) && used_anywhere.contains(&usage.child)) {
+                continue;
+            }
+            let below = all_below(parent, &used);
+            own.retain(|usage| {
+                let is_placed = usage.placement != UsagePlacement::Unstated;
+                let is_kept = below.contains(&usage.child);
+                if !is_promised(usage) || !is_kept && (is_placed || !used_anywhere.contains(&usage.child)) {
+                    return true;
+                }
+                if is_placed {
+                    self.problems.push(format!(
+                        "#{}: promises product #{}, which other usages put into #{parent}: these count alone",
+                        usage.id, usage.child
+                    ));
+                }
+                false
+            });
+        }
     }
 
     /// Takes over the usages that count, each with its placement, once for each where it has several, and with its name; `lost` are those
@@ -39,6 +72,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         for usages in usages.values_mut() {
             *usages = self.placed_usages(std::mem::take(usages));
         }
+        self.leave_out_promises(&mut usages);
         self.restore_usages(&mut usages, lost);
         for usages in usages.values_mut() {
             self.leave_out_counts(usages);
@@ -73,4 +107,14 @@ impl<'f, 'a> Assembly<'f, 'a> {
             usages.iter().filter(|usage| stands(usage)).map(|usage| usage.child).collect();
         usages.retain(|usage| stands(usage) || !standing.contains(&usage.child));
     }
+}
+
+/// Returns the products that a product uses, and those that these use; `used` are the children of each.
+fn all_below(product: u64, used: &FxHashMap<u64, Vec<u64>>) -> FxHashSet<u64> {
+    let mut below: FxHashSet<u64> = FxHashSet::default();
+    let mut open = vec![product];
+    while let Some(parent) = open.pop() {
+        open.extend(used.get(&parent).into_iter().flatten().copied().filter(|child| below.insert(*child)));
+    }
+    below
 }
