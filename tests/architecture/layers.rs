@@ -456,6 +456,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "usage_ends",
             "assembly",
             "lost_usages",
+            "subassemblies",
             "links",
             "usages",
             "placed_children",

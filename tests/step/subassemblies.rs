@@ -59,3 +59,38 @@ fn a_promise_counts_unless_usages_below_keep_it() {
     assert_eq!((x, told.len()), (vec![30.0], 1), "{told:?}");
     assert!(told[0].ends_with("#620: promises product #100, which other usages put into #200: these count alone"));
 }
+
+/// The assembly #500, in which a usage puts the part to x = 10, in #200 at x = 20 by a relationship or a mapped item; #200 may stand in
+/// another one at x = 30. Beside it there may be a usage without a place, or with the same.
+#[test]
+fn an_assembly_stands_where_a_relationship_or_a_mapped_item_puts_it() {
+    let sub = product(500, "sub", 510)
+        + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n#30=REPRESENTATION_MAP(#20,#510);\n#31=MAPPED_ITEM('',#30,#22);\n"
+        + &usage(600, NEXT, "#500,#100,$")
+        + &relation(602, [110, 510], [20, 21])
+        + &contextual(604, 602, 600);
+    let top = product(800, "top", 810)
+        + "#810=SHAPE_REPRESENTATION('',(#23),#1);\n"
+        + &usage(820, NEXT, "#800,#200,$")
+        + &relation(822, [300, 810], [20, 23])
+        + &contextual(824, 822, 820);
+    let related = relation(610, [510, 300], [20, 22]);
+    let unplaced = usage(620, NEXT, "#200,#500,$");
+    let placed = relation(622, [510, 300], [20, 22]) + &contextual(624, 622, 620);
+    for (items, data) in [("", &related), ("#31,", &String::new())] {
+        for usages in [String::new(), unplaced.clone(), unplaced.clone() + &placed] {
+            let data = format!("{sub}{data}{usages}");
+            assert_places(&assembly(items, &data), &[30.0], &data);
+            assert_places(&assembly(items, &format!("{data}{top}")), &[60.0], &data);
+        }
+    }
+    // One that moves nothing.
+    let still = format!("{sub}{}{top}", relation(610, [510, 300], [20, 20]));
+    assert_places(&assembly("", &still), &[40.0], "still");
+    // What holds an assembly by a relationship is one, and stands in another one.
+    let middle = product(700, "middle", 710)
+        + "#710=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
+        + &relation(720, [510, 710], [20, 21])
+        + &relation(730, [710, 300], [20, 22]);
+    assert_places(&assembly("", &format!("{sub}{middle}")), &[40.0], "a chain");
+}

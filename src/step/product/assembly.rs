@@ -102,14 +102,15 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let usages = Self::read_usages(&usages);
         let ends = UsageEnds::new(&usages);
         let places = a.read_contextual(&contextual, &ends);
+        let mut related = Vec::new();
         for e in relations {
             if !places.relations.contains(&e.id) {
-                a.read_relationship(e, &ends);
+                related.extend(a.read_relationship(e, &ends));
             }
         }
         a.leave_out_links_to_products(&ends);
         a.read_occurrence_shapes(&occurrence_shapes);
-        a.settle_usages(usages, places.lost);
+        a.settle_usages(usages, places.lost, related);
         a
     }
 

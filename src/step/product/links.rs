@@ -7,6 +7,7 @@ use super::relations::{
     HIGHER_USAGE, Link, OccurrenceShape, WITH_TRANSFORMATION, is_higher_usage, property_attributes,
     related_representations, usage_attributes,
 };
+use super::subassemblies::ProductLink;
 use super::usage_ends::UsageEnds;
 use crate::math::Frame;
 use crate::step::part21::Entity;
@@ -215,21 +216,24 @@ impl<'f, 'a> Assembly<'f, 'a> {
     }
 
     /// Links the two representations of a relationship: one way by its transformation, or both ways, unmoved, if it has none. Where the
-    /// product of the first uses that of the second, their ends are swapped.
-    pub(super) fn read_relationship(&mut self, e: Entity<'f, 'a>, ends: &UsageEnds) {
-        let Some([first, second]) = related_representations(e) else { return };
+    /// product of the first uses that of the second, their ends are swapped. Returns the link of a transformation between two products.
+    pub(super) fn read_relationship(&mut self, e: Entity<'f, 'a>, ends: &UsageEnds) -> Option<ProductLink> {
+        let [first, second] = related_representations(e)?;
         if !e.is_a(WITH_TRANSFORMATION) {
             self.links.entry(second).or_default().push(Link::plain(first));
             self.links.entry(first).or_default().push(Link::plain(second));
-            return;
+            return None;
         }
-        let placement = self.transformation(e, [first, second]);
-        if self.products_of([first, second]).is_some_and(|products| ends.are_swapped(products)) {
-            let placement = placement.map(|p| p.inverse());
-            self.links.entry(first).or_default().push(Link::transformed(second, placement));
-        } else {
-            self.links.entry(second).or_default().push(Link::transformed(first, placement));
+        let mut placement = self.transformation(e, [first, second]);
+        let are_swapped = self.products_of([first, second]).is_some_and(|products| ends.are_swapped(products));
+        let [shown, holder] = if are_swapped { [second, first] } else { [first, second] };
+        if are_swapped {
+            placement = placement.map(|p| p.inverse());
         }
+        self.links.entry(holder).or_default().push(Link::transformed(shown, placement));
+        let [child, parent] = self.products_of([shown, holder])?;
+        placement?;
+        Some(ProductLink { by: e.id, parent, child, holder, shown, placement })
     }
 
     /// Returns what a MAPPED_ITEM of the representation `holder` shows, and where that stands there; `None` for any other item.

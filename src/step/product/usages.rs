@@ -6,6 +6,7 @@
 use super::assembly::Assembly;
 use super::lost_usages::LostUsage;
 use super::relations::{INDIVIDUAL_USAGE, is_promise, usage_attributes};
+use super::subassemblies::ProductLink;
 use super::usage_names::{Usage, UsagePlacement, name_usages};
 use crate::math::Frame;
 use crate::step::part21::Entity;
@@ -67,13 +68,19 @@ impl<'f, 'a> Assembly<'f, 'a> {
     }
 
     /// Takes over the usages that count, each with its placement, once for each where it has several, and with its name; `lost` are those
-    /// that are not in the file.
-    pub(super) fn settle_usages(&mut self, mut usages: FxHashMap<u64, Vec<Usage>>, lost: Vec<LostUsage>) {
+    /// that are not in the file, `related` the relationships that stand for others.
+    pub(super) fn settle_usages(
+        &mut self,
+        mut usages: FxHashMap<u64, Vec<Usage>>,
+        lost: Vec<LostUsage>,
+        related: Vec<ProductLink>,
+    ) {
         for usages in usages.values_mut() {
             *usages = self.placed_usages(std::mem::take(usages));
         }
         self.leave_out_promises(&mut usages);
         self.restore_usages(&mut usages, lost);
+        self.place_assemblies(&mut usages, related);
         for usages in usages.values_mut() {
             self.leave_out_counts(usages);
             name_usages(self.file, &mut self.products, usages);

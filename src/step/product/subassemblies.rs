@@ -1,0 +1,151 @@
+//! Assemblies that stand in others by a relationship with a transformation, or by a mapped item, without a usage or beside one without a
+//! place: with all that their own usages place, which no representation leads to. What other usages place stands there alone.
+//!
+//! Known weakness: a mapped item in a representation that is only related to that of the product is not looked at.
+
+use super::assembly::Assembly;
+use super::places::{Place, PlaceTable};
+use super::usage_names::{Usage, UsagePlacement};
+use crate::math::Frame;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// What puts a representation of one product into that of another.
+#[derive(Clone, Copy)]
+pub(super) struct ProductLink {
+    /// The relationship or the mapped item.
+    pub(super) by: u64,
+    pub(super) parent: u64,
+    pub(super) child: u64,
+    /// The representations of both.
+    pub(super) holder: u64,
+    pub(super) shown: u64,
+    /// `None` where the mapped item tells it.
+    pub(super) placement: Option<Frame>,
+}
+
+/// The usages of one assembly, to which places are added.
+struct OpenUsages {
+    /// Children in the places that usages state.
+    standing: PlaceTable,
+    /// Usages without a place by their children, the last first.
+    free: FxHashMap<u64, Vec<usize>>,
+}
+
+impl OpenUsages {
+    fn new(usages: &[Usage]) -> Self {
+        let mut open = Self { standing: PlaceTable::default(), free: FxHashMap::default() };
+        for (k, usage) in usages.iter().enumerate().rev() {
+            match usage.placement {
+                UsagePlacement::Stated(frame) => open.standing.insert(usage.child, local_place(&frame)),
+                UsagePlacement::Unstated => open.free.entry(usage.child).or_default().push(k),
+                UsagePlacement::Unreadable => {}
+            }
+        }
+        open
+    }
+
+    /// Puts a child to a place where none stands yet: by a usage that has none, or else by one of its own.
+    fn place(&mut self, usages: &mut Vec<Usage>, link: &ProductLink, frame: Frame) {
+        let place = local_place(&frame);
+        if self.standing.holds(link.child, &place) {
+            return;
+        }
+        self.standing.insert(link.child, place);
+        let placement = UsagePlacement::Stated(frame);
+        match self.free.get_mut(&link.child).and_then(Vec::pop) {
+            Some(k) => usages[k].placement = placement,
+            None => usages.push(Usage { child: link.child, name: String::new(), id: link.by, placement }),
+        }
+    }
+}
+
+/// Returns the place of what stands there in its parent, in the parent's coordinates.
+fn local_place(frame: &Frame) -> Place {
+    Place::of_parent(Frame::IDENTITY).inner(frame)
+}
+
+impl Assembly<'_, '_> {
+    /// Turns relationships into usages where their child has usages of its own, and mapped items where some of these state a place;
+    /// `related` are the relationships of products with a transformation.
+    pub(super) fn place_assemblies(&mut self, usages: &mut FxHashMap<u64, Vec<Usage>>, related: Vec<ProductLink>) {
+        let mut related = by_children(related);
+        let mut mapped = by_children(self.mapped_products());
+        if related.is_empty() && mapped.is_empty() {
+            return;
+        }
+        let mut open: Vec<u64> = usages.iter().filter(|(_, own)| !own.is_empty()).map(|(id, _)| *id).collect();
+        open.sort_unstable();
+        let users = unplaced_users(usages);
+        let is_alone = |link: &ProductLink| users.get(&link.child).is_none_or(|user| *user == Some(link.parent));
+        let mut open_usages: FxHashMap<u64, OpenUsages> = FxHashMap::default();
+        let mut settled: FxHashSet<[u64; 2]> = FxHashSet::default();
+        // What holds an assembly becomes one, so that what holds that is looked at again.
+        while let Some(child) = open.pop() {
+            let mut links = related.remove(&child).unwrap_or_default();
+            links.retain(is_alone);
+            settled.extend(links.iter().map(|link| [link.holder, link.shown]));
+            // Of one whose children are all placed by mapped items these show everything.
+            let states_places = |own: &Vec<Usage>| own.iter().any(|u| u.placement != UsagePlacement::Unstated);
+            if usages.get(&child).is_some_and(states_places) {
+                links.extend(mapped.remove(&child).into_iter().flatten().filter(is_alone));
+            }
+            for link in links {
+                let in_item = || self.mapping(link.by, link.holder)?.placement;
+                // One that cannot be read is told by the walk.
+                let Some(frame) = link.placement.or_else(in_item) else { continue };
+                let own = usages.entry(link.parent).or_default();
+                open_usages.entry(link.parent).or_insert_with(|| OpenUsages::new(own)).place(own, &link, frame);
+                open.push(link.parent);
+            }
+        }
+        for (holder, links) in &mut self.links {
+            let is_settled = |to: u64| settled.contains(&[*holder, to]);
+            links.retain(|link| !link.has_transformation || link.placement.is_none() || !is_settled(link.to));
+        }
+    }
+
+    /// Returns the mapped items in representations of products that show those of others.
+    fn mapped_products(&self) -> Vec<ProductLink> {
+        let mut found = Vec::new();
+        let items = self.file.entities_named(&["MAPPED_ITEM"]).filter_map(|e| {
+            let shown = self.mapped_representation(e.id)?;
+            self.owned.get(&shown).copied().flatten().map(|child| (e.id, (shown, child)))
+        });
+        let items: FxHashMap<u64, (u64, u64)> = items.collect();
+        if items.is_empty() {
+            return found;
+        }
+        let mut holders: Vec<(u64, u64)> =
+            self.owned.iter().filter_map(|(holder, parent)| Some((*holder, (*parent)?))).collect();
+        holders.sort_unstable();
+        for (holder, parent) in holders {
+            for by in self.items(holder) {
+                if let Some(&(shown, child)) = items.get(&by)
+                    && child != parent
+                {
+                    found.push(ProductLink { by, parent, child, holder, shown, placement: None });
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Returns the children of usages, with the product that alone uses each, without a place; `None` for others.
+fn unplaced_users(usages: &FxHashMap<u64, Vec<Usage>>) -> FxHashMap<u64, Option<u64>> {
+    let mut users: FxHashMap<u64, Option<u64>> = FxHashMap::default();
+    for (parent, own) in usages {
+        for usage in own {
+            let user = users.entry(usage.child).or_insert(Some(*parent));
+            *user = user.filter(|user| user == parent && usage.placement == UsagePlacement::Unstated);
+        }
+    }
+    users
+}
+
+/// Sorts links by their children.
+fn by_children(links: Vec<ProductLink>) -> FxHashMap<u64, Vec<ProductLink>> {
+    let mut sorted: FxHashMap<u64, Vec<ProductLink>> = FxHashMap::default();
+    links.into_iter().for_each(|link| sorted.entry(link.child).or_default().push(link));
+    sorted
+}
