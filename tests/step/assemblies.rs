@@ -207,7 +207,8 @@ fn a_placement_in_a_rare_form_counts() {
                   #410=REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION('','',#110,#300,#411);\n";
     let swapped = relation(410, [300, 110], [20, 21]);
     let swapped_of_usage = [swapped.as_str(), PLACED].concat();
-    for data in [own_shape, simple, &swapped, &swapped_of_usage] {
+    let of_shapes = simple.replace("=REPRESENTATION_", "=SHAPE_REPRESENTATION_");
+    for data in [own_shape, simple, &of_shapes, &swapped, &swapped_of_usage] {
         assert_places(&assembly("", &format!("{used}{data}")), &[10.0], data);
     }
     assert_places(&assembly("", &used), &[0.0], "without a placement");

@@ -4,8 +4,8 @@ use super::assembly::{Assembly, MAX_DEPTH};
 use super::lost_usages::LostUsage;
 use super::places::{Place, PlaceTable, is_one_place};
 use super::relations::{
-    HIGHER_USAGE, Link, OccurrenceShape, WITH_TRANSFORMATION, is_higher_usage, property_attributes,
-    related_representations, usage_attributes,
+    HIGHER_USAGE, Link, OccurrenceShape, has_transformation, is_higher_usage, property_attributes,
+    related_representations, stated_transformation, usage_attributes,
 };
 use super::subassemblies::ProductLink;
 use super::usage_ends::UsageEnds;
@@ -25,8 +25,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
     /// Returns how the first of two representations stands in the second by the transformation of their relationship; `None`, which is
     /// reported, where that cannot be read.
     pub(super) fn transformation(&mut self, e: Entity<'f, 'a>, [first, second]: [u64; 2]) -> Option<Frame> {
-        let stated = e.attributes(WITH_TRANSFORMATION, 4).and_then(|a| a.entity(0));
-        let placement = stated.and_then(|t| {
+        let placement = stated_transformation(e).and_then(|t| {
             // An operator takes the first representation into the second by itself (ISO 10303-43, functionally_defined_transformation).
             if t.keywords().any(|k| k.starts_with("CARTESIAN_TRANSFORMATION_OPERATOR")) {
                 return self.geometry_reader(second).transformation(t.id).ok();
@@ -92,7 +91,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             self.problems.push(format!("#{}: its relationship lacks a representation: it places nothing", e.id));
             return;
         };
-        if !relation.is_a(WITH_TRANSFORMATION) {
+        if !has_transformation(relation) {
             return;
         }
         let mut placement = self.transformation(relation, [first, second]);
@@ -128,7 +127,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
 
     /// Tells where a usage that a higher assembly sees has another place than the usages that it is made of.
     fn compare_higher_usage(&mut self, e: Entity<'f, 'a>, relation: Entity<'f, 'a>, usage: Entity<'f, 'a>) {
-        let ends = related_representations(relation).filter(|_| relation.is_a(WITH_TRANSFORMATION));
+        let ends = related_representations(relation).filter(|_| has_transformation(relation));
         let Some(stated) = ends.and_then(|ends| self.transformation(relation, ends)) else { return };
         let Some(composed) = self.composed_place(usage) else { return };
         if !is_one_place(&composed, &stated) && !is_one_place(&composed, &stated.inverse()) {
@@ -219,7 +218,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
     /// product of the first uses that of the second, their ends are swapped. Returns the link of a transformation between two products.
     pub(super) fn read_relationship(&mut self, e: Entity<'f, 'a>, ends: &UsageEnds) -> Option<ProductLink> {
         let [first, second] = related_representations(e)?;
-        if !e.is_a(WITH_TRANSFORMATION) {
+        if !has_transformation(e) {
             self.links.entry(second).or_default().push(Link::plain(first));
             self.links.entry(first).or_default().push(Link::plain(second));
             return None;

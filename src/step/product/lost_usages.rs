@@ -2,7 +2,7 @@
 
 use super::assembly::Assembly;
 use super::places::is_one_place;
-use super::relations::{WITH_TRANSFORMATION, property_attributes, related_representations};
+use super::relations::{has_transformation, property_attributes, related_representations};
 use super::usage_ends::UsageEnds;
 use super::usage_names::{Usage, UsagePlacement};
 use crate::step::part21::Entity;
@@ -59,7 +59,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             return None;
         };
         let are_swapped = ends.are_swapped([child, parent]);
-        let placement = if !relation.is_a(WITH_TRANSFORMATION) {
+        let placement = if !has_transformation(relation) {
             UsagePlacement::Unstated
         } else if let Some(frame) = self.transformation(relation, [first, second]) {
             UsagePlacement::Stated(if are_swapped { frame.inverse() } else { frame })

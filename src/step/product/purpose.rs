@@ -21,7 +21,7 @@ pub(super) fn purpose_besides_shape(file: &File<'_>, id: u64) -> Option<&'static
 pub(super) fn is_shape_representation(keyword: &str) -> bool {
     keyword.contains("SHAPE_REPRESENTATION")
         && !keyword.starts_with("CONTEXT_DEPENDENT_")
-        && !keyword.ends_with("_RELATIONSHIP")
+        && !keyword.contains("_RELATIONSHIP")
 }
 
 /// Whether one of these items is a ready mesh, told by its name.

@@ -5,7 +5,7 @@ use crate::math::Frame;
 use crate::step::part21::{Args, Entity};
 
 /// The entities that relate products, representations and their shapes.
-pub(super) const RELATIONS: [&str; 9] = [
+pub(super) const RELATIONS: [&str; 10] = [
     "SHAPE_DEFINITION_REPRESENTATION",
     INDIVIDUAL_USAGE,
     "QUANTIFIED_ASSEMBLY_COMPONENT_USAGE",
@@ -15,6 +15,7 @@ pub(super) const RELATIONS: [&str; 9] = [
     "SHAPE_REPRESENTATION_RELATIONSHIP",
     "REPRESENTATION_RELATIONSHIP",
     WITH_TRANSFORMATION,
+    SHAPES_WITH_TRANSFORMATION,
 ];
 
 /// The usages of ISO 10303-44 that put a component into an assembly.
@@ -32,7 +33,9 @@ pub(super) const INDIVIDUAL_USAGE: &str = "NEXT_ASSEMBLY_USAGE_OCCURRENCE";
 pub(super) const HIGHER_USAGE: &str = "SPECIFIED_HIGHER_USAGE_OCCURRENCE";
 
 /// What states where one of two related representations stands in the other; without it both stand in the same place.
-pub(super) const WITH_TRANSFORMATION: &str = "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
+const WITH_TRANSFORMATION: &str = "REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
+/// The same as one entity, as some writers have it; the schemas have it as a complex instance alone.
+const SHAPES_WITH_TRANSFORMATION: &str = "SHAPE_REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION";
 
 /// A directed relationship, or what a mapped item shows: the representation it leads to, and how that is placed; `None` where that cannot
 /// be read.
@@ -101,6 +104,17 @@ pub(super) fn is_promise(e: Entity<'_, '_>) -> bool {
 /// Returns the attributes of a SHAPE_DEFINITION_REPRESENTATION: definition and representation; `None` of any other entity.
 pub(super) fn shape_definition_attributes<'f, 'a>(e: Entity<'f, 'a>) -> Option<Args<'f, 'a>> {
     own_or_inherited(e, "SHAPE_DEFINITION_REPRESENTATION", "PROPERTY_DEFINITION_REPRESENTATION")
+}
+
+/// Whether a relationship states by a transformation where one of two related representations stands in the other.
+pub(super) fn has_transformation(e: Entity<'_, '_>) -> bool {
+    e.is_one_of(&[WITH_TRANSFORMATION, SHAPES_WITH_TRANSFORMATION])
+}
+
+/// Returns the transformation of a relationship; `None` where it has none or that is missing.
+pub(super) fn stated_transformation<'f, 'a>(e: Entity<'f, 'a>) -> Option<Entity<'f, 'a>> {
+    let names = [WITH_TRANSFORMATION, SHAPES_WITH_TRANSFORMATION];
+    names.iter().find_map(|name| e.attributes(name, 4))?.entity(0)
 }
 
 /// Returns the two representations of a relationship; `None` where one is missing.

@@ -3,8 +3,7 @@
 
 use super::purpose::is_shape_representation;
 use super::relations::{
-    WITH_TRANSFORMATION, property_attributes, related_representations, shape_definition_attributes,
-    usage_attributes,
+    has_transformation, property_attributes, related_representations, shape_definition_attributes, usage_attributes,
 };
 use crate::model::Colour;
 use crate::step::part21::{Entity, File};
@@ -98,7 +97,7 @@ impl Styles {
         }
         // Shapes stand in representations that are related to the product's own.
         for e in file.entities_named(&["SHAPE_REPRESENTATION_RELATIONSHIP"]) {
-            if let Some(pair) = related_representations(e).filter(|_| !e.is_a(WITH_TRANSFORMATION))
+            if let Some(pair) = related_representations(e).filter(|_| !has_transformation(e))
                 && pair.iter().any(|id| self.overridden.contains(id))
             {
                 self.overridden.extend(pair);
