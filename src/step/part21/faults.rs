@@ -97,6 +97,13 @@ mod tests {
     }
 
     #[test]
+    fn the_end_of_a_section_without_its_semicolon_costs_nothing() {
+        let fault = &[(4, "';' is missing")];
+        assert_read("#1=A();\nENDSEC\nEND-ISO-10303-21;\n", &[1], true, fault);
+        assert_read("#1=A();\nendsec\nDATA;\n#2=B();\nENDSEC;\nEND-ISO-10303-21;\n", &[1, 2], true, fault);
+    }
+
+    #[test]
     fn what_ends_no_comment_costs_no_instance() {
         let stray = &[(4, "neither '#' nor a letter")];
         assert_read("#1=A();\n/* a /* b */ */\n#2=B();\nEND-ISO-10303-21;\n", &[1, 2], true, stray);

@@ -4,7 +4,7 @@ use super::blanks::skip_blanks;
 use super::faults::{Faults, next_statement, stray_length};
 use super::index::{Index, Instance, Kinds};
 use super::number::{TOO_LARGE, number, unsigned};
-use super::sections::{section_besides_data, signature_length};
+use super::sections::{is_section_end, section_besides_data, signature_length};
 use super::short_names::Keyword;
 use super::span::Span;
 use super::{File, Record, Value};
@@ -141,7 +141,12 @@ impl Parser<'_> {
                             self.fault(start, None, what);
                         }
                     } else if let Err(what) = self.end() {
-                        self.pass_stray(start, what);
+                        if is_section_end(name.bytes(self.source)) {
+                            // The next word may end the file.
+                            self.faults.note(start, None, what);
+                        } else {
+                            self.pass_stray(start, what);
+                        }
                     }
                 }
                 b';' => self.at += 1,

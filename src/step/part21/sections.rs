@@ -11,6 +11,11 @@ pub(super) struct Section {
     pub(super) elsewhere: Vec<(usize, u64)>,
 }
 
+/// Whether a word ends a section.
+pub(super) fn is_section_end(name: &[u8]) -> bool {
+    name.eq_ignore_ascii_case(END)
+}
+
 /// Returns what the section whose first word is `name` holds of `rest`, the bytes behind that word; `None` for any other word.
 pub(super) fn section_besides_data(name: &[u8], rest: &[u8]) -> Option<Section> {
     if ![&b"ANCHOR"[..], b"REFERENCE", b"SIGNATURE"].iter().any(|word| name.eq_ignore_ascii_case(word)) {
