@@ -47,3 +47,18 @@ fn shapes_in_a_circle_stand_all_the_same() {
     let placed = relation(410, [110, 120], [20, 21]) + &relation(420, [120, 110], [20, 22]);
     assert_places(&read(&(block(110) + &block(120) + &placed)), &[0.0, 20.0], "a circle");
 }
+
+/// What is there for mapped items stands where these do; without any it is told, once.
+#[test]
+fn a_shape_that_no_mapped_item_shows_is_told() {
+    let mapped = block(110) + "#30=REPRESENTATION_MAP(#20,#110);\n#31=REPRESENTATION_MAP(#21,#110);\n";
+    let shown = mapped.clone() + "#32=MAPPED_ITEM('',#30,#21);\n#120=SHAPE_REPRESENTATION('',(#32,#20),#1);\n";
+    for (data, expected, told) in [(&shown, &[10.0][..], 0), (&(mapped + &block(130)), &[0.0], 1)] {
+        let import = read(data);
+        assert_places(&import, expected, data);
+        let left_out: Vec<(u64, &str)> =
+            import.report.left_out.iter().map(|note| (note.id, note.reason.as_str())).collect();
+        assert_eq!(left_out.len(), told, "{left_out:?}");
+        assert!(left_out.iter().all(|(id, reason)| *id == 110 && reason.contains("#30 REPRESENTATION_MAP")));
+    }
+}

@@ -1,7 +1,7 @@
-//! Representations that no product reaches, in the order in which they are placed.
+//! Representations that no product reaches: in the order in which they are placed, and those that are there for mapped items alone.
 
 use super::assembly::Assembly;
-use super::purpose::is_shape_representation;
+use super::purpose::{is_shape_representation, purpose_besides_shape};
 use rustc_hash::FxHashSet;
 
 impl Assembly<'_, '_> {
@@ -18,6 +18,27 @@ impl Assembly<'_, '_> {
         let (inner, mut orphans): (Vec<u64>, Vec<u64>) = unmapped.partition(|id| moved.contains(id));
         orphans.extend(inner);
         orphans
+    }
+
+    /// Returns the shapes that a REPRESENTATION_MAP offers and that nothing has `reached`, each with the map, but what is left out already
+    /// and what that holds.
+    pub(super) fn unshown_maps(&self, reached: &FxHashSet<u64>) -> Vec<(u64, u64)> {
+        let file = self.file;
+        let mut known = FxHashSet::default();
+        let is_shape = |id: u64| {
+            let has_name = file.entity(id).is_some_and(|e| e.keywords().any(is_shape_representation));
+            has_name && purpose_besides_shape(file, id).is_none()
+        };
+        let maps = file.entities_named(&["REPRESENTATION_MAP"]);
+        let offered = maps.filter_map(|e| Some((e.attributes("REPRESENTATION_MAP", 0)?.id(1)?, e.id)));
+        let mut unshown: Vec<(u64, u64)> =
+            offered.filter(|(id, _)| !reached.contains(id) && is_shape(*id) && known.insert(*id)).collect();
+        if !unshown.is_empty() {
+            let left_out = self.left_out.iter().map(|(id, _)| *id).collect();
+            let told = self.held_representations(Vec::new(), left_out, &FxHashSet::default());
+            unshown.retain(|(id, _)| !told.contains(id));
+        }
+        unshown
     }
 
     /// Returns what transformations put into these representations, with all other shapes of the same things.

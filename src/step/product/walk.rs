@@ -146,6 +146,11 @@ impl Walk<'_, '_> {
                 self.reach_what_is_cut_off();
             }
         }
+        for (id, map) in self.assembly.unshown_maps(&self.reached) {
+            let reason =
+                format!("is there for mapped items to show (#{map} REPRESENTATION_MAP), and none that stands does");
+            self.assembly.left_out.push((id, reason));
+        }
     }
 
     /// Adds a problem, once of each entity.
