@@ -2,7 +2,7 @@
 
 use super::geometry::Refusal;
 use super::geometry::units::{Units, contexts};
-use super::part21::{File, parse};
+use super::part21::{File, in_capitals, parse};
 use super::product::asides::{HiddenItems, absent_shapes, external_files, void_directions};
 use super::product::assembly::{Assembly, PlacedRepresentation};
 use super::product::conversion::convert;
@@ -67,7 +67,12 @@ pub(super) fn hash_bytes(bytes: &[u8]) -> u64 {
 /// When the bytes are no Part 21 text, or when its assemblies place more than [`Settings::max_placed`].
 pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Import, Error> {
     let start = Instant::now();
-    let file = parse(name, bytes)?;
+    let capitals;
+    let mut file = parse(name, bytes)?;
+    if file.has_small_names() {
+        capitals = in_capitals(bytes);
+        file = parse(name, &capitals)?;
+    }
     let parsed = start.elapsed().as_secs_f64();
     let mut report = ImportReport {
         file: name.to_string(),

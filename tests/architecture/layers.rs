@@ -439,7 +439,19 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     ),
     (
         "step/part21",
-        &["span", "blanks", "text", "short_names", "index", "mod", "sections", "number", "faults", "parser"],
+        &[
+            "span",
+            "blanks",
+            "text",
+            "capitals",
+            "short_names",
+            "index",
+            "mod",
+            "sections",
+            "number",
+            "faults",
+            "parser",
+        ],
     ),
     (
         "step/product",

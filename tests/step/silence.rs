@@ -169,6 +169,14 @@ fn a_hole_that_stands_out_of_its_face_is_told() {
     }
 }
 
+/// A few writers give the names of entities in small letters.
+#[test]
+fn names_of_entities_in_small_letters_are_read() {
+    let import = read(&plate(0.0).to_ascii_lowercase());
+    close(area(&import), 100.0 - 4.0 * PI, 1e-4);
+    assert_eq!(import.report.problems, Vec::<String>::new());
+}
+
 #[test]
 fn a_face_that_lacks_a_bound_is_refused() {
     let whole = plate(0.0);

@@ -6,6 +6,7 @@
 //! sources beyond 4 GiB are refused, because spans are 32 bits.
 
 mod blanks;
+mod capitals;
 mod faults;
 mod index;
 mod number;
@@ -15,6 +16,7 @@ mod short_names;
 mod span;
 mod text;
 
+pub(super) use capitals::in_capitals;
 pub(super) use parser::parse;
 
 use index::{Index, Instance, Kinds};
@@ -127,6 +129,11 @@ impl<'a> File<'a> {
     pub(super) fn entities_of_kind(&self, is_meant: impl Fn(&str) -> bool) -> impl Iterator<Item = Entity<'_, 'a>> {
         let positions = self.kinds.positions(|name| std::str::from_utf8(name).is_ok_and(&is_meant));
         positions.into_iter().map(|position| self.instance(position as usize))
+    }
+
+    /// Whether some entity has a name in small letters, by which nothing finds it.
+    pub(super) fn has_small_names(&self) -> bool {
+        self.entities_of_kind(|name| name.bytes().any(|c| c.is_ascii_lowercase())).next().is_some()
     }
 
     /// Returns the parameters of the first header record of this name, such as `FILE_SCHEMA`.
