@@ -150,6 +150,10 @@ fn read_units(file: &File<'_>, settings: &Settings, report: &mut ImportReport) -
                 "{unit} gives no size that a unit could have: mm or radians are taken. unit_mm of a scene's model sets the length"
             ));
         }
+        for unit in assigned.contradictory {
+            let unit = format!("#{unit} {}", file.entity_name(unit));
+            problems.push(format!("{name}: {unit} contradicts a unit before it in context #{id}, which counts"));
+        }
         add(&mut names.length, assigned.length_name);
         add(&mut names.angle, assigned.angle_name);
     }

@@ -10,6 +10,9 @@ const MAX_DEPTH: usize = 8;
 /// Least and largest unit, mm or radians: an attometre, an exametre. A damaged definition of 1e-300 took facets a minute.
 const SIZES: [f64; 2] = [1e-15, 1e21];
 
+/// Share by which two definitions of one unit differ at most, as a degree of seven digits.
+const ONE_UNIT: f64 = 1e-6;
+
 /// Share of a face's size above which it would merge the face's own edges.
 const ACCURACY_SHARE: f64 = 1e-3;
 /// Faces smaller than this count as this large there, mm.
@@ -52,12 +55,19 @@ pub(crate) struct Assigned {
     pub(crate) angle_name: Option<String>,
     /// Units of length and angle, by their ids, that the file gives no size which a unit could have.
     pub(crate) unreadable: Vec<u64>,
+    /// Units of length and angle, by their ids, of other sizes than the first ones, which count.
+    pub(crate) contradictory: Vec<u64>,
 }
 
 /// Reads the units of a representation context; what it does not assign is mm and radians. The accuracy is the smallest uncertainty of all.
 pub(crate) fn read_context(context: Entity<'_, '_>) -> Assigned {
-    let mut assigned =
-        Assigned { units: Units::DEFAULT, length_name: None, angle_name: None, unreadable: Vec::new() };
+    let mut assigned = Assigned {
+        units: Units::DEFAULT,
+        length_name: None,
+        angle_name: None,
+        unreadable: Vec::new(),
+        contradictory: Vec::new(),
+    };
     if let Some(args) = context.attributes("GLOBAL_UNIT_ASSIGNED_CONTEXT", 2) {
         let units = args.list(0);
         for i in 0..units.len() {
@@ -70,6 +80,12 @@ pub(crate) fn read_context(context: Entity<'_, '_>) -> Assigned {
                 Some((Kind::Angle, factor, name)) if assigned.angle_name.is_none() => {
                     assigned.units.angle = factor;
                     assigned.angle_name = Some(name);
+                }
+                Some((kind, factor, _)) => {
+                    let known = if kind == Kind::Length { assigned.units.length } else { assigned.units.angle };
+                    if (factor / known - 1.0).abs() > ONE_UNIT {
+                        assigned.contradictory.push(unit.id);
+                    }
                 }
                 None if unit.is_one_of(&["LENGTH_UNIT", "PLANE_ANGLE_UNIT"]) => assigned.unreadable.push(unit.id),
                 _ => {}
@@ -224,5 +240,21 @@ mod tests {
             let assigned = read_context(file.entity(1).unwrap());
             assert_eq!((assigned.units.length, assigned.unreadable), (expected, unreadable), "{value}");
         }
+    }
+
+    /// A degree of seven digits beside that of a double is no other one; an inch beside a millimetre is.
+    #[test]
+    fn the_first_of_several_units_counts() {
+        let text = "ISO-10303-21;\nDATA;\n#1=(GLOBAL_UNIT_ASSIGNED_CONTEXT((#2,#3,#4,#5))REPRESENTATION_CONTEXT('',''));\n\
+                    #2=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));\n\
+                    #3=(CONVERSION_BASED_UNIT('INCH',$)LENGTH_UNIT()NAMED_UNIT(*));\n\
+                    #4=(CONVERSION_BASED_UNIT('DEGREE',$)NAMED_UNIT(*)PLANE_ANGLE_UNIT());\n\
+                    #5=(CONVERSION_BASED_UNIT('DEGREE',#6)NAMED_UNIT(*)PLANE_ANGLE_UNIT());\n\
+                    #6=PLANE_ANGLE_MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE(0.01745329),#7);\n\
+                    #7=(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.));\nENDSEC;\n";
+        let file = part21::parse("units.stp", text.as_bytes()).unwrap();
+        let assigned = read_context(file.entity(1).unwrap());
+        assert_eq!((assigned.units.length, assigned.units.angle), (1.0, 1f64.to_radians()));
+        assert_eq!(assigned.contradictory, [3]);
     }
 }
