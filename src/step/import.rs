@@ -3,7 +3,7 @@
 use super::geometry::Refusal;
 use super::geometry::units::{Units, contexts};
 use super::part21::{File, in_capitals, parse};
-use super::product::asides::{HiddenItems, absent_shapes, external_files, void_directions};
+use super::product::asides::{HiddenItems, absent_shapes, external_files, faces_in_sets, void_directions};
 use super::product::assembly::{Assembly, PlacedRepresentation};
 use super::product::conversion::convert;
 use super::product::numbering::ConvertedPart;
@@ -251,7 +251,9 @@ fn convert_placed(
     let Reader { mut model, report, .. } = reader;
     number_alike_paths(&mut model.instances);
     let faces = model.parts.iter().flat_map(|p| &p.shells).flat_map(|s| &s.faces);
-    hidden.find_among(faces.filter_map(|f| f.entity.as_ref()));
+    let faces = faces.filter_map(|f| f.entity.as_ref());
+    report.left_out.extend(faces_in_sets(file, faces.clone()));
+    hidden.find_among(faces);
     report.hidden = hidden.notes(file);
     model
 }

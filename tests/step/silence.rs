@@ -178,6 +178,18 @@ fn names_of_entities_in_small_letters_are_read() {
 }
 
 #[test]
+fn faces_in_a_set_of_surfaces_are_told() {
+    let data =
+        plate(0.0).replace("#900=", "#901=") + "#900=GEOMETRIC_SET('',(#72,#30));\n#902=BLOCK('',#14,1.,1.,1.);\n";
+    // In the set alone, and in the model of #901 too.
+    for (items, faces, told) in [("#900,#902", 6, vec![900]), ("#900,#901", 1, vec![])] {
+        let import = read_sections("", items, &data);
+        let left_out: Vec<u64> = import.report.left_out.iter().map(|note| note.id).collect();
+        assert_eq!((import.model.placed_face_count(), left_out), (faces, told), "{items}");
+    }
+}
+
+#[test]
 fn a_face_that_lacks_a_bound_is_refused() {
     let whole = plate(0.0);
     for (from, to, reason) in [

@@ -38,6 +38,35 @@ pub(crate) fn external_files(file: &File<'_>, own: &str) -> Vec<Note> {
     notes
 }
 
+/// Names the sets of points, curves and surfaces that list faces, which they do not hold: these are left out. Those in `converted` stand by
+/// what else holds them.
+pub(crate) fn faces_in_sets<'i>(file: &File<'_>, converted: impl Iterator<Item = &'i u64>) -> Vec<Note> {
+    let is_face = |id: &u64| file.entity(*id).is_some_and(|e| e.is_one_of(&["ADVANCED_FACE", "SUBFACE"]));
+    let mut sets: Vec<(Entity<'_, '_>, Vec<u64>)> = Vec::new();
+    for e in file.entities_named(&["GEOMETRIC_SET"]) {
+        let elements = e.attributes("GEOMETRIC_SET", 1).map_or_else(Vec::new, |a| a.list(0).ids());
+        let faces: Vec<u64> = elements.into_iter().filter(is_face).collect();
+        if !faces.is_empty() {
+            sets.push((e, faces));
+        }
+    }
+    if sets.is_empty() {
+        return Vec::new();
+    }
+    let converted: FxHashSet<u64> = converted.copied().collect();
+    let mut notes = Vec::new();
+    for (e, mut faces) in sets {
+        faces.retain(|id| !converted.contains(id));
+        if let Some(first) = faces.first() {
+            let others = if faces.len() > 1 { format!(" and {} more", faces.len() - 1) } else { String::new() };
+            let reason =
+                format!("lists the face #{first}{others}: such a set holds points, curves and surfaces alone");
+            notes.push(Note { id: e.id, entity: e.name(), reason });
+        }
+    }
+    notes
+}
+
 /// Tells of a file without a face what it holds instead: the entities that it has most of.
 pub(crate) fn absent_shapes(file: &File<'_>) -> String {
     let mut counts: FxHashMap<&str, usize> = FxHashMap::default();
