@@ -1,6 +1,6 @@
 //! What a file says of assemblies within assemblies in rare forms: usages that a higher assembly sees, promises, and places without usages.
 
-use crate::assemblies::{NEXT, assembly, assert_places, product, relation, usage};
+use crate::assemblies::{NEXT, assembly, assert_places, product, read, relation, usage};
 
 /// The place of usage #`usage` by the relationship #`relation`.
 fn contextual(id: u32, relation: u32, usage: u32) -> String {
@@ -93,4 +93,27 @@ fn an_assembly_stands_where_a_relationship_or_a_mapped_item_puts_it() {
         + &relation(720, [510, 710], [20, 21])
         + &relation(730, [710, 300], [20, 22]);
     assert_places(&assembly("", &format!("{sub}{middle}")), &[40.0], "a chain");
+}
+
+/// The shape of the part, #111, is no product's and related to that of the part, #112: a relationship of a usage may name either, at either
+/// end, and the usage may not be in the file.
+#[test]
+fn a_relationship_of_a_usage_may_name_a_related_shape() {
+    let shapes = product(150, "part", 112)
+        + "#112=SHAPE_REPRESENTATION('',(#20),#1);\n#26=CSG_SOLID('',#25);\n#111=SHAPE_REPRESENTATION('',(#26,#20),#1);\n\
+           #113=SHAPE_REPRESENTATION_RELATIONSHIP('','',#112,#111);\n#300=SHAPE_REPRESENTATION('',(#21,#22),#1);\n"
+        + &product(200, "asm", 300)
+        + &usage(600, NEXT, "#200,#150,$");
+    for shape in [111, 112] {
+        // The placement of the first representation comes to lie on that of the second, wherever the part is.
+        for related in [relation(610, [shape, 300], [20, 21]), relation(610, [300, shape], [21, 20])] {
+            let placed = read(&(shapes.clone() + &related + &contextual(620, 610, 600)));
+            assert_places(&placed, &[10.0], &related);
+        }
+        let lost = shapes.clone() + &relation(610, [shape, 300], [20, 21]);
+        let lost = read(&(lost + "#620=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#610,#99999);\n"));
+        let x: Vec<f64> = lost.model.instances.iter().map(|i| i.placement.origin.x).collect();
+        assert_eq!(x, [10.0], "{shape}: {:?}", lost.report.problems);
+        assert!(lost.report.problems.iter().any(|p| p.contains("usage #600, which has no place, takes that")));
+    }
 }

@@ -48,6 +48,8 @@ pub(crate) struct Assembly<'f, 'a> {
     pub(super) shapes: FxHashMap<u64, Vec<u64>>,
     /// Representations that stand for a product, and for which; `None` for several.
     pub(super) owned: FxHashMap<u64, Option<u64>>,
+    /// Representations of no product that are related, unmoved, to those of one product alone.
+    pub(super) related: FxHashMap<u64, u64>,
     /// Product definition → its children.
     pub(super) usages: FxHashMap<u64, Arc<[Usage]>>,
     pub(super) products: ProductNames,
@@ -74,6 +76,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             fallback,
             shapes: FxHashMap::default(),
             owned: FxHashMap::default(),
+            related: FxHashMap::default(),
             usages: FxHashMap::default(),
             products: ProductNames::default(),
             placements: FxHashMap::default(),
@@ -101,6 +104,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
         let usages = Self::read_usages(&usages);
         let ends = UsageEnds::new(&usages);
+        a.read_related_shapes(&relations, &contextual);
         let places = a.read_contextual(&contextual, &ends);
         let mut related = Vec::new();
         for e in relations {
@@ -132,6 +136,11 @@ impl<'f, 'a> Assembly<'f, 'a> {
     pub(super) fn products_of(&self, representations: [u64; 2]) -> Option<[u64; 2]> {
         let [first, second] = representations.map(|r| self.owned.get(&r).copied().flatten());
         Some([first?, second?]).filter(|[first, second]| first != second)
+    }
+
+    /// Returns the product that a representation shows, be it one that is related to that of the product; `None` for none or several.
+    pub(super) fn shown_product(&self, representation: u64) -> Option<u64> {
+        self.owned.get(&representation).copied().unwrap_or_else(|| self.related.get(&representation).copied())
     }
 
     /// Returns the ids of the items of a representation; empty when the file does not have it.

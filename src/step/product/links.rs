@@ -11,7 +11,7 @@ use super::subassemblies::ProductLink;
 use super::usage_ends::UsageEnds;
 use crate::math::Frame;
 use crate::step::part21::Entity;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// What CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs tell besides the placements of usages.
 #[derive(Default)]
@@ -48,6 +48,42 @@ impl<'f, 'a> Assembly<'f, 'a> {
             self.problems.push(format!("#{}: its transformation cannot be read; what it places is left out", e.id));
         }
         placement
+    }
+
+    /// Notes which products representations show that are related to theirs, by relationships without a transformation but those that
+    /// `contextual` entities name, which are of two products.
+    pub(super) fn read_related_shapes(&mut self, relations: &[Entity<'f, 'a>], contextual: &[Entity<'f, 'a>]) {
+        let of_usages: FxHashSet<u64> = contextual.iter().filter_map(|e| e.args().id(0)).collect();
+        let mut beside: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
+        for e in relations.iter().filter(|e| !has_transformation(**e) && !of_usages.contains(&e.id)) {
+            let Some([first, second]) = related_representations(*e) else { continue };
+            beside.entry(first).or_default().push(second);
+            beside.entry(second).or_default().push(first);
+        }
+        let mut seen: FxHashSet<u64> = FxHashSet::default();
+        for &start in beside.keys().filter(|id| !self.owned.contains_key(*id)) {
+            if !seen.insert(start) {
+                continue;
+            }
+            let mut group = vec![start];
+            let mut owners: FxHashSet<Option<u64>> = FxHashSet::default();
+            let mut at = 0;
+            while at < group.len() {
+                for next in beside.get(&group[at]).into_iter().flatten() {
+                    match self.owned.get(next) {
+                        Some(owner) => {
+                            owners.insert(*owner);
+                        }
+                        None if seen.insert(*next) => group.push(*next),
+                        None => {}
+                    }
+                }
+                at += 1;
+            }
+            if let (1, Some(Some(owner))) = (owners.len(), owners.iter().next()) {
+                self.related.extend(group.iter().map(|id| (*id, *owner)));
+            }
+        }
     }
 
     /// Reads where the children of usages stand in their parents, by CONTEXT_DEPENDENT_SHAPE_REPRESENTATIONs.
@@ -97,7 +133,9 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let mut placement = self.transformation(relation, [first, second]);
         // The first representation is the child's; some writers swap them.
         if let Some((parent, child)) = usage_attributes(usage).and_then(|a| Some((a.id(3)?, a.id(4)?))) {
-            let has = |product: u64, r: u64| self.shapes.get(&product).is_some_and(|s| s.contains(&r));
+            let has = |product: u64, r: u64| {
+                self.shapes.get(&product).is_some_and(|s| s.contains(&r)) || self.related.get(&r) == Some(&product)
+            };
             if has(parent, first) && has(child, second) && !has(child, first) {
                 placement = placement.map(|p| p.inverse());
             }

@@ -54,7 +54,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
             self.problems.push(told("lacks a representation: it places nothing"));
             return None;
         };
-        let Some([child, parent]) = self.products_of([first, second]) else {
+        let products = self.shown_product(first).zip(self.shown_product(second));
+        let Some((child, parent)) = products.filter(|(child, parent)| child != parent) else {
             self.problems.push(told("counts without it"));
             return None;
         };
