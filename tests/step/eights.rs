@@ -34,6 +34,21 @@ fn an_eight_of_equal_lobes_bounds_both() {
     }
 }
 
+/// A corner moved by 1e-8 mm along a side of length 1 changes the signed area by half of that, either way: rounding, which turns no loop.
+#[test]
+fn an_eight_runs_as_it_does_whatever_its_signed_area_rounds_to() {
+    for off in [-1e-8, 1e-8] {
+        let corner = format!("({:?},1.0,0.0)", 1.0 + off);
+        let file = eight();
+        assert!(file.contains("(1.0,1.0,0.0)"));
+        let import = read(&file.replace("(1.0,1.0,0.0)", &corner));
+        close(area(&import), 0.5, 1e-6);
+        assert_eq!(import.report.faces.repaired, 0, "{off}: {:?}", import.report.repairs);
+        let trim = &import.model.parts[0].shells[0].faces[0].loops[0];
+        assert_eq!(trim.uses.iter().filter(|u| u.reversed).count(), 0, "{off}");
+    }
+}
+
 /// A plate of 100 mm² with the eight of two triangles of 1 mm² for a hole.
 #[test]
 fn a_hole_like_an_eight_stays_open() {
