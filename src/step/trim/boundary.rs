@@ -3,7 +3,7 @@
 
 use super::fit::Budget;
 use super::holes::{Border, free_start, place_hole};
-use super::lobes::{cancelling_lobes, drop_empty_loops};
+use super::lobes::{cancelling_lobes, loops_with_extent};
 use super::loops::{Chain, Piece, Source};
 use super::obstacles::{Obstacles, unrolled_polygon};
 use super::tolerances::{SEAM_LENGTH_WEIGHT, STRAIGHT_SEAM_SHARE};
@@ -52,12 +52,12 @@ pub(crate) fn bound_region(
         out.repairs.push("a loop winds around the surface twice: one of its edges that do was turned around");
     }
     // In the unwrapped plane a loop around a closed surface ends whole periods from its start: alone it bounds no region.
-    let (winding, mut plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);
+    let (winding, plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);
     // A seam that the file runs forth and back bounds nothing by intent, other edges do not.
     let has_edges = plain.iter().any(|c| !c.is_cut_open());
     let is_given = !plain.is_empty();
     // Loops without extent: a vertex, or an edge run forth and back.
-    drop_empty_loops(&mut plain, chart);
+    let (plain, polygons) = loops_with_extent(plain, chart);
     // Nothing winds around: without any loop the face is the whole surface, else the loops bound it by themselves.
     if winding.is_empty() {
         if plain.is_empty() {
@@ -68,9 +68,9 @@ pub(crate) fn bound_region(
             out.loops.push(whole.map_err(|reason| if is_given { "its loops enclose nothing" } else { reason })?);
             return Ok(out);
         }
-        return bound_without_winding(&mut plain, chart, &mut out, implicit_outer).map(|()| out);
+        return bound_without_winding(plain, &polygons, chart, &mut out, implicit_outer).map(|()| out);
     }
-    let domain = SeamDomain { chart, holes: plain.iter().map(Chain::polygon).collect(), budget };
+    let domain = SeamDomain { chart, holes: polygons, budget };
     let mut outer = match winding.len() {
         1 => extend_to_border(winding.into_iter().next().ok_or("no loop")?, &domain, &mut out.seams, true)?,
         2 => {
@@ -106,16 +106,18 @@ fn add_with_holes(outer: Chain, holes: impl IntoIterator<Item = Chain>, chart: &
     out.loops.extend(holes);
 }
 
-/// Adds loops that wind around nothing to `out`: the largest is the outer one, except on a closed surface, where loops that all run
-/// clockwise leave the rest of the surface as the face, and one that bounds as much either way tells nothing. Empties `plain`.
+/// Adds loops that wind around nothing, with these polygons, to `out`: the largest is the outer one, except on a closed surface, where
+/// loops that all run clockwise leave the rest of the surface as the face, and one that bounds as much either way tells nothing.
 fn bound_without_winding(
-    plain: &mut Vec<Chain>,
+    mut plain: Vec<Chain>,
+    polygons: &[Vec<Uv>],
     chart: &Chart,
     out: &mut Boundary,
     implicit_outer: bool,
 ) -> Result<(), &'static str> {
     // The sign of an area that cancels is rounding.
-    let lobes: Vec<Option<f64>> = plain.iter().map(cancelling_lobes).collect();
+    let lobes: Vec<Option<f64>> =
+        plain.iter().zip(polygons).map(|(c, polygon)| cancelling_lobes(c, polygon)).collect();
     if !implicit_outer && is_closed(chart) && lobes.iter().any(Option::is_some) {
         return Err("its loop crosses itself");
     }
@@ -123,9 +125,8 @@ fn bound_without_winding(
     // A loop that runs along an edge twice was cut open by the file: it goes around the face, not around a hole.
     let all_holes = areas.iter().all(|&a| a < 0.0) && !plain.iter().any(Chain::is_cut_open);
     if implicit_outer || all_holes && is_closed(chart) {
-        let polygons: Vec<Vec<Uv>> = plain.iter().map(Chain::polygon).collect();
-        let outer = natural_boundary(chart, &polygons, &mut out.seams)?;
-        add_with_holes(outer, plain.drain(..), chart, out);
+        let outer = natural_boundary(chart, polygons, &mut out.seams)?;
+        add_with_holes(outer, plain, chart, out);
         return Ok(());
     }
     let largest = (0..areas.len()).max_by(|&a, &b| areas[a].abs().total_cmp(&areas[b].abs())).ok_or("no loop")?;
@@ -134,7 +135,7 @@ fn bound_without_winding(
         outer.reverse();
         out.repairs.push("the outer loop ran against the face's orientation");
     }
-    add_with_holes(outer, plain.drain(..), chart, out);
+    add_with_holes(outer, plain, chart, out);
     Ok(())
 }
 

@@ -12,28 +12,27 @@ use crate::step::chart::Chart;
 /// Rows along which lobes are measured: a lobe between two of them is a thirtieth of its loop's size or less.
 const ROWS: usize = 64;
 
-/// Drops the loops that enclose nothing: their signed area is nothing beside the largest one, and so are their lobes.
-pub(super) fn drop_empty_loops(loops: &mut Vec<Chain>, chart: &Chart) {
+/// Returns the loops that enclose something, and their polygons. The others are left out: their signed area is nothing beside the largest
+/// one, and so are their lobes.
+pub(super) fn loops_with_extent(loops: Vec<Chain>, chart: &Chart) -> (Vec<Chain>, Vec<Vec<Uv>>) {
     let polygons: Vec<Vec<Uv>> = loops.iter().map(Chain::polygon).collect();
     let areas: Vec<f64> = polygons.iter().map(|polygon| signed_area(polygon).abs()).collect();
     let largest = areas.iter().copied().fold(0.0, f64::max);
-    let has_extent =
-        |(polygon, area): (&Vec<Uv>, &f64)| *area > EMPTY_LOOP_SHARE * largest || has_lobes(polygon, chart);
-    let kept: Vec<bool> = polygons.iter().zip(&areas).map(has_extent).collect();
-    let mut kept = kept.into_iter();
-    loops.retain(|_| kept.next() == Some(true));
+    let all = loops.into_iter().zip(polygons).zip(areas);
+    let has_extent = |polygon: &[Uv], area: f64| area > EMPTY_LOOP_SHARE * largest || has_lobes(polygon, chart);
+    all.filter(|((_, polygon), area)| has_extent(polygon, *area)).map(|(kept, _)| kept).unzip()
 }
 
-/// Returns what a loop encloses whose signed area is rounding beside it; `None` for any other loop.
-pub(super) fn cancelling_lobes(chain: &Chain) -> Option<f64> {
-    let (polygon, area) = (chain.polygon(), chain.area().abs());
-    let [lo, hi] = bounds(&polygon);
+/// Returns what a loop of this polygon encloses where its signed area is rounding beside that; `None` for any other loop.
+pub(super) fn cancelling_lobes(chain: &Chain, polygon: &[Uv]) -> Option<f64> {
+    let area = chain.area().abs();
+    let [lo, hi] = bounds(polygon);
     let around = (hi - lo).element_product();
     // Most loops are told at once.
     if area > CANCELLED_SHARE * around {
         return None;
     }
-    let enclosed = enclosed_area(&polygon);
+    let enclosed = enclosed_area(polygon);
     (area < CANCELLED_SHARE * enclosed && enclosed > EMPTY_LOBES_SHARE * around).then_some(enclosed)
 }
 
@@ -78,10 +77,13 @@ mod tests {
     /// An eight of two triangles of base 10 and height 5; an edge run forth and back, and a square, are none.
     #[test]
     fn lobes_count_where_their_signed_areas_cancel() {
-        let eight = chain(&[[0.0, 0.0], [10.0, 10.0], [0.0, 10.0], [10.0, 0.0]]);
-        let lobes = cancelling_lobes(&eight).expect("an eight");
-        assert!((lobes - 50.0).abs() < 1e-9, "{lobes}");
-        assert_eq!(cancelling_lobes(&chain(&[[0.0, 0.0], [10.0, 3.0]])), None);
-        assert_eq!(cancelling_lobes(&chain(&[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])), None);
+        let lobes = |corners: &[[f64; 2]]| {
+            let chain = chain(corners);
+            cancelling_lobes(&chain, &chain.polygon())
+        };
+        let eight = lobes(&[[0.0, 0.0], [10.0, 10.0], [0.0, 10.0], [10.0, 0.0]]).expect("an eight");
+        assert!((eight - 50.0).abs() < 1e-9, "{eight}");
+        assert_eq!(lobes(&[[0.0, 0.0], [10.0, 3.0]]), None);
+        assert_eq!(lobes(&[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]), None);
     }
 }
