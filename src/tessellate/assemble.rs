@@ -7,7 +7,7 @@ use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::fallback;
 use super::limits;
-use super::nodes::Position;
+use super::nodes::{MeetingSamples, Position};
 use super::placed_part::PlacedPart;
 use super::previous_round::PreviousRound;
 use super::remesh_budget::RemeshBudget;
@@ -32,6 +32,8 @@ pub(super) struct PartMesh {
     pub(super) causes: FxHashMap<usize, FailureCause>,
     /// What each face has given up for the sake of others.
     pub(super) taken: Vec<TakenChords>,
+    /// Samples of edges that are one corner where the edges cross.
+    pub(super) meetings: Vec<MeetingSamples>,
 }
 
 /// Times that borders are sampled more densely where facets beside them are not proved, and that doubled chords are looked for.
@@ -102,6 +104,7 @@ fn mesh_with_rounds(
     let sides = edge_sides(part, &known);
     let mut denser = vec![0u32; part.edges.len()];
     let mut further: Vec<Vec<f64>> = vec![Vec::new(); part.edges.len()];
+    let mut meetings: Vec<MeetingSamples> = Vec::new();
     // What edges and faces come to by themselves is kept from round to round: few edges change.
     let mut own: Vec<OwnDivision> = Vec::new();
     let mut before: Option<PreviousRound> = None;
@@ -111,8 +114,9 @@ fn mesh_with_rounds(
         let (divisions, shared) = edges::divide(part, &known, &sides, (&denser, &further), &mut own);
         let mesh = |(face, surface): &(&Face, Option<FaceSurface<'_>>)| {
             let (surface, taken) = (surface.as_ref()?, &NO_CHORDS);
-            let (divisions, shared) = (&divisions[..], &shared[..]);
-            mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken, untangles: false })
+            let (divisions, shared, meetings) = (&divisions[..], &shared[..], &meetings[..]);
+            let untangles = false;
+            mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken, meetings, untangles })
         };
         let (meshes, is_kept) = match before.take() {
             None => (faces.par_iter().map(mesh).collect(), vec![false; faces.len()]),
@@ -134,6 +138,10 @@ fn mesh_with_rounds(
         } else {
             // Where shorter chords still cross, as between arcs that touch, each gets the other's corners.
             let mut facing: Vec<(EdgeId, f64)> = meshes.iter().flatten().flat_map(|m| m.facing.clone()).collect();
+            let mut met: Vec<MeetingSamples> = meshes.iter().flatten().flat_map(|m| m.meetings.clone()).collect();
+            met.retain(|pair| !meetings.contains(pair));
+            facing.extend(met.as_flattened());
+            meetings.extend(met);
             facing.retain(|(edge, _)| !settled.contains(&(edge.0 as usize)));
             if facing.is_empty() || round == MAX_ROUNDS_OF_CROSSING {
                 break (divisions, shared, meshes);
@@ -146,13 +154,15 @@ fn mesh_with_rounds(
     let input = |k: usize| {
         let (face, surface) = &faces[k];
         let (divisions, shared, surface) = (&divisions[..], &shared[..], surface.as_ref()?);
-        Some(FaceInput { part, face, surface, divisions, shared, settings, taken: &NO_CHORDS, untangles: false })
+        let (taken, meetings, untangles) = (&NO_CHORDS, &meetings[..], false);
+        Some(FaceInput { part, face, surface, divisions, shared, settings, taken, meetings, untangles })
     };
     fill_crossing_borders(&mut meshes, input);
     let again = |k: usize, taken: &TakenChords| mesh_face(&FaceInput { taken, ..input(k)? });
     let taken = take_doubled_chords(part, &mut meshes, &mut budget, again);
     let causes = exceeded_limits(&faces, too_large);
-    (with_coincident_vertices_joined(PartMesh { divisions, shared, faces: meshes, causes, taken }), asked)
+    let mesh = PartMesh { divisions, shared, faces: meshes, causes, taken, meetings };
+    (with_coincident_vertices_joined(mesh), asked)
 }
 
 /// Replaces, in `meshes`, faces whose borders cross in the parameter plane: by a mesh with their cusps untangled, or else by one of their
@@ -165,6 +175,8 @@ fn fill_crossing_borders<'i, 'a: 'i>(
     for (k, mesh) in meshes.iter_mut().enumerate() {
         let Some(mesh) = mesh.as_mut() else { continue };
         let is_border_alone = match mesh.repaired {
+            // All of its border is kept, and what it encloses twice is no strip.
+            Some(Repair::CrossingBorder) if mesh.meets_itself => continue,
             Some(Repair::CrossingBorder) => false,
             // A strip whose chords cross so often that nothing is left within them.
             Some(Repair::BorderOnly) => true,
@@ -243,6 +255,8 @@ fn coarse_edges(
         let repaired = mesh.as_ref().map(|m| m.repaired);
         let came_to_little = match repaired {
             None => surface.as_ref().is_some_and(|s| !s.steps.are_too_many()),
+            // What it lacks are corners where its edges cross.
+            Some(_) if mesh.as_ref().is_some_and(|m| !m.meetings.is_empty()) => false,
             // Of the other repairs shorter chords would mend nothing.
             Some(how) => matches!(how, Some(Repair::BorderOnly | Repair::TriangulationFailed)),
         };
@@ -266,7 +280,8 @@ fn turned_edges(meshes: &[Option<FaceMesh>], round: u32) -> Vec<usize> {
     meshes.iter().flatten().flat_map(|m| &m.turned).map(|e| e.0 as usize).collect()
 }
 
-/// Gives vertices that a file has twice in one place, where loops of a face touch, the least of their numbers, in all faces of the part.
+/// Gives vertices that a file has twice in one place, where loops of a face touch, and samples where its edges cross, the least of their
+/// numbers, in all faces of the part.
 /// Only corners change; the positions left over stay in `shared`.
 pub(super) fn with_coincident_vertices_joined(mut mesh: PartMesh) -> PartMesh {
     let pairs: Vec<[u32; 2]> = mesh.faces.iter().flatten().flat_map(|f| f.coincident.iter().copied()).collect();
@@ -308,13 +323,14 @@ pub(super) fn mesh_face(input: &FaceInput<'_, '_>) -> Option<FaceMesh> {
     }
     let finite = uses().all(|u| u.uv.points.iter().all(|p| p.is_finite()));
     let whole = if finite { face::mesh(input) } else { Err(Unmeshed::Empty) };
-    let how = match whole {
+    let (how, meetings) = match whole {
         Ok(mesh) => return Some(mesh),
-        Err(Unmeshed::Empty) => Repair::BorderOnly,
-        Err(Unmeshed::GaveUp) => Repair::TriangulationFailed,
+        Err(Unmeshed::Empty) => (Repair::BorderOnly, vec![]),
+        Err(Unmeshed::Crossing(meetings)) => (Repair::BorderOnly, meetings),
+        Err(Unmeshed::GaveUp) => (Repair::TriangulationFailed, vec![]),
         Err(Unmeshed::TooManySteps) => return None,
     };
     // The same library may give up on the border too.
     let border = catch_panic(|| fallback::border_alone(input)).ok().flatten();
-    border.map(|mesh| FaceMesh { repaired: Some(how), ..mesh })
+    border.map(|mesh| FaceMesh { repaired: Some(how), meetings, ..mesh })
 }

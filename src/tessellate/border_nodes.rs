@@ -104,15 +104,16 @@ impl BorderNodes {
         out
     }
 
-    /// Makes the nodes of all polygons and returns their numbers, polygon by polygon. Corners at one vertex with the same parameters get
-    /// one node: loops that touch there would otherwise not know of each other's chords.
+    /// Makes the nodes of all polygons and returns their numbers, polygon by polygon. Corners at one vertex, or where edges cross, with
+    /// the same parameters get one node: loops that touch there would otherwise not know of each other's chords.
     fn add_nodes(&mut self, part: &Part, polygons: &BorderPolygons, shared: &[Point]) -> Vec<Vec<u32>> {
+        let met: FxHashSet<u32> = polygons.coincident.iter().map(|[first, _]| *first).collect();
         let mut at_vertices: FxHashMap<(u32, [u64; 2]), u32> = FxHashMap::default();
         let mut node = |uv: Uv, position: Position| match position {
             Position::Own(p) => self.nodes.push(Node { uv, place: polygons.own[p as usize], position }),
             Position::Shared(p) => {
                 let mut add = || self.nodes.push(Node { uv, place: shared[p as usize], position });
-                if (p as usize) < part.vertices.len() {
+                if (p as usize) < part.vertices.len() || met.contains(&p) {
                     *at_vertices.entry((p, uv.to_array().map(f64::to_bits))).or_insert_with(add)
                 } else {
                     add()

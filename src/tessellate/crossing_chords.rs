@@ -1,13 +1,13 @@
 //! Chords of a face's border that cross in the parameter plane, and the samples that keep them apart.
 //!
 //! Between two arcs that touch, chords cross however short they are: near the cusp the arcs are nearer to each other than any chord to
-//! its arc. With corners in the same places on both they bend alike and stay apart.
+//! its arc. With corners in the same places on both they bend alike and stay apart. Where edges themselves cross, both get a corner there.
 
 use super::face_surface::FaceSurface;
-use super::nodes::{Nodes, edge_key};
+use super::nodes::{MeetingSamples, Nodes, edge_key};
 use crate::math::{Point, Uv};
-use crate::model::{EdgeId, Part};
-use crate::nurbs::Curve;
+use crate::model::{EdgeId, Part, TrimLoop};
+use crate::nurbs::{Curve, UvCurve};
 use crate::tessellate::proof::flat_triangle::distance_to_chord;
 use rustc_hash::FxHashMap;
 
@@ -27,6 +27,9 @@ const MAX_CROSSINGS: usize = 100_000;
 const CLEAR_OF_ENDS: f64 = 0.02;
 /// Steps by a third that find the nearest place on a chord's arc: to a millionth of it.
 const NEAREST_STEPS: usize = 34;
+/// Steps in which the place where two edges cross is found: each leaves a share of what was missing, about the angle by which edges turn
+/// from their chords, in radians. From a half, 50 steps reach rounding.
+const MEETING_STEPS: usize = 50;
 
 /// A chord, by its nodes, and the edge that it follows.
 type FollowedChord = ([u32; 2], Followed);
@@ -34,8 +37,12 @@ type FollowedChord = ([u32; 2], Followed);
 /// Two chords of a border that cross in the parameter plane.
 struct Crossing {
     chords: [FollowedChord; 2],
+    /// How far the nearest of their ends is from the other chord, mm.
+    depth: f64,
     /// Whether they cross no farther than both sag: their edges may not cross at all.
     is_for_sag: bool,
+    /// Whether they cross farther than both sag and than the tolerance.
+    is_deep: bool,
 }
 
 /// The chords of a face's border that could not all be kept.
@@ -70,11 +77,13 @@ impl<'c> CrossingChords<'c> {
             middles.map(|p| distance_to_chord(p, &place(ends))).into_iter().fold(0.0, f64::max)
         };
         // Edges that cross farther than their chords sag do so themselves: corners in one place would only hide it.
-        let is_for_sag = |a: FollowedChord, b: FollowedChord| {
+        let crossing = |a: FollowedChord, b: FollowedChord| {
             let beyond = |ends: [Point; 2], chord: &[Point; 2]| ends.map(|p| distance_to_chord(p, chord));
             let (p, q) = (place(a.0), place(b.0));
             let depth = beyond(p, &q).into_iter().chain(beyond(q, &p)).fold(f64::INFINITY, f64::min);
-            depth <= sag(a) + sag(b)
+            let is_for_sag = depth <= sag(a) + sag(b);
+            let is_deep = !is_for_sag && depth > surface.tolerance(uv(a.0)[0]);
+            Crossing { chords: [a, b], depth, is_for_sag, is_deep }
         };
         let mut out = Self { part, nodes, crossings: Vec::new(), touching: Vec::new() };
         let mut crosses = [vec![false; conflicts.len()], vec![false; crossed.len()]];
@@ -82,7 +91,7 @@ impl<'c> CrossingChords<'c> {
             for (j, &b) in crossed.iter().enumerate() {
                 if do_cross(uv(a.0), uv(b.0)) {
                     (crosses[0][i], crosses[1][j]) = (true, true);
-                    out.crossings.push(Crossing { chords: [a, b], is_for_sag: is_for_sag(a, b) });
+                    out.crossings.push(crossing(a, b));
                     if out.crossings.len() == MAX_CROSSINGS {
                         return out;
                     }
@@ -124,6 +133,52 @@ impl<'c> CrossingChords<'c> {
         }
         samples
     }
+
+    /// Returns, for each two chords that cross deeply, the parameters of both edges where these cross: the first [`MAX_PAIRS`] of them.
+    /// Left out are edges that `loops`, those of the face, have more than once, and those that pass each other in space.
+    pub(super) fn meeting_samples(&self, loops: &[TrimLoop], surface: &FaceSurface<'_>) -> Vec<MeetingSamples> {
+        let curve_of = |edge: EdgeId| {
+            let mut uses = loops.iter().flat_map(|l| &l.uses).filter(|u| u.edge == Some(edge));
+            uses.next().filter(|_| uses.next().is_none()).map(|u| &u.uv)
+        };
+        let meeting = |crossing: &Crossing| {
+            let [a, b] = crossing.chords.map(|(_, on)| on);
+            let t = meeting_parameters([curve_of(a.edge)?, curve_of(b.edge)?], [a.t, b.t])?;
+            let samples = [(a.edge, t[0]), (b.edge, t[1])];
+            let [p, q] = samples.map(|(edge, t)| self.part.edges[edge.0 as usize].curve.evaluate(t));
+            (p.distance(q) <= surface.rounding).then_some(samples)
+        };
+        self.crossings.iter().filter(|c| c.is_deep).take(MAX_PAIRS).filter_map(meeting).collect()
+    }
+
+    /// Returns how far, mm, facets are from the border at least, where chords that cross deeply are left out of it; 0 where none are.
+    pub(super) fn left_out_mm(&self) -> f64 {
+        self.crossings.iter().filter(|c| c.is_deep).map(|c| c.depth).fold(0.0, f64::max)
+    }
+}
+
+/// Returns the parameters at which two curves, of the same surface and each over its own interval `t`, cross; `None` where no crossing is
+/// found between the ends of both. The chords of both stand for their derivatives.
+fn meeting_parameters(curves: [&UvCurve; 2], t: [[f64; 2]; 2]) -> Option<[f64; 2]> {
+    let parameter = |k: usize, share: f64| t[k][0] + share * (t[k][1] - t[k][0]);
+    let at = |k: usize, share: f64| curves[k].evaluate(parameter(k, share));
+    let along = [0, 1].map(|k| at(k, 1.0) - at(k, 0.0));
+    let cross = along[0].perp_dot(along[1]);
+    if cross == 0.0 || !cross.is_finite() {
+        return None;
+    }
+    let mut shares = [0.5; 2];
+    for _ in 0..MEETING_STEPS {
+        let gap = at(1, shares[1]) - at(0, shares[0]);
+        let steps = [gap.perp_dot(along[1]) / cross, gap.perp_dot(along[0]) / cross];
+        if steps.iter().any(|step| !step.is_finite()) {
+            return None;
+        }
+        shares = [0, 1].map(|k| (shares[k] + steps[k]).clamp(0.0, 1.0));
+    }
+    // However near an end is as a share of its chord, a crossing as deep as this is not in it.
+    let is_inside = shares.iter().all(|share| *share > 0.0 && *share < 1.0);
+    is_inside.then(|| [0, 1].map(|k| parameter(k, shares[k])))
 }
 
 /// Whether two segments have a point between the ends of both.

@@ -18,7 +18,7 @@ use super::face_surface::FaceSurface;
 use super::imprint::{CarrierFacets, Imprint};
 use super::limits::face_budget;
 use super::lobes::turn_lobes;
-use super::nodes::{Nodes, ProvedFacet, edge_key};
+use super::nodes::{MeetingSamples, Nodes, ProvedFacet, edge_key};
 use super::proof::border_chord::BorderChords;
 use super::proof::prover::Prover;
 use super::report::Repair;
@@ -51,10 +51,12 @@ const COVERED: [f64; 2] = [1e-4, 1e-6];
 const VOTES: usize = 8;
 
 /// Why a face has no facets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Unmeshed {
     /// Its border encloses nothing in the parameter plane, or no facets came of it.
     Empty,
+    /// No facets came of it before its edges have these samples, where they cross.
+    Crossing(Vec<MeetingSamples>),
     /// The triangulation library gave up on it.
     GaveUp,
     /// Its proofs took more steps than any face may take.
@@ -79,20 +81,24 @@ pub(super) struct FaceInput<'i, 'a> {
     pub(super) settings: &'i Settings,
     /// Chords between shared positions that other faces have inside, which no side of a facet here may be.
     pub(super) taken: &'i TakenChords,
+    /// Samples of the part's edges that are one corner, where edges cross.
+    pub(super) meetings: &'i [MeetingSamples],
     /// Whether samples beside cusps are moved where edges cross there by next to nothing, and other chords led over corners that they pass
     /// on the wrong side.
     pub(super) untangles: bool,
 }
 
 impl FaceInput<'_, '_> {
-    /// Returns a polygon for each of the loops that bound the face, with corners at the imprinted points on it.
-    fn border_polygons(&self, loops: &[TrimLoop], imprint: &Imprint) -> BorderPolygons {
+    /// Returns a polygon for each of the loops that bound the face, with corners at the imprinted points on it and one corner where edges
+    /// cross; `None` where they enclose nothing.
+    fn border_polygons(&self, loops: &[TrimLoop], imprint: &Imprint) -> Option<BorderPolygons> {
         let imprinted = ImprintedPoints { points: &imprint.points(), near: imprint.near };
         let mut polygons = polygons::build(self.part, loops, self.surface, self.divisions, &imprinted);
+        polygons.join_meeting_corners(loops, self.surface, self.shared, self.meetings);
         if self.untangles {
             polygons.untangle_cusps(self.surface);
         }
-        polygons
+        (!polygons.enclose_nothing(self.surface.extent())).then_some(polygons)
     }
 }
 
@@ -113,10 +119,7 @@ pub(super) fn mesh_with_imprint(
 ) -> Result<(FaceMesh, CarrierFacets), Unmeshed> {
     let FaceInput { part, face, surface, shared, settings, taken, .. } = *input;
     let loops = polygons::loops(face);
-    let polygons = input.border_polygons(&loops, imprint);
-    if polygons.enclose_nothing(surface.extent()) {
-        return Err(Unmeshed::Empty);
-    }
+    let polygons = input.border_polygons(&loops, imprint).ok_or(Unmeshed::Empty)?;
     let mut border = BorderNodes::new(part, &loops, surface, &polygons, shared);
     let vertex_nodes = border.add_imprint(surface, imprint);
     let lines: Vec<[Uv; 2]> = border.imprinted.iter().map(|s| s.map(|n| border.nodes[n].uv)).collect();
@@ -128,12 +131,8 @@ pub(super) fn mesh_with_imprint(
     let kept = border.segments.iter().chain(&border.imprinted);
     let fixed: FxHashSet<[u32; 2]> = kept.map(|s| edge_key(s[0], s[1])).collect();
     let (lo, hi) = polygons.bounds();
-    let grid_input = GridInput {
-        nodes: &mut border.nodes,
-        chords: &border.chords,
-        resolution: parameter_resolution(lo, hi),
-        taken,
-    };
+    let resolution = parameter_resolution(lo, hi);
+    let grid_input = GridInput { nodes: &mut border.nodes, chords: &border.chords, resolution, taken };
     let mut grid = grid::build(&mut prover, &cells, grid_input);
     if surface.steps.are_too_many() {
         return Err(Unmeshed::TooManySteps);
@@ -156,19 +155,24 @@ pub(super) fn mesh_with_imprint(
     // Where the budget has ended, shorter chords only cost more.
     let unproved = |t: &Transition| if exhausted { vec![] } else { t.unproved_chords(&chords, &followed) };
     // Where chords cross, the area is off for that: facets that hold ask for no shorter ones.
-    let beside_crossings = (!transition.conflicts.is_empty()).then(|| unproved(&transition));
+    let crosses_itself = !transition.conflicts.is_empty() || polygons.meets_itself;
+    let beside_crossings = crosses_itself.then(|| unproved(&transition));
     let is_covered = prove_area(&mut transition, &mut grid.quads, &polygons);
-    let repaired = first_repair(&transition, is_covered, exhausted);
+    let repaired = first_repair(crosses_itself, is_covered, exhausted);
     let unproved = beside_crossings.unwrap_or_else(|| unproved(&transition));
     let refused = [&transition.conflicts[..], &transition.crossed];
     let crossing = CrossingChords::new(part, surface, &transition.nodes, &followed, refused);
+    let left_out_mm = crossing.left_out_mm();
+    if left_out_mm > 0.0 {
+        give_up_proofs(&mut transition.triangles, &mut grid.quads);
+    }
     let mut coarse = if exhausted { vec![] } else { crossing.edges_for_sag() };
     coarse.extend(polygons::edges_of_collapsed_loops(&loops, &polygons));
-    let facing = crossing.facing_samples();
+    let (facing, meetings) = (crossing.facing_samples(), crossing.meeting_samples(&loops, surface));
     let mut facets: Vec<TransitionFacet> = grid.quads.iter().copied().map(TransitionFacet::from).collect();
     facets.extend(pairing::pair_triangles(&transition, &fixed, &mut prover));
     let closing = Closing { surface, nodes: &transition.nodes, segments: &on_border, chords: &chords, taken };
-    let (made, facets) = emit(&closing, facets, !transition.conflicts.is_empty() || input.untangles);
+    let (made, facets) = emit(&closing, facets, crosses_itself || input.untangles);
     // Conflicts may have cost an imprinted line, so that the guests' facets would not be bounded by it.
     let holds_imprint = transition.holds_imprint && transition.conflicts.is_empty();
     let edges_of =
@@ -181,10 +185,12 @@ pub(super) fn mesh_with_imprint(
     };
     let (nodes, own) = transition.nodes.into_parts();
     if made.facets.is_empty() {
-        return Err(Unmeshed::Empty);
+        return Err(if meetings.is_empty() { Unmeshed::Empty } else { Unmeshed::Crossing(meetings) });
     }
     let carrier = CarrierFacets { nodes, facets, vertex_nodes, holds_imprint };
-    Ok((FaceMesh { own, coarse, turned, facing, coincident: polygons.coincident, repaired, ..made }, carrier))
+    let meets_itself = polygons.meets_itself && transition.conflicts.is_empty();
+    let asked = FaceMesh { coarse, turned, facing, meetings, ..made };
+    Ok((FaceMesh { own, coincident: polygons.coincident, repaired, left_out_mm, meets_itself, ..asked }, carrier))
 }
 
 /// Splits a face as [`branches::split`] for its angle, twice that, and so on, until one does not take more cells than it may, and then for
@@ -236,8 +242,8 @@ fn emit(closing: &Closing<'_, '_>, mut facets: Vec<TransitionFacet>, has_lobes: 
 }
 
 /// Returns the gravest of what was given up: a border that crosses itself, then area, then a budget used up. `None` if nothing was.
-fn first_repair(transition: &Transition, is_covered: bool, exhausted: bool) -> Option<Repair> {
-    if !transition.conflicts.is_empty() {
+fn first_repair(crosses_itself: bool, is_covered: bool, exhausted: bool) -> Option<Repair> {
+    if crosses_itself {
         Some(Repair::CrossingBorder)
     } else if !is_covered {
         Some(Repair::AreaOff)
@@ -260,10 +266,15 @@ fn unmet_segments(border: &[[u32; 2]], outline: &[[u32; 2]]) -> Vec<[u32; 2]> {
 fn prove_area(transition: &mut Transition, quads: &mut [ProvedFacet<4>], polygons: &BorderPolygons) -> bool {
     let is_covered = covers_area_of_border(transition, quads, polygons);
     if !is_covered {
-        transition.triangles.iter_mut().for_each(|f| f.bound = f64::INFINITY);
-        quads.iter_mut().for_each(|f| f.bound = f64::INFINITY);
+        give_up_proofs(&mut transition.triangles, quads);
     }
     is_covered
+}
+
+/// Makes all facets unproved.
+fn give_up_proofs(triangles: &mut [ProvedFacet<3>], quads: &mut [ProvedFacet<4>]) {
+    triangles.iter_mut().for_each(|f| f.bound = f64::INFINITY);
+    quads.iter_mut().for_each(|f| f.bound = f64::INFINITY);
 }
 
 /// Whether facets cover as much of the parameter plane as the border bounds, within [`COVERED`]. More is covered where they overlap or the

@@ -1,6 +1,6 @@
 //! The facets of one face in its part's coordinates.
 
-use super::nodes::Position;
+use super::nodes::{MeetingSamples, Position};
 use super::report::Repair;
 use crate::math::{Point, Uv, Vector};
 use crate::model::EdgeId;
@@ -38,8 +38,14 @@ pub(super) struct FaceMesh {
     pub(super) turned: Vec<EdgeId>,
     /// Further samples that edges should have, so that chords of two of them do not cross.
     pub(super) facing: Vec<(EdgeId, f64)>,
-    /// Shared positions that are one: vertices of the file in one place, where loops touch.
+    /// Further samples that edges should have where they cross each other, to be one corner.
+    pub(super) meetings: Vec<MeetingSamples>,
+    /// Shared positions that are one: vertices of the file in one place, where loops touch, and samples where edges cross.
     pub(super) coincident: Vec<[u32; 2]>,
     /// What was given up; `None` where nothing was.
     pub(super) repaired: Option<Repair>,
+    /// How far facets are at least from what of the border crosses itself and was left out, mm of the part; 0 where nothing was.
+    pub(super) left_out_mm: f64,
+    /// Whether the border crosses itself in corners alone, so that all of it was kept.
+    pub(super) meets_itself: bool,
 }

@@ -3,7 +3,7 @@
 use super::assemble::PartMesh;
 use super::face_mesh::FaceMesh;
 use super::nodes::Position;
-use super::report::Repair;
+use super::repairs::PlacedRepair;
 use super::tessellation::{FacetQuality, Tessellation};
 use crate::math::{FaceId, Frame};
 use crate::mesh::{Facet, FacetMesh, MeshVertex};
@@ -16,7 +16,7 @@ pub(super) struct Placed {
     /// Placed faces without facets.
     pub(super) failed: Vec<FaceId>,
     /// Faces of which something was given up.
-    pub(super) repairs: Vec<(FaceId, Repair)>,
+    pub(super) repairs: Vec<PlacedRepair>,
     /// Of each placed face the first one that has the same facets at another place: itself where there is none before it.
     pub(super) originals: Vec<FaceId>,
 }
@@ -49,7 +49,8 @@ pub(super) fn place_instances(
             let id = FaceId(first.0 + k as u32);
             match face {
                 Some(face) => {
-                    out.repairs.extend(face.repaired.map(|how| (id, how)));
+                    let left_out_mm = face.left_out_mm * instance.placement.scale.abs();
+                    out.repairs.extend(face.repaired.map(|how| PlacedRepair { face: id, how, left_out_mm }));
                     place_face(&mut out.made, instance, shared, face, id);
                 }
                 None => out.failed.push(id),

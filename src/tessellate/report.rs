@@ -188,8 +188,8 @@ pub struct Seconds {
 pub enum Repair {
     /// Its budget of facets ended: what was left has coarser cells or triangles.
     CoarserCells,
-    /// Its border crosses itself in the parameter plane: parts of it are not kept. Its facets are certified only if they cover as much as
-    /// the border bounds.
+    /// Its border crosses itself in the parameter plane: it has corners there, or parts of it are not kept, and facets may cover the wrong
+    /// side. Its facets are certified only if they cover as much as the border bounds, and nothing is left out farther than its tolerance.
     CrossingBorder,
     /// Its facets cover more or less of its parameter plane than its border bounds: none of them is certified.
     AreaOff,
@@ -209,6 +209,6 @@ pub struct RepairedFace {
     /// What was given up.
     pub how: Repair,
     /// The largest distance to its spline: proved for certified facets, sampled for the others or, where that would take too long, for a
-    /// share of them, mm.
+    /// share of them, mm. At least the distance to what is left out of a border that crosses itself.
     pub reached_mm: f64,
 }

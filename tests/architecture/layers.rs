@@ -628,6 +628,20 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "tessellate/border",
+        &[
+            "curve_chords",
+            "edge_chords",
+            "opposite_sides",
+            "edges",
+            "enclosure",
+            "polygons",
+            "cusps",
+            "meeting_corners",
+            "mod",
+        ],
+    ),
+    (
         "tessellate/cells",
         &[
             "cell",

@@ -5,6 +5,7 @@ mod budgets;
 mod closed;
 mod contacts;
 mod creases;
+mod eights;
 mod field;
 #[path = "../support/files.rs"]
 mod files;

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 /// A face between polygons, each corner given in the parameter plane and in space, each side an edge.
-fn face(surface: Surface, loops: &[Vec<(Uv, Point)>]) -> Model {
+pub(crate) fn face(surface: Surface, loops: &[Vec<(Uv, Point)>]) -> Model {
     let mut part = Part::default();
     let mut trims = Vec::new();
     for corners in loops {
@@ -34,12 +34,12 @@ fn face(surface: Surface, loops: &[Vec<(Uv, Point)>]) -> Model {
     Model::from_part(part)
 }
 
-fn plane() -> Surface {
+pub(crate) fn plane() -> Surface {
     sweep::plane(&Frame::IDENTITY, [[0.0, 10.0]; 2])
 }
 
 /// Corners in the plane z = 0, whose parameters are lengths.
-fn flat(corners: &[[f64; 2]]) -> Vec<(Uv, Point)> {
+pub(crate) fn flat(corners: &[[f64; 2]]) -> Vec<(Uv, Point)> {
     corners.iter().map(|&[x, y]| (Uv::new(x, y), Point::new(x, y, 0.0))).collect()
 }
 
@@ -47,7 +47,7 @@ fn square(lo: f64, hi: f64) -> Vec<[f64; 2]> {
     vec![[lo, lo], [hi, lo], [hi, hi], [lo, hi]]
 }
 
-fn measured(tolerance: f64) -> Settings {
+pub(crate) fn measured(tolerance: f64) -> Settings {
     Settings { measure: true, ..Settings::uniform(tolerance) }
 }
 
@@ -203,39 +203,6 @@ fn trims_that_end_beside_a_vertex_do_not_cross_there() {
     let r = &made.report;
     assert_eq!((r.faces.failed, r.faces.repaired, r.certified), (0, 0, r.facets), "{:?}", r.repaired);
     assert!((r.area_mm2 - 50.0).abs() < 1e-9, "{}", r.area_mm2);
-}
-
-/// A loop that crosses itself is filled by parity: two triangles of 25 mm².
-#[test]
-fn a_loop_that_crosses_itself_is_named() {
-    let loops = [flat(&[[0.0, 0.0], [10.0, 10.0], [10.0, 0.0], [0.0, 10.0]])];
-    let made = tessellate(&face(plane(), &loops), &measured(0.1));
-    let r = &made.report;
-    assert_eq!((r.faces.failed, r.faces.repaired), (0, 1));
-    assert_eq!(r.repaired[0].how, Repair::CrossingBorder);
-    assert!((r.area_mm2 - 50.0).abs() < 1e-9, "{}", r.area_mm2);
-    assert_eq!(r.certified, 0);
-}
-
-/// A loop like an eight, with corners near its crossing: around its smaller lobe it runs clockwise, and neighbours meet facets that run
-/// along it.
-#[test]
-fn facets_run_along_a_loop_that_crosses_itself() {
-    let way = [[0.0, 0.0], [8.0, 0.0], [3.1, 3.5], [1.7, 4.5], [1.0, 5.0], [3.0, 5.0], [2.7, 4.5], [2.1, 3.5]];
-    let corners = flat(&way);
-    let made = tessellate(&face(plane(), std::slice::from_ref(&corners)), &measured(0.01));
-    assert_eq!(made.report.repaired[0].how, Repair::CrossingBorder);
-    let number = |p: Point| corners.iter().position(|(_, q)| *q == p);
-    let (mut along, mut against) = (0, 0);
-    for f in 0..made.mesh.facets.len() {
-        let c = made.mesh.corners(f).map(number);
-        for (a, b) in (0..4).filter_map(|k| c[k].zip(c[(k + 1) % 4])) {
-            along += usize::from(b == (a + 1) % corners.len());
-            against += usize::from(a == (b + 1) % corners.len());
-        }
-    }
-    // One of the two chords that cross may be left out.
-    assert!(along >= corners.len() - 1 && against == 0, "{along} {against}");
 }
 
 /// A hole that stands out of its face: by parity what stands out is inside, and nothing of such a face is proved. Two faces in one, each

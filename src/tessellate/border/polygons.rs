@@ -54,8 +54,10 @@ pub(in crate::tessellate) struct BorderPolygons {
     pub(in crate::tessellate) polygons: Vec<Vec<PolygonVertex>>,
     /// Places of the positions that are not shared with other faces, in the part's coordinates.
     pub(in crate::tessellate) own: Vec<Point>,
-    /// Pairs of shared positions of vertices that the file has twice, where loops touch.
+    /// Pairs of shared positions in one place: vertices that the file has twice, where loops touch, and samples where edges cross.
     pub(in crate::tessellate) coincident: Vec<[u32; 2]>,
+    /// Whether edges cross in corners of theirs, which [`Self::join_meeting_corners`] has made one.
+    pub(in crate::tessellate) meets_itself: bool,
 }
 
 impl BorderPolygons {

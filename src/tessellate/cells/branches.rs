@@ -143,7 +143,7 @@ mod tests {
         let border = BorderPolygons {
             polygons: vec![corners.into_iter().enumerate().map(vertex).collect()],
             own,
-            coincident: Vec::new(),
+            ..BorderPolygons::default()
         };
         let cells = split(&surface, Acceptance::Proved, &border, &[], budget, None);
         (cells, surface.steps.count())

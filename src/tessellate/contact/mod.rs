@@ -194,12 +194,13 @@ impl<'j, 'm> Joiner<'j, 'm> {
                     shared: &shared,
                     settings: self.settings,
                     taken: &taken[k],
+                    meetings: &before.meetings,
                     untangles: false,
                 })
             };
             let meshes = before.faces.par_iter().enumerate().map(renew).collect();
-            let causes = before.causes.clone();
-            Some((i, PartMesh { divisions, shared, faces: meshes, causes, taken }))
+            let (causes, meetings) = (before.causes.clone(), before.meetings.clone());
+            Some((i, PartMesh { divisions, shared, faces: meshes, causes, taken, meetings }))
         };
         // Instances, not parts: another instance of the same part may touch nothing.
         instances.par_iter().filter_map(divide).collect()
@@ -216,6 +217,7 @@ impl<'j, 'm> Joiner<'j, 'm> {
             shared: &mesh.shared,
             settings: self.settings,
             taken: &mesh.taken[face.key.face],
+            meetings: &mesh.meetings,
             untangles: false,
         }
     }
