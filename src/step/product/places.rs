@@ -131,7 +131,7 @@ mod tests {
             let parent = Place::of_parent(shift(far));
             let mut table = PlaceTable::default();
             table.insert(7, parent.inner(&shift(12.5)));
-            table.insert(7, parent.inner(&shift(1234.567_84)));
+            table.insert(7, parent.inner(&shift(1_234.567_84)));
             assert!(!table.holds(7, &parent.inner(&shift(13.0))), "{far}");
             assert_eq!(table.find(7, &parent.inner(&shift(12.500_001))), Some(0), "{far}");
             // Printed with seven digits.
@@ -141,7 +141,7 @@ mod tests {
         // A parent that takes the coordinates back leaves the rounding of its child's.
         let back = Place::of_parent(shift(-1234.568));
         let mut table = PlaceTable::default();
-        table.insert(7, back.inner(&shift(1234.567_84)));
+        table.insert(7, back.inner(&shift(1_234.567_84)));
         assert!(table.holds(7, &back.inner(&shift(1234.568))));
     }
 
