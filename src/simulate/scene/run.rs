@@ -133,7 +133,7 @@ impl PowerUnit {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
-    /// An Owen-scrambled Sobol net in each replicate at the sources, and random numbers spread evenly over 256 rays behind them: smaller
+    /// An Owen-scrambled Sobol net in each replicate at the sources, and random numbers spread evenly over 64 rays behind them: smaller
     /// errors, honestly estimated.
     #[default]
     Sobol,

@@ -176,12 +176,9 @@ pub(crate) fn close_loop(uses: Vec<Piece>, chart: &Chart, tolerance: f64) -> Cha
     if first.winding.iter().all(|w| w.abs() <= allowed) {
         return first;
     }
-    if let Some(turned) = turn_closed_edge(&uses, first.winding, chart, tolerance) {
-        return turned;
-    }
-    let mut second = chain_uses(uses, chart, tolerance, true);
+    let mut second = chain_uses(uses.clone(), chart, tolerance, true);
     if second.is_winding() {
-        return first;
+        return turn_closed_edge(&uses, first.winding, chart, tolerance).unwrap_or(first);
     }
     second.reverse();
     second.is_against_sense = true;
