@@ -152,7 +152,7 @@ fn read_units(file: &File<'_>, settings: &Settings, report: &mut ImportReport) -
         }
         for unit in assigned.contradictory {
             let unit = format!("#{unit} {}", file.entity_name(unit));
-            problems.push(format!("{name}: {unit} contradicts a unit before it in context #{id}, which counts"));
+            problems.push(format!("{name}: {unit} contradicts an earlier unit of context #{id}, which is used"));
         }
         add(&mut names.length, assigned.length_name);
         add(&mut names.angle, assigned.angle_name);

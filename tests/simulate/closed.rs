@@ -201,17 +201,18 @@ fn a_void_within_a_scene_under_water_is_told_to_be_full_of_it() {
     let mut void = hollow.model.parts.pop().unwrap().shells.pop().unwrap();
     void.void = true;
     hollow.model.parts[0].shells.push(void);
-    let notes = |world: &World, surroundings: &str| {
-        let text = format!("{surroundings}\n{GLASS}[[source]]\nat = [0, 0, 20]\n");
-        let text =
-            if world.shapes.len() > 2 { text + "[[material]]\npart = 'core'\nmedium = 'PMMA'\n" } else { text };
+    let notes_with = |world: &World, surroundings: &str, core: &str| {
+        let text = format!("{surroundings}\n{GLASS}[[source]]\nat = [0, 0, 20]\n{core}");
         Scene::parse(&text, "void.toml", Path::new(".")).unwrap().bind(&world.model).unwrap().notes().join("\n")
     };
+    let notes = |world: &World, surroundings: &str| notes_with(world, surroundings, "");
     let water = "ambient = 'water'";
     let told = notes(&hollow, water);
     assert!(told.contains("the closed void in 'glass' (glass) holds 'water'"), "{told}");
     assert_eq!(notes(&hollow, "ambient = 'air'\n[[medium]]\nname = 'air'\nindex = 1.0003"), "");
-    // A solid that fills the void.
+    // A solid that fills the void, clear or opaque.
     hollow.sphere("core", Point::ZERO, 3.0);
-    assert_eq!(notes(&hollow, water), "");
+    for optics in ["medium = 'PMMA'", "surface = 'absorber'"] {
+        assert_eq!(notes_with(&hollow, water, &format!("[[material]]\npart = 'core'\n{optics}\n")), "");
+    }
 }

@@ -141,7 +141,9 @@ fn the_third_led_of_s2_meets_its_mirror() {
     };
     let (mut hits, n) = (0, 40_000u64);
     for ray in 0..n {
-        let key = |purpose| lampyris::simulate::random::Key { seed: 3, ray, branch: 0, bounce: 0, stratified: false }.pair(purpose);
+        let key = |purpose| {
+            lampyris::simulate::random::Key { seed: 3, ray, branch: 0, bounce: 0, in_net: None }.pair(purpose)
+        };
         let ([a, b], [u, v]) =
             (key(lampyris::simulate::random::Purpose::Source), key(lampyris::simulate::random::Purpose::Scatter));
         let (sin, cos) = (TAU * v).sin_cos();

@@ -281,7 +281,7 @@ fn a_relationship_without_its_usage_places_the_component() {
         (
             &twice,
             &[10.0][..],
-            "#421: its PRODUCT_DEFINITION_SHAPE #403 is not in the file; its relationship #410 is that of another usage, which counts",
+            "#421: its PRODUCT_DEFINITION_SHAPE #403 is not in the file; its relationship #410 is that of another usage, which is used",
         ),
         (&unrelated, &[0.0][..], "#420: its relationship #410 is not in the file: it places nothing"),
     ] {

@@ -68,7 +68,7 @@ fn a_lost_usage_in_the_place_of_another_adds_nothing() {
         x.sort_by(f64::total_cmp);
         let problems = &import.report.problems;
         assert_eq!(x, expected, "{problems:?}");
-        let told = "usage #400 puts product #100 where its relationship #430 does, and counts alone";
+        let told = "usage #400 puts product #100 where its relationship #430 does: it counts once";
         assert_eq!(problems.iter().any(|p| p.ends_with(told)), to == 21, "{problems:?}");
     }
 }

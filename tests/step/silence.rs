@@ -162,7 +162,7 @@ fn a_hole_that_stands_out_of_its_face_is_told() {
             report.repairs
         );
         assert!(
-            report.repairs.iter().all(|r| r.reason.contains("stands out of the outer loop")),
+            report.repairs.iter().all(|r| r.reason.contains("reaches beyond the outer loop")),
             "{:?}",
             report.repairs
         );

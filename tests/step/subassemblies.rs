@@ -57,7 +57,7 @@ fn a_promise_counts_unless_usages_below_keep_it() {
     let x: Vec<f64> = kept.model.instances.iter().map(|i| i.placement.origin.x).collect();
     let told = &kept.report.problems;
     assert_eq!((x, told.len()), (vec![30.0], 1), "{told:?}");
-    assert!(told[0].ends_with("#620: promises product #100, which other usages put into #200: these count alone"));
+    assert!(told[0].ends_with("#620: promises product #100, which other usages put into #200: only these are used"));
 }
 
 /// The assembly #500, in which a usage puts the part to x = 10, in #200 at x = 20 by a relationship or a mapped item; #200 may stand in

@@ -73,8 +73,9 @@ pub(crate) fn is_too_much_missing([refused, found]: [usize; 2], is_cut_off: bool
 /// where they are named.
 pub(crate) fn say_refused_faces([refused, found]: [usize; 2], is_reason: bool, listing: &str, console: &Console) {
     if refused > 0 {
+        let verb = if refused == 1 { "was" } else { "were" };
         let [refused, found] = [refused, found].map(|count| grouped(count as u64));
-        console.say_or_insist(is_reason, format!("{refused} of {found} faces were refused{listing}"));
+        console.say_or_insist(is_reason, format!("{refused} of {found} faces {verb} refused{listing}"));
     }
 }
 

@@ -180,7 +180,7 @@ pub(crate) fn write(
     // The page shows paths as lines of its own.
     facets.paths = None;
     let has_lost_rays = lost_rays::write(folder, &run.results, prepared)?;
-    let mut provenance = console.provenance(Some(prepared.run_settings().seed), prepared.threads);
+    let mut provenance = console.provenance(Some(prepared.run_settings().seed), run.results.threads);
     if let Some(command) = &remarks.first_command {
         provenance.command.clone_from(command);
     }

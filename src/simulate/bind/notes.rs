@@ -12,10 +12,11 @@ use crate::simulate::surfaces::FaceOptics;
 use crate::text::{count_of, figures, first_sentences};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Share of a wavelength that the end of a table may be missed by: single precision rounds by half of 2⁻²³, a change of units by less.
-const ROUNDING: f64 = 1e-7;
+/// Share of a wavelength that the end of a table may be missed by: single precision rounds by half of 2⁻²³, a change of units by less, and
+/// what is beyond can be told apart by [`WAVELENGTH_DIGITS`].
+const ROUNDING: f64 = 5e-7;
 
-/// Digits of a wavelength: as many as single precision keeps, so that what is beyond [`ROUNDING`] can be told apart.
+/// Digits of a wavelength: as many as single precision keeps.
 const WAVELENGTH_DIGITS: usize = 7;
 
 /// Tables, media, sources and remarks on files that are named; of more the number is told.
@@ -253,7 +254,9 @@ pub(super) fn filled_void_note(bound: &BoundScene, model: &Model) -> Option<Stri
             shell.void && shell.closed
         };
         let Some(shell) = f.shell.filter(is_of_void) else { continue };
-        let around = bound.entered_body(f.id).filter(|_| !bound.faces[f.id.index()].touches_body);
+        let face = &bound.faces[f.id.index()];
+        let is_filled = face.touches_body || face.touches_sibling || face.medium_on_opaque;
+        let around = bound.entered_body(f.id).filter(|_| !is_filled);
         let body = voids.entry((f.instance, shell)).or_insert(around);
         *body = body.and(around);
     }

@@ -5,7 +5,9 @@
 //! becomes of most of them. The bits are those of rays made one by one.
 
 use super::shape::Shape;
-use super::stream::{PACKET, PacketNumbers, Portion, midpoint_unit, sort_by_cell, sorted_dimension, z_order_cell};
+use super::stream::{
+    PACKET, PacketNumbers, Portion, RayIndex, midpoint_unit, sort_by_cell, sorted_dimension, z_order_cell,
+};
 use super::{Emission, Emitter};
 use crate::math::Ray;
 use crate::math::simd::{self, Instructions, Kernel};
@@ -29,8 +31,7 @@ type PacketWords = [u32; PACKET];
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MixedRay {
     pub(crate) source: usize,
-    /// Number in the run.
-    pub(crate) in_run: u64,
+    pub(crate) index: RayIndex,
     pub(crate) quanta: f64,
     pub(crate) emission: Emission,
 }
@@ -137,7 +138,8 @@ impl MixedPacket {
         emitter.bring_near(ray);
         let wavelength = emitter.wavelengths.as_ref().map(|wavelengths| wavelengths.sample(pair(2)[0]));
         let emission = Emission { from: None, wavelength, failed: false };
-        Some(MixedRay { source, in_run: self.in_run[k], quanta: self.quanta[k], emission })
+        let index = RayIndex { in_run: self.in_run[k], in_stream: self.in_stream[k] };
+        Some(MixedRay { source, index, quanta: self.quanta[k], emission })
     }
 }
 
@@ -165,7 +167,8 @@ impl Kernel for Draw<'_> {
             }
             let mut scrambles = [[0; PACKET]; 4];
             for k in 0..PACKET {
-                let key = Key { seed: packet.seed, ray, branch: packet.sources[k], bounce: block as u32, stratified: false };
+                let key =
+                    Key { seed: packet.seed, ray, branch: packet.sources[k], bounce: block as u32, in_net: None };
                 let words = key.words_in_loop(Purpose::Scramble);
                 for d in 0..4 {
                     scrambles[d][k] = words[d];
@@ -229,14 +232,14 @@ mod tests {
             packet.draw(replicate);
             let mut ray = start();
             while let Some(started) = packet.next_ray(&bound.emitters, &mut ray) {
-                let MixedRay { source, in_run, emission, .. } = started;
+                let MixedRay { source, index, emission, .. } = started;
                 let emitter = &bound.emitters[source];
                 let portion = Portion { replicate, source: source as u32, rays: 8, lattice: [0, 1] };
                 let mut alone = start();
-                let index = (in_run - firsts[source]) as u32;
+                assert_eq!(u64::from(index.in_stream), index.in_run - firsts[source]);
                 let (same, expected) = RaySampler::new(emitter, seed, sampling, portion, firsts[source])
-                    .single_ray(emitter, index, &mut alone);
-                assert_eq!((ray, in_run, emission.wavelength), (alone, same.in_run, expected.wavelength));
+                    .single_ray(emitter, index.in_stream, &mut alone);
+                assert_eq!((ray, index.in_run, emission.wavelength), (alone, same.in_run, expected.wavelength));
                 assert!(emission.wavelength.is_some() && started.quanta == (source + 1) as f64);
                 seen += 1;
             }

@@ -110,6 +110,11 @@ pub(crate) struct RayIndex {
     pub(crate) in_stream: u32,
 }
 
+impl RayIndex {
+    /// That of the first ray of a run.
+    pub(crate) const FIRST: Self = Self { in_run: 0, in_stream: 0 };
+}
+
 impl Stream {
     /// Makes the stream of a portion; of the pairs for the place, the direction and the wavelength those alone that are `true` are drawn
     /// from the net. It has no numbers before [`Self::refill`], [`Self::fill_short`] or [`Self::prepare_single`].
@@ -132,7 +137,7 @@ impl Stream {
     /// Turns to another portion of the same run, in the memory that it has.
     pub(super) fn restart(&mut self, portion: Portion, pairs: [bool; 3]) {
         let Portion { replicate, source, rays, lattice } = portion;
-        let key = Key { seed: self.seed, ray: u64::from(replicate), branch: source, bounce: 0, stratified: false };
+        let key = Key { seed: self.seed, ray: u64::from(replicate), branch: source, bounce: 0, in_net: None };
         // Where a source has one ray in a replicate, its scrambles cost more than the ray: those that no pair needs are left out.
         let [place_or_direction, wavelength] = [pairs[0] || pairs[1], pairs[2]];
         if place_or_direction {
@@ -286,7 +291,7 @@ impl Stream {
     /// Returns two numbers independent of the net, keyed by the ray's number in the run; pairs 0 to 2 are [`Self::pair`]'s, further ones
     /// free.
     pub(crate) fn random(&self, index: RayIndex, pair: u32) -> [f64; 2] {
-        Key { seed: self.seed, ray: index.in_run, branch: 0, bounce: pair, stratified: false }.pair(Purpose::Source)
+        Key { seed: self.seed, ray: index.in_run, branch: 0, bounce: pair, in_net: None }.pair(Purpose::Source)
     }
 
     /// Returns a number in `[0, 1)` that runs evenly through all rays of the source, with jitter; each replicate takes a lattice of its

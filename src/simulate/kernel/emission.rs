@@ -182,10 +182,10 @@ impl SourceQueue {
         let context = tracer.context;
         loop {
             if let Some(mixed) = &mut self.mixed
-                && let Some(MixedRay { source, in_run, quanta, emission }) =
+                && let Some(MixedRay { source, index, quanta, emission }) =
                     mixed.next_ray(&context.bound.emitters, ray)
             {
-                *path = Path::at_source(in_run, quanta, C::in_surroundings());
+                *path = Path::at_source(index, quanta, C::in_surroundings());
                 if tracer.start_path(source, &emission, path, ray) {
                     return true;
                 }
@@ -215,7 +215,7 @@ impl SourceQueue {
             } else {
                 sampler.next_ray(emitter, started, ray)
             };
-            *path = Path::at_source(index.in_run, self.quanta, C::in_surroundings());
+            *path = Path::at_source(index, self.quanta, C::in_surroundings());
             if tracer.start_path(self.source, &emission, path, ray) {
                 return true;
             }

@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::payload::RayPayload;
+use crate::simulate::emitter::RayIndex;
 use crate::simulate::random::{Key, split_branch};
 use crate::simulate::scene::Sampling;
 
@@ -23,6 +24,8 @@ pub(crate) enum RaySelection {
 pub(super) struct Path<C> {
     /// Number of its ray in the run.
     pub(super) ray: u64,
+    /// Number of its ray among those of its source and replicate.
+    pub(super) in_net: u32,
     /// Which of the paths that split off that ray.
     pub(super) branch: u32,
     /// Hits so far.
@@ -46,10 +49,11 @@ pub(super) const NO_RECEIVER: u32 = u32::MAX;
 pub(super) const SCATTERS: u32 = u32::MAX - 1;
 
 impl<C: RayPayload> Path<C> {
-    /// Makes the path of a ray of the run, by its number, that has not left its source: branch 0, no hits, no receiver ahead.
-    pub(super) fn at_source(ray: u64, quanta: f64, payload: C) -> Self {
+    /// Makes the path of a ray, by its numbers, that has not left its source: branch 0, no hits, no receiver ahead.
+    pub(super) fn at_source(index: RayIndex, quanta: f64, payload: C) -> Self {
         Self {
-            ray,
+            ray: index.in_run,
+            in_net: index.in_stream,
             branch: 0,
             bounce: 0,
             quanta,
@@ -70,7 +74,7 @@ impl<C: RayPayload> Path<C> {
             ray: self.ray,
             branch: self.branch,
             bounce: self.bounce,
-            stratified: settings.sampling == Sampling::Sobol,
+            in_net: (settings.sampling == Sampling::Sobol).then_some(self.in_net),
         }
     }
 

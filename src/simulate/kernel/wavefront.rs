@@ -7,6 +7,7 @@ use super::payload::RayPayload;
 use super::tracer::Tracer;
 use crate::intersect::{Cost, Hit};
 use crate::math::{Point, Ray, Vector};
+use crate::simulate::emitter::RayIndex;
 use crate::simulate::tallies::ReplicateTally;
 
 /// Vertices that are gathered before they are streamed: 1.3 MB.
@@ -70,7 +71,7 @@ impl<C: RayPayload> Wavefront<C> {
     /// Makes a wavefront with places for `batch` paths, all of them free.
     fn idle(batch: usize) -> Self {
         Self {
-            paths: vec![Path::at_source(0, 0.0, C::in_surroundings()); batch],
+            paths: vec![Path::at_source(RayIndex::FIRST, 0.0, C::in_surroundings()); batch],
             rays: vec![Ray::new(Point::ZERO, Vector::Z); batch],
             hits: vec![None; batch],
             ended: (0..batch as u32).collect(),

@@ -2,20 +2,18 @@
 //!
 //! A number is a function of (seed, ray, branch, bounce, purpose) alone. So a result does not depend on threads, batches or
 //! shards, and a kernel that skips an effect draws the same numbers for all other effects as one that does not.
-//! Philox 4×32-10 (Salmon et al., SC 2011) for everything behind the source, there in Latin hypercubes of [`STRATA`] rays
-//! (McKay, Beckman, Conover, Technometrics 21, 1979) unless asked otherwise; at the source a Sobol net with Owen scrambling, or Philox as
-//! well.
+//! Philox 4×32-10 (Salmon et al., SC 2011) for everything behind the source; at the source a Sobol net with Owen scrambling,
+//! or Philox as well. Of numbers at the first surfaces that a ray meets the net gives the first [`NET_DIGITS`] binary digits: light that is
+//! reflected at one of them is then as much as it should be in every part of what the source sends there.
 //!
 //! Known weakness: a Sobol index has 32 bits, so a replicate may hold at most 2³² rays of one source.
 
 mod philox;
 mod sobol;
-mod strata;
 
 pub use philox::philox4x32;
 pub use sobol::{BLOCK, DIMENSIONS, scrambled, scrambled_block};
 pub(crate) use sobol::{LOW_INDICES, scrambled_low};
-pub use strata::STRATA;
 
 /// What a random number is for; part of its key, so that adding an effect shifts no other number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -38,8 +36,24 @@ pub enum Purpose {
     BulkDirection = 8,
 }
 
-/// Hits of a path whose numbers are stratified: of the rays of a block few go the same way for longer.
-const STRATIFIED_HITS: u32 = 8;
+impl Purpose {
+    /// Returns the dimension of the net that gives the first digits of its number at a hit, of a pair the first of two; `None` where
+    /// none does. In a body light scatters at distances of its own: there a net gains nothing.
+    #[inline(always)]
+    fn dimension(self, bounce: u32) -> Option<usize> {
+        let (first, each, hits) = match self {
+            Self::Interface => (DIMENSIONS, 1, 4),
+            Self::Lobe => (DIMENSIONS + 4, 1, 2),
+            Self::Scatter => (DIMENSIONS + 6, 2, 2),
+            _ => return None,
+        };
+        (bounce < hits).then_some(first + each * bounce as usize)
+    }
+}
+
+/// Binary digits of a number behind the source that are the net's. With all of them a share of the light would be counted to the ray in
+/// every replicate or all but one, whose spread says nothing of the error.
+const NET_DIGITS: u32 = 8;
 
 /// The key of one vertex of one path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,9 +66,8 @@ pub struct Key {
     pub branch: u32,
     /// Number of hits before this one.
     pub bounce: u32,
-    /// Whether, of [`STRATA`] rays from a multiple of that on, one has its number in each stratum of the unit interval, or square, at the
-    /// first surfaces that they meet; else numbers of different rays are independent.
-    pub stratified: bool,
+    /// Number of the ray in the net of its source and replicate; `None` where its numbers are to be independent of other rays'.
+    pub in_net: Option<u32>,
 }
 
 impl Key {
@@ -62,33 +75,29 @@ impl Key {
     #[inline]
     pub fn pair(&self, purpose: Purpose) -> [f64; 2] {
         let [a, b, c, d] = self.words(purpose);
-        let [mut x, mut y] = [joined(a, b), joined(c, d)];
-        if self.is_stratified(purpose) {
-            [x, y] = strata::within_square(self.stratum(purpose), [x, y]);
-        }
-        [unit(x), unit(y)]
+        [
+            unit(self.with_digits_of_net(purpose, 0, joined(a, b))),
+            unit(self.with_digits_of_net(purpose, 1, joined(c, d))),
+        ]
     }
 
-    /// Returns one uniform number in `[0, 1)`, 53 bits; the same for the same key and purpose.
+    /// Returns one uniform number in `[0, 1)`, 53 bits: the first of [`Key::pair`].
     #[inline]
     pub fn unit(&self, purpose: Purpose) -> f64 {
         let [a, b, ..] = self.words(purpose);
-        let x = joined(a, b);
-        unit(if self.is_stratified(purpose) { strata::within_interval(self.stratum(purpose), x) } else { x })
+        unit(self.with_digits_of_net(purpose, 0, joined(a, b)))
     }
 
+    /// Returns the bits of a number, the first or second of its pair, with the net's digits before them where it has any.
     #[inline]
-    fn is_stratified(&self, purpose: Purpose) -> bool {
-        // In a body light scatters at distances of its own: there strata gain nothing.
-        let at_surface = matches!(purpose, Purpose::Interface | Purpose::Scatter | Purpose::Lobe);
-        self.stratified && at_surface && self.bounce < STRATIFIED_HITS
-    }
-
-    /// Returns which stratum the ray has among those of its block.
-    #[inline]
-    fn stratum(&self, purpose: Purpose) -> u8 {
-        let vertex = (self.ray / STRATA) << 8 | u64::from(self.bounce % STRATIFIED_HITS) << 4 | purpose as u64;
-        strata::permuted(self.ray as u8, strata::order([self.seed, vertex, u64::from(self.branch)]))
+    fn with_digits_of_net(&self, purpose: Purpose, second: usize, bits: u64) -> u64 {
+        let Some((index, first)) = self.in_net.zip(purpose.dimension(self.bounce)) else { return bits };
+        let dimension = first + second;
+        // Each source has a net of its own in each replicate: the first of its rays there tells both.
+        let net = self.ray.wrapping_sub(u64::from(index));
+        let scramble = hash([self.seed, net, u64::from(self.branch) << 32 | dimension as u64]);
+        let digits = scrambled(index, dimension, scramble) >> (32 - NET_DIGITS);
+        u64::from(digits) << (64 - NET_DIGITS) | bits >> NET_DIGITS
     }
 
     /// Returns 128 random bits, a function of key and purpose alone, independent of those of other rays.
@@ -112,6 +121,18 @@ impl Key {
         let high = (self.ray >> 32) as u32 & 0xffff | (purpose as u32) << 16;
         ([self.ray as u32, high, self.bounce, self.branch], [self.seed as u32, (self.seed >> 32) as u32])
     }
+}
+
+/// Returns a hash of three numbers: each multiplied and shifted, as MurmurHash3 ends, with the factors of D. Stafford's mix 13.
+#[inline]
+fn hash(numbers: [u64; 3]) -> u32 {
+    let mix = |x: u64| {
+        let x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        x ^ x >> 31
+    };
+    (numbers.into_iter().fold(0, |sum: u64, x| mix(sum.wrapping_add(x).wrapping_add(0x9e37_79b9_7f4a_7c15))) >> 32)
+        as u32
 }
 
 /// Returns two words as one.
@@ -166,7 +187,7 @@ mod tests {
 
     #[test]
     fn numbers_are_uniform_and_differ_by_every_part_of_the_key() {
-        let key = Key { seed: 9, ray: 1 << 40, branch: 0, bounce: 3, stratified: false };
+        let key = Key { seed: 9, ray: 1 << 40, branch: 0, bounce: 3, in_net: None };
         let u = key.unit(Purpose::Interface);
         for other in [
             Key { seed: 10, ..key },
@@ -190,46 +211,52 @@ mod tests {
         assert!((sum / (2 * n) as f64 - 0.5).abs() < 2.6e-3);
         assert!((sum2 / n as f64 - 0.25).abs() < 2.8e-3);
     }
+
+    /// A key of the ray with this number in a net of many, at a surface.
+    fn in_net(net: u64, index: u32, bounce: u32) -> Key {
+        Key { seed: 5, ray: net + u64::from(index), branch: 0, bounce, in_net: Some(index) }
+    }
+
     #[test]
-    fn of_the_rays_of_a_block_each_has_its_stratum() {
-        for (seed, block, bounce) in [(1, 0, 0), (9, 1 << 30, 3), (u64::MAX, 12_345, 1)] {
-            let key = |ray: u64| Key { seed, ray: block * STRATA + ray, branch: 0, bounce, stratified: true };
-            let mut intervals: Vec<u64> =
-                (0..STRATA).map(|r| (key(r).unit(Purpose::Lobe) * STRATA as f64) as u64).collect();
-            let cell = |[x, y]: [f64; 2]| (x * 8.0) as u64 * 8 + (y * 8.0) as u64;
-            let mut squares: Vec<u64> = (0..STRATA).map(|r| cell(key(r).pair(Purpose::Scatter))).collect();
-            for strata in [&mut intervals, &mut squares] {
-                assert!(!strata.is_sorted());
-                strata.sort_unstable();
-                assert!(strata.iter().copied().eq(0..STRATA));
+    fn as_many_rays_of_a_net_have_their_number_in_each_stratum() {
+        for (net, bounce) in [(0, 0), (1 << 40, 1)] {
+            let mut counts = [[0; 256]; 4];
+            for index in 0..1024 {
+                let key = in_net(net, index, bounce);
+                let [x, y] = key.pair(Purpose::Scatter);
+                let numbers = [key.unit(Purpose::Interface), key.unit(Purpose::Lobe), x, y];
+                for (counts, number) in counts.iter_mut().zip(numbers) {
+                    counts[(number * 256.0) as usize] += 1;
+                }
             }
+            assert_eq!(counts, [[4; 256]; 4]);
+        }
+        // After the first hits, and in bodies, they are independent: some strata are empty.
+        for (purpose, bounce) in [(Purpose::Interface, 4), (Purpose::Lobe, 2), (Purpose::Bulk, 0)] {
+            let mut counts = [0; 256];
+            (0..1024).for_each(|index| counts[(in_net(0, index, bounce).unit(purpose) * 256.0) as usize] += 1);
+            assert!(counts.contains(&0), "{purpose:?}");
         }
     }
 
-    /// Sums over whole blocks hold next to no chance; over the blocks a ray's number is uniform and independent of its neighbour's and of
-    /// the same ray's at the next hit.
+    /// Over nets a ray's number is uniform, and independent of the same ray's at the next hit and of the one that another purpose has.
     #[test]
-    fn stratified_numbers_are_uniform_and_independent_over_blocks() {
+    fn numbers_of_a_net_are_uniform_and_independent_over_nets() {
         let n = 40_000;
-        let at = |block, ray, bounce| {
-            Key { seed: 5, ray: block * STRATA + ray, branch: 0, bounce, stratified: true }.unit(Purpose::Interface)
-        };
-        for ray in [0, 1, 32, 45, 63] {
-            let mut sums = [0.0; 5];
-            for block in 0..n {
-                let [u, beside, later] =
-                    [at(block, ray, 0), at(block, ray ^ 1, 0), at(block, ray, 1)].map(|u| u - 0.5);
-                for (sum, x) in
-                    sums.iter_mut().zip([u, u * u - 1.0 / 12.0, u * beside + 1.0 / (12.0 * 63.0), u * later, later])
-                {
+        for index in [0, 1, 77, 1023] {
+            let mut sums = [0.0; 4];
+            for net in 0..n {
+                let key = |bounce| in_net(net << 20, index, bounce);
+                let [u, later] = [0, 1].map(|bounce| key(bounce).unit(Purpose::Interface) - 0.5);
+                let place = key(0).pair(Purpose::Scatter)[0] - 0.5;
+                for (sum, x) in sums.iter_mut().zip([u, u * u - 1.0 / 12.0, u * later, u * place]) {
                     *sum += x;
                 }
             }
             // Standard deviations of u, of its square and of products of two.
-            let deviations =
-                [12f64.sqrt().recip(), 180f64.sqrt().recip(), 1.0 / 12.0, 1.0 / 12.0, 12f64.sqrt().recip()];
+            let deviations = [12f64.sqrt().recip(), 180f64.sqrt().recip(), 1.0 / 12.0, 1.0 / 12.0];
             for (sum, deviation) in sums.into_iter().zip(deviations) {
-                assert!(sum.abs() < 4.5 * deviation * (n as f64).sqrt(), "ray {ray}: {sum}");
+                assert!(sum.abs() < 4.5 * deviation * (n as f64).sqrt(), "ray {index}: {sum}");
             }
         }
     }

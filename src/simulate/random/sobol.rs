@@ -2,22 +2,39 @@
 
 use std::sync::LazyLock;
 
-/// Dimensions of the sequence: two for the place, two for the direction, one for the wavelength, one spare.
+/// Dimensions of the sequence at the source: two for the place, two for the direction, one for the wavelength, one spare.
 pub const DIMENSIONS: usize = 6;
+/// Dimensions of the sequence, those behind the source included.
+const ALL_DIMENSIONS: usize = 16;
 
 /// Primitive polynomials and initial direction numbers of dimensions 2… of Joe and Kuo, *Constructing Sobol sequences with
 /// better two-dimensional projections*, SIAM J. Sci. Comput. 30 (2008), table `new-joe-kuo-6`.
-const JOE_KUO: [(u32, u32, &[u32]); DIMENSIONS - 1] =
-    [(1, 0, &[1]), (2, 1, &[1, 3]), (3, 1, &[1, 3, 1]), (3, 2, &[1, 1, 1]), (4, 1, &[1, 1, 3, 3])];
+const JOE_KUO: [(u32, u32, &[u32]); ALL_DIMENSIONS - 1] = [
+    (1, 0, &[1]),
+    (2, 1, &[1, 3]),
+    (3, 1, &[1, 3, 1]),
+    (3, 2, &[1, 1, 1]),
+    (4, 1, &[1, 1, 3, 3]),
+    (4, 4, &[1, 3, 5, 13]),
+    (5, 2, &[1, 1, 5, 5, 17]),
+    (5, 4, &[1, 1, 5, 5, 5]),
+    (5, 7, &[1, 1, 7, 11, 19]),
+    (5, 11, &[1, 1, 5, 1, 1]),
+    (5, 13, &[1, 1, 1, 3, 11]),
+    (5, 14, &[1, 3, 5, 5, 31]),
+    (6, 1, &[1, 3, 3, 9, 7, 49]),
+    (6, 13, &[1, 1, 1, 15, 21, 21]),
+    (6, 16, &[1, 3, 1, 13, 27, 49]),
+];
 
 /// Contributions of each byte of the index, so that a number is four look-ups (measured 4 × faster than bit by bit). Bits are in
 /// reverse order, as the scramble wants them.
 type Table = [[u32; 256]; 4];
 
 /// Made when first asked for.
-static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| (0..DIMENSIONS).map(byte_table).collect());
+static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| (0..ALL_DIMENSIONS).map(byte_table).collect());
 
-/// Returns the direction numbers of a dimension below [`DIMENSIONS`], counted from 0, each as 32 binary places.
+/// Returns the direction numbers of a dimension below [`ALL_DIMENSIONS`], counted from 0, each as 32 binary places.
 fn directions(dimension: usize) -> [u32; 32] {
     let mut v = [0u32; 32];
     if dimension == 0 {
@@ -47,7 +64,7 @@ fn byte_table(dimension: usize) -> Table {
     })
 }
 
-/// Returns the Sobol number of an index in a dimension below [`DIMENSIONS`], 32 bits after the point, Owen-scrambled by `seed`.
+/// Returns the Sobol number of an index in one of its 16 dimensions, 32 bits after the point, Owen-scrambled by `seed`.
 ///
 /// The scrambling is the hash of Laine and Karras as improved by N. Vegdahl, applied to reversed bits: Burley, *Practical hash-based Owen
 /// scrambling*, JCGT 9 (4), 2020. Each seed gives an independent randomisation of the same net, so the mean over seeds is unbiased and the
@@ -149,7 +166,7 @@ mod tests {
     fn low_indices_have_their_numbers_under_any_seed() {
         let indices: [u32; 256] = std::array::from_fn(|k| 255 - k as u32);
         let seeds = std::array::from_fn(|k| 0x9e37_79b9u32.wrapping_mul(k as u32));
-        for dimension in 0..DIMENSIONS {
+        for dimension in 0..ALL_DIMENSIONS {
             let expected: [u32; 256] = std::array::from_fn(|k| scrambled(indices[k], dimension, seeds[k]));
             assert_eq!(scrambled_low(&indices, dimension, &seeds), expected);
         }
@@ -157,7 +174,7 @@ mod tests {
 
     #[test]
     fn every_dimension_is_stratified() {
-        for dimension in 0..DIMENSIONS {
+        for dimension in 0..ALL_DIMENSIONS {
             let mut seen = [0; 256];
             (0..256).for_each(|i| seen[(scrambled(i, dimension, 77) >> 24) as usize] += 1);
             assert!(seen.iter().all(|&n| n == 1), "dimension {dimension}");

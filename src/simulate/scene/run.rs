@@ -133,8 +133,8 @@ impl PowerUnit {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
-    /// An Owen-scrambled Sobol net in each replicate at the sources, and random numbers spread evenly over 64 rays behind them: smaller
-    /// errors, honestly estimated.
+    /// An Owen-scrambled Sobol net in each replicate, at the sources and for the first surfaces that rays meet: smaller errors, honestly
+    /// estimated.
     #[default]
     Sobol,
     /// Independent random numbers.

@@ -81,7 +81,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let limit = self.units.widest_bridge(size).min(STATED_BRIDGE_SHARE * size);
         if !(width <= limit) {
             let reason = format!(
-                "it runs over the ends of its curve, which are {width:.3e} mm apart, and no more than {limit:.1e} mm are bridged"
+                "it runs over the ends of its curve, which are {width:.3e} mm apart; gaps of more than {limit:.1e} mm are not bridged"
             );
             return Err(Refusal::new(e, reason));
         }

@@ -160,7 +160,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
 
     /// Tells that an entity gives a usage another place than those that count.
     fn tell_other_place(&mut self, by: u64, usage: u64) {
-        self.problems.push(format!("#{by}: usage #{usage} has another place already, which counts alone"));
+        self.problems.push(format!("#{by}: usage #{usage} has another place already, which is used"));
     }
 
     /// Tells where a usage that a higher assembly sees has another place than the usages that it is made of.
@@ -170,7 +170,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let Some(composed) = self.composed_place(usage) else { return };
         if !is_one_place(&composed, &stated) && !is_one_place(&composed, &stated.inverse()) {
             self.problems.push(format!(
-                "#{}: usage #{} has another place than the usages that it is made of, which count alone",
+                "#{}: usage #{} has another place than the usages that it is made of, which are used",
                 e.id, usage.id
             ));
         }

@@ -47,7 +47,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         };
         let told = |what: &str| format!("#{}: {absence}; its relationship #{} {what}", e.id, relation.id);
         if used.contains(&relation.id) {
-            self.problems.push(told("is that of another usage, which counts"));
+            self.problems.push(told("is that of another usage, which is used"));
             return None;
         }
         let Some([first, second]) = related_representations(relation) else {
@@ -90,7 +90,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             let is_same = |usage: &&Usage| usage.child == child && are_one_place(usage.placement, placement);
             let told = if let Some(same) = own.iter().find(is_same) {
                 format!(
-                    "usage #{} puts product #{child} where its relationship #{relation} does, and counts alone",
+                    "usage #{} puts product #{child} where its relationship #{relation} does: it counts once",
                     same.id
                 )
             } else if let Some(k) = free.get_mut(&[parent, child]).and_then(Vec::pop) {

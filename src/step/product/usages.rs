@@ -58,7 +58,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 }
                 if is_placed {
                     self.problems.push(format!(
-                        "#{}: promises product #{}, which other usages put into #{parent}: these count alone",
+                        "#{}: promises product #{}, which other usages put into #{parent}: only these are used",
                         usage.id, usage.child
                     ));
                 }

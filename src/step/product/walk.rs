@@ -148,7 +148,7 @@ impl Walk<'_, '_> {
         }
         for (id, map) in self.assembly.unshown_maps(&self.reached) {
             let reason =
-                format!("is there for mapped items to show (#{map} REPRESENTATION_MAP), and none that stands does");
+                format!("is what #{map} REPRESENTATION_MAP shows, but no mapped item that has a place shows it");
             self.assembly.left_out.push((id, reason));
         }
     }

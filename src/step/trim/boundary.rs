@@ -49,7 +49,7 @@ pub(crate) fn bound_region(
     chains.retain(|c| !c.pieces.is_empty());
     let mut out = Boundary { loops: Vec::new(), seams: Vec::new(), repairs: Vec::new() };
     if chains.iter().any(|c| c.is_edge_turned) {
-        out.repairs.push("a loop winds around the surface twice: one of its edges that do was turned around");
+        out.repairs.push("a loop wound around the surface twice: one of its two rims was turned around");
     }
     // In the unwrapped plane a loop around a closed surface ends whole periods from its start: alone it bounds no region.
     let (winding, plain): (Vec<Chain>, Vec<Chain>) = chains.into_iter().partition(Chain::is_winding);

@@ -142,7 +142,7 @@ pub(super) fn place_hole(
         Some(shift) => {
             hole.shift(shift);
             if stands_out(&polygon, border, shift) {
-                repairs.push("a hole stands out of the outer loop of its face");
+                repairs.push("a hole reaches beyond the outer loop of its face");
             }
             if signed_area(&polygon) > 0.0 {
                 hole.reverse();
