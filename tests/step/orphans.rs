@@ -62,3 +62,19 @@ fn a_shape_that_no_mapped_item_shows_is_told() {
         assert!(left_out.iter().all(|(id, reason)| *id == 110 && reason.contains("#30 REPRESENTATION_MAP")));
     }
 }
+
+/// A map, as captures of product data have it, whose representation lists the solid of #110 once more, with a curve; one with a solid of
+/// its own besides is told.
+#[test]
+fn a_map_of_what_stands_already_is_not_told() {
+    let capture = |items: &str| {
+        format!("#120=SHAPE_REPRESENTATION('01',(#111,#33{items}),#1);\n#30=REPRESENTATION_MAP(#20,#120);\n")
+    };
+    let curve = "#33=POLYLINE('',(#10,#11));\n#34=CSG_SOLID('',#25);\n";
+    for (items, told) in [("", vec![]), (",#34", vec![120])] {
+        let import = read(&(block(110) + &capture(items) + curve));
+        assert_places(&import, &[0.0], items);
+        let left_out: Vec<u64> = import.report.left_out.iter().map(|note| note.id).collect();
+        assert_eq!(left_out, told, "{items}");
+    }
+}

@@ -2,6 +2,7 @@
 
 use super::assembly::Assembly;
 use super::purpose::{is_shape_representation, purpose_besides_shape};
+use super::topology::ShapeItems;
 use rustc_hash::FxHashSet;
 
 impl Assembly<'_, '_> {
@@ -20,8 +21,8 @@ impl Assembly<'_, '_> {
         orphans
     }
 
-    /// Returns the shapes that a REPRESENTATION_MAP offers and that nothing has `reached`, each with the map, but what is left out already
-    /// and what that holds.
+    /// Returns the representations that a REPRESENTATION_MAP offers and that nothing has `reached`, each with the map, where they have a
+    /// shape that no reached one lists; but what is left out already and what that holds.
     pub(super) fn unshown_maps(&self, reached: &FxHashSet<u64>) -> Vec<(u64, u64)> {
         let file = self.file;
         let mut known = FxHashSet::default();
@@ -36,9 +37,19 @@ impl Assembly<'_, '_> {
         if !unshown.is_empty() {
             let left_out = self.left_out.iter().map(|(id, _)| *id).collect();
             let told = self.held_representations(Vec::new(), left_out, &FxHashSet::default());
-            unshown.retain(|(id, _)| !told.contains(id));
+            // Captures of product data map solids of the product once more.
+            let listed: FxHashSet<u64> = reached.iter().flat_map(|id| self.items(*id)).collect();
+            unshown.retain(|(id, _)| !told.contains(id) && self.has_shape_besides(*id, &listed));
         }
         unshown
+    }
+
+    /// Whether a representation has a shape among its items that is not `listed`.
+    fn has_shape_besides(&self, representation: u64, listed: &FxHashSet<u64>) -> bool {
+        let mut rest = ShapeItems::default();
+        let items = self.items(representation).into_iter().filter(|item| !listed.contains(item));
+        items.for_each(|item| rest.add(self.file, item));
+        !rest.is_empty()
     }
 
     /// Returns what transformations put into these representations, with all other shapes of the same things.
