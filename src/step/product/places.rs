@@ -4,6 +4,7 @@
 //! half a millimetre apart are two.
 
 use crate::math::Frame;
+use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
 /// Share of a coordinate, and part of an axis, by which two placements of one thing may differ: of a number that a file prints with seven
@@ -78,29 +79,33 @@ impl Place {
 pub(super) struct PlaceTable {
     /// By thing, by the position along [`SORTING_LINE`], and by the number of the entry.
     entries: BTreeMap<(u64, i64, usize), Place>,
-    /// The largest rounding of an entry, mm.
-    widest: f64,
+    /// The largest rounding of the entries of each thing, mm.
+    widest: FxHashMap<u64, f64>,
 }
 
 impl PlaceTable {
     /// Adds a thing in a place; the entries are numbered from 0.
     pub(super) fn insert(&mut self, thing: u64, place: Place) {
         self.entries.insert((thing, ordered(place.along()), self.entries.len()), place);
-        self.widest = self.widest.max(place.rounding);
+        let widest = self.widest.entry(thing).or_default();
+        *widest = widest.max(place.rounding);
     }
 
     /// Returns the number of an entry that has the thing in this place, to rounding; `None` where there is none.
     pub(super) fn find(&self, thing: u64, place: &Place) -> Option<usize> {
+        let mut abreast = self.abreast(thing, place)?;
+        abreast.find(|(_, other)| place.is_one_with(other)).map(|(number, _)| number)
+    }
+
+    /// Returns the entries of a thing, with their numbers, of which one could be the same place: of ten thousand places of one screw few.
+    fn abreast(&self, thing: u64, place: &Place) -> Option<impl Iterator<Item = (usize, &Place)>> {
+        let widest = self.widest.get(&thing)?;
         // What is too far out for a number is refused by those who ask.
-        let along = place.along();
-        if !along.is_finite() {
-            return None;
-        }
-        // Of ten thousand places of one screw few lie abreast.
-        let reach = self.widest.max(place.rounding) * SORTING_LINE.iter().sum::<f64>();
+        let along = Some(place.along()).filter(|along| along.is_finite())?;
+        let reach = widest.max(place.rounding) * SORTING_LINE.iter().sum::<f64>();
         let [low, high] = [along - reach, along + reach].map(ordered);
-        let mut near = self.entries.range((thing, low, 0)..=(thing, high, usize::MAX));
-        near.find(|(_, other)| place.is_one_with(other)).map(|((_, _, number), _)| *number)
+        let near = self.entries.range((thing, low, 0)..=(thing, high, usize::MAX));
+        Some(near.map(|((_, _, number), other)| (*number, other)))
     }
 
     /// Whether the thing stands in this place, to rounding.
@@ -143,6 +148,17 @@ mod tests {
         let mut table = PlaceTable::default();
         table.insert(7, back.inner(&shift(1_234.567_84)));
         assert!(table.holds(7, &back.inner(&shift(1234.568))));
+    }
+
+    #[test]
+    fn one_thing_far_out_lets_no_others_lie_abreast() {
+        let parent = Place::of_parent(Frame::IDENTITY);
+        let mut table = PlaceTable::default();
+        table.insert(8, parent.inner(&shift(1e11)));
+        (0..100).for_each(|k| table.insert(7, parent.inner(&shift(1.5 * f64::from(k)))));
+        let place = parent.inner(&shift(15.0));
+        assert_eq!(table.abreast(7, &place).map(Iterator::count), Some(1));
+        assert_eq!(table.find(7, &place), Some(11));
     }
 
     #[test]
