@@ -335,6 +335,32 @@ fn many_products_of_one_shape_take_one_look_each() {
     assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
 }
 
+/// Relationships put a square into so many places of one assembly, each for a usage that is not in the file: each place is looked for once.
+#[test]
+fn many_lost_usages_take_one_look_each() {
+    const PLACES: u32 = 60_000;
+    let start = Instant::now();
+    let mut data = String::from(
+        "#900=PRODUCT_DEFINITION('','',$,$);\n#901=PRODUCT_DEFINITION_SHAPE('','',#900);\n#902=SHAPE_DEFINITION_REPRESENTATION(#901,#55);\n\
+         #910=PRODUCT_DEFINITION('','',$,$);\n#911=PRODUCT_DEFINITION_SHAPE('','',#910);\n#912=SHAPE_DEFINITION_REPRESENTATION(#911,#913);\n\
+         #913=SHAPE_REPRESENTATION('',(#2),$);\n",
+    );
+    for k in 0..PLACES {
+        let id = 1000 + 10 * k;
+        let [point, target, transformation, relation] = [id, id + 1, id + 2, id + 3];
+        data += &format!(
+            "#{point}=CARTESIAN_POINT('',({k}.,0.,0.));\n#{target}=AXIS2_PLACEMENT_3D('',#{point},$,$);\n\
+             #{transformation}=ITEM_DEFINED_TRANSFORMATION('','',#2,#{target});\n\
+             #{relation}=SHAPE_REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION('','',#55,#913,#{transformation});\n\
+             #{}=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},$);\n",
+            id + 4
+        );
+    }
+    let report = import(&square("").replace("#54=", &(data + "#54="))).report;
+    assert_eq!((report.instances, report.faces_placed.converted), (PLACES as usize, PLACES as usize));
+    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
+}
+
 #[test]
 fn what_stands_beyond_all_rounding_is_refused_by_name() {
     let far = square("").replace("CARTESIAN_POINT('',(1,0,0))", "CARTESIAN_POINT('',(1.E30,0,0))");

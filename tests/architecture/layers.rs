@@ -466,6 +466,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "styles",
             "usage_names",
             "usage_ends",
+            "open_usages",
             "assembly",
             "lost_usages",
             "subassemblies",

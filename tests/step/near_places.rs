@@ -72,3 +72,18 @@ fn a_lost_usage_in_the_place_of_another_adds_nothing() {
         assert_eq!(problems.iter().any(|p| p.ends_with(told)), to == 21, "{problems:?}");
     }
 }
+
+/// Two usages that are not in the file put the part to the same place, the second by what is no usage.
+#[test]
+fn a_lost_usage_in_the_place_of_another_lost_one_adds_nothing() {
+    let lost = |id: u32| {
+        relation(id, [110, 300], [20, 21])
+            + &format!("#{}=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{id},$);\n", id + 10)
+    };
+    let import = assembly("", &(lost(410) + &lost(430)));
+    let x: Vec<f64> = import.model.instances.iter().map(|i| i.placement.origin.x).collect();
+    let problems = &import.report.problems;
+    assert_eq!(x, [10.0], "{problems:?}");
+    let told = "; CONTEXT_DEPENDENT_SHAPE_REPRESENTATION #420 puts product #100 where its relationship #430 does: it counts once";
+    assert!(problems.iter().any(|p| p.contains("#440: ") && p.ends_with(told)), "{problems:?}");
+}

@@ -199,7 +199,6 @@ impl<'f, 'a> Assembly<'f, 'a> {
         // Usages in their places within their parents.
         let mut known = PlaceTable::default();
         let mut listed: FxHashSet<u64> = FxHashSet::default();
-        let place = |frame: &Frame| Place::of_parent(Frame::IDENTITY).inner(frame);
         for &OccurrenceShape { usage, representation } in shapes {
             let items = self.mapped_occurrences(usage, representation);
             let Some(stated) = self.placements.get(&usage) else {
@@ -208,9 +207,9 @@ impl<'f, 'a> Assembly<'f, 'a> {
                     // An item that comes again in its place is no second one.
                     let mut frames: Vec<Frame> = items.into_iter().filter_map(|(_, placement)| placement).collect();
                     frames.retain(|frame| {
-                        let is_new = !known.holds(usage, &place(frame));
+                        let is_new = !known.holds(usage, &Place::in_parent(frame));
                         if is_new {
-                            known.insert(usage, place(frame));
+                            known.insert(usage, Place::in_parent(frame));
                         }
                         is_new
                     });
@@ -219,11 +218,11 @@ impl<'f, 'a> Assembly<'f, 'a> {
                 continue;
             };
             if listed.insert(usage) {
-                stated.iter().for_each(|frame| known.insert(usage, place(frame)));
+                stated.iter().for_each(|frame| known.insert(usage, Place::in_parent(frame)));
             }
             let is_unplaced = stated.is_empty();
             let is_new = |placement: &Option<Frame>| match placement {
-                Some(placement) => !known.holds(usage, &place(placement)),
+                Some(placement) => !known.holds(usage, &Place::in_parent(placement)),
                 None => !is_unplaced,
             };
             for (item, _) in items.iter().filter(|(_, placement)| is_new(placement)) {

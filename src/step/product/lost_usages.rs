@@ -1,8 +1,8 @@
 //! Usages that are referred to but are not in the file: their relationships still tell where a component stands, and in which product.
 
 use super::assembly::Assembly;
-use super::places::is_one_place;
-use super::relations::{has_transformation, property_attributes, related_representations};
+use super::open_usages::{OpenUsages, PlacedBy};
+use super::relations::{has_transformation, property_attributes, related_representations, usage_attributes};
 use super::usage_ends::UsageEnds;
 use super::usage_names::{Usage, UsagePlacement};
 use crate::step::part21::Entity;
@@ -74,38 +74,28 @@ impl<'f, 'a> Assembly<'f, 'a> {
     /// Lets lost usages place their components, but where a usage puts them already: each by a usage of the same two products that has no
     /// placement, or else by one of its own.
     pub(super) fn restore_usages(&mut self, usages: &mut FxHashMap<u64, Vec<Usage>>, lost: Vec<LostUsage>) {
-        // Usages without a placement by parent and child, the last first.
-        let mut free: FxHashMap<[u64; 2], Vec<usize>> = FxHashMap::default();
-        let parents: FxHashSet<u64> = lost.iter().map(|lost| lost.parent).collect();
-        for parent in parents {
-            let own = usages.get(&parent).map(Vec::as_slice).unwrap_or_default();
-            for (k, usage) in own.iter().enumerate().rev() {
-                if usage.placement == UsagePlacement::Unstated {
-                    free.entry([parent, usage.child]).or_default().push(k);
-                }
-            }
-        }
+        let file = self.file;
+        let mut open: FxHashMap<u64, OpenUsages> = FxHashMap::default();
         for LostUsage { by, relation, absence, parent, child, placement } in lost {
             let own = usages.entry(parent).or_default();
-            let is_same = |usage: &&Usage| usage.child == child && are_one_place(usage.placement, placement);
-            let told = if let Some(same) = own.iter().find(is_same) {
-                format!(
-                    "usage #{} puts product #{child} where its relationship #{relation} does: it counts once",
-                    same.id
-                )
-            } else if let Some(k) = free.get_mut(&[parent, child]).and_then(Vec::pop) {
-                own[k].placement = placement;
-                format!("usage #{}, which has no place, takes that of its relationship #{relation}", own[k].id)
-            } else {
-                own.push(Usage { child, name: String::new(), id: by, placement });
-                format!("its relationship #{relation} places product #{child} in #{parent} all the same")
+            let added = Usage { child, name: String::new(), id: by, placement };
+            let told = match open.entry(parent).or_insert_with(|| OpenUsages::new(own)).place(own, added) {
+                PlacedBy::Standing(id) => {
+                    // What stands for a lost usage is none.
+                    let is_usage = file.entity(id).and_then(usage_attributes).is_some();
+                    let what = if is_usage { "usage".into() } else { file.entity_name(id) };
+                    format!(
+                        "{what} #{id} puts product #{child} where its relationship #{relation} does: it counts once"
+                    )
+                }
+                PlacedBy::Free(id) => {
+                    format!("usage #{id}, which has no place, takes that of its relationship #{relation}")
+                }
+                PlacedBy::Added => {
+                    format!("its relationship #{relation} places product #{child} in #{parent} all the same")
+                }
             };
             self.problems.push(format!("#{by}: {absence}; {told}"));
         }
     }
-}
-
-/// Whether two usages of one component in one assembly put it into the same place.
-fn are_one_place(a: UsagePlacement, b: UsagePlacement) -> bool {
-    matches!((a, b), (UsagePlacement::Stated(a), UsagePlacement::Stated(b)) if is_one_place(&a, &b))
 }

@@ -1,7 +1,7 @@
 //! From instances of the file to parts, and to where they stand.
 //!
 //! Source: ISO 10303-43/44. An assembly places representations (`assembly` with its `relations`, `links`, `usages`, `usage_names`,
-//! `usage_ends`, `lost_usages` and `subassemblies`; `walk` with `places`, `placed_children`, `orphans` and `placed_count`;
+//! `usage_ends`, `open_usages`, `lost_usages` and `subassemblies`; `walk` with `places`, `placed_children`, `orphans` and `placed_count`;
 //! `shared_items` and `pictures` say which of their items, `asides` what a viewer would not show); a representation is shells of faces
 //! (`topology`, with loops put in order by `swapped_vertices`, `face_edges` and `loop_order`, shells turned by `orientation`, and what has
 //! no extent left out by `zero_width` and `spikes`, what is there twice by `repeated_faces`), surfaces without a face and ready meshes
@@ -17,6 +17,7 @@ mod links;
 mod loop_order;
 mod lost_usages;
 pub(super) mod numbering;
+mod open_usages;
 mod orientation;
 mod orphans;
 mod pictures;

@@ -49,6 +49,11 @@ impl Place {
         Self::rounded(frame, frame.scale * PLACE_ROUNDING_MM)
     }
 
+    /// Returns the place of what stands at `local` in its parent, in the parent's coordinates.
+    pub(super) fn in_parent(local: &Frame) -> Self {
+        Self::of_parent(Frame::IDENTITY).inner(local)
+    }
+
     /// Returns the place of what stands at `local` in the thing of this place; unmoved it stands in the same parent as that.
     pub(super) fn inner(&self, local: &Frame) -> Self {
         if local.is_identity() {

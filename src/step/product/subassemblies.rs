@@ -4,7 +4,7 @@
 //! Known weakness: a mapped item in a representation that is only related to that of the product is not looked at.
 
 use super::assembly::Assembly;
-use super::places::{Place, PlaceTable};
+use super::open_usages::OpenUsages;
 use super::usage_names::{Usage, UsagePlacement};
 use crate::math::Frame;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -21,47 +21,6 @@ pub(super) struct ProductLink {
     pub(super) shown: u64,
     /// `None` where the mapped item tells it.
     pub(super) placement: Option<Frame>,
-}
-
-/// The usages of one assembly, to which places are added.
-struct OpenUsages {
-    /// Children in the places that usages state.
-    standing: PlaceTable,
-    /// Usages without a place by their children, the last first.
-    free: FxHashMap<u64, Vec<usize>>,
-}
-
-impl OpenUsages {
-    fn new(usages: &[Usage]) -> Self {
-        let mut open = Self { standing: PlaceTable::default(), free: FxHashMap::default() };
-        for (k, usage) in usages.iter().enumerate().rev() {
-            match usage.placement {
-                UsagePlacement::Stated(frame) => open.standing.insert(usage.child, local_place(&frame)),
-                UsagePlacement::Unstated => open.free.entry(usage.child).or_default().push(k),
-                UsagePlacement::Unreadable => {}
-            }
-        }
-        open
-    }
-
-    /// Puts a child to a place where none stands yet: by a usage that has none, or else by one of its own.
-    fn place(&mut self, usages: &mut Vec<Usage>, link: &ProductLink, frame: Frame) {
-        let place = local_place(&frame);
-        if self.standing.holds(link.child, &place) {
-            return;
-        }
-        self.standing.insert(link.child, place);
-        let placement = UsagePlacement::Stated(frame);
-        match self.free.get_mut(&link.child).and_then(Vec::pop) {
-            Some(k) => usages[k].placement = placement,
-            None => usages.push(Usage { child: link.child, name: String::new(), id: link.by, placement }),
-        }
-    }
-}
-
-/// Returns the place of what stands there in its parent, in the parent's coordinates.
-fn local_place(frame: &Frame) -> Place {
-    Place::of_parent(Frame::IDENTITY).inner(frame)
 }
 
 impl Assembly<'_, '_> {
@@ -93,8 +52,10 @@ impl Assembly<'_, '_> {
                 let in_item = || self.mapping(link.by, link.holder)?.placement;
                 // One that cannot be read is told by the walk.
                 let Some(frame) = link.placement.or_else(in_item) else { continue };
+                let placement = UsagePlacement::Stated(frame);
+                let added = Usage { child, name: String::new(), id: link.by, placement };
                 let own = usages.entry(link.parent).or_default();
-                open_usages.entry(link.parent).or_insert_with(|| OpenUsages::new(own)).place(own, &link, frame);
+                open_usages.entry(link.parent).or_insert_with(|| OpenUsages::new(own)).place(own, added);
                 open.push(link.parent);
             }
         }
