@@ -57,7 +57,9 @@ fn a_promise_counts_unless_usages_below_keep_it() {
     let x: Vec<f64> = kept.model.instances.iter().map(|i| i.placement.origin.x).collect();
     let told = &kept.report.problems;
     assert_eq!((x, told.len()), (vec![30.0], 1), "{told:?}");
-    assert!(told[0].ends_with("#620: promises product #100, which other usages put into #200: only these are used"));
+    assert!(
+        told[0].ends_with("#620: promises product #100, which other usages put into #200: only these are used")
+    );
 }
 
 /// The assembly #500, in which a usage puts the part to x = 10, in #200 at x = 20 by a relationship or a mapped item; #200 may stand in
@@ -93,6 +95,26 @@ fn an_assembly_stands_where_a_relationship_or_a_mapped_item_puts_it() {
         + &relation(720, [510, 710], [20, 21])
         + &relation(730, [710, 300], [20, 22]);
     assert_places(&assembly("", &format!("{sub}{middle}")), &[40.0], "a chain");
+}
+
+/// The assembly #500, in which a usage puts the part to x = 10, in #200 at x = 20 by a mapped item beside a usage without a place, and in
+/// #800 at x = 30: by another one, or by a usage.
+#[test]
+fn an_assembly_that_two_others_use_stands_in_both() {
+    let sub = product(500, "sub", 510)
+        + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n#30=REPRESENTATION_MAP(#20,#510);\n#31=MAPPED_ITEM('',#30,#22);\n"
+        + &usage(600, NEXT, "#500,#100,$")
+        + &relation(602, [110, 510], [20, 21])
+        + &contextual(604, 602, 600)
+        + &usage(620, NEXT, "#200,#500,$");
+    let other = product(800, "other", 810) + &usage(820, NEXT, "#800,#500,$");
+    let mapped = "#810=SHAPE_REPRESENTATION('',(#32,#23),#1);\n#32=MAPPED_ITEM('',#30,#23);\n".to_owned();
+    let placed = "#810=SHAPE_REPRESENTATION('',(#23),#1);\n".to_owned()
+        + &relation(822, [510, 810], [20, 23])
+        + &contextual(824, 822, 820);
+    for by in [mapped, placed] {
+        assert_places(&assembly("#31,", &format!("{sub}{other}{by}")), &[30.0, 40.0], &by);
+    }
 }
 
 /// The shape of the part, #111, is no product's and related to that of the part, #112: a relationship of a usage may name either, at either

@@ -34,8 +34,8 @@ impl Assembly<'_, '_> {
         }
         let mut open: Vec<u64> = usages.iter().filter(|(_, own)| !own.is_empty()).map(|(id, _)| *id).collect();
         open.sort_unstable();
-        let users = unplaced_users(usages);
-        let is_alone = |link: &ProductLink| users.get(&link.child).is_none_or(|user| *user == Some(link.parent));
+        let used = UsedProducts::new(usages);
+        let is_alone = |link: &ProductLink| used.allow(link);
         let mut open_usages: FxHashMap<u64, OpenUsages> = FxHashMap::default();
         let mut settled: FxHashSet<[u64; 2]> = FxHashSet::default();
         // What holds an assembly becomes one, so that what holds that is looked at again.
@@ -92,16 +92,31 @@ impl Assembly<'_, '_> {
     }
 }
 
-/// Returns the children of usages, with the product that alone uses each, without a place; `None` for others.
-fn unplaced_users(usages: &FxHashMap<u64, Vec<Usage>>) -> FxHashMap<u64, Option<u64>> {
-    let mut users: FxHashMap<u64, Option<u64>> = FxHashMap::default();
-    for (parent, own) in usages {
-        for usage in own {
-            let user = users.entry(usage.child).or_insert(Some(*parent));
-            *user = user.filter(|user| user == parent && usage.placement == UsagePlacement::Unstated);
+/// Which products the usages of a file use.
+struct UsedProducts {
+    children: FxHashSet<u64>,
+    /// Parents with their children, and whether no usage says where the child stands there.
+    pairs: FxHashMap<[u64; 2], bool>,
+}
+
+impl UsedProducts {
+    fn new(usages: &FxHashMap<u64, Vec<Usage>>) -> Self {
+        let mut used = Self { children: FxHashSet::default(), pairs: FxHashMap::default() };
+        for (parent, own) in usages {
+            for usage in own {
+                used.children.insert(usage.child);
+                let is_unplaced = used.pairs.entry([*parent, usage.child]).or_insert(true);
+                *is_unplaced &= usage.placement == UsagePlacement::Unstated;
+            }
         }
+        used
     }
-    users
+
+    /// Whether a link may stand for a usage: beside those of the same two products without a place, or where none uses the child.
+    fn allow(&self, link: &ProductLink) -> bool {
+        let pair = self.pairs.get(&[link.parent, link.child]);
+        pair.copied().unwrap_or_else(|| !self.children.contains(&link.child))
+    }
 }
 
 /// Sorts links by their children.
