@@ -117,6 +117,39 @@ fn an_assembly_that_two_others_use_stands_in_both() {
     }
 }
 
+/// The assembly #500, in which a usage puts the part to x = 10, by relationships alone in #200 and in #700. Unmoved in both it stands once;
+/// moved it stands in each, which is told where usages do not show that both are assemblies.
+#[test]
+fn an_assembly_that_relationships_put_into_several_products() {
+    let places = |[first, second]: [u32; 2], usages: &str| {
+        let data = product(500, "sub", 510)
+            + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
+            + &usage(600, NEXT, "#500,#100,$")
+            + &relation(602, [110, 510], [20, 21])
+            + &contextual(604, 602, 600)
+            + &product(700, "other", 710)
+            + "#710=SHAPE_REPRESENTATION('',(#21,#22),#1);\n"
+            + &relation(610, [510, 300], [20, first])
+            + &relation(720, [510, 710], [20, second])
+            + usages;
+        assembly("", &data)
+    };
+    assert_places(&places([20, 20], ""), &[10.0], "unmoved");
+    for (to, expected) in [([22, 21], [20.0, 30.0]), ([20, 21], [10.0, 20.0])] {
+        let import = places(to, "");
+        let mut x: Vec<f64> = import.model.instances.iter().map(|i| i.placement.origin.x).collect();
+        x.sort_by(f64::total_cmp);
+        let problems = &import.report.problems;
+        assert_eq!((x.as_slice(), problems.len()), (expected.as_slice(), 1), "{problems:?}");
+        assert!(
+            problems[0].contains("#610: puts product #500 into #200, as others put it into 1 more"),
+            "{problems:?}"
+        );
+    }
+    let both = usage(630, NEXT, "#200,#100,$") + &usage(640, NEXT, "#700,#100,$");
+    assert_places(&places([22, 21], &both), &[0.0, 0.0, 20.0, 30.0], "two assemblies");
+}
+
 /// The shape of the part, #111, is no product's and related to that of the part, #112: a relationship of a usage may name either, at either
 /// end, and the usage may not be in the file.
 #[test]

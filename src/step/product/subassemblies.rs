@@ -5,6 +5,7 @@
 
 use super::assembly::Assembly;
 use super::open_usages::OpenUsages;
+use super::places::is_one_place;
 use super::usage_names::{Usage, UsagePlacement};
 use crate::math::Frame;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -34,6 +35,7 @@ impl Assembly<'_, '_> {
         }
         let mut open: Vec<u64> = usages.iter().filter(|(_, own)| !own.is_empty()).map(|(id, _)| *id).collect();
         open.sort_unstable();
+        let assemblies: FxHashSet<u64> = open.iter().copied().collect();
         let used = UsedProducts::new(usages);
         let is_alone = |link: &ProductLink| used.allow(link);
         let mut open_usages: FxHashMap<u64, OpenUsages> = FxHashMap::default();
@@ -43,6 +45,8 @@ impl Assembly<'_, '_> {
             let mut links = related.remove(&child).unwrap_or_default();
             links.retain(is_alone);
             settled.extend(links.iter().map(|link| [link.holder, link.shown]));
+            keep_first_unmoved(&mut links);
+            self.problems.extend(unsure_direction(&links, &assemblies));
             // Of one whose children are all placed by mapped items these show everything.
             let states_places = |own: &Vec<Usage>| own.iter().any(|u| u.placement != UsagePlacement::Unstated);
             if usages.get(&child).is_some_and(states_places) {
@@ -117,6 +121,31 @@ impl UsedProducts {
         let pair = self.pairs.get(&[link.parent, link.child]);
         pair.copied().unwrap_or_else(|| !self.children.contains(&link.child))
     }
+}
+
+/// Leaves out, of the links that put one child unmoved into several products, all but those into the first: the products are mostly the
+/// same thing defined again, and it would stand in one place several times.
+fn keep_first_unmoved(links: &mut Vec<ProductLink>) {
+    let mut first = None;
+    links.retain(|link| {
+        let is_moved = link.placement.is_none_or(|frame| !is_one_place(&frame, &Frame::IDENTITY));
+        is_moved || *first.get_or_insert(link.parent) == link.parent
+    });
+}
+
+/// Says of relationships that put one child into several products, of which some are no `assemblies` by usages, that they may mean that
+/// these stand in it: writers swap the ends. `None` for others.
+fn unsure_direction(links: &[ProductLink], assemblies: &FxHashSet<u64>) -> Option<String> {
+    let parents: FxHashSet<u64> = links.iter().map(|link| link.parent).collect();
+    let first = links.iter().find(|link| !assemblies.contains(&link.parent)).filter(|_| parents.len() > 1)?;
+    Some(format!(
+        "#{}: puts product #{} into #{}, as others put it into {} more, and no usage says so: it stands in each, which is wrong if the \
+         ends of these relationships are swapped",
+        first.by,
+        first.child,
+        first.parent,
+        parents.len() - 1
+    ))
 }
 
 /// Sorts links by their children.
