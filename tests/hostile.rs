@@ -335,6 +335,33 @@ fn many_products_of_one_shape_take_one_look_each() {
     assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
 }
 
+/// So many assemblies in one another, each of which is promised the innermost part, and the outermost of which has a square of its own:
+/// what is above the part is looked at once, not what is below each assembly.
+#[test]
+fn promises_in_many_assemblies_take_one_look() {
+    const LEVELS: u32 = 40_000;
+    let start = Instant::now();
+    let mut data = String::from(
+        "#900=PRODUCT_DEFINITION_SHAPE('','',#100000);\n#901=SHAPE_DEFINITION_REPRESENTATION(#900,#55);\n",
+    );
+    let product = |level: u32| 100_000 + level;
+    for level in 0..=LEVELS {
+        data += &format!("#{}=PRODUCT_DEFINITION('','',$,$);\n", product(level));
+    }
+    for level in 0..LEVELS {
+        let (parent, child, part) = (product(level), product(level + 1), product(LEVELS));
+        data += &format!(
+            "#{}=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#{parent},#{child},$);\n\
+             #{}=PROMISSORY_USAGE_OCCURRENCE('','','',#{parent},#{part},$);\n",
+            200_000 + level,
+            300_000 + level
+        );
+    }
+    let report = import(&square("").replace("#54=", &(data + "#54="))).report;
+    assert_eq!((report.instances, report.faces_placed.converted), (1, 1));
+    assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
+}
+
 /// Relationships put a square into so many places of one assembly, each for a usage that is not in the file: each place is looked for once.
 #[test]
 fn many_lost_usages_take_one_look_each() {

@@ -9,7 +9,7 @@ pub(super) const RELATIONS: [&str; 10] = [
     "SHAPE_DEFINITION_REPRESENTATION",
     INDIVIDUAL_USAGE,
     "QUANTIFIED_ASSEMBLY_COMPONENT_USAGE",
-    "PROMISSORY_USAGE_OCCURRENCE",
+    PROMISE,
     "ASSEMBLY_COMPONENT_USAGE",
     "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION",
     "SHAPE_REPRESENTATION_RELATIONSHIP",
@@ -19,15 +19,14 @@ pub(super) const RELATIONS: [&str; 10] = [
 ];
 
 /// The usages of ISO 10303-44 that put a component into an assembly.
-const USAGES: [&str; 4] = [
-    INDIVIDUAL_USAGE,
-    "QUANTIFIED_ASSEMBLY_COMPONENT_USAGE",
-    "PROMISSORY_USAGE_OCCURRENCE",
-    "ASSEMBLY_COMPONENT_USAGE",
-];
+const USAGES: [&str; 4] =
+    [INDIVIDUAL_USAGE, "QUANTIFIED_ASSEMBLY_COMPONENT_USAGE", PROMISE, "ASSEMBLY_COMPONENT_USAGE"];
 
 /// The usage that means one occurrence of its component; the others may mean what such ones place.
 pub(super) const INDIVIDUAL_USAGE: &str = "NEXT_ASSEMBLY_USAGE_OCCURRENCE";
+
+/// The usage of a component in an assembly whose subassemblies are yet to be defined.
+pub(super) const PROMISE: &str = "PROMISSORY_USAGE_OCCURRENCE";
 
 /// What names once more, as a higher assembly sees it, what usages below put there.
 pub(super) const HIGHER_USAGE: &str = "SPECIFIED_HIGHER_USAGE_OCCURRENCE";
@@ -98,7 +97,7 @@ pub(super) fn is_higher_usage(e: Entity<'_, '_>) -> bool {
 
 /// Whether a usage puts a component into an assembly whose subassemblies are yet to be defined.
 pub(super) fn is_promise(e: Entity<'_, '_>) -> bool {
-    e.is_a("PROMISSORY_USAGE_OCCURRENCE")
+    e.is_a(PROMISE)
 }
 
 /// Returns the attributes of a SHAPE_DEFINITION_REPRESENTATION: definition and representation; `None` of any other entity.

@@ -5,7 +5,7 @@
 
 use super::assembly::Assembly;
 use super::lost_usages::LostUsage;
-use super::relations::{INDIVIDUAL_USAGE, is_promise, usage_attributes};
+use super::relations::{INDIVIDUAL_USAGE, PROMISE, is_promise, usage_attributes};
 use super::subassemblies::ProductLink;
 use super::usage_names::{Usage, UsagePlacement, name_usages};
 use crate::math::Frame;
@@ -31,29 +31,35 @@ impl<'f, 'a> Assembly<'f, 'a> {
     /// place; and those without a place of what is used anywhere else.
     fn leave_out_promises(&mut self, usages: &mut FxHashMap<u64, Vec<Usage>>) {
         let file = self.file;
-        let is_promised = |usage: &Usage| file.entity(usage.id).is_some_and(is_promise);
-        let mut parents: Vec<u64> =
-            usages.iter().filter(|(_, own)| own.iter().any(is_promised)).map(|(parent, _)| *parent).collect();
-        if parents.is_empty() {
+        if file.entities_named(&[PROMISE]).next().is_none() {
             return;
         }
-        parents.sort_unstable();
-        let mut used: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
+        let is_promised = |usage: &Usage| file.entity(usage.id).is_some_and(is_promise);
+        // Parents by what they are promised, and by what they use.
+        let mut promised: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
+        let mut users: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
         for (parent, own) in &*usages {
-            let children = own.iter().filter(|usage| !is_promised(usage)).map(|usage| usage.child);
-            used.insert(*parent, children.collect());
+            for usage in own {
+                let parents = if is_promised(usage) { &mut promised } else { &mut users };
+                parents.entry(usage.child).or_default().push(*parent);
+            }
         }
-        let used_anywhere: FxHashSet<u64> = used.values().flatten().copied().collect();
+        // Upwards from each component: there are fewer of them, and less is above one than below an assembly.
+        let mut kept: FxHashSet<[u64; 2]> = FxHashSet::default();
+        for (component, parents) in &promised {
+            let above = all_above(*component, &users);
+            let keeping = parents.iter().filter(|parent| above.contains(*parent));
+            kept.extend(keeping.map(|parent| [*parent, *component]));
+        }
+        let mut parents: Vec<u64> = promised.into_values().flatten().collect();
+        parents.sort_unstable();
+        parents.dedup();
         for parent in parents {
             let Some(own) = usages.get_mut(&parent) else { continue };
-            if !own.iter().any(|usage| is_promised(usage) && used_anywhere.contains(&usage.child)) {
-                continue;
-            }
-            let below = all_below(parent, &used);
             own.retain(|usage| {
                 let is_placed = usage.placement != UsagePlacement::Unstated;
-                let is_kept = below.contains(&usage.child);
-                if !is_promised(usage) || !is_kept && (is_placed || !used_anywhere.contains(&usage.child)) {
+                let is_kept = kept.contains(&[parent, usage.child]);
+                if !is_promised(usage) || !is_kept && (is_placed || !users.contains_key(&usage.child)) {
                     return true;
                 }
                 if is_placed {
@@ -116,12 +122,12 @@ impl<'f, 'a> Assembly<'f, 'a> {
     }
 }
 
-/// Returns the products that a product uses, and those that these use; `used` are the children of each.
-fn all_below(product: u64, used: &FxHashMap<u64, Vec<u64>>) -> FxHashSet<u64> {
-    let mut below: FxHashSet<u64> = FxHashSet::default();
+/// Returns the products that use a product, and those that use these; `users` are the parents of each.
+fn all_above(product: u64, users: &FxHashMap<u64, Vec<u64>>) -> FxHashSet<u64> {
+    let mut above: FxHashSet<u64> = FxHashSet::default();
     let mut open = vec![product];
-    while let Some(parent) = open.pop() {
-        open.extend(used.get(&parent).into_iter().flatten().copied().filter(|child| below.insert(*child)));
+    while let Some(child) = open.pop() {
+        open.extend(users.get(&child).into_iter().flatten().copied().filter(|parent| above.insert(*parent)));
     }
-    below
+    above
 }
