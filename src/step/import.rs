@@ -252,7 +252,8 @@ fn convert_placed(
     number_alike_paths(&mut model.instances);
     let faces = model.parts.iter().flat_map(|p| &p.shells).flat_map(|s| &s.faces);
     let faces = faces.filter_map(|f| f.entity.as_ref());
-    report.left_out.extend(faces_in_sets(file, faces.clone()));
+    let items = parts.keys().flat_map(|(representation, left_out)| shared.items(*representation, left_out));
+    report.left_out.extend(faces_in_sets(file, items));
     hidden.find_among(faces);
     report.hidden = hidden.notes(file);
     model

@@ -187,6 +187,9 @@ fn faces_in_a_set_of_surfaces_are_told() {
         let left_out: Vec<u64> = import.report.left_out.iter().map(|note| note.id).collect();
         assert_eq!((import.model.placed_face_count(), left_out), (faces, told), "{items}");
     }
+    // In the model it is refused, and told by that alone.
+    let refused = read_sections("", "#900,#901", &data.replace("#71=PLANE('',#14);\n", "")).report;
+    assert_eq!((refused.faces.refused, refused.left_out.len()), (1, 0), "{:?}", refused.left_out);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What few entities of a file say beside its shapes: what it hides, which other files it needs, which directions point nowhere, and what
 //! it holds without any shape.
 
+use super::topology::ShapeItems;
 use crate::formats::lower_extension;
 use crate::step::part21::{Entity, File};
 use crate::step::report::Note;
@@ -38,9 +39,9 @@ pub(crate) fn external_files(file: &File<'_>, own: &str) -> Vec<Note> {
     notes
 }
 
-/// Names the sets of points, curves and surfaces that list faces, which they do not hold: these are left out. Those in `converted` stand by
-/// what else holds them.
-pub(crate) fn faces_in_sets<'i>(file: &File<'_>, converted: impl Iterator<Item = &'i u64>) -> Vec<Note> {
+/// Names the sets of points, curves and surfaces that list faces, which they do not hold: these are left out. Those that a shell among the
+/// `placed` items lists stand, or are told, by that.
+pub(crate) fn faces_in_sets(file: &File<'_>, placed: impl Iterator<Item = u64>) -> Vec<Note> {
     let is_face = |id: &u64| file.entity(*id).is_some_and(|e| e.is_one_of(&["ADVANCED_FACE", "SUBFACE"]));
     let mut sets: Vec<(Entity<'_, '_>, Vec<u64>)> = Vec::new();
     for e in file.entities_named(&["GEOMETRIC_SET"]) {
@@ -53,10 +54,13 @@ pub(crate) fn faces_in_sets<'i>(file: &File<'_>, converted: impl Iterator<Item =
     if sets.is_empty() {
         return Vec::new();
     }
-    let converted: FxHashSet<u64> = converted.copied().collect();
+    let placed: FxHashSet<u64> = placed.collect();
+    let mut shapes = ShapeItems::default();
+    placed.into_iter().for_each(|id| shapes.add(file, id));
+    let listed: FxHashSet<u64> = shapes.shells.iter().flat_map(|shell| &shell.faces).map(|(id, _)| *id).collect();
     let mut notes = Vec::new();
     for (e, mut faces) in sets {
-        faces.retain(|id| !converted.contains(id));
+        faces.retain(|id| !listed.contains(id));
         if let Some(first) = faces.first() {
             let others = if faces.len() > 1 { format!(" and {} more", faces.len() - 1) } else { String::new() };
             let reason =
