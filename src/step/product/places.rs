@@ -2,6 +2,10 @@
 //!
 //! Only the digits of the placement within a parent count, wherever the parent stands: in an assembly a kilometre from the origin, things
 //! half a millimetre apart are two.
+//!
+//! Known weakness: of several placements one in the other only the digits of the innermost count. A thing to which two ways lead, by one
+//! step and by a large one with a small one in it, may stand twice; with the digits of the outer steps too, two things half a millimetre
+//! apart in what a mapped item puts a kilometre out would be one.
 
 use crate::math::Frame;
 use rustc_hash::FxHashMap;
