@@ -2,7 +2,7 @@
 //! decisions in files of any unit.
 
 use crate::files::part21;
-use crate::silence::{area, close, read};
+use crate::silence::{area, assert_refused, close, plate, read};
 use lampyris::math::{Point, Vector};
 use lampyris::nurbs::Curve;
 use lampyris::step::{Import, Settings, read_bytes};
@@ -232,4 +232,19 @@ fn an_edge_between_the_ends_of_its_curve_does_not_close_it() {
         let [a, b] = edge.curve.domain();
         assert!((edge.curve.evaluate(b) - edge.curve.evaluate(a)).length() > 4.9e-3, "{transition}");
     }
+}
+
+/// A hole along a straight spline from its vertex on, of a length in mm: no larger than a vertex it is none, and a longer one is refused.
+#[test]
+fn a_hole_no_larger_than_its_vertex_is_none() {
+    let with_spline = |length: f64| {
+        let end = format!("#80=CARTESIAN_POINT('',({:?},5.0,0.));\n", 7.0 + length);
+        let spline =
+            "#66=B_SPLINE_CURVE_WITH_KNOTS('',1,(#60,#80),.UNSPECIFIED.,.F.,.F.,(2,2),(0.,1.),.UNSPECIFIED.);";
+        end + &plate(0.0).replace("#66=CIRCLE('',#65,2.);", spline)
+    };
+    for length in [0.002, 0.005, 0.02] {
+        close(area(&read(&with_spline(length))), 100.0, 1e-9);
+    }
+    assert_refused(&with_spline(1.0), "it runs over the ends of its curve");
 }

@@ -9,7 +9,7 @@ use super::joints::{
     JoinedCurve, Joint, cut_overlap, doubles_back, elevate_degree, end_point, joint_crossing, joint_margin,
     start_point, step_between,
 };
-use super::tolerances::{ACCURACY_MM, LOOSE_VERTEX_MM, STATED_BRIDGE_SHARE};
+use super::tolerances::{ACCURACY_MM, EMPTY_LOOP_MM, LOOSE_VERTEX_MM, STATED_BRIDGE_SHARE};
 use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Homogeneous, Point};
 use crate::nurbs::{ControlPoint, Curve};
@@ -69,7 +69,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         }
         let is_near = width <= STATED_BRIDGE_SHARE * size;
         let is_over_ends = if usage.is_closed {
-            usage.is_alone || is_near
+            // Of a curve no larger than its vertex nothing would be lost.
+            is_near || usage.is_alone && size > EMPTY_LOOP_MM
         } else {
             let may_close = width <= accuracy || is_closed_by_file(owner);
             let is_seam = *are_one || may_close && is_near && usage.runs_backwards(&directed);

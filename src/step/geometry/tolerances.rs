@@ -38,6 +38,8 @@ pub(super) const EMPTY_SHARE: f64 = 1e-9;
 pub(super) const LOOSE_VERTEX_MM: f64 = 1e-3;
 /// Least and most that a file's stated accuracy counts for: zero and metres are both written.
 pub(super) const ACCURACY_MM: [f64; 2] = [1e-6, 1e-2];
+/// A loop along one open curve of this size or less encloses nothing: both its ends are its vertex, written as loosely as files are.
+pub(super) const EMPTY_LOOP_MM: f64 = 4.0 * ACCURACY_MM[1];
 /// A gap between segments of a composite curve up to this share of the curve's size may be a writer's inaccuracy.
 pub(super) const BRIDGE_SHARE: f64 = 1e-2;
 /// The accuracy that a file states counts for such gaps up to this share of the curve's size: metres would join anything.
