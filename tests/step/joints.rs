@@ -169,6 +169,11 @@ fn an_edge_over_segments_that_overlap_does_not_double_back() {
 /// A disc of radius 5 along two half circles of a composite curve, the second of which ends `gap` before the start of the first and with
 /// this transition, between vertices at these angles on it; a straight edge leads back to the first vertex where `is_slit`.
 fn disc(gap: f64, transition: &str, angles: &[f64], is_slit: bool) -> Import {
+    read(&disc_data(gap, transition, angles, is_slit))
+}
+
+/// The data of [`disc`]: edges from #50 on, the plane #71, the face #73.
+fn disc_data(gap: f64, transition: &str, angles: &[f64], is_slit: bool) -> String {
     let end = 2.0 * PI - gap / 5.0;
     let mut data = format!(
         "#20=CIRCLE('',#14,5.);\n#21=TRIMMED_CURVE('',#20,(PARAMETER_VALUE(0.)),(PARAMETER_VALUE({PI:?})),.T.,.PARAMETER.);\n\
@@ -190,10 +195,10 @@ fn disc(gap: f64, transition: &str, angles: &[f64], is_slit: bool) -> Import {
         uses.push(format!("#6{k}"));
     }
     let list = uses.join(",");
-    read(&format!(
+    format!(
         "{data}#70=EDGE_LOOP('',({list}));\n#71=PLANE('',#14);\n#72=FACE_OUTER_BOUND('',#70,.T.);\n\
          #73=ADVANCED_FACE('',(#72),#71,.T.);\n#74=OPEN_SHELL('',(#73));\n#900=SHELL_BASED_SURFACE_MODEL('',(#74));\n"
-    ))
+    )
 }
 
 /// By one edge from a vertex to the same, whatever the file says of the curve's end, and by two of which one runs over it.
@@ -220,6 +225,33 @@ fn an_edge_over_ends_too_far_apart_is_refused() {
         let refusals = &import.report.refusals;
         assert!(refusals.iter().any(|r| r.reason.contains("it runs over the ends of its curve")), "{refusals:?}");
     }
+}
+
+/// A segment of 225° of the disc whose arc has the wrong sense, and nothing else on its curve: gaps of 0.3, 3.5 and 7 % of the curve are no
+/// part of it. The area is that of a sector without its triangle.
+#[test]
+fn an_edge_of_wrong_sense_does_not_run_over_ends_that_lie_apart() {
+    for gap in [0.05, 0.5, 1.0] {
+        let data = disc_data(gap, "CONTINUOUS", &[0.25 * PI, 1.5 * PI], true);
+        let right = "#50=EDGE_CURVE('',#40,#41,#25,.T.)";
+        assert!(data.contains(right));
+        let import = read(&data.replace(right, "#50=EDGE_CURVE('',#40,#41,#25,.F.)"));
+        let angle = 1.25 * PI;
+        assert_read(&import, Some("sense of an edge contradicts"), 12.5 * (angle - angle.sin()), &format!("{gap}"));
+    }
+}
+
+/// The disc cut by a chord into two faces: the arc of the one takes what is between the vertices, that of the other runs over the ends.
+#[test]
+fn an_edge_runs_over_ends_beside_another_along_the_rest_of_its_curve() {
+    let data = disc_data(0.05, "CONTINUOUS", &[1.5 * PI, 0.25 * PI], true).replace("'',(#73))", "'',(#73,#85))")
+        + "#80=EDGE_CURVE('',#41,#40,#25,.T.);\n#81=ORIENTED_EDGE('',*,*,#80,.T.);\n#82=ORIENTED_EDGE('',*,*,#51,.F.);\n\
+           #83=EDGE_LOOP('',(#81,#82));\n#84=FACE_OUTER_BOUND('',#83,.T.);\n#85=ADVANCED_FACE('',(#84),#71,.T.);\n";
+    let import = read(&data);
+    let faces = &import.report.faces;
+    assert_eq!((faces.converted, faces.repaired), (2, 1), "{:?}", import.report.repairs);
+    assert!(import.report.repairs[0].reason.contains("lie apart"), "{:?}", import.report.repairs);
+    close(area(&import), 25.0 * PI, 1e-4);
 }
 
 /// A slit of 5 µm between the ends of a curve along which one edge runs from the one to the other.

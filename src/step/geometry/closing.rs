@@ -1,7 +1,8 @@
 //! Curves whose ends do not quite meet, closed for the edges that run over these ends: by a joint like those between segments.
 //!
-//! A curve is closed where an edge takes all of it from one vertex to the same, and a composite one, unless the file ends it with a
-//! discontinuity, where an edge would otherwise run against its sense. Edges along the curve as it stands are left as they are.
+//! A curve is closed where an edge takes all of it from one vertex to the same. A composite one, unless the file ends it with a
+//! discontinuity, is closed where an edge would otherwise run against its sense, and another edge runs along what lies between its
+//! vertices. Known weakness: beside a wider gap than the accuracy, and without such another edge, the sense is taken for wrong.
 
 use super::composite::{coincident, is_closed_by_file};
 use super::curves::{COMPOSITES, CurveShape, DirectedCurve};
@@ -14,6 +15,14 @@ use super::{GeometryReader, Outcome, Refusal};
 use crate::math::{Homogeneous, Point};
 use crate::nurbs::{ControlPoint, Curve};
 use crate::step::part21::Entity;
+use rustc_hash::FxHashMap;
+
+/// Edges along one curve that are asked which part of it they take: a curve in more pieces is not asked further.
+const ASKED_EDGES: usize = 64;
+
+/// Edges by the composite curve along which they run.
+#[derive(Debug, Default)]
+pub(crate) struct CompositeEdges(FxHashMap<u64, Vec<u64>>);
 
 /// How an edge uses its curve.
 pub(super) struct CurveUse {
@@ -28,10 +37,11 @@ pub(super) struct CurveUse {
 }
 
 impl CurveUse {
-    /// Whether the edge runs against its sense along an open curve.
-    fn runs_backwards(&self, curve: &DirectedCurve) -> bool {
+    /// Returns where its vertices are on a curve, in the order of the edge's sense: descending where it runs against that along an open
+    /// curve.
+    fn parameters(&self, curve: &DirectedCurve) -> [f64; 2] {
         let [first, last] = self.vertices.map(|vertex| curve.shape.parameter(vertex));
-        if self.sense != curve.reversed { last < first } else { first < last }
+        if self.sense != curve.reversed { [first, last] } else { [last, first] }
     }
 
     /// Whether its vertices are the two ends of a curve, which are `width`, mm, apart.
@@ -45,13 +55,15 @@ impl CurveUse {
 
 impl<'f, 'a> GeometryReader<'f, 'a> {
     /// Returns the curve #`id` of the edge `e`, read as `directed`, for this use of it: closed where the edge runs over ends that lie apart
-    /// by no more than is bridged between segments, else as it is. Refuses ends farther apart over which the edge runs all the same.
+    /// by no more than is bridged between segments, else as it is. Refuses ends farther apart over which the edge runs all the same, as
+    /// `others`, the edges of its part, may tell.
     pub(super) fn close_for_edge(
         &self,
         e: Entity<'f, 'a>,
         id: u64,
         directed: DirectedCurve,
         usage: &CurveUse,
+        others: &CompositeEdges,
     ) -> Outcome<DirectedCurve> {
         let CurveShape::Spline { curve, closed: are_one, joints } = &directed.shape else { return Ok(directed) };
         let owner = self.parameter_owner(self.entity(id)?);
@@ -72,9 +84,13 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             // Of a curve no larger than its vertex nothing would be lost.
             is_near || usage.is_alone && size > EMPTY_LOOP_MM
         } else {
-            let may_close = width <= accuracy || is_closed_by_file(owner);
-            let is_seam = *are_one || may_close && is_near && usage.runs_backwards(&directed);
-            is_seam && !usage.joins_ends(curve, width)
+            let may_close = is_near && (width <= accuracy || is_closed_by_file(owner));
+            let runs_over = || {
+                let [from, to] = usage.parameters(&directed);
+                let is_taken = || self.is_taken([to, from], &directed, others.along(owner, e));
+                to < from && (width <= accuracy || is_taken())
+            };
+            (*are_one || may_close && runs_over()) && !usage.joins_ends(curve, width)
         };
         if !is_over_ends {
             return Ok(directed);
@@ -89,6 +105,51 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let mut closed = join_ends(owner.id, curve, [accuracy, limit]);
         closed.joints.extend(joints.iter().copied());
         Ok(DirectedCurve { shape: CurveShape::joined(closed), reversed: directed.reversed })
+    }
+
+    /// Returns those of some edges that run along composite curves.
+    pub(crate) fn composite_edges(&self, edges: impl IntoIterator<Item = u64>) -> CompositeEdges {
+        let mut found = CompositeEdges::default();
+        if self.file.entities_named(&COMPOSITES).next().is_none() {
+            return found;
+        }
+        for id in edges {
+            let own = self.file.entity(id).and_then(|e| e.attributes("EDGE_CURVE", 3));
+            let curve = own.and_then(|a| self.file.entity(a.id(0)?));
+            let owner = curve.map(|curve| self.parameter_owner(curve)).filter(|owner| owner.is_one_of(&COMPOSITES));
+            if let Some(owner) = owner {
+                found.0.entry(owner.id).or_default().push(id);
+            }
+        }
+        found
+    }
+
+    /// Whether one of these edges, run as its sense says, takes the part of an open curve from `low` to `high`: the middle of what it takes
+    /// is there.
+    fn is_taken(&self, [low, high]: [f64; 2], curve: &DirectedCurve, edges: impl Iterator<Item = u64>) -> bool {
+        let takes_it = |id: u64| {
+            let [first, last] = self.use_of_curve(id).map_or([low; 2], |usage| usage.parameters(curve));
+            let middle = 0.5 * (first + last);
+            first < last && low < middle && middle < high
+        };
+        edges.take(ASKED_EDGES).any(takes_it)
+    }
+
+    /// Returns how the EDGE_CURVE #`id` uses its curve; `None` where that cannot be told.
+    fn use_of_curve(&self, id: u64) -> Option<CurveUse> {
+        let e = self.file.entity(id)?;
+        let ends = e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1))?;
+        let vertices = [self.vertex(ends.id(0)?).ok()?, self.vertex(ends.id(1)?).ok()?];
+        let sense = e.attributes("EDGE_CURVE", 3)?.flag(1) != Some(false);
+        Some(CurveUse { vertices, sense, is_closed: ends.id(0) == ends.id(1), is_alone: false })
+    }
+}
+
+impl CompositeEdges {
+    /// Returns the edges along the curve `owner` other than `e`.
+    fn along(&self, owner: Entity<'_, '_>, e: Entity<'_, '_>) -> impl Iterator<Item = u64> {
+        let (edges, e) = (self.0.get(&owner.id).map_or(&[][..], Vec::as_slice), e.id);
+        edges.iter().copied().filter(move |&id| id != e)
     }
 }
 

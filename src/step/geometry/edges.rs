@@ -1,6 +1,6 @@
 //! Edges: curves cut to their vertices, running from the start vertex to the end vertex.
 
-use super::closing::CurveUse;
+use super::closing::{CompositeEdges, CurveUse};
 use super::composite::coincident;
 use super::curves::{CurveShape, DirectedCurve};
 use super::joints::Joint;
@@ -41,11 +41,20 @@ pub(crate) struct TrimmedEdge {
     pub(crate) is_arc: bool,
 }
 
+/// What is known of an edge besides its own entity.
+#[derive(Clone, Copy)]
+pub(crate) struct EdgeContext<'c> {
+    /// Whether a loop has no other edge: of a closed curve it is then the whole, though its vertices are two that lie apart by rounding.
+    pub(crate) is_alone: bool,
+    /// Whether the file has its vertices in the wrong order.
+    pub(crate) is_swapped: bool,
+    /// Those of its part along composite curves.
+    pub(crate) others: &'c CompositeEdges,
+}
+
 impl<'f, 'a> GeometryReader<'f, 'a> {
-    /// Reads an edge's curve between its vertices, mm; that of a SUBEDGE is cut from its parent's. Refuses other kinds of edges. `alone` is
-    /// whether a loop has no other edge: of a closed curve it is then the whole, though its vertices are two that lie apart by rounding.
-    /// `swapped` is whether the file has its vertices in the wrong order.
-    pub(crate) fn edge(&self, id: u64, alone: bool, swapped: bool) -> Outcome<TrimmedEdge> {
+    /// Reads an edge's curve between its vertices, mm; that of a SUBEDGE is cut from its parent's. Refuses other kinds of edges.
+    pub(crate) fn edge(&self, id: u64, context: EdgeContext<'_>) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
         let vertices = e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1));
         let Some(vertices) = vertices.or_else(|| e.attributes("SUBEDGE", 1)) else {
@@ -59,8 +68,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         // A simple EDGE_CURVE has its vertices before its geometry.
         let own = owner.attributes("EDGE_CURVE", 3);
         let (curve, sense) = own.map_or((None, true), |a| (a.id(0), a.flag(1) != Some(false)));
-        let [first, last] = if swapped { [1, 0] } else { [0, 1] };
-        let edge = self.edge_between(e.id, [vertices.id(first), vertices.id(last)], curve, (sense, alone))?;
+        let [first, last] = if context.is_swapped { [1, 0] } else { [0, 1] };
+        let edge = self.edge_between(e.id, [vertices.id(first), vertices.id(last)], curve, (sense, context))?;
         // A part of an edge may run either way along it.
         let repair = edge.repair.filter(|&repair| owner.id == e.id || repair != WRONG_SENSE);
         Ok(TrimmedEdge { repair, ..edge })
@@ -75,7 +84,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         id: u64,
         vertices: [Option<u64>; 2],
         curve: Option<u64>,
-        (sense, alone): (bool, bool),
+        (sense, context): (bool, EdgeContext<'_>),
     ) -> Outcome<TrimmedEdge> {
         let e = self.entity(id)?;
         let [Some(v0), Some(v1)] = vertices else { return Err(Refusal::new(e, "a vertex is missing")) };
@@ -88,10 +97,11 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             return Ok(TrimmedEdge { curve, ..TrimmedEdge::default() });
         };
         let directed = self.curve(curve, 0)?;
-        let usage = CurveUse { vertices: [p, q], sense, is_closed: closed, is_alone: alone };
-        let directed = self.close_for_edge(e, curve, directed, &usage)?;
+        let is_alone = context.is_alone;
+        let usage = CurveUse { vertices: [p, q], sense, is_closed: closed, is_alone };
+        let directed = self.close_for_edge(e, curve, directed, &usage, context.others)?;
         // A loop of one edge encloses something: next to nothing of the curve cannot be meant.
-        let closed = closed || alone && directed.shape.period().is_some() && coincident(p, q, LOOSE_VERTEX_MM);
+        let closed = closed || is_alone && directed.shape.period().is_some() && coincident(p, q, LOOSE_VERTEX_MM);
         let edge = trim_to_vertices(&directed, p, q, closed, sense)
             .ok_or_else(|| Refusal::new(e, "its vertices leave nothing of its curve"))?;
         // A trimmed curve has the parameter of the whole one, also where it is run backwards.

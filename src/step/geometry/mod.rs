@@ -5,7 +5,7 @@
 //! `swept_surfaces`). What cannot be had is a [`Refusal`] that names the entity and the reason. Curves may lie on surfaces and surfaces
 //! be swept from curves: the readers call each other as methods of [`GeometryReader`], their types do not depend on each other.
 
-mod closing;
+pub(super) mod closing;
 pub(super) mod composite;
 pub(super) mod curves;
 pub(super) mod edges;

@@ -15,7 +15,7 @@ use super::zero_width::{joined_vertex, remove_faces_without_width, vertex_ids, v
 use crate::math::Point;
 use crate::model::{Edge, EdgeId, Face, Part, Shell, VertexId};
 use crate::nurbs::{Curve, Surface};
-use crate::step::geometry::edges::TrimmedEdge;
+use crate::step::geometry::edges::{EdgeContext, TrimmedEdge};
 use crate::step::geometry::extent::FaceExtent;
 use crate::step::geometry::units::Units;
 use crate::step::geometry::{EMPTY_EDGE_MM, FARTHEST_MM, GeometryReader, Outcome, Refusal};
@@ -58,8 +58,13 @@ pub(crate) fn convert(
     // Each edge once: faces that share one must get the same bits, or they would not join.
     let single = plans.values().flatten().flat_map(|plan| &plan.loops).filter(|l| l.len() == 1);
     let alone: FxHashSet<EdgeKey> = single.map(|l| l[0].0).collect();
-    let mut edges: Vec<Outcome<TrimmedEdge>> =
-        keys.par_iter().map(|key| edge_curve(&geometry, *key, alone.contains(key))).collect();
+    let entities = keys.iter().filter_map(|key| if let EdgeKey::Entity(id) = key { Some(*id) } else { None });
+    let others = geometry.composite_edges(entities);
+    let edge = |key: &EdgeKey| {
+        let context = EdgeContext { is_alone: alone.contains(key), is_swapped: false, others: &others };
+        edge_curve(&geometry, *key, context)
+    };
+    let mut edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(edge).collect();
     let table = EdgeTable { keys: &mut keys, index: &mut index, edges: &mut edges };
     let swapped = put_vertices_in_order(&geometry, &ids, &mut plans, table);
     let reason = "its vertices are in the wrong order: all loops run it the other way";
@@ -227,12 +232,11 @@ fn add_shells(
     out.found = out.found.saturating_sub(removed.len());
 }
 
-/// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length. `alone` is whether a
-/// loop has no other edge.
-fn edge_curve(geometry: &GeometryReader<'_, '_>, key: EdgeKey, alone: bool) -> Outcome<TrimmedEdge> {
+/// Returns the curve of an edge, mm, or the line between two points of a loop; without one where it has no length.
+fn edge_curve(geometry: &GeometryReader<'_, '_>, key: EdgeKey, context: EdgeContext<'_>) -> Outcome<TrimmedEdge> {
     match key {
         // Parts are cut from whole edges, which must be there first.
-        EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id, alone, false),
+        EdgeKey::Entity(id) | EdgeKey::Part { entity: id, .. } => geometry.edge(id, context),
         EdgeKey::Straight(a, b) => {
             let (p, q) = (geometry.point(a)?, geometry.point(b)?);
             let length = (q - p).length();

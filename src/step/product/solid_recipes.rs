@@ -10,6 +10,7 @@ use crate::model::Analytic;
 use crate::nurbs::{Curve, conic};
 use crate::step::chart::{Chart, Kind};
 use crate::step::geometry::curves::map_points;
+use crate::step::geometry::edges::EdgeContext;
 use crate::step::geometry::{GeometryReader, Outcome, Refusal, references};
 use crate::step::part21::{Args, Entity};
 use std::f64::consts::TAU;
@@ -166,12 +167,15 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             (surface, boundaries.map(|b| self.segments(self.entity(b)?, 0)).collect::<Outcome<Vec<_>>>()?)
         } else {
             let plan = read_face(self.file, area.id)?;
-            let curve = |(key, reversed): &(EdgeKey, bool), alone: bool| -> Outcome<Curve> {
+            let keys = plan.loops.iter().flatten().map(|(key, _)| key);
+            let entities = keys.filter_map(|key| if let EdgeKey::Entity(id) = key { Some(*id) } else { None });
+            let others = self.composite_edges(entities);
+            let curve = |(key, reversed): &(EdgeKey, bool), is_alone: bool| -> Outcome<Curve> {
                 let EdgeKey::Entity(edge) = key else {
                     return Err(Refusal::new(area, "polygonal loops of a profile are not supported"));
                 };
                 let curve = self
-                    .edge(*edge, alone, false)?
+                    .edge(*edge, EdgeContext { is_alone, is_swapped: false, others: &others })?
                     .curve
                     .ok_or_else(|| Refusal::new(area, "an edge has no length"))?;
                 Ok(if *reversed { curve.reversed() } else { curve })

@@ -8,6 +8,8 @@ use super::loop_order::turned_to_follow;
 use super::spikes::EdgeTable;
 use super::topology::{EdgeKey, FacePlan};
 use super::zero_width::vertex_ids;
+use crate::step::geometry::closing::CompositeEdges;
+use crate::step::geometry::edges::EdgeContext;
 use crate::step::geometry::{GeometryReader, Outcome};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -58,11 +60,13 @@ pub(super) fn put_vertices_in_order(
     against.sort_unstable();
     let mut renamed: FxHashMap<EdgeKey, EdgeKey> = FxHashMap::default();
     let mut swapped = Vec::with_capacity(against.len());
+    // Run the other way, an arc over the ends of a composite curve is the part between its vertices.
+    let context = EdgeContext { is_alone: false, is_swapped: true, others: &CompositeEdges::default() };
     for k in against {
         let old = table.keys[k];
         let (EdgeKey::Entity(entity), [Some(a), Some(b)]) = (old, vertex_ids(geometry.file, old)) else { continue };
         let new = EdgeKey::Part { entity, ends: [b, a] };
-        table.edges[k] = geometry.edge(entity, false, true);
+        table.edges[k] = geometry.edge(entity, context);
         table.keys[k] = new;
         table.index.remove(&old);
         table.index.insert(new, k);
