@@ -1,6 +1,7 @@
 //! Where the holes of a face lie on a surface with periods: moved by whole ones until they are inside its border.
 
 use super::loops::{Chain, contains};
+use super::obstacles::bounds;
 use crate::math::Uv;
 use crate::math::polygon::{nearest_on_side, polygon_sides, signed_area};
 use crate::step::chart::Chart;
@@ -17,11 +18,48 @@ const FINE_DENSITY: usize = 16;
 /// misses it by 1e-4 of its size, and holes may touch their border.
 const OUTSIDE_SHARE: f64 = 1e-3;
 
+/// A polygon in the box around it.
+struct Outline {
+    polygon: Vec<Uv>,
+    /// Lowest and highest corner of the box.
+    bounds: [Uv; 2],
+}
+
+impl Outline {
+    fn new(polygon: Vec<Uv>) -> Self {
+        let bounds = bounds(&polygon);
+        Self { polygon, bounds }
+    }
+
+    /// Returns [`PLACES`] corners, evenly over all.
+    fn places(&self) -> impl Iterator<Item = Uv> {
+        (0..PLACES).map(move |k| self.polygon[k * self.polygon.len() / PLACES])
+    }
+
+    /// Whether the box of a hole, moved by `shift`, stands out of this one by more than [`OUTSIDE_SHARE`].
+    fn is_left_by(&self, hole: &Self, shift: Uv) -> bool {
+        let ([hole_lo, hole_hi], [lo, hi]) = (hole.bounds, self.bounds);
+        let room = OUTSIDE_SHARE * (hi - lo);
+        ((hole_lo + shift).cmplt(lo - room) | (hole_hi + shift).cmpgt(hi + room)).any()
+    }
+
+    /// Whether a place lies outside by more than [`OUTSIDE_SHARE`].
+    fn is_far_from(&self, place: Uv) -> bool {
+        let size = self.bounds[1] - self.bounds[0];
+        let distance = |side: [Uv; 2]| {
+            let [a, b, p] = [side[0], side[1], place].map(|q| q / size);
+            (nearest_on_side([a, b], p) - p).length()
+        };
+        let distances = polygon_sides(&self.polygon).map(distance);
+        !contains(&self.polygon, place) && distances.fold(f64::INFINITY, f64::min) > OUTSIDE_SHARE
+    }
+}
+
 /// The border into which holes are moved, as polygons that are made once, when they are first asked for.
 pub(super) struct Border<'c> {
     outer: &'c Chain,
-    coarse: OnceCell<Vec<Uv>>,
-    fine: OnceCell<Vec<Uv>>,
+    coarse: OnceCell<Outline>,
+    fine: OnceCell<Outline>,
 }
 
 impl<'c> Border<'c> {
@@ -30,57 +68,32 @@ impl<'c> Border<'c> {
     }
 
     /// Returns the polygon in which nearly all holes are whole.
-    fn coarse(&self) -> &[Uv] {
-        self.coarse.get_or_init(|| self.outer.polygon())
+    fn coarse(&self) -> &Outline {
+        self.coarse.get_or_init(|| Outline::new(self.outer.polygon()))
     }
 
     /// Returns the polygon of [`FINE_DENSITY`].
-    fn fine(&self) -> &[Uv] {
-        self.fine.get_or_init(|| self.outer.polygon_of_density(FINE_DENSITY))
+    fn fine(&self) -> &Outline {
+        self.fine.get_or_init(|| Outline::new(self.outer.polygon_of_density(FINE_DENSITY)))
+    }
+
+    /// Whether the box of a hole, moved by `shift`, stands out.
+    fn is_left_by(&self, hole: &Outline, shift: Uv) -> bool {
+        self.coarse().is_left_by(hole, shift) && self.fine().is_left_by(hole, shift)
+    }
+
+    /// Whether one of a few places of a hole, moved by `shift`, lies outside.
+    fn leaves_out(&self, hole: &Outline, shift: Uv) -> bool {
+        let mut places = hole.places().map(|place| place + shift);
+        places.any(|p| !contains(&self.coarse().polygon, p) && self.fine().is_far_from(p))
     }
 }
 
-/// Returns the lowest and highest parameters of a polygon.
-fn corners_of_box(polygon: &[Uv]) -> [Uv; 2] {
-    polygon.iter().fold([Uv::INFINITY, Uv::NEG_INFINITY], |[lo, hi], &p| [lo.min(p), hi.max(p)])
-}
-
-/// Whether the box of a hole, moved by `shift`, stands out of that of a border by more than [`OUTSIDE_SHARE`].
-fn leaves_box(hole: &[Uv], border: &[Uv], shift: Uv) -> bool {
-    let ([hole_lo, hole_hi], [lo, hi]) = (corners_of_box(hole), corners_of_box(border));
-    let room = OUTSIDE_SHARE * (hi - lo);
-    ((hole_lo + shift).cmplt(lo - room) | (hole_hi + shift).cmpgt(hi + room)).any()
-}
-
-/// Whether a place lies outside of a border by more than [`OUTSIDE_SHARE`].
-fn is_outside(place: Uv, border: &[Uv]) -> bool {
-    let [lo, hi] = corners_of_box(border);
-    let size = hi - lo;
-    let distance = |side: [Uv; 2]| {
-        let [a, b, p] = [side[0], side[1], place].map(|q| q / size);
-        (nearest_on_side([a, b], p) - p).length()
-    };
-    !contains(border, place) && polygon_sides(border).map(distance).fold(f64::INFINITY, f64::min) > OUTSIDE_SHARE
-}
-
-/// Whether a hole, moved by `shift`, stands out of its border, as its box or one of a few places tell.
-fn stands_out(hole: &[Uv], border: &Border<'_>, shift: Uv) -> bool {
-    let is_beside = |border: &[Uv]| leaves_box(hole, border, shift);
-    let places = || (0..PLACES).map(|k| hole[k * hole.len() / PLACES] + shift);
-    is_beside(border.coarse()) && is_beside(border.fine())
-        || places().any(|p| !contains(border.coarse(), p) && is_outside(p, border.fine()))
-}
-
-/// By how many periods a hole may be moved along `axis` so that it reaches into a border, the fewest first: a border that is cut along a
-/// helix leans over several.
-fn period_counts(hole: &[Uv], border: &[Uv], axis: usize, period: f64) -> Vec<i32> {
-    let range = |places: &[Uv]| {
-        let along = places.iter().map(|p| p[axis]);
-        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)])
-    };
-    let ([hole_lo, hole_hi], [lo, hi]) = (range(hole), range(border));
-    let least = ((lo - hole_hi) / period).floor().max(-MOST_PERIODS) as i32;
-    let most = ((hi - hole_lo) / period).ceil().min(MOST_PERIODS) as i32;
+/// By how many periods a hole may be moved along `axis` so that it reaches into a border, each given by its box, the fewest first: a border
+/// that is cut along a helix leans over several.
+fn period_counts([hole_lo, hole_hi]: [Uv; 2], [lo, hi]: [Uv; 2], axis: usize, period: f64) -> Vec<i32> {
+    let least = ((lo[axis] - hole_hi[axis]) / period).floor().max(-MOST_PERIODS) as i32;
+    let most = ((hi[axis] - hole_lo[axis]) / period).ceil().min(MOST_PERIODS) as i32;
     let mut counts: Vec<i32> = (least.min(0)..=most.max(0)).collect();
     counts.sort_by_key(|count| count.abs());
     counts
@@ -120,37 +133,37 @@ pub(super) fn place_hole(
     chart: &Chart,
     repairs: &mut Vec<&'static str>,
 ) -> Chain {
-    let polygon = hole.polygon();
+    let outline = Outline::new(hole.polygon());
     // Most of a few places decide, for one may lie on the border; a shift with all of them inside is the better one.
-    let shift_into = |border: &[Uv], least: usize| {
-        let counts = [0, 1].map(|d| chart.period[d].map_or(vec![0], |p| period_counts(&polygon, border, d, p)));
+    let shift_into = |border: &Outline, least: usize| {
+        let counts =
+            [0, 1].map(|d| chart.period[d].map_or(vec![0], |p| period_counts(outline.bounds, border.bounds, d, p)));
         let [along_u, along_v] = &counts;
         let shifts = along_u.iter().flat_map(|&i| along_v.iter().map(move |&j| [i, j]));
         let inside = |shift: &Uv| {
-            let places = (0..PLACES).map(|k| polygon[k * polygon.len() / PLACES]);
-            places.filter(|&place| contains(border, place + *shift)).count() >= least
+            outline.places().filter(|&place| contains(&border.polygon, place + *shift)).count() >= least
         };
         shifts.map(|count| chart.whole_periods(count)).find(inside)
     };
-    let coarse = border.coarse();
-    let shift = shift_into(coarse, PLACES).or_else(|| {
-        let fine = border.fine();
+    let whole = shift_into(border.coarse(), PLACES);
+    let shift = whole.or_else(|| {
+        let (coarse, fine) = (border.coarse(), border.fine());
         let tries = [(fine, PLACES), (coarse, PLACES / 2 + 1), (fine, PLACES / 2 + 1)];
         tries.into_iter().find_map(|(border, least)| shift_into(border, least))
     });
     match shift {
         Some(shift) => {
             hole.shift(shift);
-            if stands_out(&polygon, border, shift) {
+            if border.is_left_by(&outline, shift) || whole.is_none() && border.leaves_out(&outline, shift) {
                 repairs.push("a hole reaches beyond the outer loop of its face");
             }
-            if signed_area(&polygon) > 0.0 {
+            if signed_area(&outline.polygon) > 0.0 {
                 hole.reverse();
                 repairs.push("a hole was turned around");
             }
         }
         None => {
-            if signed_area(&polygon) < 0.0 {
+            if signed_area(&outline.polygon) < 0.0 {
                 hole.reverse();
                 repairs.push("a loop outside the others was turned around");
             }
@@ -177,24 +190,23 @@ mod tests {
         for (low, shift, expected) in
             [(1.0, 0.0, false), (8.0, 0.0, false), (8.005, 0.0, false), (9.0, 0.0, true), (29.0, -22.0, false)]
         {
-            let hole = square(Uv::new(low, 4.0), 2.0);
-            assert_eq!(stands_out(&hole, &border, Uv::new(shift, 0.0)), expected, "{low}");
+            let hole = Outline::new(square(Uv::new(low, 4.0), 2.0));
+            let shift = Uv::new(shift, 0.0);
+            assert_eq!(border.is_left_by(&hole, shift) || border.leaves_out(&hole, shift), expected, "{low}");
         }
     }
 
     /// A hole of 1 by 1 and a border from 30 to 33 along u, of a period of 2π: four of them lead before it, five into it, none across.
     #[test]
     fn a_hole_is_moved_as_far_as_its_border_leans() {
-        let square = |low: f64, size: f64| {
-            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|p| Uv::new(low, 0.0) + Uv::from_array(p) * size)
-        };
+        let square = |low: f64, size: f64| [Uv::new(low, 0.0), Uv::new(low + size, size)];
         let period = std::f64::consts::TAU;
-        let counts = period_counts(&square(0.0, 1.0), &square(30.0, 3.0), 0, period);
+        let counts = period_counts(square(0.0, 1.0), square(30.0, 3.0), 0, period);
         assert!(
             counts.contains(&5) && counts.contains(&0) && counts.iter().all(|c| (0..=6).contains(c)),
             "{counts:?}"
         );
-        let counts = period_counts(&square(0.0, 1.0), &square(-20.0, 40.0), 0, period);
+        let counts = period_counts(square(0.0, 1.0), square(-20.0, 40.0), 0, period);
         assert_eq!(counts[0], 0);
         assert!(counts.iter().all(|c| c.abs() <= 4) && counts.contains(&-3) && counts.contains(&3), "{counts:?}");
     }
