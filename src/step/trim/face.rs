@@ -2,6 +2,7 @@
 
 use super::boundary::{Boundary, bound_region};
 use super::fit::{Fit, Overrun};
+use super::lobes::cancelling_lobes;
 use super::loops::{Chain, Piece, Source, close_loop};
 use super::region::Region;
 use super::seams::{Seam, Seams};
@@ -184,12 +185,16 @@ fn bound_chains(task: &FaceTask<'_>, chains: Vec<Chain>, step: Option<&str>) -> 
     })
 }
 
-/// Whether the largest of loops that do not wind around the surface runs clockwise; false where one winds.
+/// Whether the largest of loops that do not wind around the surface runs clockwise; false where one winds, and where the lobes of the
+/// largest cancel.
 fn runs_clockwise(chains: &[Chain]) -> bool {
     if chains.iter().any(Chain::is_winding) {
         return false;
     }
-    let areas = chains.iter().map(|chain| signed_area(&chain.polygon()));
+    let areas = chains.iter().map(|chain| {
+        let polygon = chain.polygon();
+        cancelling_lobes(chain, &polygon).unwrap_or_else(|| signed_area(&polygon))
+    });
     areas.max_by(|a, b| a.abs().total_cmp(&b.abs())).is_some_and(|area| area < 0.0)
 }
 
@@ -273,4 +278,25 @@ fn join_ends(uses: &mut [FaceUse], surface: &Surface) -> f64 {
 pub(crate) fn trim_loops(loops: Vec<Vec<FaceUse>>, id: impl Fn(Source) -> Option<EdgeId>) -> Vec<TrimLoop> {
     let numbered = |u: FaceUse| EdgeUse { edge: id(u.source), reversed: u.reversed, uv: u.uv };
     loops.into_iter().map(|l| TrimLoop { uses: l.into_iter().map(numbered).collect() }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An eight of two triangles of 25 with a corner off by 1e-8 either way, and beside it a square of 9 that runs clockwise.
+    #[test]
+    fn an_eight_whose_lobes_cancel_runs_neither_way() {
+        let chain = |corners: &[[f64; 2]]| {
+            let next = |k: usize| corners[(k + 1) % corners.len()];
+            Chain::closed((0..corners.len()).map(|k| Piece::straight(corners[k].into(), next(k).into())).collect())
+        };
+        let square = chain(&[[0.0, 0.0], [0.0, 3.0], [3.0, 3.0], [3.0, 0.0]]);
+        assert!(runs_clockwise(std::slice::from_ref(&square)));
+        for off in [-1e-8, 1e-8] {
+            let eight = chain(&[[0.0, 0.0], [10.0 + off, 10.0], [0.0, 10.0], [10.0, 0.0]]);
+            assert!(!runs_clockwise(std::slice::from_ref(&eight)), "{off}");
+            assert!(!runs_clockwise(&[eight, square.clone()]), "{off}");
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Where the holes of a face lie on a surface with periods: moved by whole ones until they are inside its border.
 
+use super::lobes::cancelling_lobes;
 use super::loops::{Chain, contains};
 use super::obstacles::bounds;
 use crate::math::Uv;
@@ -151,19 +152,21 @@ pub(super) fn place_hole(
         let tries = [(fine, PLACES), (coarse, PLACES / 2 + 1), (fine, PLACES / 2 + 1)];
         tries.into_iter().find_map(|(border, least)| shift_into(border, least))
     });
+    // The sign of an area that cancels is rounding.
+    let is_told = |hole: &Chain| cancelling_lobes(hole, &outline.polygon).is_none();
     match shift {
         Some(shift) => {
             hole.shift(shift);
             if border.is_left_by(&outline, shift) || whole.is_none() && border.leaves_out(&outline, shift) {
                 repairs.push("a hole reaches beyond the outer loop of its face");
             }
-            if signed_area(&outline.polygon) > 0.0 {
+            if signed_area(&outline.polygon) > 0.0 && is_told(&hole) {
                 hole.reverse();
                 repairs.push("a hole was turned around");
             }
         }
         None => {
-            if signed_area(&outline.polygon) < 0.0 {
+            if signed_area(&outline.polygon) < 0.0 && is_told(&hole) {
                 hole.reverse();
                 repairs.push("a loop outside the others was turned around");
             }
