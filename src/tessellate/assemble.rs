@@ -7,7 +7,8 @@ use super::face_mesh::FaceMesh;
 use super::face_surface::FaceSurface;
 use super::fallback;
 use super::limits;
-use super::nodes::{MeetingSamples, Position};
+use super::meetings::{MeetingSamples, Meetings};
+use super::nodes::Position;
 use super::placed_part::PlacedPart;
 use super::previous_round::PreviousRound;
 use super::remesh_budget::RemeshBudget;
@@ -33,7 +34,7 @@ pub(super) struct PartMesh {
     /// What each face has given up for the sake of others.
     pub(super) taken: Vec<TakenChords>,
     /// Samples of edges that are one corner where the edges cross.
-    pub(super) meetings: Vec<MeetingSamples>,
+    pub(super) meetings: Meetings,
 }
 
 /// Times that borders are sampled more densely where facets beside them are not proved, and that doubled chords are looked for.
@@ -104,7 +105,7 @@ fn mesh_with_rounds(
     let sides = edge_sides(part, &known);
     let mut denser = vec![0u32; part.edges.len()];
     let mut further: Vec<Vec<f64>> = vec![Vec::new(); part.edges.len()];
-    let mut meetings: Vec<MeetingSamples> = Vec::new();
+    let mut meetings = Meetings::default();
     // What edges and faces come to by themselves is kept from round to round: few edges change.
     let mut own: Vec<OwnDivision> = Vec::new();
     let mut before: Option<PreviousRound> = None;
@@ -114,7 +115,7 @@ fn mesh_with_rounds(
         let (divisions, shared) = edges::divide(part, &known, &sides, (&denser, &further), &mut own);
         let mesh = |(face, surface): &(&Face, Option<FaceSurface<'_>>)| {
             let (surface, taken) = (surface.as_ref()?, &NO_CHORDS);
-            let (divisions, shared, meetings) = (&divisions[..], &shared[..], &meetings[..]);
+            let (divisions, shared, meetings) = (&divisions[..], &shared[..], &meetings);
             let untangles = false;
             mesh_face(&FaceInput { part, face, surface, divisions, shared, settings, taken, meetings, untangles })
         };
@@ -139,9 +140,8 @@ fn mesh_with_rounds(
             // Where shorter chords still cross, as between arcs that touch, each gets the other's corners.
             let mut facing: Vec<(EdgeId, f64)> = meshes.iter().flatten().flat_map(|m| m.facing.clone()).collect();
             let mut met: Vec<MeetingSamples> = meshes.iter().flatten().flat_map(|m| m.meetings.clone()).collect();
-            met.retain(|pair| !meetings.contains(pair));
+            met.retain(|pair| meetings.insert(*pair));
             facing.extend(met.as_flattened());
-            meetings.extend(met);
             facing.retain(|(edge, _)| !settled.contains(&(edge.0 as usize)));
             if facing.is_empty() || round == MAX_ROUNDS_OF_CROSSING {
                 break (divisions, shared, meshes);
@@ -154,7 +154,7 @@ fn mesh_with_rounds(
     let input = |k: usize| {
         let (face, surface) = &faces[k];
         let (divisions, shared, surface) = (&divisions[..], &shared[..], surface.as_ref()?);
-        let (taken, meetings, untangles) = (&NO_CHORDS, &meetings[..], false);
+        let (taken, meetings, untangles) = (&NO_CHORDS, &meetings, false);
         Some(FaceInput { part, face, surface, divisions, shared, settings, taken, meetings, untangles })
     };
     fill_crossing_borders(&mut meshes, input);

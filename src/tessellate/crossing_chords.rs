@@ -4,7 +4,8 @@
 //! its arc. With corners in the same places on both they bend alike and stay apart. Where edges themselves cross, both get a corner there.
 
 use super::face_surface::FaceSurface;
-use super::nodes::{MeetingSamples, Nodes, edge_key};
+use super::meetings::MeetingSamples;
+use super::nodes::{Nodes, edge_key};
 use crate::math::{Point, Uv};
 use crate::model::{EdgeId, Part, TrimLoop};
 use crate::nurbs::{Curve, UvCurve};

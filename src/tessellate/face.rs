@@ -18,7 +18,8 @@ use super::face_surface::FaceSurface;
 use super::imprint::{CarrierFacets, Imprint};
 use super::limits::face_budget;
 use super::lobes::turn_lobes;
-use super::nodes::{MeetingSamples, Nodes, ProvedFacet, edge_key};
+use super::meetings::{MeetingSamples, Meetings};
+use super::nodes::{Nodes, ProvedFacet, edge_key};
 use super::proof::border_chord::BorderChords;
 use super::proof::prover::Prover;
 use super::report::Repair;
@@ -82,7 +83,7 @@ pub(super) struct FaceInput<'i, 'a> {
     /// Chords between shared positions that other faces have inside, which no side of a facet here may be.
     pub(super) taken: &'i TakenChords,
     /// Samples of the part's edges that are one corner, where edges cross.
-    pub(super) meetings: &'i [MeetingSamples],
+    pub(super) meetings: &'i Meetings,
     /// Whether samples beside cusps are moved where edges cross there by next to nothing, and other chords led over corners that they pass
     /// on the wrong side.
     pub(super) untangles: bool,

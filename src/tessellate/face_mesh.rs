@@ -1,6 +1,7 @@
 //! The facets of one face in its part's coordinates.
 
-use super::nodes::{MeetingSamples, Position};
+use super::meetings::MeetingSamples;
+use super::nodes::Position;
 use super::report::Repair;
 use crate::math::{Point, Uv, Vector};
 use crate::model::EdgeId;

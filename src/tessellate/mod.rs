@@ -36,6 +36,7 @@ mod grouped;
 mod imprint;
 mod limits;
 mod lobes;
+mod meetings;
 mod nodes;
 mod placed_part;
 mod placement;

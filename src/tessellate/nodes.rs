@@ -1,7 +1,6 @@
 //! Corners of a face's facets while it is meshed: parameters, place in space and the point that facets share there.
 
 use crate::math::{Point, Uv};
-use crate::model::EdgeId;
 use std::ops::Index;
 
 /// A point that facets meet in, by its index in one of two lists.
@@ -12,9 +11,6 @@ pub(super) enum Position {
     /// One that the face made itself.
     Own(u32),
 }
-
-/// Two samples, by edge and parameter, in the one place where their edges cross.
-pub(super) type MeetingSamples = [(EdgeId, f64); 2];
 
 /// A corner: several lie at one position where the parameters differ, as on both sides of a seam or along a pole.
 #[derive(Clone, Copy, Debug)]

@@ -584,6 +584,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     (
         "tessellate",
         &[
+            "meetings",
             "nodes",
             "triangle_frame",
             "flooding",

@@ -4,7 +4,8 @@ use super::polygons::{BorderPolygons, BorderSide};
 use crate::math::Point;
 use crate::model::{EdgeId, TrimLoop};
 use crate::tessellate::face_surface::FaceSurface;
-use crate::tessellate::nodes::{MeetingSamples, Position};
+use crate::tessellate::meetings::Meetings;
+use crate::tessellate::nodes::Position;
 use rustc_hash::FxHashMap;
 
 /// Share of the domain within which the parameters of two samples in one place are one: the trims' own rounding.
@@ -19,12 +20,13 @@ impl BorderPolygons {
         loops: &[TrimLoop],
         surface: &FaceSurface<'_>,
         shared: &[Point],
-        meetings: &[MeetingSamples],
+        meetings: &Meetings,
     ) {
-        if meetings.is_empty() {
+        let edges: Vec<Option<EdgeId>> = loops.iter().flat_map(|l| &l.uses).map(|u| u.edge).collect();
+        let pairs = meetings.on_edges(edges.iter().copied().flatten());
+        if pairs.is_empty() {
             return;
         }
-        let edges: Vec<Option<EdgeId>> = loops.iter().flat_map(|l| &l.uses).map(|u| u.edge).collect();
         let mut corners: FxHashMap<(EdgeId, u64), Vec<[usize; 2]>> = FxHashMap::default();
         for (i, polygon) in self.polygons.iter().enumerate() {
             for (k, corner) in polygon.iter().enumerate() {
@@ -39,7 +41,7 @@ impl BorderPolygons {
             Some(&[only]) => Some(only),
             _ => None,
         };
-        for &[first, second] in meetings {
+        for [first, second] in pairs {
             let (Some([i, k]), Some([j, l])) = (corner_at(first), corner_at(second)) else { continue };
             let (a, b) = (self.polygons[i][k], self.polygons[j][l]);
             let (Position::Shared(p), Position::Shared(q)) = (a.position, b.position) else { continue };
