@@ -42,33 +42,55 @@ impl Segment {
     }
 
     /// Whether it runs through the inside of a polygon between two places at which it meets sides, its ends included. Along a side it does
-    /// not.
+    /// not. Takes as many steps as there are sides, and sorts those that it meets.
     pub(super) fn runs_through(&self, polygon: &[Uv]) -> bool {
         let [a, b] = self.ends;
         let along = b - a;
+        if along == Uv::ZERO {
+            return is_inside_sides(polygon_sides(polygon), a);
+        }
         let noise = self.slack * along.length();
         let share = |p: Uv| (p - a).dot(along) / along.length_squared();
         // Where sides meet the line, and the parts of it that lie along a side, as shares of it.
         let mut shares = vec![0.0, 1.0];
         let mut covered: Vec<[f64; 2]> = Vec::new();
+        // Where sides cross a line just left of this one, beyond all places on it.
+        let mut crossings: Vec<f64> = Vec::new();
         for [p, q] in polygon_sides(polygon) {
             let (off_p, off_q) = (along.perp_dot(p - a), along.perp_dot(q - a));
-            if off_p.abs() <= noise {
-                shares.push(share(p));
+            let met = if off_p.abs() <= noise {
                 if off_q.abs() <= noise {
                     covered.push([share(p).min(share(q)), share(p).max(share(q))]);
                 }
-            } else if off_q.abs() > noise && off_p * off_q < 0.0 {
-                shares.push(share(p + (q - p) * (off_p / (off_p - off_q))));
-            }
+                Some(share(p))
+            } else if off_q.abs() <= noise {
+                Some(share(q))
+            } else if (off_p > 0.0) != (off_q > 0.0) {
+                Some(share(p + (q - p) * (off_p / (off_p - off_q))))
+            } else {
+                None
+            };
+            shares.extend(met);
+            crossings.extend(met.filter(|_| (off_p > noise) != (off_q > noise)));
         }
         shares.retain(|t| (0.0..=1.0).contains(t));
-        shares.sort_by(f64::total_cmp);
+        shares.sort_unstable_by(f64::total_cmp);
+        crossings.sort_unstable_by(f64::total_cmp);
+        covered.sort_unstable_by(|x, y| x[0].total_cmp(&y[0]));
+        // Each up to the farthest end of those before it.
+        let mut farthest = f64::NEG_INFINITY;
+        for part in &mut covered {
+            farthest = farthest.max(part[1]);
+            part[1] = farthest;
+        }
+        let is_covered = |t: f64| {
+            let before = covered.partition_point(|part| part[0] <= t);
+            before > 0 && covered[before - 1][1] >= t
+        };
+        let is_inside = |t: f64| crossings.partition_point(|crossing| *crossing <= t) % 2 == 1;
         shares.windows(2).any(|part| {
             let middle = 0.5 * (part[0] + part[1]);
-            part[1] - part[0] > CROSSING_NOISE
-                && !covered.iter().any(|side| (side[0]..=side[1]).contains(&middle))
-                && is_inside_sides(polygon_sides(polygon), a + along * middle)
+            part[1] - part[0] > CROSSING_NOISE && !is_covered(middle) && is_inside(middle)
         })
     }
 }
@@ -95,6 +117,24 @@ mod tests {
             ([3.0, 0.5], [5.0, 1.0]),
         ] {
             assert!(!runs_through(a, b) && !runs_through(b, a), "{a:?} to {b:?}, past");
+        }
+    }
+
+    /// A comb whose 100,000 teeth end on a line, flat and pointed ones in turn, and the same with one that ends beyond it. Each tooth
+    /// compared with all would take minutes.
+    #[test]
+    fn a_line_along_the_tips_of_a_comb_runs_past_it() {
+        let comb = |longest: f64| {
+            let teeth = (0..100_000).flat_map(|k| {
+                let (x, tip) = (f64::from(4 * k), if k == 50_000 { longest } else { 1.0 });
+                [[x, 0.0], [x + 0.5, tip], [x + 1.5, tip], [x + 2.0, 0.0], [x + 3.0, 1.0]].map(Uv::from)
+            });
+            let back = [[400_000.0, 0.0], [400_000.0, -1.0], [0.0, -1.0]].map(Uv::from);
+            teeth.chain(back).collect::<Vec<Uv>>()
+        };
+        let line = Segment::new([[-1.0, 1.0], [400_001.0, 1.0]].map(Uv::from));
+        for (longest, is_through) in [(1.0, false), (1.5, true)] {
+            assert_eq!(line.runs_through(&comb(longest)), is_through, "{longest}");
         }
     }
 }
