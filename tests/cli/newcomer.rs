@@ -48,9 +48,9 @@ fn a_scene_for_a_damaged_file_tells_what_is_missing() {
     let rest = surface + model[surface..].find(',').unwrap();
     fs::write(path.join("torn.stp"), format!("{}#999999{}", &model[..surface], &model[rest..])).unwrap();
     let (code, _, err) = lampyris_in(path, &["init", "torn.stp"]);
-    assert!(code == 4 && err.contains("wrote torn.toml") && err.contains("faces were refused"), "{code} {err}");
+    assert!(code == 4 && err.contains("wrote torn.toml") && err.contains("of 3 faces was refused"), "{code} {err}");
     let (code, _, err) = lampyris_in(path, &["init", "torn.stp", "-o", "b.toml", "--max-refused", "1"]);
-    assert!(code == 0 && err.contains("faces were refused"), "{code} {err}");
+    assert!(code == 0 && err.contains("of 3 faces was refused"), "{code} {err}");
     // The limit that the file needs goes into its scene.
     let limit = ["init", "torn.stp", "-o", "c.toml", "--max-refused", "1", "--max-placed", "7"];
     assert_eq!(lampyris_in(path, &limit).0, 0);

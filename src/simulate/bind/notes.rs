@@ -255,7 +255,7 @@ pub(super) fn filled_void_note(bound: &BoundScene, model: &Model) -> Option<Stri
         };
         let Some(shell) = f.shell.filter(is_of_void) else { continue };
         let face = &bound.faces[f.id.index()];
-        let is_filled = face.touches_body || face.touches_sibling || face.medium_on_opaque;
+        let is_filled = face.touches_body || face.medium_on_opaque;
         let around = bound.entered_body(f.id).filter(|_| !is_filled);
         let body = voids.entry((f.instance, shell)).or_insert(around);
         *body = body.and(around);
