@@ -95,12 +95,12 @@ impl Plan {
         let parts = if grows { 1 } else { replicates };
         let average_ray = average_quanta(&weights, parts);
         let mut first = 0;
-        let share = |&(rays, weight): &(u64, f64)| {
-            let share = SourceShare::new(first, rays, average_ray * weight, parts);
+        let share = |(source, &(rays, weight)): (usize, &(u64, f64))| {
+            let share = SourceShare::new(source, [first, rays], average_ray * weight, parts);
             first += rays;
             share
         };
-        let shares: Vec<SourceShare> = weights.iter().map(share).collect();
+        let shares: Vec<SourceShare> = weights.iter().enumerate().map(share).collect();
         let divided_quanta: f64 = shares.iter().map(|share| share.all_quanta(parts)).sum();
         let quantum = emitted / (divided_quanta * f64::from(replicates / parts));
         let first_replicate = if grows { settings.first_ray.div_ceil(GROWING_REPLICATE) as u32 } else { 0 };
@@ -148,10 +148,8 @@ impl Plan {
                 [first, first + share.rays]
             }
             None => {
-                let n = u128::from(self.replicates);
-                // Without a rest: where part k ends, part k + 1 begins.
-                let at = |k: u32| share.first + (u128::from(share.rays) * u128::from(k) / n) as u64;
-                [at(replicate), at(replicate + 1)]
+                // Without a rest: where a part ends, the next begins.
+                [replicate, replicate + 1].map(|part| share.first_in(part, self.replicates))
             }
         }
     }
@@ -244,10 +242,7 @@ impl Plan {
             return Some((self.source_of(ray % size)?, replicate));
         }
         let source = self.source_of(ray)?;
-        let share = &self.shares[source];
-        // Ray x of R lies in the first of n replicates r with ⌊R(r + 1)/n⌋ > x: several before it may have no ray of the source.
-        let up_to_it = u128::from(ray - share.first + 1) * u128::from(self.replicates);
-        Some((source, (up_to_it.div_ceil(u128::from(share.rays)) - 1) as u32))
+        Some((source, self.shares[source].part_of(ray, self.replicates)))
     }
 }
 
@@ -319,9 +314,10 @@ mod tests {
     fn every_ray_is_located_in_the_range_that_has_it_however_few_its_source_has() {
         for replicates in [2, 3, 16, 62, 128] {
             for rays in 1..=2 * u64::from(replicates) + 1 {
-                let share = |first| SourceShare::new(first, rays, QUANTA, replicates);
+                let share =
+                    |source: u64| SourceShare::new(source as usize, [source * rays, rays], QUANTA, replicates);
                 let plan = Plan {
-                    shares: vec![share(0), share(rays)],
+                    shares: vec![share(0), share(1)],
                     replicate_rays: None,
                     first_replicate: 0,
                     replicates,
@@ -355,6 +351,21 @@ mod tests {
                 assert_eq!((located, plan.locate(2 * rays)), (2 * rays, None));
             }
         }
+    }
+
+    /// 200 sources of 102 rays in 128 replicates: 159 or so in each, where all in the same places would leave some without any.
+    #[test]
+    fn few_rays_of_many_sources_fill_all_replicates() {
+        let (parts, rays) = (128, 102);
+        let shares: Vec<_> =
+            (0..200).map(|k| SourceShare::new(k, [rays * k as u64, rays], QUANTA, parts)).collect();
+        let in_part =
+            |part| shares.iter().map(|s| s.first_in(part + 1, parts) - s.first_in(part, parts)).sum::<u64>();
+        assert!(
+            (0..parts).all(|part| (157..=162).contains(&in_part(part))),
+            "{:?}",
+            (0..parts).map(in_part).collect::<Vec<_>>()
+        );
     }
 
     #[test]

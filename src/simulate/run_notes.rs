@@ -12,6 +12,8 @@ use crate::text::{count_of, figures, first_sentences};
 const OVERLAP_SEGMENTS: u64 = 10_000;
 /// Rays of a source below which next to nothing is known of its light.
 const SCARCE_RAYS: u64 = 64;
+/// Power of a ray over that of the mean one above which it is told that a source has few of them.
+const HEAVY: f64 = 10.0;
 /// Share of a source's power from which on what rounding changes of it is told.
 const ROUNDED: f64 = 1e-5;
 /// Share of the mean power of a source below which it is told: among thousands alike each has few rays, and all together enough.
@@ -73,6 +75,28 @@ impl BoundScene {
             "{name} sends {rays} of the {} rays, as it has {percent:.1e} % of the power{others}: what it lights alone is not known; give it \
              `rays` of its own",
             plan.rays
+        ))
+    }
+
+    /// Returns one sentence about sources whose `rays` are so few beside their power that no spread tells the error of their light; `None`
+    /// where there are none.
+    pub(crate) fn heavy_rays_note(&self, plan: &Plan) -> Option<String> {
+        // Of a ray among the power of all, against what a ray carries in the mean.
+        let weight = |source: usize| {
+            let power = self.emitters[source].power / plan.emitted;
+            power / plan.rays_of_source(source) as f64 * plan.rays as f64
+        };
+        let is_heavy = |source: &usize| {
+            let has_few = self.emitters[*source].rays.is_some() && plan.rays_of_source(*source) < SCARCE_RAYS;
+            has_few && weight(*source) > HEAVY
+        };
+        let first = (0..self.emitters.len()).filter(is_heavy).max_by(|a, b| weight(*a).total_cmp(&weight(*b)))?;
+        Some(format!(
+            "{} has {} % of the power in {}: how far they scatter is not known from so few, and no error that is printed holds it; give it \
+             more `rays`",
+            self.scene.source_label(first),
+            figures(100.0 * self.emitters[first].power / plan.emitted, 2),
+            count_of(plan.rays_of_source(first), "ray")
         ))
     }
 

@@ -365,3 +365,31 @@ fn many_sources_trace_as_many_rays_as_are_asked_for() {
         assert!(traced.abs_diff(rays) < 1000, "{traced} for {rays}");
     }
 }
+
+/// 200 beams of 100 rays each, in 128 replicates: all light arrives, and no replicate has much more of it than another.
+#[test]
+fn few_rays_of_many_sources_lie_in_all_replicates() {
+    let beam = "[[source]]\nkind = 'collimated'\nat = [0, 0, 0]\ndirection = [0, 0, 1]\nradius = 1\n";
+    let screen = "[[receiver]]\nname = 'screen'\nat = [0, 0, 5]\nsize = [4, 4]\ncells = [1, 1]\n";
+    let r = World::default().run(&format!("[run]\nrays = 20_000\n{}{screen}", beam.repeat(200)), |_| ());
+    let screen = &r.receivers[0];
+    assert!(
+        (screen.power - 200.0).abs() < 1e-6 && screen.power_error < 0.2,
+        "{} {}",
+        screen.power,
+        screen.power_error
+    );
+}
+
+/// Two rays have most of the power: where they go no other ray tells.
+#[test]
+fn a_source_of_few_heavy_rays_is_named() {
+    let beams = |rays: u64| {
+        format!(
+            "[[source]]\nname = 'strong'\npower = 2\nrays = {rays}\nat = [0, 0, 0]\n[[source]]\nname = 'weak'\nrays = 10_000\nat = [0, 0, 1]\n"
+        )
+    };
+    let notes = |rays| World::default().run(&format!("{}{ALL}", beams(rays)), |_| ()).notes.join("\n");
+    assert!(notes(2).contains("'strong' has 67 % of the power in 2 rays"), "{}", notes(2));
+    assert!(!notes(1000).contains("strong"), "{}", notes(1000));
+}
