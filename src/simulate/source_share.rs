@@ -27,7 +27,7 @@ impl SourceShare {
         let quanta = [fewest, fewest + 1].map(|n| (quanta * weight_among(n, rays, parts)).round().max(1.0));
         // Multiples of the golden ratio lie evenly: without, all sources of as few rays would have them in the same parts.
         let turned = (source as u32).wrapping_mul(GOLDEN_RATIO);
-        let shift = (u64::from(turned) * u64::from(parts) >> 32) as u32;
+        let shift = ((u64::from(turned) * u64::from(parts)) >> 32) as u32;
         Self { first, rays, fewest, shift, quanta }
     }
 
