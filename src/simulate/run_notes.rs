@@ -81,21 +81,20 @@ impl BoundScene {
     /// Returns one sentence about sources whose `rays` are so few beside their power that no spread tells the error of their light; `None`
     /// where there are none.
     pub(crate) fn heavy_rays_note(&self, plan: &Plan) -> Option<String> {
+        let share = |source: usize| self.emitters[source].power / plan.emitted;
         // Of a ray among the power of all, against what a ray carries in the mean.
-        let weight = |source: usize| {
-            let power = self.emitters[source].power / plan.emitted;
-            power / plan.rays_of_source(source) as f64 * plan.rays as f64
-        };
+        let weight = |source: usize| share(source) / plan.rays_of_source(source) as f64 * plan.rays as f64;
         let is_heavy = |source: &usize| {
             let has_few = self.emitters[*source].rays.is_some() && plan.rays_of_source(*source) < SCARCE_RAYS;
-            has_few && weight(*source) > HEAVY
+            // Their own scatter is above that of a run whose rays all weigh alike.
+            has_few && weight(*source) > HEAVY && weight(*source) * share(*source) > 1.0
         };
         let first = (0..self.emitters.len()).filter(is_heavy).max_by(|a, b| weight(*a).total_cmp(&weight(*b)))?;
         Some(format!(
             "{} has {} % of the power in {}: how far they scatter is not known from so few, and no error that is printed holds it; give it \
              more `rays`",
             self.scene.source_label(first),
-            figures(100.0 * self.emitters[first].power / plan.emitted, 2),
+            figures(100.0 * share(first), 2),
             count_of(plan.rays_of_source(first), "ray")
         ))
     }

@@ -117,6 +117,30 @@ fn an_assembly_that_two_others_use_stands_in_both() {
     }
 }
 
+/// The assembly #500, in which a usage puts the part to x = 10, unmoved by relationships alone in #700 and in #800, which usages put to
+/// x = 20 and to x = 30.
+#[test]
+fn an_assembly_stands_unmoved_in_each_of_two_that_usages_place() {
+    let placed = |id: u32, rep: u32, at: u32| {
+        usage(id, NEXT, &format!("#200,#{},$", rep - 10))
+            + &relation(id + 2, [rep, 300], [20, at])
+            + &contextual(id + 4, id + 2, id)
+    };
+    let data = product(500, "sub", 510)
+        + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
+        + &usage(600, NEXT, "#500,#100,$")
+        + &relation(602, [110, 510], [20, 21])
+        + &contextual(604, 602, 600)
+        + &product(700, "first", 710)
+        + &product(800, "second", 810)
+        + "#710=SHAPE_REPRESENTATION('',(#20,#21),#1);\n#810=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
+        + &placed(720, 710, 22)
+        + &placed(820, 810, 23)
+        + &relation(740, [510, 710], [20, 20])
+        + &relation(840, [510, 810], [20, 20]);
+    assert_places(&assembly("", &data), &[30.0, 40.0], "unmoved");
+}
+
 /// The assembly #500, in which a usage puts the part to x = 10, by relationships alone in #200 and in #700. Unmoved in both it stands once;
 /// moved it stands in each, which is told where usages do not show that both are assemblies.
 #[test]

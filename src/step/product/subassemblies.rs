@@ -45,8 +45,8 @@ impl Assembly<'_, '_> {
             let mut links = related.remove(&child).unwrap_or_default();
             links.retain(is_alone);
             settled.extend(links.iter().map(|link| [link.holder, link.shown]));
-            keep_first_unmoved(&mut links);
-            self.problems.extend(unsure_direction(&links, &assemblies));
+            keep_first_unmoved(&mut links, &used.children);
+            self.problems.extend(unsure_direction(&links, [&assemblies, &used.children]));
             // Of one whose children are all placed by mapped items these show everything.
             let states_places = |own: &Vec<Usage>| own.iter().any(|u| u.placement != UsagePlacement::Unstated);
             if usages.get(&child).is_some_and(states_places) {
@@ -123,21 +123,22 @@ impl UsedProducts {
     }
 }
 
-/// Leaves out, of the links that put one child unmoved into several products, all but those into the first: the products are mostly the
-/// same thing defined again, and it would stand in one place several times.
-fn keep_first_unmoved(links: &mut Vec<ProductLink>) {
+/// Leaves out, of the links that put one child unmoved into several products, all but those into the first and into those that usages put
+/// somewhere, which are the `used`: the others are mostly the same thing defined again, and it would stand in one place several times.
+fn keep_first_unmoved(links: &mut Vec<ProductLink>, used: &FxHashSet<u64>) {
     let mut first = None;
     links.retain(|link| {
         let is_moved = link.placement.is_none_or(|frame| !is_one_place(&frame, &Frame::IDENTITY));
-        is_moved || *first.get_or_insert(link.parent) == link.parent
+        is_moved || used.contains(&link.parent) || *first.get_or_insert(link.parent) == link.parent
     });
 }
 
-/// Says of relationships that put one child into several products, of which some are no `assemblies` by usages, that they may mean that
-/// these stand in it: writers swap the ends. `None` for others.
-fn unsure_direction(links: &[ProductLink], assemblies: &FxHashSet<u64>) -> Option<String> {
+/// Says of relationships that put one child into several products, of which some are no `assemblies` by usages and not `used` either, that
+/// they may mean that these stand in it: writers swap the ends. `None` for others.
+fn unsure_direction(links: &[ProductLink], [assemblies, used]: [&FxHashSet<u64>; 2]) -> Option<String> {
     let parents: FxHashSet<u64> = links.iter().map(|link| link.parent).collect();
-    let first = links.iter().find(|link| !assemblies.contains(&link.parent)).filter(|_| parents.len() > 1)?;
+    let is_known = |link: &&ProductLink| assemblies.contains(&link.parent) || used.contains(&link.parent);
+    let first = links.iter().find(|link| !is_known(link)).filter(|_| parents.len() > 1)?;
     Some(format!(
         "#{}: puts product #{} into #{}, as others put it into {} more, and no usage says so: it stands in each, which is wrong if the \
          ends of these relationships are swapped",
