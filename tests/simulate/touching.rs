@@ -92,7 +92,8 @@ fn light_passes_a_rod_whose_rims_are_divided_nearly_alike() {
 #[test]
 fn light_passes_a_rod_partly_in_its_hole() {
     let cone = "kind = 'cone'\nhalf_angle_deg = 60\nat = [0.4, 0.3, 1.2]\ndirection = [0, 0, 1]";
-    let text = scene([("rod", 1.5), ("plate", 1.6)], cone).replace("rays = 20000", "rays = 2000\nmax_bounces = 100");
+    let text =
+        scene([("rod", 1.5), ("plate", 1.6)], cone).replace("rays = 20000", "rays = 2000\nmax_bounces = 100");
     for (name, ends) in [("half", [1.0, 7.0]), ("one end flush", [0.0, 7.0]), ("short", [0.5, 2.5])] {
         for from in [0.0, 0.6] {
             check(name, &rod_in_plate(ends, from), &text);

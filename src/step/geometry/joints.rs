@@ -37,7 +37,10 @@ impl Joint {
 
     /// Returns in words why a part of the curve that runs over it is refused.
     pub(super) fn reason(&self) -> String {
-        format!("its segments are {:.3e} mm apart; gaps of more than {:.1e} mm are not bridged", self.width, self.limit)
+        format!(
+            "its segments are {:.3e} mm apart; gaps of more than {:.1e} mm are not bridged",
+            self.width, self.limit
+        )
     }
 
     /// Whether the part of the curve over a range of its parameter runs over the joint.
