@@ -37,10 +37,8 @@ impl Joint {
 
     /// Returns in words why a part of the curve that runs over it is refused.
     pub(super) fn reason(&self) -> String {
-        format!(
-            "its segments are {:.3e} mm apart; gaps of more than {:.1e} mm are not bridged",
-            self.width, self.limit
-        )
+        let Self { width, limit, .. } = self;
+        format!("its segments are {width:.3e} mm apart; gaps of more than {limit:.1e} mm are not bridged")
     }
 
     /// Whether the part of the curve over a range of its parameter runs over the joint.
