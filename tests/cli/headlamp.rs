@@ -165,7 +165,7 @@ fn rays_that_sources_do_not_heed_are_not_asked_for_in_silence() {
         code == 2 && err.contains("--rays 1000: every source of the scene has `rays` of its own"),
         "{code} {err}"
     );
-    let (code, err) = run(&low_beam(|scene| scene.replace("rays = 900_000\n", "")));
+    let (code, err) = run(&low_beam(|scene| scene.replace("rays = 3_600_000\n", "")));
     assert!(code == 0 && err.contains("3 of 4 sources have `rays` of their own"), "{code} {err}");
 }
 

@@ -3,7 +3,7 @@
 //! A number is a function of (seed, ray, branch, bounce, purpose) alone. So a result does not depend on threads, batches or
 //! shards, and a kernel that skips an effect draws the same numbers for all other effects as one that does not.
 //! Philox 4×32-10 (Salmon et al., SC 2011) for everything behind the source; at the source a Sobol net with Owen scrambling,
-//! or Philox as well. Of numbers at the first surfaces that a ray meets the net gives the first [`NET_DIGITS`] binary digits: light that is
+//! or Philox as well. Of numbers at the first surfaces that a ray meets the net gives the first eight binary digits: light that is
 //! reflected at one of them is then as much as it should be in every part of what the source sends there.
 //!
 //! Known weakness: a Sobol index has 32 bits, so a replicate may hold at most 2³² rays of one source.
