@@ -7,18 +7,18 @@
 use super::lanes::Lanes;
 use super::node::{Block, Node};
 use super::quad_edges::QuadEdges;
-use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
+use super::ray::{BoxRay, Entry, LEAVE_STRETCH, SieveLimits, SieveRay};
 use crate::intersect::facet::FacetRay;
 use std::arch::x86_64::*;
 
 /// Eight lanes of f32.
 pub(super) struct Avx2Lanes;
 
-/// Half a row of a node's bounds, from the child `first` on, as numbers.
+/// Eight of a node's bounds from a place on, as numbers.
 #[inline(always)]
-unsafe fn load_bounds(node: &Node, row: usize, first: usize) -> __m256 {
+unsafe fn load_bounds(node: &Node, place: usize) -> __m256 {
     unsafe {
-        let bytes = node.bounds.get_unchecked(row).as_ptr().add(first).cast();
+        let bytes = node.bounds.as_ptr().byte_add(place).cast();
         _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes)))
     }
 }
@@ -43,7 +43,7 @@ unsafe fn ordered(corner: __m256d, order: __m256i) -> __m256d {
 
 /// The origin of a block relative to that of the ray, mm, and its step.
 #[inline(always)]
-pub(super) unsafe fn block_from_ray(block: &Block, ray: &SieveRay) -> __m128 {
+unsafe fn block_from_ray(block: &Block, ray: &SieveRay) -> __m128 {
     unsafe {
         // In two parts: of a start far from the block one `f32` would lose the digits that tell the corners apart.
         let origin_and_step = std::ptr::from_ref(block).byte_add(std::mem::offset_of!(Block, origin));
@@ -54,7 +54,7 @@ pub(super) unsafe fn block_from_ray(block: &Block, ray: &SieveRay) -> __m128 {
 
 /// The largest size of four numbers.
 #[inline(always)]
-pub(super) unsafe fn largest(v: __m128) -> f32 {
+unsafe fn largest(v: __m128) -> f32 {
     unsafe {
         let sizes = _mm_andnot_ps(_mm_set1_ps(-0.0), v);
         let pairs = _mm_max_ps(sizes, _mm_movehl_ps(sizes, sizes));
@@ -113,35 +113,41 @@ static COMPRESSIONS: [[u8; 8]; 256] = {
 
 impl Lanes for Avx2Lanes {
     #[inline(always)]
-    fn enter(node: &Node, slot_order: u32, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+    fn prepare<'t>(entry: &mut Entry<'t>, node: &'t Node, ray: &BoxRay) {
+        entry.node = node;
+        entry.order = node.slot_order(ray.rows.octant);
+        // SAFETY: see the head of the file; what follows the origin of a node, and its steps, is read with them.
+        unsafe {
+            let (inverse, slack) = (_mm_load_ps(ray.inverse.as_ptr()), _mm_load_ps(ray.slack.as_ptr()));
+            let to = _mm_sub_ps(_mm_loadu_ps(node.origin.as_ptr()), _mm_load_ps(ray.origin.as_ptr()));
+            let step = _mm_loadu_ps(node.step.as_ptr());
+            _mm_store_ps(entry.scale.as_mut_ptr(), _mm_mul_ps(step, inverse));
+            // Entering is made earlier and leaving later by what `f32` may be wrong by: boxes may be met in vain but never missed.
+            _mm_store_ps(entry.near.as_mut_ptr(), _mm_fmsub_ps(to, inverse, slack));
+            _mm_store_ps(entry.far.as_mut_ptr(), _mm_fmadd_ps(to, inverse, slack));
+        }
+    }
+
+    #[inline(always)]
+    fn enter(entry: &Entry, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
         // SAFETY: see the head of the file; eight numbers are written from the eighth place at most.
         unsafe {
-            // Bounds are eight-bit steps from the node's corner: crossing = (corner − origin)·inverse +
-            // bound·(step·inverse), so that one fused operation a bound is left for the children.
-            let mut scale = [_mm256_setzero_ps(); 3];
-            let (mut to_low, mut to_high) = (scale, scale);
-            for a in 0..3 {
-                let to = _mm256_set1_ps(node.origin[a] - ray.origin[a]);
-                let (inverse, slack) = (_mm256_set1_ps(ray.inverse[a]), _mm256_set1_ps(ray.slack[a]));
-                scale[a] = _mm256_mul_ps(_mm256_set1_ps(node.step[a]), inverse);
-                // Entering is made earlier and leaving later by what `f32` may be wrong by: boxes may be met in vain
-                // but never missed.
-                to_low[a] = _mm256_fmsub_ps(to, inverse, slack);
-                to_high[a] = _mm256_fmadd_ps(to, inverse, slack);
-            }
+            let (node, slot_order) = (entry.node, entry.order as usize);
             // Farthest first.
-            let order = _mm256_load_si256(ORDERS.0.get_unchecked(slot_order as usize & 7).as_ptr().cast());
+            let order = _mm256_load_si256(ORDERS.0.get_unchecked(slot_order & 7).as_ptr().cast());
             let (mut met, mut count) = (0, 0);
             for half in 0..2 {
-                let first = 8 * (1 ^ half ^ (slot_order as usize >> 3 & 1));
+                let first = 8 * (1 ^ half ^ (slot_order >> 3 & 1));
                 let mut enter = _mm256_set1_ps(ray.t_min);
                 let mut leave = _mm256_set1_ps(ray.t_max);
                 for a in 0..3 {
-                    // Which is met first is told by the smaller: cheaper than to choose rows by the ray's signs.
-                    let low = _mm256_fmadd_ps(load_bounds(node, 2 * a, first), scale[a], to_low[a]);
-                    let high = _mm256_fmadd_ps(load_bounds(node, 2 * a + 1, first), scale[a], to_high[a]);
-                    enter = _mm256_max_ps(enter, _mm256_min_ps(low, high));
-                    leave = _mm256_min_ps(leave, _mm256_max_ps(low, high));
+                    let scale = _mm256_set1_ps(entry.scale[a]);
+                    let near = load_bounds(node, usize::from(ray.rows.near[a]) + first);
+                    let far = load_bounds(node, usize::from(ray.rows.far[a]) + first);
+                    let near = _mm256_fmadd_ps(near, scale, _mm256_set1_ps(entry.near[a]));
+                    let far = _mm256_fmadd_ps(far, scale, _mm256_set1_ps(entry.far[a]));
+                    enter = _mm256_max_ps(enter, near);
+                    leave = _mm256_min_ps(leave, far);
                 }
                 // Beside the slack the last few roundings scale with the distance itself.
                 let leave = _mm256_permutevar8x32_ps(leave, order);
@@ -167,19 +173,26 @@ impl Lanes for Avx2Lanes {
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay, unmet: u32) -> u32 {
-        // SAFETY: see the head of the file; `axes` are 0..3 by construction, and after the origin of a block comes its step.
+    fn sieve_limits(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> SieveLimits {
+        // SAFETY: see the head of the file; after the origin of a block comes its step.
         unsafe {
             let from_ray = block_from_ray(block, ray);
-            let corner = corner_error(block.step, largest(from_ray), ray.slack);
             let mut to = [0.0; 4];
             _mm_storeu_ps(to.as_mut_ptr(), from_ray);
-            let error = _mm256_set1_ps(edge_error(block.step, corner));
+            SieveLimits::with_place(block, ray, boxes, (to, largest(from_ray)))
+        }
+    }
+
+    #[inline(always)]
+    fn sift(block: &Block, ray: &SieveRay, limits: &SieveLimits, unmet: u32) -> u32 {
+        // SAFETY: see the head of the file; `axes` are 0..3 by construction.
+        unsafe {
+            let (to, error) = (&limits.to, _mm256_set1_ps(limits.error));
             let step = _mm256_set1_ps(block.step);
             let [kx, ky, kz] = ray.axes.map(usize::from);
             let [sx, sy, sz] = ray.shear;
             let (sx, sy, sz) = (_mm256_set1_ps(sx), _mm256_set1_ps(sy), _mm256_set1_ps(sz));
-            let (tx, ty, tz) = (broadcast_axis(&to, kx), broadcast_axis(&to, ky), broadcast_axis(&to, kz));
+            let (tx, ty, tz) = (broadcast_axis(to, kx), broadcast_axis(to, ky), broadcast_axis(to, kz));
             // Corners 0 and 2 lie in one half, 1 and 3 in the other: as triangle (0, 1, 2) uses a, b and the
             // swapped a, triangle (2, 3, 0) is the same with its lanes four on.
             let (az, bz) = (sieve_row(block, kz, 0, step, tz), sieve_row(block, kz, 8, step, tz));
@@ -202,8 +215,8 @@ impl Lanes for Avx2Lanes {
             let ct = _mm256_permute2f128_ps::<1>(at, at);
             let first = _mm256_min_ps(_mm256_min_ps(at, bt), ct);
             let last = _mm256_max_ps(_mm256_max_ps(at, bt), ct);
-            let late = _mm256_cmp_ps::<_CMP_GT_OQ>(first, _mm256_set1_ps(boxes.t_max + 2.0 * corner));
-            let early = _mm256_cmp_ps::<_CMP_LT_OQ>(last, _mm256_set1_ps(boxes.t_min - 2.0 * corner));
+            let late = _mm256_cmp_ps::<_CMP_GT_OQ>(first, _mm256_set1_ps(limits.t_max));
+            let early = _mm256_cmp_ps::<_CMP_LT_OQ>(last, _mm256_set1_ps(limits.t_min));
             let outside = _mm256_or_ps(_mm256_and_ps(below, above), _mm256_or_ps(late, early));
             let facets = _mm_loadu_si128(block.facets.as_ptr().cast());
             let own = _mm_cmpeq_epi32(facets, _mm_set1_epi32(unmet as i32));

@@ -5,24 +5,42 @@
 //! [`Node`] and [`Block`], and because axes are below three.
 #![allow(unsafe_code)]
 
-use super::avx2::{Avx2Lanes, block_from_ray, largest};
+use super::avx2::Avx2Lanes;
 use super::facet_pair::{Corners, Edges};
 use super::lanes::Lanes;
 use super::node::{Block, Node};
 use super::quad_edges::QuadEdges;
-use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
+use super::ray::{BoxRay, Entry, LEAVE_STRETCH, SieveLimits, SieveRay};
 use crate::intersect::facet::{FacetRay, Line};
 use std::arch::x86_64::*;
 
 /// Sixteen lanes of f32.
 pub(super) struct Avx512Lanes;
 
-/// A row of a node's bounds as numbers.
+/// By [`Node::slot_order`]: the slots of children, mostly the farthest first.
+#[repr(align(64))]
+struct Orders([[u32; 16]; 16]);
+
+static ORDERS: Orders = {
+    let mut orders = [[0; 16]; 16];
+    let mut order = 0;
+    while order < 16 {
+        let mut lane = 0;
+        while lane < 16 {
+            orders[order][lane] = (15 ^ lane ^ order) as u32;
+            lane += 1;
+        }
+        order += 1;
+    }
+    Orders(orders)
+};
+
+/// Sixteen of a node's bounds from a place on, as numbers.
 #[inline(always)]
-unsafe fn load_bounds(node: &Node, row: usize) -> __m512 {
+unsafe fn load_bounds(node: &Node, place: u8) -> __m512 {
     unsafe {
-        let bytes = _mm_load_si128(node.bounds.get_unchecked(row).as_ptr().cast());
-        _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes))
+        let bytes = node.bounds.as_ptr().byte_add(usize::from(place)).cast();
+        _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_load_si128(bytes)))
     }
 }
 
@@ -54,30 +72,30 @@ unsafe fn load_pair(corners: [&Corners; 2], axis: usize) -> __m512d {
 
 impl Lanes for Avx512Lanes {
     #[inline(always)]
-    fn enter(node: &Node, order: u32, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+    fn prepare<'t>(entry: &mut Entry<'t>, node: &'t Node, ray: &BoxRay) {
+        Avx2Lanes::prepare(entry, node, ray);
+    }
+
+    #[inline(always)]
+    fn enter(entry: &Entry, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
         // SAFETY: see the head of the file.
         unsafe {
-            // As with AVX2. What is the same for all children is spread over lanes as it is read, not in one register beforehand.
+            let node = entry.node;
+            let order = _mm512_load_si512(ORDERS.0.get_unchecked(entry.order as usize & 15).as_ptr().cast());
             let (mut first, mut last) = ([_mm512_setzero_ps(); 3], [_mm512_setzero_ps(); 3]);
             for a in 0..3 {
-                let to = _mm512_sub_ps(_mm512_set1_ps(node.origin[a]), _mm512_set1_ps(ray.origin[a]));
-                let (inverse, slack) = (_mm512_set1_ps(ray.inverse[a]), _mm512_set1_ps(ray.slack[a]));
-                let scale = _mm512_mul_ps(inverse, _mm512_set1_ps(node.step[a]));
-                let low = _mm512_fmadd_ps(load_bounds(node, 2 * a), scale, _mm512_fmsub_ps(to, inverse, slack));
-                let high =
-                    _mm512_fmadd_ps(load_bounds(node, 2 * a + 1), scale, _mm512_fmadd_ps(to, inverse, slack));
-                first[a] = _mm512_min_ps(low, high);
-                last[a] = _mm512_max_ps(low, high);
+                let scale = _mm512_set1_ps(entry.scale[a]);
+                let (near, far) = (load_bounds(node, ray.rows.near[a]), load_bounds(node, ray.rows.far[a]));
+                first[a] = _mm512_fmadd_ps(near, scale, _mm512_set1_ps(entry.near[a]));
+                last[a] = _mm512_fmadd_ps(far, scale, _mm512_set1_ps(entry.far[a]));
             }
             let (t_min, t_max) = (_mm512_set1_ps(ray.t_min), _mm512_set1_ps(ray.t_max));
             let enter = _mm512_max_ps(_mm512_max_ps(first[0], first[1]), _mm512_max_ps(first[2], t_min));
             let leave = _mm512_min_ps(_mm512_min_ps(last[0], last[1]), _mm512_min_ps(last[2], t_max));
-            // Farthest first.
-            let lanes = _mm512_setr_epi32(15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0);
-            let order = _mm512_xor_si512(lanes, _mm512_set1_epi32(order as i32));
             let enter = _mm512_permutexvar_ps(order, enter);
+            // Beside the slack the last few roundings scale with the distance itself.
             let leave = _mm512_mul_ps(_mm512_permutexvar_ps(order, leave), _mm512_set1_ps(LEAVE_STRETCH));
-            let children = _mm512_permutexvar_epi32(order, _mm512_loadu_si512(node.children.as_ptr().cast()));
+            let children = _mm512_permutexvar_epi32(order, _mm512_load_si512(node.children.as_ptr().cast()));
             // An unused child has link zero; its box means nothing.
             let used = _mm512_test_epi32_mask(children, children);
             let met = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, leave);
@@ -88,20 +106,21 @@ impl Lanes for Avx512Lanes {
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay, unmet: u32) -> u32 {
-        // SAFETY: see the head of the file; after the origin of a block comes its step.
+    fn sieve_limits(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> SieveLimits {
+        Avx2Lanes::sieve_limits(block, ray, boxes)
+    }
+
+    #[inline(always)]
+    fn sift(block: &Block, ray: &SieveRay, limits: &SieveLimits, unmet: u32) -> u32 {
+        // SAFETY: see the head of the file.
         unsafe {
-            let step = _mm512_set1_ps(block.step);
-            let to = block_from_ray(block, ray);
-            let corner = corner_error(block.step, largest(to), ray.slack);
-            let error = _mm256_set1_ps(edge_error(block.step, corner));
-            let mut axes_to = [0.0; 4];
-            _mm_storeu_ps(axes_to.as_mut_ptr(), to);
+            let (step, to) = (_mm512_set1_ps(block.step), &limits.to);
+            let error = _mm256_set1_ps(limits.error);
             let [kx, ky, kz] = ray.axes;
             let [sx, sy, sz] = ray.shear;
-            let z = sieve_row(block, kz, step, &axes_to);
-            let x = _mm512_fnmadd_ps(_mm512_set1_ps(sx), z, sieve_row(block, kx, step, &axes_to));
-            let y = _mm512_fnmadd_ps(_mm512_set1_ps(sy), z, sieve_row(block, ky, step, &axes_to));
+            let z = sieve_row(block, kz, step, to);
+            let x = _mm512_fnmadd_ps(_mm512_set1_ps(sx), z, sieve_row(block, kx, step, to));
+            let y = _mm512_fnmadd_ps(_mm512_set1_ps(sy), z, sieve_row(block, ky, step, to));
             let t = _mm512_mul_ps(z, _mm512_set1_ps(sz));
             let (ax, bx) = (_mm512_castps512_ps256(x), _mm512_extractf32x8_ps::<1>(x));
             let (ay, by) = (_mm512_castps512_ps256(y), _mm512_extractf32x8_ps::<1>(y));
@@ -116,10 +135,9 @@ impl Lanes for Avx512Lanes {
             let first = _mm256_min_ps(_mm256_min_ps(at, bt), ct);
             let last = _mm256_max_ps(_mm256_max_ps(at, bt), ct);
             // Chains of comparisons, each of what the one before left; not a number is no reason to drop a facet.
-            let (t_min, t_max) = (boxes.t_min - 2.0 * corner, boxes.t_max + 2.0 * corner);
             let zero = _mm256_setzero_ps();
-            let within = _mm256_cmp_ps_mask::<_CMP_NGT_UQ>(first, _mm256_set1_ps(t_max));
-            let within = _mm256_mask_cmp_ps_mask::<_CMP_NLT_UQ>(within, last, _mm256_set1_ps(t_min));
+            let within = _mm256_cmp_ps_mask::<_CMP_NGT_UQ>(first, _mm256_set1_ps(limits.t_max));
+            let within = _mm256_mask_cmp_ps_mask::<_CMP_NLT_UQ>(within, last, _mm256_set1_ps(limits.t_min));
             let outside = _mm256_cmp_ps_mask::<_CMP_GT_OQ>(most, error);
             let outside = _mm256_mask_cmp_ps_mask::<_CMP_LT_OQ>(outside, _mm256_add_ps(least, error), zero);
             let facets = _mm_loadu_si128(block.facets.as_ptr().cast());

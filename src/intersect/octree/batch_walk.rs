@@ -4,6 +4,7 @@
 use super::facet_lanes::{FacetLanes, LANES, Verdict};
 use super::lanes::Lanes;
 use super::node::Link;
+use super::ray::{Entry, SieveLimits};
 use super::ray_stack::Children;
 use super::ray_state::RayState;
 use super::step_queues::{Rays, StepQueues, WIDTH, Ways};
@@ -35,6 +36,8 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
     let arrays = Arrays::new(tree);
     let mut queues = StepQueues::default();
     let mut lanes = FacetLanes::new();
+    let (mut entries, mut met) = ([Entry::IDLE; WIDTH], [0; WIDTH]);
+    let mut limits = [SieveLimits::default(); WIDTH];
     let mut live = order.len().min(WIDTH);
     let mut next = live;
     // As many as fit are under way; whoever ends hands its place to the next.
@@ -48,10 +51,17 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
     while live > 0 {
         let entering = take(&mut queues.node);
         cost.nodes += entering.count() as u64;
+        for ray in entering {
+            let s = &states[ray];
+            L::prepare(&mut entries[ray], &arrays.nodes[s.next.index()], &s.boxes);
+        }
+        for ray in entering {
+            met[ray] = states[ray].enter::<L>(&entries[ray]);
+        }
         let mut ways = Ways::default();
         for ray in entering {
             let s = &mut states[ray];
-            let children = s.enter::<L>(&arrays.nodes[s.next.index()]);
+            let children = Children::new(&entries[ray], met[ray]);
             s.advance::<L>(children);
             prefetch_step(&arrays, s.next);
             ways.note(ray, s.next);
@@ -71,16 +81,20 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
             }
         }
         queues.put(started, &ways);
+        let sifting = take(&mut queues.block);
+        for ray in sifting {
+            let s = &states[ray];
+            limits[ray] = L::sieve_limits(&arrays.blocks[s.next.index()], &s.sieve, &s.boxes);
+        }
         let mut ways = Ways::default();
         let mut tests = 0;
-        let sifting = take(&mut queues.block);
         for ray in sifting {
             let s = &mut states[ray];
             // The sieve knows rounded corners only; what it leaves asks for its true ones first.
             let (index, count) = (s.next.index(), s.next.facets());
             tests += count as u64;
             s.block = index as u32;
-            s.candidates = sift::<L, STACK>(&arrays.blocks[index], count, s);
+            s.candidates = sift::<L, STACK>(&arrays.blocks[index], count, s, &limits[ray]);
             s.advance::<L>(Children::NONE);
             prefetch_step(&arrays, s.next);
             queues.corners.add_if(s.candidates != 0, ray);

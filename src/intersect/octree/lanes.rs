@@ -3,18 +3,27 @@
 use super::facet_pair::{Corners, Edges};
 use super::node::{Block, Node};
 use super::quad_edges::QuadEdges;
-use super::ray::{BoxRay, SieveRay};
+use super::ray::{BoxRay, Entry, SieveLimits, SieveRay};
 use crate::intersect::facet::{FacetRay, Line};
 
 /// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
 pub(super) trait Lanes {
+    /// Overwrites `entry` with what [`Self::enter`] needs to know of a ray at a node.
+    #[inline(always)]
+    fn prepare<'t>(entry: &mut Entry<'t>, node: &'t Node, ray: &BoxRay) {
+        entry.prepare(node, ray);
+    }
     /// Writes where the ray enters the children that it may meet within its range, and their links, mostly the farthest first; what lies
-    /// beyond their number is of no meaning. Returns which they are, 0 for none: bit `k` for the child in slot `15 ^ k ^ order`, where
-    /// `order` is [`Node::slot_order`] of the ray's octant.
-    fn enter(node: &Node, order: u32, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32;
+    /// beyond their number is of no meaning. Returns which they are, 0 for none: bit `k` for the child in slot `15 ^ k ^ entry.order`.
+    fn enter(entry: &Entry, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32;
+    /// Returns what a ray is wrong by in a block, and its place there; [`Self::sift`] is given it.
+    #[inline(always)]
+    fn sieve_limits(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> SieveLimits {
+        SieveLimits::new(block, ray, boxes)
+    }
     /// Returns which triangles of the block the ray may meet: bits 0–3 the first ones of its facets, 4–7 the second; without those of the
     /// facet `unmet`. Lanes without a facet have any bit.
-    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay, unmet: u32) -> u32;
+    fn sift(block: &Block, ray: &SieveRay, limits: &SieveLimits, unmet: u32) -> u32;
     /// Overwrites `edges` with the edge functions of two facets; every implementation gives the same bits.
     #[inline(always)]
     fn pair_edges(corners: [&Corners; 2], line: &Line, edges: &mut Edges) {

@@ -35,6 +35,8 @@ impl Link {
     const PLACE: u32 = (1 << 30) - 1;
     /// Blocks, and nodes, that links can tell apart.
     pub(super) const MOST_BLOCKS: usize = 1 << 28;
+    /// Of a slot that is not in use: no child is the node at the root.
+    pub(super) const NONE: Self = Self(0);
     /// Where a ray goes that has nothing left to visit.
     pub(super) const END: Self = Self(3 << 30);
 
@@ -102,11 +104,11 @@ pub(super) struct Node {
     pub(super) bounds: [[u8; CHILDREN]; 6],
     pub(super) origin: [f32; 3],
     pub(super) step: [f32; 3],
-    /// One bit for each child in use; boxes of others mean nothing.
-    pub(super) used: u32,
+    /// 1: what is loaded with the steps as a fourth must be a normal number, for those below take a hundred times as long.
+    pub(super) one: f32,
     /// The axis along which the children of slots from eight on lie above the others.
     pub(super) long_axis: u32,
-    /// Links, by slot.
+    /// Links, by slot; [`Link::NONE`] where a slot is not in use, and its box means nothing.
     pub(super) children: [u32; CHILDREN],
 }
 
@@ -115,9 +117,9 @@ impl Node {
         bounds: [[255; CHILDREN], [0; CHILDREN], [255; CHILDREN], [0; CHILDREN], [255; CHILDREN], [0; CHILDREN]],
         origin: [0.0; 3],
         step: [0.0; 3],
-        used: 0,
+        one: 1.0,
         long_axis: 0,
-        children: [0; CHILDREN],
+        children: [Link::NONE.0; CHILDREN],
     };
 
     /// What slots are to be combined with, bit by bit, for the order in which a ray of an octant mostly meets children.
@@ -130,8 +132,8 @@ impl Node {
     /// The slots in use.
     #[inline]
     pub(super) fn slots(&self) -> impl Iterator<Item = usize> + use<> {
-        let used = self.used;
-        (0..CHILDREN).filter(move |slot| used >> slot & 1 == 1)
+        let children = self.children;
+        (0..CHILDREN).filter(move |&slot| Link(children[slot]) != Link::NONE)
     }
 
     /// A node without children whose grid spans the box `all`, relative to the middle of the mesh.
@@ -159,7 +161,6 @@ impl Node {
             self.bounds[2 * a + 1][slot] = whole.saturating_add(u8::from(f64::from(whole) < high));
         }
         self.children[slot] = link.0;
-        self.used |= 1 << slot;
     }
 }
 

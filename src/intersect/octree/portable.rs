@@ -1,26 +1,24 @@
 //! The walk in plain Rust.
 
 use super::lanes::Lanes;
-use super::node::{Block, Node};
-use super::ray::{BoxRay, LEAVE_STRETCH, SieveRay, corner_error, edge_error};
+use super::node::{Block, Link};
+use super::ray::{BoxRay, Entry, LEAVE_STRETCH, SieveLimits, SieveRay};
 
 /// Eight lanes as arrays; compilers vectorise most of it for the baseline of the target.
 pub(super) struct Portable;
 
 impl Lanes for Portable {
     #[inline(always)]
-    fn enter(node: &Node, order: u32, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+    fn enter(entry: &Entry, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32 {
+        let Entry { scale, near, far, node, order } = *entry;
         let mut enter = [ray.t_min; 16];
         let mut leave = [ray.t_max; 16];
         for a in 0..3 {
-            let base = (node.origin[a] - ray.origin[a]) * ray.inverse[a];
-            let scale = node.step[a] * ray.inverse[a];
-            let (to_low, to_high) = (base - ray.slack[a], base + ray.slack[a]);
+            let [first, last] =
+                [ray.rows.near[a], ray.rows.far[a]].map(|place| &node.bounds[usize::from(place) / 16]);
             for k in 0..16 {
-                let low = f32::from(node.bounds[2 * a][k]) * scale + to_low;
-                let high = f32::from(node.bounds[2 * a + 1][k]) * scale + to_high;
-                enter[k] = enter[k].max(low.min(high));
-                leave[k] = leave[k].min(low.max(high));
+                enter[k] = enter[k].max(f32::from(first[k]) * scale[a] + near[a]);
+                leave[k] = leave[k].min(f32::from(last[k]) * scale[a] + far[a]);
             }
         }
         let order = order as usize;
@@ -28,7 +26,7 @@ impl Lanes for Portable {
         let mut count = 0;
         for lane in 0..16 {
             let k = 15 ^ lane ^ order;
-            if node.used >> k & 1 == 1 && enter[k] <= leave[k] * LEAVE_STRETCH {
+            if Link(node.children[k]) != Link::NONE && enter[k] <= leave[k] * LEAVE_STRETCH {
                 enters[count] = enter[k];
                 links[count] = node.children[k];
                 met |= 1 << lane;
@@ -39,12 +37,8 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn sift(block: &Block, ray: &SieveRay, boxes: &BoxRay, unmet: u32) -> u32 {
-        let to: [f32; 3] = std::array::from_fn(|a| (block.origin[a] - ray.high[a]) - ray.low[a]);
-        let far = to[0].abs().max(to[1].abs()).max(to[2].abs());
-        let corner = corner_error(block.step, far, ray.slack);
-        let error = edge_error(block.step, corner);
-        let (t_min, t_max) = (boxes.t_min - 2.0 * corner, boxes.t_max + 2.0 * corner);
+    fn sift(block: &Block, ray: &SieveRay, limits: &SieveLimits, unmet: u32) -> u32 {
+        let SieveLimits { to, error, t_min, t_max } = *limits;
         let [kx, ky, kz] = ray.axes.map(usize::from);
         let [sx, sy, sz] = ray.shear;
         let sheared = |row: usize| -> [[f32; 8]; 3] {

@@ -1,7 +1,8 @@
 //! What a ray has still to visit: where it enters each node or block, and which that is.
 
 use super::lanes::Lanes;
-use super::node::{CHILDREN, Link, Node};
+use super::node::{CHILDREN, Link};
+use super::ray::{BoxRay, Entry};
 use std::hint::select_unpredictable;
 
 /// Places below the first entry, so that sixteen can be looked at at once; all lead to the end of the ray.
@@ -32,6 +33,15 @@ pub(super) struct Children {
 
 impl Children {
     pub(super) const NONE: Self = Self { count: 0, nearest: 0 };
+
+    /// Those of a node that a ray meets, as [`Lanes::enter`] returned them.
+    #[inline(always)]
+    pub(super) fn new(entry: &Entry, met: u32) -> Self {
+        // The link of the nearest is read from the node: on the stack it was written just now.
+        let lane = met.leading_zeros() ^ 31;
+        let nearest = entry.node.children[((15 ^ lane ^ entry.order) & 15) as usize];
+        Self { count: met.count_ones() as usize, nearest }
+    }
 }
 
 impl<const PLACES: usize> RayStack<PLACES> {
@@ -47,22 +57,17 @@ impl<const PLACES: usize> RayStack<PLACES> {
         self.count = 0;
     }
 
-    /// Writes the children of a node that a ray may meet above the top, which stays where it is: [`Self::take_nearest`],
-    /// [`Self::keep_all`] or [`Self::advance`] takes them.
+    /// Writes the children of a node that a ray may meet above the top, which stays where it is, and returns which they are, as
+    /// [`Lanes::enter`]: [`Self::take_nearest`], [`Self::keep_all`] or [`Self::advance`] takes them.
     #[inline(always)]
-    pub(super) fn enter<L: Lanes>(&mut self, node: &Node, ray: &super::ray::BoxRay) -> Children {
+    pub(super) fn enter<L: Lanes>(&mut self, entry: &Entry, ray: &BoxRay) -> u32 {
         let top = (self.count & Self::MASK) + GROUND;
         let enters = self.enters[top..top + CHILDREN].first_chunk_mut();
         let links = self.links[top..top + CHILDREN].first_chunk_mut();
-        let order = node.slot_order(ray.octant);
-        let met = match (enters, links) {
-            (Some(enters), Some(links)) => L::enter(node, order, ray, enters, links),
+        match (enters, links) {
+            (Some(enters), Some(links)) => L::enter(entry, ray, enters, links),
             _ => unreachable!("sixteen places"),
-        };
-        // The link of the nearest is read from the node: on the stack it was written just now.
-        let lane = met.leading_zeros() ^ 31;
-        let nearest = node.children[((15 ^ lane ^ order) & 15) as usize];
-        Children { count: met.count_ones() as usize, nearest }
+        }
     }
 
     /// Returns the nearest of the children that were just written, at least one, and keeps the others.

@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use super::node::{Link, Node};
-use super::ray::{BoxRay, SieveRay};
+use super::ray::{BoxRay, Entry, Rows, SieveRay};
 use super::ray_stack::{Children, RayStack};
 use super::tree::Tree;
 use crate::intersect::facet::{FacetRay, Nearest};
@@ -107,12 +107,12 @@ impl<const STACK: usize> RayState<STACK> {
             let o = exact as f32;
             b.origin[a] = o;
             b.inverse[a] = inverse;
-            b.slack[a] = ((4.0 * o.abs() + mesh_box.reach[a]) * ROUNDING + moved) * inverse;
+            b.slack[a] = ((4.0 * o.abs() + mesh_box.reach[a]) * ROUNDING + moved) * inverse.abs();
             self.sieve.high[a] = o;
             self.sieve.low[a] = (exact - f64::from(o)) as f32;
             octant |= u8::from(inverse < 0.0) << a;
         }
-        b.octant = octant & 7;
+        b.rows = Rows::ALL[usize::from(octant & 7)];
         // Adding zero makes −0.0 positive: distances are sorted by their bits.
         b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0) + 0.0;
         // What is asked again is taken before it is written: what was written in parts is read as a whole only after a wait.
@@ -137,10 +137,10 @@ impl<const STACK: usize> RayState<STACK> {
         self.boxes.t_max = t_max;
     }
 
-    /// Writes the children of a node that the ray may meet above the top of its stack.
+    /// Writes the children of a node that the ray may meet above the top of its stack, and returns which they are, as [`Lanes::enter`].
     #[inline(always)]
-    pub(super) fn enter<L: Lanes>(&mut self, node: &Node) -> Children {
-        self.stack.enter::<L>(node, &self.boxes)
+    pub(super) fn enter<L: Lanes>(&mut self, entry: &Entry) -> u32 {
+        self.stack.enter::<L>(entry, &self.boxes)
     }
 
     /// Goes on to the nearest of the children that were just written, or where there are none to what else is nearest.

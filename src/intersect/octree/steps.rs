@@ -2,6 +2,7 @@
 
 use super::lanes::Lanes;
 use super::node::{Block, Link, Node};
+use super::ray::SieveLimits;
 use super::ray_state::RayState;
 use super::tree::Tree;
 use crate::intersect::prefetch::prefetch_lines;
@@ -34,8 +35,13 @@ impl<'t> Arrays<'t> {
 /// Returns the triangles of a block of `count` facets that the ray may meet, bits as in [`Lanes::sift`], without those of the facet that it
 /// leaves and is known not to meet.
 #[inline(always)]
-pub(super) fn sift<L: Lanes, const STACK: usize>(block: &Block, count: usize, s: &RayState<STACK>) -> u32 {
-    L::sift(block, &s.sieve, &s.boxes, s.unmet_facet) & used_lanes(count)
+pub(super) fn sift<L: Lanes, const STACK: usize>(
+    block: &Block,
+    count: usize,
+    s: &RayState<STACK>,
+    limits: &SieveLimits,
+) -> u32 {
+    L::sift(block, &s.sieve, limits, s.unmet_facet) & used_lanes(count)
 }
 
 /// The bits of both triangles of the first `count` lanes of a block.

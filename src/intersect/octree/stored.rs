@@ -82,9 +82,8 @@ struct LinkCheck {
 }
 
 impl LinkCheck {
-    /// Takes further nodes, and sets the links of their children that are not in use to zero, by which walks tell them: their boxes mean
-    /// nothing.
-    fn take(&mut self, nodes: &mut [Node]) {
+    /// Takes further nodes.
+    fn take(&mut self, nodes: &[Node]) {
         simd::dispatch(LinkScan { check: self, nodes });
     }
 
@@ -106,7 +105,7 @@ impl LinkCheck {
 /// What [`LinkCheck::take`] does, for [`simd::dispatch`].
 struct LinkScan<'a> {
     check: &'a mut LinkCheck,
-    nodes: &'a mut [Node],
+    nodes: &'a [Node],
 }
 
 impl Kernel for LinkScan<'_> {
@@ -121,8 +120,8 @@ impl Kernel for LinkScan<'_> {
             check.count += 1;
             for slot in 0..CHILDREN {
                 // All bits or none.
-                let used = (node.used >> slot & 1).wrapping_neg();
                 let link = Link(node.children[slot]);
+                let used = u32::from(link != Link::NONE).wrapping_neg();
                 let [to_node, to_block] =
                     [link.is_node(), link.is_block()].map(|is| u32::from(is).wrapping_neg() & used);
                 let index = link.index() as u32;
@@ -130,7 +129,6 @@ impl Kernel for LinkScan<'_> {
                 broken[slot] |= used & !to_block & (!to_node | leads_back);
                 node_ends[slot] = node_ends[slot].max(to_node & (index + 1));
                 block_ends[slot] = block_ends[slot].max(to_block & (index + 1));
-                node.children[slot] &= used;
             }
         }
         for slot in 0..CHILDREN {
@@ -253,24 +251,23 @@ mod tests {
     #[test]
     fn links_that_lead_back_or_out_are_told() {
         let node = |link: Link| Node {
-            used: 1,
-            children: std::array::from_fn(|k| if k == 0 { link.0 } else { 7 * u32::from(k == 1) }),
+            children: std::array::from_fn(|k| if k == 0 { link.0 } else { Link::NONE.0 }),
             ..Node::EMPTY
         };
-        let is_held = |first: Link, root: Link| {
-            let mut nodes = [node(first), node(Link::block(0, 1))];
+        let are_held = |children: [Link; 2], root: Link| {
             let mut links = LinkCheck::default();
-            nodes.iter_mut().for_each(|node| links.take(std::slice::from_mut(node)));
-            assert_eq!(nodes[1].children[1..], [0; 15]);
+            children.into_iter().for_each(|child| links.take(&[node(child)]));
             links.hold(Some(root), [2, 1])
         };
+        let is_held = |first: Link, root: Link| are_held([first, Link::block(0, 1)], root);
         assert!(is_held(Link::node(1), Link::node(0)) && is_held(Link::block(0, 4), Link::block(0, 2)));
-        for wrong in [Link::node(0), Link::node(2), Link::block(1, 1), Link::END] {
+        for wrong in [Link::node(2), Link::block(1, 1), Link::END] {
             assert!(!is_held(wrong, Link::node(0)), "{wrong:?}");
         }
         for wrong in [Link::node(2), Link::block(1, 1), Link::END] {
             assert!(!is_held(Link::node(1), wrong), "{wrong:?}");
         }
+        assert!(!are_held([Link::node(1), Link::node(1)], Link::node(0)));
     }
 
     #[test]

@@ -5,8 +5,9 @@
 use super::batch_walk::{States, walk_batch};
 use super::lanes::Lanes;
 use super::light_buffer::{self, LightBuffer};
-use super::node::{Link, Target};
-use super::ray_stack::stack_places;
+use super::node::{Link, Node, Target};
+use super::ray::Entry;
+use super::ray_stack::{Children, stack_places};
 use super::ray_state::RayState;
 use super::step_queues::WIDTH;
 use super::steps::{Arrays, prefetch_step, sift, test_with_care};
@@ -105,10 +106,10 @@ fn walk_one<L: Lanes, const STACK: usize>(tree: &Tree, s: &mut RayState<STACK>, 
                 // Two at a time: one waits for its memory and its own arithmetic most of the time, and the second is mostly needed.
                 if let Some(second) = s.stack.take_open_node(s.boxes.t_max) {
                     cost.nodes += 1;
-                    let children = s.enter::<L>(&arrays.nodes[second.index()]);
+                    let children = enter::<L, STACK>(s, &arrays.nodes[second.index()]);
                     s.stack.keep_all(children);
                 }
-                let children = s.enter::<L>(&arrays.nodes[index]);
+                let children = enter::<L, STACK>(s, &arrays.nodes[index]);
                 s.next =
                     if children.count > 0 { s.stack.take_nearest(children) } else { s.stack.pop(s.boxes.t_max) };
                 prefetch_step(&arrays, s.next);
@@ -117,7 +118,8 @@ fn walk_one<L: Lanes, const STACK: usize>(tree: &Tree, s: &mut RayState<STACK>, 
             Target::Block(index, count) => {
                 cost.tests += count as u64;
                 s.block = index as u32;
-                s.candidates = sift::<L, STACK>(&arrays.blocks[index], count, s);
+                let block = &arrays.blocks[index];
+                s.candidates = sift::<L, STACK>(block, count, s, &L::sieve_limits(block, &s.sieve, &s.boxes));
                 if s.candidates != 0 {
                     test_candidates::<L, STACK>(tree, &arrays, s);
                 }
@@ -126,6 +128,14 @@ fn walk_one<L: Lanes, const STACK: usize>(tree: &Tree, s: &mut RayState<STACK>, 
             Target::End => return,
         }
     }
+}
+
+/// Writes the children of a node that a ray may meet above the top of its stack, and returns them.
+#[inline(always)]
+fn enter<L: Lanes, const STACK: usize>(s: &mut RayState<STACK>, node: &Node) -> Children {
+    let mut entry = Entry::IDLE;
+    L::prepare(&mut entry, node, &s.boxes);
+    Children::new(&entry, s.enter::<L>(&entry))
 }
 
 /// Tests the triangles that the sieve left in f64, keeps the nearest hit and limits the boxes to it. There must be at least one.
