@@ -7,6 +7,7 @@ use super::assembly::Assembly;
 use super::lost_usages::LostUsage;
 use super::relations::{INDIVIDUAL_USAGE, PROMISE, is_promise, usage_attributes};
 use super::subassemblies::ProductLink;
+use super::usage_ends::ProductsAbove;
 use super::usage_names::{Usage, UsagePlacement, name_usages};
 use crate::math::Frame;
 use crate::step::part21::Entity;
@@ -35,40 +36,44 @@ impl<'f, 'a> Assembly<'f, 'a> {
             return;
         }
         let is_promised = |usage: &Usage| file.entity(usage.id).is_some_and(is_promise);
-        // Parents by what they are promised, and by what they use.
-        let mut promised: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
+        let is_placed = |usage: &Usage| usage.placement != UsagePlacement::Unstated;
+        // What uses each product.
         let mut users: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
+        let mut parents: Vec<u64> = Vec::new();
+        // Promises with a place, by parent and component.
+        let mut promised: Vec<[u64; 2]> = Vec::new();
         for (parent, own) in &*usages {
             for usage in own {
-                let parents = if is_promised(usage) { &mut promised } else { &mut users };
-                parents.entry(usage.child).or_default().push(*parent);
+                if !is_promised(usage) {
+                    users.entry(usage.child).or_default().push(*parent);
+                    continue;
+                }
+                parents.push(*parent);
+                if is_placed(usage) {
+                    promised.push([*parent, usage.child]);
+                }
             }
         }
-        // Upwards from each component: there are fewer of them, and less is above one than below an assembly.
-        let mut kept: FxHashSet<[u64; 2]> = FxHashSet::default();
-        for (component, parents) in &promised {
-            let above = all_above(*component, &users);
-            let keeping = parents.iter().filter(|parent| above.contains(*parent));
-            kept.extend(keeping.map(|parent| [*parent, *component]));
-        }
-        let mut parents: Vec<u64> = promised.into_values().flatten().collect();
+        let kept = ProductsAbove::new(promised.iter().map(|pair| pair[1]), &users).pairs_in_use(&promised);
         parents.sort_unstable();
         parents.dedup();
         for parent in parents {
             let Some(own) = usages.get_mut(&parent) else { continue };
             own.retain(|usage| {
-                let is_placed = usage.placement != UsagePlacement::Unstated;
-                let is_kept = kept.contains(&[parent, usage.child]);
-                if !is_promised(usage) || !is_kept && (is_placed || !users.contains_key(&usage.child)) {
+                if !is_promised(usage) {
                     return true;
                 }
-                if is_placed {
+                if !is_placed(usage) {
+                    return !users.contains_key(&usage.child);
+                }
+                let is_kept = kept.contains(&[parent, usage.child]);
+                if is_kept {
                     self.problems.push(format!(
                         "#{}: promises product #{}, which other usages put into #{parent}: only these are used",
                         usage.id, usage.child
                     ));
                 }
-                false
+                !is_kept
             });
         }
     }
@@ -120,14 +125,4 @@ impl<'f, 'a> Assembly<'f, 'a> {
             usages.iter().filter(|usage| stands(usage)).map(|usage| usage.child).collect();
         usages.retain(|usage| stands(usage) || !standing.contains(&usage.child));
     }
-}
-
-/// Returns the products that use a product, and those that use these; `users` are the parents of each.
-fn all_above(product: u64, users: &FxHashMap<u64, Vec<u64>>) -> FxHashSet<u64> {
-    let mut above: FxHashSet<u64> = FxHashSet::default();
-    let mut open = vec![product];
-    while let Some(child) = open.pop() {
-        open.extend(users.get(&child).into_iter().flatten().copied().filter(|parent| above.insert(*parent)));
-    }
-    above
 }
