@@ -21,6 +21,10 @@ const PLACE_ROUNDING_MM: f64 = 1e-5;
 const COMPOSITION_ROUNDING: f64 = 1e-14;
 /// What places are sorted along: across it lie no rows of things, as across each axis.
 const SORTING_LINE: [f64; 3] = [1.0, 0.618, 0.414];
+/// Places of one thing are searched together where their roundings differ by no more than this many binary digits: one that stands 1e11 mm
+/// out, which is known to 1e5 mm, would otherwise make all others be searched that far. Those near the origin are searched 1e-2 mm far at
+/// most.
+const CLASS_DIGITS: u64 = 10;
 
 /// Returns how far the origins of two placements may lie apart that are one, mm; `f` is either.
 fn origin_tolerance(f: &Frame) -> f64 {
@@ -86,18 +90,37 @@ impl Place {
 /// Things, by their ids, in places, of which one is found to rounding.
 #[derive(Default)]
 pub(super) struct PlaceTable {
-    /// By thing, by the position along [`SORTING_LINE`], and by the number of the entry.
-    entries: BTreeMap<(u64, i64, usize), Place>,
-    /// The largest rounding of the entries of each thing, mm.
-    widest: FxHashMap<u64, f64>,
+    /// By thing, by the class of the rounding, by the position along [`SORTING_LINE`], and by the number of the entry.
+    entries: BTreeMap<(u64, u64, i64, usize), Place>,
+    /// The classes of roundings that each thing has.
+    classes: FxHashMap<u64, Vec<RoundingClass>>,
+}
+
+/// Places of one thing whose roundings are of one size.
+struct RoundingClass {
+    /// The binary exponent of the roundings in steps of [`CLASS_DIGITS`].
+    class: u64,
+    /// The largest of the roundings, mm.
+    widest: f64,
+}
+
+impl RoundingClass {
+    /// Returns the class of a rounding.
+    fn number(rounding: f64) -> u64 {
+        (rounding.to_bits() >> (f64::MANTISSA_DIGITS - 1)) / CLASS_DIGITS
+    }
 }
 
 impl PlaceTable {
     /// Adds a thing in a place; the entries are numbered from 0.
     pub(super) fn insert(&mut self, thing: u64, place: Place) {
-        self.entries.insert((thing, ordered(place.along()), self.entries.len()), place);
-        let widest = self.widest.entry(thing).or_default();
-        *widest = widest.max(place.rounding);
+        let class = RoundingClass::number(place.rounding);
+        self.entries.insert((thing, class, ordered(place.along()), self.entries.len()), place);
+        let classes = self.classes.entry(thing).or_default();
+        match classes.iter_mut().find(|known| known.class == class) {
+            Some(known) => known.widest = known.widest.max(place.rounding),
+            None => classes.push(RoundingClass { class, widest: place.rounding.max(0.0) }),
+        }
     }
 
     /// Returns the number of an entry that has the thing in this place, to rounding; `None` where there is none.
@@ -108,13 +131,16 @@ impl PlaceTable {
 
     /// Returns the entries of a thing, with their numbers, of which one could be the same place: of ten thousand places of one screw few.
     fn abreast(&self, thing: u64, place: &Place) -> Option<impl Iterator<Item = (usize, &Place)>> {
-        let widest = self.widest.get(&thing)?;
+        let classes = self.classes.get(&thing)?;
         // What is too far out for a number is refused by those who ask.
         let along = Some(place.along()).filter(|along| along.is_finite())?;
-        let reach = widest.max(place.rounding) * SORTING_LINE.iter().sum::<f64>();
-        let [low, high] = [along - reach, along + reach].map(ordered);
-        let near = self.entries.range((thing, low, 0)..=(thing, high, usize::MAX));
-        Some(near.map(|((_, _, number), other)| (*number, other)))
+        let rounding = place.rounding;
+        Some(classes.iter().flat_map(move |&RoundingClass { class, widest }| {
+            let reach = widest.max(rounding) * SORTING_LINE.iter().sum::<f64>();
+            let [low, high] = [along - reach, along + reach].map(ordered);
+            let near = self.entries.range((thing, class, low, 0)..=(thing, class, high, usize::MAX));
+            near.map(|((.., number), other)| (*number, other))
+        }))
     }
 
     /// Whether the thing stands in this place, to rounding.
@@ -159,15 +185,32 @@ mod tests {
         assert!(table.holds(7, &back.inner(&shift(1234.568))));
     }
 
+    /// Another thing, and the same.
     #[test]
-    fn one_thing_far_out_lets_no_others_lie_abreast() {
-        let parent = Place::of_parent(Frame::IDENTITY);
-        let mut table = PlaceTable::default();
-        table.insert(8, parent.inner(&shift(1e11)));
-        (0..100).for_each(|k| table.insert(7, parent.inner(&shift(1.5 * f64::from(k)))));
-        let place = parent.inner(&shift(15.0));
-        assert_eq!(table.abreast(7, &place).map(Iterator::count), Some(1));
-        assert_eq!(table.find(7, &place), Some(11));
+    fn a_place_far_out_lets_no_others_lie_abreast() {
+        for far in [8, 7] {
+            let parent = Place::of_parent(Frame::IDENTITY);
+            let mut table = PlaceTable::default();
+            table.insert(far, parent.inner(&shift(1e11)));
+            (0..100).for_each(|k| table.insert(7, parent.inner(&shift(1.5 * f64::from(k)))));
+            let place = parent.inner(&shift(15.0));
+            assert_eq!(table.abreast(7, &place).map(Iterator::count), Some(1), "{far}");
+            assert_eq!(table.find(7, &place), Some(11), "{far}");
+            // Out there a place has the digits of its coordinate.
+            assert_eq!(table.find(far, &parent.inner(&shift(1e11 + 5e4))), Some(0), "{far}");
+        }
+    }
+
+    /// What has a place within 1e5 mm may be one with what has it within 1e-5 mm, whichever is asked for.
+    #[test]
+    fn places_of_unlike_digits_are_one_within_the_wider() {
+        let outer = Place::of_parent(shift(-1e11));
+        let [exact, wide] = [Place::of_parent(shift(2e4)), outer.inner(&shift(1e11))];
+        for [known, asked] in [[exact, wide], [wide, exact]] {
+            let mut table = PlaceTable::default();
+            table.insert(7, known);
+            assert_eq!(table.find(7, &asked), Some(0), "{known:?}");
+        }
     }
 
     #[test]
