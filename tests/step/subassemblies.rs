@@ -174,8 +174,29 @@ fn an_assembly_that_relationships_put_into_several_products() {
     assert_places(&places([22, 21], &both), &[0.0, 0.0, 20.0, 30.0], "two assemblies");
 }
 
+/// The assembly #200 uses #500 at x = 20, which uses the part at x = 10. A relationship that puts #200 into the part has its ends swapped,
+/// for the part would hold itself.
+#[test]
+fn a_relationship_that_puts_an_assembly_into_its_part_is_told() {
+    let chain = product(500, "sub", 510)
+        + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
+        + &usage(600, NEXT, "#200,#500,$")
+        + &relation(602, [510, 300], [20, 22])
+        + &contextual(604, 602, 600)
+        + &usage(610, NEXT, "#500,#100,$")
+        + &relation(612, [110, 510], [20, 21])
+        + &contextual(614, 612, 610);
+    let import = assembly("", &(chain + &relation(620, [300, 110], [21, 20])));
+    let x: Vec<f64> = import.model.instances.iter().map(|i| i.placement.origin.x).collect();
+    let told = &import.report.problems;
+    assert_eq!((x, told.len()), (vec![30.0], 1), "{told:?}");
+    assert!(
+        told[0].ends_with("#620: puts product #200 into #100, which usages put into #200: only these are used")
+    );
+}
+
 /// The shape of the part, #111, is no product's and related to that of the part, #112: a relationship of a usage may name either, at either
-/// end, and the usage may not be in the file.
+/// end, may not be told to be the usage's, and the usage may not be in the file.
 #[test]
 fn a_relationship_of_a_usage_may_name_a_related_shape() {
     let shapes = product(150, "part", 112)
@@ -188,6 +209,7 @@ fn a_relationship_of_a_usage_may_name_a_related_shape() {
         for related in [relation(610, [shape, 300], [20, 21]), relation(610, [300, shape], [21, 20])] {
             let placed = read(&(shapes.clone() + &related + &contextual(620, 610, 600)));
             assert_places(&placed, &[10.0], &related);
+            assert_places(&read(&(shapes.clone() + &related)), &[10.0], &related);
         }
         let lost = shapes.clone() + &relation(610, [shape, 300], [20, 21]);
         let lost = read(&(lost + "#620=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#610,#99999);\n"));

@@ -106,11 +106,11 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let ends = UsageEnds::new(&usages);
         a.read_related_shapes(&relations, &contextual);
         let places = a.read_contextual(&contextual, &ends);
+        relations.retain(|e| !places.relations.contains(&e.id));
+        let above = a.products_above_others(&relations, &ends);
         let mut related = Vec::new();
         for e in relations {
-            if !places.relations.contains(&e.id) {
-                related.extend(a.read_relationship(e, &ends));
-            }
+            related.extend(a.read_relationship(e, &ends, &above));
         }
         a.leave_out_links_to_products(&ends);
         a.read_occurrence_shapes(&occurrence_shapes);
@@ -141,6 +141,13 @@ impl<'f, 'a> Assembly<'f, 'a> {
     /// Returns the product that a representation shows, be it one that is related to that of the product; `None` for none or several.
     pub(super) fn shown_product(&self, representation: u64) -> Option<u64> {
         self.owned.get(&representation).copied().unwrap_or_else(|| self.related.get(&representation).copied())
+    }
+
+    /// Returns the products that two representations show, as [`Self::shown_product`]; `None` where one shows none or several, or both the
+    /// same.
+    pub(super) fn shown_products(&self, [first, second]: [u64; 2]) -> Option<[u64; 2]> {
+        let products = [self.shown_product(first)?, self.shown_product(second)?];
+        Some(products).filter(|[first, second]| first != second)
     }
 
     /// Returns the ids of the items of a representation; empty when the file does not have it.

@@ -251,17 +251,44 @@ impl<'f, 'a> Assembly<'f, 'a> {
         links.into_iter().map(|(item, link)| (item, link.placement)).collect()
     }
 
+    /// Returns those pairs of products, of which relationships with a transformation put the first into the second, in which the first uses
+    /// the second all the same, by itself or by way of others.
+    pub(super) fn products_above_others(
+        &self,
+        relations: &[Entity<'f, 'a>],
+        ends: &UsageEnds,
+    ) -> FxHashSet<[u64; 2]> {
+        let moving = relations.iter().filter(|e| has_transformation(**e));
+        let pairs: Vec<[u64; 2]> =
+            moving.filter_map(|e| self.shown_products(related_representations(*e)?)).collect();
+        ends.one_way(&pairs)
+    }
+
     /// Links the two representations of a relationship: one way by its transformation, or both ways, unmoved, if it has none. Where the
-    /// product of the first uses that of the second, their ends are swapped. Returns the link of a transformation between two products.
-    pub(super) fn read_relationship(&mut self, e: Entity<'f, 'a>, ends: &UsageEnds) -> Option<ProductLink> {
+    /// product of the first uses that of the second, their ends are swapped; where it does so by way of others, as in `above`, which place
+    /// it, the relationship places nothing, which is told. Returns the link of a transformation between two products.
+    pub(super) fn read_relationship(
+        &mut self,
+        e: Entity<'f, 'a>,
+        ends: &UsageEnds,
+        above: &FxHashSet<[u64; 2]>,
+    ) -> Option<ProductLink> {
         let [first, second] = related_representations(e)?;
         if !has_transformation(e) {
             self.links.entry(second).or_default().push(Link::plain(first));
             self.links.entry(first).or_default().push(Link::plain(second));
             return None;
         }
+        let products = self.shown_products([first, second]);
+        let are_swapped = products.is_some_and(|products| ends.are_swapped(products));
+        if let Some([child, parent]) = products.filter(|products| !are_swapped && above.contains(products)) {
+            self.problems.push(format!(
+                "#{}: puts product #{child} into #{parent}, which usages put into #{child}: only these are used",
+                e.id
+            ));
+            return None;
+        }
         let mut placement = self.transformation(e, [first, second]);
-        let are_swapped = self.products_of([first, second]).is_some_and(|products| ends.are_swapped(products));
         let [shown, holder] = if are_swapped { [second, first] } else { [first, second] };
         if are_swapped {
             placement = placement.map(|p| p.inverse());

@@ -54,8 +54,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
             self.problems.push(told("lacks a representation: it places nothing"));
             return None;
         };
-        let products = self.shown_product(first).zip(self.shown_product(second));
-        let Some((child, parent)) = products.filter(|(child, parent)| child != parent) else {
+        let Some([child, parent]) = self.shown_products([first, second]) else {
             self.problems.push(told("counts without it"));
             return None;
         };

@@ -29,6 +29,24 @@ impl UsageEnds {
     pub(super) fn are_swapped(&self, [first, second]: [u64; 2]) -> bool {
         self.pairs.contains(&[first, second]) && !self.pairs.contains(&[second, first])
     }
+
+    /// Returns those of some pairs of products in which the first uses the second, by itself or by way of others, and is not used by it.
+    pub(super) fn one_way(&self, pairs: &[[u64; 2]]) -> FxHashSet<[u64; 2]> {
+        if pairs.is_empty() {
+            return FxHashSet::default();
+        }
+        let mut users: FxHashMap<u64, Vec<u64>> = FxHashMap::default();
+        for [parent, child] in &self.pairs {
+            users.entry(*child).or_default().push(*parent);
+        }
+        let both_ways: Vec<[u64; 2]> =
+            pairs.iter().flat_map(|&[first, second]| [[first, second], [second, first]]).collect();
+        let above = ProductsAbove::new(both_ways.iter().map(|pair| pair[1]), &users);
+        let used = above.pairs_in_use(&both_ways);
+        let is_one_way =
+            |&[first, second]: &[u64; 2]| used.contains(&[first, second]) && !used.contains(&[second, first]);
+        pairs.iter().copied().filter(is_one_way).collect()
+    }
 }
 
 /// Components that one sweep follows upwards: each has a bit of a number.
@@ -164,6 +182,19 @@ mod tests {
         let pairs =
             [[1, 5], [2, 5], [4, 5], [5, 5], [7, 5], [2, 6], [3, 6], [1, 6], [7, 6], [6, 1], [9, 5], [1, 9]];
         assert_eq!(in_use(&usages, &pairs), [[1, 5], [1, 6], [2, 5], [3, 6], [4, 5], [7, 6]]);
+    }
+
+    #[test]
+    fn products_in_a_circle_use_each_other_both_ways() {
+        let ends = |usages: &[[u64; 2]]| UsageEnds {
+            pairs: usages.iter().copied().collect(),
+            parents: usages.iter().map(|pair| pair[0]).collect(),
+        };
+        let pairs = [[1, 3], [3, 1], [1, 2], [3, 4]];
+        let one_way = ends(&[[1, 2], [2, 3]]).one_way(&pairs);
+        assert_eq!(one_way, FxHashSet::from_iter([[1, 3], [1, 2]]));
+        let in_circle = ends(&[[1, 2], [2, 3], [3, 1], [3, 4]]).one_way(&pairs);
+        assert_eq!(in_circle, FxHashSet::from_iter([[3, 4]]));
     }
 
     #[test]
