@@ -241,17 +241,75 @@ fn an_edge_of_wrong_sense_does_not_run_over_ends_that_lie_apart() {
     }
 }
 
-/// The disc cut by a chord into two faces: the arc of the one takes what is between the vertices, that of the other runs over the ends.
+/// The rest of the disc of [`disc_data`] with two edges, the first along its curve, the second straight: a face #85, whose arc has this
+/// curve and sense.
+fn rest_of_disc(curve: &str) -> String {
+    format!(
+        "#80=EDGE_CURVE('',#41,#40,{curve});\n#81=ORIENTED_EDGE('',*,*,#80,.T.);\n#82=ORIENTED_EDGE('',*,*,#51,.F.);\n\
+         #83=EDGE_LOOP('',(#81,#82));\n#84=FACE_OUTER_BOUND('',#83,.T.);\n#85=ADVANCED_FACE('',(#84),#71,.T.);\n"
+    )
+}
+
+/// Asserts that so many faces are there, of this area together, all but one of which have an edge over ends that lie apart.
+fn assert_all_but_one_closed(import: &Import, faces: usize, expected: f64) {
+    let report = &import.report;
+    assert_eq!((report.faces.converted, report.faces.repaired), (faces, faces - 1), "{:?}", report.repairs);
+    assert!(report.repairs.iter().all(|r| r.reason.contains("lie apart")), "{:?}", report.repairs);
+    close(area(import), expected, 1e-4);
+}
+
+/// The disc cut by a chord into two faces: the arc of the one takes what is between the vertices, that of the other runs over the ends. The
+/// former may name a curve that runs against the other's, with the sense turned as well.
 #[test]
 fn an_edge_runs_over_ends_beside_another_along_the_rest_of_its_curve() {
-    let data = disc_data(0.05, "CONTINUOUS", &[1.5 * PI, 0.25 * PI], true).replace("'',(#73))", "'',(#73,#85))")
-        + "#80=EDGE_CURVE('',#41,#40,#25,.T.);\n#81=ORIENTED_EDGE('',*,*,#80,.T.);\n#82=ORIENTED_EDGE('',*,*,#51,.F.);\n\
-           #83=EDGE_LOOP('',(#81,#82));\n#84=FACE_OUTER_BOUND('',#83,.T.);\n#85=ADVANCED_FACE('',(#84),#71,.T.);\n";
-    let import = read(&data);
-    let faces = &import.report.faces;
-    assert_eq!((faces.converted, faces.repaired), (2, 1), "{:?}", import.report.repairs);
-    assert!(import.report.repairs[0].reason.contains("lie apart"), "{:?}", import.report.repairs);
-    close(area(&import), 25.0 * PI, 1e-4);
+    let trimmed =
+        "#86=TRIMMED_CURVE('',#25,(PARAMETER_VALUE(2.)),(PARAMETER_VALUE(0.)),.F.,.PARAMETER.);\n".to_owned();
+    for (curve, more) in [("#25,.T.", String::new()), ("#86,.F.", trimmed)] {
+        let one = disc_data(0.05, "CONTINUOUS", &[1.5 * PI, 0.25 * PI], true);
+        let data = one.replace("'',(#73))", "'',(#73,#85))") + &rest_of_disc(curve) + &more;
+        assert_all_but_one_closed(&read(&data), 2, 25.0 * PI);
+    }
+}
+
+/// Segments of the disc over one another, each of 135° less twice its number times 0.01 rad, with arcs over the ends: the edge along the
+/// rest of the curve is the last of all.
+#[test]
+fn each_of_many_edges_along_a_curve_counts() {
+    const SEGMENTS: u32 = 70;
+    let mut data = disc_data(0.05, "CONTINUOUS", &[1.5 * PI, 0.25 * PI], true);
+    let mut faces = String::from("#73,");
+    let mut expected = 25.0 * PI;
+    for k in 1..=SEGMENTS {
+        let [point, vertex, edge, used, border] = [1000, 1002, 1004, 1006, 1008].map(|id| id + 20 * k);
+        let (bound, face) = (border + 1, border + 2);
+        let angle = 0.01 * f64::from(k);
+        for (n, angle) in (0..).zip([1.5 * PI + angle, 0.25 * PI - angle]) {
+            let (sin, cos) = angle.sin_cos();
+            let curve = if n == 0 { "#25" } else { "$" };
+            let (from, to) = (vertex + n, vertex + 1 - n);
+            data += &format!(
+                "#{}=CARTESIAN_POINT('',({:?},{:?},0.));\n#{from}=VERTEX_POINT('',#{});\n\
+                 #{}=EDGE_CURVE('',#{from},#{to},{curve},.T.);\n#{}=ORIENTED_EDGE('',*,*,#{},.T.);\n",
+                point + n,
+                5.0 * cos,
+                5.0 * sin,
+                point + n,
+                edge + n,
+                used + n,
+                edge + n
+            );
+        }
+        data += &format!(
+            "#{border}=EDGE_LOOP('',(#{used},#{}));\n#{bound}=FACE_OUTER_BOUND('',#{border},.T.);\n\
+             #{face}=ADVANCED_FACE('',(#{bound}),#71,.T.);\n",
+            used + 1
+        );
+        faces += &format!("#{face},");
+        let turn = 0.75 * PI - 2.0 * angle;
+        expected += 12.5 * (turn - turn.sin());
+    }
+    let data = data.replace("'',(#73))", &format!("'',({faces}#85))")) + &rest_of_disc("#25,.T.");
+    assert_all_but_one_closed(&read(&data), SEGMENTS as usize + 2, expected);
 }
 
 /// A slit of 5 µm between the ends of a curve along which one edge runs from the one to the other.

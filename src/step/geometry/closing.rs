@@ -16,13 +16,19 @@ use crate::math::{Homogeneous, Point};
 use crate::nurbs::{ControlPoint, Curve};
 use crate::step::part21::Entity;
 use rustc_hash::FxHashMap;
-
-/// Edges along one curve that are asked which part of it they take: a curve in more pieces is not asked further.
-const ASKED_EDGES: usize = 64;
+use std::sync::OnceLock;
 
 /// Edges by the composite curve along which they run.
 #[derive(Debug, Default)]
-pub(crate) struct CompositeEdges(FxHashMap<u64, Vec<u64>>);
+pub(crate) struct CompositeEdges(FxHashMap<u64, EdgesAlong>);
+
+/// The edges along one composite curve.
+#[derive(Debug, Default)]
+struct EdgesAlong {
+    edges: Vec<u64>,
+    /// See [`GeometryReader::taken_middles`]; found when one of the edges asks for them.
+    middles: OnceLock<Vec<f64>>,
+}
 
 /// How an edge uses its curve.
 pub(super) struct CurveUse {
@@ -87,7 +93,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             let may_close = is_near && (width <= accuracy || is_closed_by_file(owner));
             let runs_over = || {
                 let [from, to] = usage.parameters(&directed);
-                let is_taken = || self.is_taken([to, from], &directed, others.along(owner, e));
+                let is_taken = || self.is_taken([to, from], owner.id, others);
                 to < from && (width <= accuracy || is_taken())
             };
             (*are_one || may_close && runs_over()) && !usage.joins_ends(curve, width)
@@ -118,38 +124,44 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             let curve = own.and_then(|a| self.file.entity(a.id(0)?));
             let owner = curve.map(|curve| self.parameter_owner(curve)).filter(|owner| owner.is_one_of(&COMPOSITES));
             if let Some(owner) = owner {
-                found.0.entry(owner.id).or_default().push(id);
+                found.0.entry(owner.id).or_default().edges.push(id);
             }
         }
         found
     }
 
-    /// Whether one of these edges, run as its sense says, takes the part of an open curve from `low` to `high`: the middle of what it takes
-    /// is there.
-    fn is_taken(&self, [low, high]: [f64; 2], curve: &DirectedCurve, edges: impl Iterator<Item = u64>) -> bool {
-        let takes_it = |id: u64| {
-            let [first, last] = self.use_of_curve(id).map_or([low; 2], |usage| usage.parameters(curve));
-            let middle = 0.5 * (first + last);
-            first < last && low < middle && middle < high
-        };
-        edges.take(ASKED_EDGES).any(takes_it)
+    /// Whether an edge, run as its sense says, takes the part from `low` to `high` of the open curve `owner`: the middle of what it takes
+    /// is there. One that runs over the ends, or has a wrong sense, takes none.
+    fn is_taken(&self, [low, high]: [f64; 2], owner: u64, others: &CompositeEdges) -> bool {
+        let Some(along) = others.0.get(&owner) else { return false };
+        let middles = along.middles.get_or_init(|| self.taken_middles(&along.edges));
+        let next = middles.partition_point(|middle| *middle <= low);
+        middles.get(next).is_some_and(|middle| *middle < high)
     }
 
-    /// Returns how the EDGE_CURVE #`id` uses its curve; `None` where that cannot be told.
-    fn use_of_curve(&self, id: u64) -> Option<CurveUse> {
+    /// Returns the middles, rising, of the parts of their curve that some edges take, where they run within it.
+    fn taken_middles(&self, edges: &[u64]) -> Vec<f64> {
+        let middle = |id: &u64| {
+            let (usage, curve) = self.use_of_curve(*id)?;
+            let [first, last] = usage.parameters(&curve);
+            (first < last).then_some(0.5 * (first + last))
+        };
+        let mut middles: Vec<f64> = edges.iter().filter_map(middle).collect();
+        middles.sort_unstable_by(f64::total_cmp);
+        middles
+    }
+
+    /// Returns how the EDGE_CURVE #`id` uses its curve, and that as the edge names it: one that trims or moves another may run against it,
+    /// and elsewhere. `None` where they cannot be read.
+    fn use_of_curve(&self, id: u64) -> Option<(CurveUse, DirectedCurve)> {
         let e = self.file.entity(id)?;
         let ends = e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1))?;
         let vertices = [self.vertex(ends.id(0)?).ok()?, self.vertex(ends.id(1)?).ok()?];
-        let sense = e.attributes("EDGE_CURVE", 3)?.flag(1) != Some(false);
-        Some(CurveUse { vertices, sense, is_closed: ends.id(0) == ends.id(1), is_alone: false })
-    }
-}
-
-impl CompositeEdges {
-    /// Returns the edges along the curve `owner` other than `e`.
-    fn along(&self, owner: Entity<'_, '_>, e: Entity<'_, '_>) -> impl Iterator<Item = u64> {
-        let (edges, e) = (self.0.get(&owner.id).map_or(&[][..], Vec::as_slice), e.id);
-        edges.iter().copied().filter(move |&id| id != e)
+        let own = e.attributes("EDGE_CURVE", 3)?;
+        let curve = self.curve(own.id(0)?, 0).ok()?;
+        let sense = own.flag(1) != Some(false);
+        let usage = CurveUse { vertices, sense, is_closed: ends.id(0) == ends.id(1), is_alone: false };
+        Some((usage, curve))
     }
 }
 
