@@ -1,6 +1,7 @@
 //! Shapes without a product that stand in each other: each is placed where its relationships say, whatever the order of the file.
 
 use crate::assemblies::{assert_places, read, relation};
+use crate::faces::{import, square};
 
 /// A representation #`id` of a block of its own, the solid #`id` + 1.
 fn block(id: u32) -> String {
@@ -76,5 +77,29 @@ fn a_map_of_what_stands_already_is_not_told() {
         assert_places(&import, &[0.0], items);
         let left_out: Vec<u64> = import.report.left_out.iter().map(|note| note.id).collect();
         assert_eq!(left_out, told, "{items}");
+    }
+}
+
+/// A map whose representation lists the shell or the face of what stands, or another shell of the same face; one with a face of its own is
+/// told.
+#[test]
+fn a_map_of_a_part_of_what_stands_is_not_told() {
+    let text = square([".T."; 4], [0, 1, 2, 3]);
+    let face = text.lines().find_map(|line| line.strip_prefix("#900=")).expect("the face");
+    for (items, told) in [
+        ("#4", vec![]),
+        ("#900", vec![]),
+        ("#102", vec![]),
+        ("#103", vec![]),
+        ("#4,#901", vec![120]),
+        ("#104", vec![120]),
+    ] {
+        let import = import(&format!(
+            "{text}#901={face}\n#102=OPEN_SHELL('',(#900));\n#103=SHELL_BASED_SURFACE_MODEL('',(#102));\n\
+             #104=OPEN_SHELL('',(#900,#901));\n#120=SHAPE_REPRESENTATION('01',({items}),#1);\n\
+             #121=AXIS2_PLACEMENT_3D('',#10,$,$);\n#122=REPRESENTATION_MAP(#121,#120);\n"
+        ));
+        let left_out: Vec<u64> = import.report.left_out.iter().map(|note| note.id).collect();
+        assert_eq!((import.model.placed_face_count(), left_out), (1, told), "{items}");
     }
 }

@@ -22,7 +22,7 @@ impl Assembly<'_, '_> {
     }
 
     /// Returns the representations that a REPRESENTATION_MAP offers and that nothing has `reached`, each with the map, where they have a
-    /// shape that no reached one lists; but what is left out already and what that holds.
+    /// shape that no reached one lists or holds; but what is left out already and what that holds.
     pub(super) fn unshown_maps(&self, reached: &FxHashSet<u64>) -> Vec<(u64, u64)> {
         let file = self.file;
         let mut known = FxHashSet::default();
@@ -37,18 +37,22 @@ impl Assembly<'_, '_> {
         if !unshown.is_empty() {
             let left_out = self.left_out.iter().map(|(id, _)| *id).collect();
             let told = self.held_representations(Vec::new(), left_out, &FxHashSet::default());
-            // Captures of product data map solids of the product once more.
-            let listed: FxHashSet<u64> = reached.iter().flat_map(|id| self.items(*id)).collect();
+            // Captures of product data map solids of the product once more, or their shells and faces.
+            let mut listed: FxHashSet<u64> = reached.iter().flat_map(|id| self.items(*id)).collect();
+            let mut shapes = ShapeItems::default();
+            listed.iter().for_each(|item| shapes.add(file, *item));
+            listed.extend(shapes.shells.iter().flat_map(|shell| &shell.faces).map(|(face, _)| *face));
             unshown.retain(|(id, _)| !told.contains(id) && self.has_shape_besides(*id, &listed));
         }
         unshown
     }
 
-    /// Whether a representation has a shape among its items that is not `listed`.
+    /// Whether a representation has a shape among its items that is not `listed`; of a shell one of its faces.
     fn has_shape_besides(&self, representation: u64, listed: &FxHashSet<u64>) -> bool {
         let mut rest = ShapeItems::default();
         let items = self.items(representation).into_iter().filter(|item| !listed.contains(item));
         items.for_each(|item| rest.add(self.file, item));
+        rest.shells.retain(|shell| shell.faces.iter().any(|(face, _)| !listed.contains(face)));
         !rest.is_empty()
     }
 
