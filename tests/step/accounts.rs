@@ -2,6 +2,7 @@
 
 use crate::faces::{import, read, square};
 use crate::files::{MILLIMETRES, part21};
+use crate::products::{NEXT, contextual, product, usage};
 use lampyris::model::SurfaceKind;
 use lampyris::step::{Import, Settings, read_bytes};
 
@@ -29,9 +30,7 @@ fn a_face_tells_its_layer_kind_area_and_a_point_on_it() {
 /// A file whose instances all come again, with the same numbers, has each of them once.
 #[test]
 fn instances_that_come_again_are_placed_once() {
-    let product = "#100=PRODUCT_DEFINITION('','',$,$);\n#101=PRODUCT_DEFINITION_SHAPE('','',#100);\n\
-                   #102=SHAPE_DEFINITION_REPRESENTATION(#101,#6);\n";
-    let data = square(FORWARD, IN_ORDER) + product;
+    let data = square(FORWARD, IN_ORDER) + &product(100, "part", 6);
     let once = import(&data);
     let twice = read(&format!("{data}{data}"));
     assert_eq!([once.model.placed_face_count(), twice.model.placed_face_count()], [1, 1]);
@@ -40,11 +39,9 @@ fn instances_that_come_again_are_placed_once() {
 
 #[test]
 fn the_shape_of_an_aspect_is_no_second_face() {
-    let product = "#100=PRODUCT_DEFINITION('','',$,$);\n#101=PRODUCT_DEFINITION_SHAPE('','',#100);\n\
-                   #102=SHAPE_DEFINITION_REPRESENTATION(#101,#6);\n#103=SHAPE_ASPECT('','',#101,.T.);\n\
-                   #104=PROPERTY_DEFINITION('','Geometry of datum',#103);\n#105=SHAPE_REPRESENTATION('',(#900),#1);\n\
-                   #106=SHAPE_DEFINITION_REPRESENTATION(#104,#105);\n";
-    let import = import(&(square(FORWARD, IN_ORDER) + product));
+    let aspect = "#103=SHAPE_ASPECT('','',#113,.T.);\n#104=PROPERTY_DEFINITION('','Geometry of datum',#103);\n\
+                  #105=SHAPE_REPRESENTATION('',(#900),#1);\n#106=SHAPE_DEFINITION_REPRESENTATION(#104,#105);\n";
+    let import = import(&(square(FORWARD, IN_ORDER) + &product(110, "part", 6) + aspect));
     assert_eq!(import.model.placed_face_count(), 1);
     let left: Vec<(u64, &str)> = import.report.left_out.iter().map(|n| (n.id, n.entity.as_str())).collect();
     assert_eq!(left, [(105, "SHAPE_REPRESENTATION")]);
@@ -127,16 +124,13 @@ fn placed_by(axes: &str, operator: &str) -> Import {
 /// The square as a part that an operator places in an assembly.
 fn placed_text(axes: &str, operator: &str) -> String {
     let assembly = format!(
-        "{axes}#108={operator};\n\
-         #100=AXIS2_PLACEMENT_3D('',#12,$,$);\n#101=PRODUCT_DEFINITION('','',$,$);\n#102=PRODUCT_DEFINITION('','',$,$);\n\
-         #103=SHAPE_REPRESENTATION('',(#100),#1);\n#104=PRODUCT_DEFINITION_SHAPE('','',#101);\n\
-         #105=PRODUCT_DEFINITION_SHAPE('','',#102);\n#106=SHAPE_DEFINITION_REPRESENTATION(#104,#103);\n\
-         #107=SHAPE_DEFINITION_REPRESENTATION(#105,#6);\n#110=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#101,#102,$);\n\
+        "{axes}#108={operator};\n#100=AXIS2_PLACEMENT_3D('',#12,$,$);\n#103=SHAPE_REPRESENTATION('',(#100),#1);\n\
          #109=(REPRESENTATION_RELATIONSHIP('','',#6,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#108)\
-         SHAPE_REPRESENTATION_RELATIONSHIP());\n\
-         #111=PRODUCT_DEFINITION_SHAPE('','',#110);\n#112=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#109,#111);\n"
+         SHAPE_REPRESENTATION_RELATIONSHIP());\n"
     );
-    square(FORWARD, IN_ORDER) + &assembly
+    let products = product(130, "asm", 103) + &product(140, "part", 6);
+    let used = usage(110, NEXT, "#130,#140,$") + &contextual(112, 109, 110);
+    square(FORWARD, IN_ORDER) + &assembly + &products + &used
 }
 
 /// Asserts that the file had no problems, and that its shape fills a box, given by both corners, mm.
@@ -152,19 +146,17 @@ fn assert_square_in_box(placed: &Import, expected: [f64; 6]) {
 fn what_a_broken_transformation_places_is_named_and_left_out() {
     // The square as a child in an assembly; the second placement of the transformation is #100, or none at all.
     let assembly = |to: &str| {
-        format!(
-            "#100=AXIS2_PLACEMENT_3D('',#12,$,$);\n#101=PRODUCT_DEFINITION('','',$,$);\n#102=PRODUCT_DEFINITION('','',$,$);\n\
-             #103=SHAPE_REPRESENTATION('',(#100),#1);\n#104=PRODUCT_DEFINITION_SHAPE('','',#101);\n\
-             #105=PRODUCT_DEFINITION_SHAPE('','',#102);\n#106=SHAPE_DEFINITION_REPRESENTATION(#104,#103);\n\
+        let related = format!(
+            "#100=AXIS2_PLACEMENT_3D('',#12,$,$);\n#103=SHAPE_REPRESENTATION('',(#100),#1);\n\
              #108=ITEM_DEFINED_TRANSFORMATION('','',#20,{to});\n\
              #109=(REPRESENTATION_RELATIONSHIP('','',#6,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#108)\
              SHAPE_REPRESENTATION_RELATIONSHIP());\n"
-        )
+        );
+        product(130, "asm", 103) + &related
     };
-    let usage = "#107=SHAPE_DEFINITION_REPRESENTATION(#105,#6);\n#110=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#101,#102,$);\n\
-                 #111=PRODUCT_DEFINITION_SHAPE('','',#110);\n#112=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#109,#111);\n";
+    let used = product(140, "part", 6) + &usage(110, NEXT, "#130,#140,$") + &contextual(112, 109, 110);
     // By the usage of a product, and by the relationship alone.
-    for usage in [usage, ""] {
+    for usage in [used.as_str(), ""] {
         let whole = import(&(square(FORWARD, IN_ORDER) + &assembly("#100") + usage));
         assert_eq!(whole.report.bbox_mm, Some([[1.0, 1.0, 0.0], [2.0, 2.0, 0.0]]));
         for to in ["#999", "$"] {

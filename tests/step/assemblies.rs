@@ -1,6 +1,7 @@
 //! How often, and where, a part of an assembly stands that several entities of the file speak of.
 
 use crate::files::{MILLIMETRES, part21};
+use crate::products::{NEXT, contextual, placed_usage, product, relation, usage};
 use lampyris::step::{ErrorKind, Import, Settings, read_bytes};
 
 /// Placements #20 at the origin, #21 at x = 10, #22 at x = 20 and #23 at x = 30, and a block #24 of 1 mm at the origin.
@@ -17,32 +18,6 @@ pub(crate) fn read(data: &str) -> Import {
     read_bytes("assemblies.stp", text.as_bytes(), &Settings::default()).expect("Part 21")
 }
 
-/// A product whose definition is #`id` and whose representation is #`representation`; takes the ids up to `id` + 4.
-pub(crate) fn product(id: u32, name: &str, representation: u32) -> String {
-    let [formation, product, shape, definition] = [id + 1, id + 2, id + 3, id + 4];
-    format!(
-        "#{id}=PRODUCT_DEFINITION('','',#{formation},$);\n#{formation}=PRODUCT_DEFINITION_FORMATION('','',#{product});\n\
-         #{product}=PRODUCT('{name}','{name}','',());\n#{shape}=PRODUCT_DEFINITION_SHAPE('','',#{id});\n\
-         #{definition}=SHAPE_DEFINITION_REPRESENTATION(#{shape},#{representation});\n"
-    )
-}
-
-/// A usage #`id` of this kind and these attributes, and its shape, #`id` + 1.
-pub(crate) fn usage(id: u32, kind: &str, ends: &str) -> String {
-    format!("#{id}={kind}('{id}','','',{ends});\n#{}=PRODUCT_DEFINITION_SHAPE('','',#{id});\n", id + 1)
-}
-
-/// A relationship #`id` of two representations that puts the placement `from` on `to`; takes `id` + 1 as well.
-pub(crate) fn relation(id: u32, [first, second]: [u32; 2], [from, to]: [u32; 2]) -> String {
-    format!(
-        "#{}=ITEM_DEFINED_TRANSFORMATION('','',#{from},#{to});\n\
-         #{id}=(REPRESENTATION_RELATIONSHIP('','',#{first},#{second})REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#{})\
-         SHAPE_REPRESENTATION_RELATIONSHIP());\n",
-        id + 1,
-        id + 1
-    )
-}
-
 /// An assembly #200, whose representation #300 has `items`, #21 and #22, and a part #100, whose representation #110 is the block.
 pub(crate) fn assembly(items: &str, data: &str) -> Import {
     let products = product(200, "asm", 300) + &product(100, "part", 110);
@@ -53,9 +28,7 @@ pub(crate) fn assembly(items: &str, data: &str) -> Import {
 }
 
 /// The place of the part in the assembly by usage #400, at x = 10.
-pub(crate) const PLACED: &str = "#420=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#410,#401);\n";
-
-pub(crate) const NEXT: &str = "NEXT_ASSEMBLY_USAGE_OCCURRENCE";
+const PLACED: &str = "#420=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#410,#401);\n";
 
 /// Asserts the x of all places, in any order, and that nothing is told.
 pub(crate) fn assert_places(import: &Import, expected: &[f64], case: &str) {
@@ -89,7 +62,7 @@ fn several_ways_of_relationships_lead_to_one_shape() {
 #[test]
 fn a_usage_and_a_mapped_item_in_one_place_are_one() {
     let mapped = "#30=REPRESENTATION_MAP(#20,#110);\n#31=MAPPED_ITEM('',#30,#21);\n#32=MAPPED_ITEM('',#30,#22);\n";
-    let data = [mapped, &usage(400, NEXT, "#200,#100,$"), &relation(410, [110, 300], [20, 21]), PLACED].concat();
+    let data = [mapped, &placed_usage(400, [200, 100], [110, 300], [20, 21])].concat();
     assert_places(&assembly("#31,", &data), &[10.0], "one place");
     assert_places(&assembly("#31,#32,", &data), &[10.0, 20.0], "two places");
 }
@@ -113,9 +86,7 @@ fn a_place_that_is_printed_with_few_digits_is_one() {
             "#30=REPRESENTATION_MAP(#20,#110);\n#31=MAPPED_ITEM('',#30,#50);\n",
             &placement(40, "123.4567", "0.8660254,0.5"),
             &placement(50, x, axis),
-            &usage(400, NEXT, "#200,#100,$"),
-            &relation(410, [110, 300], [20, 40]),
-            PLACED,
+            &placed_usage(400, [200, 100], [110, 300], [20, 40]),
         ]
         .concat();
         let import = assembly("#31,", &data);
@@ -138,14 +109,14 @@ fn every_usage_of_a_component_places_it() {
     }
     // What is promised adds nothing to what is used.
     let promised = usage(440, "PROMISSORY_USAGE_OCCURRENCE", "#200,#100,$");
-    let data = usage(400, NEXT, "#200,#100,$") + &relation(410, [110, 300], [20, 21]) + PLACED + &promised;
+    let data = placed_usage(400, [200, 100], [110, 300], [20, 21]) + &promised;
     assert_places(&assembly("", &data), &[10.0], "a promise");
 }
 
 /// What counts a component, or is of no stated kind, means the occurrence beside it, which is placed or stands with its parent.
 #[test]
 fn a_usage_that_counts_a_component_adds_nothing_to_its_occurrences() {
-    let placed = usage(400, NEXT, "#200,#100,$") + &relation(410, [110, 300], [20, 21]) + PLACED;
+    let placed = placed_usage(400, [200, 100], [110, 300], [20, 21]);
     let unplaced = usage(400, NEXT, "#200,#100,$");
     for (kind, ends) in
         [("QUANTIFIED_ASSEMBLY_COMPONENT_USAGE", "#200,#100,$,$"), ("ASSEMBLY_COMPONENT_USAGE", "#200,#100,$")]
@@ -159,9 +130,7 @@ fn a_usage_that_counts_a_component_adds_nothing_to_its_occurrences() {
         }
         assert_places(&assembly("", &format!("{unplaced}{counted}")), &[0.0], kind);
         // One that is placed, or stands in another assembly, is an occurrence of its own.
-        let own = usage(440, kind, ends)
-            + &relation(450, [110, 300], [20, 22])
-            + "#460=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#450,#441);\n";
+        let own = usage(440, kind, ends) + &relation(450, [110, 300], [20, 22]) + &contextual(460, 450, 440);
         assert_places(&assembly("", &format!("{placed}{own}")), &[10.0, 20.0], kind);
         let elsewhere = product(500, "other", 510)
             + "#510=SHAPE_REPRESENTATION('',(#20),#1);\n"
@@ -220,9 +189,7 @@ fn a_placement_in_a_rare_form_counts() {
 fn a_transformation_that_moves_nothing_places_as_others_do() {
     let outer = product(500, "top", 510)
         + "#510=SHAPE_REPRESENTATION('',(#23),#1);\n"
-        + &usage(400, NEXT, "#500,#200,$")
-        + &relation(410, [300, 510], [20, 23])
-        + PLACED;
+        + &placed_usage(400, [500, 200], [300, 510], [20, 23]);
     let turned = "#26=DIRECTION('',(0.866025403784,0.5,0.));\n#27=AXIS2_PLACEMENT_3D('',#12,#13,#26);\n";
     let still = relation(430, [110, 300], [21, 21]);
     for (still, case) in
@@ -249,9 +216,7 @@ fn a_relationship_without_its_usage_places_the_component() {
     let part = [lost, &relation(410, [110, 300], [20, 21]), PLACED].concat();
     let sub = product(500, "sub", 510)
         + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
-        + &usage(450, NEXT, "#500,#100,$")
-        + &relation(460, [110, 510], [20, 21])
-        + "#470=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#460,#451);\n"
+        + &placed_usage(450, [500, 100], [110, 510], [20, 21])
         + lost
         + &relation(410, [510, 300], [20, 22])
         + PLACED;
@@ -300,15 +265,11 @@ fn a_higher_usage_adds_nothing() {
     let data = |to: u32| {
         product(500, "sub", 510)
             + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
-            + &usage(400, NEXT, "#200,#500,$")
-            + &relation(410, [510, 300], [20, 22])
-            + PLACED
-            + &usage(450, NEXT, "#500,#100,$")
-            + &relation(460, [110, 510], [20, 21])
-            + "#470=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#460,#451);\n"
+            + &placed_usage(400, [200, 500], [510, 300], [20, 22])
+            + &placed_usage(450, [500, 100], [110, 510], [20, 21])
             + &usage(440, "SPECIFIED_HIGHER_USAGE_OCCURRENCE", "#200,#100,$,#400,#450")
             + &relation(480, [110, 300], [20, to])
-            + "#490=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#480,#441);\n"
+            + &contextual(490, 480, 440)
     };
     assert_places(&assembly("", &data(23)), &[30.0], "the same place");
     let other = assembly("", &data(21));
@@ -330,9 +291,7 @@ fn nested(levels: u32) -> Import {
         data += &product(id, &format!("a{level}"), whole);
         data += &format!("#{whole}=SHAPE_REPRESENTATION('',(#20,#{target}),#1);\n");
         data += &format!("#{target}=AXIS2_PLACEMENT_3D('',#11,#13,#14);\n");
-        data += &usage(id + 7, NEXT, &format!("#{id},#{child},$"));
-        data += &relation(id + 9, [inner, whole], [20, target]);
-        data += &format!("#{}=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{},#{});\n", id + 11, id + 9, id + 8);
+        data += &placed_usage(id + 7, [id, child], [inner, whole], [20, target]);
         [child, inner] = [id, whole];
     }
     read(&data)

@@ -19,6 +19,7 @@ mod orphans;
 mod parameters;
 mod perforated;
 mod pictures;
+mod products;
 mod rare_forms;
 mod recipes;
 mod repeated_faces;

@@ -1,7 +1,8 @@
 //! Which places of one thing are two, and which are one that the file prints with other digits: only what it says within the parent counts,
 //! wherever that stands.
 
-use crate::assemblies::{NEXT, PLACED, assembly, assert_places, product, read, relation, usage};
+use crate::assemblies::{assembly, assert_places, read};
+use crate::products::{NEXT, placed_usage, product, relation, usage};
 
 /// A placement #`id` at this x, and #`id` + 1.
 fn placement(id: u32, x: &str) -> String {
@@ -22,14 +23,10 @@ fn digits_count_within_the_parent() {
             &placement(50, mapped),
             &placement(60, outer),
             "#30=REPRESENTATION_MAP(#20,#110);\n#31=MAPPED_ITEM('',#30,#50);\n",
-            &usage(400, NEXT, "#200,#100,$"),
-            &relation(410, [110, 300], [20, 40]),
-            PLACED,
+            &placed_usage(400, [200, 100], [110, 300], [20, 40]),
             &product(500, "top", 510),
             "#510=SHAPE_REPRESENTATION('',(#60),#1);\n",
-            &usage(600, NEXT, "#500,#200,$"),
-            &relation(610, [300, 510], [20, 60]),
-            "#620=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#610,#601);\n",
+            &placed_usage(600, [500, 200], [300, 510], [20, 60]),
         ]
         .concat();
         assert_places(&assembly("#31,", &data), expected, &format!("{used} and {mapped} at {outer}"));
@@ -60,7 +57,7 @@ fn a_place_with_fewer_digits_is_no_second_one() {
 /// A usage that is not in the file, beside one that puts the part to the same place: what is known of it is that place.
 #[test]
 fn a_lost_usage_in_the_place_of_another_adds_nothing() {
-    let placed = usage(400, NEXT, "#200,#100,$") + &relation(410, [110, 300], [20, 21]) + PLACED;
+    let placed = placed_usage(400, [200, 100], [110, 300], [20, 21]);
     for (to, expected) in [(21, &[10.0][..]), (22, &[10.0, 20.0])] {
         let lost = relation(430, [110, 300], [20, to]) + "#440=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#430,$);\n";
         let import = assembly("", &format!("{placed}{lost}"));

@@ -1,6 +1,7 @@
 //! Where the parts of assemblies stand that files describe in rare forms, or in part, and what colour each place shows.
 
 use crate::files::{MILLIMETRES, part21};
+use crate::products::{contextual, definition, relation};
 use lampyris::step::{Import, Settings, read_bytes};
 
 /// Two products: #101 with representation #103, which has `items` and two placements, #21 at x = 100 and #22 at x = 200; #102, `part`, with
@@ -82,10 +83,8 @@ fn what_a_relationship_places_stands_once() {
 
 #[test]
 fn a_second_place_of_one_usage_is_told() {
-    let second = "#212=ITEM_DEFINED_TRANSFORMATION('','',#20,#22);\n\
-                  #209=(REPRESENTATION_RELATIONSHIP('','',#106,#103)REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION(#212)\
-                  SHAPE_REPRESENTATION_RELATIONSHIP());\n#213=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#209,#111);\n";
-    let import = read("", &[SHAPE, USAGE, RELATION, PLACED, second].concat());
+    let second = relation(209, [106, 103], [20, 22]) + &contextual(213, 209, 110);
+    let import = read("", &[SHAPE, USAGE, RELATION, PLACED, &second].concat());
     assert_places(&import, &[100.0]);
     assert!(
         import.report.problems.iter().any(|p| p.starts_with("assembly.stp: #213: usage #110")),
@@ -167,13 +166,11 @@ fn shapes_of_no_product_are_placed() {
 /// Each place has a path of its own through the assemblies around it; alike ones are numbered in the file's order.
 #[test]
 fn places_have_paths_of_their_own() {
-    let sub = "#201=PRODUCT_DEFINITION('','',#221,$);\n#221=PRODUCT_DEFINITION_FORMATION('','',#231);\n\
-               #231=PRODUCT('sub','sub','',());\n\
-               #210=NEXT_ASSEMBLY_USAGE_OCCURRENCE('1','A','',#101,#201,$);\n\
+    let sub = "#210=NEXT_ASSEMBLY_USAGE_OCCURRENCE('1','A','',#101,#201,$);\n\
                #211=NEXT_ASSEMBLY_USAGE_OCCURRENCE('2','B','',#101,#201,$);\n\
                #212=NEXT_ASSEMBLY_USAGE_OCCURRENCE('3','b1','',#201,#102,$);\n\
                #213=NEXT_ASSEMBLY_USAGE_OCCURRENCE('4','b1','',#201,#102,$);\n";
-    let import = read("", &[SHAPE, sub].concat());
+    let import = read("", &[SHAPE, &definition(201, "sub"), sub].concat());
     let paths: Vec<&str> = import.model.instances.iter().map(|i| i.path.as_str()).collect();
     assert_eq!(paths, ["A/b1", "A/b1:2", "B/b1", "B/b1:2"]);
     assert_eq!(import.model.labels(), paths);

@@ -1,7 +1,8 @@
 //! Shapes without a product that stand in each other: each is placed where its relationships say, whatever the order of the file.
 
-use crate::assemblies::{assert_places, read, relation};
+use crate::assemblies::{assert_places, read};
 use crate::faces::{import, square};
+use crate::products::relation;
 
 /// A representation #`id` of a block of its own, the solid #`id` + 1.
 fn block(id: u32) -> String {

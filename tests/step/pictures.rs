@@ -1,6 +1,7 @@
 //! Meshes beside exact bodies: which of them are pictures of what stands, and which are all that there is.
 
-use crate::assemblies::{product, read};
+use crate::assemblies::read;
+use crate::products::product;
 use lampyris::step::Import;
 
 /// A part whose exact body is `exact`, and a mesh #71 of one triangle with these corners, which names what it shows. The only face #29 of

@@ -1,11 +1,7 @@
 //! What a file says of assemblies within assemblies in rare forms: usages that a higher assembly sees, promises, and places without usages.
 
-use crate::assemblies::{NEXT, assembly, assert_places, product, read, relation, usage};
-
-/// The place of usage #`usage` by the relationship #`relation`.
-fn contextual(id: u32, relation: u32, usage: u32) -> String {
-    format!("#{id}=CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{relation},#{});\n", usage + 1)
-}
+use crate::assemblies::{assembly, assert_places, read};
+use crate::products::{NEXT, contextual, placed_usage, product, relation, usage};
 
 /// A chain of assemblies, #600 in #500 in #200, each at x = 10, with the part at x = 10 in the last. A higher usage sees #600 from #200,
 /// another one the part by that: whichever comes first, and whether the first has a place of its own or not.
@@ -15,9 +11,9 @@ fn a_higher_usage_of_a_later_one_is_where_their_usages_put_it() {
     let chain = [
         product(500, "sub", 510) + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n",
         product(600, "inner", 610) + "#610=SHAPE_REPRESENTATION('',(#20,#21),#1);\n",
-        usage(700, NEXT, "#200,#500,$") + &relation(702, [510, 300], [20, 21]) + &contextual(704, 702, 700),
-        usage(710, NEXT, "#500,#600,$") + &relation(712, [610, 510], [20, 21]) + &contextual(714, 712, 710),
-        usage(720, NEXT, "#600,#100,$") + &relation(722, [110, 610], [20, 21]) + &contextual(724, 722, 720),
+        placed_usage(700, [200, 500], [510, 300], [20, 21]),
+        placed_usage(710, [500, 600], [610, 510], [20, 21]),
+        placed_usage(720, [600, 100], [110, 610], [20, 21]),
     ]
     .concat();
     let upper = usage(730, higher, "#200,#600,$,#700,#710");
@@ -43,10 +39,8 @@ fn a_higher_usage_of_a_later_one_is_where_their_usages_put_it() {
 fn a_promise_counts_unless_usages_below_keep_it() {
     let other = product(500, "other", 510)
         + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
-        + &usage(600, NEXT, "#500,#100,$")
-        + &relation(602, [110, 510], [20, 21])
-        + &contextual(604, 602, 600);
-    let below = usage(610, NEXT, "#200,#500,$") + &relation(612, [510, 300], [20, 22]) + &contextual(614, 612, 610);
+        + &placed_usage(600, [500, 100], [110, 510], [20, 21]);
+    let below = placed_usage(610, [200, 500], [510, 300], [20, 22]);
     let promise = usage(620, "PROMISSORY_USAGE_OCCURRENCE", "#200,#100,$");
     let place = relation(622, [110, 300], [20, 22]) + &contextual(624, 622, 620);
     let elsewhere = format!("{other}{promise}");
@@ -68,14 +62,10 @@ fn a_promise_counts_unless_usages_below_keep_it() {
 fn an_assembly_stands_where_a_relationship_or_a_mapped_item_puts_it() {
     let sub = product(500, "sub", 510)
         + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n#30=REPRESENTATION_MAP(#20,#510);\n#31=MAPPED_ITEM('',#30,#22);\n"
-        + &usage(600, NEXT, "#500,#100,$")
-        + &relation(602, [110, 510], [20, 21])
-        + &contextual(604, 602, 600);
+        + &placed_usage(600, [500, 100], [110, 510], [20, 21]);
     let top = product(800, "top", 810)
         + "#810=SHAPE_REPRESENTATION('',(#23),#1);\n"
-        + &usage(820, NEXT, "#800,#200,$")
-        + &relation(822, [300, 810], [20, 23])
-        + &contextual(824, 822, 820);
+        + &placed_usage(820, [800, 200], [300, 810], [20, 23]);
     let related = relation(610, [510, 300], [20, 22]);
     let unplaced = usage(620, NEXT, "#200,#500,$");
     let placed = relation(622, [510, 300], [20, 22]) + &contextual(624, 622, 620);
@@ -103,9 +93,7 @@ fn an_assembly_stands_where_a_relationship_or_a_mapped_item_puts_it() {
 fn an_assembly_that_two_others_use_stands_in_both() {
     let sub = product(500, "sub", 510)
         + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n#30=REPRESENTATION_MAP(#20,#510);\n#31=MAPPED_ITEM('',#30,#22);\n"
-        + &usage(600, NEXT, "#500,#100,$")
-        + &relation(602, [110, 510], [20, 21])
-        + &contextual(604, 602, 600)
+        + &placed_usage(600, [500, 100], [110, 510], [20, 21])
         + &usage(620, NEXT, "#200,#500,$");
     let other = product(800, "other", 810) + &usage(820, NEXT, "#800,#500,$");
     let mapped = "#810=SHAPE_REPRESENTATION('',(#32,#23),#1);\n#32=MAPPED_ITEM('',#30,#23);\n".to_owned();
@@ -121,16 +109,10 @@ fn an_assembly_that_two_others_use_stands_in_both() {
 /// x = 20 and to x = 30.
 #[test]
 fn an_assembly_stands_unmoved_in_each_of_two_that_usages_place() {
-    let placed = |id: u32, rep: u32, at: u32| {
-        usage(id, NEXT, &format!("#200,#{},$", rep - 10))
-            + &relation(id + 2, [rep, 300], [20, at])
-            + &contextual(id + 4, id + 2, id)
-    };
+    let placed = |id: u32, rep: u32, at: u32| placed_usage(id, [200, rep - 10], [rep, 300], [20, at]);
     let data = product(500, "sub", 510)
         + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
-        + &usage(600, NEXT, "#500,#100,$")
-        + &relation(602, [110, 510], [20, 21])
-        + &contextual(604, 602, 600)
+        + &placed_usage(600, [500, 100], [110, 510], [20, 21])
         + &product(700, "first", 710)
         + &product(800, "second", 810)
         + "#710=SHAPE_REPRESENTATION('',(#20,#21),#1);\n#810=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
@@ -148,9 +130,7 @@ fn an_assembly_that_relationships_put_into_several_products() {
     let places = |[first, second]: [u32; 2], usages: &str| {
         let data = product(500, "sub", 510)
             + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
-            + &usage(600, NEXT, "#500,#100,$")
-            + &relation(602, [110, 510], [20, 21])
-            + &contextual(604, 602, 600)
+            + &placed_usage(600, [500, 100], [110, 510], [20, 21])
             + &product(700, "other", 710)
             + "#710=SHAPE_REPRESENTATION('',(#21,#22),#1);\n"
             + &relation(610, [510, 300], [20, first])
@@ -180,12 +160,8 @@ fn an_assembly_that_relationships_put_into_several_products() {
 fn a_relationship_that_puts_an_assembly_into_its_part_is_told() {
     let chain = product(500, "sub", 510)
         + "#510=SHAPE_REPRESENTATION('',(#20,#21),#1);\n"
-        + &usage(600, NEXT, "#200,#500,$")
-        + &relation(602, [510, 300], [20, 22])
-        + &contextual(604, 602, 600)
-        + &usage(610, NEXT, "#500,#100,$")
-        + &relation(612, [110, 510], [20, 21])
-        + &contextual(614, 612, 610);
+        + &placed_usage(600, [200, 500], [510, 300], [20, 22])
+        + &placed_usage(610, [500, 100], [110, 510], [20, 21]);
     let import = assembly("", &(chain + &relation(620, [300, 110], [21, 20])));
     let x: Vec<f64> = import.model.instances.iter().map(|i| i.placement.origin.x).collect();
     let told = &import.report.problems;
