@@ -24,8 +24,8 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// The program whose work is kept: another version, or another commit, makes its own.
-pub(super) const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_COMMIT"));
+/// The program, by version and commit, and by its sources where no commit tells them: only what the same one made is kept and added up.
+pub const PROGRAM: &str = concat!(env!("CARGO_PKG_VERSION"), " ", env!("LAMPYRIS_BUILD"));
 /// First bytes of an entry.
 const MAGIC: &[u8] = b"lampyris cache 5\n";
 /// Most bytes of a folder, unless another limit is given: some fifty scenes of a million facets.

@@ -89,3 +89,18 @@ impl Write for Pieces<'_> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two builds of changed sources draw other random numbers: what one of them traced is no part of a run of the other.
+    #[test]
+    fn a_build_without_a_commit_is_told_by_its_sources() {
+        let build = PROGRAM.split_once(' ').map_or("", |(_, build)| build);
+        let (commit, hash) = build.split_once(' ').unwrap_or((build, ""));
+        let tells_sources = commit != "unknown" && !commit.ends_with("+changes");
+        let is_hash = hash.len() == 16 && hash.chars().all(|c| c.is_ascii_hexdigit());
+        assert!(!commit.is_empty() && tells_sources != is_hash, "{PROGRAM}");
+    }
+}

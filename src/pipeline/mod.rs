@@ -43,7 +43,7 @@ mod turn;
 mod verdicts;
 
 pub use accuracy_target::{AccurateSettings, settings_for_accuracy, settings_for_accurate_facets};
-pub use cache::{Cache, CacheEntry};
+pub use cache::{Cache, CacheEntry, PROGRAM};
 pub use default_accuracy::is_accuracy_asked;
 pub use error::{Error, ErrorKind, Excerpt};
 pub use error_target::{ErrorTarget, TargetResult};

@@ -88,6 +88,8 @@ impl<'a> Checkpoint<'a> {
             if h.fingerprint == expected {
                 *self.earlier() = Some(h.clone());
                 Ok(())
+            } else if let Some(other) = h.other_program() {
+                Err(format!("it was traced {other}"))
             } else {
                 Err(format!("it was left by another run: {}", h.command))
             }

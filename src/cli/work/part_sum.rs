@@ -105,14 +105,15 @@ impl PartSum {
         if header.fingerprint == *fingerprint {
             return Ok(());
         }
-        Err(if header.fingerprint == first.fingerprint {
+        Err(if let Some(other) = header.other_program() {
+            format!("it was traced {other}: trace all parts, and merge them, with the same program")
+        } else if header.fingerprint == first.fingerprint {
             match scene {
-                Some(given) => format!(
-                    "--scene {} is not the scene that this part was traced from, or another version of the program traced it",
-                    given.display()
-                ),
+                Some(given) => {
+                    format!("--scene {} is not the scene that this part was traced from", given.display())
+                }
                 None => format!(
-                    "the scene {} or the program has changed since this part was traced",
+                    "the scene {} or a file that it names has changed since this part was traced",
                     header.scene().display()
                 ),
             }
@@ -176,6 +177,20 @@ mod tests {
     fn header() -> TallyHeader {
         let fields = serde_json::json!({"fingerprint": "f", "scene": "s", "part": [], "command": "c"});
         serde_json::from_value(fields).unwrap()
+    }
+
+    #[test]
+    fn a_part_of_another_program_is_refused_by_its_name() {
+        let traced = |program: &str| {
+            let fields = serde_json::json!({"fingerprint": "other", "scene": "s", "part": [], "command": "c",
+                "program": program});
+            serde_json::from_value::<TallyHeader>(fields).unwrap()
+        };
+        let sum = PartSum::new(AskedRun { first: header(), fingerprint: "f".into(), scene: None, rays: None });
+        let refused = sum.check(&traced("0.0.1 0123456789ab")).unwrap_err();
+        assert!(refused.contains("traced by lampyris 0.0.1 0123456789ab, and this is lampyris "), "{refused}");
+        assert!(sum.check(&traced(crate::pipeline::PROGRAM)).unwrap_err().contains("another run"));
+        assert!(sum.check(&header()).is_ok());
     }
 
     #[test]

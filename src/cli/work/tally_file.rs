@@ -9,7 +9,8 @@ use crate::formats::read_bytes;
 use crate::intersect::NormalMode;
 use crate::math::FaceId;
 use crate::pipeline::{
-    IntersectorChoice, IntersectorKind, MeshingSettings, PartChoice, PreparedScene, RayRange, TracingSettings,
+    IntersectorChoice, IntersectorKind, MeshingSettings, PROGRAM, PartChoice, PreparedScene, RayRange,
+    TracingSettings,
 };
 use crate::simulate::{Fingerprint, PartialRun};
 use crate::study::accuracy_target::{RelativeTolerance, TolerancePlan};
@@ -60,6 +61,9 @@ pub(crate) struct TallyHeader {
     #[serde(default)]
     pub(crate) faces: u32,
     pub(crate) command: String,
+    /// The program that traced it; empty in files of earlier versions.
+    #[serde(default)]
+    program: String,
     /// What it took.
     #[serde(default)]
     pub(crate) usage: Usage,
@@ -103,6 +107,7 @@ impl TallyHeader {
             sequences: prepared.job.scene.run.sequences,
             faces: prepared.job.scene.run.faces,
             command: console.command.clone(),
+            program: PROGRAM.into(),
             usage: Usage::default(),
         })
     }
@@ -120,6 +125,14 @@ impl TallyHeader {
     /// Returns the same header with what the run took.
     pub(crate) fn with_usage(&self, usage: Usage) -> Self {
         Self { usage, ..self.clone() }
+    }
+
+    /// Returns by which program the part was traced, and which one this is, in words; `None` where both are the same.
+    pub(crate) fn other_program(&self) -> Option<String> {
+        (self.program != PROGRAM).then(|| {
+            let version = if self.program.is_empty() { "of an earlier version" } else { self.program.as_str() };
+            format!("by lampyris {version}, and this is lampyris {PROGRAM}")
+        })
     }
 
     /// Returns where the scene was when the part was traced.
