@@ -382,7 +382,7 @@ fn few_rays_of_many_sources_lie_in_all_replicates() {
     );
 }
 
-/// Two rays have most of the power: where they go no other ray tells.
+/// Few rays have most of the power, and all may miss a place that gets much of it.
 #[test]
 fn a_source_of_few_heavy_rays_is_named() {
     let beams = |rays: u64| {
@@ -391,7 +391,12 @@ fn a_source_of_few_heavy_rays_is_named() {
         )
     };
     let notes = |rays| World::default().run(&format!("{}{ALL}", beams(rays)), |_| ()).notes.join("\n");
-    assert!(notes(2).contains("'strong' has 67 % of the power in 2 rays"), "{}", notes(2));
+    // Two thirds of the power, of which n rays all miss a share of 1 − 0.05^(1/n) in one run of twenty: 0.776 of 2 and 0.0464 of 63.
+    for (rays, missed) in [(2, "52"), (63, "3.1")] {
+        let (notes, says) = (notes(rays), format!("'strong' has 67 % of the power in {rays} rays: printed errors"));
+        let missing = format!("up to {missed} % of the power may be missing");
+        assert!(notes.contains(&says) && notes.contains(&missing), "{notes}");
+    }
     assert!(!notes(1000).contains("strong"), "{}", notes(1000));
     // One ray of next to no power: what it does is below the error of the others.
     let pilot = format!(
