@@ -188,6 +188,7 @@ impl Console {
     pub(crate) fn provenance(&self, seed: Option<u64>, threads: usize) -> Provenance {
         Provenance {
             command: self.command.clone(),
+            traced_by: Vec::new(),
             time: super::machine::utc_text(SystemTime::now() - self.started.elapsed()),
             version: env!("CARGO_PKG_VERSION").into(),
             commit: env!("LAMPYRIS_COMMIT").into(),

@@ -6,6 +6,7 @@ use super::table::Table;
 use super::view::View;
 use super::{plotly, static_chart};
 use crate::formats::{base64, printable, printable_json};
+use crate::text::count_of;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use sha2::{Digest, Sha256};
 
@@ -168,14 +169,25 @@ fn table_markup(table: &Table) -> Markup {
     }
 }
 
+/// Commands of a merged run's parts that the page shows: of a thousand parts each has its own.
+const SHOWN_COMMANDS: usize = 8;
+
 /// Writes the section that tells command, program, machine and seed.
 fn provenance_markup(p: &Provenance) -> Markup {
     let seed = p.seed.map_or("none used".to_owned(), |s| s.to_string());
+    let further = p.traced_by.len().saturating_sub(SHOWN_COMMANDS);
     html! {
         section #origin {
             h2 { "Where these numbers come from" }
             dl {
                 dt { "Command" } dd { code { (p.command) } }
+                @if !p.traced_by.is_empty() {
+                    dt { "Traced by" }
+                    dd {
+                        @for command in p.traced_by.iter().take(SHOWN_COMMANDS) { div { code { (command) } } }
+                        @if further > 0 { "and " (count_of(further as u64, "further command")) ", all in results.json" }
+                    }
+                }
                 dt { "Time" } dd { (p.time) }
                 dt { "Program" } dd { "lampyris " (p.version) ", commit " code { (p.commit) } }
                 dt { "Hardware" } dd { (p.hardware) }

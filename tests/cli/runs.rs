@@ -149,6 +149,15 @@ fn shards_merge_to_the_bits_of_one_run() {
         document(path, &["merge", "part3.tally", "part1.tally", "part2.tally", "-o", "merged", "--json"], 0);
     assert_eq!(whole["digest"], merged["digest"]);
     assert_eq!(whole["power"], merged["power"]);
+    // The merge alone tells nobody how to get the numbers again.
+    let traced_by = &merged["provenance"]["traced_by"];
+    let shards: Vec<&str> = traced_by.as_array().unwrap().iter().map(|command| command.as_str().unwrap()).collect();
+    let is_of_shard =
+        |(k, command): (u32, &&str)| command.contains(&format!("lampyris trace scene.toml --shard {k}/3"));
+    assert!(shards.len() == 3 && (1..).zip(&shards).all(is_of_shard), "{traced_by}");
+    let page = std::fs::read_to_string(path.join("merged/report.html")).unwrap();
+    assert!(page.contains("lampyris trace scene.toml --shard 2/3"));
+    assert!(whole["provenance"]["traced_by"].is_null());
     // Three processes of one machine, each on one thread.
     let took = &merged["seconds"]["merged"];
     let numbers = [&took["parts"], &took["machines"], &took["threads"], &merged["threads"]];
@@ -166,6 +175,8 @@ fn shards_merge_to_the_bits_of_one_run() {
     let sum = document(path, &["merge", "part1.tally", "part2.tally", "-o", "sum.tally", "--json"], 0);
     assert_eq!((sum["of"].as_u64(), sum["file"].as_str()), (Some(128), Some("sum.tally")), "{sum}");
     assert!((80..90).contains(&sum["replicates"].as_u64().unwrap()), "two thirds: {sum}");
+    let tree = document(path, &["merge", "sum.tally", "part3.tally", "-o", "tree", "--json", "--no-report"], 0);
+    assert_eq!(tree["provenance"]["traced_by"], *traced_by);
     let before = std::fs::read(path.join("part1.tally")).unwrap();
     let (code, _, err) = lampyris_in(path, &["merge", "part1.tally", "part2.tally", "-o", "part1.tally"]);
     assert!(code == 2 && err.contains("it would replace") && err.contains("which is read"), "{code} {err}");

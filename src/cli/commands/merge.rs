@@ -11,13 +11,12 @@ use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, saved_header};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::OutputPlace;
-use crate::cli::work::part_sum::{AskedRun, PartSum, input_failure, read_part};
+use crate::cli::work::part_sum::{AskedRun, PartOrigins, PartSum, input_failure, read_part};
 use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::shards::is_tally;
 use crate::cli::work::tally_file::TallyHeader;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
-use crate::cli::work::usage::Usage;
 use crate::cli::work::{input_files, lost_rays, results_folder};
 use crate::pipeline::{ErrorTarget, PreparedScene, SceneJob, TraceRequest, read_cached_scene};
 use crate::simulate::{GROWING_REPLICATE, PartialRun, shard_replicates};
@@ -78,10 +77,10 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     while let Some(absent) = part_files(command.parts)?.into_iter().find(|file| !file.exists())
         && patience.wait_again(console, &format!("{} is not there yet", absent.display()))
     {}
-    let (whole, usage) = sum_parts(command, &header, &prepared, &patience, console)?;
+    let (whole, origins) = sum_parts(command, &header, &prepared, &patience, console)?;
     if is_tally(command.folder) {
         // A merge into a tally sums up what is there, whole or not.
-        return write_sum(command, &prepared, &scene_path, (&whole, usage), console);
+        return write_sum(command, &prepared, &scene_path, (&whole, origins), console);
     }
     if !whole.is_whole() {
         let failure = Failure::input(missing_parts(&whole, &header));
@@ -98,8 +97,9 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     results_folder::try_folder(&prepared, command.folder, command.with_page)?;
     let request = TraceRequest { from: Some(whole), ..TraceRequest::default() };
     let mut run = prepared.trace(request, &monitor).map_err(|_| Failure::running("merge: the run is not whole"))?;
-    usage.note_in(&mut run.results);
-    let remarks = RunRemarks::say_target(target.map(|target| target.result(&run.results)), console);
+    origins.usage.note_in(&mut run.results);
+    let reached = RunRemarks::say_target(target.map(|target| target.result(&run.results)), console);
+    let remarks = RunRemarks { traced_by: origins.traced_by.into_iter().collect(), ..reached };
     let written = results_folder::write(&prepared, command.folder, &mut run, &remarks, command.with_page, console);
     let (document, answer) = match written {
         Ok(written) => written,
@@ -121,14 +121,14 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
         .and(Completion::incomplete_if(remarks.target.is_some_and(|result| !result.reached))))
 }
 
-/// Sums up the parts that are there, waiting for missing ones if asked to, and the usage of their processes.
+/// Sums up the parts that are there, waiting for missing ones if asked to, and what made these.
 fn sum_parts(
     command: &MergeCommand,
     header: &TallyHeader,
     prepared: &PreparedScene,
     patience: &Patience,
     console: &Console,
-) -> Result<(PartialRun, Usage), Failure> {
+) -> Result<(PartialRun, PartOrigins), Failure> {
     let mut sum = PartSum::new(AskedRun {
         first: header.clone(),
         fingerprint: prepared.fingerprint()?.0,
@@ -149,12 +149,12 @@ fn write_sum(
     command: &MergeCommand,
     prepared: &PreparedScene,
     scene: &Path,
-    (sum, usage): (&PartialRun, Usage),
+    (sum, origins): (&PartialRun, PartOrigins),
     console: &Console,
 ) -> Result<Completion, Failure> {
     let file = command.folder.to_path_buf();
     let _owned = OutputPlace::file(&file)?;
-    Checkpoint::new(prepared, scene, file, None, 0.0, console)?.save_sum(sum, usage)?;
+    Checkpoint::new(prepared, scene, file, None, 0.0, console)?.save_sum(sum, origins)?;
     if console.json {
         let counts = &sum.tallies.counts;
         let document = json!({"replicates": sum.done.len(), "of": sum.replicates, "rays": counts.rays,

@@ -1,6 +1,7 @@
 //! The file that a run is saved to while it goes on, for `--resume`.
 
 use super::output_place::{folder_of, make_folder, rescue_folders};
+use super::part_sum::PartOrigins;
 use super::tally_file::TallyHeader;
 use super::usage::Usage;
 use crate::cli::console::Console;
@@ -147,10 +148,10 @@ impl<'a> Checkpoint<'a> {
         Ok(write_atomic(&self.file, |w| portion.write(&header, w))?)
     }
 
-    /// Saves the sum of other parts, with what these took.
-    pub(crate) fn save_sum(&self, sum: &PartialRun, usage: Usage) -> Result<(), Failure> {
+    /// Saves the sum of other parts, with what made these.
+    pub(crate) fn save_sum(&self, sum: &PartialRun, origins: PartOrigins) -> Result<(), Failure> {
         make_folder(&folder_of(&self.file))?;
-        let header = self.header.with_usage(usage);
+        let header = self.header.with_usage(origins.usage).with_traced_by(origins.traced_by);
         Ok(write_atomic(&self.file, |w| sum.write(&header, w))?)
     }
 

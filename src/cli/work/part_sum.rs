@@ -4,7 +4,7 @@ use super::tally_file::TallyHeader;
 use super::usage::Usage;
 use crate::cli::failure::Failure;
 use crate::simulate::{BoundScene, GROWING_REPLICATE, PartialRun};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -35,18 +35,35 @@ pub(crate) struct AskedRun {
     pub(crate) rays: Option<u64>,
 }
 
+/// What made the parts of a sum.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PartOrigins {
+    /// What they took.
+    pub(crate) usage: Usage,
+    /// The commands that traced them.
+    pub(crate) traced_by: BTreeSet<String>,
+}
+
+impl PartOrigins {
+    /// Adds those of other parts.
+    fn add(&mut self, other: Self) {
+        self.usage.add(&other.usage);
+        self.traced_by.extend(other.traced_by);
+    }
+}
+
 /// Parts of a run and their sum.
 pub(crate) struct PartSum {
     asked: AskedRun,
     /// The files that are in the sum, as they were when they were read.
     files: BTreeMap<PathBuf, Option<Stamp>>,
     total: PartialRun,
-    usage: Usage,
+    origins: PartOrigins,
 }
 
 impl PartSum {
     pub(crate) fn new(asked: AskedRun) -> Self {
-        Self { asked, files: BTreeMap::new(), total: PartialRun::default(), usage: Usage::default() }
+        Self { asked, files: BTreeMap::new(), total: PartialRun::default(), origins: PartOrigins::default() }
     }
 
     /// Adds those of these files that are not in the sum yet, and returns it; begins anew where one that is has changed or is no longer
@@ -62,18 +79,18 @@ impl PartSum {
         if self.files.iter().any(|(file, stamp)| stamp.is_none() || present.get(file) != Some(stamp)) {
             // Nothing can be taken out of a sum.
             self.files.clear();
-            (self.total, self.usage) = Default::default();
+            (self.total, self.origins) = Default::default();
         }
         // A file that is named twice is read twice, and refused.
         let new: Vec<_> = stamped.into_iter().filter(|(file, _)| !self.files.contains_key(*file)).collect();
         for (file, stamp) in new {
-            let (part, usage) = self.read(file, bound)?;
+            let (part, origins) = self.read(file, bound)?;
             if self.files.is_empty() {
                 self.total = part;
             } else {
                 self.total.merge(&part).map_err(|message| self.not_merged(file, message, &part, bound))?;
             }
-            self.usage.add(&usage);
+            self.origins.add(origins);
             self.files.insert(file.clone(), stamp);
         }
         if self.files.is_empty() {
@@ -83,20 +100,20 @@ impl PartSum {
         Ok(&self.total)
     }
 
-    /// Returns the sum, and what its parts took.
-    pub(crate) fn into_total(self) -> (PartialRun, Usage) {
-        (self.total, self.usage)
+    /// Returns the sum, and what made its parts.
+    pub(crate) fn into_total(self) -> (PartialRun, PartOrigins) {
+        (self.total, self.origins)
     }
 
-    /// Reads a part, and what it took.
-    fn read(&self, path: &Path, bound: &BoundScene) -> Result<(PartialRun, Usage), Failure> {
-        let mut usage = Usage::default();
+    /// Reads a part, and what made it.
+    fn read(&self, path: &Path, bound: &BoundScene) -> Result<(PartialRun, PartOrigins), Failure> {
+        let mut origins = PartOrigins::default();
         let check = |header: &TallyHeader| {
-            usage.add(&header.usage);
+            origins = PartOrigins { usage: header.usage.clone(), traced_by: header.traced_by() };
             self.check(header)
         };
         let part = PartialRun::read(&read_part(path)?, check, bound).map_err(|m| input_failure(path, m))?;
-        Ok((part, usage))
+        Ok((part, origins))
     }
 
     /// Checks that a part is of the run that the first one's header names, traced from the scene as it is.

@@ -112,6 +112,8 @@ pub(crate) struct RunRemarks {
     pub(crate) target: Option<TargetResult>,
     /// The command that began the run, where this one went on with it: the one that tells how many rays it has.
     pub(crate) first_command: Option<String>,
+    /// The commands that traced the parts of a merged run; empty for any other.
+    pub(crate) traced_by: Vec<String>,
 }
 
 impl RunRemarks {
@@ -123,7 +125,7 @@ impl RunRemarks {
         for sentence in sentences.iter().filter(|_| !console.has_closing_lines()) {
             console.say_or_insist(is_missed, plain_sentence(sentence));
         }
-        Self { sentences, target, first_command: None }
+        Self { sentences, target, ..Self::default() }
     }
 }
 
@@ -184,6 +186,7 @@ pub(crate) fn write(
     if let Some(command) = &remarks.first_command {
         provenance.command.clone_from(command);
     }
+    provenance.traced_by.clone_from(&remarks.traced_by);
     let mut document = run.document(prepared).map_err(|e| Failure::running(e.to_string()))?;
     sequence_tables::add_ways(&mut document, &run.results, &prepared.job.loaded.model);
     face_tables::add_selectors(&mut document, &run.results, &prepared.job.loaded.model);

@@ -17,6 +17,7 @@ use crate::study::accuracy_target::{RelativeTolerance, TolerancePlan};
 use crate::study::default_accuracy::Chosen;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The head of a tally file. Lengths and angles as bits of `f64`.
@@ -61,6 +62,9 @@ pub(crate) struct TallyHeader {
     #[serde(default)]
     pub(crate) faces: u32,
     pub(crate) command: String,
+    /// The commands that traced the parts of a sum; empty where `command` traced it.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    traced_by: BTreeSet<String>,
     /// The program that traced it; empty in files of earlier versions.
     #[serde(default)]
     program: String,
@@ -107,6 +111,7 @@ impl TallyHeader {
             sequences: prepared.job.scene.run.sequences,
             faces: prepared.job.scene.run.faces,
             command: console.command.clone(),
+            traced_by: BTreeSet::new(),
             program: PROGRAM.into(),
             usage: Usage::default(),
         })
@@ -125,6 +130,16 @@ impl TallyHeader {
     /// Returns the same header with what the run took.
     pub(crate) fn with_usage(&self, usage: Usage) -> Self {
         Self { usage, ..self.clone() }
+    }
+
+    /// Returns the same header of a sum of parts that these commands traced.
+    pub(crate) fn with_traced_by(self, traced_by: BTreeSet<String>) -> Self {
+        Self { traced_by, ..self }
+    }
+
+    /// Returns the commands that traced what the file holds.
+    pub(crate) fn traced_by(&self) -> BTreeSet<String> {
+        if self.traced_by.is_empty() { BTreeSet::from([self.command.clone()]) } else { self.traced_by.clone() }
     }
 
     /// Returns by which program the part was traced, and which one this is, in words; `None` where both are the same.
