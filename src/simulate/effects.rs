@@ -3,6 +3,7 @@
 use super::bind::BoundScene;
 use super::body::{AMBIENT, Body};
 use super::surfaces::{Coated, FaceOptics, Surface};
+use super::wavelength_text::wavelength_text;
 use crate::optics::{Coating, Effect, Effects};
 use crate::text::count_of;
 use serde::Serialize;
@@ -170,7 +171,7 @@ fn required(bound: &BoundScene) -> Required {
 /// spectrum, or where a coating or `medium` depends on it, the name of one whose index or absorption does.
 fn needs_wavelength(bound: &BoundScene, medium: Option<&str>) -> (bool, String) {
     if !bound.light.coloured {
-        return (false, format!("all light has {} nm", bound.light.wavelength));
+        return (false, format!("all light has {}", wavelength_text(bound.light.wavelength)));
     }
     if let Some(r) = bound.receivers.iter().find(|r| r.channels.count() > 0) {
         return (true, format!("the receiver '{}' asks for the spectrum", r.name));

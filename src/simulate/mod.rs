@@ -62,6 +62,7 @@ mod tallies;
 mod tally;
 mod trim_loops;
 mod verify;
+mod wavelength_text;
 
 pub use arrivals::arrivals;
 pub use bind::{BoundScene, LeftOut, RuleFaces, face_selectors};

@@ -684,6 +684,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
         &[
             "error",
             "seconds",
+            "wavelength_text",
             "mod",
             "outcome",
             "random",

@@ -228,6 +228,13 @@ fn rules_that_do_not_fit_the_model_are_refused_with_advice() {
             ),
             "has no index at 500 nm",
         ),
+        // 395.3 as single precision has it.
+        (
+            format!(
+                "[[medium]]\nname = 'g'\nsellmeier = [[1.2, 0.16]]\n[[material]]\npart = '{part}'\nmedium = 'g'\n{REST}    spectrum = {{ values = [[395.2999877929688, 1], [600, 1]] }}\n"
+            ),
+            "has no index at 395.3 nm",
+        ),
     ] {
         let scene = Scene::parse(&text, "scene.toml", Path::new(".")).expect(&text);
         let e = scene.bind(&model).expect_err(&text);

@@ -9,6 +9,7 @@ use crate::optics;
 use crate::simulate::body::{AMBIENT, Body};
 use crate::simulate::scene::{Key, Scene, medium};
 use crate::simulate::surfaces::SceneLight;
+use crate::simulate::wavelength_text::wavelength_text;
 use crate::simulate::{Error, ErrorKind};
 use std::collections::HashMap;
 
@@ -45,7 +46,7 @@ pub(super) fn find_bodies(
                 let instance = labels[f.instance].clone();
                 let body = Body::new(medium::find(scene, name, &at)?, instance, light);
                 if !body.has_valid_index() {
-                    let message = format!("'{name}' has no index at {} nm", light.wavelength);
+                    let message = format!("'{name}' has no index at {}", wavelength_text(light.wavelength));
                     return Err(scene.error(ErrorKind::Value, &at, message));
                 }
                 places.insert((f.instance, name), bodies.len());

@@ -9,15 +9,13 @@ use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::Loaded;
 use crate::simulate::scene::{ByWavelength, Material, PowerUnit, Reflectance, Scene, medium};
 use crate::simulate::surfaces::FaceOptics;
-use crate::text::{count_of, figures, first_sentences};
+use crate::simulate::wavelength_text::wavelength_range_text;
+use crate::text::{count_of, first_sentences};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Share of a wavelength that the end of a table may be missed by: single precision rounds by half of 2⁻²³, a change of units by less, and
-/// what is beyond can be told apart by [`WAVELENGTH_DIGITS`].
+/// what is beyond can be told apart by the digits that are written.
 const ROUNDING: f64 = 5e-7;
-
-/// Digits of a wavelength: as many as single precision keeps.
-const WAVELENGTH_DIGITS: usize = 7;
 
 /// Tables, media, sources and remarks on files that are named; of more the number is told.
 pub(super) const NAMED: usize = 8;
@@ -70,17 +68,11 @@ fn range_note(scene: &Scene, known: &KnownRange, light: &[[f64; 2]]) -> Option<S
     let (source, [a, b]) = light.iter().enumerate().find(|(_, range)| outside(range))?;
     let whose = scene.source_label(source);
     let alone = if from == to { " alone" } else { "" };
-    let [known_for, light] = [[from, to], [*a, *b]].map(range_text);
+    let [known_for, light] = [[from, to], [*a, *b]].map(wavelength_range_text);
     Some(format!(
         "{} is known for {known_for}{alone}, but {whose} has light of {light}: {}",
         known.what, known.beyond
     ))
-}
-
-/// Writes the wavelengths from the first to the second, nm, or the only one.
-fn range_text([first, last]: [f64; 2]) -> String {
-    let [from, to] = [first, last].map(|nm| figures(nm, WAVELENGTH_DIGITS));
-    if from == to { format!("{from} nm") } else { format!("{from} to {to} nm") }
 }
 
 /// Returns one sentence about the sources whose power is in lumens though the eye sees nothing of their light, naming the first; `None`
@@ -97,7 +89,7 @@ pub(super) fn invisible_light_note(scene: &Scene, light: &[[f64; 2]]) -> Option<
     Some(format!(
         "the power of {}{others} is in lumens, but the eye sees nothing of light of {}: give it in watts, without `unit = \"lm\"` in [run]",
         scene.source_label(first),
-        range_text(light[first])
+        wavelength_range_text(light[first])
     ))
 }
 

@@ -5,6 +5,7 @@ use crate::simulate::body::Body;
 use crate::simulate::emitter::{Loaded, RayList};
 use crate::simulate::scene::{Key, Scene};
 use crate::simulate::surfaces::SceneLight;
+use crate::simulate::wavelength_text::wavelength_text;
 use crate::simulate::{Error, ErrorKind};
 
 /// Wavelengths of a continuous spectrum at which the index of each medium is looked at.
@@ -84,7 +85,9 @@ pub(super) fn check_indices(scene: &Scene, loaded: &[Option<Loaded>], bodies: &[
         for nm in wavelengths {
             let wrong = bodies.iter().find(|b| !Index::RANGE.contains(&b.index(Some(nm))));
             if let Some(body) = wrong {
-                let message = format!("'{}' has no index at {nm} nm, a wavelength of this source", body.medium);
+                let wavelength = wavelength_text(nm);
+                let message =
+                    format!("'{}' has no index at {wavelength}, a wavelength of this source", body.medium);
                 let at = [Key::Name("source"), Key::Index(i), Key::Name("spectrum")];
                 let error = scene.error(ErrorKind::Value, &at, message);
                 return Err(error.help("give the medium an index there, or cut the spectrum"));

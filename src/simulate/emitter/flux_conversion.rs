@@ -3,10 +3,7 @@
 use crate::formats::RayFile;
 use crate::optics::{Spectrum, Table, Wavelengths};
 use crate::simulate::scene::{PowerUnit, Source};
-use crate::text::figures;
-
-/// Significant digits of a wavelength in a message: of files in single precision all that mean something.
-const WAVELENGTH_DIGITS: usize = 6;
+use crate::simulate::wavelength_text::wavelength_range_text;
 
 /// What there is to do about a file whose powers can be taken as proportions, for all its light has one spectrum.
 pub(super) const GIVE_POWER: &str =
@@ -97,9 +94,7 @@ pub(super) fn conversion(
 
 /// Returns the clause that the eye sees nothing of some light, called `what`, of wavelengths from the first to the second, nm.
 pub(super) fn unseen_light(what: &str, range_nm: [f64; 2]) -> String {
-    let [first, last] = range_nm.map(|nm| figures(nm, WAVELENGTH_DIGITS));
-    let range = if first == last { first } else { format!("{first} to {last}") };
-    format!("the eye sees nothing of {what}, {range} nm")
+    format!("the eye sees nothing of {what}, {}", wavelength_range_text(range_nm))
 }
 
 /// Returns why lumens of some light that the eye sees nothing of, as [`unseen_light`] names it, are refused where watts are counted.

@@ -3,6 +3,7 @@
 use super::{Key, Scene};
 use crate::formats::{AgfGlass, read_agf};
 use crate::optics::{self, Absorption, BulkScatter, Dispersion, Index, Pole, Table, catalogue};
+use crate::simulate::wavelength_text::wavelength_text;
 use crate::simulate::{Error, ErrorKind};
 use crate::text;
 use serde::{Deserialize, Serialize};
@@ -258,14 +259,14 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
         let medium = m.optics().map_err(|(key, e)| scene.error(ErrorKind::Value, &at(key), e))?;
         // A formula may leave the range where it is used, though its coefficients look well.
         let n = medium.index.value(scene.run.wavelength_nm);
+        let wavelength = wavelength_text(scene.run.wavelength_nm);
         if !Index::RANGE.contains(&n) {
-            let message =
-                format!("the index of '{}' at {} nm is {n}, not from 0.1 to 10", m.name, scene.run.wavelength_nm);
+            let message = format!("the index of '{}' at {wavelength} is {n}, not from 0.1 to 10", m.name);
             return Err(scene.error(ErrorKind::Value, &at("name"), message));
         }
         // Constants in nm² leave nearly nothing of each term, with the wrong sign: no light would be bent, in silence.
         if m.sellmeier.is_some() && n < 1.0 {
-            let message = format!("`sellmeier` gives an index of {n} at {} nm, below 1", scene.run.wavelength_nm);
+            let message = format!("`sellmeier` gives an index of {n} at {wavelength}, below 1");
             let error = scene.error(ErrorKind::Value, &at("sellmeier"), message);
             return Err(error.help("its rows are [B, C] with C in µm², the square of a resonance's wavelength"));
         }
