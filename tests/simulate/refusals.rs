@@ -49,6 +49,19 @@ fn values_out_of_range_are_refused_by_name() {
 }
 
 #[test]
+fn two_of_one_name_are_refused_alike() {
+    for (table, kind, keys) in [
+        ("medium", "media", "index = 1.5"),
+        ("source", "sources", "kind = 'point'"),
+        ("receiver", "receivers", "size = [1, 1]"),
+    ] {
+        let said = refusal(&format!("[[{table}]]\nname = 'twin'\n{keys}\n").repeat(2));
+        let sentence = format!("two {kind} are called 'twin'; give each a name of its own");
+        assert!(said.starts_with("scene.toml:5:") && said.ends_with(&sentence), "{said}");
+    }
+}
+
+#[test]
 fn a_key_that_stands_elsewhere_is_told_where() {
     for (key, meant) in
         [("wavelength_nm = 550", "spectrum = {"), ("wavelength = 550", "[run]"), ("flux_lm = 5", "unit = \"lm\"")]

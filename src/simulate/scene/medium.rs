@@ -240,7 +240,7 @@ pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::
     })))
 }
 
-/// Refuses media without a name of their own, without exactly one index, with values that [`Medium::optics`] refuses, or with an index
+/// Refuses media without a name, without exactly one index, with values that [`Medium::optics`] refuses, or with an index
 /// outside 0.1 to 10 at the run's wavelength. The glasses of catalogue files must have been read: without, their names are looked up in the
 /// built-in catalogue.
 pub(super) fn check(scene: &Scene) -> Result<(), Error> {
@@ -248,10 +248,6 @@ pub(super) fn check(scene: &Scene) -> Result<(), Error> {
         let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];
         if m.name.is_empty() {
             return Err(scene.error(ErrorKind::Value, &at("name"), "this medium has no `name`"));
-        }
-        // Of two media of one name a material could mean either.
-        if scene.media[..i].iter().any(|o| o.name == m.name) {
-            return Err(scene.error(ErrorKind::Value, &at("name"), format!("two media are called '{}'", m.name)));
         }
         if m.index.is_some_and(|n| !Index::RANGE.contains(&n)) {
             return Err(scene.error(ErrorKind::Value, &at("index"), "`index` must be from 0.1 to 10"));

@@ -217,12 +217,14 @@ impl Scene {
         self.accuracy.check(self)?;
         self.models.iter().enumerate().try_for_each(|(i, m)| m.check(self, i))?;
         medium::check(self)?;
+        self.check_names("medium", "media", self.media.iter().map(|m| m.name.as_str()))?;
         surface::check(self)?;
         let all_rays = self.sources.iter().filter_map(|source| source.rays).fold(0, u64::saturating_add);
         self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i, all_rays))?;
-        self.check_source_names()?;
+        self.check_names("source", "sources", self.sources.iter().map(|s| s.name.as_str()))?;
         self.receivers.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
-        self.check_receiver_names()?;
+        self.check_names("receiver", "receivers", self.receivers.iter().map(|r| r.name.as_str()))?;
+        self.check_receiver_files()?;
         self.regulations.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
         let sums: u64 = self.receivers.iter().map(Receiver::sums).sum();
         if sums > MOST_SUMS {
@@ -235,15 +237,15 @@ impl Scene {
         Ok(())
     }
 
-    /// Refuses two sources of one name, which results and notes could not tell apart; several may have none.
-    fn check_source_names(&self) -> Result<(), Error> {
-        let mut names = HashSet::new();
-        let named = self.sources.iter().enumerate().filter(|(_, source)| !source.name.is_empty());
-        for (i, Source { name, .. }) in named {
-            if !names.insert(name.as_str()) {
-                let at = [Key::Name("source"), Key::Index(i), Key::Name("name")];
-                let error = self.error(ErrorKind::Value, &at, format!("two sources are called '{name}'"));
-                return Err(error.help("give each a name of its own, or leave `name` out"));
+    /// Refuses two entries of one name in the list `key`, by which nobody could tell them apart; several may have none. `kind` is what they
+    /// are called in a sentence.
+    fn check_names<'a>(&self, key: &str, kind: &str, names: impl Iterator<Item = &'a str>) -> Result<(), Error> {
+        let mut known = HashSet::new();
+        for (i, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
+            if !known.insert(name) {
+                let at = [Key::Name(key), Key::Index(i), Key::Name("name")];
+                let error = self.error(ErrorKind::Value, &at, format!("two {kind} are called '{name}'"));
+                return Err(error.help("give each a name of its own"));
             }
         }
         Ok(())
@@ -251,7 +253,7 @@ impl Scene {
 
     /// Refuses two receivers whose names make the same file name, with or without what pictures in colours add to it, and one that would
     /// write over lost_rays.csv.
-    fn check_receiver_names(&self) -> Result<(), Error> {
+    fn check_receiver_files(&self) -> Result<(), Error> {
         // By the name of the file, not of the receiver: `a b` and `a_b` would write over each other, on some systems `a` and `A` too.
         let mut stems: HashMap<String, &str> = HashMap::new();
         for (i, Receiver { name, channels, .. }) in self.receivers.iter().enumerate() {
@@ -261,7 +263,6 @@ impl Scene {
                 let file = stem.to_lowercase();
                 let message = match stems.get(&file) {
                     _ if file == "lost_rays" => format!("a receiver called '{name}' would overwrite lost_rays.csv"),
-                    Some(other) if *other == name => format!("two receivers are called '{name}'"),
                     Some(other) => {
                         format!("the files of the receivers '{other}' and '{name}' would both be called '{stem}'")
                     }
