@@ -36,8 +36,8 @@ pub(crate) use mixed_packet::{MixedPacket, MixedRay};
 pub(crate) use ray_list::{ListCursor, RayList};
 pub(crate) use sampler::RaySampler;
 use shape::{
-    LAMBERTIAN, Lobe, Shape, direction_about_axis, point_on_rectangle, radius_on_disc, sine_from_cosine,
-    sine_from_versine, versine, versine_in_cone,
+    LAMBERTIAN, Lobe, Shape, cosine_of_power, direction_about_axis, point_on_rectangle, radius_on_disc,
+    sine_from_cosine, sine_from_versine, versine, versine_in_cone,
 };
 use smallvec::SmallVec;
 use std::f64::consts::PI;
@@ -311,9 +311,7 @@ impl Emitter {
             }
             Lobe::Cosine(exponent) => {
                 let [u, v] = pair();
-                // From (0, 1], as the power of zero would be grazing light; for a Lambertian source cos θ is √u (Malley).
-                let u = 1.0 - u;
-                let cosine = if *exponent == LAMBERTIAN { u.sqrt() } else { u.powf(*exponent) };
+                let cosine = cosine_of_power(*exponent, u);
                 direction_about_axis(axes, [cosine, sine_from_cosine(cosine)], sin_cos(v))
             }
             Lobe::Measured(sampler) => self.frame.direction(sampler.sample(pair())),

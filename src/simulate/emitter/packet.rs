@@ -2,8 +2,8 @@
 
 use super::Emitter;
 use super::shape::{
-    LAMBERTIAN, Lobe, Shape, point_on_rectangle, radius_on_disc, sine_from_cosine, sine_from_versine,
-    versine_in_cone,
+    LAMBERTIAN, Lobe, Shape, lambertian_cosine, point_on_rectangle, radius_on_disc, sine_from_cosine,
+    sine_from_versine, versine_in_cone,
 };
 use super::stream::{PACKET, PacketNumbers, Stream};
 use crate::math::{Point, Vector};
@@ -132,7 +132,7 @@ impl Emitter {
             }
             Lobe::Cosine(_) => {
                 for k in 0..PACKET {
-                    cos_theta[k] = (1.0 - u[k]).sqrt();
+                    cos_theta[k] = lambertian_cosine(u[k]);
                     sin_theta[k] = sine_from_cosine(cos_theta[k]);
                 }
             }

@@ -64,6 +64,20 @@ pub(super) fn versine_in_cone(rim: f64, u: f64) -> f64 {
     u * rim
 }
 
+/// Returns the cosine of an angle to the axis for a uniform number `u` in `[0, 1)`, by Lambert's law (Malley's method: the root of a
+/// uniform number).
+#[inline(always)]
+pub(super) fn lambertian_cosine(u: f64) -> f64 {
+    // From (0, 1], as a cosine of zero would be grazing light.
+    (1.0 - u).sqrt()
+}
+
+/// Returns the cosine of an angle to the axis for a uniform number `u` in `[0, 1)`, intensity ∝ cosⁿ; `exponent` is `1/(n+1)`.
+#[inline(always)]
+pub(super) fn cosine_of_power(exponent: f64, u: f64) -> f64 {
+    if exponent == LAMBERTIAN { lambertian_cosine(u) } else { (1.0 - u).powf(exponent) }
+}
+
 /// Returns the sine of an angle from 0 to π by its `1 − cos`.
 #[inline(always)]
 pub(super) fn sine_from_versine(versine: f64) -> f64 {
