@@ -4,7 +4,7 @@ use super::{AxisStyle, Cell, Chart, Content, Provenance, Report, Section, Table,
 use crate::formats::{Facets, Polylines};
 use crate::math::{Point, Vector};
 use crate::study::cross_check::{Cause, CrossCheck, Disagreement};
-use crate::text::{figures, grouped};
+use crate::text::{count_of, figures, grouped};
 use std::collections::BTreeSet;
 
 /// Everything that the report of a check speaks of.
@@ -231,8 +231,9 @@ pub(super) fn odd_rays(check: &CrossCheck, facets: &Facets) -> Option<View> {
         );
     }
     Some(view.caption(&format!(
-        "{shown} rays, at most {DRAWN} of each cause, each from shortly before its first hit to behind its last; a dot is the first hit. \
-         Click a name in the legend to hide or show it."
+        "{}, at most {DRAWN} of each cause, each from shortly before its first hit to behind its last; a dot is the first hit. \
+         Click a name in the legend to hide or show it.",
+        count_of(shown, "ray")
     )))
 }
 
@@ -245,8 +246,8 @@ impl CheckReport<'_> {
         text += &match differ {
             0 => " Facets and spline name the same face for every ray.".to_owned(),
             n => format!(
-                " Facets and spline name different faces, or only one of them is hit, for **{}** rays ({} %).",
-                grouped(n),
+                " Facets and spline name different faces, or only one of them is hit, for **{}** ({} %).",
+                count_of(n, "ray"),
                 figures(100.0 * n as f64 / c.rays.max(1) as f64, 2)
             ),
         };

@@ -19,7 +19,7 @@ pub fn verdict_counts(a: &Assessment) -> [usize; 3] {
 /// Writes a sentence about the whole.
 pub fn verdict_sentence(a: &Assessment) -> String {
     let [pass, fail, unsure] = verdict_counts(a);
-    format!("**{}: {}** ({pass} rows pass, {fail} fail, {unsure} unsure). ", a.regulation.id, a.verdict)
+    format!("**{}: {}** (rows: {pass} pass, {fail} fail, {unsure} unsure). ", a.regulation.id, a.verdict)
 }
 
 /// Writes which way the directions count, for left-hand traffic; empty for the other, for which the tables are written.

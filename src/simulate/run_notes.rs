@@ -5,7 +5,7 @@ use super::outcome::{Counts, LostRay};
 use super::plan::Plan;
 use super::receiver::{NAMED_RECEIVERS, Receiver, Shape};
 use super::tally::Sum;
-use crate::text::{count_of, figures, first_sentences};
+use crate::text::{count_of, figures, first_sentences, grouped};
 
 /// Segments to one meeting of an overlap from which on it is told. Beside edges where bodies touch rounding may pass for an overlap: in
 /// one scene once in 10^6 segments.
@@ -31,9 +31,10 @@ impl BoundScene {
         // Rare meetings are the rounding of edges, and not worth alarming anybody.
         (times > counts.segments / OVERLAP_SEGMENTS).then(|| {
             format!(
-                "'{a}' ({medium_a}) and '{b}' ({medium_b}) overlap farther than [run] glue_mm, met {times} times by light; there it is \
+                "'{a}' ({medium_a}) and '{b}' ({medium_b}) overlap farther than [run] glue_mm, met {} by light; there it is \
                  taken to be in the body that it came into last, so what is right depends on its way: cut one out of the other in the \
-                 model, or give finer facets where solids touch in curved faces"
+                 model, or give finer facets where solids touch in curved faces",
+                count_of(times, "time")
             )
         })
     }
@@ -43,16 +44,16 @@ impl BoundScene {
     pub(crate) fn repair_notes(&self, counts: &Counts) -> impl Iterator<Item = String> + use<> {
         let contacts = (counts.refused_contacts > counts.segments / OVERLAP_SEGMENTS).then(|| {
             format!(
-                "{} times light met two touching faces of which the second bounds no body that it was in or could enter, as of an open or \
+                "{} light met two touching faces of which the second bounds no body that it was in or could enter, as of an open or \
                  overlapping part: it crossed the first alone",
-                counts.refused_contacts
+                count_of(counts.refused_contacts, "time")
             )
         });
         let starts = (counts.misplaced_starts > counts.rays / OVERLAP_SEGMENTS).then(|| {
             format!(
-                "{} rays of luminous faces started on the spline, as no facet of their face lies within 1 mm: they may have met their own \
+                "{} of luminous faces started on the spline, as no facet of their face lies within 1 mm: they may have met their own \
                  face; take a finer tolerance for it",
-                counts.misplaced_starts
+                count_of(counts.misplaced_starts, "ray")
             )
         });
         contacts.into_iter().chain(starts)
@@ -76,7 +77,7 @@ impl BoundScene {
         Some(format!(
             "{name} sends {rays} of the {} rays, as it has {percent:.1e} % of the power{others}: what it lights alone is not known; give it \
              `rays` of its own",
-            plan.rays
+            grouped(plan.rays)
         ))
     }
 
@@ -145,9 +146,45 @@ impl BoundScene {
     /// it.
     pub(crate) fn lost_note(&self, lost: u64, ledger: &[LostRay]) -> Option<String> {
         let first = self.loss_reasons(ledger).into_iter().next()?;
-        let recorded = ledger.len();
+        let recorded = ledger.len() as u64;
+        let verb = if lost == 1 { "was" } else { "were" };
+        let of = if recorded < lost { format!("; of the first {}", grouped(recorded)) } else { String::new() };
         Some(format!(
-            "{lost} paths were lost; of the {recorded} on record {first}; `trace --replay lost_rays.csv` shows their ways"
+            "{} {verb} lost{of}, {first}; `trace --replay lost_rays.csv` shows the paths",
+            count_of(lost, "path")
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Point, Vector};
+    use crate::model::Model;
+    use crate::simulate::Scene;
+    use crate::simulate::outcome::LostCause;
+    use std::path::Path;
+
+    #[test]
+    fn lost_paths_are_counted_as_people_count() {
+        let scene = Scene::parse("[[source]]\nkind = 'point'\n", "s.toml", Path::new(".")).unwrap();
+        let bound = scene.bind(&Model::default()).unwrap();
+        let ray = LostRay {
+            ray: 0,
+            branch: 0,
+            bounce: 0,
+            cause: LostCause::NotANumber,
+            quanta: 1,
+            origin: Point::ZERO,
+            direction: Vector::Z,
+            face: None,
+            body: 0,
+        };
+        let note = |lost, ledger: &[LostRay]| bound.lost_note(lost, ledger).unwrap();
+        let one = note(1, std::slice::from_ref(&ray));
+        assert!(one.starts_with("1 path was lost, 1 outside all bodies: "), "{one}");
+        let many = note(3000, &[ray.clone(), ray]);
+        assert!(many.starts_with("3000 paths were lost; of the first 2, 2 outside all bodies: "), "{many}");
+        assert_eq!(bound.lost_note(0, &[]), None);
     }
 }

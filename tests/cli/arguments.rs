@@ -47,7 +47,7 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         (&["study", "everything"], "accuracy"),
         (&["study", "accuracy", "--normals", "flat"], "study accuracy does not take --normals"),
         (&["study", "bvh", "--intersector", "exact"], "does not take --intersector"),
-        (&["study", "stability", "--rays", "5"], "its questions are fixed"),
+        (&["study", "stability", "--rays", "5"], "its rays are fixed"),
         (&["study", "accuracy", "--rays-in", "a.csv"], "study accuracy does not take --rays-in"),
         (&["study", "effects", "--embree", "libembree4.so"], "study effects does not take --embree"),
         (&["study", "bvh", "--embree", "no/such/library.so"], "no/such/library.so cannot be used as Embree"),

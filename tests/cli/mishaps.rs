@@ -317,9 +317,9 @@ fn faces_that_have_no_facets_make_a_trace_incomplete() {
     let run =
         |more: &[&str]| lampyris_in(folder.path(), &[&["trace", "scene.toml", "--rays", "200"], more].concat());
     let (code, _, err) = run(&["--intersector", "octree"]);
-    assert!(code == 4 && err.contains("1 of 2 faces have no facets"), "{code} {err}");
+    assert!(code == 4 && err.contains("1 of 2 faces has no facets"), "{code} {err}");
     let (code, _, err) = run(&["--intersector", "octree", "--max-refused", "0.5"]);
-    assert!(code == 0 && err.contains("1 of 2 faces have no facets"), "{code} {err}");
+    assert!(code == 0 && err.contains("1 of 2 faces has no facets"), "{code} {err}");
     // The spline needs none.
     let (code, _, err) = run(&["--intersector", "exact"]);
     assert!(code == 0 && !err.contains("no facets"), "{code} {err}");

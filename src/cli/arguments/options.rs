@@ -248,7 +248,10 @@ pub(crate) fn parse_count(text: &str) -> Result<u64, String> {
         Some('G') => (&plain[..plain.len() - 1], 1_000_000_000.0),
         _ => (plain.as_str(), 1.0),
     };
-    let value = digits.parse::<f64>().map_err(|_| format!("'{text}' is no number"))? * factor;
+    let value = digits
+        .parse::<f64>()
+        .map_err(|_| format!("a number of rays is wanted, as in 10k, 5M or 1e6, not '{text}'"))?
+        * factor;
     let whole = value.round();
     if (1.0..=MOST_RAYS as f64).contains(&whole) && (value - whole).abs() <= PRODUCT_ROUNDING * whole {
         Ok(whole as u64)

@@ -140,7 +140,9 @@ impl ResultsFile {
     /// Returns how many rays were traced, on which the prediction of errors for more rays rests; fails where the results do not say.
     fn rays(&self) -> Result<u64, Failure> {
         let rays = self.results["rays"].as_u64();
-        rays.ok_or_else(|| Failure::input(format!("{}: no number of rays", self.path.display())))
+        rays.ok_or_else(|| {
+            Failure::input(format!("{}: it does not say how many `rays` were traced", self.path.display()))
+        })
     }
 
     /// Returns the intensities of a far field, cd, from the CSV file that the results name for it.

@@ -169,7 +169,13 @@ fn meshing_summary(r: &Report) -> String {
     let n = |x: usize| grouped(x as u64);
     line(
         "facets",
-        format!("{}: {} quads, {} triangles; {} vertices", n(r.facets), n(r.quads), n(r.triangles), n(r.vertices)),
+        format!(
+            "{}: {}, {}; {} vertices",
+            n(r.facets),
+            count_of(r.quads as u64, "quad"),
+            count_of(r.triangles as u64, "triangle"),
+            n(r.vertices)
+        ),
     );
     line("quads", format!("{} % of the area", figures(100.0 * r.quad_area_share, 4)));
     line("tolerance", tolerance_text([r.tolerance_mm.min, r.tolerance_mm.max]));

@@ -96,28 +96,28 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     let traces_scene = kind == Effects;
     // Studies of their own facets take a tolerance at most, the same on all faces.
     let given = [
-        ("--intersector", t.intersector.is_some(), traces_scene, "it compares those that it is about"),
-        ("--normals", t.normals.is_some(), traces_scene, "it compares those that it is about"),
-        ("--rays", t.ray_range.is_some(), kind != Stability, "its questions are fixed"),
-        ("--seed", t.seed.is_some(), kind != Stability, "its questions are fixed"),
+        ("--intersector", t.intersector.is_some(), traces_scene, "it goes through all that it compares"),
+        ("--normals", t.normals.is_some(), traces_scene, "it goes through all that it compares"),
+        ("--rays", t.ray_range.is_some(), kind != Stability, "its rays are fixed"),
+        ("--seed", t.seed.is_some(), kind != Stability, "its rays are fixed"),
         (
             "--tolerance",
             m.tolerance.is_some(),
             matches!(kind, Effects | Accuracy | Bvh | Complexity),
-            "it goes through several of its own",
+            "it goes through tolerances of its own",
         ),
-        ("--angle", m.angle_deg.is_some(), traces_scene, "it goes through facets of its own"),
-        ("--embree", command.embree.is_some(), kind == Bvh, "it compares those that it is about"),
-        ("--rays-in", command.rays_in.is_some(), kind == Bvh, "it asks rays of its own"),
+        ("--angle", m.angle_deg.is_some(), traces_scene, "it makes facets of its own"),
+        ("--embree", command.embree.is_some(), kind == Bvh, "`study bvh` alone compares with Embree"),
+        ("--rays-in", command.rays_in.is_some(), kind == Bvh, "it traces rays of its own"),
         (
             "--rays",
             t.ray_range.is_some() && command.rays_in.is_some(),
             false,
             "the file of --rays-in has all of them",
         ),
-        ("--part", !m.part.is_empty(), traces_scene, "it goes through facets of its own"),
-        ("--face", !m.face.is_empty(), traces_scene, "it goes through facets of its own"),
-        ("--role", !m.role.is_empty(), traces_scene, "it goes through facets of its own"),
+        ("--part", !m.part.is_empty(), traces_scene, "it makes facets of its own"),
+        ("--face", !m.face.is_empty(), traces_scene, "it makes facets of its own"),
+        ("--role", !m.role.is_empty(), traces_scene, "it makes facets of its own"),
     ];
     // The first one is told; the others would be in vain too.
     let idle = given.iter().find(|(_, given, used, _)| *given && !used);
