@@ -25,7 +25,7 @@ pub(super) fn corner_normals(mesh: &FacetMesh, hit: &FacetHit) -> CornerNormals 
         let (a, b, c) = (load(a), load(b), load(c));
         let (u, v) = (_mm256_sub_pd(b, a), _mm256_sub_pd(c, a));
         let turned = _mm256_sub_pd(_mm256_mul_pd(u, next_axis(v)), _mm256_mul_pd(v, next_axis(u)));
-        let flat = normalized_or(next_axis(turned), _mm256_setzero_pd());
+        let flat = next_axis(turned);
         // With each normal the first of the parameters.
         let mut sum = _mm256_setzero_pd();
         let mut v = 0.0;
@@ -37,7 +37,8 @@ pub(super) fn corner_normals(mesh: &FacetMesh, hit: &FacetHit) -> CornerNormals 
             v = if k == 0 { part } else { v + part };
         }
         let u = _mm256_cvtsd_f64(_mm256_permute4x64_pd::<3>(sum));
-        CornerNormals { flat: vector(flat), smooth: vector(normalized_or(sum, flat)), uv: Uv::new(u, v) }
+        let [flat, smooth] = normals([flat, sum]);
+        CornerNormals { flat: vector(flat), smooth: vector(smooth), uv: Uv::new(u, v) }
     }
 }
 
@@ -53,15 +54,29 @@ unsafe fn next_axis(v: __m256d) -> __m256d {
     unsafe { _mm256_permute4x64_pd::<0b11_00_10_01>(v) }
 }
 
-/// A vector of unit length as `glam` makes it, or `other` where it makes none.
+/// Two vectors of unit length as `glam` makes them, with roots and inverses of both at once; for the first zero where it makes none, for the
+/// second the first.
 #[inline(always)]
-unsafe fn normalized_or(v: __m256d, other: __m256d) -> __m256d {
+unsafe fn normals([flat, smooth]: [__m256d; 2]) -> [__m256d; 2] {
+    unsafe {
+        let squares = _mm_unpacklo_pd(square(flat), square(smooth));
+        let inverse = _mm_div_pd(_mm_set1_pd(1.0), _mm_sqrt_pd(squares));
+        let (of_flat, of_smooth) = (_mm_cvtsd_f64(inverse), _mm_cvtsd_f64(_mm_unpackhi_pd(inverse, inverse)));
+        let is_usable = |inverse: f64| inverse > 0.0 && inverse < f64::INFINITY;
+        let flat =
+            if is_usable(of_flat) { _mm256_mul_pd(flat, _mm256_set1_pd(of_flat)) } else { _mm256_setzero_pd() };
+        let smooth = if is_usable(of_smooth) { _mm256_mul_pd(smooth, _mm256_set1_pd(of_smooth)) } else { flat };
+        [flat, smooth]
+    }
+}
+
+/// The sum of the squares of the first three numbers, in the lowest place.
+#[inline(always)]
+unsafe fn square(v: __m256d) -> __m128d {
     unsafe {
         let squares = _mm256_mul_pd(v, v);
         let xy = _mm256_castpd256_pd128(squares);
-        let square = _mm_add_sd(_mm_add_sd(xy, _mm_unpackhi_pd(xy, xy)), _mm256_extractf128_pd::<1>(squares));
-        let inverse = _mm_cvtsd_f64(_mm_div_sd(_mm_set_sd(1.0), _mm_sqrt_sd(square, square)));
-        if inverse > 0.0 && inverse < f64::INFINITY { _mm256_mul_pd(v, _mm256_set1_pd(inverse)) } else { other }
+        _mm_add_sd(_mm_add_sd(xy, _mm_unpackhi_pd(xy, xy)), _mm256_extractf128_pd::<1>(squares))
     }
 }
 

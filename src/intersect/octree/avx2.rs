@@ -5,10 +5,13 @@
 #![allow(unsafe_code)]
 
 use super::lanes::Lanes;
+use super::mesh_box::MeshBox;
 use super::node::{Block, Node};
 use super::quad_edges::QuadEdges;
 use super::ray::{BoxRay, Entry, LEAVE_STRETCH, SieveLimits, SieveRay};
+use super::ray_start_avx2;
 use crate::intersect::facet::FacetRay;
+use crate::math::Ray;
 use std::arch::x86_64::*;
 
 /// Eight lanes of f32.
@@ -112,6 +115,11 @@ static COMPRESSIONS: [[u8; 8]; 256] = {
 };
 
 impl Lanes for Avx2Lanes {
+    #[inline(always)]
+    fn start(ray: &Ray, mesh_box: &MeshBox, slack: f64, boxes: &mut BoxRay, sieve: &mut SieveRay) -> Option<f64> {
+        ray_start_avx2::start(ray, mesh_box, slack, boxes, sieve)
+    }
+
     #[inline(always)]
     fn prepare<'t>(entry: &mut Entry<'t>, node: &'t Node, ray: &BoxRay) {
         entry.node = node;

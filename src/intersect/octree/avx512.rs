@@ -8,10 +8,13 @@
 use super::avx2::Avx2Lanes;
 use super::facet_pair::{Corners, Edges};
 use super::lanes::Lanes;
+use super::mesh_box::MeshBox;
 use super::node::{Block, Node};
 use super::quad_edges::QuadEdges;
 use super::ray::{BoxRay, Entry, LEAVE_STRETCH, SieveLimits, SieveRay};
+use super::ray_start_avx2;
 use crate::intersect::facet::{FacetRay, Line};
+use crate::math::Ray;
 use std::arch::x86_64::*;
 
 /// Sixteen lanes of f32.
@@ -71,6 +74,11 @@ unsafe fn load_pair(corners: [&Corners; 2], axis: usize) -> __m512d {
 }
 
 impl Lanes for Avx512Lanes {
+    #[inline(always)]
+    fn start(ray: &Ray, mesh_box: &MeshBox, slack: f64, boxes: &mut BoxRay, sieve: &mut SieveRay) -> Option<f64> {
+        ray_start_avx2::start(ray, mesh_box, slack, boxes, sieve)
+    }
+
     #[inline(always)]
     fn prepare<'t>(entry: &mut Entry<'t>, node: &'t Node, ray: &BoxRay) {
         Avx2Lanes::prepare(entry, node, ray);

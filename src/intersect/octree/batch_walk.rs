@@ -44,7 +44,7 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
     let mut ways = Ways::default();
     for (ray, (state, &place)) in states.iter_mut().zip(order).enumerate().take(live) {
         let place = usize::from(place);
-        state.start(tree, root, &rays[place], place);
+        state.start::<L>(tree, root, &rays[place], place);
         ways.note(ray, state.next);
     }
     queues.put(Rays::first(live), &ways);
@@ -73,7 +73,7 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
         for ray in take(&mut queues.end) {
             let s = &mut states[ray];
             hits[s.index] = s.best.hit();
-            if start_next(tree, root, s, (rays, order), &mut next) {
+            if start_next::<L, STACK>(tree, root, s, (rays, order), &mut next) {
                 started.add_if(true, ray);
                 ways.note(ray, s.next);
             } else {
@@ -113,7 +113,7 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
 /// Starts in a free place the first ray from `next` on that does not pass by the mesh; `false` where none is left. What passes by is
 /// answered at once, and leaves no hit: most rays of a source that shines all around do.
 #[inline(always)]
-fn start_next<const STACK: usize>(
+fn start_next<L: Lanes, const STACK: usize>(
     tree: &Tree,
     root: Link,
     s: &mut RayState<STACK>,
@@ -129,7 +129,7 @@ fn start_next<const STACK: usize>(
         if let Some(from) = order.get(*next + AHEAD).and_then(|&place| rays[usize::from(place)].departure) {
             prefetch(&tree.slopes, from.primitive as usize);
         }
-        s.start(tree, root, &rays[place], place);
+        s.start::<L>(tree, root, &rays[place], place);
         *next += 1;
         if s.next != Link::END {
             return true;

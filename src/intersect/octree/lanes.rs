@@ -1,13 +1,21 @@
 //! What the walk does eight or sixteen lanes at a time, to be written once for each instruction set.
 
 use super::facet_pair::{Corners, Edges};
+use super::mesh_box::MeshBox;
 use super::node::{Block, Node};
 use super::quad_edges::QuadEdges;
 use super::ray::{BoxRay, Entry, SieveLimits, SieveRay};
+use super::ray_start;
 use crate::intersect::facet::{FacetRay, Line};
+use crate::math::Ray;
 
 /// What is done eight at a time. Implementations may round differently: boxes and sieve keep more than needed.
 pub(super) trait Lanes {
+    /// As [`ray_start::start`].
+    #[inline(always)]
+    fn start(ray: &Ray, mesh_box: &MeshBox, slack: f64, boxes: &mut BoxRay, sieve: &mut SieveRay) -> Option<f64> {
+        ray_start::start(ray, mesh_box, slack, boxes, sieve)
+    }
     /// Overwrites `entry` with what [`Self::enter`] needs to know of a ray at a node.
     #[inline(always)]
     fn prepare<'t>(entry: &mut Entry<'t>, node: &'t Node, ray: &BoxRay) {

@@ -11,8 +11,8 @@ pub(super) struct MeshBox {
     /// The point about which nodes and blocks are given, mm.
     pub(super) center: [f64; 4],
     /// Corners of the box, mm.
-    low: [f64; 4],
-    high: [f64; 4],
+    pub(super) low: [f64; 4],
+    pub(super) high: [f64; 4],
     /// Three times the size of the box, mm: what an f32 box test is wrong by, in roundings.
     pub(super) reach: [f32; 4],
 }

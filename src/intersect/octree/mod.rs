@@ -39,6 +39,9 @@ mod portable;
 mod quad_edges;
 mod ray;
 mod ray_stack;
+mod ray_start;
+#[cfg(target_arch = "x86_64")]
+mod ray_start_avx2;
 mod ray_state;
 mod settings;
 mod statistics;

@@ -1,20 +1,13 @@
 //! A ray on its way through the tree.
 
 use super::lanes::Lanes;
-use super::node::{Link, Node};
-use super::ray::{BoxRay, Entry, Rows, SieveRay};
+use super::node::Link;
+use super::ray::{BoxRay, Entry, SieveRay};
 use super::ray_stack::{Children, RayStack};
 use super::tree::Tree;
 use crate::intersect::facet::{FacetRay, Nearest};
 use crate::math::{Point, Ray, Vector};
 
-/// Smallest component of a direction that is divided by: along it a ray moves by less than the room around boxes in 10⁵ scene
-/// sizes, and 1e12 mm times its inverse is still a number in f32.
-const LEAST_COMPONENT: f64 = 1e-18;
-/// What a start that was moved along its ray is wrong by, relative to the way: four roundings in f64.
-const SHIFT_ERROR: f64 = 1e-15;
-/// Rounding of f32, 2⁻²⁴, rounded up.
-const ROUNDING: f32 = 6e-8;
 /// By how much limits in f32 are widened: sixteen roundings, so that ties are seen.
 const LIMIT_ROOM: f64 = 1e-6;
 /// The least `t_max` of box tests: the lowest bits of a distance are not its own.
@@ -70,7 +63,7 @@ impl<const STACK: usize> RayState<STACK> {
     /// Puts a ray, in the mesh's coordinates, on its way and replaces the one before: next is `root`, or the end when it passes by the
     /// whole mesh. `index` tells whose hit it will be. What differs from ray to ray within the mesh is chosen without branches.
     #[inline(always)]
-    pub(super) fn start(&mut self, tree: &Tree, root: Link, ray: &Ray, index: usize) {
+    pub(super) fn start<L: Lanes>(&mut self, tree: &Tree, root: Link, ray: &Ray, index: usize) {
         self.unmet_facet = tree.unmet_facet(ray);
         let lifted;
         let ray = if ray.departure.is_some() & (self.unmet_facet == u32::MAX) {
@@ -79,40 +72,15 @@ impl<const STACK: usize> RayState<STACK> {
         } else {
             ray
         };
-        let direction = [ray.direction.x, ray.direction.y, ray.direction.z, 1.0];
-        let origin = [ray.origin.x, ray.origin.y, ray.origin.z, 0.0];
-        let inverse =
-            direction.map(|d| 1.0 / if d.abs() < LEAST_COMPONENT { LEAST_COMPONENT.copysign(d) } else { d });
-        let mesh_box = &tree.mesh_box;
-        // Far origins are moved to where they enter, since f32 is good only near the mesh. Rays of one kind mostly start all inside
-        // or all outside.
         self.index = index;
         self.best = Nearest::up_to(ray.t_max);
-        self.shift = 0.0;
-        if !(mesh_box.holds(origin) & (ray.t_min >= 0.0)) {
-            let passage = mesh_box.passage(ray, origin, inverse);
-            // Guessed wrong at times, but most rays of a source that shines all around end here.
-            if !((passage.near <= passage.far) & passage.near.is_finite()) {
-                self.next = Link::END;
-                return;
-            }
-            self.shift = passage.near;
-        }
-        let moved = (tree.surroundings.slack(ray) + self.shift.abs() * SHIFT_ERROR) as f32;
+        let slack = tree.surroundings.slack(ray);
+        let Some(shift) = L::start(ray, &tree.mesh_box, slack, &mut self.boxes, &mut self.sieve) else {
+            self.next = Link::END;
+            return;
+        };
+        self.shift = shift;
         let b = &mut self.boxes;
-        let mut octant = 0;
-        for a in 0..4 {
-            let inverse = inverse[a] as f32;
-            let exact = (origin[a] - mesh_box.center[a]) + direction[a] * self.shift;
-            let o = exact as f32;
-            b.origin[a] = o;
-            b.inverse[a] = inverse;
-            b.slack[a] = ((4.0 * o.abs() + mesh_box.reach[a]) * ROUNDING + moved) * inverse.abs();
-            self.sieve.high[a] = o;
-            self.sieve.low[a] = (exact - f64::from(o)) as f32;
-            octant |= u8::from(inverse < 0.0) << a;
-        }
-        b.rows = Rows::ALL[usize::from(octant & 7)];
         // Adding zero makes −0.0 positive: distances are sorted by their bits.
         b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0) + 0.0;
         // What is asked again is taken before it is written: what was written in parts is read as a whole only after a wait.
@@ -122,7 +90,6 @@ impl<const STACK: usize> RayState<STACK> {
         self.sieve.shear = shear.map(|s| s as f32);
         self.sieve.axes = axes.map(|a| a as u8);
         self.facets = facets;
-        self.sieve.slack = moved;
         self.limit_to_hit();
         self.next = root;
         self.candidates = 0;

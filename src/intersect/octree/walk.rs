@@ -78,7 +78,7 @@ fn walk_with<L: Lanes, const STACK: usize>(
     let mut states = kept.take().unwrap_or_else(idle_states);
     if let [ray] = rays {
         let state = &mut states[0];
-        state.start(tree, root, ray, 0);
+        state.start::<L>(tree, root, ray, 0);
         walk_one::<L, STACK>(tree, state, cost);
         hits[0] = state.best.hit();
     } else {
