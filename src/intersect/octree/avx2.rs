@@ -1,7 +1,7 @@
 //! What the walk does in lanes, with AVX2 and FMA.
 //!
-//! Sound because [`super::kernels`] takes it only where kernels may use them, because loads stay inside the
-//! fixed-size arrays of [`Node`] and [`Block`], whose row indices are below six.
+//! Sound because [`super::kernels`] takes it only where kernels may use them, because loads stay inside [`Node`] and [`Block`], where
+//! bounds are read from the 88th byte at most, and because axes are below three.
 #![allow(unsafe_code)]
 
 use super::lanes::Lanes;
@@ -13,6 +13,7 @@ use super::ray_start_avx2;
 use crate::intersect::facet::FacetRay;
 use crate::math::Ray;
 use std::arch::x86_64::*;
+use std::mem::offset_of;
 
 /// Eight lanes of f32.
 pub(super) struct Avx2Lanes;
@@ -24,6 +25,12 @@ unsafe fn load_bounds(node: &Node, place: usize) -> __m256 {
         let bytes = node.bounds.as_ptr().byte_add(place).cast();
         _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes)))
     }
+}
+
+/// Four numbers of a node from so many bytes on.
+#[inline(always)]
+unsafe fn load_four(node: &Node, place: usize) -> __m128 {
+    unsafe { _mm_loadu_ps(std::ptr::from_ref(node).byte_add(place).cast()) }
 }
 
 #[inline(always)]
@@ -49,7 +56,7 @@ unsafe fn ordered(corner: __m256d, order: __m256i) -> __m256d {
 unsafe fn block_from_ray(block: &Block, ray: &SieveRay) -> __m128 {
     unsafe {
         // In two parts: of a start far from the block one `f32` would lose the digits that tell the corners apart.
-        let origin_and_step = std::ptr::from_ref(block).byte_add(std::mem::offset_of!(Block, origin));
+        let origin_and_step = std::ptr::from_ref(block).byte_add(offset_of!(Block, origin));
         let from_high = _mm_sub_ps(_mm_load_ps(origin_and_step.cast()), _mm_load_ps(ray.high.as_ptr()));
         _mm_sub_ps(from_high, _mm_load_ps(ray.low.as_ptr()))
     }
@@ -127,8 +134,8 @@ impl Lanes for Avx2Lanes {
         // SAFETY: see the head of the file; what follows the origin of a node, and its steps, is read with them.
         unsafe {
             let (inverse, slack) = (_mm_load_ps(ray.inverse.as_ptr()), _mm_load_ps(ray.slack.as_ptr()));
-            let to = _mm_sub_ps(_mm_loadu_ps(node.origin.as_ptr()), _mm_load_ps(ray.origin.as_ptr()));
-            let step = _mm_loadu_ps(node.step.as_ptr());
+            let to = _mm_sub_ps(load_four(node, offset_of!(Node, origin)), _mm_load_ps(ray.origin.as_ptr()));
+            let step = load_four(node, offset_of!(Node, step));
             _mm_store_ps(entry.scale.as_mut_ptr(), _mm_mul_ps(step, inverse));
             // Entering is made earlier and leaving later by what `f32` may be wrong by: boxes may be met in vain but never missed.
             _mm_store_ps(entry.near.as_mut_ptr(), _mm_fmsub_ps(to, inverse, slack));

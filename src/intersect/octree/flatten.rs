@@ -132,7 +132,7 @@ impl Draft {
         let (nodes, blocks) = (self.nodes.len(), self.blocks.len());
         self.blocks.extend(draft.blocks);
         self.nodes.extend(draft.nodes.into_iter().map(|mut node| {
-            // Of slots that are in use alone: a moved zero led back up the tree for ever.
+            // Of slots that are in use alone: a zero that is moved would lead back up the tree, for ever.
             for slot in node.slots() {
                 node.children[slot] = Link(node.children[slot]).moved(nodes, blocks).0;
             }

@@ -24,7 +24,7 @@ pub(super) trait Lanes {
     /// Writes where the ray enters the children that it may meet within its range, and their links, mostly the farthest first; what lies
     /// beyond their number is of no meaning. Returns which they are, 0 for none: bit `k` for the child in slot `15 ^ k ^ entry.order`.
     fn enter(entry: &Entry, ray: &BoxRay, enters: &mut [f32; 16], links: &mut [u32; 16]) -> u32;
-    /// Returns what a ray is wrong by in a block, and its place there; [`Self::sift`] is given it.
+    /// Returns where a ray is against a block and how wrong its sieve may be; [`Self::sift`] is given it.
     #[inline(always)]
     fn sieve_limits(block: &Block, ray: &SieveRay, boxes: &BoxRay) -> SieveLimits {
         SieveLimits::new(block, ray, boxes)

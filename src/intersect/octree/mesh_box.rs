@@ -13,7 +13,7 @@ pub(super) struct MeshBox {
     /// Corners of the box, mm.
     pub(super) low: [f64; 4],
     pub(super) high: [f64; 4],
-    /// Three times the size of the box, mm: what an f32 box test is wrong by, in roundings.
+    /// Four times the size of the box, mm: what an f32 box test is wrong by, in roundings.
     pub(super) reach: [f32; 4],
 }
 
@@ -32,7 +32,7 @@ impl MeshBox {
             center: lanes(center, 0.0),
             low: lanes(bounds.min, f64::NEG_INFINITY),
             high: lanes(bounds.max, f64::INFINITY),
-            reach: lanes(bounds.size() * 3.0, 0.0).map(|x| x as f32),
+            reach: lanes(bounds.size() * 4.0, 0.0).map(|x| x as f32),
         }
     }
 

@@ -1,10 +1,10 @@
 //! The walk in plain Rust.
 
 use super::lanes::Lanes;
-use super::node::{Block, Link};
+use super::node::{Block, CHILDREN, Link};
 use super::ray::{BoxRay, Entry, LEAVE_STRETCH, SieveLimits, SieveRay};
 
-/// Eight lanes as arrays; compilers vectorise most of it for the baseline of the target.
+/// Lanes as arrays; compilers vectorise most of it for the baseline of the target.
 pub(super) struct Portable;
 
 impl Lanes for Portable {
@@ -15,7 +15,7 @@ impl Lanes for Portable {
         let mut leave = [ray.t_max; 16];
         for a in 0..3 {
             let [first, last] =
-                [ray.rows.near[a], ray.rows.far[a]].map(|place| &node.bounds[usize::from(place) / 16]);
+                [ray.rows.near[a], ray.rows.far[a]].map(|place| &node.bounds[usize::from(place) / CHILDREN]);
             for k in 0..16 {
                 enter[k] = enter[k].max(f32::from(first[k]) * scale[a] + near[a]);
                 leave[k] = leave[k].min(f32::from(last[k]) * scale[a] + far[a]);

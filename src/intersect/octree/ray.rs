@@ -29,7 +29,7 @@ pub(super) struct BoxRay {
 pub(super) struct Rows {
     /// One bit an axis: set where the ray runs against it.
     pub(super) octant: u8,
-    /// By axis, the place of the first of the bounds that the ray enters by, and of those that it leaves by.
+    /// By axis, the first byte in [`Node::bounds`] of those that the ray enters by, and of those that it leaves by.
     pub(super) near: [u8; 3],
     pub(super) far: [u8; 3],
 }
@@ -55,7 +55,7 @@ impl Rows {
 }
 
 /// What a ray is against a node: which, and what crossings of the bounds of its children are computed with, by axis. A bound is crossed at
-/// `bound · scale` and `near` where the ray enters by it, or `far` where it leaves. The fourth numbers mean nothing.
+/// `bound · scale + near` where the ray enters by it, with `far` where it leaves. The fourth numbers mean nothing.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Entry<'t> {

@@ -32,7 +32,10 @@ pub(super) fn start(
     let shift = if is_inside { 0.0 } else { enter_mesh(ray, mesh_box, origin, inverse)? };
     let moved = moved(slack, shift);
     let mut octant = 0;
-    for a in 0..4 {
+    // Not the way to the mesh as a fourth: sieves ask for the largest.
+    (boxes.origin[3], boxes.inverse[3], boxes.slack[3]) = (0.0, 1.0, 0.0);
+    (sieve.high[3], sieve.low[3]) = (0.0, 0.0);
+    for a in 0..3 {
         let inverse = inverse[a] as f32;
         let exact = (origin[a] - mesh_box.center[a]) + direction[a] * shift;
         let o = exact as f32;
@@ -43,7 +46,7 @@ pub(super) fn start(
         sieve.low[a] = (exact - f64::from(o)) as f32;
         octant |= usize::from(inverse < 0.0) << a;
     }
-    boxes.rows = Rows::ALL[octant & 7];
+    boxes.rows = Rows::ALL[octant];
     sieve.slack = moved;
     Some(shift)
 }
@@ -61,4 +64,72 @@ pub(super) fn enter_mesh(ray: &Ray, mesh_box: &MeshBox, origin: [f64; 4], invers
     let passage = mesh_box.passage(ray, origin, inverse);
     // Guessed wrong at times, but most rays of a source that shines all around end here.
     ((passage.near <= passage.far) & passage.near.is_finite()).then_some(passage.near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::simd::{Instructions, Kernel, Level};
+    use crate::math::{Aabb, Point, Vector};
+
+    /// What a ray is in boxes and sieves.
+    struct Start<'a> {
+        ray: &'a Ray,
+        mesh_box: &'a MeshBox,
+    }
+
+    impl Kernel for Start<'_> {
+        type Output = (Option<f64>, BoxRay, SieveRay);
+
+        fn run<I: Instructions>(self) -> Self::Output {
+            let (mut boxes, mut sieve) = (BoxRay::default(), SieveRay::default());
+            #[cfg(target_arch = "x86_64")]
+            if I::AVX2 {
+                let shift =
+                    super::super::ray_start_avx2::start(self.ray, self.mesh_box, 0.5, &mut boxes, &mut sieve);
+                return (shift, boxes, sieve);
+            }
+            (start(self.ray, self.mesh_box, 0.5, &mut boxes, &mut sieve), boxes, sieve)
+        }
+    }
+
+    /// From inside, from a side, a corner and far off, along axes and past: all instruction sets say the same, and the way to the mesh
+    /// is no size of what a sieve asks for.
+    #[test]
+    fn rays_start_alike_with_all_instructions() {
+        let bounds = Aabb { min: Point::new(-3.0, 0.0, 5.0), max: Point::new(7.0, 2.0, 11.0) };
+        let mesh_box = MeshBox::new(Point::new(2.0, 1.0, 8.0), &bounds);
+        let inside = Point::new(1.0, 0.5, 6.0);
+        for (origin, direction, shift) in [
+            (inside, Vector::new(0.6, -0.0, -0.8), Some(0.0)),
+            (inside, Vector::new(-1e-20, 1.0, 0.0), Some(0.0)),
+            (Point::new(2.0, 1.0, 1e5), -Vector::Z, Some(1e5 - 11.0)),
+            (Point::new(-7.0, 0.5, 2.0), Vector::new(0.8, 0.0, 0.6), Some(5.0)),
+            (Point::new(2.0, 1.0, 1e5), Vector::Z, None),
+        ] {
+            let ray = Ray::new(origin, direction);
+            let [plain, other] =
+                [Level::PORTABLE, Level::avx2()].map(|level| level.run(Start { ray: &ray, mesh_box: &mesh_box }));
+            assert_eq!(plain.0.is_some(), shift.is_some(), "{ray:?}");
+            let Some(shift) = shift else { continue };
+            for (found, boxes, sieve) in [plain, other] {
+                // To the rounding of where it enters, which is outward.
+                let found = found.unwrap();
+                assert!(found <= shift && found >= shift * (1.0 - 1e-12), "{found} {shift}");
+                let start = ray.point_at(found) - Point::new(2.0, 1.0, 8.0);
+                for a in 0..3 {
+                    assert!((f64::from(boxes.origin[a]) - start[a]).abs() < 1e-6 * start[a].abs().max(1.0));
+                    assert!((f64::from(sieve.high[a]) + f64::from(sieve.low[a]) - start[a]).abs() < 1e-10);
+                    assert_eq!(
+                        usize::from(boxes.rows.octant >> a & 1),
+                        usize::from(direction[a].is_sign_negative())
+                    );
+                }
+                assert_eq!((sieve.high[3], sieve.low[3]), (0.0, 0.0));
+            }
+            assert_eq!(plain.0, other.0);
+            assert_eq!(plain.1.inverse[..3], other.1.inverse[..3]);
+            assert_eq!(plain.1.slack[..3], other.1.slack[..3]);
+        }
+    }
 }

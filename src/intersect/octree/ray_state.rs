@@ -81,8 +81,7 @@ impl<const STACK: usize> RayState<STACK> {
         };
         self.shift = shift;
         let b = &mut self.boxes;
-        // Adding zero makes −0.0 positive: distances are sorted by their bits.
-        b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0) + 0.0;
+        b.t_min = (((ray.t_min - self.shift) * (1.0 - LIMIT_ROOM)) as f32).max(0.0);
         // What is asked again is taken before it is written: what was written in parts is read as a whole only after a wait.
         let facets = FacetRay::new(ray);
         let (axes, shear) = (facets.axes(), facets.shear());
