@@ -402,6 +402,8 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "ray",
             "quad_edges",
             "facet_pair",
+            "ray_start",
+            "ray_start_avx2",
             "lanes",
             "portable",
             "facet_lanes",

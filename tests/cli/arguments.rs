@@ -56,7 +56,7 @@ fn wrong_arguments_end_with_2_and_say_what_to_write() {
         (&["study", "bvh", "--part", "lens=0.1"], "study bvh does not take --part"),
         (&["study", "stability", "--face", "#7=0.1"], "study stability does not take --face"),
         (&["study", "interpolation", "--role", "mirror=0.1"], "study interpolation does not take --role"),
-        (&["study", "interpolation", "--tolerance", "0.1"], "several of its own"),
+        (&["study", "interpolation", "--tolerance", "0.1"], "tolerances of its own"),
         (&["trace", "s.toml", "--max-lost", "nan"], "a share is a number"),
         (&["info", "s.stp", "--max-refused", "nan"], "a share is a number"),
         (&["study", "accuracy", "--angle", "5"], "study accuracy does not take --angle"),
