@@ -241,20 +241,6 @@ fn an_edge_of_wrong_sense_does_not_run_over_ends_that_lie_apart() {
     }
 }
 
-/// A segment of 135° of the disc alone, whose arc runs over the ends of its curve: with a wrong sense it would be the other 225°, and its
-/// loop would run clockwise. The face looks along its plane or against it, with its bound turned.
-#[test]
-fn an_edge_runs_over_ends_where_its_loop_would_run_clockwise_otherwise() {
-    let data = disc_data(0.05, "CONTINUOUS", &[1.5 * PI, 0.25 * PI], true);
-    let angle = 0.75 * PI;
-    for [bound, face] in [[".T.", ".T."], [".F.", ".F."]] {
-        let data = data
-            .replace("'',#70,.T.)", &format!("'',#70,{bound})"))
-            .replace("(#72),#71,.T.)", &format!("(#72),#71,{face})"));
-        assert_read(&read(&data), Some("lie apart"), 12.5 * (angle - angle.sin()), face);
-    }
-}
-
 /// The rest of the disc of [`disc_data`] with two edges, the first along its curve, the second straight: a face #85, whose arc has this
 /// curve and sense.
 fn rest_of_disc(curve: &str) -> String {

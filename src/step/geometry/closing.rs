@@ -2,8 +2,7 @@
 //!
 //! A curve is closed where an edge takes all of it from one vertex to the same. A composite one, unless the file ends it with a
 //! discontinuity, is closed where an edge would otherwise run against its sense, and another edge runs along what lies between its
-//! vertices, or a plane face says by the way its loop runs round it. Known weakness: beside a wider gap than the accuracy, and without
-//! either, the sense is taken for wrong.
+//! vertices. Known weakness: beside a wider gap than the accuracy, and without such another edge, the sense is taken for wrong.
 
 use super::composite::{coincident, is_closed_by_file};
 use super::curves::{COMPOSITES, CurveShape, DirectedCurve};
@@ -41,8 +40,6 @@ pub(super) struct CurveUse {
     pub(super) is_closed: bool,
     /// Whether its loop has no other edge.
     pub(super) is_alone: bool,
-    /// As [`EdgeContext::runs_over_ends`](super::edges::EdgeContext::runs_over_ends).
-    pub(super) runs_over_ends: bool,
 }
 
 impl CurveUse {
@@ -97,7 +94,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             let runs_over = || {
                 let [from, to] = usage.parameters(&directed);
                 let is_taken = || self.is_taken([to, from], owner.id, others);
-                to < from && (width <= accuracy || usage.runs_over_ends || is_taken())
+                to < from && (width <= accuracy || is_taken())
             };
             (*are_one || may_close && runs_over()) && !usage.joins_ends(curve, width)
         };
@@ -116,15 +113,10 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         Ok(DirectedCurve { shape: CurveShape::joined(closed), reversed: directed.reversed })
     }
 
-    /// Whether the file has composite curves.
-    pub(crate) fn has_composites(&self) -> bool {
-        self.file.entities_named(&COMPOSITES).next().is_some()
-    }
-
     /// Returns those of some edges that run along composite curves.
     pub(crate) fn composite_edges(&self, edges: impl IntoIterator<Item = u64>) -> CompositeEdges {
         let mut found = CompositeEdges::default();
-        if !self.has_composites() {
+        if self.file.entities_named(&COMPOSITES).next().is_none() {
             return found;
         }
         for id in edges {
@@ -168,8 +160,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         let own = e.attributes("EDGE_CURVE", 3)?;
         let curve = self.curve(own.id(0)?, 0).ok()?;
         let sense = own.flag(1) != Some(false);
-        let is_closed = ends.id(0) == ends.id(1);
-        Some((CurveUse { vertices, sense, is_closed, is_alone: false, runs_over_ends: false }, curve))
+        let usage = CurveUse { vertices, sense, is_closed: ends.id(0) == ends.id(1), is_alone: false };
+        Some((usage, curve))
     }
 }
 

@@ -41,13 +41,6 @@ pub(crate) struct TrimmedEdge {
     pub(crate) is_arc: bool,
 }
 
-impl TrimmedEdge {
-    /// Whether the file's sense of it contradicts its vertices.
-    pub(crate) fn has_wrong_sense(&self) -> bool {
-        self.repair == Some(WRONG_SENSE)
-    }
-}
-
 /// What is known of an edge besides its own entity.
 #[derive(Clone, Copy)]
 pub(crate) struct EdgeContext<'c> {
@@ -55,17 +48,8 @@ pub(crate) struct EdgeContext<'c> {
     pub(crate) is_alone: bool,
     /// Whether the file has its vertices in the wrong order.
     pub(crate) is_swapped: bool,
-    /// Whether it runs over the ends of a composite curve, where these may be joined and its sense would be wrong otherwise.
-    pub(crate) runs_over_ends: bool,
     /// Those of its part along composite curves.
     pub(crate) others: &'c CompositeEdges,
-}
-
-impl<'c> EdgeContext<'c> {
-    /// What is known of an edge that runs as the file says.
-    pub(crate) fn new(is_alone: bool, others: &'c CompositeEdges) -> Self {
-        Self { is_alone, is_swapped: false, runs_over_ends: false, others }
-    }
 }
 
 impl<'f, 'a> GeometryReader<'f, 'a> {
@@ -113,8 +97,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             return Ok(TrimmedEdge { curve, ..TrimmedEdge::default() });
         };
         let directed = self.curve(curve, 0)?;
-        let EdgeContext { is_alone, runs_over_ends, .. } = context;
-        let usage = CurveUse { vertices: [p, q], sense, is_closed: closed, is_alone, runs_over_ends };
+        let is_alone = context.is_alone;
+        let usage = CurveUse { vertices: [p, q], sense, is_closed: closed, is_alone };
         let directed = self.close_for_edge(e, curve, directed, &usage, context.others)?;
         // A loop of one edge encloses something: next to nothing of the curve cannot be meant.
         let closed = closed || is_alone && directed.shape.period().is_some() && coincident(p, q, LOOSE_VERTEX_MM);

@@ -61,7 +61,7 @@ pub(crate) fn convert(
     let entities = keys.iter().filter_map(|key| if let EdgeKey::Entity(id) = key { Some(*id) } else { None });
     let others = geometry.composite_edges(entities);
     let edge = |key: &EdgeKey| {
-        let context = EdgeContext::new(alone.contains(key), &others);
+        let context = EdgeContext { is_alone: alone.contains(key), is_swapped: false, others: &others };
         edge_curve(&geometry, *key, context)
     };
     let mut edges: Vec<Outcome<TrimmedEdge>> = keys.par_iter().map(edge).collect();

@@ -175,7 +175,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
                     return Err(Refusal::new(area, "polygonal loops of a profile are not supported"));
                 };
                 let curve = self
-                    .edge(*edge, EdgeContext::new(is_alone, &others))?
+                    .edge(*edge, EdgeContext { is_alone, is_swapped: false, others: &others })?
                     .curve
                     .ok_or_else(|| Refusal::new(area, "an edge has no length"))?;
                 Ok(if *reversed { curve.reversed() } else { curve })
