@@ -250,11 +250,11 @@ fn rest_of_disc(curve: &str) -> String {
     )
 }
 
-/// Asserts that so many faces are there, of this area together, all but one of which have an edge over ends that lie apart.
-fn assert_all_but_one_closed(import: &Import, faces: usize, expected: f64) {
+/// Asserts that so many faces are there, of this area together, all but one of which were repaired for this reason.
+fn assert_all_but_one_repaired(import: &Import, reason: &str, faces: usize, expected: f64) {
     let report = &import.report;
     assert_eq!((report.faces.converted, report.faces.repaired), (faces, faces - 1), "{:?}", report.repairs);
-    assert!(report.repairs.iter().all(|r| r.reason.contains("lie apart")), "{:?}", report.repairs);
+    assert!(report.repairs.iter().all(|r| r.reason.contains(reason)), "{:?}", report.repairs);
     close(area(import), expected, 1e-4);
 }
 
@@ -267,8 +267,35 @@ fn an_edge_runs_over_ends_beside_another_along_the_rest_of_its_curve() {
     for (curve, more) in [("#25,.T.", String::new()), ("#86,.F.", trimmed)] {
         let one = disc_data(0.05, "CONTINUOUS", &[1.5 * PI, 0.25 * PI], true);
         let data = one.replace("'',(#73))", "'',(#73,#85))") + &rest_of_disc(curve) + &more;
-        assert_all_but_one_closed(&read(&data), 2, 25.0 * PI);
+        assert_all_but_one_repaired(&read(&data), "lie apart", 2, 25.0 * PI);
     }
+}
+
+/// The segment of 225° whose arc has the wrong sense, beside the same 20 mm below: the arc of that one takes this part of a replica, and
+/// none of the curve.
+#[test]
+fn an_edge_along_a_replica_takes_no_part_of_the_curve() {
+    let [first, second] = [0.25 * PI, 1.5 * PI];
+    let one = disc_data(0.05, "CONTINUOUS", &[first, second], true);
+    let right = "#50=EDGE_CURVE('',#40,#41,#25,.T.)";
+    assert!(one.contains(right) && one.contains("'',(#73))"));
+    let mut data = one.replace(right, "#50=EDGE_CURVE('',#40,#41,#25,.F.)").replace("'',(#73))", "'',(#73,#94))");
+    for (k, angle) in [first, second].into_iter().enumerate() {
+        let (sin, cos) = angle.sin_cos();
+        data += &format!(
+            "#8{k}=CARTESIAN_POINT('',({:?},{:?},0.));\n#8{}=VERTEX_POINT('',#8{k});\n",
+            5.0 * cos,
+            5.0 * sin - 20.0,
+            k + 2
+        );
+    }
+    data += "#84=CARTESIAN_POINT('',(0.,-20.,0.));\n#85=CARTESIAN_TRANSFORMATION_OPERATOR_3D('',$,$,#84,1.,$);\n\
+             #86=CURVE_REPLICA('',#25,#85);\n#87=EDGE_CURVE('',#82,#83,#86,.T.);\n#88=EDGE_CURVE('',#83,#82,$,.T.);\n\
+             #90=ORIENTED_EDGE('',*,*,#87,.T.);\n#91=ORIENTED_EDGE('',*,*,#88,.T.);\n#92=EDGE_LOOP('',(#90,#91));\n\
+             #93=FACE_OUTER_BOUND('',#92,.T.);\n#94=ADVANCED_FACE('',(#93),#71,.T.);\n";
+    let angle = second - first;
+    let reason = "sense of an edge contradicts";
+    assert_all_but_one_repaired(&read(&data), reason, 2, 25.0 * (angle - angle.sin()));
 }
 
 /// Segments of the disc over one another, each of 135° less twice its number times 0.01 rad, with arcs over the ends: the edge along the
@@ -309,7 +336,7 @@ fn each_of_many_edges_along_a_curve_counts() {
         expected += 12.5 * (turn - turn.sin());
     }
     let data = data.replace("'',(#73))", &format!("'',({faces}#85))")) + &rest_of_disc("#25,.T.");
-    assert_all_but_one_closed(&read(&data), SEGMENTS as usize + 2, expected);
+    assert_all_but_one_repaired(&read(&data), "lie apart", SEGMENTS as usize + 2, expected);
 }
 
 /// A slit of 5 µm between the ends of a curve along which one edge runs from the one to the other.

@@ -18,11 +18,11 @@ use crate::step::part21::Entity;
 use rustc_hash::FxHashMap;
 use std::sync::OnceLock;
 
-/// Edges by the composite curve along which they run.
+/// Edges by the basis curve, see [`GeometryReader::basis_curve`], along which they run: composite ones, and replicas and offsets of them.
 #[derive(Debug, Default)]
 pub(crate) struct CompositeEdges(FxHashMap<u64, EdgesAlong>);
 
-/// The edges along one composite curve.
+/// The edges along one basis curve.
 #[derive(Debug, Default)]
 struct EdgesAlong {
     edges: Vec<u64>,
@@ -30,7 +30,7 @@ struct EdgesAlong {
     middles: OnceLock<Vec<f64>>,
 }
 
-/// How an edge uses its curve.
+/// How an edge uses a curve.
 pub(super) struct CurveUse {
     /// The first and the last vertex.
     pub(super) vertices: [Point; 2],
@@ -72,7 +72,8 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         others: &CompositeEdges,
     ) -> Outcome<DirectedCurve> {
         let CurveShape::Spline { curve, closed: are_one, joints } = &directed.shape else { return Ok(directed) };
-        let owner = self.parameter_owner(self.entity(id)?);
+        let curve_entity = self.entity(id)?;
+        let owner = self.parameter_owner(curve_entity);
         let is_composite = owner.is_one_of(&COMPOSITES);
         // The ends of other curves are their own: only where all would be lost they are joined.
         if !is_composite && (*are_one || !usage.is_closed) {
@@ -93,7 +94,7 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
             let may_close = is_near && (width <= accuracy || is_closed_by_file(owner));
             let runs_over = || {
                 let [from, to] = usage.parameters(&directed);
-                let is_taken = || self.is_taken([to, from], owner.id, others);
+                let is_taken = || self.is_taken([to, from], curve_entity, others);
                 to < from && (width <= accuracy || is_taken())
             };
             (*are_one || may_close && runs_over()) && !usage.joins_ends(curve, width)
@@ -113,37 +114,38 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         Ok(DirectedCurve { shape: CurveShape::joined(closed), reversed: directed.reversed })
     }
 
-    /// Returns those of some edges that run along composite curves.
+    /// Returns those of some edges that run along composite curves, or replicas or offsets of them.
     pub(crate) fn composite_edges(&self, edges: impl IntoIterator<Item = u64>) -> CompositeEdges {
-        let mut found = CompositeEdges::default();
+        let mut composite_edges = CompositeEdges::default();
         if self.file.entities_named(&COMPOSITES).next().is_none() {
-            return found;
+            return composite_edges;
         }
         for id in edges {
-            let own = self.file.entity(id).and_then(|e| e.attributes("EDGE_CURVE", 3));
-            let curve = own.and_then(|a| self.file.entity(a.id(0)?));
-            let owner = curve.map(|curve| self.parameter_owner(curve)).filter(|owner| owner.is_one_of(&COMPOSITES));
-            if let Some(owner) = owner {
-                found.0.entry(owner.id).or_default().edges.push(id);
+            let geometry = self.file.entity(id).and_then(|e| e.attributes("EDGE_CURVE", 3));
+            let curve = geometry.and_then(|a| a.entity(0));
+            if let Some(curve) = curve.filter(|curve| self.parameter_owner(*curve).is_one_of(&COMPOSITES)) {
+                let (basis, _) = self.basis_curve(curve);
+                composite_edges.0.entry(basis.id).or_default().edges.push(id);
             }
         }
-        found
+        composite_edges
     }
 
-    /// Whether an edge, run as its sense says, takes the part from `low` to `high` of the open curve `owner`: the middle of what it takes
-    /// is there. One that runs over the ends, or has a wrong sense, takes none.
-    fn is_taken(&self, [low, high]: [f64; 2], owner: u64, others: &CompositeEdges) -> bool {
-        let Some(along) = others.0.get(&owner) else { return false };
-        let middles = along.middles.get_or_init(|| self.taken_middles(&along.edges));
+    /// Whether an edge, run as its sense says, takes the part from `low` to `high` of an open curve: the middle of what it takes is there.
+    fn is_taken(&self, [low, high]: [f64; 2], curve: Entity<'f, 'a>, others: &CompositeEdges) -> bool {
+        let (basis, _) = self.basis_curve(curve);
+        let Some(along) = others.0.get(&basis.id) else { return false };
+        let middles = along.middles.get_or_init(|| self.taken_middles(basis.id, &along.edges));
         let next = middles.partition_point(|middle| *middle <= low);
         middles.get(next).is_some_and(|middle| *middle < high)
     }
 
-    /// Returns the middles, rising, of the parts of their curve that some edges take, where they run within it.
-    fn taken_middles(&self, edges: &[u64]) -> Vec<f64> {
+    /// Returns the middles, rising, of the parts that some edges take of #`basis`, their basis curve, which is read once. One that runs
+    /// over the ends, or has a wrong sense, takes none.
+    fn taken_middles(&self, basis: u64, edges: &[u64]) -> Vec<f64> {
+        let Ok(curve) = self.curve(basis, 0) else { return Vec::new() };
         let middle = |id: &u64| {
-            let (usage, curve) = self.use_of_curve(*id)?;
-            let [first, last] = usage.parameters(&curve);
+            let [first, last] = self.use_of_basis(*id)?.parameters(&curve);
             (first < last).then_some(0.5 * (first + last))
         };
         let mut middles: Vec<f64> = edges.iter().filter_map(middle).collect();
@@ -151,17 +153,16 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         middles
     }
 
-    /// Returns how the EDGE_CURVE #`id` uses its curve, and that as the edge names it: one that trims or moves another may run against it,
-    /// and elsewhere. `None` where they cannot be read.
-    fn use_of_curve(&self, id: u64) -> Option<(CurveUse, DirectedCurve)> {
+    /// Returns how the EDGE_CURVE #`id` uses its basis curve, against which the one that it names may run. `None` where its vertices or its
+    /// curve are missing.
+    fn use_of_basis(&self, id: u64) -> Option<CurveUse> {
         let e = self.file.entity(id)?;
         let ends = e.attributes("EDGE", 1).or_else(|| e.attributes("EDGE_CURVE", 1))?;
         let vertices = [self.vertex(ends.id(0)?).ok()?, self.vertex(ends.id(1)?).ok()?];
-        let own = e.attributes("EDGE_CURVE", 3)?;
-        let curve = self.curve(own.id(0)?, 0).ok()?;
-        let sense = own.flag(1) != Some(false);
-        let usage = CurveUse { vertices, sense, is_closed: ends.id(0) == ends.id(1), is_alone: false };
-        Some((usage, curve))
+        let geometry = e.attributes("EDGE_CURVE", 3)?;
+        let (_, is_against) = self.basis_curve(geometry.entity(0)?);
+        let sense = (geometry.flag(1) != Some(false)) != is_against;
+        Some(CurveUse { vertices, sense, is_closed: ends.id(0) == ends.id(1), is_alone: false })
     }
 }
 

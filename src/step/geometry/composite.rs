@@ -179,6 +179,21 @@ impl<'f, 'a> GeometryReader<'f, 'a> {
         owner
     }
 
+    /// Returns the curve that a curve trims, or has on surfaces, in turn, itself where it does not, and whether it runs against that. A
+    /// replica or an offset is a basis curve itself: it stands elsewhere than its parent.
+    pub(super) fn basis_curve(&self, curve: Entity<'f, 'a>) -> (Entity<'f, 'a>, bool) {
+        let (mut basis, mut is_against) = (curve, false);
+        for _ in 0..MAX_DEPTH {
+            let trimmed = basis.attributes("TRIMMED_CURVE", 1);
+            let inner =
+                if basis.is_one_of(&SURFACE_CURVES) { space_curve(basis) } else { trimmed.and_then(|a| a.id(0)) };
+            let Some(inner) = inner.and_then(|id| self.file.entity(id)) else { break };
+            is_against ^= trimmed.is_some_and(|a| a.flag(3) == Some(false));
+            basis = inner;
+        }
+        (basis, is_against)
+    }
+
     /// Returns the parent curve of a CURVE_REPLICA with attributes `own`, and where it is placed.
     pub(super) fn replica(&self, e: Entity<'f, 'a>, own: Args<'f, 'a>) -> Outcome<(Entity<'f, 'a>, Frame)> {
         let parent = self.resolve(e, own.id(0), "parent curve")?;
