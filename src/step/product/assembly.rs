@@ -107,10 +107,10 @@ impl<'f, 'a> Assembly<'f, 'a> {
         a.read_related_shapes(&relations, &contextual);
         let places = a.read_contextual(&contextual, &ends);
         relations.retain(|e| !places.relations.contains(&e.id));
-        let above = a.products_above_others(&relations, &ends);
+        let conflicts = a.products_above_others(&relations, &ends);
         let mut related = Vec::new();
         for e in relations {
-            related.extend(a.read_relationship(e, &ends, &above));
+            related.extend(a.read_relationship(e, &ends, &conflicts));
         }
         a.leave_out_links_to_products(&ends);
         a.read_occurrence_shapes(&occurrence_shapes);

@@ -261,17 +261,17 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let moving = relations.iter().filter(|e| has_transformation(**e));
         let pairs: Vec<[u64; 2]> =
             moving.filter_map(|e| self.shown_products(related_representations(*e)?)).collect();
-        ends.one_way(&pairs)
+        ends.one_way_pairs(&pairs)
     }
 
     /// Links the two representations of a relationship: one way by its transformation, or both ways, unmoved, if it has none. Where the
-    /// product of the first uses that of the second, their ends are swapped; where it does so by way of others, as in `above`, which place
-    /// it, the relationship places nothing, which is told. Returns the link of a transformation between two products.
+    /// product of the first uses that of the second, their ends are swapped; where it does so by way of others, which place it, as
+    /// in the `conflicts`, the relationship places nothing, which is told. Returns the link of a transformation between two products.
     pub(super) fn read_relationship(
         &mut self,
         e: Entity<'f, 'a>,
         ends: &UsageEnds,
-        above: &FxHashSet<[u64; 2]>,
+        conflicts: &FxHashSet<[u64; 2]>,
     ) -> Option<ProductLink> {
         let [first, second] = related_representations(e)?;
         if !has_transformation(e) {
@@ -281,7 +281,7 @@ impl<'f, 'a> Assembly<'f, 'a> {
         }
         let products = self.shown_products([first, second]);
         let are_swapped = products.is_some_and(|products| ends.are_swapped(products));
-        if let Some([child, parent]) = products.filter(|products| !are_swapped && above.contains(products)) {
+        if let Some([child, parent]) = products.filter(|products| !are_swapped && conflicts.contains(products)) {
             self.problems.push(format!(
                 "#{}: puts product #{child} into #{parent}, which usages put into #{child}: only these are used",
                 e.id
