@@ -21,9 +21,9 @@ const PLACE_ROUNDING_MM: f64 = 1e-5;
 const COMPOSITION_ROUNDING: f64 = 1e-14;
 /// What places are sorted along: across it lie no rows of things, as across each axis.
 const SORTING_LINE: [f64; 3] = [1.0, 0.618, 0.414];
-/// Places of one thing are searched together where their roundings differ by no more than this many binary digits: one that stands 1e11 mm
-/// out, which is known to 1e5 mm, would otherwise make all others be searched that far. Those near the origin are searched 1e-2 mm far at
-/// most.
+/// Places of one thing are searched together where the binary exponents of their roundings are in one class of so many: one that stands
+/// 1e11 mm out, which is known to 1e5 mm, would otherwise make all others be searched that far. Classes begin at fixed exponents: that of
+/// 1e-5 mm, at the origin, ends at 2^-13 mm, 1.22e-4 mm, and no rounding in it is more.
 const CLASS_DIGITS: u64 = 10;
 
 /// Returns how far the origins of two placements may lie apart that are one, mm; `f` is either.

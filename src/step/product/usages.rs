@@ -42,8 +42,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         let mut parents: Vec<u64> = Vec::new();
         // Promises with a place, by parent and component.
         let mut promised: Vec<[u64; 2]> = Vec::new();
-        for (parent, own) in &*usages {
-            for usage in own {
+        for (parent, siblings) in &*usages {
+            for usage in siblings {
                 if !is_promised(usage) {
                     users.entry(usage.child).or_default().push(*parent);
                     continue;
@@ -58,8 +58,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
         parents.sort_unstable();
         parents.dedup();
         for parent in parents {
-            let Some(own) = usages.get_mut(&parent) else { continue };
-            own.retain(|usage| {
+            let Some(siblings) = usages.get_mut(&parent) else { continue };
+            siblings.retain(|usage| {
                 if !is_promised(usage) {
                     return true;
                 }
