@@ -279,8 +279,8 @@ impl<'f, 'a> Assembly<'f, 'a> {
             self.links.entry(first).or_default().push(Link::plain(second));
             return None;
         }
+        let are_swapped = self.products_of([first, second]).is_some_and(|products| ends.are_swapped(products));
         let products = self.shown_products([first, second]);
-        let are_swapped = products.is_some_and(|products| ends.are_swapped(products));
         if let Some([child, parent]) = products.filter(|products| !are_swapped && conflicts.contains(products)) {
             self.problems.push(format!(
                 "#{}: puts product #{child} into #{parent}, which usages put into #{child}: only these are used",
