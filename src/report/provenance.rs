@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct Provenance {
     /// The command as it can be typed again.
     pub command: String,
-    /// The commands that traced the parts of a merged run, each once; empty for any other.
+    /// The commands that traced the parts of a merged run, or of one that went on with their sum, each once; empty for any other.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub traced_by: Vec<String>,
     /// When it began, UTC, as ISO 8601 has it.

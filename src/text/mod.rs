@@ -1,9 +1,13 @@
-//! Text for people: numbers with as many digits as mean something, and the name that was probably meant.
+//! Text for people: numbers with as many digits as mean something, the name that was probably meant, lists in order.
 
+#[cfg(feature = "cli")]
+mod natural_order;
 mod nearest_name;
 mod number;
 mod sentence_list;
 
+#[cfg(feature = "cli")]
+pub(crate) use natural_order::natural_order;
 pub(crate) use nearest_name::{did_you_mean, nearest_name, nearest_or_listed};
 #[cfg(feature = "report")]
 pub(crate) use number::NARROW_SPACE;

@@ -207,6 +207,32 @@ fn shards_merge_to_the_bits_of_one_run() {
     }
 }
 
+/// Whoever goes on from a sum of some parts is told what traced these, in the order of their numbers, and what traced the rest.
+#[test]
+fn a_run_that_goes_on_from_a_sum_names_all_that_traced_it() {
+    let folder = lens(|m| m);
+    let path = folder.path();
+    for k in ["10/12", "2/12"] {
+        let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--shard", k, "-o", "parts"]);
+        assert_eq!(code, 0, "{err}");
+    }
+    let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "out/checkpoint.tally"]);
+    assert_eq!(code, 0, "{err}");
+    let run = document(path, &["trace", "scene.toml", "-o", "out", "--resume", "--json", "--no-report"], 0);
+    let commands: Vec<&str> = run["provenance"]["traced_by"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|command| command.as_str().unwrap())
+        .collect();
+    let whose = ["scene.toml --shard 2/12", "scene.toml --shard 10/12", "scene.toml -o out --resume"];
+    assert!(
+        commands.len() == 3 && commands.iter().zip(whose).all(|(command, whose)| command.contains(whose)),
+        "{commands:?}"
+    );
+    assert_eq!(run["replicates"], 128);
+}
+
 /// A run that is killed goes on from where it was saved, to the bits of one that was not.
 #[test]
 fn a_killed_run_resumes_to_the_same_bits() {

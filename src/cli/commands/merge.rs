@@ -99,7 +99,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let mut run = prepared.trace(request, &monitor).map_err(|_| Failure::running("merge: the run is not whole"))?;
     origins.usage.note_in(&mut run.results);
     let reached = RunRemarks::say_target(target.map(|target| target.result(&run.results)), console);
-    let remarks = RunRemarks { traced_by: origins.traced_by.into_iter().collect(), ..reached };
+    let remarks = RunRemarks { traced_by: origins.traced_by, ..reached };
     let written = results_folder::write(&prepared, command.folder, &mut run, &remarks, command.with_page, console);
     let (document, answer) = match written {
         Ok(written) => written,

@@ -218,8 +218,8 @@ fn trace_whole(
         _ => Ok(()),
     };
     say_verification(&run, console)?;
-    let remarks =
-        RunRemarks { first_command: checkpoint.first_command(), ..RunRemarks::say_target(result, console) };
+    let (first_command, traced_by) = (checkpoint.first_command(), checkpoint.traced_by());
+    let remarks = RunRemarks { first_command, traced_by, ..RunRemarks::say_target(result, console) };
     let written = results_folder::write(prepared, folder, &mut run, &remarks, with_page, console);
     let (document, answer) =
         written.map_err(|failure| rescue_results(&mut run, &remarks, &checkpoint, with_page, failure))?;

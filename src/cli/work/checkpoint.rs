@@ -11,6 +11,7 @@ use crate::formats::{read_bytes, remove_stale, write_atomic};
 use crate::pipeline::{PreparedScene, RayRange, TracingSettings};
 use crate::simulate::PartialRun;
 use crate::text::grouped;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -113,6 +114,11 @@ impl<'a> Checkpoint<'a> {
         self.earlier().as_ref().map(|header| header.command.clone())
     }
 
+    /// Returns the commands that traced the run where this one goes on with a sum of parts, its own among them; none for any other.
+    pub(crate) fn traced_by(&self) -> BTreeSet<String> {
+        self.earlier().as_ref().map_or_else(BTreeSet::new, |header| header.continued_by(&self.console.command))
+    }
+
     /// Reads what an interrupted run left behind, and says how much that is.
     ///
     /// # Errors
@@ -160,13 +166,15 @@ impl<'a> Checkpoint<'a> {
         self.earlier.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Returns the header with what the run took so far, earlier processes included, and the command that began it.
+    /// Returns the header with what the run took so far, earlier processes included, the command that began it, and those that traced its
+    /// parts where it goes on with a sum.
     fn header_now(&self) -> TallyHeader {
         let usage = Usage::of_process(self.console.started.elapsed().as_secs_f64(), self.prepared.threads);
         let earlier = self.earlier();
         let Some(earlier) = earlier.as_ref() else { return self.header.with_usage(usage) };
         // A run that goes on counts what it took before, and is the run that was asked for first.
-        let mut header = self.header.with_usage(usage.continue_from(&earlier.usage));
+        let header = self.header.with_usage(usage.continue_from(&earlier.usage));
+        let mut header = header.with_traced_by(earlier.continued_by(&self.console.command));
         header.command.clone_from(&earlier.command);
         header
     }

@@ -20,9 +20,9 @@ use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, 
 use crate::simulate::{Scene, arrivals};
 use crate::study::figures::ReceiverFigures;
 use crate::study::model_figures::PowerFigures;
-use crate::text::grouped;
+use crate::text::{grouped, natural_order};
 use serde_json::Value;
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
 /// What the page takes at least, bytes: plotly.js and a few pictures.
@@ -112,8 +112,8 @@ pub(crate) struct RunRemarks {
     pub(crate) target: Option<TargetResult>,
     /// The command that began the run, where this one went on with it: the one that tells how many rays it has.
     pub(crate) first_command: Option<String>,
-    /// The commands that traced the parts of a merged run; empty for any other.
-    pub(crate) traced_by: Vec<String>,
+    /// The commands that traced the parts of a merged run, or of one that went on with their sum; empty for any other.
+    pub(crate) traced_by: BTreeSet<String>,
 }
 
 impl RunRemarks {
@@ -186,7 +186,9 @@ pub(crate) fn write(
     if let Some(command) = &remarks.first_command {
         provenance.command.clone_from(command);
     }
-    provenance.traced_by.clone_from(&remarks.traced_by);
+    provenance.traced_by = remarks.traced_by.iter().cloned().collect();
+    // The page shows the first of them: those of the first parts.
+    provenance.traced_by.sort_by(|a, b| natural_order(a, b));
     let mut document = run.document(prepared).map_err(|e| Failure::running(e.to_string()))?;
     sequence_tables::add_ways(&mut document, &run.results, &prepared.job.loaded.model);
     face_tables::add_selectors(&mut document, &run.results, &prepared.job.loaded.model);

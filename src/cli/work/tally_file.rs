@@ -142,6 +142,16 @@ impl TallyHeader {
         if self.traced_by.is_empty() { BTreeSet::from([self.command.clone()]) } else { self.traced_by.clone() }
     }
 
+    /// Returns the commands that traced a run in which `command` goes on with what the file holds, where that is a sum of parts; else none,
+    /// as the one that began the run tells all.
+    pub(crate) fn continued_by(&self, command: &str) -> BTreeSet<String> {
+        let mut commands = self.traced_by.clone();
+        if !commands.is_empty() {
+            commands.insert(command.to_owned());
+        }
+        commands
+    }
+
     /// Returns by which program the part was traced, and which one this is, in words; `None` where both are the same.
     pub(crate) fn other_program(&self) -> Option<String> {
         (self.program != PROGRAM).then(|| {
