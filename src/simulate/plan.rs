@@ -181,6 +181,15 @@ impl Plan {
         if self.grows() { rays * u64::from(self.replicates) } else { rays }
     }
 
+    /// Returns the number of rays of a source in these replicates.
+    pub(crate) fn rays_in(&self, source: usize, replicates: &[u32]) -> u64 {
+        let rays = |&replicate: &u32| {
+            let [from, to] = self.range(source, replicate);
+            to - from
+        };
+        replicates.iter().map(rays).sum()
+    }
+
     /// Whether the path of a ray is recorded as it is traced.
     #[inline]
     pub(crate) fn records(&self, ray: u64) -> bool {
