@@ -14,7 +14,7 @@ const OVERLAP_SEGMENTS: u64 = 10_000;
 const SCARCE_RAYS: u64 = 64;
 /// Power of a ray over that of the mean one above which it is told that a source has few of them.
 const HEAVY: f64 = 10.0;
-/// Chance below which it is taken that not all rays of a source miss a place: errors are to hold in 95 % of runs.
+/// Chance that all rays of a source miss a place, below which it is neglected: errors are to hold in 95 % of runs.
 const UNLIKELY: f64 = 0.05;
 /// Share of a source's power from which on what rounding changes of it is told.
 const ROUNDED: f64 = 1e-5;
@@ -44,15 +44,15 @@ impl BoundScene {
     pub(crate) fn repair_notes(&self, counts: &Counts) -> impl Iterator<Item = String> + use<> {
         let contacts = (counts.refused_contacts > counts.segments / OVERLAP_SEGMENTS).then(|| {
             format!(
-                "{} light met two touching faces of which the second bounds no body that it was in or could enter, as of an open or \
-                 overlapping part: it crossed the first alone",
+                "light met two touching faces of which the second bounds no body that it was in or could enter, as of an open or \
+                 overlapping part, and crossed the first alone: {}",
                 count_of(counts.refused_contacts, "time")
             )
         });
         let starts = (counts.misplaced_starts > counts.rays / OVERLAP_SEGMENTS).then(|| {
             format!(
-                "{} of luminous faces started on the spline, as no facet of their face lies within 1 mm: they may have met their own \
-                 face; take a finer tolerance for it",
+                "where no facet of a luminous face lies within 1 mm, its light started on the spline and may have met the face itself: \
+                 {}; take a finer tolerance for it",
                 count_of(counts.misplaced_starts, "ray")
             )
         });

@@ -38,7 +38,6 @@ fn values_out_of_range_are_refused_by_name() {
         ("[[receiver]]\nname = 'r'\nkind = 'far_field'\nup = [0, 0, 0]", "`up` must"),
         ("[[receiver]]\nname = 'r'\nx = [0, inf, 0]\nsize = [1, 1]", "`x` must"),
         ("[[receiver]]\nname = 'r'\nsize = [1, 1]\n[[receiver]]\nname = 'R'\nsize = [1, 1]", "both be called 'R'"),
-        ("[[source]]\nname = 'led'\n[[source]]\nname = 'led'", "two sources are called 'led'"),
         ("[run]\nray = 10", "ray"),
         ("[[material]]\nentity = '#39'\nsurface = 'absorber'", "without its `#`"),
     ] {

@@ -64,7 +64,7 @@ pub(crate) fn scene_or_model(path: &Path, placed: PlacedLimit, console: &Console
 }
 
 /// Whether of so many faces that were found more were refused than the share `most`, or a file was cut off: how much of that is missing
-/// nobody knows, but it is less than all.
+/// is unknown, but it is less than all.
 pub(crate) fn is_too_much_missing([refused, found]: [usize; 2], is_cut_off: bool, most: f64) -> bool {
     refused as f64 > most * found as f64 || is_cut_off && most < 1.0
 }
@@ -102,7 +102,7 @@ pub(crate) fn report_refusals(loaded: &LoadedModel, max_refused: f64, console: &
     let is_reason = is_too_much_missing([refused, found], false, max_refused);
     say_refused_faces([refused, found], is_reason, "; `lampyris info` lists them with the reasons", console);
     for file in cut_off.iter().filter(|_| max_refused < 1.0) {
-        console.insist(format_args!("{file} ends before its end section: nobody knows what is missing"));
+        console.insist(format_args!("{file} ends before its end section: what is missing is unknown"));
     }
     let mut is_empty = false;
     for file in loaded.empty_files() {
@@ -120,10 +120,14 @@ pub(crate) fn report_bare_faces(prepared: &PreparedScene, max_refused: f64, cons
         return Completion::Complete;
     }
     let is_incomplete = bare as f64 > max_refused * all as f64;
-    let [have, they_are, them] = if bare == 1 { ["has", "it is", "it"] } else { ["have", "they are", "them"] };
+    let [have, they_are, them] = if bare == 1 {
+        ["has", "it is", "it with the reason"]
+    } else {
+        ["have", "they are", "them with the reasons"]
+    };
     let [bare, all] = [bare, all].map(|count| grouped(count as u64));
     let message = format!(
-        "{bare} of {all} faces {have} no facets, and light passes where {they_are}; `lampyris facet` names {them} with the reason"
+        "{bare} of {all} faces {have} no facets, and light passes where {they_are}; `lampyris facet` names {them}"
     );
     console.say_or_insist(is_incomplete, message);
     Completion::incomplete_if(is_incomplete)

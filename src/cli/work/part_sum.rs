@@ -127,7 +127,10 @@ impl PartSum {
         } else if header.fingerprint == first.fingerprint {
             match scene {
                 Some(given) => {
-                    format!("--scene {} is not the scene that this part was traced from", given.display())
+                    format!(
+                        "--scene {} is not the scene that this part was traced from, or a file that it names has changed",
+                        given.display()
+                    )
                 }
                 None => format!(
                     "the scene {} or a file that it names has changed since this part was traced",
