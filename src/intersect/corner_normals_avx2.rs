@@ -54,8 +54,8 @@ unsafe fn next_axis(v: __m256d) -> __m256d {
     unsafe { _mm256_permute4x64_pd::<0b11_00_10_01>(v) }
 }
 
-/// Two vectors of unit length as `glam` makes them, with roots and inverses of both at once. Where it makes none of the first it is zero, of
-/// the second it is the first.
+/// Two vectors of unit length as `glam` makes them, with roots and inverses of both at once. Where it makes none of the first it is zero,
+/// of the second it is the first.
 #[inline(always)]
 unsafe fn normals([flat, smooth]: [__m256d; 2]) -> [__m256d; 2] {
     unsafe {
