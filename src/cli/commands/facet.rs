@@ -167,16 +167,9 @@ fn meshing_summary(r: &Report) -> String {
     let mut text = String::new();
     let mut line = |name: &str, what: String| text += &format!("  {name:<10} {what}\n");
     let n = |x: usize| grouped(x as u64);
-    line(
-        "facets",
-        format!(
-            "{}: {}, {}; {} vertices",
-            n(r.facets),
-            count_of(r.quads as u64, "quad"),
-            count_of(r.triangles as u64, "triangle"),
-            n(r.vertices)
-        ),
-    );
+    let [quads, triangles] =
+        [(r.quads, "quad"), (r.triangles, "triangle")].map(|(n, what)| count_of(n as u64, what));
+    line("facets", format!("{}: {quads}, {triangles}; {} vertices", n(r.facets), n(r.vertices)));
     line("quads", format!("{} % of the area", figures(100.0 * r.quad_area_share, 4)));
     line("tolerance", tolerance_text([r.tolerance_mm.min, r.tolerance_mm.max]));
     line(

@@ -51,21 +51,7 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
     while live > 0 {
         let entering = take(&mut queues.node);
         cost.nodes += entering.count() as u64;
-        for ray in entering {
-            let s = &states[ray];
-            L::prepare(&mut entries[ray], &arrays.nodes[s.next.index()], &s.boxes);
-        }
-        for ray in entering {
-            met[ray] = states[ray].enter::<L>(&entries[ray]);
-        }
-        let mut ways = Ways::default();
-        for ray in entering {
-            let s = &mut states[ray];
-            let children = Children::new(&entries[ray], met[ray]);
-            s.advance::<L>(children);
-            prefetch_step(&arrays, s.next);
-            ways.note(ray, s.next);
-        }
+        let ways = enter_nodes::<L, STACK>(&arrays, states, entering, (&mut entries, &mut met));
         queues.put(entering, &ways);
         // Here, not last: a ray that is started and at once asked for its first node waits until what was written of it has left the
         // processor's store buffer, which took an eighth of the walk.
@@ -108,6 +94,33 @@ pub(super) fn walk_batch<L: Lanes, const STACK: usize>(
             prefetch_corners(&arrays, &states[ray]);
         }
     }
+}
+
+/// Enters the next nodes of some rays, with room for what they are against them and for which children they meet, and notes where they go
+/// on to.
+#[inline(always)]
+fn enter_nodes<'t, L: Lanes, const STACK: usize>(
+    arrays: &Arrays<'t>,
+    states: &mut States<STACK>,
+    entering: Rays,
+    (entries, met): (&mut [Entry<'t>; WIDTH], &mut [u32; WIDTH]),
+) -> Ways {
+    for ray in entering {
+        let s = &states[ray];
+        L::prepare(&mut entries[ray], &arrays.nodes[s.next.index()], &s.boxes);
+    }
+    for ray in entering {
+        met[ray] = states[ray].enter::<L>(&entries[ray]);
+    }
+    let mut ways = Ways::default();
+    for ray in entering {
+        let s = &mut states[ray];
+        let children = Children::new(&entries[ray], met[ray]);
+        s.advance::<L>(children);
+        prefetch_step(arrays, s.next);
+        ways.note(ray, s.next);
+    }
+    ways
 }
 
 /// Starts in a free place the first ray from `next` on that does not pass by the mesh; `false` where none is left. What passes by is
