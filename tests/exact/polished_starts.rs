@@ -7,7 +7,7 @@ use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
 use lampyris::intersect::{Certainty, Cost, ExpectedRays, Footprint, Hit, Intersector};
 use lampyris::math::{Departure, FaceId, Frame, Point, Ray, Vector};
-use lampyris::model::Model;
+use lampyris::model::{Model, Part, Shell};
 use lampyris::nurbs::sweep;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -222,6 +222,35 @@ fn chords_of_a_rod_of_long_facets_are_found() {
             }
             let hit = polished.intersect(&ray, &mut Cost::default());
             assert!(hit.is_some_and(|hit| (hit.t - chord).abs() < 1e-7), "{chord} mm: {ray:?} {hit:?}");
+        }
+    });
+}
+
+/// Light that starts inside a ball is answered by the spline, as none has entered it; what it leaves from there on, facets answer: light in a
+/// sphere or a rod came to thirty segments a ray that were all asked of the spline.
+#[test]
+fn light_goes_on_by_facets_after_the_spline_answered() {
+    let shell = Shell { faces: vec![face(sphere(50.0))], closed: true, ..Shell::default() };
+    let ball = Model::from_part(Part { shells: vec![shell], ..Part::default() });
+    with_polished(&ball, 0.05, |polished| {
+        let mut s = Random(43);
+        for _ in 0..2000 {
+            let start = s.direction() * 20.0;
+            let ray = Ray::new(start, s.direction());
+            let (mut cost, mut further) = (Cost::default(), Cost::default());
+            let first = polished.intersect(&ray, &mut cost).unwrap();
+            assert_eq!((cost.doubtful, first.certainty), (1, Certainty::Certified));
+            let from = ray.point_at(first.t);
+            let way = (s.direction() - from.normalize()).normalize();
+            let chord = -2.0 * way.dot(from);
+            // At a sine below 0.3 the next root may hide from the facets.
+            if chord < 30.0 {
+                continue;
+            }
+            let ray = Ray::new(from, way).with_departure(first.departure());
+            let hit = polished.intersect(&ray, &mut further).unwrap();
+            assert!((hit.t - chord).abs() < 1e-9 && hit.certainty == Certainty::Polished, "{chord}: {hit:?}");
+            assert_eq!(further.doubtful, 0);
         }
     });
 }

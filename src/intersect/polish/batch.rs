@@ -5,6 +5,7 @@
 //! leaves, or lies before its range, the facets are asked about what is behind it. The spline is asked about all other rays, together.
 
 use super::clear_start::ClearStart;
+use super::facet_naming::Probes;
 use super::facet_record::FacetRecord;
 use super::limits::{LEAST_WINDOW_SINE, OWN_POINT, WINDOW_OF_SAGS, least_window};
 use super::start::Side;
@@ -49,6 +50,7 @@ struct Workspace {
     /// What the spline is asked, and what it answers.
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
+    probes: Probes,
 }
 
 thread_local! {
@@ -80,11 +82,11 @@ impl Polished<'_> {
                 self.ask_facets(&mut space, cost);
                 self.decide_all(rays, hits, &mut space, cost);
             }
-            let Workspace { of, doubtful, rays: asked, hits: found, .. } = &mut space;
+            let Workspace { of, doubtful, rays: asked, hits: found, probes, .. } = &mut space;
             doubtful.extend(of.iter().map(|asked| asked.place));
             asked.clear();
             asked.extend(doubtful.iter().map(|&place| rays[place as usize]));
-            self.ask_truth(asked, found, cost);
+            self.ask_truth(asked, found, probes, cost);
             for (&place, hit) in doubtful.iter().zip(found.iter()) {
                 hits[place as usize] = *hit;
             }

@@ -14,6 +14,7 @@
 mod batch;
 mod clear_start;
 mod curved_cells;
+mod facet_naming;
 mod facet_record;
 mod limits;
 mod piece;
@@ -29,6 +30,7 @@ use crate::math::{Departure, Ray};
 use crate::mesh::FacetMesh;
 use clear_start::ClearStart;
 use curved_cells::CurvedCells;
+use facet_naming::Probes;
 use facet_record::FacetRecord;
 use limits::{OWN_POINT, SHORT_OF_SAGS};
 use piece::Piece;
@@ -41,7 +43,7 @@ const SAME_POINT: f64 = 1e-7;
 const OWN_ROUNDING: f64 = 64.0;
 /// How many times as far along the ray as across it such an origin moves its own root: it leaves at a sine of at least a thousandth.
 const OWN_GRAZING: f64 = 1e3;
-/// The primitive of a hit that the spline alone knows.
+/// The primitive of a hit of which no facet is known.
 const NO_FACET: u32 = u32::MAX;
 /// Sag assumed where none was proved, mm.
 const UNPROVED_SAG: f64 = 0.2;
@@ -110,8 +112,8 @@ impl<'a> Polished<'a> {
     }
 
     /// Answers rays on the spline and on ready meshes, which have none: overwrites `hits`, makes it as long as `rays`, and counts each ray
-    /// once. A hit on the spline names its face but no facet ([`NO_FACET`]).
-    fn ask_truth(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>, cost: &mut Cost) {
+    /// once. A hit on the spline names the facet there, or none ([`NO_FACET`]) as in [`Self::name_facets`].
+    fn ask_truth(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>, probes: &mut Probes, cost: &mut Cost) {
         hits.clear();
         hits.resize(rays.len(), None);
         cost.doubtful += rays.len() as u64;
@@ -121,13 +123,13 @@ impl<'a> Polished<'a> {
             _ => self.exact.intersect_batch(rays, hits, cost),
         }
         hits.iter_mut().flatten().for_each(|hit| hit.primitive = NO_FACET);
-        if self.exact.skipped().is_empty() {
-            return;
+        if !self.exact.skipped().is_empty() {
+            for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
+                let end = hit.map_or(ray.t_max, |hit| hit.t);
+                *hit = self.first_on_meshes(&ray.with_range(ray.t_min, end), cost).or(*hit);
+            }
         }
-        for (ray, hit) in rays.iter().zip(hits) {
-            let end = hit.map_or(ray.t_max, |hit| hit.t);
-            *hit = self.first_on_meshes(&ray.with_range(ray.t_min, end), cost).or(*hit);
-        }
+        self.name_facets(rays, hits, probes, cost);
     }
 
     /// The first hit of a ray on a face that the spline leaves out; the ray is not counted.
