@@ -129,6 +129,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "ray_input",
             "shards",
             "lost_rays",
+            "run_commands",
             "results_folder",
             "tally_file",
             "part_sum",

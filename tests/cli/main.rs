@@ -20,6 +20,7 @@ mod overrides;
 mod race;
 mod ray_files;
 mod receiver_files;
+mod resumed;
 mod runs;
 mod scene;
 mod studies;

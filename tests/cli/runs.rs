@@ -6,14 +6,15 @@ use serde_json::Value;
 use std::io::Read;
 use std::path::Path;
 
-fn document(folder: &Path, arguments: &[&str], code: i32) -> Value {
+/// The document that a command prints, which ends with this exit code.
+pub(crate) fn document(folder: &Path, arguments: &[&str], code: i32) -> Value {
     let (found, out, err) = lampyris_in(folder, arguments);
     assert_eq!(found, code, "{arguments:?}: {err}");
     serde_json::from_str(&out).unwrap()
 }
 
 /// A folder with the lens of scene S1, its model under `model.stp`.
-fn lens(change: impl Fn(String) -> String) -> tempfile::TempDir {
+pub(crate) fn lens(change: impl Fn(String) -> String) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let model = std::fs::read_to_string(fixture("step/lens_planoconvex_nurbs.stp")).unwrap();
     std::fs::write(folder.path().join("model.stp"), change(model)).unwrap();
@@ -207,32 +208,6 @@ fn shards_merge_to_the_bits_of_one_run() {
     }
 }
 
-/// Whoever goes on from a sum of some parts is told what traced these, in the order of their numbers, and what traced the rest.
-#[test]
-fn a_run_that_goes_on_from_a_sum_names_all_that_traced_it() {
-    let folder = lens(|m| m);
-    let path = folder.path();
-    for k in ["10/12", "2/12"] {
-        let (code, _, err) = lampyris_in(path, &["trace", "scene.toml", "--shard", k, "-o", "parts"]);
-        assert_eq!(code, 0, "{err}");
-    }
-    let (code, _, err) = lampyris_in(path, &["merge", "parts", "-o", "out/checkpoint.tally"]);
-    assert_eq!(code, 0, "{err}");
-    let run = document(path, &["trace", "scene.toml", "-o", "out", "--resume", "--json", "--no-report"], 0);
-    let commands: Vec<&str> = run["provenance"]["traced_by"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|command| command.as_str().unwrap())
-        .collect();
-    let whose = ["scene.toml --shard 2/12", "scene.toml --shard 10/12", "scene.toml -o out --resume"];
-    assert!(
-        commands.len() == 3 && commands.iter().zip(whose).all(|(command, whose)| command.contains(whose)),
-        "{commands:?}"
-    );
-    assert_eq!(run["replicates"], 128);
-}
-
 /// A run that is killed goes on from where it was saved, to the bits of one that was not.
 #[test]
 fn a_killed_run_resumes_to_the_same_bits() {
@@ -293,6 +268,9 @@ fn a_killed_search_resumes_to_the_same_bits() {
     let resumed: Value = serde_json::from_str(&out).unwrap();
     assert_eq!((&whole["digest"], &whole["power"]), (&resumed["digest"], &resumed["power"]));
     assert_eq!(whole["until_error"], resumed["until_error"]);
+    // Whichever of its runs the search was at, it is the one that was asked for first.
+    let first = format!("lampyris {} out --threads 1 --checkpoint 0", search.join(" "));
+    assert_eq!(resumed["provenance"]["command"], first.as_str());
     assert!(!saved.exists());
 }
 

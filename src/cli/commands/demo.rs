@@ -5,6 +5,7 @@ use crate::cli::console::Console;
 use crate::cli::output::closing;
 use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::results_folder::{self, RunRemarks};
+use crate::cli::work::run_commands::RunCommands;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads::set_threads;
 use crate::cli::{completion::Completion, failure::Failure};
@@ -75,7 +76,8 @@ pub(crate) fn run(
         let what = format!("{} ray segments asked again of BVH and exact spline", grouped(check.rays));
         say_step("check", what, s.check);
     }
-    let remarks = RunRemarks { sentences: reference_comparison(r), ..RunRemarks::default() };
+    let commands = RunCommands::new(None, console);
+    let remarks = RunRemarks { sentences: reference_comparison(r), target: None, commands };
     let start = std::time::Instant::now();
     let (document, answer) = results_folder::write(&prepared, folder, &mut run, &remarks, with_page, console)?;
     write_atomic(&folder.join(MODEL_NAME), |w| w.write_all(LAMP))?;

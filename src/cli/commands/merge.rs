@@ -8,11 +8,12 @@ use crate::cli::failure::Failure;
 use crate::cli::output::closing;
 use crate::cli::output::json::json_text;
 use crate::cli::work::cache_folder;
-use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, saved_header};
+use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, SavePlace, saved_header};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::OutputPlace;
 use crate::cli::work::part_sum::{AskedRun, PartOrigins, PartSum, input_failure, read_part};
 use crate::cli::work::results_folder::RunRemarks;
+use crate::cli::work::run_commands::RunCommands;
 use crate::cli::work::shards::is_tally;
 use crate::cli::work::tally_file::TallyHeader;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
@@ -98,8 +99,8 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     let request = TraceRequest { from: Some(whole), ..TraceRequest::default() };
     let mut run = prepared.trace(request, &monitor).map_err(|_| Failure::running("merge: the run is not whole"))?;
     origins.usage.note_in(&mut run.results);
-    let reached = RunRemarks::say_target(target.map(|target| target.result(&run.results)), console);
-    let remarks = RunRemarks { traced_by: origins.traced_by, ..reached };
+    let commands = RunCommands::new(None, console).with_parts(origins.traced_by);
+    let remarks = RunRemarks::say_target(target.map(|target| target.result(&run.results)), commands, console);
     let written = results_folder::write(&prepared, command.folder, &mut run, &remarks, command.with_page, console);
     let (document, answer) = match written {
         Ok(written) => written,
@@ -154,7 +155,8 @@ fn write_sum(
 ) -> Result<Completion, Failure> {
     let file = command.folder.to_path_buf();
     let _owned = OutputPlace::file(&file)?;
-    Checkpoint::new(prepared, scene, file, None, 0.0, console)?.save_sum(sum, origins)?;
+    let place = SavePlace::new(scene, file, 0.0, console);
+    Checkpoint::new(prepared, &place)?.save_sum(sum, origins)?;
     if console.json {
         let counts = &sum.tallies.counts;
         let document = json!({"replicates": sum.done.len(), "of": sum.replicates, "rays": counts.rays,

@@ -1,6 +1,6 @@
 //! `lampyris trace`: a scene from disk.
 
-use super::trace_until::{SearchPlace, SearchedRun, Until, trace_until};
+use super::trace_until::{SearchedRun, Until, trace_until};
 use super::{dry_run, ray_range, replay, verdicts};
 use crate::cli::arguments::command::TraceOptions;
 use crate::cli::completion::Completion;
@@ -10,7 +10,7 @@ use crate::cli::output::closing;
 use crate::cli::output::json::json_text;
 use crate::cli::output::sentences::plain_sentence;
 use crate::cli::work::cache_folder;
-use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, continued_settings, refuse_overwriting};
+use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, SavePlace, continued_settings, refuse_overwriting};
 use crate::cli::work::input_guard::InputGuard;
 use crate::cli::work::output_place::{OutputPlace, folder_of, require_space, try_file};
 use crate::cli::work::path_file::PathFile;
@@ -178,10 +178,11 @@ fn trace_whole(
     let with_page = extra.page.is_wanted();
     let paths = try_outputs(prepared, command, &file)?;
     let until = target.map(Until::Error).or(extra.until_settled.then_some(Until::Settled));
-    let place = SearchPlace { scene: command.scene, file: &file, every_seconds: extra.checkpoint, console };
+    let search = until.map(|until| until.search_text(prepared.job.tracing.rays()));
+    let place = SavePlace::new(command.scene, file, extra.checkpoint, console).with_search(search);
     let found = until.map(|until| trace_until(prepared, until, &place, extra.resume)).transpose()?;
     let prepared = &*prepared;
-    let checkpoint = Checkpoint::new(prepared, command.scene, file, None, extra.checkpoint, console)?;
+    let checkpoint = Checkpoint::new(prepared, &place)?;
     let (traced, saved, result) = match found {
         Some(SearchedRun { portion, .. }) if !portion.is_whole() => {
             return Err(checkpoint.save_stopped(&portion, "interrupted", RESUME));
@@ -218,8 +219,7 @@ fn trace_whole(
         _ => Ok(()),
     };
     say_verification(&run, console)?;
-    let (first_command, traced_by) = (checkpoint.first_command(), checkpoint.traced_by());
-    let remarks = RunRemarks { first_command, traced_by, ..RunRemarks::say_target(result, console) };
+    let remarks = RunRemarks::say_target(result, checkpoint.commands(), console);
     let written = results_folder::write(prepared, folder, &mut run, &remarks, with_page, console);
     let (document, answer) =
         written.map_err(|failure| rescue_results(&mut run, &remarks, &checkpoint, with_page, failure))?;
@@ -279,7 +279,7 @@ fn rescue_results(
     with_page: bool,
     failure: Failure,
 ) -> Failure {
-    let (prepared, console) = (checkpoint.prepared, checkpoint.console);
+    let (prepared, console) = (checkpoint.prepared, checkpoint.place.console);
     if let Some(folder) = results_folder::write_anywhere(prepared, run, remarks, with_page, console) {
         return failure.with_further_help(format!("nothing is lost: the results are in {}", folder.display()));
     }
@@ -327,17 +327,17 @@ fn trace_shard(
     let file = shards::shard_file(command.folder, shard, prepared.job.tracing.ray_range);
     let _owned = OutputPlace::file(&file)?;
     require_space(&folder_of(&file), LEAST_TALLY_BYTES)?;
-    let checkpoint =
-        Checkpoint::new(prepared, command.scene, file, Some(shard), command.extra.checkpoint, console)?;
+    let place = SavePlace::new(command.scene, file, command.extra.checkpoint, console).with_shard(shard);
+    let checkpoint = Checkpoint::new(prepared, &place)?;
     let from = checkpoint.read()?;
     // Asked again, a shard that is done is not traced once more: arrays of jobs are restarted as a whole.
     if let Some(portion) = from.as_ref().filter(|p| shards::is_shard_done(p, replicates.clone(), shard)) {
         console.say("traced already: nothing is left to do");
-        say_shard(&checkpoint.file, portion, shard, console)?;
+        say_shard(&place.file, portion, shard, console)?;
         return Ok(lost_rays::report_light_lost_in_part(portion, prepared, command.extra.max_lost, console));
     }
     if !command.extra.resume {
-        refuse_overwriting(&checkpoint.file)?;
+        refuse_overwriting(&place.file)?;
     }
     let save = |p: &PartialRun| checkpoint.save_when_due(p);
     let request = TraceRequest {
@@ -354,13 +354,13 @@ fn trace_shard(
     }
     let file = checkpoint.save_anywhere(&portion)?;
     // It was rescued to another place.
-    if file != checkpoint.file {
-        let message = format!("{}: cannot be written", checkpoint.file.display());
+    if file != place.file {
+        let message = format!("{}: cannot be written", place.file.display());
         return Err(
             Failure::running(message).with_help(format!("nothing is lost: the shard is in {}", file.display()))
         );
     }
-    say_shard(&checkpoint.file, &portion, shard, console)?;
+    say_shard(&place.file, &portion, shard, console)?;
     Ok(lost_rays::report_light_lost_in_part(&portion, prepared, command.extra.max_lost, console))
 }
 

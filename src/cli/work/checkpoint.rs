@@ -2,6 +2,7 @@
 
 use super::output_place::{folder_of, make_folder, rescue_folders};
 use super::part_sum::PartOrigins;
+use super::run_commands::RunCommands;
 use super::tally_file::TallyHeader;
 use super::usage::Usage;
 use crate::cli::console::Console;
@@ -11,7 +12,6 @@ use crate::formats::{read_bytes, remove_stale, write_atomic};
 use crate::pipeline::{PreparedScene, RayRange, TracingSettings};
 use crate::simulate::PartialRun;
 use crate::text::grouped;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -22,55 +22,75 @@ pub(crate) const CHECKPOINT: &str = "checkpoint.tally";
 /// Each thread looks this often, at least, whether it is time to save: a saved run lacks no more than this of each.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
 
-/// The file of one run, with what stands at its head.
-pub(crate) struct Checkpoint<'a> {
-    pub(crate) prepared: &'a PreparedScene,
-    header: TallyHeader,
+/// Where a process saves what it traces of a scene, and what an earlier one left there. A search saves all its runs in one place, each with
+/// a [`Checkpoint`] of its own: whichever of them read what was left, all know what they go on from.
+pub(crate) struct SavePlace<'a> {
+    /// The file of the scene.
+    scene: &'a Path,
     pub(crate) file: PathBuf,
+    /// The part that is traced, as index from 0 and count; `None` for whole runs.
+    shard: Option<[u32; 2]>,
+    /// What is searched for with runs of growing length; `None` for a single run.
+    search: Option<String>,
     /// Least time between two saves.
     every: Duration,
-    /// When it was saved last, or made.
-    last: Mutex<Instant>,
-    /// The head of what an earlier process left of the run, where this one goes on with it.
+    /// The head of what an earlier process left, where this one goes on with it.
     earlier: Mutex<Option<TallyHeader>>,
     pub(crate) console: &'a Console,
 }
 
+impl<'a> SavePlace<'a> {
+    /// Makes the place of a whole run of the scene file `scene`, which is saved at most every so many seconds.
+    pub(crate) fn new(scene: &'a Path, file: PathBuf, every_seconds: f64, console: &'a Console) -> Self {
+        // Seconds without end mean never.
+        let every = Duration::try_from_secs_f64(every_seconds).unwrap_or(Duration::MAX);
+        Self { scene, file, shard: None, search: None, every, earlier: Mutex::default(), console }
+    }
+
+    /// Returns the place for a shard, index from 0 and count, of the run.
+    pub(crate) fn with_shard(self, shard: [u32; 2]) -> Self {
+        Self { shard: Some(shard), ..self }
+    }
+
+    /// Returns the place for the runs of a search, which the text tells from others.
+    pub(crate) fn with_search(self, search: Option<String>) -> Self {
+        Self { search, ..self }
+    }
+
+    /// Locks the head of what an earlier process left.
+    fn earlier(&self) -> MutexGuard<'_, Option<TallyHeader>> {
+        self.earlier.lock().unwrap_or_else(|e| e.into_inner())
+    }
+}
+
+/// The file of one run, with what stands at its head.
+pub(crate) struct Checkpoint<'a> {
+    pub(crate) prepared: &'a PreparedScene,
+    header: TallyHeader,
+    pub(crate) place: &'a SavePlace<'a>,
+    /// When it was saved last, or made.
+    last: Mutex<Instant>,
+}
+
 impl<'a> Checkpoint<'a> {
-    /// Makes the checkpoint of a run, or of a shard of it, that is about to be traced into `file`; saves at most every so many seconds.
-    /// Nothing is written yet, and what dead processes left half saved there is removed.
+    /// Makes the checkpoint of a run that is about to be traced into the file of `place`. Nothing is written yet, and what dead processes
+    /// left half saved there is removed.
     ///
     /// # Errors
     /// When a file of the scene can no longer be read.
-    pub(crate) fn new(
-        prepared: &'a PreparedScene,
-        scene: &Path,
-        file: PathBuf,
-        shard: Option<[u32; 2]>,
-        every_seconds: f64,
-        console: &'a Console,
-    ) -> Result<Self, Failure> {
+    pub(crate) fn new(prepared: &'a PreparedScene, place: &'a SavePlace<'a>) -> Result<Self, Failure> {
+        let commands = RunCommands::new(place.search.clone(), place.console);
         // Made before tracing: the files of the scene may be gone when it ends.
-        let header = TallyHeader::new(prepared, scene, shard, console)?;
+        let header = TallyHeader::new(prepared, place.scene, place.shard, commands)?;
         // Here, for a run that is short or done saves nothing, which would remove them too.
-        remove_stale(&file);
-        // Seconds without end mean never.
-        let every = Duration::try_from_secs_f64(every_seconds).unwrap_or(Duration::MAX);
-        Ok(Self {
-            prepared,
-            header,
-            file,
-            every,
-            last: Mutex::new(Instant::now()),
-            earlier: Mutex::default(),
-            console,
-        })
+        remove_stale(&place.file);
+        Ok(Self { prepared, header, place, last: Mutex::new(Instant::now()) })
     }
 
     /// Returns how often to look whether it is time to save: at least every [`LOOK_EVERY`].
     pub(crate) fn interval(&self) -> Duration {
         // Looking is cheap; to look seldom would save late.
-        self.every.min(LOOK_EVERY)
+        self.place.every.min(LOOK_EVERY)
     }
 
     /// Reads what an earlier run of the same scene, files, options and program left behind, and notes what it took for later saves; `None`
@@ -79,25 +99,26 @@ impl<'a> Checkpoint<'a> {
     /// # Errors
     /// When the file cannot be read, is damaged or is of another run.
     pub(crate) fn read(&self) -> Result<Option<PartialRun>, Failure> {
-        let bytes = match read_bytes(&self.file) {
+        let file = &self.place.file;
+        let bytes = match read_bytes(file) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(Failure::input(format!("{}: {e}", self.file.display()))),
+            Err(e) => return Err(Failure::input(format!("{}: {e}", file.display()))),
         };
         // Of the scene as it is now: what changed since cannot be gone on with.
         let expected = self.prepared.fingerprint()?.0;
         let same = |h: &TallyHeader| {
             if h.fingerprint == expected {
-                *self.earlier() = Some(h.clone());
+                *self.place.earlier() = Some(h.clone());
                 Ok(())
             } else if let Some(other) = h.other_program() {
                 Err(format!("it was traced {other}"))
             } else {
-                Err(format!("it was left by another run: {}", h.command))
+                Err(format!("it was left by another run: {}", h.commands.command))
             }
         };
         let refuse = |m: String| {
-            Failure::arguments(format!("{}: cannot go on from here: {m}", self.file.display()))
+            Failure::arguments(format!("{}: cannot go on from here: {m}", file.display()))
                 .with_help("run with the same scene, files, options and program, remove this file, or run into another place with -o")
         };
         let saved = PartialRun::read(&bytes, same, &self.prepared.bound).map_err(refuse)?;
@@ -109,14 +130,10 @@ impl<'a> Checkpoint<'a> {
         Ok(Some(saved))
     }
 
-    /// Returns the command that began the run, where this one goes on with it: `None` where nothing was read of an earlier one.
-    pub(crate) fn first_command(&self) -> Option<String> {
-        self.earlier().as_ref().map(|header| header.command.clone())
-    }
-
-    /// Returns the commands that traced the run where this one goes on with a sum of parts, its own among them; none for any other.
-    pub(crate) fn traced_by(&self) -> BTreeSet<String> {
-        self.earlier().as_ref().map_or_else(BTreeSet::new, |header| header.continued_by(&self.console.command))
+    /// Returns the commands that the run is owed to: those of the file that was gone on from, as far as it is the same run.
+    pub(crate) fn commands(&self) -> RunCommands {
+        let earlier = self.place.earlier();
+        earlier.as_ref().map_or_else(|| self.header.commands.clone(), |earlier| self.header.commands_after(earlier))
     }
 
     /// Reads what an interrupted run left behind, and says how much that is.
@@ -125,8 +142,8 @@ impl<'a> Checkpoint<'a> {
     /// As [`Self::read`].
     pub(crate) fn read_and_say(&self) -> Result<Option<PartialRun>, Failure> {
         let saved = self.read()?;
-        let folder = folder_of(&self.file);
-        self.console.say(match &saved {
+        let folder = folder_of(&self.place.file);
+        self.place.console.say(match &saved {
             Some(p) => format!("going on from {} of {} replicates", p.done.len(), p.replicates),
             None => format!("{} holds no interrupted run: starting from the beginning", folder.display()),
         });
@@ -136,12 +153,12 @@ impl<'a> Checkpoint<'a> {
     /// Saves the run if it is time to; a failure is said and the run goes on.
     pub(crate) fn save_when_due(&self, portion: &PartialRun) {
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
-        if last.elapsed() < self.every {
+        if last.elapsed() < self.place.every {
             return;
         }
         if let Err(failure) = self.save(portion) {
             // A run that cannot be saved goes on all the same.
-            self.console.say(format_args!("not saved: {failure}"));
+            self.place.console.say(format_args!("not saved: {failure}"));
         }
         // After saving, for saving may take long and must not follow itself.
         *last = Instant::now();
@@ -149,34 +166,31 @@ impl<'a> Checkpoint<'a> {
 
     /// Saves the run now, in place of what was saved before; makes the folder.
     pub(crate) fn save(&self, portion: &PartialRun) -> Result<(), Failure> {
-        make_folder(&folder_of(&self.file))?;
+        let file = &self.place.file;
+        make_folder(&folder_of(file))?;
         let header = self.header_now();
-        Ok(write_atomic(&self.file, |w| portion.write(&header, w))?)
+        Ok(write_atomic(file, |w| portion.write(&header, w))?)
     }
 
     /// Saves the sum of other parts, with what made these.
     pub(crate) fn save_sum(&self, sum: &PartialRun, origins: PartOrigins) -> Result<(), Failure> {
-        make_folder(&folder_of(&self.file))?;
-        let header = self.header.with_usage(origins.usage).with_traced_by(origins.traced_by);
-        Ok(write_atomic(&self.file, |w| sum.write(&header, w))?)
+        let file = &self.place.file;
+        make_folder(&folder_of(file))?;
+        let commands = self.header.commands.clone().with_parts(origins.traced_by);
+        let header = self.header.with_usage(origins.usage).with_commands(commands);
+        Ok(write_atomic(file, |w| sum.write(&header, w))?)
     }
 
-    /// Locks the head of what an earlier process left.
-    fn earlier(&self) -> MutexGuard<'_, Option<TallyHeader>> {
-        self.earlier.lock().unwrap_or_else(|e| e.into_inner())
-    }
-
-    /// Returns the header with what the run took so far, earlier processes included, the command that began it, and those that traced its
-    /// parts where it goes on with a sum.
+    /// Returns the header with what the run took so far, earlier processes included, and the commands that it is owed to.
     fn header_now(&self) -> TallyHeader {
-        let usage = Usage::of_process(self.console.started.elapsed().as_secs_f64(), self.prepared.threads);
-        let earlier = self.earlier();
-        let Some(earlier) = earlier.as_ref() else { return self.header.with_usage(usage) };
-        // A run that goes on counts what it took before, and is the run that was asked for first.
-        let header = self.header.with_usage(usage.continue_from(&earlier.usage));
-        let mut header = header.with_traced_by(earlier.continued_by(&self.console.command));
-        header.command.clone_from(&earlier.command);
-        header
+        let wall_seconds = self.place.console.started.elapsed().as_secs_f64();
+        let of_process = Usage::of_process(wall_seconds, self.prepared.threads);
+        // A run that goes on counts what it took before.
+        let usage = match self.place.earlier().as_ref() {
+            Some(earlier) => of_process.continue_from(&earlier.usage),
+            None => of_process,
+        };
+        self.header.with_usage(usage).with_commands(self.commands())
     }
 
     /// Saves the run in its own file or, where that cannot be written, in a new one wherever one can be; returns the file.
@@ -185,7 +199,7 @@ impl<'a> Checkpoint<'a> {
     /// When none of the places can be written.
     pub(crate) fn save_anywhere(&self, portion: &PartialRun) -> Result<PathBuf, Failure> {
         let reason = match self.save(portion) {
-            Ok(()) => return Ok(self.file.clone()),
+            Ok(()) => return Ok(self.place.file.clone()),
             Err(failure) => failure,
         };
         let name = format!("lampyris-rescued-{}.tally", machine::process_name());
@@ -198,12 +212,12 @@ impl<'a> Checkpoint<'a> {
     pub(crate) fn save_stopped(&self, portion: &PartialRun, because: &str, again: &str) -> Failure {
         let share = format!("{} of {} replicates", portion.done.len(), portion.replicates);
         match self.save_anywhere(portion) {
-            Ok(file) if file == self.file => {
+            Ok(file) if file == self.place.file => {
                 Failure::running(format!("{because}: {share} are saved in {}", file.display()))
                     .with_help(format!("{again} goes on from there"))
             }
             Ok(file) => Failure::running(format!("{because}: {share} are saved in {}", file.display()))
-                .with_help(format!("copy it to {}, and {again} goes on from there", self.file.display())),
+                .with_help(format!("copy it to {}, and {again} goes on from there", self.place.file.display())),
             Err(failure) => Failure::running(format!("{because}, and {share} could not be saved: {failure}")),
         }
     }
@@ -211,7 +225,7 @@ impl<'a> Checkpoint<'a> {
     /// Removes the file of a run that is over. A failure is passed over: a file left behind only makes the next run there ask for
     /// `--resume`.
     pub(crate) fn remove(&self) {
-        let _ = std::fs::remove_file(&self.file);
+        let _ = std::fs::remove_file(&self.place.file);
     }
 }
 
@@ -263,7 +277,7 @@ pub(crate) fn refuse_overwriting(file: &Path) -> Result<(), Failure> {
     if !file.exists() {
         return Ok(());
     }
-    let whose = saved_header(file).map_or(String::new(), |h| format!(" ({})", h.command));
+    let whose = saved_header(file).map_or(String::new(), |h| format!(" ({})", h.commands.command));
     let failure = Failure::arguments(format!("{}: an interrupted run{whose} is saved there", file.display()));
     Err(failure.with_help("--resume goes on with it; else give another place with -o, or remove the file"))
 }

@@ -15,6 +15,7 @@ pub(super) mod part_sum;
 pub(super) mod path_file;
 pub(super) mod ray_input;
 pub(super) mod results_folder;
+pub(super) mod run_commands;
 pub(super) mod shards;
 pub(super) mod tally_file;
 pub(super) mod terminal_monitor;

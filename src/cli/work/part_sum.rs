@@ -109,7 +109,7 @@ impl PartSum {
     fn read(&self, path: &Path, bound: &BoundScene) -> Result<(PartialRun, PartOrigins), Failure> {
         let mut origins = PartOrigins::default();
         let check = |header: &TallyHeader| {
-            origins = PartOrigins { usage: header.usage.clone(), traced_by: header.traced_by() };
+            origins = PartOrigins { usage: header.usage.clone(), traced_by: header.commands.tracers() };
             self.check(header)
         };
         let part = PartialRun::read(&read_part(path)?, check, bound).map_err(|m| input_failure(path, m))?;
@@ -140,10 +140,10 @@ impl PartSum {
         } else if header.accuracy != first.accuracy {
             format!(
                 "it is part of another run ({}): traced with {}, the first part with {}; give both the same",
-                header.command, header.accuracy, first.accuracy
+                header.commands.command, header.accuracy, first.accuracy
             )
         } else {
-            format!("it is part of another run ({}) than the first one", header.command)
+            format!("it is part of another run ({}) than the first one", header.commands.command)
         })
     }
 

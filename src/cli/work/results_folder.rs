@@ -3,6 +3,7 @@
 use super::input_guard::InputGuard;
 use super::lost_rays;
 use super::output_place::{make_folder, require_space, rescue_folders};
+use super::run_commands::RunCommands;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::machine;
@@ -20,9 +21,9 @@ use crate::report::{Cell, Provenance, SimulationReport, Table, View, file_stem, 
 use crate::simulate::{Scene, arrivals};
 use crate::study::figures::ReceiverFigures;
 use crate::study::model_figures::PowerFigures;
-use crate::text::{grouped, natural_order};
+use crate::text::grouped;
 use serde_json::Value;
-use std::collections::{BTreeSet, HashSet};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// What the page takes at least, bytes: plotly.js and a few pictures.
@@ -104,28 +105,26 @@ fn remove_earlier(prepared: &PreparedScene, folder: &Path) {
 }
 
 /// What is said of a run beside its figures.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct RunRemarks {
     /// Sentences of the page that compare the run with what was asked for or others found, in Markdown.
     pub(crate) sentences: Vec<String>,
     /// What came of the error that was asked for, if one was.
     pub(crate) target: Option<TargetResult>,
-    /// The command that began the run, where this one went on with it: the one that tells how many rays it has.
-    pub(crate) first_command: Option<String>,
-    /// The commands that traced the parts of a merged run, or of one that went on with their sum; empty for any other.
-    pub(crate) traced_by: BTreeSet<String>,
+    /// The commands that it is owed to.
+    pub(crate) commands: RunCommands,
 }
 
 impl RunRemarks {
     /// Puts what came of an error that was asked for into a sentence, which leads the closing lines; says it here where there are none,
     /// quiet or not where it is why the exit code is not 0. Nothing where nothing was asked.
-    pub(crate) fn say_target(target: Option<TargetResult>, console: &Console) -> Self {
+    pub(crate) fn say_target(target: Option<TargetResult>, commands: RunCommands, console: &Console) -> Self {
         let sentences: Vec<String> = target.iter().map(target_sentence).collect();
         let is_missed = target.as_ref().is_some_and(|target| !target.reached);
         for sentence in sentences.iter().filter(|_| !console.has_closing_lines()) {
             console.say_or_insist(is_missed, plain_sentence(sentence));
         }
-        Self { sentences, target, ..Self::default() }
+        Self { sentences, target, commands }
     }
 }
 
@@ -182,13 +181,7 @@ pub(crate) fn write(
     // The page shows paths as lines of its own.
     facets.paths = None;
     let has_lost_rays = lost_rays::write(folder, &run.results, prepared)?;
-    let mut provenance = console.provenance(Some(prepared.run_settings().seed), run.results.threads);
-    if let Some(command) = &remarks.first_command {
-        provenance.command.clone_from(command);
-    }
-    provenance.traced_by = remarks.traced_by.iter().cloned().collect();
-    // The page shows the first of them: those of the first parts.
-    provenance.traced_by.sort_by(|a, b| natural_order(a, b));
+    let provenance = remarks.commands.provenance(prepared.run_settings().seed, run.results.threads, console);
     let mut document = run.document(prepared).map_err(|e| Failure::running(e.to_string()))?;
     sequence_tables::add_ways(&mut document, &run.results, &prepared.job.loaded.model);
     face_tables::add_selectors(&mut document, &run.results, &prepared.job.loaded.model);

@@ -1,9 +1,9 @@
 //! What stands at the head of a tally file: enough to know the run that it is a part of, and to write its results.
 
 use super::output_place::folder_of;
+use super::run_commands::RunCommands;
 use super::shards::is_tally;
 use super::usage::Usage;
-use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::formats::read_bytes;
 use crate::intersect::NormalMode;
@@ -17,7 +17,6 @@ use crate::study::accuracy_target::{RelativeTolerance, TolerancePlan};
 use crate::study::default_accuracy::Chosen;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The head of a tally file. Lengths and angles as bits of `f64`.
@@ -61,10 +60,9 @@ pub(crate) struct TallyHeader {
     /// Faces that are listed with what they absorb and let through; 0 where that is not counted.
     #[serde(default)]
     pub(crate) faces: u32,
-    pub(crate) command: String,
-    /// The commands that traced the parts of a sum; empty where `command` traced it.
-    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
-    traced_by: BTreeSet<String>,
+    /// What it is owed to.
+    #[serde(flatten)]
+    pub(crate) commands: RunCommands,
     /// The program that traced it; empty in files of earlier versions.
     #[serde(default)]
     program: String,
@@ -74,13 +72,13 @@ pub(crate) struct TallyHeader {
 }
 
 impl TallyHeader {
-    /// Returns the header of a run that is about to be traced from the scene file `scene`, or of a shard (index from 0, count) of it. No
-    /// usage yet.
+    /// Returns the header of a run of the scene file `scene`, or of a shard (index from 0, count) of it, that is about to be traced and is
+    /// owed to `commands`. No usage yet.
     pub(crate) fn new(
         prepared: &PreparedScene,
         scene: &Path,
         shard: Option<[u32; 2]>,
-        console: &Console,
+        commands: RunCommands,
     ) -> Result<Self, Failure> {
         let m = &prepared.job.meshing;
         let t = &prepared.job.tracing;
@@ -110,8 +108,7 @@ impl TallyHeader {
             shard,
             sequences: prepared.job.scene.run.sequences,
             faces: prepared.job.scene.run.faces,
-            command: console.command.clone(),
-            traced_by: BTreeSet::new(),
+            commands,
             program: PROGRAM.into(),
             usage: Usage::default(),
         })
@@ -132,24 +129,20 @@ impl TallyHeader {
         Self { usage, ..self.clone() }
     }
 
-    /// Returns the same header of a sum of parts that these commands traced.
-    pub(crate) fn with_traced_by(self, traced_by: BTreeSet<String>) -> Self {
-        Self { traced_by, ..self }
+    /// Returns the same header of a run that is owed to other commands.
+    pub(crate) fn with_commands(self, commands: RunCommands) -> Self {
+        Self { commands, ..self }
     }
 
-    /// Returns the commands that traced what the file holds.
-    pub(crate) fn traced_by(&self) -> BTreeSet<String> {
-        if self.traced_by.is_empty() { BTreeSet::from([self.command.clone()]) } else { self.traced_by.clone() }
-    }
-
-    /// Returns the commands that traced a run in which `command` goes on with what the file holds, where that is a sum of parts; else none,
-    /// as the one that began the run tells all.
-    pub(crate) fn continued_by(&self, command: &str) -> BTreeSet<String> {
-        let mut commands = self.traced_by.clone();
-        if !commands.is_empty() {
-            commands.insert(command.to_owned());
+    /// Returns the commands that this run is owed to where its process goes on from a file with the `earlier` header: with the very run, or
+    /// by a search that has come to a longer one since.
+    pub(crate) fn commands_after(&self, earlier: &Self) -> RunCommands {
+        let own = self.commands.clone();
+        if earlier.run_rays == self.run_rays {
+            own.continue_from(&earlier.commands)
+        } else {
+            own.search_on_from(&earlier.commands)
         }
-        commands
     }
 
     /// Returns by which program the part was traced, and which one this is, in words; `None` where both are the same.
