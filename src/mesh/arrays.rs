@@ -51,6 +51,11 @@ impl<'a> ArrayReader<'a> {
         Self { from, left }
     }
 
+    /// Returns how many elements may still be read, at most: no array can be longer.
+    pub(crate) fn most_left<T>(&self) -> usize {
+        usize::try_from(self.left / size_of::<T>().max(1) as u64).unwrap_or(usize::MAX)
+    }
+
     /// Reads an array into huge pages where it is large, and calls `look` with all its elements, some after the other.
     ///
     /// # Errors
@@ -124,9 +129,11 @@ mod tests {
         let length = bytes.len() as u64;
         let mut from = &bytes[..];
         let mut reader = ArrayReader::new(&mut from, length);
+        assert!((2..=length as usize / 8).contains(&reader.most_left::<f64>()));
         let numbers = reader.array::<f64>().unwrap();
         assert!(numbers.len() == 2 && numbers[0] == 1.5 && numbers[1].is_nan());
         assert!(reader.array::<u32>().unwrap().is_empty());
+        assert_eq!(reader.most_left::<u32>(), 0);
         assert!(reader.array::<u32>().is_err());
         bytes[7] = 1;
         assert!(ArrayReader::new(&mut &bytes[..], length).array::<f64>().is_err());

@@ -6,7 +6,7 @@
 //! for longest goes.
 //!
 //! Guarantee: a run has the same bits with and without it. Known weakness: who may write the folder is trusted with results: an entry
-//! changed on purpose may change or end them, though no index of it leaves its array.
+//! changed on purpose may change or end them, though no index of it leaves its array, and what is no tree is not taken for an octree.
 
 use super::checksum::Checksum;
 use super::monitor::Monitor;

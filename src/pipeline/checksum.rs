@@ -85,6 +85,55 @@ impl Kernel for Blocks<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::intersect::octree;
+    use crate::math::{FaceId, Point, Uv, Vector};
+    use crate::mesh::{Facet, FacetMesh, MeshVertex};
+    use crate::pipeline::cache::{Cache, CachedFacets};
+    use crate::pipeline::monitor::Monitor;
+    use std::sync::Mutex;
+
+    /// Keeps what it is warned of.
+    #[derive(Default)]
+    struct Warnings(Mutex<Vec<String>>);
+
+    impl Monitor for Warnings {
+        fn warns(&self, message: &str) {
+            self.0.lock().unwrap().push(message.to_owned());
+        }
+    }
+
+    /// What is no tree is built anew as what is damaged is, though whoever wrote it gave it the checksum that it has to have.
+    #[test]
+    fn an_octree_that_is_no_tree_is_built_anew_with_a_right_checksum_too() {
+        let positions = vec![Point::ZERO, Point::X, Point::new(1.0, 1.0, 0.0), Point::Y];
+        let vertices = (0..4).map(|position| MeshVertex { position, normal: Vector::Z, uv: Uv::ZERO }).collect();
+        let square = Facet { vertices: [0, 1, 2, 3], face: FaceId(0) };
+        let mesh = FacetMesh { positions, vertices, facets: vec![square; 40], sag: vec![] };
+        let folder = tempfile::tempdir().unwrap();
+        let (cache, key, monitor) =
+            (Cache::new(folder.path()), Fingerprint::new(&[b"squares"]), Warnings::default());
+        let kept = CachedFacets { cache: &cache, key: &key, monitor: &monitor };
+        let bytes_of = |octree: &octree::Octree| {
+            let mut bytes = Vec::new();
+            octree.write_arrays(&mut bytes).unwrap();
+            bytes
+        };
+        let settings = octree::Settings::default();
+        let whole = bytes_of(&kept.octree(&mesh, &settings));
+        let entry = format!("{}.octree", key.0);
+        let write = |bytes: &[u8]| cache.keep(&entry, &monitor, |to| to.write_all(bytes));
+        // Written by hand, but as it was.
+        write(&whole);
+        assert_eq!(bytes_of(&kept.octree(&mesh, &settings)), whole);
+        assert!(monitor.0.lock().unwrap().is_empty());
+        // The number of nodes, behind the length of the first array: without nodes, though there are some.
+        let mut forged = whole.clone();
+        forged[8..16].fill(0);
+        write(&forged);
+        assert_eq!(bytes_of(&kept.octree(&mesh, &settings)), whole);
+        let warnings = monitor.0.lock().unwrap().join(" ");
+        assert!(warnings.contains("no octree of this mesh: built anew"), "{warnings}");
+    }
 
     fn checksum<'p>(pieces: impl IntoIterator<Item = &'p [u8]>) -> String {
         let mut sum = Checksum::new();

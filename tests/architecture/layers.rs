@@ -399,6 +399,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "flatten",
             "mesh_box",
             "tree",
+            "tree_check",
             "stored",
             "ray",
             "quad_edges",

@@ -50,6 +50,7 @@ mod steps;
 mod stored;
 mod subdivision;
 mod tree;
+mod tree_check;
 mod walk;
 
 use super::facet::FacetHit;
@@ -126,7 +127,7 @@ impl<'m> Octree<'m> {
     /// counts.
     ///
     /// # Errors
-    /// When it cannot be read, or names what this mesh does not have.
+    /// When it cannot be read, or is no tree of this mesh.
     pub(crate) fn read_arrays(
         mesh: &'m FacetMesh,
         settings: &Settings,

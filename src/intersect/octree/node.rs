@@ -64,11 +64,6 @@ impl Link {
         self.kind() == 0
     }
 
-    #[inline(always)]
-    pub(super) fn is_block(self) -> bool {
-        self.kind() == 2
-    }
-
     /// The index of a node or block; 0 at the end.
     #[inline(always)]
     pub(super) fn index(self) -> usize {

@@ -1,12 +1,12 @@
-//! A tree as bytes and back, to be kept from one run to the next: what is read is walked only where every link leads down and
-//! every index lies within the mesh.
+//! A tree as bytes and back, to be kept from one run to the next: what is read is walked only where it is a tree whose every index lies
+//! within the mesh.
 
-use super::node::{Block, CHILDREN, Link, Node, Target};
+use super::node::{Block, Link, Node};
 use super::statistics::Statistics;
 use super::tree::Tree;
+use super::tree_check::TreeCheck;
 use crate::intersect::facet::Surroundings;
 use crate::intersect::slopes::Slopes;
-use crate::math::simd::{self, Instructions, Kernel};
 use crate::math::{Aabb, Point};
 use crate::mesh::FacetMesh;
 use crate::mesh::arrays::{ArrayReader, invalid, write_array};
@@ -34,20 +34,24 @@ impl<'m> Tree<'m> {
     /// Reads a tree of `mesh`, and its statistics.
     ///
     /// # Errors
-    /// When it cannot be read, or its links could lead nowhere or beyond the mesh. That its boxes hold the facets is not checked, nor the
-    /// box around the mesh and the depth: walks of a tree that is deeper than it says miss facets, but end.
+    /// When it cannot be read, or is no tree of this mesh, as [`TreeCheck`] tells. That its boxes hold the facets is not checked, nor the
+    /// box around the mesh and the slopes: rays may miss facets then, but their walks come to each node and block once at most.
     pub(super) fn read_arrays(mesh: &'m FacetMesh, from: &mut ArrayReader) -> io::Result<(Self, Statistics)> {
         let (statistics, bounds) = read_head(from)?;
-        let root = from.array::<u32>()?.first().map(|&link| Link(link));
-        let mut links = LinkCheck::default();
-        let nodes: Vec<Node> = from.array_with(|nodes| links.take(nodes))?;
-        let mut corners = CornerCheck::default();
-        let blocks: Vec<Block> = from.array_with(|blocks| corners.take(blocks))?;
+        let root = match from.array::<u32>()?[..] {
+            [] => None,
+            [link] => Some(Link(link)),
+            _ => return Err(invalid("an octree of several roots")),
+        };
+        // Before room is made for as many.
+        if statistics.nodes > from.most_left::<Node>() || statistics.blocks > from.most_left::<Block>() {
+            return Err(invalid("an octree that is cut short"));
+        }
+        let mut check = TreeCheck::new(mesh, root, &statistics);
+        let nodes: Vec<Node> = from.array_with(|nodes| check.take_nodes(nodes))?;
+        let blocks: Vec<Block> = from.array_with(|blocks| check.take_blocks(blocks))?;
         let slopes: Vec<Slopes> = from.array()?;
-        let is_tree = slopes.len() == mesh.facets.len()
-            && links.hold(root, [nodes.len(), blocks.len()])
-            && corners.hold(mesh);
-        if !is_tree {
+        if slopes.len() != mesh.facets.len() || !check.holds(&statistics) {
             return Err(invalid("no octree of this mesh"));
         }
         let surroundings = Surroundings::with_bounds(mesh, bounds);
@@ -69,128 +73,8 @@ fn read_head(from: &mut ArrayReader) -> io::Result<(Statistics, Aabb)> {
     Ok((Statistics { nodes, blocks, references, left_out, depths, fill }, Aabb { min, max }))
 }
 
-/// Whether every link leads to a later node or to a block, so that every walk ends: as far as nodes were taken.
-#[derive(Default)]
-struct LinkCheck {
-    /// Nodes that were taken.
-    count: u32,
-    /// Whether a link of this slot leads back or nowhere.
-    is_broken: [bool; CHILDREN],
-    /// One more than the largest index of the nodes, and of the blocks, that links of this slot lead to.
-    nodes: [u32; CHILDREN],
-    blocks: [u32; CHILDREN],
-}
-
-impl LinkCheck {
-    /// Takes further nodes.
-    fn take(&mut self, nodes: &[Node]) {
-        simd::dispatch(LinkScan { check: self, nodes });
-    }
-
-    /// Whether the links of all nodes, and that to the root, are those of a tree of so many nodes and blocks.
-    fn hold(self, root: Option<Link>, [nodes, blocks]: [usize; 2]) -> bool {
-        let is_within = |ends: [u32; CHILDREN], count: usize| ends.iter().all(|&end| end as usize <= count);
-        let is_root = |root: Link| match root.target() {
-            Target::Node(index) => index < nodes,
-            Target::Block(index, _) => index < blocks,
-            Target::End => false,
-        };
-        !self.is_broken.contains(&true)
-            && is_within(self.nodes, nodes)
-            && is_within(self.blocks, blocks)
-            && root.is_none_or(is_root)
-    }
-}
-
-/// What [`LinkCheck::take`] does, for [`simd::dispatch`].
-struct LinkScan<'a> {
-    check: &'a mut LinkCheck,
-    nodes: &'a [Node],
-}
-
-impl Kernel for LinkScan<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Instructions>(self) {
-        let Self { check, nodes } = self;
-        // Slot by slot, which are compared at once: one by one they took a tenth of reading a tree.
-        let (mut broken, mut node_ends, mut block_ends) = ([0; CHILDREN], check.nodes, check.blocks);
-        for node in nodes {
-            check.count += 1;
-            for slot in 0..CHILDREN {
-                // All bits or none.
-                let link = Link(node.children[slot]);
-                let used = u32::from(link != Link::NONE).wrapping_neg();
-                let [to_node, to_block] =
-                    [link.is_node(), link.is_block()].map(|is| u32::from(is).wrapping_neg() & used);
-                let index = link.index() as u32;
-                let leads_back = u32::from(index < check.count).wrapping_neg();
-                broken[slot] |= used & !to_block & (!to_node | leads_back);
-                node_ends[slot] = node_ends[slot].max(to_node & (index + 1));
-                block_ends[slot] = block_ends[slot].max(to_block & (index + 1));
-            }
-        }
-        for slot in 0..CHILDREN {
-            check.is_broken[slot] |= broken[slot] != 0;
-        }
-        (check.nodes, check.blocks) = (node_ends, block_ends);
-    }
-}
-
-/// Whether blocks name facets and corners of the mesh alone: as far as they were taken.
-#[derive(Default)]
-struct CornerCheck {
-    /// One more than the largest facet; lanes without a facet name none.
-    facets: u32,
-    /// The largest corner; `None` before the first block.
-    corner: Option<u32>,
-}
-
-impl CornerCheck {
-    /// Takes further blocks.
-    fn take(&mut self, blocks: &[Block]) {
-        simd::dispatch(CornerScan { check: self, blocks });
-    }
-
-    /// Whether all indices lie within the mesh.
-    fn hold(&self, mesh: &FacetMesh) -> bool {
-        self.facets as usize <= mesh.facets.len() && self.corner.is_none_or(|p| (p as usize) < mesh.positions.len())
-    }
-}
-
-/// What [`CornerCheck::take`] does, for [`simd::dispatch`].
-struct CornerScan<'a> {
-    check: &'a mut CornerCheck,
-    blocks: &'a [Block],
-}
-
-impl Kernel for CornerScan<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Instructions>(self) {
-        let Self { check, blocks } = self;
-        // Lane by lane, which are compared at once: one by one they took a fifth of the instructions of reading a tree.
-        let (mut facets, mut corners) = ([0; 4], [[0; 4]; 4]);
-        for block in blocks {
-            for lane in 0..4 {
-                // One more than the name of no facet is zero.
-                facets[lane] = block.facets[lane].wrapping_add(1).max(facets[lane]);
-                for corner in 0..4 {
-                    corners[lane][corner] = block.positions[lane][corner].max(corners[lane][corner]);
-                }
-            }
-        }
-        check.facets = facets.into_iter().fold(check.facets, u32::max);
-        if !blocks.is_empty() {
-            check.corner = check.corner.max(corners.into_iter().flatten().max());
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::intersect::octree::{Octree, Settings};
     use crate::intersect::{Cost, Intersector};
@@ -198,7 +82,7 @@ mod tests {
     use crate::mesh::{Facet, MeshVertex};
 
     /// A strip of unit squares along x.
-    fn strip(count: u32) -> FacetMesh {
+    pub(crate) fn strip(count: u32) -> FacetMesh {
         let positions: Vec<Point> =
             (0..=count).flat_map(|i| [0.0, 1.0].map(|y| Point::new(f64::from(i), y, 0.0))).collect();
         let vertices = (0..positions.len() as u32)
@@ -246,42 +130,6 @@ mod tests {
                 assert_eq!(octree.tree.levels, deepest.unwrap_or(0), "{count}");
             }
         }
-    }
-
-    #[test]
-    fn links_that_lead_back_or_out_are_told() {
-        let node = |link: Link| Node {
-            children: std::array::from_fn(|k| if k == 0 { link.0 } else { Link::NONE.0 }),
-            ..Node::EMPTY
-        };
-        let are_held = |children: [Link; 2], root: Link| {
-            let mut links = LinkCheck::default();
-            children.into_iter().for_each(|child| links.take(&[node(child)]));
-            links.hold(Some(root), [2, 1])
-        };
-        let is_held = |first: Link, root: Link| are_held([first, Link::block(0, 1)], root);
-        assert!(is_held(Link::node(1), Link::node(0)) && is_held(Link::block(0, 4), Link::block(0, 2)));
-        for wrong in [Link::node(2), Link::block(1, 1), Link::END] {
-            assert!(!is_held(wrong, Link::node(0)), "{wrong:?}");
-        }
-        for wrong in [Link::node(2), Link::block(1, 1), Link::END] {
-            assert!(!is_held(Link::node(1), wrong), "{wrong:?}");
-        }
-        assert!(!are_held([Link::node(1), Link::node(1)], Link::node(0)));
-    }
-
-    #[test]
-    fn corners_beyond_the_mesh_are_told() {
-        let mesh = strip(1);
-        let is_held = |facet: u32, corner: u32| {
-            let mut block = Block::new(&mesh, Point::ZERO, &[0]);
-            (block.facets[0], block.positions[0][3]) = (facet, corner);
-            let mut corners = CornerCheck::default();
-            corners.take(&[Block::new(&mesh, Point::ZERO, &[0]), block]);
-            corners.hold(&mesh)
-        };
-        assert!(is_held(0, 3) && is_held(u32::MAX, 3) && CornerCheck::default().hold(&FacetMesh::default()));
-        assert!(!is_held(1, 3) && !is_held(0, 4) && !is_held(u32::MAX - 1, 3));
     }
 
     /// Of how many bytes one is bent: all, but for Miri, which takes most of a second for each; prime, so that all parts of words are hit.

@@ -10,6 +10,8 @@ use crate::math::{Aabb, Point, Ray, huge_pages};
 use crate::mesh::FacetMesh;
 use rayon::prelude::*;
 
+/// Levels of nodes that no tree goes beyond: 61, of which cells have 32 and packing 30, with one that both share; rounded up.
+pub(super) const DEEPEST: usize = 64;
 /// By how much the box around the mesh is grown, in diagonals: far more than the rounding of where a ray enters it.
 const BOUNDS_ROOM: f64 = 1e-6;
 

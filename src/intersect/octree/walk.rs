@@ -11,7 +11,7 @@ use super::ray_stack::{Children, stack_places};
 use super::ray_state::RayState;
 use super::step_queues::WIDTH;
 use super::steps::{Arrays, prefetch_step, sift, test_with_care};
-use super::tree::Tree;
+use super::tree::{DEEPEST, Tree};
 use crate::intersect::Cost;
 use crate::intersect::facet::FacetHit;
 use crate::math::Ray;
@@ -23,8 +23,6 @@ pub(super) const BATCH: usize = 512;
 
 /// Levels of nodes up to which a tree is shallow, as nearly all are: its stacks take few pages of memory, which a walk is 4 % faster by.
 const SHALLOW: usize = 8;
-/// Levels of nodes that no tree goes beyond: 61, of which cells have 32 and packing 30, with one that both share; rounded up.
-const DEEPEST: usize = 64;
 
 /// Where a thread keeps states from one walk to the next.
 type KeptStates<const STACK: usize> = LocalKey<RefCell<Option<Box<States<STACK>>>>>;
