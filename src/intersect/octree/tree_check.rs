@@ -1,8 +1,8 @@
 //! Whether what was read is a tree of its mesh, in one pass over the nodes and one over the blocks.
 //!
 //! Guarantee: each node and block but the root hangs in one place, so that a walk comes to each once at most; levels, blocks and facets are
-//! as many as the statistics tell; what a link says that a block holds are facets of the mesh. Weakness: boxes and rounded corners, which
-//! only building anew would prove, may be false, and hits are missed there.
+//! as many as the statistics tell; what a link says that a block holds are facets of the mesh with their corners. Weakness: boxes and
+//! rounded corners, which only building anew would prove, may be false, and hits are missed there.
 
 use super::Statistics;
 use super::node::{Block, CHILDREN, Link, Node, Target};
@@ -84,7 +84,10 @@ impl<'m> TreeCheck<'m> {
             self.is_broken = true;
             return;
         };
-        self.is_broken |= !simd::dispatch(LaneScan { mesh: self.mesh, blocks, fills });
+        let facets = self.mesh.facets.len();
+        let is_whole =
+            simd::dispatch(LaneScan { facets, blocks, fills }) && have_own_corners(self.mesh, blocks, fills);
+        self.is_broken |= !is_whole;
     }
 
     /// Whether all that was taken is a tree with these statistics; facets that were left out are not counted again.
@@ -94,9 +97,18 @@ impl<'m> TreeCheck<'m> {
     }
 }
 
-/// Whether blocks name, of facets and corners of the mesh alone, as many as their links say.
+/// Whether the lanes of blocks that their links count, `fills` of each, have the corners of the facets that they name; these must be of
+/// the mesh.
+fn have_own_corners(mesh: &FacetMesh, blocks: &[Block], fills: &[u8]) -> bool {
+    blocks.iter().zip(fills).all(|(block, &fill)| {
+        let mut lanes = block.facets.iter().zip(&block.positions).take(usize::from(fill));
+        lanes.all(|(&facet, positions)| *positions == mesh.corner_positions(facet as usize))
+    })
+}
+
+/// Whether blocks name, of so many facets, as many as their links say.
 struct LaneScan<'a> {
-    mesh: &'a FacetMesh,
+    facets: usize,
     blocks: &'a [Block],
     /// By block.
     fills: &'a [u8],
@@ -107,10 +119,10 @@ impl Kernel for LaneScan<'_> {
 
     #[inline(always)]
     fn run<I: Instructions>(self) -> bool {
-        let Self { mesh, blocks, fills } = self;
-        let facet_count = u32::try_from(mesh.facets.len()).unwrap_or(u32::MAX);
-        // Lane by lane, which are compared at once: one by one they took a fifth of the instructions of reading a tree.
-        let (mut wrong, mut corners) = ([0; 4], [[0; 4]; 4]);
+        let Self { facets, blocks, fills } = self;
+        let facet_count = u32::try_from(facets).unwrap_or(u32::MAX);
+        // Lane by lane, which are compared at once.
+        let mut wrong = [0; 4];
         for (block, &fill) in blocks.iter().zip(fills) {
             for lane in 0..4 {
                 // All bits or none.
@@ -119,13 +131,9 @@ impl Kernel for LaneScan<'_> {
                     [(lane as u32) < u32::from(fill), facet < facet_count, facet == u32::MAX]
                         .map(|is| u32::from(is).wrapping_neg());
                 wrong[lane] |= !((is_counted & is_named) | (!is_counted & is_none));
-                for corner in 0..4 {
-                    corners[lane][corner] = block.positions[lane][corner].max(corners[lane][corner]);
-                }
             }
         }
-        let last_corner = corners.into_iter().flatten().fold(0, u32::max);
-        blocks.is_empty() || (wrong == [0; 4] && (last_corner as usize) < mesh.positions.len())
+        wrong == [0; 4]
     }
 }
 
@@ -296,7 +304,7 @@ mod tests {
 
     /// One block alone, of which its link says so many facets.
     #[test]
-    fn lanes_that_are_counted_name_facets_of_the_mesh() {
+    fn lanes_that_are_counted_name_facets_of_the_mesh_and_their_corners() {
         const NONE: u32 = u32::MAX;
         let mesh = strip(2);
         let is_block_held = |count: u8, facets: [u32; 4], corner: u32| {
@@ -320,6 +328,11 @@ mod tests {
         ] {
             assert!(!is_block_held(count, facets, 3), "{count} of {facets:?}");
         }
-        assert!(!is_block_held(2, [0, 1, NONE, NONE], 6));
+        // Those of the other square alone, a corner twice, and none of the mesh.
+        for corner in [1, 4, 6] {
+            assert!(!is_block_held(2, [0, 1, NONE, NONE], corner), "{corner}");
+        }
+        // Each square with the corners of the other.
+        assert!(!is_block_held(2, [1, 0, NONE, NONE], 3));
     }
 }
