@@ -3,8 +3,9 @@
 //! A place 1 AU away is known to 0.03 mm in an `f64`, and so is every hit of a ray that starts there. A ray is the same wherever on it
 //! one starts: it is moved along its direction, with products and sums that keep what is rounded off.
 
+use super::near_start::NearStart;
 use super::{Emitter, Lobe, Shape};
-use crate::math::{Aabb, Point, Ray, Vector};
+use crate::math::{Aabb, Point, Vector};
 
 /// Diagonals of the scene from which on a start is far: nearer, its rounding is below 10^-12 of the scene.
 const FAR_DIAGONALS: f64 = 1e3;
@@ -66,33 +67,6 @@ fn foot_on_line(origin: Point, direction: Vector, centre: Point) -> Point {
     let square = (0..3).fold(zero, |sum, k| sum.plus(TwoFold::product(direction[k], direction[k])));
     let t = along.over(square);
     Point::from_array([0, 1, 2].map(|k| t.times(direction[k]).plus(TwoFold { high: origin[k], low: 0.0 }).value()))
-}
-
-/// Where the rays of a far source start.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NearStart {
-    centre: Point,
-    /// Distance before the point nearest to the centre, mm: as far as the scene reaches.
-    before: f64,
-    /// Distance from the centre from which on a start is moved, mm.
-    far: f64,
-}
-
-impl NearStart {
-    /// Moves the origin of a ray that starts more than `far` from the centre along its direction to beside the scene; leaves one that
-    /// starts nearer, or goes away from the scene.
-    #[inline(always)]
-    pub(super) fn bring_near(&self, ray: &mut Ray) {
-        let to_centre = self.centre - ray.origin;
-        // Squares, as most rays start near and need no root.
-        if to_centre.length_squared() > self.far * self.far {
-            let t = to_centre.dot(ray.direction) - self.before;
-            if t > 0.0 {
-                let [o, d] = [ray.origin, ray.direction];
-                ray.origin = Point::new(d.x.mul_add(t, o.x), d.y.mul_add(t, o.y), d.z.mul_add(t, o.z));
-            }
-        }
-    }
 }
 
 impl Emitter {

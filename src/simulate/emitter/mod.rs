@@ -8,6 +8,7 @@ mod far;
 mod flux_conversion;
 mod measured;
 mod mixed_packet;
+mod near_start;
 mod own_wavelengths;
 mod packet;
 mod ray_list;
@@ -30,9 +31,9 @@ use crate::optics::{Spectrum, Wavelengths};
 use crate::text;
 pub(crate) use area::{Area, CoveredArea};
 pub(crate) use cover::Cover;
-use far::NearStart;
 pub(crate) use measured::{Loaded, load};
 pub(crate) use mixed_packet::{MixedPacket, MixedRay};
+use near_start::NearStart;
 pub(crate) use ray_list::{ListCursor, RayList};
 pub(crate) use sampler::RaySampler;
 use shape::{
