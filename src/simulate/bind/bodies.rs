@@ -27,7 +27,7 @@ pub(super) fn find_bodies(
     labels: &[String],
 ) -> Result<(Vec<Body>, Vec<u32>, bool), Error> {
     let ambient = match &scene.ambient {
-        Some(name) => medium::find(scene, name, &[Key::Name("ambient")])?,
+        Some(name) => medium::find(&scene.media, name, &scene.origin, &[Key::Name("ambient")])?,
         None => optics::Medium::vacuum(),
     };
     let mut bodies = vec![Body::new(ambient, "surroundings".into(), light)];
@@ -44,7 +44,8 @@ pub(super) fn find_bodies(
             None => {
                 let at = [Key::Name("material"), Key::Index(rule), Key::Name("medium")];
                 let instance = labels[f.instance].clone();
-                let body = Body::new(medium::find(scene, name, &at)?, instance, light);
+                let medium = medium::find(&scene.media, name, &scene.origin, &at)?;
+                let body = Body::new(medium, instance, light);
                 if !body.has_valid_index() {
                     let message = format!("'{name}' has no index at {}", wavelength_text(light.wavelength));
                     return Err(scene.error(ErrorKind::Value, &at, message));

@@ -233,8 +233,8 @@ fn refuse_what_nothing_has(
     search: &mut FaceSearch<'_>,
 ) -> Result<(), Error> {
     let path = |key| base.iter().copied().chain([Key::Name(key)]).collect::<Vec<_>>();
-    if rule.colour.as_ref().is_some_and(|c| c.rgb().is_none()) {
-        return Err(scene.not_a_colour(&path("colour")));
+    if let Some(colour) = &rule.colour {
+        colour.check(&scene.origin, &path("colour"))?;
     }
     let solid_names = rule.solid.as_ref().map(|keys| {
         let names = keys.as_slice().iter().filter_map(|key| match key {

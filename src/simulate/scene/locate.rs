@@ -1,12 +1,20 @@
 //! Where in a scene file something is wrong, and what was probably meant.
 
-use super::Key;
 use crate::simulate::{Error, ErrorKind};
 use crate::text;
 use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+/// One step of a path into a scene file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Key<'a> {
+    /// A key of a table.
+    Name(&'a str),
+    /// A place in an array.
+    Index(usize),
+}
 
 /// Effects that a user may ask for by key or kind and that are not simulated: what such words start with.
 const REFUSED: [(&str, &str); 20] = [

@@ -1,7 +1,8 @@
 //! The keys `[[model]]` and `[[material]]`: CAD files, and what their faces are made of.
 
 use super::selector::{ColourKey, FaceSelector, OneOrMany, SolidKey};
-use super::{Error, ErrorKind, Key, Scene};
+use super::{Key, Origin};
+use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
 /// A CAD file and where it stands.
@@ -31,11 +32,11 @@ const SCALES: std::ops::RangeInclusive<f64> = 1e-9..=1e6;
 
 impl ModelUse {
     /// Refuses a model without a file, or with a placement or unit that is no number or out of range; `index` is its place in the scene.
-    pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
+    pub(super) fn check(&self, origin: &Origin, index: usize) -> Result<(), Error> {
         let fail = |keys: &[&str], message: &str| {
             let mut at = vec![Key::Name("model"), Key::Index(index)];
             at.extend(keys.iter().map(|k| Key::Name(k)));
-            Err(scene.error(ErrorKind::Value, &at, message.to_owned()))
+            Err(origin.error(ErrorKind::Value, &at, message.to_owned()))
         };
         let finite = |x: &[f64]| x.iter().all(|x| x.is_finite());
         let direction = |x: &[f64; 3]| finite(x) && x.iter().any(|x| *x != 0.0);

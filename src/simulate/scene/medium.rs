@@ -1,6 +1,6 @@
 //! The key `[[medium]]`: transparent media.
 
-use super::{Key, Scene};
+use super::{Key, Origin};
 use crate::formats::{AgfGlass, read_agf};
 use crate::optics::{self, Absorption, BulkScatter, Dispersion, Index, Pole, Table, catalogue};
 use crate::simulate::wavelength_text::wavelength_text;
@@ -105,6 +105,59 @@ impl Medium {
         }
         Ok(medium)
     }
+
+    /// Reads the glass from the catalogue file that the medium names; `None` where it names none. `index` is its place in the scene.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or has no glass of the name, which is compared in any case.
+    pub(super) fn read_glass(&self, origin: &Origin, index: usize) -> Result<Option<AgfGlass>, Error> {
+        let at = |key| [Key::Name("medium"), Key::Index(index), Key::Name(key)];
+        let Some(file) = &self.file else { return Ok(None) };
+        let Some(name) = &self.catalogue else {
+            let message = "a catalogue's file needs the name of a glass in it";
+            let error = origin.error(ErrorKind::Value, &at("file"), message);
+            return Err(error.help("add `catalogue = \"N-SF6\"`, say"));
+        };
+        let all = read_agf(&origin.resolve(file))
+            .map_err(|e| origin.error(ErrorKind::Unreadable, &at("file"), e.to_string()))?;
+        // Makers write capitals, people do not.
+        let Some(glass) = all.iter().find(|g| g.name.eq_ignore_ascii_case(name)) else {
+            let message = format!("no glass of {file} is called '{name}'");
+            let error = origin.error(ErrorKind::NoMatch, &at("catalogue"), message);
+            let advice = text::did_you_mean(name, all.iter().map(|g| g.name.as_str()))
+                .unwrap_or_else(|| format!("it has {} glasses, the first {}", all.len(), all[0].name));
+            return Err(error.help(advice));
+        };
+        Ok(Some(glass.clone()))
+    }
+
+    /// Refuses a medium without a name, without exactly one index, with values that [`Medium::optics`] refuses, or with an index outside
+    /// 0.1 to 10 at `wavelength_nm`, that of the run. The glass of a catalogue file must have been read: without, its name is looked up in
+    /// the built-in catalogue. `index` is its place in the scene.
+    pub(super) fn check(&self, origin: &Origin, index: usize, wavelength_nm: f64) -> Result<(), Error> {
+        let at = |key| [Key::Name("medium"), Key::Index(index), Key::Name(key)];
+        if self.name.is_empty() {
+            return Err(origin.error(ErrorKind::Value, &at("name"), "this medium has no `name`"));
+        }
+        if self.index.is_some_and(|n| !Index::RANGE.contains(&n)) {
+            return Err(origin.error(ErrorKind::Value, &at("index"), "`index` must be from 0.1 to 10"));
+        }
+        let medium = self.optics().map_err(|(key, e)| origin.error(ErrorKind::Value, &at(key), e))?;
+        // A formula may leave the range where it is used, though its coefficients look well.
+        let n = medium.index.value(wavelength_nm);
+        let wavelength = wavelength_text(wavelength_nm);
+        if !Index::RANGE.contains(&n) {
+            let message = format!("the index of '{}' at {wavelength} is {n}, not from 0.1 to 10", self.name);
+            return Err(origin.error(ErrorKind::Value, &at("name"), message));
+        }
+        // Constants in nm² leave nearly nothing of each term, with the wrong sign: no light would be bent, in silence.
+        if self.sellmeier.is_some() && n < 1.0 {
+            let message = format!("`sellmeier` gives an index of {n} at {wavelength}, below 1");
+            let error = origin.error(ErrorKind::Value, &at("sellmeier"), message);
+            return Err(error.help("its rows are [B, C] with C in µm², the square of a resonance's wavelength"));
+        }
+        Ok(())
+    }
 }
 
 /// Returns the index of a glass by the formula of its catalogue (OpticStudio's numbers of them).
@@ -172,38 +225,6 @@ fn agf_absorption(glass: &AgfGlass) -> Result<Absorption, String> {
     absorption.map_err(|e| e.to_string())
 }
 
-/// Reads the glass of each medium that names a catalogue file; `None` for the others.
-///
-/// # Errors
-/// When a file cannot be read, or has no glass of the name, which is compared in any case.
-pub(super) fn read_glasses(scene: &Scene) -> Result<Vec<Option<AgfGlass>>, Error> {
-    let mut glasses = Vec::with_capacity(scene.media.len());
-    for (i, medium) in scene.media.iter().enumerate() {
-        let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];
-        let Some(file) = &medium.file else {
-            glasses.push(None);
-            continue;
-        };
-        let Some(name) = &medium.catalogue else {
-            let error =
-                scene.error(ErrorKind::Value, &at("file"), "a catalogue's file needs the name of a glass in it");
-            return Err(error.help("add `catalogue = \"N-SF6\"`, say"));
-        };
-        let all = read_agf(&scene.resolve(file))
-            .map_err(|e| scene.error(ErrorKind::Unreadable, &at("file"), e.to_string()))?;
-        // Makers write capitals, people do not.
-        let Some(glass) = all.iter().find(|g| g.name.eq_ignore_ascii_case(name)) else {
-            let message = format!("no glass of {file} is called '{name}'");
-            let error = scene.error(ErrorKind::NoMatch, &at("catalogue"), message);
-            let advice = text::did_you_mean(name, all.iter().map(|g| g.name.as_str()))
-                .unwrap_or_else(|| format!("it has {} glasses, the first {}", all.len(), all[0].name));
-            return Err(error.help(advice));
-        };
-        glasses.push(Some(glass.clone()));
-    }
-    Ok(glasses)
-}
-
 /// Returns a medium of the built-in catalogue.
 ///
 /// # Errors
@@ -217,55 +238,25 @@ fn catalogued(name: &str) -> Result<optics::Medium, String> {
     })
 }
 
-/// Returns the medium of a name, of the scene before the catalogue; `at` is where the name stands, for messages.
+/// Returns the medium of a name, of the scene's `media` before the catalogue; `at` is where the name stands, for messages.
 ///
 /// # Errors
 /// When there is none of this name, or its index or absorption is wrong.
-pub(crate) fn find(scene: &Scene, name: &str, at: &[Key<'_>]) -> Result<optics::Medium, Error> {
+pub(crate) fn find(media: &[Medium], name: &str, origin: &Origin, at: &[Key<'_>]) -> Result<optics::Medium, Error> {
     // Names of the scene come before those of the catalogue, so that a scene may have a glass of its own.
-    if let Some(m) = scene.media.iter().find(|m| m.name == name) {
-        return m.optics().map_err(|(_, e)| scene.error(ErrorKind::Value, at, e));
+    if let Some(m) = media.iter().find(|m| m.name == name) {
+        return m.optics().map_err(|(_, e)| origin.error(ErrorKind::Value, at, e));
     }
     if let Ok(m) = catalogued(name) {
         return Ok(m);
     }
-    let error = scene.error(ErrorKind::NoMatch, at, format!("no medium is called '{name}'"));
+    let error = origin.error(ErrorKind::NoMatch, at, format!("no medium is called '{name}'"));
     let mut known: Vec<&str> = catalogue::names().collect();
-    known.extend(scene.media.iter().map(|m| m.name.as_str()));
+    known.extend(media.iter().map(|m| m.name.as_str()));
     Err(error.help(text::did_you_mean(name, known).unwrap_or_else(|| {
         format!(
             "`lampyris media` lists the catalogue; others are described: [[medium]] with name = \"{name}\" and an `index`, or the `file` of a \
              maker's catalogue"
         )
     })))
-}
-
-/// Refuses media without a name, without exactly one index, with values that [`Medium::optics`] refuses, or with an index
-/// outside 0.1 to 10 at the run's wavelength. The glasses of catalogue files must have been read: without, their names are looked up in the
-/// built-in catalogue.
-pub(super) fn check(scene: &Scene) -> Result<(), Error> {
-    for (i, m) in scene.media.iter().enumerate() {
-        let at = |key| [Key::Name("medium"), Key::Index(i), Key::Name(key)];
-        if m.name.is_empty() {
-            return Err(scene.error(ErrorKind::Value, &at("name"), "this medium has no `name`"));
-        }
-        if m.index.is_some_and(|n| !Index::RANGE.contains(&n)) {
-            return Err(scene.error(ErrorKind::Value, &at("index"), "`index` must be from 0.1 to 10"));
-        }
-        let medium = m.optics().map_err(|(key, e)| scene.error(ErrorKind::Value, &at(key), e))?;
-        // A formula may leave the range where it is used, though its coefficients look well.
-        let n = medium.index.value(scene.run.wavelength_nm);
-        let wavelength = wavelength_text(scene.run.wavelength_nm);
-        if !Index::RANGE.contains(&n) {
-            let message = format!("the index of '{}' at {wavelength} is {n}, not from 0.1 to 10", m.name);
-            return Err(scene.error(ErrorKind::Value, &at("name"), message));
-        }
-        // Constants in nm² leave nearly nothing of each term, with the wrong sign: no light would be bent, in silence.
-        if m.sellmeier.is_some() && n < 1.0 {
-            let message = format!("`sellmeier` gives an index of {n} at {wavelength}, below 1");
-            let error = scene.error(ErrorKind::Value, &at("sellmeier"), message);
-            return Err(error.help("its rows are [B, C] with C in µm², the square of a resonance's wavelength"));
-        }
-    }
-    Ok(())
 }

@@ -10,6 +10,7 @@ mod lenient;
 mod locate;
 mod material;
 pub(crate) mod medium;
+mod origin;
 mod receiver;
 mod regulation;
 mod run;
@@ -20,8 +21,10 @@ mod surface;
 
 use super::{Error, ErrorKind};
 use crate::formats::file_stem;
+pub(crate) use locate::Key;
 pub use material::{LobeKind, Material, ModelUse, Placement, Reflectance, ScatterKey, SurfaceKind};
 pub use medium::{ByWavelength, Medium};
+pub use origin::Origin;
 pub use receiver::{Channels, FarFieldType, Receiver, ReceiverKind};
 pub use regulation::RegulationUse;
 pub use run::{Accuracy, Interfaces, MOST_RAYS, PowerUnit, Run, Sampling};
@@ -95,17 +98,6 @@ pub struct Scene {
     pub origin: Origin,
 }
 
-/// Where a scene came from.
-#[derive(Clone, Debug, Default)]
-pub struct Origin {
-    /// Name of the scene file, as the user gave it.
-    pub file: String,
-    /// Folder that relative paths start from.
-    pub folder: PathBuf,
-    /// The text, for messages that show the line.
-    pub text: Option<Arc<str>>,
-}
-
 impl Scene {
     /// Reads and checks a scene file, and the glass catalogues that it names; paths in it are relative to its folder.
     ///
@@ -144,8 +136,9 @@ impl Scene {
         if let Some((span, message)) = locate::unread_entries(text, &understood) {
             return Err(Error::new(ErrorKind::Syntax, message).located(file_name, &shared, Some(span)));
         }
-        let glasses = medium::read_glasses(&scene)?;
-        scene.media.iter_mut().zip(glasses).for_each(|(medium, glass)| medium.glass = glass);
+        for (i, medium) in scene.media.iter_mut().enumerate() {
+            medium.glass = medium.read_glass(&scene.origin, i)?;
+        }
         scene.check()?;
         Ok(scene)
     }
@@ -167,7 +160,7 @@ impl Scene {
 
     /// Returns a path named in the scene, seen from where the program runs; an absolute one stays as it is.
     pub fn resolve(&self, file: &str) -> PathBuf {
-        self.origin.folder.join(file)
+        self.origin.resolve(file)
     }
 
     /// Returns a source as sentences name it: by its name, or by its number from 1 where it has none.
@@ -183,46 +176,33 @@ impl Scene {
         self.origin.text.as_deref().map_or_else(Vec::new, |text| locate::tables_with(text, "source", "kind"))
     }
 
-    /// Returns the error that the colour at a place of the scene is none.
-    pub(super) fn not_a_colour(&self, at: &[Key<'_>]) -> Error {
-        self.error(ErrorKind::Value, at, "not a colour")
-            .help("write \"#rrggbb\", or shares of red, green and blue from 0 to 1, as in [0.8, 0.1, 0]")
-    }
-
-    /// Makes an error about the value at `path`, with its place in the file; without a place for a scene that was not parsed from text.
+    /// Makes an error about the value at `path`, as [`Origin::error`].
     pub(crate) fn error(&self, kind: ErrorKind, path: &[Key<'_>], message: impl Into<String>) -> Error {
-        let error = Error::new(kind, message);
-        match &self.origin.text {
-            Some(text) => error.located(&self.origin.file, text, self.span(path)),
-            None => error,
-        }
+        self.origin.error(kind, path, message)
     }
 
     /// Returns the scene file, its text, and the bytes that name the file of model `index`; `None` for a scene that was not parsed from
     /// text.
     pub fn place_of_model(&self, index: usize) -> Option<(&str, &str, Range<usize>)> {
-        let span = self.span(&[Key::Name("model"), Key::Index(index), Key::Name("file")])?;
+        let span = self.origin.span(&[Key::Name("model"), Key::Index(index), Key::Name("file")])?;
         Some((&self.origin.file, self.origin.text.as_deref()?, span))
-    }
-
-    /// Returns the bytes of the value at a path, as `locate::span`; `None` for a scene that was not parsed from text.
-    fn span(&self, path: &[Key<'_>]) -> Option<Range<usize>> {
-        locate::span(self.origin.text.as_deref()?, path)
     }
 
     /// Checks all values, in the order of the file's keys, and that the receivers' cells fit into memory.
     fn check(&self) -> Result<(), Error> {
         // In the order of the file's keys, so that the first fault told is one that stands far up.
-        self.run.check(self)?;
-        self.accuracy.check(self)?;
-        self.models.iter().enumerate().try_for_each(|(i, m)| m.check(self, i))?;
-        medium::check(self)?;
+        let origin = &self.origin;
+        self.run.check(origin)?;
+        self.accuracy.check(origin)?;
+        self.models.iter().enumerate().try_for_each(|(i, m)| m.check(origin, i))?;
+        self.media.iter().enumerate().try_for_each(|(i, m)| m.check(origin, i, self.run.wavelength_nm))?;
         self.check_names("medium", "media", self.media.iter().map(|m| m.name.as_str()))?;
-        surface::check(self)?;
+        self.check_defaults()?;
+        self.materials.iter().enumerate().try_for_each(|(i, m)| m.check(origin, i, &self.media))?;
         let all_rays = self.sources.iter().filter_map(|source| source.rays).fold(0, u64::saturating_add);
-        self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(self, i, all_rays))?;
+        self.sources.iter().enumerate().try_for_each(|(i, s)| s.check(origin, i, &self.run, all_rays))?;
         self.check_names("source", "sources", self.sources.iter().map(|s| s.name.as_str()))?;
-        self.receivers.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
+        self.receivers.iter().enumerate().try_for_each(|(i, r)| r.check(origin, i, self.run.unit))?;
         self.check_names("receiver", "receivers", self.receivers.iter().map(|r| r.name.as_str()))?;
         self.check_receiver_files()?;
         self.regulations.iter().enumerate().try_for_each(|(i, r)| r.check(self, i))?;
@@ -233,6 +213,21 @@ impl Scene {
             let at: &[Key<'_>] = at.as_ref().map_or(&[], |at| at);
             let message = format!("the receivers have {sums} cells with all their channels, more than {MOST_SUMS}");
             return Err(self.error(ErrorKind::Value, at, message).help("use fewer `cells` or fewer `bins_nm`"));
+        }
+        Ok(())
+    }
+
+    /// Refuses surroundings of a medium that is not known, and a default surface that needs values.
+    fn check_defaults(&self) -> Result<(), Error> {
+        if let Some(name) = &self.ambient {
+            medium::find(&self.media, name, &self.origin, &[Key::Name("ambient")])?;
+        }
+        if matches!(self.default_surface, SurfaceKind::Coating | SurfaceKind::Metal) {
+            let message = "this surface needs values, which `default_surface` cannot give";
+            let error = self.error(ErrorKind::Value, &[Key::Name("default_surface")], message);
+            return Err(error.help(
+                "write `absorber`, `mirror`, `diffuse` or `interface`, and give other surfaces to faces by a [[material]]",
+            ));
         }
         Ok(())
     }
@@ -281,12 +276,3 @@ impl Scene {
 
 /// Most sums of all receivers of a scene: a gigabyte.
 const MOST_SUMS: u64 = 1 << 25;
-
-/// One step of a path into a scene file.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Key<'a> {
-    /// A key of a table.
-    Name(&'a str),
-    /// A place in an array.
-    Index(usize),
-}

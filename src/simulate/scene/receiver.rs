@@ -1,6 +1,6 @@
 //! The key `[[receiver]]`: where light is counted.
 
-use super::{FaceSelector, Key, OneOrMany, PowerUnit, Scene};
+use super::{FaceSelector, Key, OneOrMany, Origin, PowerUnit};
 use crate::math::units::WAVELENGTHS_NM;
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
@@ -230,11 +230,12 @@ impl Receiver {
             .then_some(("channels", "absorbed flux is counted as power alone"))
     }
 
-    /// Refuses a receiver whose values contradict each other, or leave it without a place or cells; `index` is its place in the scene.
-    pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
+    /// Refuses a receiver whose values contradict each other or the unit of the run, or leave it without a place or cells; `index` is its
+    /// place in the scene.
+    pub(super) fn check(&self, origin: &Origin, index: usize, unit: PowerUnit) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
             let at = [Key::Name("receiver"), Key::Index(index), Key::Name(key)];
-            Err(scene.error(ErrorKind::Value, &at, message))
+            Err(origin.error(ErrorKind::Value, &at, message))
         };
         if self.name.is_empty() {
             return fail("name", "this receiver has no `name`");
@@ -258,7 +259,7 @@ impl Receiver {
                 );
             }
         }
-        if let Some((key, message)) = self.spectral_fault(scene.run.unit) {
+        if let Some((key, message)) = self.spectral_fault(unit) {
             return fail(key, message);
         }
         match self.kind {

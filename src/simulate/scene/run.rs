@@ -1,6 +1,6 @@
 //! The keys `[run]` and `[accuracy]`: settings of a run, and how models are faceted and traced.
 
-use super::{Key, Scene, lenient};
+use super::{Key, Origin, lenient};
 use crate::math::units::WAVELENGTHS_NM;
 use crate::simulate::{Error, ErrorKind};
 use crate::tessellate::LEAST_TOLERANCE_MM;
@@ -172,10 +172,10 @@ pub struct Accuracy {
 
 impl Accuracy {
     /// Refuses names that are not known, and tolerances and angles out of range.
-    pub(super) fn check(&self, scene: &Scene) -> Result<(), Error> {
+    pub(super) fn check(&self, origin: &Origin) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
             let at = [Key::Name("accuracy"), Key::Name(key)];
-            Err(scene.error(ErrorKind::Value, &at, format!("`{key}` {message}")))
+            Err(origin.error(ErrorKind::Value, &at, format!("`{key}` {message}")))
         };
         let names: [(&str, &Option<String>, &[&str]); 2] = [
             ("intersector", &self.intersector, &["octree", "bvh2", "cwbvh", "exact"]),
@@ -186,7 +186,7 @@ impl Accuracy {
                 continue;
             };
             let at = [Key::Name("accuracy"), Key::Name(key)];
-            let error = scene.error(ErrorKind::Value, &at, format!("'{name}' is none of {}", known.join(", ")));
+            let error = origin.error(ErrorKind::Value, &at, format!("'{name}' is none of {}", known.join(", ")));
             return Err(match text::did_you_mean(name, known.iter().copied()) {
                 Some(advice) => error.help(advice),
                 None => error,
@@ -205,9 +205,9 @@ impl Accuracy {
 
 impl Run {
     /// Refuses the first number that is out of range.
-    pub(super) fn check(&self, scene: &Scene) -> Result<(), Error> {
+    pub(super) fn check(&self, origin: &Origin) -> Result<(), Error> {
         let fail = |key: &str, message: &str| {
-            Err(scene.error(ErrorKind::Value, &[Key::Name("run"), Key::Name(key)], format!("`{key}` {message}")))
+            Err(origin.error(ErrorKind::Value, &[Key::Name("run"), Key::Name(key)], format!("`{key}` {message}")))
         };
         match self {
             r if r.rays == 0 || r.rays > MOST_RAYS => fail("rays", "must be from 1 to 2e13"),

@@ -1,6 +1,8 @@
 //! Which faces of a model a rule means: by names, numbers, looks, figures and places.
 
+use super::{Key, Origin};
 use crate::formats::printable_toml;
+use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
 /// One value or a list of them.
@@ -82,6 +84,15 @@ pub enum ColourKey {
 }
 
 impl ColourKey {
+    /// Refuses a colour that is none; `at` is its place in the scene.
+    pub(crate) fn check(&self, origin: &Origin, at: &[Key<'_>]) -> Result<(), Error> {
+        if self.rgb().is_some() {
+            return Ok(());
+        }
+        let error = origin.error(ErrorKind::Value, at, "not a colour");
+        Err(error.help("write \"#rrggbb\", or shares of red, green and blue from 0 to 1, as in [0.8, 0.1, 0]"))
+    }
+
     /// Returns it as red, green, blue; `None` for a text that is no `#rrggbb`, and for numbers beyond 0 and 1.
     pub fn rgb(&self) -> Option<[f64; 3]> {
         match self {

@@ -1,6 +1,6 @@
 //! The key `[[source]]`: where light comes from.
 
-use super::{FaceSelector, Key, MOST_RAYS, OneOrMany, PowerUnit, Scene, SpectrumKey, lenient};
+use super::{FaceSelector, Key, MOST_RAYS, OneOrMany, Origin, PowerUnit, Run, SpectrumKey, lenient};
 use crate::simulate::{Error, ErrorKind};
 use serde::{Deserialize, Serialize};
 
@@ -123,22 +123,22 @@ impl Source {
     }
 
     /// Refuses a source with the first of its faults; `index` is its place in the scene, `all_rays` the sum of the `rays` of all sources.
-    pub(super) fn check(&self, scene: &Scene, index: usize, all_rays: u64) -> Result<(), Error> {
+    pub(super) fn check(&self, origin: &Origin, index: usize, run: &Run, all_rays: u64) -> Result<(), Error> {
         let fault = (self.power_fault())
             .or_else(|| self.file_fault())
             .or_else(|| self.geometry_fault())
-            .or_else(|| self.light_fault(scene, all_rays))
+            .or_else(|| self.light_fault(run, all_rays))
             .or_else(|| self.lobe_fault());
         if let Some((key, message)) = fault {
             let at = [Key::Name("source"), Key::Index(index), Key::Name(key)];
-            return Err(scene.error(ErrorKind::Value, &at, message));
+            return Err(origin.error(ErrorKind::Value, &at, message));
         }
         // Photometric files are in lumens by definition, and their power need not be written.
         let photometric = matches!(self.kind, SourceKind::Ies | SourceKind::Eulumdat);
-        if photometric && self.power.is_none() && scene.run.unit != PowerUnit::Lumen {
+        if photometric && self.power.is_none() && run.unit != PowerUnit::Lumen {
             let at = [Key::Name("source"), Key::Index(index), Key::Name("file")];
             let error =
-                scene.error(ErrorKind::Value, &at, "a photometric file gives lumens, but the run counts watts");
+                origin.error(ErrorKind::Value, &at, "a photometric file gives lumens, but the run counts watts");
             return Err(error.help("set `unit = \"lm\"` in [run], or give the source's `power` in watts"));
         }
         Ok(())
@@ -234,14 +234,14 @@ impl Source {
 
     /// Returns the first that is wrong with the number of rays, of which all sources name `all_rays`, the spectrum or the polarisation;
     /// `None` where nothing is.
-    fn light_fault(&self, scene: &Scene, all_rays: u64) -> Fault {
+    fn light_fault(&self, run: &Run, all_rays: u64) -> Fault {
         if self.rays.is_some_and(|rays| rays == 0 || all_rays > MOST_RAYS) {
             return Some(("rays", "`rays` must be positive, and those of all sources 2e13 at most".into()));
         }
-        if let Some(Err(message)) = self.spectrum.as_ref().map(|s| s.wavelengths(scene.run.unit)) {
+        if let Some(Err(message)) = self.spectrum.as_ref().map(|s| s.wavelengths(run.unit)) {
             return Some(("spectrum", message));
         }
-        if self.polarised.is_some() && !scene.run.polarisation {
+        if self.polarised.is_some() && !run.polarisation {
             return Some(("polarised", "polarised light needs `polarisation = true` in [run]".into()));
         }
         None

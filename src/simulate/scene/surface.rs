@@ -1,6 +1,6 @@
 //! Materials in the form that the laws of light read: coatings and scatter.
 
-use super::{Key, LobeKind, Material, Reflectance, Scene, SurfaceKind, medium};
+use super::{Key, LobeKind, Material, Medium, Origin, Reflectance, SurfaceKind, medium};
 use crate::optics::fresnel::Power;
 use crate::optics::{Abg, Coating, CoatingTable, Lobe, Scatter, Split};
 use crate::simulate::{Error, ErrorKind};
@@ -92,6 +92,28 @@ impl Material {
         };
         Scatter::new(s.share.unwrap_or(1.0), lobe).map(Some).map_err(|e| e.to_string())
     }
+
+    /// Refuses a material that says nothing, selects twice, has values that do not go together, or names a colour that is none or a medium
+    /// that is neither one of `media` nor of the catalogue; `index` is its place in the scene.
+    pub(super) fn check(&self, origin: &Origin, index: usize, media: &[Medium]) -> Result<(), Error> {
+        let at = |key| [Key::Name("material"), Key::Index(index), Key::Name(key)];
+        if let Some(name) = &self.medium {
+            medium::find(media, name, origin, &at("medium"))?;
+        }
+        if self.medium.is_none() && self.surface.is_none() && self.scatter.is_none() {
+            let message = "this material says neither `medium` nor `surface`";
+            return Err(origin.error(ErrorKind::Value, &at(""), message).help("add one of them"));
+        }
+        self.optics().map_err(|(key, message)| origin.error(ErrorKind::Value, &at(key), message))?;
+        if self.selects_twice() {
+            let error = origin.error(ErrorKind::Value, &at("on"), "this rule has `on` and selectors beside it");
+            return Err(error.help("put all of them into `on`"));
+        }
+        if let Some(colour) = &self.colour {
+            colour.check(origin, &at("colour"))?;
+        }
+        Ok(())
+    }
 }
 
 /// Makes the coating of a reflectance, `unset` where the scene gives none, and a transmittance that is the same everywhere.
@@ -157,38 +179,4 @@ fn coating_from_grid(rows: impl Iterator<Item = ([f64; 2], Split)>) -> Result<Co
         return Err("the rows are no full grid of angles and wavelengths, wavelengths fastest".into());
     }
     CoatingTable::new(angles, nm, cells).map(Coating::Table).map_err(|e| e.to_string())
-}
-
-/// Refuses surroundings of a medium that is not known, a default surface that needs values, and materials that say nothing, select twice,
-/// have values that do not go together, or name a medium or a colour that is not known.
-pub(super) fn check(scene: &Scene) -> Result<(), Error> {
-    if let Some(name) = &scene.ambient {
-        medium::find(scene, name, &[Key::Name("ambient")])?;
-    }
-    if matches!(scene.default_surface, SurfaceKind::Coating | SurfaceKind::Metal) {
-        let message = "this surface needs values, which `default_surface` cannot give";
-        let error = scene.error(ErrorKind::Value, &[Key::Name("default_surface")], message);
-        return Err(error.help(
-            "write `absorber`, `mirror`, `diffuse` or `interface`, and give other surfaces to faces by a [[material]]",
-        ));
-    }
-    for (i, m) in scene.materials.iter().enumerate() {
-        let at = |key| [Key::Name("material"), Key::Index(i), Key::Name(key)];
-        if let Some(name) = &m.medium {
-            medium::find(scene, name, &at("medium"))?;
-        }
-        if m.medium.is_none() && m.surface.is_none() && m.scatter.is_none() {
-            let error = scene.error(ErrorKind::Value, &at(""), "this material says neither `medium` nor `surface`");
-            return Err(error.help("add one of them"));
-        }
-        m.optics().map_err(|(key, message)| scene.error(ErrorKind::Value, &at(key), message))?;
-        if m.selects_twice() {
-            let error = scene.error(ErrorKind::Value, &at("on"), "this rule has `on` and selectors beside it");
-            return Err(error.help("put all of them into `on`"));
-        }
-        if m.colour.as_ref().is_some_and(|c| c.rgb().is_none()) {
-            return Err(scene.not_a_colour(&at("colour")));
-        }
-    }
-    Ok(())
 }
