@@ -161,7 +161,7 @@ fn doubt(edge: &Edge, what: &str) -> String {
     format!("; the errors of the map leave the {what} open from {} to {}", angle_text(low), angle_text(high))
 }
 
-/// Writes an angle for people, to a hundredth of a degree: `−0.58°`, with a minus sign, as all numbers of the page.
+/// Writes an angle for people, to a hundredth of a degree: `−0.58°`, with a minus sign, as all numbers of the report.
 fn angle_text(angle_deg: f64) -> String {
     let hundredths = (100.0 * angle_deg).round();
     // Zero has no sign.

@@ -307,7 +307,7 @@ mod tests {
         assert_eq!(samples, (0..=60).map(|k| [100 + k, 40 + k]).collect::<Vec<_>>());
     }
 
-    /// The page prints it, also one that was read in the dark.
+    /// It is printed with the report, also with one that was read in the dark.
     #[test]
     fn the_background_is_that_of_paper() {
         assert!(Canvas::default().picture().rgb.iter().all(|byte| *byte == 255));

@@ -5,7 +5,7 @@ use super::number::unit_in_words;
 use crate::formats::{Axis, ColourMap, Grid, Picture};
 use crate::text::figures;
 
-/// A picture in two dimensions: interactive in the page, static beside it.
+/// A picture in two dimensions: interactive in the report, static beside it.
 #[derive(Clone, Debug)]
 pub struct Chart {
     /// Stem of its files.

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 /// A result for people.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// Title of the page.
+    /// Title of the report.
     pub title: String,
     /// The answer in one paragraph; `**words**` are emphasised.
     pub answer: String,

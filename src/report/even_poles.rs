@@ -50,7 +50,7 @@ pub(crate) fn with_even_poles(grid: &Grid) -> Cow<'_, Grid> {
 }
 
 /// Returns the grid with even poles in which noisy neighbours beside them have their mean too, as the figure of the brightest direction
-/// takes them. For the page alone: files for other programs keep their cells.
+/// takes them. For the report alone: files for other programs keep their cells.
 pub(super) fn with_joined_slivers(grid: &Grid) -> Cow<'_, Grid> {
     with_joined_cells(grid, grid.error.as_deref())
 }

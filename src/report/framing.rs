@@ -19,7 +19,7 @@ const FEWEST_CELLS: usize = 24;
 /// What the caption of a picture of the [`lit_part`] ends with.
 pub(super) const LIT_PART_SHOWN: &str = " Shown: the part that is lit; the files hold all of it.";
 
-/// Most cells along an axis of a picture in the page: as many as it has pixels, and 2 MB of the page.
+/// Most cells along an axis of a picture in the report: as many as it has pixels, and 2 MB of the report.
 const MOST_CELLS: usize = 600;
 
 /// Joins cells of the values to blocks, so that at most [`MOST_CELLS`] remain along each axis, each with the mean of its finite cells;

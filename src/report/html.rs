@@ -1,4 +1,4 @@
-//! The page itself.
+//! A report as one page of HTML.
 
 use super::document::{Block, Report, Section};
 use super::provenance::Provenance;

@@ -112,7 +112,7 @@ fn in_words(mut grid: Grid) -> Grid {
     grid
 }
 
-/// Cells of a cut that are drawn: more than a screen has pixels, and 400 kB of the page.
+/// Cells of a cut that are drawn: more than a screen has pixels, and 400 kB of the report.
 const MOST_CUT_POINTS: usize = 2000;
 
 /// Draws the values along both axes through the peak, or of a luminaire in its plane and the one across, with their errors, as far as the
@@ -129,7 +129,7 @@ pub(super) fn cuts(grid: &Grid) -> Option<Chart> {
     let series = lines.map(|line| {
         let points = line.positions.iter().zip(&line.cells).map(|(x, &cell)| (*x, cell));
         let points: Vec<(f64, usize)> = points.filter(|(_, cell)| is_framed(*cell)).collect();
-        // Every so many-th cell of a very fine receiver, the brightest among them: each has a bar of its error in the page.
+        // Every so many-th cell of a very fine receiver, the brightest among them: each has a bar of its error in the report.
         let step = points.len().div_ceil(MOST_CUT_POINTS).max(1);
         let value = |k: &usize| grid.values[points[*k].1];
         let brightest = (0..points.len()).max_by(|k, l| value(k).total_cmp(&value(l))).unwrap_or(0);

@@ -2,10 +2,10 @@
 //!
 //! A [`Report`] is plain data: sections of text, charts, 3-D views and tables. [`Report::write`] turns it into `report.html`
 //! (plotly.js embedded once, nothing loaded from elsewhere), a static PNG of every picture under `figures/`, for charts with an SVG beside
-//! it, and a CSV of every table under `tables/`. Every chart carries its static twin in the page, so that it shows without scripts or
-//! WebGL.
+//! it, and a CSV of every table under `tables/`. In `report.html` every chart carries its static twin, so that it shows without
+//! scripts or WebGL.
 //!
-//! Guarantee: the page stays under 15 MB; what is simplified for showing says so in its caption. Known weakness: the 3-D views need
+//! Guarantee: `report.html` stays under 15 MB; what is simplified for showing says so in its caption. Known weakness: the 3-D views need
 //! WebGL to turn; without it their static picture remains.
 
 mod canvas;

@@ -16,7 +16,7 @@ use std::io::Read;
 /// plotly.js 3.0.1 as its authors publish it, compressed from 4.7 to 1.4 MB; its licence is in `plotly-licence.txt`.
 static SCRIPT: &[u8] = include_bytes!("plotly-3.0.1.min.js.gz");
 
-/// Unpacks the script of plotly.js, which a page holds once.
+/// Unpacks the script of plotly.js, which a report holds once.
 ///
 /// # Panics
 /// When the script that the program holds is damaged, which a test rules out.
@@ -125,13 +125,13 @@ fn mark_traces(marks: &Marks, labels: &MapLabels) -> Vec<Value> {
     traces
 }
 
-/// Pixels of the longer side of a map in the page, about: pages have two columns, which windows make wider or narrower.
+/// Pixels of the longer side of a map in the report, about: reports have two columns, which windows make wider or narrower.
 const MAP_PIXELS: f64 = 260.0;
 
 /// Pixels of the longer side of a map with named points, which has both columns.
 const WIDE_MAP_PIXELS: f64 = 600.0;
 
-/// Width of a digit and height of a line of the labels in the page, pixels.
+/// Width of a digit and height of a line of the labels in the report, pixels.
 const LETTER: [f64; 2] = [6.5, 15.0];
 
 /// Returns where names and levels are written on a map; `same` where a unit has one length along both axes.
@@ -256,7 +256,7 @@ fn shape(shape: &Shape, [low, high]: [f32; 2]) -> Value {
                 // before the part left all that is seen in the shade.
                 "lightposition": {"x": -600, "y": 1500, "z": -2500}});
             if !labels.is_empty() {
-                // Where each face begins among the points: the page finds a face by the point under the pointer.
+                // Where each face begins among the points: the script finds a face by the point under the pointer.
                 let (first, selectors): (Vec<u32>, Vec<&str>) =
                     labels.iter().map(|(k, s)| (*k, s.as_str())).unzip();
                 mesh["meta"] = json!({"points": points.len(), "first": first, "selectors": selectors});

@@ -1,4 +1,4 @@
-//! What the page shows of one receiver: its map, and what people of the trade read beside it.
+//! What the report shows of one receiver: its map, and what people of the trade read beside it.
 
 use super::colour_picture::colour_chart;
 use super::framing::{LIT_PART_SHOWN, joined_cells, lit_part};

@@ -1,4 +1,4 @@
-//! Tables for the page and as CSV.
+//! Tables for the report and as CSV.
 
 use crate::formats::csv_text;
 use crate::text::{figures, grouped};
@@ -63,7 +63,7 @@ impl Table {
 
     /// Adds a row, cut or filled to the number of columns.
     pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
-        // Rows that do not fit would shift the cells of the page.
+        // Rows that do not fit would shift the cells of the report.
         let mut row: Vec<Cell> = cells.into_iter().take(self.columns.len()).collect();
         row.resize(self.columns.len(), Cell::Empty);
         self.rows.push(row);

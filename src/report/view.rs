@@ -1,11 +1,11 @@
-//! 3-D views as plain data, made of facets, lines and points, simplified until a page can show them.
+//! 3-D views as plain data, made of facets, lines and points, simplified until a report can show them.
 
 use super::view_triangles::{FaceTriangles, merge_corners, triangles_of, used_points};
 use crate::formats::{ColourMap, Facets, Group, Polylines};
 use crate::math::Point;
 use crate::text::{figures, grouped};
 
-/// A 3-D view: turns in the page, a static picture beside it.
+/// A 3-D view: turns in the report, a static picture beside it.
 #[derive(Clone, Debug)]
 pub struct View {
     /// Stem of its files.
@@ -72,7 +72,7 @@ pub struct Values {
     pub map: ColourMap,
 }
 
-/// More triangles than this are simplified for showing: base64 of 60,000 is 3 MB of page.
+/// More triangles than this are simplified for showing: base64 of 60,000 is 3 MB of the report.
 const SHOWN: usize = 60_000;
 /// Triangles that a surface keeps in any case, so that it is recognised, unless surfaces are so many that these would pass [`SHOWN`].
 const LEAST_SHOWN: usize = 2000;

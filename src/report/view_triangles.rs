@@ -1,4 +1,4 @@
-//! The triangles of a 3-D view: made of facets, and fewer where a page cannot show all.
+//! The triangles of a 3-D view: made of facets, and fewer where a report cannot show all.
 
 use crate::formats::Facets;
 use rustc_hash::FxHashMap;

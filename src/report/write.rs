@@ -1,4 +1,4 @@
-//! A report as a folder: the page, a static picture of every figure, a CSV of every table.
+//! A report as a folder: `report.html`, a static picture of every figure, a CSV of every table.
 
 use super::document::{Block, Report};
 use super::view::View;
@@ -8,13 +8,13 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 impl Report {
-    /// Writes the page as one self-contained HTML text; draws every view.
+    /// Writes the report as one self-contained HTML text; draws every view.
     pub fn to_html(&self) -> String {
         html::page(self, &view_png)
     }
 
     /// Writes `report.html`, `figures/*.svg` and `.png` and `tables/*.csv` into a folder, which is made when missing; returns the files
-    /// written, the page first. Files of the same name are replaced.
+    /// written, `report.html` first. Files of the same name are replaced.
     ///
     /// # Errors
     /// When the folder cannot be made or a file cannot be written.
@@ -22,7 +22,7 @@ impl Report {
         let make = |path: &Path| std::fs::create_dir_all(path).map_err(|e| Error::new(path, ErrorKind::Write(e)));
         make(folder)?;
         let page = folder.join("report.html");
-        // The page and the folder have the same pictures: drawn once.
+        // `report.html` and the folder have the same pictures: drawn once.
         let views = self.sections.iter().flat_map(|s| &s.blocks).filter_map(|block| match block {
             Block::View(view) => Some((view.name.as_str(), view_png(view))),
             _ => None,
@@ -53,7 +53,7 @@ impl Report {
                 Block::View(view) => {
                     let path = inside("figures", format!("{}.png", view.name))?;
                     match pictures.get(view.name.as_str()) {
-                        // A view that could not be drawn for the page is tried once more, so that its error reaches
+                        // A view that could not be drawn for it is tried once more, so that its error reaches
                         // the caller.
                         Some(Ok(png)) => write_atomic(&path, |w| w.write_all(png))?,
                         _ => write_png(&path, &raster::render(view))?,

@@ -77,7 +77,7 @@ pub use outcome::{Counts, Event, LostCause, LostRay, PathSink, PathVertex};
 pub use partial_run::PartialRun;
 pub use path_sample::PathSample;
 pub use plan::GROWING_REPLICATE;
-// Pages level the rings of their grids too.
+// Reports level the rings of their grids too.
 #[cfg(feature = "report")]
 pub(crate) use pole_rings::PoleRings;
 pub use receiver_results::{ChannelResult, ReceiverResult};

@@ -42,7 +42,7 @@ fn what_was_answered_differently_is_so_again() {
 }
 
 #[test]
-fn the_page_of_a_check_shows_the_disagreeing_rays() {
+fn the_report_of_a_check_shows_the_disagreeing_rays() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().display().to_string();
     let found = check(&["--rays", "9000", "-o", &output]);

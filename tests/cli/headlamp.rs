@@ -53,7 +53,7 @@ fn a_low_beam_goes_from_step_to_verdict() {
     // By default by the regulation that the scene names.
     let (code, by_default, err) = lampyris_in(folder.path(), &["assess", "out", "--json"]);
     assert!(code == 0 && by_default == out, "{code} {err}");
-    // The page shows the verdict, the pictures of the trade and their words.
+    // The report shows the verdict, the pictures of the trade and their words.
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     for word in [
         "Verdict by UN R112 B passing",

@@ -71,7 +71,7 @@ fn terminal_codes_in_names_reach_no_output() {
     }
     let mut files = Vec::new();
     texts(&path.join("out"), &mut files);
-    // The library in the page holds marks of its own; it is not part of any name.
+    // The library in the report holds marks of its own; it is not part of any name.
     let library = "<script>/**";
     for (file, text) in &mut files {
         if let Some(at) = text.find(library) {

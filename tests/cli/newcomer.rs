@@ -147,7 +147,7 @@ fn selectors_are_pasted_and_shown_with_their_faces() {
     let (_, out, _) = lampyris_in(path, &["trace", "s.toml", "--dry-run", "--threads", "1"]);
     assert!(out.contains(" on 1 thread "), "{out}");
     assert!(out.contains("Rules and their faces") && out.contains("no rule names them"), "{out}");
-    // The page has the table, and the selector of every face for its 3-D view.
+    // The report has the table, and the selector of every face for its 3-D view.
     let (code, _, err) = lampyris_in(path, &["trace", "s.toml", "-o", "out"]);
     assert_eq!(code, 0, "{err}");
     let page = fs::read_to_string(path.join("out/report.html")).unwrap();
@@ -171,7 +171,7 @@ fn folders_of_outputs_are_made() {
     assert!(["one/two/a.stl", "three/all.rays", "four/odd.rays"].iter().all(|file| path.join(file).is_file()));
 }
 
-/// What a run finds out about itself is told once on the terminal, of merged parts too, not on the page alone.
+/// What a run finds out about itself is told once on the terminal, of merged parts too, not in the report alone.
 #[test]
 fn what_a_run_finds_is_told_on_the_terminal() {
     let folder = tempfile::tempdir().unwrap();

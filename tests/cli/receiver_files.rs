@@ -346,7 +346,7 @@ fn a_scene_without_a_model_is_drawn() {
     assert!(accessors.len() == 2 && accessors.iter().all(|a| a["count"].as_u64() > Some(100)), "{accessors:?}");
 }
 
-/// D65 on a round wall that counts X, Y, Z: white in the middle of the picture, and a chart of it in the page.
+/// D65 on a round wall that counts X, Y, Z: white in the middle of the picture, and a chart of it in the report.
 #[test]
 fn a_receiver_of_colours_has_a_picture_in_them() {
     let folder = tempfile::tempdir().unwrap();

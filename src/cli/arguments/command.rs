@@ -41,7 +41,7 @@ pub(crate) enum Command {
         #[arg(short, long, default_value = "lampyris-demo", value_name = "DIR")]
         output: PathBuf,
         #[command(flatten)]
-        page: PageOption,
+        report: ReportOption,
         #[command(flatten)]
         meshing: MeshingOptions,
         #[command(flatten)]
@@ -97,7 +97,7 @@ pub(crate) enum Command {
         #[arg(long, value_name = "LIBRARY")]
         embree: Option<PathBuf>,
         #[command(flatten)]
-        page: PageOption,
+        report: ReportOption,
         #[command(flatten)]
         meshing: MeshingOptions,
         #[command(flatten)]
@@ -130,7 +130,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         cache: CacheOption,
         #[command(flatten)]
-        page: PageOption,
+        report: ReportOption,
         #[command(flatten)]
         limits: RefusalLimit,
     },
@@ -237,7 +237,7 @@ pub(crate) struct CheckCommand {
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) page: PageOption,
+    pub(crate) report: ReportOption,
     /// Write the rays used and the octree's answers
     #[arg(long, value_name = "FILE")]
     pub(crate) rays_out: Option<PathBuf>,
@@ -310,14 +310,14 @@ pub(crate) struct TraceOptions {
     #[command(flatten)]
     pub(crate) cache: CacheOption,
     #[command(flatten)]
-    pub(crate) page: PageOption,
+    pub(crate) report: ReportOption,
     #[command(flatten)]
     pub(crate) limits: RefusalLimit,
 }
 
-/// Whether a page is written.
+/// Whether a report is written.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
-pub(crate) struct PageOption {
+pub(crate) struct ReportOption {
     /// Write no report.html, figures and tables: numbers alone
     #[arg(long, overrides_with = "report")]
     no_report: bool,
@@ -326,7 +326,7 @@ pub(crate) struct PageOption {
     report: bool,
 }
 
-impl PageOption {
+impl ReportOption {
     /// Whether report.html, figures and tables are to be written.
     pub(crate) fn is_wanted(self) -> bool {
         !self.no_report

@@ -41,7 +41,7 @@ macro_rules! check {
     () => {
         "\
 Examples:
-  lampyris check lamp.stp -o check                            a page, with odd rays in 3-D
+  lampyris check lamp.stp -o check                            a report, with odd rays in 3-D
   lampyris check lamp.toml --accuracy 0.05deg                 on the scene's own rays
   lampyris check lamp.stp --disagreements odd.rays            keep the rays that differ
   lampyris check lamp.stp --replay odd.rays --tolerance 0.01  and ask only those again"

@@ -114,7 +114,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
             also: reached.iter().map(|a| a.answer.clone()).collect(),
             provenance: console.provenance(Some(tracing.seed.or(scene.map(|s| s.run.seed)).unwrap_or(1)), threads),
         };
-        write_folder(folder, &report, command.page.is_wanted(), &text)?;
+        write_folder(folder, &report, command.report.is_wanted(), &text)?;
     }
     if console.json {
         print(&text)?;
@@ -151,9 +151,9 @@ fn judge(contenders: &Contenders<'_>, rays: &[Ray], loosest: f64, console: &Cons
     found
 }
 
-/// Writes `check.json`, which is `text`, and the page if it is wanted, into a folder.
-fn write_folder(folder: &Path, report: &CheckReport, with_page: bool, text: &str) -> Result<(), Failure> {
-    if with_page {
+/// Writes `check.json`, which is `text`, and the report if it is wanted, into a folder.
+fn write_folder(folder: &Path, report: &CheckReport, with_report: bool, text: &str) -> Result<(), Failure> {
+    if with_report {
         report.report().write(folder)?;
     }
     Ok(write_atomic(&folder.join("check.json"), |w| w.write_all(text.as_bytes()))?)
@@ -241,14 +241,14 @@ fn write_rays(
 fn say_files(command: &CheckCommand, found: &CrossCheck, console: &Console) {
     match &command.output {
         Some(folder) => {
-            if command.page.is_wanted() {
+            if command.report.is_wanted() {
                 console
                     .say(format_args!("\n  {}", console.bold(&folder.join("report.html").display().to_string())));
             }
             console.say(format_args!("  {}", folder.join("check.json").display()));
         }
         None if !found.disagreements.is_empty() => {
-            console.say(console.dim("  -o DIR writes a page with the rays that differ in 3-D"));
+            console.say(console.dim("  -o DIR writes a report with the rays that differ in 3-D"));
         }
         None => {}
     }

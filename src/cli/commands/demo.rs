@@ -1,6 +1,6 @@
 //! `lampyris demo`: the main job on the built-in three-cavity lamp, in any folder, with nothing else installed.
 
-use crate::cli::arguments::command::PageOption;
+use crate::cli::arguments::command::ReportOption;
 use crate::cli::console::Console;
 use crate::cli::output::closing;
 use crate::cli::work::output_place::OutputPlace;
@@ -39,7 +39,7 @@ pub(crate) fn run(
     folder: &Path,
     meshing: MeshingSettings,
     tracing: TracingSettings,
-    page: PageOption,
+    report: ReportOption,
     console: &Console,
 ) -> Result<Completion, Failure> {
     console.say(console.bold("lampyris demo: a three-cavity lamp, from its STEP file to its light"));
@@ -62,8 +62,8 @@ pub(crate) fn run(
     say_step("tessellate", what, prepared.tessellation_seconds);
     // Claimed before the trace, which would be lost on a folder that cannot be written.
     let _owned = OutputPlace::folder(folder)?;
-    let with_page = page.is_wanted();
-    results_folder::try_folder(&prepared, folder, with_page)?;
+    let with_report = report.is_wanted();
+    results_folder::try_folder(&prepared, folder, with_report)?;
     let mut run = prepared
         .trace(TraceRequest::default(), &monitor)
         .map_err(|_| Failure::running("demo: the run was stopped"))?;
@@ -79,12 +79,12 @@ pub(crate) fn run(
     let commands = RunCommands::new(None, console);
     let remarks = RunRemarks { sentences: reference_comparison(r), target: None, commands };
     let start = std::time::Instant::now();
-    let (document, answer) = results_folder::write(&prepared, folder, &mut run, &remarks, with_page, console)?;
+    let (document, answer) = results_folder::write(&prepared, folder, &mut run, &remarks, with_report, console)?;
     write_atomic(&folder.join(MODEL_NAME), |w| w.write_all(LAMP))?;
     // The scene beside its model, as a user would keep them.
     write_atomic(&folder.join(SCENE_NAME), |w| w.write_all(scene_text.as_bytes()))?;
     say_step("write", format!("report, pictures, data into {}", folder.display()), start.elapsed().as_secs_f64());
-    closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
+    closing::print_results(&document, &answer, folder, &run.results, with_report, console)?;
     console.say(format_args!(
         "  {}",
         console.dim("lamp.stp and lamp.toml beside them are yours to copy: `lampyris trace lamp.toml`")
@@ -109,7 +109,7 @@ pub(crate) fn lamp() -> Result<(Scene, LoadedModel), Failure> {
     Ok((scene, loaded))
 }
 
-/// Returns how the run compares with what other programs found, as a sentence for the page; none without a plane receiver.
+/// Returns how the run compares with what other programs found, as a sentence for the report; none without a plane receiver.
 fn reference_comparison(r: &crate::simulate::Results) -> Vec<String> {
     let Some(wall) = r.receivers.iter().find(|x| x.kind == "plane") else { return Vec::new() };
     let share = wall.power / r.power.emitted;

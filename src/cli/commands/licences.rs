@@ -13,7 +13,7 @@ const EMBEDDED: [(&str, &str, &str); 2] = [
         "Ubuntu Font Licence 1.0",
         include_str!("../licences/ubuntu-font.txt"),
     ),
-    ("plotly.js 3, the interactive pictures of the page", "MIT", include_str!("../../report/plotly-licence.txt")),
+    ("plotly.js 3, the interactive pictures of the report", "MIT", include_str!("../../report/plotly-licence.txt")),
 ];
 
 /// Libraries compiled in, `name version licence` a line, as `cargo tree -e normal` lists them.

@@ -35,7 +35,7 @@ pub(crate) struct MergeCommand<'a> {
     pub(crate) until_error: Option<&'a str>,
     pub(crate) cache: &'a CacheOption,
     pub(crate) max_lost: f64,
-    pub(crate) with_page: bool,
+    pub(crate) with_report: bool,
     pub(crate) limits: RefusalLimit,
 }
 
@@ -95,17 +95,18 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
         prepared.rays = Some(u64::from(whole.replicates) * GROWING_REPLICATE);
     }
     let _owned = OutputPlace::folder(command.folder)?;
-    results_folder::try_folder(&prepared, command.folder, command.with_page)?;
+    results_folder::try_folder(&prepared, command.folder, command.with_report)?;
     let request = TraceRequest { from: Some(whole), ..TraceRequest::default() };
     let mut run = prepared.trace(request, &monitor).map_err(|_| Failure::running("merge: the run is not whole"))?;
     origins.usage.note_in(&mut run.results);
     let commands = RunCommands::new(None, console).with_parts(origins.traced_by);
     let remarks = RunRemarks::say_target(target.map(|target| target.result(&run.results)), commands, console);
-    let written = results_folder::write(&prepared, command.folder, &mut run, &remarks, command.with_page, console);
+    let written =
+        results_folder::write(&prepared, command.folder, &mut run, &remarks, command.with_report, console);
     let (document, answer) = match written {
         Ok(written) => written,
         Err(failure) => {
-            let place = results_folder::write_anywhere(&prepared, &mut run, &remarks, command.with_page, console);
+            let place = results_folder::write_anywhere(&prepared, &mut run, &remarks, command.with_report, console);
             let saved = place.map(|folder| format!("nothing is lost: the results are in {}", folder.display()));
             return Err(
                 failure.with_further_help(saved.unwrap_or("nothing is lost: the parts are as they were".into()))
@@ -114,7 +115,7 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     };
     closing::say_notes(&run.results.notes, &[], console);
     closing::print_listings(&run, &prepared, console)?;
-    closing::print_results(&document, &answer, command.folder, &run.results, command.with_page, console)?;
+    closing::print_results(&document, &answer, command.folder, &run.results, command.with_report, console)?;
     let refused = input_files::report_refusals(&prepared.job.loaded, command.limits.max_refused, console)
         .and(input_files::report_bare_faces(&prepared, command.limits.max_refused, console));
     Ok(lost_rays::report_lost_light(&run.results, &prepared, command.max_lost, command.folder, console)

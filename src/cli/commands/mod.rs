@@ -31,8 +31,8 @@ use crate::pipeline::RayRange;
 pub(super) fn execute(command: Command, console: &Console) -> Result<Completion, Failure> {
     refuse_ray_range(&command)?;
     match command {
-        Command::Demo { output, page, meshing, tracing } => {
-            demo::run(&output, meshing.settings(), tracing.settings(), page, console)
+        Command::Demo { output, report, meshing, tracing } => {
+            demo::run(&output, meshing.settings(), tracing.settings(), report, console)
         }
         Command::Info { file, faces, limits, placed } => info::run(&file, faces, limits, placed, console),
         Command::Facet(command) => facet::run(&command, console),
@@ -47,20 +47,20 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
             trace::run(&command, console)
         }
         Command::Check(command) => check::run(&command, console),
-        Command::Study { kind, file, output, rays_in, embree, page, meshing, tracing } => {
+        Command::Study { kind, file, output, rays_in, embree, report, meshing, tracing } => {
             let command = study::StudyCommand {
                 kind,
                 file: file.as_deref(),
                 output: output.as_ref(),
                 rays_in: rays_in.as_deref(),
                 embree: embree.as_deref(),
-                page,
+                report,
                 meshing: meshing.settings(),
                 tracing: tracing.settings(),
             };
             study::run(&command, console)
         }
-        Command::Merge { parts, output, scene, wait, rays, until_error, max_lost, cache, page, limits } => {
+        Command::Merge { parts, output, scene, wait, rays, until_error, max_lost, cache, report, limits } => {
             let command = merge::MergeCommand {
                 parts: &parts,
                 folder: &output,
@@ -70,7 +70,7 @@ pub(super) fn execute(command: Command, console: &Console) -> Result<Completion,
                 until_error: until_error.as_deref(),
                 max_lost,
                 cache: &cache,
-                with_page: page.is_wanted(),
+                with_report: report.is_wanted(),
                 limits,
             };
             merge::run(&command, console)

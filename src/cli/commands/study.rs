@@ -1,8 +1,8 @@
-//! `lampyris study`: rows to study.json, a page, pictures and tables; the small tables and one sentence on the terminal.
+//! `lampyris study`: rows to study.json, a report, pictures and tables; the small tables and one sentence on the terminal.
 
 use super::bvh_benchmark::BvhCommand;
 use super::demo;
-use crate::cli::arguments::command::{PageOption, PlacedLimit, StudyKind};
+use crate::cli::arguments::command::{PlacedLimit, ReportOption, StudyKind};
 use crate::cli::console::{Console, print, show_progress};
 use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::sentences::plain_sentence_lines;
@@ -44,7 +44,7 @@ pub(crate) struct StudyCommand<'a> {
     pub(crate) rays_in: Option<&'a Path>,
     /// The library of Embree to compare with; `None` leaves Embree out.
     pub(crate) embree: Option<&'a Path>,
-    pub(crate) page: PageOption,
+    pub(crate) report: ReportOption,
     pub(crate) meshing: MeshingSettings,
     pub(crate) tracing: TracingSettings,
 }
@@ -126,8 +126,8 @@ fn refuse_unused_options(command: &StudyCommand) -> Result<(), Failure> {
     Err(failure.with_help("leave it out"))
 }
 
-/// Runs a study and writes `study.json`, and the page if wanted, into its folder; prints the document, or its small tables and the answer.
-/// Fails on options that the study would not look at.
+/// Runs a study and writes `study.json`, and the report if wanted, into its folder; prints the document, or its small tables and the
+/// answer. Fails on options that the study would not look at.
 pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completion, Failure> {
     refuse_unused_options(command)?;
     let threads = threads::set_threads(command.tracing.threads)?;
@@ -187,7 +187,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         report.sections.insert(1, octree_shape::octree_section(&shapes));
         octree_shape::write_octree_files(&folder, &shapes)?;
     }
-    if command.page.is_wanted() {
+    if command.report.is_wanted() {
         report.write(&folder)?;
     }
     if console.json {
@@ -196,7 +196,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
         let tables = terminal_tables::study_tables(&report, console.width());
         let answer = plain_sentence_lines(&report.answer, console.width());
         print(&format!("{tables}\n{answer}\n"))?;
-        if command.page.is_wanted() {
+        if command.report.is_wanted() {
             console.say(format_args!("  {}", console.bold(&folder.join("report.html").display().to_string())));
         }
         console.say(format_args!("  {}", folder.join("study.json").display()));

@@ -175,7 +175,7 @@ fn trace_whole(
     let file = folder.join(CHECKPOINT);
     // All that can go wrong with the place of the results is tried before anything is traced.
     let _owned = OutputPlace::folder(folder)?;
-    let with_page = extra.page.is_wanted();
+    let with_report = extra.report.is_wanted();
     let paths = try_outputs(prepared, command, &file)?;
     let until = target.map(Until::Error).or(extra.until_settled.then_some(Until::Settled));
     let search = until.map(|until| until.search_text(prepared.job.tracing.rays()));
@@ -220,9 +220,9 @@ fn trace_whole(
     };
     say_verification(&run, console)?;
     let remarks = RunRemarks::say_target(result, checkpoint.commands(), console);
-    let written = results_folder::write(prepared, folder, &mut run, &remarks, with_page, console);
+    let written = results_folder::write(prepared, folder, &mut run, &remarks, with_report, console);
     let (document, answer) =
-        written.map_err(|failure| rescue_results(&mut run, &remarks, &checkpoint, with_page, failure))?;
+        written.map_err(|failure| rescue_results(&mut run, &remarks, &checkpoint, with_report, failure))?;
     // What was missed comes before what was found.
     let unsettled = if extra.until_settled { verdicts::unsettled_sentence(&document) } else { None };
     let missed = remarks.target.as_ref().is_some_and(|result| !result.reached) || unsettled.is_some();
@@ -233,7 +233,7 @@ fn trace_whole(
     verdicts::say_verdicts(&run, prepared, console)?;
     closing::say_notes(&run.results.notes, prepared.bound.notes(), console);
     closing::print_listings(&run, prepared, console)?;
-    closing::print_results(&document, &answer, folder, &run.results, with_page, console)?;
+    closing::print_results(&document, &answer, folder, &run.results, with_report, console)?;
     // Last of all, for it may fail where the results did not.
     let ends_written = end_file::write(prepared, extra.ends.as_deref(), console);
     // Only after everything was written: until then it is all that would be left.
@@ -256,7 +256,7 @@ fn try_outputs(
     if !extra.resume {
         refuse_overwriting(checkpoint)?;
     }
-    results_folder::try_folder(prepared, folder, extra.page.is_wanted())?;
+    results_folder::try_folder(prepared, folder, extra.report.is_wanted())?;
     extra.ends.as_deref().map_or(Ok(()), try_file)?;
     let Some(file) = &extra.paths else { return Ok(None) };
     try_file(file)?;
@@ -276,11 +276,11 @@ fn rescue_results(
     run: &mut SceneResults,
     remarks: &RunRemarks,
     checkpoint: &Checkpoint,
-    with_page: bool,
+    with_report: bool,
     failure: Failure,
 ) -> Failure {
     let (prepared, console) = (checkpoint.prepared, checkpoint.place.console);
-    if let Some(folder) = results_folder::write_anywhere(prepared, run, remarks, with_page, console) {
+    if let Some(folder) = results_folder::write_anywhere(prepared, run, remarks, with_report, console) {
         return failure.with_further_help(format!("nothing is lost: the results are in {}", folder.display()));
     }
     let Some(sums) = run.sums() else { return failure };

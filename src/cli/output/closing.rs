@@ -44,13 +44,13 @@ pub(crate) fn print_results(
     answer: &str,
     folder: &Path,
     results: &Results,
-    with_page: bool,
+    with_report: bool,
     console: &Console,
 ) -> Result<(), Failure> {
     if console.json {
         return Ok(print(&json_text(document)?)?);
     }
-    say_closing_lines(answer, folder, results, with_page, console);
+    say_closing_lines(answer, folder, results, with_report, console);
     Ok(())
 }
 
@@ -61,12 +61,12 @@ pub(crate) fn say_notes(notes: &[String], said: &[String], console: &Console) {
 }
 
 /// Says the last lines of a traced scene: what was found, and which files to open.
-fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: bool, console: &Console) {
+fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_report: bool, console: &Console) {
     console.say("");
     console.say(plain_sentence_lines(answer, console.width().min(LINE_LENGTH)));
     let mut files = notable_files(folder, results);
-    // Without a page its line, the first one, is left out.
-    if !with_page {
+    // Without a report its line, the first one, is left out.
+    if !with_report {
         files.remove(0);
     }
     let lengths = files.iter().map(|(p, _)| p.display().to_string().chars().count());
@@ -79,7 +79,7 @@ fn say_closing_lines(answer: &str, folder: &Path, results: &Results, with_page: 
     }
 }
 
-/// Returns the files of a result folder that a person wants to know of, with what they are; the page is always the first.
+/// Returns the files of a result folder that a person wants to know of, with what they are; the report is always the first.
 fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
     let mut files = vec![
         (folder.join("report.html"), "open this in a browser: pictures, tables, cross-check".to_owned()),

@@ -66,7 +66,7 @@ fn face_table(run: &SceneResults, prepared: &PreparedScene) -> Option<Table> {
     Some(table)
 }
 
-/// Returns the page's section on light by face; `None` where the run did not count it.
+/// Returns the report's section on light by face; `None` where the run did not count it.
 pub(crate) fn face_section(run: &SceneResults, prepared: &PreparedScene) -> Option<Section> {
     Some(Section::new("Light by face").with_block(face_table(run, prepared)?))
 }

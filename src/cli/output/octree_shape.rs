@@ -13,7 +13,7 @@ use std::path::Path;
 /// Most boxes written to files; deeper levels are left out beyond it.
 const MOST_BOXES: usize = 50_000;
 
-/// Most boxes drawn in the page: 16 corners each are half a megabyte.
+/// Most boxes drawn in the report: 16 corners each are half a megabyte.
 const MOST_DRAWN: usize = 2_000;
 
 /// The shape of an octree, and what a benchmark's rays cost on it.

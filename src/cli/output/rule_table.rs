@@ -12,12 +12,12 @@ const NAMED_FACES: usize = 3;
 /// Instances of a selector that are named where it leaves them out.
 const NAMED_INSTANCES: usize = 12;
 
-/// Most faces of a model whose selectors stand in a page: a megabyte of them.
+/// Most faces of a model whose selectors stand in a report: a megabyte of them.
 const MOST_LABELLED: usize = 20_000;
 
-/// Returns the selector of every placed face, in their order; empty where there are more than [`MOST_LABELLED`], too many for a page.
+/// Returns the selector of every placed face, in their order; empty where there are more than [`MOST_LABELLED`], too many for a report.
 pub(crate) fn face_labels(model: &Model) -> Vec<String> {
-    // None rather than some: a page whose faces answer here and there would puzzle.
+    // None rather than some: a report whose faces answer here and there would puzzle.
     if model.placed_face_count() > MOST_LABELLED {
         return Vec::new();
     }

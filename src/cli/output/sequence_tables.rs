@@ -97,7 +97,7 @@ fn sequence_tables(results: &Results, model: &Model, unit: &str) -> Vec<Table> {
     results.sequences.iter().enumerate().filter(|(_, found)| found.count > 0).map(table).collect()
 }
 
-/// Returns the section of a page with view and tables; `None` where light was not grouped.
+/// Returns the section of a report with view and tables; `None` where light was not grouped.
 pub(crate) fn sequence_section(prepared: &PreparedScene, results: &Results, facets: &Facets) -> Option<Section> {
     let tables = sequence_tables(results, &prepared.job.loaded.model, prepared.power_unit());
     if tables.is_empty() {

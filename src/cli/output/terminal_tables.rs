@@ -119,7 +119,7 @@ fn grid_text(table: &Table, columns: &[&Column<'_>], width: usize) -> String {
     format!("{grid}\n")
 }
 
-/// Returns the tables of a study's page as text, empty ones and its list of every measurement left out.
+/// Returns the tables of a study's report as text, empty ones and its list of every measurement left out.
 pub(crate) fn study_tables(report: &Report, width: usize) -> String {
     let blocks = report.sections.iter().flat_map(|s| &s.blocks);
     let tables = blocks.filter_map(|b| if let Block::Table(t) = b { Some(t) } else { None });

@@ -1,4 +1,4 @@
-//! The folder that a traced scene leaves: receiver files, ray paths, facets, `results.json` and the page.
+//! The folder that a traced scene leaves: receiver files, ray paths, facets, `results.json` and the report.
 
 use super::input_guard::InputGuard;
 use super::lost_rays;
@@ -26,8 +26,8 @@ use serde_json::Value;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// What the page takes at least, bytes: plotly.js and a few pictures.
-const PAGE_BYTES: u64 = 5_000_000;
+/// What the report takes at least, bytes: plotly.js and a few pictures.
+const REPORT_BYTES: u64 = 5_000_000;
 /// What a cell of a receiver takes at least in all its files, bytes: its number as text, twice in binary.
 const CELL_BYTES: u64 = 40;
 /// Facets that are drawn where parts are placed often; the rest of their places are boxes, or nothing: three seconds of a viewer.
@@ -37,19 +37,19 @@ const FACET_BYTES: u64 = 50;
 
 /// Files of every folder of results.
 const OWN_FILES: [&str; 5] = ["results.json", "report.html", "facets.glb", "paths.vtp", LEDGER];
-/// Folders of the page's pictures and tables, with the extensions of the files in them.
-const PAGE_FOLDERS: [(&str, &[&str]); 2] = [("figures", &["svg", "png"]), ("tables", &["csv"])];
+/// Folders of the report's pictures and tables, with the extensions of the files in them.
+const REPORT_FOLDERS: [(&str, &[&str]); 2] = [("figures", &["svg", "png"]), ("tables", &["csv"])];
 
 /// Tries, before anything is traced, whether the folder can hold the results: room, and a file of every receiver's name.
 ///
 /// # Errors
 /// When it cannot.
-pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_page: bool) -> Result<(), Failure> {
+pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_report: bool) -> Result<(), Failure> {
     let scene = &prepared.job.scene;
     let cells: u64 = scene.receivers.iter().map(|r| r.cells.iter().map(|&n| n as u64).product::<u64>()).sum();
     let facets = prepared.facets.drawn(MOST_DRAWN).facets.len() as u64;
-    let page = if with_page { PAGE_BYTES } else { 0 };
-    require_space(folder, page + cells.saturating_mul(CELL_BYTES) + facets * FACET_BYTES)?;
+    let report = if with_report { REPORT_BYTES } else { 0 };
+    require_space(folder, report + cells.saturating_mul(CELL_BYTES) + facets * FACET_BYTES)?;
     for receiver in &scene.receivers {
         // By the names of the results: one may be too long or forbidden.
         try_write(&folder.join(format!("{}.csv", file_stem(&receiver.name))))?;
@@ -63,17 +63,18 @@ pub(crate) fn try_folder(prepared: &PreparedScene, folder: &Path, with_page: boo
 /// When they would.
 pub(crate) fn refuse_inputs(scene: &Scene, scene_file: &Path, folder: &Path) -> Result<(), Failure> {
     let receivers: HashSet<String> = scene.receivers.iter().flat_map(receiver_files::names).collect();
-    // The folders of the page are its own: what they hold goes with the run that made it.
+    // The folders of the report are its own: what they hold goes with the run that made it.
     let is_written = |name: &Path| {
-        is_of_page(name) || name.to_str().is_some_and(|name| OWN_FILES.contains(&name) || receivers.contains(name))
+        is_of_report(name)
+            || name.to_str().is_some_and(|name| OWN_FILES.contains(&name) || receivers.contains(name))
     };
     InputGuard::new([scene_file]).with_scene(scene).refuse_folder(folder, is_written)
 }
 
-/// Whether a file, named relative to a folder of results, is a picture or table of its page by its folder and extension.
-fn is_of_page(name: &Path) -> bool {
+/// Whether a file, named relative to a folder of results, is a picture or table of its report by its folder and extension.
+fn is_of_report(name: &Path) -> bool {
     let extension = name.extension().and_then(|e| e.to_str()).unwrap_or("");
-    PAGE_FOLDERS
+    REPORT_FOLDERS
         .iter()
         .any(|(folder, kinds)| name.parent() == Some(Path::new(folder)) && kinds.contains(&extension))
 }
@@ -93,9 +94,11 @@ fn remove_earlier(prepared: &PreparedScene, folder: &Path) {
     // A document that somebody changed names files of the folder alone.
     names.retain(|name| name.file_name() == Some(name.as_os_str()));
     names.extend(OWN_FILES.map(PathBuf::from));
-    for (inner, _) in PAGE_FOLDERS {
+    for (inner, _) in REPORT_FOLDERS {
         let entries = std::fs::read_dir(folder.join(inner)).into_iter().flatten().flatten();
-        names.extend(entries.map(|entry| Path::new(inner).join(entry.file_name())).filter(|name| is_of_page(name)));
+        names.extend(
+            entries.map(|entry| Path::new(inner).join(entry.file_name())).filter(|name| is_of_report(name)),
+        );
     }
     let scene = &prepared.job.scene;
     let guard = InputGuard::new([Path::new(&scene.origin.file)]).with_scene(scene);
@@ -107,7 +110,7 @@ fn remove_earlier(prepared: &PreparedScene, folder: &Path) {
 /// What is said of a run beside its figures.
 #[derive(Clone, Debug)]
 pub(crate) struct RunRemarks {
-    /// Sentences of the page that compare the run with what was asked for or others found, in Markdown.
+    /// Sentences of the report that compare the run with what was asked for or others found, in Markdown.
     pub(crate) sentences: Vec<String>,
     /// What came of the error that was asked for, if one was.
     pub(crate) target: Option<TargetResult>,
@@ -134,13 +137,13 @@ pub(crate) fn write_anywhere(
     prepared: &PreparedScene,
     run: &mut SceneResults,
     remarks: &RunRemarks,
-    with_page: bool,
+    with_report: bool,
     console: &Console,
 ) -> Option<PathBuf> {
     let name = format!("lampyris-rescued-{}", machine::process_name());
     let mut places = rescue_folders().into_iter().map(|folder| folder.join(&name));
     places.find(|folder| {
-        let written = write(prepared, folder, run, remarks, with_page, console);
+        let written = write(prepared, folder, run, remarks, with_report, console);
         if written.is_err() {
             // Half of the results tells nobody anything.
             let _ = std::fs::remove_dir_all(folder);
@@ -149,14 +152,14 @@ pub(crate) fn write_anywhere(
     })
 }
 
-/// Writes everything into a folder, which is made; the page, if wanted, comes last, so that a folder with a page is complete. Notes in
+/// Writes everything into a folder, which is made; the report, if wanted, comes last, so that a folder with one is complete. Notes in
 /// `run` which files each receiver got. Returns the document of `results.json` and the answer in words.
 pub(crate) fn write(
     prepared: &PreparedScene,
     folder: &Path,
     run: &mut SceneResults,
     remarks: &RunRemarks,
-    with_page: bool,
+    with_report: bool,
     console: &Console,
 ) -> Result<(Value, String), Failure> {
     let spinner = console.spinner("writing");
@@ -178,7 +181,7 @@ pub(crate) fn write(
     let mut facets = appearance::grouped_facets(&prepared.job.loaded.model, mesh, Some(&prepared.bound));
     facets.paths = Some(&near);
     write_facets(&folder.join("facets.glb"), &facets)?;
-    // The page shows paths as lines of its own.
+    // The report shows paths as lines of its own.
     facets.paths = None;
     let has_lost_rays = lost_rays::write(folder, &run.results, prepared)?;
     let provenance = remarks.commands.provenance(prepared.run_settings().seed, run.results.threads, console);
@@ -203,14 +206,14 @@ pub(crate) fn write(
     }
     let text = json_text(&document)?;
     write_atomic(&folder.join("results.json"), |w| w.write_all(text.as_bytes()))?;
-    // Labels are for the page, where a click names a face.
-    if with_page {
+    // Labels are for the report, where a click names a face.
+    if with_report {
         facets.labels = rule_table::face_labels(&prepared.job.loaded.model);
     }
     let found = (all_figures.as_slice(), &power, verdicts.as_slice());
-    let report = report_page(prepared, run, found, &facets, remarks.sentences.clone(), provenance);
+    let report = scene_report(prepared, run, found, &facets, remarks.sentences.clone(), provenance);
     let answer = report.answer();
-    if with_page {
+    if with_report {
         report.with_views(facet_views(prepared, &facets)).report().write(folder)?;
     }
     spinner.finish_and_clear();
@@ -218,8 +221,8 @@ pub(crate) fn write(
     Ok((document, asked + &answer))
 }
 
-/// Returns the page of a traced scene; `sentences` compare it with what was asked for or others found.
-fn report_page<'a>(
+/// Returns the report of a traced scene; `sentences` compare it with what was asked for or others found.
+fn scene_report<'a>(
     prepared: &'a PreparedScene,
     run: &'a SceneResults,
     (all_figures, power, verdicts): (&'a [ReceiverFigures], &'a PowerFigures, &'a [(usize, Assessment)]),
@@ -228,7 +231,7 @@ fn report_page<'a>(
     provenance: Provenance,
 ) -> SimulationReport<'a> {
     let scene = &prepared.job.scene;
-    // A page without a title says nothing to those who only hear it.
+    // A report without a title says nothing to those who only hear it.
     let file = crate::formats::file_name(Path::new(&scene.origin.file));
     let titles = [scene.title.as_str(), prepared.job.loaded.model.name.as_str(), file.as_str()];
     let title = titles.into_iter().find(|t| !t.trim().is_empty()).unwrap_or("light through a scene").to_owned();
