@@ -81,7 +81,7 @@ impl Place {
     }
 
     /// Returns how far along [`SORTING_LINE`] it lies, times the line's length.
-    fn along(&self) -> f64 {
+    fn sorting_position(&self) -> f64 {
         let origin = self.frame.origin.to_array();
         origin.iter().zip(SORTING_LINE).map(|(x, slope)| x * slope).sum()
     }
@@ -115,7 +115,7 @@ impl PlaceTable {
     /// Adds a thing in a place; the entries are numbered from 0.
     pub(super) fn insert(&mut self, thing: u64, place: Place) {
         let class = RoundingClass::number(place.rounding);
-        self.entries.insert((thing, class, ordered(place.along()), self.entries.len()), place);
+        self.entries.insert((thing, class, ordered(place.sorting_position()), self.entries.len()), place);
         let classes = self.classes.entry(thing).or_default();
         match classes.iter_mut().find(|known| known.class == class) {
             Some(known) => known.widest = known.widest.max(place.rounding),
@@ -133,7 +133,7 @@ impl PlaceTable {
     fn abreast(&self, thing: u64, place: &Place) -> Option<impl Iterator<Item = (usize, &Place)>> {
         let classes = self.classes.get(&thing)?;
         // What is too far out for a number is refused by those who ask.
-        let along = Some(place.along()).filter(|along| along.is_finite())?;
+        let along = Some(place.sorting_position()).filter(|along| along.is_finite())?;
         let rounding = place.rounding;
         Some(classes.iter().flat_map(move |&RoundingClass { class, widest }| {
             let reach = widest.max(rounding) * SORTING_LINE.iter().sum::<f64>();

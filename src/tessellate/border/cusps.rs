@@ -51,8 +51,9 @@ fn untangle(polygon: &mut [PolygonVertex], corner: usize, scale: Uv, limit: f64,
         return;
     }
     // Where they are clearly apart, it is told on which side of the other each belongs.
-    let apart =
-        |line: &[Uv], points: &[Uv]| points.iter().map(|&p| beside(p, line).0).find(|away| away.abs() > limit);
+    let apart = |line: &[Uv], points: &[Uv]| {
+        points.iter().map(|&p| Foot::on_line(p, line).away).find(|away| away.abs() > limit)
+    };
     let left = apart(&back, &ahead).or_else(|| apart(&ahead, &back).map(|away| -away));
     // A strip that is nowhere wide lies to the left of the way around it.
     let is_strip = is_alone && ahead.len() + back.len() == polygon.len() + 2;
@@ -90,22 +91,33 @@ fn side_from(polygon: &[PolygonVertex], corner: usize, ahead: bool) -> Vec<usize
 fn part(points: &mut [Uv], line: &[Uv], sign: f64, limit: f64) {
     let inner = points.len() - 1;
     for p in &mut points[1..inner] {
-        let (away, foot, left) = beside(*p, line);
-        if away.abs() > limit {
+        let foot = Foot::on_line(*p, line);
+        if foot.away.abs() > limit {
             break;
         }
-        if away * sign < BESIDE * limit {
-            *p = foot + left * (sign * BESIDE * limit);
+        if foot.away * sign < BESIDE * limit {
+            *p = foot.place + foot.left * (sign * BESIDE * limit);
         }
     }
 }
 
-/// Returns how far a point lies to the left of a line of two points or more, its foot there, and the unit vector to the left.
-fn beside(p: Uv, line: &[Uv]) -> (f64, Uv, Uv) {
-    let foot = |s: &[Uv]| (nearest_on_side([s[0], s[1]], p), (s[1] - s[0]).perp().normalize_or_zero());
-    let feet = line.windows(2).filter(|s| s[0] != s[1]).map(foot);
-    let nearest = feet.min_by(|a, b| (a.0 - p).length_squared().total_cmp(&(b.0 - p).length_squared()));
-    let Some((foot, left)) = nearest else { return (0.0, p, Uv::ZERO) };
-    let away = p - foot;
-    (away.length().copysign(away.dot(left)), foot, left)
+/// The place of a line that is nearest to a point.
+struct Foot {
+    place: Uv,
+    /// Unit vector to the left of the line there.
+    left: Uv,
+    /// Distance of the point, positive to the left, mm.
+    away: f64,
+}
+
+impl Foot {
+    /// Finds the foot of a point on a line of two points or more; of a line without length it is the point.
+    fn on_line(p: Uv, line: &[Uv]) -> Self {
+        let foot = |s: &[Uv]| (nearest_on_side([s[0], s[1]], p), (s[1] - s[0]).perp().normalize_or_zero());
+        let feet = line.windows(2).filter(|s| s[0] != s[1]).map(foot);
+        let nearest = feet.min_by(|a, b| (a.0 - p).length_squared().total_cmp(&(b.0 - p).length_squared()));
+        let Some((place, left)) = nearest else { return Self { place: p, left: Uv::ZERO, away: 0.0 } };
+        let away = p - place;
+        Self { place, left, away: away.length().copysign(away.dot(left)) }
+    }
 }

@@ -46,7 +46,7 @@ pub(super) fn cosine_of_free_cone(tree: &Tree, facet: usize, axis: Vector, wides
     for (base, _) in bases.iter().flatten() {
         limit.lower(axis.dot(base.normal));
     }
-    let sheet = (sag > 0.0).then(|| Sheet::around(mesh, facet));
+    let sheet = (sag > 0.0).then(|| Sheet::new(mesh, facet));
     if let Some(sheet) = &sheet {
         limit.lower_half_angle(sheet.half_angle(facet, axis));
     }

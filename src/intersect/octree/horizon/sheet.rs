@@ -22,8 +22,8 @@ pub(super) struct Sheet<'m> {
 }
 
 impl<'m> Sheet<'m> {
-    /// The sheet around this facet of the mesh.
-    pub(super) fn around(mesh: &'m FacetMesh, facet: usize) -> Self {
+    /// Makes the sheet around a facet of the mesh.
+    pub(super) fn new(mesh: &'m FacetMesh, facet: usize) -> Self {
         Self { mesh, facet, positions: mesh.corner_positions(facet) }
     }
 
