@@ -4,6 +4,8 @@ use std::f64::consts::PI;
 
 /// Millimetres in a metre.
 pub const METRE: f64 = 1000.0;
+/// Square millimetres in a square metre.
+pub const SQUARE_METRE: f64 = METRE * METRE;
 /// Millimetres in an inch, exact.
 pub const INCH: f64 = 25.4;
 /// Radians in a degree.

@@ -18,7 +18,7 @@ const FRAMED_PERCENT: f64 = 99.5;
 /// Steps of the cells below which a radius says more of the cells than of the light: with the light in two cells beside each other it is
 /// half a step, in three in a row one.
 const FEW_CELLS: f64 = 2.0;
-/// Distance in cells from an edge between two within which a plane lies on it.
+/// Distance in cells from an edge between two within which a plane, or the direction ahead, lies on it.
 const ON_EDGE: f64 = 1e-9;
 /// Radii at which the encircled power is drawn.
 const RADII: usize = 200;
@@ -111,7 +111,7 @@ fn value_ahead(grid: &Grid) -> Option<[Cell; 2]> {
     }
     let cells = |axis: &crate::formats::Axis| -> Vec<usize> {
         // An even number of cells has none in the middle: two or four meet there, to rounding.
-        (0..axis.cells).filter(|&k| axis.center(k).abs() <= 0.5 * axis.step() * (1.0 + 1e-9)).collect()
+        (0..axis.cells).filter(|&k| axis.center(k).abs() <= (0.5 + ON_EDGE) * axis.step()).collect()
     };
     let (columns, rows) = (cells(&grid.axes[0]), cells(&grid.axes[1]));
     let mut meeting: Vec<usize> =

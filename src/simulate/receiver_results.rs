@@ -6,12 +6,10 @@ use super::receiver::{NAMED_RECEIVERS, Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
 use super::tallies::Tallies;
 use super::tally::{Moments, Sum};
+use crate::math::units::SQUARE_METRE;
 use crate::text::{count_of, first_sentences};
 use serde::Serialize;
 use std::borrow::Cow;
-
-/// Square millimetres to a square metre.
-const MM2_PER_M2: f64 = 1e6;
 
 /// What one receiver counted.
 #[derive(Clone, Debug, Serialize)]
@@ -140,7 +138,7 @@ impl ShapeUnits {
         let is_lumen = unit == PowerUnit::Lumen;
         let per_area = if is_lumen { "lx" } else { "W/m2" };
         let on_area =
-            |kind, half| Self { kind, unit: per_area, scale: MM2_PER_M2, half, middle: [0.0; 2], angles: None };
+            |kind, half| Self { kind, unit: per_area, scale: SQUARE_METRE, half, middle: [0.0; 2], angles: None };
         match shape {
             Shape::Plane { half, .. } => on_area("plane", *half),
             Shape::Disc { radius, .. } => on_area("disc", [*radius; 2]),

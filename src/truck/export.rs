@@ -7,6 +7,15 @@ use crate::math::{Frame, Homogeneous};
 use crate::model::{EdgeId, EdgeUse, Face, Part, TrimLoop};
 use crate::nurbs::{ControlPoint, Curve};
 
+/// Diagonal of the box around an edge below which it is a point, mm: the rounding of places up to 100 m.
+const SHORTEST_EDGE: f64 = 1e-9;
+
+/// Parameters along a seam that differ by less are one: the rounding of parameters up to a million.
+const SAME_PARAMETER: f64 = 1e-9;
+
+/// Share of a line below which a stretch of it has no length: thousands of roundings.
+const NO_LENGTH: f64 = 1e-12;
+
 /// A truck face and which face of the part it came from.
 #[derive(Clone, Debug)]
 pub struct TruckFace {
@@ -97,7 +106,7 @@ impl<'a> Exporter<'a> {
                 Some(id) => self.part.edges[id.0 as usize].curve.clone(),
                 None => seam_curve(f, u)?,
             };
-            if curve.bounds().diagonal() > 1e-9 {
+            if curve.bounds().diagonal() > SHORTEST_EDGE {
                 curves.push(self.placed_curve(if u.reversed { curve.reversed() } else { curve }));
             }
         }
@@ -159,14 +168,14 @@ fn seam_curve(f: &Face, u: &EdgeUse) -> Result<Curve, String> {
     let [t0, t1] = u.uv.domain();
     let (a, b) = (u.uv.evaluate(t0), u.uv.evaluate(t1));
     // Seams are lines of constant parameter; anything else has no curve that both sides share.
-    let constant = (0..2).find(|&k| u.uv.points.iter().all(|p| (p.position()[k] - a[k]).abs() < 1e-9));
+    let constant = (0..2).find(|&k| u.uv.points.iter().all(|p| (p.position()[k] - a[k]).abs() < SAME_PARAMETER));
     let constant = constant.ok_or("a seam that is no line of constant parameter")?;
     let [from, to] = [a[1 - constant], b[1 - constant]];
     let line = f.surface.isoline(constant, a[constant]);
     let [low, high] = line.domain();
     let cut = [from.min(to).max(low), from.max(to).min(high)];
     // A stretch without length is a pole: a line from the point to itself.
-    if cut[1] - cut[0] < 1e-12 * (high - low) {
+    if cut[1] - cut[0] < NO_LENGTH * (high - low) {
         return Ok(Curve::line(line.evaluate(from), line.evaluate(from), [0.0, 1.0]));
     }
     let line = line.restricted(cut[0], cut[1]);

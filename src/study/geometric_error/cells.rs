@@ -5,6 +5,7 @@
 
 use super::paired::{Paired, SIGNIFICANT};
 use super::replicates::{ReplicateSums, ReplicatedRun};
+use crate::math::units::SQUARE_METRE;
 use crate::math::{error_of_sum, variance_of_sum};
 use crate::simulate::BoundScene;
 use serde::Serialize;
@@ -113,7 +114,7 @@ impl<'r> CellPairs<'r> {
         let power = if worth == 1.0 { None } else { Some(cells_of_layer(0)?) };
         let cells = cells_of_layer(layer)?;
         // Lux and W/m² of cells in mm².
-        let scale = if result.kind == "far_field" { 1.0 } else { 1e6 };
+        let scale = if result.kind == "far_field" { 1.0 } else { SQUARE_METRE };
         let results = &runs[1].results;
         // A power of two, which rounding of the quotient must not blur.
         let ray =

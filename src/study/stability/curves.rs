@@ -7,6 +7,9 @@ use crate::nurbs::{ControlPoint, Curve, Surface, sweep};
 use crate::study::Random;
 use std::f64::consts::PI;
 
+/// Stands for the cosine 0 of a ray that runs along the surface, which would divide the tolerance.
+const LEAST_COS: f64 = 1e-12;
+
 /// Makes the cases on swept curves and graphs.
 pub(super) fn cases() -> Vec<Case> {
     vec![
@@ -84,11 +87,11 @@ fn cusp_case() -> Case {
         let (ray, t, cos) = ray_down(&mut random, x, height(x));
         // dx/dz on the curve is 3/2·(|x|/40)^(1/3): the cosine of a vertical ray.
         let across = 1.5 * (x.abs() / 40.0).cbrt();
-        // At the cusp a vertical ray runs along the surface; a cosine of zero would divide the tolerance.
+        // At the cusp a vertical ray runs along the surface.
         let steep = across / across.hypot(1.0);
         Question::First {
             ray,
-            truth: Truth::hit(t, (cos * steep).max(1e-12), if x == 0.0 { 0.0 } else { x.abs() }),
+            truth: Truth::hit(t, (cos * steep).max(LEAST_COS), if x == 0.0 { 0.0 } else { x.abs() }),
         }
     };
     Case {
@@ -165,8 +168,8 @@ fn ruling_case() -> Case {
         let mut random = Random::new(24, i);
         let x = random.between(-40.0, 40.0);
         let ray = Ray::new(Point::new(x, -150.0, 0.5 * x), Vector::Y);
-        // On the ruling the ray lies in the surface; a cosine of zero would divide the tolerance.
-        Question::First { ray, truth: Truth::hit(100.0, 1e-12, 0.0) }
+        // On the ruling the ray lies in the surface.
+        Question::First { ray, truth: Truth::hit(100.0, LEAST_COS, 0.0) }
     });
     Case {
         name: "ray along a ruling",

@@ -113,13 +113,16 @@ fn coincident_case() -> Case {
 
 /// Makes the case of rays on facets a million times as long as wide.
 fn slivers_case() -> Case {
-    // A bar of 1000 × 1e-3 × 1e-4 mm in facets as long as the bar.
-    let (min, max) = (Point::ZERO, Point::new(1000.0, 1e-3, 1e-4));
+    // A bar in facets as long as the bar; its sides in mm.
+    let [length, width, height] = [1000.0, 1e-3, 1e-4];
+    let (min, max) = (Point::ZERO, Point::new(length, width, height));
     let questions = (0..300).map(|i| {
         let mut random = Random::new(43, i);
-        let target = Point::new(random.between(1.0, 999.0), 1e-3 * random.between(0.05, 0.95), 1e-4);
+        let target = Point::new(random.between(1.0, length - 1.0), width * random.between(0.05, 0.95), height);
         let d = Vector::new(random.between(-0.5, 0.5), random.between(-0.5, 0.5), -1.0).normalize();
-        Question::First { ray: Ray::new(target - d * 10.0, d), truth: Truth::hit(10.0, d.z, 4e-5) }
+        // Every target lies farther from the long edges than this.
+        let margin = 0.04 * width;
+        Question::First { ray: Ray::new(target - d * 10.0, d), truth: Truth::hit(10.0, d.z, margin) }
     });
     Case {
         name: "slivers",

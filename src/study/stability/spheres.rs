@@ -8,6 +8,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Radius of the balls, mm.
 const R: f64 = 50.0;
+/// Stands for the cosine 0 of a ray that touches a ball, which would divide the tolerance.
+const TOUCHING_COS: f64 = 1e-9;
 /// All around.
 const FULL: [f64; 2] = [0.0, 2.0 * PI];
 
@@ -78,7 +80,7 @@ fn graze_case() -> Case {
     }
     let touch = |i| Question::First {
         ray: ray_past_origin(&mut Random::new(2, i), R),
-        truth: Truth::hit(150.0, 1e-9, 0.0),
+        truth: Truth::hit(150.0, TOUCHING_COS, 0.0),
     };
     questions.extend((0..40).map(touch));
     ball_case("grazing sphere", questions)
@@ -235,13 +237,14 @@ fn on_surface_case() -> Case {
 
 /// Makes the case of rays on a ball from a kilometre off.
 fn far_origin_case() -> Case {
+    let distance: f64 = 1e6;
     let question = |i| {
         let mut random = Random::new(9, i);
         let depth = random.between(1.0, R);
         let near = ray_past_origin(&mut random, R - depth);
         let truth = ball_crossings(depth)[0];
-        let ray = Ray::new(near.origin - near.direction * 1e6, near.direction);
-        Question::First { ray, truth: Truth { t: truth.t.map(|t| t + 1e6), ..truth } }
+        let ray = Ray::new(near.origin - near.direction * distance, near.direction);
+        Question::First { ray, truth: Truth { t: truth.t.map(|t| t + distance), ..truth } }
     };
     ball_case("origin 1e6 mm away", (0..400).map(question).collect())
 }
