@@ -112,8 +112,7 @@ pub fn read_bytes(name: &str, bytes: &[u8], settings: &Settings) -> Result<Impor
     }
     report.seconds.parse = parsed;
     report.seconds.convert = start.elapsed().as_secs_f64() - parsed;
-    // 0 stands for a system that does not tell.
-    report.peak_bytes = peak_bytes().unwrap_or(0);
+    report.peak_bytes = peak_bytes();
     Ok(Import { model, report })
 }
 

@@ -51,8 +51,8 @@ pub struct ImportReport {
     pub cut_off: bool,
     /// Time taken.
     pub seconds: Seconds,
-    /// Largest resident size of the process so far, bytes; 0 where the system does not tell.
-    pub peak_bytes: u64,
+    /// Largest resident size of the process so far, bytes; `None` where the system does not tell.
+    pub peak_bytes: Option<u64>,
 }
 
 /// Names of units.

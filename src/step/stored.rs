@@ -43,7 +43,7 @@ impl<'s> Source<'s> {
     /// When `to` cannot be written.
     pub(crate) fn write(&self, import: &Import, to: &mut dyn Write) -> io::Result<()> {
         // What is of that one reading is left out.
-        let report = ImportReport { seconds: Seconds::default(), peak_bytes: 0, ..import.report.clone() };
+        let report = ImportReport { seconds: Seconds::default(), peak_bytes: None, ..import.report.clone() };
         let bytes = postcard::to_allocvec(&(&import.model, &report)).map_err(io::Error::other)?;
         write_array(to, &bytes)
     }
@@ -57,8 +57,8 @@ impl<'s> Source<'s> {
         let (model, report): (Model, ImportReport) =
             postcard::from_bytes(&bytes).map_err(|_| invalid("no model"))?;
         let seconds = Seconds { parse: self.start.elapsed().as_secs_f64(), convert: 0.0 };
-        let peak_bytes = peak_bytes().unwrap_or(0);
-        Ok(Import { model, report: ImportReport { hash: self.hash, seconds, peak_bytes, ..report } })
+        let report = ImportReport { hash: self.hash, seconds, peak_bytes: peak_bytes(), ..report };
+        Ok(Import { model, report })
     }
 }
 
@@ -81,13 +81,13 @@ mod tests {
             let bytes = std::fs::read(&path).unwrap();
             let source = Source::new("part.stp", &bytes, &settings);
             let Ok(Import { model, report }) = source.import() else { continue };
-            let import = Import { model, report: ImportReport { peak_bytes: 7, ..report } };
+            let import = Import { model, report: ImportReport { peak_bytes: Some(7), ..report } };
             let mut kept = Vec::new();
             source.write(&import, &mut kept).unwrap();
             let mut from = &kept[..];
             let again = source.read(&mut ArrayReader::new(&mut from, kept.len() as u64)).unwrap();
             let timeless = |report: &ImportReport| {
-                format!("{:?}", ImportReport { seconds: Seconds::default(), peak_bytes: 0, ..report.clone() })
+                format!("{:?}", ImportReport { seconds: Seconds::default(), peak_bytes: None, ..report.clone() })
             };
             assert_eq!(format!("{:?}", again.model), format!("{:?}", import.model), "{path:?}");
             assert_eq!(timeless(&again.report), timeless(&import.report), "{path:?}");
