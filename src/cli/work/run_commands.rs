@@ -58,7 +58,7 @@ impl RunCommands {
     /// Returns where the numbers of the run come from, which this process writes.
     pub(crate) fn provenance(&self, seed: u64, threads: usize, console: &Console) -> Provenance {
         let mut traced_by: Vec<String> = self.traced_by.iter().cloned().collect();
-        // The page shows the first of them: those of the first parts.
+        // The report shows the first of them: those of the first parts.
         traced_by.sort_by(|a, b| natural_order(a, b));
         Provenance { command: self.command.clone(), traced_by, ..console.provenance(Some(seed), threads) }
     }
