@@ -6,9 +6,10 @@ use lampyris::intersect::exact::{Exact, Settings};
 use lampyris::intersect::octree::{self, Octree};
 use lampyris::intersect::polish::Polished;
 use lampyris::intersect::{Certainty, Cost, Intersector};
-use lampyris::math::{Departure, FaceId, Homogeneous, Point, Ray, Uv, Vector};
-use lampyris::nurbs::Surface;
+use lampyris::math::{Departure, FaceId, Frame, Homogeneous, Point, Ray, Uv, Vector};
+use lampyris::nurbs::{Surface, sweep};
 use lampyris::tessellate;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The bowl `z = (x² + y²) / 2` over the square of ±0.5, times `size` and moved by `shift`. The weights of its rows and columns grow by
 /// `speed` from one to the next: a place of the plane keeps its height, and parameters run unevenly.
@@ -171,4 +172,34 @@ fn a_polished_chord_is_found_whatever_the_size_of_its_part() {
         assert!(wrong.is_empty(), "{} of {asked} on {size} mm: {:?}", wrong.len(), &wrong[..wrong.len().min(5)]);
         assert!(*asked > 1000 && flagged * 50 < *asked, "{flagged} of {asked} flagged on {size} mm");
     }
+}
+
+/// Chords of a fillet in the plane across its axis, on leaves so coarse that both ends of a chord lie on one: boxes are cut as thin as
+/// rounding along the axis long before they are short along the arc, and a chord's end was taken for its start.
+#[test]
+fn chords_of_a_coarse_fillet_are_found() {
+    let center = Point::new(8.9, 0.0, 3.89);
+    let frame = Frame::from_axis(center, -Vector::Y, Some(Vector::new(1.0, 0.0, 1.0)));
+    let fillet = sweep::cylinder(&frame, 2.0, [1.75 * PI, 2.25 * PI], [0.05, 1.65]);
+    let exact = Exact::build(&model([fillet]), &Settings { most_leaves: Some(0), ..Settings::default() });
+    let mut asked = 0;
+    for k in 1..240 {
+        let angle = FRAC_PI_2 * f64::from(k) / 240.0;
+        for graze in [0.5f64, 1.0, 2.0, 4.05, 8.0, 16.0].map(f64::to_radians) {
+            if angle + 2.0 * graze > 0.99 * FRAC_PI_2 {
+                continue;
+            }
+            let height = [-0.3, -0.85, -1.181576][asked % 3];
+            let middle = center.with_y(height);
+            let ((sin, cos), (rise, along)) = (angle.sin_cos(), graze.sin_cos());
+            let (out, onward) = (Vector::new(cos, 0.0, sin), Vector::new(-sin, 0.0, cos));
+            let from = exact.intersect(&Ray::new(middle, out), &mut Cost::default()).unwrap().departure();
+            let ray = Ray::new(middle + 2.0 * out, along * onward - rise * out).with_departure(from);
+            let hit = exact.intersect(&ray, &mut Cost::default());
+            // 2 r sin θ.
+            assert!(hit.is_some_and(|hit| (hit.t - 4.0 * rise).abs() < 1e-9), "{angle} {graze}: {hit:?}");
+            asked += 1;
+        }
+    }
+    assert!(asked > 1000);
 }

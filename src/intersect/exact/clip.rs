@@ -244,41 +244,42 @@ impl Exact {
         let start = keep.map(|[a, b]| 0.5 * (a + b));
         // The method may run off although a root is there; the box is then cut or halved like any other.
         let Some([u, v]) = newton(&node.net, degree, start) else { return false };
-        let e = ROOT_ROUNDING + 2.0 * y.slack[0].max(y.slack[1]);
+        // By direction: boxes may be as thin as rounding along one and long along the other.
+        let room = y.slack.map(|slack| ROOT_ROUNDING + 2.0 * slack);
+        let found = [u, v];
         // Beside the box: if it is a root of the leaf, another box holds it, and this one is cut until its hull
         // misses the ray.
-        if [u, v].iter().any(|x| !(-e..=1.0 + e).contains(x)) {
+        if (0..2).any(|k| !(-room[k]..=1.0 + room[k]).contains(&found[k])) {
             return false;
         }
         let s = net::evaluate(&node.net, degree, u, v).s;
         let t = s[2] / s[3];
-        let [[u0, u1], [v0, v1]] = node.rect;
-        let [size_u, size_v] = size(&node.rect);
-        let local = [u0 + size_u * u, v0 + size_v * v];
+        let sizes = size(&node.rect);
+        let local = [0, 1].map(|k: usize| node.rect[k][0] + sizes[k] * found[k]);
         // An origin a little off its surface point moves the root by that much across the ray.
-        let moved =
-            query.departure.map_or(0.0, |own| own.off) * y.inverse.iter().flatten().map(|x| x.abs()).sum::<f64>();
+        let off = query.departure.map_or(0.0, |own| own.off);
+        let moved = y.inverse.map(|[a, b]| off * (a.abs() + b.abs()));
         // With one root at most in the box, a departure in it is that root. Near the box counts too, for neighbours
         // find a root on their border both.
         let is_departure = |p: [f64; 2]| {
-            let close = (p[0] - local[0]).abs() <= size_u * (e + moved) + SAME_PARAMETER
-                && (p[1] - local[1]).abs() <= size_v * (e + moved) + SAME_PARAMETER;
-            close || p[0] >= u0 && p[0] <= u1 && p[1] >= v0 && p[1] <= v1
+            let is_close =
+                (0..2).all(|k| (p[k] - local[k]).abs() <= sizes[k] * (room[k] + moved[k]) + SAME_PARAMETER);
+            is_close || (0..2).all(|k| p[k] >= node.rect[k][0] && p[k] <= node.rect[k][1])
         };
         let leaving =
             clipping.departure.is_some_and(is_departure) && query.departure.is_some_and(|own| own.is_root_at(t));
         if !leaving {
-            let found = Candidate { local, t, certainty: Certainty::Certified, settled: None };
-            let margin = [0, 1].map(|k: usize| (ROOT_ROUNDING + 2.0 * y.slack[k]) * [size_u, size_v][k]);
+            let candidate = Candidate { local, t, certainty: Certainty::Certified, settled: None };
+            let margin = [0, 1].map(|k: usize| room[k] * sizes[k]);
             let ill_scaled = self.linearizations[clipping.index as usize].ill_scaled;
             if clipping.seen.precise {
-                self.settle(query, clipping.index, found, [settlement::LOOSE; 2]);
+                self.settle(query, clipping.index, candidate, [settlement::LOOSE; 2]);
             } else if ill_scaled || settlement::needs_settling(local, margin) {
                 // Where its margin reaches over the leaf's border, or the patch has few digits, `f64` cannot say
                 // whose root it is.
-                self.settle(query, clipping.index, found, margin);
+                self.settle(query, clipping.index, candidate, margin);
             } else {
-                self.offer(query, clipping.index, found);
+                self.offer(query, clipping.index, candidate);
             }
         }
         true
