@@ -106,10 +106,11 @@ fn wavelength(bound: &BoundScene, settings: &RunSettings, plan: &Plan, ray: u64)
 /// is in front of it, and light that it ends is recorded as much before it.
 fn counted_range(ray: &Ray, a: &PathVertex, b: &PathVertex, absorbs: bool) -> [f64; 2] {
     let length = (b.point - a.point).length();
-    if absorbs {
+    let end = match b.event {
+        Event::Escaped => f64::INFINITY,
         // Twice, for the way back is rounded too.
-        return [0.0, length + 2.0 * in_front(ray, length)];
-    }
-    let end = if b.event == Event::Escaped { f64::INFINITY } else { length + in_front(ray, length) };
-    [in_front(ray, 0.0), end]
+        Event::Received => length + 2.0 * in_front(ray, length),
+        _ => length + in_front(ray, length),
+    };
+    [if absorbs { 0.0 } else { in_front(ray, 0.0) }, end]
 }

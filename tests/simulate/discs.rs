@@ -1,8 +1,10 @@
-//! Round receivers: solid angles and view factors in closed form, and maps that end at the rim.
+//! Round receivers: solid angles and view factors in closed form, and maps that end at the rim; receivers at one place.
 
-use crate::support::World;
-use lampyris::simulate::{ReceiverResult, Results};
+use crate::support::{Shape, World};
+use lampyris::math::{Frame, Point, Vector};
+use lampyris::simulate::{ReceiverResult, Results, RunSettings, Scene, arrivals};
 use std::f64::consts::PI;
+use std::path::Path;
 
 /// Standard errors that a figure may be off.
 const SIGMAS: f64 = 4.0;
@@ -153,4 +155,64 @@ fn light_that_no_channel_counts_is_told() {
         run.notes.iter().any(|note| note.contains("came to 'screen' is of wavelengths"))
     };
     assert!(is_told("[600, 700]") && !is_told("[500, 600]"));
+}
+
+/// Two receivers at one place of which one ends light and the other lets it pass.
+fn coinciding(passing: &str, ending: &str, passing_first: bool) -> String {
+    let passing = format!("[[receiver]]\nname = 'passing'\n{passing}\nabsorbs = false\n");
+    let ending = format!("[[receiver]]\nname = 'ending'\n{ending}\n");
+    if passing_first { passing + &ending } else { ending + &passing }
+}
+
+/// All light of a watt comes to both receivers of a scene, and every ray that was recorded.
+fn assert_both_count_all(world: &World, text: &str) {
+    let results = world.run(text, |s| s.path_samples = s.rays);
+    let scene = Scene::parse(text, "test.toml", Path::new(".")).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    for (k, receiver) in results.receivers.iter().enumerate() {
+        assert!((receiver.power - 1.0).abs() < 1e-9, "{}: {} W of\n{text}", receiver.name, receiver.power);
+        let arrived = arrivals(&bound, &RunSettings::from(&scene.run), k, &results).len();
+        assert_eq!(arrived, 1000, "{} of\n{text}", receiver.name);
+    }
+}
+
+/// Light that ends on a receiver has come to its place: one there that lets light pass counts all of it, whichever stands first in the scene,
+/// turned to either side, and in the box around the scene (the beam of radius 10) or outside of it (9.9).
+#[test]
+fn a_receiver_that_lets_light_pass_counts_it_at_one_that_ends_it() {
+    let (small, large) = ("kind = 'disc'\nradius = 80", "kind = 'disc'\nradius = 90");
+    let (square, wide) = ("size = [160, 160]", "size = [180, 180]");
+    for (passing, ending) in [(small, large), (square, wide), (small, wide), (square, large)] {
+        for [normal, other] in [["[0, 0, 1]"; 2], ["[0.1, 0.3, 1]"; 2], ["[-0.1, -0.3, -1]", "[0.1, 0.3, 1]"]] {
+            let place = |shape: &str, normal: &str| format!("{shape}\nat = [0, 0, 40]\nnormal = {normal}");
+            for (radius, passing_first) in [(10.0, true), (10.0, false), (9.9, true), (9.9, false)] {
+                let text = format!(
+                    "[run]\nrays = 1000\n[[source]]\nkind = 'collimated'\nat = [0, 0, 50]\ndirection = [0, 0, -1]\nradius = {radius}\n{}",
+                    coinciding(&place(passing, normal), &place(ending, other), passing_first)
+                );
+                assert_both_count_all(&World::default(), &text);
+            }
+        }
+    }
+}
+
+/// The same behind a flat mirror that turns the beam by a right angle, within its box and outside of it.
+#[test]
+fn receivers_at_one_place_count_what_a_mirror_sends_there() {
+    let mut world = World::default();
+    let frame = Frame::from_axis(Point::ZERO, Vector::new(1.0, 0.0, 1.0), Some(Vector::Y));
+    world.part("mirror", false, &[("front", Shape::Rectangle { frame, half: [10.0, 10.0] })]);
+    for (x, passing_first) in [(3.0, true), (3.0, false), (400.0, true), (400.0, false)] {
+        let place = |shape: &str| format!("{shape}\nat = [{x}, 0, 0]\nnormal = [1, 0, 0]");
+        for (passing, ending) in
+            [("kind = 'disc'\nradius = 2", "size = [5, 5]"), ("size = [3, 3]", "kind = 'disc'\nradius = 2.5")]
+        {
+            let text = format!(
+                "[run]\nrays = 1000\n[[material]]\npart = 'mirror'\nsurface = 'mirror'\nreflectance = 1\n\
+                 [[source]]\nkind = 'collimated'\nat = [0, 0, 50]\ndirection = [0, 0, -1]\nradius = 1\n{}",
+                coinciding(&place(passing), &place(ending), passing_first)
+            );
+            assert_both_count_all(&world, &text);
+        }
+    }
 }

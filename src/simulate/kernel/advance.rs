@@ -28,7 +28,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let context = self.context;
         let hit = clip_outside(context, path, ray, hit);
         // Receivers that let light through count it, and the medium takes its part, before the surface gets what is left.
-        if !self.cover_segment(path, ray, hit.map_or(ray.t_max, |h| h.t)) {
+        if !self.cover_segment(path, ray, hit) {
             return false;
         }
         let Some(hit) = hit else {
@@ -72,16 +72,18 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         self.apply_surface(path, ray, &mut at)
     }
 
-    /// Counts the light of a segment up to `end`, mm, on receivers that let it pass, then takes from `path` what the body absorbs. An
-    /// endless segment is absorbed in the surroundings alone. `false`, and the path ends, where the body took all of it.
+    /// Counts the light of a segment, up to `hit` or to the end of the clipped `ray`, on receivers that let it pass, then takes from `path`
+    /// what the body absorbs. An endless segment is absorbed in the surroundings alone. `false`, and the path ends, where the body took all
+    /// of it.
     #[inline(always)]
-    fn cover_segment(&mut self, path: &mut Path<C>, ray: &Ray, end: f64) -> bool {
+    fn cover_segment(&mut self, path: &mut Path<C>, ray: &Ray, hit: Option<&Hit>) -> bool {
+        let end = hit.map_or(ray.t_max, |h| h.t);
         // Endless segments end in the surroundings; of a body they would take all light that only missed a face by
         // an error.
         let absorbed = C::MEDIA && (end.is_finite() || path.payload.body() == AMBIENT);
         if !C::ENDS_ONLY && !self.context.passing.is_empty() {
             let absorption = if absorbed { self.absorption(path) } else { 0.0 };
-            self.count_passing(path, ray, end, absorption);
+            self.count_passing(path, ray, hit, absorption);
         }
         if !absorbed || self.absorb_in_body(path, end) {
             return true;
@@ -314,7 +316,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         }
         self.tally.counts.segments += 1;
         clip_outside(self.context, path, ray, None);
-        if self.cover_segment(path, ray, ray.t_max) {
+        if self.cover_segment(path, ray, None) {
             self.end_without_face(path, ray);
         }
         true

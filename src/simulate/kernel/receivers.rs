@@ -70,13 +70,26 @@ pub(super) fn clip_outside<'h, C: RayPayload>(
     None
 }
 
+/// Returns where on its ray a segment without a hit ends, mm: on a receiver at the receiver itself, of which `ray.t_max` may come a rounding
+/// short; else at `ray.t_max`.
+#[inline(always)]
+fn end_without_hit<C: RayPayload>(context: &Context<'_>, path: &Path<C>, ray: &Ray) -> f64 {
+    if matches!(path.receiver, NO_RECEIVER | SCATTERS) {
+        return ray.t_max;
+    }
+    // The crossing that clipped the segment is the nearest one of its receiver, and so is found once more, to the last bit.
+    let receiver = &context.bound.receivers[path.receiver as usize];
+    receiver.crossing(ray, ray.t_min, f64::INFINITY).unwrap_or(ray.t_max)
+}
+
 impl<C: RayPayload> Tracer<'_, '_, C> {
-    /// Counts the light on receivers that let it pass, on its way to `end`, mm, as what a body of this absorption, 1/mm, leaves of it up to
-    /// there; a sphere may count it twice.
-    pub(super) fn count_passing(&mut self, path: &Path<C>, ray: &Ray, end: f64, absorption: f64) {
+    /// Counts the light of a segment on receivers that let it pass, as what a body of this absorption, 1/mm, leaves of it up to there; a
+    /// sphere may count it twice.
+    pub(super) fn count_passing(&mut self, path: &Path<C>, ray: &Ray, hit: Option<&Hit>, absorption: f64) {
         let context = self.context;
-        let length = end;
-        // A receiver that lies in a face is crossed on the way to the face, not on the way from it.
+        let length = hit.map_or(ray.t_max, |h| h.t);
+        let end = hit.map_or_else(|| end_without_hit(context, path, ray), |h| h.t);
+        // A receiver that lies in a face, or on one that ends light, is crossed on the way there, not on the way from it.
         let start = ray.t_min + in_front(ray, 0.0);
         let end = end + in_front(ray, end.min(LONGEST_SEGMENT));
         let mut room = Candidates::new();
