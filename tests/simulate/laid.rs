@@ -2,7 +2,7 @@
 
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
-use lampyris::simulate::Scene;
+use lampyris::simulate::{LostCause, Scene};
 use std::path::Path;
 
 const FAR: &str = "[[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 18]\n";
@@ -29,6 +29,42 @@ fn light_of_a_disc_on_an_opaque_solid_goes_out() {
         assert_eq!(r.lost_rays, 0, "{source}: {:?}", r.ledger.first());
         assert!((r.power.received - out).abs() < 2e-3, "{source}: {:?}", r.power);
     }
+}
+
+/// A source in a face of an opaque solid that shines into it alone stands inside, as one a millimetre further in does: none of its light comes
+/// out on the outer side, and all of it is told as lost there. Turned round it shines out; with a medium of index 1 it lights the room.
+#[test]
+fn light_of_a_source_in_the_wall_of_a_solid_room_is_told_as_inside() {
+    let mut world = World::default();
+    world.cuboid("room", Point::new(-50.0, -50.0, 0.0), Point::new(50.0, 50.0, 60.0));
+    let run = |source: &str, material: &str| {
+        let text = format!(
+            "[run]\nrays = 2000\n[[material]]\npart = 'room'\nsurface = 'diffuse'\nreflectance = 0.6\n{material}\n[[source]]\n{source}\n{FAR}"
+        );
+        world.run(&text, |_| ())
+    };
+    for (kind, z) in [("lambertian", 0.0), ("lambertian", 1e-6), ("lambertian", 1.0), ("collimated", 0.0)] {
+        let source =
+            |up: f64| format!("kind = '{kind}'\nat = [0, 0, {z}]\ndirection = [0, 0, {up}]\nsize = [50, 50]");
+        let inwards = run(&source(1.0), "");
+        assert_eq!(inwards.lost_rays, 2000, "{kind} {z}: {:?}", inwards.power);
+        assert!(inwards.ledger.iter().all(|l| l.cause == LostCause::InsideSolid), "{kind} {z}");
+        if z < 1.0 {
+            let outwards = run(&source(-1.0), "");
+            assert_eq!((outwards.lost_rays, outwards.power.escaped), (0, 0.0), "{kind} {z}");
+            assert!((outwards.power.received - 1.0).abs() < 1e-9, "{kind} {z}: {:?}", outwards.power);
+        }
+    }
+    // Drawn around a hollow: all light stays in the room, whose walls take it.
+    let hollow = run(
+        "kind = 'lambertian'\nat = [0, 0, 0]\nsize = [50, 50]",
+        "medium = 'hollow'\n[[medium]]\nname = 'hollow'\nindex = 1",
+    );
+    assert_eq!((hollow.lost_rays, hollow.power.received), (0, 0.0), "{:?}", hollow.power);
+    // Of the light of a point half goes out, and the wall takes of the other half what it does not send out too.
+    let point = run("kind = 'point'\nat = [0.1, 0.3, 0]", "");
+    assert_eq!(point.lost_rays, 0, "{:?}", point.ledger.first());
+    assert!((point.power.received - 0.8).abs() < 2e-3, "{:?}", point.power);
 }
 
 /// Glass glued on a black die that shines: its light starts in the glass. Of diffuse light inside, Walsh's 0.596346 is reflected at

@@ -23,6 +23,8 @@ pub(super) enum StartingMedia {
     PerRay,
     /// The same, and the source may lie on a face of a solid, which its rays must start clear of.
     OnFace,
+    /// In an opaque solid: the source lies on a face of it and shines into it alone.
+    InSolid,
 }
 
 /// What all replicates share.

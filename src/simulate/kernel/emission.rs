@@ -270,13 +270,18 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
             StartingMedia::Same(bodies) => C::inside(bodies),
             StartingMedia::OnFace => {
                 // Through an edge or a corner a ray may pass without a hit.
-                *ray = start_clear_of_faces(context, ray).unwrap_or_else(|| start_behind_glue(context, ray));
+                *ray = start_clear_of_faces(context, ray)
+                    .map_or_else(|| start_behind_glue(context, ray), |start| start.ray);
                 let emitter = &context.bound.emitters[source];
                 if C::MEDIA && !emitter.media_stated {
                     C::inside(&media_at(context, ray))
                 } else {
                     C::inside(&emitter.inside)
                 }
+            }
+            StartingMedia::InSolid => {
+                *ray = start_behind_glue(context, ray);
+                C::inside(&[])
             }
             // Light that is emitted into a touching body starts behind the contact: its media are those there.
             StartingMedia::PerRay if C::MEDIA => C::inside(&media_at(context, into_contact.unwrap_or(ray))),
