@@ -176,6 +176,7 @@ impl Results {
             .chain(bound.lost_note(lost, &tallies.ledger))
             .chain(bound.scarce_sources_note(&plan))
             .chain(bound.heavy_rays_note(&plan, &partial.done))
+            .chain(bound.short_lists_note(&plan, &partial.done))
             .chain(bound.rounded_sources_note(&plan));
         let found = found.chain(bound.uncounted_light_notes(&tallies.receivers));
         let found = found.chain(cut_sequences_note(&tallies.sequences)).chain(few_replicates(tallies.replicates));

@@ -16,6 +16,8 @@ const SCARCE_RAYS: u64 = 64;
 const HEAVY: f64 = 10.0;
 /// Chance that all rays of a source miss a place, below which it is neglected: errors are to hold in 95 % of runs.
 const UNLIKELY: f64 = 0.05;
+/// Share of a list's light that arrives where what the list leaves open is greatest, for which it is told.
+const HALF: f64 = 0.5;
 /// Share of a source's power from which on what rounding changes of it is told.
 const ROUNDED: f64 = 1e-5;
 /// Share of the mean power of a source below which it is told: among thousands alike each has few rays, and all together enough.
@@ -107,6 +109,31 @@ impl BoundScene {
             figures(100.0 * share(first), 2),
             count_of(rays, "ray"),
             figures(100.0 * missed * share(first), 2)
+        ))
+    }
+
+    /// Returns one sentence about ray lists from which more rays are drawn than they have: what a list leaves open, as a sample of its light,
+    /// is then more than the scatter of the draws, which alone is in the errors. `None` where there are none.
+    pub(crate) fn short_lists_note(&self, plan: &Plan, done: &[u32]) -> Option<String> {
+        let length = |source: usize| self.emitters[source].list().map(|list| list.len());
+        let is_short = |&source: &usize| length(source).is_some_and(|n| plan.rays_in(source, done) > n);
+        let short: Vec<usize> = (0..self.emitters.len()).filter(is_short).collect();
+        let first = short.iter().copied().min_by_key(|&source| length(source))?;
+        let listed = length(first)?;
+        let others = if short.len() > 1 {
+            format!(" ({} lists are drawn from so often)", short.len())
+        } else {
+            String::new()
+        };
+        // What arrives of independent rays is binomial.
+        let open = HALF * (1.0 - HALF);
+        Some(format!(
+            "{} draws {} from a list of {}{others}: printed errors are those of the draws; what the list itself leaves open, about {} % of its \
+             light where half of it arrives, is in none of them",
+            self.scene.source_label(first),
+            count_of(plan.rays_in(first, done), "ray"),
+            grouped(listed),
+            figures(100.0 * (open / listed as f64).sqrt(), 2)
         ))
     }
 

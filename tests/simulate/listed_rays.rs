@@ -156,6 +156,38 @@ fn parts_of_a_ray_have_rows_of_their_own() {
     }
 }
 
+/// Of 25 independent rays half arrive to ±10 % of the light: runs that draw more rays than a list has print less, which a note says once. One
+/// that draws as many has the list's own scatter in its errors.
+#[test]
+fn what_a_short_list_leaves_open_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, rays) in [("short.csv", 25), ("long.csv", 400)] {
+        write_rays(&folder.path().join(name), &vec![ray(0.0, Vector::Z, 1.0); rays]).unwrap();
+    }
+    let notes = |rays: u32| {
+        let text = format!(
+            "[[source]]\nname = 'long'\nkind = 'rays'\nfile = 'long.csv'\nrays = {rays}
+            [[source]]\nname = 'short'\nkind = 'rays'\nfile = 'short.csv'\nrays = {rays}\n"
+        );
+        let scene = Scene::parse(&text, "test.toml", folder.path()).unwrap();
+        let bound = scene.bind(&World::default().model).unwrap();
+        let results = simulate(&bound, &World::default(), &RunSettings::from(&scene.run), &|_| true);
+        results.notes.into_iter().filter(|note| note.contains("from a list of")).collect::<Vec<String>>()
+    };
+    assert_eq!(notes(25), [""; 0]);
+    let one = notes(400);
+    assert!(
+        one.len() == 1 && one[0].starts_with("the source 'short' draws 400 rays from a list of 25: "),
+        "{one:?}"
+    );
+    assert!(one[0].contains("about 10 % of its light where half of it arrives"), "{one:?}");
+    let both = notes(401);
+    assert!(
+        both.len() == 1 && both[0].contains("from a list of 25 (2 lists are drawn from so often): "),
+        "{both:?}"
+    );
+}
+
 /// A ray whose file was cut while it was in use is lost for that reason, and for no number of its own.
 #[test]
 fn rays_of_a_file_that_went_are_lost_as_unreadable() {
