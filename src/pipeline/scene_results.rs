@@ -2,7 +2,7 @@
 
 use super::prepared_scene::PreparedScene;
 use super::settings::IntersectorKind;
-use crate::simulate::{PartialRun, Results, Verification};
+use crate::simulate::{PartialRun, ReceiverResult, Results, Verification};
 use crate::study::cross_check::CrossCheck;
 use crate::study::figures::{self, ReceiverFigures, Surface};
 use crate::study::geometric_error::GeometricError;
@@ -118,11 +118,8 @@ impl SceneResults {
         if let Some(check) = &self.check {
             document["check"] = serde_json::to_value(check)?;
         }
-        // Light that did not come has no place: 0 would be one.
-        for (k, _) in self.results.receivers.iter().enumerate().filter(|(_, r)| r.power == 0.0) {
-            for key in ["centroid", "centroid_error", "rms", "rms_error"] {
-                document["receivers"][k][key] = Value::Null;
-            }
+        for (k, receiver) in self.results.receivers.iter().enumerate() {
+            clear_places(&mut document["receivers"][k], receiver);
         }
         for (k, figures) in self.figures(prepared).iter().enumerate() {
             document["receivers"][k]["figures"] = serde_json::to_value(figures)?;
@@ -144,10 +141,42 @@ impl SceneResults {
         }
         if let Some(geometric) = self.geometric.as_ref().filter(|g| g.rays > 0) {
             document["faceting"] = serde_json::to_value(geometric)?;
+            for (k, receiver) in self.results.receivers.iter().enumerate().filter(|(_, r)| r.is_cyclic(0)) {
+                clear_compared_places(&mut document["faceting"]["receivers"][k], receiver);
+            }
         }
         if let Some(accuracy) = &prepared.job.accuracy {
             document["accuracy"] = serde_json::to_value(accuracy)?;
         }
         Ok(document)
+    }
+}
+
+/// Puts `null` in place of what means nothing among the places of a receiver in `results.json`: 0 would be a place.
+fn clear_places(document: &mut Value, receiver: &ReceiverResult) {
+    for key in ["centroid", "centroid_error", "rms", "rms_error"] {
+        // Light that did not come has no place.
+        if receiver.power == 0.0 {
+            document[key] = Value::Null;
+        } else {
+            clear_cyclic(&mut document[key], receiver);
+        }
+    }
+}
+
+/// Does the same to what facets change of these places.
+fn clear_compared_places(document: &mut Value, receiver: &ReceiverResult) {
+    for key in ["centroid", "rms", "width"] {
+        clear_cyclic(&mut document[key], receiver);
+    }
+    for key in ["centroid", "rms"] {
+        clear_cyclic(&mut document["statistical"][key], receiver);
+    }
+}
+
+/// Puts `null` in place of the value along an axis of a receiver that is cyclic; `pair` has one for each axis.
+fn clear_cyclic(pair: &mut Value, receiver: &ReceiverResult) {
+    for axis in (0..2).filter(|&axis| receiver.is_cyclic(axis)) {
+        pair[axis] = Value::Null;
     }
 }

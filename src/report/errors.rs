@@ -95,8 +95,11 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
         let share = 100.0 * (r.peak.facets / r.peak.spline - 1.0);
         parts.push(format!("its brightest place changes by {} %", figures(share, 2)));
     }
+    // Along C all around there is neither.
+    let axes = || (0..2).filter(|&axis| [&f.rms_1, &f.rms_2][axis].is_some());
     let widths = |pick: fn(&Paired) -> f64| {
-        format!("{} × {}", figures(pick(&r.width[0]), 3), with_unit(&figures(pick(&r.width[1]), 3), r.unit))
+        let along: Vec<String> = axes().map(|axis| figures(pick(&r.width[axis]), 3)).collect();
+        with_unit(&along.join(" × "), r.unit)
     };
     if is_limit(&r.rms[0], f.rms_1.as_ref()) || is_limit(&r.rms[1], f.rms_2.as_ref()) {
         let [on_facets, on_spline] = [widths(|p| p.facets), widths(|p| p.spline)];
@@ -105,8 +108,9 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
     let moved = is_limit(&r.centroid[0], f.centroid_1.as_ref()) || is_limit(&r.centroid[1], f.centroid_2.as_ref());
     // Where power or width changed, that the middle moved goes without saying.
     if moved && parts.is_empty() {
-        let by = [0, 1].map(|a| figures(r.centroid[a].facets - r.centroid[a].spline, 2));
-        parts.push(format!("the light is moved by {} and {}", by[0], with_unit(&by[1], r.unit)));
+        let by: Vec<String> =
+            axes().map(|axis| figures(r.centroid[axis].facets - r.centroid[axis].spline, 2)).collect();
+        parts.push(format!("the light is moved by {}", with_unit(&by.join(" and "), r.unit)));
     }
     // Only where nothing else was found: it says least of what is wrong.
     if parts.is_empty() && r.map.geometric > 3.0 * r.map.noise && r.map.geometric > r.map.statistical {
@@ -186,6 +190,16 @@ pub(super) fn power_table(results: &Results, power: &PowerFigures, unit: &str) -
     table.row(cells("cut off by limits", p.cut_off).chain(error_cells(&power.cut_off)));
     table.row(cells("lost", p.lost).chain([Cell::Number(results.power_errors.lost, 2)]));
     table
+}
+
+/// Writes what the mean positions and widths in the table of receivers are, and where there are none.
+pub(super) fn places_caption(results: &Results) -> String {
+    let mut caption =
+        "Positions and widths in mm, of far fields and spheres in degrees; errors are those of rays and facets together.".to_owned();
+    if results.receivers.iter().any(|r| r.is_cyclic(0)) {
+        caption += " Planes C all around have no mean position 1 and no rms 1: C 0° and 360° are one.";
+    }
+    caption
 }
 
 /// Makes a table of every figure with both its errors.
@@ -288,8 +302,9 @@ pub(super) fn change_table(error: &GeometricError, results: &Results, unit: &str
             row(format!("max{over}"), &r.peak, &unit_in_words(result.unit));
         }
         if !r.unit.is_empty() {
-            row("width 1".into(), &r.width[0], &unit_in_words(r.unit));
-            row("width 2".into(), &r.width[1], &unit_in_words(r.unit));
+            for axis in (0..2).filter(|&axis| !result.is_cyclic(axis)) {
+                row(format!("width {}", axis + 1), &r.width[axis], &unit_in_words(r.unit));
+            }
         }
     }
     table

@@ -265,11 +265,11 @@ impl SimulationReport<'_> {
             ("± of rms 2 (1σ)", ""),
         ];
         let power = errors::power_table(self.results, self.power, self.unit);
-        let caption = "Positions and widths in mm, of far fields and spheres in degrees; errors are those of rays and facets together.";
-        let mut receivers = Table::new("receivers", "Receivers", &columns).caption(caption);
+        let mut receivers =
+            Table::new("receivers", "Receivers", &columns).caption(errors::places_caption(self.results));
         for (r, f) in self.results.receivers.iter().zip(self.figures) {
-            // Light that did not come has no place.
-            let place = |cell: Cell| if r.power > 0.0 { cell } else { Cell::Empty };
+            let place =
+                |axis: usize, values: [f64; 2]| if r.has_place(axis) { values[axis].into() } else { Cell::Empty };
             let error =
                 |figure: &Option<Figure>| figure.as_ref().map_or(Cell::Empty, |f| Cell::Number(f.combined(), 2));
             receivers.row([
@@ -278,11 +278,11 @@ impl SimulationReport<'_> {
                 Cell::Number(f.power.combined(), 2),
                 r.max.into(),
                 unit_in_words(r.unit).into(),
-                place(r.centroid[0].into()),
-                place(r.centroid[1].into()),
-                place(r.rms[0].into()),
+                place(0, r.centroid),
+                place(1, r.centroid),
+                place(0, r.rms),
                 error(&f.rms_1),
-                place(r.rms[1].into()),
+                place(1, r.rms),
                 error(&f.rms_2),
             ]);
         }

@@ -11,6 +11,8 @@ use std::ops::Range;
 
 /// Angles nearer than this are one, degrees.
 const SAME_ANGLE_DEG: f64 = 1e-6;
+/// The angle all around, degrees.
+const FULL_TURN_DEG: f64 = 360.0;
 /// Fewer planes than these leave cells that are no slivers.
 const LEAST_PLANES: usize = 4;
 /// Standard error of a ring's cells, as a share of them, from which on neighbours are joined: the largest of a hundred values with as much
@@ -33,10 +35,15 @@ struct Ring {
 /// Groups of neighbouring cells that count as one.
 pub(crate) struct JoinedCells(Vec<Range<usize>>);
 
+/// Whether planes C between these bounds, in degrees, go all around.
+pub(super) fn are_all_around(c: [f64; 2]) -> bool {
+    (c[1] - c[0] - FULL_TURN_DEG).abs() < SAME_ANGLE_DEG
+}
+
 impl PoleRings {
     /// The rings of a grid of so many planes and cells of γ between these bounds, in degrees; none where the planes are not all around.
     pub(crate) fn new([planes, rows]: [usize; 2], c: [f64; 2], gamma: [f64; 2]) -> Self {
-        let is_all_around = planes >= LEAST_PLANES && (c[1] - c[0] - 360.0).abs() < SAME_ANGLE_DEG;
+        let is_all_around = planes >= LEAST_PLANES && are_all_around(c);
         if !is_all_around || rows == 0 {
             return Self::default();
         }

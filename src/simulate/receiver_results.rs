@@ -1,6 +1,6 @@
 //! What one receiver counted, in the units of the scene.
 
-use super::pole_rings::PoleRings;
+use super::pole_rings::{PoleRings, are_all_around};
 use super::power_scale::PowerScale;
 use super::receiver::{NAMED_RECEIVERS, Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
@@ -30,7 +30,8 @@ pub struct ReceiverResult {
     pub min: f64,
     /// Unit of the cells: `W/m2` or `W/sr` for sources in watts, `lx` or `cd` for sources in lumens.
     pub unit: &'static str,
-    /// Mean position of the light: mm on a plane or disc, degrees in angles.
+    /// Mean position of the light: mm on a plane or disc, degrees in angles; like `rms` without a meaning along an axis that
+    /// [`Self::has_place`] denies.
     pub centroid: [f64; 2],
     /// Its standard error.
     pub centroid_error: [f64; 2],
@@ -272,8 +273,23 @@ impl ReceiverResult {
         if self.angles != Some(FarFieldType::C) {
             return PoleRings::default();
         }
-        let bounds = |a: usize| [self.middle[a] - self.half[a], self.middle[a] + self.half[a]];
-        PoleRings::new(self.grid, bounds(0), bounds(1))
+        PoleRings::new(self.grid, self.bounds(0), self.bounds(1))
+    }
+
+    /// Returns between which values a coordinate lies: mm, or degrees of angles.
+    fn bounds(&self, axis: usize) -> [f64; 2] {
+        [self.middle[axis] - self.half[axis], self.middle[axis] + self.half[axis]]
+    }
+
+    /// Whether an axis (0 or 1) is that of planes C all around. There 0° and 360° are one plane: a beam about it would have its mean at 180°,
+    /// in the opposite one, so that mean position and root mean square mean nothing.
+    pub fn is_cyclic(&self, axis: usize) -> bool {
+        axis == 0 && self.angles == Some(FarFieldType::C) && are_all_around(self.bounds(0))
+    }
+
+    /// Whether mean position and root mean square along an axis (0 or 1) mean anything: not without light, nor along one that is cyclic.
+    pub fn has_place(&self, axis: usize) -> bool {
+        self.power > 0.0 && !self.is_cyclic(axis)
     }
 
     /// Returns one sentence where light came and none of it is of wavelengths that its channels count; `None` where it has none.

@@ -58,7 +58,7 @@ pub struct ReceiverFigures {
     /// The largest cell; absent, as all that follow, where only power is counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<Figure>,
-    /// Root mean square distance from the centre along the first axis; absent, as all places, where no ray arrived.
+    /// Root mean square distance from the centre along the first axis; absent, as all places, where [`ReceiverResult::has_place`] says so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_1: Option<Figure>,
     /// Root mean square distance from the centre along the second axis.
@@ -283,12 +283,14 @@ impl<'a> Errors<'a> {
         // Of a map too large to compare nothing is known.
         let max = max.filter(|_| self.measured.is_none_or(ReceiverError::has_cells));
         let length = if matches!(r.kind, "plane" | "disc") { "mm" } else { "deg" };
-        let along = |value: f64, statistical: f64, paired: &dyn Fn(&ReceiverError) -> Paired| {
-            let size = r.rms[0].hypot(r.rms[1]);
-            let geometric = self.geometric(0.0, size, |m| paired(m).geometric());
-            // Light that did not come has no place.
-            (!is_dark).then(|| Figure::new(value, length, statistical, geometric))
-        };
+        let size = (0..2).filter(|&axis| r.has_place(axis)).map(|axis| r.rms[axis]).fold(0.0, f64::hypot);
+        let place =
+            |axis: usize, values: [f64; 2], errors: [f64; 2], paired: fn(&ReceiverError) -> &[Paired; 2]| {
+                let geometric = self.geometric(0.0, size, |m| paired(m)[axis].geometric());
+                r.has_place(axis).then(|| Figure::new(values[axis], length, errors[axis], geometric))
+            };
+        let rms = |axis: usize| place(axis, r.rms, r.rms_error, |m| &m.rms);
+        let centroid = |axis: usize| place(axis, r.centroid, r.centroid_error, |m| &m.centroid);
         let largest = if is_dark {
             largest_of(&r.ray_cells)
         } else {
@@ -297,10 +299,10 @@ impl<'a> Errors<'a> {
         ReceiverFigures {
             power,
             max: Some(Figure::new(r.max, r.unit, largest, max)),
-            rms_1: along(r.rms[0], r.rms_error[0], &|m| m.rms[0]),
-            rms_2: along(r.rms[1], r.rms_error[1], &|m| m.rms[1]),
-            centroid_1: along(r.centroid[0], r.centroid_error[0], &|m| m.centroid[0]),
-            centroid_2: along(r.centroid[1], r.centroid_error[1], &|m| m.centroid[1]),
+            rms_1: rms(0),
+            rms_2: rms(1),
+            centroid_1: centroid(0),
+            centroid_2: centroid(1),
             channels,
         }
     }

@@ -181,7 +181,7 @@ fn split_errors(found: &ReceiverResult, truth: &ReceiverResult) -> Row {
         power_statistical: share(truth.power_error, truth.power),
         map_geometric: geometric,
         map_statistical: statistical,
-        spot_geometric: [0, 1].map(|a| relative(found.rms[a], truth.rms[a])),
+        spot_geometric: [0, 1].map(|a| relative(found.rms[a], truth.rms[a]).filter(|_| !truth.is_cyclic(a))),
         limited_by: limited_by.into(),
         ..Row::default()
     }

@@ -402,6 +402,39 @@ fn faces_are_listed_with_their_power() {
 }
 
 /// Light that did not come has no place: neither 0 nor any other.
+/// A point shines evenly: over the whole sphere its light has its mean at γ 90°, over a quarter of the planes C at 45° too. Over all planes C has no
+/// mean, and neither figure nor error.
+#[test]
+fn planes_all_around_have_no_mean() {
+    let folder = tempfile::tempdir().unwrap();
+    let far = |name: &str, h: &str| {
+        format!("[[receiver]]\nname = '{name}'\nkind = 'far_field'\nangles = 'C'\ncells = [8, 6]\n{h}\n")
+    };
+    let receivers = far("all", "") + &far("quarter", "h_deg = [0, 90]");
+    std::fs::write(folder.path().join("scene.toml"), format!("[run]\nrays = 20_000\n[[source]]\n{receivers}"))
+        .unwrap();
+    let (code, text, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&text).unwrap();
+    let [all, quarter] = [0, 1].map(|k| &found["receivers"][k]);
+    for key in ["centroid", "centroid_error", "rms", "rms_error"] {
+        assert!(all[key][0].is_null() && all[key][1].is_number(), "{key}: {}", all[key]);
+        assert!(quarter[key][0].is_number() && quarter[key][1].is_number(), "{key}: {}", quarter[key]);
+    }
+    let figures = all["figures"].as_object().unwrap();
+    assert!(!figures.contains_key("centroid_1") && !figures.contains_key("rms_1"), "{figures:?}");
+    for (figure, expected) in [
+        (&all["figures"]["centroid_2"], 90.0),
+        (&quarter["figures"]["centroid_1"], 45.0),
+        (&quarter["figures"]["centroid_2"], 90.0),
+    ] {
+        let [value, error] = ["value", "statistical"].map(|key| figure[key].as_f64().unwrap());
+        assert!(error > 0.0 && (value - expected).abs() < 4.0 * error, "{figure}");
+    }
+    let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("Planes C all around have no mean position 1"));
+}
+
 #[test]
 fn a_receiver_without_light_has_no_centroid() {
     let collimated = |receivers: &str| {

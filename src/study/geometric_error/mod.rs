@@ -61,7 +61,8 @@ pub struct ReceiverError {
     pub unit: &'static str,
     /// Power counted.
     pub power: Paired,
-    /// Mean position along both axes.
+    /// Mean position along both axes; 0 along one that is cyclic, as the other places and their errors, see
+    /// [`ReceiverResult::is_cyclic`](crate::simulate::ReceiverResult::is_cyclic).
     pub centroid: [Paired; 2],
     /// Root mean square distance from the receiver's centre along both axes.
     pub rms: [Paired; 2],
@@ -219,9 +220,15 @@ fn receiver_error(bound: &BoundScene, runs: [&ReplicatedRun; 2], k: usize) -> Re
             ..ReceiverError::default()
         };
     }
-    let [first, second] = [0, 1].map(|axis| estimate::moments(runs, k, axis));
+    // Where an axis is cyclic there is no mean position that facets could move.
+    let moments = |axis| {
+        if result.is_cyclic(axis) { [Paired::default(); 3] } else { estimate::moments(runs, k, axis) }
+    };
+    let [first, second] = [0, 1].map(moments);
     // What few rays leave open falls much faster with their number than the spread: the whole run will have none of it.
-    [statistical.centroid, statistical.rms] = result.spread_errors;
+    [statistical.centroid, statistical.rms] = result
+        .spread_errors
+        .map(|errors| [0, 1].map(|axis| if result.is_cyclic(axis) { 0.0 } else { errors[axis] }));
     let mut error = ReceiverError {
         name: result.name.clone(),
         unit: if matches!(result.kind, "plane" | "disc") { "mm" } else { "deg" },
