@@ -17,23 +17,23 @@ pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
     // One ray is stated as the error where none arrived: three of them are the limit of 95 %.
     if *value == 0.0 && *statistical > 0.0 {
         let most = with_unit(&figures(3.0 * figure.combined(), 2), unit);
-        return format!("0 {unit} (no ray arrived: at most {most}, 95 %)");
+        return format!("{} (no ray arrived: at most {most}, 95 %)", with_unit("0", unit));
     }
     let value = figures(*value, digits);
-    match geometric {
-        None => format!(
-            "{value} {unit} (± {} from the rays alone; the facets were not judged)",
-            figures(*statistical, 2)
-        ),
-        // Below a tenth of the statistical error the facets change the sum by half a percent.
-        Some(g) if *g > 0.1 * statistical => format!(
-            "{value} ± {} {unit} (± {} from the rays, ± {} from the facets)",
-            figures(figure.combined(), 2),
-            figures(*statistical, 2),
-            figures(*g, 2)
-        ),
-        Some(_) => format!("{value} ± {} {unit}", figures(figure.combined(), 2)),
+    let Some(geometric) = geometric else {
+        let of_rays = figures(*statistical, 2);
+        return format!(
+            "{} (± {of_rays} from the rays alone; the facets were not judged)",
+            with_unit(&value, unit)
+        );
+    };
+    let told = with_unit(&format!("{value} ± {}", figures(figure.combined(), 2)), unit);
+    // Below a tenth of the statistical error the facets change the sum by half a percent.
+    if *geometric > 0.1 * statistical {
+        let [of_rays, of_facets] = [*statistical, *geometric].map(|error| figures(error, 2));
+        return format!("{told} (± {of_rays} from the rays, ± {of_facets} from the facets)");
     }
+    told
 }
 
 /// Channels whose totals a sentence tells; of more the table tells.
@@ -308,4 +308,21 @@ pub(super) fn change_table(error: &GeometricError, results: &Results, unit: &str
         }
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// CIE X and Z have no unit, and none is written.
+    #[test]
+    fn a_figure_without_a_unit_has_none() {
+        let told = |unit: &str, value: f64, geometric: Option<f64>| {
+            with_errors(&Figure::new(value, unit, 0.3, geometric), 4)
+        };
+        assert_eq!(told("", 135.1, Some(0.0)), "135.1 ± 0.3");
+        assert_eq!(told("lm", 135.1, Some(0.4)), "135.1 ± 0.5 lm (± 0.3 from the rays, ± 0.4 from the facets)");
+        assert_eq!(told("", 0.0, None), "0 (no ray arrived: at most 0.9, 95 %)");
+        assert_eq!(told("", 135.1, None), "135.1 (± 0.3 from the rays alone; the facets were not judged)");
+    }
 }

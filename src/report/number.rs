@@ -23,9 +23,9 @@ pub(super) fn unit_in_words(unit: &str) -> String {
     if unit == "deg" { "°".into() } else { unit.replace("m2", "m²") }
 }
 
-/// Writes a number, or what stands for one, with its unit for people: `0.5°`, `0.5 mm`.
+/// Writes a number, or what stands for one, with its unit for people: `0.5°`, `0.5 mm`, and `0.5` where it has none.
 pub(super) fn with_unit(number: &str, unit: &str) -> String {
-    let space = if unit == "deg" { "" } else { " " };
+    let space = if matches!(unit, "" | "deg") { "" } else { " " };
     format!("{number}{space}{}", unit_in_words(unit))
 }
 

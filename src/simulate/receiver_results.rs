@@ -91,9 +91,13 @@ pub struct ChannelResult {
 }
 
 impl ChannelResult {
-    /// Unit of the total: that of powers, `W` or `lm`, for a bin, lumens for the others.
+    /// Unit of the total: that of powers, `W` or `lm`, for a bin, lumens for those and Y, none (empty) for X and Z, of which the CIE has none.
     pub fn total_unit<'u>(&self, power: &'u str) -> &'u str {
-        if matches!(self.unit, "lx" | "cd") { "lm" } else { power }
+        match self.name.as_str() {
+            "X" | "Z" => "",
+            "lm" | "Y" => "lm",
+            _ => power,
+        }
     }
 
     /// The figures of channel `c` from the sums of its total and its cells; `scale` and `per` make power and density of a power, the

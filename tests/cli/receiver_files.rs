@@ -69,6 +69,12 @@ fn every_channel_stands_in_the_files_cell_by_cell() {
             let figure = &found["receivers"][k]["figures"]["channels"][c];
             assert_eq!(figure["value"], found["receivers"][k]["channels"][c]["total"]);
             let (_, geometric) = columns.iter().find(|(n, _)| *n == format!("{wanted}_geometric")).unwrap();
+            let unit = match *wanted {
+                "X_cd" | "Z_cd" => "",
+                "Y_cd" | "luminous_intensity_cd" => "lm",
+                _ => "W",
+            };
+            assert_eq!(figure["unit"], unit, "{wanted}");
             assert_eq!((figure["geometric"].as_f64(), geometric.iter().all(|g| *g == 0.0)), (Some(0.0), true));
         }
     }
