@@ -1,5 +1,6 @@
 //! Both errors of every figure, for people: what stands behind a ±, what limits the answer, what the next halving costs.
 
+use super::geometric_cause::GeometricCause;
 use super::number::{unit_in_words, with_unit};
 use super::{Cell, Table, seconds};
 use crate::intersect::NormalMode;
@@ -10,9 +11,10 @@ use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
 use crate::study::model_figures::PowerFigures;
 use crate::text::{figures, grouped};
 
-/// Writes a figure of `digits` significant digits with its unit and one ± (1σ) for both errors. Both are named where the facets' exceeds
-/// a tenth of the rays', the rays' alone where the facets were not judged. A 0 that no ray reached gets its limit of 95 % instead.
-pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
+/// Writes a figure of `digits` significant digits with its unit and one ± (1σ) for both errors. Both are named where the geometric one,
+/// by its `cause`, exceeds a tenth of the rays', the rays' alone where the facets were not judged. A 0 that no ray reached gets its limit of
+/// 95 % instead.
+pub(super) fn with_errors(figure: &Figure, digits: usize, cause: GeometricCause) -> String {
     let Figure { value, unit, statistical, geometric, .. } = figure;
     // One ray is stated as the error where none arrived: three of them are the limit of 95 %.
     if *value == 0.0 && *statistical > 0.0 {
@@ -30,8 +32,8 @@ pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
     let told = with_unit(&format!("{value} ± {}", figures(figure.combined(), 2)), unit);
     // Below a tenth of the statistical error the facets change the sum by half a percent.
     if *geometric > 0.1 * statistical {
-        let [of_rays, of_facets] = [*statistical, *geometric].map(|error| figures(error, 2));
-        return format!("{told} (± {of_rays} from the rays, ± {of_facets} from the facets)");
+        let [of_rays, others] = [*statistical, *geometric].map(|error| figures(error, 2));
+        return format!("{told} (± {of_rays} from the rays, ± {others} from {})", cause.in_words());
     }
     told
 }
@@ -40,11 +42,11 @@ pub(super) fn with_errors(figure: &Figure, digits: usize) -> String {
 const SPOKEN_CHANNELS: usize = 6;
 
 /// Writes the totals of a receiver's further channels, in parentheses, six at most; nothing where there are none.
-pub(super) fn channel_totals(all: &ReceiverFigures) -> String {
+pub(super) fn channel_totals(all: &ReceiverFigures, cause: GeometricCause) -> String {
     if all.channels.is_empty() {
         return String::new();
     }
-    let total = |c: &ChannelFigure| format!("{} {}", c.name, with_errors(&c.figure, 4));
+    let total = |c: &ChannelFigure| format!("{} {}", c.name, with_errors(&c.figure, 4, cause));
     let mut told: Vec<String> = all.channels.iter().take(SPOKEN_CHANNELS).map(total).collect();
     if let Some(more @ 1..) = all.channels.len().checked_sub(SPOKEN_CHANNELS) {
         told.push(format!("{more} more in the table"));
@@ -170,9 +172,10 @@ pub(super) fn choice_sentence(chosen: &Chosen) -> String {
     format!("Traced {how}, because {}. ", chosen.because)
 }
 
-/// Makes a table of where the power went, each sum with both its errors; what was lost is itself an error of the others.
-pub(super) fn power_table(results: &Results, power: &PowerFigures, unit: &str) -> Table {
-    let columns = [("", ""), ("power", unit), ("share", "%"), ("± rays (1σ)", unit), ("± facets (1σ)", unit)];
+/// Makes a table of where the power went, each sum with both its errors, the geometric one by its `cause`; what was lost is itself an error
+/// of the others.
+pub(super) fn power_table(results: &Results, power: &PowerFigures, unit: &str, cause: GeometricCause) -> Table {
+    let columns = [("", ""), ("power", unit), ("share", "%"), ("± rays (1σ)", unit), (cause.column(), unit)];
     let p = &results.power;
     let mut table = Table::new("power", "Where the power went", &columns).caption(format!(
         "Emitted is the sum of the others{}. Received counts receivers that end light: what passes one that lets it through is counted where it ends.",
@@ -202,25 +205,28 @@ pub(super) fn places_caption(results: &Results) -> String {
     caption
 }
 
-/// Makes a table of every figure with both its errors.
-pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures]) -> Table {
+/// Makes a table of every figure with both its errors, the geometric one by its `cause`.
+pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures], cause: GeometricCause) -> Table {
     let columns = [
         ("receiver", ""),
         ("figure", ""),
         ("value", ""),
         ("unit", ""),
         ("± rays (1σ)", ""),
-        ("± facets (1σ)", ""),
+        (cause.column(), ""),
         ("limited by", ""),
     ];
-    let caption = "Each figure with the standard error from the number of rays and that from the facets; a dash where the facets were \
-        not compared with the true surfaces.";
+    let caption = format!(
+        "Each figure with the standard error from the number of rays and that from {}; a dash where the facets were not compared with the \
+         true surfaces.",
+        cause.in_words()
+    );
     let mut table = Table::new("figures", "Figures with both errors", &columns).caption(caption);
     for (r, f) in results.receivers.iter().zip(all) {
         for (name, figure) in f.named() {
             let limit = match figure.limited_by {
                 Limit::Statistics => "rays",
-                Limit::Geometry => "facets",
+                Limit::Geometry => cause.limit(),
             };
             let [statistical, geometric] = error_cells(figure);
             table.row([
@@ -231,6 +237,49 @@ pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures]) -> Table 
                 statistical,
                 geometric,
                 limit.into(),
+            ]);
+        }
+    }
+    table
+}
+
+/// Makes a table of colours and bands of wavelengths, receiver by receiver; `unit` is that of powers.
+pub(super) fn channel_table(
+    results: &Results,
+    all: &[ReceiverFigures],
+    unit: &str,
+    cause: GeometricCause,
+) -> Table {
+    let columns = [
+        ("receiver", ""),
+        ("channel", ""),
+        ("total", ""),
+        ("± rays (1σ)", ""),
+        (cause.column(), ""),
+        ("unit", ""),
+        ("x", ""),
+        ("y", ""),
+    ];
+    let caption = "X, Y and Z are the CIE's of 1931, Y in lumens; x and y are the chromaticity. Every cell of each channel is in the \
+        receiver's CSV, NPZ and VTI files.";
+    let mut table = Table::new("channels", "Channels", &columns).caption(caption);
+    for (r, f) in results.receivers.iter().zip(all) {
+        let sum: f64 = r.channels.iter().map(|c| c.total).sum();
+        for (c, told) in r.channels.iter().zip(&f.channels) {
+            let [statistical, geometric] = error_cells(&told.figure);
+            let shown = |name: &str| c.name == name && sum > 0.0;
+            // x and y stand at the row of X; a dark receiver has no chromaticity.
+            let chromaticity = |k: usize| Cell::from(r.channels[k].total / sum);
+            let [x, y] = if shown("X") { [0, 1].map(chromaticity) } else { ["".into(), "".into()] };
+            table.row([
+                r.name.as_str().into(),
+                c.name.as_str().into(),
+                Cell::Number(c.total, 6),
+                statistical,
+                geometric,
+                c.total_unit(unit).into(),
+                x,
+                y,
             ]);
         }
     }
@@ -318,10 +367,12 @@ mod tests {
     #[test]
     fn a_figure_without_a_unit_has_none() {
         let told = |unit: &str, value: f64, geometric: Option<f64>| {
-            with_errors(&Figure::new(value, unit, 0.3, geometric), 4)
+            with_errors(&Figure::new(value, unit, 0.3, geometric), 4, GeometricCause::Facets)
         };
         assert_eq!(told("", 135.1, Some(0.0)), "135.1 ± 0.3");
         assert_eq!(told("lm", 135.1, Some(0.4)), "135.1 ± 0.5 lm (± 0.3 from the rays, ± 0.4 from the facets)");
+        let lossy = with_errors(&Figure::new(135.1, "lm", 0.3, Some(0.4)), 4, GeometricCause::Loss);
+        assert!(lossy.ends_with("± 0.4 from lost light)"), "{lossy}");
         assert_eq!(told("", 0.0, None), "0 (no ray arrived: at most 0.9, 95 %)");
         assert_eq!(told("", 135.1, None), "135.1 (± 0.3 from the rays alone; the facets were not judged)");
     }

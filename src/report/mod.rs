@@ -19,6 +19,7 @@ mod drawing;
 mod errors;
 mod even_poles;
 mod framing;
+mod geometric_cause;
 mod half_width;
 mod html;
 mod lamp_figures;

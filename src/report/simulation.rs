@@ -2,6 +2,7 @@
 
 use super::cross_check::{self, run_verdict};
 use super::even_poles::{brightest_direction, with_joined_slivers};
+use super::geometric_cause::GeometricCause;
 use super::lamp_figures::Counted;
 use super::maps::{cuts, grids, receiver_grid};
 use super::number::{counted, unit_in_words};
@@ -105,12 +106,13 @@ impl SimulationReport<'_> {
     /// Writes the answer in a paragraph: power on each receiver with errors, speed, losses, verdicts, what limits it.
     pub fn answer(&self) -> String {
         let r = self.results;
+        let cause = GeometricCause::new(r, self.geometric);
         let mut text = format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit);
         // Parted by semicolons: what passes a receiver is counted by the next one too, so that shares need not add up.
         let parts: Vec<String> = (r.receivers.iter().zip(self.figures))
             .map(|(x, f)| {
-                let power = errors::with_errors(&f.power, 4);
-                let channels = errors::channel_totals(f);
+                let power = errors::with_errors(&f.power, 4, cause);
+                let channels = errors::channel_totals(f, cause);
                 format!("**{power}** ({}) reach {}{channels}", self.share(x.power), x.name)
             })
             .collect();
@@ -130,7 +132,7 @@ impl SimulationReport<'_> {
         {
             if let Some((direction, _)) = brightest_direction(&with_joined_slivers(&grid)) {
                 let of = if several { format!(" of {}", grid.name) } else { String::new() };
-                let value = errors::with_errors(max, 3);
+                let value = errors::with_errors(max, 3, cause);
                 text += &format!("The brightest direction{of} is {direction} with **{value}**. ");
             }
         }
@@ -188,7 +190,7 @@ impl SimulationReport<'_> {
         };
         format!(
             "**{}** ({}) were cut off, {why}. ",
-            errors::with_errors(&self.power.cut_off, 4),
+            errors::with_errors(&self.power.cut_off, 4, GeometricCause::new(r, self.geometric)),
             self.share(r.power.cut_off)
         )
     }
@@ -264,7 +266,8 @@ impl SimulationReport<'_> {
             ("rms 2", ""),
             ("± of rms 2 (1σ)", ""),
         ];
-        let power = errors::power_table(self.results, self.power, self.unit);
+        let cause = GeometricCause::new(self.results, self.geometric);
+        let power = errors::power_table(self.results, self.power, self.unit, cause);
         let mut receivers =
             Table::new("receivers", "Receivers", &columns).caption(errors::places_caption(self.results));
         for (r, f) in self.results.receivers.iter().zip(self.figures) {
@@ -287,55 +290,17 @@ impl SimulationReport<'_> {
             ]);
         }
         let section = Section::new("Energy").with_block(power).with_block(receivers);
-        let section = section.with_block(errors::figure_table(self.results, self.figures));
+        let section = section.with_block(errors::figure_table(self.results, self.figures, cause));
         let section = section.with_block(errors::halving_cost(self.results, self.geometric).as_str());
         let measured = self.geometric.filter(|g| g.rays > 0);
         let measured = measured.map(|g| errors::change_table(g, self.results, self.unit)).into_iter();
         let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(errors::alternative_table);
         let section = measured.chain(tried).fold(section, |s, table| s.with_block(table));
         if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {
-            section.with_block(self.channels())
+            section.with_block(errors::channel_table(self.results, self.figures, self.unit, cause))
         } else {
             section
         }
-    }
-
-    /// Makes a table of colours and bands of wavelengths, receiver by receiver.
-    fn channels(&self) -> Table {
-        let columns = [
-            ("receiver", ""),
-            ("channel", ""),
-            ("total", ""),
-            ("± rays (1σ)", ""),
-            ("± facets (1σ)", ""),
-            ("unit", ""),
-            ("x", ""),
-            ("y", ""),
-        ];
-        let caption = "X, Y and Z are the CIE's of 1931, Y in lumens; x and y are the chromaticity. Every cell of each channel is in the \
-            receiver's CSV, NPZ and VTI files.";
-        let mut table = Table::new("channels", "Channels", &columns).caption(caption);
-        for (i, r) in self.results.receivers.iter().enumerate() {
-            let sum: f64 = r.channels.iter().map(|c| c.total).sum();
-            for (j, c) in r.channels.iter().enumerate() {
-                let [statistical, geometric] = errors::error_cells(&self.figures[i].channels[j].figure);
-                let shown = |name: &str| c.name == name && sum > 0.0;
-                // x and y stand at the row of X; a dark receiver has no chromaticity.
-                let chromaticity = |k: usize| Cell::from(r.channels[k].total / sum);
-                let [x, y] = if shown("X") { [0, 1].map(chromaticity) } else { ["".into(), "".into()] };
-                table.row([
-                    r.name.as_str().into(),
-                    c.name.as_str().into(),
-                    Cell::Number(c.total, 6),
-                    statistical,
-                    geometric,
-                    c.total_unit(self.unit).into(),
-                    x,
-                    y,
-                ]);
-            }
-        }
-        table
     }
 
     /// Makes the section on rays of this run that all intersectors were asked.

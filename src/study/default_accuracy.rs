@@ -171,8 +171,7 @@ pub fn choose(undecided: &Undecided<'_>) -> (Chosen, Option<TimedFacets>) {
         };
     let unjudged = error.unjudged(scale, emitted).map(|name| name.to_owned());
     if worst.ratio <= 1.0 && unjudged.is_none() {
-        let because =
-            format!("facets change no figure by more than its statistical error ({}{judged})", worst.in_words());
+        let because = undecided.unchanged_reason(&worst);
         return (chosen(ON_FACETS, tolerance, because, alternatives, Some(error)), None);
     }
     // What the spline loses is an error too, and one that more rays do not mend.
@@ -317,6 +316,18 @@ impl Undecided<'_> {
             return "; a run that grows is judged as one of 10⁸ rays".into();
         }
         format!("; judged for a run of {} rays", grouped(self.run.rays))
+    }
+
+    /// Says why facets are taken that change no figure of the pilot by much: printed errors from the facets are larger all the same, for they
+    /// hold what rarer rays than the pilot's may meet.
+    fn unchanged_reason(&self, worst: &Worst) -> String {
+        format!(
+            "on the pilot's {} rays facets change no figure by more than its statistical error ({}{}); what so few may have missed \
+             is in the errors from the facets",
+            grouped(self.pilot_settings().rays),
+            worst.in_words(),
+            self.judged_note()
+        )
     }
 
     /// Returns the run's settings with the pilot's number of rays, from the first one on, its own replicates and no shard.

@@ -251,6 +251,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "chart_png",
             "table",
             "road",
+            "geometric_cause",
             "errors",
             "view_triangles",
             "view",

@@ -41,7 +41,8 @@ fn face_table(run: &SceneResults, prepared: &PreparedScene) -> Option<Table> {
     ];
     let caption = format!(
         "Light met {}; those that are not listed absorbed {} {unit} and let {} {unit} out. Light that passes a face several \
-         times counts each time. Errors (1σ) are those of the rays and, where facets were compared with the spline on the face, of the facets.",
+         times counts each time. Errors (1σ) are those of the rays and, where facets were compared with the spline on the face, of the facets; \
+         lost light is part of the latter.",
         count_of(found.count as u64, "face"),
         figures(found.rest_absorbed, SAID_DIGITS),
         figures(found.rest_left, SAID_DIGITS)
