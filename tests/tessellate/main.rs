@@ -11,6 +11,7 @@ mod field;
 mod files;
 mod fixtures;
 mod folder;
+mod helices;
 mod holes_alone;
 mod limits;
 mod poles;

@@ -1,6 +1,6 @@
 //! Chords of one edge: within the tolerance of each of its faces in space, and by the edge's curve in their parameter planes.
 
-use super::curve_chords::{self, bisect_all, bisect_coarse};
+use super::curve_chords::{self, Effort, bisect_all, bisect_coarse};
 use crate::math::{Point, Uv, Vector};
 use crate::model::EdgeUse;
 use crate::nurbs::{Curve, FundamentalForms};
@@ -78,7 +78,7 @@ pub(super) fn edge_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser:
     } else {
         curve_chords::chord_parameters(
             &curve_chords::breaks(curve),
-            curve_chords::steps_of(curve),
+            Effort::new(curve),
             |t| curve.evaluate(t),
             |t, along| edge_tolerance(sides, denser, t, along),
         )
@@ -98,6 +98,7 @@ pub(super) fn edge_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser:
 pub(super) fn divide_further(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32, mut t: Vec<f64>) -> Vec<f64> {
     curve_chords::halve_long_chords(
         &mut t,
+        Effort::new(curve),
         |t| curve.evaluate(t),
         |t, along| edge_tolerance(sides, denser, t, along),
     );
@@ -113,7 +114,7 @@ fn follow_in_parameters(curve: &Curve, sides: &[EdgeSide<'_, '_>], denser: u32, 
     let at = |t: f64| curve.evaluate(t);
     let shorter = 0.25f64.powi(denser as i32);
     let tightest = sides.iter().map(|s| s.surface.field.tightest()).fold(f64::INFINITY, f64::min);
-    bisect_coarse(&mut t, |a, b| {
+    bisect_coarse(&mut t, Effort::new(curve), |a, b| {
         let chord = [at(a), at(b)];
         let is_straight = distance_to_chord(at(0.5 * (a + b)), &chord) <= STRAIGHT_EDGE * tightest;
         let places = PLACES.map(|f| {

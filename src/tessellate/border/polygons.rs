@@ -1,6 +1,6 @@
 //! The border of a face as polygons in its parameter plane, on the shared samples of its edges.
 
-use super::curve_chords;
+use super::curve_chords::{self, Effort};
 use super::edges::Division;
 use crate::math::polygon::signed_area;
 use crate::math::{NearPoints, Point, Uv};
@@ -282,7 +282,7 @@ fn free_side(
             breaks.push(1.0);
             breaks.sort_by(f64::total_cmp);
             let tolerance = |f: f64, _| SEAM_SHARE * surface.tolerance(uv(f));
-            let mut fs = curve_chords::chord_parameters(&breaks, curve_chords::STEPS, at, tolerance);
+            let mut fs = curve_chords::chord_parameters(&breaks, Effort::UNKNOWN_CURVE, at, tolerance);
             imprinted.add_samples(&mut fs, at);
             let samples: Vec<(f64, Position)> = fs[1..fs.len() - 1].iter().map(|&f| (f, own.add(at(f)))).collect();
             seams.push(SeamSide { shape, samples: samples.clone() });
