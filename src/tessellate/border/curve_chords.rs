@@ -283,6 +283,7 @@ mod tests {
         // By hand: the curve lies up to 1/3 beyond the one chord, and within the tolerance of two.
         assert!(parameters.len() > 2 && parameters.iter().all(|t| (0.0..=1.0).contains(t)), "{parameters:?}");
     }
+
     /// A helix of 1000 turns, at a tolerance that asks for ten times the chords that there may be: they are about equally long all along.
     #[test]
     fn chords_that_end_early_are_as_long_at_both_ends() {
