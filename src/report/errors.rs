@@ -12,8 +12,8 @@ use crate::study::model_figures::PowerFigures;
 use crate::text::{figures, grouped};
 
 /// Writes a figure of `digits` significant digits with its unit and one ± (1σ) for both errors. Both are named where the geometric one,
-/// by its `cause`, exceeds a tenth of the rays', the rays' alone where the facets were not judged. A 0 that no ray reached gets its limit of
-/// 95 % instead.
+/// by its `cause`, exceeds a tenth of the rays', the rays' alone where the facets were not judged. A 0 that no ray reached gets its limit
+/// of 95 % instead.
 pub(super) fn with_errors(figure: &Figure, digits: usize, cause: GeometricCause) -> String {
     let Figure { value, unit, statistical, geometric, .. } = figure;
     // One ray is stated as the error where none arrived: three of them are the limit of 95 %.

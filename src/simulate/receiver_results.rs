@@ -91,7 +91,8 @@ pub struct ChannelResult {
 }
 
 impl ChannelResult {
-    /// Unit of the total: that of powers, `W` or `lm`, for a bin, lumens for those and Y, none (empty) for X and Z, of which the CIE has none.
+    /// Unit of the total: that of powers, `W` or `lm`, for a bin, lumens for those and Y, none (empty) for X and Z, of which the CIE has
+    /// none.
     pub fn total_unit<'u>(&self, power: &'u str) -> &'u str {
         match self.name.as_str() {
             "X" | "Z" => "",
@@ -285,8 +286,8 @@ impl ReceiverResult {
         [self.middle[axis] - self.half[axis], self.middle[axis] + self.half[axis]]
     }
 
-    /// Whether an axis (0 or 1) is that of planes C all around. There 0° and 360° are one plane: a beam about it would have its mean at 180°,
-    /// in the opposite one, so that mean position and root mean square mean nothing.
+    /// Whether an axis (0 or 1) is that of planes C all around. There 0° and 360° are one plane: a beam about it would have its mean at
+    /// 180°, in the opposite one, so that mean position and root mean square mean nothing.
     pub fn is_cyclic(&self, axis: usize) -> bool {
         axis == 0 && self.angles == Some(FarFieldType::C) && are_all_around(self.bounds(0))
     }

@@ -112,8 +112,8 @@ impl BoundScene {
         ))
     }
 
-    /// Returns one sentence about ray lists from which more rays are drawn than they have: what a list leaves open, as a sample of its light,
-    /// is then more than the scatter of the draws, which alone is in the errors. `None` where there are none.
+    /// Returns one sentence about ray lists from which more rays are drawn than they have: what a list leaves open, as a sample of its
+    /// light, is then more than the scatter of the draws, which alone is in the errors. `None` where there are none.
     pub(crate) fn short_lists_note(&self, plan: &Plan, done: &[u32]) -> Option<String> {
         let length = |source: usize| self.emitters[source].list().map(|list| list.len());
         let is_short = |&source: &usize| length(source).is_some_and(|n| plan.rays_in(source, done) > n);

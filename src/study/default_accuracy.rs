@@ -318,8 +318,8 @@ impl Undecided<'_> {
         format!("; judged for a run of {} rays", grouped(self.run.rays))
     }
 
-    /// Says why facets are taken that change no figure of the pilot by much: printed errors from the facets are larger all the same, for they
-    /// hold what rarer rays than the pilot's may meet.
+    /// Says why facets are taken that change no figure of the pilot by much: printed errors from the facets are larger all the same, for
+    /// they hold what rarer rays than the pilot's may meet.
     fn unchanged_reason(&self, worst: &Worst) -> String {
         format!(
             "on the pilot's {} rays facets change no figure by more than its statistical error ({}{}); what so few may have missed \

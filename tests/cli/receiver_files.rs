@@ -407,9 +407,8 @@ fn faces_are_listed_with_their_power() {
     assert_eq!(document["faces"]["first"][0]["left_geometric"], document["power"]["lost"]);
 }
 
-/// Light that did not come has no place: neither 0 nor any other.
-/// A point shines evenly: over the whole sphere its light has its mean at γ 90°, over a quarter of the planes C at 45° too. Over all planes C has no
-/// mean, and neither figure nor error.
+/// A point shines evenly: over the whole sphere its light has its mean at γ 90°, over a quarter of the planes C at 45° too. Over all planes
+/// C has no mean, and neither figure nor error.
 #[test]
 fn planes_all_around_have_no_mean() {
     let folder = tempfile::tempdir().unwrap();
@@ -441,6 +440,7 @@ fn planes_all_around_have_no_mean() {
     assert!(page.contains("Planes C all around have no mean position 1"));
 }
 
+/// Light that did not come has no place: neither 0 nor any other.
 #[test]
 fn a_receiver_without_light_has_no_centroid() {
     let collimated = |receivers: &str| {

@@ -176,8 +176,8 @@ fn assert_both_count_all(world: &World, text: &str) {
     }
 }
 
-/// Light that ends on a receiver has come to its place: one there that lets light pass counts all of it, whichever stands first in the scene,
-/// turned to either side, and in the box around the scene (the beam of radius 10) or outside of it (9.9).
+/// Light that ends on a receiver has come to its place: one there that lets light pass counts all of it, whichever stands first in the
+/// scene, turned to either side, and in the box around the scene (the beam of radius 10) or outside of it (9.9).
 #[test]
 fn a_receiver_that_lets_light_pass_counts_it_at_one_that_ends_it() {
     let (small, large) = ("kind = 'disc'\nradius = 80", "kind = 'disc'\nradius = 90");

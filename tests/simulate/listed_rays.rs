@@ -156,8 +156,8 @@ fn parts_of_a_ray_have_rows_of_their_own() {
     }
 }
 
-/// Of 25 independent rays half arrive to ±10 % of the light: runs that draw more rays than a list has print less, which a note says once. One
-/// that draws as many has the list's own scatter in its errors.
+/// Of 25 independent rays half arrive to ±10 % of the light: runs that draw more rays than a list has print less, which a note says once.
+/// One that draws as many has the list's own scatter in its errors.
 #[test]
 fn what_a_short_list_leaves_open_is_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -70,8 +70,8 @@ pub(super) fn clip_outside<'h, C: RayPayload>(
     None
 }
 
-/// Returns where on its ray a segment without a hit ends, mm: on a receiver at the receiver itself, of which `ray.t_max` may come a rounding
-/// short; else at `ray.t_max`.
+/// Returns where on its ray a segment without a hit ends, mm: on a receiver at the receiver itself, of which `ray.t_max` may come a
+/// rounding short; else at `ray.t_max`.
 #[inline(always)]
 fn end_without_hit<C: RayPayload>(context: &Context<'_>, path: &Path<C>, ray: &Ray) -> f64 {
     if matches!(path.receiver, NO_RECEIVER | SCATTERS) {
