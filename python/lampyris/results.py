@@ -32,7 +32,7 @@ class Figure:
     unit: str
     #: From the number of rays.
     statistical: float
-    #: From the facets; 0 on the spline, none where it was not measured.
+    #: From the facets and lost light; of lost light alone on the spline, none where it was not measured.
     geometric: float | None
     #: ``statistics`` or ``geometry``: the larger of the two.
     limited_by: str
@@ -64,7 +64,8 @@ class Receiver:
         self.kind: str = document["kind"]
         #: Unit of the cells.
         self.unit: str = document["unit"]
-        #: ``power``, ``max``, ``rms_1``, ``rms_2``, ``centroid_1``, ``centroid_2``.
+        #: ``power``, ``max``, ``rms_1``, ``rms_2``, ``centroid_1``, ``centroid_2``; places are absent where no light came, ``rms_1``
+        #: and ``centroid_1`` also in planes C all around.
         self.figures: dict[str, Figure] = {
             name: Figure.from_document(f) for name, f in document["figures"].items() if isinstance(f, dict)
         }

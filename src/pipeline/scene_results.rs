@@ -177,6 +177,8 @@ fn clear_compared_places(document: &mut Value, receiver: &ReceiverResult) {
 /// Puts `null` in place of the value along an axis of a receiver that is cyclic; `pair` has one for each axis.
 fn clear_cyclic(pair: &mut Value, receiver: &ReceiverResult) {
     for axis in (0..2).filter(|&axis| receiver.is_cyclic(axis)) {
-        pair[axis] = Value::Null;
+        if let Some(value) = pair.get_mut(axis) {
+            *value = Value::Null;
+        }
     }
 }

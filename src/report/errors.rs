@@ -77,11 +77,16 @@ pub(super) fn facet_limits(
     )
 }
 
+/// Whether what facets change of a figure is more than what the rays leave open. Lost light is in its geometric error too, and no fault of
+/// the facets.
+fn is_limited_by_facets(figure: &Figure, paired: &Paired) -> bool {
+    figure.limited_by == Limit::Geometry && paired.geometric() > figure.statistical
+}
+
 /// Writes what facets change of one receiver, as far as it is both beyond doubt and beyond the noise of the run; empty where nothing is.
 fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
     let is_limit = |paired: &Paired, figure: Option<&Figure>| {
-        // Both: a difference that is real, and larger than what the rays leave open.
-        paired.is_significant() && figure.is_some_and(|f| f.limited_by == Limit::Geometry)
+        paired.is_significant() && figure.is_some_and(|f| is_limited_by_facets(f, paired))
     };
     let mut parts = Vec::new();
     if is_limit(&r.power, Some(&f.power)) {
@@ -124,7 +129,7 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
 /// Writes what facets change of the power that a body or medium took, as far as it is beyond doubt and limits that figure; else nothing.
 fn absorbed_sentence(error: &GeometricError, absorbed: &Absorbed, figure: &Figure) -> String {
     let measured = error.absorbed.iter().find(|e| e.index == absorbed.index);
-    match measured.filter(|e| e.power.is_significant() && figure.limited_by == Limit::Geometry) {
+    match measured.filter(|e| e.power.is_significant() && is_limited_by_facets(figure, &e.power)) {
         Some(e) if e.power.spline > 0.0 => {
             let change = 100.0 * (e.power.facets / e.power.spline - 1.0);
             let (by, how) = (figures(change.abs(), 2), if change < 0.0 { "less" } else { "more" });

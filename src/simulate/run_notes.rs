@@ -112,11 +112,11 @@ impl BoundScene {
         ))
     }
 
-    /// Returns one sentence about ray lists from which more rays are drawn than they have: what a list leaves open, as a sample of its
+    /// Returns one sentence about ray lists of which each ray is drawn twice or more: what a list leaves open, as a sample of its
     /// light, is then more than the scatter of the draws, which alone is in the errors. `None` where there are none.
     pub(crate) fn short_lists_note(&self, plan: &Plan, done: &[u32]) -> Option<String> {
         let length = |source: usize| self.emitters[source].list().map(|list| list.len());
-        let is_short = |&source: &usize| length(source).is_some_and(|n| plan.rays_in(source, done) > n);
+        let is_short = |&source: &usize| length(source).is_some_and(|n| plan.rays_in(source, done) >= 2 * n);
         let short: Vec<usize> = (0..self.emitters.len()).filter(is_short).collect();
         let first = short.iter().copied().min_by_key(|&source| length(source))?;
         let listed = length(first)?;

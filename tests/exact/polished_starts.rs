@@ -9,6 +9,7 @@ use lampyris::intersect::{Certainty, Cost, ExpectedRays, Footprint, Hit, Interse
 use lampyris::math::{Departure, FaceId, Frame, Point, Ray, Vector};
 use lampyris::model::{Model, Part, Shell};
 use lampyris::nurbs::sweep;
+use lampyris::tessellate;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -226,8 +227,7 @@ fn chords_of_a_rod_of_long_facets_are_found() {
     });
 }
 
-/// Light that starts inside a ball is answered by the spline, as none has entered it; what it leaves from there on, facets answer: light in a
-/// sphere or a rod came to thirty segments a ray that were all asked of the spline.
+/// Light that starts inside a ball is answered by the spline, as none has entered it; what it leaves from there on, facets answer.
 #[test]
 fn light_goes_on_by_facets_after_the_spline_answered() {
     let shell = Shell { faces: vec![face(sphere(50.0))], closed: true, ..Shell::default() };
@@ -253,4 +253,38 @@ fn light_goes_on_by_facets_after_the_spline_answered() {
             assert_eq!(further.doubtful, 0);
         }
     });
+}
+
+/// Light in a thread of one face, thinner than the sag beside it: no facet of its far side is taken for that of a place that the spline
+/// answered.
+#[test]
+fn light_in_a_thread_thinner_than_the_largest_sag_meets_its_wall() {
+    let thread = face(sweep::cylinder(&Frame::IDENTITY, 0.05, [0.0, TAU], [0.0, 10.0]));
+    let beside = face(sweep::sphere(
+        &Frame::translation(Vector::new(90.0, 0.0, 0.0)),
+        60.0,
+        [0.0, TAU],
+        [-FRAC_PI_2, FRAC_PI_2],
+    ));
+    let shells = [thread, beside].map(|face| Shell { faces: vec![face], closed: true, ..Shell::default() });
+    let both = Model::from_part(Part { shells: shells.to_vec(), ..Part::default() });
+    let settings = tessellate::Settings { tolerance: [0.002, 0.2], measure: false, ..Default::default() };
+    let mesh = tessellate::tessellate(&both, &settings).mesh;
+    let exact = Exact::build(&both, &Settings::default());
+    let octree = Octree::build(&mesh, &octree::Settings::default());
+    let polished = Polished::new(&octree, &mesh, &exact);
+    let mut s = Random(47);
+    for _ in 0..2000 {
+        let (sin, cos) = s.within(0.0, TAU).sin_cos();
+        let out = Vector::new(cos, sin, 0.0);
+        let start = Ray::new(Point::new(0.0, 0.0, s.within(4.0, 6.0)), out);
+        let first = polished.intersect(&start, &mut Cost::default()).unwrap();
+        assert!((first.t - 0.05).abs() < 1e-9, "{first:?}");
+        let turn = s.within(-1.0, 1.0);
+        let way = -out * f64::cos(turn) + Vector::new(-sin, cos, 0.0) * f64::sin(turn);
+        let ray = Ray::new(start.point_at(first.t), way).with_departure(first.departure());
+        let hit = polished.intersect(&ray, &mut Cost::default());
+        // 2 r cos θ to the far wall.
+        assert!(hit.is_some_and(|h| (h.t - 0.1 * turn.cos()).abs() < 1e-9), "{turn}: {hit:?}");
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! Guarantee: each node and block but the root hangs in one place, so that a walk comes to each once at most; levels, blocks and facets are
 //! as many as the statistics tell; what a link says that a block holds are facets of the mesh with their corners. Weakness: boxes and
-//! rounded corners, which only building anew would prove, may be false, and hits are missed there.
+//! rounded corners, which only building anew would prove, may be false, and facets may be left out: hits are missed there.
 
 use super::Statistics;
 use super::node::{Block, CHILDREN, Link, Node, Target};

@@ -1,9 +1,9 @@
 //! The facets at places that the spline alone answered.
 //!
-//! A ray that leaves a place of which no facet is known is asked of the spline, and so would be all that follow it on their path: in a rod or
-//! an integrating sphere these were most segments.
+//! A ray that leaves a place of which no facet is known is asked of the spline, and so would be all that follow it on their path: in a rod
+//! or an integrating sphere most segments.
 
-use super::limits::OWN_POINT;
+use super::limits::{OWN_POINT, PLACE_OF_SAGS};
 use super::{NO_FACET, Polished};
 use crate::intersect::{Cost, Hit};
 use crate::math::Ray;
@@ -18,14 +18,14 @@ pub(super) struct Probes {
 }
 
 impl Polished<'_> {
-    /// Names in `hits`, those of `rays`, the facets that lie at places of which none is known; where another face's comes first none is
-    /// named. No ray is counted.
+    /// Names in `hits`, those of `rays`, the facets that lie at places of which none is known. None is named where another comes first: of
+    /// another face, or of the far side of a part that is thinner than the largest sag. No ray is counted.
     pub(super) fn name_facets(&self, rays: &[Ray], hits: &mut [Option<Hit>], probes: &mut Probes, cost: &mut Cost) {
         let Probes { rays: across, of, hits: met } = probes;
         across.clear();
         of.clear();
         // Across the spline, not along the ray, which may come in flat and meet the facet far away.
-        let reach = 2.0 * self.sag + OWN_POINT;
+        let reach = PLACE_OF_SAGS * self.sag + OWN_POINT;
         for (k, (ray, hit)) in rays.iter().zip(hits.iter()).enumerate() {
             if let Some(hit) = hit.filter(|hit| hit.primitive == NO_FACET) {
                 let normal = hit.geometric_normal;
@@ -42,9 +42,11 @@ impl Polished<'_> {
         self.facets.intersect_batch(across, met, &mut own);
         *cost += Cost { rays: 0, ..own };
         for (&k, met) in of.iter().zip(met.iter()) {
-            if let (Some(hit), Some(met)) = (&mut hits[k as usize], met)
-                && met.face == hit.face
-            {
+            let (Some(hit), Some(met)) = (&mut hits[k as usize], met) else { continue };
+            let sag = f64::from(self.records[met.primitive as usize].sag);
+            let is_near = (met.t - reach).abs() <= PLACE_OF_SAGS * sag + OWN_POINT;
+            let faces_alike = met.geometric_normal.dot(hit.geometric_normal) > 0.0;
+            if met.face == hit.face && is_near && faces_alike {
                 (hit.primitive, hit.triangle) = (met.primitive, met.triangle);
             }
         }

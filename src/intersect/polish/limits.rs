@@ -18,6 +18,8 @@ const LEAST_WINDOW: f64 = 1e-6;
 const LEAST_WINDOW_OF_SAGS: f64 = 1e3;
 /// The least sine by which a search begins before the facets.
 pub(super) const LEAST_SLACK_SINE: f64 = 0.05;
+/// A facet lies within so many of its sags of each place of its piece, across the spline: its proof is of the nearest places.
+pub(super) const PLACE_OF_SAGS: f64 = 2.0;
 /// The bend of a facet is by how much the spline's normals on its piece stray from one another, as a sine: where the curvature does not
 /// change, so many sags over the facet's length.
 pub(super) const BEND_OF_SAGS: f64 = 4.0;

@@ -16,10 +16,6 @@ use crate::simulate::settings::RunSettings;
 /// Rays of a source that are asked before it is believed that all start in the same bodies.
 const PROBED_RAYS: u64 = 64;
 
-/// Fewest rays of a source that is believed to shine into an opaque solid alone because all of them do: half the light of a point on a flat
-/// face goes in, and 16 of 16 rays by chance once in 65,536 sources.
-const FEWEST_INTO_SOLID: u64 = 16;
-
 impl<'a> Context<'a> {
     /// Makes what all replicates of a run share; probes the intersector for what the sources lie in.
     pub(crate) fn new(bound: &'a BoundScene, intersector: &'a dyn Intersector, settings: &'a RunSettings) -> Self {
@@ -55,7 +51,11 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
     let mut sampler: Option<RaySampler> = None;
     // What starts on a face and goes in meets it from outside, as the half of a point's light does that a board takes. A source whose whole
     // light does is taken to stand inside, as in a room that is drawn as a solid: on the outer side it would light the wrong one, unseen.
-    let mut all_go_in = emitter.inside.is_empty() && context.plan.rays_of_source(source) >= FEWEST_INTO_SOLID;
+    // Not where the scene says what the source is in, nor of rays that were recorded on their way to a face.
+    let mut all_go_in = !emitter.media_stated
+        && emitter.inside.is_empty()
+        && emitter.list().is_none()
+        && context.plan.rays_of_source(source) >= PROBED_RAYS;
     let mut some_go_in = false;
     for k in 0..PROBED_RAYS {
         // Over all replicates and the whole of each: they are spread over the whole of a ray list. As many where replicates are few, of

@@ -14,8 +14,8 @@ const STEPS_PER_POINT: usize = 8;
 const MANY_PIECES: usize = 10;
 /// Tolerances vary slowly: one in so many samples asks for its own.
 const TOLERANCE_EVERY: usize = 4;
-/// Most chords of any curve, and how many more each of its control points allows: a helix of 130 turns, 2500 points in its file, takes
-/// 23,500 chords within 2.5 µm.
+/// Most chords that halving makes of any curve, and how many more each of its control points allows: a helix of 130 turns, 2500 points in
+/// its file, takes 23,500 chords within 2.5 µm.
 const MAX_CHORDS: usize = 20_000;
 const CHORDS_PER_POINT: usize = 10;
 /// Halvings of one chord at most: 4096 parts, of which the last differ by the rounding of trims that were fitted.
@@ -65,7 +65,7 @@ pub(in crate::tessellate) fn breaks(curve: &Curve) -> Vec<f64> {
 pub(super) struct Effort {
     /// In how many steps a piece is sampled before it is divided.
     steps: usize,
-    /// Chords of all pieces together.
+    /// Chords of all pieces together up to which they are halved.
     most_chords: usize,
 }
 
