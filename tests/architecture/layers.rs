@@ -345,6 +345,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "slabs",
             "clear_start",
             "mod",
+            "facet_naming",
             "start",
             "batch",
         ],

@@ -86,7 +86,8 @@ impl Polished<'_> {
             doubtful.extend(of.iter().map(|asked| asked.place));
             asked.clear();
             asked.extend(doubtful.iter().map(|&place| rays[place as usize]));
-            self.ask_truth(asked, found, probes, cost);
+            self.ask_truth(asked, found, cost);
+            self.name_facets(asked, found, probes, cost);
             for (&place, hit) in doubtful.iter().zip(found.iter()) {
                 hits[place as usize] = *hit;
             }

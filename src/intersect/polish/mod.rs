@@ -30,7 +30,6 @@ use crate::math::{Departure, Ray};
 use crate::mesh::FacetMesh;
 use clear_start::ClearStart;
 use curved_cells::CurvedCells;
-use facet_naming::Probes;
 use facet_record::FacetRecord;
 use limits::{OWN_POINT, SHORT_OF_SAGS};
 use piece::Piece;
@@ -112,8 +111,8 @@ impl<'a> Polished<'a> {
     }
 
     /// Answers rays on the spline and on ready meshes, which have none: overwrites `hits`, makes it as long as `rays`, and counts each ray
-    /// once. A hit on the spline names the facet there, or none ([`NO_FACET`]) as in [`Self::name_facets`].
-    fn ask_truth(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>, probes: &mut Probes, cost: &mut Cost) {
+    /// once. A hit on the spline names its face but no facet ([`NO_FACET`]).
+    fn ask_truth(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>, cost: &mut Cost) {
         hits.clear();
         hits.resize(rays.len(), None);
         cost.doubtful += rays.len() as u64;
@@ -129,7 +128,6 @@ impl<'a> Polished<'a> {
                 *hit = self.first_on_meshes(&ray.with_range(ray.t_min, end), cost).or(*hit);
             }
         }
-        self.name_facets(rays, hits, probes, cost);
     }
 
     /// The first hit of a ray on a face that the spline leaves out; the ray is not counted.
