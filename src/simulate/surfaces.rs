@@ -9,6 +9,8 @@ pub(crate) struct FaceOptics {
     pub(crate) surface: u16,
     /// The body whose boundary it is; [`AMBIENT`](super::body::AMBIENT) when there is no medium behind it.
     pub(crate) body: u32,
+    /// Number of its solid in its part, by which solids of one body are told apart.
+    pub(crate) solid: u32,
     /// Whether it bounds a closed solid that lets no light in.
     pub(crate) opaque_solid: bool,
     /// Whether it may lie on a face of another body.

@@ -32,6 +32,7 @@ mod selectors;
 mod sequences;
 mod sources;
 mod support;
+mod thin_edges;
 mod touching;
 #[path = "../support/turned.rs"]
 mod turned;

@@ -13,14 +13,14 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
 
 /// Traces a scene on facets of the default tolerance.
-fn on_facets(model: &Model, text: &str) -> Results {
+pub(crate) fn on_facets(model: &Model, text: &str) -> Results {
     let (scene, bound) = bind(model, text);
     let mesh = tessellate(model, &tessellate::Settings { glue_mm: scene.run.glue_mm, ..Default::default() }).mesh;
     run(&scene, &bound, &Octree::build(&mesh, &octree::Settings::default()))
 }
 
 /// Traces a scene on the spline.
-fn on_spline(model: &Model, text: &str) -> Results {
+pub(crate) fn on_spline(model: &Model, text: &str) -> Results {
     let (scene, bound) = bind(model, text);
     run(&scene, &bound, &Exact::build(model, &exact::Settings::default()))
 }

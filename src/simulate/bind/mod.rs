@@ -169,6 +169,7 @@ fn bind_faces(
         faces.push(FaceOptics {
             surface,
             body,
+            solid: f.solid as u32,
             opaque_solid: closed && opaque,
             touches_body: touching[f.id.index()],
             touches_sibling: siblings[f.id.index()],

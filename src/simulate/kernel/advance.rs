@@ -1,7 +1,7 @@
 //! One step of a path: over its segment, through what it meets, and into the next segment. What a surface or a limit does to its light
 //! is booked here alone.
 
-use super::contact::{ContactSurface, FaceHit, contact_surface, end_of_contact, opaque_contact};
+use super::contact::{ContactSurface, FaceHit, LeftContact, contact_surface, end_of_contact, opaque_contact};
 use super::interaction::{Division, Interaction, SurfaceInteraction};
 use super::media_at::{has_left_by_opening, recover_media};
 use super::path::{NO_RECEIVER, Path, SCATTERS};
@@ -256,8 +256,11 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         let mut next = Ray::new(at.point, direction).with_departure(at.departure());
         // Both faces of a contact were crossed at once: the ray goes on behind the second, which it would meet from the wrong side.
         if C::MEDIA && at.skip > 0.0 {
-            let reach = way_through_glue(at.skip, direction.dot(at.hit.geometric_normal));
-            next.t_min = end_of_contact(self.context, &next, at.hit.geometric_normal, reach);
+            let normal = at.hit.geometric_normal;
+            let reach = way_through_glue(at.skip, direction.dot(normal));
+            let contact = LeftContact { face: at.face, normal, reach };
+            let is_inside = |body| path.payload.cross(body, false).is_some();
+            next.t_min = end_of_contact(self.context, &next, &contact, &is_inside);
         }
         self.start_segment(path, ray, next)
     }

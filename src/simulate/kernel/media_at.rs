@@ -1,12 +1,14 @@
 //! The bodies around a point, from geometry: for sources that do not say what they lie in, and for light that has passed an edge unseen.
 
+use super::contact::{FaceHit, faces_along, lies_on_solid, may_be_siblings};
 use super::context::{Bodies, Context};
 use super::payload::RayPayload;
-use super::tolerances::{ALIGNED, rounding_at, way_through_glue};
-use crate::intersect::Cost;
-use crate::math::{Point, Ray, orthonormal_pair};
+use super::tolerances::{ALIGNED, MOST_COINCIDENT_FACES, rounding_at, way_through_glue};
+use crate::intersect::{Cost, Hit};
+use crate::math::{FaceId, Point, Ray, orthonormal_pair};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::surfaces::FaceOptics;
+use smallvec::SmallVec;
 
 /// Faces on the way out after which it is given up: a few times what stands in one line in any model of the corpus.
 const MOST_FACES_ON_WAY_OUT: usize = 1000;
@@ -63,6 +65,9 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
     let mut crossings = Crossings::default();
     let mut certain = true;
     let mut segment = Ray { t_max: f64::INFINITY, ..*ray };
+    // From the start of the ray to that of the segment.
+    let mut length = 0.0;
+    let mut passed = PassedFaces::default();
     let mut faces = 0;
     // Straight out of the scene: what is left without having been entered must have been around the start, whatever the shapes are.
     while let Some(hit) = context.intersector.intersect(&segment, &mut Cost::default()) {
@@ -71,41 +76,78 @@ fn bodies_left(context: &Context<'_>, ray: &Ray) -> (Bodies, bool) {
             break;
         }
         faces += 1;
-        let point = segment.point_at(hit.t);
         let d = segment.direction;
+        let point = segment.point_at(hit.t);
+        // Against the outward normal the ray goes in, along it out.
+        let entering = d.dot(hit.geometric_normal) < 0.0;
+        let here = PassedFace { face: hit.face, entering, distance: length + hit.t };
+        let rounding = rounding_at(point);
+        if passed.contains(&here, rounding) {
+            // The second face of a contact, noted with the first.
+            segment.t_min = hit.t + rounding;
+            continue;
+        }
         segment = Ray::new(point, d).with_departure(hit.departure());
+        length = here.distance;
         // A face that the scene does not know bounds no body.
         let Some(face) = context.bound.faces.get(hit.face.index()) else { continue };
-        let along = d.dot(hit.geometric_normal);
-        // Against the outward normal the ray goes in, along it out.
-        crossings.note_crossing(face.body, along < 0.0);
+        crossings.note_crossing(face.body, entering);
         if !(face.touches_body || face.medium_on_opaque || face.touches_sibling) {
             continue;
         }
+        passed.0.push(here);
         // Both faces of touching solids are crossed at once, as light crosses them, wherever rounding puts the second.
-        let reach = way_through_glue(context.glue_mm(), along);
-        let probe = Ray::new(point - d * reach, d).with_range(0.0, 2.0 * reach).with_departure(hit.departure());
-        let Some(second) = context.intersector.intersect(&probe, &mut Cost::default()) else { continue };
-        let entering = d.dot(second.geometric_normal) < 0.0;
-        let may_touch = |other: &&FaceOptics| {
-            if other.body == face.body {
-                other.touches_sibling && face.touches_sibling
-            } else {
-                other.touches_body && face.touches_body || other.medium_on_opaque && face.medium_on_opaque
-            }
-        };
-        // Overlapping bodies that end at one plane look the same way there, touching ones against each other.
-        let opposite = entering == (along >= 0.0);
-        let aligned = second.geometric_normal.dot(hit.geometric_normal) > ALIGNED;
-        let other = context.bound.faces.get(second.face.index()).filter(may_touch);
-        if let Some(other) = other.filter(|_| opposite || aligned) {
-            crossings.note_crossing(other.body, entering);
-            // Past both faces, or the second would be crossed once more on its own.
-            segment.t_min = reach;
+        if let Some((second, other)) = second_of_contact(context, &segment, &hit, length, &passed) {
+            crossings.note_crossing(other.body, second.entering);
+            passed.0.push(second);
             certain = false;
         }
     }
     (crossings.bodies_around(), certain)
+}
+
+/// Returns the face that lies within the glue distance of one that the way out has just met, at the start of `segment` and at this length
+/// of the way, and what it is to light: the nearest that may touch that face and is not passed yet. `None` where there is none.
+fn second_of_contact(
+    context: &Context<'_>,
+    segment: &Ray,
+    hit: &Hit,
+    length: f64,
+    passed: &PassedFaces,
+) -> Option<(PassedFace, FaceOptics)> {
+    let face = context.bound.faces.get(hit.face.index())?;
+    let (point, d) = (segment.origin, segment.direction);
+    let rounding = rounding_at(point);
+    let along = d.dot(hit.geometric_normal);
+    let reach = way_through_glue(context.glue_mm(), along);
+    let may_touch = |other: &FaceOptics| {
+        if other.body == face.body {
+            may_be_siblings(face, other)
+        } else {
+            other.touches_body && face.touches_body || other.medium_on_opaque && face.medium_on_opaque
+        }
+    };
+    let probe = Ray::new(point - d * reach, d).with_range(0.0, 2.0 * reach).with_departure(hit.departure());
+    faces_along(context, probe)
+        .filter(|(_, other)| may_touch(other))
+        .filter_map(|(found, other)| {
+            let behind = found.t - reach;
+            let entering = d.dot(found.geometric_normal) < 0.0;
+            // Touching bodies look against each other. Overlapping ones that end at one plane look the same way there; what does so and was
+            // met before is another face of the body that is left.
+            let opposite = entering == (along >= 0.0);
+            let aligned = found.geometric_normal.dot(hit.geometric_normal) > ALIGNED && behind >= -rounding;
+            let second = PassedFace { face: found.face, entering, distance: length + behind };
+            if !(opposite || aligned) || passed.contains(&second, rounding) {
+                return None;
+            }
+            // Nor does a body that begins where the first one ends overlap it.
+            let place = FaceHit { hit: found, face: other, point: probe.point_at(found.t) };
+            let overlaps = opposite || !lies_on_solid(context, &probe, &place, face);
+            overlaps.then_some((behind.abs(), second, other))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, second, other)| (second, other))
 }
 
 /// Returns the payload of a ray with the media that geometry finds on its way to `end` (mm), for a ray that carries media that cannot be.
@@ -142,6 +184,30 @@ pub(super) fn has_left_by_opening<C: RayPayload>(
     // Out of its box nothing has to be asked.
     open && (!is_within_box(context, body, point)
         || !media_at(context, &Ray::new(point, ray.direction)).contains(&body))
+}
+
+/// A face that a way out has passed.
+#[derive(Clone, Copy)]
+struct PassedFace {
+    face: FaceId,
+    entering: bool,
+    /// From the start of the way, mm.
+    distance: f64,
+}
+
+/// Faces of solids that may touch, in the order in which a way out passed them.
+#[derive(Default)]
+struct PassedFaces(SmallVec<[PassedFace; 8]>);
+
+impl PassedFaces {
+    /// Whether a face was passed there, as far as rounding, mm, lets one tell. The last are asked, for only those may be as near.
+    fn contains(&self, other: &PassedFace, rounding: f64) -> bool {
+        self.0.iter().rev().take(MOST_COINCIDENT_FACES).any(|passed| {
+            passed.face == other.face
+                && passed.entering == other.entering
+                && (passed.distance - other.distance).abs() <= rounding
+        })
+    }
 }
 
 /// Faces of bodies crossed one after another on the way out.
