@@ -6,6 +6,7 @@
 mod aabb;
 mod box_tree;
 mod distance;
+mod enclosure;
 mod frame;
 pub(crate) mod huge_pages;
 mod maximum;
@@ -23,6 +24,7 @@ use bytemuck::{AnyBitPattern, NoUninit};
 pub use aabb::Aabb;
 pub use box_tree::{BoxTree, BoxWalk};
 pub(crate) use distance::{distance_to_segment, distance_to_triangle, squared_distance_to_segment};
+pub(crate) use enclosure::Enclosure;
 pub use frame::Frame;
 pub(crate) use maximum::{error_of_maximum, largest_distance};
 pub(crate) use near_points::NearPoints;

@@ -284,13 +284,13 @@ pub struct TrimLoop {
 impl TrimLoop {
     /// Returns the loop as a polygon in its own direction, which does not repeat its start at the end: `pieces` says into how many pieces a
     /// span of a use is divided.
-    pub(crate) fn polygon(&self, pieces: impl Fn(&UvCurve, [f64; 2]) -> usize) -> Vec<Uv> {
+    pub(crate) fn polygon(&self, pieces: impl Fn(&UseSpan<'_>) -> usize) -> Vec<Uv> {
         let mut points = Vec::new();
         for u in &self.uses {
             let breaks = u.uv.breakpoints();
             let start = points.len();
             for span in breaks.windows(2) {
-                let count = pieces(&u.uv, [span[0], span[1]]);
+                let count = pieces(&UseSpan { curve: &u.uv, ends: [span[0], span[1]], spans: breaks.len() - 1 });
                 let share = |k: usize| k as f64 / count as f64;
                 points.extend((0..count).map(|k| u.uv.evaluate(span[0] + (span[1] - span[0]) * share(k))));
             }
@@ -309,6 +309,15 @@ impl TrimLoop {
     pub(crate) fn signed_area(&self) -> f64 {
         area_within(self.uses.iter().map(|u| (&u.uv, u.reversed)))
     }
+}
+
+/// A span of the spline of an edge use.
+pub(crate) struct UseSpan<'u> {
+    pub(crate) curve: &'u UvCurve,
+    /// Its parameters.
+    pub(crate) ends: [f64; 2],
+    /// How many spans the curve has.
+    pub(crate) spans: usize,
 }
 
 /// One side of an edge, as a face's loop runs along it.

@@ -1,9 +1,10 @@
 //! The loops of a face as polygons of its parameter plane: what is inside, for boxes and for points on the face.
 
 use super::Face;
-use crate::math::Uv;
-use crate::math::polygon::{is_inside_polygons, polygon_sides, row_crossing};
-use crate::nurbs::UvCurve;
+use super::face::UseSpan;
+use crate::math::polygon::{polygon_sides, row_crossing};
+use crate::math::{Enclosure, Uv};
+use std::cell::OnceCell;
 
 /// Points on a curved edge use at least; a span of its spline has four at least.
 const POINTS_PER_USE: usize = 24;
@@ -17,19 +18,22 @@ pub(super) struct Outline {
     /// One for each loop, which closes by itself.
     pub(super) polygons: Vec<Vec<Uv>>,
     domain: [[f64; 2]; 2],
+    /// Of the polygons, once it is asked: some thousand places of a thread, each compared with all sides of its border, took ten seconds.
+    enclosure: OnceCell<Enclosure>,
 }
 
 impl Outline {
     /// Follows every loop by a polygon, fine enough to tell inside from outside but near the trims.
     pub(super) fn new(face: &Face) -> Self {
         // A straight use is its two ends.
-        let pieces = |curve: &UvCurve, _: [f64; 2]| match curve.degree {
+        let pieces = |span: &UseSpan<'_>| match span.curve.degree {
             1 => 1,
-            _ => POINTS_PER_USE.div_ceil(curve.breakpoints().len() - 1).max(POINTS_PER_SPAN),
+            _ => POINTS_PER_USE.div_ceil(span.spans).max(POINTS_PER_SPAN),
         };
         Self {
             polygons: face.bounding_loops().iter().map(|l| l.polygon(pieces)).collect(),
             domain: face.surface.domain(),
+            enclosure: OnceCell::new(),
         }
     }
 
@@ -45,7 +49,8 @@ impl Outline {
 
     /// Whether surface parameters lie inside the trims; without polygons all do.
     pub(super) fn contains(&self, p: Uv) -> bool {
-        is_inside_polygons(&self.polygons, p)
+        let sides = || self.polygons.iter().flat_map(|polygon| polygon_sides(polygon)).collect();
+        self.polygons.is_empty() || self.enclosure.get_or_init(|| Enclosure::new(sides())).encloses(p)
     }
 
     /// Surface parameters well inside: the middle of the longest stretch of one of a few rows; `None` when no row is crossed.

@@ -75,7 +75,7 @@ fn fine_polygon(trim: &TrimLoop) -> Vec<Uv> {
     let controls = trim.uses.iter().flat_map(|u| &u.uv.points).map(|c| c.truncate() / c.z);
     let (low, high) = controls.fold((Uv::MAX, Uv::MIN), |(low, high), p| (low.min(p), high.max(p)));
     let tolerance = LOOP_SHARE * (high - low);
-    trim.polygon(|curve, span| piece_count(curve, span, tolerance))
+    trim.polygon(|span| piece_count(span.curve, span.ends, tolerance))
 }
 
 /// Returns into how many pieces to divide a span, so that their chords are beside it by no more than `tolerance` in u and v.

@@ -1,9 +1,9 @@
 //! Lobes of a border that crosses itself. It runs around them the other way than around the rest of the face: facets that are turned over
 //! there run along their sides of the border as all others do, and so against the neighbours' facets.
 
-use super::border::enclosure::Enclosure;
 use super::nodes::{Nodes, Position};
 use super::transition::pairing::TransitionFacet;
+use crate::math::Enclosure;
 use crate::math::polygon::signed_area;
 use rustc_hash::FxHashMap;
 

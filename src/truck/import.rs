@@ -186,7 +186,7 @@ fn points_outward(shell: &Shell) -> Option<bool> {
 fn face_samples(face: &Face) -> Vec<(Vector, Vector)> {
     const GRID: usize = 12;
     const PIECES_OF_SPAN: usize = 16;
-    let outline: Vec<Vec<Uv>> = face.loops.iter().map(|l| l.polygon(|_, _| PIECES_OF_SPAN)).collect();
+    let outline: Vec<Vec<Uv>> = face.loops.iter().map(|l| l.polygon(|_| PIECES_OF_SPAN)).collect();
     let [[u0, u1], [v0, v1]] = face.surface.domain();
     let sign = if face.reversed { -1.0 } else { 1.0 };
     let at = |i: usize, a: f64, b: f64| a + (b - a) * (i as f64 + 0.5) / GRID as f64;

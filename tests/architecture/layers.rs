@@ -303,6 +303,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "roots",
             "quadrature",
             "polygon",
+            "enclosure",
             "distance",
             "maximum",
             "near_points",
@@ -637,17 +638,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
     ),
     (
         "tessellate/border",
-        &[
-            "curve_chords",
-            "edge_chords",
-            "opposite_sides",
-            "edges",
-            "enclosure",
-            "polygons",
-            "cusps",
-            "meeting_corners",
-            "mod",
-        ],
+        &["curve_chords", "edge_chords", "opposite_sides", "edges", "polygons", "cusps", "meeting_corners", "mod"],
     ),
     (
         "tessellate/cells",

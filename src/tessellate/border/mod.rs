@@ -4,7 +4,6 @@ mod curve_chords;
 mod cusps;
 pub(in crate::tessellate) mod edge_chords;
 pub(in crate::tessellate) mod edges;
-pub(in crate::tessellate) mod enclosure;
 mod meeting_corners;
 mod opposite_sides;
 pub(in crate::tessellate) mod polygons;

@@ -6,8 +6,7 @@
 use super::candidate_facet::CandidateFacet;
 use super::cell::{Cell, ProvedCell, Subdivision, parameter_resolution};
 use super::preferred_cuts::preferred_cuts;
-use crate::math::Uv;
-use crate::tessellate::border::enclosure::Enclosure;
+use crate::math::{Enclosure, Uv};
 use crate::tessellate::border::polygons::{BorderPolygons, BorderSide};
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::proof::pole;

@@ -1,7 +1,7 @@
 //! Which triangles of the transition lie inside what the border bounds: of all once, then of those that refinement made.
 
 use super::delaunay::{DelaunayMesh, Vertex};
-use crate::tessellate::border::enclosure::Enclosure;
+use crate::math::Enclosure;
 use crate::tessellate::flooding::{Side, Steps, faces_inside, flood};
 use crate::tessellate::nodes::edge_key;
 use rustc_hash::FxHashSet;

@@ -3,9 +3,8 @@
 
 use super::delaunay::DelaunayMesh;
 use super::sides::Sides;
-use crate::math::Uv;
+use crate::math::{Enclosure, Uv};
 use crate::model::EdgeId;
-use crate::tessellate::border::enclosure::Enclosure;
 use crate::tessellate::crossing_chords::Followed;
 use crate::tessellate::face_surface::FaceSurface;
 use crate::tessellate::nodes::{Nodes, ProvedFacet, edge_key};

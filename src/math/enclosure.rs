@@ -1,14 +1,14 @@
 //! Which side of a border places lie on, asked many times.
 
-use crate::math::Uv;
-use crate::math::polygon::crosses_ray_from;
+use super::Uv;
+use super::polygon::crosses_ray_from;
 
 /// Sides of one node that are compared one by one: about what a binary search takes twice.
 const SIDES_OF_LEAF: usize = 16;
 
 /// The sides of a border in a tree of boxes. A box right of a place counts the sides that cross its height by a binary search, so that few
 /// sides are compared: a damaged face with a winding border of thousands of sides spent two thirds of its time comparing.
-pub(in crate::tessellate) struct Enclosure {
+pub(crate) struct Enclosure {
     /// Each half of a node's sides is a run.
     sides: Vec<[Uv; 2]>,
     /// The root comes first; empty where there are no sides.
@@ -35,7 +35,7 @@ struct Halves {
 
 impl Enclosure {
     /// Sorts the sides of a border, in parameters; without sides nothing is enclosed.
-    pub(in crate::tessellate) fn new(sides: Vec<[Uv; 2]>) -> Self {
+    pub(crate) fn new(sides: Vec<[Uv; 2]>) -> Self {
         let mut out = Self { nodes: Vec::with_capacity(4 * sides.len() / SIDES_OF_LEAF + 1), sides };
         if !out.sides.is_empty() {
             let (low, high) = bounds(&out.sides);
@@ -77,12 +77,12 @@ impl Enclosure {
 
     /// Whether `p` lies inside the closed loops of the border, by the parity of their crossings with the ray along +u. On the border either
     /// answer may come.
-    pub(in crate::tessellate) fn encloses(&self, p: Uv) -> bool {
+    pub(crate) fn encloses(&self, p: Uv) -> bool {
         self.winding_number(p) % 2 != 0
     }
 
     /// Returns how often the border runs around `p`, counter-clockwise less clockwise. On the border any neighbour's answer may come.
-    pub(in crate::tessellate) fn winding_number(&self, p: Uv) -> i32 {
+    pub(crate) fn winding_number(&self, p: Uv) -> i32 {
         if self.nodes.is_empty() { 0 } else { self.rising_right_of(0, p) }
     }
 
