@@ -3,7 +3,7 @@
 use super::outline::Outline;
 use super::{Colour, Face, Instance, Model, Part, Shell, SurfaceKind, TessellatedFace};
 use crate::math::quadrature::GAUSS;
-use crate::math::{Aabb, Frame, Uv};
+use crate::math::{Aabb, Frame, Uv, safe_newton};
 use crate::nurbs::UvCurve;
 use serde::{Serialize, Serializer};
 
@@ -91,6 +91,8 @@ fn hex_colour<S: Serializer>(colour: &Option<Colour>, serializer: S) -> Result<S
 const PIECES: usize = 2;
 /// Knots in u for each in v from which on rows run along v: of fewer, arcs mostly, the kinks at knots cost accuracy where rows cross them.
 const MANY_KNOTS: usize = 8;
+/// Share of a span within which its crossing of a row of knots is known: what the piece on the wrong side adds is below rounding.
+const CROSSING_SHARE: f64 = 1e-12;
 
 impl Model {
     /// Returns every part with its solids and faces, in order; parts without faces are left out, those without an instance are not.
@@ -227,8 +229,8 @@ impl Sweep<'_> {
         sum
     }
 
-    /// Parameters at which a span of a curve is divided, both ends included: at the rows of knots that a straight one crosses, at as many
-    /// even steps of a bent one, and in [`PIECES`] between.
+    /// Parameters at which a span of a curve is divided, both ends included: at the rows of knots between those of its ends, each crossed
+    /// once, and in [`PIECES`] between.
     fn smooth_pieces(&self, curve: &UvCurve, [t0, t1]: [f64; 2]) -> Vec<f64> {
         let across = 1 - self.swept;
         let v0 = curve.evaluate(t0)[across];
@@ -236,12 +238,18 @@ impl Sweep<'_> {
         let between = |k: &&f64| **k > v0.min(v1) && **k < v0.max(v1);
         let crossed: Vec<f64> = self.breaks[across].iter().filter(between).copied().collect();
         let mut cuts = vec![t0, t1];
-        // A straight line's crossings are known in closed form; those of a bent one would need a search each.
+        // A straight line's crossings are known in closed form.
         if curve.degree == 1 {
             cuts.extend(crossed.iter().map(|k| t0 + (t1 - t0) * (k - v0) / (v1 - v0)));
         } else {
-            let count = crossed.len() + 1;
-            cuts.extend((1..count).map(|i| t0 + (t1 - t0) * i as f64 / count as f64));
+            let crossing = |k: &f64| {
+                let above = |t: f64| {
+                    let d = curve.derivatives(t);
+                    (d.point[across] - k, d.first[across])
+                };
+                safe_newton(above, t0, t1, CROSSING_SHARE * (t1 - t0))
+            };
+            cuts.extend(crossed.iter().filter_map(crossing));
         }
         cuts.sort_by(f64::total_cmp);
         let mut pieces: Vec<f64> = cuts
@@ -306,8 +314,9 @@ fn corners(b: Aabb) -> [[f64; 3]; 2] {
 mod tests {
     use super::*;
     use crate::model::{Analytic, EdgeUse, TrimLoop};
-    use crate::nurbs::{ControlPoint, sweep};
+    use crate::nurbs::{ControlPoint, Surface, sweep};
     use std::f64::consts::PI;
+    use std::iter;
 
     const TURN: [f64; 2] = [0.0, 2.0 * PI];
 
@@ -344,6 +353,21 @@ mod tests {
         for (face, area) in [(sphere, 36.0 * PI), (torus, 40.0 * PI * PI), (cone, PI * (1.0 + r) * slope)] {
             assert!((face.area() / area - 1.0).abs() < 1e-5, "{} {area}", face.area());
         }
+    }
+
+    /// A square of 10 mm whose lower half has a hundredth of the parameters, beside a trim of degree two.
+    #[test]
+    fn bent_trims_are_divided_where_they_cross_knots() {
+        let points = [0.0, 10.0].map(|x| [0.0, 5.0, 10.0].map(|y| glam::DVec4::new(x, y, 0.0, 1.0)));
+        let knots = [vec![0.0, 0.0, 1.0, 1.0], vec![0.0, 0.0, 0.01, 1.0, 1.0]];
+        let square = Face::whole(Surface { degree: [1, 1], knots, points: points.as_flattened().to_vec() });
+        let side = [0.0, 0.2, 1.0].map(|v| glam::DVec3::new(1.0, v, 1.0)).to_vec();
+        let bent = UvCurve { degree: 2, knots: vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0], points: side };
+        let straight = [(Uv::ONE, Uv::Y), (Uv::Y, Uv::ZERO), (Uv::ZERO, Uv::X)];
+        let uvs = iter::once(bent).chain(straight.map(|(a, b)| UvCurve::line(a, b, [0.0, 1.0])));
+        let uses = uvs.map(|uv| EdgeUse { edge: None, reversed: false, uv }).collect();
+        let area = Face { loops: vec![TrimLoop { uses }], ..square }.area();
+        assert!((area - 100.0).abs() < 1e-9, "{area}");
     }
 
     #[test]
