@@ -1,8 +1,9 @@
 //! Light next to the thin edge of a body that lies on another: each face is crossed, however near to a contact it is.
 
 use crate::touching::{on_facets, on_spline};
-use lampyris::math::{Frame, Point, Vector};
-use lampyris::model::{Face, Instance, Model, Part, PartId, Shell};
+use crate::turned::assembly;
+use lampyris::math::{Point, Vector};
+use lampyris::model::{Face, Model, Part, Shell};
 use lampyris::nurbs::Surface;
 use lampyris::simulate::Results;
 use std::f64::consts::PI;
@@ -42,14 +43,7 @@ fn wedge_on_base(gap: f64, covered: bool) -> Model {
     if covered {
         parts.push(prism("cover", [[0.0, gap], [10.0, gap + 10.0 * tan], [10.0, 8.0], [0.0, 8.0]]));
     }
-    let instance = |(i, part): (usize, &Part)| Instance {
-        name: part.name.clone(),
-        path: String::new(),
-        part: PartId(i as u32),
-        placement: Frame::IDENTITY,
-        colour: None,
-    };
-    Model { instances: parts.iter().enumerate().map(instance).collect(), parts, ..Model::default() }
+    assembly(parts)
 }
 
 /// The direction behind an interface with this normal, on the light's side of it or not, and the share that passes (Snell, Fresnel).
