@@ -239,6 +239,54 @@ fn a_void_that_is_turned_once_too_often_encloses_a_hole() {
     }
 }
 
+/// Two cubes side by side, of which the file says that one is a void in the other.
+#[test]
+fn a_void_outside_of_its_solid_is_a_solid_of_its_own() {
+    let beside = cube_corners().into_iter().take(8).map(|[x, y, z]| [x + 2.0 * SIDE, y, z]);
+    let corners: Vec<[f64; 3]> = cube_corners().into_iter().take(8).chain(beside).collect();
+    let second = CUBE.map(|face| face.iter().map(|k| k + 8).collect::<Vec<_>>());
+    let faces: Vec<&[usize]> = CUBE.into_iter().chain(second.iter().map(|f| f.as_slice())).collect();
+    let ids = |range: std::ops::Range<usize>| {
+        range.map(|f| format!("#{}", 100_006 + 10 * f)).collect::<Vec<_>>().join(",")
+    };
+    let text = solid_text(&corners, &faces, &[".T."; 12], None);
+    let (outer, void) = (ids(0..6), ids(6..12));
+    for turn in [".T.", ".F."] {
+        let shells = format!(
+            "#5=BREP_WITH_VOIDS('',#7,(#8));#7=CLOSED_SHELL('',({outer}));\
+             #8=ORIENTED_CLOSED_SHELL('',*,#9,{turn});#9=CLOSED_SHELL('',({void}));"
+        );
+        let import = read(&text.replace("#5=MANIFOLD_SOLID_BREP('',#4);", &shells));
+        let made = tessellate(&import.model, &tessellate::Settings::uniform(0.1)).report;
+        let volume = made.volume_mm3.expect("closed");
+        assert!((volume - 2.0 * SIDE.powi(3)).abs() < 1e-6, "{turn}: {volume}");
+        let said = import.report.repairs.iter().filter(|r| r.reason.contains("a solid of its own")).count();
+        assert_eq!((made.shells.closed, said), (2, 1), "{turn}: {:?}", import.report.repairs);
+    }
+}
+
+/// A solid and a surface of the same shell, as representations of one product: the surface is the solid once more, whichever comes first.
+#[test]
+fn a_surface_of_the_shell_of_a_solid_is_that_solid() {
+    let text = solid_text(&cube_corners(), &CUBE, &[".T."; 6], None);
+    let solid = "#6=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#5),#1);";
+    assert!(text.contains(solid));
+    let surface = "SHELL_BASED_SURFACE_MODEL('',(#4))";
+    for (first, second) in [(6, 8), (8, 6)] {
+        let both = format!(
+            "#{first}=ADVANCED_BREP_SHAPE_REPRESENTATION('',(#5),#1);#7={surface};\
+             #{second}=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#7),#1);#9=SHAPE_REPRESENTATION('',(),#1);\
+             #900001=SHAPE_REPRESENTATION_RELATIONSHIP('','',#9,#6);#900002=SHAPE_REPRESENTATION_RELATIONSHIP('','',#9,#8);"
+        );
+        assert_closes(&read(&text.replace(solid, &both)));
+    }
+    let alone = format!("#6=MANIFOLD_SURFACE_SHAPE_REPRESENTATION('',(#7),#1);#7={surface};");
+    assert_eq!(
+        read(&text.replace(solid, &alone).replace("#5=MANIFOLD_SOLID_BREP('',#4);", "")).report.faces.converted,
+        6
+    );
+}
+
 /// The void of a solid that the list does not name is told; so is a face, and without it the volume tells nothing of the side.
 #[test]
 fn entries_of_shells_and_solids_that_are_no_references_are_told() {

@@ -3,7 +3,7 @@
 use super::face_edges::{FaceEdges, face_edges};
 use super::free_surfaces::{Bounded, convert_free_surfaces, convert_trimmed_face, number_boundaries};
 use super::numbering::{ConvertedPart, add_face};
-use super::orientation::{faces_against_neighbours, is_inside_out};
+use super::orientation::{faces_against_neighbours, is_inside_out, lies_outside};
 use super::recipe_parts::convert_recipes;
 use super::repeated_faces::{RepeatedFace, remove_repeated_faces};
 use super::rims::align_rims;
@@ -175,8 +175,8 @@ fn add_shells(
     // A face moves into the last shell that has it, and is copied into those before.
     let mut left: FxHashMap<u64, usize> = FxHashMap::default();
     items.shells.iter().flat_map(|s| &s.faces).for_each(|f| *left.entry(f.0).or_default() += 1);
-    // A void without the shell around it stands alone.
-    let mut enclosed = false;
+    // A void without the shell around it stands alone: which of the part's shells that is.
+    let mut outer: Option<usize> = None;
     let mut removed: FxHashSet<u64> = FxHashSet::default();
     for plan in &items.shells {
         let layer = plan.owners.iter().find_map(|o| styles.layer(*o));
@@ -204,16 +204,24 @@ fn add_shells(
             out.repaired.extend(own[k].entity.map(|id| repair_note(file, id, reason.into())));
         }
         // Only a whole shell tells by its volume which way it faces.
-        let void = plan.void && enclosed;
+        let mut void = plan.void && outer.is_some();
+        if void && outer.is_some_and(|outer| lies_outside(&own, &part.shells[outer].faces)) {
+            void = false;
+            // Of four pipes in a row, three of them voids of the first, light lost a fifth.
+            let reason = "a void lies outside of the shell that it is in: it is taken as a solid of its own";
+            out.repaired.extend(plan.owners.first().map(|owner| repair_note(file, *owner, reason.into())));
+        }
         let whole = plan.whole && is_complete;
-        if (plan.outer || void) && whole && is_inside_out(&own, void) {
+        if (plan.outer || plan.void && outer.is_some()) && whole && is_inside_out(&own, void) {
             own.iter_mut().for_each(|face| face.reversed ^= true);
             // Rays would enter where they should leave: one such file lost 857 of 50,000, one with a void 465 of 100,000.
             let reason =
                 if void { "the shell of a void was inside out" } else { "the shell of a solid was inside out" };
             out.repaired.extend(plan.owners.first().map(|owner| repair_note(file, *owner, reason.into())));
         }
-        enclosed = if plan.void { enclosed } else { !own.is_empty() };
+        if !plan.void {
+            outer = (!own.is_empty()).then_some(part.shells.len());
+        }
         if !own.is_empty() {
             part.shells.push(Shell {
                 faces: own,

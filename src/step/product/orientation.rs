@@ -1,4 +1,5 @@
-//! Which way shells and their faces look: faces that contradict their neighbours, and shells of solids that are inside out.
+//! Which way shells and their faces look: faces that contradict their neighbours, shells of solids that are inside out, and voids that are
+//! none.
 //!
 //! Neighbours run along their common edge in opposite directions. A face whose flag of sense says otherwise is turned, if few do.
 //!
@@ -14,6 +15,8 @@ use rustc_hash::FxHashMap;
 
 /// Points across a face of the first look and of the two that decide.
 const GRIDS: [usize; 3] = [4, 16, 23];
+/// Share of the diagonal of a box by which points in it may lie beside it: far more than files round by.
+const BOX_ROUNDING: f64 = 1e-4;
 /// Points on each edge of a loop.
 const EDGE: usize = 6;
 
@@ -100,6 +103,22 @@ pub(crate) fn is_inside_out(faces: &[Face], void: bool) -> bool {
     let ([coarse, _], [fine, whole]) = (flux(GRIDS[1]), flux(GRIDS[2]));
     // Negative by more than what a finer grid changed, and by more than a sliver of the whole: a flat or a twisted shell stays as it is.
     fine < 0.0 && -fine > 4.0 * (fine - coarse).abs() && -fine > 0.02 * whole
+}
+
+/// Whether a void is none, as part of it certainly lies outside of the shell that is said to enclose it.
+pub(crate) fn lies_outside(void: &[Face], outer: &[Face]) -> bool {
+    // Surfaces lie within their boxes, and so does all that they enclose; trims may cut off much of one.
+    let enclosed = outer.iter().fold(Aabb::EMPTY, |all, face| all.union(face.surface.bounds()));
+    let enclosed = enclosed.grown(BOX_ROUNDING * enclosed.diagonal());
+    let corners = |face: &Face| {
+        let uses = face.loops.iter().flat_map(|l| &l.uses);
+        let mut corners: Vec<Uv> = uses.map(|u| u.start()).collect();
+        if corners.is_empty() {
+            corners.push(domain_center(face));
+        }
+        corners.into_iter().map(|uv| face.surface.evaluate(uv)).collect::<Vec<Point>>()
+    };
+    void.iter().flat_map(corners).any(|corner| corner.is_finite() && !enclosed.contains(corner))
 }
 
 fn domain_center(face: &Face) -> Uv {

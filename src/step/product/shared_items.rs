@@ -1,7 +1,7 @@
 //! Shapes that several representations name: which of their items a placed representation adds to what stands already.
 //!
 //! Linked representations often name the same shapes, each of which is meant once in a place. The same shape in another place is another
-//! one, whichever representation brings it there.
+//! one, whichever representation brings it there. A surface of shells that bound solids in the same place is these solids once more.
 
 use super::assembly::{Assembly, PlacedRepresentation};
 use super::places::{Place, PlaceTable};
@@ -20,6 +20,8 @@ const MODELS: [&str; 5] = [
     "SHELL_BASED_SURFACE_MODEL",
     "FACE_BASED_SURFACE_MODEL",
 ];
+/// The first of [`MODELS`], as many as these, are solids.
+const SOLIDS: usize = 3;
 /// Rank of [`MODELS`].
 const MODEL_RANK: usize = 4;
 
@@ -35,6 +37,9 @@ pub(crate) struct SharedItems {
     brought_by: Vec<u64>,
     /// Shared shapes that products have brought anywhere.
     of_products: FxHashSet<u64>,
+    /// The shells of each surface, by representation, and those of solids in the places where they stand.
+    surfaces: FxHashMap<u64, Vec<(u64, Vec<u64>)>>,
+    of_solids: PlaceTable,
 }
 
 impl SharedItems {
@@ -77,12 +82,30 @@ impl SharedItems {
             named.retain(|(_, ids)| !ids.is_empty());
         }
         brings.retain(|_, named| !named.is_empty());
+        let shells_of = |kinds: &[&str]| -> FxHashMap<u64, Vec<(u64, Vec<u64>)>> {
+            let of_items = |ids: &Vec<u64>| {
+                let models = ids.iter().filter(|&&id| file.entity(id).is_some_and(|e| e.is_one_of(kinds)));
+                models.map(|&id| (id, inner_shells(file, id))).collect::<Vec<_>>()
+            };
+            items.iter().map(|(r, ids)| (*r, of_items(ids))).filter(|(_, models)| !models.is_empty()).collect()
+        };
+        let surfaces = shells_of(&MODELS[SOLIDS..]);
+        let mut of_solids = PlaceTable::default();
+        if !surfaces.is_empty() {
+            let solids = shells_of(&MODELS[..SOLIDS]);
+            for p in placed {
+                let shells = solids.get(&p.representation).into_iter().flatten().flat_map(|(_, shells)| shells);
+                shells.for_each(|&shell| of_solids.insert(shell, place_of(p)));
+            }
+        }
         Self {
             items,
             brings,
             standing: PlaceTable::default(),
             brought_by: Vec::new(),
             of_products: FxHashSet::default(),
+            surfaces,
+            of_solids,
         }
     }
 
@@ -94,13 +117,20 @@ impl SharedItems {
     }
 
     /// Returns the shapes of a placed representation that stand already, brought to this place by another representation, and notes that
-    /// the others stand there now. Of an orphan all that a product has brought anywhere are returned.
+    /// the others stand there now. Of an orphan all that a product has brought anywhere are returned; surfaces of the shells of solids
+    /// that stand there, before or after, always.
     pub(crate) fn place(&mut self, p: &PlacedRepresentation) -> Vec<u64> {
-        let mut left_out = Vec::new();
+        let place = place_of(p);
+        let surfaces = self.surfaces.get(&p.representation).into_iter().flatten();
+        let is_solid =
+            |shells: &[u64]| !shells.is_empty() && shells.iter().all(|&s| self.of_solids.holds(s, &place));
+        let mut left_out: Vec<u64> = surfaces.filter(|(_, shells)| is_solid(shells)).map(|(id, _)| *id).collect();
         let Some(named) = self.brings.get(&p.representation) else { return left_out };
-        let place = Place { frame: p.placement, rounding: p.rounding };
         let mut added: Vec<u64> = Vec::new();
         for (item, ids) in named {
+            if left_out.contains(item) {
+                continue;
+            }
             let is_repeated = p.orphan && self.of_products.contains(item);
             let owner = self.standing.find(*item, &place).map(|number| self.brought_by[number]);
             // A product that is used twice in one place stands there twice, as its file says: only others' shapes are left out.
@@ -121,6 +151,18 @@ impl SharedItems {
         }
         left_out
     }
+}
+
+fn place_of(p: &PlacedRepresentation) -> Place {
+    Place { frame: p.placement, rounding: p.rounding }
+}
+
+/// Returns the shells that a model names itself.
+fn inner_shells(file: &File<'_>, model: u64) -> Vec<u64> {
+    let mut named = Vec::new();
+    file.entity(model).into_iter().flat_map(|e| e.all_args()).for_each(|a| a.deep_ids(&mut named));
+    named.retain(|&id| file.entity(id).is_some_and(|e| e.is_one_of(&SHELLS)));
+    named
 }
 
 /// Returns the shapes of one representation but those that another of them holds: a shell beside its model, a face beside its shell.
