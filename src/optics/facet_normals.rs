@@ -13,6 +13,9 @@ pub struct FacetNormals {
     pub interpolated: Vector,
     /// The facet's own, which tells its sides apart.
     pub geometric: Vector,
+    /// Whether the light goes to and fro in the edge between two facets: interpolated normals, which are alike there, would keep it for
+    /// ever.
+    pub in_edge: bool,
     /// Times that the facet's own had to be taken.
     pub corrections: u32,
 }
@@ -21,7 +24,7 @@ impl FacetNormals {
     /// Makes the pair, of which nothing is known yet.
     #[inline(always)]
     pub fn new(interpolated: Vector, geometric: Vector) -> Self {
-        Self { interpolated, geometric, corrections: 0 }
+        Self { interpolated, geometric, in_edge: false, corrections: 0 }
     }
 
     /// Returns the normal to shade light of direction `d` with and the cosine of incidence, from 0 to 1. An interpolated normal that looks
@@ -40,12 +43,12 @@ impl FacetNormals {
     }
 
     /// Returns the direction `d` mirrored about `normal`, on the side of the facet that the light came from; about the facet's own normal,
-    /// and counted, where `normal` would send it through.
+    /// and counted, where `normal` would send it through or it is caught in an edge.
     #[inline(always)]
     pub fn reflected(&mut self, d: Vector, normal: Vector) -> Vector {
         let r = reflect(d, normal);
         // A reflection that points into the facet would meet it again from inside.
-        if r.dot(self.geometric) * d.dot(self.geometric) < 0.0 {
+        if !self.in_edge && r.dot(self.geometric) * d.dot(self.geometric) < 0.0 {
             return r;
         }
         self.corrections += 1;

@@ -120,6 +120,14 @@ pub(crate) fn rod_in_plate([bottom, top]: [f64; 2], from: f64) -> Model {
     assembly(vec![turned("rod", &rod, 0.0), turned("plate", &plate, from)])
 }
 
+/// A pin of radius 2 from z = 0 to 10.5 whose upper end is rounded off by 0.5.
+pub(crate) fn rounded_pin() -> Model {
+    let mut pin = lines(&[[0.0, 0.0], [2.0, 0.0], [2.0, 10.0]]);
+    pin.push(arc([1.5, 10.0], 0.5, [0.0, FRAC_PI_2]));
+    pin.extend(lines(&[[1.5, 10.5], [0.0, 10.5]]));
+    assembly(vec![turned("pin", &pin, 0.0)])
+}
+
 /// A ball of radius 10 in a cup that reaches nearly to its equator.
 pub(crate) fn ball_in_cup(from: f64) -> Model {
     let rim = -0.3f64;

@@ -40,7 +40,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         };
         let point = ray.point_at(hit.t);
         // Before the surface has its say: limits of length hold for what has been run.
-        path.length += hit.t;
+        path.run(hit.t);
         // An intersector that answers nonsense costs its ray, not the run.
         let face = context.bound.faces.get(hit.face.index());
         let Some(&face) = face.filter(|_| hit.t.is_finite() && hit.normal.is_finite()) else {
@@ -49,6 +49,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         };
         let entering = ray.direction.dot(hit.geometric_normal) < 0.0;
         let mut at = SurfaceInteraction::new(hit, face, entering, point);
+        at.normals.in_edge = path.is_caught_in_edge();
         // Of faces at one place another may say what happens.
         let mut partner = None;
         if C::MEDIA && (face.opaque_solid || face.medium_on_opaque || face.touches_body || face.touches_sibling) {
@@ -297,7 +298,7 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         };
         let point = ray.point_at(ray.t_max);
         let numbers = path.key(context).pair(Purpose::BulkDirection);
-        path.length += ray.t_max;
+        path.run(ray.t_max);
         // Light that was held by total reflection has another direction now, and may get out.
         path.release();
         // Before it is counted among the hits, as at a face: vertices of a path stand in the order of their hits.

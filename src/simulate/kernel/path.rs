@@ -40,8 +40,15 @@ pub(super) struct Path<C> {
     pub(super) receiver: u32,
     /// Length up to the last hit that was no total reflection, mm.
     pub(super) released_at: f32,
+    /// Segments in a row that were shorter than [`WITHIN_EDGE`].
+    pub(super) short_segments: u32,
     pub(super) payload: C,
 }
+
+/// A segment below this length, mm, lies in the edge between two facets, or crosses the gap between two faces that touch.
+const WITHIN_EDGE: f64 = 1e-6;
+/// So many such segments in a row are of light that is caught in an edge; a contact has one.
+const CAUGHT_IN_EDGE: u32 = 3;
 
 /// No receiver ahead.
 pub(super) const NO_RECEIVER: u32 = u32::MAX;
@@ -61,6 +68,7 @@ impl<C: RayPayload> Path<C> {
             length: 0.0,
             receiver: NO_RECEIVER,
             released_at: 0.0,
+            short_segments: 0,
             payload,
         }
     }
@@ -76,6 +84,19 @@ impl<C: RayPayload> Path<C> {
             bounce: self.bounce,
             in_net: (settings.sampling == Sampling::Sobol).then_some(self.in_net),
         }
+    }
+
+    /// Takes it over a segment of this length, mm.
+    #[inline(always)]
+    pub(super) fn run(&mut self, length: f64) {
+        self.length += length;
+        self.short_segments = if length < WITHIN_EDGE { self.short_segments + 1 } else { 0 };
+    }
+
+    /// Whether it goes to and fro in the edge between two facets, in ever shorter segments: at last it would be beside them.
+    #[inline(always)]
+    pub(super) fn is_caught_in_edge(&self) -> bool {
+        self.short_segments >= CAUGHT_IN_EDGE
     }
 
     /// Notes that it has just met what is no total reflection; does nothing without media.
