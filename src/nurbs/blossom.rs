@@ -34,18 +34,19 @@ fn bezier_points_in<const W: usize, P: ControlPoint>(
     [a, b]: [f64; 2],
     out: &mut [P],
 ) {
-    // How far `a` and `b` lie along each interval of each round: the same for all points.
-    let mut shares = [[[0.0; 2]; W]; W];
+    // How far `a` and `b` lie from either end of each interval of each round, as shares of it: the same for all points. Each is a
+    // difference of knots: what is left to 1 of a share near it has lost its digits.
+    let mut shares = [[[[0.0; 2]; 2]; W]; W];
     for r in 0..p {
         for j in 0..p - r {
             let (lo, hi) = (knots[span - p + j + r + 1], knots[span + j + 1]);
-            shares[r][j] = [(a - lo) / (hi - lo), (b - lo) / (hi - lo)];
+            shares[r][j] = [a, b].map(|x| [(hi - x) / (hi - lo), (x - lo) / (hi - lo)]);
         }
     }
     let round = |d: &mut [P; W], r: usize, end: usize| {
         for j in 0..p - r {
-            let s = shares[r][j][end];
-            d[j] = d[j] * (1.0 - s) + d[j + 1] * s;
+            let [before, after] = shares[r][j][end];
+            d[j] = d[j] * before + d[j + 1] * after;
         }
     };
     let mut at_a = [P::ZERO; W];
@@ -101,8 +102,8 @@ impl<P: ControlPoint> Spline<P> {
         for (r, &u) in arguments[..p].iter().enumerate() {
             for j in 0..p - r {
                 let (lo, hi) = (knots[j + r], knots[j + p]);
-                let s = (u - lo) / (hi - lo);
-                d[j] = d[j] * (1.0 - s) + d[j + 1] * s;
+                let [before, after] = [(hi - u) / (hi - lo), (u - lo) / (hi - lo)];
+                d[j] = d[j] * before + d[j + 1] * after;
             }
         }
         d[0]

@@ -1,6 +1,7 @@
 //! The exact spline intersector: closed forms, pure clipping and closed shells judge it.
 
 mod audit;
+mod borders;
 mod certificates;
 mod closed_forms;
 mod drift;

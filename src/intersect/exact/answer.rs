@@ -47,7 +47,7 @@ const GIVEN_ROUNDING: f64 = 4.0;
 /// ball drifted by 5e-10 in 20,000 bounces.
 const UNBIASED: f64 = 2e-15;
 /// By how much the square of a direction's length may miss 1: normalised in `f32`, and some.
-const UNIT_ROUNDING: f64 = 1e-5;
+const SINGLE_ROUNDING: f64 = 1e-5;
 /// Corrections before a hit is named; steps square, so that the second is mostly the last.
 const CORRECTIONS: usize = 4;
 
@@ -91,7 +91,7 @@ impl Exact {
             let mut hit = self.hit(&query, &root);
             // From where the budget ended on crossings may be missing: none behind that is known to be the next
             // one.
-            if hit.t >= query.undecided_from {
+            if root.t >= query.undecided_from {
                 hit.certainty = Certainty::Uncertified;
             }
             let contact = contact_distance(self.geometry.patches[hit.primitive as usize].size());
@@ -99,7 +99,8 @@ impl Exact {
                 hits.push(hit);
             }
         }
-        Passage { crossings: hits, near_trims, undecided_from: query.undecided_from }
+        near_trims.iter_mut().for_each(|t| *t /= query.length);
+        Passage { crossings: hits, near_trims, undecided_from: query.undecided_from / query.length }
     }
 
     /// Takes up a ray with this budget of clipping steps; one that is not sound will miss, undecided.
@@ -173,7 +174,16 @@ impl Exact {
         let regular = if label.ill_scaled { None } else { patch::regular_normal(&jet, label.rounding) };
         let normal = label.sign * regular.unwrap_or_else(|| self.delicate_normal(root.leaf, uv, inside));
         let (face, primitive, certainty) = (label.face, label.patch, root.certainty);
-        Hit { t, normal, geometric_normal: normal, face, primitive, triangle: None, uv, certainty }
+        Hit {
+            t: t / query.length,
+            normal,
+            geometric_normal: normal,
+            face,
+            primitive,
+            triangle: None,
+            uv,
+            certainty,
+        }
     }
 
     /// The unit normal along `Su × Sv` on a leaf where `f64` leaves too little of it: of the surface as given, and its limit at singular
@@ -213,7 +223,7 @@ fn repeats(hits: &[Hit], hit: &Hit, certainty: Certainty, ray: &Ray, contact: f6
 /// Whether a ray has a finite origin, a direction of unit length but for rounding, and no NaN as an end of its range.
 fn is_sound(ray: &Ray) -> bool {
     // NaN is beyond any bound.
-    let is_unit = (ray.direction.length_squared() - 1.0).abs() <= UNIT_ROUNDING;
+    let is_unit = (ray.direction.length_squared() - 1.0).abs() <= SINGLE_ROUNDING;
     ray.origin.is_finite() && is_unit && !ray.t_min.is_nan() && !ray.t_max.is_nan()
 }
 

@@ -104,7 +104,8 @@ impl Exact {
         let oc = query.o - leaf.center;
         let (net, size) = seen_along(query, leaf.net(&self.geometry.nets), oc);
         let noise = self.noise(leaf, oc);
-        let margin = size.map(|s| noise + halving_rounding(leaf) * s);
+        let heaviest = net.iter().map(|p| p[3]).fold(0.0, f64::max);
+        let margin = size.map(|s| heaviest * noise + halving_rounding(leaf) * s);
         let departure = query.departure.and_then(|own| own.local_to(leaf, query.o, &self.geometry));
         let seen = &SeenLeaf { net, frame: [query.n1, query.n2], margin, precise: false };
         let patch = || &self.geometry.patches[leaf.patch as usize];

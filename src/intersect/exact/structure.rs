@@ -187,7 +187,8 @@ fn subdivide(geometry: &Geometry, settings: &Settings) -> (PatchLeaves, bool) {
     // Five per cent over the flattest: a further round would change next to nothing.
     while cut.leaves.len() < settings.leaves && flatness.deviation > 1.05 * flattest {
         flatness.deviation = (FLATTER * flatness.deviation).max(flattest);
-        cut = subdivision::subdivide_all(geometry, flatness);
+        let Some(finer) = subdivision::subdivide_up_to(geometry, flatness, most) else { break };
+        cut = finer;
     }
     (cut, false)
 }

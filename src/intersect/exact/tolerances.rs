@@ -34,7 +34,7 @@ pub(super) const COORDINATE_ROUNDING: f64 = 32.0;
 pub(super) const EXTENSION: f64 = 0.1;
 /// Where roots count on a leaf without trims on its border: Newton's method ends within [`NEWTON_STEP`] of a root.
 pub(super) const REACH: [[f64; 2]; 2] = [[-NEWTON_STEP, 1.0 + NEWTON_STEP]; 2];
-/// Newton's method stops where its next step is foreseen below this: 1e-12 of a leaf of 10 mm are 1e-11 mm.
+/// Newton's method ends within this of a root: 1e-12 of a leaf of 10 mm are 1e-11 mm.
 pub(super) const NEWTON_STEP: f64 = 1e-12;
 
 /// A Jacobian whose determinant is a smaller part of the product of its row sums is inverted only where the margin says that no digit that
