@@ -250,8 +250,9 @@ mod tests {
         grid.error = Some(grid.values.iter().map(|v| 0.01 * v).collect());
         let max = |unit: &str, geometric| Figure::new(1071.0, unit, 30.0, geometric);
         assert_eq!(peak_error(&grid, Some(&max("cd", Some(40.0)))), Some(50.0));
-        // Watts a steradian are another map's: the cell's own 1 %, or more for that many rivals.
-        assert!((10.0..20.0).contains(&peak_error(&grid, Some(&max("W/sr", None))).unwrap()));
+        // Watts a steradian are another map's: the cell's own 1 %, 10.21, or more for its rivals; were all cells of two rows alike, the
+        // largest of 144 would be too large by 2.59 of these, 28.4 in all.
+        assert!((10.2..28.4).contains(&peak_error(&grid, Some(&max("W/sr", None))).unwrap()));
     }
 
     #[test]
