@@ -181,7 +181,7 @@ impl Results {
         let found = found.chain(bound.uncounted_light_notes(&tallies.receivers));
         let found = found.chain(cut_sequences_note(&tallies.sequences)).chain(few_replicates(tallies.replicates));
         let mut notes: Vec<String> = bound.notes.iter().cloned().chain(found).collect();
-        let scale = PowerScale { quantum, replicates: partial.done.len() as u32 };
+        let scale = PowerScale { quantum, replicates: partial.done.len() as u32, rays };
         let receiver = |(i, r): (usize, &Receiver)| {
             ReceiverResult::new(r, i, &tallies, (&scale, plan.heaviest_ray()), bound.scene.run.unit)
         };

@@ -18,7 +18,7 @@ pub const QUANTA: f64 = (1u64 << 40) as f64;
 /// Squares are kept without these lowest bits of theirs, so that a replicate of 2³⁰ rays cannot overflow.
 const SQUARE_CUT: u32 = 20;
 /// What half of these bits cut from a number whose square would fill two words.
-const CUT: u32 = SQUARE_CUT / 2;
+pub(super) const CUT: u32 = SQUARE_CUT / 2;
 
 /// What added to a number below 2⁵¹ leaves the nearest whole number in the lowest bits.
 const SHIFT: f64 = 6_755_399_441_055_744.0;
