@@ -16,8 +16,12 @@ const SCARCE_RAYS: u64 = 64;
 const HEAVY: f64 = 10.0;
 /// Chance that all rays of a source miss a place, below which it is neglected: errors are to hold in 95 % of runs.
 const UNLIKELY: f64 = 0.05;
+/// Draws of each ray of a list, were all of equal power, from which on its own scatter is more than theirs.
+const DRAWN_OFTEN: f64 = 2.0;
 /// Share of a list's light that arrives where what the list leaves open is greatest, for which it is told.
 const HALF: f64 = 0.5;
+/// Share of a list's rays below which it is told how many of equal power leave as little open.
+const UNEVEN: f64 = 0.9;
 /// Share of a source's power from which on what rounding changes of it is told.
 const ROUNDED: f64 = 1e-5;
 /// Share of the mean power of a source below which it is told: among thousands alike each has few rays, and all together enough.
@@ -112,14 +116,21 @@ impl BoundScene {
         ))
     }
 
-    /// Returns one sentence about ray lists of which each ray is drawn twice or more: what a list leaves open, as a sample of its
-    /// light, is then more than the scatter of the draws, which alone is in the errors. `None` where there are none.
+    /// Returns one sentence about ray lists of which each ray, were all of equal power, is drawn twice or more: what a list leaves open, as a
+    /// sample of its light, is then more than the scatter of the draws, which alone is in the errors. `None` where there are none.
     pub(crate) fn short_lists_note(&self, plan: &Plan, done: &[u32]) -> Option<String> {
-        let length = |source: usize| self.emitters[source].list().map(|list| list.len());
-        let is_short = |&source: &usize| length(source).is_some_and(|n| plan.rays_in(source, done) >= 2 * n);
-        let short: Vec<usize> = (0..self.emitters.len()).filter(is_short).collect();
-        let first = short.iter().copied().min_by_key(|&source| length(source))?;
-        let listed = length(first)?;
+        let short_list = |source: usize| {
+            let even = self.emitters[source].list()?.even_rays();
+            (plan.rays_in(source, done) as f64 >= DRAWN_OFTEN * even).then_some((source, even))
+        };
+        let short: Vec<(usize, f64)> = (0..self.emitters.len()).filter_map(short_list).collect();
+        let &(first, even) = short.iter().min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let listed = self.emitters[first].list()?.len();
+        let as_good = if even < UNEVEN * listed as f64 {
+            format!(", as good as {} of equal power", figures(even, 3))
+        } else {
+            String::new()
+        };
         let others = if short.len() > 1 {
             format!(" ({} lists are drawn from so often)", short.len())
         } else {
@@ -128,12 +139,12 @@ impl BoundScene {
         // What arrives of independent rays is binomial.
         let open = HALF * (1.0 - HALF);
         Some(format!(
-            "{} draws {} from a list of {}{others}: printed errors are those of the draws; what the list itself leaves open, about {} % of its \
-             light where half of it arrives, is in none of them",
+            "{} draws {} from a list of {}{as_good}{others}: printed errors are those of the draws; what the list itself leaves open, about \
+             {} % of its light where half of it arrives, is in none of them",
             self.scene.source_label(first),
             count_of(plan.rays_in(first, done), "ray"),
             grouped(listed),
-            figures(100.0 * (open / listed as f64).sqrt(), 2)
+            figures(100.0 * (open / even).sqrt(), 2)
         ))
     }
 

@@ -189,6 +189,27 @@ fn what_a_short_list_leaves_open_is_told() {
     );
 }
 
+/// A hundred rays of power 1 and one of 100 leave as much open as 200²/10,100 = 3.96 even ones: half arrives to ±25 % of the light, which
+/// eight draws, not seven, make more than their own scatter.
+#[test]
+fn what_a_list_of_unequal_powers_leaves_open_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rays = vec![ray(0.0, Vector::Z, 1.0); 100];
+    rays.push(ray(0.0, Vector::Z, 100.0));
+    write_rays(&folder.path().join("list.csv"), &rays).unwrap();
+    let note = |rays: u32| {
+        let text = format!("[[source]]\nname = 'uneven'\nkind = 'rays'\nfile = 'list.csv'\nrays = {rays}\n");
+        let scene = Scene::parse(&text, "test.toml", folder.path()).unwrap();
+        let bound = scene.bind(&World::default().model).unwrap();
+        let results = simulate(&bound, &World::default(), &RunSettings::from(&scene.run), &|_| true);
+        results.notes.into_iter().find(|note| note.contains("from a list of"))
+    };
+    assert_eq!(note(7), None);
+    let told = note(8).unwrap();
+    assert!(told.contains("draws 8 rays from a list of 101, as good as 3.96 of equal power: "), "{told}");
+    assert!(told.contains("about 25 % of its light where half of it arrives"), "{told}");
+}
+
 /// A ray whose file was cut while it was in use is lost for that reason, and for no number of its own.
 #[test]
 fn rays_of_a_file_that_went_are_lost_as_unreadable() {

@@ -40,6 +40,8 @@ pub(crate) struct RayList {
     block: usize,
     /// Power up to the end of each block.
     sums: Arc<RunningSums>,
+    /// As [`Self::even_rays`].
+    even_rays: f64,
     /// Box around the origins, mm, in the source's frame.
     pub(crate) origins: Aabb,
     /// Wavelengths, nm, that single rays have of their own.
@@ -87,6 +89,7 @@ impl RayList {
             spectrum,
             notes,
             sums: Arc::default(),
+            even_rays: 1.0,
             origins: Aabb::EMPTY,
             own_wavelengths: Arc::default(),
         };
@@ -141,7 +144,7 @@ impl RayList {
         let mut sums = Vec::new();
         let mut wavelengths = OwnWavelengths::default();
         let mut block = RayBlock::default();
-        let mut sum = 0.0;
+        let [mut sum, mut squares] = [0.0; 2];
         let mut unseen = None;
         for first in (0..self.len()).step_by(SURVEYED) {
             self.file.read_block(first, SURVEYED, &mut block).map_err(changed)?;
@@ -152,6 +155,7 @@ impl RayList {
                     unseen = unseen.or(ray.wavelength_nm.filter(|nm| xyz_of_watt(*nm)[1] == 0.0));
                 }
                 sum += power;
+                squares += power * power;
                 self.origins = self.origins.union(Aabb::from_points([ray.origin]));
                 ray.wavelength_nm.into_iter().for_each(|nm| wavelengths.add(nm));
                 let read = first + k as u64 + 1;
@@ -161,6 +165,8 @@ impl RayList {
             }
         }
         self.sums = Arc::new(RunningSums::new(sums));
+        // From one ray to all of them, also where squares are beyond numbers.
+        self.even_rays = (sum / squares * sum).max(1.0).min(self.len() as f64);
         self.own_wavelengths = Arc::new(wavelengths);
         Ok(unseen)
     }
@@ -168,6 +174,12 @@ impl RayList {
     /// Number of rays.
     pub(crate) fn len(&self) -> u64 {
         self.file.len()
+    }
+
+    /// Returns how many rays of equal power leave as little open as these, as a sample of their light: (Σ w)²/Σ w² of their powers w (Kish,
+    /// *Survey Sampling*, 1965).
+    pub(crate) fn even_rays(&self) -> f64 {
+        self.even_rays
     }
 
     /// Returns the power of all rays, in the unit of the run.
