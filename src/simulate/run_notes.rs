@@ -87,9 +87,9 @@ impl BoundScene {
         ))
     }
 
-    /// Returns one sentence about sources whose `rays` are so few beside their power that the spread of replicates may tell too small an
-    /// error of their light, and by how much; `None` where there are none. Rays count in the replicates that are `done`: where none is, as
-    /// in a replay, no error is told.
+    /// Returns one sentence about sources whose `rays` are so few beside their power that the spread of replicates may tell too small or
+    /// too large an error of their light, and by how much; `None` where there are none. Rays count in the replicates that are `done`: where
+    /// none is, as in a replay, no error is told.
     pub(crate) fn heavy_rays_note(&self, plan: &Plan, done: &[u32]) -> Option<String> {
         if done.is_empty() {
             return None;
@@ -100,15 +100,23 @@ impl BoundScene {
         let is_heavy = |source: &usize| {
             // Their own scatter is above that of a run whose rays all weigh alike.
             let scatters = weight(*source) > HEAVY && weight(*source) * share(*source) > 1.0;
-            self.emitters[*source].rays.is_some() && scatters && plan.rays_in(*source, done) < SCARCE_RAYS
+            let scarce = SCARCE_RAYS.max(done.len() as u64);
+            self.emitters[*source].rays.is_some() && scatters && plan.rays_in(*source, done) < scarce
         };
         let first = (0..self.emitters.len()).filter(is_heavy).max_by(|a, b| weight(*a).total_cmp(&weight(*b)))?;
         let rays = plan.rays_in(first, done);
         // Of independent rays at least one meets a place that gets a larger share of their light, but in one run of twenty.
         let missed = 1.0 - UNLIKELY.powf(1.0 / rays as f64);
+        let too_large = replicate_scatter(rays, done.len()).map_or_else(String::new, |scatter| {
+            format!(
+                ", and too large by up to {} % where all arrive, as they lie in {rays} of {} replicates alone",
+                figures(100.0 * scatter * share(first), 2),
+                done.len()
+            )
+        });
         Some(format!(
             "{} has {} % of the power in {}: printed errors may be too small, as where none of them arrives up to {} % of the power may be \
-             missing; give it more `rays`",
+             missing{too_large}; give it more `rays`",
             self.scene.source_label(first),
             figures(100.0 * share(first), 2),
             count_of(rays, "ray"),
@@ -116,8 +124,8 @@ impl BoundScene {
         ))
     }
 
-    /// Returns one sentence about ray lists of which each ray, were all of equal power, is drawn twice or more: what a list leaves open, as a
-    /// sample of its light, is then more than the scatter of the draws, which alone is in the errors. `None` where there are none.
+    /// Returns one sentence about ray lists of which each ray, were all of equal power, is drawn twice or more: what a list leaves open, as
+    /// a sample of its light, is then more than the scatter of the draws, which alone is in the errors. `None` where there are none.
     pub(crate) fn short_lists_note(&self, plan: &Plan, done: &[u32]) -> Option<String> {
         let short_list = |source: usize| {
             let even = self.emitters[source].list()?.even_rays();
@@ -198,6 +206,15 @@ impl BoundScene {
     }
 }
 
+/// Returns the error that the spread of so many replicates tells of the power of so few rays, as a share of it, though all of them arrive:
+/// one replicate has a ray, another none. `None` where each has one, and where none has.
+fn replicate_scatter(rays: u64, replicates: usize) -> Option<f64> {
+    let (rays, replicates) = (rays as f64, replicates as f64);
+    let some_have_none = rays > 0.0 && rays < replicates;
+    // Of n rays in n of N replicates the squares about the mean add up to n (1 − n/N).
+    some_have_none.then(|| ((1.0 - rays / replicates) / rays * replicates / (replicates - 1.0)).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -231,7 +248,8 @@ mod tests {
     }
 
     /// The 32 rays of half the power lie in every fourth of 128 replicates, from the fourth on. n of them all miss 1 − 0.05^(1/n) of their
-    /// light in one run of twenty: 0.0894 of 32, 0.1708 of 16, and all of it of none.
+    /// light in one run of twenty: 0.0894 of 32, 0.1708 of 16, and all of it of none. Where n of N replicates have a ray, N/4 here, their
+    /// spread is √(3/4 / n · N/(N − 1)) of it: 0.1537 of 32 and 0.2182 of 16.
     #[test]
     fn heavy_rays_are_counted_in_the_replicates_that_are_done() {
         let text =
@@ -239,8 +257,12 @@ mod tests {
         let bound = Scene::parse(text, "s.toml", Path::new(".")).unwrap().bind(&Model::default()).unwrap();
         let plan = Plan::new(&bound, &RunSettings::default());
         let note = |replicates: u32| bound.heavy_rays_note(&plan, &(0..replicates).collect::<Vec<u32>>());
-        for (replicates, rays, missing) in [(128, 32, "4.5"), (64, 16, "8.5"), (3, 0, "50")] {
+        let runs = [(128, 32, "4.5", Some("7.7")), (64, 16, "8.5", Some("11")), (3, 0, "50", None)];
+        for (replicates, rays, missing, too_large) in runs {
             let note = note(replicates).unwrap();
+            let scatter = too_large.map(|percent| format!("too large by up to {percent} % where all arrive"));
+            assert_eq!(note.contains("too large"), scatter.is_some(), "{note}");
+            assert!(scatter.is_none_or(|scatter| note.contains(&scatter)), "{note}");
             let counted = note.starts_with(&format!("the source 'few' has 50 % of the power in {rays} rays: "));
             assert!(counted && note.contains(&format!("up to {missing} % of the power may be missing")), "{note}");
         }

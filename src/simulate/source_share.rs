@@ -6,7 +6,8 @@ const GOLDEN_RATIO: u32 = 0x9e37_79b9;
 /// The rays of one source: in the whole run, or in each replicate of one that can grow.
 ///
 /// Every replicate has the same quanta of it, so that their spread is that of the light alone: where its rays don't divide evenly, those of
-/// a replicate with one more weigh less. A source with fewer rays than there are replicates is in some of them alone, another in others.
+/// a replicate with one more weigh less. A source with fewer rays than there are replicates is in some of them alone, another in others:
+/// the spread then holds that too, even where all of its light arrives, which a note says of one with much power.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SourceShare {
     /// Number of its first ray, and how many it has.

@@ -398,6 +398,20 @@ fn a_source_of_few_heavy_rays_is_named() {
         assert!(notes.contains(&says) && notes.contains(&missing), "{notes}");
     }
     assert!(!notes(1000).contains("strong"), "{}", notes(1000));
+    // All light of both arrives. Of 10 rays in 10 of 128 replicates the spread is √((1 − 10/128) / 10 · 128/127) all the same: 0.3048 of
+    // two thirds; of 100 rays, each in a replicate of its own as well, 0.0470.
+    for (rays, scatter, percent) in [(10, 0.304_82, "20"), (100, 0.046_96, "3.1")] {
+        let run = World::default().run(&format!("{}{ALL}", beams(rays)), |_| ());
+        let all = &run.receivers[0];
+        assert!(
+            (all.power - 3.0).abs() < 1e-9 && (all.power_error - 2.0 * scatter).abs() < 1e-3,
+            "{}",
+            all.power_error
+        );
+        let told =
+            format!("too large by up to {percent} % where all arrive, as they lie in {rays} of 128 replicates");
+        assert!(run.notes.iter().any(|note| note.contains(&told)), "{:?}", run.notes);
+    }
     // One ray of next to no power: what it does is below the error of the others.
     let pilot = format!(
         "[[source]]\npower = 1000\nrays = 100_000\n[[source]]\nname = 'pilot'\npower = 0.02\nrays = 1\n{ALL}"
