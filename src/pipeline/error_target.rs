@@ -8,7 +8,7 @@ use super::error::Error;
 use super::growing_search::{GrowingSearch, growth_margin, most_rays, next_rays};
 use super::monitor::Monitor;
 use super::prepared_scene::PreparedScene;
-use crate::simulate::{GROWING_REPLICATE, PartialRun, Results, Scene};
+use crate::simulate::{GROWING_REPLICATE, PartialRun, ReceiverResult, Results, Scene};
 use crate::study::figures::{cell_errors, light_weighted_error};
 use crate::text::nearest_or_listed;
 use serde::Serialize;
@@ -47,7 +47,8 @@ pub struct TargetResult {
     pub rays: u64,
     /// Whether the error found is at most the one asked for.
     pub reached: bool,
-    /// Rays that are still missing, as far as the error tells, in whole replicates of a run that grows; 0 where it is reached.
+    /// Rays that are still missing, as far as the error tells, in whole replicates of a run that grows; 0 where it is reached, and where
+    /// all of the error is the rounding of each ray, which more of them do not lessen.
     pub missing_rays: u64,
 }
 
@@ -121,7 +122,7 @@ impl ErrorTarget {
             prepared.rays = Some(rays);
             let (portion, results) = search.trace(prepared, monitor);
             let result = self.result(&results);
-            if result.reached || !portion.is_whole() || rays >= most {
+            if result.missing_rays == 0 || !portion.is_whole() || rays >= most {
                 return (portion, result);
             }
             rays = next_rays(rays, self.growth(result.found_percent, results.replicates), most);
@@ -140,8 +141,18 @@ impl ErrorTarget {
             found_percent: found,
             rays,
             reached,
-            missing_rays: if reached { 0 } else { self.missing_rays(found, rays, results.replicates) },
+            missing_rays: if reached || self.is_rounding(results) {
+                0
+            } else {
+                self.missing_rays(found, rays, results.replicates)
+            },
         }
+    }
+
+    /// Whether all of the error of the power is what rounding to whole quanta may change of each ray.
+    fn is_rounding(&self, results: &Results) -> bool {
+        let is_asked = |r: &&ReceiverResult| !self.cells && r.name == self.receiver && r.power > 0.0;
+        results.receivers.iter().find(is_asked).is_some_and(|r| r.power_error <= results.rounding())
     }
 
     /// Returns how many rays a run of so many rays and replicates lacks whose error, `found` percent, is too large.

@@ -6,7 +6,7 @@ use super::tally::{CUT, Sum};
 const SQUARELESS: f64 = (1u32 << CUT) as f64;
 
 /// The most that rounding to whole quanta changes of the power of a ray.
-const HALF_QUANTUM: f64 = 0.5;
+pub(super) const HALF_QUANTUM: f64 = 0.5;
 
 /// What turns the sums of a run into figures.
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,7 @@ use super::face_results::FaceResults;
 use super::hooks::Traced;
 use super::outcome::{Counts, LostRay, PathVertex};
 use super::plan::Plan;
-use super::power_scale::PowerScale;
+use super::power_scale::{HALF_QUANTUM, PowerScale};
 use super::receiver::Receiver;
 use super::receiver_results::{ReceiverResult, unseen_light_notes};
 use super::seconds::Seconds;
@@ -223,6 +223,12 @@ impl Results {
             quantum,
             digest,
         }
+    }
+
+    /// Returns what rounding to whole quanta may change of a power that every ray adds to: the same share of all light, however many rays
+    /// are traced.
+    pub(crate) fn rounding(&self) -> f64 {
+        HALF_QUANTUM * self.rays as f64 * self.quantum
     }
 }
 

@@ -2,7 +2,8 @@
 
 use crate::support::{Shape, World};
 use lampyris::math::{Frame, Point, Vector};
-use lampyris::simulate::{Required, Results, Scene};
+use lampyris::pipeline::ErrorTarget;
+use lampyris::simulate::{QUANTA, Required, Results, Scene};
 use std::f64::consts::PI;
 
 fn slab() -> World {
@@ -332,5 +333,28 @@ fn bare_faces_without_a_medium_are_none_for_light() {
         let required = Required::new(&scene.bind(&world.model).unwrap());
         let fresnel = required.simulated.iter().find(|b| format!("{:?}", b.effect) == "Fresnel");
         assert_eq!(fresnel.map(|b| b.because.as_str()), expected.then_some("6 bare or metal faces"));
+    }
+}
+
+/// A filter leaves 2.6 quanta of each ray, which are counted as 3: no spread tells of it, and the error is half a quantum of each. That is
+/// 1/6 of what arrives, however many rays are traced.
+#[test]
+fn what_rounding_changes_behind_a_dense_filter_is_in_the_error() {
+    let mut world = World::default();
+    world.cuboid("filter", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 10.0));
+    let text = format!(
+        "[run]\nrays = 64_000\npower_floor = 0\n[[medium]]\nname = 'dense'\nindex = 1\nabsorption_per_mm = {}
+        [[material]]\npart = 'filter'\nmedium = 'dense'
+        [[source]]\nkind = 'collimated'\nat = [0, 0, -20]\nsize = [2, 2]
+        [[receiver]]\nname = 'behind'\nat = [0, 0, 30]\nsize = [10, 10]\n",
+        (QUANTA / 2.6).ln() / 10.0
+    );
+    let results = world.run(&text, |_| ());
+    let behind = &results.receivers[0];
+    let [off, error] = [behind.power - 2.6 / QUANTA, behind.power_error].map(|power| power * QUANTA);
+    assert!((off - 0.4).abs() < 1e-6 && (error - 0.5).abs() < 1e-6, "{off} ± {error}");
+    for (target, reached) in [("17%@behind", true), ("16%@behind", false)] {
+        let result = ErrorTarget::parse(target).unwrap().result(&results);
+        assert_eq!((result.reached, result.missing_rays), (reached, 0), "{result:?}");
     }
 }

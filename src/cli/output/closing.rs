@@ -103,7 +103,8 @@ pub(crate) fn target_sentence(result: &TargetResult) -> String {
     let found = result.found_percent.map_or("nothing arrived".into(), |e| format!("{} %", figures(e, 2)));
     let verdict = if result.reached { "reached" } else { "**not reached**" };
     let missing = match result.missing_rays {
-        0 => String::new(),
+        0 if result.reached => String::new(),
+        0 => "; it is the rounding of the rays' power, which more rays do not lessen".into(),
         more => format!("; about {} more are needed", grouped(more)),
     };
     format!(
