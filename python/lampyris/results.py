@@ -64,8 +64,8 @@ class Receiver:
         self.kind: str = document["kind"]
         #: Unit of the cells.
         self.unit: str = document["unit"]
-        #: ``power``, ``max``, ``rms_1``, ``rms_2``, ``centroid_1``, ``centroid_2``; places are absent where no light came, ``rms_1``
-        #: and ``centroid_1`` also in planes C all around.
+        #: ``power``, ``max``, ``rms_1``, ``rms_2``, ``centroid_1``, ``centroid_2``; places are absent where no light came,
+        #: and along an angle that goes all around.
         self.figures: dict[str, Figure] = {
             name: Figure.from_document(f) for name, f in document["figures"].items() if isinstance(f, dict)
         }

@@ -141,7 +141,7 @@ impl SceneResults {
         }
         if let Some(geometric) = self.geometric.as_ref().filter(|g| g.rays > 0) {
             document["faceting"] = serde_json::to_value(geometric)?;
-            for (k, receiver) in self.results.receivers.iter().enumerate().filter(|(_, r)| r.is_cyclic(0)) {
+            for (k, receiver) in self.results.receivers.iter().enumerate() {
                 clear_compared_places(&mut document["faceting"]["receivers"][k], receiver);
             }
         }

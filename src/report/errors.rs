@@ -102,7 +102,7 @@ fn sentence(r: &ReceiverError, f: &ReceiverFigures) -> String {
         let share = 100.0 * (r.peak.facets / r.peak.spline - 1.0);
         parts.push(format!("its brightest place changes by {} %", figures(share, 2)));
     }
-    // Along C all around there is neither.
+    // Along an angle that goes all around there is neither.
     let axes = || (0..2).filter(|&axis| [&f.rms_1, &f.rms_2][axis].is_some());
     let widths = |pick: fn(&Paired) -> f64| {
         let along: Vec<String> = axes().map(|axis| figures(pick(&r.width[axis]), 3)).collect();
@@ -204,8 +204,8 @@ pub(super) fn power_table(results: &Results, power: &PowerFigures, unit: &str, c
 pub(super) fn places_caption(results: &Results) -> String {
     let mut caption =
         "Positions and widths in mm, of far fields and spheres in degrees; errors are those of rays and facets together.".to_owned();
-    if results.receivers.iter().any(|r| r.is_cyclic(0)) {
-        caption += " Planes C all around have no mean position 1 and no rms 1: C 0° and 360° are one.";
+    if results.receivers.iter().any(|r| r.is_cyclic(0) || r.is_cyclic(1)) {
+        caption += " Along an angle that goes all around there is no mean position and no rms: both ends of its range are one.";
     }
     caption
 }

@@ -35,15 +35,15 @@ struct Ring {
 /// Groups of neighbouring cells that count as one.
 pub(crate) struct JoinedCells(Vec<Range<usize>>);
 
-/// Whether planes C between these bounds, in degrees, go all around.
-pub(super) fn are_all_around(c: [f64; 2]) -> bool {
-    (c[1] - c[0] - FULL_TURN_DEG).abs() < SAME_ANGLE_DEG
+/// Whether an angle between these bounds, in degrees, goes all around: both are one direction.
+pub(super) fn is_whole_turn(bounds: [f64; 2]) -> bool {
+    (bounds[1] - bounds[0] - FULL_TURN_DEG).abs() < SAME_ANGLE_DEG
 }
 
 impl PoleRings {
     /// The rings of a grid of so many planes and cells of γ between these bounds, in degrees; none where the planes are not all around.
     pub(crate) fn new([planes, rows]: [usize; 2], c: [f64; 2], gamma: [f64; 2]) -> Self {
-        let is_all_around = planes >= LEAST_PLANES && are_all_around(c);
+        let is_all_around = planes >= LEAST_PLANES && is_whole_turn(c);
         if !is_all_around || rows == 0 {
             return Self::default();
         }

@@ -1,6 +1,6 @@
 //! What one receiver counted, in the units of the scene.
 
-use super::pole_rings::{PoleRings, are_all_around};
+use super::pole_rings::{PoleRings, is_whole_turn};
 use super::power_scale::PowerScale;
 use super::receiver::{NAMED_RECEIVERS, Receiver, Shape};
 use super::scene::{FarFieldType, PowerUnit};
@@ -286,10 +286,10 @@ impl ReceiverResult {
         [self.middle[axis] - self.half[axis], self.middle[axis] + self.half[axis]]
     }
 
-    /// Whether an axis (0 or 1) is that of planes C all around. There 0° and 360° are one plane: a beam about it would have its mean at
-    /// 180°, in the opposite one, so that mean position and root mean square mean nothing.
+    /// Whether an axis (0 or 1) is an angle that goes all around: C, H of type A and of spheres, V of type B. Both ends of its range are
+    /// one direction: a beam about it would have its mean in the opposite one, so that mean position and root mean square mean nothing.
     pub fn is_cyclic(&self, axis: usize) -> bool {
-        axis == 0 && self.angles == Some(FarFieldType::C) && are_all_around(self.bounds(0))
+        matches!(self.kind, "far_field" | "sphere") && is_whole_turn(self.bounds(axis))
     }
 
     /// Whether mean position and root mean square along an axis (0 or 1) mean anything: not without light, nor along one that is cyclic.

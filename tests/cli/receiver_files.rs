@@ -437,7 +437,41 @@ fn planes_all_around_have_no_mean() {
         assert!(error > 0.0 && (value - expected).abs() < 4.0 * error, "{figure}");
     }
     let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
-    assert!(page.contains("Planes C all around have no mean position 1"));
+    assert!(page.contains("Along an angle that goes all around there is no mean position"));
+}
+
+/// A beam against the normal lies where H of type A and of spheres, and V of type B, begin and end. Along the other angle its mean is 0, and
+/// its mean square, of an even cone of the half angle a = 5° about a direction on the equator, a²/4: 2.5°, up to terms of a⁴.
+#[test]
+fn an_angle_of_type_a_or_b_all_around_has_no_mean() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "[run]\nrays = 20_000\n[[source]]\nkind = 'cone'\nhalf_angle_deg = 5\ndirection = [0, 0, -1]\n\
+        [[receiver]]\nname = 'A'\nkind = 'far_field'\nh_deg = [-180, 180]\n\
+        [[receiver]]\nname = 'B'\nkind = 'far_field'\nangles = 'B'\nv_deg = [-180, 180]\n\
+        [[receiver]]\nname = 'ball'\nkind = 'sphere'\nradius = 9\nabsorbs = false\n\
+        [[receiver]]\nname = 'behind'\nkind = 'far_field'\nnormal = [0, 0, -1]\n";
+    std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let (code, text, err) =
+        lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out", "--json", "--no-report"]);
+    assert_eq!(code, 0, "{err}");
+    let found: Value = serde_json::from_str(&text).unwrap();
+    for (k, cyclic) in [(0, 0), (1, 1), (2, 0)] {
+        let receiver = &found["receivers"][k];
+        let other = 1 - cyclic;
+        for key in ["centroid", "centroid_error", "rms", "rms_error"] {
+            let pair = &receiver[key];
+            assert!(pair[cyclic].is_null() && pair[other].is_number(), "{} {key}: {pair}", receiver["name"]);
+        }
+        let figures = receiver["figures"].as_object().unwrap();
+        for name in ["centroid", "rms"] {
+            assert!(!figures.contains_key(&format!("{name}_{}", cyclic + 1)), "{figures:?}");
+        }
+        let [mean, width] = ["centroid", "rms"].map(|key| receiver[key][other].as_f64().unwrap());
+        assert!(mean.abs() < 0.1 && (width - 2.5).abs() < 0.05, "{}: {mean} {width}", receiver["name"]);
+    }
+    // Half a space has its ends apart.
+    let behind = &found["receivers"][3];
+    assert!(behind["centroid"][0].is_number() && behind["rms"][1].is_number(), "{behind}");
 }
 
 /// Light that did not come has no place: neither 0 nor any other.
