@@ -53,8 +53,10 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
         &title,
         &[("", ""), ("value", ""), ("± rays and facets (1σ)", ""), ("unit", ""), ("where", "")],
     );
-    if let Some((place, value)) = brightest_direction(grid) {
-        let error = peak_error(grid, of_receiver.max.as_ref()).map_or(Cell::Empty, |error| Cell::Number(error, 2));
+    let rings = receiver.pole_rings();
+    if let Some((place, value)) = brightest_direction(grid, &rings) {
+        let error = peak_error(grid, &rings, of_receiver.max.as_ref());
+        let error = error.map_or(Cell::Empty, |error| Cell::Number(error, 2));
         table.row(["Imax".into(), Cell::Number(value, 5), error, "cd".into(), place.into()]);
     }
     let power = &of_receiver.power;
@@ -236,7 +238,7 @@ mod tests {
     use crate::model::Model;
     use crate::regulation::{Aim, Reading, Regulation, RowKind, RowVerdict, Traffic, Verdict};
     use crate::report::chart::Content;
-    use crate::report::even_poles::with_even_poles;
+    use crate::report::even_poles::{plane_rings, with_even_poles};
     use crate::simulate::{RunSettings, Scene, simulate};
     use std::f64::consts::PI;
     use std::path::Path;
@@ -353,13 +355,14 @@ mod tests {
             let noise = if gamma < 0.03 { 2.0 * (i % 2) as f64 } else { 1.0 };
             noise * 100.0 * gamma.cos().max(0.0)
         });
-        let even = with_even_poles(&grid);
+        let rings = plane_rings(&grid);
+        let even = with_even_poles(&grid, &rings);
         let at_pole = 100.0 * 1.5f64.to_radians().cos();
         assert!((even.peak().unwrap().1 / at_pole - 1.0).abs() < 1e-12);
         let Some([Cell::Number(ahead, _), Cell::Number(ahead_error, _)]) = value_ahead(&even) else { panic!("HV") };
         assert!((ahead / at_pole - 1.0).abs() < 1e-12);
         // 60 cells of ±10 % of twice the value, and 60 without light: √60 · 0.2 / 120 of it.
-        let error = peak_error(&even, None).unwrap();
+        let error = peak_error(&even, &rings, None).unwrap();
         for error in [error, ahead_error] {
             assert!((error / at_pole - 0.2 * 60f64.sqrt() / 120.0).abs() < 1e-12, "{error}");
         }
@@ -386,9 +389,10 @@ mod tests {
         let own = 0.3;
         grid.error =
             Some(grid.values.iter().map(|v| if *v == grid.values[59 * 120 + 5] { own } else { 0.0 }).collect());
-        let even = with_even_poles(&grid);
+        let rings = plane_rings(&grid);
+        let even = with_even_poles(&grid, &rings);
         assert_eq!(even.peak_cell(), Some((5, 59)));
-        let error = peak_error(&even, None).unwrap();
+        let error = peak_error(&even, &rings, None).unwrap();
         assert!((error - own).abs() < 1e-12, "{error}");
     }
 }

@@ -1,6 +1,6 @@
 //! What a receiver counted as maps: the grid for files and pictures, its cuts, and what stands below them.
 
-use super::even_poles::{brightest_direction, is_all_around, pole_rings};
+use super::even_poles::{brightest_direction, is_all_around};
 use super::framing::{LIT_PART_SHOWN, lit_part};
 use super::number::{coordinate_figures, unit_in_words, with_unit};
 use super::peak_lines::lines_through_peak;
@@ -9,7 +9,7 @@ use crate::formats::file_stem;
 use crate::formats::{Axis, Grid, Layer};
 use crate::math::error_of_maximum;
 use crate::simulate::scene::FarFieldType;
-use crate::simulate::{ChannelResult, ReceiverResult, Results};
+use crate::simulate::{ChannelResult, PoleRings, ReceiverResult, Results};
 use crate::study::figures::{Figure, cell_errors, channel_cell_errors, light_weighted_error};
 use crate::study::geometric_error::GeometricError;
 use crate::text::figures;
@@ -162,14 +162,14 @@ pub(super) fn cuts(grid: &Grid) -> Option<Chart> {
 
 /// Returns the standard error of the largest value, in its unit: that of the receiver's figure `max` where that has the unit of the grid,
 /// else the statistical one with the upward bias of a noisy maximum ([`error_of_maximum`]) and the geometric one of its cell, as squares;
-/// `None` without statistical errors. `grid` has even poles.
-pub(super) fn peak_error(grid: &Grid, max: Option<&Figure>) -> Option<f64> {
+/// `None` without statistical errors. `grid` has even poles, which `rings` tell.
+pub(super) fn peak_error(grid: &Grid, rings: &PoleRings, max: Option<&Figure>) -> Option<f64> {
     if let Some(max) = max.filter(|max| unit_in_words(&max.unit) == grid.unit) {
         return Some(max.combined());
     }
     let (i, j) = grid.peak_cell()?;
     let mut errors = grid.error.clone()?;
-    pole_rings(grid).clear_rivals(&grid.values, &mut errors);
+    rings.clear_rivals(&grid.values, &mut errors);
     let geometric = grid.geometric.as_ref().map_or(0.0, |geometric| geometric[j * grid.axes[0].cells + i]);
     let values = grid.values.iter().zip(&errors).map(|(&value, &error)| [value, error]);
     Some(error_of_maximum(values).hypot(geometric))
@@ -185,7 +185,8 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid, max: Option<&Figure>) -> 
         });
         format!("{x}, {y}")
     };
-    let peak = match brightest_direction(grid).filter(|_| r.kind == "far_field") {
+    let rings = r.pole_rings();
+    let peak = match brightest_direction(grid, &rings).filter(|_| r.kind == "far_field") {
         Some(direction) => Some(direction),
         None => grid.peak().map(|(at, value)| (place(at), value)),
     };
@@ -194,7 +195,8 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid, max: Option<&Figure>) -> 
             return "No light came here. ".to_owned();
         }
         let of = if max.is_some_and(|max| max.geometric.is_none()) { " (± of the rays alone)" } else { "" };
-        let error = peak_error(grid, max).map_or_else(String::new, |error| format!(" ± {}", figures(error, 2)));
+        let error =
+            peak_error(grid, &rings, max).map_or_else(String::new, |error| format!(" ± {}", figures(error, 2)));
         format!("Peak {}{error} {}{of} at {place}. ", figures(value, 3), grid.unit)
     });
     let error = grid.error.as_ref().and_then(|errors| light_weighted_error(&grid.values, errors)).map(|share| {
@@ -210,6 +212,7 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid, max: Option<&Figure>) -> 
 mod tests {
     use super::*;
     use crate::report::Content;
+    use crate::report::even_poles::plane_rings;
 
     /// A beam along γ 0 of 2° cells, with faint light beside and behind it.
     fn beam() -> Grid {
@@ -249,10 +252,11 @@ mod tests {
         let mut grid = beam();
         grid.error = Some(grid.values.iter().map(|v| 0.01 * v).collect());
         let max = |unit: &str, geometric| Figure::new(1071.0, unit, 30.0, geometric);
-        assert_eq!(peak_error(&grid, Some(&max("cd", Some(40.0)))), Some(50.0));
+        let rings = plane_rings(&grid);
+        assert_eq!(peak_error(&grid, &rings, Some(&max("cd", Some(40.0)))), Some(50.0));
         // Watts a steradian are another map's: the cell's own 1 %, 10.21, or more for its rivals; were all cells of two rows alike, the
         // largest of 144 would be too large by 2.59 of these, 28.4 in all.
-        assert!((10.2..28.4).contains(&peak_error(&grid, Some(&max("W/sr", None))).unwrap()));
+        assert!((10.2..28.4).contains(&peak_error(&grid, &rings, Some(&max("W/sr", None))).unwrap()));
     }
 
     #[test]

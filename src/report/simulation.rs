@@ -124,13 +124,13 @@ impl SimulationReport<'_> {
         text += ". ";
         let directions = r.receivers.iter().zip(self.figures).filter(|(x, _)| x.kind == "far_field");
         let brightest: Vec<_> =
-            directions.filter_map(|(x, f)| Some((receiver_grid(x)?, f.max.as_ref()?))).collect();
+            directions.filter_map(|(x, f)| Some((receiver_grid(x)?, x.pole_rings(), f.max.as_ref()?))).collect();
         let several = brightest.len() > 1;
         // The largest of many cells that few rays met says nothing of the lamp.
-        for (grid, max) in
-            brightest.into_iter().filter(|(_, max)| max.statistical < MOST_UNCERTAIN_PEAK * max.value)
+        for (grid, rings, max) in
+            brightest.into_iter().filter(|(_, _, max)| max.statistical < MOST_UNCERTAIN_PEAK * max.value)
         {
-            if let Some((direction, _)) = brightest_direction(&with_joined_slivers(&grid)) {
+            if let Some((direction, _)) = brightest_direction(&with_joined_slivers(&grid, &rings), &rings) {
                 let of = if several { format!(" of {}", grid.name) } else { String::new() };
                 let value = errors::with_errors(max, 3, cause);
                 text += &format!("The brightest direction{of} is {direction} with **{value}**. ");
@@ -229,7 +229,7 @@ impl SimulationReport<'_> {
                 .caption(&self.drawn),
         );
         for (k, grid) in maps {
-            let grid = with_joined_slivers(&grid);
+            let grid = with_joined_slivers(&grid, &self.results.receivers[k].pole_rings());
             let shown = Counted { receiver: &self.results.receivers[k], figures: &self.figures[k], grid: &grid };
             section = section.with_block(receiver_blocks::framed_map(&shown));
             // The map that matters most stands beside the facets and has its cuts drawn.

@@ -1,39 +1,67 @@
-//! Rings of cells at and beside the poles of planes C all around, where planes draw together: slivers that few rays meet, and the brightest
-//! of so many would be the luckiest.
+//! Rings of cells at and beside the poles of far fields and spheres: slivers that few rays meet, and the brightest of so many would be the
+//! luckiest. Planes C draw together at γ 0° and 180°, columns of type A and of spheres at V ±90°, rows of type B at H ±90°.
 //!
 //! The ring at a pole is one direction, and stands at its mean. In a ring beside it neighbours are joined while their noise asks for it,
-//! at most as many as have the solid angle of a cell at γ 90° together. So the peak of a smooth distribution is as noisy as far from the
-//! poles, and what rays do tell apart there stays apart.
+//! at most as many as have the solid angle of a cell on the equator together. So the peak of a smooth distribution is as noisy as far from
+//! the poles, and what rays do tell apart there stays apart.
 
+use super::scene::FarFieldType;
 use crate::math::error_of_mean;
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::PI;
+use std::iter::StepBy;
 use std::ops::Range;
 
 /// Angles nearer than this are one, degrees.
 const SAME_ANGLE_DEG: f64 = 1e-6;
 /// The angle all around, degrees.
 const FULL_TURN_DEG: f64 = 360.0;
-/// Fewer planes than these leave cells that are no slivers.
+/// From pole to pole, and what a field of the half space ahead covers of the angle about its poles, degrees.
+const HALF_TURN_DEG: f64 = 180.0;
+/// Fewer cells about a pole than these are no slivers.
 const LEAST_PLANES: usize = 4;
 /// Standard error of a ring's cells, as a share of them, from which on neighbours are joined: the largest of a hundred values with as much
 /// is 7 % too bright on average.
 const NOISY: f64 = 0.03;
 
-/// The rings of cells at γ 0° and 180° of a grid over planes C, row after row with C running fastest, and beside them.
+/// The rings of cells at and beside the poles of a grid over both angles of directions, row after row with the first running fastest.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PoleRings {
     rings: Vec<Ring>,
+    polar_axis: usize,
+    poles: [Option<usize>; 2],
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Ring {
-    cells: Range<usize>,
+    cells: CellLine,
     /// How many cells may be joined; `None` at a pole, where all are.
     most_joined: Option<usize>,
 }
 
+/// Cells one behind the other in a row or a column of their grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct CellLine {
+    first: usize,
+    /// From one to the next, in the order of the grid.
+    step: usize,
+    count: usize,
+}
+
+impl CellLine {
+    /// Goes through the indices of its cells, rising.
+    fn indices(self) -> StepBy<Range<usize>> {
+        (self.first..self.first + self.step * self.count).step_by(self.step)
+    }
+
+    /// Returns its `k`-th part of so many.
+    fn part(self, k: usize, parts: usize) -> Self {
+        let [from, to] = [k, k + 1].map(|k| k * self.count / parts);
+        Self { first: self.first + self.step * from, count: to - from, ..self }
+    }
+}
+
 /// Groups of neighbouring cells that count as one.
-pub(crate) struct JoinedCells(Vec<Range<usize>>);
+pub(crate) struct JoinedCells(Vec<CellLine>);
 
 /// Whether an angle between these bounds, in degrees, goes all around: both are one direction.
 pub(super) fn is_whole_turn(bounds: [f64; 2]) -> bool {
@@ -41,25 +69,41 @@ pub(super) fn is_whole_turn(bounds: [f64; 2]) -> bool {
 }
 
 impl PoleRings {
-    /// The rings of a grid of so many planes and cells of γ between these bounds, in degrees; none where the planes are not all around.
-    pub(crate) fn new([planes, rows]: [usize; 2], c: [f64; 2], gamma: [f64; 2]) -> Self {
-        let is_all_around = planes >= LEAST_PLANES && is_whole_turn(c);
-        if !is_all_around || rows == 0 {
+    /// The rings of a grid over the angles of a type, of so many cells along both, between these bounds in degrees; none where planes C do
+    /// not go all around, or the cells of types A and B not through half a turn about their poles.
+    pub(crate) fn new(angles: FarFieldType, cells: [usize; 2], bounds: [[f64; 2]; 2]) -> Self {
+        // Which angle tells how far a direction is from the poles, what it is at the first, and how far the other goes about them at least.
+        let (polar_axis, first_pole_deg, least_turn_deg) = match angles {
+            FarFieldType::A => (1, -0.5 * HALF_TURN_DEG, HALF_TURN_DEG),
+            FarFieldType::B => (0, -0.5 * HALF_TURN_DEG, HALF_TURN_DEG),
+            FarFieldType::C => (1, 0.0, FULL_TURN_DEG),
+        };
+        let (count, around) = (cells[polar_axis], cells[1 - polar_axis]);
+        let [from, to] = bounds[1 - polar_axis];
+        let reaches_around = around >= LEAST_PLANES && to - from > least_turn_deg - SAME_ANGLE_DEG;
+        if !reaches_around || count == 0 {
             return Self::default();
         }
-        let is_pole = |row: usize| {
-            row == 0 && gamma[0].abs() < SAME_ANGLE_DEG
-                || row + 1 == rows && (gamma[1] - 180.0).abs() < SAME_ANGLE_DEG
-        };
-        let ring = |row: usize| {
-            let middle = gamma[0] + (gamma[1] - gamma[0]) * (row as f64 + 0.5) / rows as f64;
-            // Cells are as wide as the sine of γ.
-            let joined = 1.0 / middle.to_radians().clamp(0.0, 2.0 * FRAC_PI_2).sin();
-            let most_joined = (!is_pole(row)).then_some((joined.round() as usize).min(planes));
+        let [low, high] = bounds[polar_axis].map(|angle| angle - first_pole_deg);
+        let poles = [
+            (low.abs() < SAME_ANGLE_DEG).then_some(0),
+            ((high - HALF_TURN_DEG).abs() < SAME_ANGLE_DEG).then_some(count - 1),
+        ];
+        let ring = |place: usize| {
+            let middle = low + (high - low) * (place as f64 + 0.5) / count as f64;
+            // Cells are as wide as the sine of their angle from a pole.
+            let joined = 1.0 / middle.to_radians().clamp(0.0, PI).sin();
+            let is_pole = poles.contains(&Some(place));
+            let most_joined = (!is_pole).then_some((joined.round() as usize).min(around));
+            let cells = if polar_axis == 1 {
+                CellLine { first: place * around, step: 1, count: around }
+            } else {
+                CellLine { first: place, step: count, count: around }
+            };
             let is_even = most_joined.is_none_or(|most| most > 1);
-            is_even.then_some(Ring { cells: row * planes..(row + 1) * planes, most_joined })
+            is_even.then_some(Ring { cells, most_joined })
         };
-        Self { rings: (0..rows).filter_map(ring).collect() }
+        Self { rings: (0..count).filter_map(ring).collect(), polar_axis, poles }
     }
 
     /// Whether the grid has neither poles nor slivers beside them.
@@ -67,49 +111,55 @@ impl PoleRings {
         self.rings.is_empty()
     }
 
-    /// Whether the first row is a ring at γ 0°, and the last one at γ 180°, of a grid of so many cells.
-    pub(crate) fn has_poles(&self, cells: usize) -> [bool; 2] {
-        let mut poles = self.rings.iter().filter(|ring| ring.most_joined.is_none()).map(|ring| &ring.cells);
-        [poles.clone().any(|ring| ring.start == 0), poles.any(|ring| ring.end == cells)]
+    /// Returns which axis of the grid (0 or 1) has the angle from the poles: its rings are columns or rows. 0 of a grid without rings.
+    pub(crate) fn polar_axis(&self) -> usize {
+        self.polar_axis
+    }
+
+    /// Returns which columns or rows lie at the first pole and at the last one, the first and the last of the grid; `None` where it ends
+    /// before.
+    pub(crate) fn poles(&self) -> [Option<usize>; 2] {
+        self.poles
     }
 
     /// Returns which cells with these values and standard errors are to be joined; without errors those at the poles alone.
     pub(crate) fn joined_cells(&self, values: &[f64], errors: Option<&[f64]>) -> JoinedCells {
         let groups = self.rings.iter().flat_map(|ring| {
-            let (first, cells) = (ring.cells.start, ring.cells.len());
-            let noise =
-                errors.map_or(0.0, |errors| noise_share(&values[ring.cells.clone()], &errors[ring.cells.clone()]));
+            let cells = ring.cells;
+            let noise = errors.map_or(0.0, |errors| noise_share(cells.indices().map(|k| [values[k], errors[k]])));
             // Noise falls with the root of the number of cells.
             let wanted = (noise / NOISY).powi(2).ceil().max(1.0);
             let count = match ring.most_joined {
                 None => 1,
-                Some(most) => cells.div_ceil((wanted as usize).min(most)),
+                Some(most) => cells.count.div_ceil((wanted as usize).min(most)),
             };
-            (0..count).map(move |k| first + k * cells / count..first + (k + 1) * cells / count)
+            (0..count).map(move |k| cells.part(k, count))
         });
-        JoinedCells(groups.filter(|group| group.len() > 1).collect())
+        JoinedCells(groups.filter(|group| group.count > 1).collect())
     }
 
     /// Clears the error of each cell that is one with the next of its ring, in value and error, so that of joined cells the last, which of
     /// equal ones is the brightest, stands for all: they are no rivals of each other.
     pub(crate) fn clear_rivals(&self, values: &[f64], errors: &mut [f64]) {
-        for k in self.rings.iter().flat_map(|ring| ring.cells.start..ring.cells.end - 1) {
-            if values[k] == values[k + 1] && errors[k] == errors[k + 1] {
-                errors[k] = 0.0;
+        for ring in &self.rings {
+            for (k, next) in ring.cells.indices().zip(ring.cells.indices().skip(1)) {
+                if values[k] == values[next] && errors[k] == errors[next] {
+                    errors[k] = 0.0;
+                }
             }
         }
     }
 }
 
 /// Returns the standard error of the cells of a ring that have light, as a share of them, weighted by it; in the dark infinite where errors
-/// are stated, which are those of one ray, and 0 without any.
-fn noise_share(values: &[f64], errors: &[f64]) -> f64 {
-    let lit = || values.iter().zip(errors).filter(|(value, _)| **value > 0.0);
-    let light: f64 = lit().map(|(value, _)| value * value).sum();
-    let noise: f64 = lit().map(|(_, error)| error * error).sum();
+/// are stated, which are those of one ray, and 0 without any. Each cell is `[value, error]`.
+fn noise_share(mut cells: impl Iterator<Item = [f64; 2]> + Clone) -> f64 {
+    let lit = cells.clone().filter(|[value, _]| *value > 0.0);
+    let light: f64 = lit.clone().map(|[value, _]| value * value).sum();
+    let noise: f64 = lit.map(|[_, error]| error * error).sum();
     if light > 0.0 {
         (noise / light).sqrt()
-    } else if errors.iter().any(|error| *error > 0.0) {
+    } else if cells.any(|[_, error]| error > 0.0) {
         f64::INFINITY
     } else {
         0.0
@@ -120,8 +170,8 @@ impl JoinedCells {
     /// Sets the values of each group to their mean: cells of a ring have one solid angle.
     pub(crate) fn level(&self, values: &mut [f64]) {
         for group in &self.0 {
-            let mean = values[group.clone()].iter().sum::<f64>() / group.len() as f64;
-            values[group.clone()].fill(mean);
+            let mean = group.indices().map(|k| values[k]).sum::<f64>() / group.count as f64;
+            group.indices().for_each(|k| values[k] = mean);
         }
     }
 
@@ -129,8 +179,8 @@ impl JoinedCells {
     pub(crate) fn level_errors(&self, values: &[f64], errors: &mut [f64]) {
         for group in &self.0 {
             // Cells of a ring count different rays.
-            let error = error_of_mean(group.clone().map(|k| [values[k], errors[k]]));
-            errors[group.clone()].fill(error);
+            let error = error_of_mean(group.indices().map(|k| [values[k], errors[k]]));
+            group.indices().for_each(|k| errors[k] = error);
         }
     }
 }
@@ -139,14 +189,17 @@ impl JoinedCells {
 mod tests {
     use super::*;
 
+    const WHOLE: [[f64; 2]; 2] = [[0.0, 360.0], [0.0, 180.0]];
+
     #[test]
     fn rings_are_where_the_planes_meet() {
-        let all = PoleRings::new([4, 3], [0.0, 360.0], [0.0, 180.0]);
-        assert_eq!(all.has_poles(12), [true, true]);
-        let back = PoleRings::new([4, 3], [-180.0, 180.0], [90.0, 180.0]);
-        assert_eq!(back.has_poles(12), [false, true]);
-        assert!(PoleRings::new([4, 3], [0.0, 180.0], [0.0, 180.0]).is_empty());
-        assert!(PoleRings::new([3, 3], [0.0, 360.0], [0.0, 180.0]).is_empty());
+        let planes = |cells, bounds| PoleRings::new(FarFieldType::C, cells, bounds);
+        let all = planes([4, 3], WHOLE);
+        assert_eq!((all.polar_axis(), all.poles()), (1, [Some(0), Some(2)]));
+        let back = planes([4, 3], [[-180.0, 180.0], [90.0, 180.0]]);
+        assert_eq!(back.poles(), [None, Some(2)]);
+        assert!(planes([4, 3], [[0.0, 180.0], [0.0, 180.0]]).is_empty());
+        assert!(planes([3, 3], WHOLE).is_empty());
 
         let mut values = [1.0, 2.0, 3.0, 6.0, 5.0, 5.0, 5.0, 9.0, 0.0, 0.0, 0.0, 8.0];
         all.joined_cells(&values, None).level(&mut values);
@@ -158,10 +211,39 @@ mod tests {
         assert_eq!(errors, [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0, 1.0]);
     }
 
+    /// Type A has its poles in the first and the last row, type B in the first and the last column; half a space ends at both.
+    #[test]
+    fn types_a_and_b_have_their_poles_across() {
+        let (half, turn) = ([-90.0, 90.0], [-180.0, 180.0]);
+        let mut values = [1.0, 5.0, 0.0, 2.0, 6.0, 0.0, 3.0, 7.0, 0.0, 6.0, 8.0, 8.0];
+        for around in [half, turn] {
+            let rows = PoleRings::new(FarFieldType::A, [4, 3], [around, half]);
+            assert_eq!((rows.polar_axis(), rows.poles()), (1, [Some(0), Some(2)]));
+            let columns = PoleRings::new(FarFieldType::B, [3, 4], [half, around]);
+            assert_eq!((columns.polar_axis(), columns.poles()), (0, [Some(0), Some(2)]));
+            let mut even = values;
+            columns.joined_cells(&values, None).level(&mut even);
+            assert_eq!(even, [3.0, 5.0, 2.0, 3.0, 6.0, 2.0, 3.0, 7.0, 2.0, 3.0, 8.0, 2.0]);
+        }
+        let part = PoleRings::new(FarFieldType::A, [4, 3], [turn, [-30.0, 90.0]]);
+        assert_eq!(part.poles(), [None, Some(2)]);
+        part.joined_cells(&values, None).level(&mut values);
+        assert_eq!(values, [1.0, 5.0, 0.0, 2.0, 6.0, 0.0, 3.0, 7.0, 5.5, 5.5, 5.5, 5.5]);
+        // As a headlamp is measured: no pole is near.
+        assert!(PoleRings::new(FarFieldType::A, [400, 200], [[-40.0, 40.0], [-20.0, 20.0]]).is_empty());
+
+        // Two columns of four cells with an error of 2: at the pole √(4 · 2²)/4, for the last of them.
+        let columns = PoleRings::new(FarFieldType::B, [2, 4], [[0.0, 90.0], turn]);
+        let (lit, mut errors) = ([100.0; 8], [2.0; 8]);
+        columns.joined_cells(&lit, Some(&errors.clone())).level_errors(&lit, &mut errors);
+        columns.clear_rivals(&lit, &mut errors);
+        assert_eq!(errors, [2.0, 0.0, 2.0, 0.0, 2.0, 0.0, 2.0, 1.0]);
+    }
+
     /// Rows of 20°, of which the second has its middle at 30°: two cells there are as wide as one at 90°. A ring between has none.
     #[test]
     fn cells_beside_a_pole_are_joined_for_noise_alone() {
-        let rings = PoleRings::new([6, 9], [0.0, 360.0], [0.0, 180.0]);
+        let rings = PoleRings::new(FarFieldType::C, [6, 9], WHOLE);
         let values: Vec<f64> = (0..54).map(|k| 100.0 + f64::from(k % 6)).collect();
         let means = |share: f64| {
             let errors: Vec<f64> = values.iter().map(|v| share * v).collect();
@@ -181,7 +263,7 @@ mod tests {
     /// One ray that adds 6 to a cell adds 3 to two of them and 1 to the six at the pole.
     #[test]
     fn what_a_ray_may_add_in_the_dark_is_spread_over_the_joined_cells() {
-        let rings = PoleRings::new([6, 9], [0.0, 360.0], [0.0, 180.0]);
+        let rings = PoleRings::new(FarFieldType::C, [6, 9], WHOLE);
         let (dark, mut errors) = ([0.0; 54], [6.0; 54]);
         rings.joined_cells(&dark, Some(&errors.clone())).level_errors(&dark, &mut errors);
         assert_eq!((errors[..6].to_vec(), errors[6..12].to_vec()), (vec![1.0; 6], vec![3.0; 6]));

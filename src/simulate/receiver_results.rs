@@ -24,7 +24,7 @@ pub struct ReceiverResult {
     pub power_error: f64,
     /// Cells along both sides.
     pub grid: [usize; 2],
-    /// Largest cell, in `unit`; of planes C all around with each ring of cells at a pole at its mean.
+    /// Largest cell, in `unit`; of angles with each ring of cells at a pole at its mean, see [`Self::cells_with_even_poles`].
     pub max: f64,
     /// Smallest cell, in `unit`.
     pub min: f64,
@@ -245,10 +245,11 @@ impl ReceiverResult {
         self.ray_power / self.ray_cells[cell]
     }
 
-    /// Returns the cells and their errors with each ring of cells at a pole (γ 0° and 180°) at its mean, where planes C go all around:
-    /// these are slivers of one direction. Beside a pole neighbours of a ring whose standard errors are above 3 % of them are joined to
-    /// their mean too, at most as many as have the solid angle of a cell at γ 90° together. The error of joined cells stands at the last
-    /// of them; the others, which are no rivals of it, have none.
+    /// Returns the cells and their errors with each ring of cells at a pole at its mean: these are slivers of one direction. Poles are γ 0°
+    /// and 180° of planes C all around, V ±90° of type A and of spheres and H ±90° of type B over half a turn or more. Beside a pole
+    /// neighbours of a ring whose standard errors are above 3 % of them are joined to their mean too, at most as many as have the solid
+    /// angle of a cell on the equator together. The error of joined cells stands at the last of them; the others, which are no rivals of
+    /// it, have none.
     pub fn cells_with_even_poles(&self) -> [Cow<'_, [f64]>; 2] {
         let mut even = [Cow::Borrowed(self.cells.as_slice()), Cow::Borrowed(self.errors.as_slice())];
         let rings = self.pole_rings();
@@ -272,13 +273,12 @@ impl ReceiverResult {
         joined
     }
 
-    /// Returns the rings of cells at and beside γ 0° and 180°, as far as the map reaches them; none where it is not one of planes C all
-    /// around.
+    /// Returns the rings of cells at and beside the poles, as far as the map reaches them; none of receivers without angles.
     pub(crate) fn pole_rings(&self) -> PoleRings {
-        if self.angles != Some(FarFieldType::C) {
-            return PoleRings::default();
-        }
-        PoleRings::new(self.grid, self.bounds(0), self.bounds(1))
+        // A sphere is told by angles of type A.
+        let angles = if self.kind == "sphere" { Some(FarFieldType::A) } else { self.angles };
+        let Some(angles) = angles else { return PoleRings::default() };
+        PoleRings::new(angles, self.grid, [self.bounds(0), self.bounds(1)])
     }
 
     /// Returns between which values a coordinate lies: mm, or degrees of angles.

@@ -172,6 +172,30 @@ fn the_brightest_direction_is_no_lucky_sliver_at_a_pole() {
     }
 }
 
+/// Types A and B have their slivers at V ±90° and H ±90°, also over half a turn, and a sphere as type A has: of a point the brightest is
+/// Φ/4π, in W/sr and on a sphere of 1 m in W/m².
+#[test]
+fn the_brightest_direction_of_types_a_and_b_is_no_sliver_either() {
+    let fields = [
+        "kind = 'far_field'\nh_deg = [-180, 180]\ncells = [72, 90]",
+        "kind = 'far_field'\nangles = 'B'\nv_deg = [-180, 180]\ncells = [90, 72]",
+        "kind = 'far_field'\ncells = [36, 90]",
+        "kind = 'far_field'\nangles = 'B'\ncells = [90, 36]",
+        "kind = 'sphere'\nradius = 1000\nabsorbs = false\ncells = [72, 90]",
+    ];
+    let receivers: Vec<String> =
+        fields.iter().enumerate().map(|(k, field)| format!("[[receiver]]\nname = 'r{k}'\n{field}\n")).collect();
+    let text = format!("[run]\nrays = 1_000_000\n[[source]]\nkind = 'point'\n{}", receivers.concat());
+    let r = World::default().run(&text, |_| ());
+    let brightest = 0.25 / PI;
+    for (receiver, field) in r.receivers.iter().zip(fields) {
+        // 240 rays in a cell of 5° × 2° on the equator, as of planes C above; of a sliver at the pole 4.
+        assert!((receiver.max / brightest - 1.0).abs() < 0.3, "{field}: {} for {brightest}", receiver.max);
+        let luckiest = receiver.cells.iter().copied().fold(0.0, f64::max);
+        assert!(luckiest > 1.5 * brightest, "{field}: {luckiest}");
+    }
+}
+
 /// A bar of 1 × 1 × 10 000 mm, rays at 45° to its walls: 10 000 total reflections, nothing lost.
 #[test]
 fn a_light_guide_of_ten_thousand_reflections_loses_nothing() {

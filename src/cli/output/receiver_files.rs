@@ -51,7 +51,8 @@ fn write_grid(
     let stem = file_stem(&receiver.name);
     type Writer = fn(&Path, &Grid) -> Result<(), crate::formats::Error>;
     // A sliver at a pole would outshine a picture by the luck of its few rays.
-    let pictured = with_even_poles(&grid);
+    let rings = receiver.pole_rings();
+    let pictured = with_even_poles(&grid, &rings);
     let writers: [(&str, Writer, &Grid); 4] = [
         ("csv", write_grid_csv, &grid),
         ("npz", write_grid_npz, &grid),
@@ -72,7 +73,7 @@ fn write_grid(
         "cd" => photometry(receiver, &pictured, receiver.power),
         _ => photometric_grid(receiver)
             .zip(receiver.photometric())
-            .and_then(|(grid, channel)| photometry(receiver, &with_even_poles(&grid), channel.total)),
+            .and_then(|(grid, channel)| photometry(receiver, &with_even_poles(&grid, &rings), channel.total)),
     };
     // Of millions of cells they take as much memory as what follows.
     drop(pictured);

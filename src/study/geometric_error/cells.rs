@@ -68,6 +68,15 @@ struct Block {
 }
 
 impl Block {
+    /// Makes the column (`axis` 0) or the row (1) at a place of a grid of so many cells.
+    fn line(axis: usize, place: usize, grid: [usize; 2]) -> Self {
+        if axis == 0 {
+            Self { x: place, y: 0, size: [1, grid[1]] }
+        } else {
+            Self { x: 0, y: place, size: [grid[0], 1] }
+        }
+    }
+
     /// Makes a square of `side` cells a side whose first cell is in column `x` and row `y`.
     fn square(x: usize, y: usize, side: usize) -> Self {
         Self { x, y, size: [side; 2] }
@@ -82,8 +91,8 @@ impl Block {
 /// The cells of a receiver in two runs of the same rays.
 pub(super) struct CellPairs<'r> {
     grid: [usize; 2],
-    /// Rows of cells that are slivers of one direction, a pole.
-    pole_rows: Vec<usize>,
+    /// Rows or columns of cells that are slivers of one direction, a pole.
+    poles: Vec<Block>,
     cells: Vec<Cell>,
     /// The cells of power, whose quanta tell how many rays came; `None` where the layer's own do, as it is not weighted.
     power: Option<Vec<Cell>>,
@@ -123,10 +132,11 @@ impl<'r> CellPairs<'r> {
         let per_measure = |m: f64| if m > 0.0 { quantum * scale / m } else { 0.0 };
         let unit: Vec<f64> =
             (0..cells.len()).map(|c| per_measure(receiver.measure(c % grid[0], c / grid[0]))).collect();
-        let [first, last] = result.pole_rings().has_poles(cells.len());
-        let pole_rows = [first.then_some(0), last.then(|| grid[1] - 1)].into_iter().flatten().collect();
+        let rings = result.pole_rings();
+        let places = rings.poles().into_iter().flatten();
+        let poles = places.map(|place| Block::line(rings.polar_axis(), place, grid)).collect();
         let measure = unit.iter().map(|u| if *u > 0.0 { 1.0 / u } else { 0.0 }).collect();
-        Some(Self { grid, pole_rows, cells, power, ray, unit, measure, replicates, layer })
+        Some(Self { grid, poles, cells, power, ray, unit, measure, replicates, layer })
     }
 
     /// Goes through the indices of the cells of a block, as far as the grid goes.
@@ -147,11 +157,13 @@ impl<'r> CellPairs<'r> {
     fn brightest(&self, side: usize, quanta: impl Fn(&Cell) -> f64) -> (Block, f64) {
         let corners =
             (0..self.grid[1]).step_by(side).flat_map(|y| (0..self.grid[0]).step_by(side).map(move |x| (x, y)));
-        let poles = if side == 1 { self.pole_rows.as_slice() } else { &[] };
-        let squares = corners.filter(|(_, y)| !poles.contains(y)).map(|(x, y)| Block::square(x, y, side));
-        let rings = poles.iter().map(|&y| Block { x: 0, y, size: [self.grid[0], 1] });
-        let on_receiver =
-            squares.chain(rings).map(|b| (b, self.measure_of(b))).filter(|(_, measure)| *measure > 0.0);
+        let poles = if side == 1 { self.poles.as_slice() } else { &[] };
+        let is_at_pole = |x: usize, y: usize| poles.iter().any(|ring| ring.contains(x, y));
+        let squares = corners.filter(|&(x, y)| !is_at_pole(x, y)).map(|(x, y)| Block::square(x, y, side));
+        let on_receiver = squares
+            .chain(poles.iter().copied())
+            .map(|b| (b, self.measure_of(b)))
+            .filter(|(_, measure)| *measure > 0.0);
         let brought = |block: Block| self.cells_of(block).map(|c| quanta(&self.cells[c])).sum::<f64>();
         let blocks = on_receiver.map(|(block, measure)| (block, brought(block) / measure));
         blocks.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Block::square(0, 0, side), 0.0))
@@ -196,7 +208,7 @@ impl<'r> CellPairs<'r> {
         let variance: f64 = self.cells_of(block).map(|c| self.cells[c].spline_variance * unit(c).powi(2)).sum();
         let density = Paired { facets, spline, error: if side > 1 { noise.hypot(blurred) } else { noise } };
         // A ring about a pole is one place, which is known as well as all its cells together.
-        let places = if block.size[0] == side { count } else { count * count };
+        let places = if block.size == [side; 2] { count } else { count * count };
         Peak { density, cells: side.min(self.grid[0].max(self.grid[1])), statistical: (variance / places).sqrt() }
     }
 
@@ -250,11 +262,11 @@ impl<'r> CellPairs<'r> {
                 layer[c] = (shared.max(self.cells[c].excess()) + noise).sqrt() * self.unit[c];
             }
         }
-        for &y in &self.pole_rows {
-            let ring = || self.cells_of(Block { x: 0, y, size: [self.grid[0], 1] });
+        for &pole in &self.poles {
+            let ring = || self.cells_of(pole);
             let difference: f64 = ring().map(|c| self.cells[c].difference()).sum();
             let variance: f64 = ring().map(|c| self.cells[c].difference_variance).sum();
-            let error = difference.hypot(variance.sqrt()) / self.grid[0] as f64;
+            let error = difference.hypot(variance.sqrt()) / ring().count() as f64;
             ring().for_each(|c| layer[c] = error * self.unit[c]);
         }
         (layer, pooled)
@@ -312,7 +324,7 @@ mod tests {
             facets.iter().zip(&spline).map(|(a, b)| [a.layers[0].as_slice(), b.layers[0].as_slice()]).collect();
         let pairs = CellPairs {
             grid: [16, 1],
-            pole_rows: vec![0],
+            poles: vec![Block::line(1, 0, [16, 1])],
             cells: paired_cells(16, &pairs),
             power: None,
             ray: quanta as f64,
@@ -340,7 +352,7 @@ mod tests {
         let measure: Vec<f64> = (0..16).map(|c| if [0, 3, 12, 15].contains(&c) { 0.0 } else { 1.0 }).collect();
         let pairs = CellPairs {
             grid: [4; 2],
-            pole_rows: Vec::new(),
+            poles: Vec::new(),
             cells: paired_cells(16, &pairs),
             power: None,
             ray: (1u64 << 40) as f64,
