@@ -25,8 +25,9 @@ const RADII: usize = 200;
 
 /// Returns the width at half along a line and its error, both in degrees.
 fn width_along(grid: &Grid, line: &Line) -> [Cell; 2] {
-    let values: Vec<f64> = line.cells.iter().map(|&k| grid.values[k]).collect();
-    let errors: Option<Vec<f64>> = line.cells.iter().map(|&k| grid.combined_error(k)).collect();
+    let places = 0..line.cells.len();
+    let values: Vec<f64> = places.clone().map(|k| line.value(grid, k)).collect();
+    let errors: Option<Vec<f64>> = places.map(|k| line.error(grid, k)).collect();
     let Some(width) = half_width(&values, errors.as_deref()) else { return [Cell::Empty, Cell::Empty] };
     let error = width.error.map_or(Cell::Empty, |error| Cell::Number(error * line.step, 2));
     [Cell::Number(width.cells * line.step, 3), error]
@@ -67,7 +68,7 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
     let [share, error] = [power.value, power.combined()].map(|p| 100.0 * p / results.power.emitted);
     let [value, error] = [Cell::Number(share, 4), Cell::Number(error, 2)];
     table.row(["efficiency".into(), value, error, "%".into(), "of what the sources emit".into()]);
-    for line in lines_through_peak(grid).iter().flatten() {
+    for line in lines_through_peak(grid).iter().flatten().filter(|line| line.has_peak) {
         let [width, error] = width_along(grid, line);
         table.row([
             format!("width at half, {}", line.name).into(),

@@ -122,22 +122,22 @@ pub(super) fn cuts(grid: &Grid) -> Option<Chart> {
     let framed = part.as_ref().unwrap_or(grid);
     let lines = lines_through_peak(grid).filter(|_| grid.peak().is_some_and(|(_, value)| value > 0.0))?;
     let [a, b] = &grid.axes;
-    let is_framed = |cell: usize| {
+    let is_framed = |cell: &usize| {
         let at = [a.center(cell % a.cells), b.center(cell / a.cells)];
         framed.axes.iter().zip(at).all(|(axis, x)| (axis.range[0]..=axis.range[1]).contains(&x))
     };
     let series = lines.map(|line| {
-        let points = line.positions.iter().zip(&line.cells).map(|(x, &cell)| (*x, cell));
-        let points: Vec<(f64, usize)> = points.filter(|(_, cell)| is_framed(*cell)).collect();
+        let points = line.positions.iter().enumerate().map(|(k, x)| (*x, k));
+        let points: Vec<(f64, usize)> = points.filter(|(_, k)| line.cells[*k].iter().any(is_framed)).collect();
         // Every so many-th cell of a very fine receiver, the brightest among them: each has a bar of its error in the report.
         let step = points.len().div_ceil(MOST_CUT_POINTS).max(1);
-        let value = |k: &usize| grid.values[points[*k].1];
+        let value = |k: &usize| line.value(grid, points[*k].1);
         let brightest = (0..points.len()).max_by(|k, l| value(k).total_cmp(&value(l))).unwrap_or(0);
         let shown = || points.iter().skip(brightest % step).step_by(step);
         Series {
-            name: line.name + &line.place,
-            points: shown().map(|(x, cell)| [*x, grid.values[*cell]]).collect(),
-            errors: shown().filter_map(|(_, cell)| grid.combined_error(*cell)).collect(),
+            name: format!("{}{}", line.name, line.place),
+            points: shown().map(|(x, k)| [*x, line.value(grid, *k)]).collect(),
+            errors: shown().filter_map(|(_, k)| line.error(grid, *k)).collect(),
             style: SeriesStyle::Line,
             ..Series::default()
         }

@@ -483,6 +483,23 @@ fn an_angle_of_type_a_or_b_all_around_has_no_mean() {
     assert!(behind["centroid"][0].is_number() && behind["rms"][1].is_number(), "{behind}");
 }
 
+/// A beam aside passes one of two planes across each other, one about the pole both.
+#[test]
+fn the_width_at_half_is_told_in_planes_that_have_the_peak() {
+    for (direction, widths) in [("[-0.3, 0.1, 1]", 1), ("[0, 0, 1]", 2)] {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = format!(
+            "[run]\nrays = 20_000\nunit = 'lm'\n[[source]]\nkind = 'cosine'\nexponent = 200\ndirection = {direction}\n\
+            [[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\ncells = [36, 36]\n"
+        );
+        std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+        let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out", "-q"]);
+        assert_eq!(code, 0, "{err}");
+        let table = std::fs::read_to_string(folder.path().join("out/tables/far-lamp.csv")).unwrap();
+        assert_eq!(table.matches("width at half").count(), widths, "{table}");
+    }
+}
+
 /// Light that did not come has no place: neither 0 nor any other.
 #[test]
 fn a_receiver_without_light_has_no_centroid() {
