@@ -113,6 +113,53 @@ fn an_ies_file_comes_out_as_it_went_in() {
     }
 }
 
+/// A photometry with light around one direction alone: a thousand candela there, and none at the other angles.
+fn single_peak(
+    kind: PhotometricType,
+    horizontal_deg: &[f64],
+    vertical_deg: &[f64],
+    peak: [usize; 2],
+) -> Photometry {
+    let rows = vertical_deg.len();
+    let mut candela = vec![0.0; horizontal_deg.len() * rows];
+    candela[peak[0] * rows + peak[1]] = 1000.0;
+    Photometry {
+        kind,
+        horizontal_deg: horizontal_deg.to_vec(),
+        vertical_deg: vertical_deg.to_vec(),
+        candela,
+        lamp_lumens: None,
+        watts: 1.0,
+        opening_mm: [0.0; 3],
+        keywords: vec![("TEST".into(), "none".into()), ("MANUFAC".into(), "none".into())],
+    }
+}
+
+/// The first side of a rectangle of 10 × 0.1 mm lies along `x` whatever the type of the file: along a side a the root mean square is a/√12.
+#[test]
+fn the_first_side_of_a_measured_source_lies_along_x() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("beam.ies");
+    let across = [-90.0, -5.0, 0.0, 5.0, 90.0];
+    for photometry in [
+        single_peak(PhotometricType::A, &across, &across, [2, 2]),
+        single_peak(PhotometricType::B, &across, &across, [2, 2]),
+        single_peak(PhotometricType::C, &[0.0], &[0.0, 5.0, 90.0], [0, 0]),
+    ] {
+        write_ies(&path, &photometry).unwrap();
+        for x in ["[1, 0, 0]", "[0, 1, 0]", "[3, 4, 0]"] {
+            let source =
+                format!("[[source]]\nkind = 'ies'\nfile = '{}'\nsize = [10, 0.1]\nx = {x}\n", path.display());
+            let wall = format!("[[receiver]]\nname = 'wall'\nat = [0, 0, 1e-3]\nsize = [20, 20]\nx = {x}\n");
+            let r = World::default().run(&format!("[run]\nrays = 20_000\nunit = 'lm'\n{source}{wall}"), |_| ());
+            let [first, second] = r.receivers[0].rms;
+            let told = format!("{:?}, {x}: {first} × {second} mm", photometry.kind);
+            assert!((first - 10.0 / 12f64.sqrt()).abs() < 0.05, "{told}");
+            assert!((second - 0.1 / 12f64.sqrt()).abs() < 5e-4, "{told}");
+        }
+    }
+}
+
 /// Stated errors cover the truth in 68 % and 95 % of 200 seeds, for random numbers and for nets.
 #[test]
 fn stated_errors_are_honest() {

@@ -116,12 +116,10 @@ impl Emitter {
         let mut coloured_list = false;
         match loaded {
             Some(Loaded::Intensity { sampler, kind, flux, .. }) => {
-                if kind == PhotometricType::C {
-                    // C runs counterclockwise for one who looks along the light: the plan of a luminaire that shines down.
-                    frame.y = -frame.y;
-                } else {
-                    // To positive H, to positive V, forward: as far fields have it.
-                    frame = far_axes(at, direction, s.x.map_or(Vector::Y, Vector::from_array));
+                frame = intensity_frame(kind, frame, direction, s.x.map(Vector::from_array));
+                // The key `x` is upward there, the second axis; the first side lies along it all the same.
+                if kind != PhotometricType::C && s.x.is_some() {
+                    shape = shape.with_sides_swapped();
                 }
                 (lobe, own_power) = (Lobe::Measured(sampler), flux);
             }
@@ -344,6 +342,17 @@ impl Emitter {
         };
         *ray = Ray::new(origin, self.direction(axes, || stream.pair(index, 1), sin_cos_turns));
         emission
+    }
+}
+
+/// Returns the frame in which the directions of a measured intensity have the components of [`PhotometricType::direction`], of a source
+/// with this `frame`, whose first axis lies along the key `x`, if that is given.
+fn intensity_frame(kind: PhotometricType, frame: Frame, direction: Vector, x: Option<Vector>) -> Frame {
+    match kind {
+        // C runs counterclockwise for one who looks along the light: the plan of a luminaire that shines down.
+        PhotometricType::C => Frame { y: -frame.y, ..frame },
+        // To positive H, to positive V, forward: as far fields have it.
+        PhotometricType::A | PhotometricType::B => far_axes(frame.origin, direction, x.unwrap_or(Vector::Y)),
     }
 }
 

@@ -38,6 +38,14 @@ impl Shape {
     pub(super) fn is_extended(&self) -> bool {
         matches!(self, Self::Disc(_) | Self::Rectangle(_) | Self::Faces(_))
     }
+
+    /// Returns it with a rectangle's first side along the second axis of the source's frame; others as they are.
+    pub(super) fn with_sides_swapped(self) -> Self {
+        match self {
+            Self::Rectangle([a, b]) => Self::Rectangle([b, a]),
+            other => other,
+        }
+    }
 }
 
 /// Returns the distance from the middle of a disc for a uniform number `u`; equal areas are equally likely.
