@@ -87,8 +87,8 @@ mod tests {
     use super::*;
     use crate::formats::Axis;
 
-    /// Two columns of four cells: of type B the brightest is the ring at H 90°, which has no V; of type A, whose rows have no ring there, it is
-    /// a cell.
+    /// Two columns of four cells: of type B the brightest is the ring at H 90°, which has no V; of type A, whose rows have no ring there,
+    /// it is a cell.
     #[test]
     fn a_pole_of_type_b_is_named_by_h_alone() {
         let axis = |label: &str, range, cells| Axis { label: label.into(), unit: "deg".into(), range, cells };

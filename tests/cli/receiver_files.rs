@@ -449,8 +449,8 @@ fn planes_all_around_have_no_mean() {
     assert!(page.contains("Along an angle that goes all around there is no mean position"));
 }
 
-/// A beam against the normal lies where H of type A and of spheres, and V of type B, begin and end. Along the other angle its mean is 0, and
-/// its mean square, of an even cone of the half angle a = 5° about a direction on the equator, a²/4: 2.5°, up to terms of a⁴.
+/// A beam against the normal lies where H of type A and of spheres, and V of type B, begin and end. Along the other angle its mean is 0,
+/// and its mean square, of an even cone of the half angle a = 5° about a direction on the equator, a²/4: 2.5°, up to terms of a⁴.
 #[test]
 fn an_angle_of_type_a_or_b_all_around_has_no_mean() {
     let folder = tempfile::tempdir().unwrap();

@@ -160,6 +160,40 @@ fn the_first_side_of_a_measured_source_lies_along_x() {
     }
 }
 
+/// Type C as a source has the planes of a far field about the same direction where its `x` is what lies to the right of one who looks
+/// along it, `normal` × `up`: light at C 60°, γ 30° comes there, 5° wide to all sides.
+#[test]
+fn a_source_of_type_c_has_the_planes_of_a_far_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lobe.ies");
+    let planes = [0.0, 50.0, 60.0, 70.0, 360.0];
+    let lobe = single_peak(PhotometricType::C, &planes, &[0.0, 25.0, 30.0, 35.0, 90.0], [2, 2]);
+    write_ies(&path, &lobe).unwrap();
+    let (up, slanted) = (Vector::Y, Vector::new(0.3, -0.2, 0.9));
+    for (normal, up, key) in [
+        (Vector::Z, up, ""),
+        (-Vector::Z, up, ""),
+        (Vector::X, up, ""),
+        (Vector::new(1.0, 2.0, -2.0), up, ""),
+        (Vector::new(1.0, 2.0, -2.0), slanted, "up = [0.3, -0.2, 0.9]\n"),
+        // There is no upward along +y: +x stands for it.
+        (Vector::Y, Vector::X, ""),
+    ] {
+        let (n, x) = (normal.to_array(), normal.cross(up).to_array());
+        let source =
+            format!("[[source]]\nkind = 'ies'\nfile = '{}'\ndirection = {n:?}\nx = {x:?}\n", path.display());
+        let far = format!(
+            "[[receiver]]\nname = 'far'\nkind = 'far_field'\nangles = 'C'\nnormal = {n:?}\n{key}h_deg = [0, 120]\nv_deg = [0, 60]\n"
+        );
+        let r = World::default().run(&format!("[run]\nrays = 20_000\nunit = 'lm'\n{source}{far}"), |_| ());
+        let receiver = &r.receivers[0];
+        let [c, gamma] = receiver.centroid;
+        assert!((receiver.power / r.power.emitted - 1.0).abs() < 1e-9, "{n:?}: {}", receiver.power);
+        // Rings of larger γ are longer, by some per cent over the width of the lobe.
+        assert!((c - 60.0).abs() < 0.2 && (gamma - 30.0).abs() < 0.5, "{n:?}: C {c}°, γ {gamma}°");
+    }
+}
+
 /// Stated errors cover the truth in 68 % and 95 % of 200 seeds, for random numbers and for nets.
 #[test]
 fn stated_errors_are_honest() {

@@ -22,7 +22,13 @@ pub struct Source {
     ///
     /// Its main axis points along `direction`, for type C with the plane C 0 along `x` and C 90 to its left as seen by one who looks
     /// along `direction` (counterclockwise in the plan of a luminaire that shines down), for types A and B with upward along `x`
-    /// (+y unless said otherwise) and positive H to the right. Ray lists stand with their origin in `at`.
+    /// (+y unless said otherwise) and positive H to the right.
+    /// A far field's own file is the light it was written from again with that far field's `normal` for `direction` and, for `x`, in
+    /// types A and B its `up`, in type C what lies to the right of one who looks along `normal`, the vector product `normal` × `up`:
+    /// where `up` is +y, `[-1, 0, 0]` along +z and `[1, 0, 0]` along −z (for a `normal` along y without `up` take +x as `up`). Without
+    /// `x` the plane C 0 lies along +x as far as `direction` lets it, for light within 26° of the x axis along +y; along +z that is C 180
+    /// of a far field.
+    /// Ray lists stand with their origin in `at`.
     /// In CSV a row is a ray, below a head that names the columns `x,y,z,dx,dy,dz,power,wavelength_nm` in any order, or in this one
     /// without a head; the wavelength may be missing. NPZ has the arrays `origin`, `direction`, `power` and, if given, `wavelength_nm`.
     /// Long lists stay on the disk; of CSV and NPZ 64 bytes a ray are unpacked into the folder for temporary files (`TMPDIR`). The TILT
@@ -39,7 +45,8 @@ pub struct Source {
     pub at: [f64; 3],
     /// Main direction; need not be of unit length.
     pub direction: [f64; 3],
-    /// Direction of the first side of `size`, as far as `direction` lets it.
+    /// Direction of the first side of `size`, as far as `direction` lets it; of light from an IES or EULUMDAT file it tells the turn about
+    /// `direction` too, see `file`.
     pub x: Option<[f64; 3]>,
     /// Radius of a disc, mm; a `frame` that enlarges moves the source and leaves it.
     #[cfg_attr(feature = "schema", schemars(range(min = 0)))]
