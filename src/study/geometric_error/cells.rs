@@ -312,7 +312,7 @@ mod tests {
     use super::*;
 
     /// Of sixteen slivers each second one got ten rays more on facets, and ten fewer in the other replicate, but for one: their mean is as
-    /// uncertain as sixteen such cells together.
+    /// uncertain as sixteen such cells together, in a row as in a column.
     #[test]
     fn cells_around_a_pole_have_the_error_of_their_mean() {
         let quanta = 1u64 << 40;
@@ -322,21 +322,28 @@ mod tests {
         let spline = [sums(list([0, 10])), sums(list([10, 0]))];
         let pairs: Vec<_> =
             facets.iter().zip(&spline).map(|(a, b)| [a.layers[0].as_slice(), b.layers[0].as_slice()]).collect();
-        let pairs = CellPairs {
-            grid: [16, 1],
-            poles: vec![Block::line(1, 0, [16, 1])],
-            cells: paired_cells(16, &pairs),
-            power: None,
-            ray: quanta as f64,
-            unit: vec![1.0; 16],
-            measure: vec![1.0; 16],
-            replicates: [facets.iter().collect(), spline.iter().collect()],
-            layer: 0,
-        };
-        let (errors, _) = pairs.cell_errors();
-        // All got one ray more, with a variance of 2 · (10² + 9² − ½) and 2 · (10² + 11² − ½) rays.
-        let error = (16f64.powi(2) + 8.0 * (361.0 + 441.0)).sqrt() / 16.0;
-        assert!(errors.iter().all(|e| (e / quanta as f64 / error - 1.0).abs() < 1e-12), "{errors:?}");
+        for (axis, grid) in [(1, [16, 1]), (0, [1, 16])] {
+            let pairs = CellPairs {
+                grid,
+                poles: vec![Block::line(axis, 0, grid)],
+                cells: paired_cells(16, &pairs),
+                power: None,
+                ray: quanta as f64,
+                unit: vec![1.0; 16],
+                measure: vec![1.0; 16],
+                replicates: [facets.iter().collect(), spline.iter().collect()],
+                layer: 0,
+            };
+            let (errors, _) = pairs.cell_errors();
+            // All got one ray more, with a variance of 2 · (10² + 9² − ½) and 2 · (10² + 11² − ½) rays.
+            let error = (16f64.powi(2) + 8.0 * (361.0 + 441.0)).sqrt() / 16.0;
+            assert!(errors.iter().all(|e| (e / quanta as f64 / error - 1.0).abs() < 1e-12), "{errors:?}");
+            // The ring is one place, as well known as its cells together.
+            let variance: f64 = pairs.cells.iter().map(|c| c.spline_variance).sum();
+            let peak = pairs.peak();
+            assert!((peak.statistical / (variance.sqrt() / 16.0) - 1.0).abs() < 1e-12, "{}", peak.statistical);
+            assert_eq!(peak.cells, 1);
+        }
     }
 
     /// A disc of 4 × 4 cells whose corners lie off it: 300 rays in one cell of the spline, none on facets.
