@@ -27,19 +27,22 @@ pub fn arrivals(bound: &BoundScene, settings: &RunSettings, receiver: usize, res
     let share = results.power.emitted / emitted.max(f64::MIN_POSITIVE);
     let mut rays = Vec::new();
     for path in results.paths.chunk_by(|a, b| (a.ray, a.branch) == (b.ray, b.branch)) {
-        let first = rays.len();
-        for crossing in crossings(receiver, path) {
-            let [a, b] = crossing.segment;
-            // A receiver that lets light pass counts it before the next face takes its part.
-            let power = if receiver.absorbs { b.power } else { a.power } * share;
-            let (origin, direction) = (crossing.point(), crossing.ray.direction);
-            rays.push(LightRay { origin, direction, power, wavelength_nm: None });
+        let crossings = crossings(receiver, path);
+        if crossings.is_empty() {
+            continue;
         }
         // On its way light keeps the wavelength that its source gave it.
-        let wavelength_nm = if rays.len() > first { wavelength(bound, settings, &plan, path[0].ray) } else { None };
-        rays[first..].iter_mut().for_each(|ray| ray.wavelength_nm = wavelength_nm);
+        let wavelength_nm = wavelength(bound, settings, &plan, path[0].ray);
+        rays.extend(crossings.iter().map(|crossing| {
+            let [a, b] = crossing.segment;
+            // A receiver that lets light pass counts what the medium leaves up to it, before the next face takes its part.
+            let arriving =
+                if receiver.absorbs { b.power } else { a.power * crossing.transmittance(bound, wavelength_nm) };
+            let (origin, direction) = (crossing.point(), crossing.ray.direction);
+            LightRay { origin, direction, power: arriving * share, wavelength_nm }
+        }));
     }
-    // What a medium takes up to the receiver no vertex tells: the sum is that of the receiver, where it was counted.
+    // Of a sample of the paths the sum is by chance another one: that of the receiver is known.
     let sum: f64 = rays.iter().map(|ray| ray.power).sum();
     if !receiver.absorbs && sum > 0.0 {
         rays.iter_mut().for_each(|ray| ray.power *= counted.power / sum);
@@ -63,6 +66,16 @@ impl Crossing<'_> {
     /// Where it is, mm.
     pub(super) fn point(&self) -> Point {
         self.ray.point_at(self.distance)
+    }
+
+    /// Returns the share of the light from the vertex before that the medium leaves of it here, at `wavelength`, nm, or, for `None`, at
+    /// that of the scene (Beer's law).
+    fn transmittance(&self, bound: &BoundScene, wavelength: Option<f64>) -> f64 {
+        // A vertex names the body that light came to it through.
+        let body = bound.bodies.get(self.segment[1].body as usize);
+        let absorption = body.map_or(0.0, |body| body.absorption(wavelength));
+        // Where nothing absorbs the way may be endless.
+        if absorption > 0.0 { (-absorption * self.distance).exp() } else { 1.0 }
     }
 }
 

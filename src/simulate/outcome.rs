@@ -77,6 +77,15 @@ pub struct PathVertex {
     /// The placed face where it happens, if it is at one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub face: Option<u32>,
+    /// The body that light came here through, as [`BoundScene::body_names`](crate::simulate::BoundScene::body_names) names it; 0 for the
+    /// surroundings. Where a path begins, the body that it begins in.
+    #[serde(default, skip_serializing_if = "is_surroundings")]
+    pub body: u32,
+}
+
+/// Whether a body is what is around everything, which files of vertices leave out.
+fn is_surroundings(body: &u32) -> bool {
+    *body == 0
 }
 
 /// Takes vertices of paths as they come, from any thread.

@@ -99,6 +99,7 @@ mod tests {
             power: 1.0,
             event: Event::Scattered,
             face: None,
+            body: 0,
         };
         (0..vertices).map(vertex).collect()
     }

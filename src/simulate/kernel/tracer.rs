@@ -32,7 +32,8 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
         if !C::ENDS_ONLY && self.context.plan.records(path.ray) {
             let Path { ray, branch, bounce, .. } = *path;
             let (power, face) = (path.quanta / self.context.plan.average_ray, face.map(|f| f.0));
-            self.tally.paths.push(PathVertex { ray, branch, bounce, point, power, event, face });
+            let body = path.payload.body();
+            self.tally.paths.push(PathVertex { ray, branch, bounce, point, power, event, face, body });
         }
     }
 
