@@ -1,7 +1,7 @@
 //! Ray files of measured sources as a user gives them to a scene: units, spectra, totals that disagree, and what a run says about them.
 
 use crate::support::lampyris_in;
-use lampyris::formats::{Flux, LightRay, SpectralData, Tm25, write_tm25};
+use lampyris::formats::{Flux, LightRay, SpectralData, Tm25, read_tm25, write_tm25};
 use lampyris::math::{Point, Vector};
 use lampyris::simulate::{Fingerprint, FingerprintHasher};
 use serde_json::Value;
@@ -93,6 +93,40 @@ fn watts_with_wavelengths_are_lumens() {
     let found = results(folder.path(), "lm", "spectrum = { kind = 'lines', values = [[555, 2]] }\n");
     assert!((power(&found) / (4.0 * 683.0) - 1.0).abs() < 1e-4);
     assert!(found["notes"].to_string().contains("by the scene's spectrum"), "{}", found["notes"]);
+}
+
+/// Blue light of one line, written by a run and read by the next, is the same lumens: 0.038 of 683 lm/W at 450 nm (CIE 1924). Of light
+/// in lumens that no wavelength was said of, the file says none.
+#[test]
+fn the_one_wavelength_of_a_run_goes_with_its_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    let wall = |z: f64| {
+        format!(
+            "[[receiver]]\nname = 'p'\nat = [0, 0, {z}]\nsize = [10, 10]\ncells = [1, 1]\nchannels = 'photometric'\n"
+        )
+    };
+    let lines = "spectrum = { kind = 'lines', values = [[450, 1]] }\n";
+    let lamp = format!("[run]\nrays = 4000\n[[source]]\nkind = 'collimated'\nradius = 1\n{lines}{}", wall(10.0));
+    let again =
+        "[run]\nrays = 4000\n[[source]]\nkind = 'rays'\nfile = 'first/p.tm25ray'\n".to_owned() + &wall(20.0);
+    for (name, scene) in [("first", &lamp), ("second", &again)] {
+        std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+        let (code, out, err) =
+            lampyris_in(folder.path(), &["trace", "scene.toml", "-o", name, "--json", "--no-report"]);
+        assert_eq!(code, 0, "{err}");
+        let found: Value = serde_json::from_str(&out).unwrap();
+        let lumens = found["receivers"][0]["channels"][0]["total"].as_f64().unwrap();
+        assert!((lumens / (0.038 * 683.0) - 1.0).abs() < 1e-3, "{name}: {lumens} lm");
+        let header = read_tm25(&folder.path().join(name).join("p.tm25ray")).unwrap().header;
+        assert_eq!((header.spectral, header.wavelengths[0]), (SpectralData::Single, 450.0), "{name}");
+    }
+    let lumens =
+        lamp.replace(lines, "").replace("[run]", "[run]\nunit = 'lm'").replace("channels = 'photometric'", "");
+    std::fs::write(folder.path().join("scene.toml"), lumens).unwrap();
+    let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "third", "--no-report"]);
+    assert_eq!(code, 0, "{err}");
+    let header = read_tm25(&folder.path().join("third/p.tm25ray")).unwrap().header;
+    assert_eq!(header.spectral, SpectralData::None);
 }
 
 /// One table for all rays: even from 400 to 600 nm, so that half of the light is in each bin.

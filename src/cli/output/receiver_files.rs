@@ -3,8 +3,8 @@
 
 use crate::cli::failure::Failure;
 use crate::formats::{
-    Data3, Flux, Grid, LightRay, PhotometricType, Photometry, Tm25, printable_line, write_data3, write_eulumdat,
-    write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_png, write_tm25, write_vti,
+    Data3, Flux, Grid, LightRay, PhotometricType, Photometry, SpectralData, Tm25, printable_line, write_data3,
+    write_eulumdat, write_grid_csv, write_grid_npz, write_grid_png, write_ies, write_png, write_tm25, write_vti,
 };
 use crate::report::{colour_picture, file_stem, on_receiver, photometric_grid, receiver_grid, with_even_poles};
 use crate::simulate::ReceiverResult;
@@ -15,20 +15,28 @@ use std::path::Path;
 /// A far field whose ends are this near to those of all directions holds all of them, degrees.
 const WHOLE_RANGE_DEG: f64 = 1e-9;
 
+/// Rays that a receiver counted.
+pub(crate) struct RaySample {
+    /// Each with its wavelength where the light of the run has several.
+    pub(crate) rays: Vec<LightRay>,
+    /// The only wavelength of the run's light, nm, where it is known.
+    pub(crate) wavelength_nm: Option<f64>,
+}
+
 /// Writes all files of a receiver into a folder and returns their names: those of its cells where it has several, and those of its rays.
-/// `geometric` are the errors of its cells from the facets, where they are known, and those of its further channels; `rays` are the sample
+/// `geometric` are the errors of its cells from the facets, where they are known, and those of its further channels; `sample` are rays
 /// that it counted.
 pub(crate) fn write(
     folder: &Path,
     receiver: &ReceiverResult,
     geometric: Vec<Option<Vec<f64>>>,
-    rays: Vec<LightRay>,
+    sample: RaySample,
 ) -> Result<Vec<String>, Failure> {
     let mut names = match receiver_grid(receiver) {
         Some(grid) => write_grid(folder, receiver, grid, geometric)?,
         None => Vec::new(),
     };
-    names.extend(write_rays(folder, receiver, rays)?);
+    names.extend(write_rays(folder, receiver, sample)?);
     Ok(names)
 }
 
@@ -90,19 +98,19 @@ fn write_grid(
 }
 
 /// Writes the sampled rays of a plane or disc; returns the names of the files.
-fn write_rays(folder: &Path, receiver: &ReceiverResult, rays: Vec<LightRay>) -> Result<Vec<String>, Failure> {
+fn write_rays(folder: &Path, receiver: &ReceiverResult, sample: RaySample) -> Result<Vec<String>, Failure> {
     let stem = file_stem(&receiver.name);
     let mut names = Vec::new();
     if matches!(receiver.kind, "plane" | "disc") {
         names.push(format!("{stem}.tm25ray"));
-        write_tm25(&folder.join(format!("{stem}.tm25ray")), &sampled_rays(receiver, &rays))?;
+        write_tm25(&folder.join(format!("{stem}.tm25ray")), &sampled_rays(receiver, &sample))?;
     }
     // A Data_3 holds a rectangle.
     if receiver.kind == "plane" {
         names.push(format!("{stem}.data3"));
         // Data_3 gives rows first.
         let size = [receiver.grid[1], receiver.grid[0]];
-        let data = Data3 { size, results: receiver.cells.clone(), rays };
+        let data = Data3 { size, results: receiver.cells.clone(), rays: sample.rays };
         write_data3(&folder.join(format!("{stem}.data3")), &data)?;
     }
     Ok(names)
@@ -122,13 +130,19 @@ pub(crate) fn names(receiver: &Receiver) -> Vec<String> {
 }
 
 /// Makes a TM-25 file of the sampled rays of a plane or disc, their powers scaled to carry what the receiver counted in all.
-fn sampled_rays(receiver: &ReceiverResult, rays: &[LightRay]) -> Tm25 {
+fn sampled_rays(receiver: &ReceiverResult, sample: &RaySample) -> Tm25 {
+    let rays = &sample.rays;
     let flux = if receiver.unit == "lx" { Flux::Luminous } else { Flux::Radiant };
     let total: f64 = rays.iter().map(|ray| ray.power).sum();
     // A sample has its own chance: its rays are to carry what the receiver counted, which all rays of the run found.
     let share = if total > 0.0 { receiver.power / total } else { 1.0 };
     let rays: Vec<LightRay> = rays.iter().map(|ray| LightRay { power: ray.power * share, ..*ray }).collect();
     let mut file = Tm25::from_rays(&rays, flux);
+    if let Some(nm) = sample.wavelength_nm {
+        // One for all: the columns of the rays have none then.
+        file.header.spectral = SpectralData::Single;
+        file.header.wavelengths[0] = nm as f32;
+    }
     file.header.descriptions[SOFTWARE] = concat!("lampyris ", env!("CARGO_PKG_VERSION")).into();
     file.header.descriptions[ADDITIONAL] =
         "a sample of the rays of a simulation where they met the receiver; each stands for many".into();

@@ -167,10 +167,13 @@ pub(crate) fn write(
     remove_earlier(prepared, folder);
     let settings = prepared.run_settings();
     for k in 0..run.results.receivers.len() {
-        let rays = arrivals(&prepared.bound, &settings, k, &run.results);
+        let sample = receiver_files::RaySample {
+            rays: arrivals(&prepared.bound, &settings, k, &run.results),
+            wavelength_nm: prepared.bound.single_wavelength_nm(),
+        };
         let receiver = &run.results.receivers[k];
         let geometric = [vec![run.geometric_cells(prepared, k)], run.geometric_channel_cells(prepared, k)].concat();
-        run.results.receivers[k].files = receiver_files::write(folder, receiver, geometric, rays)?;
+        run.results.receivers[k].files = receiver_files::write(folder, receiver, geometric, sample)?;
     }
     let all_figures = run.figures(prepared);
     let power = run.power_figures(prepared);

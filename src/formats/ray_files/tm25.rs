@@ -125,8 +125,8 @@ impl Tm25Reader {
         };
         let power = if flux == Flux::Radiant { self.places.radiant } else { self.places.luminous };
         let power = power.ok_or_else(|| self.file.malformed("no column of the flux"))?;
-        // Zero or no number stands for unknown.
-        let single = Some(f64::from(self.header.wavelengths[0])).filter(|w| *w > 0.0);
+        // Zero or no number stands for unknown. By its decimals in single precision, 587.5618 nm are those of other sources.
+        let single = self.header.wavelengths[0].to_string().parse::<f64>().ok().filter(|w| *w > 0.0);
 
         let columns = self.places.count;
         let wavelength = match (self.header.spectral, self.places.wavelength) {

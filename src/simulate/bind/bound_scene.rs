@@ -4,7 +4,7 @@ use crate::math::{Aabb, BoxTree, FaceId};
 use crate::simulate::body::{AMBIENT, Body};
 use crate::simulate::emitter::Emitter;
 use crate::simulate::receiver::Receiver;
-use crate::simulate::scene::Scene;
+use crate::simulate::scene::{PowerUnit, Run, Scene};
 use crate::simulate::surfaces::{FaceOptics, SceneLight, Surface};
 use serde::Serialize;
 
@@ -79,6 +79,14 @@ impl BoundScene {
     pub fn relative_index(&self, body: u32) -> f64 {
         let ambient = self.bodies[AMBIENT as usize].index(None);
         self.bodies.get(body as usize).map_or(1.0, |b| b.index(None) / ambient)
+    }
+
+    /// Returns the only wavelength of its light, nm; `None` where there are several, and where lumens are counted of light of which the scene
+    /// says no wavelength: that of the helium d line then stands for the indices of media alone.
+    pub fn single_wavelength_nm(&self) -> Option<f64> {
+        let SceneLight { wavelength, coloured } = self.light;
+        let supposed = self.scene.run.unit == PowerUnit::Lumen && wavelength == Run::default().wavelength_nm;
+        (!coloured && !supposed).then_some(wavelength)
     }
 
     /// Returns sentences that someone who reads the results must know: bodies that are open or too thin, light beyond the wavelengths of a
