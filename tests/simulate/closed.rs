@@ -216,3 +216,27 @@ fn a_void_within_a_scene_under_water_is_told_to_be_full_of_it() {
         assert_eq!(notes_with(&hollow, water, &format!("[[material]]\npart = 'core'\n{optics}\n")), "");
     }
 }
+
+/// Light that leaves the scene has a way without end before it: in surroundings that absorb or scatter no far field gets any, which is told.
+#[test]
+fn a_far_field_in_surroundings_that_absorb_or_scatter_is_told_to_be_dark() {
+    let world = World::default();
+    let notes = |medium: &str, kind: &str| {
+        let text = format!(
+            "ambient = 'fog'\n[run]\nrays = 100\n[[medium]]\nname = 'fog'\nindex = 1.0\n{medium}\n\
+             [[source]]\n[[receiver]]\nname = 'r'\n{kind}\n"
+        );
+        Scene::parse(&text, "fog.toml", Path::new(".")).unwrap().bind(&world.model).unwrap().notes().join("\n")
+    };
+    let far = "kind = 'far_field'";
+    for (medium, does) in [
+        ("absorption_per_mm = 1e-5", "absorbs light"),
+        ("scatter_per_mm = 1e-5", "scatters light"),
+        ("absorption_per_mm = 1e-5\nscatter_per_mm = 1e-5", "absorbs and scatters light"),
+    ] {
+        let told = notes(medium, far);
+        assert!(told.contains("the far field 'r' lies without end away in 'fog'") && told.contains(does), "{told}");
+        assert_eq!(notes(medium, "kind = 'sphere'\nradius = 10"), "");
+    }
+    assert_eq!(notes("", far), "");
+}

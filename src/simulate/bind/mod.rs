@@ -119,6 +119,7 @@ impl Scene {
         bound.notes.extend(luminous_notes);
         bound.notes.extend(notes::opening_note(&bound, model));
         bound.notes.extend(notes::filled_void_note(&bound, model));
+        bound.notes.extend(notes::dark_far_field_note(&bound));
         bound.notes.extend(notes::shut_body_note(&bound, &chosen));
         bound.notes.extend(notes::thin_body_note(&bound));
         bound.notes.extend(notes::ready_mesh_note(model));

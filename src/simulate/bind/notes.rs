@@ -7,6 +7,7 @@ use crate::model::{Model, PlacedFace};
 use crate::optics::{catalogue, observer_range};
 use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::Loaded;
+use crate::simulate::receiver::{Receiver, Shape};
 use crate::simulate::scene::{ByWavelength, Material, PowerUnit, Reflectance, Scene, medium};
 use crate::simulate::surfaces::FaceOptics;
 use crate::simulate::wavelength_text::wavelength_range_text;
@@ -258,6 +259,27 @@ pub(super) fn filled_void_note(bound: &BoundScene, model: &Model) -> Option<Stri
     Some(format!(
         "the closed void in '{instance}' ({medium}){others} holds '{ambient}', the `ambient` medium: anything else in it has to be a solid of \
          its own with a `medium`"
+    ))
+}
+
+/// Returns one sentence about far fields, naming the first, in surroundings that absorb or scatter: light is counted there once it has left
+/// the scene, after a way without end. `None` without far fields, and where the surroundings do nothing to light.
+pub(super) fn dark_far_field_note(bound: &BoundScene) -> Option<String> {
+    let body = &bound.bodies[AMBIENT as usize];
+    let does = match (body.absorbs(), body.scatter.is_some()) {
+        (true, true) => "absorbs and scatters",
+        (true, false) => "absorbs",
+        (false, true) => "scatters",
+        (false, false) => return None,
+    };
+    let far: Vec<&Receiver> =
+        bound.receivers.iter().filter(|r| matches!(r.shape, Shape::FarField { .. })).collect();
+    let first = &far.first()?.name;
+    let others = if far.len() > 1 { format!(" (and {} more)", far.len() - 1) } else { String::new() };
+    Some(format!(
+        "the far field '{first}'{others} lies without end away in '{}', the `ambient` medium, which {does} light: what it {does} does not \
+         get there; count the light on a receiver of `kind = \"sphere\"` around the scene, or leave out `ambient`",
+        body.medium
     ))
 }
 
