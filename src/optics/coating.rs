@@ -1,6 +1,6 @@
 //! What a coated interface reflects and transmits, by angle and wavelength.
 
-use super::error::{Error, ErrorKind, require};
+use super::error::{Error, ErrorKind, require, require_wavelength};
 use super::fresnel::{self, Power};
 use super::refraction::cos_transmitted;
 use super::table::{bracket, check_increasing};
@@ -146,17 +146,20 @@ impl CoatingTable {
     /// A table from cells angle by angle, in each wavelength by wavelength (nm); shares together above 1 as in [`Coating::ideal`].
     ///
     /// # Errors
-    /// When an axis is empty or not strictly increasing, angles leave 0 to 90°, there are more or fewer cells, or a share is not from 0 to
+    /// When an axis is empty or not strictly increasing, angles leave 0 to 90° or wavelengths 1 to 1e6 nm, there are more or fewer cells, or a share is not from 0 to
     /// 1 or two are more than 1 together.
     pub fn new(angles_deg: Vec<f64>, wavelengths_nm: Vec<f64>, mut cells: Vec<Split>) -> Result<Self, Error> {
         let what = "coating";
         if angles_deg.is_empty() || wavelengths_nm.is_empty() {
             return Err(ErrorKind::EmptyTable { what }.into());
         }
-        check_increasing("coating angle", &angles_deg)?;
-        check_increasing("coating wavelength", &wavelengths_nm)?;
+        check_increasing("angle", &angles_deg)?;
+        check_increasing("wavelength", &wavelengths_nm)?;
+        for &nm in &wavelengths_nm {
+            require_wavelength("a wavelength", nm)?;
+        }
         for &angle in &angles_deg {
-            require("a coating angle", angle, (0.0..=90.0).contains(&angle), "from 0 to 90 degrees")?;
+            require("an angle", angle, (0.0..=90.0).contains(&angle), "from 0 to 90 degrees")?;
         }
         let expected = angles_deg.len() * wavelengths_nm.len();
         if cells.len() != expected {
@@ -165,8 +168,8 @@ impl CoatingTable {
         let columns = wavelengths_nm.len();
         for (k, c) in cells.iter_mut().enumerate() {
             for (r, t) in [(c.reflected.rs, c.transmitted.rs), (c.reflected.rp, c.transmitted.rp)] {
-                require("a reflectance of the coating", r, (0.0..=1.0).contains(&r), SHARE)?;
-                require("a transmittance of the coating", t, (0.0..=1.0).contains(&t), SHARE)?;
+                require("a reflectance", r, (0.0..=1.0).contains(&r), SHARE)?;
+                require("a transmittance", t, (0.0..=1.0).contains(&t), SHARE)?;
                 if r + t > 1.0 + SUM_ROUNDING {
                     let [angle_deg, wavelength_nm] = [angles_deg[k / columns], wavelengths_nm[k % columns]];
                     return Err(ErrorKind::CoatingGain { angle_deg, wavelength_nm, sum: r + t }.into());

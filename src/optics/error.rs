@@ -1,5 +1,6 @@
 //! Why optical data was refused.
 
+use crate::math::units::WAVELENGTHS_NM;
 use thiserror::Error;
 
 /// Why optical data was refused; the message says what is wrong and what to give instead.
@@ -86,4 +87,9 @@ impl From<ErrorKind> for Error {
 /// Returns `value` when it is `good` and finite, else the refusal that names it and what is `allowed`.
 pub(super) fn require(what: &'static str, value: f64, good: bool, allowed: &'static str) -> Result<f64, Error> {
     if good && value.is_finite() { Ok(value) } else { Err(ErrorKind::OutOfRange { what, value, allowed }.into()) }
+}
+
+/// Refuses what is no wavelength of light in nm.
+pub(super) fn require_wavelength(what: &'static str, nm: f64) -> Result<f64, Error> {
+    require(what, nm, WAVELENGTHS_NM.contains(&nm), "from 1 to 1e6 nm; 0.55 µm are 550 nm")
 }

@@ -1,7 +1,7 @@
 //! What light travels through: refractive index and absorption over the wavelength.
 
 use super::dispersion::Dispersion;
-use super::error::{Error, require};
+use super::error::{Error, require, require_wavelength};
 use super::phase::BulkScatter;
 use super::table::Table;
 use std::ops::RangeInclusive;
@@ -59,6 +59,14 @@ pub enum Index {
 }
 
 impl Index {
+    /// Indices at vacuum wavelengths in nm: linear between them, constant beyond the ends.
+    ///
+    /// # Errors
+    /// When there are none, the wavelengths do not increase strictly or are not from 1 to 1e6 nm, or an index is not finite.
+    pub fn table(points: impl IntoIterator<Item = (f64, f64)>) -> Result<Self, Error> {
+        spectral_table("index", points).map(Self::Table)
+    }
+
     /// The index at a vacuum wavelength.
     ///
     /// NaN where a formula has no real value, far outside the range it was fitted to; see [`Index::checked`].
@@ -116,6 +124,15 @@ impl Index {
     }
 }
 
+/// Makes a table over the wavelength in nm; refuses what [`Table::new`] does, and wavelengths that light does not have in nm.
+fn spectral_table(what: &'static str, points: impl IntoIterator<Item = (f64, f64)>) -> Result<Table, Error> {
+    let table = Table::new(what, points)?;
+    for nm in table.range() {
+        require_wavelength("a wavelength", nm)?;
+    }
+    Ok(table)
+}
+
 /// Vacuum wavelengths of spectral lines, nm.
 pub mod line {
     /// Hydrogen, blue.
@@ -163,9 +180,10 @@ impl Absorption {
     /// Napierian coefficients per mm at wavelengths in nm: linear between them, constant beyond the ends.
     ///
     /// # Errors
-    /// When there are none, the wavelengths do not increase strictly, a number is not finite, or a coefficient is negative.
+    /// When there are none, the wavelengths do not increase strictly or are not from 1 to 1e6 nm, a number is not finite, or a coefficient
+    /// is negative.
     pub fn table(points: impl IntoIterator<Item = (f64, f64)>) -> Result<Self, Error> {
-        let table = Table::new("absorption", points)?;
+        let table = spectral_table("absorption", points)?;
         let [low, _] = table.extremes();
         require("an absorption coefficient", low, low >= 0.0, "zero or more")?;
         Ok(Self::Table(table))

@@ -1,9 +1,9 @@
 //! Spectra of sources, and wavelengths drawn from them.
 
 use super::cie_daylight;
-use super::error::{Error, require};
+use super::error::{Error, require, require_wavelength};
 use super::table::Table;
-use super::wavelengths::{MOST_EVEN_NM, Wavelengths, require_wavelength, steps};
+use super::wavelengths::{MOST_EVEN_NM, Wavelengths, steps};
 
 /// The power of a source over the wavelength, up to a factor.
 ///

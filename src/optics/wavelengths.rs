@@ -1,18 +1,12 @@
 //! Wavelengths drawn in proportion to the power of a spectrum.
 
 use super::cie_observer::{observer_range, xyz_of_watt};
-use super::error::{Error, ErrorKind, require};
+use super::error::{Error, ErrorKind, require, require_wavelength};
 use super::intensity::linear_quantile;
 use super::table::Table;
-use crate::math::units::WAVELENGTHS_NM;
 
 /// Range of wavelengths that is divided into even steps of at most 1 nm.
 pub(super) const MOST_EVEN_NM: f64 = 4000.0;
-
-/// Refuses what is no wavelength of light in nm.
-pub(super) fn require_wavelength(what: &'static str, nm: f64) -> Result<f64, Error> {
-    require(what, nm, WAVELENGTHS_NM.contains(&nm), "from 1 to 1e6 nm; 0.55 µm are 550 nm")
-}
 
 /// Number of even steps over a range of wavelengths of at most [`MOST_EVEN_NM`]: of at most 1 nm, but no fewer than 64.
 pub(super) fn steps(range_nm: f64) -> usize {

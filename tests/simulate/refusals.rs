@@ -269,6 +269,30 @@ fn constants_of_a_glass_in_square_nanometres_are_refused() {
     assert!(said.contains("below 1") && said.contains("C in µm²") && e.line_and_column().is_some(), "{said}");
 }
 
+/// Wavelengths in micrometres are below all light in nanometres, in every table; and coefficients in nm² are no index.
+#[test]
+fn tables_over_micrometres_are_refused() {
+    let medium = |keys: &str| format!("[[medium]]\nname = 'g'\n{keys}");
+    let coating = |keys: &str| format!("[[material]]\npart = 'x'\nsurface = 'coating'\n{keys}");
+    for (head, words, line) in [
+        (medium("index_table = [[0.4, 1.5], [0.7, 1.51]]"), "a wavelength is 0.4, but must be from 1 to 1e6 nm", 3),
+        (medium("index = 1.5\nabsorption_per_mm = [[0.4, 0.1], [0.7, 0.2]]"), "0.55 µm are 550 nm", 4),
+        (medium("cauchy = [1.5, 4200]"), "`[A, B, C, …]` with B in µm²", 3),
+        (coating("reflectance = [[0, 0.4, 0.9], [0, 0.7, 0.8]]"), "in `reflectance`: a wavelength is 0.4", 4),
+        (coating("coating = [[0, 0.55, 0.1, 0.8]]"), "in `coating`: a wavelength is 0.55", 4),
+        (
+            "[[material]]\npart = 'x'\nsurface = 'mirror'\nreflectance = [[90, 0.9], [0, 0.8]]".into(),
+            "in `reflectance`: row 2 of the angle table",
+            4,
+        ),
+    ] {
+        let e = Scene::parse(&format!("{head}\n{REST}"), "scene.toml", Path::new(".")).expect_err(&head);
+        let said = e.to_string();
+        assert!(said.contains(words), "{head}: {said}");
+        assert_eq!(e.line_and_column().map(|l| l.0), Some(line), "{head}: {said}");
+    }
+}
+
 /// Light of wavelengths that a table or a formula was not made for is used at the table's ends, and this is said by name.
 #[test]
 fn light_beyond_a_table_is_named() {

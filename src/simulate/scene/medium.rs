@@ -2,7 +2,7 @@
 
 use super::{Key, Origin};
 use crate::formats::{AgfGlass, read_agf};
-use crate::optics::{self, Absorption, BulkScatter, Dispersion, Index, Pole, Table, catalogue};
+use crate::optics::{self, Absorption, BulkScatter, Dispersion, Index, Pole, catalogue};
 use crate::simulate::wavelength_text::wavelength_text;
 use crate::simulate::{Error, ErrorKind};
 use crate::text;
@@ -55,6 +55,9 @@ pub enum ByWavelength {
     Table(Vec<[f64; 2]>),
 }
 
+/// What the numbers of `sellmeier` are.
+const SELLMEIER_ROWS: &str = "its rows are [B, C] with C in µm², the square of a resonance's wavelength";
+
 impl Medium {
     /// Returns the medium in the form that the laws of light read.
     ///
@@ -75,7 +78,7 @@ impl Medium {
         ways.extend(self.cauchy.clone().map(Index::Cauchy));
         ways.extend(self.schott.map(Index::Schott));
         if let Some(t) = &self.index_table {
-            ways.push(Index::Table(Table::new("index", points(t)).map_err(|e| ("index_table", e.to_string()))?));
+            ways.push(Index::table(points(t)).map_err(|e| ("index_table", e.to_string()))?);
         }
         // Two indices would leave open which one counts.
         if ways.len() != 1 {
@@ -148,13 +151,23 @@ impl Medium {
         let wavelength = wavelength_text(wavelength_nm);
         if !Index::RANGE.contains(&n) {
             let message = format!("the index of '{}' at {wavelength} is {n}, not from 0.1 to 10", self.name);
-            return Err(origin.error(ErrorKind::Value, &at("name"), message));
+            let formulas = [
+                ("cauchy", self.cauchy.is_some(), "it is `[A, B, C, …]` with B in µm², C in µm⁴ and so on"),
+                ("schott", self.schott.is_some(), "its λ is in µm: A1 in µm⁻², A2 in µm² and so on"),
+                ("sellmeier", self.sellmeier.is_some(), SELLMEIER_ROWS),
+            ];
+            let formula = formulas.into_iter().find(|(_, is_given, _)| *is_given);
+            let error = origin.error(ErrorKind::Value, &at(formula.map_or("name", |(key, ..)| key)), message);
+            return Err(match formula {
+                Some((_, _, advice)) => error.help(advice),
+                None => error,
+            });
         }
         // Constants in nm² leave nearly nothing of each term, with the wrong sign: no light would be bent, in silence.
         if self.sellmeier.is_some() && n < 1.0 {
             let message = format!("`sellmeier` gives an index of {n} at {wavelength}, below 1");
             let error = origin.error(ErrorKind::Value, &at("sellmeier"), message);
-            return Err(error.help("its rows are [B, C] with C in µm², the square of a resonance's wavelength"));
+            return Err(error.help(SELLMEIER_ROWS));
         }
         Ok(())
     }

@@ -25,7 +25,7 @@ impl Material {
             },
             SurfaceKind::Mirror | SurfaceKind::Diffuse => reflector(self.reflectance.as_ref(), 1.0, 0.0),
             SurfaceKind::Coating => match &self.coating {
-                Some(rows) => coating_from_rows(rows).map_err(|e| ("coating", e)),
+                Some(rows) => coating_from_rows(rows).map_err(|e| ("coating", format!("in `coating`: {e}"))),
                 // A coating passes only what it says that it passes; the rest is absorbed.
                 None => reflector(self.reflectance.as_ref(), 0.0, self.transmittance.unwrap_or(0.0)),
             },
@@ -137,10 +137,11 @@ fn reflector(r: Option<&Reflectance>, unset: f64, transmittance: f64) -> Result<
             // One column: a table without wavelengths holds for all, and which one it names does not matter.
             CoatingTable::new(angles, vec![550.0], cells)
                 .map(Coating::Table)
-                .map_err(|e| ("reflectance", e.to_string()))
+                .map_err(|e| ("reflectance", format!("in `reflectance`: {e}")))
         }
         Some(Reflectance::ByAngleAndWavelength(t)) => {
-            coating_from_grid(t.iter().map(|[a, nm, r]| ([*a, *nm], same(*r)))).map_err(|e| ("reflectance", e))
+            coating_from_grid(t.iter().map(|[a, nm, r]| ([*a, *nm], same(*r))))
+                .map_err(|e| ("reflectance", format!("in `reflectance`: {e}")))
         }
     }
 }
