@@ -2,7 +2,9 @@
 
 use super::prepared_scene::PreparedScene;
 use super::scene_results::SceneResults;
-use crate::regulation::{Assessment, Assumptions, IntensityMap, RaySample, Regulation, Traffic, assess};
+use crate::regulation::{
+    Assessment, Assumptions, IntensityMap, RaySample, Regulation, Traffic, assess, even_edges,
+};
 use crate::simulate::scene::RegulationUse;
 use crate::simulate::{ReceiverResult, Results};
 use crate::study::figures::cell_errors;
@@ -26,10 +28,7 @@ fn intensities(
     geometric: Option<&[f64]>,
     rays: RaySample,
 ) -> Result<IntensityMap, String> {
-    let edges = |k: usize| -> Vec<f64> {
-        let step = 2.0 * receiver.half[k] / receiver.grid[k] as f64;
-        (0..=receiver.grid[k]).map(|i| receiver.middle[k] - receiver.half[k] + step * i as f64).collect()
-    };
+    let edges = |k: usize| even_edges(receiver.middle[k], receiver.half[k], receiver.grid[k]);
     let known = geometric.filter(|errors| errors.len() == receiver.cells.len());
     let cells = (receiver.cells.iter().zip(cell_errors(receiver)).enumerate())
         .map(|(k, (value, statistical))| [*value, statistical, known.map_or(0.0, |errors| errors[k])])

@@ -40,6 +40,7 @@ pub use assessment::{Assessment, Assumptions, RowVerdict};
 pub use few_rays::RaySample;
 pub use judgement::{Settles, Verdict};
 pub use map::{IntensityMap, Reading};
+pub(crate) use read::even_edges;
 pub use row::{Bound, Row, RowKind};
 pub use table::{Function, Regulation, Traffic};
 pub use verdict::assess;

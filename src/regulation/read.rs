@@ -90,6 +90,16 @@ impl IntensityMap {
     /// When a column is missing, several may be the intensity, a cell stands twice or the cells make no regular grid; the message names the
     /// line where one is at fault.
     pub fn from_csv(text: &str, rays: Option<RaySample>) -> Result<Self, String> {
+        Self::from_csv_over(text, None, rays)
+    }
+
+    /// Makes the map of [`Self::from_csv`] with edges, where the results say where the far field lies, that are the run's own to the last
+    /// bit: `axes` are middle and half width, degrees, over H and over V. The file has the centres of cells alone, and what is worked out
+    /// from these differs by rounding.
+    ///
+    /// # Errors
+    /// As [`Self::from_csv`].
+    pub fn from_csv_over(text: &str, axes: Option<[[f64; 2]; 2]>, rays: Option<RaySample>) -> Result<Self, String> {
         let mut lines = lines_of_cells(text);
         let (_, header) = lines.next().ok_or("the file is empty")?;
         let Columns { names, h, v, intensity, statistical, geometric } = Columns::new(header)?;
@@ -130,11 +140,26 @@ impl IntensityMap {
         }
         let edges =
             |axis, centres: BTreeMap<i64, f64>| edges_between(axis, &centres.into_values().collect::<Vec<_>>());
-        let (h_edges, v_edges) = (edges("H", columns)?, edges("V", rows)?);
+        let mut of_file = [edges("H", columns)?, edges("V", rows)?];
+        for (edges, [middle, half]) in of_file.iter_mut().zip(axes.into_iter().flatten()) {
+            let stated = even_edges(middle, half, edges.len() - 1);
+            // Where they are others, the file is another's: it has the word.
+            let agrees = stated.iter().zip(&*edges).all(|(a, b)| (a - b).abs() < 10.0 * SAME_CENTRE_DEG);
+            if agrees {
+                *edges = stated;
+            }
+        }
+        let [h_edges, v_edges] = of_file;
         let map = Self::new(h_edges, v_edges, cells.into_values().collect())?;
         let map = if geometric.is_some() { map } else { map.without_geometric_errors() };
         Ok(rays.into_iter().fold(map, Self::with_rays))
     }
+}
+
+/// Returns the edges of so many cells of equal width, at least one, about a middle.
+pub(crate) fn even_edges(middle: f64, half: f64, cells: usize) -> Vec<f64> {
+    let step = 2.0 * half / cells as f64;
+    (0..=cells).map(|i| middle - half + step * i as f64).collect()
 }
 
 /// The edges of cells of equal width from their rising centres, degrees; an error for fewer than two or unequal steps.
@@ -186,6 +211,29 @@ mod tests {
         let reach = dark.noise(&weights, 1.0, 1e-3, 3.0).reach(3.0, 1.0);
         assert!((reach / (6.74 * 1e-6 / 0.1f64.to_radians().powi(2)) - 1.0).abs() < 1e-2, "{reach}");
         assert_eq!(dark.read(&weights).statistical, 0.0);
+    }
+
+    /// Of 135 cells over 20° the centres are no round numbers: edges worked out from them alone differ in their last digits.
+    #[test]
+    fn edges_are_those_of_the_run_to_the_last_bit() {
+        let axes = [[0.25, 10.0], [0.0, 7.0]];
+        let stated = axes.map(|[middle, half]| even_edges(middle, half, 135));
+        let centre = |k: usize, i: usize| 0.5 * (stated[k][i] + stated[k][i + 1]);
+        let mut text = "H_deg,V_deg,luminous_intensity_cd,standard_error\n".to_owned();
+        for (i, j) in (0..135).flat_map(|j| (0..135).map(move |i| (i, j))) {
+            text += &format!("{},{},{},0.1\n", centre(0, i), centre(1, j), i + j);
+        }
+        let [h, v] = stated.clone();
+        let cells = (0..135).flat_map(|j| (0..135).map(move |i| [(i + j) as f64, 0.1, 0.0])).collect();
+        let own = IntensityMap::new(h, v, cells).unwrap();
+        let read = |map: &IntensityMap| {
+            map.read(&map.measure(Sensor { half_deg: 0.3, round: true }, 1.234, -2.345).unwrap()).value
+        };
+        let again = IntensityMap::from_csv_over(&text, Some(axes), None).unwrap();
+        assert_eq!((again.extent(), read(&again)), (own.extent(), read(&own)));
+        // Of a place that is not the file's nothing is taken.
+        let elsewhere = IntensityMap::from_csv_over(&text, Some([[3.0, 10.0], [0.0, 7.0]]), None).unwrap();
+        assert!((elsewhere.extent()[0][0] + 9.75).abs() < 1e-9);
     }
 
     #[test]

@@ -50,6 +50,7 @@ fn a_low_beam_goes_from_step_to_verdict() {
     for (a, b) in rows.iter().zip(again["rows"].as_array().unwrap()) {
         assert_eq!((&a["id"], &a["verdict"]), (&b["id"], &b["verdict"]));
     }
+    assert_eq!(again["aim"], found["regulations"][0]["aim"]);
     // By default by the regulation that the scene names.
     let (code, by_default, err) = lampyris_in(folder.path(), &["assess", "out", "--json"]);
     assert!(code == 0 && by_default == out, "{code} {err}");

@@ -160,7 +160,9 @@ impl ResultsFile {
         let replicates = self.results["replicates"].as_u64().and_then(|n| u32::try_from(n).ok());
         let rays = heaviest.zip(replicates);
         let rays = rays.map(|(heaviest_flux, replicates)| RaySample { heaviest_flux, replicates });
-        let map = IntensityMap::from_csv(&text, rays).map_err(failure)?;
+        let axis = |k: usize| Some([receiver["middle"][k].as_f64()?, receiver["half"][k].as_f64()?]);
+        let map =
+            IntensityMap::from_csv_over(&text, axis(0).zip(axis(1)).map(Into::into), rays).map_err(failure)?;
         // A run on facets writes what they change of every cell, unless the cells were too many to compare; one on the spline has none.
         Ok(if self.results["faceting"].is_null() { map.of_spline() } else { map })
     }
