@@ -3,6 +3,7 @@
 use super::super::input::open_file;
 use super::super::{Error, ErrorKind, LightRay};
 use super::ray_collector::RayCollector;
+use crate::text::count_of;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -47,15 +48,22 @@ impl ByteReader {
         Error::new(&self.path, ErrorKind::Malformed(message.into()))
     }
 
+    /// An error about the end of the file before that of `field`, which begins at byte `start` and has so many bytes.
+    fn cut_short(&self, field: &str, start: u64, bytes: u64) -> Error {
+        let there = self.length.saturating_sub(start);
+        let place = if there > 0 { "in the middle of" } else { "before" };
+        let missing = count_of(bytes.saturating_sub(there), "byte");
+        self.malformed(format!(
+            "the file ends {place} {field} at byte {start} ({missing} missing): it was cut short"
+        ))
+    }
+
     /// Reads as many bytes as `bytes` has; `field` is what they are, for the message when the file ends too soon.
     pub(super) fn fill(&mut self, bytes: &mut [u8], field: &str) -> Result<(), Error> {
         // Kept for the message: it must name where the field began.
         let start = self.position;
         self.file.read_exact(bytes).map_err(|e| match e.kind() {
-            std::io::ErrorKind::UnexpectedEof => self.malformed(format!(
-                "the file ends within {field}, which starts at byte {start} and needs {} bytes; it was cut short",
-                bytes.len()
-            )),
+            std::io::ErrorKind::UnexpectedEof => self.cut_short(field, start, bytes.len() as u64),
             _ => Error::new(&self.path, ErrorKind::Read(e)),
         })?;
         self.position += bytes.len() as u64;
@@ -116,7 +124,12 @@ impl ByteReader {
         mut ray: impl FnMut(&[f32]) -> Result<LightRay, String>,
     ) -> Result<(), Error> {
         let mut row = vec![0.0; columns];
+        let row_bytes = 4 * columns as u64;
         for index in 0..count {
+            // Asked before it is read: the number of the ray that is cut helps, not which of its numbers is the first to be missing.
+            if self.length.saturating_sub(self.position) < row_bytes {
+                return Err(self.cut_short(&format!("ray {}", index + 1), self.position, row_bytes));
+            }
             self.read_row(&mut row, "the rays")?;
             rays.add(ray(&row).map_err(|m| self.malformed(format!("ray {}: {m}", index + 1)))?)?;
         }

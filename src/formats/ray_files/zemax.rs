@@ -150,10 +150,15 @@ pub(super) mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("source.dat");
         let whole = file(4, 0, 0, 0.0, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-        for cut in [10, 207, whole.len() - 1] {
+        for (cut, message) in [
+            (10, "the file ends in the middle of"),
+            (207, "(1 byte missing): it was cut short"),
+            (208, "the file ends before ray 1 at byte 208 (28 bytes missing): it was cut short"),
+            (232, "the file ends in the middle of ray 1 at byte 208 (4 bytes missing): it was cut short"),
+        ] {
             std::fs::write(&path, &whole[..cut]).unwrap();
             let error = read_ray_set(&path, Flux::Radiant).unwrap_err().to_string();
-            assert!(error.contains("cut short"), "{error}");
+            assert!(error.contains(message), "{error}");
         }
         for (bytes, message) in [
             (file(9, 0, 0, 0.0, &[0.0; 7]), "unit of length 9 at byte 136"),
