@@ -13,12 +13,13 @@ use crate::text::{figures, grouped};
 
 /// Writes a figure of `digits` significant digits with its unit and one ± (1σ) for both errors. Both are named where the geometric one,
 /// by its `cause`, exceeds a tenth of the rays', the rays' alone where the facets were not judged. A 0 that no ray reached gets its limit
-/// of 95 % instead.
-pub(super) fn with_errors(figure: &Figure, digits: usize, cause: GeometricCause) -> String {
+/// of 95 % instead, no more than `most` where a most is known.
+pub(super) fn with_errors(figure: &Figure, digits: usize, cause: GeometricCause, most: Option<f64>) -> String {
     let Figure { value, unit, statistical, geometric, .. } = figure;
     // One ray is stated as the error where none arrived: three of them are the limit of 95 %.
     if *value == 0.0 && *statistical > 0.0 {
-        let most = with_unit(&figures(3.0 * figure.combined(), 2), unit);
+        let limit = (3.0 * figure.combined()).min(most.unwrap_or(f64::INFINITY));
+        let most = with_unit(&figures(limit, 2), unit);
         return format!("{} (no ray arrived: at most {most}, 95 %)", with_unit("0", unit));
     }
     let value = figures(*value, digits);
@@ -46,7 +47,7 @@ pub(super) fn channel_totals(all: &ReceiverFigures, cause: GeometricCause) -> St
     if all.channels.is_empty() {
         return String::new();
     }
-    let total = |c: &ChannelFigure| format!("{} {}", c.name, with_errors(&c.figure, 4, cause));
+    let total = |c: &ChannelFigure| format!("{} {}", c.name, with_errors(&c.figure, 4, cause, None));
     let mut told: Vec<String> = all.channels.iter().take(SPOKEN_CHANNELS).map(total).collect();
     if let Some(more @ 1..) = all.channels.len().checked_sub(SPOKEN_CHANNELS) {
         told.push(format!("{more} more in the table"));
@@ -372,13 +373,23 @@ mod tests {
     #[test]
     fn a_figure_without_a_unit_has_none() {
         let told = |unit: &str, value: f64, geometric: Option<f64>| {
-            with_errors(&Figure::new(value, unit, 0.3, geometric), 4, GeometricCause::Facets)
+            with_errors(&Figure::new(value, unit, 0.3, geometric), 4, GeometricCause::Facets, None)
         };
         assert_eq!(told("", 135.1, Some(0.0)), "135.1 ± 0.3");
         assert_eq!(told("lm", 135.1, Some(0.4)), "135.1 ± 0.5 lm (± 0.3 from the rays, ± 0.4 from the facets)");
-        let lossy = with_errors(&Figure::new(135.1, "lm", 0.3, Some(0.4)), 4, GeometricCause::Loss);
+        let lossy = with_errors(&Figure::new(135.1, "lm", 0.3, Some(0.4)), 4, GeometricCause::Loss, None);
         assert!(lossy.ends_with("± 0.4 from lost light)"), "{lossy}");
         assert_eq!(told("", 0.0, None), "0 (no ray arrived: at most 0.9, 95 %)");
         assert_eq!(told("", 135.1, None), "135.1 (± 0.3 from the rays alone; the facets were not judged)");
+    }
+
+    /// Where all light was lost, an error of all that was emitted, three times that is no bound: no more than all can arrive.
+    #[test]
+    fn a_bound_is_no_more_than_what_is_emitted() {
+        let told = |emitted: f64| {
+            with_errors(&Figure::new(0.0, "W", 0.001, Some(1.0)), 4, GeometricCause::Loss, Some(emitted))
+        };
+        assert_eq!(told(1.0), "0 W (no ray arrived: at most 1 W, 95 %)");
+        assert_eq!(told(5.0), "0 W (no ray arrived: at most 3 W, 95 %)");
     }
 }

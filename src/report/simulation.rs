@@ -111,7 +111,7 @@ impl SimulationReport<'_> {
         // Parted by semicolons: what passes a receiver is counted by the next one too, so that shares need not add up.
         let parts: Vec<String> = (r.receivers.iter().zip(self.figures))
             .map(|(x, f)| {
-                let power = errors::with_errors(&f.power, 4, cause);
+                let power = errors::with_errors(&f.power, 4, cause, Some(r.power.emitted));
                 let channels = errors::channel_totals(f, cause);
                 format!("**{power}** ({}) reach {}{channels}", self.share(x.power), x.name)
             })
@@ -132,7 +132,7 @@ impl SimulationReport<'_> {
         {
             if let Some((direction, _)) = brightest_direction(&with_joined_slivers(&grid, &rings), &rings) {
                 let of = if several { format!(" of {}", grid.name) } else { String::new() };
-                let value = errors::with_errors(max, 3, cause);
+                let value = errors::with_errors(max, 3, cause, None);
                 text += &format!("The brightest direction{of} is {direction} with **{value}**. ");
             }
         }
@@ -190,7 +190,7 @@ impl SimulationReport<'_> {
         };
         format!(
             "**{}** ({}) were cut off, {why}. ",
-            errors::with_errors(&self.power.cut_off, 4, GeometricCause::new(r, self.geometric)),
+            errors::with_errors(&self.power.cut_off, 4, GeometricCause::new(r, self.geometric), None),
             self.share(r.power.cut_off)
         )
     }

@@ -102,10 +102,11 @@ fn notable_files(folder: &Path, results: &Results) -> Vec<(PathBuf, String)> {
 pub(crate) fn target_sentence(result: &TargetResult) -> String {
     let found = result.found_percent.map_or("nothing arrived".into(), |e| format!("{} %", figures(e, 2)));
     let verdict = if result.reached { "reached" } else { "**not reached**" };
-    let missing = match result.missing_rays {
-        0 if result.reached => String::new(),
-        0 => "; it is the rounding of the rays' power, which more rays do not lessen".into(),
-        more => format!("; about {} more are needed", grouped(more)),
+    let missing = match (result.missing_rays, result.found_percent) {
+        (0, _) if result.reached => String::new(),
+        (_, None) => ", so the number needed is not known".into(),
+        (0, Some(_)) => "; it is the rounding of the rays' power, which more rays do not lessen".into(),
+        (more, Some(_)) => format!("; about {} more are needed", grouped(more)),
     };
     format!(
         "Asked for a statistical error of {} % of the {} on {}: {verdict} with {} rays ({found}){missing}.",
@@ -114,4 +115,28 @@ pub(crate) fn target_sentence(result: &TargetResult) -> String {
         result.receiver,
         grouped(result.rays)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is missing follows from the error; where nothing arrived there is none.
+    #[test]
+    fn how_many_rays_are_missing_is_told_where_it_is_known() {
+        let told = |found_percent: Option<f64>, missing_rays: u64| {
+            target_sentence(&TargetResult {
+                receiver: "wall".into(),
+                quantity: "power",
+                asked_percent: 1.0,
+                found_percent,
+                rays: 900,
+                reached: missing_rays == 0,
+                missing_rays,
+            })
+        };
+        assert!(told(Some(0.9), 0).ends_with("reached with 900 rays (0.9 %)."));
+        assert!(told(Some(2.0), 2700).ends_with("(2 %); about 2700 more are needed."));
+        assert!(told(None, 2700).ends_with("(nothing arrived), so the number needed is not known."));
+    }
 }
