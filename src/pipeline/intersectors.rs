@@ -59,10 +59,18 @@ pub fn refuse_facet_normals(tracing: &TracingSettings, scene: Option<&Scene>) ->
     if intersector != IntersectorKind::Exact || !is_asked || normals == NormalMode::Exact {
         return Ok(());
     }
-    let error = Error::setting(
-        "normals",
-        format!("{normals} with the intersector exact: the spline has normals of its own"),
-    );
+    let why = "the spline has normals of its own";
+    let error = match (tracing.normals.is_some(), tracing.intersector.is_some()) {
+        // Nothing of it was asked beside the scene: its keys are named.
+        (false, _) => Error::request(format!(
+            "[accuracy] in the scene has `normals = \"{normals}\"` with `intersector = \"exact\"`: {why}"
+        )),
+        (true, true) => Error::setting("normals", format!("{normals} with the intersector exact: {why}")),
+        (true, false) => Error::setting(
+            "normals",
+            format!("{normals} with `intersector = \"exact\"` in [accuracy] of the scene: {why}"),
+        ),
+    };
     Err(error.help("leave the normals out, or choose an intersector on facets, as octree"))
 }
 

@@ -3,7 +3,7 @@
 use lampyris::model::Model;
 use lampyris::pipeline::{
     Cache, ErrorTarget, IntersectorKind, LoadedModel, MeshingSettings, Monitor, PreparedScene, RayRange, SceneJob,
-    Silent, Stage, TraceRequest, TracingSettings, read_scene,
+    Silent, Stage, TraceRequest, TracingSettings, normal_mode, read_scene, refuse_facet_normals,
 };
 use lampyris::regulation::Verdict;
 use lampyris::simulate::Scene;
@@ -280,4 +280,23 @@ fn a_choice_on_coarser_facets_is_found_again() {
     let [first, second] = [(); 2].map(|()| PreparedScene::new(job.clone(), &Silent).unwrap().chosen.unwrap());
     assert!(first.because.contains("coarser ones were tried"), "{}", first.because);
     assert_eq!(first, second, "with the seconds of the pilot");
+}
+
+/// Normals that do not go with the spline are named as they were asked for: by the keys of the scene, or by settings beside it.
+#[test]
+fn normals_beside_the_spline_are_named_where_they_stand() {
+    let text = "[accuracy]\nintersector = 'exact'\nnormals = 'flat'\n[[source]]\n";
+    let scene = Scene::parse(text, "s.toml", Path::new(".")).unwrap();
+    let said = |normals: Option<&str>, intersector: Option<IntersectorKind>, scene: Option<&Scene>| {
+        let normals = normals.map(|name| normal_mode(name).unwrap());
+        let tracing = TracingSettings { normals, intersector, ..TracingSettings::default() };
+        refuse_facet_normals(&tracing, scene).unwrap_err().to_string()
+    };
+    let of_scene = said(None, None, Some(&scene));
+    assert!(of_scene.contains("`normals = \"flat\"` with `intersector = \"exact\"`"), "{of_scene}");
+    assert!(of_scene.contains("[accuracy]") && !of_scene.contains("--normals"), "{of_scene}");
+    let of_both = said(Some("nearest"), None, Some(&scene));
+    assert!(of_both.contains("nearest with `intersector = \"exact\"` in [accuracy]"), "{of_both}");
+    let of_settings = said(Some("flat"), Some(IntersectorKind::Exact), None);
+    assert!(of_settings.contains("flat with the intersector exact"), "{of_settings}");
 }
