@@ -293,6 +293,49 @@ fn tables_over_micrometres_are_refused() {
     }
 }
 
+/// What is refused is named as it is written, with its limits and what to write in its place.
+#[test]
+fn refusals_say_what_would_be_right() {
+    let coat = |keys: &str| format!("[[material]]\npart = 'x'\n{keys}");
+    let lamp = |keys: &str| format!("[[source]]\n{keys}");
+    for (head, words) in [
+        (coat("scatter = { lobe = 'gaussian', sigma_deg = -1 }"), "`sigma_deg` is -1, but must be above 0"),
+        (coat("surface = 'metal'\nmetal = [0.2, -3]"), "n above 0 and k 0 or more (n + i k)"),
+        (
+            lamp("spectrum = { kind = 'table', values = [[550, 1]] }"),
+            "a table of one wavelength has no width: give two, or `kind = \"lines\"`",
+        ),
+        (
+            lamp("spectrum = { kind = 'black_body', kelvin = 1 }"),
+            "a black body of 1 K has no light in 360 to 830 nm",
+        ),
+        (
+            lamp("kind = 'cone'\nhalf_angle_deg = 0"),
+            "above 0 and at most 180; for parallel light take `collimated`",
+        ),
+        (
+            lamp("kind = 'ies'\nfile = 'a.ies'\nspectrum = { kind = 'd65' }"),
+            "its `spectrum` is not used to convert photometric files",
+        ),
+        (format!("{PLANE}rays = 1000"), "`rays` is a key of [run] and [[source]]"),
+        ("[run]\nambient = 'water'".into(), "`ambient` is a key of the head of the file"),
+        ("[run]\nhalf_angle_deg = 3".into(), "`half_angle_deg` is a key of [[source]]"),
+        (format!("{PLANE}cells = [1000000000000, 10]"), "expected a whole number from 0 to 4294967295"),
+        (format!("{PLANE}cells = [1000000000000, 10]"), "from 1 to 16 million cells in all"),
+        (
+            "[[receiver]]\nname = 'r'\nkind = 'far_field'\nangles = 'C'\nh_deg = [-90, 90]".into(),
+            "`h_deg` must rise and stay within 0 to 360, the angles of type C",
+        ),
+        (
+            "[[receiver]]\nname = 'r'\nkind = 'far_field'\nv_deg = [-90, 91]".into(),
+            "`v_deg` must rise and stay within -90 to 90, the angles of type A",
+        ),
+    ] {
+        let said = refusal(&head);
+        assert!(said.contains(words), "{head}: {said}");
+    }
+}
+
 /// Light of wavelengths that a table or a formula was not made for is used at the table's ends, and this is said by name.
 #[test]
 fn light_beyond_a_table_is_named() {

@@ -192,6 +192,31 @@ fn what_selects_nothing_is_refused_with_what_there_is() {
     }
 }
 
+/// Where a model has no names of a kind, what to give in their place is said; and where there is no model, that.
+#[test]
+fn what_no_model_has_is_refused_with_what_to_give() {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-5.0, -5.0, 0.0), Point::new(5.0, 5.0, 3.0));
+    let empty = World::default().model;
+    let file = "[[model]]\nfile = 'a.stp'\n";
+    for (model, head, selector, says) in [
+        (&world.model, "", "solid = 'xx'", "its solids have no names: give the number, as in `solid = 0`"),
+        (&world.model, "", "layer = 'L1'", "the model has no layers"),
+        (&empty, "", "part = 'cover*'", "the scene has no model: add a [[model]] with its `file`"),
+        (&empty, file, "part = 'cover*'", "the model has no faces"),
+        (
+            &empty,
+            "[[model]]\nfile = 'a.stp'\nwithout = [{ part = '*' }]\n",
+            "part = 'cover*'",
+            "`without` leaves out all its faces",
+        ),
+    ] {
+        let text = format!("{head}[[material]]\n{selector}\nsurface = 'mirror'\n");
+        let error = bound(model, &text).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(error.contains(says), "{selector}: {error}");
+    }
+}
+
 /// Ready meshes bear names as surfaces do.
 #[test]
 fn faces_that_are_meshes_are_named_too() {
@@ -270,7 +295,7 @@ fn what_the_scene_describes_in_vain_is_told() {
     let notes = |text: &str| bound(&world.model, text).unwrap().notes().join("\n");
     let media = "[[medium]]\nname = 'a'\nindex = 1.5\n[[medium]]\nname = 'b'\nindex = 1.6\n";
     let unused = notes(&format!("{media}[[material]]\nmedium = 'a'\n"));
-    assert_eq!(unused, "of [[medium]] 'b' is in no use: no [[material]] names it as its `medium`");
+    assert_eq!(unused, "[[medium]] 'b' is not used: no [[material]] has `medium = \"b\"`");
     let both = notes(&format!("{media}[[material]]\nmedium = 'a'\n[[material]]\npart = 'plate'\nmedium = 'b'\n"));
     assert!(!both.contains("[[medium]]"), "{both}");
     for (run, told) in [("", false), ("unit = 'lm'\n", false), ("unit = 'lm'\nwavelength_nm = 1000\n", true)] {

@@ -33,7 +33,13 @@ pub(super) fn frame(scene: &Scene, model: &Model, of: [Key<'_>; 2], name: Option
             let parts = model.instances.iter().flat_map(|i| [part_name(i), i.name.as_str()]);
             let entries = scene.models.iter().map(|entry| entry.name.as_str()).filter(|name| !name.is_empty());
             let message = format!("no instance, part or model is called '{name}'");
-            Err(scene.error(ErrorKind::NoMatch, &at, message).help(advice(name, parts.chain(entries))))
+            Err(scene.error(ErrorKind::NoMatch, &at, message).help(advice(
+                name,
+                parts.chain(entries),
+                "frame",
+                scene,
+                model,
+            )))
         }
         _ => {
             let message = format!("'{name}' is placed {} times, each with a frame of its own", named.len());

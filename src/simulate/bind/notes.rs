@@ -99,12 +99,16 @@ pub(super) fn unused_media_note(scene: &Scene) -> Option<String> {
     let named = scene.materials.iter().filter_map(|rule| rule.medium.as_deref());
     let named: BTreeSet<&str> = named.chain(scene.ambient.as_deref()).collect();
     let unused = scene.media.iter().map(|medium| medium.name.as_str()).filter(|name| !named.contains(name));
-    let quoted =
-        first_sentences(unused.map(|name| format!("'{name}'")), NAMED, |further| format!("{further} more"));
-    let verb = if quoted.len() == 1 { "is" } else { "are" };
-    (!quoted.is_empty()).then(|| {
-        format!("of [[medium]] {} {verb} in no use: no [[material]] names it as its `medium`", quoted.join(", "))
-    })
+    let unused: Vec<&str> = unused.collect();
+    match unused[..] {
+        [] => None,
+        [one] => Some(format!("[[medium]] '{one}' is not used: no [[material]] has `medium = \"{one}\"`")),
+        _ => {
+            let quoted = unused.iter().map(|name| format!("'{name}'"));
+            let quoted = first_sentences(quoted, NAMED, |further| format!("{further} more")).join(", ");
+            Some(format!("[[medium]] {quoted} are not used: no [[material]] has one of them as its `medium`"))
+        }
+    }
 }
 
 /// Returns what the readers of sources' files changed or supposed: the first sentences, each with its source in front, and one that counts

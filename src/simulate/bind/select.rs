@@ -182,7 +182,11 @@ pub(super) fn select_faces(
     let candidates = matching_faces(rule, model);
     if candidates.is_empty() {
         let message = "this matches no face of the model";
-        return Err(scene.error(ErrorKind::NoMatch, base, message).help("loosen its selectors, or remove it"));
+        let help = match model.placed_face_count() {
+            0 => empty_model_advice(scene),
+            _ => "loosen its selectors, or remove it",
+        };
+        return Err(scene.error(ErrorKind::NoMatch, base, message).help(help));
     }
     let Some(points) = &rule.at else { return Ok(candidates) };
     let nearest = search.nearest.get_or_insert_with(|| Nearest::new(model));
@@ -243,6 +247,7 @@ fn refuse_what_nothing_has(
         });
         OneOrMany::Many(names.collect())
     });
+    let model = search.model;
     let asked = [&rule.part, &rule.instance, &rule.face, &rule.layer, &solid_names, &rule.kind];
     for (place, ((key, _), patterns)) in NAMES.into_iter().zip(asked).enumerate() {
         let Some(patterns) = patterns else { continue };
@@ -250,7 +255,7 @@ fn refuse_what_nothing_has(
         let fits_nothing = |pattern: &&String| !names.iter().any(|name| matches_pattern(pattern, name));
         if let Some(pattern) = patterns.as_slice().iter().find(fits_nothing) {
             let error = scene.error(ErrorKind::NoMatch, &path(key), format!("no {key} is called '{pattern}'"));
-            return Err(error.help(advice(pattern, names.iter().copied())));
+            return Err(error.help(advice(pattern, names.iter().copied(), key, scene, model)));
         }
     }
     if rule.entity.is_none() && rule.solid.is_none() && rule.radius_mm.is_none() {
@@ -308,14 +313,37 @@ pub(super) fn absorbing_faces(scene: &Scene, index: usize, search: &mut FaceSear
     if faces.is_empty() {
         let error = scene.error(ErrorKind::NoMatch, &at, "this receiver matches no face of the model");
         let names = model.instances.iter().flat_map(|i| [model.part(i.part).name.as_str(), i.name.as_str()]);
-        return Err(error.help(advice("", names)));
+        return Err(error.help(advice("", names, "part", scene, model)));
     }
     Ok(faces)
 }
 
-/// Returns advice that names the nearest name, or some where none is near.
-pub(super) fn advice<'a>(word: &str, names: impl IntoIterator<Item = &'a str>) -> String {
-    text::nearest_or_listed(word, names).unwrap_or_else(|| "the model has no such names".into())
+/// Returns advice that names the nearest name, or some where none is near, or says why a model has none that `key` could ask for.
+pub(super) fn advice<'a>(
+    word: &str,
+    names: impl IntoIterator<Item = &'a str>,
+    key: &str,
+    scene: &Scene,
+    model: &Model,
+) -> String {
+    text::nearest_or_listed(word, names).unwrap_or_else(|| match key {
+        _ if model.placed_face_count() == 0 => empty_model_advice(scene).into(),
+        "solid" => "its solids have no names: give the number, as in `solid = 0`".into(),
+        "layer" => "the model has no layers".into(),
+        "face" => "its faces have no names: `lampyris info FILE --faces` shows what else tells them apart".into(),
+        _ => "the model has no such names".into(),
+    })
+}
+
+/// Returns what to do about a scene whose model has no faces.
+fn empty_model_advice(scene: &Scene) -> &'static str {
+    if scene.models.is_empty() {
+        "the scene has no model: add a [[model]] with its `file`"
+    } else if scene.models.iter().any(|entry| !entry.without.is_empty()) {
+        "nothing of the model is left: `without` leaves out all its faces"
+    } else {
+        "the model has no faces"
+    }
 }
 
 #[cfg(test)]

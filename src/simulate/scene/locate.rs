@@ -194,11 +194,24 @@ fn type_error(message: &str, key: &str) -> Error {
             };
         }
     }
-    Error::new(ErrorKind::Syntax, plain_types(message))
+    let error = Error::new(ErrorKind::Syntax, plain_types(message));
+    // What the type holds is far more than a receiver may have.
+    if key == "cells" { error.help("a receiver has from 1 to 16 million cells in all") } else { error }
 }
+
+/// What the reader calls whole numbers of a limited size, and the greatest of them.
+const LIMITS: [(&str, u64); 3] =
+    [("expected u32", u32::MAX as u64), ("expected u16", u16::MAX as u64), ("expected u8", u8::MAX as u64)];
 
 /// Returns a message of the reader with numbers called as people do.
 fn plain_types(message: &str) -> String {
+    // Of one that is too large the limit is what is wrong.
+    let given = message.strip_prefix("invalid value: integer `").and_then(|rest| rest.split_once('`'));
+    let is_too_large = given.is_some_and(|(number, _)| !number.starts_with('-'));
+    let limit = LIMITS.iter().find(|(form, _)| is_too_large && message.contains(form));
+    if let Some((form, most)) = limit {
+        return message.replace(form, &format!("expected a whole number from 0 to {most}"));
+    }
     PLAIN_TYPES.iter().fold(message.to_owned(), |m, (form, plain)| m.replace(form, plain))
 }
 
@@ -234,8 +247,31 @@ pub(super) fn unread_entries(text: &str, understood: &serde_json::Value) -> Opti
     root.get_ref().iter().find_map(|(key, v)| unread(v, known.get(&**key.get_ref())?))
 }
 
-/// Makes the scene's error of one of the TOML reader, with its place, and the key that was probably meant.
-pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>) -> Error {
+/// A table of a scene file as it is written, such as `[run]`, and its keys.
+pub(super) struct TableKeys {
+    pub(super) table: &'static str,
+    pub(super) keys: Vec<String>,
+}
+
+/// Returns what to say of a key that does not exist where the `known` ones do: what to write there, the tables that it belongs to, the
+/// nearest of the known, or all of these.
+fn key_advice(word: &str, known: &[&str], tables: &[TableKeys]) -> String {
+    let meant = ELSEWHERE.iter().find(|(start, beside, _)| word.starts_with(start) && known.contains(beside));
+    if let Some((_, _, help)) = meant {
+        return (*help).to_owned();
+    }
+    let has_word = |table: &&TableKeys| table.keys.iter().any(|key| key == word);
+    let owners: Vec<&str> = tables.iter().filter(has_word).map(|table| table.table).collect();
+    match &owners[..] {
+        [] => text::did_you_mean(word, known.iter().copied())
+            .unwrap_or_else(|| format!("known here: {}", known.join(", "))),
+        [owner] => format!("`{word}` is a key of {owner}"),
+        [first @ .., last] => format!("`{word}` is a key of {} and {last}", first.join(", ")),
+    }
+}
+
+/// Makes the scene's error of one of the TOML reader, with its place, and the key that was probably meant; `tables` are those of a scene.
+pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>, tables: &[TableKeys]) -> Error {
     let message = e.message();
     let mut words = message.split('`').skip(1).step_by(2);
     // The reader's errors are texts: known keys stand in backquotes, the unknown one first.
@@ -249,13 +285,7 @@ pub(super) fn syntax_error(e: &toml::de::Error, file: &str, text: &Arc<str>) -> 
         } else {
             let known: Vec<&str> = words.collect();
             let error = Error::new(ErrorKind::Syntax, format!("unknown key `{word}`"));
-            let meant =
-                ELSEWHERE.iter().find(|(start, beside, _)| word.starts_with(start) && known.contains(beside));
-            error.help(match meant {
-                Some((_, _, help)) => (*help).to_owned(),
-                None => text::did_you_mean(word, known.iter().copied())
-                    .unwrap_or_else(|| format!("known here: {}", known.join(", "))),
-            })
+            error.help(key_advice(word, &known, tables))
         }
     } else if message.starts_with("unknown variant") {
         let word = words.next().unwrap_or("");

@@ -22,6 +22,7 @@ mod surface;
 use super::{Error, ErrorKind};
 use crate::formats::file_stem;
 pub(crate) use locate::Key;
+use locate::TableKeys;
 pub use material::{LobeKind, Material, ModelUse, Placement, Reflectance, ScatterKey, SurfaceKind};
 pub use medium::{ByWavelength, Medium};
 pub use origin::Origin;
@@ -128,7 +129,8 @@ impl Scene {
     /// For the first key that is not known, or value that cannot be, with its place in the text.
     pub fn parse(text: &str, file_name: &str, base_dir: &Path) -> Result<Self, Error> {
         let shared: Arc<str> = text.into();
-        let mut scene: Self = toml::from_str(text).map_err(|e| locate::syntax_error(&e, file_name, &shared))?;
+        let mut scene: Self =
+            toml::from_str(text).map_err(|e| locate::syntax_error(&e, file_name, &shared, &table_keys()))?;
         scene.origin = Origin { file: file_name.into(), folder: base_dir.into(), text: Some(shared.clone()) };
         // Written out again, the scene shows what was understood: a list that lost entries on the way was too long.
         let understood = serde_json::to_value(&scene)
@@ -272,6 +274,28 @@ impl Scene {
         }
         Ok(())
     }
+}
+
+/// Returns the tables of a scene that have keys of their own, with all of these.
+fn table_keys() -> Vec<TableKeys> {
+    // Written out, an entry shows each of its keys, set or not.
+    fn keys<T: Default + Serialize>(table: &'static str) -> TableKeys {
+        let entry = serde_json::to_value(T::default()).unwrap_or_default();
+        let keys = entry.as_object().map_or_else(Vec::new, |entry| entry.keys().cloned().collect());
+        TableKeys { table, keys }
+    }
+    let head = ["title", "default_surface", "ambient"].map(str::to_owned).to_vec();
+    vec![
+        TableKeys { table: "the head of the file, above its first table", keys: head },
+        keys::<Run>("[run]"),
+        keys::<Accuracy>("[accuracy]"),
+        keys::<ModelUse>("[[model]]"),
+        keys::<Medium>("[[medium]]"),
+        keys::<Material>("[[material]]"),
+        keys::<Source>("[[source]]"),
+        keys::<Receiver>("[[receiver]]"),
+        keys::<RegulationUse>("[[regulation]]"),
+    ]
 }
 
 /// Most sums of all receivers of a scene: a gigabyte.

@@ -139,6 +139,17 @@ pub enum FarFieldType {
     C,
 }
 
+impl FarFieldType {
+    /// Returns what it is called in a scene.
+    const fn letter(self) -> char {
+        match self {
+            Self::A => 'A',
+            Self::B => 'B',
+            Self::C => 'C',
+        }
+    }
+}
+
 impl Receiver {
     /// Returns the ranges of both angles, degrees: where one is not given, the half space ahead, and of C-planes all directions.
     pub(crate) fn angles_deg(&self) -> ([f64; 2], [f64; 2]) {
@@ -280,11 +291,21 @@ impl Receiver {
                     FarFieldType::C => (360.0, 180.0),
                 };
                 let low = if self.angles == FarFieldType::C { [0.0, 0.0] } else { [-h, -v] };
-                if !(low[0] <= h0 && h0 < h1 && h1 <= h) {
-                    return fail("h_deg", "`h_deg` must rise and stay within the angles of its type");
+                let is_within =
+                    |[from, to]: [f64; 2], [low, high]: [f64; 2]| low <= from && from < to && to <= high;
+                let [h_range, v_range] = [[low[0], h], [low[1], v]];
+                let fault = |key: &'static str, [low, high]: [f64; 2]| {
+                    let kind = self.angles.letter();
+                    fail(
+                        key,
+                        &format!("`{key}` must rise and stay within {low} to {high}, the angles of type {kind}"),
+                    )
+                };
+                if !is_within([h0, h1], h_range) {
+                    return fault("h_deg", h_range);
                 }
-                if !(low[1] <= v0 && v0 < v1 && v1 <= v) {
-                    return fail("v_deg", "`v_deg` must rise and stay within the angles of its type");
+                if !is_within([v0, v1], v_range) {
+                    return fault("v_deg", v_range);
                 }
                 Ok(())
             }

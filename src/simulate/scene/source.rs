@@ -146,7 +146,11 @@ impl Source {
             let at = [Key::Name("source"), Key::Index(index), Key::Name("file")];
             let error =
                 origin.error(ErrorKind::Value, &at, "a photometric file gives lumens, but the run counts watts");
-            return Err(error.help("set `unit = \"lm\"` in [run], or give the source's `power` in watts"));
+            let advice = "set `unit = \"lm\"` in [run], or give the source's `power` in watts";
+            return Err(match self.spectrum {
+                Some(_) => error.help(format!("{advice}: its `spectrum` is not used to convert photometric files")),
+                None => error.help(advice),
+            });
         }
         Ok(())
     }
@@ -259,7 +263,11 @@ impl Source {
         match (self.kind, self.half_angle_deg, self.exponent) {
             (SourceKind::Cone, Some(a), _) if a > 0.0 && a <= 180.0 => {}
             (SourceKind::Cone, ..) => {
-                return Some(("half_angle_deg", "a cone needs `half_angle_deg` in 0 to 180".into()));
+                return Some((
+                    "half_angle_deg",
+                    "a cone needs `half_angle_deg` above 0 and at most 180; for parallel light take `collimated`"
+                        .into(),
+                ));
             }
             (_, Some(_), _) => return Some(("half_angle_deg", "`half_angle_deg` belongs to a cone".into())),
             _ => {}

@@ -1,7 +1,8 @@
 //! The key `spectrum` of a source.
 
 use super::PowerUnit;
-use crate::optics::{Spectrum, Table, Wavelengths, WhiteLed};
+use crate::optics::{ErrorKind, Spectrum, Table, Wavelengths, WhiteLed};
+use crate::simulate::wavelength_text::wavelength_range_text;
 use serde::{Deserialize, Serialize};
 
 /// The spectrum of a source: `{ kind = … }` with the keys of that kind.
@@ -70,7 +71,11 @@ impl SpectrumKey {
         let spectrum = match self.kind {
             SpectrumName::Lines => Spectrum::Lines(values()?),
             SpectrumName::Table => {
-                let points = values()?.into_iter().map(|[nm, p]| (nm, p));
+                let values = values()?;
+                if values.len() == 1 {
+                    return Err("a table of one wavelength has no width: give two, or `kind = \"lines\"`".into());
+                }
+                let points = values.into_iter().map(|[nm, p]| (nm, p));
                 Spectrum::Table(Table::new("spectrum", points).map_err(|e| e.to_string())?)
             }
             SpectrumName::BlackBody => Spectrum::BlackBody {
@@ -88,8 +93,14 @@ impl SpectrumKey {
             }
         };
         // Made once and thrown away: what cannot be sampled is refused where it is written.
-        spectrum.sampler().map_err(|e| e.to_string())?;
-        Ok(spectrum)
+        let Err(fault) = spectrum.sampler() else { return Ok(spectrum) };
+        Err(match (&spectrum, fault.kind()) {
+            (Spectrum::BlackBody { kelvin, range_nm }, ErrorKind::NoPower { .. }) => {
+                let range = wavelength_range_text(*range_nm);
+                format!("a black body of {kelvin} K has no light in {range}: give another `kelvin` or `range_nm`")
+            }
+            _ => fault.to_string(),
+        })
     }
 
     /// Returns what wavelengths are drawn from: the watts of the spectrum, or its lumens where the run counts these.

@@ -21,7 +21,11 @@ impl Material {
             SurfaceKind::Interface => Ok(Coating::Bare),
             SurfaceKind::Metal => match self.metal {
                 Some([n, k]) if n > 0.0 && k >= 0.0 && n + k < LARGEST_INDEX => Ok(Coating::Metal { n, k }),
-                _ => Err(("metal", "a metal needs `metal = [n, k]`, n positive".into())),
+                _ => Err((
+                    "metal",
+                    "a metal needs `metal = [n, k]`, n above 0 and k 0 or more (n + i k), both together below 1000"
+                        .into(),
+                )),
             },
             SurfaceKind::Mirror | SurfaceKind::Diffuse => reflector(self.reflectance.as_ref(), 1.0, 0.0),
             SurfaceKind::Coating => match &self.coating {
@@ -77,7 +81,13 @@ impl Material {
         let Some(s) = &self.scatter else { return Ok(None) };
         let lobe = match (s.lobe, s.sigma_deg, s.exponent, s.abg) {
             (LobeKind::Lambertian, None, None, None) => Lobe::Lambertian,
-            (LobeKind::Gaussian, Some(sigma), None, None) => Lobe::Gaussian { sigma: sigma.to_radians() },
+            (LobeKind::Gaussian, Some(sigma), None, None) if sigma > 0.0 && sigma.is_finite() => {
+                Lobe::Gaussian { sigma: sigma.to_radians() }
+            }
+            // In the unit in which it is written.
+            (LobeKind::Gaussian, Some(sigma), None, None) => {
+                return Err(format!("`sigma_deg` is {sigma}, but must be above 0"));
+            }
             (LobeKind::Cosine, None, Some(exponent), None) => Lobe::Cosine { exponent },
             (LobeKind::Abg, None, None, Some([a, b, g])) => {
                 Lobe::Abg(Abg::new(a, b, g).map_err(|e| e.to_string())?)
