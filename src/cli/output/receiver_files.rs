@@ -16,7 +16,7 @@ use std::path::Path;
 const WHOLE_RANGE_DEG: f64 = 1e-9;
 
 /// Rays that a receiver counted.
-pub(crate) struct RaySample {
+pub(crate) struct SampledRays {
     /// Each with its wavelength where the light of the run has several.
     pub(crate) rays: Vec<LightRay>,
     /// The only wavelength of the run's light, nm, where it is known.
@@ -30,7 +30,7 @@ pub(crate) fn write(
     folder: &Path,
     receiver: &ReceiverResult,
     geometric: Vec<Option<Vec<f64>>>,
-    sample: RaySample,
+    sample: SampledRays,
 ) -> Result<Vec<String>, Failure> {
     let mut names = match receiver_grid(receiver) {
         Some(grid) => write_grid(folder, receiver, grid, geometric)?,
@@ -98,7 +98,7 @@ fn write_grid(
 }
 
 /// Writes the sampled rays of a plane or disc; returns the names of the files.
-fn write_rays(folder: &Path, receiver: &ReceiverResult, sample: RaySample) -> Result<Vec<String>, Failure> {
+fn write_rays(folder: &Path, receiver: &ReceiverResult, sample: SampledRays) -> Result<Vec<String>, Failure> {
     let stem = file_stem(&receiver.name);
     let mut names = Vec::new();
     if matches!(receiver.kind, "plane" | "disc") {
@@ -130,7 +130,7 @@ pub(crate) fn names(receiver: &Receiver) -> Vec<String> {
 }
 
 /// Makes a TM-25 file of the sampled rays of a plane or disc, their powers scaled to carry what the receiver counted in all.
-fn sampled_rays(receiver: &ReceiverResult, sample: &RaySample) -> Tm25 {
+fn sampled_rays(receiver: &ReceiverResult, sample: &SampledRays) -> Tm25 {
     let rays = &sample.rays;
     let flux = if receiver.unit == "lx" { Flux::Luminous } else { Flux::Radiant };
     let total: f64 = rays.iter().map(|ray| ray.power).sum();

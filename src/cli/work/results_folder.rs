@@ -167,7 +167,7 @@ pub(crate) fn write(
     remove_earlier(prepared, folder);
     let settings = prepared.run_settings();
     for k in 0..run.results.receivers.len() {
-        let sample = receiver_files::RaySample {
+        let sample = receiver_files::SampledRays {
             rays: arrivals(&prepared.bound, &settings, k, &run.results),
             wavelength_nm: prepared.bound.single_wavelength_nm(),
         };
