@@ -43,6 +43,9 @@ fn every_channel_stands_in_the_files_cell_by_cell() {
          [[receiver]]\nname = 'bins'\nat = [0, 0, 900]\nsize = [3000, 2000]\ncells = [6, 4]\nabsorbs = false\n\
          bins_nm = [380, 480, 580.5, 780]\n",
     );
+    // Beside a flux in lumens the efficiency says of what it is a share.
+    let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(page.contains("of the watts that the sources emit") && !page.contains("of what the sources emit"));
     let (rad, step) = (|deg: f64| deg.to_radians(), [10.0f64, 20.0]);
     for (k, name, names) in [
         (0, "lumens", vec!["luminous_intensity_cd"]),
