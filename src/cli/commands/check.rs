@@ -12,7 +12,7 @@ use crate::cli::output::terminal_tables::blank_table;
 use crate::cli::work::contenders::{Contenders, Structures};
 use crate::cli::work::input_files::{self, Input};
 use crate::cli::work::input_guard::InputGuard;
-use crate::cli::work::output_place::{OutputPlace, try_file};
+use crate::cli::work::output_place::{OutputPlace, require_report_space, try_file, try_folder};
 use crate::cli::work::ray_input::read_rays;
 use crate::cli::work::results_folder::MOST_DRAWN;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
@@ -53,6 +53,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     let outputs = outputs_of(command);
     let guard = InputGuard::new(command.rays_in.iter().map(PathBuf::as_path).chain([command.file.as_path()]));
     outputs.iter().try_for_each(|(option, path)| guard.refuse(option, path).and_then(|()| try_file(path)))?;
+    command.output.as_deref().map_or(Ok(()), try_folder)?;
     let threads = threads::set_threads(command.tracing.threads)?;
     let given = command.rays_in.as_deref().map(read_rays).transpose()?;
     let input = input_files::scene_or_model(&command.file, command.placed, console)?;
@@ -66,7 +67,7 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
     if given.is_some() && scene.is_none() {
         refuse_unused_options(&command.tracing)?;
     }
-    let _owned = command.output.as_deref().map(OutputPlace::folder).transpose()?;
+    let _owned = claim_output(command)?;
     let model = &loaded.model;
     let monitor = TerminalMonitor::new(console);
     let requested = (command.meshing.settings(), command.tracing.settings());
@@ -131,6 +132,14 @@ pub(crate) fn run(command: &CheckCommand, console: &Console) -> Result<Completio
 fn outputs_of(command: &CheckCommand) -> Vec<(&'static str, &Path)> {
     let outputs = [("--rays-out", &command.rays_out), ("--disagreements", &command.disagreements)];
     outputs.into_iter().filter_map(|(option, path)| path.as_deref().map(|path| (option, path))).collect()
+}
+
+/// Claims the folder of results, if one was asked for.
+fn claim_output(command: &CheckCommand) -> Result<Option<OutputPlace>, Failure> {
+    let Some(folder) = &command.output else { return Ok(None) };
+    let owned = OutputPlace::folder(folder)?;
+    require_report_space(folder, command.report.is_wanted())?;
+    Ok(Some(owned))
 }
 
 /// Measures hits moved to the spline by themselves, for those on the facets say nothing of them: `polish` against `exact`.

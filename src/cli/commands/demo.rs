@@ -3,7 +3,7 @@
 use crate::cli::arguments::command::ReportOption;
 use crate::cli::console::Console;
 use crate::cli::output::closing;
-use crate::cli::work::output_place::OutputPlace;
+use crate::cli::work::output_place::{OutputPlace, try_folder};
 use crate::cli::work::results_folder::{self, RunRemarks};
 use crate::cli::work::run_commands::RunCommands;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
@@ -47,6 +47,7 @@ pub(crate) fn run(
     for (name, content) in [(MODEL_NAME, LAMP), (SCENE_NAME, scene_text.as_bytes())] {
         refuse_replacing(&folder.join(name), content)?;
     }
+    try_folder(folder)?;
     set_threads(tracing.threads)?;
     let (scene, loaded) = lamp()?;
     let faces: usize = loaded.reports.iter().map(|r| r.faces.converted).sum();

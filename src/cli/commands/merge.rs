@@ -10,7 +10,7 @@ use crate::cli::output::json::json_text;
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, SavePlace, saved_header};
 use crate::cli::work::input_guard::InputGuard;
-use crate::cli::work::output_place::OutputPlace;
+use crate::cli::work::output_place::{OutputPlace, try_claim, try_folder};
 use crate::cli::work::part_sum::{AskedRun, PartOrigins, PartSum, input_failure, read_part};
 use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::run_commands::RunCommands;
@@ -67,8 +67,11 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
     })?;
     scene.run.sequences = header.sequences;
     scene.run.faces = header.faces;
-    if !is_tally(command.folder) {
+    if is_tally(command.folder) {
+        try_claim(command.folder)?;
+    } else {
         results_folder::refuse_inputs(&scene, &scene_path, command.folder)?;
+        try_folder(command.folder)?;
     }
     let (meshing, tracing) = (header.meshing(), header.tracing());
     let target = command.until_error.map(|text| ErrorTarget::new(text, &scene)).transpose()?;
@@ -89,7 +92,6 @@ pub(crate) fn run(command: &MergeCommand, console: &Console) -> Result<Completio
             failure.with_help("merge all parts at once; --wait SECONDS waits for those that are still traced")
         );
     }
-
     if whole.grows {
         // As large as it has grown, whichever part came first.
         prepared.rays = Some(u64::from(whole.replicates) * GROWING_REPLICATE);

@@ -8,7 +8,7 @@ use crate::cli::output::json::{json_text, json_value};
 use crate::cli::output::sentences::plain_sentence_lines;
 use crate::cli::output::{octree_shape, terminal_tables};
 use crate::cli::work::input_files::{self, Input};
-use crate::cli::work::output_place::OutputPlace;
+use crate::cli::work::output_place::{OutputPlace, require_report_space};
 use crate::cli::work::terminal_monitor::TerminalMonitor;
 use crate::cli::work::threads;
 use crate::cli::{completion::Completion, failure::Failure};
@@ -136,6 +136,7 @@ pub(crate) fn run(command: &StudyCommand, console: &Console) -> Result<Completio
     let folder: PathBuf =
         command.output.cloned().unwrap_or_else(|| format!("lampyris-study-{}", command.kind.name()).into());
     let _owned = OutputPlace::folder(&folder)?;
+    require_report_space(&folder, command.report.is_wanted())?;
     let bar = console.stage_bar(command.kind.name());
     let progress = |p: Progress| show_progress(&bar, &p);
     let mut shapes = Vec::new();

@@ -4,15 +4,16 @@ use super::trace_until::{SearchedRun, Until, trace_until};
 use super::{dry_run, ray_range, replay, verdicts};
 use crate::cli::arguments::command::TraceOptions;
 use crate::cli::completion::Completion;
-use crate::cli::console::{Console, print};
+use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::output::closing;
-use crate::cli::output::json::json_text;
 use crate::cli::output::sentences::plain_sentence;
 use crate::cli::work::cache_folder;
 use crate::cli::work::checkpoint::{CHECKPOINT, Checkpoint, SavePlace, continued_settings, refuse_overwriting};
 use crate::cli::work::input_guard::InputGuard;
-use crate::cli::work::output_place::{OutputPlace, folder_of, require_space, try_file};
+use crate::cli::work::output_place::{
+    OutputPlace, folder_of, require_space, try_claim, try_file, try_folder, try_new_file,
+};
 use crate::cli::work::path_file::PathFile;
 use crate::cli::work::results_folder::RunRemarks;
 use crate::cli::work::terminal_monitor::TerminalMonitor;
@@ -25,7 +26,6 @@ use crate::pipeline::{
 use crate::report::seconds;
 use crate::simulate::{PartialRun, PathSink, PathVertex, Scene};
 use crate::text::grouped;
-use serde_json::json;
 use std::path::Path;
 
 /// Room that the sums of a shard need at least, bytes.
@@ -73,10 +73,6 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
     extra.ends.as_deref().map_or(Ok(()), |file| end_file::check_scene(&scene, file))?;
     let has_results = shard.is_none() && !is_range && replay.is_empty();
     refuse_inputs(command, &scene, has_results)?;
-    // Before the search for an accuracy and the pilot, which take their time; and again once the folder is this process's own.
-    if has_results && !extra.resume && !extra.dry_run {
-        refuse_overwriting(&folder.join(CHECKPOINT))?;
-    }
     scene.run.sequences = extra.sequences.unwrap_or(scene.run.sequences);
     scene.run.faces = extra.faces.unwrap_or(scene.run.faces);
     let accuracy = extra.precision.accuracy;
@@ -86,6 +82,10 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         let message = "--accuracy would search for its facets again in every part";
         return Err(Failure::arguments(message)
             .with_help("give --tolerance and --normals with --shard, --resume and --rays A..B"));
+    }
+    // Before the search for an accuracy and the pilot, which take their time; and again once the folder is this process's own.
+    if !extra.dry_run && replay.is_empty() {
+        try_places(command, shard.or(is_range.then_some([0, 1])), &tracing)?;
     }
     let requested = (command.meshing.clone(), tracing);
     let AccurateSettings { meshing, tracing, plan } =
@@ -120,6 +120,20 @@ pub(crate) fn run(command: &TraceCommand, console: &Console) -> Result<Completio
         None => trace_whole(&mut prepared, command, target.as_ref(), console)?,
     };
     Ok(done.and(refused))
+}
+
+/// Tries all places that something is to be written to, those of the part (index from 0, count) if one is traced. Fails where one cannot be
+/// written, or holds an interrupted run that would be written over.
+fn try_places(command: &TraceCommand, part: Option<[u32; 2]>, tracing: &TracingSettings) -> Result<(), Failure> {
+    let TraceCommand { folder, extra, .. } = *command;
+    [&extra.paths, &extra.ends].into_iter().flatten().try_for_each(|file| try_new_file(file))?;
+    if let Some(part) = part {
+        return try_claim(&shards::shard_file(folder, part, tracing.ray_range));
+    }
+    if !extra.resume {
+        refuse_overwriting(&folder.join(CHECKPOINT))?;
+    }
+    try_folder(folder)
 }
 
 /// Checks what can be told of the options without the scene.
@@ -333,7 +347,7 @@ fn trace_shard(
     // Asked again, a shard that is done is not traced once more: arrays of jobs are restarted as a whole.
     if let Some(portion) = from.as_ref().filter(|p| shards::is_shard_done(p, replicates.clone(), shard)) {
         console.say("traced already: nothing is left to do");
-        say_shard(&place.file, portion, shard, console)?;
+        shards::say_shard(&place.file, portion, shard, console)?;
         return Ok(lost_rays::report_light_lost_in_part(portion, prepared, command.extra.max_lost, console));
     }
     if !command.extra.resume {
@@ -360,34 +374,6 @@ fn trace_shard(
             Failure::running(message).with_help(format!("nothing is lost: the shard is in {}", file.display()))
         );
     }
-    say_shard(&place.file, &portion, shard, console)?;
+    shards::say_shard(&place.file, &portion, shard, console)?;
     Ok(lost_rays::report_light_lost_in_part(&portion, prepared, command.extra.max_lost, console))
-}
-
-/// Says, or with `--json` prints, what a finished shard (index from 0, count) holds.
-fn say_shard(
-    file: &Path,
-    portion: &PartialRun,
-    [index, count]: [u32; 2],
-    console: &Console,
-) -> Result<(), Failure> {
-    let counts = &portion.tallies.counts;
-    if console.json {
-        let document = json!({"shard": [index + 1, count], "replicates": portion.done.len(),
-            "of": portion.replicates, "rays": counts.rays, "segments": counts.segments, "lost_rays": counts.lost,
-            "seconds": {"trace": portion.seconds}, "file": file.display().to_string()});
-        return Ok(print(&json_text(&document)?)?);
-    }
-    let (rays, file) = (grouped(counts.rays), file.display());
-    match count {
-        // A range of the rays of a run that grows.
-        1 => {
-            console.say(format_args!("{rays} rays in {file}; `lampyris merge` adds them to those of other ranges"))
-        }
-        _ => console.say(format_args!(
-            "shard {} of {count}: {rays} rays in {file}; `lampyris merge` puts all {count} together",
-            index + 1
-        )),
-    }
-    Ok(())
 }

@@ -3,7 +3,7 @@
 use crate::cli::failure::Failure;
 use crate::cli::interruption::WatchedLock;
 use crate::cli::machine;
-use crate::formats::{file_name, try_write};
+use crate::formats::{self, file_name, try_write};
 use std::fs::{self, File, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -12,6 +12,10 @@ use std::path::{Path, PathBuf};
 const FOLDER_LOCK: &str = ".lampyris.lock";
 /// Longest content of a lock file that is read: the number of a process and the name of its machine.
 const LOCK_BYTES: u64 = 300;
+/// What a report takes at least, bytes: plotly.js and a few pictures.
+pub(crate) const REPORT_BYTES: u64 = 5_000_000;
+/// What the document of a study or check takes at least, bytes: the smallest of a study is about so large.
+const DOCUMENT_BYTES: u64 = 4_000;
 
 /// A folder, or a file, that no other lampyris writes while this value lives.
 ///
@@ -46,10 +50,7 @@ impl OutputPlace {
     /// unasked.
     fn claim(folder: &Path, lock: PathBuf) -> Result<Self, Failure> {
         make_folder(folder)?;
-        let unwritable = |e: std::io::Error| {
-            Failure::running(format!("{}: cannot be written: {}", folder.display(), reason(&e)))
-                .with_help("nothing was traced; give another folder with -o")
-        };
+        let unwritable = |e: std::io::Error| unwritable(folder, &e);
         // The owner before may remove its lock file between opening and locking: then once more.
         loop {
             let mut file = File::options()
@@ -119,17 +120,76 @@ fn is_file_at(_: &File, _: &Path) -> bool {
 /// When that fails.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|e| {
-        let place = folder.display();
-        // What is in its way: itself, or a name above it.
-        let in_the_way = folder.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir());
-        let failure = Failure::running(match in_the_way {
-            Some(file) if file == folder => {
-                format!("{place}: cannot be made: it is a file, and a folder is needed")
-            }
-            Some(file) => format!("{place}: cannot be made: {} is a file", file.display()),
-            None => format!("{place}: cannot be made: {}", reason(&e)),
-        });
-        failure.with_help("give another folder")
+        let in_the_way = nearest_there(folder).filter(|there| !there.is_dir());
+        let why = in_the_way.map_or_else(|| reason(&e), |there| obstacle(folder, there));
+        unmakeable(folder, &why)
+    })
+}
+
+/// Returns what is there already, be it a link to nothing, of a folder and those above it: itself, or else the nearest; `None` where that
+/// is the working folder.
+fn nearest_there(folder: &Path) -> Option<&Path> {
+    folder.ancestors().find(|path| path.symlink_metadata().is_ok())
+}
+
+/// Returns why a folder cannot be made where `there`, which is itself or a name above it, is no folder.
+fn obstacle(folder: &Path, there: &Path) -> String {
+    // Only a link that leads nowhere is there and does not exist.
+    let what = if there.exists() { "a file" } else { "a link to nothing" };
+    if there == folder {
+        return format!("it is {what}, and a folder is needed");
+    }
+    format!("{} is {what}", there.display())
+}
+
+/// Returns the failure of a folder that cannot be made.
+fn unmakeable(folder: &Path, why: &str) -> Failure {
+    Failure::running(format!("{}: cannot be made: {why}", folder.display())).with_help("give another folder")
+}
+
+/// Returns the failure of a folder that is there and cannot be written.
+fn unwritable(folder: &Path, error: &std::io::Error) -> Failure {
+    Failure::running(format!("{}: cannot be written: {}", folder.display(), reason(error)))
+        .with_help("nothing was traced; give another folder with -o")
+}
+
+/// Tries, before any work, whether [`OutputPlace::folder`] could claim a folder. One that is missing is not made: the work may yet be
+/// refused.
+///
+/// # Errors
+/// As [`OutputPlace::folder`].
+pub(crate) fn try_folder(folder: &Path) -> Result<(), Failure> {
+    if folder.is_dir() { OutputPlace::folder(folder).map(drop) } else { try_making(folder) }
+}
+
+/// Tries, before any work, whether [`OutputPlace::file`] could claim a file; makes nothing.
+///
+/// # Errors
+/// As [`OutputPlace::file`].
+pub(crate) fn try_claim(file: &Path) -> Result<(), Failure> {
+    let folder = folder_of(file);
+    // The folder itself is not claimed, for other parts are written beside this one.
+    if folder.is_dir() { OutputPlace::file(file).map(drop) } else { try_making(&folder) }
+}
+
+/// Tries, before any work, whether a file can be written, as [`try_file`] does; makes nothing.
+///
+/// # Errors
+/// When it cannot.
+pub(crate) fn try_new_file(file: &Path) -> Result<(), Failure> {
+    let folder = folder_of(file);
+    if folder.is_dir() { try_file(file) } else { try_making(&folder) }
+}
+
+/// Tries whether a folder that is missing can be made, by a file in the one that it would be made in.
+fn try_making(folder: &Path) -> Result<(), Failure> {
+    let there = nearest_there(folder).unwrap_or(Path::new("."));
+    if !there.is_dir() {
+        return Err(unmakeable(folder, &obstacle(folder, there)));
+    }
+    try_write(&there.join(FOLDER_LOCK)).map_err(|e| match e.kind() {
+        formats::ErrorKind::Write(error) => unmakeable(folder, &reason(error)),
+        _ => e.into(),
     })
 }
 
@@ -138,6 +198,7 @@ fn reason(error: &std::io::Error) -> String {
     match error.kind() {
         ErrorKind::PermissionDenied => "there is no permission to write there".into(),
         ErrorKind::ReadOnlyFilesystem => "it is on a file system that is read-only".into(),
+        ErrorKind::StorageFull => "no space is left there".into(),
         _ => error.to_string(),
     }
 }
@@ -181,6 +242,14 @@ pub(crate) fn require_space(folder: &Path, needed_bytes: u64) -> Result<(), Fail
     }
 }
 
+/// Refuses a folder without room for a document of rows and, where it is wanted, a report.
+///
+/// # Errors
+/// As [`require_space`].
+pub(crate) fn require_report_space(folder: &Path, with_report: bool) -> Result<(), Failure> {
+    require_space(folder, DOCUMENT_BYTES + if with_report { REPORT_BYTES } else { 0 })
+}
+
 /// Returns the bytes that are left on the folder's file system; `None` where it does not tell.
 #[cfg(unix)]
 fn free_bytes(folder: &Path) -> Option<u64> {
@@ -221,6 +290,41 @@ mod tests {
         // Left by a process that was killed: nobody holds its lock.
         fs::write(folder.join(FOLDER_LOCK), "4294967295").unwrap();
         drop(OutputPlace::folder(&folder).unwrap());
+    }
+
+    #[test]
+    fn a_folder_is_tried_without_being_made() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("a/b");
+        try_folder(&folder).unwrap();
+        try_claim(&folder.join("1.tally")).unwrap();
+        assert_eq!(fs::read_dir(parent.path()).unwrap().count(), 0);
+        let owned = OutputPlace::folder(&folder).unwrap();
+        assert!(try_folder(&folder).unwrap_err().to_string().contains("another lampyris"));
+        // Parts stand beside what others write.
+        try_claim(&folder.join("1.tally")).unwrap();
+        drop(owned);
+        try_folder(&folder).unwrap();
+        let file = parent.path().join("file");
+        fs::write(&file, "").unwrap();
+        for place in [file.clone(), file.join("out")] {
+            let [tried, made] = [try_folder(&place), make_folder(&place)].map(|done| done.unwrap_err().to_string());
+            assert!(tried == made && tried.contains("a file"), "{tried}");
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_link_to_nothing_is_named() {
+        let parent = tempfile::tempdir().unwrap();
+        let link = parent.path().join("link");
+        std::os::unix::fs::symlink(parent.path().join("nothing"), &link).unwrap();
+        for (place, why) in
+            [(link.clone(), "it is a link to nothing"), (link.join("out"), "link is a link to nothing")]
+        {
+            let [tried, made] = [try_folder(&place), make_folder(&place)].map(|done| done.unwrap_err().to_string());
+            assert!(tried == made && tried.contains(why), "{tried}");
+        }
     }
 
     #[test]

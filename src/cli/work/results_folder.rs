@@ -2,7 +2,7 @@
 
 use super::input_guard::InputGuard;
 use super::lost_rays;
-use super::output_place::{make_folder, require_space, rescue_folders};
+use super::output_place::{REPORT_BYTES, make_folder, require_space, rescue_folders};
 use super::run_commands::RunCommands;
 use crate::cli::console::Console;
 use crate::cli::failure::Failure;
@@ -26,8 +26,6 @@ use serde_json::Value;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// What the report takes at least, bytes: plotly.js and a few pictures.
-const REPORT_BYTES: u64 = 5_000_000;
 /// What a cell of a receiver takes at least in all its files, bytes: its number as text, twice in binary.
 const CELL_BYTES: u64 = 40;
 /// Facets that are drawn where parts are placed often; the rest of their places are boxes, or nothing: three seconds of a viewer.

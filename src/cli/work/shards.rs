@@ -1,10 +1,13 @@
 //! Parts of a run that are traced by themselves: which one, and where it goes.
 
-use crate::cli::console::Console;
+use crate::cli::console::{Console, print};
 use crate::cli::failure::Failure;
+use crate::cli::output::json::json_text;
 use crate::formats::lower_extension;
 use crate::pipeline::RayRange;
 use crate::simulate::{PartialRun, shard_replicates};
+use crate::text::grouped;
+use serde_json::json;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -126,6 +129,34 @@ pub(crate) fn shard_file(output: &Path, [i, n]: [u32; 2], rays: Option<RayRange>
         _ => shard,
     };
     output.join(name + ".tally")
+}
+
+/// Says, or with `--json` prints, what a finished shard (index from 0, count) holds.
+pub(crate) fn say_shard(
+    file: &Path,
+    portion: &PartialRun,
+    [index, count]: [u32; 2],
+    console: &Console,
+) -> Result<(), Failure> {
+    let counts = &portion.tallies.counts;
+    if console.json {
+        let document = json!({"shard": [index + 1, count], "replicates": portion.done.len(),
+            "of": portion.replicates, "rays": counts.rays, "segments": counts.segments, "lost_rays": counts.lost,
+            "seconds": {"trace": portion.seconds}, "file": file.display().to_string()});
+        return Ok(print(&json_text(&document)?)?);
+    }
+    let (rays, file) = (grouped(counts.rays), file.display());
+    match count {
+        // A range of the rays of a run that grows.
+        1 => {
+            console.say(format_args!("{rays} rays in {file}; `lampyris merge` adds them to those of other ranges"))
+        }
+        _ => console.say(format_args!(
+            "shard {} of {count}: {rays} rays in {file}; `lampyris merge` puts all {count} together",
+            index + 1
+        )),
+    }
+    Ok(())
 }
 
 /// Whether a path names a tally file, told by its extension.
