@@ -21,7 +21,7 @@ pub enum ErrorKind {
     #[error("cannot read: {0}")]
     Read(io::Error),
     /// The file could not be written.
-    #[error("cannot write: {0}; check that the folder exists and may be written")]
+    #[error("cannot write: {0}{advice}", advice = writing_advice(.0))]
     Write(io::Error),
     /// The name says nothing about the format.
     #[error("the extension '{given}' names no format; use one of {known}")]
@@ -34,6 +34,16 @@ pub enum ErrorKind {
     /// The content is not what the format says.
     #[error("{0}")]
     Malformed(String),
+}
+
+/// Returns what to do about a file that could not be written, as the end of a sentence; nothing where the error tells all that is known.
+fn writing_advice(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::NotFound => "; check that the folder exists",
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => "; name another place",
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "; make room there, or name another place",
+        _ => "",
+    }
 }
 
 impl Error {
@@ -63,5 +73,19 @@ impl Error {
     /// The file concerned.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_advice_is_about_what_went_wrong() {
+        let said = |kind: io::ErrorKind| Error::new(Path::new("a.csv"), ErrorKind::Write(kind.into())).to_string();
+        assert!(said(io::ErrorKind::NotFound).ends_with("the folder exists"));
+        assert!(said(io::ErrorKind::StorageFull).ends_with("make room there, or name another place"));
+        assert!(said(io::ErrorKind::ReadOnlyFilesystem).ends_with("; name another place"));
+        assert!(!said(io::ErrorKind::BrokenPipe).contains(';'));
     }
 }

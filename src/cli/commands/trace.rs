@@ -199,7 +199,7 @@ fn trace_whole(
     let checkpoint = Checkpoint::new(prepared, &place)?;
     let (traced, saved, result) = match found {
         Some(SearchedRun { portion, .. }) if !portion.is_whole() => {
-            return Err(checkpoint.save_stopped(&portion, "interrupted", RESUME));
+            return Err(checkpoint.save_stopped(&portion, None, RESUME));
         }
         Some(SearchedRun { portion, result }) => (Some(portion), None, result),
         None if extra.resume => (None, checkpoint.read_and_say()?, None),
@@ -221,10 +221,10 @@ fn trace_whole(
     let mut run = match prepared.trace(request, &monitor) {
         Ok(run) => run,
         Err(portion) => {
-            let because = paths.and_then(PathFile::failure).map_or("interrupted".into(), |e| e.to_string());
+            let failed = paths.and_then(PathFile::failure).map(|e| e.to_string());
             // Of rays that are traced already there are no paths to be had.
             let again = if extra.paths.is_some() { RESUME_WITHOUT_PATHS } else { RESUME };
-            return Err(checkpoint.save_stopped(&portion, &because, again));
+            return Err(checkpoint.save_stopped(&portion, failed.as_deref(), again));
         }
     };
     // The run counts whether its paths could be written or not.
@@ -364,7 +364,7 @@ fn trace_shard(
     let portion = prepared.trace_part(request, &TerminalMonitor::of_saveable(console, None));
     // Fewer replicates than the shard has: it was stopped.
     if !shards::is_shard_done(&portion, replicates, shard) {
-        return Err(checkpoint.save_stopped(&portion, "interrupted", RESUME));
+        return Err(checkpoint.save_stopped(&portion, None, RESUME));
     }
     let file = checkpoint.save_anywhere(&portion)?;
     // It was rescued to another place.

@@ -208,17 +208,20 @@ impl<'a> Checkpoint<'a> {
         places.find(|file| write_atomic(file, |w| portion.write(&header, w)).is_ok()).ok_or(reason)
     }
 
-    /// Saves a run that stopped before its end, and returns the failure that says why, and that `again` goes on from there.
-    pub(crate) fn save_stopped(&self, portion: &PartialRun, because: &str, again: &str) -> Failure {
+    /// Saves a run that stopped before its end, interrupted or because something `failed`, and returns the failure that says so, and that
+    /// `again` goes on from there.
+    pub(crate) fn save_stopped(&self, portion: &PartialRun, failed: Option<&str>, again: &str) -> Failure {
+        // A failure is a sentence of its own, with its own colons.
+        let because = failed.map_or_else(|| "interrupted: ".to_owned(), |failure| format!("{failure}. "));
         let share = format!("{} of {} replicates", portion.done.len(), portion.replicates);
         match self.save_anywhere(portion) {
             Ok(file) if file == self.place.file => {
-                Failure::running(format!("{because}: {share} are saved in {}", file.display()))
+                Failure::running(format!("{because}{share} are saved in {}", file.display()))
                     .with_help(format!("{again} goes on from there"))
             }
-            Ok(file) => Failure::running(format!("{because}: {share} are saved in {}", file.display()))
+            Ok(file) => Failure::running(format!("{because}{share} are saved in {}", file.display()))
                 .with_help(format!("copy it to {}, and {again} goes on from there", self.place.file.display())),
-            Err(failure) => Failure::running(format!("{because}, and {share} could not be saved: {failure}")),
+            Err(failure) => Failure::running(format!("{because}{share} could not be saved: {failure}")),
         }
     }
 
