@@ -26,9 +26,11 @@ pub(super) fn unsettled_sentence(document: &Value) -> Option<String> {
     let (beyond, within): (Vec<&Value>, Vec<&Value>) = rows.partition(|row| row["unseen"] != 0);
     let mut reasons = Vec::new();
     if !within.is_empty() {
+        // On the true surfaces there is nothing to take away.
+        let is_exact = within.iter().all(|row| row["geometric"] == 0.0);
+        let facets = if is_exact { "" } else { ", or by the facets, whose errors --intersector exact takes away" };
         reasons.push(format!(
-            "{} unsure at the most rays, or by the facets, whose errors --intersector exact takes away; the column 'settled by' says \
-             what would do",
+            "{} unsure at the most rays{facets}; the column 'settled by' says what would do",
             count_of(within.len() as u64, "row")
         ));
     }
@@ -55,4 +57,20 @@ pub(super) fn check_settling(scene: &Scene) -> Result<(), Failure> {
         return Err(failure.with_help("take `rays` out of the [[source]]s"));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn what_was_done_already_is_no_advice() {
+        let said = |geometric: f64| {
+            let row = json!({"verdict": "unsure", "unseen": 0, "geometric": geometric});
+            unsettled_sentence(&json!({"regulations": [{"rows": [row]}]})).unwrap()
+        };
+        assert!(said(0.1).contains("--intersector exact"));
+        assert!(said(0.0).contains("1 row unsure") && !said(0.0).contains("--intersector"));
+    }
 }
