@@ -37,7 +37,7 @@ for name, tracer in (("octree", octree), ("bvh", bvh), ("spline", exact)):
 # %%
 assert np.array_equal(np.isfinite(hits["octree"].t), np.isfinite(hits["bvh"].t))
 both = np.isfinite(hits["octree"].t) & np.isfinite(hits["spline"].t)
-print("median distance from the spline:", np.median(np.abs(hits["octree"].t - hits["spline"].t)[both]), "mm")
+print("median distance from the spline:", np.median(np.abs(hits["octree"].t[both] - hits["spline"].t[both])), "mm")
 
 # %% [markdown]
 # A cause for every difference comes from the cross-check.

@@ -14,7 +14,8 @@ run = scene.trace(rays=50_000, progress=False)
 
 # %%
 far = next(r for r in run.values() if r.kind == "far_field")
-print(far.unit, far.candela.max(), "at most, within", far.figures["max"].statistical)
+brightest = far.figures["max"]
+print(f"brightest cell {brightest.value:,.0f} {far.unit}, standard error of the rays {brightest.statistical:,.0f} {far.unit}")
 
 # %% [markdown]
 # The tables of the regulations come with the package; each row has its reading with both errors, and is unsure where these decide.

@@ -21,7 +21,8 @@ def test_the_blocks_of_a_page_run(page: pathlib.Path, tmp_path: pathlib.Path, mo
     # Whether a picture can be drawn is a question of the machine.
     monkeypatch.setattr(pyvista.Plotter, "show", lambda self: None)
     monkeypatch.chdir(tmp_path)
-    names: dict[str, Any] = {}
+    # As a program that is run, or a notebook, is called.
+    names: dict[str, Any] = {"__name__": "__main__"}
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     assert blocks
     for block in blocks:
