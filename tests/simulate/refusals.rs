@@ -402,5 +402,13 @@ fn the_schema_asks_for_what_the_reader_asks_for() {
         assert!(keys.contains(&wanted), "{name}: {keys:?}");
         assert!(keys.iter().all(|k| definition["properties"].get(k).is_some()), "{name}: {keys:?}");
     }
+    for owner in ["Material", "FaceSelector"] {
+        let kind = &schema["$defs"][owner]["properties"]["kind"];
+        assert!(
+            kind["pattern"].as_str().unwrap().contains("|cylinder|") && kind["pattern"] == kind["items"]["pattern"]
+        );
+    }
+    let material = &schema["$defs"]["Material"]["properties"];
+    assert!(["reflectance", "transmittance"].iter().all(|key| material[key]["maximum"] == 1));
     assert!(schema["$defs"]["Accuracy"]["properties"]["normals"]["pattern"].as_str().unwrap().contains("[fF][lL]"));
 }

@@ -2,6 +2,7 @@
 //! the command does. Whatever it refuses the reader of scenes refuses too; not the other way round.
 
 use super::lenient::LARGEST_COUNT;
+use crate::model::SurfaceKind;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
 
@@ -43,13 +44,19 @@ pub(super) fn add_conditions(schema: &mut Value) {
         of_kind(&["d65", "white_led"], never(&["values", "kelvin"])),
     ]});
     let said: Vec<Value> = ["medium", "surface", "scatter"].iter().map(|k| needs(&[k])).collect();
+    let material = json!({
+        "anyOf": said,
+        // Of a number alone: a table has shares in its rows.
+        "properties": {"kind": kind_of_surface(), "reflectance": {"minimum": 0, "maximum": 1}},
+    });
     merge(schema, &root);
     for (name, more) in [
         ("Medium", json!({"required": ["name"], "oneOf": indices.map(|k| needs(&[k]))})),
         ("Receiver", receiver),
         ("Source", source),
         ("SpectrumKey", spectrum),
-        ("Material", json!({"anyOf": said})),
+        ("Material", material),
+        ("FaceSelector", json!({"properties": {"kind": kind_of_surface()}})),
         (
             "Accuracy",
             json!({"properties": {
@@ -66,6 +73,12 @@ pub(super) fn add_conditions(schema: &mut Value) {
         let owner = if direction == "normal" { "Receiver" } else { "Source" };
         schema["$defs"][owner]["properties"][direction]["not"] = json!({"const": [0, 0, 0]});
     }
+}
+
+/// Returns what a schema says of a kind of surface, or of each of a list: one of the words, or a pattern with a star.
+fn kind_of_surface() -> Value {
+    let pattern = format!("^({})$|[*]", SurfaceKind::ALL.map(SurfaceKind::word).join("|"));
+    json!({"pattern": pattern, "items": {"pattern": pattern}})
 }
 
 /// Returns a regular expression for any of these words in any case.

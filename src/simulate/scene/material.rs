@@ -121,6 +121,7 @@ pub struct Material {
     /// grid. 1 for mirrors and diffuse faces, 0 for coatings unless said otherwise.
     pub reflectance: Option<Reflectance>,
     /// Share of the power that a coating transmits, 0 unless said otherwise; the rest is absorbed.
+    #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1)))]
     pub transmittance: Option<f64>,
     /// Rows of a coating over a full grid: `[angle_deg, nm, R, T]` or `[angle_deg, nm, Rs, Rp, Ts, Tp]`. The angle is that in the
     /// rarer of the two media, for light from either side; between rows shares are linear, beyond them constant, and where
@@ -140,6 +141,7 @@ pub struct ScatterKey {
     /// The lobe.
     pub lobe: LobeKind,
     /// Share of the light that scatters; the rest stays specular. All of it unless said otherwise.
+    #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1)))]
     pub share: Option<f64>,
     /// Standard deviation of a Gaussian lobe in each direction, degrees.
     pub sigma_deg: Option<f64>,
