@@ -30,6 +30,8 @@ pub(crate) struct Body {
     pub(crate) bounds: Aabb,
     /// Whether it has faces in no closed shell.
     pub(crate) open: bool,
+    /// Largest distance between an edge of the file and a face of this body that it bounds, mm.
+    pub(crate) gap: f64,
 }
 
 impl Body {
@@ -47,6 +49,7 @@ impl Body {
             trapped_length: f64::INFINITY,
             bounds: Aabb::EMPTY,
             open: false,
+            gap: 0.0,
         }
     }
 

@@ -4,10 +4,13 @@ use super::bind::BoundScene;
 use super::body::AMBIENT;
 use super::outcome::{LostCause, LostRay};
 use super::surfaces::{FaceOptics, Surface};
+use crate::text::figures;
 use std::collections::BTreeMap;
 
 /// Reasons that are told.
 const TOLD_REASONS: usize = 3;
+/// Largest gap that is not worth a word, mm: what curves in parameters are allowed.
+const NO_GAP_MM: f64 = 1e-6;
 
 impl BoundScene {
     /// Returns where most rays of the ledger were lost, why, and what helps, in words; the [`TOLD_REASONS`] most frequent first, none of an
@@ -28,7 +31,7 @@ impl BoundScene {
                 (None, Some(name)) => format!("at '{name}'"),
                 (None, None) => "outside all bodies".into(),
             };
-            format!("{number} {place}: {}", self.reason(cause, at))
+            format!("{number} {place}: {}{}", self.reason(cause, at), self.known_causes(cause, body, at))
         });
         told.collect()
     }
@@ -58,6 +61,24 @@ impl BoundScene {
         }
     }
 
+    /// Returns what is known of the file and the sources that explains such a loss in a body or at an instance, to go on the sentence with.
+    fn known_causes(&self, cause: LostCause, body: u32, at: Option<&str>) -> String {
+        if !matches!(cause, LostCause::NoExit | LostCause::ImpossibleMedium) {
+            return String::new();
+        }
+        let concerned = (0u32..).zip(&self.bodies).filter(|(k, b)| *k == body || at == Some(b.name.as_str()));
+        let gap = concerned.map(|(_, body)| body.gap).fold(0.0, f64::max);
+        let mut known = String::new();
+        if self.emitters.iter().any(|emitter| emitter.media_stated) {
+            known += ", or because a source does not lie where its `inside` says";
+        }
+        if gap > NO_GAP_MM {
+            known +=
+                &format!("; the file has edges up to {} mm off the faces that they bound there", figures(gap, 3));
+        }
+        known
+    }
+
     /// Whether a face of this instance lets light through, though no medium is behind it.
     fn lets_light_into_solid(&self, instance: Option<&str>) -> bool {
         let is_open = |face: &FaceOptics| {
@@ -66,5 +87,40 @@ impl BoundScene {
         let of_instance =
             |face: usize| self.instances.get(self.instance_of_face[face] as usize).map(String::as_str);
         (0..self.faces.len()).any(|face| is_open(&self.faces[face]) && of_instance(face) == instance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Point, Vector};
+    use crate::model::Model;
+    use crate::simulate::Scene;
+    use std::path::Path;
+
+    #[test]
+    fn gaps_of_the_file_and_stated_media_are_named() {
+        let told = |source: &str, gap: f64| {
+            let text = format!("[[source]]\nkind = 'point'\n{source}\n");
+            let scene = Scene::parse(&text, "s.toml", Path::new(".")).unwrap();
+            let mut bound = scene.bind(&Model::default()).unwrap();
+            bound.bodies[AMBIENT as usize].gap = gap;
+            let ray = LostRay {
+                ray: 0,
+                branch: 0,
+                bounce: 0,
+                cause: LostCause::NoExit,
+                quanta: 1,
+                origin: Point::ZERO,
+                direction: Vector::Z,
+                face: None,
+                body: AMBIENT,
+            };
+            bound.loss_reasons(&[ray]).remove(0)
+        };
+        let plain = told("", 1e-9);
+        assert!(!plain.contains("`inside`") && plain.ends_with("a missing face"), "{plain}");
+        let stated = told("inside = []", 0.001_65);
+        assert!(stated.contains("its `inside` says; the file has edges up to 0.00165 mm off"), "{stated}");
     }
 }

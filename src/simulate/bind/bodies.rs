@@ -57,6 +57,8 @@ pub(super) fn find_bodies(
         };
         bodies[body].open |= belongs_to_open_shell(&f, model);
         bodies[body].bounds = bodies[body].bounds.union(f.bounds());
+        let gap = f.face.map_or(0.0, |face| face.gap * f.placement.scale.abs());
+        bodies[body].gap = bodies[body].gap.max(gap);
         of_face[f.id.index()] = body as u32;
     }
     let boxes: Vec<Aabb> = bodies[1..].iter().map(|b| b.bounds.grown(scene.run.glue_mm)).collect();
