@@ -3,7 +3,7 @@
 use super::locate::{self, Key};
 use crate::simulate::{Error, ErrorKind};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Where a scene came from.
@@ -18,9 +18,17 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// Returns a path named in the scene, seen from where the program runs; an absolute one stays as it is.
+    /// Returns a path named in the scene, seen from where the program runs; an absolute one stays as it is. Of a scene that was opened by a
+    /// link, what is not beside the link is looked for beside the scene itself.
     pub(super) fn resolve(&self, file: &str) -> PathBuf {
-        self.folder.join(file)
+        let beside = self.folder.join(file);
+        if beside.exists() {
+            return beside;
+        }
+        // Without a link both places are one, and the file is not there either.
+        let scene = Path::new(&self.file).canonicalize().ok();
+        let beside_scene = scene.and_then(|scene| Some(scene.parent()?.join(file)));
+        beside_scene.filter(|path| path.exists()).unwrap_or(beside)
     }
 
     /// Returns the bytes of the value at a path, as `locate::span`; `None` for a scene that was not parsed from text.
@@ -35,5 +43,27 @@ impl Origin {
             Some(text) => error.located(&self.file, text, self.span(path)),
             None => error,
         }
+    }
+}
+
+#[cfg(test)]
+#[cfg(unix)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_opened_by_a_link_has_its_files_beside_itself() {
+        let place = tempfile::tempdir().unwrap();
+        let [own, links] = ["own", "links"].map(|name| place.path().join(name));
+        [&own, &links].map(|folder| std::fs::create_dir(folder).unwrap());
+        ["s.toml", "lamp.stp"].map(|name| std::fs::write(own.join(name), "").unwrap());
+        let link = links.join("l.toml");
+        std::os::unix::fs::symlink(own.join("s.toml"), &link).unwrap();
+        let origin = Origin { file: link.display().to_string(), folder: links.clone(), text: None };
+        assert_eq!(origin.resolve("lamp.stp"), own.canonicalize().unwrap().join("lamp.stp"));
+        // What stands beside the link comes first, and what is nowhere is missed there.
+        std::fs::write(links.join("lamp.stp"), "").unwrap();
+        assert_eq!(origin.resolve("lamp.stp"), links.join("lamp.stp"));
+        assert_eq!(origin.resolve("none.stp"), links.join("none.stp"));
     }
 }
