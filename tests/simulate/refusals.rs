@@ -412,3 +412,14 @@ fn the_schema_asks_for_what_the_reader_asks_for() {
     assert!(["reflectance", "transmittance"].iter().all(|key| material[key]["maximum"] == 1));
     assert!(schema["$defs"]["Accuracy"]["properties"]["normals"]["pattern"].as_str().unwrap().contains("[fF][lL]"));
 }
+
+#[test]
+fn a_regulation_that_stands_twice_is_refused() {
+    let head = "[run]\nunit = 'lm'\n[[source]]\nkind = 'point'\n\
+        [[receiver]]\nname = 'road'\nkind = 'far_field'\nh_deg = [-12, 12]\nv_deg = [-6, 6]\ncells = [240, 120]\n";
+    let once = "[[regulation]]\nid = 'UN R112 B passing'\n";
+    let read = |regulations: &str| Scene::parse(&format!("{head}{regulations}"), "scene.toml", Path::new("."));
+    assert!(read(once).is_ok() && read(&format!("{once}{once}left_hand = true\n")).is_ok());
+    let error = read(&once.repeat(2)).unwrap_err().to_string();
+    assert!(error.contains("stands above already"), "{error}");
+}

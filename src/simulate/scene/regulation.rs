@@ -35,7 +35,7 @@ impl RegulationUse {
         if found.next().is_some() { None } else { first }
     }
 
-    /// Refuses a regulation that is not known, or that has no far field which could answer it.
+    /// Refuses a regulation that is not known, that stands in the scene before, or that has no far field which could answer it.
     pub(super) fn check(&self, scene: &Scene, index: usize) -> Result<(), Error> {
         let fail = |key: &str, message: String, help: &str| {
             let at = [Key::Name("regulation"), Key::Index(index), Key::Name(key)];
@@ -48,6 +48,10 @@ impl RegulationUse {
                 return Err(scene.error(ErrorKind::Value, &at, message));
             }
         };
+        if scene.regulations[..index].contains(self) {
+            let message = format!("'{}' stands above already, about the same far field", self.id);
+            return fail("id", message, "leave one of them out");
+        }
         if scene.run.unit != PowerUnit::Lumen {
             let message = "a regulation asks for candela, but the run counts watts".into();
             return fail("id", message, "set `unit = \"lm\"` in [run]");
