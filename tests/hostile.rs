@@ -68,7 +68,9 @@ fn a_bad_record_costs_that_record() {
 
 #[test]
 fn what_is_not_step_is_refused_by_kind() {
-    for text in ["", "solid cube\nfacet normal 0 0 1\n", "\u{0}\u{1}\u{2}", "PK\u{3}\u{4}"] {
+    let empty = read_bytes("x.stp", b"", &Settings::default()).expect_err("no STEP");
+    assert!(empty.to_string().starts_with("x.stp: the file is empty"), "{empty}");
+    for text in ["solid cube\nfacet normal 0 0 1\n", "\u{0}\u{1}\u{2}", "PK\u{3}\u{4}"] {
         let error = read_bytes("x.stl", text.as_bytes(), &Settings::default()).expect_err("no STEP");
         assert!(matches!(error.kind(), ErrorKind::NotStep { .. }), "{text:?}");
         assert!(error.to_string().starts_with("x.stl: line 1"));

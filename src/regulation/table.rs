@@ -183,9 +183,12 @@ impl Regulation {
         if !begin_so.is_empty() {
             return Err(format!("'{id}' is the beginning of several regulations, name one: {}", named(&begin_so)));
         }
-        // Five letters name a family: `unr11`, `fmvss`.
-        let mut near: Vec<&Self> =
-            all.iter().filter(|r| plain(&r.id).chars().take(5).eq(wanted.chars().take(5))).collect();
+        // A part of a name, as `r112`, or else five letters, which name a family: `unr11`, `fmvss`.
+        let holds = |r: &&Self| !wanted.is_empty() && plain(&r.id).contains(&wanted);
+        let mut near: Vec<&Self> = all.iter().filter(holds).collect();
+        if near.is_empty() {
+            near = all.iter().filter(|r| plain(&r.id).chars().take(5).eq(wanted.chars().take(5))).collect();
+        }
         if near.is_empty() {
             near = all.iter().filter(|r| EXAMPLES.contains(&r.id.as_str())).collect();
         }
@@ -362,8 +365,8 @@ mod tests {
             let error = Regulation::find(asked).unwrap_err();
             assert!(error.contains("several regulations") && error.contains(named), "{error}");
         }
-        let error = Regulation::find("UN R112 X passing").unwrap_err();
-        assert!(error.contains("UN R112 B passing"), "{error}");
+        let [error, part] = ["UN R112 X passing", "r112"].map(|asked| Regulation::find(asked).unwrap_err());
+        assert!(error.contains("UN R112 B passing") && part.contains("UN R112 B passing"), "{error} {part}");
         assert!(Regulation::find("").is_err());
     }
 

@@ -20,6 +20,12 @@ pub enum ErrorKind {
         /// What the system said.
         source: std::io::Error,
     },
+    /// There are no bytes.
+    #[error("{file}: the file is empty; export the model as STEP once more")]
+    Empty {
+        /// Name of the file.
+        file: String,
+    },
     /// The bytes are no Part 21 text.
     #[error(
         "{file}: line 1: 'ISO-10303-21;' is missing, this is not a STEP file (Part 21 clear text in ASCII or UTF-8); export the model as STEP"

@@ -23,7 +23,7 @@ pub(super) fn material_text(rules: &[String]) -> String {
         String::new()
     };
     let (mark, hint) = if rules.len() > MOST_LIVE_RULES {
-        ("# ", "# Of so many each begins with a #, which is to be taken from those that are not black.\n")
+        ("# ", "# There are many: each rule is commented out; take away the # of those that are not black.\n")
     } else {
         ("", "")
     };

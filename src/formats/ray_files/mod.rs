@@ -66,6 +66,10 @@ impl RayFile {
             start => {
                 let mut head = start.to_vec();
                 file.take(TEXT_HEAD).read_to_end(&mut head).map_err(|e| Error::new(path, ErrorKind::Read(e)))?;
+                // Of fewer bytes than are asked for, those that are missing are no bytes of the file.
+                if binary && lower_extension(path) != "npz" {
+                    refuse_bytes(path, &head)?;
+                }
                 refuse_text(path, &head)?;
                 let mut rays = RayCollector::new(path, most_in_memory);
                 read_list(path, |ray| rays.add(ray))?;
@@ -77,6 +81,17 @@ impl RayFile {
 
 /// Bytes in which a text file says whose it is: a few lines.
 const TEXT_HEAD: u64 = 4096;
+
+/// Refuses what begins with bytes that no text has, which a reader of lists would take for a text in another encoding.
+fn refuse_bytes(path: &Path, head: &[u8]) -> Result<(), Error> {
+    // Of control characters a text has tabs, ends of lines and at most form feeds.
+    if head.iter().all(|&b| b >= b' ' || matches!(b, b'\t' | b'\n' | b'\r' | 0x0c)) {
+        return Ok(());
+    }
+    let message = "no file of rays: neither IES TM-25 nor Zemax or LightTools binary, by its first bytes, nor .npz, by its name, nor a CSV \
+                   text in UTF-8";
+    Err(Error::new(path, ErrorKind::Malformed(message.into())))
+}
 
 /// Refuses a text that begins so where it is another program's, which a reader of lists would take for a list with wrong columns.
 fn refuse_text(path: &Path, head: &[u8]) -> Result<(), Error> {
@@ -198,6 +213,8 @@ mod tests {
         std::fs::write(&path, "0,0,0,0,0,1,2\n").unwrap();
         let set = read_ray_set(&path, Flux::Radiant).unwrap();
         assert_eq!((set.rays.len(), set.flux), (1, None));
+        std::fs::write(&path, b"\x00\x01\xff\xfe\x02").unwrap();
+        assert!(read_ray_set(&path, Flux::Radiant).unwrap_err().to_string().contains("no file of rays"));
         std::fs::write(&path, "").unwrap();
         assert!(read_ray_set(&path, Flux::Radiant).unwrap_err().to_string().contains("no rays in it"));
         std::fs::write(&path, "1").unwrap();

@@ -20,6 +20,9 @@ pub(in crate::step) fn parse<'a>(name: &str, source: &'a [u8]) -> Result<File<'a
     if u32::try_from(source.len()).is_err() {
         return Err(Error::new(ErrorKind::TooLarge { file: name.into() }));
     }
+    if source.is_empty() {
+        return Err(Error::new(ErrorKind::Empty { file: name.into() }));
+    }
     let mut p = Parser {
         source,
         at: if source.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 },
