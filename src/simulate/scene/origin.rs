@@ -55,8 +55,12 @@ mod tests {
     fn a_scene_opened_by_a_link_has_its_files_beside_itself() {
         let place = tempfile::tempdir().unwrap();
         let [own, links] = ["own", "links"].map(|name| place.path().join(name));
-        [&own, &links].map(|folder| std::fs::create_dir(folder).unwrap());
-        ["s.toml", "lamp.stp"].map(|name| std::fs::write(own.join(name), "").unwrap());
+        for folder in [&own, &links] {
+            std::fs::create_dir(folder).unwrap();
+        }
+        for name in ["s.toml", "lamp.stp"] {
+            std::fs::write(own.join(name), "").unwrap();
+        }
         let link = links.join("l.toml");
         std::os::unix::fs::symlink(own.join("s.toml"), &link).unwrap();
         let origin = Origin { file: link.display().to_string(), folder: links.clone(), text: None };
