@@ -69,7 +69,7 @@ fn files_that_are_no_step_end_with_3_and_say_what_to_do() {
     for (path, says) in [
         (f.join("missing.stp"), "missing.stp"),
         (f.to_path_buf(), "cannot be read"),
-        (empty, "not a STEP file"),
+        (empty, "the file is empty"),
         (picture, "not a STEP file"),
         (text, "ISO-10303-21"),
     ] {

@@ -108,8 +108,8 @@ fn files_that_cannot_be_read_end_with_3() {
     for (arguments, says) in [
         (&["trace", "gone.toml"][..], "gone.toml"),
         (&["trace", "scene.toml"], "gone.stp"),
-        (&["check", "empty.stp"], "not a STEP file"),
-        (&["facet", "empty.stp", "-o", "a.obj"], "not a STEP file"),
+        (&["check", "empty.stp"], "the file is empty"),
+        (&["facet", "empty.stp", "-o", "a.obj"], "the file is empty"),
         (&["facet", "gone.stp"], "gone.stp"),
     ] {
         let (code, out, err) = lampyris_in(folder.path(), arguments);
