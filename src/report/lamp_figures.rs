@@ -67,7 +67,6 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
     table.row(["flux".into(), value, error, "lm".into(), "into the far field".into()]);
     let [share, error] = [power.value, power.combined()].map(|p| 100.0 * p / results.power.emitted);
     let [value, error] = [Cell::Number(share, 4), Cell::Number(error, 2)];
-    // The flux above it may be that of a channel, in lumens of a run in watts.
     let whole = if seen.is_some() { "of the watts that the sources emit" } else { "of what the sources emit" };
     table.row(["efficiency".into(), value, error, "%".into(), whole.into()]);
     for line in lines_through_peak(grid).iter().flatten().filter(|line| line.has_peak) {
