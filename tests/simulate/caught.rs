@@ -2,9 +2,11 @@
 
 use crate::support::World;
 use crate::touching::on_facets;
-use crate::turned::rounded_pin;
+use crate::turned::{arc, assembly, lines, turned};
 use lampyris::math::Point;
+use lampyris::model::Model;
 use lampyris::simulate::Results;
+use std::f64::consts::FRAC_PI_2;
 
 const N: f64 = 1.5;
 
@@ -45,6 +47,14 @@ fn what_a_block_of_glued_bricks_keeps_is_what_the_block_keeps() {
         );
         assert!((r.power.received + r.power.cut_off - 1.0).abs() < 1e-9, "{parts:?}: {:?}", r.power);
     }
+}
+
+/// A pin of radius 2 from z = 0 to 10.5 whose upper end is rounded off by 0.5.
+fn rounded_pin() -> Model {
+    let mut pin = lines(&[[0.0, 0.0], [2.0, 0.0], [2.0, 10.0]]);
+    pin.push(arc([1.5, 10.0], 0.5, [0.0, FRAC_PI_2]));
+    pin.extend(lines(&[[1.5, 10.5], [0.0, 10.5]]));
+    assembly(vec![turned("pin", &pin, 0.0)])
 }
 
 /// Both facets at an edge have the same interpolated normals there, and a ray nearly along them goes to and fro between them, nearer to

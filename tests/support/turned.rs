@@ -71,12 +71,13 @@ fn at(r: f64, z: f64) -> Point {
     Point::new(r, 0.0, z)
 }
 
-fn lines(points: &[[f64; 2]]) -> Vec<Curve> {
+/// Lines from each of these places, x and z, to the next.
+pub(crate) fn lines(points: &[[f64; 2]]) -> Vec<Curve> {
     points.windows(2).map(|w| Curve::line(at(w[0][0], w[0][1]), at(w[1][0], w[1][1]), [0.0, 1.0])).collect()
 }
 
 /// An arc about (x, z) from one angle to another, measured from x towards z.
-fn arc([x, z]: [f64; 2], radius: f64, [from, to]: [f64; 2]) -> Curve {
+pub(crate) fn arc([x, z]: [f64; 2], radius: f64, [from, to]: [f64; 2]) -> Curve {
     let frame = Frame::from_axis(at(x, z), -Vector::Y, Some(Vector::X));
     if from < to {
         conic::arc(&frame, radius, [from, to])
@@ -118,14 +119,6 @@ pub(crate) fn rod_in_plate([bottom, top]: [f64; 2], from: f64) -> Model {
     let rod = lines(&[[0.0, bottom], [2.0, bottom], [2.0, top], [0.0, top]]);
     let plate = lines(&[[2.0, 0.0], [6.0, 0.0], [6.0, 3.0], [2.0, 3.0], [2.0, 0.0]]);
     assembly(vec![turned("rod", &rod, 0.0), turned("plate", &plate, from)])
-}
-
-/// A pin of radius 2 from z = 0 to 10.5 whose upper end is rounded off by 0.5.
-pub(crate) fn rounded_pin() -> Model {
-    let mut pin = lines(&[[0.0, 0.0], [2.0, 0.0], [2.0, 10.0]]);
-    pin.push(arc([1.5, 10.0], 0.5, [0.0, FRAC_PI_2]));
-    pin.extend(lines(&[[1.5, 10.5], [0.0, 10.5]]));
-    assembly(vec![turned("pin", &pin, 0.0)])
 }
 
 /// A ball of radius 10 in a cup that reaches nearly to its equator.
