@@ -127,14 +127,15 @@ fn figure_markup(
     // '<' would let a name end the script element.
     let json = printable_json(data.to_string()).replace('<', "\\u003c");
     let (kind, files): (_, &[&str]) = if solid { ("view", &["png"]) } else { ("chart", &["svg", "png"]) };
-    let keys = if solid { " Drag or arrow keys turn, wheel or + and − zoom, 0 resets." } else { "" };
     html! {
         figure {
             h3 { (title) }
             div class={ "plot " (kind) } id={ "fig-" (name) } tabindex="0" role="group" aria-label=(title) { (drawing) }
             script type="application/json" data-for={ "fig-" (name) } { (PreEscaped(json)) }
             figcaption {
-                (emphasised(caption)) (keys) " Static picture:"
+                (emphasised(caption))
+                @if solid { span.keys { " Drag or arrow keys turn, wheel or + and − zoom, 0 resets." } }
+                " Static picture:"
                 @for kind in files { " " a href={ "figures/" (name) "." (kind) } { (kind.to_uppercase()) } }
             }
         }

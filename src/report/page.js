@@ -22,11 +22,26 @@
     return layout;
   };
 
+  // Remote desktops have no WebGL, where the library shows an error in place of a view: the static picture stays there.
+  let webgl;
+  const hasWebgl = () => {
+    if (webgl !== undefined) return webgl;
+    const context = document.createElement("canvas").getContext("webgl");
+    webgl = !!context;
+    // Browsers allow few contexts at a time.
+    context?.getExtension("WEBGL_lose_context")?.loseContext();
+    return webgl;
+  };
+
   const drawn = [];
   const draw = (data) => {
     const box = document.getElementById(data.dataset.for);
     const twin = [...box.childNodes];
     const figure = JSON.parse(data.textContent);
+    if (figure.layout.scene && !hasWebgl()) {
+      box.parentElement.querySelector(".keys").textContent = " To turn it takes WebGL, which this browser does not have.";
+      return Promise.resolve();
+    }
     box.replaceChildren();
     // Paper gets the static picture: browsers print what WebGL drew as nothing, and charts as wide as the screen was.
     const printed = Object.assign(document.createElement("div"), { className: "printed" });
