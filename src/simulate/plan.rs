@@ -11,9 +11,6 @@ use super::tally::QUANTA;
 /// with a kernel that records.
 const FEW: u64 = 63;
 
-/// How far a ray that escapes is drawn, mm.
-const DRAWN_LENGTH: f64 = 100.0;
-
 /// Fewest rays of a replicate, so that a small run still has an error to state.
 const FEWEST_RAYS: u64 = 16;
 
@@ -119,7 +116,7 @@ impl Plan {
             emitted,
             record_mask,
             sample_mask: record_mask,
-            drawn_length: DRAWN_LENGTH,
+            drawn_length: bound.drawn_length(),
         }
     }
 
@@ -336,7 +333,7 @@ mod tests {
                     emitted: 1.0,
                     record_mask: None,
                     sample_mask: None,
-                    drawn_length: DRAWN_LENGTH,
+                    drawn_length: 0.0,
                 };
                 let mut located = 0;
                 for replicate in 0..replicates {

@@ -16,7 +16,7 @@ pub struct RecordedWay {
     /// The sequence that this light belongs to.
     pub sequence: Sequence,
     /// Its vertices and the place where it was counted, mm; of a path that split off those from there on. Light that left the scene for a
-    /// far field ends 100 mm on its way.
+    /// far field ends on its way, 100 mm on or beyond all faces.
     pub points: Vec<Point>,
 }
 

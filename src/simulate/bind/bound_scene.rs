@@ -51,7 +51,19 @@ pub struct BoundScene {
     pub(crate) notes: Vec<String>,
 }
 
+/// How far a ray that escapes is drawn, mm, at least: it is seen to leave a small model, and a lone source.
+const DRAWN_LENGTH: f64 = 100.0;
+
+/// How far a ray that escapes is drawn, in diagonals of the box around faces and sources. One leads out of it from anywhere in it; half of
+/// one more is what is shown around it.
+const DRAWN_DIAGONALS: f64 = 1.5;
+
 impl BoundScene {
+    /// Returns how far a ray that escapes is drawn, mm: past all faces, wherever it starts.
+    pub(crate) fn drawn_length(&self) -> f64 {
+        DRAWN_LENGTH.max(DRAWN_DIAGONALS * self.region.diagonal())
+    }
+
     /// Returns the names of the instance and the medium of a body, by its number in lost rays, 0 for the surroundings; `None` beyond the
     /// last.
     pub fn body_names(&self, body: u32) -> Option<[&str; 2]> {
@@ -127,5 +139,24 @@ impl BoundScene {
     /// Returns the name of the instance that a placed face belongs to; empty where there is no such face.
     pub fn instance_of(&self, face: FaceId) -> &str {
         self.instance_of_face.get(face.index()).map_or("", |&i| &self.instances[i as usize])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+    use std::path::Path;
+
+    /// Rays of the first source would end in empty air 200 mm before what stands around the second.
+    #[test]
+    fn rays_are_drawn_past_all_that_is_there() {
+        let drawn = |text: &str| {
+            Scene::parse(text, "s.toml", Path::new(".")).unwrap().bind(&Model::default()).unwrap().drawn_length()
+        };
+        let one = "[[source]]\nkind = 'point'\n";
+        assert_eq!(drawn(one), DRAWN_LENGTH);
+        let two = format!("{one}{one}at = [0, 0, 300]\n");
+        assert!((450.0..460.0).contains(&drawn(&two)), "{}", drawn(&two));
     }
 }
