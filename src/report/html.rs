@@ -2,7 +2,7 @@
 
 use super::document::{Block, Report, Section};
 use super::provenance::Provenance;
-use super::table::Table;
+use super::table::{Cell, Table};
 use super::view::View;
 use super::{plotly, static_chart};
 use crate::formats::{base64, printable, printable_json};
@@ -142,6 +142,22 @@ fn figure_markup(
     }
 }
 
+/// Returns how the style sheet calls a cell: `num` and `brief` do not break, `words` are given room for some in a line.
+fn cell_class(cell: &Cell) -> &'static str {
+    if cell.is_numeric() {
+        "num"
+    } else if cell.is_brief() {
+        "brief"
+    } else if cell.is_sentence() {
+        "words"
+    } else {
+        ""
+    }
+}
+
+/// Rows up to which a table is shown whole, all that regulations have among them; one of more is scrolled in a frame.
+const MOST_WHOLE_ROWS: usize = 40;
+
 /// Writes a table that can be sorted, copied and fetched as CSV.
 fn table_markup(table: &Table) -> Markup {
     html! {
@@ -153,7 +169,7 @@ fn table_markup(table: &Table) -> Markup {
                     a.button href={ "tables/" (table.name) ".csv" } { "CSV" }
                 }
             }
-            div.scroll tabindex="0" role="region" aria-label=(table.title) {
+            div.scroll.whole[table.rows.len() <= MOST_WHOLE_ROWS] tabindex="0" role="region" aria-label=(table.title) {
                 table {
                     thead { tr { @for column in &table.columns {
                         th scope="col" { button type="button" title="Sort" {
@@ -161,7 +177,7 @@ fn table_markup(table: &Table) -> Markup {
                         } }
                     } } }
                     tbody { @for row in &table.rows { tr { @for cell in row {
-                        td.num[cell.is_numeric()] data-v=(cell.plain()) { (cell.shown()) }
+                        td class=(cell_class(cell)) data-v=(cell.plain()) { (cell.shown()) }
                     } } } }
                 }
             }
@@ -241,6 +257,20 @@ mod tests {
         let written = emphasised("**Note:** add `medium = \"<PMMA>\"` or `rays`; a ` stays.").into_string();
         let wanted = "<strong>Note:</strong> add <code>medium = &quot;&lt;PMMA&gt;&quot;</code> or <code>rays</code>; a ` stays.";
         assert_eq!(written, wanted);
+    }
+
+    /// A note of a verdict beside ten other columns had one word in a line, and a table of 17 rows was cut at 12.
+    #[test]
+    fn notes_have_room_and_short_tables_no_frame() {
+        let note = "18 500 instead where LED modules are driven by an electronic control gear";
+        let classes = [Cell::Number(1.0, 2), "3.43L 0.57U".into(), note.into(), "Lateral variations".into()];
+        assert_eq!(classes.each_ref().map(cell_class), ["num", "brief", "words", ""]);
+        let mut table = Table::new("rows", "Rows", &[("row", "")]);
+        (0..MOST_WHOLE_ROWS).for_each(|k| table.row([k.into()]));
+        let is_whole = |table: &Table| table_markup(table).into_string().contains("class=\"scroll whole\"");
+        assert!(is_whole(&table));
+        table.row(["one more".into()]);
+        assert!(!is_whole(&table));
     }
 
     /// An evenly lit disc, whose corners have no cells, is evenly bright: its darkest cell is not black.

@@ -119,6 +119,20 @@ impl Cell {
     pub(super) fn is_numeric(&self) -> bool {
         matches!(self, Self::Count(_) | Self::Number(..))
     }
+
+    /// Whether it has words enough for several lines, which a narrow window would press to one of a word each.
+    pub(super) fn is_sentence(&self) -> bool {
+        /// Characters of a name or a direction at most.
+        const LONGEST_NAME: usize = 40;
+        matches!(self, Self::Text(text) if text.chars().count() > LONGEST_NAME)
+    }
+
+    /// Whether it has so few words that they stand on one line, as a direction does.
+    pub(super) fn is_brief(&self) -> bool {
+        /// Characters of a direction at most.
+        const LONGEST_DIRECTION: usize = 14;
+        matches!(self, Self::Text(text) if text.chars().count() <= LONGEST_DIRECTION)
+    }
 }
 
 impl From<&str> for Cell {

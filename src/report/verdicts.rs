@@ -127,13 +127,14 @@ fn section(a: &Assessment, grid: &Grid, number: usize) -> Section {
 fn table(a: &Assessment, name: &str) -> Table {
     let columns = [
         ("row", ""),
-        ("direction", ""),
+        // Where narrow windows show it.
+        ("verdict", ""),
         ("limit", "cd"),
         ("reading", "cd"),
         ("± rays", "cd"),
         ("± facets", "cd"),
         ("± cells", "cd"),
-        ("verdict", ""),
+        ("direction", ""),
         ("settled by", ""),
         ("note", ""),
     ];
@@ -144,13 +145,13 @@ fn table(a: &Assessment, name: &str) -> Table {
         let number = |x: Option<f64>, digits| x.map_or(Cell::Empty, |x| Cell::Number(x, digits));
         table.row([
             row.row.id.as_str().into(),
-            row.direction.map_or(String::new(), direction_text).into(),
+            row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
             requirement_text(row).into(),
             number(row.reading.map(|r| r.value), DIGITS),
             number(row.reading.map(|r| r.statistical), 2),
             number(row.reading.and_then(|r| r.geometric), 2),
             number(row.reading.map(|r| r.cells), 2),
-            row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
+            row.direction.map_or(String::new(), direction_text).into(),
             settling_text(row).into(),
             judged_note(row).unwrap_or("").into(),
         ]);
