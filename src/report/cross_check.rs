@@ -185,6 +185,9 @@ pub(super) fn count_table(check: &CrossCheck) -> Table {
     table
 }
 
+/// What rounding leaves of no distance or angle at coordinates of some metres, mm and degrees.
+const ROUNDING: f64 = 1e-10;
+
 /// Makes a table of how far hits and normals of `who` are off, where both hit the same place.
 pub(super) fn error_table(check: &CrossCheck, subject: &str) -> Table {
     let f = &check.facets_vs_exact;
@@ -193,7 +196,8 @@ pub(super) fn error_table(check: &CrossCheck, subject: &str) -> Table {
     let mut table = Table::new("facet-errors", &title, &columns);
     for (name, s, unit) in [("distance along the ray", &f.t_error_mm, "mm"), ("normal", &f.normal_error_deg, "°")]
     {
-        table.row([name.into(), Cell::from(s.p50), s.p99.into(), s.max.into(), unit.into()]);
+        let [median, most, largest] = [s.p50, s.p99, s.max].map(|x| Cell::Known(x, ROUNDING, 4));
+        table.row([name.into(), median, most, largest, unit.into()]);
     }
     table
 }

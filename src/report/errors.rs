@@ -1,14 +1,13 @@
 //! Both errors of every figure, for people: what stands behind a ±, what limits the answer, what the next halving costs.
 
 use super::geometric_cause::GeometricCause;
-use super::number::{unit_in_words, with_unit};
-use super::{Cell, Table, seconds};
+use super::number::{error_figures, known_figures, with_unit};
+use super::seconds;
 use crate::intersect::NormalMode;
 use crate::simulate::{Absorbed, Results};
 use crate::study::default_accuracy::Chosen;
-use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, figure_in_words, halving};
+use crate::study::figures::{ChannelFigure, Figure, Limit, ReceiverFigures, halving};
 use crate::study::geometric_error::{GeometricError, Paired, ReceiverError};
-use crate::study::model_figures::PowerFigures;
 use crate::text::{figures, grouped};
 
 /// Writes a figure of `digits` significant digits with its unit and one ± (1σ) for both errors. Both are named where the geometric one,
@@ -22,18 +21,18 @@ pub(super) fn with_errors(figure: &Figure, digits: usize, cause: GeometricCause,
         let most = with_unit(&figures(limit, 2), unit);
         return format!("{} (no ray arrived: at most {most}, 95 %)", with_unit("0", unit));
     }
-    let value = figures(*value, digits);
+    let value = known_figures(*value, figure.combined(), digits);
     let Some(geometric) = geometric else {
-        let of_rays = figures(*statistical, 2);
+        let of_rays = error_figures(*statistical);
         return format!(
             "{} (± {of_rays} from the rays alone; the facets were not judged)",
             with_unit(&value, unit)
         );
     };
-    let told = with_unit(&format!("{value} ± {}", figures(figure.combined(), 2)), unit);
+    let told = with_unit(&format!("{value} ± {}", error_figures(figure.combined())), unit);
     // Below a tenth of the statistical error the facets change the sum by half a percent.
     if *geometric > 0.1 * statistical {
-        let [of_rays, others] = [*statistical, *geometric].map(|error| figures(error, 2));
+        let [of_rays, others] = [*statistical, *geometric].map(error_figures);
         return format!("{told} (± {of_rays} from the rays, ± {others} from {})", cause.in_words());
     }
     told
@@ -141,11 +140,6 @@ fn absorbed_sentence(error: &GeometricError, absorbed: &Absorbed, figure: &Figur
     }
 }
 
-/// Makes the cells of both errors of a figure, that of facets a dash where it is not known.
-pub(super) fn error_cells(figure: &Figure) -> [Cell; 2] {
-    [Cell::Number(figure.statistical, 2), figure.geometric.map_or_else(|| "–".into(), |g| Cell::Number(g, 2))]
-}
-
 /// Writes the seconds that halving the statistical error takes at most, and where `error` tells, a run at half the tolerance or on the
 /// spline.
 pub(super) fn halving_cost(results: &Results, error: Option<&GeometricError>) -> String {
@@ -176,193 +170,6 @@ pub(super) fn choice_sentence(chosen: &Chosen) -> String {
         _ => format!("**on facets** of {low} to {high} mm"),
     };
     format!("Traced {how}, because {}. ", chosen.because)
-}
-
-/// Makes a table of where the power went, each sum with both its errors, the geometric one by its `cause`; what was lost is itself an error
-/// of the others.
-pub(super) fn power_table(results: &Results, power: &PowerFigures, unit: &str, cause: GeometricCause) -> Table {
-    let columns = [("", ""), ("power", unit), ("share", "%"), ("± rays (1σ)", unit), (cause.column(), unit)];
-    let p = &results.power;
-    let mut table = Table::new("power", "Where the power went", &columns).caption(format!(
-        "Emitted is the sum of the others{}. Received counts receivers that end light: what passes one that lets it through is counted where it ends.",
-        if p.imbalance() == 0.0 { String::new() } else { format!(", but for {} of it", figures(p.imbalance(), 1)) }
-    ));
-    let cells = |name: &str, power: f64| {
-        [name.into(), Cell::Number(power, 6), Cell::Number(100.0 * power / p.emitted, 5)].into_iter()
-    };
-    table.row(cells("emitted", p.emitted));
-    table.row(cells("received", p.received).chain(error_cells(&power.received)));
-    for (a, figure) in results.absorbed.iter().zip(&power.by_body) {
-        table.row(cells(&format!("absorbed in {} ({})", a.name, a.r#in), a.power).chain(error_cells(figure)));
-    }
-    table.row(cells("escaped", p.escaped).chain(error_cells(&power.escaped)));
-    table.row(cells("cut off by limits", p.cut_off).chain(error_cells(&power.cut_off)));
-    table.row(cells("lost", p.lost).chain([Cell::Number(results.power_errors.lost, 2)]));
-    table
-}
-
-/// Writes what the mean positions and widths in the table of receivers are, and where there are none.
-pub(super) fn places_caption(results: &Results) -> String {
-    let mut caption =
-        "Positions and widths in mm, of far fields and spheres in degrees; errors are those of rays and facets together.".to_owned();
-    if results.receivers.iter().any(|r| r.is_cyclic(0) || r.is_cyclic(1)) {
-        caption += " Along an angle that goes all around there is no mean position and no rms: both ends of its range are one.";
-    }
-    caption
-}
-
-/// Makes a table of every figure with both its errors, the geometric one by its `cause`.
-pub(super) fn figure_table(results: &Results, all: &[ReceiverFigures], cause: GeometricCause) -> Table {
-    let columns = [
-        ("receiver", ""),
-        ("figure", ""),
-        ("value", ""),
-        ("unit", ""),
-        ("± rays (1σ)", ""),
-        (cause.column(), ""),
-        ("limited by", ""),
-    ];
-    let caption = format!(
-        "Each figure with the standard error from the number of rays and that from {}; a dash where the facets were not compared with the \
-         true surfaces.",
-        cause.in_words()
-    );
-    let mut table = Table::new("figures", "Figures with both errors", &columns).caption(caption);
-    for (r, f) in results.receivers.iter().zip(all) {
-        for (name, figure) in f.named() {
-            let limit = match figure.limited_by {
-                Limit::Statistics => "rays",
-                Limit::Geometry => cause.limit(),
-            };
-            let [statistical, geometric] = error_cells(figure);
-            table.row([
-                r.name.as_str().into(),
-                figure_in_words(name).into(),
-                Cell::Number(figure.value, 6),
-                unit_in_words(&figure.unit).into(),
-                statistical,
-                geometric,
-                limit.into(),
-            ]);
-        }
-    }
-    table
-}
-
-/// Makes a table of colours and bands of wavelengths, receiver by receiver; `unit` is that of powers.
-pub(super) fn channel_table(
-    results: &Results,
-    all: &[ReceiverFigures],
-    unit: &str,
-    cause: GeometricCause,
-) -> Table {
-    let columns = [
-        ("receiver", ""),
-        ("channel", ""),
-        ("total", ""),
-        ("± rays (1σ)", ""),
-        (cause.column(), ""),
-        ("unit", ""),
-        ("x", ""),
-        ("y", ""),
-    ];
-    let caption = "X, Y and Z are the CIE's of 1931, Y in lumens; x and y are the chromaticity. Every cell of each channel is in the \
-        receiver's CSV, NPZ and VTI files.";
-    let mut table = Table::new("channels", "Channels", &columns).caption(caption);
-    for (r, f) in results.receivers.iter().zip(all) {
-        let sum: f64 = r.channels.iter().map(|c| c.total).sum();
-        for (c, told) in r.channels.iter().zip(&f.channels) {
-            let [statistical, geometric] = error_cells(&told.figure);
-            let shown = |name: &str| c.name == name && sum > 0.0;
-            // x and y stand at the row of X; a dark receiver has no chromaticity.
-            let chromaticity = |k: usize| Cell::from(r.channels[k].total / sum);
-            let [x, y] = if shown("X") { [0, 1].map(chromaticity) } else { ["".into(), "".into()] };
-            table.row([
-                r.name.as_str().into(),
-                c.name.as_str().into(),
-                Cell::Number(c.total, 6),
-                statistical,
-                geometric,
-                c.total_unit(unit).into(),
-                x,
-                y,
-            ]);
-        }
-    }
-    table
-}
-
-/// Makes a table of the ways that a pilot tried before the run was chosen to be traced so, each with the figure it gets most wrong.
-pub(super) fn alternative_table(chosen: &Chosen) -> Table {
-    let columns = [
-        ("intersector", ""),
-        ("normals", ""),
-        ("tolerance from", "mm"),
-        ("to", "mm"),
-        ("trace", "s"),
-        ("worst figure", ""),
-        ("wrong by", "%"),
-        ("in its standard errors", ""),
-    ];
-    let caption = format!(
-        "{} rays of the scene, traced so before the run; a run is given the cheapest way whose geometric error stays below the \
-         statistical one on every figure.",
-        grouped(chosen.pilot_rays)
-    );
-    let mut table = Table::new("alternatives", "What was tried first", &columns).caption(caption);
-    for a in &chosen.alternatives {
-        table.row([
-            a.intersector.into(),
-            a.normals.name().into(),
-            Cell::Number(a.tolerance_mm[0], 2),
-            Cell::Number(a.tolerance_mm[1], 2),
-            Cell::Number(a.seconds, 3),
-            figure_in_words(&a.figure).into(),
-            a.geometric_share.map_or_else(|| "–".into(), |share| Cell::Number(100.0 * share, 2)),
-            Cell::Number(a.geometric_to_statistical, 2),
-        ]);
-    }
-    table
-}
-
-/// Makes a table of what facets change of each receiver's power, brightest place and widths, a row each: as many columns would not fit on
-/// paper. `unit` is that of power; `error` has the receivers of `results`.
-pub(super) fn change_table(error: &GeometricError, results: &Results, unit: &str) -> Table {
-    let columns = [
-        ("receiver", ""),
-        ("figure", ""),
-        ("on facets", ""),
-        ("on the spline", ""),
-        ("± of the difference (1σ)", ""),
-        ("unit", ""),
-    ];
-    let caption = format!(
-        "{0} rays of the run, traced on the facets and on the true surfaces with the same random numbers; max is the largest value of these \
-         {0} rays alone, not of the run. A width is the root mean square distance from the mean position; cells that few rays reach are \
-         judged with their neighbours.",
-        grouped(error.rays)
-    );
-    let mut table = Table::new("faceting", "What the facets change", &columns).caption(caption);
-    for (r, result) in error.receivers.iter().zip(&results.receivers) {
-        let mut row = |figure: String, p: &Paired, unit: &str| {
-            let numbers = [Cell::Number(p.facets, 5), Cell::Number(p.spline, 5), Cell::Number(p.error, 2)];
-            let [name, figure, unit] = [r.name.as_str(), &figure, unit].map(Cell::from);
-            table.row([name, figure].into_iter().chain(numbers).chain([unit]));
-        };
-        row("power".into(), &r.power, unit);
-        // A receiver that counts power alone has no cells, and no place for a width.
-        if r.peak_cells > 0 {
-            let over =
-                if r.peak_cells == 1 { String::new() } else { format!(" over {0} × {0} cells", r.peak_cells) };
-            row(format!("max{over}"), &r.peak, &unit_in_words(result.unit));
-        }
-        if !r.unit.is_empty() {
-            for axis in (0..2).filter(|&axis| !result.is_cyclic(axis)) {
-                row(format!("width {}", axis + 1), &r.width[axis], &unit_in_words(r.unit));
-            }
-        }
-    }
-    table
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ pub(super) fn direction_text(grid: &Grid, at: [f64; 2]) -> String {
 }
 
 /// Returns the name of an axis as people write it; files have it in plain letters.
-fn symbol(label: &str) -> &str {
+pub(super) fn symbol(label: &str) -> &str {
     if label == "gamma" { "γ" } else { label }
 }
 

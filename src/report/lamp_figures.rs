@@ -29,8 +29,7 @@ fn width_along(grid: &Grid, line: &Line) -> [Cell; 2] {
     let values: Vec<f64> = places.clone().map(|k| line.value(grid, k)).collect();
     let errors: Option<Vec<f64>> = places.map(|k| line.error(grid, k)).collect();
     let Some(width) = half_width(&values, errors.as_deref()) else { return [Cell::Empty, Cell::Empty] };
-    let error = width.error.map_or(Cell::Empty, |error| Cell::Number(error * line.step, 2));
-    [Cell::Number(width.cells * line.step, 3), error]
+    Cell::with_error(width.cells * line.step, width.error.map(|error| error * line.step), 3)
 }
 
 /// What a receiver counted.
@@ -56,17 +55,16 @@ pub(super) fn lamp_table(counted: &Counted<'_>, results: &Results, assessment: O
     );
     let rings = receiver.pole_rings();
     if let Some((place, value)) = brightest_direction(grid, &rings) {
-        let error = peak_error(grid, &rings, of_receiver.max.as_ref());
-        let error = error.map_or(Cell::Empty, |error| Cell::Number(error, 2));
-        table.row(["Imax".into(), Cell::Number(value, 5), error, "cd".into(), place.into()]);
+        let [value, error] = Cell::with_error(value, peak_error(grid, &rings, of_receiver.max.as_ref()), 5);
+        table.row(["Imax".into(), value, error, "cd".into(), place.into()]);
     }
     let power = &of_receiver.power;
     let seen = receiver.photometric().and_then(|seen| of_receiver.channels.iter().find(|c| c.name == seen.name));
     let lumens = seen.map_or(power, |channel| &channel.figure);
-    let [value, error] = [Cell::Number(lumens.value, 5), Cell::Number(lumens.combined(), 2)];
+    let [value, error] = Cell::with_error(lumens.value, Some(lumens.combined()), 5);
     table.row(["flux".into(), value, error, "lm".into(), "into the far field".into()]);
     let [share, error] = [power.value, power.combined()].map(|p| 100.0 * p / results.power.emitted);
-    let [value, error] = [Cell::Number(share, 4), Cell::Number(error, 2)];
+    let [value, error] = Cell::with_error(share, Some(error), 4);
     let whole = if seen.is_some() { "of the watts that the sources emit" } else { "of what the sources emit" };
     table.row(["efficiency".into(), value, error, "%".into(), whole.into()]);
     for line in lines_through_peak(grid).iter().flatten().filter(|line| line.has_peak) {
@@ -98,12 +96,13 @@ fn add_assessment(table: &mut Table, assessment: &Assessment, degrees: impl Fn([
     table.row(["cut-off and gradient G".into(), gradient, Cell::Empty, "".into(), how.into()]);
     for row in &assessment.rows {
         let Some(reading) = row.reading else { continue };
-        let (value, error) = (Cell::Number(reading.value, 5), reading.known_error().hypot(reading.cells));
+        let error = reading.known_error().hypot(reading.cells);
+        let [value, error] = Cell::with_error(reading.value, Some(error), 5);
         // Those of the table are before aiming: beside Imax and HV they would be other places.
         let place = row.direction.map_or(String::new(), |at| degrees(assessment.placed_direction(at)));
         // A relative row's reading is a difference of two.
         let name = multiple_text(&row.row).map_or(row.row.id.clone(), |less| format!("{}, {less}", row.row.id));
-        table.row([name.into(), value, Cell::Number(error, 2), "cd".into(), place.into()]);
+        table.row([name.into(), value, error, "cd".into(), place.into()]);
     }
 }
 
@@ -125,12 +124,12 @@ fn value_ahead(grid: &Grid) -> Option<[Cell; 2]> {
         meeting.truncate(1);
     }
     let mean = |values: &[f64]| meeting.iter().map(|&k| values[k]).sum::<f64>() / meeting.len() as f64;
-    let error = grid.error.as_ref().map_or(Cell::Empty, |errors| {
+    let error = grid.error.as_ref().map(|errors| {
         let rays = error_of_mean(meeting.iter().map(|&k| [grid.values[k], errors[k]]));
         // What facets change they change alike in neighbouring cells.
-        Cell::Number(rays.hypot(grid.geometric.as_deref().map_or(0.0, mean)), 2)
+        rays.hypot(grid.geometric.as_deref().map_or(0.0, mean))
     });
-    (!meeting.is_empty()).then(|| [Cell::Number(mean(&grid.values), 5), error])
+    (!meeting.is_empty()).then(|| Cell::with_error(mean(&grid.values), error, 5))
 }
 
 /// Draws the share of the power of a plane or disc within a radius around the mean position of its light; `None` for other receivers, and
@@ -361,7 +360,7 @@ mod tests {
         let even = with_even_poles(&grid, &rings);
         let at_pole = 100.0 * 1.5f64.to_radians().cos();
         assert!((even.peak().unwrap().1 / at_pole - 1.0).abs() < 1e-12);
-        let Some([Cell::Number(ahead, _), Cell::Number(ahead_error, _)]) = value_ahead(&even) else { panic!("HV") };
+        let Some([Cell::Known(ahead, ..), Cell::Error(ahead_error)]) = value_ahead(&even) else { panic!("HV") };
         assert!((ahead / at_pole - 1.0).abs() < 1e-12);
         // 60 cells of ±10 % of twice the value, and 60 without light: √60 · 0.2 / 120 of it.
         let error = peak_error(&even, &rings, None).unwrap();
@@ -369,9 +368,7 @@ mod tests {
             assert!((error / at_pole - 0.2 * 60f64.sqrt() / 120.0).abs() < 1e-12, "{error}");
         }
         for line in lines_through_peak(&even).unwrap() {
-            let [Cell::Number(width, _), Cell::Number(error, _)] = width_along(&even, &line) else {
-                panic!("a width")
-            };
+            let [Cell::Known(width, ..), Cell::Error(error)] = width_along(&even, &line) else { panic!("a width") };
             assert!(
                 (width - 120.0).abs() < 0.1 && line.name.starts_with("in the plane C"),
                 "{}: {width}",

@@ -1,8 +1,8 @@
 //! What a receiver counted as maps: the grid for files and pictures, its cuts, and what stands below them.
 
-use super::even_poles::{brightest_direction, is_all_around};
+use super::even_poles::{brightest_direction, is_all_around, symbol};
 use super::framing::{LIT_PART_SHOWN, lit_part};
-use super::number::{coordinate_figures, unit_in_words, with_unit};
+use super::number::{coordinate_figures, error_figures, known_figures, unit_in_words, with_unit};
 use super::peak_lines::lines_through_peak;
 use super::{AxisStyle, Chart, Series, SeriesStyle};
 use crate::formats::file_stem;
@@ -20,11 +20,8 @@ pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
     if r.grid[0] * r.grid[1] < 2 || r.cells.len() != r.grid[0] * r.grid[1] {
         return None;
     }
-    let (labels, unit) = match r.kind {
-        "plane" | "disc" => (["x", "y"], "mm"),
-        _ if r.angles == Some(FarFieldType::C) => (["C", "gamma"], "deg"),
-        _ => (["H", "V"], "deg"),
-    };
+    let labels = axis_labels(r);
+    let unit = if labels[0] == "x" { "mm" } else { "deg" };
     let axis = |k: usize| Axis {
         label: labels[k].into(),
         unit: unit.into(),
@@ -48,6 +45,15 @@ pub fn receiver_grid(r: &ReceiverResult) -> Option<Grid> {
         geometric: None,
         layers: r.channels.iter().map(|channel| layer(r, channel)).collect(),
     })
+}
+
+/// Returns the names of the axes of a receiver, as its files have them.
+pub(super) fn axis_labels(r: &ReceiverResult) -> [&'static str; 2] {
+    match r.kind {
+        "plane" | "disc" => ["x", "y"],
+        _ if r.angles == Some(FarFieldType::C) => ["C", "gamma"],
+        _ => ["H", "V"],
+    }
 }
 
 /// Returns the values of a receiver's cells, NaN for those off a disc.
@@ -105,8 +111,9 @@ pub(super) fn grids(results: &Results, error: Option<&GeometricError>) -> Vec<(u
     grids
 }
 
-/// Writes the units of a grid and its layers for people; files keep those of the results.
+/// Writes the units of a grid and its layers, and the names of its axes, for people; files keep those of the results.
 fn in_words(mut grid: Grid) -> Grid {
+    grid.axes.iter_mut().for_each(|axis| axis.label = symbol(&axis.label).into());
     let layers = grid.layers.iter_mut().map(|layer| &mut layer.unit);
     std::iter::once(&mut grid.unit).chain(layers).for_each(|unit| *unit = unit_in_words(unit));
     grid
@@ -146,6 +153,8 @@ pub(super) fn cuts(grid: &Grid) -> Option<Chart> {
     let unit = if a.unit == b.unit { a.unit.as_str() } else { "" };
     let (position, cut) = if is_all_around(grid) {
         (b.label.as_str(), "The plane C of the peak and the one across, with negative angles for their far sides")
+    } else if a.unit == "deg" {
+        ("angle", "One row and one column of cells")
     } else {
         ("position", "One row and one column of cells")
     };
@@ -195,9 +204,11 @@ pub(super) fn reading(r: &ReceiverResult, grid: &Grid, max: Option<&Figure>) -> 
             return "No light came here. ".to_owned();
         }
         let of = if max.is_some_and(|max| max.geometric.is_none()) { " (± of the rays alone)" } else { "" };
-        let error =
-            peak_error(grid, &rings, max).map_or_else(String::new, |error| format!(" ± {}", figures(error, 2)));
-        format!("Peak {}{error} {}{of} at {place}. ", figures(value, 3), grid.unit)
+        let value = match peak_error(grid, &rings, max) {
+            Some(error) => format!("{} ± {}", known_figures(value, error, 3), error_figures(error)),
+            None => figures(value, 3),
+        };
+        format!("Peak {value} {}{of} at {place}. ", grid.unit)
     });
     let error = grid.error.as_ref().and_then(|errors| light_weighted_error(&grid.values, errors)).map(|share| {
         format!("Statistical error of a cell, weighted by its light: {} %. ", figures(100.0 * share, 2))

@@ -16,6 +16,7 @@ mod contour;
 mod cross_check;
 mod document;
 mod drawing;
+mod error_tables;
 mod errors;
 mod even_poles;
 mod framing;

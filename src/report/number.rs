@@ -18,6 +18,47 @@ pub(super) fn counted(value: f64, noun: &str) -> String {
     format!("{number} {noun}{end}")
 }
 
+/// Digits of an error that are written: of few replicates it is known to some per cent.
+const ERROR_DIGITS: usize = 2;
+
+/// Returns the power of ten of the last of so many significant digits of a number, after rounding to these: 2 for 1309 and two; `None` for
+/// 0 and what is not finite.
+fn last_place(value: f64, digits: usize) -> Option<i32> {
+    let scientific = format!("{:.*e}", digits.saturating_sub(1), value);
+    let exponent: i32 = scientific.split_once('e')?.1.parse().ok()?;
+    (value != 0.0).then_some(exponent + 1 - digits as i32)
+}
+
+/// Writes a number rounded to a multiple of this power of ten.
+fn figures_to_place(value: f64, place: i32) -> String {
+    let power = 10f64.powi(place.abs());
+    let multiple = if place > 0 { (value / power).round() } else { (value * power).round() };
+    if multiple == 0.0 {
+        return figures(0.0, 1);
+    }
+    if !multiple.is_finite() {
+        return figures(value, ERROR_DIGITS);
+    }
+    let digits = multiple.abs().log10().floor() as usize + 1;
+    figures(if place > 0 { multiple * power } else { multiple / power }, digits)
+}
+
+/// Writes a standard error to two digits: `1300` for 1309.
+pub(super) fn error_figures(error: f64) -> String {
+    last_place(error, ERROR_DIGITS)
+        .map_or_else(|| figures(error, ERROR_DIGITS), |place| figures_to_place(error, place))
+}
+
+/// Writes a number as far as its standard error knows it, to the place of the error's second digit, and to `most` digits at most: `20500`
+/// for 20465.8 ± 1309. All of these where it has no error.
+pub(super) fn known_figures(value: f64, error: f64, most: usize) -> String {
+    match last_place(error, ERROR_DIGITS).zip(last_place(value, most)) {
+        // Whole numbers are not rounded to fewer digits than they are known to.
+        Some((known, own)) => figures_to_place(value, known.max(own.min(0))),
+        None => figures(value, most),
+    }
+}
+
 /// Writes a unit of the results for people: `W/m²` for `W/m2`, `°` for `deg`.
 pub(super) fn unit_in_words(unit: &str) -> String {
     if unit == "deg" { "°".into() } else { unit.replace("m2", "m²") }
@@ -84,6 +125,25 @@ pub(super) fn without_rounding(angle_deg: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_has_the_digits_that_its_error_knows() {
+        for (value, error, most, text) in [
+            (202_191_486.0, 3_639_695.0, 3, "202\u{202f}200\u{202f}000 ± 3\u{202f}600\u{202f}000"),
+            (20_465.8, 1309.0, 6, "20\u{202f}500 ± 1300"),
+            (-0.000189921, 0.00013, 6, "−0.00019 ± 0.00013"),
+            (135.1, 0.3, 4, "135.1 ± 0.3"),
+            (12_345.6, 0.5, 4, "12\u{202f}346 ± 0.5"),
+            (99.96, 9.97, 6, "100 ± 10"),
+            (0.002, 0.5, 6, "0 ± 0.5"),
+            (382.0, 0.0, 6, "382 ± 0"),
+            (0.0, 3.21, 6, "0 ± 3.2"),
+            (1.5, f64::INFINITY, 6, "1.5 ± ∞"),
+            (1e-320, 1e-310, 6, "1e−320 ± 1e−310"),
+        ] {
+            assert_eq!(format!("{} ± {}", known_figures(value, error, most), error_figures(error)), text);
+        }
+    }
 
     #[test]
     fn units_fit_the_size() {

@@ -5,14 +5,14 @@ use super::even_poles::{brightest_direction, with_joined_slivers};
 use super::geometric_cause::GeometricCause;
 use super::lamp_figures::Counted;
 use super::maps::{cuts, grids, receiver_grid};
-use super::number::{counted, unit_in_words};
+use super::number::counted;
 use super::verdicts::{self, verdict_sentence};
 use super::{Block, Cell, Provenance, Report, Section, Table, View};
-use super::{errors, receiver_blocks, seconds};
+use super::{error_tables, errors, receiver_blocks, seconds};
 use crate::formats::{Facets, Polylines};
 use crate::regulation::Assessment;
 use crate::simulate::{Event, PathVertex, Results};
-use crate::study::figures::{Figure, ReceiverFigures};
+use crate::study::figures::ReceiverFigures;
 use crate::study::model_figures::PowerFigures;
 use crate::study::{cross_check::CrossCheck, default_accuracy::Chosen, geometric_error::GeometricError};
 use crate::text::{count_of, figures, grouped};
@@ -253,51 +253,18 @@ impl SimulationReport<'_> {
 
     /// Makes the section on where the power went: emitted to lost, each receiver, and all figures with both errors.
     fn energy(&self) -> Section {
-        let columns = [
-            ("receiver", ""),
-            ("power", self.unit),
-            ("± of the power (1σ)", self.unit),
-            ("largest", ""),
-            ("unit", ""),
-            ("mean position 1", ""),
-            ("mean position 2", ""),
-            ("rms 1", ""),
-            ("± of rms 1 (1σ)", ""),
-            ("rms 2", ""),
-            ("± of rms 2 (1σ)", ""),
-        ];
         let cause = GeometricCause::new(self.results, self.geometric);
-        let power = errors::power_table(self.results, self.power, self.unit, cause);
-        let mut receivers =
-            Table::new("receivers", "Receivers", &columns).caption(errors::places_caption(self.results));
-        for (r, f) in self.results.receivers.iter().zip(self.figures) {
-            let place =
-                |axis: usize, values: [f64; 2]| if r.has_place(axis) { values[axis].into() } else { Cell::Empty };
-            let error =
-                |figure: &Option<Figure>| figure.as_ref().map_or(Cell::Empty, |f| Cell::Number(f.combined(), 2));
-            receivers.row([
-                r.name.as_str().into(),
-                Cell::Number(r.power, 6),
-                Cell::Number(f.power.combined(), 2),
-                r.max.into(),
-                unit_in_words(r.unit).into(),
-                place(0, r.centroid),
-                place(1, r.centroid),
-                place(0, r.rms),
-                error(&f.rms_1),
-                place(1, r.rms),
-                error(&f.rms_2),
-            ]);
-        }
+        let power = error_tables::power_table(self.results, self.power, self.unit, cause);
+        let receivers = error_tables::receiver_table(self.results, self.figures, self.unit);
         let section = Section::new("Energy").with_block(power).with_block(receivers);
-        let section = section.with_block(errors::figure_table(self.results, self.figures, cause));
+        let section = section.with_block(error_tables::figure_table(self.results, self.figures, cause));
         let section = section.with_block(errors::halving_cost(self.results, self.geometric).as_str());
         let measured = self.geometric.filter(|g| g.rays > 0);
-        let measured = measured.map(|g| errors::change_table(g, self.results, self.unit)).into_iter();
-        let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(errors::alternative_table);
+        let measured = measured.map(|g| error_tables::change_table(g, self.results, self.unit)).into_iter();
+        let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(error_tables::alternative_table);
         let section = measured.chain(tried).fold(section, |s, table| s.with_block(table));
         if self.results.receivers.iter().any(|r| !r.channels.is_empty()) {
-            section.with_block(errors::channel_table(self.results, self.figures, self.unit, cause))
+            section.with_block(error_tables::channel_table(self.results, self.figures, self.unit, cause))
         } else {
             section
         }

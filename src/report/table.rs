@@ -1,5 +1,6 @@
 //! Tables for the report and as CSV.
 
+use super::number::{error_figures, known_figures};
 use crate::formats::csv_text;
 use crate::text::{figures, grouped};
 
@@ -47,6 +48,11 @@ pub enum Cell {
     Count(u64),
     /// A measured number, shown with so many significant digits, copied and written in full.
     Number(f64, usize),
+    /// A measured number and its standard error: shown to the error's second digit, with so many digits at most; copied and written in full
+    /// as [`Self::Number`].
+    Known(f64, f64, usize),
+    /// A standard error, shown with two digits, copied and written in full.
+    Error(f64),
 }
 
 impl Table {
@@ -102,6 +108,8 @@ impl Cell {
             Self::Text(t) => t.clone(),
             Self::Count(n) => grouped(*n),
             Self::Number(x, digits) => figures(*x, *digits),
+            Self::Known(x, error, digits) => known_figures(*x, *error, *digits),
+            Self::Error(error) => error_figures(*error),
         }
     }
 
@@ -112,12 +120,20 @@ impl Cell {
             Self::Text(t) => t.clone(),
             Self::Count(n) => n.to_string(),
             // As Rust writes them: every digit, and none too many.
-            Self::Number(x, _) => x.to_string(),
+            Self::Number(x, _) | Self::Known(x, ..) | Self::Error(x) => x.to_string(),
+        }
+    }
+
+    /// Returns a number and its error as cells, each with the digits that the error knows; without one, all `digits` and an empty cell.
+    pub(super) fn with_error(value: f64, error: Option<f64>, digits: usize) -> [Self; 2] {
+        match error {
+            Some(error) => [Self::Known(value, error, digits), Self::Error(error)],
+            None => [Self::Number(value, digits), Self::Empty],
         }
     }
 
     pub(super) fn is_numeric(&self) -> bool {
-        matches!(self, Self::Count(_) | Self::Number(..))
+        matches!(self, Self::Count(_) | Self::Number(..) | Self::Known(..) | Self::Error(_))
     }
 
     /// Whether it has words enough for several lines, which a narrow window would press to one of a word each.
@@ -183,5 +199,8 @@ mod tests {
         table.row([Cell::Empty]);
         assert_eq!(table.to_csv(), "name,sag (mm)\n\"a, \"\"b\"\"\",0.3333333333333333\n,\n");
         assert_eq!(table.rows[0][1].shown(), "0.3333");
+        let known = [Cell::Known(20_465.8, 1309.4, 6), Cell::Error(1309.4)];
+        assert_eq!(known.each_ref().map(Cell::shown), ["20\u{202f}500", "1300"]);
+        assert_eq!(known.each_ref().map(Cell::plain), ["20465.8", "1309.4"]);
     }
 }

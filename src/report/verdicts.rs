@@ -5,7 +5,7 @@ use super::framing::lit_part;
 use super::number::without_rounding;
 use super::{Cell, Chart, Section, Table, road};
 use crate::formats::{Grid, file_stem};
-use crate::regulation::{Assessment, Bound, Row, RowVerdict, Traffic, Verdict};
+use crate::regulation::{Assessment, Bound, Reading, Row, RowVerdict, Traffic, Verdict};
 use crate::text::{NARROW_SPACE, figures};
 
 /// Significant digits of intensities: more than any photometer has.
@@ -142,15 +142,15 @@ fn table(a: &Assessment, name: &str) -> Table {
         of the table after aiming.";
     let mut table = Table::new(&format!("{name}-verdict"), &a.regulation.function.name, &columns).caption(caption);
     for row in &a.rows {
-        let number = |x: Option<f64>, digits| x.map_or(Cell::Empty, |x| Cell::Number(x, digits));
+        let reading = |cell: fn(&Reading) -> Cell| row.reading.as_ref().map_or(Cell::Empty, cell);
         table.row([
             row.row.id.as_str().into(),
             row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
             requirement_text(row).into(),
-            number(row.reading.map(|r| r.value), DIGITS),
-            number(row.reading.map(|r| r.statistical), 2),
-            number(row.reading.and_then(|r| r.geometric), 2),
-            number(row.reading.map(|r| r.cells), 2),
+            reading(|r| Cell::Known(r.value, r.known_error().hypot(r.cells), DIGITS)),
+            reading(|r| Cell::Error(r.statistical)),
+            reading(|r| r.geometric.map_or(Cell::Empty, Cell::Error)),
+            reading(|r| Cell::Error(r.cells)),
             row.direction.map_or(String::new(), direction_text).into(),
             settling_text(row).into(),
             judged_note(row).unwrap_or("").into(),

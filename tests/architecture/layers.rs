@@ -253,6 +253,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "road",
             "geometric_cause",
             "errors",
+            "error_tables",
             "view_triangles",
             "view",
             "document",

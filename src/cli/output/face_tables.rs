@@ -49,20 +49,15 @@ fn face_table(run: &SceneResults, prepared: &PreparedScene) -> Option<Table> {
     );
     let mut table = Table::new("faces", "Power by face", &columns).caption(caption);
     for (face, geometric) in found.first.iter().zip(run.geometric_face_errors(prepared)) {
-        let power = |value: f64| Cell::Number(value, DIGITS);
-        let of_facets = |k: usize| geometric.map_or(Cell::Empty, |errors| errors[k].into());
-        table.row([
-            name(&names, face).into(),
-            power(face.absorbed),
-            face.absorbed_error.into(),
-            of_facets(0),
-            power(face.entered),
-            face.entered_error.into(),
-            of_facets(1),
-            power(face.left),
-            face.left_error.into(),
-            of_facets(2),
-        ]);
+        let cells = |power: f64, of_rays: f64, k: usize| {
+            let of_facets = geometric.map(|errors| errors[k]);
+            let error = of_rays.hypot(of_facets.unwrap_or(0.0));
+            [Cell::Known(power, error, DIGITS), Cell::Error(of_rays), of_facets.map_or(Cell::Empty, Cell::Error)]
+        };
+        let absorbed = cells(face.absorbed, face.absorbed_error, 0);
+        let entered = cells(face.entered, face.entered_error, 1);
+        let left = cells(face.left, face.left_error, 2);
+        table.row([Cell::from(name(&names, face))].into_iter().chain(absorbed).chain(entered).chain(left));
     }
     Some(table)
 }

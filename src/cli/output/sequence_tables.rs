@@ -89,8 +89,8 @@ fn sequence_tables(results: &Results, model: &Model, unit: &str) -> Vec<Table> {
             ));
         }
         for (rank, s) in found.first.iter().enumerate() {
-            let power = Cell::Number(s.power, 6);
-            table.row([(rank + 1).into(), power, s.power_error.into(), share(s.power), way_text(s, &names).into()]);
+            let [power, error] = [Cell::Known(s.power, s.power_error, 6), Cell::Error(s.power_error)];
+            table.row([(rank + 1).into(), power, error, share(s.power), way_text(s, &names).into()]);
         }
         table
     };

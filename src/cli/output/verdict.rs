@@ -2,7 +2,7 @@
 
 use super::sentences::sentence_lines;
 use super::terminal_tables::table_text;
-use crate::regulation::{Assessment, RowVerdict};
+use crate::regulation::{Assessment, Reading, RowVerdict};
 use crate::report::{
     Cell, Table, direction_text, judged_note, requirement_text, settling_text, traffic_sentence, verdict_counts,
 };
@@ -66,17 +66,15 @@ fn notes(a: &Assessment) -> Vec<(&str, Vec<&str>)> {
 
 /// Returns the cells of a row of the table; a dash where nothing was read.
 fn row_cells(row: &RowVerdict) -> [Cell; COLUMNS.len()] {
-    let read = |value: fn(crate::regulation::Reading) -> Option<f64>| {
-        row.reading.and_then(value).map_or(Cell::Empty, |x| Cell::Number(x, DIGITS))
-    };
+    let reading = |cell: fn(&Reading) -> Cell| row.reading.as_ref().map_or(Cell::Empty, cell);
     [
         row.row.id.as_str().into(),
         row.verdict.map_or("not judged".to_owned(), |v| v.to_string()).into(),
         requirement_text(row).into(),
-        read(|r| Some(r.value)),
-        read(|r| Some(r.statistical)),
-        read(|r| r.geometric),
-        read(|r| Some(r.cells)),
+        reading(|r| Cell::Known(r.value, r.known_error().hypot(r.cells), DIGITS)),
+        reading(|r| Cell::Error(r.statistical)),
+        reading(|r| r.geometric.map_or(Cell::Empty, Cell::Error)),
+        reading(|r| Cell::Error(r.cells)),
         row.direction.map_or(String::new(), direction_text).into(),
         settling_text(row).into(),
     ]
