@@ -59,6 +59,13 @@ pub enum Content {
         /// Lines and points over it.
         marks: Box<Marks>,
     },
+    /// A polar diagram of intensities, drawn over circles and spokes in place of axes.
+    Polar {
+        /// Curves of intensities to the right and up, with what the pointer shows at each point.
+        series: Vec<Series>,
+        /// Unit of the intensities.
+        unit: String,
+    },
     /// A picture over two axes, a pixel a cell.
     Picture {
         /// The axes; the second points up.

@@ -4,6 +4,7 @@ use super::even_poles::{brightest_direction, direction_text, is_all_around};
 use super::half_width::half_width;
 use super::maps::peak_error;
 use super::peak_lines::{Line, lines_through_peak};
+use super::polar::ON_EDGE;
 use super::verdicts::multiple_text;
 use super::{AxisStyle, Cell, Chart, Series, SeriesStyle, Table};
 use crate::formats::Grid;
@@ -18,8 +19,6 @@ const FRAMED_PERCENT: f64 = 99.5;
 /// Steps of the cells below which a radius says more of the cells than of the light: with the light in two cells beside each other it is
 /// half a step, in three in a row one.
 const FEW_CELLS: f64 = 2.0;
-/// Distance in cells from an edge between two within which a plane, or the direction ahead, lies on it.
-const ON_EDGE: f64 = 1e-9;
 /// Radii at which the encircled power is drawn.
 const RADII: usize = 200;
 
@@ -194,42 +193,6 @@ pub(super) fn encircled_power(receiver: &ReceiverResult, grid: &Grid) -> Option<
     Some(Chart::series(&name, &title, &caption, axes, series))
 }
 
-/// The angles γ, radians, and the intensities in the half-plane of this angle C of a grid that is all around.
-fn half_plane(grid: &Grid, angle_deg: f64) -> Vec<(f64, f64)> {
-    let [c, gamma] = &grid.axes;
-    let column = ((angle_deg - c.range[0]) / c.step()).rem_euclid(c.cells as f64);
-    // A plane between two cells takes their mean.
-    let edge = column.round();
-    let column = if (column - edge).abs() < ON_EDGE { edge } else { column };
-    let (after, before) = (column.floor() as usize % c.cells, (column.ceil() as usize + c.cells - 1) % c.cells);
-    let value = |j: usize| 0.5 * (grid.values[j * c.cells + after] + grid.values[j * c.cells + before]);
-    (0..gamma.cells).map(|j| (gamma.center(j).to_radians(), value(j))).collect()
-}
-
-/// Draws the polar diagram of a luminaire: intensities over γ in the planes C 0–180 and C 90–270, nadir below; `None` for a grid that is
-/// not over C-planes all around.
-pub(super) fn polar(receiver: &ReceiverResult, grid: &Grid) -> Option<Chart> {
-    // The diagram needs the whole turn.
-    if !is_all_around(grid) {
-        return None;
-    }
-    let plane = |name: &str, right: f64| {
-        // The opposite half-plane, drawn to the left.
-        let left = half_plane(grid, right + 180.0).into_iter().rev().map(|(g, i)| [-i * g.sin(), -i * g.cos()]);
-        let right = half_plane(grid, right).into_iter().map(|(g, i)| [i * g.sin(), -i * g.cos()]);
-        let points = left.chain(right).collect();
-        Series { name: name.into(), points, style: SeriesStyle::Line, ..Series::default() }
-    };
-    let series = vec![plane("C 0–180", 0.0), plane("C 90–270", 90.0)];
-    let name = format!("{}-polar", crate::formats::file_stem(&receiver.name));
-    let title = format!("{}: polar diagram", receiver.name);
-    let unit = grid.unit.as_str();
-    let axes = [AxisStyle::linear("intensity, sideways", unit), AxisStyle::linear("intensity up", unit)];
-    let caption =
-        "The length of the arrow from the origin to the curve is the intensity in its direction; γ 0 points down.";
-    Some(Chart::series(&name, &title, caption, axes, series).with_equal_scales())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -330,23 +293,6 @@ mod tests {
         // Only the cells at the pole are uncertain, by a tenth.
         let error = Some((0..7200).map(|k| if k < 120 { 0.1 * values[k] } else { 0.0 }).collect());
         Grid { name, quantity, unit, axes, values, error, geometric: None, layers: Vec::new() }
-    }
-
-    /// 270° over 76 cells is cell 57 and a rounding: between two cells all the same.
-    #[test]
-    fn planes_between_two_cells_take_their_mean() {
-        let axis = |end: f64, cells| crate::formats::Axis {
-            label: "C".into(),
-            unit: "°".into(),
-            range: [0.0, end],
-            cells,
-        };
-        let values = (0..76).map(|c| if c == 56 { 2.0 } else { 0.0 }).collect();
-        let (name, quantity, unit) = ("l".to_owned(), String::new(), "cd".to_owned());
-        let axes = [axis(360.0, 76), axis(180.0, 1)];
-        let grid = Grid { name, quantity, unit, axes, values, error: None, geometric: None, layers: Vec::new() };
-        assert_eq!(half_plane(&grid, 270.0), [(PI / 2.0, 1.0)]);
-        assert_eq!(half_plane(&grid, 268.0), [(PI / 2.0, 2.0)]);
     }
 
     #[test]

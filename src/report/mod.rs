@@ -32,6 +32,8 @@ mod peak_lines;
 mod plotly;
 mod plotly_axis;
 mod plotly_data;
+mod plotly_polar;
+mod polar;
 mod provenance;
 mod raster;
 mod receiver_blocks;

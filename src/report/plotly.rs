@@ -7,6 +7,8 @@ use super::plotly_axis::axis;
 use super::plotly_data::{
     colour_scale, css, doubles, hover_place, indices, lighting, plain, singles, text_position,
 };
+use super::plotly_polar::polar_frame;
+use super::polar::PolarFrame;
 use super::raster::{EYE, common_range};
 use super::view::{Shape, View};
 use crate::formats::{Axis, Picture, base64};
@@ -63,6 +65,17 @@ pub(super) fn chart(chart: &Chart) -> Value {
                 json!({"yaxis": anchor, "xaxis": {"constrain": "domain"}, "annotations": level_annotations(&labels),
                 "showlegend": false, "meta": {"unit": grid.unit, "scales": "both"}}),
             )
+        }
+        Content::Polar { series, unit } => {
+            let (mut data, layout) = polar_frame(&PolarFrame::new(series), unit);
+            let curve = |(s, c): (&Series, &str)| {
+                let mut trace = trace(c, s);
+                // Its coordinates are no figures of the lamp.
+                trace["hovertemplate"] = json!("%{text}<extra>%{fullData.name}</extra>");
+                trace
+            };
+            data.extend(series.iter().zip(colours(series)).map(curve));
+            (data, layout)
         }
         Content::Picture { axes, picture } => picture_trace(axes, picture),
     };

@@ -2,9 +2,10 @@
 
 use super::colour_picture::colour_chart;
 use super::framing::{LIT_PART_SHOWN, joined_cells, lit_part};
-use super::lamp_figures::{Counted, encircled_power, lamp_table, polar};
+use super::lamp_figures::{Counted, encircled_power, lamp_table};
 use super::maps::reading;
 use super::number::unit_in_words;
+use super::polar::polar;
 use super::{Block, Chart};
 use crate::formats::file_stem;
 use crate::regulation::Assessment;
@@ -38,6 +39,6 @@ pub(super) fn trade_figures(counted: &Counted<'_>, results: &Results, judged: Op
     let Counted { receiver: r, grid, .. } = *counted;
     let in_candela = r.kind == "far_field" && grid.unit == "cd";
     let charts =
-        [colour_chart(grid), polar(r, grid), encircled_power(r, grid)].into_iter().flatten().map(Block::from);
+        [colour_chart(grid), polar(&r.name, grid), encircled_power(r, grid)].into_iter().flatten().map(Block::from);
     charts.chain(in_candela.then(|| Block::Table(lamp_table(counted, results, judged)))).collect()
 }

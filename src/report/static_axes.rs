@@ -96,7 +96,7 @@ pub(super) fn linear_scale([low, high]: [f64; 2], [from, to]: [f64; 2]) -> Scale
 }
 
 /// How strongly the lines of the grid stand against the data.
-const GRID_OPACITY: f64 = 0.13;
+pub(super) const GRID_OPACITY: f64 = 0.13;
 /// How strongly the numbers beside the axes stand against the data.
 const NUMBER_OPACITY: f64 = 0.75;
 

@@ -2,7 +2,8 @@
 
 use super::chart::{AxisStyle, Chart, Content, PALETTE, Series, SeriesStyle, colours};
 use super::drawing::{Anchor, Drawing, Element, Ink, Place};
-use super::static_axes::{AREA, Scale, axes, label, tick_label};
+use super::polar::PolarFrame;
+use super::static_axes::{AREA, GRID_OPACITY, Scale, axes, label, linear_scale, tick_label};
 use super::static_map;
 
 /// Width of a chart in the drawing's units.
@@ -21,6 +22,7 @@ pub(super) fn draw(chart: &Chart) -> Drawing {
             let scales = static_map::map_chart(elements, chart, grid, *map);
             static_map::draw_marks(elements, marks, &grid.unit, scales);
         }
+        Content::Polar { series, unit } => polar_chart(elements, series, unit),
         Content::Picture { axes, picture } => {
             static_map::pixels(elements, chart, axes, picture.clone());
         }
@@ -28,9 +30,9 @@ pub(super) fn draw(chart: &Chart) -> Drawing {
     drawing
 }
 
-/// Draws the names of series in their colours; nothing for a single one, which the title names.
-fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)]) {
-    let [_, top, right, _] = AREA;
+/// Draws the names of series in their colours, at the right from `top` on; nothing for a single one, which the title names.
+fn legend(elements: &mut Vec<Element>, names: &[(&str, &str)], top: f64) {
+    let [_, _, right, _] = AREA;
     if names.len() < 2 {
         return;
     }
@@ -60,7 +62,34 @@ fn series_chart(elements: &mut Vec<Element>, chart: &Chart, series: &[Series]) {
         }
         one_series(elements, s, Ink::hex(colour), [&x, &y]);
     }
-    legend(elements, &names);
+    legend(elements, &names, top);
+}
+
+/// Draws curves over circles and spokes with their numbers; `unit` is that of the circles.
+fn polar_chart(elements: &mut Vec<Element>, series: &[Series], unit: &str) {
+    let [left, top, right, bottom] = AREA;
+    let frame = PolarFrame::new(series);
+    let [across, up] = frame.ranges();
+    let (mut x, mut y) = (linear_scale(across, [left, right]), linear_scale(up, [bottom, top]));
+    equalise_units(&mut x, &mut y);
+    let place = |p: &[f64; 2]| [x.position(p[0]), y.position(p[1])];
+    for line in frame.lines() {
+        let points = line.iter().map(place).collect();
+        let (ink, opacity) = (Ink::Text, 2.0 * GRID_OPACITY);
+        elements.push(Element::Line { points, ink, width: 1.0, opacity, dashed: false });
+    }
+    for label in frame.labels(unit) {
+        let anchor = [Anchor::End, Anchor::Middle, Anchor::Start][(label.side + 1) as usize];
+        let [x, y] = place(&label.at);
+        elements.push(tick_label(label.text, [x, y + 4.0], anchor));
+    }
+    let mut names = Vec::new();
+    for (s, colour) in series.iter().zip(colours(series)) {
+        names.push((s.name.as_str(), colour));
+        one_series(elements, s, Ink::hex(colour), [&x, &y]);
+    }
+    // Below the outermost circle the corners are free.
+    legend(elements, &names, bottom - 40.0);
 }
 
 /// Widens the range of the finer of two linear scales, so that a unit is as long on both.
@@ -168,7 +197,7 @@ fn bar_chart(
     }
     let names: Vec<(&str, &str)> =
         layers.iter().enumerate().map(|(k, (n, _))| (n.as_str(), PALETTE[k % PALETTE.len()])).collect();
-    legend(elements, &names);
+    legend(elements, &names, top);
 }
 
 #[cfg(test)]
