@@ -66,6 +66,21 @@ impl Cover {
 /// Lines that reach less far from their number than so many of its half sizes have none: it would hide the bright spot within them.
 const LEAST_REACH: f64 = 2.0;
 
+/// Half sizes of a number within which no middle of a ring lies: it would hide the peak of a small spot.
+const SPARED: f64 = 1.5;
+
+/// Returns the middle of a ring in the picture; `None` for a line that is not closed.
+fn ring_middle(line: &Isoline, place: impl Fn([f64; 2]) -> [f64; 2]) -> Option<[f64; 2]> {
+    if line.points.first() != line.points.last() {
+        return None;
+    }
+    let points = line.points.iter().map(|p| place(*p));
+    let empty = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+    let [low, high] =
+        points.fold(empty, |[low, high], p| [[0, 1].map(|k| low[k].min(p[k])), [0, 1].map(|k| high[k].max(p[k]))]);
+    Some([0, 1].map(|k| 0.5 * (low[k] + high[k])))
+}
+
 /// Places the name of each point beside it, on the first side where it covers no other and no point and stays within the map, and the
 /// number of each level on its longest line, where it covers nothing of these and not most of its line; what has no room is left out, of
 /// levels the lowest first. `place` takes a point of the map to the picture, whose second axis points down, `frame` is two opposite
@@ -93,6 +108,7 @@ pub(super) fn map_labels(
     }
     let mut longest = longest_of_levels(&marks.lines);
     longest.sort_by(|a, b| b.level.total_cmp(&a.level));
+    let peak = longest.first().and_then(|line| ring_middle(line, &place));
     for line in longest {
         let text = figures(line.level, DIGITS);
         let number = |at: [f64; 2]| Cover::of_text(&text, place(at), letter);
@@ -100,7 +116,13 @@ pub(super) fn map_labels(
             let far = |p: [f64; 2]| (0..2).any(|k| (p[k] - number.middle[k]).abs() > LEAST_REACH * number.half[k]);
             line.points.iter().any(|p| far(place(*p)))
         };
-        let has_room = |number: &Cover| !taken.iter().any(|other| number.meets(other)) && reaches_out(number);
+        let own_peak = ring_middle(line, &place);
+        let hides = |number: &Cover, peak: [f64; 2]| {
+            (0..2).all(|k| (number.middle[k] - peak[k]).abs() < SPARED * number.half[k])
+        };
+        let spares = |number: &Cover| ![peak, own_peak].into_iter().flatten().any(|peak| hides(number, peak));
+        let is_free = |number: &Cover| !taken.iter().any(|other| number.meets(other));
+        let has_room = |number: &Cover| is_free(number) && reaches_out(number) && spares(number);
         let candidates = PLACES.map(|share| line.points[(share * (line.points.len() - 1) as f64) as usize]);
         // A level without room is left out: two texts over each other say less than one.
         if let Some(at) = candidates.into_iter().find(|at| has_room(&number(*at))) {
@@ -192,11 +214,15 @@ mod tests {
         let ring = |level: f64, radius: f64| Isoline {
             level,
             points: (0..=64)
-                .map(|k| f64::from(k) * std::f64::consts::TAU / 64.0)
+                .map(|k| f64::from(k % 64) * std::f64::consts::TAU / 64.0)
                 .map(|t| [radius * t.cos(), radius * t.sin()])
                 .collect(),
         };
         let marks = Marks { lines: vec![ring(100.0, 40.0), ring(900.0, 6.0)], ..Marks::default() };
         assert_eq!(labels(&marks), ["100"]);
+        // "200000", 49 by 13 with its space: at the top of a ring of radius 8 it would still hide its middle, of 20 no more.
+        for (radius, shown) in [(8.0, 0), (20.0, 1)] {
+            assert_eq!(labels(&Marks { lines: vec![ring(200_000.0, radius)], ..Marks::default() }).len(), shown);
+        }
     }
 }

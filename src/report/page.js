@@ -50,7 +50,7 @@
     figure.data.forEach(label);
     fit(box, figure);
     return Plotly.newPlot(box, figure.data, themed(figure.layout), { responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: !!figure.layout.scene })
-      .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); if (figure.data.some((trace) => trace.meta?.selectors)) pick(box); if (figure.layout.meta?.scales === "both") scales(box); })
+      .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); if (figure.data.some((trace) => trace.meta?.selectors)) pick(box); if (figure.layout.meta?.scales === "both") scales(box); return names(box); })
       .catch(() => { printed.remove(); box.replaceChildren(...twin); });
   };
 
@@ -112,6 +112,38 @@
     box.after(button);
   };
 
+  // Names of points on a map, each on the first side where it covers no other and no point and stays within the map: the page's own places
+  // are those of one width. Numbers of lines under a name are hidden.
+  const SIDES = [[1, -1], [1, 1], [-1, -1], [-1, 1], [1, 0], [-1, 0], [0, -1], [0, 1]];
+  const pen = document.createElement("canvas").getContext("2d");
+  const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  const names = (box) => {
+    const index = box._fullData.findIndex((trace) => trace.customdata && trace.mode === "markers+text");
+    if (index < 0) return undefined;
+    const { xaxis, yaxis } = box._fullLayout, trace = box._fullData[index];
+    pen.font = `${trace.textfont.size}px ${box._fullLayout.font.family}`;
+    const half = trace.marker.size / 2 + 1, height = 1.3 * trace.textfont.size;
+    const points = [...trace.x].map((x, k) => [xaxis.l2p(x), yaxis.l2p(trace.y[k])]);
+    const taken = points.map(([x, y]) => ({ left: x - half, right: x + half, top: y - half, bottom: y + half }));
+    const sides = points.map(([x, y], k) => {
+      const width = pen.measureText(trace.customdata[k]).width;
+      for (const side of SIDES) {
+        const middle = [x + side[0] * (half + 2 + width / 2), y + side[1] * (half + height / 2)];
+        const name = { left: middle[0] - width / 2, right: middle[0] + width / 2, top: middle[1] - height / 2, bottom: middle[1] + height / 2 };
+        if (name.left < 0 || name.top < 0 || name.right > xaxis._length || name.bottom > yaxis._length || taken.some((other) => meet(name, other))) continue;
+        taken.push(name);
+        return side;
+      }
+      return null;
+    });
+    const written = (side) => `${["top", "middle", "bottom"][side[1] + 1]} ${["left", "center", "right"][side[0] + 1]}`;
+    const text = sides.map((side, k) => side ? trace.customdata[k] : "");
+    return Plotly.restyle(box, { text: [text], textposition: [sides.map((side) => written(side || SIDES[0]))] }, [index]).then(() => {
+      const shown = [...box.querySelectorAll(".textpoint text")].map((name) => name.getBoundingClientRect());
+      for (const number of box.querySelectorAll(".annotation")) number.style.visibility = shown.some((name) => meet(name, number.getBoundingClientRect())) ? "hidden" : "";
+    });
+  };
+
   const keys = (box) => {
     const { camera: start, aspectratio: sides } = structuredClone(box.layout.scene);
     box.addEventListener("keydown", (event) => {
@@ -133,7 +165,7 @@
   // A legend whose rows become fewer as the window widens stays over the plot until it is laid out once more.
   let settled;
   const again = (box) => box.querySelector(".legend") && Plotly.relayout(box, { "legend.y": box.layout.legend.y });
-  window.addEventListener("resize", () => { clearTimeout(settled); settled = setTimeout(() => drawn.forEach(again), 400); });
+  window.addEventListener("resize", () => { clearTimeout(settled); settled = setTimeout(() => drawn.forEach((box) => { again(box); names(box); }), 400); });
 
   const retheme = () => { for (const box of drawn) Plotly.relayout(box, themed(structuredClone(box.layout))); };
   document.getElementById("theme").addEventListener("click", () => { root.dataset.theme = remember(dark() ? "light" : "dark") || (dark() ? "light" : "dark"); retheme(); });

@@ -128,15 +128,21 @@ fn mark_traces(marks: &Marks, labels: &MapLabels) -> Vec<Value> {
         let name = |(p, side): (&MapPoint, &Option<_>)| if side.is_some() { plain(&p.name) } else { String::new() };
         let names: Vec<String> = marks.points.iter().zip(&labels.sides).map(name).collect();
         let sides: Vec<String> = labels.sides.iter().map(|side| text_position(side.unwrap_or_default())).collect();
+        // The script places them anew in windows of other widths.
+        let all_names: Vec<String> = marks.points.iter().map(|p| plain(&p.name)).collect();
         let notes: Vec<String> = marks.points.iter().map(|p| plain(&format!("{}: {}", p.name, p.note))).collect();
         // Names lie on black and on the brightest light: the shadow sets them off from both.
         traces.push(json!({"type": "scatter", "mode": "markers+text", "x": along(0), "y": along(1), "text": names,
-            "hovertext": notes, "hoverinfo": "text", "textposition": sides,
-            "textfont": {"color": "#5eead4", "size": 12, "shadow": "0 0 3px #000, 0 0 2px #000"},
+            "customdata": all_names, "hovertext": notes, "hoverinfo": "text", "textposition": sides,
+            "textfont": {"color": "#5eead4", "size": 12, "shadow": HALO},
             "marker": {"color": "#5eead4", "size": 2.0 * POINT_RADIUS}}));
     }
     traces
 }
+
+/// The shadows around a name, dark on every side.
+const HALO: &str =
+    "1px 1px 1px #000, -1px 1px 1px #000, 1px -1px 1px #000, -1px -1px 1px #000, 0 0 4px #000, 0 0 4px #000";
 
 /// Pixels of the longer side of a map in the report, about: reports have two columns, which windows make wider or narrower.
 const MAP_PIXELS: f64 = 260.0;

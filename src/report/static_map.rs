@@ -68,6 +68,9 @@ const MARK: Ink = Ink::Colour([255, 255, 255]);
 /// The colour of the borders of zones: it stands against every colour of a map.
 const ZONE: Ink = Ink::Colour([0x5e, 0xea, 0xd4]);
 
+/// Where the dark copies of a word lie.
+const HALO: [Place; 4] = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
+
 /// Width of a digit, which most fonts have at about half of the height of the type, with room to either side.
 const LETTER_WIDTH: f64 = 0.6 * TYPE_SIZE;
 
@@ -96,10 +99,18 @@ pub(super) fn draw_marks(elements: &mut Vec<Element>, marks: &Marks, unit: &str,
         let points: Vec<Place> = outline.iter().map(place).collect();
         elements.push(Element::Line { points, ink: ZONE, width: 1.2, opacity: 1.0, dashed: true });
     }
+    // Words lie on black and on the brightest light: dark copies around them set them off from both.
+    let write = |elements: &mut Vec<Element>, text: String, place: Place, ink: Ink, anchor: Anchor| {
+        for [right, down] in HALO {
+            let place = [place[0] + right, place[1] + down];
+            elements.push(word(text.clone(), place, Ink::Colour([0; 3]), anchor));
+        }
+        elements.push(word(text, place, ink, anchor));
+    };
     let frame = [[x.from, y.from], [x.to, y.to]];
     let labels = map_labels(marks, |at| place(&at), frame, [LETTER_WIDTH, TYPE_SIZE]);
     for label in labels.levels {
-        elements.push(word(label.text, place(&label.at), MARK, Anchor::Middle));
+        write(elements, label.text, place(&label.at), MARK, Anchor::Middle);
     }
     for (point, side) in marks.points.iter().zip(labels.sides) {
         let at = place(&point.at);
@@ -108,13 +119,17 @@ pub(super) fn draw_marks(elements: &mut Vec<Element>, marks: &Marks, unit: &str,
         let anchor = [Anchor::End, Anchor::Middle, Anchor::Start][(side[0] + 1) as usize];
         let [right, down] = side.map(f64::from);
         let base = at[1] + down * (NAME_GAP[1] + 0.5 * TYPE_SIZE) + BASELINE * TYPE_SIZE;
-        elements.push(word(point.name.clone(), [at[0] + right * NAME_GAP[0], base], ZONE, anchor));
+        write(elements, point.name.clone(), [at[0] + right * NAME_GAP[0], base], ZONE, anchor);
     }
     // A map without lines has no level to name.
     if let Some(line) = marks.lines.first().filter(|_| marks.points.is_empty()) {
         let corner = [x.from + 8.0, y.from - 8.0];
         let text = format!("lines: {unit}, from {}", figures(line.level, 3));
-        elements.push(word(text, corner, MARK, Anchor::Start));
+        // On a narrow map, as of a road, it would lie over the light and beyond; the caption has the levels too.
+        if LETTER_WIDTH * text.chars().count() as f64 > 0.5 * (x.to - x.from) {
+            return;
+        }
+        write(elements, text, corner, MARK, Anchor::Start);
     }
 }
 
