@@ -2,10 +2,7 @@
 
 use super::cell_axis::{CellAxis, Overlap};
 use super::few_rays::{LandedRays, MANY_REPLICATES, Noise, RaySample};
-use super::opening::{CellWeights, OpeningSum, Sensor};
-
-/// Cosine of the elevation that an opening's width is divided by at least, so that it stays finite at the poles.
-const LEAST_COSINE: f64 = 1e-3;
+use super::opening::{CellWeights, OpeningSum, Sensor, azimuth_deg, least_share, slope_shares};
 
 /// Luminous intensities in cells over azimuth H and elevation V (type A angles: the polar axis is vertical).
 #[derive(Clone, Debug)]
@@ -174,9 +171,13 @@ impl IntensityMap {
                 sum.weights.add(cell, weight);
                 sum.total += weight;
                 // A cell is not as bright in the part that is covered as on its mean.
-                let v_place = (v_part.cell, rows, columns);
-                self.add_slope(&mut sum.weights, cell, v_place, weight * v_part.offset);
-                self.add_slope(&mut sum.weights, cell, (h_part.cell, columns, 1), weight * h_part.offset);
+                let axes =
+                    [((v_part.cell, rows, columns), v_part.offset), ((h_part.cell, columns, 1), h_part.offset)];
+                let rise: f64 = axes.iter().map(|&(place, offset)| offset * self.rise(cell, place)).sum();
+                let share = least_share(self.cells[cell][0], rise);
+                for (place, offset) in axes {
+                    self.add_slope(&mut sum.weights, cell, place, [weight * offset, share]);
+                }
             }
         }
         Some(())
@@ -189,16 +190,25 @@ impl IntensityMap {
         (left - (h - half)).max(h + half - right).max(0.0)
     }
 
-    /// Adds `amount` times how much brighter a cell gets over its width along an axis. On the axis the cell has this place, of so many,
-    /// and its neighbours are `step` cells off. The rise is the monotonised central difference (van Leer, J. Comput. Phys. 23, 1977):
-    /// half of that between the neighbours, at most twice that from either, and none where a neighbour is missing or both are brighter,
-    /// or darker; so no cell that lies between two others is taken beyond them.
+    /// Returns how much brighter a cell gets over its width along an axis, cd, on which it has this place, of so many, and its neighbours
+    /// are `step` cells off; none at the ends.
+    fn rise(&self, cell: usize, (place, count, step): (usize, usize, usize)) -> f64 {
+        if place == 0 || place + 1 == count {
+            return 0.0;
+        }
+        let [below, here, above] = [cell - step, cell, cell + step].map(|cell| self.cells[cell][0]);
+        let [a, b, c] = slope_shares([here - below, above - here]);
+        a * below + b * here + c * above
+    }
+
+    /// Adds this share of `amount` times how much brighter a cell gets over its width along an axis, as [`Self::rise`] has it; what the
+    /// width of the cell leaves open is that of the whole amount.
     fn add_slope(
         &self,
         weights: &mut CellWeights,
         cell: usize,
         (place, count, step): (usize, usize, usize),
-        amount: f64,
+        [amount, share]: [f64; 2],
     ) {
         if place == 0 || place + 1 == count || amount == 0.0 {
             return;
@@ -215,19 +225,9 @@ impl IntensityMap {
         let noise = NOISE_OF_SLOPE * spread[0].hypot(2.0 * spread[1]).hypot(spread[2]);
         let uneven = ((after - before).abs() - noise).max(0.0);
         weights.unresolved += amount.abs() * SLOPE_ERROR * uneven.min(2.0 * before.abs().min(after.abs()));
-        if before * after <= 0.0 {
-            return;
-        }
-        let central = 0.5 * (before + after).abs();
-        let shares = if central <= 2.0 * before.abs().min(after.abs()) {
-            [-0.5, 0.0, 0.5]
-        } else if before.abs() < after.abs() {
-            [-2.0, 2.0, 0.0]
-        } else {
-            [0.0, -2.0, 2.0]
-        };
-        for (cell, share) in cells.into_iter().zip(shares).filter(|(_, share)| *share != 0.0) {
-            weights.add(cell, amount * share);
+        let shares = slope_shares([before, after]);
+        for (cell, of_cell) in cells.into_iter().zip(shares).filter(|(_, of_cell)| *of_cell != 0.0) {
+            weights.add(cell, amount * share * of_cell);
         }
     }
 
@@ -292,12 +292,6 @@ impl IntensityMap {
         }
         noise
     }
-}
-
-/// The azimuth that a small angle to the side takes at an elevation, degrees: the angle over the cosine of the elevation, which is taken to
-/// be no less than [`LEAST_COSINE`].
-fn azimuth_deg(angle_deg: f64, v_deg: f64) -> f64 {
-    angle_deg / v_deg.to_radians().cos().max(LEAST_COSINE)
 }
 
 #[cfg(test)]

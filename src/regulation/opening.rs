@@ -1,5 +1,8 @@
 //! What a photometer's opening adds up of the cells below it.
 
+/// Cosine of the elevation that an opening's width is divided by at least, so that it stays finite at the poles.
+const LEAST_COSINE: f64 = 1e-3;
+
 /// The cells that a photometer in one or several directions adds up, and by which weights.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CellWeights {
@@ -54,10 +57,41 @@ impl OpeningSum {
     }
 }
 
+/// Returns the shares of a cell and its neighbours along an axis, in order, in how much brighter it gets over its width, from the steps to
+/// it and from it: the monotonised central difference (van Leer, J. Comput. Phys. 23, 1977), half of that between the neighbours, at most
+/// twice that from either, and none where both are brighter, or darker; so no cell that lies between two others is taken beyond them.
+pub(super) fn slope_shares([before, after]: [f64; 2]) -> [f64; 3] {
+    if before * after <= 0.0 {
+        return [0.0; 3];
+    }
+    let central = 0.5 * (before + after).abs();
+    if central <= 2.0 * before.abs().min(after.abs()) {
+        [-0.5, 0.0, 0.5]
+    } else if before.abs() < after.abs() {
+        [-2.0, 2.0, 0.0]
+    } else {
+        [0.0, -2.0, 2.0]
+    }
+}
+
+/// Returns the share of its slopes with which no part of a cell is darker than none, from its value and how much brighter the part is by
+/// the slopes: each alone leaves it some light, both together at its corner may not.
+pub(super) fn least_share(value: f64, rise: f64) -> f64 {
+    /// Less than all, by far more than the rounding of the sums.
+    const NEARLY_ALL: f64 = 1.0 - 1e-12;
+    if value + rise < 0.0 { NEARLY_ALL * value.max(0.0) / -rise } else { 1.0 }
+}
+
 /// Form of a photometer's opening.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sensor {
     /// Half a side of a square, or the radius of a disc, degrees.
     pub(super) half_deg: f64,
     pub(super) round: bool,
+}
+
+/// The azimuth that a small angle to the side takes at an elevation, degrees: the angle over the cosine of the elevation, which is taken to
+/// be no less than [`LEAST_COSINE`].
+pub(super) fn azimuth_deg(angle_deg: f64, v_deg: f64) -> f64 {
+    angle_deg / v_deg.to_radians().cos().max(LEAST_COSINE)
 }

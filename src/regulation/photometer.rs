@@ -182,6 +182,23 @@ mod tests {
         assert!(directions.last().unwrap()[0] > 87.9);
     }
 
+    /// Of a lone bright cell the neighbours along H and V are lit towards it; beside its corner they were darker than none on the far side.
+    #[test]
+    fn no_reading_is_below_none() {
+        let edges: Vec<f64> = (0..=4).map(f64::from).collect();
+        let aim = Aim::unchanged("test");
+        let sensor = Sensor { half_deg: 0.1, round: false };
+        // Row after row: dark below and on the left, bright above and on the right of the cell in the middle.
+        let values = [[0.0, 0.0, 0.0, 0.0], [0.0, 10.0, 90.0, 0.0], [0.0, 90.0, 90.0, 0.0], [0.0; 4]];
+        let cells = values.as_flattened().iter().map(|value| [*value, 1.0, 0.0]).collect();
+        let map = IntensityMap::new(edges.clone(), edges, cells).unwrap();
+        let photometer = Photometer { map: &map, aim: &aim, turns: 1, sensor, tolerance_deg: 0.0 };
+        let read = |h: f64, v: f64| map.read(&photometer.measure([h, v]).unwrap()).value;
+        // 10 − 0.4 · 20 along either axis, and as much again along the other.
+        assert!((0.0..1e-9).contains(&read(1.1, 1.1)), "{}", read(1.1, 1.1));
+        assert!((read(1.5, 1.1) - 2.0).abs() < 0.1, "{}", read(1.5, 1.1));
+    }
+
     /// At 75° up an opening takes 1/cos 75° = 3.9 times its width of azimuth: one that just fits at the horizon ends beside the field.
     #[test]
     fn a_zone_whose_rim_the_opening_leaves_is_not_held() {
