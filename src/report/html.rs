@@ -6,7 +6,7 @@ use super::table::{Cell, Table};
 use super::view::View;
 use super::{plotly, static_chart};
 use crate::formats::{base64, printable, printable_json};
-use crate::text::count_of;
+use crate::text::{count_of, unbroken};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use sha2::{Digest, Sha256};
 
@@ -177,7 +177,7 @@ fn table_markup(table: &Table) -> Markup {
                         } }
                     } } }
                     tbody { @for row in &table.rows { tr { @for cell in row {
-                        td class=(cell_class(cell)) data-v=(cell.plain()) { (cell.shown()) }
+                        td class=(cell_class(cell)) data-v=(cell.plain()) { (unbroken(&cell.shown())) }
                     } } } }
                 }
             }
@@ -223,11 +223,11 @@ fn emphasised(text: &str) -> Markup {
     } }
 }
 
-/// Writes text with words between backticks as code; a backtick without another after it stays.
+/// Writes text with words between backticks as code, where spaces stay what they are; a backtick without another after it stays.
 fn with_code(text: &str) -> Markup {
     let last = text.split('`').count() - 1;
     html! { @for (k, piece) in text.split('`').enumerate() {
-        @if k % 2 == 0 { (piece) } @else if k < last { code { (piece) } } @else { "`" (piece) }
+        @if k % 2 == 0 { (unbroken(piece)) } @else if k < last { code { (piece) } } @else { "`" (piece) }
     } }
 }
 

@@ -9,7 +9,7 @@
   const colours = () => { const s = getComputedStyle(root); return { fg: s.getPropertyValue("--fg").trim(), line: s.getPropertyValue("--line").trim(), card: s.getPropertyValue("--card").trim() }; };
 
   // A window of a phone: titles of axes and bars of colours beside the map would not leave room for it.
-  const narrow = () => innerWidth < 480;
+  const narrow = () => innerWidth < 560;
   const themed = (layout) => {
     const c = colours();
     layout.paper_bgcolor = layout.plot_bgcolor = "rgba(0,0,0,0)";
@@ -59,6 +59,15 @@
   const ENTRY = { width: 240, height: 20 };
   const fit = (box, { data, layout }) => {
     if (narrow()) for (const { colorbar } of data) if (colorbar) Object.assign(colorbar, { orientation: "h", y: 1, yanchor: "bottom", title: { ...colorbar.title, side: "top" } });
+    // A wide map in one column leaves most of its place empty, beside a bar of colours several times its height.
+    const cells = data[0]?.z?.shape?.split(",").map(Number);
+    if (cells && layout.yaxis.scaleanchor && innerWidth <= 960) {
+      const ratio = (cells[0] * data[0].dy) / (cells[1] * data[0].dx);
+      const height = (box.clientWidth - 74) * ratio + (narrow() ? 150 : 70);
+      box.style.height = `${Math.round(Math.max(220, Math.min(box.clientHeight, height)))}px`;
+    }
+    // Numbers of the axes stand beside the box: in a narrow window beyond the picture.
+    if (layout.scene && narrow()) for (const side of ["x", "y", "z"]) layout.scene.aspectratio[side] *= 0.8;
     if (!layout.scene || !layout.showlegend) return;
     const entries = data.filter((trace) => trace.showlegend !== false).length;
     const rows = Math.ceil(entries / Math.max(1, Math.floor(box.clientWidth / ENTRY.width)));
@@ -91,6 +100,9 @@
     }, true);
   };
 
+  // A power of ten as the tables have it: thousands set apart from five digits on.
+  const grouped = (value) => String(Number(value.toPrecision(3))).replace(/^\d{5,}$/, (digits) => digits.replace(/\B(?=(\d{3})+$)/g, "\u202f"));
+
   // Maps of light on a linear or a logarithmic scale of colours, over four decades below the peak.
   const scales = (box) => {
     const trace = box._fullData[0], linear = [...trace.z].map((row) => [...row]);
@@ -107,7 +119,7 @@
       log = !log;
       button.textContent = log ? "Linear scale" : "Logarithmic scale";
       Plotly.restyle(box, { z: [log ? logarithmic : linear], zmin: log ? Math.log10(floor) : zmin, zmax: log ? Math.log10(most) : zmax, customdata: [linear], hovertemplate: [log ? hover.replace("%{z:", "%{customdata:") : hover],
-        "colorbar.tickvals": [log ? decades : null], "colorbar.ticktext": [log ? decades.map((e) => (10 ** e).toLocaleString("en", { maximumSignificantDigits: 3 })) : null] }, [0]);
+        "colorbar.tickvals": [log ? decades : null], "colorbar.ticktext": [log ? decades.map((e) => grouped(10 ** e)) : null] }, [0]);
     });
     box.after(button);
   };

@@ -20,6 +20,10 @@ use crate::text::{count_of, figures, grouped};
 /// Share of the power from which on light that limits cut off is spoken of: below it no figure of four digits changes.
 const WORTH_A_SENTENCE: f64 = 1e-4;
 
+/// Share of the power from which on lost light leads the answer, and from which on it is all of it.
+const MOSTLY_LOST: f64 = 0.5;
+const ALL: f64 = 0.9995;
+
 /// Paths drawn that leave the model, and those that end inside, which would hide the others.
 const DRAWN_LEAVING: usize = 250;
 const DRAWN_ENDING: usize = 60;
@@ -98,6 +102,28 @@ impl SimulationReport<'_> {
         Self { views, ..self }
     }
 
+    /// Whether so much light was lost that the figures say nothing of the lamp.
+    fn is_mostly_lost(&self) -> bool {
+        self.results.power.lost > MOSTLY_LOST * self.results.power.emitted
+    }
+
+    /// Returns a sentence in Markdown, a space behind it, that most light was lost; empty where it was not.
+    fn lost_sentence(&self) -> String {
+        let r = self.results;
+        if !self.is_mostly_lost() {
+            return String::new();
+        }
+        let share = if r.power.lost >= ALL * r.power.emitted {
+            "All light".to_owned()
+        } else {
+            format!("{} of the light", self.share(r.power.lost))
+        };
+        format!(
+            "**{share} was lost** ({}): what follows says nothing of the lamp; the notes say where that happened and why. ",
+            count_of(r.lost_rays, "path")
+        )
+    }
+
     /// Writes a power as per cent of what was emitted.
     fn share(&self, power: f64) -> String {
         format!("{} %", figures(100.0 * power / self.results.power.emitted, 4))
@@ -107,7 +133,8 @@ impl SimulationReport<'_> {
     pub fn answer(&self) -> String {
         let r = self.results;
         let cause = GeometricCause::new(r, self.geometric);
-        let mut text = format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit);
+        let mut text =
+            self.lost_sentence() + &format!("Of **{} {}** emitted, ", figures(r.power.emitted, 4), self.unit);
         // Parted by semicolons: what passes a receiver is counted by the next one too, so that shares need not add up.
         let parts: Vec<String> = (r.receivers.iter().zip(self.figures))
             .map(|(x, f)| {
@@ -160,6 +187,10 @@ impl SimulationReport<'_> {
         text.extend(
             self.geometric.map(|g| errors::facet_limits(g, self.results, self.figures, &self.power.by_body)),
         );
+        // How well nothing is known is no news.
+        if self.is_mostly_lost() {
+            return text;
+        }
         text.extend(self.chosen.map(errors::choice_sentence));
         if let Some(check) = self.check.filter(|check| check.scene.facets > 0) {
             text += &run_verdict(check, self.on_spline);
@@ -258,7 +289,11 @@ impl SimulationReport<'_> {
         let receivers = error_tables::receiver_table(self.results, self.figures, self.unit);
         let section = Section::new("Energy").with_block(power).with_block(receivers);
         let section = section.with_block(error_tables::figure_table(self.results, self.figures, cause));
-        let section = section.with_block(errors::halving_cost(self.results, self.geometric).as_str());
+        let section = if self.is_mostly_lost() {
+            section
+        } else {
+            section.with_block(errors::halving_cost(self.results, self.geometric).as_str())
+        };
         let measured = self.geometric.filter(|g| g.rays > 0);
         let measured = measured.map(|g| error_tables::change_table(g, self.results, self.unit)).into_iter();
         let tried = self.chosen.filter(|c| !c.alternatives.is_empty()).map(error_tables::alternative_table);

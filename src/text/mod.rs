@@ -5,6 +5,8 @@ mod natural_order;
 mod nearest_name;
 mod number;
 mod sentence_list;
+#[cfg(feature = "report")]
+mod unbroken;
 
 #[cfg(feature = "cli")]
 pub(crate) use natural_order::natural_order;
@@ -13,3 +15,7 @@ pub(crate) use nearest_name::{did_you_mean, nearest_name, nearest_or_listed};
 pub(crate) use number::NARROW_SPACE;
 pub use number::{count_of, figures, grouped};
 pub(crate) use sentence_list::first_sentences;
+#[cfg(feature = "cli")]
+pub(crate) use unbroken::belong_together;
+#[cfg(feature = "report")]
+pub(crate) use unbroken::unbroken;

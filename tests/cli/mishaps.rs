@@ -342,6 +342,7 @@ fn a_source_in_an_opaque_part_and_an_unknown_medium_are_told() {
     assert!(err.contains("give the part a `medium` of index 1"), "{err}");
     let page = fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     assert!(page.contains("No light came here.") && !page.contains("cuts through the peak"));
+    assert!(page.contains("light was lost</strong>") && !page.contains("To halve the statistical errors"));
     let folder = lens(|scene| scene.replace("medium = \"glass\"", "medium = \"D-ZK3\""));
     let (code, _, err) = lampyris_in(folder.path(), &["trace", "scene.toml", "-o", "out"]);
     assert!(code == 2 && err.contains("lampyris media") && err.contains("name = \"D-ZK3\""), "{code} {err}");

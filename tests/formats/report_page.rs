@@ -128,7 +128,7 @@ fn the_page_stands_alone_and_its_parts_lie_beside_it() {
     let ours: Vec<&str> = page.split("<script").filter(|piece| piece.len() < 2_000_000).collect();
     let ours = ours.concat().replace("http://www.w3.org/2000/svg", "the name of a language, not an address");
     assert!(!ours.contains("http://") && !ours.contains("https://"), "an address in the page");
-    assert!(page.contains("<strong>42 cd</strong> &amp; no &lt;more&gt;"));
+    assert!(page.contains("<strong>42\u{a0}cd</strong> &amp; no &lt;more&gt;"));
     // Of narrow triangles too: by its default plotly gives those no normal, and they stand black in a flat face.
     assert!(ours.contains("\"facenormalsepsilon\":0.0"), "every triangle has its normal");
     assert!(!page.contains("left </script>"), "a name may not end a script");

@@ -1,23 +1,6 @@
 //! Sentences in lines that fit a terminal.
 
-/// What is kept beside a number: units of what is printed, and signs between two numbers.
-const UNITS: [&str; 25] = [
-    "%", "°", "±", "×", "nm", "µm", "mm", "m", "mm²", "sr", "µs", "ms", "s", "min", "B", "kB", "MB", "GB", "W",
-    "lm", "cd", "lx", "W/m²", "W/sr", "lm/W",
-];
-
-/// Whether two words stand in one line: a number and its unit, an angle and its name, a value and its error.
-fn belong_together(word: &str, next: &str) -> bool {
-    let is_number = |word: &str| {
-        let word = word.trim_start_matches(['(', '−', '-', '±']);
-        word.starts_with(|c: char| c.is_ascii_digit())
-    };
-    let unit = next.trim_end_matches(['.', ',', ';', ':', ')']);
-    if is_number(word) && word.ends_with(|c: char| c.is_ascii_digit()) {
-        return UNITS.contains(&unit);
-    }
-    ["H", "V", "C", "γ", "±", "×"].contains(&word.trim_start_matches('(')) && is_number(next)
-}
+use crate::text::belong_together;
 
 /// Returns the words of a text; those that [`belong_together`] are one, as far as it has at most `width` characters.
 fn words(text: &str, width: usize) -> Vec<String> {
