@@ -122,10 +122,10 @@ fn front_table(points: &[Point]) -> Table {
 
 /// Draws every combination as time against p99 direction error; dominated ones are faint.
 fn front_chart(points: &[Point]) -> Chart {
-    // An error of exactly 0 has no place on a logarithmic axis; it is shown at a tenth of the smallest other.
-    let smallest =
-        points.iter().map(|p| p.error).filter(|e| *e > 0.0).min_by(f64::total_cmp).unwrap_or(ROUNDING_DEG);
-    let shown = |p: &&Point| [p.seconds, if p.error > 0.0 { p.error } else { smallest / 10.0 }];
+    // None has no place on a logarithmic axis, and rounding one far below all others; it is shown at a tenth of the smallest of these.
+    let is_error = |error: &f64| *error > ROUNDING_DEG;
+    let smallest = points.iter().map(|p| p.error).filter(is_error).min_by(f64::total_cmp).unwrap_or(ROUNDING_DEG);
+    let shown = |p: &&Point| [p.seconds, if is_error(&p.error) { p.error } else { smallest / 10.0 }];
     let of = |name: String, style, wanted: &dyn Fn(&Point) -> bool| {
         let mut list: Vec<&Point> = points.iter().filter(|p| wanted(p)).collect();
         list.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
@@ -147,8 +147,8 @@ fn front_chart(points: &[Point]) -> Chart {
     series.push(of("dominated".into(), SeriesStyle::Faint, &|p| is_dominated(p, points)));
     series.retain(|s| !s.points.is_empty());
     let caption = "Each point is one combination of tolerance, normals and intersector; lower left is better. Faint: another \
-        combination is no worse in either and better in one. Time is tessellation, build and the median of the traces; an error of 0 is drawn at a \
-        tenth of the smallest other.";
+        combination is no worse in either and better in one. Time is tessellation, build and the median of the traces; no error, or one \
+        that is rounding, is drawn at a tenth of the smallest other.";
     let axes = [AxisStyle::log("time", "s"), AxisStyle::log("direction error, p99", "°")];
     Chart::series("front", "Cost–accuracy front", caption, axes, series)
 }
