@@ -13,7 +13,7 @@ use crate::study::model_figures::PowerFigures;
 use crate::text::{figures, grouped};
 
 /// Makes the cells of both errors of a figure, that of facets a dash where it is not known.
-pub(super) fn error_cells(figure: &Figure) -> [Cell; 2] {
+fn error_cells(figure: &Figure) -> [Cell; 2] {
     [Cell::Error(figure.statistical), figure.geometric.map_or_else(|| "–".into(), Cell::Error)]
 }
 
@@ -55,15 +55,15 @@ pub(super) fn power_table(results: &Results, power: &PowerFigures, unit: &str, c
 /// Writes what the mean positions and widths in the table of receivers are, and where there are none.
 fn places_caption(results: &Results) -> String {
     let mut caption =
-        "1 and 2 are the axes that are named, with the unit of positions and widths; errors are those of rays and facets together.".to_owned();
+        "1 and 2 are the axes named, with the unit of positions and widths; errors are those of rays and facets together.".to_owned();
     if results.receivers.iter().any(|r| r.is_cyclic(0) || r.is_cyclic(1)) {
         caption += " Along an angle that goes all around there is no mean position and no rms: both ends of its range are one.";
     }
     caption
 }
 
-/// Makes a table of the receivers, a row each: power, brightest cell, place and width of the light with both errors together; `unit` is that
-/// of powers.
+/// Makes a table of the receivers, a row each: power, brightest cell, place and width of the light with both errors together; `unit` is
+/// that of powers.
 pub(super) fn receiver_table(results: &Results, all: &[ReceiverFigures], unit: &str) -> Table {
     let columns = [
         ("receiver", ""),

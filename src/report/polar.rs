@@ -147,8 +147,8 @@ pub(super) fn polar(receiver: &str, grid: &Grid) -> Option<Chart> {
     Some(Chart {
         name: format!("{}-polar", file_stem(receiver)),
         title: format!("{receiver}: polar diagram"),
-        caption: "The distance of the curve from the centre is the intensity in its direction, by the circles; the spokes are γ, of which 0° \
-            points down. C 0° and C 90° are on the right."
+        caption: "The distance of the curve from the centre is the intensity in its direction, by the circles; the spokes are γ, of which \
+            0° points down. C 0° and C 90° are on the right."
             .into(),
         x: AxisStyle::default(),
         y: AxisStyle::default(),
