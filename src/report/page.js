@@ -50,7 +50,7 @@
     figure.data.forEach(label);
     fit(box, figure);
     return Plotly.newPlot(box, figure.data, themed(figure.layout), { responsive: true, displaylogo: false, displayModeBar: false, scrollZoom: !!figure.layout.scene })
-      .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); if (figure.data.some((trace) => trace.meta?.selectors)) pick(box); if (figure.layout.meta?.scales === "both") scales(box); return names(box); })
+      .then(() => { drawn.push(box); box.dataset.drawn = "yes"; if (figure.layout.scene) keys(box); if (figure.data.some((trace) => trace.meta?.selectors)) pick(box); if (figure.layout.meta?.scales === "both") scales(box); box.on("plotly_relayout", () => names(box)); return names(box); })
       .catch(() => { printed.remove(); box.replaceChildren(...twin); });
   };
 
