@@ -93,8 +93,8 @@ impl BoundScene {
         self.bodies.get(body as usize).map_or(1.0, |b| b.index(None) / ambient)
     }
 
-    /// Returns the only wavelength of its light, nm; `None` where there are several, and where lumens are counted of light of which the scene
-    /// says no wavelength: that of the helium d line then stands for the indices of media alone.
+    /// Returns the only wavelength of its light, nm; `None` where there are several, and where lumens are counted of light of which the
+    /// scene says no wavelength: that of the helium d line then stands for the indices of media alone.
     pub fn single_wavelength_nm(&self) -> Option<f64> {
         let SceneLight { wavelength, coloured } = self.light;
         let supposed = self.scene.run.unit == PowerUnit::Lumen && wavelength == Run::default().wavelength_nm;
