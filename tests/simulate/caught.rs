@@ -67,8 +67,8 @@ fn light_does_not_pass_the_edge_between_two_facets() {
         [[source]]\nkind = 'lambertian'\nat = [0, 0, -0.3]\ndirection = [0, 0, 1]\nradius = 2";
     let r = on_facets(&rounded_pin(), glass);
     assert_eq!((r.lost_rays, r.cut_off_rays - r.caught_rays), (0, 0), "{:?}", r.ledger.first());
-    let mirrors = "[run]\nrays = 5000\nmax_bounces = 40
-        [[material]]\npart = 'pin'\nsurface = 'mirror'\nreflectance = 1
+    let mirrors = "[run]\nrays = 5000\nmax_bounces = 40\n[[medium]]\nname = 'room'\nindex = 1
+        [[material]]\npart = 'pin'\nmedium = 'room'\nsurface = 'mirror'\nreflectance = 1
         [[source]]\nkind = 'point'\nat = [-1.38, 1.17, 5.45]";
     let r = on_facets(&rounded_pin(), mirrors);
     assert_eq!((r.power.escaped, r.cut_off_rays), (0.0, 5000), "{:?}", r.power);
