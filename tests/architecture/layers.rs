@@ -792,6 +792,7 @@ pub(crate) const INNER: &[(&str, &[&str])] = &[
             "media_at",
             "crossing",
             "start",
+            "stated_start",
             "starting_media",
             "surface",
             "tracer",

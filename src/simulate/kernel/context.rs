@@ -23,6 +23,8 @@ pub(super) enum StartingMedia {
     PerRay,
     /// The same, and the source may lie on a face of a solid, which its rays must start clear of.
     OnFace,
+    /// Those that the scene states, and the source may lie on a face of a solid: its rays must start on the side where that is true.
+    Stated,
     /// In an opaque solid: the source lies on a face of it and shines into it alone.
     InSolid,
 }

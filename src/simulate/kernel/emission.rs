@@ -8,6 +8,7 @@ use super::payload::RayPayload;
 use super::receivers::clip_segment;
 use super::start::start_on_face;
 use super::starting_media::{start_behind_glue, start_clear_of_faces};
+use super::stated_start::start_in_stated_media;
 use super::tracer::Tracer;
 use crate::intersect::prefetch;
 use crate::math::Ray;
@@ -278,6 +279,12 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
                 } else {
                     C::inside(&emitter.inside)
                 }
+            }
+            StartingMedia::Stated => {
+                let inside = &context.bound.emitters[source].inside;
+                *ray =
+                    start_in_stated_media(context, inside, ray).unwrap_or_else(|| start_behind_glue(context, ray));
+                C::inside(inside)
             }
             StartingMedia::InSolid => {
                 *ray = start_behind_glue(context, ray);

@@ -21,6 +21,7 @@ mod receivers;
 mod simd_dispatch;
 mod start;
 mod starting_media;
+mod stated_start;
 mod surface;
 mod tolerances;
 mod tracer;

@@ -4,6 +4,7 @@ use super::contact::emit_into_contact;
 use super::context::{Bodies, Context, StartingMedia};
 use super::media_at::media_at;
 use super::start::start_on_face;
+use super::stated_start::start_in_stated_media;
 use super::tolerances::{MOST_COINCIDENT_FACES, rounding_at};
 use crate::intersect::{Cost, Intersector};
 use crate::math::{Point, Ray, Vector};
@@ -39,7 +40,7 @@ fn starts_clear(context: &Context<'_>, emitter: &Emitter) -> bool {
 
 /// Decides what the rays of one source start in, by [`PROBED_RAYS`] of its rays from all replicates. The bodies that the scene states, else
 /// the same bodies where all agree; ray by ray where they do not, or where a luminous face shines into a body glued on it; `OnFace` as soon
-/// as one starts on a face that it does not shine from, but `InSolid` where all start on an opaque one and go in.
+/// as one starts on a face that it does not shine from, or `Stated`, but `InSolid` where all start on an opaque one and go in.
 fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_media: bool) -> StartingMedia {
     if starts_clear(context, emitter) {
         return StartingMedia::Same(emitter.inside.clone());
@@ -77,7 +78,12 @@ fn starting_media(context: &Context<'_>, source: usize, emitter: &Emitter, has_m
         let Some(sampler) = &mut sampler else { continue };
         let (_, emission) = sampler.single_ray(emitter, index, &mut ray);
         // One start on a face decides for all: the rays of such a source must each be asked. Luminous faces find their own start.
-        if emission.from.is_none() {
+        if emission.from.is_none() && emitter.media_stated && has_media {
+            // What starts clear of all faces, on the stated side, is left as it is.
+            if start_in_stated_media(context, &emitter.inside, &ray).is_some_and(|start| start != ray) {
+                return StartingMedia::Stated;
+            }
+        } else if emission.from.is_none() {
             let start = start_clear_of_faces(context, &ray);
             all_go_in &= start.as_ref().is_some_and(|start| start.goes_into_solid);
             if all_go_in {

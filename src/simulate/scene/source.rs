@@ -59,7 +59,9 @@ pub struct Source {
     /// Exponent n of a cosⁿ lobe.
     #[cfg_attr(feature = "schema", schemars(range(min = 0, max = 1e6)))]
     pub exponent: Option<f64>,
-    /// Names of the instances that the source lies inside of, outermost first; without, geometry tells. `[]` for none.
+    /// Names of the instances that the source lies inside of, outermost first; `[]` for none. Within `glue_mm` of a face its light
+    /// starts on the side of it where that is true. Without `inside` geometry tells: light that goes into a body and starts within
+    /// `glue_mm` of its face, on either side, starts inside, as if glued to it, and a note says so. Faces that shine (`on`) do so outward.
     pub inside: Option<OneOrMany<String>>,
     /// Spectrum, in watts (in a run that counts lumens too: its light is then weighed by what the eye sees of it); the line
     /// `wavelength_nm` of the run unless said otherwise.

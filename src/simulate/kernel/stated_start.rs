@@ -1,0 +1,113 @@
+//! Where the rays of a source begin that lies near faces, and of which the scene says what it is inside of: on the side of each face on
+//! which that is true, whichever side the source was drawn on, or rounding puts it.
+//!
+//! Known weakness: between two bodies that touch there is no room, so that light that is stated to be in neither counts as coming out of
+//! the one behind it.
+
+use super::context::Context;
+use super::tolerances::{ALIGNED, MOST_COINCIDENT_FACES, rounding_at, way_through_glue};
+use crate::intersect::{Cost, Hit};
+use crate::math::Ray;
+use crate::simulate::body::AMBIENT;
+use crate::simulate::surfaces::FaceOptics;
+use smallvec::SmallVec;
+
+/// A face that the line of a ray meets near its start.
+struct NearFace {
+    hit: Hit,
+    face: FaceOptics,
+    /// Place on the ray, mm: negative behind its start.
+    t: f64,
+    entering: bool,
+}
+
+impl NearFace {
+    /// Whether it bounds a body or an opaque solid.
+    fn bounds_solid(&self) -> bool {
+        self.face.opaque_solid || self.face.body != AMBIENT
+    }
+
+    /// Whether light that is inside of these bodies has the face behind it: one by which it came into one of them, or out of another or of
+    /// an opaque solid. A sheet stays where it is.
+    fn lies_behind(&self, inside: &[u32]) -> bool {
+        if self.face.body != AMBIENT {
+            self.entering == inside.contains(&self.face.body)
+        } else if self.face.opaque_solid {
+            !self.entering
+        } else {
+            self.t <= 0.0
+        }
+    }
+}
+
+/// Returns the ray of a source that is stated to lie inside of these bodies, and of no others, started where that is true: before the faces
+/// that it is yet to cross, of those within the glue distance of its start, and behind the others. The ray as it is where it lies clear of
+/// them; `None` where no body and no opaque solid has a face there.
+///
+/// Distances to faces are those across them: along a ray that slants by 60° faces within the glue distance are met up to twice as far off.
+#[cold]
+pub(super) fn start_in_stated_media(context: &Context<'_>, inside: &[u32], ray: &Ray) -> Option<Ray> {
+    let near = faces_near_start(context, ray);
+    if !near.iter().any(NearFace::bounds_solid) {
+        return None;
+    }
+    let room = 2.0 * rounding_at(ray.origin);
+    let is_ahead = |f: &&NearFace| f.bounds_solid() && !f.lies_behind(inside) && !passes_edge(&near, f, room);
+    let ahead = near.iter().find(is_ahead);
+    let end = ahead.map_or(f64::INFINITY, |f| f.t);
+    // At one place rounding puts them in either order.
+    let behind = near.iter().rfind(|f| f.lies_behind(inside) && f.t <= end + room);
+    let begin = behind.map_or(f64::NEG_INFINITY, |f| f.t);
+    if begin < -room && end > room {
+        return Some(*ray);
+    }
+    let glue = context.glue_mm();
+    let start = |t: f64| Ray::new(ray.point_at(t), ray.direction);
+    Some(match (behind, ahead) {
+        // By the glue distance, for facets that lie a little off the hits that are moved to the spline.
+        (_, None) => start(f64::max(begin + room, glue)),
+        (None, Some(_)) => start(f64::min(end - room, -glue)),
+        (Some(_), Some(_)) if end - begin > 2.0 * room => start(0.5 * (begin + end)),
+        // No place is between them: just before both, and past the one.
+        (Some(behind), Some(_)) => start(f64::min(begin, end) - room).with_departure(behind.hit.departure()),
+    })
+}
+
+/// Whether a ray that comes in by this face, of those near its start, goes out of the same solid over an edge at once; `room`, mm, is what
+/// rounding makes of one place. The faces of a thin plate look away from each other, and are no edge.
+fn passes_edge(near: &[NearFace], face: &NearFace, room: f64) -> bool {
+    let is_of_edge = |f: &NearFace| {
+        let same_solid = f.face.body == face.face.body && f.face.solid == face.face.solid;
+        let looks_away = f.hit.geometric_normal.dot(face.hit.geometric_normal) < -ALIGNED;
+        same_solid && f.bounds_solid() && !f.entering && f.t + room >= face.t && !looks_away
+    };
+    face.entering && near.iter().any(is_of_edge)
+}
+
+/// Returns the faces within the glue distance of the start of a ray that its line meets, in order; of faces at one place in either.
+fn faces_near_start(context: &Context<'_>, ray: &Ray) -> SmallVec<[NearFace; MOST_COINCIDENT_FACES]> {
+    let (d, rounding) = (ray.direction, rounding_at(ray.origin));
+    // As far as a ray that grazes a face has to go across the glue distance.
+    let farthest = way_through_glue(context.glue_mm(), 0.0);
+    let mut probe = Ray::new(ray.point_at(-farthest), d).with_range(0.0, 2.0 * farthest);
+    // Place of the start of the probe on the ray.
+    let mut place = -farthest;
+    let mut near: SmallVec<[NearFace; MOST_COINCIDENT_FACES]> = SmallVec::new();
+    // Of two faces at one place the other comes next, and then the first once more.
+    for _ in 0..2 * MOST_COINCIDENT_FACES {
+        let Some(hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { break };
+        let Some(&face) = context.bound.faces.get(hit.face.index()) else { break };
+        let t = place + hit.t;
+        if near.iter().any(|f| f.hit.face == hit.face && (f.t - t).abs() <= 2.0 * rounding) {
+            probe.t_min = hit.t + rounding;
+            continue;
+        }
+        near.push(NearFace { hit, face, t, entering: d.dot(hit.geometric_normal) < 0.0 });
+        place = t;
+        probe = Ray::new(probe.point_at(hit.t), d)
+            .with_range(-rounding, probe.t_max - hit.t)
+            .with_departure(hit.departure());
+    }
+    near.retain(|f| f.t.abs() * d.dot(f.hit.geometric_normal).abs() <= context.glue_mm() + rounding);
+    near
+}

@@ -1,0 +1,160 @@
+//! Sources flush with the face of a body: they start in what the scene says that they are inside of, in the face and within the glue
+//! distance to either side of it.
+
+use crate::support::World;
+use lampyris::formats::{LightRay, write_rays};
+use lampyris::math::{Point, Vector};
+
+/// Heights over a face, mm: in it, as rounding puts it, and up to the glue distance of 1e-3 to either side.
+const HEIGHTS: [f64; 7] = [0.0, 1e-9, -1e-9, 5e-4, -5e-4, 9.9e-4, -9.9e-4];
+
+/// All light that is reflected is followed; what goes up ends on the first receiver, what goes down on the second.
+const SPLIT: &str = "[run]\nrays = 2000\ninterfaces = 'split'\nsplit_floor = 0\npower_floor = 0\n
+    [[receiver]]\nname = 'above'\nat = [0, 0, 20]\nsize = [500, 500]
+    [[receiver]]\nname = 'below'\nat = [0, 0, -20]\nsize = [500, 500]\n";
+
+/// A wide plate of index 1.5, 3 mm thick, that stands on z = 0.
+fn plate() -> World {
+    let mut world = World::default();
+    world.cuboid("plate", Point::new(-1e3, -1e3, 0.0), Point::new(1e3, 1e3, 3.0));
+    world
+}
+
+/// The medium of a part.
+fn medium(part: &str, index: f64) -> String {
+    format!(
+        "[[medium]]\nname = 'of {part}'\nindex = {index}\n[[material]]\npart = '{part}'\nmedium = 'of {part}'\n"
+    )
+}
+
+/// Returns what an interface reflects of unpolarised light, by the sines on both sides.
+fn reflectance(sin_i: f64, n1: f64, n2: f64) -> f64 {
+    let sin_t = sin_i * n1 / n2;
+    let [cos_i, cos_t] = [sin_i, sin_t].map(|sin| (1.0 - sin * sin).sqrt());
+    let s = (n1 * cos_i - n2 * cos_t) / (n1 * cos_i + n2 * cos_t);
+    let p = (n2 * cos_i - n1 * cos_t) / (n2 * cos_i + n1 * cos_t);
+    0.5 * (s * s + p * p)
+}
+
+/// Of a plate whose faces reflect r, (1 − r)/(1 + r) comes through from outside, and 1/(1 + r) of what starts up inside of it. That holds
+/// up to 60° off the normal, where the face lies twice as far along the ray as across.
+#[test]
+fn a_flush_source_starts_in_what_the_scene_says() {
+    for sin_outside in [0.0, 0.75f64.sqrt()] {
+        let r = reflectance(sin_outside, 1.0, 1.5);
+        let cases = [
+            ("inside = []", sin_outside, [(1.0 - r) / (1.0 + r), 2.0 * r / (1.0 + r)]),
+            ("inside = 'plate'", sin_outside / 1.5, [1.0 / (1.0 + r), r / (1.0 + r)]),
+        ];
+        for (inside, sin, expected) in cases {
+            let cos = (1.0 - sin * sin).sqrt();
+            for height in HEIGHTS {
+                let text = format!(
+                    "{SPLIT}{}[[source]]\nkind = 'collimated'\nat = [0, 0, {height:?}]\ndirection = [{sin:?}, 0, {cos:?}]\n{inside}\n",
+                    medium("plate", 1.5)
+                );
+                let results = plate().run(&text, |_| ());
+                assert_eq!(results.lost_rays, 0, "{inside} {sin} {height}: {:?}", results.ledger.first());
+                for (receiver, expected) in results.receivers.iter().zip(expected) {
+                    let power = receiver.power;
+                    assert!((power - expected).abs() < 1e-5, "{inside} {sin} {height}: {power}, not {expected}");
+                }
+            }
+        }
+    }
+}
+
+/// The same where light goes out of the plate by its upper face: from inside a part of it is reflected there, from outside none.
+#[test]
+fn a_source_in_the_face_by_which_its_light_goes_out_starts_where_the_scene_says() {
+    let r = reflectance(0.0, 1.0, 1.5);
+    for (inside, above) in [("inside = []", 1.0), ("inside = 'plate'", 1.0 / (1.0 + r))] {
+        for height in HEIGHTS {
+            let text = format!(
+                "{SPLIT}{}[[source]]\nkind = 'collimated'\nat = [0, 0, {:?}]\nradius = 2\n{inside}\n",
+                medium("plate", 1.5),
+                3.0 + height
+            );
+            let results = plate().run(&text, |_| ());
+            assert_eq!(results.lost_rays, 0, "{inside} {height}: {:?}", results.ledger.first());
+            let power = results.receivers[0].power;
+            assert!((power - above).abs() < 1e-5, "{inside} {height}: {power}, not {above}");
+        }
+    }
+}
+
+/// Of diffuse light glass reflects Walsh's 0.091778; its far side is black. Grazing rays have the face far along their way.
+#[test]
+fn diffuse_sources_of_any_shape_may_be_flush() {
+    let black = "[[material]]\nface = 'z1'\nsurface = 'absorber'\n";
+    for shape in ["", "radius = 2", "size = [3, 4]"] {
+        for height in HEIGHTS {
+            let text = format!(
+                "[run]\nrays = 4000\ninterfaces = 'split'\n{}{black}
+                [[source]]\nkind = 'lambertian'\nat = [0, 0, {height:?}]\ninside = []\n{shape}\n",
+                medium("plate", 1.5)
+            );
+            let results = plate().run(&text, |_| ());
+            assert_eq!(results.lost_rays, 0, "{shape} {height}: {:?}", results.ledger.first());
+            // Shares of rays spread by 0.13: 1σ of independent ones is 0.002.
+            let reflected = results.power.escaped;
+            assert!((reflected - 0.091778).abs() < 0.008, "{shape} {height}: {reflected}");
+        }
+    }
+}
+
+/// Two plates that touch: light starts in the one that the scene names, through the face between them or behind it. With a and b the shares
+/// of light going up in the lower and in the upper one: b = t + r₃ D, with what comes back down, D = b (r₂ + (1 − r₂)² r₁/(1 − r₁ r₂)).
+#[test]
+fn a_source_between_touching_bodies_starts_in_the_one_that_is_named() {
+    let [r1, r2, r3] = [(1.0, 1.5), (1.5, 1.7), (1.7, 1.0)].map(|(n1, n2)| reflectance(0.0, n1, n2));
+    let back = r2 + (1.0 - r2).powi(2) * r1 / (1.0 - r1 * r2);
+    let upper = (1.0 - r3) / (1.0 - r3 * back);
+    let lower = upper * (1.0 - r2) / (1.0 - r1 * r2);
+    let mut world = World::default();
+    world.cuboid("lower", Point::new(-1e3, -1e3, -3.0), Point::new(1e3, 1e3, 0.0)).cuboid(
+        "upper",
+        Point::new(-1e3, -1e3, 0.0),
+        Point::new(1e3, 1e3, 3.0),
+    );
+    for (inside, expected) in [("'lower'", Some(lower)), ("'upper'", Some(upper)), ("[]", None)] {
+        for height in HEIGHTS {
+            let text = format!(
+                "{SPLIT}{}{}[[source]]\nkind = 'collimated'\nat = [0, 0, {height:?}]\nradius = 2\ninside = {inside}\n",
+                medium("lower", 1.5),
+                medium("upper", 1.7)
+            );
+            let results = world.run(&text, |_| ());
+            assert_eq!(results.lost_rays, 0, "{inside} {height}: {:?}", results.ledger.first());
+            let power = results.receivers[0].power;
+            let is_right = expected.is_none_or(|expected| (power - expected).abs() < 1e-5);
+            assert!(is_right, "{inside} {height}: {power}, not {expected:?}");
+        }
+    }
+}
+
+/// Rays that were recorded in the plane of a face come through both faces where the scene says that they are in no body, and through one
+/// where it says nothing.
+#[test]
+fn recorded_rays_may_start_in_a_face() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("list.csv");
+    let ray = |k: u32| LightRay {
+        origin: Point::new(f64::from(k), 0.0, 0.0),
+        direction: Vector::Z,
+        power: 1.0,
+        wavelength_nm: None,
+    };
+    write_rays(&file, &(0..8).map(ray).collect::<Vec<_>>()).unwrap();
+    for (inside, expected) in [("inside = []", 0.96 / 1.04), ("", 1.0 / 1.04)] {
+        let text = format!(
+            "{SPLIT}{}[[source]]\nkind = 'rays'\npower = 1\nfile = '{}'\n{inside}\n",
+            medium("plate", 1.5),
+            file.display()
+        );
+        let results = plate().run(&text, |_| ());
+        assert_eq!(results.lost_rays, 0, "{inside}: {:?}", results.ledger.first());
+        let power = results.receivers[0].power;
+        assert!((power - expected).abs() < 1e-5, "{inside}: {power}, not {expected}");
+    }
+}
