@@ -160,6 +160,10 @@ pub struct Counts {
     pub refused_contacts: u64,
     /// Rays of luminous faces that started on the spline, as the intersector has their face nowhere near.
     pub misplaced_starts: u64,
+    /// Rays that started in the face of a body, and inside of it, as they go into it and the scene does not say what their source is in.
+    pub flush_starts: u64,
+    /// Source and placed face of one of them, those of the lowest numbers; zeros where there are none.
+    pub flush_place: [u32; 2],
 }
 
 impl Counts {
@@ -174,6 +178,7 @@ impl Counts {
         self.add_overlap(o.overlapping, o.overlaps);
         self.refused_contacts += o.refused_contacts;
         self.misplaced_starts += o.misplaced_starts;
+        self.add_flush_starts(o.flush_place, o.flush_starts);
     }
 
     /// Adds `times` meetings of two overlapping bodies, and keeps the pair of the lowest numbers; `[0; 2]` is no pair.
@@ -182,6 +187,14 @@ impl Counts {
         if self.overlapping == [0; 2] || (pair != [0; 2] && pair < self.overlapping) {
             self.overlapping = pair;
         }
+    }
+
+    /// Adds so many rays that started in a face, of a source and a face by their numbers, and keeps the lowest of these; none adds nothing.
+    pub(crate) fn add_flush_starts(&mut self, place: [u32; 2], rays: u64) {
+        if rays > 0 && (self.flush_starts == 0 || place < self.flush_place) {
+            self.flush_place = place;
+        }
+        self.flush_starts += rays;
     }
 }
 

@@ -32,7 +32,7 @@ pub struct PartialRun {
 }
 
 /// Begins a file of this version.
-const MAGIC: &[u8] = b"lampyris tally 10\n";
+const MAGIC: &[u8] = b"lampyris tally 11\n";
 
 impl PartialRun {
     /// Makes a part with no replicate done, of a run that does not grow.
@@ -118,9 +118,11 @@ impl PartialRun {
         [&t.entered, &t.left].into_iter().for_each(|s| append_sums(&mut out, s));
         let c = &t.counts;
         let [one, other] = c.overlapping.map(u64::from);
+        let [source, face] = c.flush_place.map(u64::from);
         let ends = [c.rays, c.segments, c.corrected_normals, c.lost, c.cut_off, c.caught];
         let repairs = [c.overlaps, one, other, c.refused_contacts, c.misplaced_starts];
-        ends.iter().chain(&repairs).for_each(|x| out.extend(x.to_le_bytes()));
+        let flush = [c.flush_starts, source, face];
+        ends.iter().chain(&repairs).chain(&flush).for_each(|x| out.extend(x.to_le_bytes()));
         // Numbers of f64 survive as bits: text would round the last one, and has no word for NaN.
         let zero = crate::math::Point::ZERO;
         let bare = |l: &LostRay| LostRay { origin: zero, direction: zero, ..l.clone() };
@@ -338,6 +340,8 @@ impl<'a> Reader<'a> {
             overlapping: [self.u64()? as u32, self.u64()? as u32],
             refused_contacts: self.u64()?,
             misplaced_starts: self.u64()?,
+            flush_starts: self.u64()?,
+            flush_place: [self.u64()? as u32, self.u64()? as u32],
         })
     }
 

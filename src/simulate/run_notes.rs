@@ -65,6 +65,26 @@ impl BoundScene {
         contacts.into_iter().chain(starts)
     }
 
+    /// Returns one sentence about sources that lie in the face of a body and shine into it, where the scene does not say what they are in,
+    /// naming the first; `None` where fewer rays than one in [`OVERLAP_SEGMENTS`] start so.
+    pub(crate) fn flush_sources_note(&self, counts: &Counts) -> Option<String> {
+        if counts.flush_starts <= counts.rays / OVERLAP_SEGMENTS {
+            return None;
+        }
+        let [source, face] = counts.flush_place;
+        let body = self.faces.get(face as usize)?.body;
+        let [name, medium] = self.body_names(body)?;
+        Some(format!(
+            "{} lies in {} and shines into it: its light ({} of the run) is taken to start inside '{name}' ({medium}), as if glued to \
+             it, and loses nothing in that face; move it off by more than [run] glue_mm = {:e}, or say by `inside` which bodies it lies \
+             in: `inside = []` for none, as behind a gap of air, `inside = [\"{name}\"]` for what is taken now",
+            self.scene.source_label(source as usize),
+            self.face_label(face),
+            count_of(counts.flush_starts, "ray"),
+            self.scene.run.glue_mm
+        ))
+    }
+
     /// Returns one sentence about sources so weak beside the others that they send next to no rays; `None` where there are none.
     pub(crate) fn scarce_sources_note(&self, plan: &Plan) -> Option<String> {
         let even_share = plan.emitted / self.emitters.len() as f64;

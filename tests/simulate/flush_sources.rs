@@ -1,9 +1,11 @@
 //! Sources flush with the face of a body: they start in what the scene says that they are inside of, in the face and within the glue
-//! distance to either side of it.
+//! distance to either side of it; where it says nothing they start inside, and that is told.
 
 use crate::support::World;
 use lampyris::formats::{LightRay, write_rays};
 use lampyris::math::{Point, Vector};
+use lampyris::simulate::{Hooks, PartialRun, Results, RunSettings, Scene, trace};
+use std::path::Path;
 
 /// Heights over a face, mm: in it, as rounding puts it, and up to the glue distance of 1e-3 to either side.
 const HEIGHTS: [f64; 7] = [0.0, 1e-9, -1e-9, 5e-4, -5e-4, 9.9e-4, -9.9e-4];
@@ -156,5 +158,82 @@ fn recorded_rays_may_start_in_a_face() {
         assert_eq!(results.lost_rays, 0, "{inside}: {:?}", results.ledger.first());
         let power = results.receivers[0].power;
         assert!((power - expected).abs() < 1e-5, "{inside}: {power}, not {expected}");
+        assert_eq!(is_told(&results), inside.is_empty(), "{inside}: {:?}", results.notes);
     }
+}
+
+/// Whether a note says that a source lies in a face that it shines into.
+fn is_told(results: &Results) -> bool {
+    results.notes.iter().any(|note| note.contains("shines into it"))
+}
+
+/// Light that starts in the face of a plate comes through one of its faces where the scene does not say what it is in, and a note says so,
+/// with the face. Clear of the glue distance it comes through two.
+#[test]
+fn a_flush_source_of_which_nothing_is_said_is_told() {
+    let mut world = plate();
+    world.model.parts[0].shells[0].faces[4].entity = Some(109);
+    let through = [0.96 / 1.04, 1.0 / 1.04];
+    for (height, told) in [(0.0, true), (5e-4, true), (-5e-4, true), (-2e-3, false)] {
+        let source = format!("[[source]]\nkind = 'collimated'\nat = [0, 0, {height:?}]\nradius = 2\n");
+        let results = world.run(&format!("{SPLIT}{}{source}", medium("plate", 1.5)), |_| ());
+        let (power, expected) = (results.receivers[0].power, through[usize::from(told)]);
+        assert!((power - expected).abs() < 1e-5, "{height}: {power}, not {expected}");
+        let words = "[[source]] 1 lies in face #109 of 'plate' and shines into it: its light (2000 rays of the run) is taken to start";
+        assert_eq!(results.notes.iter().any(|note| note.starts_with(words)), told, "{height}: {:?}", results.notes);
+    }
+}
+
+/// Nothing is told of light that goes away from the face, of a face that shines itself, where the scene says what the source is in, and
+/// where the face does nothing to light or lets none in.
+#[test]
+fn flush_sources_that_are_meant_so_are_not_told() {
+    let glass = medium("plate", 1.5);
+    let hollow = medium("plate", 1.0);
+    let opaque = format!("{glass}[[material]]\npart = 'plate'\nsurface = 'absorber'\n");
+    for (media, source, told) in [
+        (&glass, "kind = 'point'", true),
+        (&glass, "kind = 'lambertian'\nsize = [1, 1]", true),
+        (&glass, "kind = 'lambertian'\ndirection = [0, 0, -1]\nsize = [1, 1]", false),
+        (&glass, "kind = 'lambertian'\nat = [0, 0, 3]\nsize = [1, 1]", false),
+        (&glass, "kind = 'lambertian'\non = { part = 'plate', face = 'z0' }", false),
+        (&glass, "kind = 'lambertian'\ninside = []", false),
+        (&glass, "kind = 'lambertian'\ninside = 'plate'", false),
+        (&hollow, "kind = 'lambertian'", false),
+        (&opaque, "kind = 'lambertian'", false),
+    ] {
+        let results = plate().run(&format!("[run]\nrays = 500\n{media}[[source]]\n{source}\n"), |_| ());
+        assert_eq!(is_told(&results), told, "{media} {source}: {:?}", results.notes);
+    }
+    // On a black die, glued under the plate.
+    let mut world = plate();
+    world.cuboid("die", Point::new(-1.0, -1.0, -1.0), Point::new(1.0, 1.0, 0.0));
+    let text = format!(
+        "[run]\nrays = 500\n{glass}[[material]]\npart = 'die'\nsurface = 'absorber'
+        [[source]]\nkind = 'lambertian'\nradius = 0.5\n"
+    );
+    let results = world.run(&text, |_| ());
+    assert!(!is_told(&results), "{:?}", results.notes);
+}
+
+/// What is known of flush sources outlives the file of a part of a run and the sum of two.
+#[test]
+fn parts_of_a_run_know_of_flush_sources() {
+    let world = plate();
+    let text = format!("[run]\nrays = 2000\n{}[[source]]\nkind = 'collimated'\n", medium("plate", 1.5));
+    let scene = Scene::parse(&text, "test.toml", Path::new(".")).unwrap();
+    let bound = scene.bind(&world.model).unwrap();
+    let part = |shard: u32| {
+        let settings = RunSettings { threads: 1, shard: [shard, 2], ..RunSettings::from(&scene.run) };
+        let partial = trace(&bound, &world, &settings, None, &Hooks::with_progress(&|_| true)).partial;
+        let mut bytes = Vec::new();
+        partial.write(&(), &mut bytes).unwrap();
+        let (_, read) = PartialRun::read_alone::<()>(&bytes).unwrap();
+        assert_eq!(read.tallies.counts, partial.tallies.counts);
+        read
+    };
+    let mut sum = part(0);
+    sum.merge(&part(1)).unwrap();
+    let counts = sum.tallies.counts;
+    assert_eq!((counts.flush_starts, counts.flush_place), (2000, [0, 4]));
 }

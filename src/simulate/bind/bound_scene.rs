@@ -45,6 +45,8 @@ pub struct BoundScene {
     /// Names of the instances, and the instance of each face.
     pub(crate) instances: Vec<String>,
     pub(crate) instance_of_face: Vec<u32>,
+    /// The `#id` of each face in its file; `None` for one that came from none.
+    pub(crate) entity_of_face: Vec<Option<u64>>,
     /// Which faces each rule decides.
     pub(crate) rules: Vec<RuleFaces>,
     /// Sentences about what in the scene is open or beyond its tables.
@@ -116,6 +118,13 @@ impl BoundScene {
     pub fn instance(&self, face: u32) -> Option<&str> {
         let instance = *self.instance_of_face.get(face as usize)?;
         self.instances.get(instance as usize).map(String::as_str)
+    }
+
+    /// Returns what a placed face is called in a sentence, by its number in the model, with its instance.
+    pub(crate) fn face_label(&self, face: u32) -> String {
+        let entity = self.entity_of_face.get(face as usize).copied().flatten();
+        let what = entity.map_or_else(|| format!("face {face}"), |id| format!("face #{id}"));
+        format!("{what} of '{}'", self.instance(face).unwrap_or_default())
     }
 
     /// Returns the scene as it was read.

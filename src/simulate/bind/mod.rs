@@ -108,6 +108,7 @@ impl Scene {
             solids: None,
             instances: labels,
             instance_of_face: model.placed_faces().map(|f| f.instance as u32).collect(),
+            entity_of_face: model.placed_faces().map(|f| f.entity()).collect(),
             rules: rule_table::rule_table(self, &chosen),
             notes: notes::range_notes(self, &chosen, &ranges),
         };

@@ -263,22 +263,22 @@ impl<C: RayPayload> Tracer<'_, '_, C> {
     }
 
     /// Returns the payload of a ray with the media that it starts in; `None` when it cannot carry so many. Moves the start of a ray of a
-    /// source that lies on a face of a solid clear of it.
+    /// source that lies on a face of a solid clear of it, and counts those that pass a face by that.
     #[inline(always)]
-    fn payload_at_start(&self, source: usize, into_contact: Option<&Ray>, ray: &mut Ray) -> Option<C> {
+    fn payload_at_start(&mut self, source: usize, into_contact: Option<&Ray>, ray: &mut Ray) -> Option<C> {
         let context = self.context;
         match &context.starting_media[source] {
             StartingMedia::Same(bodies) => C::inside(bodies),
             StartingMedia::OnFace => {
-                // Through an edge or a corner a ray may pass without a hit.
-                *ray = start_clear_of_faces(context, ray)
-                    .map_or_else(|| start_behind_glue(context, ray), |start| start.ray);
+                let start = start_clear_of_faces(context, ray);
                 let emitter = &context.bound.emitters[source];
-                if C::MEDIA && !emitter.media_stated {
-                    C::inside(&media_at(context, ray))
-                } else {
-                    C::inside(&emitter.inside)
+                let asks_geometry = C::MEDIA && !emitter.media_stated;
+                if asks_geometry && let Some(face) = start.as_ref().and_then(|start| start.passed_face) {
+                    self.tally.counts.add_flush_starts([source as u32, face.0], 1);
                 }
+                // Through an edge or a corner a ray may pass without a hit.
+                *ray = start.map_or_else(|| start_behind_glue(context, ray), |start| start.ray);
+                if asks_geometry { C::inside(&media_at(context, ray)) } else { C::inside(&emitter.inside) }
             }
             StartingMedia::Stated => {
                 let inside = &context.bound.emitters[source].inside;

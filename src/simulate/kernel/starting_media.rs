@@ -7,12 +7,13 @@ use super::start::start_on_face;
 use super::stated_start::start_in_stated_media;
 use super::tolerances::{MOST_COINCIDENT_FACES, rounding_at};
 use crate::intersect::{Cost, Intersector};
-use crate::math::{Point, Ray, Vector};
+use crate::math::{FaceId, Point, Ray, Vector};
 use crate::simulate::bind::BoundScene;
 use crate::simulate::body::AMBIENT;
 use crate::simulate::emitter::{Emitter, Portion, RaySampler};
 use crate::simulate::outcome::Counts;
 use crate::simulate::settings::RunSettings;
+use crate::simulate::surfaces::{FaceOptics, Surface};
 
 /// Rays of a source that are asked before it is believed that all start in the same bodies.
 const PROBED_RAYS: u64 = 64;
@@ -126,6 +127,8 @@ pub(super) struct ClearStart {
     pub(super) ray: Ray,
     /// Whether it goes into an opaque solid, and out of no body.
     goes_into_solid: bool,
+    /// The face of a body that it would meet, were it started before all of them; `None` where that would change nothing.
+    pub(super) passed_face: Option<FaceId>,
 }
 
 /// Returns the ray of a source that lies on faces of solids, started behind all of them, by the glue distance along its way; one that goes
@@ -143,18 +146,25 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<C
     let mut on_body = false;
     let mut enters_opaque = false;
     let mut leaves_opaque = false;
+    let mut entered: Option<(FaceId, &FaceOptics)> = None;
+    let mut left = Bodies::new();
     // Of two faces at one place the other comes next, and then the first once more.
     for _ in 0..MOST_COINCIDENT_FACES {
         let Some(hit) = context.intersector.intersect(&probe, &mut Cost::default()) else { break };
         let face = context.bound.faces.get(hit.face.index())?;
+        let entering = d.dot(hit.geometric_normal) < 0.0;
         if face.opaque_solid {
-            let entering = d.dot(hit.geometric_normal) < 0.0;
             enters_opaque |= entering;
             leaves_opaque |= !entering;
         }
         // Either makes a difference to a start on it: light must not begin inside of an opaque solid, and must know
         // which body it is in.
         on_body |= face.body != AMBIENT;
+        if face.body != AMBIENT && entering {
+            entered = entered.or(Some((hit.face, face)));
+        } else if face.body != AMBIENT {
+            left.push(face.body);
+        }
         on_solid |= face.opaque_solid || face.body != AMBIENT;
         let rounding = rounding_at(ray.origin);
         probe = Ray::new(probe.point_at(hit.t), d)
@@ -163,8 +173,23 @@ pub(super) fn start_clear_of_faces(context: &Context<'_>, ray: &Ray) -> Option<C
     }
     // Over an edge a ray goes in and out at once.
     let into_opaque = enters_opaque && !leaves_opaque;
+    // What shines out of a die lies glued between it and its dome. Over an edge, and between two solids of one body, nothing is entered.
+    let passes = |face: &FaceOptics| {
+        !(enters_opaque || leaves_opaque || left.contains(&face.body)) && changes_light(context, face)
+    };
     on_solid.then(|| ClearStart {
         ray: if into_opaque { before } else { start_behind_glue(context, ray) },
         goes_into_solid: into_opaque && !on_body,
+        passed_face: entered.filter(|(_, face)| passes(face)).map(|(id, _)| id),
     })
+}
+
+/// Whether a face of a body changes light that comes in by it: `false` where none does, so that a source in it can only be meant to lie
+/// inside, and for the bare face of a body that has the index of the surroundings.
+fn changes_light(context: &Context<'_>, face: &FaceOptics) -> bool {
+    let bound = context.bound;
+    match &bound.surfaces[usize::from(face.surface)] {
+        Surface::Interface => !bound.bodies[face.body as usize].matches_index(&bound.bodies[AMBIENT as usize]),
+        surface => !surface.is_opaque(),
+    }
 }
