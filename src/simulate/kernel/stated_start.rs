@@ -1,8 +1,9 @@
 //! Where the rays of a source begin that lies near faces, and of which the scene says what it is inside of: on the side of each face on
 //! which that is true, whichever side the source was drawn on, or rounding puts it.
 //!
-//! Known weakness: between two bodies that touch there is no room, so that light that is stated to be in neither counts as coming out of
-//! the one behind it.
+//! Known weaknesses: between two bodies that touch there is no room, so that light that is stated to be in neither counts as coming out of
+//! the one behind it. Light that is stated to be outside of a body and starts in an edge of it is aimed at that edge, where two faces let it
+//! in at once: what goes into the body may be lost, and is told as such.
 
 use super::context::Context;
 use super::tolerances::{ALIGNED, MOST_COINCIDENT_FACES, rounding_at, way_through_glue};
@@ -63,11 +64,14 @@ pub(super) fn start_in_stated_media(context: &Context<'_>, inside: &[u32], ray: 
     }
     let glue = context.glue_mm();
     let start = |t: f64| Ray::new(ray.point_at(t), ray.direction);
+    let clear = f64::min(glue, 0.5 * (end - begin));
     Some(match (behind, ahead) {
         // By the glue distance, for facets that lie a little off the hits that are moved to the spline.
         (_, None) => start(f64::max(begin + room, glue)),
         (None, Some(_)) => start(f64::min(end - room, -glue)),
-        (Some(_), Some(_)) if end - begin > 2.0 * room => start(0.5 * (begin + end)),
+        (Some(_), Some(_)) if end - begin > 2.0 * room => {
+            start(f64::min(f64::max(0.0, begin + clear), end - clear))
+        }
         // No place is between them: just before both, and past the one.
         (Some(behind), Some(_)) => start(f64::min(begin, end) - room).with_departure(behind.hit.departure()),
     })
