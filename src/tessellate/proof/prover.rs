@@ -96,7 +96,7 @@ impl<'s, 'a> Prover<'s, 'a> {
         if self.acceptance == Acceptance::Sampled {
             return self.sampled_distance(uv, &flat).max(sampled);
         }
-        self.hull_bound(uv, &flat, limit)
+        self.triangle_hull_bound(uv, &flat, limit)
     }
 
     /// Returns the largest distance of the surface to `flat` at `places`, shares of the corners `uv`; stops at the first above the limit.
@@ -111,8 +111,8 @@ impl<'s, 'a> Prover<'s, 'a> {
         most
     }
 
-    /// Returns a bound as of [`Self::triangle_bound`], by hulls of control points.
-    fn hull_bound(&mut self, uv: [Uv; 3], flat: &FlatTriangle, limit: f64) -> f64 {
+    /// Returns a bound as of [`Self::triangle_bound`], by hulls of control points; above `limit` it proves nothing.
+    fn triangle_hull_bound(&mut self, uv: [Uv; 3], flat: &FlatTriangle, limit: f64) -> f64 {
         self.max_over_patches(&uv, |this, a, b, polygon| {
             let patch = this.surface.patch(a, b);
             let mut worst = 0f64;
@@ -150,7 +150,7 @@ impl<'s, 'a> Prover<'s, 'a> {
             let triangle = [uv[0], uv[k], uv[k + 1]];
             // Nearly all of these slivers hold: samples would seldom spare the proof.
             let one = if bounded {
-                self.hull_bound(triangle, &flat, limit)
+                self.triangle_hull_bound(triangle, &flat, limit)
             } else {
                 self.triangle_bound(triangle, xyz, limit)
             };
